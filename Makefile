@@ -1,0 +1,70 @@
+# er3a: `make run` sets up and produces the reports, `make test` sets up and passes the tests.
+# Everything lives in .venv; nothing needs root.
+
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+STUDY  ?= config/config.yaml
+ROBOT  ?=
+ARGS   ?=
+
+.DEFAULT_GOAL := help
+.PHONY: help run test view lint format schema lock clean distclean campaigns
+
+help:  ## list the targets
+	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):[^#]*## /  make \1\t/' | expand -t 18
+
+run: $(VENV)/run.stamp  ## set up, run the study, write reports/index.html (ARGS="--cores 1", STUDY=config/small.yaml)
+	@$(BIN)/python workflow/scripts/run.py --study $(STUDY) -- $(ARGS)
+
+test: $(VENV)/dev.stamp  ## set up and run the tests (ARGS="-k workspace")
+	@$(BIN)/python -m pytest $(ARGS)
+
+view: $(VENV)/run.stamp  ## open the recordings in the Rerun viewer (ROBOT=er3a_c60 for one arm)
+	@$(BIN)/er3a view $(ROBOT)
+
+lint: $(VENV)/dev.stamp  ## check format and lint of Python and Snakemake code
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/snakefmt --check Snakefile workflow
+	$(BIN)/snakemake --lint
+
+format: $(VENV)/dev.stamp  ## format Python and Snakemake code
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+	$(BIN)/snakefmt Snakefile workflow
+
+schema: $(VENV)/run.stamp  ## write the JSON schemas again from the pydantic models
+	$(BIN)/er3a schema
+
+campaigns: $(VENV)/dev.stamp  ## full-size evidence: writes the tables in docs/evidence/ again
+	$(BIN)/python benchmarks/campaigns.py $(ARGS)
+
+lock: $(VENV)/uv.stamp  ## resolve the locked requirements again
+	$(BIN)/uv pip compile pyproject.toml --extra dev --extra peers $(LOCK_FLAGS) -o requirements/dev.txt
+	$(BIN)/uv pip compile pyproject.toml -c requirements/dev.txt $(LOCK_FLAGS) -o requirements/run.txt
+	echo uv | $(BIN)/uv pip compile - $(LOCK_FLAGS) -o requirements/uv.txt
+
+LOCK_FLAGS := --quiet --universal --python-version 3.11 --generate-hashes \
+	--no-header --no-annotate --no-emit-index-url --no-emit-find-links
+
+clean:  ## remove results, reports and recordings
+	rm -rf results .snakemake
+	find reports -mindepth 1 ! -name README.md -delete
+
+distclean: clean  ## also remove the environment
+	rm -rf $(VENV) .pytest_cache .ruff_cache .hypothesis
+
+# The environment: a venv, a hash-checked uv in it, then the hash-checked lock.
+$(VENV)/uv.stamp: requirements/uv.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "er3a needs Python 3.11 or newer; $(PYTHON) is older. Name another one: make PYTHON=python3.12"; exit 1; }
+	@$(PYTHON) -m venv $(VENV)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/uv.txt
+	@touch $@
+
+$(VENV)/%.stamp: requirements/%.txt pyproject.toml $(VENV)/uv.stamp
+	@echo "Setting up $(VENV) from $< ..."
+	@$(BIN)/uv pip install --quiet --python $(BIN)/python --require-hashes -r $<
+	@$(BIN)/uv pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation -e .
+	@touch $@

@@ -1,0 +1,24 @@
+"""er3a: can this kinematic model of a six-axis robot be trusted, and what can the robot do?
+
+The names below are imported on first use, so that one part of the package does not depend on all others.
+"""
+
+from importlib import import_module
+
+_PUBLIC = {
+    "load_robot": "er3a.robots.load",
+    "Robot": "er3a.robots.robot",
+    "forward": "er3a.kinematics.forward",
+    "jacobian": "er3a.kinematics.forward",
+    "inverse": "er3a.kinematics.inverse",
+    "Er3aError": "er3a.errors",
+}
+
+__all__ = list(_PUBLIC)
+__version__ = "0.1.0"
+
+
+def __getattr__(name):
+    if name not in _PUBLIC:
+        raise AttributeError(f"module 'er3a' has no attribute '{name}'")
+    return getattr(import_module(_PUBLIC[name]), name)

@@ -1,0 +1,60 @@
+"""Every error that er3a raises on purpose derives from :class:`Er3aError`.
+
+The command line prints such an error as one line and ends with exit code 2; anything else is a defect.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class Er3aError(Exception):
+    """Root of all errors that a user can cause and mend."""
+
+
+class InputError(Er3aError):
+    """A file holds something that can't be used.
+
+    Parameters
+    ----------
+    file : path of the file, or None for values given in Python
+    field : where in the file, e.g. ``limits.rows[2].lower_deg`` or ``row 4, column x_mm``
+    problem : what is wrong, with the offending value
+    remedy : what would be right
+    """
+
+    def __init__(self, file: str | Path | None, field: str | None, problem: str, remedy: str):
+        self.file = None if file is None else str(file)
+        self.field = field
+        self.problem = problem
+        self.remedy = remedy
+        where = ": ".join(part for part in (self.file, field) if part)
+        super().__init__(f"{where}: {problem}. {remedy}" if where else f"{problem}. {remedy}")
+
+
+class ShapeError(Er3aError, ValueError):
+    """An array argument has the wrong shape."""
+
+    def __init__(self, argument: str, shape: tuple[int, ...], expected: str):
+        self.argument, self.shape, self.expected = argument, shape, expected
+        super().__init__(f"{argument} has shape {shape}; expected {expected}")
+
+
+class PoseError(Er3aError, ValueError):
+    """A 4x4 matrix is no rigid transform, or holds NaN."""
+
+
+class NotWristPartitionedError(Er3aError):
+    """The closed-form inverse does not apply to this arm; ``property_missing`` says which property it lacks."""
+
+    def __init__(self, robot: str, property_missing: str):
+        self.robot, self.property_missing = robot, property_missing
+        super().__init__(f"{robot}: no closed-form inverse, because {property_missing}")
+
+
+class ResultError(Er3aError):
+    """A results file is missing, damaged or of another format version; a rerun of its stage mends it."""
+
+    def __init__(self, file: str | Path, problem: str):
+        self.file = str(file)
+        super().__init__(f"{file}: {problem}. Delete the file and run `make run`, which computes it again")

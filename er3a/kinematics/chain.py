@@ -1,0 +1,96 @@
+"""From a robot's table to the form that all kernels use.
+
+Both D-H conventions are the product ``links[0] Rz(theta_1) links[1] ... Rz(theta_6) links[6]`` with constant
+``links``: standard rows put ``Tz(d) Tx(a) Rx(alpha)`` behind their joint's rotation [1]_, modified rows put
+``Rx(alpha) Tx(a)`` before it and ``Tz(d)`` behind [2]_. Joint axes are the z axes of the frames before each Rz.
+
+References
+----------
+.. [1] J. Denavit, R. S. Hartenberg, "A kinematic notation for lower-pair mechanisms", J. Appl. Mech. 22 (1955).
+.. [2] J. J. Craig, *Introduction to Robotics*, 3rd ed., section 3.4, equation 3.6.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from er3a.errors import Er3aError
+from er3a.kinematics.transforms import rot_x, translation
+from er3a.robots.robot import Robot
+
+JOINTS = 6
+ALONG_Z, TO_NEXT_AXIS = 0, 1
+
+
+@lru_cache(maxsize=256)
+def constant_links(robot: Robot, frame: int | None = None) -> np.ndarray:
+    """Constant transforms between the joint rotations, base included.
+
+    Parameters
+    ----------
+    frame : None for the chain up to the tool point, or 0..6 for the chain that ends in the frame after that joint in
+        the table's own convention (tool not included)
+
+    Returns
+    -------
+    links : (n + 1, 4, 4), read-only, n the number of joints in that chain (6 for None)
+    """
+    if frame is not None and frame not in range(JOINTS + 1):
+        raise Er3aError(f"frame is {frame!r}; expected None or a whole number from 0 to 6")
+    count = JOINTS if frame is None else frame
+    parts = link_parts(robot)
+    links = np.empty((count + 1, 4, 4))
+    links[0] = robot.base @ parts[0, ALONG_Z] @ (parts[0, TO_NEXT_AXIS] if count else np.eye(4))
+    for k in range(1, count):
+        links[k] = parts[k, ALONG_Z] @ parts[k, TO_NEXT_AXIS]
+    if count:
+        links[count] = parts[count, ALONG_Z]
+        if robot.convention == "standard":
+            links[count] = links[count] @ parts[count, TO_NEXT_AXIS]
+    if frame is None:
+        links[count] = links[count] @ robot.tool
+    links.setflags(write=False)
+    return links
+
+
+def link_parts(robot: Robot) -> np.ndarray:
+    """Each link's constant transform in two steps: along its joint's axis, then across to the next axis.
+
+    Returns
+    -------
+    parts : (7, 2, 4, 4); row 0 is what precedes joint 1 (base not included), row k what follows the rotation of joint k
+    """
+    parts = np.tile(np.eye(4), (JOINTS + 1, 2, 1, 1))
+    for k in range(JOINTS):
+        along = translation(0, 0, robot.d[k])
+        if robot.convention == "standard":
+            across = translation(robot.a[k], 0, 0) @ rot_x(robot.alpha[k])
+            parts[k + 1, ALONG_Z], parts[k + 1, TO_NEXT_AXIS] = along, across
+        else:
+            parts[k, TO_NEXT_AXIS] = rot_x(robot.alpha[k]) @ translation(robot.a[k], 0, 0)
+            parts[k + 1, ALONG_Z] = along
+    return parts
+
+
+@lru_cache(maxsize=256)
+def axes_at_zero_theta(robot: Robot) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Joint axes with all model angles theta at 0 (not the maker's zero pose), in the base frame.
+
+    Returns
+    -------
+    directions : (6, 3), unit vectors
+    points : (6, 3), m, a point on each axis
+    T_base_tool : (4, 4)
+    """
+    T = np.eye(4)
+    directions, points = np.empty((JOINTS, 3)), np.empty((JOINTS, 3))
+    links = constant_links(robot)
+    for k in range(JOINTS):
+        T = T @ links[k]
+        directions[k], points[k] = T[:3, 2], T[:3, 3]
+    T = T @ links[JOINTS]
+    for array in (directions, points, T):
+        array.setflags(write=False)
+    return directions, points, T

@@ -1,0 +1,105 @@
+"""Rigid transforms as 4x4 arrays; rotations given as roll-pitch-yaw ZYX.
+
+References
+----------
+.. [1] J. J. Craig, *Introduction to Robotics*, 3rd ed., sections 2.8 and 3.4.
+.. [2] B. Siciliano, L. Sciavicco, L. Villani, G. Oriolo, *Robotics: Modelling, Planning and Control*, 2.4 and 2.8.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from er3a.errors import PoseError, ShapeError
+
+ORTHONORMAL_TOLERANCE = 1e-6
+
+
+def cos_sin(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Cosine and sine, exactly 0 where the angle is a right angle to rounding (``cos(pi/2)`` is 6e-17 otherwise)."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.where(np.abs(c) < 1e-15, 0.0, c), np.where(np.abs(s) < 1e-15, 0.0, s)
+
+
+def rot_x(angle: float) -> np.ndarray:
+    """Rotation about x by ``angle`` (rad) as a transform, shape (4, 4)."""
+    c, s = cos_sin(angle)
+    return np.array([[1, 0, 0, 0], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1]], dtype=float)
+
+
+def rot_z(angle: float) -> np.ndarray:
+    """Rotation about z by ``angle`` (rad) as a transform, shape (4, 4)."""
+    c, s = cos_sin(angle)
+    return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], dtype=float)
+
+
+def translation(x: float, y: float, z: float) -> np.ndarray:
+    """Translation (m) as a transform, shape (4, 4)."""
+    T = np.eye(4)
+    T[:3, 3] = x, y, z
+    return T
+
+
+def transform(xyz: np.ndarray, rpy: np.ndarray) -> np.ndarray:
+    """Transforms from positions (..., 3) in m and roll-pitch-yaw (..., 3) in rad, ZYX: R = Rz(yaw) Ry(pitch) Rx(roll) [2]_.
+
+    Returns
+    -------
+    T : (..., 4, 4)
+    """
+    xyz, rpy = np.asarray(xyz, float), np.asarray(rpy, float)
+    (cr, cp, cy), (sr, sp, sy) = (np.moveaxis(part, -1, 0) for part in cos_sin(rpy))
+    T = np.zeros((*xyz.shape[:-1], 4, 4))
+    T[..., 0, 0], T[..., 0, 1], T[..., 0, 2] = cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr
+    T[..., 1, 0], T[..., 1, 1], T[..., 1, 2] = sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr
+    T[..., 2, 0], T[..., 2, 1], T[..., 2, 2] = -sp, cp * sr, cp * cr
+    T[..., :3, 3] = xyz
+    T[..., 3, 3] = 1.0
+    return T
+
+
+def rpy_of(T: np.ndarray) -> np.ndarray:
+    """Roll-pitch-yaw ZYX (..., 3) in rad of transforms (..., 4, 4); at pitch +-90 deg the roll is set to 0."""
+    R = np.asarray(T, float)[..., :3, :3]
+    pitch = np.arctan2(-R[..., 2, 0], np.hypot(R[..., 0, 0], R[..., 1, 0]))
+    locked = np.hypot(R[..., 0, 0], R[..., 1, 0]) < 1e-9
+    roll = np.where(locked, 0.0, np.arctan2(R[..., 2, 1], R[..., 2, 2]))
+    yaw = np.where(locked, np.arctan2(-R[..., 0, 1], R[..., 1, 1]), np.arctan2(R[..., 1, 0], R[..., 0, 0]))
+    return np.stack([roll, pitch, yaw], axis=-1)
+
+
+def rotation_angle(R_a: np.ndarray, R_b: np.ndarray) -> np.ndarray:
+    """Angle (...,) in rad of the rotation from R_a to R_b, each (..., 3, 3)."""
+    relative = np.swapaxes(R_a, -1, -2) @ R_b
+    flat = relative.reshape(-1, 3, 3)
+    return Rotation.from_matrix(flat).magnitude().reshape(relative.shape[:-2])
+
+
+def check_poses(T: np.ndarray, argument: str = "T") -> np.ndarray:
+    """Return T as float array (..., 4, 4), or raise if any matrix is no rigid transform.
+
+    Raises
+    ------
+    ShapeError, PoseError
+        the message names the first offending index and what is wrong with it
+    """
+    T = np.asarray(T, dtype=float)
+    if T.ndim < 2 or T.shape[-2:] != (4, 4):
+        raise ShapeError(argument, T.shape, "(..., 4, 4)")
+    R = T[..., :3, :3]
+    faults = (
+        (~np.isfinite(T).all(axis=(-1, -2)), "holds NaN or infinity"),
+        (np.abs(T[..., 3, :] - [0, 0, 0, 1]).max(axis=-1) > 1e-12, "has a bottom row other than 0 0 0 1"),
+        (
+            np.abs(R @ np.swapaxes(R, -1, -2) - np.eye(3)).max(axis=(-1, -2)) > ORTHONORMAL_TOLERANCE,
+            f"has a rotation part that is not orthonormal to {ORTHONORMAL_TOLERANCE:g}",
+        ),
+        (np.linalg.det(R) < 0, "has a mirrored (left-handed) rotation part"),
+    )
+    for bad, what in faults:
+        if np.any(bad):
+            index = tuple(int(i) for i in np.argwhere(bad)[0])
+            where = f"{argument}[{', '.join(map(str, index))}]" if index else argument
+            raise PoseError(f"{where} {what}")
+    return T

@@ -1,0 +1,75 @@
+"""Robot files to :class:`Robot`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from er3a.errors import InputError
+from er3a.inputs.yaml_file import load
+from er3a.kinematics.transforms import transform
+from er3a.robots.robot import Robot, Source
+from er3a.robots.schema import Placement, RobotFile
+
+DATA = Path(__file__).resolve().parents[2] / "data"
+ROBOTS = DATA / "robots"
+
+
+def load_robot(name_or_path: str | Path) -> Robot:
+    """Load a robot by the name of a file in data/robots, or by a path that ends in .yaml.
+
+    Raises
+    ------
+    InputError
+        naming file, field and remedy
+    """
+    path = robot_path(name_or_path)
+    content = load(RobotFile, path)
+    if content.name != path.stem:
+        raise InputError(path, "name", f"'{content.name}' is not the file's name", f"Write {path.stem}")
+    return robot_of(content)
+
+
+def robot_path(name_or_path: str | Path) -> Path:
+    """The file that a robot's name, or a path ending in .yaml, stands for."""
+    text = str(name_or_path)
+    if text.endswith((".yaml", ".yml")):
+        return Path(text)
+    path = ROBOTS / f"{text}.yaml"
+    if "/" in text or "\0" in text or not path.is_file():
+        known = ", ".join(sorted(file.stem for file in ROBOTS.glob("*.yaml")))
+        raise InputError(None, None, f"there is no robot '{text}'", f"Known: {known}; or give a path ending in .yaml")
+    return path
+
+
+def robot_of(content: RobotFile) -> Robot:
+    """The model behind a checked file: metres and radians."""
+    groups = ("dh", "zero", "limits", "speeds", "base", "tool")
+    present = {group: getattr(content, group) for group in groups if getattr(content, group) is not None}
+    speeds = [row.speed_deg_s for row in content.speeds.rows] if content.speeds else [np.nan] * 6
+    return Robot(
+        name=content.name,
+        title=content.title,
+        convention=content.dh.convention,
+        a=np.array([row.a_mm for row in content.dh.rows]) / 1000,
+        alpha=np.radians([row.alpha_deg for row in content.dh.rows]),
+        d=np.array([row.d_mm for row in content.dh.rows]) / 1000,
+        direction=np.array([row.direction for row in content.zero.rows], dtype=float),
+        offset=np.radians([row.offset_deg for row in content.zero.rows]),
+        lower=np.radians([row.lower_deg for row in content.limits.rows]),
+        upper=np.radians([row.upper_deg for row in content.limits.rows]),
+        speed=np.radians(speeds),
+        base=placement_transform(content.base),
+        tool=placement_transform(content.tool),
+        zero_pose=content.zero_pose,
+        references=tuple(content.references),
+        sources={group: Source(value.source, value.grade) for group, value in present.items()},
+    )
+
+
+def placement_transform(placement: Placement | None) -> np.ndarray:
+    """The (4, 4) transform of a placement in mm and degrees; the identity for None."""
+    if placement is None:
+        return np.eye(4)
+    return transform(np.array(placement.xyz_mm) / 1000, np.radians(placement.rpy_deg))

@@ -1,0 +1,83 @@
+"""The frozen robot model that everything else takes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+
+from er3a.errors import ShapeError
+
+Grade = Literal["official", "cad", "export", "claim", "inferred"]
+GRADES: dict[str, str] = {
+    "official": "the maker's own document",
+    "cad": "measured on a CAD model that carries the model's name",
+    "export": "a URDF exported from CAD",
+    "claim": "an article's text",
+    "inferred": "reasoned, not stated",
+}
+WEIGHTY_GRADES = ("official", "cad", "export")
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a group of values comes from, and how far it can be relied on (``GRADES``)."""
+
+    source: str
+    grade: Grade
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A six-revolute serial arm. SI units; angles are in rad, arrays are read-only.
+
+    The D-H angle of joint i is ``theta_i = direction_i * q_i + offset_i``, where q is what the teach pendant shows.
+
+    Attributes
+    ----------
+    name, title : short name (file stem) and name for people
+    convention : "standard" (row i follows joint i) or "modified" (Craig: a and alpha of row i precede joint i)
+    a, d : (6,), m
+    alpha, offset : (6,), rad
+    direction : (6,), +1 or -1
+    lower, upper : (6,), rad, limits of q
+    speed : (6,), rad/s, greatest joint speed, NaN where unknown
+    base : (4, 4), T_world_base; tool : (4, 4), T_flange_tool
+    zero_pose : what the arm looks like at q = 0, in words
+    references : names of the reference sets (folders of data/manual_refs) that it is checked against
+    sources : per group of values ("dh", "zero", "limits", "speeds", "base", "tool") its source and grade
+    """
+
+    name: str
+    title: str
+    convention: Literal["standard", "modified"]
+    a: np.ndarray
+    alpha: np.ndarray
+    d: np.ndarray
+    direction: np.ndarray
+    offset: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    speed: np.ndarray = field(default_factory=lambda: np.full(6, np.nan))
+    base: np.ndarray = field(default_factory=lambda: np.eye(4))
+    tool: np.ndarray = field(default_factory=lambda: np.eye(4))
+    zero_pose: str = ""
+    references: tuple[str, ...] = ()
+    sources: Mapping[str, Source] = field(default_factory=dict)
+
+    def __post_init__(self):
+        for key in ("a", "alpha", "d", "direction", "offset", "lower", "upper", "speed", "base", "tool"):
+            array = np.array(getattr(self, key), dtype=float)
+            expected = (4, 4) if key in ("base", "tool") else (6,)
+            if array.shape != expected:
+                raise ShapeError(key, array.shape, str(expected))
+            array.setflags(write=False)
+            object.__setattr__(self, key, array)
+        object.__setattr__(self, "sources", MappingProxyType(dict(self.sources)))
+
+    def replace(self, **changes) -> Robot:
+        """A copy with other values for some attributes."""
+        return replace(self, **changes)

@@ -1,0 +1,160 @@
+"""What a robot file may hold (YAML, mm and degrees), and the checks that need only the file itself."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from er3a.inputs.yaml_file import StrictModel
+from er3a.robots.robot import Grade
+
+NAME_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
+SHORTEST_PLAIN_LENGTH_MM = 2.0
+LONGEST_LENGTH_MM = 20_000.0
+
+Text = Annotated[str, Field(min_length=1, max_length=2000)]
+Name = Annotated[str, Field(pattern=NAME_PATTERN)]
+JointNumber = Annotated[int, Field(ge=1, le=6)]
+Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
+
+
+class Sourced(StrictModel):
+    """A group of values with its source and grade."""
+
+    source: Text
+    grade: Grade
+
+
+class DhRow(StrictModel):
+    joint: JointNumber
+    a_mm: float
+    alpha_deg: float
+    d_mm: float
+
+
+class ZeroRow(StrictModel):
+    joint: JointNumber
+    direction: Literal[1, -1]
+    offset_deg: float
+
+
+class LimitRow(StrictModel):
+    joint: JointNumber
+    lower_deg: float
+    upper_deg: float
+
+
+class SpeedRow(StrictModel):
+    joint: JointNumber
+    speed_deg_s: Annotated[float, Field(gt=0)]
+
+
+class DhTable(Sourced):
+    """Denavit-Hartenberg rows. ``calibrated: true`` admits lengths below 2 mm, which otherwise count as metres."""
+
+    convention: Literal["standard", "modified"]
+    calibrated: bool = False
+    rows: list[DhRow]
+
+
+class Zero(Sourced):
+    """theta = direction * q + offset, per joint."""
+
+    rows: list[ZeroRow]
+
+
+class Limits(Sourced):
+    rows: list[LimitRow]
+
+
+class Speeds(Sourced):
+    rows: list[SpeedRow]
+
+
+class Placement(StrictModel):
+    """A rigid transform: position, and roll-pitch-yaw with R = Rz(yaw) Ry(pitch) Rx(roll)."""
+
+    xyz_mm: Triple = [0.0, 0.0, 0.0]
+    rpy_deg: Triple = [0.0, 0.0, 0.0]
+
+
+class SourcedPlacement(Placement, Sourced):
+    pass
+
+
+class RobotFile(StrictModel):
+    """A robot file: data/robots/NAME.yaml."""
+
+    kind: Literal["robot"]
+    name: Name
+    title: Text
+    zero_pose: Text
+    references: list[Name] = []
+    dh: DhTable
+    zero: Zero
+    limits: Limits
+    speeds: Speeds | None = None
+    base: SourcedPlacement | None = None
+    tool: SourcedPlacement | None = None
+
+    @model_validator(mode="after")
+    def _six_joints_in_order(self):
+        for group in ("dh", "zero", "limits", "speeds"):
+            table = getattr(self, group)
+            if table is None:
+                continue
+            joints = [row.joint for row in table.rows]
+            if joints != [1, 2, 3, 4, 5, 6]:
+                missing = [joint for joint in range(1, 7) if joint not in joints]
+                what = f"joint {missing[0]} is missing" if missing else f"the joints come as {joints}"
+                raise ValueError(f"{group}.rows: {what} | Write one row for each joint, 1 to 6 in order")
+        return self
+
+    @model_validator(mode="after")
+    def _units_plausible(self):
+        for i, row in enumerate(self.dh.rows):
+            for key in ("a_mm", "d_mm"):
+                _check_length(f"dh.rows[{i}].{key}", getattr(row, key), self.dh.calibrated)
+            _check_not_radians(f"dh.rows[{i}].alpha_deg", row.alpha_deg)
+            _check_not_radians(f"zero.rows[{i}].offset_deg", self.zero.rows[i].offset_deg)
+        longest = max(max(abs(row.a_mm), abs(row.d_mm)) for row in self.dh.rows)
+        if longest < 10:
+            raise ValueError(
+                f"dh.rows: the longest length is {longest:g} mm, which can only be metres | Multiply by 1000"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _limits_plausible(self):
+        for i, row in enumerate(self.limits.rows):
+            if row.lower_deg > row.upper_deg:
+                raise ValueError(
+                    f"limits.rows[{i}]: joint {row.joint} has lower_deg {row.lower_deg:g} above "
+                    f"upper_deg {row.upper_deg:g} | Swap them"
+                )
+            if max(abs(row.lower_deg), abs(row.upper_deg)) > 3600:
+                raise ValueError(f"limits.rows[{i}]: joint {row.joint} turns more than ten times | Check the value")
+        widest = max(max(abs(row.lower_deg), abs(row.upper_deg)) for row in self.limits.rows)
+        if widest <= 2.01 * math.pi:
+            raise ValueError(
+                f"limits.rows: the widest limit is {widest:g} deg, which can only be radians | Convert them to degrees"
+            )
+        return self
+
+
+def _check_length(field: str, value: float, calibrated: bool) -> None:
+    if abs(value) > LONGEST_LENGTH_MM:
+        raise ValueError(f"{field}: {value:g} mm is longer than any robot's link | Write the length in mm")
+    if 0 < abs(value) < SHORTEST_PLAIN_LENGTH_MM and not calibrated:
+        raise ValueError(
+            f"{field}: {value:g} mm looks like metres | Write {value * 1000:g}; if so short a length is meant "
+            "(a calibrated table), set dh.calibrated: true"
+        )
+
+
+def _check_not_radians(field: str, value: float) -> None:
+    quarter = value / (math.pi / 2)
+    if 0 < abs(value) < 6.3 and round(quarter) and abs(value - round(quarter) * math.pi / 2) < 2e-3:
+        raise ValueError(f"{field}: {value:g} deg looks like radians | Write {round(quarter) * 90:g}")

@@ -1,0 +1,111 @@
+"""The study: which robots, which budgets, which targets and paths. Read from one YAML file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from er3a.errors import InputError
+from er3a.inputs.yaml_file import StrictModel, load
+from er3a.robots.load import DATA, load_robot, placement_transform, robot_path
+from er3a.robots.robot import Robot
+from er3a.robots.schema import Name, Placement, Text
+
+STAGES = ("validation", "workspace", "inverse", "trajectory")
+REFERENCES = DATA / "manual_refs"
+
+
+class RobotEntry(StrictModel):
+    """One robot of the study. ``base`` and ``tool`` replace those of the robot's file."""
+
+    file: Text | None = None
+    targets: Text
+    paths: Text
+    base: Placement | None = None
+    tool: Placement | None = None
+
+
+class ValidationSettings(StrictModel):
+    """``round_trips``: random joint vectors taken to a pose and back. ``reach_starts``: starts of each reach search."""
+
+    round_trips: Annotated[int, Field(ge=1, le=10_000_000)]
+    reach_starts: Annotated[int, Field(ge=1, le=10_000)]
+
+
+class WorkspaceSettings(StrictModel):
+    """Monte Carlo budget and grid.
+
+    ``samples`` are drawn in ``blocks`` seeded blocks, ``cells_across`` cells span the bounding box's longest side,
+    the hull is taken over the extreme samples in ``hull_directions`` directions, and the recording shows ``cloud_points``.
+    """
+
+    samples: Annotated[int, Field(ge=1, le=100_000_000_000)]
+    blocks: Annotated[int, Field(ge=1, le=100_000)]
+    cells_across: Annotated[int, Field(ge=8, le=1024)]
+    hull_directions: Annotated[int, Field(ge=100, le=100_000)]
+    cloud_points: Annotated[int, Field(ge=1, le=300_000)]
+
+    @model_validator(mode="after")
+    def _a_sample_per_block(self):
+        if self.samples < self.blocks:
+            raise ValueError(f"{self.samples} samples can't fill {self.blocks} blocks | Lower workspace.blocks")
+        return self
+
+
+class TrajectorySettings(StrictModel):
+    """Where a path counts as near-singular, and how many points are checked between two samples."""
+
+    checks_per_sample: Annotated[int, Field(ge=1, le=1000)]
+    near_wrist_deg: Annotated[float, Field(gt=0, le=90)]
+    near_elbow_deg: Annotated[float, Field(gt=0, le=90)]
+    near_shoulder_mm: Annotated[float, Field(gt=0, le=10_000)]
+
+
+class Study(StrictModel):
+    """config/config.yaml."""
+
+    kind: Literal["study"]
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1)]
+    robots: Annotated[dict[Name, RobotEntry], Field(min_length=1)]
+    validation: ValidationSettings
+    workspace: WorkspaceSettings
+    trajectory: TrajectorySettings
+
+    def entry(self, name: str) -> RobotEntry:
+        """The study's entry for a robot; :class:`InputError` if it has none."""
+        if name not in self.robots:
+            raise InputError(None, f"robots.{name}", "the study has no such robot", f"Known: {', '.join(self.robots)}")
+        return self.robots[name]
+
+    def robot(self, name: str) -> Robot:
+        """The robot with the study's base and tool."""
+        entry = self.entry(name)
+        robot = load_robot(robot_path(entry.file or name))
+        changes = {key: placement_transform(getattr(entry, key)) for key in ("base", "tool") if getattr(entry, key)}
+        return robot.replace(name=name, **changes)
+
+    def inputs(self, name: str, stage: str) -> list[Path]:
+        """The files that a stage reads for a robot."""
+        entry = self.entry(name)
+        files = [robot_path(entry.file or name)]
+        if stage == "validation":
+            for reference in load_robot(files[0]).references:
+                files += sorted((REFERENCES / reference).glob("*.csv"))
+        if stage == "inverse":
+            files.append(Path(entry.targets))
+        if stage == "trajectory":
+            files.append(Path(entry.paths))
+        return files
+
+    def settings(self, name: str, stage: str) -> dict[str, Any]:
+        """The resolved part of the study that a stage's numbers depend on; plain data."""
+        entry = self.entry(name).model_dump(exclude={"targets", "paths", "file"}, exclude_none=True)
+        own = getattr(self, stage, None)
+        return {"seed": self.seed, "robot": entry, stage: own.model_dump() if own else {}}
+
+
+def load_study(path: str | Path) -> Study:
+    """Read and check a study file; the files it names are checked by the stages that read them."""
+    return load(Study, path)
