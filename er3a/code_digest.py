@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import ast
 import hashlib
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parent
 
 
-@lru_cache(maxsize=None)
+@cache
 def code_digest(module: str) -> str:
     """SHA-256 over the sources of ``module``, of all modules of er3a it imports (transitively), and of templates
     (``*.j2``, ``*.css``) that stand beside those that are part of a view."""
@@ -38,7 +38,7 @@ def _reached(module: str) -> set[Path]:
     return found
 
 
-@lru_cache(maxsize=None)
+@cache
 def _imports(path: Path) -> tuple[str, ...]:
     names: list[str] = []
     for node in ast.walk(ast.parse(path.read_bytes())):

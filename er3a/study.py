@@ -38,7 +38,7 @@ class WorkspaceSettings(StrictModel):
     """Monte Carlo budget and grid.
 
     ``samples`` are drawn in ``blocks`` seeded blocks, ``cells_across`` cells span the bounding box's longest side,
-    the hull is taken over the extreme samples in ``hull_directions`` directions, and the recording shows ``cloud_points``.
+    the hull is taken over the extreme samples in ``hull_directions`` directions, the recording shows ``cloud_points``.
     """
 
     samples: Annotated[int, Field(ge=1, le=100_000_000_000)]

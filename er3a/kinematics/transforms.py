@@ -42,7 +42,7 @@ def translation(x: float, y: float, z: float) -> np.ndarray:
 
 
 def transform(xyz: np.ndarray, rpy: np.ndarray) -> np.ndarray:
-    """Transforms from positions (..., 3) in m and roll-pitch-yaw (..., 3) in rad, ZYX: R = Rz(yaw) Ry(pitch) Rx(roll) [2]_.
+    """Transforms from positions (..., 3) in m and roll-pitch-yaw (..., 3) in rad: R = Rz(yaw) Ry(pitch) Rx(roll) [2]_.
 
     Returns
     -------

@@ -263,7 +263,22 @@ def _solve(
 
 @kernel
 def _solve_wrist(
-    R, theta_1, theta_2, theta_3, theta_ref, w, angle_45, angle_56, epsilon_0, e6, direction, offset, slot, q, fault, gap
+    R,
+    theta_1,
+    theta_2,
+    theta_3,
+    theta_ref,
+    w,
+    angle_45,
+    angle_56,
+    epsilon_0,
+    e6,
+    direction,
+    offset,
+    slot,
+    q,
+    fault,
+    gap,
 ):
     wrist_turn = np.empty((3, 3))
     for k in range(3):

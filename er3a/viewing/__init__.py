@@ -1,0 +1,1 @@
+"""What recordings and reports share. Nothing here computes a result."""

@@ -1,0 +1,59 @@
+"""Matplotlib figures as SVG images for the pages."""
+
+from __future__ import annotations
+
+import base64
+import io
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from er3a.viewing.palette import GRID, INK, JOINTS, MUTED
+
+_STYLE = {
+    "axes.edgecolor": MUTED,
+    "axes.grid": True,
+    "axes.labelcolor": INK,
+    "axes.prop_cycle": matplotlib.cycler(color=JOINTS),
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlelocation": "left",
+    "axes.titlesize": 11,
+    "axes.titleweight": "bold",
+    "figure.constrained_layout.use": True,
+    "figure.facecolor": "white",
+    "font.family": "DejaVu Sans",
+    "font.size": 10,
+    "grid.color": GRID,
+    "grid.linewidth": 0.7,
+    "legend.frameon": False,
+    "legend.fontsize": 9,
+    "lines.linewidth": 1.6,
+    "svg.hashsalt": "er3a",
+    "xtick.color": INK,
+    "ytick.color": INK,
+}
+
+
+def new_figure(rows: int = 1, columns: int = 1, width: float = 9.0, height: float = 4.5, **subplots):
+    """A figure in the house style and its axes (as ``Figure.subplots`` returns them); sizes in inches."""
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=(width, height))
+        axes = figure.subplots(rows, columns, **subplots)
+    return figure, axes
+
+
+def equal_scale(axes: Axes, x_label: str, y_label: str) -> None:
+    """A drawing to scale: equal units on both axes."""
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel(x_label)
+    axes.set_ylabel(y_label)
+
+
+def svg_data_uri(figure: Figure) -> str:
+    """The figure as a ``data:`` address of an SVG image (dense clouds rasterised at 160 dpi)."""
+    buffer = io.BytesIO()
+    with matplotlib.rc_context(_STYLE):
+        figure.savefig(buffer, format="svg", dpi=160, metadata={"Date": None})
+    return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")

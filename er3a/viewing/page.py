@@ -1,0 +1,130 @@
+"""HTML pages: one self-contained file each, rendered from a stage's template on the shared base."""
+
+from __future__ import annotations
+
+import platform
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from matplotlib.figure import Figure
+
+from er3a.results import write_atomically
+from er3a.viewing.figures import svg_data_uri
+
+_HERE = Path(__file__).parent
+_ROOT = _HERE.parents[1]
+SHOWN_VERSIONS = ("numpy", "scipy", "numba", "open3d-cpu", "rerun-sdk", "matplotlib")
+VERDICT_WORDS = {
+    "pass": "pass",
+    "caution": "caution",
+    "fail": "fail",
+    "conflict": "conflict",
+    "no_reference": "no reference",
+}
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure for a page: the image, what it shows (for those who can't see it), and what to conclude from it."""
+
+    figure: Figure
+    alt: str
+    caption: str
+
+    @property
+    def uri(self) -> str:
+        """The image as a data address."""
+        return svg_data_uri(self.figure)
+
+
+def number(value: float | int | None, digits: int = 4) -> str:
+    """A number with ``digits`` significant digits, thousands apart by thin spaces; a dash for None."""
+    if value is None:
+        return "–"
+    if isinstance(value, int):
+        return f"{value:,}".replace(",", "\u202f")
+    if value != value or value in (float("inf"), float("-inf")):
+        return {"inf": "∞", "-inf": "−∞"}.get(str(value), "–")
+    if value == 0:
+        return "0"
+    if not 1e-4 <= abs(value) < 1e7:
+        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+        return f"{mantissa}·10^{int(exponent)}".replace("-", "−")
+    text = f"{value:#.{digits}g}"
+    if "e" in text:
+        text = f"{float(text):.0f}"
+    text = f"{float(text):,.{max(0, len(text.partition('.')[2]))}f}".replace(",", "\u202f")
+    return text.replace("-", "−")
+
+
+def fixed(value: float | None, decimals: int = 1) -> str:
+    """A number with fixed decimals, minus signs typographic, no negative zero; a dash for None."""
+    if value is None or value != value:
+        return "–"
+    text = f"{value:,.{decimals}f}".replace(",", "\u202f")
+    return (text[1:] if float(f"{value:.{decimals}f}") == 0 and text.startswith("-") else text).replace("-", "−")
+
+
+def render(template: Path, output: Path, summary: dict[str, Any] | None = None, **context: Any) -> None:
+    """Render a template to ``output``, whole or not at all.
+
+    Parameters
+    ----------
+    template : a Jinja file that extends ``base.html.j2``
+    summary : the stage's summary; its verdict, figures and provenance frame the page
+    context : what the template needs besides
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader([template.parent, _HERE]),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"number": number, "fixed": fixed}
+    html = environment.get_template(template.name).render(
+        style=(_HERE / "style.css").read_text(encoding="utf-8"),
+        verdict_words=VERDICT_WORDS,
+        summary=summary,
+        versions=_versions(),
+        commit=_commit(),
+        **context,
+    )
+    write_atomically(output, lambda file: file.write_text(html, encoding="utf-8"))
+
+
+def rows_of(records: Sequence[dict[str, Any]], *columns: str) -> list[list[Any]]:
+    """The given columns of a list of records, for the ``table`` macro."""
+    return [[record[column] for column in columns] for record in records]
+
+
+def _versions() -> dict[str, str]:
+    found = {"python": platform.python_version(), "er3a": version("er3a")}
+    for name in SHOWN_VERSIONS:
+        try:
+            found[name] = version(name)
+        except ModuleNotFoundError:
+            continue
+    return found
+
+
+def _commit() -> str | None:
+    """Commit of the project's checkout, with ``+ changes`` if it is dirty; None outside a checkout."""
+
+    def git(*words: str) -> str | None:
+        command = ["git", "-C", str(_ROOT), *words]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=False)
+        except (OSError, subprocess.TimeoutExpired):
+            return None
+        return done.stdout.strip() if done.returncode == 0 else None
+
+    if git("rev-parse", "--show-toplevel") != str(_ROOT):
+        return None
+    commit = git("rev-parse", "--short=12", "HEAD")
+    return commit and commit + (" + changes" if git("status", "--porcelain", "--untracked-files=no") else "")

@@ -1,0 +1,29 @@
+"""Colours used the same way in figures and recordings; the joints' six are safe for colour-blind readers.
+
+The joint colours are the qualitative set of M. Okabe and K. Ito, "Color Universal Design", 2008.
+"""
+
+JOINTS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9")
+JOINT_NAMES = ("J1", "J2", "J3", "J4", "J5", "J6")
+
+INK = "#1f2933"
+MUTED = "#7b8794"
+GRID = "#d9e0e7"
+MODEL = "#0072b2"
+REFERENCE = "#d55e00"
+HIGHLIGHT = "#c2185b"
+LINK = "#c9d1d9"
+BODY = "#9aa5b1"
+
+VERDICTS = {
+    "pass": "#18794e",
+    "caution": "#9a6700",
+    "fail": "#b42318",
+    "conflict": "#6941c6",
+    "no_reference": "#52606d",
+}
+
+
+def rgb(colour: str) -> tuple[int, int, int]:
+    """Red, green and blue (0..255) of a ``#rrggbb`` colour."""
+    return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)

@@ -1,0 +1,78 @@
+"""Rerun recordings: opened arranged, written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+os.environ.setdefault("RERUN_ANALYTICS_ENABLED", "false")
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from er3a.results import write_atomically
+from er3a.viewing.palette import rgb
+
+APPLICATION = "er3a"
+TIMELINE = "t"
+
+
+@contextmanager
+def recording(output: Path, robot: str, stage: str, *views: rrb.View | rrb.Container) -> Iterator[rr.RecordingStream]:
+    """Open a recording for logging; ``output`` appears when the block ends without an error.
+
+    Parameters
+    ----------
+    robot, stage : name the recording, ``er3a/<robot>/<stage>``
+    views : side by side in the blueprint
+    """
+    rr.set_strict_mode(True)
+    blueprint = rrb.Blueprint(
+        rrb.Horizontal(*views, column_shares=[2] + [1] * (len(views) - 1)) if len(views) > 1 else views[0],
+        rrb.TimePanel(timeline=TIMELINE, state="collapsed"),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.BlueprintPanel(state="collapsed"),
+        auto_views=False,
+    )
+
+    def finish(file: Path) -> None:
+        stream.flush()
+        stream.disconnect()
+        os.replace(partial, file)
+
+    output.parent.mkdir(parents=True, exist_ok=True)
+    partial = output.with_name(f".{output.stem}.{os.getpid()}.partial")
+    stream = rr.RecordingStream(APPLICATION, recording_id=f"{robot}-{stage}", send_properties=False)
+    try:
+        with stream:
+            stream.save(partial, default_blueprint=blueprint)
+            stream.set_log_time_enabled(False)
+            stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+            yield stream
+        write_atomically(output, finish)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def seconds(times: np.ndarray) -> rr.TimeColumn:
+    """A time column (s) for ``send_columns``."""
+    return rr.TimeColumn(TIMELINE, duration=np.asarray(times, dtype=float))
+
+
+def send_series(
+    stream: rr.RecordingStream, entity: str, times: np.ndarray, values: np.ndarray, names: list[str], colours: list[str]
+) -> None:
+    """Log curves as one entity.
+
+    Parameters
+    ----------
+    times : (N,), s
+    values : (N, k); NaN where a curve has a gap
+    names, colours : k of each
+    """
+    stream.log(entity, rr.SeriesLines(names=names, colors=[rgb(colour) for colour in colours]), static=True)
+    stream.send_columns(entity, [seconds(times)], rr.Scalars.columns(scalars=np.asarray(values, dtype=float)))
