@@ -105,7 +105,7 @@ def principal(q: np.ndarray) -> np.ndarray:
 
 
 def nearest_turns(robot: Robot, q: np.ndarray, q_ref: np.ndarray) -> np.ndarray:
-    """The same arm poses (..., 6) by the turns nearest to q_ref within the limits, else by those nearest to the range."""
+    """The same arm poses (..., 6) by the turns nearest to q_ref within the limits, else by those nearest to them."""
     near = q + TURN * np.round((q_ref - q) / TURN)
     low, high = _turn_bounds(robot, near)
     inside = near + TURN * np.clip(0, low, np.maximum(low, high))
