@@ -49,7 +49,7 @@ LOCK_FLAGS := --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-header --no-annotate --no-emit-index-url --no-emit-find-links
 
 clean:  ## remove results, reports and recordings
-	rm -rf results .snakemake
+	rm -rf results logs .snakemake
 	find reports -mindepth 1 ! -name README.md -delete
 
 distclean: clean  ## also remove the environment

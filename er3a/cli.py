@@ -1,0 +1,197 @@
+"""The command line: what the workflow's rules call, and what a person may call by hand."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from er3a.errors import Er3aError
+from er3a.study import STAGES, Study, load_study
+
+app = typer.Typer(
+    name="er3a",
+    help="Can this kinematic model of a six-axis robot be trusted, and what can the robot do?",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+StageName = Annotated[str, typer.Argument(metavar="STAGE", help=" | ".join(STAGES))]
+RobotName = Annotated[str, typer.Argument(metavar="ROBOT", help="a robot of the study")]
+StudyFile = Annotated[Path, typer.Option("--study", envvar="ER3A_STUDY", help="the study file")]
+Results = Annotated[Path, typer.Option(help="folder of the results")]
+Reports = Annotated[Path, typer.Option(help="folder of the reports")]
+
+DEFAULT_STUDY = Path("config/config.yaml")
+DEFAULT_RESULTS = Path("results")
+DEFAULT_REPORTS = Path("reports")
+
+
+@app.command()
+def check(files: Annotated[list[Path], typer.Argument(help="robot, study, target, path, scene or reference files")]):
+    """Check input files and say of each what it is, or what is wrong with it."""
+    from er3a.check import check_file
+
+    faults = 0
+    for file in files:
+        try:
+            print(f"{file}: {check_file(file)}, in order")
+        except Er3aError as error:
+            faults += 1
+            _complain(error)
+    if faults:
+        raise typer.Exit(2)
+
+
+@app.command()
+def sample(
+    robot: RobotName,
+    part: Annotated[str, typer.Option(help="which part of the blocks, e.g. 2-of-4")],
+    output: Annotated[Path, typer.Option(help="the part's file")],
+    study: StudyFile = DEFAULT_STUDY,
+):
+    """Draw one part of the workspace's seeded sample blocks."""
+    number, _, count = part.partition("-of-")
+    if not (number.isdigit() and count.isdigit() and 1 <= int(number) <= int(count)):
+        raise Er3aError(f"--part is '{part}'; expected for example 2-of-4")
+    from er3a.stages.workspace.sample import sample as draw
+
+    draw(load_study(study), robot, int(number), int(count), output)
+
+
+@app.command()
+def compute(
+    stage: StageName,
+    robot: RobotName,
+    parts: Annotated[
+        list[Path] | None, typer.Argument(help="workspace only: sampled parts; drawn here if absent")
+    ] = None,
+    study: StudyFile = DEFAULT_STUDY,
+    results: Results = DEFAULT_RESULTS,
+):
+    """Compute a stage's numbers: tables and summary.json."""
+    if parts and stage != "workspace":
+        raise Er3aError(f"the stage {stage} takes no sampled parts")
+    extra = {"parts": parts} if parts else {}
+    loaded, folder = _folder(study, results, robot, stage)
+    _verb("compute", stage)(loaded, robot, folder, **extra)
+
+
+@app.command()
+def record(
+    stage: StageName,
+    robot: RobotName,
+    study: StudyFile = DEFAULT_STUDY,
+    results: Results = DEFAULT_RESULTS,
+    reports: Reports = DEFAULT_REPORTS,
+):
+    """Write a stage's Rerun recording from its results."""
+    loaded, folder = _folder(study, results, robot, stage)
+    _verb("record", stage)(loaded, robot, folder, reports / robot / f"{stage}.rrd")
+
+
+@app.command()
+def report(
+    stage: StageName,
+    robot: RobotName,
+    study: StudyFile = DEFAULT_STUDY,
+    results: Results = DEFAULT_RESULTS,
+    reports: Reports = DEFAULT_REPORTS,
+):
+    """Write a stage's page from its results."""
+    loaded, folder = _folder(study, results, robot, stage)
+    _verb("report", stage)(loaded, robot, folder, reports / robot / f"{stage}.html")
+
+
+@app.command()
+def index(study: StudyFile = DEFAULT_STUDY, results: Results = DEFAULT_RESULTS, reports: Reports = DEFAULT_REPORTS):
+    """Write the index page over all robots and stages."""
+    from er3a.viewing.index import write_index
+
+    write_index(load_study(study), results, reports / "index.html")
+
+
+@app.command()
+def view(
+    robot: Annotated[str | None, typer.Argument(help="one robot; all if absent")] = None,
+    reports: Reports = DEFAULT_REPORTS,
+):
+    """Open the recordings in the Rerun viewer."""
+    recordings = sorted(str(path) for path in reports.glob(f"{robot or '*'}/*.rrd"))
+    if not recordings:
+        raise Er3aError(f"no recordings below {reports / (robot or '')}; `make run` writes them")
+    viewer = Path(sys.executable).with_name("rerun")
+    raise typer.Exit(subprocess.run([viewer, *recordings], check=False).returncode)
+
+
+@app.command()
+def import_urdf(
+    file: Annotated[Path, typer.Argument(help="a URDF of a six-axis serial arm")],
+    output: Annotated[Path, typer.Option(help="the robot file to write")],
+    snap: Annotated[bool, typer.Option(help="take angles within 1e-4 rad of a right angle for it, and say so")] = False,
+):
+    """Derive a robot file (D-H table, directions, offsets, limits) from a URDF's axes."""
+    from er3a.robots.urdf import import_urdf as read_urdf
+    from er3a.robots.write import write_robot
+
+    imported = read_urdf(file, snap=snap)
+    write_robot(imported.robot.replace(name=output.stem), output)
+    for note in imported.notes:
+        print(f"note: {note}")
+    print(f"{output}: written; differs from the URDF by at most {imported.misfit_m * 1000:.2g} mm on random poses")
+
+
+@app.command()
+def export_urdf(
+    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="a robot's name or file")],
+    output: Annotated[Path, typer.Option(help="the URDF to write")],
+):
+    """Write a robot as URDF."""
+    from er3a.results import write_atomically
+    from er3a.robots.load import load_robot
+    from er3a.robots.urdf import export_urdf as urdf_text
+
+    text = urdf_text(load_robot(robot))
+    write_atomically(output, lambda path: path.write_text(text, encoding="utf-8"))
+    print(f"{output}: written")
+
+
+@app.command()
+def schema(folder: Annotated[Path, typer.Option(help="where to write them")] = Path("config")):
+    """Write the JSON schemas of the input files, for editors."""
+    from er3a.check import SCHEMAS
+
+    for kind, model in SCHEMAS.items():
+        text = json.dumps(model.model_json_schema(), indent=2) + "\n"
+        (folder / f"{kind}.schema.json").write_text(text, encoding="utf-8")
+
+
+def main() -> None:
+    """Entry point: errors that a user can mend are one line on standard error and exit code 2."""
+    try:
+        app(standalone_mode=True)
+    except Er3aError as error:
+        _complain(error)
+        raise SystemExit(2) from None
+
+
+def _complain(error: Er3aError) -> None:
+    print(f"error: {error}", file=sys.stderr)
+
+
+def _folder(study_file: Path, results: Path, robot: str, stage: str) -> tuple[Study, Path]:
+    study = load_study(study_file)
+    study.entry(robot)
+    return study, results / robot / stage
+
+
+def _verb(verb: str, stage: str):
+    if stage not in STAGES:
+        raise Er3aError(f"there is no stage '{stage}'; known: {', '.join(STAGES)}")
+    return getattr(import_module(f"er3a.stages.{stage}.{verb}"), verb)

@@ -12,6 +12,7 @@ from functools import cache
 from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parent
+VIEWS = ("report.py", "page.py", "index.py")
 
 
 @cache
@@ -32,7 +33,7 @@ def _reached(module: str) -> set[Path]:
         if path is None or path in found:
             continue
         found.add(path)
-        if path.name in ("report.py", "page.py"):
+        if path.name in VIEWS:
             found |= {*path.parent.glob("*.j2"), *path.parent.glob("*.css")}
         todo += _imports(path)
     return found

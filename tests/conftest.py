@@ -2,6 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -21,3 +30,66 @@ def robot(request: pytest.FixtureRequest) -> Robot:
 def random() -> np.random.Generator:
     """A generator with a fixed seed."""
     return np.random.default_rng(20261120)
+
+
+ROOT = Path(__file__).resolve().parents[1]
+PROJECT_PARTS = ("Snakefile", "workflow", "er3a", "config", "data", "profiles")
+
+
+@dataclass(frozen=True)
+class StudyRun:
+    """A copy of the project in which the small study is run."""
+
+    folder: Path
+
+    def snakemake(self, *words: str, check: bool = True) -> subprocess.CompletedProcess[str]:
+        """Run Snakemake in the copy, on the copy's own package."""
+        return self._run([sys.executable, "-m", "snakemake", "--configfile", "config/small.yaml", *words], check)
+
+    def make_run(self, *words: str, check: bool = True) -> subprocess.CompletedProcess[str]:
+        """What `make run` runs once the environment stands."""
+        command = [sys.executable, "workflow/scripts/run.py", "--study", "config/small.yaml", "--", *words]
+        return self._run(command, check)
+
+    def environment(self) -> dict[str, str]:
+        """The environment that makes the copy's package the one that is imported."""
+        return os.environ | {"PYTHONPATH": str(self.folder)}
+
+    def planned(self) -> set[str]:
+        """Messages of the jobs that a run would do now, such as ``er3_600: compute workspace``."""
+        output = self.snakemake("--dry-run", "--nocolor").stdout
+        return set(re.findall(r"^Job \d+: (.+)$", output, flags=re.MULTILINE))
+
+    def _run(self, command: list[str], check: bool) -> subprocess.CompletedProcess[str]:
+        done = subprocess.run(
+            command, cwd=self.folder, env=self.environment(), capture_output=True, text=True, timeout=900, check=False
+        )
+        if check and done.returncode != 0:
+            pytest.fail(f"{' '.join(command[1:])} ended with {done.returncode}:\n{done.stdout}\n{done.stderr}")
+        return done
+
+
+def copy_of_project(folder: Path) -> StudyRun:
+    """Copy what a run needs, without results."""
+    folder.mkdir(parents=True)
+    for part in PROJECT_PARTS:
+        source = ROOT / part
+        if source.is_dir():
+            shutil.copytree(source, folder / part, ignore=shutil.ignore_patterns("__pycache__"))
+        else:
+            shutil.copy2(source, folder / part)
+    return StudyRun(folder)
+
+
+@pytest.fixture(scope="session")
+def fresh_project(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], StudyRun]:
+    """Makes further copies of the project, without results."""
+    return lambda name: copy_of_project(tmp_path_factory.mktemp(name) / "project")
+
+
+@pytest.fixture(scope="session")
+def small_study(fresh_project: Callable[[str], StudyRun]) -> StudyRun:
+    """The small study, run once from nothing with two cores; tests must leave it as they found it."""
+    run = fresh_project("small_study")
+    run.make_run("--cores", "2")
+    return run

@@ -119,6 +119,8 @@ class RobotFile(StrictModel):
                 _check_length(f"dh.rows[{i}].{key}", getattr(row, key), self.dh.calibrated)
             _check_not_radians(f"dh.rows[{i}].alpha_deg", row.alpha_deg)
             _check_not_radians(f"zero.rows[{i}].offset_deg", self.zero.rows[i].offset_deg)
+        check_placement("base", self.base)
+        check_placement("tool", self.tool)
         longest = max(max(abs(row.a_mm), abs(row.d_mm)) for row in self.dh.rows)
         if longest < 10:
             raise ValueError(
@@ -142,6 +144,16 @@ class RobotFile(StrictModel):
                 f"limits.rows: the widest limit is {widest:g} deg, which can only be radians | Convert them to degrees"
             )
         return self
+
+
+def check_placement(field: str, placement: Placement | None) -> None:
+    """Refuse a placement that can only be in metres or radians: ``ValueError`` with ``field: problem | remedy``."""
+    if placement is None:
+        return
+    if 0 < max(abs(value) for value in placement.xyz_mm) < SHORTEST_PLAIN_LENGTH_MM:
+        raise ValueError(f"{field}.xyz_mm: {placement.xyz_mm} can only be metres | Multiply by 1000")
+    for i, value in enumerate(placement.rpy_deg):
+        _check_not_radians(f"{field}.rpy_deg[{i}]", value)
 
 
 def _check_length(field: str, value: float, calibrated: bool) -> None:

@@ -1,0 +1,27 @@
+# er3a: results are data; recordings and reports are views of it.
+#
+# `make run` calls this with config/config.yaml; another study: snakemake --configfile FILE.
+from pathlib import Path
+
+from snakemake.utils import min_version
+
+min_version("9.10")
+
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/validation.smk"
+include: "workflow/rules/workspace.smk"
+include: "workflow/rules/inverse.smk"
+include: "workflow/rules/trajectory.smk"
+include: "workflow/rules/views.smk"
+
+
+rule all:
+    default_target: True
+    input:
+        "reports/index.html",
+        expand("reports/{robot}/{stage}.rrd", robot=ROBOTS, stage=STAGES),
+
+
+onsuccess:
+    print("\nOpen reports/index.html in a browser; `make view` opens the recordings.")

@@ -1,0 +1,5 @@
+"""`python -m er3a`."""
+
+from er3a.cli import main
+
+main()

@@ -1,0 +1,60 @@
+"""Checking an input file without computing anything from it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import BaseModel
+
+from er3a.collision.scene import SceneFile, load_scene
+from er3a.errors import InputError
+from er3a.inputs.yaml_file import read_yaml
+from er3a.planning.path_file import PathFile, load_paths
+from er3a.references.load import check_reference_file, load_references
+from er3a.robots.load import load_robot
+from er3a.robots.schema import RobotFile
+from er3a.study import Study, load_study
+from er3a.targets import TargetFile, load_targets
+
+SCHEMAS: dict[str, type[BaseModel]] = {
+    "study": Study,
+    "robot": RobotFile,
+    "targets": TargetFile,
+    "paths": PathFile,
+    "scene": SceneFile,
+}
+
+_CHECKS = {
+    "study": load_study,
+    "robot": load_robot,
+    "targets": load_targets,
+    "paths": load_paths,
+    "scene": load_scene,
+}
+_WORDS = {"robot": "a robot", "study": "a study", "targets": "targets", "paths": "paths", "scene": "a scene"}
+
+
+def check_file(path: Path) -> str:
+    """Check a file and return in words what it is; :class:`er3a.errors.InputError` if something is wrong with it."""
+    if path.suffix == ".csv":
+        return check_reference_file(path)
+    if path.suffix not in (".yaml", ".yml"):
+        raise InputError(path, None, f"'{path.suffix}' files are none of er3a's inputs", "Give a .yaml or .csv file")
+    kind = read_yaml(path).get("kind")
+    if not isinstance(kind, str) or kind not in _CHECKS:
+        problem = "missing" if kind is None else f"'{kind}' is not known"
+        raise InputError(path, "kind", problem, f"Write one of: {', '.join(_CHECKS)}")
+    _CHECKS[kind](path)
+    return _WORDS[kind]
+
+
+def check_study(path: Path) -> Study:
+    """Check a study file and every file that it leads to, before a run starts."""
+    study = load_study(path)
+    for name, entry in study.robots.items():
+        robot = study.robot(name)
+        for reference in robot.references:
+            load_references(reference)
+        load_targets(entry.targets)
+        load_paths(entry.paths)
+    return study

@@ -1,0 +1,42 @@
+"""The same arm under the other Denavit-Hartenberg convention.
+
+The two conventions cut the same product of elementary transforms at other places, so the rows shift by one and nothing
+is approximated: a standard row's ``Tx(a) Rx(alpha)`` is the next modified row's ``Rx(alpha) Tx(a)`` (they commute). What
+has no row left goes to the ends: behind joint 6 to the tool, before joint 1 to the base.
+
+Reference: J. J. Craig, *Introduction to Robotics*, 3rd ed., section 3.4 and its notes on the two conventions.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from er3a.kinematics.transforms import rot_x, translation
+from er3a.robots.robot import Robot
+
+
+def to_modified(robot: Robot) -> Robot:
+    """The arm with a modified (Craig) table; itself if it has one. Tool poses are the same for all joint angles."""
+    if robot.convention == "modified":
+        return robot
+    return robot.replace(
+        convention="modified",
+        a=np.roll(robot.a, 1) * _NOT_FIRST,
+        alpha=np.roll(robot.alpha, 1) * _NOT_FIRST,
+        tool=translation(robot.a[5], 0, 0) @ rot_x(robot.alpha[5]) @ robot.tool,
+    )
+
+
+def to_standard(robot: Robot) -> Robot:
+    """The arm with a standard table; itself if it has one. Tool poses are the same for all joint angles."""
+    if robot.convention == "standard":
+        return robot
+    return robot.replace(
+        convention="standard",
+        a=np.roll(robot.a * _NOT_FIRST, -1),
+        alpha=np.roll(robot.alpha * _NOT_FIRST, -1),
+        base=robot.base @ rot_x(robot.alpha[0]) @ translation(robot.a[0], 0, 0),
+    )
+
+
+_NOT_FIRST = np.array([0.0, 1.0, 1.0, 1.0, 1.0, 1.0])

@@ -1,0 +1,160 @@
+"""The real pipeline on the small study: what it leaves, what it repeats, what an edit reruns."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from er3a.results import FORMAT_VERSION
+
+ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
+STAGES = ("validation", "workspace", "inverse", "trajectory")
+
+
+@contextmanager
+def edited(path: Path, old: str, new: str) -> Iterator[None]:
+    """Change a file for a while; content and times are put back."""
+    text, times = path.read_text(), path.stat()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    try:
+        yield
+    finally:
+        path.write_text(text)
+        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
+
+
+def views(robot: str, stage: str) -> set[str]:
+    return {f"{robot}: record {stage}", f"{robot}: report {stage}"}
+
+
+def test_every_stage_leaves_results_a_page_and_a_recording(small_study):
+    for robot in ROBOTS:
+        for stage in STAGES:
+            summary = json.loads((small_study.folder / "results" / robot / stage / "summary.json").read_text())
+            assert summary["format_version"] == FORMAT_VERSION
+            assert (summary["robot"], summary["stage"]) == (robot, stage)
+            assert summary["verdict"]["status"] in ("pass", "caution", "fail", "no_reference")
+            assert summary["verdict"]["text"].endswith(".")
+            assert {"name", "value", "unit", "uncertainty"} == set(summary["figures"][0])
+            assert summary["provenance"]["inputs"][0]["path"] == f"data/robots/{robot}.yaml"
+            for suffix in ("html", "rrd"):
+                assert (small_study.folder / "reports" / robot / f"{stage}.{suffix}").stat().st_size > 1000
+    assert (small_study.folder / "reports/index.html").is_file()
+    assert not list((small_study.folder / "results").glob("*/workspace/parts/*.parquet"))
+
+
+def test_verdicts_tell_the_article_from_the_real_arm(small_study):
+    def status(robot: str) -> str:
+        path = small_study.folder / "results" / robot / "validation/summary.json"
+        return json.loads(path.read_text())["verdict"]["status"]
+
+    assert status("er3a_c60_article") == "fail"
+    assert status("er3a_c60") in ("pass", "caution")
+    assert status("er3_600") in ("pass", "caution")
+
+
+def test_a_second_run_does_nothing(small_study):
+    assert small_study.planned() == set()
+    assert "Nothing to be done" in small_study.make_run().stdout + small_study.make_run().stderr
+
+
+def test_editing_a_template_renders_reports_only(small_study):
+    template = small_study.folder / "er3a/stages/inverse/report.html.j2"
+    with edited(template, "{% block content %}", "{% block content %}<!-- -->"):
+        assert small_study.planned() == {f"{robot}: report inverse" for robot in ROBOTS} | {"write the index"}
+
+
+def test_editing_the_base_template_renders_all_pages_and_no_number(small_study):
+    with edited(small_study.folder / "er3a/viewing/base.html.j2", "<body>", "<body >"):
+        expected = {f"{robot}: report {stage}" for robot in ROBOTS for stage in STAGES}
+        assert small_study.planned() == expected | {"write the index"}
+
+
+def test_editing_a_kinematics_module_reruns_what_uses_it(small_study):
+    with edited(small_study.folder / "er3a/kinematics/selection.py", '"""', '"""Edited. '):
+        expected = {f"{robot}: compute inverse" for robot in ROBOTS}
+        for robot in ROBOTS:
+            expected |= views(robot, "inverse")
+        assert small_study.planned() - expected <= {"write the index"}
+        assert expected <= small_study.planned()
+
+
+def test_editing_forward_kinematics_reruns_every_stage(small_study):
+    with edited(small_study.folder / "er3a/kinematics/forward.py", '"""', '"""Edited. '):
+        planned = small_study.planned()
+        assert {f"{robot}: compute {stage}" for robot in ROBOTS for stage in STAGES} <= planned
+
+
+def test_changing_one_table_leaves_the_other_robots_alone(small_study):
+    with edited(small_study.folder / "data/robots/er3_600.yaml", "d_mm: 367.5", "d_mm: 367.6"):
+        planned = small_study.planned()
+    assert {f"er3_600: compute {stage}" for stage in STAGES} <= planned
+    assert {job.split(":")[0] for job in planned} == {"er3_600", "write the index"}
+
+
+def test_changing_a_reference_reruns_validation_of_those_checked_against_it(small_study):
+    folder = small_study.folder / "data/manual_refs/er3a_c60"
+    with edited(folder / "axes.csv", "cad", "export"):
+        computed = {job for job in small_study.planned() if "compute" in job}
+    assert computed == {"er3a_c60: compute validation", "er3a_c60_article: compute validation"}
+
+
+def test_changing_the_workspace_budget_reruns_only_workspaces(small_study):
+    with edited(small_study.folder / "config/small.yaml", "samples: 200000", "samples: 200008"):
+        planned = small_study.planned()
+    assert {f"{robot}: compute workspace" for robot in ROBOTS} <= planned
+    assert all("workspace" in job for job in planned - {"write the index"})
+
+
+def test_results_are_the_same_bytes_on_one_core_and_with_another_scatter(small_study, fresh_project):
+    again = fresh_project("again")
+    again.snakemake("--cores", "1", "--set-scatter", "blocks=3")
+    compared = 0
+    for path in sorted((small_study.folder / "results").rglob("*")):
+        if path.is_file():
+            twin = again.folder / path.relative_to(small_study.folder)
+            assert path.read_bytes() == twin.read_bytes(), path.name
+            compared += 1
+    assert compared >= 2 * len(ROBOTS) * len(STAGES)
+    rerun = Path(sys.executable).with_name("rerun")
+    for path in sorted((small_study.folder / "reports").rglob("*.rrd")):
+        twin = again.folder / path.relative_to(small_study.folder)
+        command = [rerun, "rrd", "compare", "--unordered", path, twin]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, f"{path}: {done.stderr[-500:]}"
+
+
+def test_half_deleted_results_are_made_again(small_study):
+    folder = small_study.folder / "results/er3a_c60/inverse"
+    before = (folder / "summary.json").read_bytes()
+    (folder / "summary.json").unlink()
+    assert "er3a_c60: compute inverse" in small_study.planned()
+    small_study.make_run("--cores", "2")
+    assert (folder / "summary.json").read_bytes() == before
+    assert small_study.planned() == set()
+
+
+@pytest.mark.parametrize(
+    ("path", "old", "new", "told"),
+    [
+        ("config/small.yaml", "workspace:", "workspce:", "unknown key 'workspce'"),
+        ("data/robots/er3_600.yaml", "d_mm: 295.5", "d_mm: 0.2955", "looks like metres"),
+        ("data/manual_refs/er3_600/axes.csv", "x_mm", "x_cm", "column x_cm"),
+    ],
+)
+def test_bad_input_is_one_error_before_anything_runs(small_study, path, old, new, told):
+    with edited(small_study.folder / path, old, new):
+        done = small_study.make_run(check=False)
+    assert done.returncode == 2
+    assert told in done.stderr
+    assert Path(path).name in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert small_study.planned() == set()

@@ -1,0 +1,154 @@
+"""URDF in and out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio
+import pytest
+from scipy.spatial.transform import Rotation
+
+from er3a.errors import InputError
+from er3a.kinematics.forward import forward, frames
+from er3a.robots.from_axes import table_from_axes
+from er3a.robots.load import load_robot
+from er3a.robots.robot import Robot
+from er3a.robots.urdf import export_urdf, import_urdf
+from er3a.robots.write import write_robot
+
+# The real arm as its published URDF has it: joint origins to 0.1 mm, right angles rounded to five digits.
+REAL_ARM = [
+    ("revolute", "0 0 0.1815", "0 0 0", "0 0 1"),
+    ("revolute", "0.05 0 0.14", "1.5708 -1.5708 0", "0 0 1"),
+    ("revolute", "0.27 0 0", "0 0 0", "0 0 1"),
+    ("revolute", "0.07 -0.299 0", "1.5708 0 0", "0 0 1"),
+    ("revolute", "0 0 0", "-1.5708 0 0", "0 0 1"),
+    ("continuous", "0 -0.0785 0", "1.5708 0 0", "0 0 1"),
+]
+
+
+def urdf(joints=REAL_ARM, limit='<limit lower="-2" upper="2" velocity="3" effort="0"/>', extra="") -> str:
+    text = '<robot name="r"><link name="l0"/>'
+    for k, (kind, xyz, rpy, axis) in enumerate(joints):
+        text += f'<link name="l{k + 1}"/><joint name="j{k + 1}" type="{kind}"><parent link="l{k}"/>'
+        text += f'<child link="l{k + 1}"/><origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="{axis}"/>{limit}</joint>'
+    return text + extra + "</robot>"
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "arm.urdf"
+    path.write_text(text)
+    return path
+
+
+def pinocchio_poses(path: Path, q: np.ndarray, frame: str) -> np.ndarray:
+    model = pinocchio.buildModelFromUrdf(str(path))
+    data = model.createData()
+    poses = []
+    for row in q:
+        pinocchio.framesForwardKinematics(model, data, row)
+        poses.append(data.oMf[model.getFrameId(frame)].homogeneous.copy())
+    return np.array(poses)
+
+
+def test_export_is_the_same_arm_to_pinocchio(robot, random, tmp_path):
+    tool = np.eye(4)
+    tool[:3, :3] = Rotation.from_euler("xyz", [0.3, -0.8, 2.0]).as_matrix()
+    tool[:3, 3] = 0.1, -0.05, 0.2
+    robot = robot.replace(tool=tool)
+    path = written(tmp_path, export_urdf(robot))
+    q = random.uniform(robot.lower, robot.upper, (200, 6))
+    np.testing.assert_allclose(pinocchio_poses(path, q, "tool"), forward(robot, q), atol=1e-12)
+
+
+def test_round_trip_gives_the_table_back(robot, tmp_path):
+    imported = import_urdf(written(tmp_path, export_urdf(robot)))
+    back = imported.robot
+    for key in ("a", "alpha", "d", "direction", "offset", "lower", "upper", "base", "tool"):
+        np.testing.assert_allclose(getattr(back, key), getattr(robot, key), atol=1e-12, err_msg=key)
+    assert imported.misfit_m < 1e-12
+    assert imported.notes == ()
+
+
+def test_import_agrees_with_pinocchio_and_survives_the_robot_file(random, tmp_path):
+    path = written(tmp_path, urdf([(kind.replace("continuous", "revolute"), *rest) for kind, *rest in REAL_ARM]))
+    imported = import_urdf(path)
+    assert imported.misfit_m < 1e-9
+    q = random.uniform(-3, 3, (200, 6))
+    np.testing.assert_allclose(forward(imported.robot, q), pinocchio_poses(path, q, "l6"), atol=1e-9)
+
+
+def test_snapping_gives_the_real_arm_and_says_what_it_changed(tmp_path):
+    imported = import_urdf(written(tmp_path, urdf()), snap=True)
+    real, got = load_robot("er3a_c60"), imported.robot
+    np.testing.assert_allclose(got.a, real.a, atol=1e-12)
+    np.testing.assert_allclose(got.d, [0.3215, 0, 0, 0.299, 0, 0.0785], atol=1e-12)
+    np.testing.assert_allclose(got.alpha, real.alpha, atol=1e-12)
+    assert "joint j2: angle 1.5708 rad taken as 90 deg" in imported.notes
+    assert any("continuous" in note for note in imported.notes)
+    path = tmp_path / "arm.yaml"
+    write_robot(got, path)
+    q = np.random.default_rng(1).uniform(-3, 3, (100, 6))
+    np.testing.assert_allclose(forward(load_robot(path), q), forward(got, q), atol=1e-12)
+
+
+def test_any_six_axes_get_an_exact_table(random):
+    for k in range(300):
+        alpha = random.uniform(-np.pi, np.pi, 6) if k % 3 else random.choice([0, np.pi / 2, -np.pi / 2, np.pi], 6)
+        arm = Robot(
+            name="any",
+            title="any",
+            convention="standard" if k % 2 else "modified",
+            a=random.uniform(-1, 1, 6) * random.choice([0, 1], 6),
+            alpha=alpha,
+            d=random.uniform(-1, 1, 6) * random.choice([0, 1], 6),
+            direction=random.choice([-1.0, 1.0], 6),
+            offset=random.uniform(-3, 3, 6),
+            lower=-np.ones(6),
+            upper=np.ones(6),
+        )
+        T = frames(arm, np.zeros(6))
+        directions = T[:6, :3, 2] * arm.direction[:, None]
+        table = table_from_axes(directions, T[:6, :3, 3] + 0.3 * directions, T[6])
+        derived = arm.replace(convention="standard", **vars(table))
+        q = random.uniform(-np.pi, np.pi, (20, 6))
+        np.testing.assert_allclose(forward(derived, q), forward(arm, q), atol=1e-9)
+
+
+def test_fixed_joints_are_merged_and_side_frames_ignored(tmp_path, random):
+    fixed = '<link name="cam"/><joint name="c" type="fixed"><parent link="l2"/><child link="cam"/></joint>'
+    flange = (
+        '<link name="fl"/><joint name="f" type="fixed"><parent link="l6"/><child link="fl"/>'
+        '<origin xyz="0 0 0.05"/></joint>'
+    )
+    q = random.uniform(-3, 3, (50, 6))
+    plain = import_urdf(written(tmp_path, urdf())).robot
+    with_flange = import_urdf(written(tmp_path, urdf(extra=fixed + flange))).robot
+    expected = forward(plain, q) @ np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0.05], [0, 0, 0, 1.0]])
+    np.testing.assert_allclose(forward(with_flange, q), expected, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (urdf(REAL_ARM[:5]), "5 revolute joints"),
+        (urdf([*REAL_ARM, REAL_ARM[0]]), "7 revolute joints"),
+        (urdf([("prismatic", *REAL_ARM[0][1:]), *REAL_ARM[1:]]), "type 'prismatic'"),
+        (urdf(limit=""), "has no lower"),
+        (urdf(limit='<limit lower="2" upper="-2" velocity="1"/>'), "lower limit 2 above upper -2"),
+        (urdf(limit='<mimic joint="j1"/><limit lower="-2" upper="2"/>'), "coupled joints"),
+        (urdf([("revolute", "0 0 nan", "0 0 0", "0 0 1"), *REAL_ARM[1:]]), "'0 0 nan'"),
+        (urdf([("revolute", "0 0 1", "0 0 0", "0 0 0"), *REAL_ARM[1:]]), "no length"),
+        (urdf().replace("<robot", "<sdf").replace("</robot", "</sdf"), "<sdf>"),
+        (urdf()[:-20], "not valid XML"),
+        ('<!DOCTYPE x [<!ENTITY a "b">]>' + urdf(), "entities"),
+        ("<robot/>", "no joints"),
+    ],
+)
+def test_what_is_no_six_axis_chain_is_one_clear_error(tmp_path, text, told):
+    path = written(tmp_path, text)
+    with pytest.raises(InputError, match=r"arm\.urdf") as caught:
+        import_urdf(path)
+    assert told in str(caught.value)
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,63 @@
+import os
+import sys
+
+from er3a.code_digest import code_digest
+from er3a.errors import Er3aError
+from er3a.study import STAGES, load_study
+
+DEFAULT_STUDY = "config/config.yaml"
+
+# A study is one file as a whole: several would be merged key by key, and single values set on the command line would
+# reach the rules but not the stages, which read the file.
+if len(workflow.overwrite_configfiles) > 1 or workflow.config_settings.config:
+    raise WorkflowError("er3a takes one study file (--configfile FILE) and no --config; edit the file instead.")
+
+STUDY_FILE = str(next(iter(workflow.overwrite_configfiles), DEFAULT_STUDY))
+
+try:
+    STUDY = load_study(STUDY_FILE)
+except Er3aError as error:
+    raise WorkflowError(str(error)) from None
+
+ROBOTS = list(STUDY.robots)
+
+# The tables that each stage writes beside its summary.json.
+TABLES = {
+    "validation": ["checks"],
+    "workspace": [],
+    "inverse": ["solutions"],
+    "trajectory": ["samples"],
+}
+
+
+wildcard_constraints:
+    robot="|".join(ROBOTS),
+    stage="|".join(STAGES),
+
+
+# Jobs find the commands of the environment that Snakemake runs in, read the same study, and use one thread each:
+# the pipeline runs jobs side by side instead.
+shell.prefix(
+    f'export PATH="{Path(sys.executable).parent}:$PATH" ER3A_STUDY="{STUDY_FILE}" '
+    "OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 PYTHONHASHSEED=0; "
+)
+
+
+def tables(stage):
+    """Paths of a stage's tables, the robot as wildcard."""
+    return [f"results/{{robot}}/{stage}/{table}.parquet" for table in TABLES[stage]]
+
+
+def inputs(stage):
+    """Input function: the files that a stage reads for a robot."""
+    return lambda wildcards: [os.path.relpath(path) for path in STUDY.inputs(wildcards.robot, stage)]
+
+
+def settings(stage):
+    """Params function: the part of the study that a stage's numbers depend on, so that only its change reruns them."""
+    return lambda wildcards: STUDY.settings(wildcards.robot, stage)
+
+
+def code_of(stage, verb):
+    """Digest of the modules that a verb of a stage uses: Snakemake doesn't see edits of an imported package."""
+    return code_digest(f"er3a.stages.{stage}.{verb}")

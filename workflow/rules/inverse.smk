@@ -1,0 +1,19 @@
+rule compute_inverse:
+    input:
+        inputs("inverse"),
+    output:
+        summary="results/{robot}/inverse/summary.json",
+        tables=tables("inverse"),
+    log:
+        "logs/{robot}/inverse.compute.log",
+    benchmark:
+        "logs/{robot}/inverse.compute.tsv"
+    conda:
+        "er3a"
+    params:
+        settings=settings("inverse"),
+        code=code_of("inverse", "compute"),
+    message:
+        "{wildcards.robot}: compute inverse"
+    shell:
+        "er3a compute inverse {wildcards.robot} 2> {log}"

@@ -1,0 +1,58 @@
+def results_of(wildcards):
+    """A stage's results, as the input of its views."""
+    return [
+        f"results/{wildcards.robot}/{wildcards.stage}/summary.json",
+        *(path.format(robot=wildcards.robot) for path in tables(wildcards.stage)),
+    ]
+
+
+rule record:
+    input:
+        results_of,
+    output:
+        "reports/{robot}/{stage}.rrd",
+    log:
+        "logs/{robot}/{stage}.record.log",
+    conda:
+        "er3a"
+    params:
+        code=lambda wildcards: code_of(wildcards.stage, "record"),
+    message:
+        "{wildcards.robot}: record {wildcards.stage}"
+    shell:
+        "er3a record {wildcards.stage} {wildcards.robot} 2> {log}"
+
+
+rule report:
+    input:
+        results_of,
+    output:
+        "reports/{robot}/{stage}.html",
+    log:
+        "logs/{robot}/{stage}.report.log",
+    conda:
+        "er3a"
+    params:
+        code=lambda wildcards: code_of(wildcards.stage, "report"),
+    message:
+        "{wildcards.robot}: report {wildcards.stage}"
+    shell:
+        "er3a report {wildcards.stage} {wildcards.robot} 2> {log}"
+
+
+rule index:
+    input:
+        expand("results/{robot}/{stage}/summary.json", robot=ROBOTS, stage=STAGES),
+        expand("reports/{robot}/{stage}.html", robot=ROBOTS, stage=STAGES),
+    output:
+        "reports/index.html",
+    log:
+        "logs/index.log",
+    conda:
+        "er3a"
+    params:
+        code=code_digest("er3a.viewing.index"),
+    message:
+        "write the index"
+    shell:
+        "er3a index 2> {log}"

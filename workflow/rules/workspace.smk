@@ -1,0 +1,45 @@
+# The seeded blocks are fixed by the study; scattering only groups them into jobs (--set-scatter blocks=N).
+scattergather:
+    blocks=min(4, STUDY.workspace.blocks),
+
+
+rule sample_workspace:
+    input:
+        inputs("workspace"),
+    output:
+        temp("results/{robot}/workspace/parts/{scatteritem}.parquet"),
+    log:
+        "logs/{robot}/workspace.sample.{scatteritem}.log",
+    benchmark:
+        "logs/{robot}/workspace.sample.{scatteritem}.tsv"
+    conda:
+        "er3a"
+    params:
+        settings=settings("workspace"),
+        code=code_of("workspace", "sample"),
+    message:
+        "{wildcards.robot}: sample the workspace, part {wildcards.scatteritem}"
+    shell:
+        "er3a sample {wildcards.robot} --part {wildcards.scatteritem} --output {output} 2> {log}"
+
+
+rule compute_workspace:
+    input:
+        files=inputs("workspace"),
+        parts=gather.blocks("results/{{robot}}/workspace/parts/{scatteritem}.parquet"),
+    output:
+        summary="results/{robot}/workspace/summary.json",
+        tables=tables("workspace"),
+    log:
+        "logs/{robot}/workspace.compute.log",
+    benchmark:
+        "logs/{robot}/workspace.compute.tsv"
+    conda:
+        "er3a"
+    params:
+        settings=settings("workspace"),
+        code=code_of("workspace", "compute"),
+    message:
+        "{wildcards.robot}: compute workspace"
+    shell:
+        "er3a compute workspace {wildcards.robot} {input.parts} 2> {log}"
