@@ -1,8 +1,8 @@
 """The same arm under the other Denavit-Hartenberg convention.
 
 The two conventions cut the same product of elementary transforms at other places, so the rows shift by one and nothing
-is approximated: a standard row's ``Tx(a) Rx(alpha)`` is the next modified row's ``Rx(alpha) Tx(a)`` (they commute). What
-has no row left goes to the ends: behind joint 6 to the tool, before joint 1 to the base.
+is approximated: a standard row's ``Tx(a) Rx(alpha)`` is the next modified row's ``Rx(alpha) Tx(a)`` (they commute).
+What has no row left goes to the ends: behind joint 6 to the tool, before joint 1 to the base.
 
 Reference: J. J. Craig, *Introduction to Robotics*, 3rd ed., section 3.4 and its notes on the two conventions.
 """

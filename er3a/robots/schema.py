@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from er3a.inputs.yaml_file import StrictModel
 from er3a.robots.robot import Grade
@@ -34,9 +34,16 @@ class DhRow(StrictModel):
     d_mm: float
 
 
+def _sign(value: int) -> int:
+    # A Literal[1, -1] would let `true` pass, which equals 1.
+    if value not in (1, -1):
+        raise ValueError(f"{value} is no direction | Write 1 or -1")
+    return value
+
+
 class ZeroRow(StrictModel):
     joint: JointNumber
-    direction: Literal[1, -1]
+    direction: Annotated[int, AfterValidator(_sign), Field(json_schema_extra={"enum": [1, -1]})]
     offset_deg: float
 
 
@@ -139,7 +146,7 @@ class RobotFile(StrictModel):
             if max(abs(row.lower_deg), abs(row.upper_deg)) > 3600:
                 raise ValueError(f"limits.rows[{i}]: joint {row.joint} turns more than ten times | Check the value")
         widest = max(max(abs(row.lower_deg), abs(row.upper_deg)) for row in self.limits.rows)
-        if widest <= 2.01 * math.pi:
+        if 0 < widest <= 2.01 * math.pi:
             raise ValueError(
                 f"limits.rows: the widest limit is {widest:g} deg, which can only be radians | Convert them to degrees"
             )

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from er3a.viewing.palette import GRID, INK, JOINTS, MUTED
 
-_STYLE = {
+matplotlib.rcParams |= {
     "axes.edgecolor": MUTED,
     "axes.grid": True,
     "axes.labelcolor": INK,
@@ -38,10 +38,8 @@ _STYLE = {
 
 def new_figure(rows: int = 1, columns: int = 1, width: float = 9.0, height: float = 4.5, **subplots):
     """A figure in the house style and its axes (as ``Figure.subplots`` returns them); sizes in inches."""
-    with matplotlib.rc_context(_STYLE):
-        figure = Figure(figsize=(width, height))
-        axes = figure.subplots(rows, columns, **subplots)
-    return figure, axes
+    figure = Figure(figsize=(width, height))
+    return figure, figure.subplots(rows, columns, **subplots)
 
 
 def equal_scale(axes: Axes, x_label: str, y_label: str) -> None:
@@ -54,6 +52,5 @@ def equal_scale(axes: Axes, x_label: str, y_label: str) -> None:
 def svg_data_uri(figure: Figure) -> str:
     """The figure as a ``data:`` address of an SVG image (dense clouds rasterised at 160 dpi)."""
     buffer = io.BytesIO()
-    with matplotlib.rc_context(_STYLE):
-        figure.savefig(buffer, format="svg", dpi=160, metadata={"Date": None})
+    figure.savefig(buffer, format="svg", dpi=160, metadata={"Date": None})
     return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")

@@ -19,6 +19,7 @@ from er3a.viewing.figures import svg_data_uri
 _HERE = Path(__file__).parent
 _ROOT = _HERE.parents[1]
 SHOWN_VERSIONS = ("numpy", "scipy", "numba", "open3d-cpu", "rerun-sdk", "matplotlib")
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 VERDICT_WORDS = {
     "pass": "pass",
     "caution": "caution",
@@ -54,7 +55,7 @@ def number(value: float | int | None, digits: int = 4) -> str:
         return "0"
     if not 1e-4 <= abs(value) < 1e7:
         mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
-        return f"{mantissa}·10^{int(exponent)}".replace("-", "−")
+        return f"{mantissa}·10".replace("-", "−") + str(int(exponent)).translate(_SUPERSCRIPTS)
     text = f"{value:#.{digits}g}"
     if "e" in text:
         text = f"{float(text):.0f}"

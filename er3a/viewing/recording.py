@@ -8,9 +8,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-
-os.environ.setdefault("RERUN_ANALYTICS_ENABLED", "false")
-
 import rerun as rr
 import rerun.blueprint as rrb
 

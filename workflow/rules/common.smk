@@ -23,8 +23,8 @@ ROBOTS = list(STUDY.robots)
 
 # The tables that each stage writes beside its summary.json.
 TABLES = {
-    "validation": ["checks"],
-    "workspace": [],
+    "validation": ["checks", "axes", "key_poses", "section"],
+    "workspace": ["cells", "section", "curve", "cloud", "hull_vertices", "hull_triangles"],
     "inverse": ["solutions"],
     "trajectory": ["samples"],
 }

@@ -7,7 +7,7 @@ rule sample_workspace:
     input:
         inputs("workspace"),
     output:
-        temp("results/{robot}/workspace/parts/{scatteritem}.parquet"),
+        temp("results/{robot}/workspace/parts/{scatteritem}.npz"),
     log:
         "logs/{robot}/workspace.sample.{scatteritem}.log",
     benchmark:
@@ -26,7 +26,7 @@ rule sample_workspace:
 rule compute_workspace:
     input:
         files=inputs("workspace"),
-        parts=gather.blocks("results/{{robot}}/workspace/parts/{scatteritem}.parquet"),
+        parts=gather.blocks("results/{{robot}}/workspace/parts/{scatteritem}.npz"),
     output:
         summary="results/{robot}/workspace/summary.json",
         tables=tables("workspace"),

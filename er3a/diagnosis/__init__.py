@@ -1,0 +1,1 @@
+"""Which fault of a table explains its disagreement with the references."""

@@ -1,0 +1,199 @@
+"""Workspace: gather the samples' tally and work out hull, volumes and voids."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy import ndimage
+
+from er3a.kinematics.forward import forward, jacobian
+from er3a.results import Figure, write_summary, write_table
+from er3a.robots.robot import Robot
+from er3a.stages.workspace.grid import Grid, make_grid
+from er3a.stages.workspace.hull import Hull, cells_inside, convex_hull
+from er3a.stages.workspace.parts import gather
+from er3a.stages.workspace.random_joints import joint_vectors
+from er3a.stages.workspace.reach import reach_figures
+from er3a.stages.workspace.sample import sampled
+from er3a.stages.workspace.tally import UNTOUCHED, Tally, block_sizes
+from er3a.stages.workspace.verdict import judge
+from er3a.stages.workspace.voids import Voids, find_voids, shape_of, unseen_cells
+from er3a.study import Study
+
+COARSER = (1, 2, 4)
+SECTION_VOID_CELLS = 16
+UNLISTED = -1
+
+
+def compute(study: Study, name: str, folder: Path, parts: list[Path] | None = None) -> None:
+    """Write tables and ``summary.json`` of a robot's workspace into ``folder``.
+
+    Parameters
+    ----------
+    parts : part files that hold each block of the study once; None to sample here and now
+
+    Raises
+    ------
+    ResultError
+        naming the part file that is damaged, foreign or one too many
+    InputError
+        if the grid does not fit into memory
+    """
+    robot, settings = study.robot(name), study.workspace
+    grid = make_grid(robot, settings.cells_across)
+    if parts is None:
+        tally = sampled(study, robot, grid, range(settings.blocks))
+    else:
+        tally = gather([Path(part) for part in parts], study, robot)
+    q_extreme = joint_vectors(robot, study.seed, tally.extremes.block, tally.extremes.sample)
+    hull = convex_hull(forward(robot, q_extreme)[:, :3, 3])
+    inside = cells_inside(hull, grid)
+    voids = find_voids(tally.counts, inside)
+    q_cloud = _cloud_joints(study, robot)
+
+    write_table(folder / "cells.parquet", _cells(tally, inside, voids))
+    write_table(folder / "section.parquet", _section(tally, grid))
+    write_table(folder / "curve.parquet", _curve(study, tally, grid))
+    write_table(folder / "cloud.parquet", _cloud(robot, q_cloud))
+    _write_hull(folder, hull, q_extreme)
+
+    cells = {"touched": int((tally.counts > 0).sum()), "inside_hull": int(inside.sum())}
+    cells["touched_inside_hull"] = int(((tally.counts > 0) & inside).sum())
+    unseen = unseen_cells(tally.counts)
+    shoulder = _shoulder(robot, grid)
+    records = _void_records(voids, grid, shoulder)
+    reach = reach_figures(robot, grid, np.concatenate([q_extreme, q_cloud]))
+    filled = cells["touched_inside_hull"] / cells["inside_hull"] if cells["inside_hull"] else None
+    enclosed = sum(record["volume_m3"]["untouched"] for record in records if record["kind"] == "enclosed")
+    volume = {"touched": cells["touched"] * grid.cell_volume}
+    volume["touched_in_hull"] = cells["touched_inside_hull"] * grid.cell_volume
+    figures = [
+        Figure("samples", settings.samples, ""),
+        Figure("cell size", grid.cell * 1000, "mm"),
+        Figure("convex hull", hull.volume, "m³"),
+        Figure("touched within the hull", volume["touched_in_hull"], "m³"),
+        Figure("share of the hull touched", None if filled is None else 100 * filled, "%"),
+        Figure("enclosed voids", enclosed * 1000, "L"),
+        Figure("greatest reach from axis 1", reach["furthest_from_axis"] * 1000, "mm"),
+        Figure("least distance from axis 1", reach["nearest_to_axis"] * 1000, "mm"),
+    ]
+    write_summary(
+        folder,
+        study,
+        name,
+        "workspace",
+        judge(hull, records, cells, unseen),
+        figures,
+        samples=settings.samples,
+        volume_m3=volume,
+        hull={
+            "volume_m3": hull.volume,
+            "area_m2": hull.area,
+            "directions": settings.hull_directions,
+            "vertices": len(hull.vertices),
+            "touched_share": filled,
+        },
+        reach_m=reach,
+        grid={"origin_m": grid.origin.tolist(), "cell_m": grid.cell, "shape": list(grid.shape)},
+        axis={"point_m": grid.axis_point.tolist(), "direction": grid.axis.tolist(), "shoulder_m": shoulder.tolist()},
+        section_cell_m=grid.section_cell,
+        cells={**cells, "unseen_estimate": unseen},
+        voids=records,
+        specks={"count": voids.specks, "volume_m3": voids.speck_cells * grid.cell_volume},
+        skin_m3=voids.skin_cells * grid.cell_volume,
+    )
+
+
+def _cloud_joints(study: Study, robot: Robot) -> np.ndarray:
+    """The first samples of each block, drawn again: (n, 6)."""
+    settings = study.workspace
+    wanted = block_sizes(min(settings.cloud_points, settings.samples), settings.blocks)
+    blocks = np.repeat(np.arange(settings.blocks), wanted)
+    samples = np.concatenate([np.arange(count) for count in wanted])
+    return joint_vectors(robot, study.seed, blocks, samples)
+
+
+def _cloud(robot: Robot, q: np.ndarray) -> pd.DataFrame:
+    points = forward(robot, q)[:, :3, 3]
+    table = pd.DataFrame(points, columns=["x_m", "y_m", "z_m"])
+    return table.assign(manipulability_m3=np.abs(np.linalg.det(jacobian(robot, q))))
+
+
+def _cells(tally: Tally, inside: np.ndarray, voids: Voids) -> pd.DataFrame:
+    """Touched cells, and untouched ones in the hull with the number of their void (from 1; -1: speck or skin)."""
+    number = np.where(inside & (tally.counts == 0), UNLISTED, 0)
+    for n, void in enumerate(voids.listed, start=1):
+        number[tuple(void.cells.T)] = n
+    shown = (tally.counts > 0) | (number != 0)
+    table = pd.DataFrame(np.argwhere(shown).astype(np.int16), columns=["ix", "iy", "iz"])
+    first = tally.first_block[shown]
+    return table.assign(
+        samples=tally.counts[shown],
+        first_block=np.where(first == UNTOUCHED, -1, first),
+        void=number[shown].astype(np.int32),
+    )
+
+
+def _section(tally: Tally, grid: Grid) -> pd.DataFrame:
+    """Cells of the side section that were touched, or are cut off by touched ones (the axis counts as a wall)."""
+    padded = np.pad(tally.section == 0, ((0, 1), (1, 1)), constant_values=True)
+    labels, _ = ndimage.label(padded)
+    sizes = np.bincount(labels.ravel())
+    is_void = (sizes >= SECTION_VOID_CELLS) & (np.arange(len(sizes)) != labels[-1, 0])
+    is_void[0] = False
+    void = is_void[labels][:-1, 1:-1]
+    shown = (tally.section > 0) | void
+    index = np.argwhere(shown)
+    rho, z = (grid.section_origin + (index + 0.5) * grid.section_cell).T
+    return pd.DataFrame({"rho_m": rho, "z_m": z, "samples": tally.section[shown], "void": void[shown]})
+
+
+def _curve(study: Study, tally: Tally, grid: Grid) -> pd.DataFrame:
+    """Touched volume after each block, at several cell sizes."""
+    drawn = np.cumsum(block_sizes(study.workspace.samples, study.workspace.blocks))
+    tables = []
+    for factor in COARSER:
+        first = tally.first_block
+        padding = [(0, -size % factor) for size in first.shape]
+        first = np.pad(first, padding, constant_values=UNTOUCHED)
+        nx, ny, nz = (size // factor for size in first.shape)
+        first = first.reshape(nx, factor, ny, factor, nz, factor).min(axis=(1, 3, 5))
+        cells = np.cumsum(np.bincount(first[first != UNTOUCHED], minlength=len(drawn)))
+        cell = grid.cell * factor
+        tables.append(pd.DataFrame({"cell_mm": cell * 1000, "samples": drawn, "touched_m3": cells * cell**3}))
+    return pd.concat(tables, ignore_index=True)
+
+
+def _write_hull(folder: Path, hull: Hull, q_extreme: np.ndarray) -> None:
+    """Vertices with the joint angles that reach them, and triangles as row numbers of the vertices."""
+    vertices = pd.DataFrame(hull.vertices, columns=["x_m", "y_m", "z_m"])
+    for k, angles in enumerate(np.degrees(q_extreme[hull.of]).T, start=1):
+        vertices[f"q{k}_deg"] = angles
+    write_table(folder / "hull_vertices.parquet", vertices)
+    write_table(folder / "hull_triangles.parquet", pd.DataFrame(hull.triangles, columns=["a", "b", "c"]))
+
+
+def _shoulder(robot: Robot, grid: Grid) -> np.ndarray:
+    """The point of axis 1 at the height of joint 2: (3,), m."""
+    joint_2 = forward(robot, np.zeros(6), frame=1)[:3, 3]
+    return grid.axis_point + ((joint_2 - grid.axis_point) @ grid.axis) * grid.axis
+
+
+def _void_records(voids: Voids, grid: Grid, shoulder: np.ndarray) -> list[dict[str, Any]]:
+    cell_of_shoulder = np.floor((shoulder - grid.origin) / grid.cell)
+    return [
+        {
+            "kind": void.kind,
+            "status": void.status,
+            "volume_m3": {"untouched": len(void.cells) * grid.cell_volume},
+            **shape_of(void, grid),
+            "cells": len(void.cells),
+            "expected_samples": void.expected_samples,
+            "unseen_cells": void.unseen_cells,
+            "holds_shoulder": bool(np.any(np.all(np.abs(void.cells - cell_of_shoulder) <= 1, axis=1))),
+        }
+        for void in voids.listed
+    ]

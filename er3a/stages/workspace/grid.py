@@ -1,0 +1,147 @@
+"""The voxel grid: cubic cells over a box that the tool point can't leave, whatever the joint angles."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+
+from er3a.errors import InputError
+from er3a.kinematics.chain import JOINTS, constant_links
+from er3a.robots.robot import Robot
+
+BYTES_PER_CELL = 64
+"""Peak over sampling and gathering: counts, first blocks, masks, labels and their copies."""
+SECTION_REFINEMENT = 4
+_MARGIN = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Cells in the base frame, and finer ones in the side section about axis 1.
+
+    Attributes
+    ----------
+    origin : (3,), m, lowest corner; cell : m, edge of the cubic cells; shape : cells along x, y, z
+    axis_point, axis : (3,), m and unit vector, the line of joint 1; the section's height z is measured from the point
+    section_origin : (2,), m, lowest (rho, z); section_cell : m; section_shape : cells along rho and z
+    """
+
+    origin: np.ndarray
+    cell: float
+    shape: tuple[int, int, int]
+    axis_point: np.ndarray
+    axis: np.ndarray
+    section_origin: np.ndarray
+    section_cell: float
+    section_shape: tuple[int, int]
+
+    @property
+    def cell_volume(self) -> float:
+        """Volume of a cell, m^3."""
+        return self.cell**3
+
+    def centres(self, indices: np.ndarray) -> np.ndarray:
+        """Centres (N, 3) in m of the cells with indices (N, 3)."""
+        return self.origin + (np.asarray(indices) + 0.5) * self.cell
+
+
+@dataclass(frozen=True, eq=False)
+class Bound:
+    """A ball that joint 1 sweeps around its axis; the tool point never leaves the swept solid.
+
+    Attributes
+    ----------
+    axis_point, axis : (3,), the line of joint 1; height, offset : m, the ball's centre above the point and off the axis
+    radius : m, of the ball
+    """
+
+    axis_point: np.ndarray
+    axis: np.ndarray
+    height: float
+    offset: float
+    radius: float
+
+    @property
+    def reach(self) -> float:
+        """No tool point is further (m) from axis 1."""
+        return self.offset + self.radius
+
+
+def tool_bound(robot: Robot) -> Bound:
+    """Bound the tool point by lengths alone.
+
+    The tool point is a chain of constant steps joined by rotations about z. The part of a step along its joint's z axis
+    does not turn with that joint, so it may be added to the step before; this is done where it shortens the sum of
+    lengths (forearm and elbow offset become one lever). Joint 2 onwards then give a ball by the triangle inequality.
+    """
+    links = constant_links(robot)
+    steps = links[:, :3, 3].copy()
+    for k in range(JOINTS, 1, -1):
+        moved = steps[k - 1] + links[k - 1, :3, 2] * steps[k, 2]
+        kept_length = np.linalg.norm(steps[k - 1]) + np.linalg.norm(steps[k])
+        if np.linalg.norm(moved) + np.linalg.norm(steps[k, :2]) < kept_length:
+            steps[k - 1], steps[k, 2] = moved, 0.0
+    return Bound(
+        axis_point=steps[0],
+        axis=links[0, :3, 2],
+        height=float(steps[1, 2]),
+        offset=float(np.linalg.norm(steps[1, :2])),
+        radius=float(np.linalg.norm(steps[2:], axis=1).sum()),
+    )
+
+
+def make_grid(robot: Robot, cells_across: int) -> Grid:
+    """A grid with ``cells_across`` cells along the longest side of the tool point's bounding box.
+
+    Raises
+    ------
+    InputError
+        if the grid would not fit into half of this machine's memory; the message says how fine is possible
+    """
+    bound = tool_bound(robot)
+    reach = max(bound.radius, 1e-6)
+    half = (bound.offset * np.sqrt(np.maximum(0.0, 1 - bound.axis**2)) + reach) * (1 + _MARGIN)
+    centre = bound.axis_point + bound.height * bound.axis
+    _check_memory(half, cells_across)
+    cell, shape = float(2 * half.max() / cells_across), _shape(half, cells_across)
+    fine = cell / SECTION_REFINEMENT
+    section = ((bound.offset + reach) * (1 + _MARGIN), 2 * reach * (1 + _MARGIN))
+    return Grid(
+        origin=centre - shape * cell / 2,
+        cell=cell,
+        shape=tuple(int(n) for n in shape),
+        axis_point=bound.axis_point,
+        axis=bound.axis,
+        section_origin=np.array([0.0, bound.height - section[1] / 2]),
+        section_cell=fine,
+        section_shape=(int(np.ceil(section[0] / fine)), int(np.ceil(section[1] / fine))),
+    )
+
+
+def memory_budget() -> int:
+    """Bytes that a grid may take: half of the machine's memory."""
+    return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2
+
+
+def _shape(half: np.ndarray, cells_across: int) -> np.ndarray:
+    """Cells along each side of a box with the given half sides."""
+    cells = np.ceil(cells_across * half / half.max() * (1 - _MARGIN / 10))
+    return np.minimum(cells, cells_across).astype(np.int64)
+
+
+def _check_memory(half: np.ndarray, cells_across: int) -> None:
+    budget = memory_budget()
+    needed = int(_shape(half, cells_across).prod()) * BYTES_PER_CELL
+    if needed <= budget:
+        return
+    possible = int(cells_across * (budget / needed) ** (1 / 3)) + 1
+    while int(_shape(half, possible).prod()) * BYTES_PER_CELL > budget:
+        possible -= 1
+    raise InputError(
+        None,
+        "workspace.cells_across",
+        f"{cells_across} cells across need {needed / 2**30:.1f} GiB, this machine can spare {budget / 2**30:.1f} GiB",
+        f"Write {possible} or less",
+    )

@@ -1,0 +1,67 @@
+"""What the voids say about the model, in one sentence."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from er3a.results import Verdict
+from er3a.stages.workspace.hull import Hull
+from er3a.stages.workspace.voids import UNSEEN_SHARE
+
+
+def judge(hull: Hull, voids: list[dict[str, Any]], cells: dict[str, int], unseen: float) -> Verdict:
+    """The stage's verdict.
+
+    An enclosed void about the shoulder is what every arm leaves that can't fold onto itself. Any other one is a hole
+    where none is expected, which points to a wrong limit or direction of joints 2 or 3.
+
+    Parameters
+    ----------
+    voids : the summary's records; cells : numbers of cells; unseen : cells that more samples would touch
+    """
+    if hull.volume == 0:
+        text = "The tool point moves on a plane, a line or not at all, so there is no volume to speak of."
+        return Verdict("caution", "workspace.flat", text)
+    if unseen > UNSEEN_SHARE * cells["touched"]:
+        share = 100 * unseen / (unseen + cells["touched"])
+        text = (
+            f"Too few samples for cells this small: about {share:.0f} % of the reachable cells were not touched yet, "
+            "so nothing can be said about voids."
+        )
+        return Verdict("caution", "workspace.undersampled", text, {"unseen_percent": share})
+    enclosed = [void for void in voids if void["kind"] == "enclosed"]
+    elsewhere = [void for void in enclosed if not void["holds_shoulder"]]
+    astray = [void for void in elsewhere if void["status"] == "sampled"]
+    if astray:
+        return _about(
+            astray[0],
+            "caution",
+            "workspace.void_unexpected",
+            "An enclosed void of {litres:.3g} L lies at ({x}, {y}, {z}) mm, away from the shoulder: check the limits, "
+            "the zero and the direction of joints 2 and 3.",
+        )
+    if elsewhere:
+        return _about(
+            elsewhere[0],
+            "caution",
+            "workspace.void_uncertain",
+            "An enclosed void of {litres:.3g} L may lie at ({x}, {y}, {z}) mm, away from the shoulder; the samples "
+            "around it are too thin to tell. Draw more of them.",
+        )
+    if enclosed:
+        return _about(
+            enclosed[0],
+            "pass",
+            "workspace.void_at_shoulder",
+            "An enclosed void of {litres:.3g} L surrounds the arm's own shoulder, where it can't fold to; none "
+            "elsewhere points to a wrong joint range.",
+        )
+    return Verdict("pass", "workspace.no_void", "The samples leave no enclosed void inside the hull.")
+
+
+def _about(void: dict[str, Any], status: str, code: str, text: str) -> Verdict:
+    litres = 1000 * void["volume_m3"]["untouched"]
+    x, y, z = (1000 * value for value in void["centroid_m"])
+    shown = {key: str(round(value)).replace("-", "−") for key, value in (("x", x), ("y", y), ("z", z))}
+    params = {"litres": litres, "x_mm": x, "y_mm": y, "z_mm": z}
+    return Verdict(status, code, text.format(litres=litres, **shown), params)

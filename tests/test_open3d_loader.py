@@ -1,0 +1,27 @@
+"""Open3D loads without a system package, and through one module only."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+import er3a
+from er3a.open3d_loader import load_open3d
+
+
+def test_open3d_has_the_geometry_we_use():
+    open3d = load_open3d()
+    assert open3d.geometry.TriangleMesh.create_box().get_volume() == pytest.approx(1.0)
+    assert load_open3d() is open3d
+
+
+def test_no_other_module_imports_open3d():
+    package = Path(er3a.__file__).parent
+    importing = [
+        path.relative_to(package).as_posix()
+        for path in package.rglob("*.py")
+        if re.search(r"^\s*(import|from) open3d\b", path.read_text(encoding="utf-8"), re.MULTILINE)
+    ]
+    assert importing == ["open3d_loader.py"]
