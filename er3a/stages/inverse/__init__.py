@@ -1,0 +1,1 @@
+"""Which joint solutions reach a pose, and which to take?"""

@@ -1,0 +1,106 @@
+"""What would help a target that has no solution within the limits: a search over neighbouring poses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from er3a.kinematics.inverse import nearest_turns, within
+from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.robots.robot import Robot
+
+DIRECTIONS = 400
+TURN_STEPS = 90
+HALVINGS = 12
+RANDOM_ORIENTATIONS = 4000
+COARSE_GRID, FINE_GRID, REFINEMENTS = 25, 9, 5
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbours:
+    """Poses near a refused one that have a solution within the limits.
+
+    The least turn is searched about ``DIRECTIONS`` evenly spread axes, the least shift over a grid that spans the arm
+    and is refined around its best point, so both are upper bounds.
+
+    Attributes
+    ----------
+    orientation_share : share of 4000 random tool orientations at the target's position that have a solution
+    least_turn : rad, least rotation of the tool found that has one, position kept; None if none has
+    least_shift : m, least shift of the tool found that has one, orientation kept; None if none has
+    shifted_to : (3,), m, where that shift ends; None if none has
+    """
+
+    orientation_share: float
+    least_turn: float | None
+    least_shift: float | None
+    shifted_to: np.ndarray | None
+
+
+def solvable(robot: Robot, T: np.ndarray) -> np.ndarray:
+    """Whether poses (N, 4, 4) have a solution within the limits, (N,)."""
+    zeros = np.zeros((len(T), 6))
+    q, _, _ = solve_slots(robot, T, zeros)
+    return within(robot, nearest_turns(robot, q, zeros[:, None])).any(axis=1)
+
+
+def neighbours(robot: Robot, T: np.ndarray, random: np.random.Generator) -> Neighbours:
+    """Search around a pose (4, 4) of the tool."""
+    turned = np.tile(T, (RANDOM_ORIENTATIONS, 1, 1))
+    turned[:, :3, :3] = Rotation.random(RANDOM_ORIENTATIONS, rng=random).as_matrix()
+    shifted_to = _nearest_position(robot, T)
+    return Neighbours(
+        orientation_share=float(solvable(robot, turned).mean()),
+        least_turn=_least_turn(robot, T),
+        least_shift=None if shifted_to is None else float(np.linalg.norm(shifted_to - T[:3, 3])),
+        shifted_to=shifted_to,
+    )
+
+
+def _least_turn(robot: Robot, T: np.ndarray) -> float | None:
+    axes, angles = _even_directions(DIRECTIONS), np.linspace(0, np.pi, TURN_STEPS + 1)[1:]
+
+    def turned_ok(about: np.ndarray, by: np.ndarray) -> np.ndarray:
+        poses = np.tile(T, (len(about), 1, 1))
+        poses[:, :3, :3] = Rotation.from_rotvec(about * by[:, None]).as_matrix() @ T[:3, :3]
+        return solvable(robot, poses)
+
+    found = turned_ok(np.repeat(axes, TURN_STEPS, axis=0), np.tile(angles, DIRECTIONS)).reshape(DIRECTIONS, TURN_STEPS)
+    if not found.any():
+        return None
+    first = np.where(found.any(axis=1), found.argmax(axis=1), TURN_STEPS)
+    about = axes[first == first.min()]
+    high = np.full(len(about), angles[first.min()])
+    low = high - angles[0]
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        ok = turned_ok(about, middle)
+        low, high = np.where(ok, low, middle), np.where(ok, middle, high)
+    return float(high.min())
+
+
+def _nearest_position(robot: Robot, T: np.ndarray) -> np.ndarray | None:
+    """Position (3,) nearest to that of T which has a solution with its orientation, on a grid refined step by step."""
+    half = np.abs(robot.a).sum() + np.abs(robot.d).sum() + np.linalg.norm(robot.tool[:3, 3])
+    centre, count = robot.base[:3, 3], COARSE_GRID
+    for _ in range(1 + REFINEMENTS):
+        ticks = np.linspace(-half, half, count)
+        points = centre + np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 3)
+        poses = np.tile(T, (len(points), 1, 1))
+        poses[:, :3, 3] = points
+        points = points[solvable(robot, poses)]
+        if not len(points):
+            return None
+        centre = points[np.linalg.norm(points - T[:3, 3], axis=1).argmin()]
+        half, count = ticks[1] - ticks[0], FINE_GRID
+    return centre
+
+
+def _even_directions(count: int) -> np.ndarray:
+    """Unit vectors (count, 3) on a Fibonacci lattice."""
+    z = 1 - (2 * np.arange(count) + 1) / count
+    around = np.arange(count) * np.pi * (3 - np.sqrt(5))
+    radius = np.sqrt(1 - z**2)
+    return np.stack([radius * np.cos(around), radius * np.sin(around), z], axis=1)

@@ -1,0 +1,114 @@
+"""The recording of the inverse stage: one second for each target, every branch an arm of its own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import rerun as rr
+import rerun.blueprint as rrb
+from scipy.spatial.transform import Rotation
+
+from er3a.results import read_summary, read_table
+from er3a.robots.robot import Robot
+from er3a.stages.inverse.columns import JOINT_COLUMNS
+from er3a.stages.inverse.shape_colours import SHAPE_COLOURS
+from er3a.study import Study
+from er3a.viewing.arm import arm_view, log_arm, send_motion, size_of, skeleton
+from er3a.viewing.palette import HIGHLIGHT, MUTED, rgb
+from er3a.viewing.recording import TIMELINE, recording
+
+NOTE = """# Ways to reach each target
+
+Drag the time line: **one second for each target**.
+
+- **Solid arm**: the solution taken; where none is, the arm where it comes from.
+- **Translucent arms**: the other branches within the limits, coloured as on the page.
+- **Thin grey arms**: branches that leave a joint limit.
+- **Pink ball with axes**: the target's frame.
+
+Look first at how differently the arm can stand for one and the same tool pose. Each branch is an entity
+`/targets/<name>/branch_<number>` and can be switched off in the entity tree. A flip and a no-flip branch lie on one
+another.
+"""
+
+
+def record(study: Study, name: str, folder: Path, output: Path) -> None:
+    """Write the recording of a robot of the study from its results."""
+    robot = study.robot(name)
+    summary = read_summary(folder)
+    solutions = read_table(folder / "solutions.parquet")
+    note = rrb.Vertical(
+        rrb.TextDocumentView(origin="/about_target", name="This target"),
+        rrb.TextDocumentView(origin="/note", name="What to look at"),
+    )
+    view = arm_view(robot, "Solutions", ["+ /arm/**", "+ /targets/**"], reach=_sight(robot, summary["targets"]))
+    with recording(output, name, "inverse", view, note) as stream:
+        stream.log("note", rr.TextDocument(NOTE, media_type=rr.MediaType.MARKDOWN), static=True)
+        targets = summary["targets"]
+        stands = np.radians([target["chosen_deg"] or target["q_ref_deg"] for target in targets])
+        log_arm(stream, robot, stands[0])
+        send_motion(stream, robot, np.arange(len(targets)), stands)
+        for second, target in enumerate(targets):
+            stream.set_time(TIMELINE, duration=float(second))
+            if second:
+                stream.log(f"targets/{targets[second - 1]['name']}", rr.Clear(recursive=True))
+            rows = solutions[(solutions["target"] == target["name"]) & solutions["first_of_branch"].astype(bool)]
+            _log_target(stream, robot, target, rows)
+
+
+def _sight(robot: Robot, targets: list[dict[str, Any]]) -> float:
+    """Radius (m) that shows the arm and the targets, unless they are so far that the arm would vanish."""
+    points = np.array([target["xyz_mm"] for target in targets]) / 1000
+    farthest = np.linalg.norm(points - robot.base[:3, 3], axis=1).max()
+    return float(np.clip(1.4 * farthest, size_of(robot), 2.5 * size_of(robot)))
+
+
+def _log_target(stream: rr.RecordingStream, robot: Robot, target: dict[str, Any], branches: pd.DataFrame) -> None:
+    root, size = f"targets/{target['name']}", size_of(robot)
+    position = np.array(target["xyz_mm"]) / 1000
+    w, x, y, z = target["quaternion_wxyz"]
+    frame = rr.Transform3D(translation=position, quaternion=[x, y, z, w])
+    stream.log(f"{root}/frame", frame, rr.TransformAxes3D(0.12 * size))
+    ball = rr.Points3D([position], radii=0.012 * size, colors=rgb(HIGHLIGHT), labels=target["name"], show_labels=True)
+    stream.log(f"{root}/point", ball)
+    stream.log("about_target", rr.TextDocument(_about(target, branches), media_type=rr.MediaType.MARKDOWN))
+    for _, branch in branches.iterrows():
+        points = skeleton(robot, np.radians(branch[JOINT_COLUMNS].astype(float).to_numpy()))
+        entity = f"{root}/branch_{branch['branch']}"
+        if not branch["within_limits"]:
+            stream.log(entity, rr.LineStrips3D([points], radii=0.003 * size, colors=rgb(MUTED)))
+        elif branch["rank"] != 1:
+            stream.log(entity, _ghost(points, 0.014 * size, SHAPE_COLOURS[branch["branch"] // 2]))
+
+
+def _ghost(points: np.ndarray, radius: float, colour: str) -> rr.Capsules3D:
+    vectors = np.diff(points, axis=0)
+    lengths = np.linalg.norm(vectors, axis=1)
+    up = np.array([[0.0, 0.0, 1.0]])
+    turns = [Rotation.align_vectors([vector], up)[0].as_quat() for vector in vectors / lengths[:, None]]
+    return rr.Capsules3D(
+        lengths=lengths,
+        radii=np.full(len(lengths), radius),
+        translations=points[:-1],
+        quaternions=turns,
+        colors=[(*rgb(colour), 150)] * len(lengths),
+        fill_mode="transparentfillmajorwireframe",
+    )
+
+
+def _about(target: dict[str, Any], branches: pd.DataFrame) -> str:
+    lines = [f"# {target['name']}", target["note"] or ""]
+    verdict = "Taken" if target["chosen_deg"] is not None else "None taken"
+    lines.append(f"**{verdict}:** {target['reason']}.")
+    lines += target["advice"]
+    if len(branches):
+        rows = [
+            f"| {row['branch']} | {row['label']} | "
+            f"{'taken' if row['rank'] == 1 else 'within limits' if row['within_limits'] else row['beyond']} |"
+            for _, row in branches.sort_values("branch").iterrows()
+        ]
+        lines.append("\n".join(["| no. | branch | outcome (deg) |", "|---|---|---|", *rows]))
+    return "\n\n".join(line for line in lines if line)

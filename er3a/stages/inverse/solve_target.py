@@ -1,0 +1,190 @@
+"""One target: all its solutions as a table, and the entry that the summary holds of it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy.spatial.transform import Rotation
+
+from er3a.kinematics.closed_form import ORIENTATION
+from er3a.kinematics.forward import forward
+from er3a.kinematics.inverse import LIMIT_TOLERANCE, Solutions, branch_labels, inverse
+from er3a.kinematics.selection import Choice, limit_margin, nearest
+from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
+from er3a.kinematics.transforms import rotation_angle, rpy_of
+from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.robots.robot import Robot
+from er3a.stages.inverse.advice import Neighbours, neighbours
+from er3a.stages.inverse.columns import COLUMNS, JOINT_COLUMNS, TURN_COLUMNS
+from er3a.targets import Target
+
+SINGULAR = 1e-6
+LITTLE_MARGIN_DEG = 2.0
+
+
+def solve_target(robot: Robot, target: Target, random: np.random.Generator) -> tuple[dict[str, Any], pd.DataFrame]:
+    """Solve, choose, explain.
+
+    Returns
+    -------
+    entry : plain data for the summary
+    table : one row per solution, turns included
+    """
+    T, q_ref = target.pose(robot), target.reference()
+    solutions = inverse(robot, T, q_ref)
+    choice = nearest(robot, solutions, q_ref)
+    table = _table(robot, target, T, solutions, choice)
+    entry = refused_target(robot, target, choice.reason)
+    entry["solutions"] = int(table["branch"].nunique())
+    entry["within_limits"] = int(table.loc[table["within_limits"], "branch"].nunique())
+    entry["rows_within_limits"] = int(table["within_limits"].sum())
+    entry["unsolved"] = list(solutions.unsolved)
+    if choice.chosen is None:
+        missing = _missing(robot, T, q_ref) if not len(solutions.q) else None
+        entry["neighbours"] = _plain(near := neighbours(robot, T, random))
+        entry["short_reason"] = _short_reason(entry["solutions"], missing)
+        entry["advice"] = _what_would_help(near)
+        return entry, table
+    row = table.iloc[choice.chosen]
+    entry["chosen_deg"] = row[JOINT_COLUMNS].astype(float).tolist()
+    entry["chosen_branch"] = int(row["branch"])
+    entry["short_reason"] = "nearest" if choice.runner_up is not None else "the only one"
+    entry["advice"] = _what_to_know(row)
+    return entry, table
+
+
+def refused_target(robot: Robot, target: Target, reason: str) -> dict[str, Any]:
+    """The summary's entry of a target for which nothing was found."""
+    T = target.pose(robot)
+    return {
+        "name": target.name,
+        "note": target.note,
+        "xyz_mm": (T[:3, 3] * 1000).tolist(),
+        "rpy_deg": np.degrees(rpy_of(T)).tolist(),
+        "quaternion_wxyz": Rotation.from_matrix(T[:3, :3]).as_quat(canonical=True, scalar_first=True).tolist(),
+        "q_ref_deg": list(target.q_ref_deg),
+        "solutions": 0,
+        "within_limits": 0,
+        "rows_within_limits": 0,
+        "chosen_deg": None,
+        "chosen_branch": None,
+        "short_reason": "not solved",
+        "reason": reason,
+        "unsolved": [],
+        "neighbours": None,
+        "advice": [],
+    }
+
+
+def _table(robot: Robot, target: Target, T: np.ndarray, solutions: Solutions, choice: Choice) -> pd.DataFrame:
+    q, count = solutions.q, len(solutions.q)
+    back = forward(robot, q)
+    labels = np.array(branch_labels(robot), dtype=object)
+    factors = determinant_factors(robot, q)
+    singular = [" ".join(kind for kind in TYPES if abs(getattr(factors, kind)[row]) < SINGULAR) for row in range(count)]
+    rank = np.zeros(count, dtype=int)
+    rank[choice.order] = np.arange(1, len(choice.order) + 1)
+    table = pd.DataFrame(
+        {
+            "target": target.name,
+            "branch": solutions.branch,
+            "label": labels[solutions.branch],
+            **dict(zip(JOINT_COLUMNS, np.degrees(q).T + 0.0)),
+            **dict(zip(TURN_COLUMNS, solutions.turn.reshape(-1, 6).T)),
+            "within_limits": solutions.within_limits,
+            "reason": list(solutions.reason),
+            "beyond": [_beyond(robot, row) for row in q],
+            "rank": rank,
+            "first_of_branch": _first_of_branch(solutions.branch, rank),
+            "position_residual_mm": np.linalg.norm(back[:, :3, 3] - T[:3, 3], axis=1) * 1000,
+            "orientation_residual_deg": np.degrees(rotation_angle(back[:, :3, :3], np.tile(T[:3, :3], (count, 1, 1)))),
+            "manipulability": conditioning(robot, q, characteristic_length(robot)).manipulability,
+            "singular": singular,
+            "limit_margin_deg": np.degrees(limit_margin(robot, q)),
+            "greatest_move_deg": np.degrees(choice.greatest_move),
+            "distance_deg": np.degrees(choice.distance),
+        }
+    )
+    return table[COLUMNS].astype(dict.fromkeys(("target", "label", "reason", "beyond", "singular"), object))
+
+
+def _beyond(robot: Robot, q: np.ndarray) -> str:
+    above, below = np.degrees(q - robot.upper), np.degrees(robot.lower - q)
+    out = np.flatnonzero(np.maximum(above, below) > np.degrees(LIMIT_TOLERANCE))
+    return ", ".join(
+        f"J{j + 1} {above[j]:.1f} above" if above[j] > below[j] else f"J{j + 1} {below[j]:.1f} below" for j in out
+    )
+
+
+def _first_of_branch(branch: np.ndarray, rank: np.ndarray) -> np.ndarray:
+    order = np.lexsort((np.arange(len(rank)), rank == 0, rank))
+    first = np.zeros(len(rank), dtype=bool)
+    seen: set[int] = set()
+    for row in order:
+        if branch[row] not in seen:
+            seen.add(branch[row])
+            first[row] = True
+    return first
+
+
+def _missing(robot: Robot, T: np.ndarray, q_ref: np.ndarray) -> tuple[float, bool]:
+    """By how much the pose is missed (m, or rad if True): the least over the branches."""
+    _, fault, gap = (batch[0] for batch in solve_slots(robot, T[None], q_ref[None]))
+    least = int(gap.argmin())
+    return float(gap[least]), bool(fault[least] == ORIENTATION)
+
+
+def _short_reason(solutions: int, missing: tuple[float, bool] | None) -> str:
+    if missing is None:
+        return f"all {solutions} solutions leave the limits"
+    amount, is_angle = missing
+    if is_angle:
+        return f"{np.degrees(amount):.3g} deg of wrist missing"
+    return f"{amount * 1000:.0f} mm out of reach" if amount >= 0.01 else f"{amount * 1000:.2g} mm out of reach"
+
+
+def _what_would_help(near: Neighbours) -> list[str]:
+    texts = []
+    if near.least_turn is not None:
+        texts.append(
+            f"Turn the tool: {100 * near.orientation_share:.2g} % of random orientations at this position have a "
+            f"solution within the limits, the nearest one found {np.degrees(near.least_turn):.1f} deg away."
+        )
+    else:
+        texts.append("Turning the tool does not help: no orientation tried at this position has a solution.")
+    if near.least_shift is not None:
+        x, y, z = near.shifted_to * 1000
+        texts.append(
+            f"Move the part or the base: with the tool's orientation kept, a shift of {near.least_shift * 1000:.0f} mm "
+            f"to ({x:.0f}, {y:.0f}, {z:.0f}) mm is enough."
+        )
+    else:
+        texts.append("Moving the part alone does not help: no position tried has a solution with this orientation.")
+    return texts
+
+
+def _what_to_know(row: pd.Series) -> list[str]:
+    texts = []
+    if "wrist" in row["singular"]:
+        texts.append(
+            "Wrist singularity: axes 4 and 6 lie in one line, so J4 and J6 can be traded against one another without "
+            "end; J4 stays where the reference has it. Leave this pose by a joint move, not along a straight line."
+        )
+    if "elbow" in row["singular"]:
+        texts.append("Elbow singularity: the arm is stretched or folded; it can't move further along itself.")
+    if "shoulder" in row["singular"]:
+        texts.append("Shoulder singularity: the wrist centre is on axis 1, so J1 is free; it stays at the reference.")
+    if row["limit_margin_deg"] < LITTLE_MARGIN_DEG:
+        texts.append(f"Little room: one joint is {row['limit_margin_deg']:.2g} deg from its limit.")
+    return texts
+
+
+def _plain(near: Neighbours) -> dict[str, Any]:
+    return {
+        "orientation_share": near.orientation_share,
+        "least_turn_deg": None if near.least_turn is None else float(np.degrees(near.least_turn)),
+        "least_shift_mm": None if near.least_shift is None else near.least_shift * 1000,
+        "shifted_to_mm": None if near.shifted_to is None else (near.shifted_to * 1000).tolist(),
+    }

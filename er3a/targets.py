@@ -1,0 +1,184 @@
+"""Target files: the poses that the inverse-kinematics study asks for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, field_validator, model_validator
+from scipy.spatial.transform import Rotation
+
+from er3a.inputs.units import check_degrees, check_millimetres
+from er3a.inputs.yaml_file import StrictModel, load
+from er3a.kinematics.forward import forward
+from er3a.kinematics.transforms import ORTHONORMAL_TOLERANCE, transform
+from er3a.robots.robot import Robot
+from er3a.robots.schema import Name, Triple
+
+MOST_TARGETS = 50
+UNIT_LENGTH_TOLERANCE = 1e-6
+ORIENTATION_FORMS = ("rpy_deg", "zyz_deg", "quaternion_wxyz", "matrix")
+
+Joints = Annotated[list[float], Field(min_length=6, max_length=6)]
+Line = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\r\n]*$")]
+
+
+class Target(StrictModel):
+    """One pose of the tool, in the frame that the robot's base is placed in.
+
+    Either ``xyz_mm`` and one orientation form, or ``q_deg`` (the pose at these joint angles).
+
+    Attributes
+    ----------
+    rpy_deg : R = Rz(yaw) Ry(pitch) Rx(roll)
+    zyz_deg : R = Rz(a) Ry(b) Rz(c)
+    quaternion_wxyz : of unit length to 1e-6
+    matrix : rotation matrix by rows, orthonormal to 1e-6; the nearest exact rotation is used
+    q_ref_deg : the joint angles that the arm comes from
+    """
+
+    name: Name
+    note: Line | None = None
+    xyz_mm: Triple | None = None
+    rpy_deg: Triple | None = None
+    zyz_deg: Triple | None = None
+    quaternion_wxyz: Annotated[list[float], Field(min_length=4, max_length=4)] | None = None
+    matrix: Annotated[list[Triple], Field(min_length=3, max_length=3)] | None = None
+    q_deg: Joints | None = None
+    q_ref_deg: Joints = [0.0] * 6
+
+    @field_validator("xyz_mm")
+    @classmethod
+    def _millimetres(cls, values):
+        if values is not None:
+            check_millimetres(values)
+        return values
+
+    @field_validator("rpy_deg", "zyz_deg")
+    @classmethod
+    def _degrees(cls, values):
+        if values is not None:
+            check_degrees(values, "give the orientation as a quaternion or a matrix")
+        return values
+
+    @field_validator("q_deg")
+    @classmethod
+    def _joint_degrees(cls, values):
+        if values is not None:
+            check_degrees(values, "give the pose by xyz_mm and an orientation")
+        return values
+
+    @field_validator("q_ref_deg")
+    @classmethod
+    def _reference_degrees(cls, values):
+        check_degrees(values, "round them to whole degrees")
+        return values
+
+    @field_validator("quaternion_wxyz")
+    @classmethod
+    def _unit_length(cls, values):
+        length = 1.0 if values is None else float(np.linalg.norm(values))
+        if abs(length - 1) > UNIT_LENGTH_TOLERANCE:
+            raise ValueError(f"the quaternion's length is {length:.9g}, not 1 | Divide w, x, y and z by it")
+        return values
+
+    @field_validator("matrix")
+    @classmethod
+    def _rotation(cls, rows):
+        if rows is None:
+            return rows
+        R = np.array(rows)
+        worst = np.abs(R @ R.T - np.eye(3)).max()
+        if not worst <= ORTHONORMAL_TOLERANCE:
+            raise ValueError(
+                f"the matrix is no rotation: R R^T differs from 1 by {worst:.3g} | "
+                f"Its rows must be orthonormal to {ORTHONORMAL_TOLERANCE:g}; write more digits"
+            )
+        if np.linalg.det(R) < 0:
+            raise ValueError("the matrix mirrors (its determinant is -1) | Turn the sign of one axis")
+        return rows
+
+    @model_validator(mode="after")
+    def _one_pose(self):
+        forms = [key for key in ORIENTATION_FORMS if getattr(self, key) is not None]
+        if self.q_deg is not None:
+            if self.xyz_mm is not None or forms:
+                extra = "xyz_mm" if self.xyz_mm is not None else forms[0]
+                raise ValueError(f"q_deg and {extra} both give a pose | Keep one of the two")
+            return self
+        if self.xyz_mm is None:
+            raise ValueError("the position is missing | Add xyz_mm and an orientation, or q_deg alone")
+        if not forms:
+            raise ValueError(f"the orientation is missing | Add one of {', '.join(ORIENTATION_FORMS)}")
+        if len(forms) > 1:
+            raise ValueError(f"the orientation stands here twice, as {' and '.join(forms)} | Keep one")
+        return self
+
+    def pose(self, robot: Robot) -> np.ndarray:
+        """T_base_tool (4, 4), m, read-only; the robot is needed for a target given by joint angles."""
+        if self.q_deg is not None:
+            T = forward(robot, np.radians(self.q_deg))
+        elif self.rpy_deg is not None:
+            T = transform(np.array(self.xyz_mm) / 1000, np.radians(self.rpy_deg))
+        else:
+            T = np.eye(4)
+            T[:3, 3] = np.array(self.xyz_mm) / 1000
+            T[:3, :3] = self._rotation_matrix()
+        T.setflags(write=False)
+        return T
+
+    def reference(self) -> np.ndarray:
+        """``q_ref_deg`` in rad, (6,)."""
+        return np.radians(self.q_ref_deg)
+
+    def _rotation_matrix(self) -> np.ndarray:
+        if self.zyz_deg is not None:
+            first, second, third = (transform(np.zeros(3), turn)[:3, :3] for turn in _zyz_turns(self.zyz_deg))
+            return first @ second @ third
+        if self.quaternion_wxyz is not None:
+            return Rotation.from_quat(self.quaternion_wxyz, scalar_first=True).as_matrix()
+        u, _, vt = np.linalg.svd(np.array(self.matrix))
+        return u @ vt
+
+
+class TargetFile(StrictModel):
+    """data/targets/ROBOT.yaml."""
+
+    kind: Literal["targets"]
+    targets: list[Target]
+
+    @field_validator("targets")
+    @classmethod
+    def _some_but_not_many(cls, targets):
+        if not targets:
+            raise ValueError("the list is empty | Add a target, or take the robot out of the study")
+        if len(targets) > MOST_TARGETS:
+            raise ValueError(f"{len(targets)} targets don't fit on a page | Split the file; {MOST_TARGETS} at most")
+        return targets
+
+    @model_validator(mode="after")
+    def _own_names(self):
+        names = [target.name for target in self.targets]
+        for i, name in enumerate(names):
+            if name in names[:i]:
+                raise ValueError(
+                    f"targets[{i}].name: '{name}' is also that of targets[{names.index(name)}] | Rename it"
+                )
+        return self
+
+
+def load_targets(path: str | Path) -> tuple[Target, ...]:
+    """The targets of a file, in its order.
+
+    Raises
+    ------
+    InputError
+        naming file, field and remedy
+    """
+    return tuple(load(TargetFile, path).targets)
+
+
+def _zyz_turns(zyz_deg: list[float]) -> np.ndarray:
+    a, b, c = np.radians(zyz_deg)
+    return np.array([[0, 0, a], [0, b, 0], [0, 0, c]])

@@ -1,0 +1,73 @@
+"""Scene files: what they may hold, and every way to get one wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from er3a.collision.scene import load_scene
+from er3a.errors import InputError
+
+SHIPPED = Path(__file__).parents[2] / "data" / "scenes" / "table_and_post.yaml"
+BOX = {"name": "table", "size_mm": [500, 800, 40], "xyz_mm": [500, 0, 80]}
+CYLINDER = {"name": "post", "radius_mm": 40, "length_mm": 900, "xyz_mm": [200, 420, 450]}
+SPHERE = {"name": "lamp", "radius_mm": 60, "xyz_mm": [450, -350, 750]}
+PLANE = {"name": "floor", "normal": [0, 0, 2], "offset_mm": -5}
+
+
+def write(folder: Path, **shapes) -> Path:
+    path = folder / "scene.yaml"
+    path.write_text(yaml.safe_dump({"kind": "scene", "title": "test", **shapes}), encoding="utf-8")
+    return path
+
+
+def test_shipped_scene_holds_one_of_each():
+    scene = load_scene(SHIPPED)
+    assert [scene.boxes[0].name, scene.cylinders[0].name, scene.spheres[0].name, scene.planes[0].name] == [
+        "table",
+        "post",
+        "lamp",
+        "floor",
+    ]
+    assert scene.boxes[0].rpy_deg == [0, 0, 0]
+
+
+def test_normal_comes_at_unit_length(tmp_path):
+    scene = load_scene(write(tmp_path, planes=[PLANE]))
+    np.testing.assert_array_equal(scene.planes[0].unit_normal(), [0, 0, 1])
+
+
+BAD = {
+    "empty": ({}, None, "the scene is empty"),
+    "misspelt": ({"boxs": [BOX]}, "boxs", "Did you mean 'boxes'"),
+    "same name twice": ({"boxes": [BOX], "spheres": [SPHERE | {"name": "table"}]}, "spheres[0]", "that of boxes[0]"),
+    "no position": ({"boxes": [{"name": "a", "size_mm": [10, 10, 10]}]}, "boxes[0].xyz_mm", "missing"),
+    "no thickness": ({"boxes": [BOX | {"size_mm": [500, 800, 0]}]}, "boxes[0].size_mm[2]", "refused"),
+    "negative radius": ({"spheres": [SPHERE | {"radius_mm": -60}]}, "spheres[0].radius_mm", "refused"),
+    "box in metres": ({"boxes": [BOX | {"size_mm": [0.5, 0.8, 0.04]}]}, "boxes[0].size_mm", "can only be metres"),
+    "cylinder in metres": (
+        {"cylinders": [CYLINDER | {"radius_mm": 0.04, "length_mm": 0.9}]},
+        "cylinders[0]",
+        "can only be metres",
+    ),
+    "sphere in metres": ({"spheres": [SPHERE | {"radius_mm": 0.06}]}, "spheres[0].radius_mm", "can only be metres"),
+    "position in metres": ({"boxes": [BOX | {"xyz_mm": [0.5, 0, 0.08]}]}, "boxes[0].xyz_mm", "can only be metres"),
+    "radians": ({"boxes": [BOX | {"rpy_deg": [0, 0, 1.5708]}]}, "boxes[0].rpy_deg", "can only be radians"),
+    "NaN": ({"planes": [PLANE | {"offset_mm": float("nan")}]}, "planes[0].offset_mm", "refused"),
+    "no direction": ({"planes": [PLANE | {"normal": [0, 0, 0]}]}, "planes[0].normal", "no direction"),
+    "bad name": ({"planes": [PLANE | {"name": "the floor"}]}, "planes[0].name", "refused"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_wrong_file_is_refused_with_file_and_field(case, tmp_path):
+    shapes, field, words = BAD[case]
+    path = write(tmp_path, **shapes)
+    with pytest.raises(InputError) as caught:
+        load_scene(path)
+    assert caught.value.file == str(path)
+    assert caught.value.field == field
+    assert words in str(caught.value)

@@ -1,0 +1,147 @@
+"""Target files: each form of a pose against SciPy or by hand, and every way to get one wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from er3a.errors import InputError
+from er3a.kinematics.forward import forward
+from er3a.robots.load import load_robot
+from er3a.targets import MOST_TARGETS, Target, load_targets
+
+ROBOT = load_robot("er3_600")
+DATA = Path(__file__).parents[1] / "data" / "targets"
+PLACE = {"name": "a", "xyz_mm": [400, 0, 300]}
+TURNED = PLACE | {"rpy_deg": [0, 90, 0]}
+angles = st.lists(st.integers(-180, 180).map(float), min_size=3, max_size=3)
+
+
+class PlainDumper(yaml.SafeDumper):
+    """Writes repeated values out in full."""
+
+    def ignore_aliases(self, data):
+        return True
+
+
+def pose(**changes) -> np.ndarray:
+    return Target(**(PLACE | changes)).pose(ROBOT)
+
+
+@given(angles)
+def test_roll_pitch_yaw_turns_about_fixed_x_then_y_then_z(rpy):
+    expected = Rotation.from_euler("xyz", rpy, degrees=True).as_matrix()
+    np.testing.assert_allclose(pose(rpy_deg=rpy)[:3, :3], expected, atol=1e-12)
+
+
+@given(angles)
+def test_zyz_turns_about_its_own_axes(zyz):
+    expected = Rotation.from_euler("ZYZ", zyz, degrees=True).as_matrix()
+    np.testing.assert_allclose(pose(zyz_deg=zyz)[:3, :3], expected, atol=1e-12)
+
+
+@given(angles)
+def test_quaternion_and_matrix_give_the_same_rotation(rpy):
+    rotation = Rotation.from_euler("xyz", rpy, degrees=True)
+    x, y, z, w = rotation.as_quat()
+    by_quaternion = pose(quaternion_wxyz=[w, x, y, z])
+    np.testing.assert_allclose(by_quaternion, pose(matrix=rotation.as_matrix().tolist()), atol=1e-12)
+    np.testing.assert_allclose(by_quaternion, pose(rpy_deg=rpy), atol=1e-12)
+
+
+def test_quaternion_half_turn_about_x_points_the_tool_down():
+    np.testing.assert_allclose(pose(quaternion_wxyz=[0, 1, 0, 0])[:3, :3], np.diag([1, -1, -1]), atol=1e-15)
+
+
+def test_rounded_matrix_becomes_an_exact_rotation():
+    c, s = 0.8660254, 0.5  # seven digits
+    R = pose(matrix=[[c, -s, 0], [s, c, 0], [0, 0, 1]])[:3, :3]
+    np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-15)
+    np.testing.assert_allclose(R[0, 0], np.cos(np.pi / 6), atol=1e-7)
+
+
+def test_position_is_in_metres_inside():
+    np.testing.assert_array_equal(pose(rpy_deg=[0, 0, 0])[:3, 3], [0.4, 0, 0.3])
+
+
+def test_joint_angles_give_the_pose_of_forward_kinematics():
+    q_deg = [0, 45, -30, 0, 60, 0]
+    np.testing.assert_array_equal(Target(name="a", q_deg=q_deg).pose(ROBOT), forward(ROBOT, np.radians(q_deg)))
+
+
+def test_reference_is_zeros_unless_given():
+    assert not Target(**TURNED).reference().any()
+    np.testing.assert_allclose(Target(**TURNED, q_ref_deg=[180, 0, 0, 0, 0, 0]).reference()[0], np.pi)
+
+
+@pytest.mark.parametrize("name", ["er3a_c60", "er3a_c60_article", "er3_600"])
+def test_shipped_files_hold_the_article_target(name):
+    targets = {target.name: target for target in load_targets(DATA / f"{name}.yaml")}
+    T = targets["article_target"].pose(load_robot(name))
+    np.testing.assert_allclose(T[:3, 3], [0.5, 0.2, 0.7], atol=1e-15)
+    np.testing.assert_allclose(T[:3, :3], Rotation.from_euler("ZYX", [0, 90, 0], degrees=True).as_matrix(), atol=1e-15)
+    np.testing.assert_array_equal(targets["article_example"].q_deg, [0, 45, -30, 0, 60, 0])
+
+
+BAD = {
+    "empty list": ([], "targets", "the list is empty"),
+    "duplicate name": ([TURNED, TURNED], "targets[1].name", "also that of targets[0]"),
+    "too many": ([TURNED | {"name": f"a{i}"} for i in range(MOST_TARGETS + 1)], "targets", "51 targets"),
+    "name with a slash": ([TURNED | {"name": "../a"}], "targets[0].name", "refused"),
+    "empty name": ([TURNED | {"name": ""}], "targets[0].name", "refused"),
+    "note of two lines": ([TURNED | {"note": "one\ntwo"}], "targets[0].note", "refused"),
+    "NaN": ([PLACE | {"rpy_deg": [0, float("nan"), 0]}], "targets[0].rpy_deg[1]", "not a finite number"),
+    "infinite position": ([TURNED | {"xyz_mm": [float("inf"), 0, 0]}], "targets[0].xyz_mm[0]", "not a finite number"),
+    "text for a number": ([TURNED | {"xyz_mm": ["400", 0, 0]}], "targets[0].xyz_mm[0]", "'400' is refused"),
+    "two numbers": ([TURNED | {"xyz_mm": [400, 0]}], "targets[0].xyz_mm", "refused"),
+    "no orientation": ([PLACE], "targets[0]", "the orientation is missing"),
+    "two orientations": ([TURNED | {"zyz_deg": [0, 90, 0]}], "targets[0]", "rpy_deg and zyz_deg"),
+    "no position": ([{"name": "a", "rpy_deg": [0, 90, 0]}], "targets[0]", "the position is missing"),
+    "joints and a position": ([TURNED | {"q_deg": [0] * 6}], "targets[0]", "q_deg and xyz_mm"),
+    "metres": ([TURNED | {"xyz_mm": [0.5, 0.2, 0.7]}], "targets[0].xyz_mm", "0.5, 0.2, 0.7 mm can only be metres"),
+    "micrometres": ([TURNED | {"xyz_mm": [500_000, 0, 0]}], "targets[0].xyz_mm", "more than 100 m"),
+    "radians": ([PLACE | {"rpy_deg": [0, 1.5708, 0]}], "targets[0].rpy_deg", "can only be radians"),
+    "any radians": ([PLACE | {"zyz_deg": [0.3, 1.1, 0]}], "targets[0].zyz_deg", "can only be radians"),
+    "joints in radians": (
+        [{"name": "a", "q_deg": [0, 0.785, -0.524, 0, 1.047, 0]}],
+        "targets[0].q_deg",
+        "Write 0, 44.98",
+    ),
+    "reference in radians": ([TURNED | {"q_ref_deg": [0, 0.5236, 0, 0, 0, 0]}], "targets[0].q_ref_deg", "radians"),
+    "many turns": ([TURNED | {"q_ref_deg": [0, 0, 0, 0, 0, 99999]}], "targets[0].q_ref_deg", "ten turns"),
+    "long quaternion": ([PLACE | {"quaternion_wxyz": [1, 1, 0, 0]}], "targets[0].quaternion_wxyz", "length is 1.41"),
+    "short quaternion": ([PLACE | {"quaternion_wxyz": [0.999998, 0, 0, 0]}], "targets[0].quaternion_wxyz", "length is"),
+    "zero quaternion": ([PLACE | {"quaternion_wxyz": [0, 0, 0, 0]}], "targets[0].quaternion_wxyz", "length is 0"),
+    "skew matrix": ([PLACE | {"matrix": [[1, 0.01, 0], [0, 1, 0], [0, 0, 1]]}], "targets[0].matrix", "no rotation"),
+    "mirror": ([PLACE | {"matrix": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}], "targets[0].matrix", "mirrors"),
+    "two rows": ([PLACE | {"matrix": [[1, 0, 0], [0, 1, 0]]}], "targets[0].matrix", "refused"),
+    "unknown Euler order": ([PLACE | {"xyz_deg": [0, 90, 0]}], "targets[0].xyz_deg", "Did you mean"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_wrong_file_is_refused_with_file_and_field(case, tmp_path):
+    targets, field, words = BAD[case]
+    path = tmp_path / "wrong.yaml"
+    content = {"kind": "targets", "targets": targets}
+    path.write_text(yaml.dump(content, Dumper=PlainDumper), encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        load_targets(path)
+    assert caught.value.file == str(path)
+    assert caught.value.field == field
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize("rpy", [[0, 0, 0], [0.5, 90, 0], [0, 5, 0], [0, 3, 6], [0, 0.1, 0], [-180, 6.2, 180]])
+def test_small_angles_that_are_degrees_pass(rpy):
+    assert Target(**PLACE, rpy_deg=rpy).rpy_deg == rpy
+
+
+def test_target_at_the_origin_passes():
+    assert Target(name="a", xyz_mm=[0, 0, 0], rpy_deg=[0, 0, 0]).xyz_mm == [0, 0, 0]
