@@ -20,15 +20,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.diagnosis.candidate_tables import Tables, join, predictions, tables_of
-from er3a.diagnosis.faults import Repair, Slope, repairs_of, slopes
+from er3a.diagnosis.candidate_tables import Tables, predictions, tables_of
+from er3a.diagnosis.hypotheses import Pool, evaluate
 from er3a.references.quantities import Extreme, Speed
 from er3a.references.reference import Reference, ReferenceSet, expected_of
 from er3a.robots.robot import Robot
 
 SHOWN = 10
-FREE_NUMBER = 1.5
-PROBE_M = 1e-3
 MEETS = 1.0 + 1e-6
 UNITS = ("mm", "deg")
 
@@ -61,19 +59,24 @@ class Hypothesis:
 
 
 @dataclass(frozen=True, eq=False)
-class _Pool:
-    """Evaluated hypotheses: tables (H), differences (H, n) to the references, faults and cost of each."""
+class Ranking:
+    """Hypotheses in order.
 
-    tables: Tables
-    difference: np.ndarray
-    faults: list[tuple[str, ...]]
-    kinds: list[tuple[str, ...]]
-    cost: np.ndarray
+    Attributes
+    ----------
+    pool : all that were evaluated
+    score : (H,), smaller is better
+    groups : rows of the pool, best group first; the first row of a group is its best, the others are those that no
+        reference tells from it
+    before : (n,), difference of the given table to the references, in their units
+    references : those it rests on
+    """
 
-    @property
-    def count(self) -> np.ndarray:
-        """Number of faults of each hypothesis, (H,)."""
-        return np.array([len(faults) for faults in self.faults])
+    pool: Pool
+    score: np.ndarray
+    groups: tuple[tuple[int, ...], ...]
+    before: np.ndarray
+    references: tuple[Reference, ...]
 
 
 def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> list[Hypothesis]:
@@ -88,22 +91,27 @@ def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> li
     -------
     ranked : at most 10
     """
+    ranking = rank(robot, references)
+    return [_described(ranking, group) for group in ranking.groups] if ranking else []
+
+
+def rank(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> Ranking | None:
+    """The ranking behind :func:`diagnose`; None if there is nothing to explain."""
     stated = usable(references)
     if not stated:
-        return []
+        return None
     given = tables_of(robot)
     expected, uncertainty = expected_of(stated)
 
     def difference(tables: Tables) -> np.ndarray:
         return predictions(tables, robot, stated) - expected
 
-    before = difference(given)
-    if (np.abs(before[0]) <= uncertainty * MEETS).all():
-        return []
-    pool = _evaluate(given, difference, uncertainty)
+    before = difference(given)[0]
+    if (np.abs(before) <= uncertainty * MEETS).all():
+        return None
+    pool = evaluate(given, difference, uncertainty)
     score = _score(pool, uncertainty)
-    order = np.lexsort((np.arange(len(score)), score))
-    return _described(pool, score, order, before[0], uncertainty, stated)
+    return Ranking(pool, score, _groups(pool, score, uncertainty), before, stated)
 
 
 def usable(references: ReferenceSet | Sequence[Reference]) -> tuple[Reference, ...]:
@@ -114,83 +122,7 @@ def usable(references: ReferenceSet | Sequence[Reference]) -> tuple[Reference, .
     return tuple(weighty or stated)
 
 
-def _evaluate(given: Tables, difference, uncertainty: np.ndarray) -> _Pool:
-    """All single faults, all pairs of faults, free numbers solved."""
-    repairs, free = repairs_of(given), slopes()
-    singles = [repair.apply(given) for repair in repairs]
-    pools = [_plain(singles, [(repair,) for repair in repairs], difference)]
-    starts = join([given, *singles])
-    started_by: list[tuple[Repair, ...]] = [(), *((repair,) for repair in repairs)]
-    pools.append(_with_free(starts, started_by, free, difference, uncertainty))
-    pools.append(_with_two_free(given, free, difference, uncertainty))
-    pairs, pair_tables = [], []
-    for i, first in enumerate(repairs):
-        batch = join(singles[i + 1 :]) if i + 1 < len(repairs) else None
-        if batch is not None:
-            pair_tables.append(first.apply(batch))
-            pairs += [(second, first) for second in repairs[i + 1 :]]
-    pools.append(_plain(pair_tables, pairs, difference))
-    return _Pool(
-        tables=join([pool.tables for pool in pools]),
-        difference=np.concatenate([pool.difference for pool in pools]),
-        faults=[faults for pool in pools for faults in pool.faults],
-        kinds=[kinds for pool in pools for kinds in pool.kinds],
-        cost=np.concatenate([pool.cost for pool in pools]),
-    )
-
-
-def _plain(tables: list[Tables], repairs: list[tuple[Repair, ...]], difference) -> _Pool:
-    joined = join(tables)
-    return _Pool(
-        tables=joined,
-        difference=difference(joined),
-        faults=[tuple(repair.fault for repair in chosen) for chosen in repairs],
-        kinds=[tuple(repair.kind for repair in chosen) for chosen in repairs],
-        cost=np.array([float(len(chosen)) for chosen in repairs]),
-    )
-
-
-def _with_free(
-    starts: Tables, started_by: list[tuple[Repair, ...]], free: list[Slope], difference, uncertainty: np.ndarray
-) -> _Pool:
-    """Each start with each free number at its best value."""
-    base = difference(starts)
-    probe = np.full(len(starts), PROBE_M)
-    solved, faults, kinds = [], [], []
-    for slope in free:
-        gradient = (difference(slope.apply(starts, probe)) - base) / PROBE_M
-        weighted = gradient / uncertainty**2
-        strength = (weighted * gradient).sum(axis=1)
-        amounts = -(weighted * base).sum(axis=1) / np.where(strength > 0, strength, np.inf)
-        solved.append(slope.apply(starts, amounts))
-        for chosen, entry, amount in zip(started_by, slope.entry(starts), amounts):
-            faults.append((*(repair.fault for repair in chosen), slope.fault(float(entry), float(amount))))
-            kinds.append((*(repair.kind for repair in chosen), slope.kind))
-    joined = join(solved)
-    cost = np.tile([len(chosen) + FREE_NUMBER for chosen in started_by], len(free))
-    return _Pool(joined, difference(joined), faults, kinds, cost)
-
-
-def _with_two_free(given: Tables, free: list[Slope], difference, uncertainty: np.ndarray) -> _Pool:
-    """Each pair of free numbers at its best values."""
-    base = difference(given)[0]
-    probe = np.array([PROBE_M])
-    gradients = np.array([(difference(slope.apply(given, probe))[0] - base) / PROBE_M for slope in free])
-    solved, faults, kinds = [], [], []
-    for i, first in enumerate(free):
-        for j in range(i + 1, len(free)):
-            system = (gradients[[i, j]] / uncertainty).T
-            amounts = np.linalg.lstsq(system, -base / uncertainty, rcond=1e-9)[0]
-            second = free[j]
-            solved.append(second.apply(first.apply(given, amounts[:1]), amounts[1:]))
-            entries = (float(first.entry(given)[0]), float(second.entry(given)[0]))
-            faults.append((first.fault(entries[0], float(amounts[0])), second.fault(entries[1], float(amounts[1]))))
-            kinds.append((first.kind, second.kind))
-    joined = join(solved)
-    return _Pool(joined, difference(joined), faults, kinds, np.full(len(joined), 2 * FREE_NUMBER))
-
-
-def _score(pool: _Pool, uncertainty: np.ndarray) -> np.ndarray:
+def _score(pool: Pool, uncertainty: np.ndarray) -> np.ndarray:
     count = len(uncertainty)
     square = ((pool.difference / uncertainty) ** 2).mean(axis=1)
     fit = count * np.log(np.maximum(square, 1.0))
@@ -198,56 +130,50 @@ def _score(pool: _Pool, uncertainty: np.ndarray) -> np.ndarray:
     return fit + per_fault * pool.cost
 
 
-def _described(
-    pool: _Pool,
-    score: np.ndarray,
-    order: np.ndarray,
-    before: np.ndarray,
-    uncertainty: np.ndarray,
-    references: Sequence[Reference],
-) -> list[Hypothesis]:
-    unit_of = np.array([reference.unit for reference in references])
-    found: list[Hypothesis] = []
+def _groups(pool: Pool, score: np.ndarray, uncertainty: np.ndarray) -> tuple[tuple[int, ...], ...]:
+    groups: list[tuple[int, ...]] = []
     placed: set[int] = set()
-    for best in order:
+    for best in np.argsort(score, kind="stable"):
         if best in placed:
             continue
-        after = pool.difference[best]
-        unit = _telling_unit(unit_of, before, after, uncertainty)
-        residuals = [float(np.abs(values[unit_of == unit]).max()) for values in (before, after)]
         alike = _alike(pool, best, uncertainty)
-        better_alone = any({fault} == set(shown.faults) for shown in found for fault in pool.faults[best])
-        if better_alone or any(len(pool.faults[i]) < len(pool.faults[best]) for i in alike):
+        better_alone = any({fault} == set(pool.faults[group[0]]) for group in groups for fault in pool.faults[best])
+        if better_alone or any(pool.count[i] < pool.count[best] for i in alike):
             continue  # a second fault adds nothing to the first
-        placed |= {best, *alike}
-        faults = pool.faults[best]
-        words = (
-            f"{' and '.join(faults)}; residual falls from {residuals[0]:.4g} {unit} to {_small(residuals[1])} {unit}"
-        )
-        found.append(
-            Hypothesis(
-                hypothesis=words,
-                faults=faults,
-                kinds=pool.kinds[best],
-                residual_before=residuals[0],
-                residual_after=residuals[1],
-                unit=unit,
-                explains=bool((np.abs(after) <= uncertainty * MEETS).all()),
-                indistinguishable_from=tuple(" and ".join(pool.faults[i]) for i in alike),
-                score=float(score[best]),
-            )
-        )
-        if len(found) == SHOWN:
+        groups.append((int(best), *alike))
+        placed.update(groups[-1])
+        if len(groups) == SHOWN:
             break
-    return found
+    return tuple(groups)
 
 
-def _alike(pool: _Pool, best: int, uncertainty: np.ndarray) -> list[int]:
+def _alike(pool: Pool, best: int, uncertainty: np.ndarray) -> list[int]:
     """Other hypotheses with no more faults than this one that no reference tells from it."""
     apart = np.abs(pool.difference - pool.difference[best])
     same = (apart < uncertainty).all(axis=1) & (pool.count <= pool.count[best])
     same[best] = False
     return [int(i) for i in np.flatnonzero(same)]
+
+
+def _described(ranking: Ranking, group: tuple[int, ...]) -> Hypothesis:
+    pool, best = ranking.pool, group[0]
+    _, uncertainty = expected_of(ranking.references)
+    unit_of = np.array([reference.unit for reference in ranking.references])
+    before, after = ranking.before, pool.difference[best]
+    unit = _telling_unit(unit_of, before, after, uncertainty)
+    residuals = [float(np.abs(values[unit_of == unit]).max()) for values in (before, after)]
+    faults = " and ".join(pool.faults[best])
+    return Hypothesis(
+        hypothesis=f"{faults}; residual falls from {residuals[0]:.4g} {unit} to {_small(residuals[1])} {unit}",
+        faults=pool.faults[best],
+        kinds=pool.kinds[best],
+        residual_before=residuals[0],
+        residual_after=residuals[1],
+        unit=unit,
+        explains=bool((np.abs(after) <= uncertainty * MEETS).all()),
+        indistinguishable_from=tuple(" and ".join(pool.faults[i]) for i in group[1:]),
+        score=float(ranking.score[best]),
+    )
 
 
 def _telling_unit(unit_of: np.ndarray, before: np.ndarray, after: np.ndarray, uncertainty: np.ndarray) -> str:

@@ -1,0 +1,239 @@
+"""What a reference can be about, and what a model says there.
+
+Every quantity is one number in the unit that people read (mm, deg, deg/s). ``value`` reads it off a :class:`ModelState`
+whose arrays may carry leading batch dimensions, so that many candidate tables are evaluated at once. Two quantities are
+equal if they are about the same thing; fields that only say how it is measured don't count.
+
+The wrist centre is the point of axis 5 nearest to axis 4: where axes 4, 5 and 6 meet on an arm with a spherical wrist,
+and still defined on a table with a fault.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+Pose = tuple[float, float, float, float, float, float]
+Vector = tuple[float, float, float]
+ZERO_POSE: Pose = (0.0,) * 6
+MM = 1000.0
+AXES = {"x": 0, "y": 1, "z": 2}
+FRAME_OF_POINT = {"wrist_centre": 4, "flange": 6}
+
+
+@dataclass(frozen=True, eq=False)
+class ModelState:
+    """What quantities are read from.
+
+    Attributes
+    ----------
+    frames : (..., P, 7, 4, 4), as :func:`er3a.kinematics.forward.frames` gives them, at P poses
+    index : place of each pose (maker's angles, deg) among the P
+    direction, lower, upper, speed : (..., 6), of the robot
+    extremes : value (mm) of each :class:`Extreme` that was searched for
+    """
+
+    frames: np.ndarray
+    index: Mapping[Pose, int]
+    direction: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    speed: np.ndarray
+    extremes: Mapping[Quantity, np.ndarray]
+
+    def at(self, pose: Pose) -> np.ndarray:
+        """Frames (..., 7, 4, 4) at a pose."""
+        return self.frames[..., self.index[pose], :, :, :]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One number about an arm."""
+
+    unit = "mm"
+
+    @property
+    def seen_at(self) -> Pose:
+        """The pose (deg) at which it looks at the arm."""
+        return ZERO_POSE
+
+    def value(self, state: ModelState) -> np.ndarray:
+        """The model's value, shape (...,), in this quantity's unit."""
+        raise NotImplementedError
+
+    def apart(self, expected: float, other: Quantity, other_expected: float) -> float:
+        """How far two statements about this quantity are apart."""
+        return abs(expected - other_expected)
+
+
+@dataclass(frozen=True)
+class AxisAngle(Quantity):
+    """Angle between a joint's axis in the zero pose and a direction; ``signed``: the direction of positive rotation."""
+
+    joint: int
+    toward: Vector = field(compare=False)
+    signed: bool = field(compare=False)
+    unit = "deg"
+
+    def value(self, state):
+        axis = state.at(ZERO_POSE)[..., self.joint - 1, :3, 2] * state.direction[..., self.joint - 1, None]
+        return _angle(axis, np.array(self.toward), self.signed)
+
+    def apart(self, expected, other, other_expected):
+        return float(_angle(np.array(self.toward), np.array(other.toward), self.signed and other.signed))
+
+
+@dataclass(frozen=True)
+class AxisCoordinate(Quantity):
+    """A coordinate (base frame) of that point of a joint's axis, in the zero pose, which is nearest to ``point_mm``."""
+
+    joint: int
+    coordinate: str
+    point_mm: Vector = field(compare=False)
+
+    def value(self, state):
+        return nearest_on_axis(state.at(ZERO_POSE), self.joint, np.array(self.point_mm))[..., AXES[self.coordinate]]
+
+
+@dataclass(frozen=True)
+class QuantityAtPose(Quantity):
+    """One number about an arm at a pose (maker's angles, deg)."""
+
+    pose: Pose
+
+    @property
+    def seen_at(self):
+        return self.pose
+
+
+@dataclass(frozen=True)
+class PointCoordinate(QuantityAtPose):
+    """A coordinate (base frame) of the flange or the wrist centre at a pose."""
+
+    point: str
+    coordinate: str
+
+    def value(self, state):
+        return point_of(state.at(self.pose), self.point)[..., AXES[self.coordinate]]
+
+
+@dataclass(frozen=True)
+class SectionCoordinate(QuantityAtPose):
+    """The wrist centre in a side view (joint 1 at 0): x from axis 1, z from axis 2; ``unsigned``: |x|, |z|."""
+
+    coordinate: str
+    unsigned: bool
+
+    def value(self, state):
+        value = section_of(state.at(self.pose))[..., 0 if self.coordinate == "x" else 1]
+        return np.abs(value) if self.unsigned else value
+
+
+@dataclass(frozen=True)
+class SegmentAngle(Quantity):
+    """Angle from the vertical (base z) of the upper arm or the forearm in the zero pose.
+
+    The upper arm runs from axis 2 to axis 3, the forearm along axis 4 towards the wrist.
+    """
+
+    segment: str
+    unit = "deg"
+
+    def value(self, state):
+        T = state.at(ZERO_POSE)
+        if self.segment == "upper_arm":
+            axis, vector = T[..., 1, :3, 2], T[..., 2, :3, 3] - T[..., 1, :3, 3]
+            vector = vector - axis * _dot(axis, vector)[..., None]
+        else:
+            axis = T[..., 3, :3, 2]
+            vector = axis * np.where(_dot(axis, T[..., 4, :3, 3] - T[..., 2, :3, 3]) < 0, -1.0, 1.0)[..., None]
+        return _angle(vector, np.array([0.0, 0.0, 1.0]), True)
+
+
+@dataclass(frozen=True)
+class Limit(Quantity):
+    """A joint's ``lower`` or ``upper`` limit."""
+
+    joint: int
+    side: str
+    unit = "deg"
+
+    def value(self, state):
+        return np.degrees(getattr(state, self.side)[..., self.joint - 1])
+
+
+@dataclass(frozen=True)
+class Speed(Quantity):
+    """A joint's greatest speed; NaN where the robot's file gives none."""
+
+    joint: int
+    unit = "deg/s"
+
+    def value(self, state):
+        return np.degrees(state.speed[..., self.joint - 1])
+
+
+@dataclass(frozen=True)
+class PoseOutside(QuantityAtPose):
+    """How far a pose lies outside the joint limits: greatest excess of a joint, 0 inside."""
+
+    unit = "deg"
+
+    def value(self, state):
+        q = np.radians(self.pose)
+        return np.degrees(np.maximum(np.maximum(state.lower - q, q - state.upper).max(axis=-1), 0.0))
+
+
+@dataclass(frozen=True)
+class Extreme(Quantity):
+    """Greatest or least value of a measure of a point over all joint angles within the limits.
+
+    ``measure``: ``axis_1`` or ``axis_2``, the point's distance from that axis; ``section_x`` or ``section_z``, its
+    coordinate in the side view (joint 1 at 0, from axis 1 and axis 2).
+    """
+
+    point: str
+    measure: str
+    extreme: str
+
+    def value(self, state):
+        return state.extremes[self]
+
+
+def measure_of(T: np.ndarray, point: str, measure: str) -> np.ndarray:
+    """An :class:`Extreme`'s measure (...,) in m of frames (..., 7, 4, 4)."""
+    p = T[..., FRAME_OF_POINT[point], :3, 3]
+    if measure.startswith("section"):
+        return p[..., 0] - T[..., 0, 0, 3] if measure == "section_x" else p[..., 2] - T[..., 1, 2, 3]
+    k = int(measure[-1]) - 1
+    across = np.cross(T[..., k, :3, 2], p - T[..., k, :3, 3])
+    return np.sqrt(_dot(across, across))
+
+
+def point_of(T: np.ndarray, point: str) -> np.ndarray:
+    """Position (..., 3) in mm of the flange or the wrist centre, of frames (..., 7, 4, 4)."""
+    return T[..., FRAME_OF_POINT[point], :3, 3] * MM
+
+
+def section_of(T: np.ndarray) -> np.ndarray:
+    """The wrist centre in the side view (..., 2) in mm: x from axis 1, z from axis 2."""
+    parts = [measure_of(T, "wrist_centre", f"section_{axis}") for axis in "xz"]
+    return np.stack(parts, axis=-1) * MM
+
+
+def nearest_on_axis(T: np.ndarray, joint: int, point_mm: np.ndarray) -> np.ndarray:
+    """Point (..., 3) in mm of a joint's axis nearest to a given point, of frames (..., 7, 4, 4)."""
+    axis, origin = T[..., joint - 1, :3, 2], T[..., joint - 1, :3, 3] * MM
+    return origin + axis * _dot(axis, point_mm - origin)[..., None]
+
+
+def _angle(a: np.ndarray, b: np.ndarray, signed: bool) -> np.ndarray:
+    """Angle in deg; of lines (at most 90) if not signed."""
+    cross, dot = np.cross(a, b), _dot(a, b)
+    return np.degrees(np.arctan2(np.sqrt(_dot(cross, cross)), dot if signed else np.abs(dot)))
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.einsum("...i,...i->...", a, b)

@@ -1,0 +1,94 @@
+"""One checkable number from one source, and sets of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from er3a.references.quantities import Quantity
+from er3a.references.rows import AxisRow, PositionRow, Row
+from er3a.robots.robot import WEIGHTY_GRADES, Grade
+
+GROUPS = ("zero pose", "axes", "key poses", "reach", "envelope", "limits", "speeds")
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A scalar that a source states.
+
+    Attributes
+    ----------
+    name : for people
+    group : one of ``GROUPS``
+    quantity : what it is about
+    expected : in the quantity's unit; None where the source says that it gives no value
+    uncertainty : half-width of the interval that the source leaves open, same unit
+    """
+
+    name: str
+    group: str
+    quantity: Quantity
+    expected: float | None
+    uncertainty: float
+    source: str
+    grade: Grade
+
+    @property
+    def unit(self) -> str:
+        """mm, deg or deg/s."""
+        return self.quantity.unit
+
+    @property
+    def weighty(self) -> bool:
+        """Whether a verdict may rest on it."""
+        return self.grade in WEIGHTY_GRADES
+
+
+@dataclass(frozen=True)
+class ReferenceSet:
+    """All references of one folder.
+
+    Attributes
+    ----------
+    name : the folder's name
+    references : the scalars
+    rows : the rows they come from, per kind (file stem)
+    """
+
+    name: str
+    references: tuple[Reference, ...]
+    rows: dict[str, tuple[Row, ...]] = field(hash=False)
+
+    @property
+    def checkable(self) -> tuple[Reference, ...]:
+        """References that state a value."""
+        return tuple(reference for reference in self.references if reference.expected is not None)
+
+    @property
+    def axes(self) -> tuple[AxisRow, ...]:
+        """Axis lines, for drawing."""
+        return self.rows.get("axes", ())
+
+    @property
+    def positions(self) -> tuple[PositionRow, ...]:
+        """Key poses, for drawing."""
+        return self.rows.get("positions", ())
+
+
+def expected_of(references: tuple[Reference, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Expected values and uncertainties, (n,) each, of references that state a value."""
+    return np.array([r.expected for r in references]), np.array([r.uncertainty for r in references])
+
+
+def conflicts(references: tuple[Reference, ...]) -> list[tuple[int, int]]:
+    """Pairs (i, j), i < j, of references about the same quantity that no value can meet both of."""
+    pairs = []
+    for j, second in enumerate(references):
+        for i, first in enumerate(references[:j]):
+            if first.quantity != second.quantity or first.expected is None or second.expected is None:
+                continue
+            apart = first.quantity.apart(first.expected, second.quantity, second.expected)
+            if apart > first.uncertainty + second.uncertainty:
+                pairs.append((i, j))
+    return pairs

@@ -1,0 +1,1 @@
+"""Does the table match the reference data?"""

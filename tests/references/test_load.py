@@ -1,0 +1,103 @@
+"""Reading reference sets, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from er3a.errors import InputError
+from er3a.references.load import MANUAL_REFS, check_reference_file, load_references
+from er3a.references.rows import COLUMNS
+from er3a.robots.robot import GRADES
+
+LIMITS = "joint,lower_deg,upper_deg,uncertainty_deg,source,grade\n"
+POSITIONS = "name,point,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm,uncertainty_mm,source,grade\n"
+AXES = "joint,direction_x,direction_y,direction_z,x_mm,y_mm,z_mm,signed,uncertainty_mm,uncertainty_deg,source,grade\n"
+ENVELOPE = "quantity,q2_deg,q3_deg,value_mm,uncertainty_mm,source,grade\n"
+REACH = "point,from_axis,extreme,value_mm,uncertainty_mm,source,grade\n"
+SPEEDS = "joint,speed_deg_s,uncertainty_deg_s,source,grade\n"
+
+
+def written(folder: Path, name: str, text: str) -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("name", ["er3a_c60", "er3a_c60_article", "er3_600"])
+def test_every_committed_reference_has_source_grade_and_uncertainty(name):
+    references = load_references(name)
+    assert set(references.rows) <= set(COLUMNS)
+    for reference in references.references:
+        assert reference.source
+        assert reference.grade in GRADES
+        assert reference.uncertainty > 0
+
+
+def test_folder_and_name_give_the_same_set():
+    assert load_references(MANUAL_REFS / "er3_600") == load_references("er3_600")
+
+
+def test_a_limit_that_is_not_given_is_kept_as_not_given():
+    blank = [r for r in load_references("er3a_c60").references if r.expected is None]
+    assert [r.name for r in blank] == ["joint 6 lower limit", "joint 6 upper limit"]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        (
+            "limits.csv",
+            "joint,lower_deg,upper_deg,source,grade\n1,-170,170,m,official\n",
+            ["uncertainty_deg", "missing"],
+        ),
+        ("limits.csv", LIMITS.replace("lower_deg", "lower_rad") + "1,-2,2,0.5,m,official\n", ["lower_rad", "unit"]),
+        ("limits.csv", LIMITS + "1,nan,170,0.5,m,official\n", ["row 2", "lower_deg", "finite"]),
+        ("limits.csv", LIMITS + "1,-170,170,0.5,m,rumour\n", ["row 2", "grade", "official"]),
+        ("limits.csv", LIMITS + "1,-170,170,0.5,,official\n", ["row 2", "source", "empty"]),
+        ("limits.csv", LIMITS + "7,-170,170,0.5,m,official\n", ["row 2", "joint 7"]),
+        ("limits.csv", LIMITS + "1,170,-170,0.5,m,official\n", ["row 2", "lower_deg", "Swap"]),
+        ("limits.csv", LIMITS + "1,-170,170,0,m,official\n", ["row 2", "uncertainty_deg", "positive"]),
+        ("limits.csv", LIMITS + "1,-2.9,2.9,0.5,m,official\n2,-1,1,0.5,m,official\n", ["radians"]),
+        ("limits.csv", LIMITS + "1,-170,170,0.5,m,official\n" * 2, ["row 3", "repeats row 2"]),
+        (
+            "limits.csv",
+            LIMITS + "1,-170,170,0.5,m,official\n1,-165,170,0.5,m,official\n",
+            ["row 3", "contradicts row 2", "joint 1 lower"],
+        ),
+        ("limits.csv", LIMITS, ["no rows"]),
+        ("speeds.csv", SPEEDS + "1,0,0.5,m,official\n", ["row 2", "speed_deg_s"]),
+        (
+            "positions.csv",
+            POSITIONS + "zero,flange,0,0,0,,0,0,1,2,300,0.1,m,cad\n",
+            ["row 2", "q4_deg", "empty"],
+        ),
+        ("positions.csv", POSITIONS + "zero,tip,0,0,0,0,0,0,1,2,300,0.1,m,cad\n", ["point", "wrist_centre"]),
+        ("positions.csv", POSITIONS + "zero,flange,0,0,0,0,0,0,0.4,0,0.66,0.1,m,cad\n", ["metres", "1000"]),
+        ("axes.csv", AXES + "1,0,0,2,0,0,0,no,0.1,0.1,m,cad\n", ["row 2", "direction_x", "unit vector"]),
+        ("envelope.csv", ENVELOPE + "z,,,100,0.1,m,official\n", ["row 2", "q2_deg", "missing for z"]),
+        ("envelope.csv", ENVELOPE + "least_x,5,5,-100,0.1,m,official\n", ["row 2", "q2_deg", "given"]),
+        ("reach.csv", REACH + "flange,3,greatest,600,0.5,m,official\n", ["row 2", "from_axis", "1 or 2"]),
+        ("limit.csv", LIMITS, ["limit.csv", "limits.csv"]),
+    ],
+)
+def test_one_error_names_file_place_and_remedy(tmp_path, name, text, words):
+    path = written(tmp_path, name, text)
+    with pytest.raises(InputError) as caught:
+        check_reference_file(path)
+    for word in [*words, str(path)]:
+        assert word in str(caught.value)
+
+
+def test_sources_may_differ_but_not_contradict_themselves(tmp_path):
+    rows = "1,-170,170,0.5,table,official\n1,-165,165,0.5,drawing,official\n"
+    written(tmp_path, "limits.csv", LIMITS + rows)
+    assert len(load_references(tmp_path).references) == 4
+
+
+def test_unknown_set_and_empty_folder(tmp_path):
+    with pytest.raises(InputError, match="er3a_c60"):
+        load_references("er4")
+    with pytest.raises(InputError, match=r"axes\.csv"):
+        load_references(tmp_path)
