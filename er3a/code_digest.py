@@ -19,8 +19,11 @@ VIEWS = ("report.py", "page.py", "index.py")
 def code_digest(module: str) -> str:
     """SHA-256 over the sources of ``module``, of all modules of er3a it imports (transitively), and of templates
     (``*.j2``, ``*.css``) that stand beside those that are part of a view."""
+    reached = _reached(module)
+    if not reached:
+        raise ModuleNotFoundError(f"er3a has no module '{module}'")
     digest = hashlib.sha256()
-    for path in sorted(_reached(module)):
+    for path in sorted(reached):
         digest.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()
 

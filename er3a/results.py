@@ -70,11 +70,11 @@ def write_table(path: Path, table: pd.DataFrame) -> None:
 def read_table(path: Path) -> pd.DataFrame:
     """Read a Parquet file of ours, or raise :class:`ResultError`."""
     try:
-        return pq.read_table(path).to_pandas()
+        return pq.read_table(path, partitioning=None).to_pandas()
     except FileNotFoundError:
         raise ResultError(path, "missing") from None
     except (OSError, pa.ArrowException) as error:
-        raise ResultError(path, f"damaged ({error})") from None
+        raise ResultError(path, f"damaged ({' '.join(str(error).split())})") from None
 
 
 def write_summary(
@@ -117,6 +117,9 @@ def read_summary(folder: Path) -> dict[str, Any]:
     version = summary.get("format_version") if isinstance(summary, dict) else None
     if version != FORMAT_VERSION:
         raise ResultError(path, f"format version {version}, this er3a reads {FORMAT_VERSION}")
+    for key in ("robot", "stage", "verdict", "figures", "provenance"):
+        if key not in summary:
+            raise ResultError(path, f"damaged (no '{key}' in it)")
     return summary
 
 

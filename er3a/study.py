@@ -11,7 +11,7 @@ from er3a.errors import InputError
 from er3a.inputs.yaml_file import StrictModel, load
 from er3a.robots.load import DATA, load_robot, placement_transform, robot_path
 from er3a.robots.robot import Robot
-from er3a.robots.schema import Name, Placement, Text
+from er3a.robots.schema import Name, Placement, Text, check_placement
 
 STAGES = ("validation", "workspace", "inverse", "trajectory")
 REFERENCES = DATA / "manual_refs"
@@ -25,6 +25,12 @@ class RobotEntry(StrictModel):
     paths: Text
     base: Placement | None = None
     tool: Placement | None = None
+
+    @model_validator(mode="after")
+    def _placements_plausible(self):
+        check_placement("base", self.base)
+        check_placement("tool", self.tool)
+        return self
 
 
 class ValidationSettings(StrictModel):
@@ -79,17 +85,24 @@ class Study(StrictModel):
             raise InputError(None, f"robots.{name}", "the study has no such robot", f"Known: {', '.join(self.robots)}")
         return self.robots[name]
 
+    def robot_file(self, name: str) -> Path:
+        """The robot's file; :class:`InputError` naming the entry if there is none."""
+        try:
+            return robot_path(self.entry(name).file or name)
+        except InputError as error:
+            raise InputError(error.file, error.field or f"robots.{name}", error.problem, error.remedy) from None
+
     def robot(self, name: str) -> Robot:
         """The robot with the study's base and tool."""
         entry = self.entry(name)
-        robot = load_robot(robot_path(entry.file or name))
+        robot = load_robot(self.robot_file(name))
         changes = {key: placement_transform(getattr(entry, key)) for key in ("base", "tool") if getattr(entry, key)}
         return robot.replace(name=name, **changes)
 
     def inputs(self, name: str, stage: str) -> list[Path]:
         """The files that a stage reads for a robot."""
         entry = self.entry(name)
-        files = [robot_path(entry.file or name)]
+        files = [self.robot_file(name)]
         if stage == "validation":
             for reference in load_robot(files[0]).references:
                 files += sorted((REFERENCES / reference).glob("*.csv"))

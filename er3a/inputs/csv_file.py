@@ -60,7 +60,7 @@ def read_csv(path: str | Path, columns: Mapping[str, Column]) -> list[dict[str, 
 
 
 def _check_header(path: Path, header: list[str], columns: Mapping[str, Column]) -> None:
-    for name in header:
+    for name in filter(None, header):
         if header.count(name) > 1:
             raise InputError(path, f"column {name}", "stands in the header twice", "Keep one of the two")
     missing = [name for name in columns if name not in header]
@@ -72,6 +72,8 @@ def _check_header(path: Path, header: list[str], columns: Mapping[str, Column]) 
         if same_stem:
             problem, remedy = "not a unit this column can have", f"Convert the values and name it '{same_stem[0]}'"
             raise InputError(path, f"column {name}", problem, remedy)
+        if not name:
+            raise InputError(path, f"column {header.index(name) + 1}", "has no name", "Name it, or remove a comma")
         close = difflib.get_close_matches(name, missing, n=1)
         remedy = f"Did you mean '{close[0]}'?" if close else f"Known columns: {', '.join(columns)}"
         raise InputError(path, f"column {name}", "unknown column", remedy)
@@ -90,9 +92,10 @@ def _value(path: Path, row: int, name: str, text: str, column: Column) -> Any:
             raise InputError(path, where, f"'{text}' is not known", "Write" + _allowed(column))
         return text
     try:
-        value = column.type(text)
+        value = column.type(text.replace("_", "?"))  # Python would read 1_000 as 1000
     except ValueError:
-        raise InputError(path, where, f"'{text}' is not a number", "Write a number without a unit") from None
+        number = "a whole number" if column.type is int else "a number"
+        raise InputError(path, where, f"'{text}' is not {number}", f"Write {number} without a unit") from None
     if not math.isfinite(value):
         raise InputError(path, where, f"'{text}' is not a finite number", "Write a number, or remove the row")
     return value

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import difflib
+import re
+import stat
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -15,6 +17,17 @@ Model = TypeVar("Model", bound=BaseModel)
 
 MAX_BYTES = 1_000_000
 
+_FIELD = re.compile(r"([A-Za-z_]\w*(?:\.\w+|\[\d+\])*): ")
+_REMEDIES = {
+    "float_type": "Write a number, without quotes or unit",
+    "int_type": "Write a whole number, without point, quotes or unit",
+    "bool_type": "Write true or false",
+    "string_type": "Write a text, in quotes if it looks like a number",
+    "list_type": "Write a list",
+    "dict_type": "Write `key: value` lines below it",
+    "model_type": "Write `key: value` lines below it",
+}
+
 
 class StrictModel(BaseModel):
     """Base of all file models: no unknown keys, no NaN, no silent conversion of types."""
@@ -22,8 +35,11 @@ class StrictModel(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
 
-class _UniqueKeyLoader(yaml.SafeLoader):
-    """Safe YAML loader that refuses a key written twice and aliases (no file of ours needs them)."""
+class _PlainLoader(yaml.SafeLoader):
+    """Safe YAML loader with numbers as in YAML 1.2, which refuses a key written twice and aliases.
+
+    YAML 1.1 would read ``0650`` as octal 424, ``1:30`` as 90, and ``1e3`` as a text.
+    """
 
     def compose_node(self, parent, index):
         if self.check_event(yaml.AliasEvent):
@@ -41,10 +57,23 @@ class _UniqueKeyLoader(yaml.SafeLoader):
                 )
             if key in seen:
                 raise yaml.constructor.ConstructorError(
-                    None, None, f"the key '{key}' stands here twice; keep one of the two", key_node.start_mark
+                    None, None, f"the key {key!r} stands here twice; keep one of the two", key_node.start_mark
                 )
             seen.add(key)
         return super().construct_mapping(node, deep=True)
+
+
+_NUMBERS = {
+    "tag:yaml.org,2002:int": r"[-+]?(?:0|[1-9][0-9]*)$",
+    "tag:yaml.org,2002:float": r"""(?x)[-+]?(?:[0-9]+\.[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?$
+        |[-+]?[0-9]+[eE][-+]?[0-9]+$ |[-+]?\.(?:inf|Inf|INF)$ |\.(?:nan|NaN|NAN)$""",
+}
+_PlainLoader.yaml_implicit_resolvers = {
+    first: [(tag, pattern) for tag, pattern in resolvers if tag not in _NUMBERS]
+    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+for _tag, _pattern in _NUMBERS.items():
+    _PlainLoader.add_implicit_resolver(_tag, re.compile(_pattern), list("-+.0123456789"))
 
 
 def read_yaml(path: str | Path) -> dict[str, Any]:
@@ -58,12 +87,14 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
     path = Path(path)
     text = read_text(path)
     try:
-        data = yaml.load(text, Loader=_UniqueKeyLoader)
+        data = yaml.load(text, Loader=_PlainLoader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         where = f"line {mark.line + 1}, column {mark.column + 1}" if mark else None
         raise InputError(path, where, error.problem or "not valid YAML", "Mend this line") from None
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
+    except RecursionError:
+        raise InputError(path, None, "nested too deeply", "Input tables are flat; mend the brackets") from None
+    except (yaml.YAMLError, ValueError) as error:
         reason = " ".join(str(error).split())[:200]
         raise InputError(path, None, f"not valid YAML ({reason})", "Mend the file") from None
     if not isinstance(data, dict):
@@ -75,11 +106,15 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
 def read_text(path: Path) -> str:
     """Read a UTF-8 text file of at most 1 MB, or raise :class:`InputError`."""
     try:
-        raw = path.read_bytes() if path.stat().st_size <= MAX_BYTES else None
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            raise InputError(path, None, "not a file", "Check the path")
+        raw = path.read_bytes() if status.st_size <= MAX_BYTES else None
     except FileNotFoundError:
         raise InputError(path, None, "there is no such file", "Check the path") from None
     except (OSError, ValueError) as error:
-        raise InputError(path, None, f"can't be read ({error})", "Check the path and its permissions") from None
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(path, None, f"can't be read ({reason})", "Check the path and its permissions") from None
     if raw is None:
         raise InputError(path, None, f"larger than {MAX_BYTES} bytes", "Input tables are small text files")
     try:
@@ -94,9 +129,11 @@ def parse(model: type[Model], data: dict[str, Any], path: str | Path | None) -> 
         return model.model_validate(data)
     except ValidationError as error:
         faults = error.errors()
-        first = min(faults, key=lambda fault: fault["type"] != "extra_forbidden")
+        first = min(faults, key=lambda fault: (fault["loc"] != ("kind",), fault["type"] != "extra_forbidden"))
         field = _dotted(first["loc"])
         problem, remedy = _explain(first, model)
+        if named := _FIELD.match(problem):
+            field, problem = ".".join(filter(None, (field, named[1]))), problem[named.end() :]
         if len(faults) > 1:
             remedy += f" ({len(faults) - 1} more to mend after this one)"
         raise InputError(path, field or None, problem, remedy) from None
@@ -110,7 +147,10 @@ def load(model: type[Model], path: str | Path) -> Model:
 def _dotted(loc: tuple[int | str, ...]) -> str:
     text = ""
     for part in loc:
-        text += f"[{part}]" if isinstance(part, int) else (f".{part}" if text else part)
+        if isinstance(part, int):
+            text += f"[{part}]"
+        else:
+            text += ("." if text else "") + (part if part.isprintable() else repr(part))
     return text
 
 
@@ -122,7 +162,7 @@ def _explain(fault: dict[str, Any], model: type[BaseModel]) -> tuple[str, str]:
         known = _known_keys(model)
         close = difflib.get_close_matches(str(key), known, n=1)
         hint = f"Did you mean '{close[0]}'?" if close else "Remove it, or check its place in the file"
-        return f"unknown key '{key}'", hint
+        return f"unknown key {str(key)!r}", hint
     if kind == "missing":
         return "missing", f"Add the key '{key}'"
     if kind == "value_error":
@@ -131,7 +171,7 @@ def _explain(fault: dict[str, Any], model: type[BaseModel]) -> tuple[str, str]:
     if kind == "finite_number":
         return f"{fault['input']} is not a finite number", "Write a number"
     given = repr(fault["input"])
-    return f"{given[:80]} is refused", fault["msg"]
+    return f"{given[:80]} is refused", _REMEDIES.get(kind, fault["msg"])
 
 
 def _known_keys(model: type[BaseModel]) -> list[str]:

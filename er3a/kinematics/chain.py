@@ -37,7 +37,7 @@ def constant_links(robot: Robot, frame: int | None = None) -> np.ndarray:
     -------
     links : (n + 1, 4, 4), read-only, n the number of joints in that chain (6 for None)
     """
-    if frame is not None and frame not in range(JOINTS + 1):
+    if frame is not None and not (isinstance(frame, int | np.integer) and 0 <= frame <= JOINTS):
         raise Er3aError(f"frame is {frame!r}; expected None or a whole number from 0 to 6")
     count = JOINTS if frame is None else frame
     parts = link_parts(robot)

@@ -23,7 +23,7 @@ def forward(robot: Robot, q: np.ndarray, frame: int | None = None, out: np.ndarr
     q : (..., 6), rad, the maker's joint angles; NaN in a row gives NaN in its pose
     frame : None for the tool point (``T_base_tool``); 0..6 for the frame after that joint in the table's own
         convention, base included, tool not
-    out : (..., 4, 4) float64 C-contiguous array to write into
+    out : (..., 4, 4) writeable float64 C-contiguous array to fill and return
 
     Returns
     -------
@@ -38,8 +38,8 @@ def forward(robot: Robot, q: np.ndarray, frame: int | None = None, out: np.ndarr
     shape = (*q.shape[:-1], 4, 4)
     if out is None:
         out = np.empty(shape)
-    elif out.shape != shape or out.dtype != np.float64 or not out.flags.c_contiguous:
-        raise ShapeError("out", out.shape, f"{shape}, float64, C-contiguous")
+    elif out.shape != shape or out.dtype != np.float64 or not out.flags.carray:
+        raise ShapeError("out", out.shape, f"{shape}, float64, C-contiguous and writeable")
     links = constant_links(robot, frame)
     _forward(q.reshape(-1, JOINTS), robot.direction, robot.offset, links, out.reshape(-1, 4, 4))
     return out
@@ -89,60 +89,82 @@ def checked_joints(q: np.ndarray, argument: str = "q") -> np.ndarray:
 
 
 @kernel
-def rotate_and_step(T, angle, link, turned):
-    """Set ``turned`` to T Rz(angle), then T to ``turned`` times link, for (4, 4) transforms."""
-    c, s = np.cos(angle), np.sin(angle)
-    for i in range(3):
-        x, y = T[i, 0], T[i, 1]
-        turned[i, 0] = x * c + y * s
-        turned[i, 1] = y * c - x * s
-        turned[i, 2] = T[i, 2]
-        turned[i, 3] = T[i, 3]
-    for i in range(3):
-        for j in range(4):
-            value = turned[i, 0] * link[0, j] + turned[i, 1] * link[1, j] + turned[i, 2] * link[2, j]
-            T[i, j] = value + turned[i, 3] if j == 3 else value
+def turn_row(row, c, s):
+    """Row (4 floats) of T, after T is multiplied from the right by Rz, given its cosine and sine."""
+    return row[0] * c + row[1] * s, row[1] * c - row[0] * s, row[2], row[3]
+
+
+@kernel
+def step_row(row, link):
+    """Row (4 floats) of T, after T is multiplied from the right by the constant transform ``link``."""
+    return (
+        row[0] * link[0, 0] + row[1] * link[1, 0] + row[2] * link[2, 0],
+        row[0] * link[0, 1] + row[1] * link[1, 1] + row[2] * link[2, 1],
+        row[0] * link[0, 2] + row[1] * link[1, 2] + row[2] * link[2, 2],
+        row[0] * link[0, 3] + row[1] * link[1, 3] + row[2] * link[2, 3] + row[3],
+    )
+
+
+@kernel
+def rows_of(T):
+    """The three upper rows of a transform, each as 4 floats."""
+    return (
+        (T[0, 0], T[0, 1], T[0, 2], T[0, 3]),
+        (T[1, 0], T[1, 1], T[1, 2], T[1, 3]),
+        (T[2, 0], T[2, 1], T[2, 2], T[2, 3]),
+    )
+
+
+@kernel
+def write_rows(x, y, z, out):
+    for j in range(4):
+        out[0, j], out[1, j], out[2, j] = x[j], y[j], z[j]
+    out[3, 0], out[3, 1], out[3, 2], out[3, 3] = 0.0, 0.0, 0.0, 1.0
 
 
 @kernel
 def _forward(q, direction, offset, links, out):
-    turned = np.zeros((4, 4))
     for n in range(q.shape[0]):
-        T = out[n]
-        T[:, :] = links[0]
+        x, y, z = rows_of(links[0])
         for k in range(links.shape[0] - 1):
-            rotate_and_step(T, direction[k] * q[n, k] + offset[k], links[k + 1], turned)
+            angle, link = direction[k] * q[n, k] + offset[k], links[k + 1]
+            c, s = np.cos(angle), np.sin(angle)
+            x = step_row(turn_row(x, c, s), link)
+            y = step_row(turn_row(y, c, s), link)
+            z = step_row(turn_row(z, c, s), link)
+        write_rows(x, y, z, out[n])
 
 
 @kernel
 def _frames(q, direction, offset, links, out):
-    T = np.zeros((4, 4))
     for n in range(q.shape[0]):
-        T[:, :] = links[0]
+        x, y, z = rows_of(links[0])
         for k in range(6):
-            rotate_and_step(T, direction[k] * q[n, k] + offset[k], links[k + 1], out[n, k])
-            out[n, k, 3, :3] = 0.0
-            out[n, k, 3, 3] = 1.0
-        out[n, 6] = T
+            angle, link = direction[k] * q[n, k] + offset[k], links[k + 1]
+            c, s = np.cos(angle), np.sin(angle)
+            x, y, z = turn_row(x, c, s), turn_row(y, c, s), turn_row(z, c, s)
+            write_rows(x, y, z, out[n, k])
+            x, y, z = step_row(x, link), step_row(y, link), step_row(z, link)
+        write_rows(x, y, z, out[n, 6])
 
 
 @kernel
 def _jacobian(q, direction, offset, links, out):
-    T, turned = np.zeros((4, 4)), np.zeros((4, 4))
-    axis, point = np.zeros((6, 3)), np.zeros((6, 3))
     for n in range(q.shape[0]):
-        T[:, :] = links[0]
+        J = out[n]
+        x, y, z = rows_of(links[0])
         for k in range(6):
-            for i in range(3):
-                axis[k, i] = T[i, 2] * direction[k]
-                point[k, i] = T[i, 3]
-            rotate_and_step(T, direction[k] * q[n, k] + offset[k], links[k + 1], turned)
+            # Until the tool point is known, the linear rows hold a point on the axis.
+            J[0, k], J[1, k], J[2, k] = x[3], y[3], z[3]
+            J[3, k], J[4, k], J[5, k] = x[2] * direction[k], y[2] * direction[k], z[2] * direction[k]
+            angle, link = direction[k] * q[n, k] + offset[k], links[k + 1]
+            c, s = np.cos(angle), np.sin(angle)
+            x = step_row(turn_row(x, c, s), link)
+            y = step_row(turn_row(y, c, s), link)
+            z = step_row(turn_row(z, c, s), link)
         for k in range(6):
-            rx, ry, rz = T[0, 3] - point[k, 0], T[1, 3] - point[k, 1], T[2, 3] - point[k, 2]
-            wx, wy, wz = axis[k, 0], axis[k, 1], axis[k, 2]
-            out[n, 0, k] = wy * rz - wz * ry
-            out[n, 1, k] = wz * rx - wx * rz
-            out[n, 2, k] = wx * ry - wy * rx
-            out[n, 3, k] = wx
-            out[n, 4, k] = wy
-            out[n, 5, k] = wz
+            rx, ry, rz = x[3] - J[0, k], y[3] - J[1, k], z[3] - J[2, k]
+            wx, wy, wz = J[3, k], J[4, k], J[5, k]
+            J[0, k] = wy * rz - wz * ry
+            J[1, k] = wz * rx - wx * rz
+            J[2, k] = wx * ry - wy * rx

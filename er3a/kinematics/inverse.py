@@ -3,23 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
+from functools import lru_cache
 
 import numpy as np
 
 from er3a.errors import Er3aError, PoseError, ShapeError
+from er3a.kinematics.closed_form import BOUNDARY_M, OFF_AXIS, ORIENTATION, REACHED, SLOTS, TOO_FAR
 from er3a.kinematics.forward import checked_joints
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.transforms import check_poses
-from er3a.kinematics.wrist_partitioned import (
-    OFF_AXIS,
-    ORIENTATION,
-    REACHED,
-    SLOTS,
-    TOO_FAR,
-    solve_slots,
-    wrist_partitioned_arm,
-)
+from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from er3a.robots.robot import Robot
 
 LIMIT_TOLERANCE = 1e-9
@@ -76,18 +69,17 @@ def inverse(robot: Robot, T: np.ndarray, q_ref: np.ndarray | None = None) -> Sol
         raise PoseError("q_ref holds NaN or infinity")
     q, fault, gap = (batch[0] for batch in solve_slots(robot, T[None], q_ref[None]))
 
-    rows, branches = [], []
+    slots: list[int] = []
     for slot in np.flatnonzero(fault == REACHED):
-        for row in _rows_of_branch(robot, q[slot], q_ref):
-            if not any(np.abs(row - other).max() < SAME_JOINTS for other in rows):
-                rows.append(row)
-                branches.append(slot)
-    solutions = np.array(rows).reshape(-1, 6)
+        if not any(np.abs(principal(q[slot] - q[other])).max() < SAME_JOINTS for other in slots):
+            slots.append(slot)
+    rows = [_rows_of_branch(robot, q[slot], q_ref) for slot in slots]
+    solutions = np.concatenate([np.empty((0, 6)), *rows])
     inside = within(robot, solutions)
     return Solutions(
         q=solutions,
         within_limits=inside,
-        branch=np.array(branches, dtype=int),
+        branch=np.repeat(np.array(slots, dtype=int), [len(turns) for turns in rows]),
         turn=np.round((solutions - principal(solutions)) / TURN).astype(int),
         reason=tuple("" if ok else limit_reason(robot, row) for row, ok in zip(solutions, inside)),
         unsolved=_unsolved(robot, fault, gap),
@@ -96,7 +88,7 @@ def inverse(robot: Robot, T: np.ndarray, q_ref: np.ndarray | None = None) -> Sol
 
 def within(robot: Robot, q: np.ndarray) -> np.ndarray:
     """Whether joint angles (..., 6) in rad lie within the limits, to 1e-9 rad; shape (...,)."""
-    return ((q >= robot.lower - LIMIT_TOLERANCE) & (q <= robot.upper + LIMIT_TOLERANCE)).all(axis=-1)
+    return (np.maximum(q - robot.upper, robot.lower - q) <= LIMIT_TOLERANCE).all(axis=-1)
 
 
 def principal(q: np.ndarray) -> np.ndarray:
@@ -128,17 +120,20 @@ def limit_reason(robot: Robot, q: np.ndarray) -> str:
     return "; ".join(parts)
 
 
+@lru_cache(maxsize=256)
 def branch_labels(robot: Robot) -> tuple[str, ...]:
     """The eight slots in words.
 
-    *front*: the wrist centre is on the side of axis 1 where it stands in the maker's zero pose; *back*: reached over
-    the head. *up*: with the arm stretched out level on that side, the elbow is above the line from shoulder to wrist.
-    *flip*: the wrist root with the negative angle.
+    *front*: the wrist centre is on the side of axis 1 where it stands in the maker's zero pose (if it stands on axis 1
+    there, the side of the cross product of axes 1 and 2); *back*: reached over the head. *up*: with the arm stretched
+    out level on that side, the elbow is above the line from shoulder to wrist. *flip*: the wrist root with the
+    negative angle.
     """
     arm = wrist_partitioned_arm(robot)
     w1, w2 = arm.axes[0], arm.axes[1]
     forward_root = -1.0  # slot 0 has theta_1 = phi + delta: the wrist lies against w1 x w2
-    zero_side = np.sign(determinant_factors(robot, np.zeros(6)).shoulder) or 1.0
+    at_zero = determinant_factors(robot, np.zeros(6)).shoulder
+    zero_side = 1.0 if abs(at_zero) < BOUNDARY_M else np.sign(at_zero)
     labels = []
     for slot in range(SLOTS):
         side = forward_root * (1.0 if slot < 4 else -1.0)
@@ -157,27 +152,27 @@ def _turn_bounds(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return low, high
 
 
-def _rows_of_branch(robot: Robot, q: np.ndarray, q_ref: np.ndarray) -> list[np.ndarray]:
+def _rows_of_branch(robot: Robot, q: np.ndarray, q_ref: np.ndarray) -> np.ndarray:
     low, high = _turn_bounds(robot, q)
     if (low > high).any():
-        return [nearest_turns(robot, q, q_ref)]
+        return nearest_turns(robot, q, q_ref)[None]
     if np.prod(high - low + 1) > MOST_ROWS:
         raise Er3aError(f"{robot.name}: the limits allow more than {MOST_ROWS} turns of one pose; narrow them")
     choices = [q[j] + TURN * np.arange(low[j], high[j] + 1) for j in range(6)]
-    rows = [np.array(row) for row in product(*choices)]
-    return sorted(rows, key=lambda row: np.abs(row - q_ref).max())
+    rows = np.stack(np.meshgrid(*choices, indexing="ij"), axis=-1).reshape(-1, 6)
+    return rows[np.argsort(np.abs(rows - q_ref).max(axis=1), kind="stable")]
 
 
 def _unsolved(robot: Robot, fault: np.ndarray, gap: np.ndarray) -> tuple[str, ...]:
-    labels, texts = branch_labels(robot), []
+    texts = []
     for shoulder in (0, 1):
         part = slice(4 * shoulder, 4 * shoulder + 4)
         if (fault[part] == REACHED).any():
             continue
         best = 4 * shoulder + int(np.argmin(gap[part]))
-        side = labels[best].split(",")[0]
+        side = branch_labels(robot)[best].split(",")[0]
         texts.append(f"{side}: {_fault_text(robot, int(fault[best]), float(gap[best]))}")
-    return tuple(dict.fromkeys(texts))
+    return tuple(texts)
 
 
 def _fault_text(robot: Robot, fault: int, gap: float) -> str:
@@ -185,14 +180,15 @@ def _fault_text(robot: Robot, fault: int, gap: float) -> str:
     if fault == ORIENTATION:
         return f"the wrist can't tilt that far; {np.degrees(gap):.3g} deg are missing"
     if fault == OFF_AXIS:
-        return f"the wrist centre would be {gap * 1000:.3g} mm too near to axis 1 for the arm's sideways offset"
+        return f"the wrist centre would be {_mm(gap)} too near to axis 1 for the arm's sideways offset"
     if fault == TOO_FAR:
         return (
-            f"the wrist centre would be {gap * 1000:.3g} mm too far from axis 2, "
-            f"which the stretched arm reaches to {arm.wrist_reach * 1000:.1f} mm"
+            f"the wrist centre would be {_mm(gap)} too far from axis 2, "
+            f"which the stretched arm reaches to {_mm(arm.wrist_reach)}"
         )
     least = abs(arm.upper_arm_length - arm.forearm_length)
-    return (
-        f"the wrist centre would be {gap * 1000:.3g} mm too near to axis 2, "
-        f"which the folded arm reaches down to {least * 1000:.1f} mm"
-    )
+    return f"the wrist centre would be {_mm(gap)} too near to axis 2, which the folded arm reaches down to {_mm(least)}"
+
+
+def _mm(length: float) -> str:
+    return f"{length * 1000:.1f} mm" if length >= 1e-4 else f"{length * 1000:.2g} mm"

@@ -21,6 +21,7 @@ from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
 from er3a.robots.robot import Robot
 
 TYPES = ("wrist", "elbow", "shoulder")
+ROUNDING = 6 * np.finfo(float).eps
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +31,7 @@ class Conditioning:
     Attributes
     ----------
     manipulability : (...,), product of the singular values [2]_
-    condition_number : (...,), infinite at a singularity
+    condition_number : (...,), infinite where the Jacobian is singular to rounding
     smallest_singular_value : (...,)
     """
 
@@ -71,8 +72,8 @@ def conditioning(robot: Robot, q: np.ndarray, length: float) -> Conditioning:
     J[..., :3, :] /= length
     values = np.linalg.svd(J, compute_uv=False)
     smallest = values[..., -1]
-    with np.errstate(divide="ignore"):
-        condition = np.where(smallest > 0, values[..., 0] / smallest, np.inf)
+    regular = smallest > ROUNDING * values[..., 0]
+    condition = np.divide(values[..., 0], smallest, out=np.full_like(smallest, np.inf), where=regular)
     return Conditioning(values.prod(axis=-1), condition, smallest)
 
 

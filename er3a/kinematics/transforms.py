@@ -87,9 +87,10 @@ def check_poses(T: np.ndarray, argument: str = "T") -> np.ndarray:
     T = np.asarray(T, dtype=float)
     if T.ndim < 2 or T.shape[-2:] != (4, 4):
         raise ShapeError(argument, T.shape, "(..., 4, 4)")
-    R = T[..., :3, :3]
+    finite = np.isfinite(T).all(axis=(-1, -2))
+    R = np.where(finite[..., None, None], T[..., :3, :3], np.eye(3))
     faults = (
-        (~np.isfinite(T).all(axis=(-1, -2)), "holds NaN or infinity"),
+        (~finite, "holds NaN or infinity"),
         (np.abs(T[..., 3, :] - [0, 0, 0, 1]).max(axis=-1) > 1e-12, "has a bottom row other than 0 0 0 1"),
         (
             np.abs(R @ np.swapaxes(R, -1, -2) - np.eye(3)).max(axis=(-1, -2)) > ORTHONORMAL_TOLERANCE,

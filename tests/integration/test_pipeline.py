@@ -48,7 +48,7 @@ def test_every_stage_leaves_results_a_page_and_a_recording(small_study):
             for suffix in ("html", "rrd"):
                 assert (small_study.folder / "reports" / robot / f"{stage}.{suffix}").stat().st_size > 1000
     assert (small_study.folder / "reports/index.html").is_file()
-    assert not list((small_study.folder / "results").glob("*/workspace/parts/*.parquet"))
+    assert not list((small_study.folder / "results").glob("*/workspace/parts/*"))
 
 
 def test_verdicts_tell_the_article_from_the_real_arm(small_study):

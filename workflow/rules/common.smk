@@ -26,7 +26,7 @@ TABLES = {
     "validation": ["checks", "axes", "key_poses", "section"],
     "workspace": ["cells", "section", "curve", "cloud", "hull_vertices", "hull_triangles"],
     "inverse": ["solutions"],
-    "trajectory": ["samples"],
+    "trajectory": ["checks", "samples"],
 }
 
 

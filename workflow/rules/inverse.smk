@@ -9,7 +9,7 @@ rule compute_inverse:
     benchmark:
         "logs/{robot}/inverse.compute.tsv"
     conda:
-        "er3a"
+        "../envs/er3a.yaml"
     params:
         settings=settings("inverse"),
         code=code_of("inverse", "compute"),

@@ -9,7 +9,7 @@ rule compute_trajectory:
     benchmark:
         "logs/{robot}/trajectory.compute.tsv"
     conda:
-        "er3a"
+        "../envs/er3a.yaml"
     params:
         settings=settings("trajectory"),
         code=code_of("trajectory", "compute"),

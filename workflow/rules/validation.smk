@@ -9,7 +9,7 @@ rule compute_validation:
     benchmark:
         "logs/{robot}/validation.compute.tsv"
     conda:
-        "er3a"
+        "../envs/er3a.yaml"
     params:
         settings=settings("validation"),
         code=code_of("validation", "compute"),

@@ -14,7 +14,7 @@ rule record:
     log:
         "logs/{robot}/{stage}.record.log",
     conda:
-        "er3a"
+        "../envs/er3a.yaml"
     params:
         code=lambda wildcards: code_of(wildcards.stage, "record"),
     message:
@@ -31,7 +31,7 @@ rule report:
     log:
         "logs/{robot}/{stage}.report.log",
     conda:
-        "er3a"
+        "../envs/er3a.yaml"
     params:
         code=lambda wildcards: code_of(wildcards.stage, "report"),
     message:
@@ -49,7 +49,7 @@ rule index:
     log:
         "logs/index.log",
     conda:
-        "er3a"
+        "../envs/er3a.yaml"
     params:
         code=code_digest("er3a.viewing.index"),
     message:

@@ -13,7 +13,7 @@ rule sample_workspace:
     benchmark:
         "logs/{robot}/workspace.sample.{scatteritem}.tsv"
     conda:
-        "er3a"
+        "../envs/er3a.yaml"
     params:
         settings=settings("workspace"),
         code=code_of("workspace", "sample"),
@@ -35,7 +35,7 @@ rule compute_workspace:
     benchmark:
         "logs/{robot}/workspace.compute.tsv"
     conda:
-        "er3a"
+        "../envs/er3a.yaml"
     params:
         settings=settings("workspace"),
         code=code_of("workspace", "compute"),

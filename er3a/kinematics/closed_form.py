@@ -1,0 +1,189 @@
+"""The closed-form inverse of an arm with a spherical wrist and parallel axes 2 and 3, as a kernel over poses.
+
+With w the axis directions, P points on the axes and W the wrist centre, the steps are [1]_, [2]_:
+
+1. Rotations about the parallel axes 2 and 3 leave the component of W along w2 alone: one equation
+   A cos(theta_1) + B sin(theta_1) = C, two roots (the *shoulder* branches).
+2. Across w2 the upper arm u, the forearm m and the distance D of W from axis 2 form a triangle: two mirror roots for
+   theta_3 (the *elbow* branches), then theta_2 by one angle.
+3. The rotation left for the wrist gives the angle gamma between axes 4 and 6; axes 4, 5, 6 form a spherical triangle:
+   two mirror roots for theta_5 (the *wrist* branches), then theta_4 and theta_6 by one angle each.
+
+Triangle angles come from half-angle tangents, which keep full accuracy where a cosine formula loses half the digits
+(elbow straight, wrist aligned) [3]_.
+
+Slot order: ``4 * shoulder + 2 * elbow + wrist``, 0 the root with the positive angle in each of the three steps.
+
+References
+----------
+.. [1] D. L. Pieper, "The kinematics of manipulators under computer control", PhD thesis, Stanford, 1968.
+.. [2] R. M. Murray, Z. Li, S. S. Sastry, *A Mathematical Introduction to Robotic Manipulation*, 1994, section 3.3.
+.. [3] W. Kahan, "Miscalculating area and angles of a needle-like triangle", 2014.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from er3a.kinematics.jit import kernel
+from er3a.kinematics.vectors import (
+    Vector,
+    add,
+    cross,
+    dot,
+    rotated,
+    scaled,
+    signed_angle,
+    subtract,
+    unsigned_angle,
+)
+
+SLOTS = 8
+BOUNDARY_M = 1e-9
+BOUNDARY_RAD = 1e-9
+FREE = 1e-13
+
+REACHED, TOO_FAR, TOO_NEAR, OFF_AXIS, ORIENTATION = 0, 1, 2, 3, 4
+
+
+class ArmConstants(NamedTuple):
+    """What the kernel takes of an arm: its axis lines as plain numbers, with all theta at 0.
+
+    ``beside_6`` is a vector across axis 6; ``_in_tool`` marks components in the tool frame. ``reach`` and ``least`` are
+    the stretched and the folded arm's length, ``elbow_angle`` turns the upper arm to the forearm, ``wrist_angle`` axis
+    4 to axis 6 about axis 5, ``angle_45`` and ``angle_56`` lie between neighbouring axes.
+    """
+
+    axis_1: Vector
+    axis_2: Vector
+    axis_4: Vector
+    axis_5: Vector
+    axis_6: Vector
+    point_1: Vector
+    point_2: Vector
+    upper_arm: Vector
+    forearm: Vector
+    beside_6: Vector
+    wrist_in_tool: Vector
+    axis_6_in_tool: Vector
+    beside_6_in_tool: Vector
+    reach: float
+    least: float
+    cos_12: float
+    sin_12: float
+    shoulder_offset: float
+    elbow_sign: float
+    elbow_angle: float
+    wrist_angle: float
+    angle_45: float
+    angle_56: float
+
+
+@kernel
+def _wrap(angle):
+    """Into (-pi, pi]."""
+    return angle - 2 * np.pi * np.ceil((angle - np.pi) / (2 * np.pi))
+
+
+@kernel
+def _to_base(T, v):
+    """Components in the base frame of a vector given in the tool frame."""
+    return (
+        T[0, 0] * v[0] + T[0, 1] * v[1] + T[0, 2] * v[2],
+        T[1, 0] * v[0] + T[1, 1] * v[1] + T[1, 2] * v[2],
+        T[2, 0] * v[0] + T[2, 1] * v[1] + T[2, 2] * v[2],
+    )
+
+
+@kernel
+def solve(arm, direction, offset, T, q_ref, q, fault, gap):
+    """Fill ``q`` (N, 8, 6), ``fault`` and ``gap`` (N, 8) for poses ``T`` (N, 4, 4); see ``solve_slots``."""
+    for n in range(T.shape[0]):
+        tool_point = (T[n, 0, 3], T[n, 1, 3], T[n, 2, 3])
+        v = subtract(add(tool_point, _to_base(T[n], arm.wrist_in_tool)), arm.point_1)
+        axis_6, beside_6 = _to_base(T[n], arm.axis_6_in_tool), _to_base(T[n], arm.beside_6_in_tool)
+
+        along = dot(arm.axis_1, v)
+        A, B = dot(arm.axis_2, v) - along * arm.cos_12, -dot(arm.axis_2, cross(arm.axis_1, v))
+        C, H = arm.shoulder_offset - along * arm.cos_12, np.hypot(A, B)
+        missing = np.abs(C) - H
+        if missing > BOUNDARY_M * arm.sin_12:
+            fault[n, :] = OFF_AXIS
+            gap[n, :] = missing / arm.sin_12
+            continue
+        phi, delta = np.arctan2(B, A), np.arctan2(np.sqrt(max((H - C) * (H + C), 0.0)), C)
+        for shoulder in range(2):
+            theta_1 = phi + (delta if shoulder == 0 else -delta)
+            if H < FREE:
+                theta_1 = direction[0] * q_ref[n, 0] + offset[0]
+            c, s = np.cos(theta_1), -np.sin(theta_1)
+            x = subtract(add(rotated(v, arm.axis_1, c, s), arm.point_1), arm.point_2)
+            x = subtract(x, scaled(arm.axis_2, dot(arm.axis_2, x)))
+            axis_6_1, beside_6_1 = rotated(axis_6, arm.axis_1, c, s), rotated(beside_6, arm.axis_1, c, s)
+
+            D = np.sqrt(dot(x, x))
+            far, near = D - arm.reach, arm.least - D
+            if far > BOUNDARY_M or near > BOUNDARY_M:
+                for slot in range(4 * shoulder, 4 * shoulder + 4):
+                    fault[n, slot] = TOO_FAR if far > 0 else TOO_NEAR
+                    gap[n, slot] = max(far, near)
+                continue
+            bend = 2.0 * np.arctan2(
+                np.sqrt(max(-far, 0.0) * (arm.reach + D)), np.sqrt(max(-near, 0.0) * (D + arm.least))
+            )
+            for elbow in range(2):
+                turn = (bend if elbow == 0 else -bend) - arm.elbow_angle
+                y = add(arm.upper_arm, rotated(arm.forearm, arm.axis_2, np.cos(turn), np.sin(turn)))
+                theta_2 = signed_angle(y, x, arm.axis_2)
+                if D < FREE:
+                    theta_2 = direction[1] * q_ref[n, 1] + offset[1]
+                # Axes 2 and 3 are parallel, so one rotation undoes both joints.
+                c, s = np.cos(theta_2 + turn), -np.sin(theta_2 + turn)
+                slot = 4 * shoulder + 2 * elbow
+                for wrist in range(2):
+                    q[n, slot + wrist, 0] = theta_1
+                    q[n, slot + wrist, 1] = theta_2
+                    q[n, slot + wrist, 2] = arm.elbow_sign * turn
+                free_theta_4 = direction[3] * q_ref[n, 3] + offset[3]
+                beyond = _solve_wrist(
+                    arm,
+                    rotated(axis_6_1, arm.axis_2, c, s),
+                    rotated(beside_6_1, arm.axis_2, c, s),
+                    free_theta_4,
+                    q[n, slot : slot + 2],
+                )
+                for wrist in range(slot, slot + 2):
+                    if beyond > BOUNDARY_RAD:
+                        fault[n, wrist] = ORIENTATION
+                        gap[n, wrist] = beyond
+                    for j in range(6):
+                        q[n, wrist, j] = _wrap(direction[j] * (q[n, wrist, j] - offset[j]))
+
+
+@kernel
+def _solve_wrist(arm, axis_6, beside_6, free_theta_4, theta):
+    """Set the last three columns of ``theta`` (2, 6) from where axis 6 and the vector beside it must turn to.
+
+    Returns by how much (rad) the wrist would have to tilt further than it can; beyond the boundary ``theta`` is NaN.
+    """
+    b, c = arm.angle_45, arm.angle_56
+    gamma = unsigned_angle(arm.axis_4, axis_6)
+    beyond = max(gamma - (b + c), np.abs(b - c) - gamma, gamma + b + c - 2 * np.pi)
+    if beyond > BOUNDARY_RAD:
+        theta[:, :] = np.nan
+        return beyond
+    upper_part = np.sin((gamma + b - c) / 2) * np.sin((gamma - b + c) / 2)
+    lower_part = np.sin((b + c + gamma) / 2) * np.sin((b + c - gamma) / 2)
+    bend = 2.0 * np.arctan2(np.sqrt(max(upper_part, 0.0)), np.sqrt(max(lower_part, 0.0)))
+    aligned = gamma < FREE or np.pi - gamma < FREE
+    for k in range(2):
+        theta_5 = (bend if k == 0 else -bend) - arm.wrist_angle
+        c_5, s_5 = np.cos(theta_5), np.sin(theta_5)
+        tilted = rotated(arm.axis_6, arm.axis_5, c_5, s_5)
+        theta_4 = free_theta_4 if aligned else signed_angle(tilted, axis_6, arm.axis_4)
+        rest = rotated(beside_6, arm.axis_4, np.cos(theta_4), -np.sin(theta_4))
+        rest = rotated(rest, arm.axis_5, c_5, -s_5)
+        theta[k, 3], theta[k, 4], theta[k, 5] = theta_4, theta_5, signed_angle(arm.beside_6, rest, arm.axis_6)
+    return beyond

@@ -1,0 +1,192 @@
+"""Joint angles along a line of the tool: the sequence of closed-form branches that is best as a whole.
+
+On the grid of :mod:`er3a.planning.branches`, dynamic programming [1]_ finds for each branch at the start the best way
+to continue to the end. Best means, in this order: fewest jumps (a joint would have to move far in no time), least time
+outside the limits, least joint travel. Whole turns cost no states of their own: along a continuous sequence they are
+fixed by the first angle, so each joint's turn is chosen once per stretch, by least time outside the limits, then
+nearest to the joints before. Among the branches at the start, the best whole sequence wins; given start joints admit
+only the branches that they lie on (several, if the start is singular).
+
+An unreachable pose interrupts the sequence; the stretch behind it is solved on its own.
+
+References
+----------
+.. [1] R. Bellman, *Dynamic Programming*, Princeton, 1957.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from er3a.errors import PoseError
+from er3a.kinematics.closed_form import SLOTS
+from er3a.kinematics.inverse import LIMIT_TOLERANCE, TURN, nearest_turns, within
+from er3a.kinematics.jit import kernel
+from er3a.planning.branches import WIDE_STEP, Branches, branches_along, turned_difference
+from er3a.planning.followed import Followed, Jump
+from er3a.planning.moves import Line
+from er3a.robots.robot import Robot
+
+JUMP_COST = 1e7
+OUTSIDE_COST = 1e4  # for the whole duration
+SAME_JOINTS = 1e-6
+SWITCH_STEP = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class _Sequence:
+    """One way through a stretch: angles (n, 6) in rad, slots (n,), jumps behind points (n - 1,), and its cost."""
+
+    q: np.ndarray
+    slot: np.ndarray
+    jumps: np.ndarray
+    cost: tuple[float, float, float]
+
+
+def follow(
+    robot: Robot, line: Line, t: np.ndarray, q_start: np.ndarray | None = None, start_slot: int | None = None
+) -> Followed:
+    """Follow a line.
+
+    Parameters
+    ----------
+    t : (N,), s, rising from 0 to the line's duration: where to solve at least
+    q_start : (6,), rad, joints at the start, whose tool pose is the line's first
+    start_slot : closed-form branch (0..7) to begin on; None for the best
+
+    Raises
+    ------
+    PoseError
+        if ``start_slot`` has no solution at the start
+    NotWristPartitionedError
+        if the arm has no closed form here
+    """
+    grid = branches_along(robot, line, np.asarray(t, float))
+    q = np.full((len(grid.t), 6), np.nan)
+    slot = np.full(len(grid.t), -1)
+    before, jumps = q_start, []
+    for first, last in _stretches(grid.reached.any(axis=1)):
+        starts = np.flatnonzero(grid.reached[first])
+        if first == 0:
+            starts = _admitted(grid, starts, q_start, start_slot)
+        best = _best(robot, grid, slice(first, last), starts, before)
+        q[first:last], slot[first:last] = best.q, best.slot
+        jumps += [_jump(grid.t, q, first + i) for i in np.flatnonzero(best.jumps)]
+        before = best.q[-1]
+    turn = q[0] - q_start if q_start is not None else np.zeros(6)
+    turn = np.where(np.abs(turn) < SAME_JOINTS, 0.0, turn)
+    return Followed(robot, line, grid.t, grid.progress, q, slot, turn, tuple(jumps))
+
+
+def _stretches(reached: np.ndarray) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], reached, [False]]).astype(int)))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+
+
+def _admitted(grid: Branches, starts: np.ndarray, q_start: np.ndarray | None, start_slot: int | None) -> np.ndarray:
+    if start_slot is not None:
+        if start_slot not in starts:
+            raise PoseError(f"the start pose has no solution on branch {start_slot}")
+        return np.array([start_slot])
+    if q_start is None:
+        return starts
+    distance = np.abs(turned_difference(grid.q[0], q_start))
+    distance[np.ix_(grid.free_wrist[0], [3, 5])] = 0.0
+    distance[np.ix_(grid.free_shoulder[0], [0, 3, 4, 5])] = 0.0
+    worst = distance.max(axis=1)[starts]
+    return starts[worst <= max(SAME_JOINTS, worst.min())]
+
+
+def _best(robot: Robot, grid: Branches, part: slice, starts: np.ndarray, before: np.ndarray | None) -> _Sequence:
+    q, t = grid.q[part], grid.t[part]
+    share = np.gradient(t) / grid.t[-1] if len(t) > 1 else np.zeros(1)
+    fits = within(robot, nearest_turns(robot, q, np.zeros(6)))
+    price = np.where(fits, 0.0, OUTSIDE_COST * share[:, None])
+    onward, leaps = _costs_to_go(q, price, grid.meeting[part])
+    sequences = []
+    for start in starts:
+        slot = _walk(onward, start)
+        jumps = leaps[np.arange(len(t) - 1), slot[:-1]]
+        sequences.append(_turned(robot, q[np.arange(len(t)), slot], slot, jumps, share, before))
+    return min(sequences, key=lambda sequence: sequence.cost)
+
+
+def _turned(
+    robot: Robot, q: np.ndarray, slot: np.ndarray, jumps: np.ndarray, share: np.ndarray, before: np.ndarray | None
+) -> _Sequence:
+    """Make angles continuous and choose each joint's whole turns."""
+    steps = turned_difference(q[:-1], q[1:])
+    unwound = q[0] + np.concatenate([np.zeros((1, 6)), np.cumsum(steps, axis=0)])
+    reference = np.zeros(6) if before is None else before
+    outside = 0.0
+    for j in range(6):
+        low = int(np.floor((robot.lower[j] - unwound[:, j].max()) / TURN))
+        high = int(np.ceil((robot.upper[j] - unwound[:, j].min()) / TURN))
+        nearest = round((reference[j] - unwound[0, j]) / TURN)
+        fixed = before is not None and abs(unwound[0, j] + TURN * nearest - reference[j]) < SAME_JOINTS
+        turns = [nearest] if fixed else sorted({nearest, *range(low, high + 1)})
+        priced = []
+        for turn in turns:
+            angle = unwound[:, j] + TURN * turn
+            beyond = (angle > robot.upper[j] + LIMIT_TOLERANCE) | (angle < robot.lower[j] - LIMIT_TOLERANCE)
+            priced.append((round(float(share[beyond].sum()), 6), abs(angle[0] - reference[j]), turn))
+        outside += min(priced)[0]
+        unwound[:, j] += TURN * min(priced)[2]
+    travel = float(np.linalg.norm(steps, axis=1).sum() + np.linalg.norm(unwound[0] - reference))
+    return _Sequence(unwound, slot, jumps, (float(jumps.sum()), outside, travel))
+
+
+def _jump(t: np.ndarray, q: np.ndarray, i: int) -> Jump:
+    step = q[i + 1] - q[i]
+    joint = int(np.argmax(np.abs(step)))
+    return Jump(float(t[i + 1]), joint + 1, float(step[joint]))
+
+
+@kernel
+def _costs_to_go(q, price, meeting):
+    """The branch to take next from each point and branch, and whether that is a jump; both (n - 1, 8).
+
+    Going from one branch to another is no jump only where they meet, or are the same to SWITCH_STEP.
+    """
+    count = q.shape[0]
+    cost = np.full(SLOTS, np.inf)
+    onward = np.zeros((count - 1, SLOTS), dtype=np.int64)
+    jumps = np.zeros((count - 1, SLOTS), dtype=np.bool_)
+    for a in range(SLOTS):
+        if np.isfinite(q[count - 1, a, 0]):
+            cost[a] = price[count - 1, a]
+    for i in range(count - 2, -1, -1):
+        behind = cost.copy()
+        cost[:] = np.inf
+        for a in range(SLOTS):
+            if not np.isfinite(q[i, a, 0]):
+                continue
+            for b in range(SLOTS):
+                if not np.isfinite(behind[b]):
+                    continue
+                travel, farthest = 0.0, 0.0
+                for j in range(6):
+                    step = q[i + 1, b, j] - q[i, a, j]
+                    step -= 2 * np.pi * np.round(step / (2 * np.pi))
+                    travel += step * step
+                    farthest = max(farthest, abs(step))
+                together = a == b or meeting[i, a] or meeting[i + 1, b]
+                jump = farthest > (WIDE_STEP if together else SWITCH_STEP)
+                total = price[i, a] + np.sqrt(travel) + behind[b] + (JUMP_COST if jump else 0.0)
+                if total < cost[a]:
+                    cost[a] = total
+                    onward[i, a] = b
+                    jumps[i, a] = jump
+    return onward, jumps
+
+
+@kernel
+def _walk(onward, start):
+    """The sequence of branches from ``start`` to the end."""
+    slot = np.empty(onward.shape[0] + 1, dtype=np.int64)
+    slot[0] = start
+    for i in range(onward.shape[0]):
+        slot[i + 1] = onward[i, slot[i]]
+    return slot

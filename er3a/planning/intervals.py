@@ -1,0 +1,102 @@
+"""Stretches of a motion outside the joint limits, beyond reach, or faster than the joints can turn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from er3a.kinematics.inverse import LIMIT_TOLERANCE, inverse
+from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.planning.followed import Followed
+from er3a.planning.singular_events import Joints, runs
+from er3a.robots.robot import Robot
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A stretch of time (s), and what is wrong in it in words."""
+
+    start: float
+    end: float
+    cause: str
+
+
+def out_of_limits(robot: Robot, t: np.ndarray, q: np.ndarray, joints: Joints) -> list[Interval]:
+    """Where joints leave their limits, one interval per joint and side, its ends located on the motion.
+
+    Parameters
+    ----------
+    t : (N,), s; q : (N, 6), rad, NaN where unreachable; joints : angles (..., 6) at times (...,)
+    """
+    found = []
+    for j in range(6):
+        for sign, limit, word in ((1.0, robot.upper[j], "upper"), (-1.0, robot.lower[j], "lower")):
+
+            def beyond(at, j=j, sign=sign, limit=limit):
+                return sign * (joints(at)[..., j] - limit) - LIMIT_TOLERANCE
+
+            values = sign * (q[:, j] - limit) - LIMIT_TOLERANCE
+            for start, end, worst in _where_positive(t, values, beyond):
+                reached, bound = np.degrees([q[worst, j], limit])
+                cause = f"J{j + 1} goes to {reached:.1f} deg; its {word} limit is {bound:g} deg"
+                found.append(Interval(start, end, cause))
+    return sorted(found, key=lambda interval: (interval.start, interval.cause))
+
+
+def too_fast(
+    robot: Robot, t: np.ndarray, velocity: np.ndarray, speed: Callable[[np.ndarray], np.ndarray]
+) -> list[Interval]:
+    """Where joints would have to turn faster than they can; none for joints of unknown speed.
+
+    Parameters
+    ----------
+    t : (N,), s; velocity : (N, 6), rad/s, NaN where unknown; speed : the same at times (n,)
+    """
+    found = []
+    for j in np.flatnonzero(np.isfinite(robot.speed)):
+
+        def excess(at, j=j):
+            return float(np.abs(speed(np.array([at]))[0, j]) - robot.speed[j])
+
+        values = np.abs(velocity[:, j]) - robot.speed[j]
+        for start, end, worst in _where_positive(t, values, excess):
+            needed, able = np.degrees([abs(velocity[worst, j]), robot.speed[j]])
+            found.append(Interval(start, end, f"J{j + 1} would need {needed:.0f} deg/s; it can do {able:g} deg/s"))
+    return sorted(found, key=lambda interval: (interval.start, interval.cause))
+
+
+def unreachable(followed: Followed) -> list[Interval]:
+    """Where no branch of the closed form reaches the pose, with the distance that is missing at the worst point."""
+    robot, found = followed.robot, []
+    for first, last in runs(np.isnan(followed.q[:, 0])):
+        poses = followed.line.poses(followed.progress[first:last])
+        gap = solve_slots(robot, poses, np.zeros((len(poses), 6)))[2]
+        worst = int(np.argmax(gap.min(axis=1)))
+        cause = "; ".join(inverse(robot, poses[worst]).unsolved)
+        found.append(Interval(float(followed.t[first]), float(followed.t[last - 1]), cause))
+    return found
+
+
+def _where_positive(
+    t: np.ndarray, values: np.ndarray, function: Callable[[float], float]
+) -> list[tuple[float, float, int]]:
+    """Stretches of positive values: start, end (roots of ``function``), index of the greatest value."""
+    found = []
+    for first, last in runs(values > 0):
+        start = _root(function, t, values, first - 1, first) if first > 0 else t[0]
+        end = _root(function, t, values, last - 1, last) if last < len(t) else t[-1]
+        found.append((float(start), float(end), first + int(np.argmax(values[first:last]))))
+    return found
+
+
+def _root(function: Callable[[float], float], t: np.ndarray, values: np.ndarray, a: int, b: int) -> float:
+    """Where the function changes sign between grid points a and b; the bad one's time beside an unknown value."""
+    if not (np.isfinite(values[a]) and np.isfinite(values[b])):
+        return t[a] if values[a] > 0 else t[b]
+    low, high = function(t[a]), function(t[b])
+    if not low * high < 0:
+        return t[a] if abs(values[a]) < abs(values[b]) else t[b]
+    return brentq(function, t[a], t[b], xtol=1e-12 * (t[-1] - t[0]))

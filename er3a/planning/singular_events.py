@@ -1,0 +1,173 @@
+"""Where a motion is singular, or nearly so: per type, at the time located on the motion itself.
+
+The determinant's factors (:func:`er3a.kinematics.singularity.determinant_factors`) are signed distances from the three
+singular sets. A change of sign is a crossing, refined by Brent's method [1]_ on the motion; a local minimum of the
+distance is the root of its slope, found the same way.
+
+References
+----------
+.. [1] R. P. Brent, *Algorithms for Minimization without Derivatives*, 1973, chapter 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.signal import find_peaks
+
+from er3a.kinematics.singularity import TYPES, determinant_factors
+from er3a.robots.robot import Robot
+
+ON_SET = 1e-9  # rad or m: this near counts as on the singular set
+EDGE = 1e-3  # rad or m: a branch that ends this near to a singular set ends on it
+SLOPE_STEP = 1e-5  # share of the duration
+SAME_EVENT = 1e-8  # share of the duration
+LONG_STAY = 0.01  # share of the duration
+
+Joints = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class SingularEvent:
+    """A pass through, or next to, a singular set.
+
+    Attributes
+    ----------
+    t, until : s; they differ where the motion stays on the set
+    type : "wrist", "elbow" or "shoulder"
+    crossing : whether the motion meets the set; else it passes by at ``distance``
+    distance : rad (wrist, elbow) or m (shoulder); 0 for a crossing
+    """
+
+    t: float
+    until: float
+    type: str
+    crossing: bool
+    distance: float
+
+
+def singular_events(
+    robot: Robot, t: np.ndarray, q: np.ndarray, joints: Joints, near: Mapping[str, float]
+) -> list[SingularEvent]:
+    """All crossings, and the nearest pass of each stretch below its type's threshold, in order of time.
+
+    Parameters
+    ----------
+    t : (N,), s, rising; q : (N, 6), rad, NaN where unreachable
+    joints : joint angles (..., 6) at times (...,) within reach
+    near : per type the distance, in rad or m, below which a pass is reported
+    """
+    events = []
+    for kind in TYPES:
+
+        def factor(at, kind=kind):
+            return getattr(determinant_factors(robot, joints(at)), kind)
+
+        values = getattr(determinant_factors(robot, q), kind)
+        for first, last in runs(np.isfinite(values)):
+            events += _in_stretch(kind, t, values, first, last, factor, near[kind])
+    return sorted(events, key=lambda event: (event.t, TYPES.index(event.type)))
+
+
+def runs(flags: np.ndarray) -> list[tuple[int, int]]:
+    """Index ranges (first, behind the last) of the stretches of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+
+
+def _in_stretch(
+    kind: str, t: np.ndarray, values: np.ndarray, first: int, last: int, factor: Joints, near: float
+) -> list[SingularEvent]:
+    """Events between two unreachable stretches (or the ends of the motion)."""
+    f, times = values[first:last], t[first:last]
+    duration = t[-1] - t[0]
+    met = [_on_set(times, f, a, b, factor, duration) for a, b in runs(np.abs(f) <= ON_SET)]
+    if first > 0 and abs(f[0]) < EDGE:
+        met.append((times[0], times[0]))
+    if last < len(t) and abs(f[-1]) < EDGE:
+        met.append((times[-1], times[-1]))
+    for i in np.flatnonzero(f[:-1] * f[1:] < 0):
+        if min(abs(f[i]), abs(f[i + 1])) > ON_SET:
+            root = _root(factor, times[i], times[i + 1], duration)
+            if abs(factor(root)) < EDGE:
+                met.append((root, root))
+    passed = []
+    for low, distance in _minima(times, f, factor, near, duration):
+        if distance <= ON_SET:
+            met.append((low, low))
+        else:
+            passed.append((low, distance))
+    merged = _merged(sorted(met), SAME_EVENT * duration)
+    events = [SingularEvent(float(a), float(b), kind, True, 0.0) for a, b in merged]
+    for a, b in runs(np.abs(f) < near):
+        begin, end = times[max(a - 1, 0)], times[min(b, len(times) - 1)]
+        if any(begin <= until and start <= end for start, until in merged):
+            continue
+        here = [(distance, low) for low, distance in passed if begin <= low <= end]
+        if here:
+            distance, low = min(here)
+            events.append(SingularEvent(float(low), float(low), kind, False, float(distance)))
+    for low, distance in passed:  # a dip between two grid points, both outside the threshold
+        i = np.clip(np.searchsorted(times, low), 1, len(times) - 1)
+        if min(abs(f[i - 1]), abs(f[i])) >= near:
+            events.append(SingularEvent(float(low), float(low), kind, False, float(distance)))
+    return events
+
+
+def _on_set(times: np.ndarray, f: np.ndarray, a: int, b: int, factor: Joints, duration: float) -> tuple[float, float]:
+    """When the grid points a to b - 1, which lie on the set to rounding, meet it: a span only if it is a long one."""
+    if times[b - 1] - times[a] > LONG_STAY * duration:
+        return times[a], times[b - 1]
+    if a > 0 and b < len(f) and f[a - 1] * f[b] < 0:
+        at = _root(factor, times[a - 1], times[b], duration)
+    else:
+        at = times[a + int(np.argmin(np.abs(f[a:b])))]
+    return at, at
+
+
+def _root(factor: Joints, start: float, end: float, duration: float) -> float:
+    return brentq(factor, start, end, xtol=1e-14 * duration, rtol=4 * np.finfo(float).eps)
+
+
+def _minima(
+    times: np.ndarray, f: np.ndarray, factor: Joints, near: float, duration: float
+) -> list[tuple[float, float]]:
+    """Local minima of the distance below the threshold, apart from the changes of sign: time and distance."""
+    size = np.abs(f)
+    padded = np.concatenate([[np.inf], size, [np.inf]])
+    peaks = find_peaks(-padded)[0] - 1
+    step = SLOPE_STEP * duration
+
+    def slope(at):
+        a, b = factor(np.array([at - step, at + step]))
+        return b * b - a * a
+
+    found = []
+    for i in peaks:
+        beside = slice(max(i - 1, 0), i + 2)
+        if size[i] > 2 * near or size[beside].min() <= ON_SET or np.ptp(np.sign(f[beside])) > 0:
+            continue
+        low, distance = times[i], size[i]
+        left, right = times[max(i - 1, 0)], times[min(i + 1, len(f) - 1)]
+        left, right = max(left, times[0] + step), min(right, times[-1] - step)
+        if 0 < i < len(f) - 1 and right > left and slope(left) < 0 < slope(right):
+            at = brentq(slope, left, right, xtol=1e-13 * duration)
+            refined = abs(float(factor(at)))
+            if refined <= distance:
+                low, distance = at, refined
+        if distance < near:
+            found.append((float(low), float(distance)))
+    return found
+
+
+def _merged(spans: list[tuple[float, float]], gap: float) -> list[tuple[float, float]]:
+    merged: list[tuple[float, float]] = []
+    for start, until in spans:
+        if merged and start - merged[-1][1] <= gap:
+            merged[-1] = (merged[-1][0], max(until, merged[-1][1]))
+        else:
+            merged.append((start, until))
+    return merged

@@ -1,0 +1,1 @@
+"""Does a path run into a singularity, a limit, or out of reach?"""

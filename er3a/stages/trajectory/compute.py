@@ -1,0 +1,119 @@
+"""Plan and check every path of a robot: where it is singular, leaves the limits, or can't be reached.
+
+Writes ``samples.parquet`` (the paths' own points), ``checks.parquet`` (the same columns, with the points checked
+between them and the closest passes) and ``summary.json``.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from er3a.kinematics.inverse import within
+from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
+from er3a.planning.path_file import load_paths
+from er3a.results import Figure, Verdict, write_summary, write_table
+from er3a.robots.robot import Robot
+from er3a.stages.trajectory.judge import WORDS, Judgement, judge, path_record
+from er3a.stages.trajectory.motion import Motion, motion_of
+from er3a.study import Study
+
+HARD_FAULTS = ("unreachable", "leaves limits", "too fast")
+
+
+def compute(study: Study, name: str, folder: Path) -> None:
+    """Compute the trajectory stage of a robot into ``folder``."""
+    robot, settings = study.robot(name), study.trajectory
+    file = Path(study.entry(name).paths)
+    near = {
+        "wrist": np.radians(settings.near_wrist_deg),
+        "elbow": np.radians(settings.near_elbow_deg),
+        "shoulder": settings.near_shoulder_mm / 1000,
+    }
+    length = characteristic_length(robot)
+    tables, records = [], []
+    for i, entry in enumerate(load_paths(file).paths):
+        motion = motion_of(robot, entry, settings.checks_per_sample, f"paths[{i}]", file)
+        found = judge(robot, motion, near)
+        tables.append(_table(robot, motion, found, near, length))
+        records.append(path_record(robot, motion, found))
+    checks = pd.concat(tables, ignore_index=True)
+    write_table(folder / "checks.parquet", checks)
+    write_table(folder / "samples.parquet", checks[checks["sample"]].drop(columns="sample"))
+    write_summary(
+        folder,
+        study,
+        name,
+        "trajectory",
+        _verdict(records),
+        _figures(records, length),
+        characteristic_length_m=length,
+        near={"wrist_deg": settings.near_wrist_deg, "elbow_deg": settings.near_elbow_deg}
+        | {"shoulder_mm": settings.near_shoulder_mm},
+        paths=records,
+    )
+
+
+def _table(robot: Robot, motion: Motion, found: Judgement, near: dict[str, float], length: float) -> pd.DataFrame:
+    """One row per check point; joint columns are NaN where the path can't be reached."""
+    reached = np.isfinite(found.q[:, 0])
+    measures = np.full((len(found.q), 3), np.nan)
+    part = conditioning(robot, found.q[reached], length)
+    measures[reached] = np.stack([part.manipulability, part.condition_number, part.smallest_singular_value], axis=1)
+    factors = determinant_factors(robot, found.q)
+    tool = motion.tool(found.times)[:, :3, 3] * 1000
+    columns: dict[str, Any] = {
+        "path": motion.entry.name,
+        "t_s": found.times,
+        "s_m": motion.way(found.times),
+        "sample": np.isin(found.times, motion.samples),
+    }
+    for values, unit in ((found.q, "deg"), (found.velocity, "deg_s"), (found.acceleration, "deg_s2")):
+        columns |= {f"q{j + 1}_{unit}": np.degrees(values[:, j]) for j in range(6)}
+    columns |= {f"{axis}_mm": tool[:, k] for k, axis in enumerate("xyz")}
+    columns |= {
+        "manipulability": measures[:, 0],
+        "condition_number": measures[:, 1],
+        "smallest_singular_value": measures[:, 2],
+        "wrist_deg": np.degrees(factors.wrist),
+        "elbow_deg": np.degrees(factors.elbow),
+        "shoulder_mm": factors.shoulder * 1000,
+        "reachable": reached,
+        "within_limits": within(robot, found.q) & reached,
+        "near_singular": np.any([np.abs(getattr(factors, kind)) < near[kind] for kind in TYPES], axis=0),
+    }
+    return pd.DataFrame(columns)
+
+
+def _verdict(records: list[dict[str, Any]]) -> Verdict:
+    groups = {word: [record["name"] for record in records if record["verdict"] == word] for word in WORDS}
+    safe = groups.pop("safe")
+    faults = [f"{len(names)} {word} ({', '.join(names)})" for word, names in groups.items() if names]
+    text = f"{len(safe)} of {len(records)} paths are safe" + (f"; {', '.join(faults)}." if faults else ".")
+    params = {"paths": len(records), "safe": len(safe)} | {word.replace(" ", "_"): n for word, n in groups.items()}
+    if any(groups[word] for word in HARD_FAULTS):
+        return Verdict("fail", "trajectory.not_executable", text, params)
+    if faults:
+        return Verdict("caution", "trajectory.singular", text, params)
+    return Verdict("pass", "trajectory.safe", text, params)
+
+
+def _figures(records: list[dict[str, Any]], length: float) -> list[Figure]:
+    events = [event for record in records for event in record["singularities"]]
+    bounded = [record for record in records if record["max_joint_speed_deg_s"]]
+    ratios = [record["max_joint_speed_ratio"] for record in bounded if record["max_joint_speed_ratio"] is not None]
+    agreement = max((record["velocity_check_deg_s"] * 1e6 for record in bounded), default=None)
+    fastest = max((max(record["max_joint_speed_deg_s"]) for record in bounded), default=None)
+    return [
+        Figure("Paths planned", len(records), ""),
+        Figure("Paths safe as they are", sum(record["verdict"] == "safe" for record in records), ""),
+        Figure("Singular poses met", sum(event["crossing"] for event in events), ""),
+        Figure("Near passes", sum(not event["crossing"] for event in events), ""),
+        Figure("Greatest joint speed needed, where bounded", fastest, "deg/s"),
+        Figure("Share of the joint's greatest speed", max(ratios, default=None), ""),
+        Figure("Velocity by Jacobian against differences, within", agreement, "µdeg/s"),
+        Figure("Characteristic length of the Jacobian", length * 1000, "mm"),
+    ]

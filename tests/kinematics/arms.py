@@ -1,0 +1,165 @@
+"""Arms for the tests of the kinematics, and computations of theirs that share no code with er3a."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from er3a.kinematics.singularity import DeterminantFactors, determinant_factors
+from er3a.robots.robot import Robot
+
+DEG = np.pi / 180
+
+
+def placement(xyz, rpy) -> np.ndarray:
+    """A transform from metres and roll-pitch-yaw, by SciPy."""
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_euler("ZYX", rpy[::-1]).as_matrix()
+    T[:3, 3] = xyz
+    return T
+
+
+def make_arm(convention="standard", **changes) -> Robot:
+    """A six-axis arm of common shape: shoulder offset 0.1, upper arm 0.4, elbow offset 0.05, forearm 0.35 (m)."""
+    values = {
+        "name": "made",
+        "title": "made up",
+        "convention": convention,
+        "a": [0.1, 0.4, 0.05, 0, 0, 0],
+        "alpha": np.array([-90, 0, -90, 90, -90, 0]) * DEG,
+        "d": [0.3, 0, 0, 0.35, 0, 0.08],
+        "direction": np.ones(6),
+        "offset": np.zeros(6),
+        "lower": np.full(6, -np.pi),
+        "upper": np.full(6, np.pi),
+    }
+    if convention == "modified":
+        values["a"] = [0, 0.1, 0.4, 0.05, 0, 0]
+        values["alpha"] = np.array([0, -90, 0, -90, 90, -90]) * DEG
+    return Robot(**(values | changes))
+
+
+def number(low: float, high: float):
+    return st.floats(low, high, allow_nan=False)
+
+
+def six(low: float, high: float):
+    return st.lists(number(low, high), min_size=6, max_size=6).map(np.array)
+
+
+@st.composite
+def arms(draw, orthogonal_wrist: bool = False) -> Robot:
+    """Wrist-partitioned arms with parallel axes 2 and 3, in both conventions, with all that a table may hold."""
+    convention = draw(st.sampled_from(["standard", "modified"]))
+    right = st.sampled_from([-90.0, 90.0])
+    wrist = right if orthogonal_wrist else st.one_of(right, number(35, 145), number(-145, -35))
+    alpha = [
+        draw(st.one_of(right, number(30, 150))),
+        draw(st.sampled_from([0.0, 180.0])),
+        draw(st.one_of(right, number(-120, -40))),
+        draw(wrist),
+        draw(wrist),
+    ]
+    lengths = [draw(number(-0.3, 0.3)), draw(number(0.1, 1.0)), draw(number(-0.15, 0.15)), 0.0, 0.0]
+    end_a, end_alpha = draw(number(-0.2, 0.2)), draw(number(-180, 180))
+    if convention == "standard":
+        a, alpha = [*lengths, end_a], [*alpha, end_alpha]
+    else:
+        a, alpha = [end_a, *lengths], [end_alpha, *alpha]
+    d = [draw(number(-0.5, 0.5)), draw(number(-0.2, 0.2)), draw(number(-0.2, 0.2)), draw(number(0.2, 1.0)), 0.0]
+    return Robot(
+        name="drawn",
+        title="drawn at random",
+        convention=convention,
+        a=a,
+        alpha=np.array(alpha) * DEG,
+        d=[*d, draw(number(-0.3, 0.3))],
+        direction=draw(st.lists(st.sampled_from([-1.0, 1.0]), min_size=6, max_size=6)),
+        offset=draw(six(-np.pi, np.pi)),
+        lower=draw(six(-350 * DEG, -30 * DEG)),
+        upper=draw(six(30 * DEG, 350 * DEG)),
+        base=placement(draw(six(-2, 2))[:3], draw(six(-np.pi, np.pi))[:3]),
+        tool=placement(draw(six(-0.3, 0.3))[:3], draw(six(-np.pi, np.pi))[:3]),
+    )
+
+
+@st.composite
+def joints_within(draw, robot: Robot) -> np.ndarray:
+    """Joint angles (6,) within the robot's limits."""
+    return robot.lower + draw(six(0, 1)) * (robot.upper - robot.lower)
+
+
+def joints_at_random(robot: Robot, random: np.random.Generator, count: int) -> np.ndarray:
+    """Uniform joint angles (count, 6) within the robot's limits."""
+    return random.uniform(robot.lower, robot.upper, (count, 6))
+
+
+def margin(robot: Robot, q: np.ndarray) -> np.ndarray:
+    """Least of |sin wrist|, |sin elbow| and |shoulder| / 1 m: how far from a singularity."""
+    factors: DeterminantFactors = determinant_factors(robot, q)
+    parts = [np.sin(factors.wrist), np.sin(factors.elbow), factors.shoulder]
+    return np.abs(parts).min(axis=0)
+
+
+def dh_matrix(convention: str, a: float, alpha: float, d: float, theta: float) -> np.ndarray:
+    """One row's transform, in the closed form that the textbooks print."""
+    ca, sa, ct, st_ = np.cos(alpha), np.sin(alpha), np.cos(theta), np.sin(theta)
+    if convention == "standard":
+        return np.array(
+            [[ct, -st_ * ca, st_ * sa, a * ct], [st_, ct * ca, -ct * sa, a * st_], [0, sa, ca, d], [0, 0, 0, 1]]
+        )
+    return np.array(
+        [[ct, -st_, 0, a], [st_ * ca, ct * ca, -sa, -sa * d], [st_ * sa, ct * sa, ca, ca * d], [0, 0, 0, 1]]
+    )
+
+
+def frame_by_hand(robot: Robot, q: np.ndarray, frame: int) -> np.ndarray:
+    """Frame after joint ``frame``, base included, tool not."""
+    T = robot.base.copy()
+    for k in range(frame):
+        theta = robot.direction[k] * q[k] + robot.offset[k]
+        T = T @ dh_matrix(robot.convention, robot.a[k], robot.alpha[k], robot.d[k], theta)
+    return T
+
+
+class PinocchioArm:
+    """The same arm in Pinocchio: joints turn about +-z, all else of the table goes into their placements."""
+
+    def __init__(self, robot: Robot):
+        self.model = pin.Model()
+        before = pin.SE3(robot.base[:3, :3], robot.base[:3, 3])
+        parent = 0
+        for k in range(6):
+            across = pin.SE3(pin.utils.rotate("x", robot.alpha[k]), np.array([robot.a[k], 0, 0]))
+            along = pin.SE3(np.eye(3), np.array([0, 0, robot.d[k]]))
+            offset = pin.SE3(pin.utils.rotate("z", robot.offset[k]), np.zeros(3))
+            modified = robot.convention == "modified"
+            axis = pin.JointModelRevoluteUnaligned(np.array([0, 0, robot.direction[k]]))
+            parent = self.model.addJoint(parent, axis, before * across if modified else before, f"joint_{k + 1}")
+            before = offset * along if modified else offset * along * across
+        tool = before * pin.SE3(robot.tool[:3, :3], robot.tool[:3, 3])
+        frame = pin.Frame("tool", parent, 0, tool, pin.FrameType.OP_FRAME)
+        self.tool = self.model.addFrame(frame)
+        self.data = self.model.createData()
+
+    def forward(self, q: np.ndarray) -> np.ndarray:
+        """Tool poses (N, 4, 4)."""
+        poses = np.empty((len(q), 4, 4))
+        for pose, row in zip(poses, q):
+            pin.forwardKinematics(self.model, self.data, row)
+            pose[:] = pin.updateFramePlacement(self.model, self.data, self.tool).homogeneous
+        return poses
+
+    def jacobian(self, q: np.ndarray) -> np.ndarray:
+        """Jacobians (N, 6, 6) at the tool, in the base's orientation, linear rows first."""
+        reference = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        return np.array([pin.computeFrameJacobian(self.model, self.data, row, self.tool, reference) for row in q])
+
+
+def pose_errors(A: np.ndarray, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Distance (m) and angle (rad) between poses (..., 4, 4)."""
+    distance = np.linalg.norm(A[..., :3, 3] - B[..., :3, 3], axis=-1)
+    chord = np.linalg.norm(A[..., :3, :3] - B[..., :3, :3], axis=(-1, -2))
+    return distance, 2 * np.arcsin(np.minimum(chord / np.sqrt(8), 1.0))

@@ -1,0 +1,161 @@
+"""The trajectory stage on the project's own paths."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from er3a.errors import InputError
+from er3a.kinematics.forward import forward
+from er3a.results import read_summary, read_table
+from er3a.stages.trajectory.compute import compute
+from er3a.stages.trajectory.record import record
+from er3a.stages.trajectory.report import report
+from er3a.study import Study, load_study
+
+ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
+JOINTS = [f"q{j + 1}_deg" for j in range(6)]
+
+
+@pytest.fixture(scope="module")
+def study() -> Study:
+    return load_study("config/small.yaml")
+
+
+@pytest.fixture(scope="module")
+def folders(study, tmp_path_factory):
+    found = {}
+    for name in ROBOTS:
+        found[name] = tmp_path_factory.mktemp(name)
+        compute(study, name, found[name])
+    return found
+
+
+def by_name(folder):
+    return {path["name"]: path for path in read_summary(folder)["paths"]}
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_each_kind_of_path_is_in_the_study(folders, name):
+    paths = by_name(folders[name])
+    assert paths["line_clean"]["verdict"] == "safe"
+    assert paths["line_wrist"]["verdict"] == "singular"
+    assert paths["line_shoulder"]["verdict"] in ("near-singular", "too fast")
+    assert paths["line_limits"]["verdict"] == "leaves limits"
+    assert paths["line_out"]["verdict"] == "unreachable"
+    (shoulder,) = paths["line_shoulder"]["singularities"]
+    assert shoulder["distance_mm"] == pytest.approx(20, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_samples_meet_the_poses_that_the_path_asks_for(study, folders, name):
+    robot, samples = study.robot(name), read_table(folders[name] / "samples.parquet")
+    reached = samples[samples["reachable"]]
+    tool = forward(robot, np.radians(reached[JOINTS].to_numpy()))[:, :3, 3] * 1000
+    np.testing.assert_allclose(tool, reached[["x_mm", "y_mm", "z_mm"]], atol=1e-6)
+    assert set(samples.groupby("path").size()) == {50}
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_velocities_in_the_table_are_those_of_the_angles(folders, name):
+    checks = read_table(folders[name] / "checks.parquet")
+    rows = checks[checks["path"] == "line_clean"]
+    for j in range(6):
+        slope = np.gradient(rows[f"q{j + 1}_deg"], rows["t_s"])
+        np.testing.assert_allclose(slope[2:-2], rows[f"q{j + 1}_deg_s"][2:-2], atol=0.02)
+
+
+def test_the_articles_line_starts_at_a_singular_pose_and_meets_a_second(folders):
+    path = by_name(folders["er3a_c60_article"])["article_line"]
+    assert path["verdict"] == "singular"
+    assert [event["type"] for event in path["singularities"]] == ["wrist", "wrist"]
+    assert all(event["crossing"] for event in path["singularities"])
+    assert path["singularities"][0]["t_s"] == 0
+    assert path["singularities"][1]["t_s"] == pytest.approx(0.941177, abs=1e-5)
+    assert path["half_turn_axis"] == [0, 0, 1]
+    assert path["start_turn_deg"] == [0] * 6
+    assert path["out_of_limits"] == path["unreachable"] == []
+    assert path["max_joint_speed_ratio"] is None
+
+
+def test_speeds_are_judged_where_they_are_known(folders):
+    paths = by_name(folders["er3_600"])
+    assert paths["line_shoulder"]["max_joint_speed_ratio"] > 1
+    assert paths["line_shoulder"]["too_fast"]
+    assert paths["line_clean"]["max_joint_speed_ratio"] < 1
+
+
+def test_equal_inputs_give_equal_bytes(study, folders, tmp_path):
+    compute(study, "er3a_c60_article", tmp_path)
+    for file in sorted(folders["er3a_c60_article"].iterdir()):
+        assert (tmp_path / file.name).read_bytes() == file.read_bytes()
+
+
+def test_page_and_recording_are_written(study, folders, tmp_path):
+    name = "er3a_c60_article"
+    report(study, name, folders[name], tmp_path / "trajectory.html")
+    record(study, name, folders[name], tmp_path / "trajectory.rrd")
+    html = (tmp_path / "trajectory.html").read_text()
+    assert "article_line" in html
+    assert html.count("data:image/svg+xml") == 2 * len(by_name(folders[name]))
+    assert (tmp_path / "trajectory.rrd").stat().st_size > 100_000
+
+
+def with_paths(study, tmp_path, *paths):
+    file = tmp_path / "paths.yaml"
+    file.write_text(json.dumps({"kind": "paths", "paths": list(paths)}))
+    entry = study.entry("er3a_c60").model_copy(update={"paths": str(file)})
+    return study.model_copy(update={"robots": {"er3a_c60": entry}})
+
+
+LINE = {
+    "name": "line",
+    "kind": "line",
+    "title": "A line",
+    "start": {"xyz_mm": [300, 0, 300], "rpy_deg": [180, 0, 0]},
+    "end": {"xyz_mm": [300, 100, 300], "rpy_deg": [180, 0, 0]},
+    "duration_s": 2,
+    "samples": 2,
+}
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"start_branch": "upside down"}, r"paths\[0\]\.start_branch: this robot has no branch 'upside down'"),
+        ({"half_turn_axis": [0, 0, 1]}, r"paths\[0\]\.half_turn_axis: .*the rotation is by 0 deg"),
+    ],
+)
+def test_choices_that_do_not_fit_are_refused(study, tmp_path, change, message):
+    with pytest.raises(InputError, match=message):
+        compute(with_paths(study, tmp_path, LINE | change), "er3a_c60", tmp_path)
+
+
+def test_extreme_paths_give_results(study, tmp_path):
+    far = {"xyz_mm": [5000, 0, 300], "rpy_deg": [180, 0, 0]}
+    paths = [
+        LINE | {"name": "still", "end": LINE["start"]},
+        LINE | {"name": "far", "start": far, "end": far},
+        LINE | {"name": "outside", "start": None, "start_deg": [170, 0, 0, 0, 30, 0]},
+        {
+            "name": "joint-still",
+            "kind": "joint",
+            "title": "No motion",
+            "start_deg": [0, 0, 0, 0, 0, 0],
+            "end_deg": [0, 0, 0, 0, 0, 0],
+            "duration_s": 1,
+            "samples": 2,
+        },
+    ]
+    changed = with_paths(study, tmp_path, *paths)
+    compute(changed, "er3a_c60", tmp_path)
+    found = by_name(tmp_path)
+    assert found["still"]["verdict"] == "safe"
+    assert found["far"]["unreachable"][0]["t1_s"] == 2
+    assert found["outside"]["out_of_limits"][0]["t0_s"] == 0
+    assert found["joint-still"]["singularities"][0]["until_s"] == 1
+    json.dumps(found, allow_nan=False)
+    report(changed, "er3a_c60", tmp_path, tmp_path / "page.html")
+    record(changed, "er3a_c60", tmp_path, tmp_path / "recording.rrd")

@@ -1,0 +1,177 @@
+"""The code digest changes with what a module uses, and with nothing else; so does the folder of compiled kernels."""
+
+from __future__ import annotations
+
+import ast
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import er3a
+from er3a.code_digest import code_digest
+
+PACKAGE = Path(er3a.__file__).parent
+
+
+class Copy:
+    """A copy of the package, imported by processes of its own."""
+
+    def __init__(self, folder: Path):
+        self.folder = folder
+        shutil.copytree(PACKAGE, folder / "er3a", ignore=shutil.ignore_patterns("__pycache__"))
+
+    def write(self, path: str, text: str) -> None:
+        file = self.folder / "er3a" / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text, encoding="utf-8")
+
+    def append(self, path: str, text: str = "\n# changed\n") -> None:
+        with (self.folder / "er3a" / path).open("a", encoding="utf-8") as file:
+            file.write(text)
+
+    def run(self, code: str) -> str:
+        environment = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
+        environment |= {"PYTHONPATH": str(self.folder), "XDG_CACHE_HOME": str(self.folder / "cache")}
+        done = subprocess.run(
+            [sys.executable, "-c", code], cwd=self.folder, env=environment, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout.strip()
+
+    def digests(self, *modules: str) -> list[str]:
+        code = f"from er3a.code_digest import code_digest\nfor name in {modules}: print(code_digest('er3a.' + name))"
+        return self.run(code).split()
+
+
+def package_with_a_stage(folder: Path) -> Copy:
+    """A copy with a stage of its own: compute uses the forward kinematics, the report the page."""
+    copy = Copy(folder)
+    copy.write("stages/made/compute.py", "from er3a.kinematics.forward import forward\n")
+    copy.write("stages/made/report.py", "from er3a.viewing.page import Picture\nimport er3a.stages.made.parts\n")
+    copy.write("stages/made/parts.py", "from er3a.kinematics import chain\n")
+    copy.write("stages/made/report.html.j2", "a template")
+    return copy
+
+
+MADE = ("stages.made.compute", "stages.made.report")
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Copy:
+    return package_with_a_stage(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def before(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """Digests of the made stage in an unchanged copy."""
+    return package_with_a_stage(tmp_path_factory.mktemp("unchanged")).digests(*MADE)
+
+
+@pytest.mark.parametrize(
+    ("path", "changes_compute", "changes_report"),
+    [
+        ("stages/made/compute.py", True, False),
+        ("kinematics/forward.py", True, False),
+        ("kinematics/jit.py", True, False),
+        ("robots/robot.py", True, True),
+        ("kinematics/chain.py", True, True),
+        ("stages/made/parts.py", False, True),
+        ("stages/made/report.html.j2", False, True),
+        ("viewing/base.html.j2", False, True),
+        ("viewing/style.css", False, True),
+        ("kinematics/inverse.py", False, False),
+        ("stages/workspace/report.html.j2", False, False),
+        ("stages/workspace/compute.py", False, False),
+        ("cli.py", False, False),
+        ("kinematics/__init__.py", False, False),
+    ],
+)
+def test_digest_changes_with_what_is_used(package, before, path, changes_compute, changes_report):
+    package.append(path)
+    after = package.digests(*MADE)
+    assert (before[0] != after[0]) == changes_compute
+    assert (before[1] != after[1]) == changes_report
+
+
+def test_digest_is_that_of_the_content_not_of_the_place(package):
+    assert package.digests("kinematics.forward", "study") == [
+        code_digest("er3a.kinematics.forward"),
+        code_digest("er3a.study"),
+    ]
+
+
+def test_a_new_template_changes_the_report_only(package, before):
+    package.write("stages/made/extra.html.j2", "more")
+    after = package.digests(*MADE)
+    assert before[0] == after[0]
+    assert before[1] != after[1]
+
+
+def test_moving_code_to_another_module_changes_the_digest(package, before):
+    package.write("stages/made/parts.py", "from er3a.stages.made import more\n")
+    package.write("stages/made/more.py", "from er3a.kinematics import chain\n")
+    assert package.digests(*MADE)[1] != before[1]
+
+
+def test_circular_imports_end(package):
+    package.write("stages/made/more.py", "from er3a.stages.made import compute\n")
+    package.write("stages/made/compute.py", "from er3a.stages.made import more\n")
+    assert len(package.digests("stages.made.compute")[0]) == 64
+
+
+def test_unknown_module_is_refused():
+    with pytest.raises(ModuleNotFoundError, match=r"er3a has no module 'er3a\.stages\.typo\.compute'"):
+        code_digest("er3a.stages.typo.compute")
+
+
+@pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.py")), ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_every_import_is_one_that_the_digest_follows(path):
+    """No relative imports, nothing from a package's ``__init__``: both would escape the digest."""
+    for node in ast.walk(ast.parse(path.read_bytes())):
+        if isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"line {node.lineno}: relative import"
+        names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "er3a":
+            source = PACKAGE.joinpath(*node.module.split(".")[1:])
+            is_module = source.with_suffix(".py").is_file()
+            names = [node.module] if is_module else [f"{node.module}.{alias.name}" for alias in node.names]
+        for name in names:
+            if name.split(".")[0] == "er3a":
+                file = PACKAGE.joinpath(*name.split(".")[1:]).with_suffix(".py")
+                assert file.is_file(), f"line {node.lineno}: {name} is no module"
+
+
+def test_cache_folder_changes_with_a_kernel_s_source(package):
+    folders = package.run(
+        "from er3a.kinematics import jit\n"
+        "import numba\n"
+        "print(numba.config.CACHE_DIR)\n"
+        "for name in ('study.py', 'kinematics/forward.py'):\n"
+        "    with open('er3a/' + name, 'a') as file: file.write('# changed')\n"
+        "    print(jit._cache_folder())\n"
+    ).split()
+    assert Path(folders[0]).is_relative_to(package.folder / "cache" / "er3a")
+    assert folders[1] == folders[0]
+    assert folders[2] != folders[0]
+
+
+def test_an_edited_kernel_reaches_the_kernels_that_call_it(package):
+    """numba alone would go on with the old machine code of the caller."""
+    head = "from er3a.kinematics.jit import kernel\n"
+    inner = "@kernel\ndef inner(x):\n    return x + {}\n"
+    package.write("kinematics/inner.py", head + inner.format(1))
+    outer = "from er3a.kinematics.inner import inner\n@kernel\ndef outer(x):\n    return 10 * inner(x)\n"
+    package.write("kinematics/outer.py", head + outer)
+    ask = "from er3a.kinematics.outer import outer; print(outer(1))"
+    assert package.run(ask) == "20"
+    package.write("kinematics/inner.py", head + inner.format(2))
+    assert package.run(ask) == "30"
+
+
+def test_a_cache_folder_of_one_s_own_is_kept(package):
+    code = "import os; os.environ['NUMBA_CACHE_DIR'] = '/nowhere'; from er3a.kinematics import jit; import numba; "
+    assert package.run(code + "print(numba.config.CACHE_DIR)") == "/nowhere"

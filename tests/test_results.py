@@ -1,0 +1,187 @@
+"""Result files: whole or not at all, equal bytes for equal inputs, damage told."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from er3a.code_digest import code_digest
+from er3a.errors import ResultError
+from er3a.results import (
+    FORMAT_VERSION,
+    Figure,
+    Verdict,
+    read_summary,
+    read_table,
+    sha256,
+    write_atomically,
+    write_summary,
+    write_table,
+)
+from er3a.robots.load import ROBOTS
+from er3a.study import load_study
+
+ROOT = Path(__file__).resolve().parents[1]
+VERDICT = Verdict("fail", "workspace.void_enclosed", "Ein Hohlraum – 空洞.", {"volume_m3": 0.25, "cells": 12})
+FIGURES = (Figure("hull volume", 1.25, "m³", 0.01), Figure("reach", None, "mm"))
+TABLE = pd.DataFrame({"x_m": [0.1, np.nan, -0.0], "count": [1, 2, 3], "name": ["a", "b", None]})
+
+
+@pytest.fixture
+def study(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    return load_study("config/small.yaml")
+
+
+def write(folder, study, **more):
+    write_summary(folder, study, "er3_600", "workspace", VERDICT, FIGURES, **more)
+    return folder / "summary.json"
+
+
+def leftovers(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_shape_of_a_summary(tmp_path, study):
+    write(tmp_path, study, voids=[{"volume_m3": 0.25}])
+    summary = read_summary(tmp_path)
+    assert list(summary) == ["format_version", "robot", "stage", "verdict", "figures", "voids", "provenance"]
+    assert summary["verdict"] == {
+        "status": "fail",
+        "code": "workspace.void_enclosed",
+        "text": "Ein Hohlraum – 空洞.",
+        "params": {"volume_m3": 0.25, "cells": 12},
+    }
+    assert summary["figures"][1] == {"name": "reach", "value": None, "unit": "mm", "uncertainty": None}
+    assert summary["provenance"] == {
+        "inputs": [
+            {
+                "path": "data/robots/er3_600.yaml",
+                "sha256": hashlib.sha256((ROBOTS / "er3_600.yaml").read_bytes()).hexdigest(),
+            }
+        ],
+        "config": study.settings("er3_600", "workspace"),
+        "seed": study.seed,
+        "code": code_digest("er3a.stages.workspace.compute"),
+    }
+
+
+def test_equal_inputs_give_equal_bytes(tmp_path, study):
+    first = write(tmp_path / "a", study, voids=[1, 2]).read_bytes()
+    assert write(tmp_path / "b", study, voids=[1, 2]).read_bytes() == first
+    assert str(ROOT).encode() not in first
+    assert first.decode().endswith("}\n")
+    assert "空洞".encode() in first
+    for folder in ("a", "b"):
+        write_table(tmp_path / folder / "t.parquet", TABLE)
+    assert (tmp_path / "a/t.parquet").read_bytes() == (tmp_path / "b/t.parquet").read_bytes()
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("where", ["stage key", "figure", "params"])
+def test_a_number_that_is_none_is_refused_and_the_old_file_stays(tmp_path, study, bad, where):
+    path = write(tmp_path, study)
+    before = path.read_bytes()
+    verdict = Verdict("pass", "workspace.ok", "Fine.", {"x": bad if where == "params" else 1})
+    figures = [Figure("x", bad if where == "figure" else 1, "m")]
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        write_summary(tmp_path, study, "er3_600", "workspace", verdict, figures, x=bad if where == "stage key" else 1)
+    assert path.read_bytes() == before
+    assert leftovers(tmp_path) == ["summary.json"]
+
+
+def test_a_failing_write_leaves_the_old_file_and_no_temporary(tmp_path):
+    path = tmp_path / "new" / "file.txt"
+    write_atomically(path, lambda file: file.write_text("old"))
+
+    def fail(file):
+        file.write_text("half")
+        raise OSError("disk full")
+
+    with pytest.raises(OSError, match="disk full"):
+        write_atomically(path, fail)
+    assert path.read_text() == "old"
+    assert leftovers(path.parent) == ["file.txt"]
+
+
+def test_while_writing_the_file_is_not_there_yet(tmp_path):
+    path = tmp_path / "file.parquet"
+    seen = []
+    write_atomically(path, lambda file: (file.write_text("x"), seen.append((path.exists(), file.suffix))))
+    assert seen == [(False, ".parquet")]
+    assert path.read_text() == "x"
+
+
+def test_tables_come_back_as_written(tmp_path):
+    path = tmp_path / "robot=x" / "t.parquet"
+    write_table(path, TABLE)
+    table = read_table(path)
+    assert list(table) == ["x_m", "count", "name"]
+    pd.testing.assert_frame_equal(table, TABLE, check_dtype=False)
+    assert np.signbit(table["x_m"][2])
+
+
+@pytest.mark.parametrize("keep", [0, 4, 100, -10, -1])
+def test_a_truncated_table_is_told(tmp_path, keep):
+    path = tmp_path / "t.parquet"
+    write_table(path, TABLE)
+    path.write_bytes(path.read_bytes()[:keep])
+    with pytest.raises(ResultError, match=r"t\.parquet: damaged .*run `make run`") as caught:
+        read_table(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_table_with_a_damaged_page_is_told(tmp_path):
+    path = tmp_path / "t.parquet"
+    write_table(path, pd.DataFrame({"x": np.random.default_rng(1).random(1000)}))
+    content = bytearray(path.read_bytes())
+    content[20:2000] = bytes(1980)
+    path.write_bytes(bytes(content))
+    with pytest.raises(ResultError, match="damaged"):
+        read_table(path)
+
+
+def test_missing_files_are_told(tmp_path):
+    with pytest.raises(ResultError, match=r"t\.parquet: missing\. Delete the file and run `make run`"):
+        read_table(tmp_path / "t.parquet")
+    with pytest.raises(ResultError, match=r"summary\.json: missing"):
+        read_summary(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        (b"", "damaged"),
+        (b"{", "damaged"),
+        (b"\xff\xfe", "damaged"),
+        (b"[]", "format version None, this er3a reads 1"),
+        (b'{"format_version": 2}', "format version 2, this er3a reads 1"),
+        (b'{"format_version": 1, "robot": "x", "stage": "y"}', "damaged .no 'verdict' in it"),
+    ],
+)
+def test_a_damaged_summary_is_told(tmp_path, content, problem):
+    (tmp_path / "summary.json").write_bytes(content)
+    with pytest.raises(ResultError, match=problem) as caught:
+        read_summary(tmp_path)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_summary_cut_short_is_told(tmp_path, study):
+    path = write(tmp_path, study)
+    path.write_bytes(path.read_bytes()[:-20])
+    with pytest.raises(ResultError, match="damaged"):
+        read_summary(tmp_path)
+
+
+def test_format_version_is_what_is_written(tmp_path, study):
+    assert json.loads(write(tmp_path, study).read_text())["format_version"] == FORMAT_VERSION
+
+
+def test_checksum(tmp_path):
+    (tmp_path / "x").write_bytes(b"abc")
+    assert sha256(tmp_path / "x") == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"

@@ -1,0 +1,149 @@
+"""The study file: refusals, resolved settings, overrides."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from er3a.errors import InputError
+from er3a.kinematics.forward import forward
+from er3a.robots.load import ROBOTS, load_robot
+from er3a.study import STAGES, Study, load_study
+from tests.kinematics.arms import placement
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture
+def content():
+    return yaml.safe_load((ROOT / "config" / "small.yaml").read_text(encoding="utf-8"))
+
+
+@pytest.fixture
+def study_with(tmp_path, content):
+    """Loads the small study after a change."""
+
+    def load(change) -> Study:
+        changed = copy.deepcopy(content)
+        change(changed)
+        path = tmp_path / "study.yaml"
+        path.write_text(yaml.safe_dump(changed, sort_keys=False), encoding="utf-8")
+        return load_study(path)
+
+    return load
+
+
+@pytest.fixture
+def study(study_with) -> Study:
+    return study_with(lambda content: None)
+
+
+@pytest.mark.parametrize("name", ["config.yaml", "small.yaml"])
+def test_the_studies_that_ship_load(name):
+    study = load_study(ROOT / "config" / name)
+    assert list(study.robots) == ["er3a_c60", "er3a_c60_article", "er3_600"]
+    for robot in study.robots:
+        assert study.robot(robot).name == robot
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "words"),
+    [
+        (lambda c: c.update(sede=1), "sede", "unknown key 'sede'. Did you mean 'seed'?"),
+        (lambda c: c["workspace"].update(sampels=1), "workspace.sampels", "Did you mean 'samples'?"),
+        (lambda c: c["robots"]["er3_600"].update(targest="x"), "robots.er3_600.targest", "Did you mean 'targets'?"),
+        (lambda c: c.pop("seed"), "seed", "missing"),
+        (lambda c: c.update(seed=-1), "seed", "-1 is refused"),
+        (lambda c: c.update(seed=1.5), "seed", "1.5 is refused. Write a whole number"),
+        (lambda c: c.update(robots={}), "robots", "{} is refused"),
+        (lambda c: c.update(robots={"Ärm": c["robots"]["er3_600"]}), "robots.Ärm.[key]", "'Ärm' is refused"),
+        (lambda c: c["workspace"].update(samples=4, blocks=5), "workspace", "4 samples can't fill 5 blocks. Lower"),
+        (lambda c: c["workspace"].update(samples=1e6), "workspace.samples", "1000000.0 is refused. Write a whole"),
+        (lambda c: c["trajectory"].update(near_wrist_deg=float("nan")), "trajectory.near_wrist_deg", "not a finite"),
+        (
+            lambda c: c["robots"]["er3_600"].update(tool={"xyz_mm": [0, 0, 0.15]}),
+            "robots.er3_600.tool.xyz_mm",
+            "can only be metres",
+        ),
+        (
+            lambda c: c["robots"]["er3_600"].update(base={"rpy_deg": [0, 0, 1.5708]}),
+            "robots.er3_600.base.rpy_deg[2]",
+            "looks like radians",
+        ),
+        (lambda c: c.update(kind="robot"), "kind", "'robot' is refused"),
+    ],
+)
+def test_a_wrong_study_is_refused_with_field_and_remedy(study_with, change, field, words):
+    with pytest.raises(InputError) as caught:
+        study_with(change)
+    assert caught.value.field == field
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_robot_that_the_study_lacks(study):
+    with pytest.raises(InputError, match=r"robots\.er3: the study has no such robot\. Known: er3a_c60, "):
+        study.robot("er3")
+
+
+def test_a_robot_without_a_file_names_its_entry(study_with):
+    study = study_with(lambda content: content["robots"].update(er3_601=content["robots"].pop("er3_600")))
+    with pytest.raises(InputError, match=r"^robots\.er3_601: there is no robot 'er3_601'\. Known: er3_600"):
+        study.robot("er3_601")
+    with pytest.raises(InputError, match=r"^robots\.er3_601: there is no robot"):
+        study.inputs("er3_601", "workspace")
+
+
+def test_a_file_of_one_s_own(study_with, tmp_path):
+    text = (ROBOTS / "er3_600.yaml").read_text(encoding="utf-8").replace("name: er3_600", "name: mine")
+    own = tmp_path / "mine.yaml"
+    own.write_text(text, encoding="utf-8")
+    study = study_with(lambda content: content["robots"]["er3_600"].update(file=str(own)))
+    assert study.robot("er3_600").name == "er3_600"
+    assert study.inputs("er3_600", "workspace") == [own]
+    missing = study_with(lambda content: content["robots"]["er3_600"].update(file="no/such/file.yaml"))
+    with pytest.raises(InputError, match=r"^no/such/file\.yaml: there is no such file"):
+        missing.robot("er3_600")
+
+
+def test_base_and_tool_of_the_study_replace_those_of_the_file(study_with):
+    base, tool = {"xyz_mm": [0, 0, 500.0], "rpy_deg": [180.0, 0, 0]}, {"xyz_mm": [0, 0, 120.0]}
+    study = study_with(lambda content: content["robots"]["er3_600"].update(base=base, tool=tool))
+    plain, placed = load_robot("er3_600"), study.robot("er3_600")
+    q = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+    expected = placement([0, 0, 0.5], [np.pi, 0, 0]) @ forward(plain, q) @ placement([0, 0, 0.12], [0, 0, 0])
+    np.testing.assert_allclose(forward(placed, q), expected, atol=1e-15)
+    np.testing.assert_array_equal(study.robot("er3a_c60").tool, np.eye(4))
+
+
+def test_settings_are_plain_and_hold_just_what_the_stage_depends_on(study_with, content):
+    study = study_with(lambda content: content["robots"]["er3_600"].update(tool={"xyz_mm": [0, 0, 120.0]}))
+    for stage in STAGES:
+        own = {"workspace": content["workspace"], "trajectory": content["trajectory"]}.get(stage)
+        settings = study.settings("er3_600", stage)
+        assert settings["seed"] == content["seed"]
+        assert settings["robot"] == {"tool": {"xyz_mm": [0, 0, 120.0], "rpy_deg": [0, 0, 0]}}
+        assert set(settings) == {"seed", "robot", stage}
+        if own:
+            assert settings[stage] == own
+        assert study.settings("er3a_c60", stage)["robot"] == {}
+
+
+def test_each_stage_s_inputs_exist_and_are_its_own(study, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    robot = ROBOTS / "er3a_c60_article.yaml"
+    assert study.inputs("er3a_c60_article", "workspace") == [robot]
+    assert study.inputs("er3a_c60_article", "inverse") == [robot, Path("data/targets/er3a_c60_article.yaml")]
+    assert study.inputs("er3a_c60_article", "trajectory") == [robot, Path("data/paths/er3a_c60_article.yaml")]
+    references = study.inputs("er3a_c60_article", "validation")[1:]
+    assert {path.parent.name for path in references} == {"er3a_c60_article", "er3a_c60"}
+    assert {path.suffix for path in references} == {".csv"}
+
+
+def test_a_study_is_frozen(study):
+    with pytest.raises(ValueError, match="frozen"):
+        study.seed = 1
