@@ -85,8 +85,8 @@ def identifiable(robot: Robot, mutation: Mutation, references: Sequence[Referenc
     """Whether the references see the parameters that the fault changed.
 
     The Jacobian of the references with respect to the table's entries, by central differences at the right table (for
-    joint directions and the convention, which have no derivative, by the change itself): some changed entry must move some
-    reference by more than its uncertainty when the entry changes by as much as the fault changed it.
+    joint directions and the convention, which have no derivative, by the change itself): some changed entry must move
+    some reference by more than its uncertainty when the entry changes by as much as the fault changed it.
     """
     right = tables_of(robot)
     _, uncertainty = expected_of(tuple(references))
@@ -108,7 +108,9 @@ def identifiable(robot: Robot, mutation: Mutation, references: Sequence[Referenc
 def _slope(right: Tables, column: str, j: int, robot: Robot, references, at_right: np.ndarray) -> np.ndarray:
     entry = getattr(right, column)[:, [j]]
     if column == "direction":
-        return (predictions(right.with_column(column, [j], -entry), robot, references)[0] - at_right) / (-2 * entry[0, 0])
+        return (predictions(right.with_column(column, [j], -entry), robot, references)[0] - at_right) / (
+            -2 * entry[0, 0]
+        )
     step = STEPS[column]
     ahead, behind = (
         predictions(right.with_column(column, [j], entry + sign * step), robot, references)[0] for sign in (1, -1)

@@ -73,7 +73,7 @@ def test_editing_a_template_renders_reports_only(small_study):
 
 
 def test_editing_the_base_template_renders_all_pages_and_no_number(small_study):
-    with edited(small_study.folder / "er3a/viewing/base.html.j2", "<body>", "<body >"):
+    with edited(small_study.folder / "er3a/viewing/base.html.j2", "<main>", "<main >"):
         expected = {f"{robot}: report {stage}" for robot in ROBOTS for stage in STAGES}
         assert small_study.planned() == expected | {"write the index"}
 

@@ -1,6 +1,10 @@
+# Below this a job costs more to start than to do.
+SAMPLES_PER_JOB = 16_000_000
+
+
 # The seeded blocks are fixed by the study; scattering only groups them into jobs (--set-scatter blocks=N).
 scattergather:
-    blocks=min(4, STUDY.workspace.blocks),
+    blocks=min(STUDY.workspace.blocks, math.ceil(STUDY.workspace.samples / SAMPLES_PER_JOB)),
 
 
 rule sample_workspace:

@@ -21,8 +21,6 @@ from er3a.stages.trajectory.judge import WORDS, Judgement, judge, path_record
 from er3a.stages.trajectory.motion import Motion, motion_of
 from er3a.study import Study
 
-HARD_FAULTS = ("unreachable", "leaves limits", "too fast")
-
 
 def compute(study: Study, name: str, folder: Path) -> None:
     """Compute the trajectory stage of a robot into ``folder``."""
@@ -94,10 +92,10 @@ def _verdict(records: list[dict[str, Any]]) -> Verdict:
     faults = [f"{len(names)} {word} ({', '.join(names)})" for word, names in groups.items() if names]
     text = f"{len(safe)} of {len(records)} paths are safe" + (f"; {', '.join(faults)}." if faults else ".")
     params = {"paths": len(records), "safe": len(safe)} | {word.replace(" ", "_"): n for word, n in groups.items()}
-    if any(groups[word] for word in HARD_FAULTS):
-        return Verdict("fail", "trajectory.not_executable", text, params)
+    if not safe:
+        return Verdict("fail", "trajectory.none_safe", text, params)
     if faults:
-        return Verdict("caution", "trajectory.singular", text, params)
+        return Verdict("caution", "trajectory.some_unsafe", text, params)
     return Verdict("pass", "trajectory.safe", text, params)
 
 

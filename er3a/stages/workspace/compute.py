@@ -71,14 +71,14 @@ def compute(study: Study, name: str, folder: Path, parts: list[Path] | None = No
     volume = {"touched": cells["touched"] * grid.cell_volume}
     volume["touched_in_hull"] = cells["touched_inside_hull"] * grid.cell_volume
     figures = [
-        Figure("samples", settings.samples, ""),
-        Figure("cell size", grid.cell * 1000, "mm"),
+        Figure("greatest reach from axis 1", reach["furthest_from_axis"] * 1000, "mm"),
+        Figure("enclosed voids", enclosed * 1000, "L"),
         Figure("convex hull", hull.volume, "m³"),
         Figure("touched within the hull", volume["touched_in_hull"], "m³"),
         Figure("share of the hull touched", None if filled is None else 100 * filled, "%"),
-        Figure("enclosed voids", enclosed * 1000, "L"),
-        Figure("greatest reach from axis 1", reach["furthest_from_axis"] * 1000, "mm"),
         Figure("least distance from axis 1", reach["nearest_to_axis"] * 1000, "mm"),
+        Figure("samples", settings.samples, ""),
+        Figure("cell size", grid.cell * 1000, "mm"),
     ]
     write_summary(
         folder,

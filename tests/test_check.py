@@ -1,0 +1,69 @@
+"""Checking input files, and the schemas that editors use."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+
+from er3a.check import SCHEMAS, check_file, check_study
+from er3a.errors import InputError
+
+ROOT = Path(__file__).resolve().parents[1]
+INPUTS = sorted(
+    [*ROOT.glob("data/**/*.yaml"), *ROOT.glob("data/**/*.csv"), *ROOT.glob("config/*.yaml")],
+)
+
+
+@pytest.mark.parametrize("path", INPUTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_every_committed_input_is_in_order(path):
+    assert check_file(path)
+
+
+@pytest.mark.parametrize("kind", SCHEMAS)
+def test_committed_schema_is_the_models(kind):
+    committed = json.loads((ROOT / "config" / f"{kind}.schema.json").read_text())
+    assert committed == SCHEMAS[kind].model_json_schema(), "run `make schema`"
+
+
+@pytest.mark.parametrize("path", [p for p in INPUTS if p.suffix == ".yaml"], ids=lambda path: path.name)
+def test_every_yaml_input_names_its_schema(path):
+    first = next(line for line in path.read_text().splitlines() if "$schema=" in line)
+    assert (path.parent / first.partition("$schema=")[2]).resolve().is_file()
+
+
+@pytest.mark.parametrize("study", ["config/config.yaml", "config/small.yaml"])
+def test_the_studies_lead_to_sound_files(study, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    assert list(check_study(Path(study)).robots) == ["er3a_c60", "er3a_c60_article", "er3_600"]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "told"),
+    [
+        ("a.yaml", "name: x\n", "kind: missing"),
+        ("a.yaml", "kind: robto\n", "kind: 'robto' is not known"),
+        ("a.txt", "kind: robot\n", "'.txt' files are none"),
+        ("other.csv", "a,b\n1,2\n", "other.csv"),
+        ("a.yaml", "kind: targets\ntargets: []\n", "targets"),
+    ],
+)
+def test_a_file_that_is_none_of_ours_is_one_clear_error(tmp_path, name, text, told):
+    path = tmp_path / name
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        check_file(path)
+    assert told in str(caught.value)
+    assert name in str(caught.value)
+
+
+def test_a_study_that_names_a_missing_file_is_refused(tmp_path, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    content = yaml.safe_load((ROOT / "config/small.yaml").read_text())
+    content["robots"]["er3_600"]["targets"] = "data/targets/nowhere.yaml"
+    path = tmp_path / "study.yaml"
+    path.write_text(yaml.safe_dump(content))
+    with pytest.raises(InputError, match=r"nowhere\.yaml: there is no such file"):
+        check_study(path)
