@@ -62,3 +62,11 @@ def settings(stage):
 def code_of(stage, verb):
     """Digest of the modules that a verb of a stage uses: Snakemake doesn't see edits of an imported package."""
     return code_digest(f"er3a.stages.{stage}.{verb}")
+
+
+def results_of(wildcards):
+    """A stage's results, as the input of its views."""
+    return [
+        f"results/{wildcards.robot}/{wildcards.stage}/summary.json",
+        *(path.format(robot=wildcards.robot) for path in tables(wildcards.stage)),
+    ]

@@ -1,11 +1,3 @@
-def results_of(wildcards):
-    """A stage's results, as the input of its views."""
-    return [
-        f"results/{wildcards.robot}/{wildcards.stage}/summary.json",
-        *(path.format(robot=wildcards.robot) for path in tables(wildcards.stage)),
-    ]
-
-
 rule record:
     input:
         results_of,
