@@ -23,6 +23,7 @@ ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 PIPELINE_TESTS = ("integration", "browser", "viewing")
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Tests that share the small study run in one worker, so that it is run once; they start first."""
     for item in items:

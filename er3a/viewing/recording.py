@@ -68,8 +68,12 @@ def send_series(
     Parameters
     ----------
     times : (N,), s
-    values : (N, k); NaN where a curve has a gap
+    values : (N, k); a row with NaN is a gap in all curves (NaN itself would never compare equal between recordings)
     names, colours : k of each
     """
     stream.log(entity, rr.SeriesLines(names=names, colors=[rgb(colour) for colour in colours]), static=True)
-    stream.send_columns(entity, [seconds(times)], rr.Scalars.columns(scalars=np.asarray(values, dtype=float)))
+    times, known = np.asarray(times, dtype=float), np.isfinite(values).all(axis=1)
+    stream.send_columns(entity, [seconds(times[known])], rr.Scalars.columns(scalars=np.asarray(values)[known]))
+    gap_starts = times[~known & np.append(True, known[:-1])]
+    cleared = rr.Clear.columns(is_recursive=np.zeros(len(gap_starts), dtype=bool))
+    stream.send_columns(entity, [seconds(gap_starts)], cleared)

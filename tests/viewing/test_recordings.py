@@ -50,7 +50,7 @@ def test_recording_is_drawn(small_study, recording, vulkan, tmp_path):
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     command = [RERUN, small_study.folder / "reports" / recording, "--headless", "--port", str(port)]
-    for _ in range(3):  # the viewer takes its picture after a fixed time, loaded or not
+    for _ in range(6):  # the viewer takes its picture after a fixed time, loaded or not
         subprocess.run(
             [*command, "--screenshot-to", picture, "--window-size", "1200x800"],
             capture_output=True,
