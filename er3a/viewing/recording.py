@@ -43,7 +43,11 @@ def recording(output: Path, robot: str, stage: str, *views: rrb.View | rrb.Conta
 
     output.parent.mkdir(parents=True, exist_ok=True)
     partial = output.with_name(f".{output.stem}.{os.getpid()}.partial")
-    stream = rr.RecordingStream(APPLICATION, recording_id=f"{robot}-{stage}", send_properties=False)
+    # No chunk is cut by the clock: recordings of equal data then compare equal on a busy machine too.
+    never = rr.ChunkBatcherConfig.NEVER()
+    stream = rr.RecordingStream(
+        APPLICATION, recording_id=f"{robot}-{stage}", send_properties=False, batcher_config=never
+    )
     try:
         with stream:
             stream.save(partial, default_blueprint=blueprint)
