@@ -28,10 +28,13 @@ class Sourced(StrictModel):
 
 
 class DhRow(StrictModel):
+    """One row; ``beta_deg`` is Hayati's turn about y, in calibrated tables of arms with parallel axes."""
+
     joint: JointNumber
     a_mm: float
     alpha_deg: float
     d_mm: float
+    beta_deg: float | None = None
 
 
 def _sign(value: int) -> int:
@@ -125,6 +128,9 @@ class RobotFile(StrictModel):
             for key in ("a_mm", "d_mm"):
                 _check_length(f"dh.rows[{i}].{key}", getattr(row, key), self.dh.calibrated)
             _check_not_radians(f"dh.rows[{i}].alpha_deg", row.alpha_deg)
+            if row.beta_deg and not self.dh.calibrated:
+                problem = f"dh.rows[{i}].beta_deg: {row.beta_deg:g} deg in a table that is not calibrated"
+                raise ValueError(f"{problem} | Set dh.calibrated: true, or remove it")
             _check_not_radians(f"zero.rows[{i}].offset_deg", self.zero.rows[i].offset_deg)
         check_placement("base", self.base)
         check_placement("tool", self.tool)
