@@ -100,10 +100,10 @@ class AxisAngle(Quantity):
     unit = "deg"
 
     def value(self, state):
-        return _angle(state.axis(self.joint)[0], np.array(self.toward), self.signed)
+        return angle_between(state.axis(self.joint)[0], np.array(self.toward), self.signed)
 
     def apart(self, expected, other, other_expected):
-        return float(_angle(np.array(self.toward), np.array(other.toward), self.signed and other.signed))
+        return float(angle_between(np.array(self.toward), np.array(other.toward), self.signed and other.signed))
 
 
 @dataclass(frozen=True)
@@ -199,7 +199,7 @@ class SegmentAngle(Quantity):
         else:
             axis = T[..., 3, :3, 2]
             vector = axis * np.where(_dot(axis, T[..., 4, :3, 3] - T[..., 2, :3, 3]) < 0, -1.0, 1.0)[..., None]
-        return _angle(vector, np.array([0.0, 0.0, 1.0]), True)
+        return angle_between(vector, np.array([0.0, 0.0, 1.0]), True)
 
 
 @dataclass(frozen=True)
@@ -283,7 +283,7 @@ def nearest_on_line(direction: np.ndarray, on_line: np.ndarray, point: np.ndarra
     return on_line + direction * _dot(direction, point - on_line)[..., None]
 
 
-def _angle(a: np.ndarray, b: np.ndarray, signed: bool) -> np.ndarray:
+def angle_between(a: np.ndarray, b: np.ndarray, signed: bool) -> np.ndarray:
     """Angle in deg; of lines (at most 90) if not signed."""
     cross, dot = np.cross(a, b), _dot(a, b)
     return np.degrees(np.arctan2(np.sqrt(_dot(cross, cross)), dot if signed else np.abs(dot)))

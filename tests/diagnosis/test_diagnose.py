@@ -130,8 +130,8 @@ def test_noise_raises_no_alarm(name, random):
 
 
 def some_mutations(name: str) -> list[Mutation]:
-    """Every sixth mutation, so that each family is there."""
-    return list(mutations_of(load_robot(name)))[::6]
+    """Every tenth mutation, so that each family is there."""
+    return list(mutations_of(load_robot(name)))[::10]
 
 
 @pytest.mark.parametrize("noise_mm", [0.0, 0.5])
