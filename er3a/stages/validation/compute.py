@@ -15,6 +15,7 @@ from er3a.references.scalars import reach_name
 from er3a.results import write_summary, write_table
 from er3a.stages.validation.checks import Check, checks_of_set, nothing_to_compare
 from er3a.stages.validation.circle_points import circle_points
+from er3a.stages.validation.corrections import identify_from_sets
 from er3a.stages.validation.culprits import diagnose_sets
 from er3a.stages.validation.findings import SHOWN_DECIMALS, key_figures, set_findings, verdict_of
 from er3a.stages.validation.model import model_of
@@ -41,7 +42,7 @@ def compute(study: Study, name: str, folder: Path) -> None:
 
     The summary's own keys: ``checks`` (see :class:`er3a.stages.validation.checks.Check`), ``conflicts``, ``sets`` (what
     was found per reference set), ``diagnosis`` and ``culprits`` (:mod:`er3a.stages.validation.culprits`),
-    ``circle_points`` (the carried point and how round its tracks are), ``table`` (convention, and why there is no closed
+    ``identification`` (:mod:`er3a.stages.validation.corrections`), ``circle_points`` (the carried point and how round its tracks are), ``table`` (convention, and why there is no closed
     form, if so), ``round_trips`` and ``section_origin_mm`` (axis 1 and axis 2 in the base frame, where the workspace
     drawing has its origin).
     """
@@ -69,12 +70,14 @@ def compute(study: Study, name: str, folder: Path) -> None:
     axes = axes_table(circles, sets)
     poses = key_poses_table(robot, sets, extremes)
     diagnosis, culprits, residuals = diagnose_sets(robot, sets)
+    identified, corrections = identify_from_sets(robot, sets)
     findings = set_findings(sets, checks, poses, culprits)
     write_table(folder / "checks.parquet", pd.DataFrame([asdict(check) for check in checks]))
     write_table(folder / "axes.parquet", axes)
     write_table(folder / "key_poses.parquet", poses)
     write_table(folder / "section.parquet", section_table(robot, extremes))
     write_table(folder / "residuals.parquet", residuals)
+    write_table(folder / "corrections.parquet", corrections)
 
     reach = {
         "Wrist centre reaches from axis 1": values[WRIST_REACH],
@@ -93,6 +96,7 @@ def compute(study: Study, name: str, folder: Path) -> None:
         sets=findings,
         diagnosis=diagnosis,
         culprits=culprits,
+        identification=identified,
         circle_points={
             "offset_mm": circles.offset_mm.tolist(),
             "radius_mm": circles.radius_mm.round(SHOWN_DECIMALS).tolist(),
