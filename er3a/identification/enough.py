@@ -98,12 +98,12 @@ def _what_more(
     undetermined = [parameters[k].name for k in best.kept if k not in here.kept]
     least = -(-max(lacking, len(best.kept) + 1 - len(references)) // 3)
     text = (
-        f"{name}: {len(references)} coordinates at {poses} pose{'s' if poses > 1 else ''} determine {len(here.kept)} of "
-        f"the {len(best.kept)} entries that positions of these points can determine; it takes at least "
+        f"{len(references)} coordinates at {poses} pose{'s' if poses > 1 else ''} determine {len(here.kept)} of the "
+        f"{len(best.kept)} entries ({name}) that positions of these points can determine; it takes at least "
         f"{least} more position{'s' if least > 1 else ''}"
     )
     if undetermined:
-        text += f", for {', '.join(undetermined)}"
+        text += f" for {', '.join(undetermined)}"
     return text + f". Spread them over all joints, for example {_examples(robot, parameters, best, references)}."
 
 

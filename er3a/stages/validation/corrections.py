@@ -60,7 +60,7 @@ def _plain(result: Identification) -> dict[str, Any]:
     elif beyond:
         text = f"The positions ask for corrections of {', '.join(beyond)}, beyond their 95 % intervals."
     else:
-        text = f"The positions ask for no correction: all {len(result.estimates)} lie within their 95 % intervals."
+        text = f"The positions ask for no correction: all {len(result.estimates)} intervals (95 %) hold 0."
     return {
         "status": "identified" if fits else "misfit",
         "text": text,
