@@ -8,8 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from er3a.kinematics.table_batch import Tables, join
 from er3a.diagnosis.faults import Repair, Slope, repairs_of, slopes
+from er3a.kinematics.table_batch import Tables, join
 
 FREE_NUMBER = 1.5
 PROBE_M = 1e-3

@@ -213,11 +213,12 @@ def in_words(found: Identification) -> str:
         f"{'entry':<9}{'table':>12}{'correction':>14}{'95 % interval':>16}",
     ]
     for each in found.estimates:
-        lines.append(f"{each.name:<9}{each.nominal:>12.4f}{each.correction:>+14.4f}{each.half_width:>12.4f} {each.unit}")
+        values = f"{each.nominal:>12.4f}{each.correction:>+14.4f}{each.half_width:>12.4f}"
+        lines.append(f"{each.name:<9}{values} {each.unit}")
     lines += [f"held: {words}" for words in found.held]
     lines += [f"close: {first} and {second} are correlated by {value:.2f}" for first, second, value in found.close]
     if found.scatter > MUCH_SCATTER:
-        lines.append("warning: the differences that remain are larger than the stated deviations allow; so are the errors")
+        lines.append("warning: what remains is larger than the stated deviations allow; so are the errors")
     if found.more:
         lines.append(f"for more: {found.more}")
     return "\n".join(lines)

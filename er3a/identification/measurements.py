@@ -85,7 +85,8 @@ def check_poses(measurements: Sequence[Measurement], robot: Robot, path: str | P
     for measurement in measurements:
         for joint, angle in enumerate(measurement.pose):
             if not lower[joint] - LIMIT_SLACK_DEG <= angle <= upper[joint] + LIMIT_SLACK_DEG:
-                problem = f"{angle:g} deg is outside the limits {lower[joint]:g} .. {upper[joint]:g} of joint {joint + 1}"
+                limits = f"{lower[joint]:g} .. {upper[joint]:g}"
+                problem = f"{angle:g} deg is outside the limits {limits} of joint {joint + 1}"
                 remedy = "Check the angle, its sign and its unit, or the robot's limits"
                 raise InputError(path, f"row {measurement.row}, column q{joint + 1}_deg", problem, remedy)
 

@@ -142,9 +142,7 @@ def subspace(
     return Subspace(tuple(kept), tuple(held), tuple(words), np.linalg.svd(J, compute_uv=False))
 
 
-def _why(
-    robot: Robot, parameters: Sequence[Parameter], k: int, kept: list[int], J: np.ndarray, no_effect: bool
-) -> str:
+def _why(robot: Robot, parameters: Sequence[Parameter], k: int, kept: list[int], J: np.ndarray, no_effect: bool) -> str:
     name = parameters[k].name
     if no_effect:
         return f"{name} moves none of the measured points"

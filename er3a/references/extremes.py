@@ -26,8 +26,8 @@ STEP = 1e-6
 def search(robot: Robot, quantity: Extreme, starts: int) -> tuple[float, np.ndarray]:
     """Find an extreme.
 
-    The robot's tool does not count. Joint 1 stays at 0: none of the measures changes with it, or the side view is drawn there. A joint without
-    influence on the result is given as 0 (or its limit nearest to 0).
+    The robot's tool does not count. Joint 1 stays at 0: none of the measures changes with it, or the side view is drawn
+    there. A joint without influence on the result is given as 0 (or its limit nearest to 0).
 
     Parameters
     ----------

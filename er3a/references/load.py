@@ -8,8 +8,8 @@ from typing import Any
 
 from er3a.errors import InputError
 from er3a.inputs.csv_file import read_csv
-from er3a.references.reference import Reference, ReferenceSet
 from er3a.references.quantities import ZERO_POSE, PoseOutside
+from er3a.references.reference import Reference, ReferenceSet
 from er3a.references.rows import COLUMNS, ENVELOPE_CORNERS, PositionRow, Row, row_of
 from er3a.references.scalars import pose_reached, scalars_of
 from er3a.robots.load import DATA

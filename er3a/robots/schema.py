@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -108,6 +108,17 @@ class RobotFile(StrictModel):
     speeds: Speeds | None = None
     base: SourcedPlacement | None = None
     tool: SourcedPlacement | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _a_six_joint_arm(cls, content: Any) -> Any:
+        groups = [content.get(group) for group in ("dh", "zero", "limits")] if isinstance(content, dict) else []
+        rows = [group["rows"] for group in groups if isinstance(group, dict) and isinstance(group.get("rows"), list)]
+        counts = {len(each) for each in rows}
+        if len(rows) == 3 and len(counts) == 1 and counts != {6}:
+            problem = f"dh.rows: a table of {counts.pop()} joints"
+            raise ValueError(f"{problem} | er3a models arms with exactly six revolute joints in series")
+        return content
 
     @model_validator(mode="after")
     def _six_joints_in_order(self):

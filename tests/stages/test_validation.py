@@ -17,8 +17,8 @@ from er3a.references.load import load_references
 from er3a.references.predict import predict
 from er3a.references.quantities import Limit
 from er3a.references.reference import Reference, ReferenceSet
-from er3a.robots.load import ROBOTS, load_robot
 from er3a.results import read_table
+from er3a.robots.load import ROBOTS, load_robot
 from er3a.robots.schema import Placement
 from er3a.stages.validation.checks import checks_of_set
 from er3a.stages.validation.circle_points import circle_points, fit_circle

@@ -37,14 +37,14 @@ ALWAYS_SEARCHED = (
 
 
 def compute(study: Study, name: str, folder: Path) -> None:
-    """Write ``summary.json``, and ``checks``, ``axes``, ``key_poses``, ``section``, ``residuals`` and ``corrections`` as
-    Parquet tables.
+    """Write ``summary.json``, and the tables ``checks``, ``axes``, ``key_poses``, ``section``, ``residuals`` and
+    ``corrections`` as Parquet.
 
     The summary's own keys: ``checks`` (see :class:`er3a.stages.validation.checks.Check`), ``conflicts``, ``sets`` (what
     was found per reference set), ``diagnosis`` and ``culprits`` (:mod:`er3a.stages.validation.culprits`),
-    ``identification`` (:mod:`er3a.stages.validation.corrections`), ``circle_points`` (the carried point and how round its tracks are), ``table`` (convention, and why there is no closed
-    form, if so), ``round_trips`` and ``section_origin_mm`` (axis 1 and axis 2 in the base frame, where the workspace
-    drawing has its origin).
+    ``identification`` (:mod:`er3a.stages.validation.corrections`), ``circle_points`` (the carried point, and how round
+    its tracks are), ``table`` (convention, and why there is no closed form, if so), ``round_trips`` and
+    ``section_origin_mm`` (axis 1 and axis 2 in the base frame, where the workspace drawing has its origin).
     """
     robot = model_of(study, name)
     settings = study.validation

@@ -19,7 +19,7 @@ def identify_from_sets(robot: Robot, sets: list[ReferenceSet]) -> tuple[list[dic
 
     Returns
     -------
-    found : per set ``status`` (``identified``; ``misfit``, no corrections make the table meet the positions within three
+    found : per set ``status`` (``identified``; ``misfit``, no corrections make the table meet the positions to three
         times their uncertainty; ``too_few``) and what was found
     table : estimates with standard error and half-width of the 95 % interval, of the sets that are identified
     """

@@ -22,10 +22,10 @@ def diagnose_sets(robot: Robot, sets: list[ReferenceSet]) -> tuple[list[dict], l
     Returns
     -------
     diagnosis : ranked hypotheses as plain data, set by set
-    culprits : per set what follows: ``status`` is ``met`` (nothing to explain), ``named`` (the best hypothesis meets all
-        references), ``mostly`` (it leaves less than 5 % of the residual, but more than the references allow),
+    culprits : per set what follows: ``status`` is ``met`` (nothing to explain), ``named`` (the best hypothesis meets
+        all references), ``mostly`` (it leaves less than 5 % of the residual, but more than the references allow),
         ``unexplained`` (no one or two faults will do) or ``no_reference``
-    table : residuals per reference before and after the best hypothesis, worst first, for sets with something to explain
+    table : residuals before and after the best hypothesis, worst first, for sets with something to explain
     """
     diagnosis, culprits, tables = [], [], []
     for references in sets:

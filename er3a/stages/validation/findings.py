@@ -45,9 +45,7 @@ def set_findings(
     return findings
 
 
-def verdict_of(
-    checks: list[Check], conflicts: list[Conflict], findings: list[dict], culprits: list[dict]
-) -> Verdict:
+def verdict_of(checks: list[Check], conflicts: list[Conflict], findings: list[dict], culprits: list[dict]) -> Verdict:
     """The stage's answer."""
     resting = [check for check in checks if weighs(check) and check.status != "no_reference"]
     failed = [check for check in resting if check.status == "fail"]
