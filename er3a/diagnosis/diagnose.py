@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -49,13 +50,14 @@ class Hypothesis:
     repaired: Robot
 
 
-def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference] | str) -> list[Hypothesis]:
+def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference] | str | Path) -> list[Hypothesis]:
     """Hypotheses about what is wrong with a table, best first.
 
     Parameters
     ----------
     robot : the table as given, tool not considered (references speak of the flange)
-    references : a reference set or its name; official, CAD and export data count, if there are any, else claims do
+    references : a reference set, its name or its folder; official, CAD and export data count, if there are any, else
+        claims do
 
     Returns
     -------
@@ -66,7 +68,7 @@ def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference] | str)
     InputError
         if there is no such reference set, or it can't be read
     """
-    ranking = rank(robot, load_references(references) if isinstance(references, str) else references)
+    ranking = rank(robot, load_references(references) if isinstance(references, str | Path) else references)
     return described(ranking, robot) if ranking else []
 
 

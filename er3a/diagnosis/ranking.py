@@ -25,7 +25,7 @@ from er3a.diagnosis.hypotheses import Pool, evaluate
 from er3a.kinematics.table_batch import Tables, tables_of
 from er3a.references.predict import predict_tables
 from er3a.references.quantities import Extreme, Speed
-from er3a.references.reference import Reference, ReferenceSet, expected_of
+from er3a.references.reference import Reference, ReferenceSet, conflicts, expected_of
 from er3a.robots.robot import Robot
 
 SHOWN = 10
@@ -78,12 +78,15 @@ def rank(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> Rankin
 def usable(references: ReferenceSet | Sequence[Reference]) -> tuple[Reference, ...]:
     """The references that a diagnosis rests on: single poses and limits, weighty ones if there are any.
 
-    Extremes over the limits are left out: they take a search for every hypothesis.
+    Extremes over the limits are left out, because they take a search for every hypothesis, and so are references that
+    contradict each other, which no table could meet.
     """
     every = references.checkable if isinstance(references, ReferenceSet) else references
     stated = [r for r in every if r.expected is not None and not isinstance(r.quantity, Extreme | Speed)]
     weighty = [r for r in stated if r.weighty]
-    return tuple(weighty or stated)
+    resting = tuple(weighty or stated)
+    contradicted = {i for pair in conflicts(resting) for i in pair}
+    return tuple(reference for i, reference in enumerate(resting) if i not in contradicted)
 
 
 def _misfit(weighted: np.ndarray) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import combinations
 
 import numpy as np
 
@@ -102,12 +103,14 @@ def lengths_of(values: np.ndarray, group: np.ndarray) -> np.ndarray:
 
 def conflicts(references: tuple[Reference, ...]) -> list[tuple[int, int]]:
     """Pairs (i, j), i < j, of references about the same quantity that no value can meet both of."""
+    about: dict[Quantity, list[int]] = {}
+    for i, reference in enumerate(references):
+        if reference.expected is not None:
+            about.setdefault(reference.quantity, []).append(i)
     pairs = []
-    for j, second in enumerate(references):
-        for i, first in enumerate(references[:j]):
-            if first.quantity != second.quantity or first.expected is None or second.expected is None:
-                continue
-            apart = first.quantity.apart(first.expected, second.quantity, second.expected)
-            if apart > first.uncertainty + second.uncertainty:
-                pairs.append((i, j))
-    return pairs
+    for i, j in (pair for same in about.values() for pair in combinations(same, 2)):
+        first, second = references[i], references[j]
+        apart = first.quantity.apart(first.expected, second.quantity, second.expected)
+        if apart > first.uncertainty + second.uncertainty:
+            pairs.append((i, j))
+    return sorted(pairs, key=lambda pair: pair[::-1])

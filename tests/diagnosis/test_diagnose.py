@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -122,10 +123,7 @@ def test_noise_raises_no_alarm(name, random):
     for _ in range(20):
         honest = noisy(stated, 0.5, random)
         assert er3a.diagnose(load_robot(name), honest) == []
-    silent = [
-        r.__class__(r.name, r.group, r.quantity, noise.expected, r.uncertainty, r.source, r.grade)
-        for r, noise in zip(stated, honest)
-    ]
+    silent = [replace(loud, uncertainty=r.uncertainty) for r, loud in zip(stated, honest)]
     assert er3a.diagnose(load_robot(name), silent) == []
 
 
@@ -167,3 +165,13 @@ def test_too_few_references_leave_many_hypotheses_and_say_what_to_measure():
 def test_an_unknown_reference_set_is_one_clear_error():
     with pytest.raises(InputError, match="er3a_c60"):
         er3a.diagnose(load_robot("er3_600"), "er4")
+
+
+def test_references_that_contradict_each_other_accuse_no_table():
+    robot = load_robot("er3_600")
+    stated = usable(load_references("er3_600"))
+    flange = next(r for r in stated if r.name == "zero pose: flange x")
+    rumour = replace(flange, expected=flange.expected + 10, source="another catalogue")
+    assert er3a.diagnose(robot, (*stated, rumour)) == []
+    faulty = er3a.diagnose(changed("er3_600", offset=(2, 0.0)), (*stated, rumour))
+    assert faulty[0].faults == ("joint 2: offset -90 deg missing",)

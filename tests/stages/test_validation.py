@@ -217,7 +217,13 @@ def test_table_checks_see_faults_that_a_file_could_not_hold():
     found = {check.name: check for check in table_checks(crossed)}
     assert found["numbers that are not finite"].measured == 6
     assert found["joints whose limits are crossed"].measured == 6
-    assert [check.status for check in table_checks(robot)] == ["pass"] * 3
+    assert [check.status for check in table_checks(robot)] == ["pass"] * 6
+    metres = robot.replace(
+        a=robot.a / 1000, d=robot.d / 1000, lower=np.radians(robot.lower), upper=np.radians(robot.upper)
+    )
+    assert [check.status for check in table_checks(metres)] == ["pass"] * 3 + ["fail"] * 2 + ["pass"]
+    bent = table_checks(robot.replace(a=robot.a + 0.02))[-1]
+    assert (bent.status, bent.note != "") == ("no_reference", True)
 
 
 def test_round_trips_find_the_joints_again(robot):
