@@ -27,7 +27,8 @@ def what_decides(tables: Tables, robot: Robot) -> str:
     if len(tables) < 2:
         return ""
     poses = _candidates(robot)
-    points = frames_of(tables, robot.base, np.radians(poses))[:, :, 6, :3, 3] * 1000
+    flanges = frames_of(tables, robot.base, np.radians(poses))[:, :, 6]
+    points = flanges[..., :3, 3] * 1000
     apart = np.linalg.norm(points[:, None] - points[None, :], axis=-1)
     pairs = np.triu_indices(len(tables), 1)
     told = (apart[pairs] > APART_MM).mean(axis=0)
@@ -43,7 +44,9 @@ def what_decides(tables: Tables, robot: Robot) -> str:
         joints = np.flatnonzero(np.ptp(column, axis=0) > APART_RAD)
         if len(joints):
             return f"the {name} limit of joint {joints[0] + 1} would tell them apart"
-    return "no position of the flange tells them apart; its orientation or a point beside axis 6 may"
+    if np.ptp(flanges, axis=0).max() < APART_RAD:
+        return "nothing can, they are the same arm written in different ways"
+    return "no position of the flange does, but its orientation, or a point beside axis 6"
 
 
 def _candidates(robot: Robot) -> np.ndarray:

@@ -104,7 +104,7 @@ def test_what_references_cannot_tell_apart_is_named_with_what_would_decide():
     named = {*first.faults, *first.indistinguishable_from}
     assert "joint 2: d is 20 mm, 0 mm fits" in named
     assert any("joint 3: d" in words for words in named)
-    assert first.to_decide
+    assert first.to_decide == "nothing can, they are the same arm written in different ways"
 
 
 def test_members_of_a_set_differ_by_less_than_the_uncertainty_everywhere():

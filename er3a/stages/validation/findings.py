@@ -13,6 +13,7 @@ from er3a.robots.robot import WEIGHTY_GRADES
 from er3a.stages.validation.checks import Check, Conflict
 
 TELLING_GROUPS = ("reach", "zero pose", "axes", "envelope", "key poses", "limits", "speeds")
+TELLING_SHARE = 0.25
 SHOWN_DECIMALS = 9
 MODEL_GROUPS = ("table sanity", "round trips")
 
@@ -69,7 +70,7 @@ def verdict_of(checks: list[Check], conflicts: list[Conflict], findings: list[di
         other = any(finding["another_arm"] for finding in findings if finding["name"] == telling.reference_set)
         lead = f"This is not the arm that {described} describe" if other else f"The model contradicts {described}"
         text = (
-            f"{lead}: {params['failed']} of {params['checks']} checks fail; the {telling.name} is "
+            f"{lead}: {params['failed']} of {params['checks']} checks fail; the {_quoted(telling.name)} is "
             f"{_value(telling.measured, telling.unit)}, not {_value(telling.expected, telling.unit)}."
         )
         culprit = named.get(telling.reference_set, "")
@@ -92,8 +93,12 @@ def verdict_of(checks: list[Check], conflicts: list[Conflict], findings: list[di
 
 
 def most_telling(failed: list[Check]) -> Check:
-    """The failed check to quote: the first of the group that tells most."""
-    return min(failed, key=lambda check: TELLING_GROUPS.index(check.group))
+    """The failed check to quote: of those not far behind the largest difference in mm, the first of the group that
+    tells most."""
+    lengths = [check for check in failed if check.unit == "mm"]
+    least = TELLING_SHARE * max((abs(check.difference) for check in lengths), default=0.0)
+    large = [check for check in lengths if abs(check.difference) >= least]
+    return min(large or failed, key=lambda check: TELLING_GROUPS.index(check.group))
 
 
 def key_figures(
@@ -141,6 +146,12 @@ def _claims_sentence(findings: list[dict], named: dict[str, str]) -> str:
         sentence = f" Of the {claims['total']} claims in {finding['name']}, {claims['fail']} don't hold"
         sentences.append(f"{sentence}. {named[finding['name']]}" if finding["name"] in named else f"{sentence}.")
     return "".join(sentences)
+
+
+def _quoted(name: str) -> str:
+    """A check's name in a sentence: the pose behind what is seen there."""
+    pose, _, seen = name.rpartition(": ")
+    return f"{seen} ({pose})" if pose else name
 
 
 def _grades(checks: list[Check]) -> str:
