@@ -11,6 +11,14 @@ _PUBLIC = {
     "forward": "er3a.kinematics.forward",
     "jacobian": "er3a.kinematics.forward",
     "inverse": "er3a.kinematics.inverse",
+    "diagnose": "er3a.diagnosis.diagnose",
+    "identify": "er3a.identification.identify",
+    "load_measurements": "er3a.identification.measurements",
+    "load_references": "er3a.references.load",
+    "to_modified": "er3a.robots.conventions",
+    "to_standard": "er3a.robots.conventions",
+    "import_urdf": "er3a.robots.urdf",
+    "export_urdf": "er3a.robots.urdf",
     "Er3aError": "er3a.errors",
 }
 

@@ -26,8 +26,8 @@ STEP = 1e-6
 def search(robot: Robot, quantity: Extreme, starts: int) -> tuple[float, np.ndarray]:
     """Find an extreme.
 
-    Joint 1 stays at 0: none of the measures changes with it, or the side view is drawn there. A joint without
-    influence on the result is given as 0 (or its limit nearest to 0).
+    The robot's tool does not count. Joint 1 stays at 0: none of the measures changes with it, or the side view is drawn
+    there. A joint without influence on the result is given as 0 (or its limit nearest to 0).
 
     Parameters
     ----------
@@ -38,6 +38,7 @@ def search(robot: Robot, quantity: Extreme, starts: int) -> tuple[float, np.ndar
     value : mm
     q : (6,), rad, where it is attained
     """
+    robot = robot.replace(tool=np.eye(4))
     lower, upper = robot.lower.copy(), robot.upper.copy()
     lower[0] = upper[0] = 0.0
     sign = -1.0 if quantity.extreme == "greatest" else 1.0

@@ -42,6 +42,7 @@ class Robot:
     convention : "standard" (row i follows joint i) or "modified" (Craig: a and alpha of row i precede joint i)
     a, d : (6,), m
     alpha, offset : (6,), rad
+    beta : (6,), rad, Hayati's turn about y behind Rx(alpha), for axes that are parallel but for an error; usually 0
     direction : (6,), +1 or -1
     lower, upper : (6,), rad, limits of q
     speed : (6,), rad/s, greatest joint speed, NaN where unknown
@@ -62,6 +63,7 @@ class Robot:
     lower: np.ndarray
     upper: np.ndarray
     speed: np.ndarray = field(default_factory=lambda: np.full(6, np.nan))
+    beta: np.ndarray = field(default_factory=lambda: np.zeros(6))
     base: np.ndarray = field(default_factory=lambda: np.eye(4))
     tool: np.ndarray = field(default_factory=lambda: np.eye(4))
     zero_pose: str = ""
@@ -69,7 +71,7 @@ class Robot:
     sources: Mapping[str, Source] = field(default_factory=dict)
 
     def __post_init__(self):
-        for key in ("a", "alpha", "d", "direction", "offset", "lower", "upper", "speed", "base", "tool"):
+        for key in ("a", "alpha", "d", "beta", "direction", "offset", "lower", "upper", "speed", "base", "tool"):
             array = np.array(getattr(self, key), dtype=float)
             expected = (4, 4) if key in ("base", "tool") else (6,)
             if array.shape != expected:

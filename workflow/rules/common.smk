@@ -24,7 +24,7 @@ ROBOTS = list(STUDY.robots)
 
 # The tables that each stage writes beside its summary.json.
 TABLES = {
-    "validation": ["checks", "axes", "key_poses", "section"],
+    "validation": ["checks", "axes", "key_poses", "section", "residuals", "corrections"],
     "workspace": ["cells", "section", "curve", "cloud", "hull_vertices", "hull_triangles"],
     "inverse": ["solutions"],
     "trajectory": ["checks", "samples"],
