@@ -6,16 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import qmc
 
 from er3a.errors import IdentificationError
 from er3a.identification.parameters import LEVELS, SCALE, Parameter, Subspace, jacobian, parameters_of, subspace
+from er3a.kinematics.spread import spread
 from er3a.kinematics.table_batch import tables_of
 from er3a.references.quantities import CarriedCoordinate, PointCoordinate
 from er3a.references.reference import Reference
 from er3a.robots.robot import Robot
 
-RICH_POSES_EXPONENT = 6
+RICH_POSES = 64
 SHOWN_POSES = 3
 
 
@@ -81,8 +81,7 @@ def _rich(robot: Robot, references: Sequence[Reference]) -> tuple[Reference, ...
 
 def _spread(robot: Robot) -> list[tuple[float, ...]]:
     low, high = np.degrees(robot.lower), np.degrees(robot.upper)
-    share = qmc.Sobol(6, scramble=False).random_base2(RICH_POSES_EXPONENT)
-    return [tuple(map(float, row)) for row in np.round((low + share * (high - low)) / 5) * 5]
+    return [tuple(map(float, row)) for row in np.round(spread(low, high, RICH_POSES) / 5) * 5 + 0.0]
 
 
 def _what_more(

@@ -9,7 +9,6 @@ from er3a.identification.measurements import Measurement
 from er3a.identification.parameters import Parameter, moved
 from er3a.kinematics.forward import forward
 from er3a.kinematics.table_batch import robot_of, tables_of
-from er3a.references.predict import at_flange
 from er3a.references.quantities import MM
 from er3a.robots.robot import Robot
 
@@ -19,7 +18,7 @@ ANGLE_ERROR_RAD = 2e-3
 
 def measured(arm: Robot, q: np.ndarray, deviation_mm: float, random: np.random.Generator) -> tuple[Measurement, ...]:
     """Flange positions of an arm at joint angles (P, 6) in rad, with Gaussian noise."""
-    position = forward(at_flange(arm), q)[:, :3, 3] * MM
+    position = forward(arm.without_tool(), q)[:, :3, 3] * MM
     position = position + random.normal(0.0, deviation_mm, position.shape)
     return tuple(
         Measurement(row, tuple(map(float, angles)), "flange", tuple(map(float, xyz)), deviation_mm)

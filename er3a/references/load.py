@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from er3a.errors import InputError
-from er3a.inputs.csv_file import read_csv
+from er3a.inputs.csv_file import Written, read_csv
 from er3a.references.quantities import ZERO_POSE, PoseOutside
 from er3a.references.reference import Reference, ReferenceSet
-from er3a.references.rows import COLUMNS, ENVELOPE_CORNERS, PositionRow, Row, row_of
+from er3a.references.rows import COLUMNS, DIGITS_OF, ENVELOPE_CORNERS, PositionRow, Row, row_of
 from er3a.references.scalars import pose_reached, scalars_of
 from er3a.robots.load import DATA
 
@@ -71,11 +71,22 @@ def check_reference_file(path: str | Path) -> tuple[Row, ...]:
     if not table:
         raise InputError(path, None, "the table has a header but no rows", "Add a row, or remove the file")
     for fields in table:
+        _fill_uncertainty(path.stem, fields)
         _check_row(path, path.stem, fields)
     _check_units(path, table)
     rows = tuple(row_of(path.stem, fields) for fields in table)
     _check_repeats(path, rows)
     return rows
+
+
+def _fill_uncertainty(kind: str, fields: dict[str, Any]) -> None:
+    """Half the last digit that the source prints, where the row gives no uncertainty; then plain numbers."""
+    column, values = DIGITS_OF.get(kind, ("", ()))
+    if column and fields[column] is None:
+        decimals = [fields[name].decimals for name in values if fields[name] is not None]
+        fields[column] = 0.5 * 10.0 ** -max(decimals, default=0)
+    for name, value in fields.items():
+        fields[name] = float(value) if isinstance(value, Written) else value
 
 
 def _check_row(path: Path, kind: str, fields: dict[str, Any]) -> None:

@@ -52,7 +52,7 @@ def state_of(
     axes: AxisLines | None = None,
 ) -> ModelState:
     """One model's state, with the extremes searched for unless given. The robot's tool does not count."""
-    robot = at_flange(robot)
+    robot = robot.without_tool()
     poses = poses_of(references)
     if extremes is None:
         wanted = dict.fromkeys(r.quantity for r in references if isinstance(r.quantity, Extreme))
@@ -67,11 +67,6 @@ def state_of(
         extremes=extremes,
         axes=axes,
     )
-
-
-def at_flange(robot: Robot) -> Robot:
-    """The robot without its tool: references speak of the flange, which is frame 6 of the table."""
-    return robot.replace(tool=np.eye(4))
 
 
 def predict_tables(tables: Tables, robot: Robot, references: Sequence[Reference]) -> np.ndarray:

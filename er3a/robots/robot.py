@@ -80,6 +80,10 @@ class Robot:
             object.__setattr__(self, key, array)
         object.__setattr__(self, "sources", MappingProxyType(dict(self.sources)))
 
+    def without_tool(self) -> Robot:
+        """The robot with its flange as tool: references speak of the flange, which is frame 6 of the table."""
+        return self.replace(tool=np.eye(4))
+
     def replace(self, **changes) -> Robot:
         """A copy with other values for some attributes."""
         return replace(self, **changes)

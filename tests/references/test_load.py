@@ -9,6 +9,7 @@ import pytest
 from er3a.errors import InputError
 from er3a.references.load import MANUAL_REFS, check_reference_file, load_references
 from er3a.references.rows import COLUMNS
+from er3a.references.scalars import scalars_of
 from er3a.robots.robot import GRADES
 
 LIMITS = "joint,lower_deg,upper_deg,uncertainty_deg,source,grade\n"
@@ -123,3 +124,20 @@ def test_a_pose_that_a_source_shows_counts_as_within_the_limits_once(tmp_path):
     written(tmp_path, "positions.csv", POSITIONS + row.format("flange") + row.format("wrist_centre"))
     names = [reference.name for reference in load_references(tmp_path).references]
     assert names.count("up: outside the limits by") == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "uncertainty"),
+    [
+        ("reach.csv", REACH + "flange,1,greatest,600,,m,official\n", 0.5),
+        ("reach.csv", REACH + "flange,1,greatest,592.8,,m,official\n", 0.05),
+        ("reach.csv", REACH + "flange,1,greatest,592.80,,m,official\n", 0.005),
+        ("positions.csv", POSITIONS + "zero,flange,0,0,0,0,0,0,374,0,699.5,,m,cad\n", 0.05),
+        ("limits.csv", LIMITS + "6,,,,m,export\n", 0.5),
+        ("speeds.csv", SPEEDS + "1,4.0e2,,m,official\n", 5.0),
+    ],
+)
+def test_without_uncertainty_half_the_last_digit_counts(tmp_path, name, text, uncertainty):
+    (row,) = check_reference_file(written(tmp_path, name, text))
+    (reference, *_) = scalars_of(row)
+    assert reference.uncertainty == pytest.approx(uncertainty)

@@ -16,7 +16,6 @@ from itertools import product
 import numpy as np
 
 from er3a.kinematics.forward import forward, frames
-from er3a.references.predict import at_flange
 from er3a.references.quantities import MM, AxisLines
 from er3a.robots.robot import Robot
 
@@ -54,7 +53,7 @@ def circle_points(robot: Robot) -> CirclePoints:
 
 def carried_point(robot: Robot) -> np.ndarray:
     """A point (3,) in mm in the flange's frame that is at least 100 mm off every axis in the zero pose."""
-    T = frames(at_flange(robot), np.zeros(6))
+    T = frames(robot.without_tool(), np.zeros(6))
     ways = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
     offsets = np.concatenate([ways * length for length in TRIED_OFFSETS_MM])
@@ -101,5 +100,5 @@ def _track(robot: Robot, joint: int, offset_mm: np.ndarray) -> np.ndarray:
     middle, turn = (lower + upper) / 2, np.clip(upper - lower, LEAST_TURN, MOST_TURN)
     q = np.zeros((STATIONS, 6))
     q[:, joint] = middle + np.linspace(-turn / 2, turn / 2, STATIONS)
-    T = forward(at_flange(robot), q)
+    T = forward(robot.without_tool(), q)
     return T[:, :3, 3] * MM + T[:, :3, :3] @ offset_mm

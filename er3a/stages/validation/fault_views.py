@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from er3a.kinematics.table_batch import COLUMNS
-from er3a.robots.robot import Robot
+from er3a.stages.validation.mended import typographic
 from er3a.viewing.figures import new_figure
 from er3a.viewing.page import Picture, fixed
 from er3a.viewing.palette import INK, MODEL, MUTED, REFERENCE
@@ -29,9 +28,9 @@ def culprit_stories(summary: dict[str, Any], residuals: pd.DataFrame) -> list[di
         stories.append(
             culprit
             | {
-                "text": _typographic(culprit["text"]),
-                "alike": [_typographic(words) for words in ranked[0]["indistinguishable_from"]] if named else [],
-                "to_decide": _typographic(ranked[0]["to_decide"]) if named else "",
+                "text": typographic(culprit["text"]),
+                "alike": [typographic(words) for words in ranked[0]["indistinguishable_from"]] if named else [],
+                "to_decide": typographic(ranked[0]["to_decide"]) if named else "",
                 "others": [_hypothesis_row(row) for row in ranked[1 if named else 0 : SHOWN_HYPOTHESES]],
                 "others_title": "Next-best hypotheses" if named else "The best hypotheses, none of which will do",
                 "picture": _residual_picture(own, culprit, ranked),
@@ -40,22 +39,12 @@ def culprit_stories(summary: dict[str, Any], residuals: pd.DataFrame) -> list[di
     return stories
 
 
-def mended_robot(robot: Robot, culprits: list[dict[str, Any]]) -> tuple[Robot | None, str]:
-    """The robot with the first named fault mended, and its label; None if no fault is named."""
-    for culprit in culprits:
-        if culprit["repaired"]:
-            columns = {name: culprit["repaired"][name] for name in COLUMNS}
-            label = _typographic(f"mended: {' and '.join(culprit['faults'])}")
-            return robot.replace(convention=culprit["repaired"]["convention"], **columns), label
-    return None, ""
-
-
 def correction_stories(summary: dict[str, Any], corrections: pd.DataFrame) -> list[dict[str, Any]]:
     """Per reference set: what its positions say about the table's entries, with the figure."""
     stories = []
     for found in summary["identification"]:
         own = corrections[corrections["reference_set"] == found["reference_set"]]
-        story = found | {"text": _typographic(found["text"]), "picture": None, "rows": []}
+        story = found | {"text": typographic(found["text"]), "picture": None, "rows": []}
         if len(own):
             alt = "Correction of each identified entry of the table with its 95 % interval, lengths and angles apart."
             story["picture"] = Picture(corrections_figure(own), alt, story["text"])
@@ -122,11 +111,7 @@ def _residual_picture(rows: pd.DataFrame, culprit: dict[str, Any], ranked: list[
 
 def _hypothesis_row(row: dict[str, Any]) -> list[str]:
     alike = row["indistinguishable_from"]
-    words = _typographic(" and ".join(row["faults"]))
+    words = typographic(" and ".join(row["faults"]))
     if alike:
         words += f" (or {len(alike)} more that these references can't tell from it)"
     return [words, fixed(row["residual_before"], 1), fixed(row["residual_after"], 1), row["unit"]]
-
-
-def _typographic(text: str) -> str:
-    return text.replace(" -", " −").replace("(-", "(−")

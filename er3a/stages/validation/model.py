@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from er3a.references.predict import at_flange
 from er3a.robots.load import load_robot
 from er3a.robots.robot import Robot
 from er3a.study import Study
@@ -10,4 +9,4 @@ from er3a.study import Study
 
 def model_of(study: Study, name: str) -> Robot:
     """The robot as its file has it, without tool: references speak of its flange and of the maker's base."""
-    return at_flange(load_robot(study.robot_file(name))).replace(name=name)
+    return load_robot(study.robot_file(name)).without_tool().replace(name=name)

@@ -11,7 +11,8 @@ import pandas as pd
 from er3a.results import read_summary, read_table
 from er3a.robots.robot import GRADES, WEIGHTY_GRADES, Robot
 from er3a.stages.validation.drawings import axis_deviation, side_view, workspace_drawing
-from er3a.stages.validation.fault_views import correction_stories, culprit_stories, mended_robot
+from er3a.stages.validation.fault_views import correction_stories, culprit_stories
+from er3a.stages.validation.mended import mended_robot
 from er3a.stages.validation.model import model_of
 from er3a.study import Study
 from er3a.viewing.page import Picture, fixed, number, render
