@@ -12,7 +12,7 @@ from er3a.diagnosis.mutations import Outcome, mutations_of, noisy, try_mutation
 from er3a.diagnosis.ranking import rank, usable
 
 ROBOTS = ("er3a_c60", "er3_600")
-NOISE_MM, DRAWS, FALSE_ALARM_DRAWS, SEED = 0.5, 5, 1000, 20261120
+NOISE_MM, DRAWS, FALSE_ALARM_DRAWS, SEED = 0.5, 3, 500, 20261120
 
 
 def outcomes(name: str, noise_mm: float, draws: int, random: np.random.Generator) -> list[Outcome]:
@@ -26,7 +26,7 @@ def outcomes(name: str, noise_mm: float, draws: int, random: np.random.Generator
 
 
 def false_alarms(name: str, random: np.random.Generator) -> tuple[int, int]:
-    """Right tables that get a diagnosis, out of 1000: with noise that the references own up to, and without."""
+    """Right tables that get a diagnosis, out of 500: with noise that the references own up to, and without."""
     robot, stated = load_robot(name), usable(load_references(name))
     owned = silent = 0
     for _ in range(FALSE_ALARM_DRAWS):

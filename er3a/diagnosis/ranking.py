@@ -2,12 +2,13 @@
 
 Each hypothesis repairs the table at one or two places and predicts all references again, in one batch. Its score is
 
-    n ln(max(chi2 / n, 1)) + c k,
+    sum over mm and deg of n ln(max(chi2 / n, 1)) + c k,
 
-the Gaussian log-likelihood of n references with unknown noise, floored where the references' own uncertainty is met,
-plus a cost c for each of k faults (half as much again for one with a free number), after Schwarz [1]_. c grows with the
-number of hypotheses, because the best of many fits noise better than one does. A hypothesis that scores no better than
-the table as it is (k = 0) is no explanation. Free lengths enter linearly and are solved by weighted least squares.
+the Gaussian log-likelihood of n references of a unit with unknown noise in that unit, floored where the references'
+own uncertainty is met, plus a cost c for each of k faults (half as much again for one with a free number), after
+Schwarz [1]_. c grows with the number of hypotheses, because the best of many fits noise better than one does. A
+hypothesis that scores no better than the table as it is (k = 0) is no explanation. Free lengths enter linearly and are
+solved by weighted least squares.
 
 References
 ----------
@@ -30,6 +31,7 @@ from er3a.robots.robot import Robot
 
 SHOWN = 10
 MEETS = 1.0 + 1e-6
+UNITS = ("mm", "deg")
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +72,9 @@ def rank(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> Rankin
         return None
     pool = evaluate(given, difference, uncertainty)
     per_fault = np.log(len(stated)) + np.log(len(pool.faults))
-    score = _misfit(pool.difference / uncertainty) + per_fault * pool.cost
-    untouched = float(_misfit(before / uncertainty))
+    units = np.array([reference.unit for reference in stated])
+    score = _misfit(pool.difference / uncertainty, units) + per_fault * pool.cost
+    untouched = float(_misfit(before / uncertainty, units))
     return Ranking(pool, score, untouched, _groups(pool, score, untouched, uncertainty), before, stated)
 
 
@@ -89,9 +92,14 @@ def usable(references: ReferenceSet | Sequence[Reference]) -> tuple[Reference, .
     return tuple(reference for i, reference in enumerate(resting) if i not in contradicted)
 
 
-def _misfit(weighted: np.ndarray) -> np.ndarray:
-    """n ln(max(chi2 / n, 1)) of differences (..., n) in uncertainties."""
-    return weighted.shape[-1] * np.log(np.maximum((weighted**2).mean(axis=-1), 1.0))
+def _misfit(weighted: np.ndarray, units: np.ndarray) -> np.ndarray:
+    """Sum over the units of n ln(max(chi2 / n, 1)), of differences (..., n) in uncertainties."""
+    total = np.zeros(weighted.shape[:-1])
+    for unit in UNITS:
+        own = weighted[..., units == unit]
+        if own.shape[-1]:
+            total += own.shape[-1] * np.log(np.maximum((own**2).mean(axis=-1), 1.0))
+    return total
 
 
 def _groups(pool: Pool, score: np.ndarray, untouched: float, uncertainty: np.ndarray) -> tuple[tuple[int, ...], ...]:
