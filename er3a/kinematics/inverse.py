@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
 from er3a.errors import Er3aError, PoseError, ShapeError
-from er3a.kinematics.closed_form import BOUNDARY_M, OFF_AXIS, ORIENTATION, REACHED, SLOTS, TOO_FAR
+from er3a.kinematics.branch import branch_labels
+from er3a.kinematics.closed_form import FREE, OFF_AXIS, ORIENTATION, REACHED, TOO_FAR
+from er3a.kinematics.families import Family, families
 from er3a.kinematics.forward import checked_joints
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.transforms import check_poses
+from er3a.kinematics.turns import TURN, limit_reason, nearest_turns, principal, turn_bounds, within
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from er3a.robots.robot import Robot
 
-LIMIT_TOLERANCE = 1e-9
 SAME_JOINTS = 1e-9
-TURN = 2 * np.pi
 MOST_ROWS = 10_000
 
 
@@ -33,6 +33,7 @@ class Solutions:
     turn : (n, 6) int, full turns added to the angle in (-pi, pi]
     reason : n texts; empty for rows within the limits, else which limits they leave and by how much
     unsolved : per shoulder side without solution, why (both sides: the pose can't be reached)
+    families : continua of solutions, where a joint can turn with the tool at rest
     """
 
     q: np.ndarray
@@ -41,16 +42,20 @@ class Solutions:
     turn: np.ndarray
     reason: tuple[str, ...]
     unsolved: tuple[str, ...]
+    families: tuple[Family, ...] = ()
 
 
 def inverse(robot: Robot, T: np.ndarray, q_ref: np.ndarray | None = None) -> Solutions:
     """All closed-form solutions of a wrist-partitioned arm for one pose of the tool.
 
+    Where a joint is free, its branches appear by the member of their family that is nearest to ``q_ref`` and by the one
+    half a turn further, which are the two branches that meet there.
+
     Parameters
     ----------
     T : (4, 4), T_base_tool, m
-    q_ref : (6,), rad; where a joint is free (aligned wrist, wrist centre on axis 1) it keeps this value, and rows of a
-        branch come nearest turn first. None means zeros.
+    q_ref : (6,), rad, what members of families and turns are chosen by: rows of a branch come nearest turn first. None
+        means zeros.
 
     Raises
     ------
@@ -62,12 +67,10 @@ def inverse(robot: Robot, T: np.ndarray, q_ref: np.ndarray | None = None) -> Sol
     T = check_poses(T)
     if T.shape != (4, 4):
         raise ShapeError("T", T.shape, "(4, 4)")
-    q_ref = np.zeros(6) if q_ref is None else checked_joints(q_ref, "q_ref")
-    if q_ref.shape != (6,):
-        raise ShapeError("q_ref", q_ref.shape, "(6,)")
-    if not np.isfinite(q_ref).all():
-        raise PoseError("q_ref holds NaN or infinity")
-    q, fault, gap = (batch[0] for batch in solve_slots(robot, T[None], q_ref[None]))
+    q_ref = checked_reference(q_ref)
+    q, fault, gap = (batch[0] for batch in solve_slots(robot, T[None], q_ref[None], apart=True, twins=True))
+    continua = families(robot, T, q, q_ref)
+    q = _free_joints_near(robot, T, q, q_ref, continua)
 
     slots: list[int] = []
     for slot in np.flatnonzero(fault == REACHED):
@@ -83,77 +86,38 @@ def inverse(robot: Robot, T: np.ndarray, q_ref: np.ndarray | None = None) -> Sol
         turn=np.round((solutions - principal(solutions)) / TURN).astype(int),
         reason=tuple("" if ok else limit_reason(robot, row) for row, ok in zip(solutions, inside)),
         unsolved=_unsolved(robot, fault, gap),
+        families=continua,
     )
 
 
-def within(robot: Robot, q: np.ndarray) -> np.ndarray:
-    """Whether joint angles (..., 6) in rad lie within the limits, to 1e-9 rad; shape (...,)."""
-    return (np.maximum(q - robot.upper, robot.lower - q) <= LIMIT_TOLERANCE).all(axis=-1)
+def checked_reference(q_ref: np.ndarray | None) -> np.ndarray:
+    """Reference joint angles (6,), zeros for None; :class:`ShapeError` or :class:`PoseError` if they are none."""
+    q_ref = np.zeros(6) if q_ref is None else checked_joints(q_ref, "q_ref")
+    if q_ref.shape != (6,):
+        raise ShapeError("q_ref", q_ref.shape, "(6,)")
+    if not np.isfinite(q_ref).all():
+        raise PoseError("q_ref holds NaN or infinity")
+    return q_ref
 
 
-def principal(q: np.ndarray) -> np.ndarray:
-    """The same angles in (-pi, pi]."""
-    return q - TURN * np.ceil((q - np.pi) / TURN)
-
-
-def nearest_turns(robot: Robot, q: np.ndarray, q_ref: np.ndarray) -> np.ndarray:
-    """The same arm poses (..., 6) by the turns nearest to q_ref within the limits, else by those nearest to them."""
-    near = q + TURN * np.round((q_ref - q) / TURN)
-    low, high = _turn_bounds(robot, near)
-    inside = near + TURN * np.clip(0, low, np.maximum(low, high))
-    below, above = near + TURN * (low - 1), near + TURN * low
-    outside = np.where(robot.lower - below < above - robot.upper, below, above)
-    return np.where(low <= high, inside, outside)
-
-
-def limit_reason(robot: Robot, q: np.ndarray) -> str:
-    """Which limits the angles (6,) leave, and by how many degrees; empty if none."""
-    parts = []
-    for j, angle in enumerate(q):
-        for excess, side, limit in (
-            (angle - robot.upper[j], "above", robot.upper[j]),
-            (robot.lower[j] - angle, "below", robot.lower[j]),
-        ):
-            if excess > LIMIT_TOLERANCE:
-                at, by, bound = np.degrees([angle, excess, limit])
-                parts.append(f"J{j + 1} at {at:.1f} deg is {by:.3g} deg {side} its limit of {bound:g} deg")
-    return "; ".join(parts)
-
-
-@lru_cache(maxsize=256)
-def branch_labels(robot: Robot) -> tuple[str, ...]:
-    """The eight slots in words.
-
-    *front*: the wrist centre is on the side of axis 1 where it stands in the maker's zero pose (if it stands on axis 1
-    there, the side of the cross product of axes 1 and 2); *back*: reached over the head. *up*: with the arm stretched
-    out level on that side, the elbow is above the line from shoulder to wrist. *flip*: the wrist root with the
-    negative angle.
-    """
-    arm = wrist_partitioned_arm(robot)
-    w1, w2 = arm.axes[0], arm.axes[1]
-    forward_root = -1.0  # slot 0 has theta_1 = phi + delta: the wrist lies against w1 x w2
-    at_zero = determinant_factors(robot, np.zeros(6)).shoulder
-    zero_side = 1.0 if abs(at_zero) < BOUNDARY_M else np.sign(at_zero)
-    labels = []
-    for slot in range(SLOTS):
-        side = forward_root * (1.0 if slot < 4 else -1.0)
-        outward = side * np.cross(w1, w2)
-        bend = 1.0 if slot % 4 < 2 else -1.0
-        up = bend * (np.cross(w2, outward) @ w1) < 0
-        shoulder = "front" if side == zero_side else "back"
-        labels.append(f"{shoulder}, elbow {'up' if up else 'down'}, {'flip' if slot % 2 else 'no flip'}")
-    return tuple(labels)
-
-
-def _turn_bounds(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Least and greatest number of turns to add so that each angle lies within its limits (least > greatest: none)."""
-    low = np.ceil((robot.lower - LIMIT_TOLERANCE - q) / TURN)
-    high = np.floor((robot.upper + LIMIT_TOLERANCE - q) / TURN)
-    return low, high
+def _free_joints_near(
+    robot: Robot, T: np.ndarray, q: np.ndarray, q_ref: np.ndarray, continua: tuple[Family, ...]
+) -> np.ndarray:
+    """The slots (8, 6) with free joints where their nearest family has them."""
+    factors = determinant_factors(robot, q)
+    exact = {"wrist": np.abs(factors.wrist) < FREE, "shoulder": np.abs(factors.shoulder) < FREE}
+    exact["elbow"] = np.ones(len(q), dtype=bool)
+    reference, moved = np.tile(q_ref, (len(q), 1)), np.zeros(len(q), dtype=bool)
+    for family in reversed(continua):
+        for slot in family.branches:
+            if exact[family.kind][slot]:
+                reference[slot], moved[slot] = family.q0, True
+    again = solve_slots(robot, np.broadcast_to(T, (len(q), 4, 4)), reference, apart=True, twins=True)[0]
+    return np.where(moved[:, None], again[np.arange(len(q)), np.arange(len(q))], q)
 
 
 def _rows_of_branch(robot: Robot, q: np.ndarray, q_ref: np.ndarray) -> np.ndarray:
-    low, high = _turn_bounds(robot, q)
+    low, high = turn_bounds(robot, q)
     if (low > high).any():
         return nearest_turns(robot, q, q_ref)[None]
     if np.prod(high - low + 1) > MOST_ROWS:
