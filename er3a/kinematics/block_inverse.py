@@ -20,17 +20,20 @@ import numpy as np
 
 from er3a.kinematics.fast_math import arctan2
 from er3a.kinematics.jit import kernel
+from er3a.kinematics.transforms import ORTHONORMAL_TOLERANCE
+from er3a.kinematics.turns import LIMIT_TOLERANCE, TURN
 from er3a.kinematics.vectors import Vector
 
 BLOCK = 64
 NEAR = 1e-6  # m or rad from where a joint becomes free
+PER_TURN = 1 / TURN
 EDGE = 2e-9  # m or rad from where two branches meet or end
 
 # Rows of scratch memory; a row holds one number of each pose of the block. Offsets are constants, so that the compiler
 # sees that rows don't overlap.
-_Z6, _X6, _PLANE, _MARK, _POSE_ROWS = 12, 15, 18, 19, 20  # the pose itself (3 x 4) comes first
+_Z6, _X6, _PLANE, _MARK, _RIGID, _POSE_ROWS = 12, 15, 18, 19, 20, 21  # the pose itself (3 x 4) comes first
 _COS_1, _SIN_1, _ACROSS, _BEND, _COS_BEND, _SIN_BEND, _REACHED, _SIDE_ROWS = range(8)
-_VALID, _PAIR_ROWS = 12, 13  # two slots of a wrist: six angles each, then whether they are solved
+_VALID, _WITHIN, _PAIR_ROWS = 12, 13, 15  # two slots of a wrist: six angles each, whether solved, each within limits
 
 
 class BlockConstants(NamedTuple):
@@ -73,13 +76,15 @@ class BlockConstants(NamedTuple):
 
 
 @kernel
-def solve_blocks(arm, direction, offset, T, q, marked):
-    """Fill ``q`` (N, 8, 6) with angles theta turned into the maker's, in (-pi, pi], NaN where a slot has no solution.
+def solve_blocks(arm, direction, offset, lower, upper, T, q_ref, q, valid, within, rigid, marked):
+    """Solve poses ``T`` (N, 4, 4).
 
-    ``marked`` (N,) tells which poses are left to the careful solver.
+    Fills ``q`` (N, 8, 6), the maker's angles by the turns within the limits that are nearest to ``q_ref`` (N or 1, 6),
+    NaN where a slot has no solution, and per slot ``valid`` and ``within`` the limits (N, 8). ``rigid`` (N,) tells
+    which poses are rigid transforms, ``marked`` (N,) which are left to the careful solver.
     """
     pose, sides = np.empty(_POSE_ROWS * BLOCK), np.empty((2, _SIDE_ROWS * BLOCK))
-    pairs = np.empty((4, _PAIR_ROWS * BLOCK))
+    pairs, reference = np.empty((4, _PAIR_ROWS * BLOCK)), np.empty(6 * BLOCK)
     for start in range(0, T.shape[0], BLOCK):
         size = min(BLOCK, T.shape[0] - start)
         for i in range(BLOCK):
@@ -87,29 +92,74 @@ def solve_blocks(arm, direction, offset, T, q, marked):
             for r in range(3):
                 for c in range(4):
                     pose[(4 * r + c) * BLOCK + i] = T[n, r, c]
+            last = abs(T[n, 3, 0]) + abs(T[n, 3, 1]) + abs(T[n, 3, 2]) + abs(T[n, 3, 3] - 1.0)
+            pose[_RIGID * BLOCK + i] = last
+        if start == 0 or q_ref.shape[0] > 1:
+            for i in range(BLOCK):
+                n = min(start + min(i, size - 1), q_ref.shape[0] - 1)
+                for j in range(6):
+                    reference[j * BLOCK + i] = q_ref[n, j]
+        _check(pose)
         _shoulder(arm, pose, sides[0], sides[1])
         for pair in range(4):
             side = sides[pair // 2]
             if pair % 2 == 0:
                 _elbow(arm, pose, side)
             _wrist(arm, pose, side, 1.0 - 2.0 * (pair % 2), pairs[pair])
-            _as_the_maker_counts(direction, offset, pairs[pair])
+            _as_the_maker_counts(direction, offset, lower, upper, reference, pairs[pair])
             for i in range(size):
                 for row in range(6):
                     q[start + i, 2 * pair, row] = pairs[pair, row * BLOCK + i]
                     q[start + i, 2 * pair + 1, row] = pairs[pair, (6 + row) * BLOCK + i]
+                for k in range(2):
+                    valid[start + i, 2 * pair + k] = pairs[pair, _VALID * BLOCK + i] > 0.0
+                    within[start + i, 2 * pair + k] = pairs[pair, (_WITHIN + k) * BLOCK + i] > 0.0
         for i in range(size):
+            rigid[start + i] = pose[_RIGID * BLOCK + i] > 0.0
             marked[start + i] = pose[_MARK * BLOCK + i] > 0.0
 
 
 @kernel
-def _as_the_maker_counts(direction, offset, pair):
-    for row in range(12):
-        sign, zero = direction[row % 6], offset[row % 6]
-        for i in range(BLOCK):
-            angle = sign * (pair[row * BLOCK + i] - zero)
-            angle = angle - 2 * np.pi * np.ceil((angle - np.pi) * (1 / (2 * np.pi)))
-            pair[row * BLOCK + i] = angle if pair[_VALID * BLOCK + i] > 0.0 else np.nan
+def _check(w):
+    """1 where the pose is a rigid transform, to the tolerances of ``transforms.check_poses``."""
+    for i in range(BLOCK):
+        a, b, c, x = w[i], w[BLOCK + i], w[2 * BLOCK + i], w[3 * BLOCK + i]
+        d, e, f, y = w[4 * BLOCK + i], w[5 * BLOCK + i], w[6 * BLOCK + i], w[7 * BLOCK + i]
+        g, h, k, z = w[8 * BLOCK + i], w[9 * BLOCK + i], w[10 * BLOCK + i], w[11 * BLOCK + i]
+        first, second, third = a * a + b * b + c * c - 1.0, d * d + e * e + f * f - 1.0, g * g + h * h + k * k - 1.0
+        off_1, off_2, off_3 = a * d + b * e + c * f, a * g + b * h + c * k, d * g + e * h + f * k
+        volume = a * (e * k - f * h) + b * (f * g - d * k) + c * (d * h - e * g)
+        straight = (abs(first) <= ORTHONORMAL_TOLERANCE) & (abs(second) <= ORTHONORMAL_TOLERANCE)
+        straight = straight & (abs(third) <= ORTHONORMAL_TOLERANCE) & (abs(off_1) <= ORTHONORMAL_TOLERANCE)
+        straight = straight & (abs(off_2) <= ORTHONORMAL_TOLERANCE) & (abs(off_3) <= ORTHONORMAL_TOLERANCE)
+        placed = (abs(x) < np.inf) & (abs(y) < np.inf) & (abs(z) < np.inf) & (w[_RIGID * BLOCK + i] <= 1e-12)
+        w[_RIGID * BLOCK + i] = 1.0 if straight & placed & (volume > 0.0) else 0.0
+
+
+@kernel
+def _as_the_maker_counts(direction, offset, lower, upper, reference, pair):
+    """Angles theta into maker's angles by the nearest turn within the limits; see ``turns.nearest_turns``."""
+    for i in range(BLOCK):
+        pair[_WITHIN * BLOCK + i] = pair[_VALID * BLOCK + i]
+        pair[(_WITHIN + 1) * BLOCK + i] = pair[_VALID * BLOCK + i]
+    for k in range(2):
+        for j in range(6):
+            row = (6 * k + j) * BLOCK
+            sign, zero, least, most = direction[j], offset[j], lower[j], upper[j]
+            inside = (_WITHIN + k) * BLOCK
+            for i in range(BLOCK):
+                angle = sign * (pair[row + i] - zero)
+                near = angle - TURN * np.floor((angle - reference[j * BLOCK + i]) * PER_TURN + 0.5)
+                low = np.ceil((least - LIMIT_TOLERANCE - near) * PER_TURN)
+                high = np.floor((most + LIMIT_TOLERANCE - near) * PER_TURN)
+                fits = low <= high
+                turns = low if low > 0.0 else high if high < 0.0 else 0.0
+                below = near + TURN * (low - 1.0)
+                above = near + TURN * low
+                outside = below if least - below < above - most else above
+                chosen = near + TURN * turns if fits else outside
+                pair[inside + i] = pair[inside + i] if fits else 0.0
+                pair[row + i] = chosen if pair[_VALID * BLOCK + i] > 0.0 else np.nan
 
 
 @kernel

@@ -70,7 +70,7 @@ class Family:
             return self.q0 + t[..., None] * self.direction
         joint = FREE_JOINT[self.kind]
         q = _on_curve(self.robot, self.T, joint, self.q0[joint] + t.reshape(-1), self.q0, self.branches[0])
-        q = nearest_turns(self.robot, q, self.q0)
+        q = nearest_turns(self.robot, _nearest_wrists(self.robot, q, self.q0), self.q0)
         q[:, joint] = self.q0[joint] + t.reshape(-1)
         return q.reshape(*t.shape, 6)
 

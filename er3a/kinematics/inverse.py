@@ -18,6 +18,7 @@ from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from er3a.robots.robot import Robot
 
 SAME_JOINTS = 1e-9
+SAME_MEMBER = 1e-6
 MOST_ROWS = 10_000
 
 
@@ -48,8 +49,8 @@ class Solutions:
 def inverse(robot: Robot, T: np.ndarray, q_ref: np.ndarray | None = None) -> Solutions:
     """All closed-form solutions of a wrist-partitioned arm for one pose of the tool.
 
-    Where a joint is free, its branches appear by the member of their family that is nearest to ``q_ref`` and by the one
-    half a turn further, which are the two branches that meet there.
+    Where a joint is free, the member of each family within the limits that is nearest to ``q_ref`` is among the rows,
+    and for the branch that meets there the one half a turn further.
 
     Parameters
     ----------
@@ -77,6 +78,10 @@ def inverse(robot: Robot, T: np.ndarray, q_ref: np.ndarray | None = None) -> Sol
         if not any(np.abs(principal(q[slot] - q[other])).max() < SAME_JOINTS for other in slots):
             slots.append(slot)
     rows = [_rows_of_branch(robot, q[slot], q_ref) for slot in slots]
+    for family in continua:
+        if family.within_limits and np.abs(np.concatenate(rows) - family.q0).max(axis=1).min() > SAME_MEMBER:
+            slots.append(family.branches[0])
+            rows.append(family.q0[None])
     solutions = np.concatenate([np.empty((0, 6)), *rows])
     inside = within(robot, solutions)
     return Solutions(

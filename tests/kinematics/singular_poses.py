@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.kinematics.branch import branch_of
+from er3a.kinematics.families import Family
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
@@ -89,3 +90,11 @@ def admissible_slots(robot: Robot, q: np.ndarray) -> np.ndarray:
     for bit, factor in ((1, factors.wrist), (2, factors.elbow), (4, factors.shoulder)):
         allowed &= (differ & bit == 0) | (np.abs(factor) < 4e-15)[:, None]
     return allowed
+
+
+def family_holds(family: Family, q: np.ndarray, slots: np.ndarray, most: float) -> bool:
+    """Whether a family with an admissible label has q (6,) as a member."""
+    joint = {"wrist": 3, "shoulder": 0, "elbow": 1}[family.kind]
+    t = q[joint] - family.q0[joint] + 2 * np.pi * np.arange(-2, 3)
+    away = turned(family.members(t) - q).max(axis=1).min()
+    return bool(slots[list(family.branches)].any() and away <= max(most, 1e-9))

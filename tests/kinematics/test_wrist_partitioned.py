@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import NotWristPartitionedError
+from er3a.kinematics.branch import branch_labels
 from er3a.kinematics.closed_form import OFF_AXIS, ORIENTATION, TOO_FAR, TOO_NEAR
 from er3a.kinematics.forward import forward, frames
-from er3a.kinematics.inverse import branch_labels, inverse
+from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from tests.kinematics.arms import DEG, joints_at_random, make_arm, number, placement, pose_errors
 
