@@ -11,6 +11,7 @@ _PUBLIC = {
     "forward": "er3a.kinematics.forward",
     "jacobian": "er3a.kinematics.forward",
     "inverse": "er3a.kinematics.inverse",
+    "solve": "er3a.kinematics.numerical",
     "inverse_batch": "er3a.kinematics.batch",
     "Er3aError": "er3a.errors",
 }

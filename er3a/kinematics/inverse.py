@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.errors import Er3aError, PoseError, ShapeError
+from er3a.errors import Er3aError, NotWristPartitionedError, PoseError, ShapeError
 from er3a.kinematics.branch import branch_labels
 from er3a.kinematics.closed_form import FREE, OFF_AXIS, ORIENTATION, REACHED, TOO_FAR
 from er3a.kinematics.families import Family, families
 from er3a.kinematics.forward import checked_joints
+from er3a.kinematics.numerical import all_found
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.transforms import check_poses
 from er3a.kinematics.turns import TURN, limit_reason, nearest_turns, principal, turn_bounds, within
@@ -20,6 +22,8 @@ from er3a.robots.robot import Robot
 SAME_JOINTS = 1e-9
 SAME_MEMBER = 1e-6
 MOST_ROWS = 10_000
+STARTS = 400
+CLOSED_FORM = "closed form"
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,11 +34,14 @@ class Solutions:
     ----------
     q : (n, 6), rad, maker's angles; each branch once per turn that the limits allow, or once if it leaves them
     within_limits : (n,) bool
-    branch : (n,) int, slot ``4 * shoulder + 2 * elbow + wrist`` (words: :func:`branch_labels`)
+    branch : (n,) int, slot ``4 * shoulder + 2 * elbow + wrist``; for arms without a closed form, the number of the arm
+        found
+    label : n texts, the branch in words
     turn : (n, 6) int, full turns added to the angle in (-pi, pi]
     reason : n texts; empty for rows within the limits, else which limits they leave and by how much
     unsolved : per shoulder side without solution, why (both sides: the pose can't be reached)
     families : continua of solutions, where a joint can turn with the tool at rest
+    method : ``closed form``, or how the arm was solved instead and why
     """
 
     q: np.ndarray
@@ -44,10 +51,12 @@ class Solutions:
     reason: tuple[str, ...]
     unsolved: tuple[str, ...]
     families: tuple[Family, ...] = ()
+    label: tuple[str, ...] = ()
+    method: str = CLOSED_FORM
 
 
 def inverse(robot: Robot, T: np.ndarray, q_ref: np.ndarray | None = None) -> Solutions:
-    """All closed-form solutions of a wrist-partitioned arm for one pose of the tool.
+    """All joint solutions of one pose of the tool: in closed form for a wrist-partitioned arm, else by iteration.
 
     Where a joint is free, the member of each family within the limits that is nearest to ``q_ref`` is among the rows,
     and for the branch that meets there the one half a turn further.
@@ -62,13 +71,15 @@ def inverse(robot: Robot, T: np.ndarray, q_ref: np.ndarray | None = None) -> Sol
     ------
     ShapeError, PoseError
         if T is no rigid transform, or q_ref no six finite numbers
-    NotWristPartitionedError
-        if the arm has no closed form here
     """
     T = check_poses(T)
     if T.shape != (4, 4):
         raise ShapeError("T", T.shape, "(4, 4)")
     q_ref = checked_reference(q_ref)
+    try:
+        wrist_partitioned_arm(robot)
+    except NotWristPartitionedError as error:
+        return _by_iteration(robot, T, q_ref, error.property_missing)
     q, fault, gap = (batch[0] for batch in solve_slots(robot, T[None], q_ref[None], apart=True, twins=True))
     continua = families(robot, T, q, q_ref)
     q = _free_joints_near(robot, T, q, q_ref, continua)
@@ -82,17 +93,33 @@ def inverse(robot: Robot, T: np.ndarray, q_ref: np.ndarray | None = None) -> Sol
         if family.within_limits and np.abs(np.concatenate(rows) - family.q0).max(axis=1).min() > SAME_MEMBER:
             slots.append(family.branches[0])
             rows.append(family.q0[None])
-    solutions = np.concatenate([np.empty((0, 6)), *rows])
-    inside = within(robot, solutions)
+    labels = branch_labels(robot)
+    return _judged(robot, slots, rows, labels, unsolved=_unsolved(robot, fault, gap), families=continua)
+
+
+def _judged(robot: Robot, branches: list[int], rows: list[np.ndarray], labels: Sequence[str], **rest) -> Solutions:
+    """Solutions from the rows of each branch, with the limits' verdict."""
+    q = np.concatenate([np.empty((0, 6)), *rows])
+    branch = np.repeat(np.array(branches, dtype=int), [len(turns) for turns in rows])
+    inside = within(robot, q)
     return Solutions(
-        q=solutions,
+        q=q,
         within_limits=inside,
-        branch=np.repeat(np.array(slots, dtype=int), [len(turns) for turns in rows]),
-        turn=np.round((solutions - principal(solutions)) / TURN).astype(int),
-        reason=tuple("" if ok else limit_reason(robot, row) for row, ok in zip(solutions, inside)),
-        unsolved=_unsolved(robot, fault, gap),
-        families=continua,
+        branch=branch,
+        turn=np.round((q - principal(q)) / TURN).astype(int),
+        reason=tuple("" if ok else limit_reason(robot, row) for row, ok in zip(q, inside)),
+        label=tuple(labels[number] for number in branch),
+        **rest,
     )
+
+
+def _by_iteration(robot: Robot, T: np.ndarray, q_ref: np.ndarray, lacking: str) -> Solutions:
+    arms, first = all_found(robot, T, STARTS)
+    rows = [_rows_of_branch(robot, q, q_ref) for q in arms]
+    labels = [f"arm {number + 1}" for number in range(len(arms))]
+    method = f"iteration from {STARTS} random starts, which may miss solutions; no closed form, because {lacking}"
+    unsolved = () if len(arms) else (str(first.reason),)
+    return _judged(robot, list(range(len(arms))), rows, labels, unsolved=unsolved, method=method)
 
 
 def checked_reference(q_ref: np.ndarray | None) -> np.ndarray:

@@ -180,7 +180,7 @@ def test_the_text_for_a_wrist_that_can_t_tilt_far_enough():
 def test_other_arms_are_told_what_they_lack(change, lacks):
     arm = make_arm(**change)
     with pytest.raises(NotWristPartitionedError, match=f"^made: no closed-form inverse, because {lacks}") as caught:
-        inverse(arm, forward(arm, np.full(6, 0.3)))
+        wrist_partitioned_arm(arm)
     assert caught.value.property_missing.startswith(lacks)
 
 
