@@ -9,6 +9,8 @@ _PUBLIC = {
     "load_robot": "er3a.robots.load",
     "Robot": "er3a.robots.robot",
     "forward": "er3a.kinematics.forward",
+    "select": "er3a.selection.select",
+    "select_sequence": "er3a.selection.sequence",
     "jacobian": "er3a.kinematics.forward",
     "inverse": "er3a.kinematics.inverse",
     "solve": "er3a.kinematics.numerical",

@@ -9,11 +9,11 @@ from itertools import pairwise
 import numpy as np
 
 from er3a.errors import PoseError, ShapeError
-from er3a.kinematics.block_inverse import BLOCK, solve_blocks
+from er3a.kinematics.block_inverse import BLOCK, count_turns, solve_blocks
 from er3a.kinematics.closed_form import REACHED, SLOTS
 from er3a.kinematics.forward import checked_joints
 from er3a.kinematics.transforms import check_poses
-from er3a.kinematics.turns import nearest_turns, turn_bounds, within
+from er3a.kinematics.turns import nearest_turns, within
 from er3a.kinematics.wrist_partitioned import constants_for_blocks, solve_slots
 from er3a.robots.robot import Robot
 
@@ -115,6 +115,6 @@ def _parts(count: int, threads: int) -> list[slice]:
 
 
 def _turns(robot: Robot, q: np.ndarray) -> np.ndarray:
-    empty = np.isnan(q)
-    low, high = turn_bounds(robot, np.where(empty, 0.0, q))
-    return np.stack([np.where(empty, 0, low), np.where(empty, -1, high)], axis=-1).astype(np.int8)
+    turns = np.empty((*q.shape, 2), dtype=np.int8)
+    count_turns(q.reshape(-1, 6), robot.lower, robot.upper, turns.reshape(-1, 6, 2))
+    return turns

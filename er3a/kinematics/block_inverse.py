@@ -163,6 +163,17 @@ def _as_the_maker_counts(direction, offset, lower, upper, reference, pair):
 
 
 @kernel
+def count_turns(q, lower, upper, turns):
+    """Least and greatest number of turns (n, 6, 2) to add to angles (n, 6) within the limits; 0 and -1 for NaN."""
+    for n in range(q.shape[0]):
+        for j in range(6):
+            low = np.ceil((lower[j] - LIMIT_TOLERANCE - q[n, j]) * PER_TURN)
+            high = np.floor((upper[j] + LIMIT_TOLERANCE - q[n, j]) * PER_TURN)
+            known = q[n, j] == q[n, j]
+            turns[n, j, 0], turns[n, j, 1] = np.int8(low if known else 0.0), np.int8(high if known else -1.0)
+
+
+@kernel
 def _in_frame_1(rows, x, y, z):
     a, b, c = rows
     return (
