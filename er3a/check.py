@@ -8,9 +8,11 @@ from pydantic import BaseModel
 
 from er3a.collision.scene import SceneFile, load_scene
 from er3a.errors import InputError
-from er3a.inputs.yaml_file import read_yaml
+from er3a.identification.measurements import load_measurements
+from er3a.inputs.yaml_file import read_text, read_yaml
 from er3a.planning.path_file import PathFile, load_paths
 from er3a.references.load import check_reference_file, load_references
+from er3a.references.rows import COLUMNS
 from er3a.robots.load import load_robot
 from er3a.robots.schema import RobotFile
 from er3a.study import Study, load_study
@@ -37,7 +39,7 @@ _WORDS = {"robot": "a robot", "study": "a study", "targets": "targets", "paths":
 def check_file(path: Path) -> str:
     """Check a file and return in words what it is; :class:`er3a.errors.InputError` if something is wrong with it."""
     if path.suffix == ".csv":
-        return check_reference_file(path)
+        return _check_table(path)
     if path.suffix not in (".yaml", ".yml"):
         raise InputError(path, None, f"'{path.suffix}' files are none of er3a's inputs", "Give a .yaml or .csv file")
     kind = read_yaml(path).get("kind")
@@ -46,6 +48,14 @@ def check_file(path: Path) -> str:
         raise InputError(path, "kind", problem, f"Write one of: {', '.join(_CHECKS)}")
     _CHECKS[kind](path)
     return _WORDS[kind]
+
+
+def _check_table(path: Path) -> str:
+    if path.stem not in COLUMNS and "q1_deg" in read_text(path).partition("\n")[0]:
+        load_measurements(path)
+        return "measured positions"
+    check_reference_file(path)
+    return f"references about {path.stem}"
 
 
 def check_study(path: Path) -> Study:

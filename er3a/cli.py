@@ -163,6 +163,26 @@ def export_urdf(
 
 
 @app.command()
+def identify(
+    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="a robot's name or file: the table to start from")],
+    measurements: Annotated[str, typer.Argument(help="a CSV of measured positions, or a reference set's name")],
+    output: Annotated[Path, typer.Option(help="the robot file to write")],
+):
+    """Estimate corrections to a robot's table from measured positions, and write the corrected robot file."""
+    from er3a.identification.identify import identify as identify_robot
+    from er3a.identification.identify import in_words
+    from er3a.references.load import load_references
+    from er3a.robots.load import load_robot
+    from er3a.robots.write import write_robot
+
+    source = Path(measurements) if measurements.endswith(".csv") else load_references(measurements)
+    found = identify_robot(load_robot(robot), source)
+    print(in_words(found))
+    write_robot(found.robot.replace(name=output.stem, title=f"{found.robot.title}, identified"), output)
+    print(f"{output}: written")
+
+
+@app.command()
 def schema(folder: Annotated[Path, typer.Option(help="where to write them")] = Path("config")):
     """Write the JSON schemas of the input files, for editors."""
     from er3a.check import SCHEMAS

@@ -20,6 +20,18 @@ from er3a.robots.robot import Robot
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 
 
+PIPELINE_TESTS = ("integration", "browser", "viewing")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests that share the small study run in one worker, so that it is run once; they start first."""
+    for item in items:
+        if item.path.parent.name in PIPELINE_TESTS:
+            item.add_marker(pytest.mark.xdist_group("pipeline"))
+    items.sort(key=lambda item: item.path.parent.name not in PIPELINE_TESTS)
+
+
 @pytest.fixture(params=ROBOTS)
 def robot(request: pytest.FixtureRequest) -> Robot:
     """Each of the project's robots in turn."""
@@ -69,11 +81,11 @@ class StudyRun:
         return done
 
 
-def copy_of_project(folder: Path) -> StudyRun:
+def copy_of_project(source_folder: Path, folder: Path) -> StudyRun:
     """Copy what a run needs, without results."""
     folder.mkdir(parents=True)
     for part in PROJECT_PARTS:
-        source = ROOT / part
+        source = source_folder / part
         if source.is_dir():
             shutil.copytree(source, folder / part, ignore=shutil.ignore_patterns("__pycache__"))
         else:
@@ -83,8 +95,9 @@ def copy_of_project(folder: Path) -> StudyRun:
 
 @pytest.fixture(scope="session")
 def fresh_project(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], StudyRun]:
-    """Makes further copies of the project, without results."""
-    return lambda name: copy_of_project(tmp_path_factory.mktemp(name) / "project")
+    """Makes copies, without results, of the project as it stands at the start of the tests."""
+    snapshot = copy_of_project(ROOT, tmp_path_factory.mktemp("snapshot") / "project").folder
+    return lambda name: copy_of_project(snapshot, tmp_path_factory.mktemp(name) / "project")
 
 
 @pytest.fixture(scope="session")

@@ -1,33 +1,20 @@
-"""Rank single and double faults by the residual that remains and by simplicity.
-
-Each hypothesis repairs the table at one or two places and predicts all references again, in one batch. Its score is
-
-    n ln(max(chi2 / n, 1)) + c k,
-
-the Gaussian log-likelihood of n references with unknown noise, floored where the references' own uncertainty is met,
-plus a cost c for each of k faults (half as much again for one with a free number), after Schwarz [1]_. Free
-lengths enter linearly and are solved by weighted least squares.
-
-References
-----------
-.. [1] G. Schwarz, "Estimating the dimension of a model", Annals of Statistics 6(2), 1978.
-"""
+"""What is most likely wrong with a table, in words."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
-from er3a.diagnosis.candidate_tables import Tables, predictions, tables_of
-from er3a.diagnosis.hypotheses import Pool, evaluate
-from er3a.references.quantities import Extreme, Speed
-from er3a.references.reference import Reference, ReferenceSet, expected_of
+from er3a.diagnosis.next_measurement import what_decides
+from er3a.diagnosis.ranking import MEETS, Ranking, rank
+from er3a.kinematics.table_batch import robot_of
+from er3a.references.load import load_references
+from er3a.references.reference import Reference, ReferenceSet, expected_of, lengths_of, vectors_of
 from er3a.robots.robot import Robot
 
-SHOWN = 10
-MEETS = 1.0 + 1e-6
 UNITS = ("mm", "deg")
 
 
@@ -40,11 +27,14 @@ class Hypothesis:
     hypothesis : the faults in words, with the residual before and after
     faults : each fault in words
     kinds : the family of each fault
-    residual_before, residual_after : greatest difference over the references of that unit
+    residual_before, residual_after : greatest difference over the references of that unit; coordinates of one point are
+        taken together, as a distance
     unit : mm, or deg where all lengths agree before and after
     explains : whether all references are met within their uncertainty
     indistinguishable_from : other hypotheses (their faults in words) that no reference tells from this one
+    to_decide : what would tell them apart, in words; empty if there is nothing to tell apart
     score : what it is ranked by; smaller is better
+    repaired : the robot with the faults mended
     """
 
     hypothesis: str
@@ -55,135 +45,84 @@ class Hypothesis:
     unit: str
     explains: bool
     indistinguishable_from: tuple[str, ...]
+    to_decide: str
     score: float
+    repaired: Robot
 
 
-@dataclass(frozen=True, eq=False)
-class Ranking:
-    """Hypotheses in order.
-
-    Attributes
-    ----------
-    pool : all that were evaluated
-    score : (H,), smaller is better
-    groups : rows of the pool, best group first; the first row of a group is its best, the others are those that no
-        reference tells from it
-    before : (n,), difference of the given table to the references, in their units
-    references : those it rests on
-    """
-
-    pool: Pool
-    score: np.ndarray
-    groups: tuple[tuple[int, ...], ...]
-    before: np.ndarray
-    references: tuple[Reference, ...]
-
-
-def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> list[Hypothesis]:
-    """Hypotheses about what is wrong with a table, best first; empty if the references are met.
+def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference] | str | Path) -> list[Hypothesis]:
+    """Hypotheses about what is wrong with a table, best first.
 
     Parameters
     ----------
     robot : the table as given, tool not considered (references speak of the flange)
-    references : those that rest on the maker's data count, if there are any; else claims do
+    references : a reference set, its name or its folder; official, CAD and export data count, if there are any, else
+        claims do
 
     Returns
     -------
-    ranked : at most 10
+    ranked : at most 10; empty if the references are met, or if no one or two faults explain more than scatter would
+
+    Raises
+    ------
+    InputError
+        if there is no such reference set, or it can't be read
     """
-    ranking = rank(robot, references)
-    return [_described(ranking, group) for group in ranking.groups] if ranking else []
+    ranking = rank(robot, load_references(references) if isinstance(references, str | Path) else references)
+    return described(ranking, robot) if ranking else []
 
 
-def rank(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> Ranking | None:
-    """The ranking behind :func:`diagnose`; None if there is nothing to explain."""
-    stated = usable(references)
-    if not stated:
-        return None
-    given = tables_of(robot)
-    expected, uncertainty = expected_of(stated)
-
-    def difference(tables: Tables) -> np.ndarray:
-        return predictions(tables, robot, stated) - expected
-
-    before = difference(given)[0]
-    if (np.abs(before) <= uncertainty * MEETS).all():
-        return None
-    pool = evaluate(given, difference, uncertainty)
-    score = _score(pool, uncertainty)
-    return Ranking(pool, score, _groups(pool, score, uncertainty), before, stated)
+def described(ranking: Ranking, robot: Robot) -> list[Hypothesis]:
+    """A ranking's groups as hypotheses in words."""
+    return [_described(ranking, group, robot) for group in ranking.groups]
 
 
-def usable(references: ReferenceSet | Sequence[Reference]) -> tuple[Reference, ...]:
-    """The references that a diagnosis rests on: single poses and limits, weighty ones if there are any."""
-    every = references.checkable if isinstance(references, ReferenceSet) else references
-    stated = [r for r in every if r.expected is not None and not isinstance(r.quantity, Extreme | Speed)]
-    weighty = [r for r in stated if r.weighty]
-    return tuple(weighty or stated)
+def residuals(ranking: Ranking, difference: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """Differences (n,) as lengths of vectors: residual and uncertainty (m,) each, and their units.
+
+    The uncertainty of a vector is the greatest of its coordinates'.
+    """
+    group, units = vectors_of(ranking.references)
+    _, uncertainty = expected_of(ranking.references)
+    bound = np.array([uncertainty[group == i].max() for i in range(len(units))])
+    return lengths_of(difference, group), bound, units
 
 
-def _score(pool: Pool, uncertainty: np.ndarray) -> np.ndarray:
-    count = len(uncertainty)
-    square = ((pool.difference / uncertainty) ** 2).mean(axis=1)
-    fit = count * np.log(np.maximum(square, 1.0))
-    per_fault = np.log(count) + np.log(len(pool.faults))
-    return fit + per_fault * pool.cost
-
-
-def _groups(pool: Pool, score: np.ndarray, uncertainty: np.ndarray) -> tuple[tuple[int, ...], ...]:
-    groups: list[tuple[int, ...]] = []
-    placed: set[int] = set()
-    for best in np.argsort(score, kind="stable"):
-        if best in placed:
-            continue
-        alike = _alike(pool, best, uncertainty)
-        better_alone = any({fault} == set(pool.faults[group[0]]) for group in groups for fault in pool.faults[best])
-        if better_alone or any(pool.count[i] < pool.count[best] for i in alike):
-            continue  # a second fault adds nothing to the first
-        groups.append((int(best), *alike))
-        placed.update(groups[-1])
-        if len(groups) == SHOWN:
-            break
-    return tuple(groups)
-
-
-def _alike(pool: Pool, best: int, uncertainty: np.ndarray) -> list[int]:
-    """Other hypotheses with no more faults than this one that no reference tells from it."""
-    apart = np.abs(pool.difference - pool.difference[best])
-    same = (apart < uncertainty).all(axis=1) & (pool.count <= pool.count[best])
-    same[best] = False
-    return [int(i) for i in np.flatnonzero(same)]
-
-
-def _described(ranking: Ranking, group: tuple[int, ...]) -> Hypothesis:
+def _described(ranking: Ranking, group: tuple[int, ...], robot: Robot) -> Hypothesis:
     pool, best = ranking.pool, group[0]
     _, uncertainty = expected_of(ranking.references)
-    unit_of = np.array([reference.unit for reference in ranking.references])
-    before, after = ranking.before, pool.difference[best]
-    unit = _telling_unit(unit_of, before, after, uncertainty)
-    residuals = [float(np.abs(values[unit_of == unit]).max()) for values in (before, after)]
+    after = pool.difference[best]
+    before_lengths, _, units = residuals(ranking, ranking.before)
+    after_lengths, _, _ = residuals(ranking, after)
+    unit = _telling_unit(ranking, after, uncertainty)
+    of_unit = np.array([each == unit for each in units])
+    greatest = [float(lengths[of_unit].max()) for lengths in (before_lengths, after_lengths)]
     faults = " and ".join(pool.faults[best])
     return Hypothesis(
-        hypothesis=f"{faults}; residual falls from {residuals[0]:.4g} {unit} to {_small(residuals[1])} {unit}",
+        hypothesis=f"{faults}; residual falls from {shown(greatest[0])} {unit} to {shown(greatest[1])} {unit}",
         faults=pool.faults[best],
         kinds=pool.kinds[best],
-        residual_before=residuals[0],
-        residual_after=residuals[1],
+        residual_before=greatest[0],
+        residual_after=greatest[1],
         unit=unit,
         explains=bool((np.abs(after) <= uncertainty * MEETS).all()),
         indistinguishable_from=tuple(" and ".join(pool.faults[i]) for i in group[1:]),
+        to_decide=what_decides(pool.tables[list(group)], robot),
         score=float(ranking.score[best]),
+        repaired=robot_of(pool.tables, best, robot),
     )
 
 
-def _telling_unit(unit_of: np.ndarray, before: np.ndarray, after: np.ndarray, uncertainty: np.ndarray) -> str:
+def _telling_unit(ranking: Ranking, after: np.ndarray, uncertainty: np.ndarray) -> str:
     """mm if any length is missed before or after, else the first unit in which something is."""
-    missed = (np.abs(before) > uncertainty) | (np.abs(after) > uncertainty)
+    units = np.array([reference.unit for reference in ranking.references])
+    missed = (np.abs(ranking.before) > uncertainty) | (np.abs(after) > uncertainty)
     for unit in UNITS:
-        if missed[unit_of == unit].any():
+        if missed[units == unit].any():
             return unit
-    return str(unit_of[missed][0])
+    return str(units[missed][0])
 
 
-def _small(value: float) -> str:
-    return f"{value:.1f}" if value < 10 else f"{value:.4g}"
+def shown(value: float) -> str:
+    """A residual: one decimal below 100, none above."""
+    return f"{value:.1f}" if value < 100 else f"{value:.0f}"

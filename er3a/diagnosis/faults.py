@@ -12,7 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
-from er3a.diagnosis.candidate_tables import Tables
+from er3a.kinematics.table_batch import COLUMNS, Tables
 
 JOINTS = range(6)
 RADIANS_PER_DEGREE = np.pi / 180
@@ -57,7 +57,7 @@ def repairs_of(given: Tables) -> list[Repair]:
         *_offsets(given),
         *_directions(),
         *_convention(given),
-        *_limits(given),
+        *_limits(),
     ]
     return [repair for repair in candidates if _differs(repair.apply(given), given)]
 
@@ -71,33 +71,31 @@ def slopes() -> list[Slope]:
 def _differs(left: Tables, right: Tables) -> bool:
     if left.modified[0] != right.modified[0]:
         return True
-    columns = ("a", "alpha", "d", "direction", "offset", "lower", "upper")
-    return any(np.abs(getattr(left, name) - getattr(right, name)).max() > SAME for name in columns)
+    return any(np.abs(getattr(left, name) - getattr(right, name)).max() > SAME for name in COLUMNS)
 
 
 def _units() -> list[Repair]:
+    limits = ("lower", "upper")
+    lengths = ((("a",), "column a"), (("d",), "column d"), (("a", "d"), "all lengths"))
+    angles = (
+        (("alpha",), "column alpha"),
+        (("offset",), "column offset"),
+        (limits, "joint limits"),
+        (("alpha", "offset", *limits), "all angles"),
+    )
     found = []
-    for columns, words in ((("a",), "column a"), (("d",), "column d"), (("a", "d"), "all lengths")):
+    for columns, words in lengths:
         for factor, fault in (
-            (1000.0, "metres written where millimetres are meant"),
-            (0.001, "micrometres, or millimetres converted twice"),
+            (1000.0, "metres read as millimetres (1000 times too small)"),
+            (0.001, "millimetres read as metres (1000 times too large)"),
         ):
-            found.append(Repair("unit", f"{words}: {fault} (factor {factor:g})", _scaled(columns, factor)))
-    for column in ("alpha", "offset"):
-        found.append(
-            Repair(
-                "unit",
-                f"column {column}: radians written where degrees are meant",
-                _scaled((column,), 1 / RADIANS_PER_DEGREE),
-            )
-        )
-        found.append(
-            Repair(
-                "unit",
-                f"column {column}: degrees converted to radians twice over, or not at all",
-                _scaled((column,), RADIANS_PER_DEGREE),
-            )
-        )
+            found.append(Repair("unit", f"{words}: {fault}", _scaled(columns, factor)))
+    for columns, words in angles:
+        for factor, fault in (
+            (1 / RADIANS_PER_DEGREE, "radians read as degrees (57.3 times too small)"),
+            (RADIANS_PER_DEGREE, "degrees read as radians (57.3 times too large)"),
+        ):
+            found.append(Repair("unit", f"{words}: {fault}", _scaled(columns, factor)))
     return found
 
 
@@ -125,6 +123,8 @@ def _swaps() -> list[Repair]:
         order = list(JOINTS)
         order[i], order[j] = j, i
         found.append(Repair("rows", f"rows {i + 1} and {j + 1} are swapped", _reordered(("a", "alpha", "d"), order)))
+        words = f"limits of joints {i + 1} and {j + 1} are swapped"
+        found.append(Repair("limits", words, _reordered(("lower", "upper"), order)))
     for columns, words in (
         (("a", "alpha", "d"), "all rows are"),
         (("a",), "column a is"),
@@ -176,40 +176,27 @@ def _convention(given: Tables) -> list[Repair]:
     return [Repair("convention", words, lambda tables: replace(tables, modified=~tables.modified))]
 
 
-def _limits(given: Tables) -> list[Repair]:
-    found = []
-    for j in JOINTS:
-        found.append(
-            Repair("limits", f"joint {j + 1}: limits crossed", _limits_changed(j, lambda low, high: (high, low)))
-        )
-        found.append(
-            Repair(
-                "limits",
-                f"joint {j + 1}: limits signed the wrong way round",
-                _limits_changed(j, lambda low, high: (-high, -low)),
-            )
-        )
-        found.append(
-            Repair(
-                "limits",
-                f"joint {j + 1}: lower limit has the wrong sign",
-                _limits_changed(j, lambda low, high: (-low, high)),
-            )
-        )
-        found.append(
-            Repair(
-                "limits",
-                f"joint {j + 1}: upper limit has the wrong sign",
-                _limits_changed(j, lambda low, high: (low, -high)),
-            )
-        )
-    return found
+_LIMIT_FAULTS = (
+    ("limits crossed", lambda low, high: (high, low)),
+    ("limits signed the wrong way round", lambda low, high: (-high, -low)),
+    ("lower limit has the wrong sign", lambda low, high: (-low, high)),
+    ("upper limit has the wrong sign", lambda low, high: (low, -high)),
+)
 
 
-def _limits_changed(joint: int, change: Callable) -> Callable[[Tables], Tables]:
+def _limits() -> list[Repair]:
+    places = [([j], f"joint {j + 1}") for j in JOINTS] + [(list(JOINTS), "every joint")]
+    return [
+        Repair("limits", f"{place}: {words}", _limits_changed(joints, change))
+        for joints, place in places
+        for words, change in _LIMIT_FAULTS
+    ]
+
+
+def _limits_changed(joints: list[int], change: Callable) -> Callable[[Tables], Tables]:
     def apply(tables: Tables) -> Tables:
-        low, high = change(tables.lower[:, [joint]], tables.upper[:, [joint]])
-        return tables.with_column("lower", [joint], low).with_column("upper", [joint], high)
+        low, high = change(tables.lower[:, joints], tables.upper[:, joints])
+        return tables.with_column("lower", joints, low).with_column("upper", joints, high)
 
     return apply
 

@@ -8,8 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from er3a.diagnosis.candidate_tables import Tables, join
 from er3a.diagnosis.faults import Repair, Slope, repairs_of, slopes
+from er3a.kinematics.table_batch import Tables, join
 
 FREE_NUMBER = 1.5
 PROBE_M = 1e-3
@@ -63,7 +63,7 @@ def evaluate(given: Tables, difference: Difference, uncertainty: np.ndarray) -> 
         batch = join(singles[i + 1 :]) if i + 1 < len(repairs) else None
         if batch is not None:
             pair_tables.append(first.apply(batch))
-            pairs += [(second, first) for second in repairs[i + 1 :]]
+            pairs += [(first, second) for second in repairs[i + 1 :]]
     pools.append(_plain(pair_tables, pairs, difference))
     return Pool(
         tables=join([pool.tables for pool in pools]),

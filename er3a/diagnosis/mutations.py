@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from er3a.diagnosis.candidate_tables import Tables, predictions, robot_of, tables_of
-from er3a.diagnosis.diagnose import Ranking, rank, usable
 from er3a.diagnosis.faults import repairs_of
+from er3a.diagnosis.ranking import rank, usable
+from er3a.kinematics.table_batch import COLUMNS, Tables, robot_of, tables_of
+from er3a.references.predict import predict_tables
 from er3a.references.reference import Reference, ReferenceSet, expected_of
 from er3a.robots.robot import Robot
 
 SCALES = (0.9, 1.05, 25.4)
 WRONG_BY_M = (0.005, -0.02)
 SAME_LENGTH_M = 2e-3
+SAME_SCALE = 5e-3
 SAME_ANGLE = 1e-9
-OBSERVABLE = 1.0
-STEPS = {"a": 0.01, "d": 0.01, "alpha": 0.02, "offset": 0.02, "lower": 0.02, "upper": 0.02}
+STEP = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,67 +67,73 @@ def mutations_of(robot: Robot) -> Iterator[Mutation]:
         yield Mutation("scale", f"lengths times {scale}", replace(right, a=right.a * scale, d=right.d * scale))
 
 
-def try_mutation(robot: Robot, mutation: Mutation, references: ReferenceSet | Sequence[Reference]) -> Outcome:
-    """Diagnose the faulty table against references that the right one meets."""
+def noisy(references: Sequence[Reference], noise_mm: float, random: np.random.Generator) -> tuple[Reference, ...]:
+    """Lengths with uniform noise up to ``noise_mm``, and with an uncertainty that owns up to it."""
+    return tuple(
+        replace(r, expected=r.expected + random.uniform(-noise_mm, noise_mm), uncertainty=r.uncertainty + noise_mm)
+        if r.unit == "mm"
+        else r
+        for r in references
+    )
+
+
+def try_mutation(
+    robot: Robot, mutation: Mutation, references: ReferenceSet | Sequence[Reference], noise_mm: float = 0.0
+) -> Outcome:
+    """Diagnose the faulty table against references that the right one meets, with noise up to ``noise_mm`` in them."""
     stated = usable(references)
-    faulty = robot_of(mutation.table, 0, robot)
-    ranking = rank(faulty, stated)
+    ranking = rank(robot_of(mutation.table, 0, robot), stated)
     group = ranking.groups[0] if ranking and ranking.groups else ()
     return Outcome(
         kind=mutation.kind,
         fault=mutation.fault,
-        identifiable=identifiable(robot, mutation, stated),
-        found=_holds_truth(ranking, group, tables_of(robot)) if ranking else False,
+        identifiable=identifiable(robot, mutation, stated, noise_mm),
+        found=any(_same(ranking.pool.tables[[row]], tables_of(robot)) for row in group) if ranking else False,
         set_size=len(group),
     )
 
 
-def identifiable(robot: Robot, mutation: Mutation, references: Sequence[Reference]) -> bool:
-    """Whether the references see the parameters that the fault changed.
+def identifiable(robot: Robot, mutation: Mutation, references: Sequence[Reference], noise_mm: float = 0.0) -> bool:
+    """Whether the references see the fault, before any diagnosis.
 
-    The Jacobian of the references with respect to the table's entries, by central differences at the right table (for
-    joint directions and the convention, which have no derivative, by the change itself): some changed entry must move
-    some reference by more than its uncertainty when the entry changes by as much as the fault changed it.
+    The change of the table's entries times the Jacobian of the references with respect to these entries (central
+    differences at the right table) must move some reference by more than its uncertainty and the noise in it. A joint's
+    direction and the convention have no derivative: there the change itself counts.
     """
     right = tables_of(robot)
     _, uncertainty = expected_of(tuple(references))
-    at_right = predictions(right, robot, references)[0]
+    noise = np.array([noise_mm if reference.unit == "mm" else 0.0 for reference in references])
+    at_right = predict_tables(right, robot, references)[0]
     if mutation.table.modified[0] != right.modified[0]:
-        moved = predictions(mutation.table, robot, references)[0] - at_right
-        return bool((np.abs(moved) > OBSERVABLE * uncertainty).any())
-    for field in fields(Tables):
-        if field.name == "modified":
-            continue
-        change = getattr(mutation.table, field.name)[0] - getattr(right, field.name)[0]
-        for j in np.flatnonzero(np.abs(change) > SAME_ANGLE):
-            slope = _slope(right, field.name, int(j), robot, references, at_right)
-            if (np.abs(slope * change[j]) > OBSERVABLE * uncertainty).any():
-                return True
-    return False
+        moved = predict_tables(mutation.table, robot, references)[0] - at_right
+        return bool((np.abs(moved) > uncertainty + noise).any())
+    moved = np.zeros(len(references))
+    for column in COLUMNS:
+        before, after = getattr(right, column)[0], getattr(mutation.table, column)[0]
+        for j in np.flatnonzero(before != after):
+            if column == "direction":
+                turned = right.with_column(column, [j], np.full((1, 1), after[j]))
+                moved += predict_tables(turned, robot, references)[0] - at_right
+            else:
+                moved += _slope(right, column, int(j), robot, references) * (after[j] - before[j])
+    return bool((np.abs(moved) > uncertainty + noise).any())
 
 
-def _slope(right: Tables, column: str, j: int, robot: Robot, references, at_right: np.ndarray) -> np.ndarray:
+def _slope(right: Tables, column: str, j: int, robot: Robot, references: Sequence[Reference]) -> np.ndarray:
+    """Derivative (n,) of the references with respect to one entry, by central differences."""
     entry = getattr(right, column)[:, [j]]
-    if column == "direction":
-        return (predictions(right.with_column(column, [j], -entry), robot, references)[0] - at_right) / (
-            -2 * entry[0, 0]
-        )
-    step = STEPS[column]
     ahead, behind = (
-        predictions(right.with_column(column, [j], entry + sign * step), robot, references)[0] for sign in (1, -1)
+        predict_tables(right.with_column(column, [j], entry + sign * STEP), robot, references)[0] for sign in (1, -1)
     )
-    return (ahead - behind) / (2 * step)
-
-
-def _holds_truth(ranking: Ranking, group: tuple[int, ...], right: Tables) -> bool:
-    return any(_same(ranking.pool.tables[[row]], right) for row in group)
+    return (ahead - behind) / (2 * STEP)
 
 
 def _same(table: Tables, right: Tables) -> bool:
-    """Equal entries; lengths to 2 mm (free lengths are fitted to noisy references), angles modulo full turns."""
-    lengths = max(np.abs(getattr(table, name) - getattr(right, name)).max() for name in "ad")
-    turned = [getattr(table, name) - getattr(right, name) for name in ("alpha", "offset")]
+    """Equal entries: lengths to 2 mm or 0.5 % (free lengths are fitted to noisy references), angles modulo turns."""
+    lengths = all(
+        np.allclose(getattr(table, name), getattr(right, name), rtol=SAME_SCALE, atol=SAME_LENGTH_M) for name in "ad"
+    )
+    turned = [getattr(table, name) - getattr(right, name) for name in ("alpha", "beta", "offset")]
     angles = max(np.abs((gap + np.pi) % (2 * np.pi) - np.pi).max() for gap in turned)
     rest = max(np.abs(getattr(table, name) - getattr(right, name)).max() for name in ("direction", "lower", "upper"))
-    same_convention = table.modified[0] == right.modified[0]
-    return bool(lengths < SAME_LENGTH_M and max(angles, rest) < SAME_ANGLE and same_convention)
+    return bool(lengths and max(angles, rest) < SAME_ANGLE and table.modified[0] == right.modified[0])

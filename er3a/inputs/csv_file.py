@@ -15,13 +15,25 @@ from er3a.errors import InputError
 from er3a.inputs.yaml_file import read_text
 
 
+class Written(float):
+    """A number that knows with how many decimals it was written."""
+
+    decimals: int
+
+    def __new__(cls, text: str) -> Written:
+        number = super().__new__(cls, text)
+        mantissa, _, exponent = text.lower().partition("e")
+        number.decimals = len(mantissa.partition(".")[2]) - int(exponent or 0)
+        return number
+
+
 @dataclass(frozen=True)
 class Column:
     """One column of a CSV table.
 
     Attributes
     ----------
-    type : float, int or str
+    type : float, Written, int or str
     optional : an empty field is read as None
     choices : the allowed values, for columns of words
     """

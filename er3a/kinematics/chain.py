@@ -2,12 +2,15 @@
 
 Both D-H conventions are the product ``links[0] Rz(theta_1) links[1] ... Rz(theta_6) links[6]`` with constant
 ``links``: standard rows put ``Tz(d) Tx(a) Rx(alpha)`` behind their joint's rotation [1]_, modified rows put
-``Rx(alpha) Tx(a)`` before it and ``Tz(d)`` behind [2]_. Joint axes are the z axes of the frames before each Rz.
+``Rx(alpha) Tx(a)`` before it and ``Tz(d)`` behind [2]_ (Rx and Tx commute). A calibrated table may add ``Ry(beta)``
+behind ``Rx(alpha)``, for axes that are parallel but for an error [3]_. Joint axes are the z axes of the frames before
+each Rz.
 
 References
 ----------
 .. [1] J. Denavit, R. S. Hartenberg, "A kinematic notation for lower-pair mechanisms", J. Appl. Mech. 22 (1955).
 .. [2] J. J. Craig, *Introduction to Robotics*, 3rd ed., section 3.4, equation 3.6.
+.. [3] S. A. Hayati, "Robot arm geometric link parameter estimation", 22nd IEEE Conf. on Decision and Control (1983).
 """
 
 from __future__ import annotations
@@ -17,7 +20,7 @@ from functools import lru_cache
 import numpy as np
 
 from er3a.errors import Er3aError
-from er3a.kinematics.transforms import rot_x, translation
+from er3a.kinematics.transforms import rot_x, rot_y, translation
 from er3a.robots.robot import Robot
 
 JOINTS = 6
@@ -65,11 +68,11 @@ def link_parts(robot: Robot) -> np.ndarray:
     parts = np.tile(np.eye(4), (JOINTS + 1, 2, 1, 1))
     for k in range(JOINTS):
         along = translation(0, 0, robot.d[k])
+        across = translation(robot.a[k], 0, 0) @ rot_x(robot.alpha[k]) @ rot_y(robot.beta[k])
         if robot.convention == "standard":
-            across = translation(robot.a[k], 0, 0) @ rot_x(robot.alpha[k])
             parts[k + 1, ALONG_Z], parts[k + 1, TO_NEXT_AXIS] = along, across
         else:
-            parts[k, TO_NEXT_AXIS] = rot_x(robot.alpha[k]) @ translation(robot.a[k], 0, 0)
+            parts[k, TO_NEXT_AXIS] = across
             parts[k + 1, ALONG_Z] = along
     return parts
 

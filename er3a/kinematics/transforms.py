@@ -28,6 +28,12 @@ def rot_x(angle: float) -> np.ndarray:
     return np.array([[1, 0, 0, 0], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1]], dtype=float)
 
 
+def rot_y(angle: float) -> np.ndarray:
+    """Rotation about y by ``angle`` (rad) as a transform, shape (4, 4)."""
+    c, s = cos_sin(angle)
+    return np.array([[c, 0, s, 0], [0, 1, 0, 0], [-s, 0, c, 0], [0, 0, 0, 1]], dtype=float)
+
+
 def rot_z(angle: float) -> np.ndarray:
     """Rotation about z by ``angle`` (rad) as a transform, shape (4, 4)."""
     c, s = cos_sin(angle)

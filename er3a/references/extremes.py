@@ -1,7 +1,7 @@
 """Greatest and least values over the joint limits, by optimisation.
 
-A Sobol sequence over the box is evaluated in one batch; its best points and an equal number spread over the box start
-a bounded truncated-Newton search each [1]_. Nothing is random: equal inputs give equal numbers.
+Points spread evenly over the box are evaluated in one batch; its best points and an equal number of others start a
+bounded truncated-Newton search each [1]_. Nothing is random: equal inputs give equal numbers.
 
 References
 ----------
@@ -12,22 +12,22 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.stats import qmc
 
 from er3a.kinematics.chain import JOINTS
 from er3a.kinematics.forward import frames
+from er3a.kinematics.spread import spread
 from er3a.references.quantities import MM, Extreme, measure_of
 from er3a.robots.robot import Robot
 
-SCAN_EXPONENT = 12
+SCAN = 4096
 STEP = 1e-6
 
 
 def search(robot: Robot, quantity: Extreme, starts: int) -> tuple[float, np.ndarray]:
     """Find an extreme.
 
-    Joint 1 stays at 0: none of the measures changes with it, or the side view is drawn there. A joint without
-    influence on the result is given as 0 (or its limit nearest to 0).
+    The robot's tool does not count. Joint 1 stays at 0: none of the measures changes with it, or the side view is drawn
+    there. A joint without influence on the result is given as 0 (or its limit nearest to 0).
 
     Parameters
     ----------
@@ -38,6 +38,7 @@ def search(robot: Robot, quantity: Extreme, starts: int) -> tuple[float, np.ndar
     value : mm
     q : (6,), rad, where it is attained
     """
+    robot = robot.without_tool()
     lower, upper = robot.lower.copy(), robot.upper.copy()
     lower[0] = upper[0] = 0.0
     sign = -1.0 if quantity.extreme == "greatest" else 1.0
@@ -51,7 +52,7 @@ def search(robot: Robot, quantity: Extreme, starts: int) -> tuple[float, np.ndar
         values = cost(q + offsets)
         return values[0], (values[1 : JOINTS + 1] - values[JOINTS + 1 :]) / (2 * STEP)
 
-    scan = lower + qmc.Sobol(JOINTS, scramble=False).random_base2(SCAN_EXPONENT) * (upper - lower)
+    scan = spread(lower, upper, SCAN)
     best = scan[np.argsort(cost(scan), kind="stable")[: (starts + 1) // 2]]
     results = [
         minimize(

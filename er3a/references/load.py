@@ -7,15 +7,19 @@ from pathlib import Path
 from typing import Any
 
 from er3a.errors import InputError
-from er3a.inputs.csv_file import read_csv
+from er3a.inputs.csv_file import Written, read_csv
+from er3a.references.quantities import ZERO_POSE, PoseOutside
 from er3a.references.reference import Reference, ReferenceSet
-from er3a.references.rows import COLUMNS, ENVELOPE_CORNERS, Row, row_of
-from er3a.references.scalars import scalars_of
+from er3a.references.rows import COLUMNS, DIGITS_OF, ENVELOPE_CORNERS, PositionRow, Row, row_of
+from er3a.references.scalars import pose_reached, scalars_of
 from er3a.robots.load import DATA
 
 MANUAL_REFS = DATA / "manual_refs"
 LEAST_SPAN_MM = 10.0
 WIDEST_IN_RADIANS = 2.01 * math.pi
+SHORTEST_BESIDE_LONG_MM, LONG_MM = 2.0, 100.0
+WIDE_DEG = 30.0
+STEP_IN_RADIANS, NEAR_STEP = math.pi / 12, 2e-3  # 15 deg, written with four digits
 
 
 def load_references(name_or_folder: str | Path) -> ReferenceSet:
@@ -36,8 +40,19 @@ def load_references(name_or_folder: str | Path) -> ReferenceSet:
     if not files:
         raise InputError(folder, None, "the folder holds no CSV file", f"Add one of: {_file_names()}")
     rows = {file.stem: check_reference_file(file) for file in files}
-    references = tuple(reference for table in rows.values() for row in table for reference in scalars_of(row))
-    return ReferenceSet(folder.name, references, rows)
+    stated = [reference for table in rows.values() for row in table for reference in scalars_of(row)]
+    return ReferenceSet(folder.name, (*stated, *_reached_poses(rows.get("positions", ()), stated)), rows)
+
+
+def _reached_poses(rows: tuple[PositionRow, ...], stated: list[Reference]) -> list[Reference]:
+    """A pose at which a source shows the arm lies within its limits: one reference for each pose and source."""
+    said = {(reference.source, reference.quantity) for reference in stated}
+    found = {}
+    for row in rows:
+        key = (row.source, PoseOutside(row.pose))
+        if row.pose != ZERO_POSE and key not in said:
+            found.setdefault(key, pose_reached(row))
+    return list(found.values())
 
 
 def check_reference_file(path: str | Path) -> tuple[Row, ...]:
@@ -56,11 +71,22 @@ def check_reference_file(path: str | Path) -> tuple[Row, ...]:
     if not table:
         raise InputError(path, None, "the table has a header but no rows", "Add a row, or remove the file")
     for fields in table:
+        _fill_uncertainty(path.stem, fields)
         _check_row(path, path.stem, fields)
     _check_units(path, table)
     rows = tuple(row_of(path.stem, fields) for fields in table)
     _check_repeats(path, rows)
     return rows
+
+
+def _fill_uncertainty(kind: str, fields: dict[str, Any]) -> None:
+    """Half the last digit that the source prints, where the row gives no uncertainty; then plain numbers."""
+    column, values = DIGITS_OF.get(kind, ("", ()))
+    if column and fields[column] is None:
+        decimals = [fields[name].decimals for name in values if fields[name] is not None]
+        fields[column] = 0.5 * 10.0 ** -max(decimals, default=0)
+    for name, value in fields.items():
+        fields[name] = float(value) if isinstance(value, Written) else value
 
 
 def _check_row(path: Path, kind: str, fields: dict[str, Any]) -> None:
@@ -95,6 +121,12 @@ def _check_row(path: Path, kind: str, fields: dict[str, Any]) -> None:
 def _check_units(path: Path, table: list[dict[str, Any]]) -> None:
     lengths = [f"{c}_mm" for c in "xyz"] + ["value_mm"]
     _check_span(path, table, lengths, LEAST_SPAN_MM, "mm", "metres", "Multiply by 1000")
+    if path.stem in ("positions", "reach"):
+        _check_mixed(path, table, lengths, SHORTEST_BESIDE_LONG_MM, LONG_MM, "mm", "metres", "Multiply by 1000")
+    if path.stem == "limits":
+        _check_mixed(path, table, ["lower_deg", "upper_deg"], WIDEST_IN_RADIANS, WIDE_DEG, "deg", "radians", "Convert")
+    if path.stem == "positions":
+        _check_angles(path, table)
     angles = ["lower_deg", "upper_deg", "speed_deg_s"]
     _check_span(path, table, angles, WIDEST_IN_RADIANS, "deg", "radians", "Convert to degrees")
 
@@ -107,6 +139,29 @@ def _check_span(
     if sizes and 0 < max(sizes) < least:
         problem = f"the largest value is {max(sizes):g} {unit}, which can only be {other}"
         raise InputError(path, f"columns {', '.join(present)}", problem, remedy)
+
+
+def _check_mixed(
+    path: Path, table: list[dict[str, Any]], columns: list[str], least: float, most: float, unit: str, other: str,
+    remedy: str,
+) -> None:  # fmt: skip
+    """Refuse a row of small values beside rows of large ones."""
+    present = [column for column in columns if column in table[0]]
+    sizes = [max((abs(row[column]) for column in present if row[column] is not None), default=0.0) for row in table]
+    for fields, size in zip(table, sizes):
+        if 0 < size < least and max(sizes) > most:
+            problem = f"{size:g} {unit} at most beside up to {max(sizes):g} {unit} in other rows looks like {other}"
+            raise InputError(path, f"row {fields['row']}, columns {', '.join(present)}", problem, remedy)
+
+
+def _check_angles(path: Path, table: list[dict[str, Any]]) -> None:
+    for fields in table:
+        for column in (f"q{joint}_deg" for joint in range(1, 7)):
+            steps = fields[column] / STEP_IN_RADIANS
+            if round(steps) and abs(fields[column]) < WIDEST_IN_RADIANS and abs(steps - round(steps)) < NEAR_STEP:
+                problem = f"{fields[column]:g} deg looks like radians"
+                remedy = f"Write {round(steps) * 15:g}"
+                raise InputError(path, f"row {fields['row']}, column {column}", problem, remedy)
 
 
 def _check_repeats(path: Path, rows: tuple[Row, ...]) -> None:

@@ -7,12 +7,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from er3a.kinematics.forward import frames
+from er3a.kinematics.table_batch import Tables, frames_of
 from er3a.references.extremes import search
-from er3a.references.quantities import ZERO_POSE, Extreme, ModelState, Pose, Quantity
+from er3a.references.quantities import ZERO_POSE, AxisLines, Extreme, ModelState, Pose, Quantity
 from er3a.references.reference import Reference
 from er3a.robots.robot import Robot
 
 REACH_STARTS = 32
+CHUNK = 2048
 
 
 def predict(robot: Robot, references: Sequence[Reference], starts: int = REACH_STARTS) -> np.ndarray:
@@ -47,8 +49,10 @@ def state_of(
     references: Sequence[Reference],
     starts: int = REACH_STARTS,
     extremes: Mapping[Quantity, float] | None = None,
+    axes: AxisLines | None = None,
 ) -> ModelState:
-    """One model's state, with the extremes searched for unless given."""
+    """One model's state, with the extremes searched for unless given. The robot's tool does not count."""
+    robot = robot.without_tool()
     poses = poses_of(references)
     if extremes is None:
         wanted = dict.fromkeys(r.quantity for r in references if isinstance(r.quantity, Extreme))
@@ -61,4 +65,33 @@ def state_of(
         upper=robot.upper,
         speed=robot.speed,
         extremes=extremes,
+        axes=axes,
     )
+
+
+def predict_tables(tables: Tables, robot: Robot, references: Sequence[Reference]) -> np.ndarray:
+    """What each of many tables says about references, none of which may be about an extreme over the limits.
+
+    Parameters
+    ----------
+    robot : for the base, and the speeds
+
+    Returns
+    -------
+    values : (H, n), in the references' units
+    """
+    poses = poses_of(references)
+    values = np.empty((len(tables), len(references)))
+    for start in range(0, len(tables), CHUNK):
+        part = tables[start : start + CHUNK]
+        state = ModelState(
+            frames=frames_of(part, robot.base, np.radians(poses)),
+            index={pose: i for i, pose in enumerate(poses)},
+            direction=part.direction,
+            lower=part.lower,
+            upper=part.upper,
+            speed=robot.speed,
+            extremes={},
+        )
+        values[start : start + CHUNK] = read(references, state)
+    return values

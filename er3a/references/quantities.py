@@ -10,7 +10,7 @@ and still defined on a table with a fault.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -33,6 +33,7 @@ class ModelState:
     index : place of each pose (maker's angles, deg) among the P
     direction, lower, upper, speed : (..., 6), of the robot
     extremes : value (mm) of each :class:`Extreme` that was searched for
+    axes : the joints' axis lines in the zero pose, if they were measured on the model; else those of the frames
     """
 
     frames: np.ndarray
@@ -42,10 +43,26 @@ class ModelState:
     upper: np.ndarray
     speed: np.ndarray
     extremes: Mapping[Quantity, np.ndarray]
+    axes: AxisLines | None = None
 
     def at(self, pose: Pose) -> np.ndarray:
         """Frames (..., 7, 4, 4) at a pose."""
         return self.frames[..., self.index[pose], :, :, :]
+
+    def axis(self, joint: int) -> tuple[np.ndarray, np.ndarray]:
+        """Direction of positive rotation and a point (mm), (..., 3) each, of a joint's axis in the zero pose."""
+        if self.axes:
+            return self.axes.direction[joint - 1], self.axes.point_mm[joint - 1]
+        T = self.at(ZERO_POSE)[..., joint - 1, :, :]
+        return T[..., :3, 2] * self.direction[..., joint - 1, None], T[..., :3, 3] * MM
+
+
+@dataclass(frozen=True, eq=False)
+class AxisLines:
+    """Six axis lines: ``direction`` (6, 3), unit vectors of positive rotation; ``point_mm`` (6, 3), on each."""
+
+    direction: np.ndarray
+    point_mm: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -63,6 +80,11 @@ class Quantity:
         """The model's value, shape (...,), in this quantity's unit."""
         raise NotImplementedError
 
+    @property
+    def vector(self) -> Hashable:
+        """What it is a coordinate of; coordinates of one vector from one source add up to a distance."""
+        return self
+
     def apart(self, expected: float, other: Quantity, other_expected: float) -> float:
         """How far two statements about this quantity are apart."""
         return abs(expected - other_expected)
@@ -78,11 +100,10 @@ class AxisAngle(Quantity):
     unit = "deg"
 
     def value(self, state):
-        axis = state.at(ZERO_POSE)[..., self.joint - 1, :3, 2] * state.direction[..., self.joint - 1, None]
-        return _angle(axis, np.array(self.toward), self.signed)
+        return angle_between(state.axis(self.joint)[0], np.array(self.toward), self.signed)
 
     def apart(self, expected, other, other_expected):
-        return float(_angle(np.array(self.toward), np.array(other.toward), self.signed and other.signed))
+        return float(angle_between(np.array(self.toward), np.array(other.toward), self.signed and other.signed))
 
 
 @dataclass(frozen=True)
@@ -94,7 +115,11 @@ class AxisCoordinate(Quantity):
     point_mm: Vector = field(compare=False)
 
     def value(self, state):
-        return nearest_on_axis(state.at(ZERO_POSE), self.joint, np.array(self.point_mm))[..., AXES[self.coordinate]]
+        return nearest_on_line(*state.axis(self.joint), np.array(self.point_mm))[..., AXES[self.coordinate]]
+
+    @property
+    def vector(self):
+        return AxisCoordinate, self.joint
 
 
 @dataclass(frozen=True)
@@ -118,6 +143,27 @@ class PointCoordinate(QuantityAtPose):
     def value(self, state):
         return point_of(state.at(self.pose), self.point)[..., AXES[self.coordinate]]
 
+    @property
+    def vector(self):
+        return self.pose, self.point
+
+
+@dataclass(frozen=True)
+class CarriedCoordinate(QuantityAtPose):
+    """A coordinate (base frame) of a point that the flange carries, at a pose; ``offset_mm`` in the flange's frame."""
+
+    offset_mm: Vector
+    coordinate: str
+
+    def value(self, state):
+        T = state.at(self.pose)[..., FRAME_OF_POINT["flange"], :3, :]
+        k = AXES[self.coordinate]
+        return T[..., k, 3] * MM + T[..., k, :3] @ np.array(self.offset_mm)
+
+    @property
+    def vector(self):
+        return self.pose, self.offset_mm
+
 
 @dataclass(frozen=True)
 class SectionCoordinate(QuantityAtPose):
@@ -129,6 +175,10 @@ class SectionCoordinate(QuantityAtPose):
     def value(self, state):
         value = section_of(state.at(self.pose))[..., 0 if self.coordinate == "x" else 1]
         return np.abs(value) if self.unsigned else value
+
+    @property
+    def vector(self):
+        return SectionCoordinate, self.pose
 
 
 @dataclass(frozen=True)
@@ -149,7 +199,7 @@ class SegmentAngle(Quantity):
         else:
             axis = T[..., 3, :3, 2]
             vector = axis * np.where(_dot(axis, T[..., 4, :3, 3] - T[..., 2, :3, 3]) < 0, -1.0, 1.0)[..., None]
-        return _angle(vector, np.array([0.0, 0.0, 1.0]), True)
+        return angle_between(vector, np.array([0.0, 0.0, 1.0]), True)
 
 
 @dataclass(frozen=True)
@@ -225,11 +275,15 @@ def section_of(T: np.ndarray) -> np.ndarray:
 
 def nearest_on_axis(T: np.ndarray, joint: int, point_mm: np.ndarray) -> np.ndarray:
     """Point (..., 3) in mm of a joint's axis nearest to a given point, of frames (..., 7, 4, 4)."""
-    axis, origin = T[..., joint - 1, :3, 2], T[..., joint - 1, :3, 3] * MM
-    return origin + axis * _dot(axis, point_mm - origin)[..., None]
+    return nearest_on_line(T[..., joint - 1, :3, 2], T[..., joint - 1, :3, 3] * MM, point_mm)
 
 
-def _angle(a: np.ndarray, b: np.ndarray, signed: bool) -> np.ndarray:
+def nearest_on_line(direction: np.ndarray, on_line: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Point (..., 3) of lines through ``on_line`` (..., 3) along unit vectors, nearest to a given point."""
+    return on_line + direction * _dot(direction, point - on_line)[..., None]
+
+
+def angle_between(a: np.ndarray, b: np.ndarray, signed: bool) -> np.ndarray:
     """Angle in deg; of lines (at most 90) if not signed."""
     cross, dot = np.cross(a, b), _dot(a, b)
     return np.degrees(np.arctan2(np.sqrt(_dot(cross, cross)), dot if signed else np.abs(dot)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import combinations
 
 import numpy as np
 
@@ -81,14 +82,35 @@ def expected_of(references: tuple[Reference, ...]) -> tuple[np.ndarray, np.ndarr
     return np.array([r.expected for r in references]), np.array([r.uncertainty for r in references])
 
 
+def vectors_of(references: tuple[Reference, ...]) -> tuple[np.ndarray, list[str]]:
+    """Coordinates of one vector from one source belong together: their differences add up to a distance.
+
+    Returns
+    -------
+    group : (n,), number of the vector that each reference belongs to; numbers count up from 0
+    unit : of each vector
+    """
+    keys = [(reference.source, reference.quantity.vector) for reference in references]
+    number = {key: i for i, key in enumerate(dict.fromkeys(keys))}
+    unit = dict(zip(keys, (reference.unit for reference in references)))
+    return np.array([number[key] for key in keys]), [unit[key] for key in number]
+
+
+def lengths_of(values: np.ndarray, group: np.ndarray) -> np.ndarray:
+    """Length of each vector (..., m) of coordinates (..., n) that :func:`vectors_of` has put together."""
+    return np.sqrt(np.stack([(values[..., group == i] ** 2).sum(axis=-1) for i in range(group.max() + 1)], axis=-1))
+
+
 def conflicts(references: tuple[Reference, ...]) -> list[tuple[int, int]]:
     """Pairs (i, j), i < j, of references about the same quantity that no value can meet both of."""
+    about: dict[Quantity, list[int]] = {}
+    for i, reference in enumerate(references):
+        if reference.expected is not None:
+            about.setdefault(reference.quantity, []).append(i)
     pairs = []
-    for j, second in enumerate(references):
-        for i, first in enumerate(references[:j]):
-            if first.quantity != second.quantity or first.expected is None or second.expected is None:
-                continue
-            apart = first.quantity.apart(first.expected, second.quantity, second.expected)
-            if apart > first.uncertainty + second.uncertainty:
-                pairs.append((i, j))
-    return pairs
+    for i, j in (pair for same in about.values() for pair in combinations(same, 2)):
+        first, second = references[i], references[j]
+        apart = first.quantity.apart(first.expected, second.quantity, second.expected)
+        if apart > first.uncertainty + second.uncertainty:
+            pairs.append((i, j))
+    return sorted(pairs, key=lambda pair: pair[::-1])

@@ -9,11 +9,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from er3a.inputs.csv_file import Column
+from er3a.inputs.csv_file import Column, Written
 from er3a.references.quantities import Pose, Vector
 from er3a.robots.robot import GRADES, Grade
 
-_WORD, _NUMBER, _OPTIONAL, _JOINT = Column(str), Column(float), Column(float, optional=True), Column(int)
+_WORD, _NUMBER, _OPTIONAL, _JOINT = Column(str), Column(Written), Column(Written, optional=True), Column(int)
 _SOURCE = {"source": _WORD, "grade": Column(str, choices=tuple(GRADES))}
 _POINT = Column(str, choices=("flange", "wrist_centre"))
 ENVELOPE_CORNERS = ("x", "abs_x", "z")
@@ -34,13 +34,13 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "point": _POINT,
         **{f"q{joint}_deg": _NUMBER for joint in range(1, 7)},
         **{f"{c}_mm": _OPTIONAL for c in "xyz"},
-        "uncertainty_mm": _NUMBER,
+        "uncertainty_mm": _OPTIONAL,
         **_SOURCE,
     },
     "directions": {
         "segment": Column(str, choices=("upper_arm", "forearm")),
         "angle_from_vertical_deg": _NUMBER,
-        "uncertainty_deg": _NUMBER,
+        "uncertainty_deg": _OPTIONAL,
         **_SOURCE,
     },
     "envelope": {
@@ -48,7 +48,7 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "q2_deg": _OPTIONAL,
         "q3_deg": _OPTIONAL,
         "value_mm": _NUMBER,
-        "uncertainty_mm": _NUMBER,
+        "uncertainty_mm": _OPTIONAL,
         **_SOURCE,
     },
     "reach": {
@@ -56,22 +56,32 @@ COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "from_axis": Column(int),
         "extreme": Column(str, choices=("greatest", "least")),
         "value_mm": _NUMBER,
-        "uncertainty_mm": _NUMBER,
+        "uncertainty_mm": _OPTIONAL,
         **_SOURCE,
     },
     "limits": {
         "joint": _JOINT,
         "lower_deg": _OPTIONAL,
         "upper_deg": _OPTIONAL,
-        "uncertainty_deg": _NUMBER,
+        "uncertainty_deg": _OPTIONAL,
         **_SOURCE,
     },
     "speeds": {
         "joint": _JOINT,
         "speed_deg_s": _OPTIONAL,
-        "uncertainty_deg_s": _NUMBER,
+        "uncertainty_deg_s": _OPTIONAL,
         **_SOURCE,
     },
+}
+
+# Where a row gives no uncertainty, it is half the last digit of these.
+DIGITS_OF: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "positions": ("uncertainty_mm", ("x_mm", "y_mm", "z_mm")),
+    "directions": ("uncertainty_deg", ("angle_from_vertical_deg",)),
+    "envelope": ("uncertainty_mm", ("value_mm",)),
+    "reach": ("uncertainty_mm", ("value_mm",)),
+    "limits": ("uncertainty_deg", ("lower_deg", "upper_deg")),
+    "speeds": ("uncertainty_deg_s", ("speed_deg_s",)),
 }
 
 

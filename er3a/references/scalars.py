@@ -62,7 +62,15 @@ def _position(row: PositionRow) -> Parts:
             quantity = PointCoordinate(row.pose, row.point, coordinate)
             yield name, group, quantity, expected, row.uncertainty_mm
     if row.xyz_mm == (None, None, None):
-        yield f"{row.name}: outside the limits by", group, PoseOutside(row.pose), 0.0, POSE_SLACK_DEG
+        reached = pose_reached(row)
+        yield reached.name, reached.group, reached.quantity, reached.expected, reached.uncertainty
+
+
+def pose_reached(row: PositionRow) -> Reference:
+    """That a row's pose lies within the joint limits."""
+    group = "zero pose" if row.pose == ZERO_POSE else "key poses"
+    name = f"{row.name}: outside the limits by"
+    return Reference(name, group, PoseOutside(row.pose), 0.0, POSE_SLACK_DEG, row.source, row.grade)
 
 
 def _direction(row: DirectionRow) -> Parts:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.kinematics.transforms import rot_x, translation
+from er3a.kinematics.transforms import rot_x, rot_y, translation
 from er3a.robots.robot import Robot
 
 
@@ -23,7 +23,8 @@ def to_modified(robot: Robot) -> Robot:
         convention="modified",
         a=np.roll(robot.a, 1) * _NOT_FIRST,
         alpha=np.roll(robot.alpha, 1) * _NOT_FIRST,
-        tool=translation(robot.a[5], 0, 0) @ rot_x(robot.alpha[5]) @ robot.tool,
+        beta=np.roll(robot.beta, 1) * _NOT_FIRST,
+        tool=translation(robot.a[5], 0, 0) @ rot_x(robot.alpha[5]) @ rot_y(robot.beta[5]) @ robot.tool,
     )
 
 
@@ -35,7 +36,8 @@ def to_standard(robot: Robot) -> Robot:
         convention="standard",
         a=np.roll(robot.a * _NOT_FIRST, -1),
         alpha=np.roll(robot.alpha * _NOT_FIRST, -1),
-        base=robot.base @ rot_x(robot.alpha[0]) @ translation(robot.a[0], 0, 0),
+        beta=np.roll(robot.beta * _NOT_FIRST, -1),
+        base=robot.base @ rot_x(robot.alpha[0]) @ translation(robot.a[0], 0, 0) @ rot_y(robot.beta[0]),
     )
 
 

@@ -55,6 +55,7 @@ def robot_of(content: RobotFile) -> Robot:
         a=np.array([row.a_mm for row in content.dh.rows]) / 1000,
         alpha=np.radians([row.alpha_deg for row in content.dh.rows]),
         d=np.array([row.d_mm for row in content.dh.rows]) / 1000,
+        beta=np.radians([row.beta_deg or 0.0 for row in content.dh.rows]),
         direction=np.array([row.direction for row in content.zero.rows], dtype=float),
         offset=np.radians([row.offset_deg for row in content.zero.rows]),
         lower=np.radians([row.lower_deg for row in content.limits.rows]),

@@ -58,6 +58,7 @@ class Robot:
     convention : "standard" (row i follows joint i) or "modified" (Craig: a and alpha of row i precede joint i)
     a, d : (6,), m
     alpha, offset : (6,), rad
+    beta : (6,), rad, Hayati's turn about y behind Rx(alpha), for axes that are parallel but for an error; usually 0
     direction : (6,), +1 or -1
     lower, upper : (6,), rad, limits of q
     speed : (6,), rad/s, greatest joint speed, NaN where unknown
@@ -79,6 +80,7 @@ class Robot:
     lower: np.ndarray
     upper: np.ndarray
     speed: np.ndarray = field(default_factory=lambda: np.full(6, np.nan))
+    beta: np.ndarray = field(default_factory=lambda: np.zeros(6))
     base: np.ndarray = field(default_factory=lambda: np.eye(4))
     tool: np.ndarray = field(default_factory=lambda: np.eye(4))
     zero_pose: str = ""
@@ -87,7 +89,7 @@ class Robot:
     sources: Mapping[str, Source] = field(default_factory=dict)
 
     def __post_init__(self):
-        for key in ("a", "alpha", "d", "direction", "offset", "lower", "upper", "speed", "base", "tool"):
+        for key in ("a", "alpha", "d", "beta", "direction", "offset", "lower", "upper", "speed", "base", "tool"):
             array = np.array(getattr(self, key), dtype=float)
             expected = (4, 4) if key in ("base", "tool") else (6,)
             if array.shape != expected:
@@ -95,6 +97,10 @@ class Robot:
             array.setflags(write=False)
             object.__setattr__(self, key, array)
         object.__setattr__(self, "sources", MappingProxyType(dict(self.sources)))
+
+    def without_tool(self) -> Robot:
+        """The robot with its flange as tool: references speak of the flange, which is frame 6 of the table."""
+        return self.replace(tool=np.eye(4))
 
     def replace(self, **changes) -> Robot:
         """A copy with other values for some attributes."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
@@ -28,10 +28,13 @@ class Sourced(StrictModel):
 
 
 class DhRow(StrictModel):
+    """One row; ``beta_deg`` is Hayati's turn about y, in calibrated tables of arms with parallel axes."""
+
     joint: JointNumber
     a_mm: float
     alpha_deg: float
     d_mm: float
+    beta_deg: float | None = None
 
 
 def _sign(value: int) -> int:
@@ -129,6 +132,17 @@ class RobotFile(StrictModel):
     tool: SourcedPlacement | None = None
     envelopes: Envelopes | None = None
 
+    @model_validator(mode="before")
+    @classmethod
+    def _a_six_joint_arm(cls, content: Any) -> Any:
+        groups = [content.get(group) for group in ("dh", "zero", "limits")] if isinstance(content, dict) else []
+        rows = [group["rows"] for group in groups if isinstance(group, dict) and isinstance(group.get("rows"), list)]
+        counts = {len(each) for each in rows}
+        if len(rows) == 3 and len(counts) == 1 and counts != {6}:
+            problem = f"dh.rows: a table of {counts.pop()} joints"
+            raise ValueError(f"{problem} | er3a models arms with exactly six revolute joints in series")
+        return content
+
     @model_validator(mode="after")
     def _six_joints_in_order(self):
         for group in ("dh", "zero", "limits", "speeds"):
@@ -148,6 +162,9 @@ class RobotFile(StrictModel):
             for key in ("a_mm", "d_mm"):
                 _check_length(f"dh.rows[{i}].{key}", getattr(row, key), self.dh.calibrated)
             _check_not_radians(f"dh.rows[{i}].alpha_deg", row.alpha_deg)
+            if row.beta_deg and not self.dh.calibrated:
+                problem = f"dh.rows[{i}].beta_deg: {row.beta_deg:g} deg in a table that is not calibrated"
+                raise ValueError(f"{problem} | Set dh.calibrated: true, or remove it")
             _check_not_radians(f"zero.rows[{i}].offset_deg", self.zero.rows[i].offset_deg)
         check_placement("base", self.base)
         check_placement("tool", self.tool)

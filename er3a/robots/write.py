@@ -36,6 +36,9 @@ def robot_file(robot: Robot) -> RobotFile:
     zero_rows = rows(offset_deg=np.degrees(robot.offset))
     for row, direction in zip(zero_rows, robot.direction):
         row["direction"] = int(direction)
+    dh_rows = rows(a_mm=a_mm, alpha_deg=np.degrees(robot.alpha), d_mm=d_mm)
+    for row, beta in zip(dh_rows, robot.beta):
+        row["beta_deg"] = _tidy(np.degrees(beta)) or None
     content = {
         "kind": "robot",
         "name": robot.name,
@@ -45,8 +48,8 @@ def robot_file(robot: Robot) -> RobotFile:
         "dh": sourced("dh")
         | {
             "convention": robot.convention,
-            "calibrated": bool(((lengths > 0) & (lengths < SHORTEST_PLAIN_LENGTH_MM)).any()),
-            "rows": rows(a_mm=a_mm, alpha_deg=np.degrees(robot.alpha), d_mm=d_mm),
+            "calibrated": bool(((lengths > 0) & (lengths < SHORTEST_PLAIN_LENGTH_MM)).any() or robot.beta.any()),
+            "rows": dh_rows,
         },
         "zero": sourced("zero") | {"rows": zero_rows},
         "limits": sourced("limits")

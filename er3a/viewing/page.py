@@ -15,11 +15,11 @@ from matplotlib.figure import Figure
 
 from er3a.results import write_atomically
 from er3a.viewing.figures import svg_data_uri
+from er3a.viewing.numbers import fixed, number
 
 _HERE = Path(__file__).parent
 _ROOT = _HERE.parents[1]
 SHOWN_VERSIONS = ("numpy", "scipy", "numba", "open3d-cpu", "rerun-sdk", "matplotlib")
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 VERDICT_WORDS = {
     "pass": "pass",
     "caution": "caution",
@@ -41,34 +41,6 @@ class Picture:
     def uri(self) -> str:
         """The image as a data address."""
         return svg_data_uri(self.figure)
-
-
-def number(value: float | int | None, digits: int = 4) -> str:
-    """A number with ``digits`` significant digits, thousands apart by thin spaces; a dash for None."""
-    if value is None:
-        return "–"
-    if isinstance(value, int):
-        return f"{value:,}".replace(",", "\u202f")
-    if value != value or value in (float("inf"), float("-inf")):
-        return {"inf": "∞", "-inf": "−∞"}.get(str(value), "–")
-    if value == 0:
-        return "0"
-    if not 1e-4 <= abs(value) < 1e7:
-        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
-        return f"{mantissa}·10".replace("-", "−") + str(int(exponent)).translate(_SUPERSCRIPTS)
-    text = f"{value:#.{digits}g}"
-    if "e" in text:
-        text = f"{float(text):.0f}"
-    text = f"{float(text):,.{max(0, len(text.partition('.')[2]))}f}".replace(",", "\u202f")
-    return text.replace("-", "−")
-
-
-def fixed(value: float | None, decimals: int = 1) -> str:
-    """A number with fixed decimals, minus signs typographic, no negative zero; a dash for None."""
-    if value is None or value != value:
-        return "–"
-    text = f"{value:,.{decimals}f}".replace(",", "\u202f")
-    return (text[1:] if float(f"{value:.{decimals}f}") == 0 and text.startswith("-") else text).replace("-", "−")
 
 
 def render(template: Path, output: Path, summary: dict[str, Any] | None = None, **context: Any) -> None:

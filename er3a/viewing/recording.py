@@ -43,7 +43,11 @@ def recording(output: Path, robot: str, stage: str, *views: rrb.View | rrb.Conta
 
     output.parent.mkdir(parents=True, exist_ok=True)
     partial = output.with_name(f".{output.stem}.{os.getpid()}.partial")
-    stream = rr.RecordingStream(APPLICATION, recording_id=f"{robot}-{stage}", send_properties=False)
+    # No chunk is cut by the clock: recordings of equal data then compare equal on a busy machine too.
+    never = rr.ChunkBatcherConfig.NEVER()
+    stream = rr.RecordingStream(
+        APPLICATION, recording_id=f"{robot}-{stage}", send_properties=False, batcher_config=never
+    )
     try:
         with stream:
             stream.save(partial, default_blueprint=blueprint)
@@ -68,8 +72,12 @@ def send_series(
     Parameters
     ----------
     times : (N,), s
-    values : (N, k); NaN where a curve has a gap
+    values : (N, k); a row with NaN is a gap in all curves (NaN itself would never compare equal between recordings)
     names, colours : k of each
     """
     stream.log(entity, rr.SeriesLines(names=names, colors=[rgb(colour) for colour in colours]), static=True)
-    stream.send_columns(entity, [seconds(times)], rr.Scalars.columns(scalars=np.asarray(values, dtype=float)))
+    times, known = np.asarray(times, dtype=float), np.isfinite(values).all(axis=1)
+    stream.send_columns(entity, [seconds(times[known])], rr.Scalars.columns(scalars=np.asarray(values)[known]))
+    gap_starts = times[~known & np.append(True, known[:-1])]
+    cleared = rr.Clear.columns(is_recursive=np.zeros(len(gap_starts), dtype=bool))
+    stream.send_columns(entity, [seconds(gap_starts)], cleared)

@@ -12,6 +12,9 @@ import er3a
 from er3a.errors import Er3aError, ShapeError
 from er3a.kinematics.chain import axes_at_zero_theta
 from er3a.kinematics.forward import forward, frames, jacobian
+from er3a.kinematics.table_batch import frames_of, join, tables_of
+from er3a.kinematics.transforms import transform
+from er3a.robots.conventions import to_modified, to_standard
 from er3a.robots.load import load_robot
 from tests.kinematics.arms import (
     PinocchioArm,
@@ -187,3 +190,29 @@ def test_nan_stays_in_its_own_row(robot):
     T = forward(robot, q)
     assert np.isnan(T[1, :3, 3]).any()
     np.testing.assert_array_equal(T[[0, 2]], forward(robot, q[[0, 2]]))
+
+
+def test_a_batch_of_tables_has_the_frames_of_each(random):
+    """With Hayati's beta, both conventions, base; against the single-robot kernels and hand-multiplied rotations."""
+    arms = [
+        load_robot("er3a_c60").replace(
+            convention=convention, beta=random.uniform(-0.1, 0.1, 6), alpha=random.uniform(-3, 3, 6), base=base
+        )
+        for base in [transform(np.array([0.1, 0.2, 0.3]), np.array([0.2, -0.4, 0.9]))]
+        for convention in ("standard", "modified")
+    ]
+    q = random.uniform(-3, 3, (20, 6))
+    found = frames_of(join([tables_of(arm) for arm in arms]), arms[0].base, q)
+    for row, arm in zip(found, arms):
+        np.testing.assert_allclose(row, frames(arm, q), atol=1e-14)
+    np.testing.assert_allclose(forward(to_modified(arms[0]), q), forward(arms[0], q), atol=1e-14)
+    np.testing.assert_allclose(forward(to_standard(arms[1]), q), forward(arms[1], q), atol=1e-14)
+    T = arms[0].base
+    for k in range(6):
+        turn = Rotation.from_euler("Z", arms[0].direction[k] * q[0, k] + arms[0].offset[k])
+        tilt = Rotation.from_euler("XY", [arms[0].alpha[k], arms[0].beta[k]])
+        step = np.eye(4)
+        step[:3, :3] = (turn * tilt).as_matrix()
+        step[:3, 3] = turn.apply([arms[0].a[k], 0, arms[0].d[k]])
+        T = T @ step
+    np.testing.assert_allclose(found[0, 0, 6], T, atol=1e-14)

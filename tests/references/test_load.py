@@ -9,6 +9,7 @@ import pytest
 from er3a.errors import InputError
 from er3a.references.load import MANUAL_REFS, check_reference_file, load_references
 from er3a.references.rows import COLUMNS
+from er3a.references.scalars import scalars_of
 from er3a.robots.robot import GRADES
 
 LIMITS = "joint,lower_deg,upper_deg,uncertainty_deg,source,grade\n"
@@ -75,6 +76,21 @@ def test_a_limit_that_is_not_given_is_kept_as_not_given():
         ),
         ("positions.csv", POSITIONS + "zero,tip,0,0,0,0,0,0,1,2,300,0.1,m,cad\n", ["point", "wrist_centre"]),
         ("positions.csv", POSITIONS + "zero,flange,0,0,0,0,0,0,0.4,0,0.66,0.1,m,cad\n", ["metres", "1000"]),
+        (
+            "positions.csv",
+            POSITIONS + "zero,flange,0,0,0,0,0,0,374,0,699.5,0.1,m,cad\nup,flange,0,90,0,0,0,0,0.4,0,0.66,0.1,m,cad\n",
+            ["row 3", "metres", "Multiply by 1000"],
+        ),
+        (
+            "positions.csv",
+            POSITIONS + "up,flange,0,0.7854,0,0,0,0,374,0,699.5,0.1,m,cad\n",
+            ["row 2, column q2_deg", "radians", "Write 45"],
+        ),
+        (
+            "limits.csv",
+            LIMITS + "1,-170,170,0.5,m,official\n2,-2.27,1.57,0.5,m,official\n",
+            ["row 3", "radians", "Convert"],
+        ),
         ("axes.csv", AXES + "1,0,0,2,0,0,0,no,0.1,0.1,m,cad\n", ["row 2", "direction_x", "unit vector"]),
         ("envelope.csv", ENVELOPE + "z,,,100,0.1,m,official\n", ["row 2", "q2_deg", "missing for z"]),
         ("envelope.csv", ENVELOPE + "least_x,5,5,-100,0.1,m,official\n", ["row 2", "q2_deg", "given"]),
@@ -101,3 +117,27 @@ def test_unknown_set_and_empty_folder(tmp_path):
         load_references("er4")
     with pytest.raises(InputError, match=r"axes\.csv"):
         load_references(tmp_path)
+
+
+def test_a_pose_that_a_source_shows_counts_as_within_the_limits_once(tmp_path):
+    row = "up,{},0,90,0,0,0,0,10,0,699.5,0.1,m,cad\n"
+    written(tmp_path, "positions.csv", POSITIONS + row.format("flange") + row.format("wrist_centre"))
+    names = [reference.name for reference in load_references(tmp_path).references]
+    assert names.count("up: outside the limits by") == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "uncertainty"),
+    [
+        ("reach.csv", REACH + "flange,1,greatest,600,,m,official\n", 0.5),
+        ("reach.csv", REACH + "flange,1,greatest,592.8,,m,official\n", 0.05),
+        ("reach.csv", REACH + "flange,1,greatest,592.80,,m,official\n", 0.005),
+        ("positions.csv", POSITIONS + "zero,flange,0,0,0,0,0,0,374,0,699.5,,m,cad\n", 0.05),
+        ("limits.csv", LIMITS + "6,,,,m,export\n", 0.5),
+        ("speeds.csv", SPEEDS + "1,4.0e2,,m,official\n", 5.0),
+    ],
+)
+def test_without_uncertainty_half_the_last_digit_counts(tmp_path, name, text, uncertainty):
+    (row,) = check_reference_file(written(tmp_path, name, text))
+    (reference, *_) = scalars_of(row)
+    assert reference.uncertainty == pytest.approx(uncertainty)

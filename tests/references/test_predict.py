@@ -52,16 +52,13 @@ def urdf_flange_mm(pose_deg) -> np.ndarray:
 def published_modified_table() -> Robot:
     """The modified table of the ER3A-C60's CAD project, which ends at the wrist: the flange is 78.5 mm further."""
     standard = load_robot("er3a_c60")
-    tool = np.eye(4)
-    tool[2, 3] = 0.0785
     return standard.replace(
         convention="modified",
         a=np.array([0, 50, 270, 70, 0, 0]) / 1000,
         alpha=np.radians([0, 90, 0, 90, -90, 90]),
-        d=np.array([321.5, 0, 0, 299, 0, 0]) / 1000,
+        d=np.array([321.5, 0, 0, 299, 0, 78.5]) / 1000,
         direction=np.ones(6),
         offset=np.radians([0, 90, 0, 0, 0, 0]),
-        tool=tool,
     )
 
 

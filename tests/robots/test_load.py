@@ -17,6 +17,7 @@ from er3a.robots.load import ROBOTS, load_robot
 from er3a.robots.robot import GRADES
 from tests.kinematics.arms import make_arm, placement
 
+GROUPS = ("dh", "zero", "limits", "speeds")
 Change = Callable[[dict[str, Any]], Any]
 
 
@@ -227,6 +228,13 @@ def test_calibrated_tables_may_hold_short_lengths(write):
         (set_in("speeds", "rows", 3, "joint", to=3), "speeds.rows", "joint 4 is missing"),
         (set_in("dh", "rows", 5, "joint", to=7), "dh.rows[5].joint", "7 is refused"),
         (lambda c: c["dh"]["rows"].append(dict(c["dh"]["rows"][5])), "dh.rows", "joints come as"),
+        (lambda c: [c[g]["rows"].pop() for g in GROUPS], "dh.rows", "a table of 5 joints. er3a models arms with"),
+        (
+            lambda c: [c[g]["rows"].append({**c[g]["rows"][5], "joint": 7}) for g in GROUPS],
+            "dh.rows",
+            "a table of 7 joints. er3a models arms with exactly six",
+        ),
+        (set_in("dh", "rows", 1, "beta_deg", to=0.1), "dh.rows[1].beta_deg", "not calibrated. Set dh.calibrated: true"),
         (rename("dh", 1, "a_mm", "a_m"), "dh.rows[1].a_m", "unknown key 'a_m'. Did you mean 'a_mm'?"),
         (set_in("tol", to={}), "tol", "unknown key 'tol'. Did you mean 'tool'?"),
         (set_in("colour", to="red"), "colour", "unknown key 'colour'"),

@@ -410,7 +410,7 @@ def test_tables_agree_with_the_summary(tmp_path):
 
 def test_void_centres_have_no_inverse_solution(tmp_path, random):
     """The closed form, over random orientations, is an independent witness of what the samples left out."""
-    study = make_study({"er3a_c60_article": ROBOTS / "er3a_c60_article.yaml"}, samples=2_000_000, cells_across=48)
+    study = make_study({"er3a_c60_article": ROBOTS / "er3a_c60_article.yaml"}, samples=4_000_000, cells_across=48)
     compute(study, "er3a_c60_article", tmp_path)
     summary, robot = read_summary(tmp_path), study.robot("er3a_c60_article")
     assert summary["verdict"]["code"] == "workspace.void_unexpected"

@@ -24,7 +24,7 @@ ROBOTS = list(STUDY.robots)
 
 # The tables that each stage writes beside its summary.json.
 TABLES = {
-    "validation": ["checks", "axes", "key_poses", "section"],
+    "validation": ["checks", "axes", "key_poses", "section", "residuals", "corrections"],
     "workspace": ["cells", "section", "curve", "cloud", "hull_vertices", "hull_triangles"],
     "inverse": ["solutions"],
     "trajectory": ["checks", "samples"],
@@ -64,9 +64,11 @@ def code_of(stage, verb):
     return code_digest(f"er3a.stages.{stage}.{verb}")
 
 
-def results_of(wildcards):
-    """A stage's results, as the input of its views."""
-    return [
-        f"results/{wildcards.robot}/{wildcards.stage}/summary.json",
-        *(path.format(robot=wildcards.robot) for path in tables(wildcards.stage)),
-    ]
+def results_of(stage):
+    """Paths of a stage's results, the robot as wildcard."""
+    return [f"results/{{robot}}/{stage}/summary.json", *tables(stage)]
+
+
+def viewed(wildcards):
+    """Input function: the results that a stage's views show."""
+    return [path.format(robot=wildcards.robot) for path in results_of(wildcards.stage)]

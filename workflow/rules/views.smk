@@ -1,6 +1,6 @@
 rule record:
     input:
-        results_of,
+        viewed,
     output:
         "reports/{robot}/{stage}.rrd",
     log:
@@ -17,7 +17,7 @@ rule record:
 
 rule report:
     input:
-        results_of,
+        viewed,
     output:
         "reports/{robot}/{stage}.html",
     log:

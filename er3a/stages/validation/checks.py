@@ -138,8 +138,11 @@ def _gaps(references: ReferenceSet) -> list[Check]:
             note = f"{references.name} has no data"
             gaps.append(nothing_to_compare(MISSING_WORDS[group], group, "", note, reference_set=references.name))
     quantities = {reference.quantity for reference in references.references}
+    with_axis = {row.joint for row in references.axes}
     note = f"{references.name} has no data"
     for joint in range(1, 7):
+        if "axes" in present and joint not in with_axis:
+            gaps.append(nothing_to_compare(f"axis {joint}", "axes", "mm", note, reference_set=references.name))
         per_joint = [("limits", f"{side} limit", Limit(joint, side)) for side in ("lower", "upper")]
         for group, words, quantity in (*per_joint, ("speeds", "speed", Speed(joint))):
             if group in present and quantity not in quantities:

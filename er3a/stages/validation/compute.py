@@ -14,7 +14,10 @@ from er3a.references.quantities import MM, ZERO_POSE, Extreme, Quantity
 from er3a.references.scalars import reach_name
 from er3a.results import write_summary, write_table
 from er3a.stages.validation.checks import Check, checks_of_set, nothing_to_compare
-from er3a.stages.validation.findings import key_figures, set_findings, verdict_of
+from er3a.stages.validation.circle_points import circle_points
+from er3a.stages.validation.corrections import identify_from_sets
+from er3a.stages.validation.culprits import diagnose_sets
+from er3a.stages.validation.findings import SHOWN_DECIMALS, key_figures, set_findings, verdict_of
 from er3a.stages.validation.model import model_of
 from er3a.stages.validation.self_checks import closed_form, round_trip_checks, table_checks
 from er3a.stages.validation.tables import axes_table, key_poses_table, section_table
@@ -34,10 +37,13 @@ ALWAYS_SEARCHED = (
 
 
 def compute(study: Study, name: str, folder: Path) -> None:
-    """Write ``summary.json``, and ``checks``, ``axes``, ``key_poses`` and ``section`` as Parquet tables.
+    """Write ``summary.json``, and the tables ``checks``, ``axes``, ``key_poses``, ``section``, ``residuals`` and
+    ``corrections`` as Parquet.
 
     The summary's own keys: ``checks`` (see :class:`er3a.stages.validation.checks.Check`), ``conflicts``, ``sets`` (what
-    was found per reference set), ``table`` (convention, and why there is no closed form, if so), ``round_trips`` and
+    was found per reference set), ``diagnosis`` and ``culprits`` (:mod:`er3a.stages.validation.culprits`),
+    ``identification`` (:mod:`er3a.stages.validation.corrections`), ``circle_points`` (the carried point, and how round
+    its tracks are), ``table`` (convention, and why there is no closed form, if so), ``round_trips`` and
     ``section_origin_mm`` (axis 1 and axis 2 in the base frame, where the workspace drawing has its origin).
     """
     robot = model_of(study, name)
@@ -49,23 +55,29 @@ def compute(study: Study, name: str, folder: Path) -> None:
     extremes = {quantity: search(robot, quantity, settings.reach_starts) for quantity in wanted}
     values = {quantity: value for quantity, (value, _) in extremes.items()}
 
+    circles = circle_points(robot)
     checks, conflicts = table_checks(robot), []
     for references in sets:
         stated = references.checkable
-        judged, contradictions = checks_of_set(references, read(stated, state_of(robot, stated, extremes=values)))
+        state = state_of(robot, stated, extremes=values, axes=circles.axes)
+        judged, contradictions = checks_of_set(references, read(stated, state))
         checks += judged
         conflicts += contradictions
     checks += _without_reference(values, checks)
     trip_checks, trips = round_trip_checks(robot, settings.round_trips, study.seed)
     checks += trip_checks
 
-    axes = axes_table(robot, sets)
+    axes = axes_table(circles, sets)
     poses = key_poses_table(robot, sets, extremes)
-    findings = set_findings(robot, sets, checks, poses)
+    diagnosis, culprits, residuals = diagnose_sets(robot, sets)
+    identified, corrections = identify_from_sets(robot, sets)
+    findings = set_findings(sets, checks, poses, culprits)
     write_table(folder / "checks.parquet", pd.DataFrame([asdict(check) for check in checks]))
     write_table(folder / "axes.parquet", axes)
     write_table(folder / "key_poses.parquet", poses)
     write_table(folder / "section.parquet", section_table(robot, extremes))
+    write_table(folder / "residuals.parquet", residuals)
+    write_table(folder / "corrections.parquet", corrections)
 
     reach = {
         "Wrist centre reaches from axis 1": values[WRIST_REACH],
@@ -77,11 +89,19 @@ def compute(study: Study, name: str, folder: Path) -> None:
         study,
         name,
         STAGE,
-        verdict_of(checks, conflicts, findings),
+        verdict_of(checks, conflicts, findings, culprits),
         key_figures(checks, axes, findings, reach, trips),
         checks=[asdict(check) for check in checks],
         conflicts=[asdict(conflict) for conflict in conflicts],
         sets=findings,
+        diagnosis=diagnosis,
+        culprits=culprits,
+        identification=identified,
+        circle_points={
+            "offset_mm": circles.offset_mm.tolist(),
+            "radius_mm": circles.radius_mm.round(SHOWN_DECIMALS).tolist(),
+            "roundness_mm": circles.roundness_mm.round(SHOWN_DECIMALS).tolist(),
+        },
         table={"convention": robot.convention, "no_closed_form": closed_form(robot)},
         round_trips=trips,
         section_origin_mm=[float(zero[0, 0, 3] * MM), float(zero[1, 2, 3] * MM)],

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
-from itertools import product
 
-import numpy as np
 import pandas as pd
 
-from er3a.references.predict import read, state_of
-from er3a.references.reference import ReferenceSet, expected_of
+from er3a.references.reference import ReferenceSet
 from er3a.results import Figure, Verdict
-from er3a.robots.robot import WEIGHTY_GRADES, Robot
+from er3a.robots.robot import WEIGHTY_GRADES
 from er3a.stages.validation.checks import Check, Conflict
 
 TELLING_GROUPS = ("reach", "zero pose", "axes", "envelope", "key poses", "limits", "speeds")
-TRIED_OFFSETS_DEG = (-90.0, 90.0, 180.0)
+TELLING_SHARE = 0.25
 SHOWN_DECIMALS = 9
 MODEL_GROUPS = ("table sanity", "round trips")
 
@@ -26,42 +23,30 @@ def weighs(check: Check) -> bool:
     return check.grade in WEIGHTY_GRADES or check.group in MODEL_GROUPS
 
 
-def set_findings(robot: Robot, sets: list[ReferenceSet], checks: list[Check], poses: pd.DataFrame) -> list[dict]:
-    """Per reference set: its counts, whether it describes another arm (most of the checks that count fail), how far the
-    flange is off in the zero pose, and offsets that would mend that."""
+def set_findings(
+    sets: list[ReferenceSet], checks: list[Check], poses: pd.DataFrame, culprits: list[dict]
+) -> list[dict]:
+    """Per reference set: its counts, whether it describes another arm (most of the checks that count fail, and
+    no one or two faults explain that), and how far the flange is off in the zero pose."""
+    explained = {culprit["reference_set"]: culprit["status"] for culprit in culprits}
     findings = []
     for references in sets:
         own = [check for check in checks if check.reference_set == references.name]
         weighty = _counts(check for check in own if weighs(check))
-        zero_failed = any(check.group == "zero pose" and check.status == "fail" for check in own)
         findings.append(
             {
                 "name": references.name,
                 "grades": sorted({reference.grade for reference in references.references}),
                 "weighty": weighty,
-                "another_arm": weighty["fail"] > weighty["total"] / 2,
+                "another_arm": weighty["fail"] > weighty["total"] / 2 and explained[references.name] == "unexplained",
                 "claims": _counts(check for check in own if not weighs(check) and check.grade),
                 "zero_pose_flange_off_mm": _zero_pose_miss(poses, references.name),
-                "offsets_that_mend_the_zero_pose": mending_offsets(robot, references) if zero_failed else [],
             }
         )
     return findings
 
 
-def mending_offsets(robot: Robot, references: ReferenceSet) -> list[dict]:
-    """Changes of one joint's offset by a right angle or two with which the set's zero pose would hold."""
-    stated = tuple(reference for reference in references.checkable if reference.group == "zero pose")
-    expected, uncertainty = expected_of(stated)
-    found = []
-    for joint, change in product(range(1, 7), TRIED_OFFSETS_DEG):
-        offset = robot.offset + np.radians(change) * (np.arange(1, 7) == joint)
-        values = read(stated, state_of(robot.replace(offset=offset), stated, extremes={}))
-        if (np.abs(values - expected) <= uncertainty).all():
-            found.append({"joint": joint, "change_deg": change})
-    return found
-
-
-def verdict_of(checks: list[Check], conflicts: list[Conflict], findings: list[dict]) -> Verdict:
+def verdict_of(checks: list[Check], conflicts: list[Conflict], findings: list[dict], culprits: list[dict]) -> Verdict:
     """The stage's answer."""
     resting = [check for check in checks if weighs(check) and check.status != "no_reference"]
     failed = [check for check in resting if check.status == "fail"]
@@ -72,7 +57,8 @@ def verdict_of(checks: list[Check], conflicts: list[Conflict], findings: list[di
         "conflicts": len(conflicts),
         "sets": [finding["name"] for finding in findings],
     }
-    claims = _claims_sentence(findings)
+    named = {culprit["reference_set"]: culprit["text"] for culprit in culprits if culprit["faults"]}
+    claims = _claims_sentence(findings, named)
     own_faults = [check for check in failed if check.group in MODEL_GROUPS]
     if own_faults:
         first = own_faults[0]
@@ -84,11 +70,13 @@ def verdict_of(checks: list[Check], conflicts: list[Conflict], findings: list[di
         other = any(finding["another_arm"] for finding in findings if finding["name"] == telling.reference_set)
         lead = f"This is not the arm that {described} describe" if other else f"The model contradicts {described}"
         text = (
-            f"{lead}: {params['failed']} of {params['checks']} checks fail; the {telling.name} is "
-            f"{_value(telling.measured, telling.unit)}, not {_value(telling.expected, telling.unit)}.{claims}"
+            f"{lead}: {params['failed']} of {params['checks']} checks fail; the {_quoted(telling.name)} is "
+            f"{_value(telling.measured, telling.unit)}, not {_value(telling.expected, telling.unit)}."
         )
+        culprit = named.get(telling.reference_set, "")
+        text += f" {culprit}{claims}" if culprit else claims
         code = "validation.another_arm" if other else "validation.contradicted"
-        return Verdict("fail", code, text, params | {"check": telling.name})
+        return Verdict("fail", code, text, params | {"check": telling.name, "culprit": culprit})
     if not documented:
         text = f"There is no official, CAD or exported data to hold this model against.{claims}"
         return Verdict("no_reference", "validation.no_reference", text, params)
@@ -105,8 +93,12 @@ def verdict_of(checks: list[Check], conflicts: list[Conflict], findings: list[di
 
 
 def most_telling(failed: list[Check]) -> Check:
-    """The failed check to quote: the first of the group that tells most."""
-    return min(failed, key=lambda check: TELLING_GROUPS.index(check.group))
+    """The failed check to quote: of those not far behind the largest difference in mm, the first of the group that
+    tells most."""
+    lengths = [check for check in failed if check.unit == "mm"]
+    least = TELLING_SHARE * max((abs(check.difference) for check in lengths), default=0.0)
+    large = [check for check in lengths if abs(check.difference) >= least]
+    return min(large or failed, key=lambda check: TELLING_GROUPS.index(check.group))
 
 
 def key_figures(
@@ -145,21 +137,21 @@ def _zero_pose_miss(poses: pd.DataFrame, set_name: str) -> float | None:
     return float(rows["deviation_mm"].max()) if len(rows) else None
 
 
-def _claims_sentence(findings: list[dict]) -> str:
+def _claims_sentence(findings: list[dict], named: dict[str, str]) -> str:
     sentences = []
     for finding in findings:
         claims = finding["claims"]
         if finding["weighty"]["total"] or not claims["total"]:
             continue
         sentence = f" Of the {claims['total']} claims in {finding['name']}, {claims['fail']} don't hold"
-        if finding["offsets_that_mend_the_zero_pose"] and finding["zero_pose_flange_off_mm"] is not None:
-            mend = finding["offsets_that_mend_the_zero_pose"][0]
-            sentence += (
-                f": it misses its own zero pose by {finding['zero_pose_flange_off_mm']:.0f} mm, "
-                f"which an offset of {mend['change_deg']:g} deg on joint {mend['joint']} would mend"
-            )
-        sentences.append(sentence + ".")
+        sentences.append(f"{sentence}. {named[finding['name']]}" if finding["name"] in named else f"{sentence}.")
     return "".join(sentences)
+
+
+def _quoted(name: str) -> str:
+    """A check's name in a sentence: the pose behind what is seen there."""
+    pose, _, seen = name.rpartition(": ")
+    return f"{seen} ({pose})" if pose else name
 
 
 def _grades(checks: list[Check]) -> str:

@@ -8,5 +8,5 @@ from er3a.study import Study
 
 
 def model_of(study: Study, name: str) -> Robot:
-    """The robot as its file has it: references speak of its flange and of the maker's base, not of a study's tool."""
-    return load_robot(study.robot_file(name)).replace(name=name)
+    """The robot as its file has it, without tool: references speak of its flange and of the maker's base."""
+    return load_robot(study.robot_file(name)).without_tool().replace(name=name)

@@ -11,6 +11,7 @@ import rerun.blueprint as rrb
 
 from er3a.results import read_summary, read_table
 from er3a.robots.robot import WEIGHTY_GRADES, Robot
+from er3a.stages.validation.mended import mended_robot
 from er3a.stages.validation.model import model_of
 from er3a.study import Study
 from er3a.viewing.arm import log_arm, send_motion, size_of, skeleton
@@ -44,6 +45,7 @@ def record(study: Study, name: str, folder: Path, output: Path) -> None:
     axes, poses = read_table(folder / "axes.parquet"), read_table(folder / "key_poses.parquet")
     stations = _stations(poses)
     starts = STATION_S * np.arange(len(stations))
+    mended, fault = mended_robot(robot, summary["culprits"])
     views = (
         _view(robot, poses, axes),
         rrb.Vertical(
@@ -55,11 +57,15 @@ def record(study: Study, name: str, folder: Path, output: Path) -> None:
     )
     with recording(output, name, "validation", *views) as stream:
         note = NOTE.format(title=robot.title, text=summary["verdict"]["text"], hold=HOLD_S)
+        note += f"\nThe see-through arm has the most likely fault {fault}.\n" if mended is not None else ""
         stream.log("note", rr.TextDocument(note, media_type=rr.MediaType.MARKDOWN), static=True)
         _log_axes(stream, axes, size_of(robot), end=starts[1] - MOVE_S if len(starts) > 1 else None)
         log_arm(stream, robot, np.zeros(6))
         times, q = _motion(stations, starts)
         send_motion(stream, robot, times, q)
+        if mended is not None:
+            log_arm(stream, mended, np.zeros(6), entity="mended", ghost=True)
+            send_motion(stream, mended, times, q, entity="mended")
         for start, rows in zip(starts, stations):
             _log_station(stream, float(start), rows, 0.012 * size_of(robot))
         worst = np.array([rows["deviation_mm"].max() for rows in stations])

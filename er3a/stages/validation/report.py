@@ -11,12 +11,15 @@ import pandas as pd
 from er3a.results import read_summary, read_table
 from er3a.robots.robot import GRADES, WEIGHTY_GRADES, Robot
 from er3a.stages.validation.drawings import axis_deviation, side_view, workspace_drawing
+from er3a.stages.validation.fault_views import correction_stories, culprit_stories
+from er3a.stages.validation.mended import mended_robot
 from er3a.stages.validation.model import model_of
 from er3a.study import Study
 from er3a.viewing.page import Picture, fixed, number, render
 
 SHOWN_FAILURES = 12
 DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "": 0}
+HYPOTHESIS_COLUMNS = ["Hypothesis", "Residual now>", "With it mended>", "Unit"]
 COLUMNS = ["Check", "Model>", "Reference>", "Difference>", "Tolerance>", "Unit", "Source"]
 
 
@@ -34,6 +37,10 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
         summary,
         robot=robot,
         sets=[_set_story(finding, checks, poses) for finding in summary["sets"]],
+        culprits=culprit_stories(summary, read_table(folder / "residuals.parquet")),
+        corrections=correction_stories(summary, read_table(folder / "corrections.parquet")),
+        hypothesis_columns=HYPOTHESIS_COLUMNS,
+        circles=summary["circle_points"],
         groups=_groups(checks),
         failed=[_row(check) for check in failed[:SHOWN_FAILURES]],
         more_failed=[_row(check) for check in failed[SHOWN_FAILURES:]],
@@ -148,12 +155,7 @@ def _drawn_axes(axes: pd.DataFrame) -> pd.DataFrame:
 
 def _side_picture(robot: Robot, axes: pd.DataFrame, summary: dict) -> Picture:
     drawn = _drawn_axes(axes)
-    mends = [mend for finding in summary["sets"] for mend in finding["offsets_that_mend_the_zero_pose"]]
-    mended, label = None, ""
-    if mends:
-        change = np.radians(mends[0]["change_deg"]) * (np.arange(1, 7) == mends[0]["joint"])
-        mended = robot.replace(offset=robot.offset + change)
-        label = f"same links with {mends[0]['change_deg']:g} deg on joint {mends[0]['joint']}".replace("-", "−")
+    mended, label = mended_robot(robot, summary["culprits"])
     if drawn.empty:
         caption = "No reference states any axis: there is nothing to hold the model's against."
     elif (drawn["distance_mm"] <= drawn["uncertainty_mm"]).all() and _directions_hold(drawn):
@@ -164,10 +166,17 @@ def _side_picture(robot: Robot, axes: pd.DataFrame, summary: dict) -> Picture:
         if any(finding["another_arm"] for finding in summary["sets"]):
             caption += ": the two arms differ in size and shape, not in a detail"
         caption += "."
-        if mends:
+        if mended is not None and drawn["reference_set"].iloc[0] == _repaired_against(summary):
+            caption += " The dashed arm has the named fault mended: it meets the stated axes."
+        elif mended is not None:
             caption += " The dashed arm has the model's own zero pose put right; it still misses the stated axes."
     alt = "Side view of the zero pose: links and joint axes of the model, and the axes that references state."
     return Picture(side_view(robot, drawn, mended, label), alt, caption)
+
+
+def _repaired_against(summary: dict) -> str:
+    """The reference set whose named fault the dashed arm has mended."""
+    return next(culprit["reference_set"] for culprit in summary["culprits"] if culprit["repaired"])
 
 
 def _directions_hold(axes: pd.DataFrame) -> bool:

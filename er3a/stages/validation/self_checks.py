@@ -21,6 +21,8 @@ JOINT_TOLERANCE_DEG = 1e-6
 POSITION_TOLERANCE_MM = 1e-6
 ORIENTATION_TOLERANCE_DEG = 1e-6
 BLOCK = 20_000
+SHORTEST, LONGEST = 0.01, 20.0  # m
+WIDEST_IN_RADIANS = 2.01 * np.pi
 GROUP = "round trips"
 
 
@@ -45,14 +47,24 @@ class RoundTrips:
 
 
 def table_checks(robot: Robot) -> list[Check]:
-    """Checks of the table alone."""
-    parts = [robot.a, robot.alpha, robot.d, robot.offset, robot.lower, robot.upper, robot.base, robot.tool]
+    """Checks of the table alone: sound numbers in plausible units, and whether a closed-form inverse applies to it."""
+    parts = [robot.a, robot.alpha, robot.d, robot.offset, robot.lower, robot.upper, robot.base]
+    lengths, limits = np.abs([robot.a, robot.d]), np.abs([robot.lower, robot.upper])
     faults = {
         "numbers that are not finite": sum(int((~np.isfinite(part)).sum()) for part in parts),
         "joints whose limits are crossed": int((robot.lower >= robot.upper).sum()),
         "joint directions other than +1 and -1": int((np.abs(robot.direction) != 1).sum()),
+        "lengths in another unit (longest below 10 mm or above 20 m)": int(
+            not SHORTEST <= np.nanmax(lengths) <= LONGEST
+        ),
+        "limits in another unit (widest below 6.3 deg)": int(0 < np.degrees(np.nanmax(limits)) < WIDEST_IN_RADIANS),
     }
-    return [against_itself(name, "table sanity", float(count), 0.5, "") for name, count in faults.items()]
+    checks = [against_itself(name, "table sanity", float(count), 0.5, "") for name, count in faults.items()]
+    missing = "numbers are missing" if checks[0].status == "fail" else closed_form(robot)
+    name = "properties lacking for a closed-form inverse (parallel axes 2 and 3, spherical wrist)"
+    if missing:
+        return [*checks, nothing_to_compare(name, "table sanity", "", missing)]
+    return [*checks, against_itself(name, "table sanity", 0.0, 0.5, "")]
 
 
 def closed_form(robot: Robot) -> str:

@@ -8,13 +8,13 @@ import numpy as np
 import pandas as pd
 
 from er3a.kinematics.forward import frames
-from er3a.references.predict import state_of
 from er3a.references.quantities import (
     MM,
     ZERO_POSE,
-    AxisAngle,
     Extreme,
+    angle_between,
     nearest_on_axis,
+    nearest_on_line,
     point_of,
     section_of,
 )
@@ -22,14 +22,15 @@ from er3a.references.reference import ReferenceSet
 from er3a.references.rows import ENVELOPE_CORNERS
 from er3a.references.scalars import reach_name
 from er3a.robots.robot import Robot
+from er3a.stages.validation.circle_points import CirclePoints
 
 SECTION_STEPS = 60
 XYZ = ("x_mm", "y_mm", "z_mm")
 Q = tuple(f"q{joint}_deg" for joint in range(1, 7))
 
 
-def axes_table(robot: Robot, sets: list[ReferenceSet]) -> pd.DataFrame:
-    """Each stated axis line beside the model's, in the zero pose.
+def axes_table(circles: CirclePoints, sets: list[ReferenceSet]) -> pd.DataFrame:
+    """Each stated axis line beside the model's, as its circles show it.
 
     Returns
     -------
@@ -37,14 +38,12 @@ def axes_table(robot: Robot, sets: list[ReferenceSet]) -> pd.DataFrame:
         and its point nearest to the stated one (``model_*``); ``angle_deg`` and ``distance_mm`` between the two, and
         the source's ``uncertainty_deg`` and ``uncertainty_mm``
     """
-    state = state_of(robot, ())
-    T = state.at(ZERO_POSE)
     records = []
     for references in sets:
         for row in references.axes:
             stated = np.array(row.point_mm)
-            nearest = nearest_on_axis(T, row.joint, stated)
-            direction = T[row.joint - 1, :3, 2] * robot.direction[row.joint - 1]
+            direction = circles.axes.direction[row.joint - 1]
+            nearest = nearest_on_line(direction, circles.axes.point_mm[row.joint - 1], stated)
             records.append(
                 {"reference_set": references.name, "source": row.source, "grade": row.grade, "joint": row.joint}
                 | {f"direction_{c}": v for c, v in zip("xyz", row.direction)}
@@ -52,7 +51,7 @@ def axes_table(robot: Robot, sets: list[ReferenceSet]) -> pd.DataFrame:
                 | {f"model_direction_{c}": v for c, v in zip("xyz", direction)}
                 | {f"model_{c}": v for c, v in zip(XYZ, nearest)}
                 | {
-                    "angle_deg": float(AxisAngle(row.joint, row.direction, row.signed).value(state)),
+                    "angle_deg": float(angle_between(direction, np.array(row.direction), row.signed)),
                     "distance_mm": float(np.linalg.norm(nearest - stated)),
                     "uncertainty_deg": row.uncertainty_deg,
                     "uncertainty_mm": row.uncertainty_mm,

@@ -13,7 +13,7 @@ from matplotlib import colormaps
 from er3a.results import read_summary, read_table
 from er3a.study import Study
 from er3a.viewing.arm import arm_view, log_arm
-from er3a.viewing.page import fixed
+from er3a.viewing.numbers import fixed
 from er3a.viewing.palette import HIGHLIGHT, MUTED, REFERENCE, rgb
 from er3a.viewing.recording import recording
 

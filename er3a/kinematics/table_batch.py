@@ -1,4 +1,4 @@
-"""Many candidate D-H tables at once, and what they predict for a list of references."""
+"""Many D-H tables at once, and the frames of each at many poses."""
 
 from __future__ import annotations
 
@@ -9,12 +9,7 @@ import numpy as np
 
 from er3a.kinematics.forward import rows_of, step_row, turn_row, write_rows
 from er3a.kinematics.jit import kernel
-from er3a.references.predict import poses_of, read
-from er3a.references.quantities import ModelState
-from er3a.references.reference import Reference
 from er3a.robots.robot import Robot
-
-CHUNK = 2048
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,12 +19,13 @@ class Tables:
     Attributes
     ----------
     modified : (H,) bool, whether the rows are read as modified (Craig) ones
-    a, d : (H, 6), m; alpha, offset, lower, upper : (H, 6), rad; direction : (H, 6), +1 or -1
+    a, d : (H, 6), m; alpha, beta, offset, lower, upper : (H, 6), rad; direction : (H, 6), +1 or -1
     """
 
     modified: np.ndarray
     a: np.ndarray
     alpha: np.ndarray
+    beta: np.ndarray
     d: np.ndarray
     direction: np.ndarray
     offset: np.ndarray
@@ -49,16 +45,18 @@ class Tables:
         return replace(self, **{name: column})
 
 
+COLUMNS = tuple(field.name for field in fields(Tables) if field.name != "modified")
+
+
 def tables_of(robot: Robot) -> Tables:
     """The robot's own table, as a batch of one."""
-    columns = (getattr(robot, name)[None] for name in ("a", "alpha", "d", "direction", "offset", "lower", "upper"))
-    return Tables(np.array([robot.convention == "modified"]), *columns)
+    return Tables(np.array([robot.convention == "modified"]), *(getattr(robot, name)[None] for name in COLUMNS))
 
 
 def robot_of(tables: Tables, row: int, robot: Robot) -> Robot:
     """One table of the batch as a robot that is otherwise like ``robot``."""
-    columns = {field.name: getattr(tables, field.name)[row] for field in fields(tables)}
-    return robot.replace(convention="modified" if columns.pop("modified") else "standard", **columns)
+    columns = {name: getattr(tables, name)[row] for name in COLUMNS}
+    return robot.replace(convention="modified" if tables.modified[row] else "standard", **columns)
 
 
 def join(batches: Sequence[Tables]) -> Tables:
@@ -66,52 +64,31 @@ def join(batches: Sequence[Tables]) -> Tables:
     return Tables(*(np.concatenate([getattr(batch, field.name) for batch in batches]) for field in fields(Tables)))
 
 
-def predictions(tables: Tables, robot: Robot, references: Sequence[Reference]) -> np.ndarray:
-    """What each table says about each reference (none of them about an extreme over the limits).
-
-    Returns
-    -------
-    values : (H, n), in the references' units
-    """
-    poses = poses_of(references)
-    values = np.empty((len(tables), len(references)))
-    for start in range(0, len(tables), CHUNK):
-        part = tables[start : start + CHUNK]
-        state = ModelState(
-            frames=_frames_of(part, robot.base, np.radians(poses)),
-            index={pose: i for i, pose in enumerate(poses)},
-            direction=part.direction,
-            lower=part.lower,
-            upper=part.upper,
-            speed=robot.speed,
-            extremes={},
-        )
-        values[start : start + CHUNK] = read(references, state)
-    return values
-
-
-def _frames_of(tables: Tables, base: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Frames (H, P, 7, 4, 4) of each table at joint angles (P, 6) in rad, as ``kinematics.forward.frames`` has them for
-    one robot; entry 6 is the flange."""
+def frames_of(tables: Tables, base: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Frames (H, P, 7, 4, 4) of each table at joint angles (P, 6) in rad, as :func:`er3a.kinematics.forward.frames` has
+    them for one robot without tool; entry 6 is the flange."""
     out = np.empty((len(tables), len(q), 7, 4, 4))
     none = np.zeros((len(tables), 1))
-    shifted = tables.modified[:, None]
-    a = np.where(shifted, np.hstack([tables.a, none]), np.hstack([none, tables.a]))
-    alpha = np.where(shifted, np.hstack([tables.alpha, none]), np.hstack([none, tables.alpha]))
+    before = tables.modified[:, None]
+    across = (
+        np.where(before, np.hstack([column, none]), np.hstack([none, column]))
+        for column in (tables.a, tables.alpha, tables.beta)
+    )
     d = np.hstack([none, tables.d])
-    _fill_frames(np.ascontiguousarray(base), a, alpha, d, tables.direction, tables.offset, q, out)
+    _fill_frames(np.ascontiguousarray(base), *across, d, tables.direction, tables.offset, q, out)
     return out
 
 
 @kernel
-def _fill_frames(base, a, alpha, d, direction, offset, q, out):
+def _fill_frames(base, a, alpha, beta, d, direction, offset, q, out):
     links = np.zeros((7, 4, 4))
     for h in range(out.shape[0]):
         for k in range(7):
             c, s = np.cos(alpha[h, k]), np.sin(alpha[h, k])
-            links[k, 0, 0], links[k, 0, 3] = 1.0, a[h, k]
-            links[k, 1, 1], links[k, 1, 2] = c, -s
-            links[k, 2, 1], links[k, 2, 2], links[k, 2, 3] = s, c, d[h, k]
+            cb, sb = np.cos(beta[h, k]), np.sin(beta[h, k])
+            links[k, 0, 0], links[k, 0, 2], links[k, 0, 3] = cb, sb, a[h, k]
+            links[k, 1, 0], links[k, 1, 1], links[k, 1, 2] = s * sb, c, -s * cb
+            links[k, 2, 0], links[k, 2, 1], links[k, 2, 2], links[k, 2, 3] = -c * sb, s, c * cb, d[h, k]
         start = rows_of(base)
         for p in range(q.shape[0]):
             x, y, z = step_row(start[0], links[0]), step_row(start[1], links[0]), step_row(start[2], links[0])

@@ -1,0 +1,1 @@
+"""Corrections to a table's entries from measured positions, with their uncertainty."""

@@ -1,0 +1,25 @@
+"""Joint angles spread evenly over the limits, without randomness.
+
+The additive recurrence R_d: x_n = n (1/g, 1/g^2, ...) mod 1, where g is the root of g^(d+1) = g + 1 [1]_.
+
+References
+----------
+.. [1] M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+ROUNDS = 64
+
+
+def spread(lower: np.ndarray, upper: np.ndarray, count: int) -> np.ndarray:
+    """Points (count, d) in the box between ``lower`` and ``upper`` (d,)."""
+    d = len(lower)
+    g = 1.5
+    for _ in range(ROUNDS):
+        g = (1 + g) ** (1 / (d + 1))
+    steps = g ** -np.arange(1.0, d + 1)
+    share = (0.5 + np.arange(1, count + 1)[:, None] * steps) % 1.0
+    return lower + share * (upper - lower)

@@ -1,0 +1,104 @@
+"""Circle point analysis: turn one joint at a time, and find its axis from the circle that a carried point runs on.
+
+This is how a real arm's axes are measured with a tracker [1]_; here the model runs through the same procedure, so that
+what is compared with the maker's axis lines is what the model does and not what its table says.
+
+References
+----------
+.. [1] B. W. Mooring, Z. S. Roth, M. R. Driels, *Fundamentals of Manipulator Calibration*, Wiley 1991, section 5.3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from er3a.kinematics.forward import forward, frames
+from er3a.references.quantities import MM, AxisLines
+from er3a.robots.robot import Robot
+
+OFF_EVERY_AXIS_MM = 100.0
+TRIED_OFFSETS_MM = (200.0, 400.0, 800.0, 1600.0)
+STATIONS = 25
+LEAST_TURN, MOST_TURN = np.pi / 2, 2 * np.pi
+
+
+@dataclass(frozen=True, eq=False)
+class CirclePoints:
+    """Axes found from circles.
+
+    Attributes
+    ----------
+    axes : direction of positive rotation and the circle's centre, per joint
+    radius_mm : (6,), of the circles
+    roundness_mm : (6,), greatest distance of a track's point from its circle
+    offset_mm : (3,), the carried point in the flange's frame
+    """
+
+    axes: AxisLines
+    radius_mm: np.ndarray
+    roundness_mm: np.ndarray
+    offset_mm: np.ndarray
+
+
+def circle_points(robot: Robot) -> CirclePoints:
+    """Turn each joint through its limits (a quarter turn at least, a full one at most), the others at 0."""
+    offset = carried_point(robot)
+    fits = [fit_circle(_track(robot, joint, offset)) for joint in range(6)]
+    direction, centre, radius, roundness = (np.array(part) for part in zip(*fits))
+    return CirclePoints(AxisLines(direction, centre), radius, roundness, offset)
+
+
+def carried_point(robot: Robot) -> np.ndarray:
+    """A point (3,) in mm in the flange's frame that is at least 100 mm off every axis in the zero pose."""
+    T = frames(robot.without_tool(), np.zeros(6))
+    ways = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    offsets = np.concatenate([ways * length for length in TRIED_OFFSETS_MM])
+    points = T[6, :3, 3] + (offsets / MM) @ T[6, :3, :3].T
+    across = np.cross(T[:6, None, :3, 2], points - T[:6, None, :3, 3])
+    least = np.linalg.norm(across, axis=-1).min(axis=0) * MM
+    by_length = least.reshape(len(TRIED_OFFSETS_MM), -1)
+    length = int(np.argmax(by_length.max(axis=1) >= OFF_EVERY_AXIS_MM))
+    return offsets[length * len(ways) + int(np.argmax(by_length[length]))]
+
+
+def fit_circle(track: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, float]:
+    """Plane by singular values, then centre and radius in it by linear least squares (Kasa 1976).
+
+    Parameters
+    ----------
+    track : (N, 3), points in order
+
+    Returns
+    -------
+    normal : (3,), unit vector about which the points run right-handed
+    centre : (3,)
+    radius, roundness : radius, and the greatest distance of a point from the circle
+    """
+    middle = track.mean(axis=0)
+    basis = np.linalg.svd(track - middle)[2]
+    normal = basis[2]
+    x, y = ((track - middle) @ basis[:2].T).T
+    system = np.column_stack([2 * x, 2 * y, np.ones_like(x)])
+    (cx, cy, rest), *_ = np.linalg.lstsq(system, x**2 + y**2, rcond=None)
+    centre = middle + np.array([cx, cy]) @ basis[:2]
+    radius = float(np.sqrt(rest + cx**2 + cy**2))
+    spokes = track - centre
+    if np.einsum("ij,j->i", np.cross(spokes[:-1], spokes[1:]), normal).sum() < 0:
+        normal = -normal
+    height = spokes @ normal
+    across = np.linalg.norm(spokes - height[:, None] * normal, axis=1)
+    return normal, centre, radius, float(np.hypot(height, across - radius).max())
+
+
+def _track(robot: Robot, joint: int, offset_mm: np.ndarray) -> np.ndarray:
+    """The carried point's positions (N, 3) in mm while one joint turns from its lower to its upper limit."""
+    lower, upper = sorted((robot.lower[joint], robot.upper[joint]))
+    middle, turn = (lower + upper) / 2, np.clip(upper - lower, LEAST_TURN, MOST_TURN)
+    q = np.zeros((STATIONS, 6))
+    q[:, joint] = middle + np.linspace(-turn / 2, turn / 2, STATIONS)
+    T = forward(robot.without_tool(), q)
+    return T[:, :3, 3] * MM + T[:, :3, :3] @ offset_mm

@@ -1,0 +1,177 @@
+"""The diagnosis names the fault that a table has, and says when it can't."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import er3a
+from er3a.diagnosis.mutations import Mutation, mutations_of, noisy, try_mutation
+from er3a.diagnosis.ranking import rank, usable
+from er3a.errors import InputError
+from er3a.references.load import load_references
+from er3a.references.reference import expected_of
+from er3a.robots.conventions import to_modified
+from er3a.robots.load import load_robot
+
+TRUSTED = ("er3a_c60", "er3_600")
+
+
+def changed(name: str, **entries) -> er3a.Robot:
+    """A robot with single entries changed: ``column=(joint, value)``."""
+    robot = load_robot(name)
+    for column, (joint, value) in entries.items():
+        robot = robot.replace(**{column: np.where(np.arange(1, 7) == joint, value, getattr(robot, column))})
+    return robot
+
+
+def test_the_articles_zero_pose_lacks_an_offset_on_joint_2():
+    first, second = er3a.diagnose(load_robot("er3a_c60_article"), "er3a_c60_article")[:2]
+    assert first.hypothesis == "joint 2: offset -90 deg missing; residual falls from 1433 mm to 0.0 mm"
+    assert first.explains
+    assert first.indistinguishable_from == ()
+    assert first.residual_before == pytest.approx(np.hypot(777.21 - 650, 819.77 + 607.44), abs=1e-6)
+    assert second.residual_after > 0.5
+    assert not second.explains
+
+
+def test_no_fault_or_two_makes_the_article_the_real_arm():
+    ranked = er3a.diagnose(load_robot("er3a_c60_article"), "er3a_c60")
+    assert not any(hypothesis.explains for hypothesis in ranked)
+    assert min(hypothesis.residual_after for hypothesis in ranked) > 300
+
+
+@pytest.mark.parametrize("name", TRUSTED)
+def test_a_right_table_gets_no_diagnosis(name):
+    assert er3a.diagnose(load_robot(name), name) == []
+    assert er3a.diagnose(to_modified(load_robot(name)), name) == []
+
+
+@pytest.mark.parametrize(
+    ("entries", "named"),
+    [
+        ({"offset": (2, 0.0)}, "joint 2: offset -90 deg missing"),
+        ({"offset": (3, np.pi)}, "joint 3: offset is 180 deg, 0 deg fits"),
+        ({"direction": (3, 1.0)}, "joint 3: direction reversed"),
+        ({"alpha": (3, np.pi / 2)}, "joint 3: alpha has the wrong sign (90 deg given, -90 deg fits)"),
+        ({"a": (3, 0.0)}, "joint 3: a missing, 70 mm fits"),
+        ({"d": (6, 0.0)}, "joint 6: d missing, 78.5 mm fits"),
+        ({"d": (4, 0.3015)}, "joint 4: d is 301.5 mm, 299 mm fits"),
+        ({"lower": (3, np.radians(75))}, "joint 3: lower limit has the wrong sign"),
+    ],
+)
+def test_single_faults_are_named_in_words(entries, named):
+    first = er3a.diagnose(changed("er3a_c60", **entries), "er3a_c60")[0]
+    assert named in (*first.faults, *first.indistinguishable_from)
+    assert first.explains
+
+
+def test_unit_swap_scale_and_convention_are_named():
+    robot = load_robot("er3a_c60")
+    modified = to_modified(robot)
+    for faulty, named in (
+        (robot.replace(a=robot.a / 1000), "column a: metres read as millimetres (1000 times too small)"),
+        (robot.replace(alpha=np.radians(robot.alpha)), "column alpha: radians read as degrees (57.3 times too small)"),
+        (robot.replace(a=robot.d, d=robot.a), "columns a and d are swapped"),
+        (robot.replace(a=robot.a * 1.05, d=robot.d * 1.05), "all lengths: scale wrong, times 0.952381 fits"),
+        (modified.replace(convention="standard"), "the table is a modified one, read as standard"),
+        (robot.replace(lower=np.radians(robot.lower), upper=np.radians(robot.upper)), "joint limits: radians read"),
+        (robot.replace(lower=robot.upper, upper=robot.lower), "every joint: limits crossed"),
+    ):
+        ranked = er3a.diagnose(faulty, "er3a_c60")
+        assert any(named in fault for fault in (*ranked[0].faults, *ranked[0].indistinguishable_from)), named
+
+
+def test_two_faults_are_found_together():
+    faulty = changed("er3a_c60", offset=(2, 0.0), d=(6, 0.0))
+    first = er3a.diagnose(faulty, "er3a_c60")[0]
+    assert set(first.faults) == {"joint 2: offset -90 deg missing", "joint 6: d missing, 78.5 mm fits"}
+    np.testing.assert_allclose(first.repaired.d, load_robot("er3a_c60").d, atol=1e-5)
+
+
+def test_a_tool_in_the_robots_file_does_not_count():
+    tool = np.eye(4)
+    tool[:3, 3] = 0.0, 0.05, 0.2
+    assert er3a.diagnose(load_robot("er3_600").replace(tool=tool), "er3_600") == []
+
+
+def test_what_references_cannot_tell_apart_is_named_with_what_would_decide():
+    """Parallel axes 2 and 3: a sideways shift may stand in either row."""
+    first = er3a.diagnose(changed("er3_600", d=(2, 0.02)), "er3_600")[0]
+    named = {*first.faults, *first.indistinguishable_from}
+    assert "joint 2: d is 20 mm, 0 mm fits" in named
+    assert any("joint 3: d" in words for words in named)
+    assert first.to_decide == "nothing can, they are the same arm written in different ways"
+
+
+def test_members_of_a_set_differ_by_less_than_the_uncertainty_everywhere():
+    ranking = rank(changed("er3_600", alpha=(4, -np.pi / 2)), load_references("er3_600"))
+    _, uncertainty = expected_of(ranking.references)
+    assert len(ranking.groups[0]) > 1
+    for group in ranking.groups:
+        difference = ranking.pool.difference[list(group)]
+        assert (np.ptp(difference, axis=0) < uncertainty).all()
+
+
+@pytest.mark.parametrize("name", TRUSTED)
+def test_noise_raises_no_alarm(name, random):
+    """Neither noise that the references own up to, nor ten times more than they say."""
+    stated = usable(load_references(name))
+    for _ in range(20):
+        honest = noisy(stated, 0.5, random)
+        assert er3a.diagnose(load_robot(name), honest) == []
+    silent = [replace(loud, uncertainty=r.uncertainty) for r, loud in zip(stated, honest)]
+    assert er3a.diagnose(load_robot(name), silent) == []
+
+
+def some_mutations(name: str) -> list[Mutation]:
+    """Every tenth mutation, so that each family is there."""
+    return list(mutations_of(load_robot(name)))[::10]
+
+
+@pytest.mark.parametrize("noise_mm", [0.0, 0.5])
+@pytest.mark.parametrize("name", TRUSTED)
+def test_faults_that_references_see_are_ranked_first(name, noise_mm, random):
+    robot, stated = load_robot(name), usable(load_references(name))
+    outcomes = [
+        try_mutation(robot, mutation, noisy(stated, noise_mm, random) if noise_mm else stated, noise_mm)
+        for mutation in some_mutations(name)
+    ]
+    seen = [outcome for outcome in outcomes if outcome.identifiable]
+    assert len(seen) > 0.85 * len(outcomes)
+    assert [outcome.fault for outcome in seen if not outcome.found] == []
+    assert np.median([outcome.set_size for outcome in seen]) == 1
+
+
+def test_a_hypothesis_costs_microseconds():
+    robot = load_robot("er3a_c60_article")
+    references = load_references("er3a_c60")
+    er3a.diagnose(robot, references)
+    start = time.perf_counter()
+    ranking = rank(robot, references)
+    assert (time.perf_counter() - start) / len(ranking.pool.faults) < 1e-3
+
+
+def test_too_few_references_leave_many_hypotheses_and_say_what_to_measure():
+    stated = [r for r in usable(load_references("er3a_c60")) if r.name == "zero pose: flange z"][:1]
+    first = er3a.diagnose(changed("er3a_c60", d=(1, 0.2)), stated)[0]
+    assert len(first.indistinguishable_from) > 5
+    assert "flange's position at joints" in first.to_decide
+
+
+def test_an_unknown_reference_set_is_one_clear_error():
+    with pytest.raises(InputError, match="er3a_c60"):
+        er3a.diagnose(load_robot("er3_600"), "er4")
+
+
+def test_references_that_contradict_each_other_accuse_no_table():
+    robot = load_robot("er3_600")
+    stated = usable(load_references("er3_600"))
+    flange = next(r for r in stated if r.name == "zero pose: flange x")
+    rumour = replace(flange, expected=flange.expected + 10, source="another catalogue")
+    assert er3a.diagnose(robot, (*stated, rumour)) == []
+    faulty = er3a.diagnose(changed("er3_600", offset=(2, 0.0)), (*stated, rumour))
+    assert faulty[0].faults == ("joint 2: offset -90 deg missing",)
