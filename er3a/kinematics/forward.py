@@ -11,8 +11,12 @@ import numpy as np
 
 from er3a.errors import ShapeError
 from er3a.kinematics.chain import JOINTS, constant_links
+from er3a.kinematics.fast_math import LARGEST_ANGLE, cos_sin
 from er3a.kinematics.jit import kernel
 from er3a.robots.robot import Robot
+
+BLOCK = 64
+_COS, _SIN = 12, 13  # rows of scratch memory behind the 3 x 4 entries of a block of poses
 
 
 def forward(robot: Robot, q: np.ndarray, frame: int | None = None, out: np.ndarray | None = None) -> np.ndarray:
@@ -123,16 +127,55 @@ def write_rows(x, y, z, out):
 
 
 @kernel
+def _cos_sin_rows(q, direction, offset, start, k, rows):
+    """Cosines and sines of joint ``k`` for a block, as rows 12 and 13; poses past the end repeat the last."""
+    sign, zero, far = direction[k], offset[k], False
+    for i in range(BLOCK):
+        rows[_COS * BLOCK + i] = q[min(start + i, q.shape[0] - 1), k]
+    for i in range(BLOCK):
+        angle = sign * rows[_COS * BLOCK + i] + zero
+        c, s = cos_sin(angle)
+        rows[_COS * BLOCK + i], rows[_SIN * BLOCK + i] = c, s
+        far = far | (abs(angle) > LARGEST_ANGLE)
+    if far:
+        for i in range(BLOCK):
+            angle = sign * q[min(start + i, q.shape[0] - 1), k] + zero
+            rows[_COS * BLOCK + i], rows[_SIN * BLOCK + i] = np.cos(angle), np.sin(angle)
+
+
+@kernel
 def _forward(q, direction, offset, links, out):
-    for n in range(q.shape[0]):
-        x, y, z = rows_of(links[0])
+    rows = np.empty((_SIN + 1) * BLOCK)
+    for start in range(0, q.shape[0], BLOCK):
+        _fill_start(rows, links[0])
         for k in range(links.shape[0] - 1):
-            angle, link = direction[k] * q[n, k] + offset[k], links[k + 1]
-            c, s = np.cos(angle), np.sin(angle)
-            x = step_row(turn_row(x, c, s), link)
-            y = step_row(turn_row(y, c, s), link)
-            z = step_row(turn_row(z, c, s), link)
-        write_rows(x, y, z, out[n])
+            _cos_sin_rows(q, direction, offset, start, k, rows)
+            _turn_and_step(rows, links[k + 1])
+        for i in range(min(BLOCK, q.shape[0] - start)):
+            for r in range(3):
+                for c in range(4):
+                    out[start + i, r, c] = rows[(4 * r + c) * BLOCK + i]
+            out[start + i, 3, 0], out[start + i, 3, 1], out[start + i, 3, 2] = 0.0, 0.0, 0.0
+            out[start + i, 3, 3] = 1.0
+
+
+@kernel
+def _turn_and_step(rows, link):
+    """Multiply a block of transforms by Rz of the block's cosines and sines and by a constant transform."""
+    a, b, c, x = link[0, 0], link[0, 1], link[0, 2], link[0, 3]
+    d, e, f, y = link[1, 0], link[1, 1], link[1, 2], link[1, 3]
+    g, h, k, z = link[2, 0], link[2, 1], link[2, 2], link[2, 3]
+    for r in range(3):
+        row = rows[4 * r * BLOCK : (4 * r + 4) * BLOCK]
+        angle = rows[_COS * BLOCK :]
+        for i in range(BLOCK):
+            cosine, sine = angle[i], angle[BLOCK + i]
+            p, s, t = row[i], row[BLOCK + i], row[2 * BLOCK + i]
+            p, s = p * cosine + s * sine, s * cosine - p * sine
+            row[i] = p * a + s * d + t * g
+            row[BLOCK + i] = p * b + s * e + t * h
+            row[2 * BLOCK + i] = p * c + s * f + t * k
+            row[3 * BLOCK + i] += p * x + s * y + t * z
 
 
 @kernel
@@ -150,21 +193,43 @@ def _frames(q, direction, offset, links, out):
 
 @kernel
 def _jacobian(q, direction, offset, links, out):
-    for n in range(q.shape[0]):
-        J = out[n]
-        x, y, z = rows_of(links[0])
+    rows, columns = np.empty((_SIN + 1) * BLOCK), np.empty((6, 6 * BLOCK))
+    for start in range(0, q.shape[0], BLOCK):
+        _fill_start(rows, links[0])
         for k in range(6):
             # Until the tool point is known, the linear rows hold a point on the axis.
-            J[0, k], J[1, k], J[2, k] = x[3], y[3], z[3]
-            J[3, k], J[4, k], J[5, k] = x[2] * direction[k], y[2] * direction[k], z[2] * direction[k]
-            angle, link = direction[k] * q[n, k] + offset[k], links[k + 1]
-            c, s = np.cos(angle), np.sin(angle)
-            x = step_row(turn_row(x, c, s), link)
-            y = step_row(turn_row(y, c, s), link)
-            z = step_row(turn_row(z, c, s), link)
+            _keep_axis(rows, direction[k], columns[k])
+            _cos_sin_rows(q, direction, offset, start, k, rows)
+            _turn_and_step(rows, links[k + 1])
         for k in range(6):
-            rx, ry, rz = x[3] - J[0, k], y[3] - J[1, k], z[3] - J[2, k]
-            wx, wy, wz = J[3, k], J[4, k], J[5, k]
-            J[0, k] = wy * rz - wz * ry
-            J[1, k] = wz * rx - wx * rz
-            J[2, k] = wx * ry - wy * rx
+            _lever(rows, columns[k])
+        for i in range(min(BLOCK, q.shape[0] - start)):
+            for r in range(6):
+                for k in range(6):
+                    out[start + i, r, k] = columns[k, r * BLOCK + i]
+
+
+@kernel
+def _fill_start(rows, link):
+    for r in range(3):
+        for c in range(4):
+            rows[(4 * r + c) * BLOCK : (4 * r + c + 1) * BLOCK] = link[r, c]
+
+
+@kernel
+def _keep_axis(rows, sign, column):
+    """A point on the joint's axis, and the axis in the sense of the maker's angle."""
+    for r in range(3):
+        for i in range(BLOCK):
+            column[r * BLOCK + i] = rows[(4 * r + 3) * BLOCK + i]
+            column[(3 + r) * BLOCK + i] = rows[(4 * r + 2) * BLOCK + i] * sign
+
+
+@kernel
+def _lever(rows, column):
+    """The tool point's velocity: axis times arm from the axis to the tool point."""
+    for i in range(BLOCK):
+        x, y, z = rows[3 * BLOCK + i], rows[7 * BLOCK + i], rows[11 * BLOCK + i]
+        x, y, z = x - column[i], y - column[BLOCK + i], z - column[2 * BLOCK + i]
+        wx, wy, wz = column[3 * BLOCK + i], column[4 * BLOCK + i], column[5 * BLOCK + i]
+        column[i], column[BLOCK + i], column[2 * BLOCK + i] = wy * z - wz * y, wz * x - wx * z, wx * y - wy * x

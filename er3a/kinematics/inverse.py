@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
-from er3a.errors import Er3aError, PoseError, ShapeError
-from er3a.kinematics.closed_form import BOUNDARY_M, OFF_AXIS, ORIENTATION, REACHED, SLOTS, TOO_FAR
+from er3a.errors import Er3aError, NotWristPartitionedError, PoseError, ShapeError
+from er3a.kinematics.branch import branch_labels
+from er3a.kinematics.closed_form import FREE, OFF_AXIS, ORIENTATION, REACHED, TOO_FAR
+from er3a.kinematics.families import Family, families
 from er3a.kinematics.forward import checked_joints
+from er3a.kinematics.numerical import all_found
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.transforms import check_poses
+from er3a.kinematics.turns import TURN, limit_reason, nearest_turns, principal, turn_bounds, within
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from er3a.robots.robot import Robot
 
-LIMIT_TOLERANCE = 1e-9
 SAME_JOINTS = 1e-9
-TURN = 2 * np.pi
+SAME_MEMBER = 1e-6
 MOST_ROWS = 10_000
+STARTS = 400
+CLOSED_FORM = "closed form"
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,10 +34,14 @@ class Solutions:
     ----------
     q : (n, 6), rad, maker's angles; each branch once per turn that the limits allow, or once if it leaves them
     within_limits : (n,) bool
-    branch : (n,) int, slot ``4 * shoulder + 2 * elbow + wrist`` (words: :func:`branch_labels`)
+    branch : (n,) int, slot ``4 * shoulder + 2 * elbow + wrist``; for arms without a closed form, the number of the arm
+        found
+    label : n texts, the branch in words
     turn : (n, 6) int, full turns added to the angle in (-pi, pi]
     reason : n texts; empty for rows within the limits, else which limits they leave and by how much
     unsolved : per shoulder side without solution, why (both sides: the pose can't be reached)
+    families : continua of solutions, where a joint can turn with the tool at rest
+    method : ``closed form``, or how the arm was solved instead and why
     """
 
     q: np.ndarray
@@ -41,119 +50,106 @@ class Solutions:
     turn: np.ndarray
     reason: tuple[str, ...]
     unsolved: tuple[str, ...]
+    families: tuple[Family, ...] = ()
+    label: tuple[str, ...] = ()
+    method: str = CLOSED_FORM
 
 
 def inverse(robot: Robot, T: np.ndarray, q_ref: np.ndarray | None = None) -> Solutions:
-    """All closed-form solutions of a wrist-partitioned arm for one pose of the tool.
+    """All joint solutions of one pose of the tool: in closed form for a wrist-partitioned arm, else by iteration.
+
+    Where a joint is free, the member of each family within the limits that is nearest to ``q_ref`` is among the rows,
+    and for the branch that meets there the one half a turn further.
 
     Parameters
     ----------
     T : (4, 4), T_base_tool, m
-    q_ref : (6,), rad; where a joint is free (aligned wrist, wrist centre on axis 1) it keeps this value, and rows of a
-        branch come nearest turn first. None means zeros.
+    q_ref : (6,), rad, what members of families and turns are chosen by: rows of a branch come nearest turn first. None
+        means zeros.
 
     Raises
     ------
     ShapeError, PoseError
         if T is no rigid transform, or q_ref no six finite numbers
-    NotWristPartitionedError
-        if the arm has no closed form here
     """
     T = check_poses(T)
     if T.shape != (4, 4):
         raise ShapeError("T", T.shape, "(4, 4)")
-    q_ref = np.zeros(6) if q_ref is None else checked_joints(q_ref, "q_ref")
-    if q_ref.shape != (6,):
-        raise ShapeError("q_ref", q_ref.shape, "(6,)")
-    if not np.isfinite(q_ref).all():
-        raise PoseError("q_ref holds NaN or infinity")
-    q, fault, gap = (batch[0] for batch in solve_slots(robot, T[None], q_ref[None]))
+    q_ref = checked_reference(q_ref)
+    try:
+        wrist_partitioned_arm(robot)
+    except NotWristPartitionedError as error:
+        return _by_iteration(robot, T, q_ref, error.property_missing)
+    q, fault, gap = (batch[0] for batch in solve_slots(robot, T[None], q_ref[None], apart=True, twins=True))
+    continua = families(robot, T, q, q_ref)
+    q = _free_joints_near(robot, T, q, q_ref, continua)
 
     slots: list[int] = []
     for slot in np.flatnonzero(fault == REACHED):
         if not any(np.abs(principal(q[slot] - q[other])).max() < SAME_JOINTS for other in slots):
             slots.append(slot)
     rows = [_rows_of_branch(robot, q[slot], q_ref) for slot in slots]
-    solutions = np.concatenate([np.empty((0, 6)), *rows])
-    inside = within(robot, solutions)
+    for family in continua:
+        if family.within_limits and np.abs(np.concatenate(rows) - family.q0).max(axis=1).min() > SAME_MEMBER:
+            slots.append(family.branches[0])
+            rows.append(family.q0[None])
+    labels = branch_labels(robot)
+    return _judged(robot, slots, rows, labels, unsolved=_unsolved(robot, fault, gap), families=continua)
+
+
+def _judged(robot: Robot, branches: list[int], rows: list[np.ndarray], labels: Sequence[str], **rest) -> Solutions:
+    """Solutions from the rows of each branch, with the limits' verdict."""
+    q = np.concatenate([np.empty((0, 6)), *rows])
+    branch = np.repeat(np.array(branches, dtype=int), [len(turns) for turns in rows])
+    inside = within(robot, q)
     return Solutions(
-        q=solutions,
+        q=q,
         within_limits=inside,
-        branch=np.repeat(np.array(slots, dtype=int), [len(turns) for turns in rows]),
-        turn=np.round((solutions - principal(solutions)) / TURN).astype(int),
-        reason=tuple("" if ok else limit_reason(robot, row) for row, ok in zip(solutions, inside)),
-        unsolved=_unsolved(robot, fault, gap),
+        branch=branch,
+        turn=np.round((q - principal(q)) / TURN).astype(int),
+        reason=tuple("" if ok else limit_reason(robot, row) for row, ok in zip(q, inside)),
+        label=tuple(labels[number] for number in branch),
+        **rest,
     )
 
 
-def within(robot: Robot, q: np.ndarray) -> np.ndarray:
-    """Whether joint angles (..., 6) in rad lie within the limits, to 1e-9 rad; shape (...,)."""
-    return (np.maximum(q - robot.upper, robot.lower - q) <= LIMIT_TOLERANCE).all(axis=-1)
+def _by_iteration(robot: Robot, T: np.ndarray, q_ref: np.ndarray, lacking: str) -> Solutions:
+    arms, first = all_found(robot, T, STARTS)
+    rows = [_rows_of_branch(robot, q, q_ref) for q in arms]
+    labels = [f"arm {number + 1}" for number in range(len(arms))]
+    method = f"iteration from {STARTS} random starts, which may miss solutions; no closed form, because {lacking}"
+    unsolved = () if len(arms) else (str(first.reason),)
+    return _judged(robot, list(range(len(arms))), rows, labels, unsolved=unsolved, method=method)
 
 
-def principal(q: np.ndarray) -> np.ndarray:
-    """The same angles in (-pi, pi]."""
-    return q - TURN * np.ceil((q - np.pi) / TURN)
+def checked_reference(q_ref: np.ndarray | None) -> np.ndarray:
+    """Reference joint angles (6,), zeros for None; :class:`ShapeError` or :class:`PoseError` if they are none."""
+    q_ref = np.zeros(6) if q_ref is None else checked_joints(q_ref, "q_ref")
+    if q_ref.shape != (6,):
+        raise ShapeError("q_ref", q_ref.shape, "(6,)")
+    if not np.isfinite(q_ref).all():
+        raise PoseError("q_ref holds NaN or infinity")
+    return q_ref
 
 
-def nearest_turns(robot: Robot, q: np.ndarray, q_ref: np.ndarray) -> np.ndarray:
-    """The same arm poses (..., 6) by the turns nearest to q_ref within the limits, else by those nearest to them."""
-    near = q + TURN * np.round((q_ref - q) / TURN)
-    low, high = _turn_bounds(robot, near)
-    inside = near + TURN * np.clip(0, low, np.maximum(low, high))
-    below, above = near + TURN * (low - 1), near + TURN * low
-    outside = np.where(robot.lower - below < above - robot.upper, below, above)
-    return np.where(low <= high, inside, outside)
-
-
-def limit_reason(robot: Robot, q: np.ndarray) -> str:
-    """Which limits the angles (6,) leave, and by how many degrees; empty if none."""
-    parts = []
-    for j, angle in enumerate(q):
-        for excess, side, limit in (
-            (angle - robot.upper[j], "above", robot.upper[j]),
-            (robot.lower[j] - angle, "below", robot.lower[j]),
-        ):
-            if excess > LIMIT_TOLERANCE:
-                at, by, bound = np.degrees([angle, excess, limit])
-                parts.append(f"J{j + 1} at {at:.1f} deg is {by:.3g} deg {side} its limit of {bound:g} deg")
-    return "; ".join(parts)
-
-
-@lru_cache(maxsize=256)
-def branch_labels(robot: Robot) -> tuple[str, ...]:
-    """The eight slots in words.
-
-    *front*: the wrist centre is on the side of axis 1 where it stands in the maker's zero pose (if it stands on axis 1
-    there, the side of the cross product of axes 1 and 2); *back*: reached over the head. *up*: with the arm stretched
-    out level on that side, the elbow is above the line from shoulder to wrist. *flip*: the wrist root with the
-    negative angle.
-    """
-    arm = wrist_partitioned_arm(robot)
-    w1, w2 = arm.axes[0], arm.axes[1]
-    forward_root = -1.0  # slot 0 has theta_1 = phi + delta: the wrist lies against w1 x w2
-    at_zero = determinant_factors(robot, np.zeros(6)).shoulder
-    zero_side = 1.0 if abs(at_zero) < BOUNDARY_M else np.sign(at_zero)
-    labels = []
-    for slot in range(SLOTS):
-        side = forward_root * (1.0 if slot < 4 else -1.0)
-        outward = side * np.cross(w1, w2)
-        bend = 1.0 if slot % 4 < 2 else -1.0
-        up = bend * (np.cross(w2, outward) @ w1) < 0
-        shoulder = "front" if side == zero_side else "back"
-        labels.append(f"{shoulder}, elbow {'up' if up else 'down'}, {'flip' if slot % 2 else 'no flip'}")
-    return tuple(labels)
-
-
-def _turn_bounds(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Least and greatest number of turns to add so that each angle lies within its limits (least > greatest: none)."""
-    low = np.ceil((robot.lower - LIMIT_TOLERANCE - q) / TURN)
-    high = np.floor((robot.upper + LIMIT_TOLERANCE - q) / TURN)
-    return low, high
+def _free_joints_near(
+    robot: Robot, T: np.ndarray, q: np.ndarray, q_ref: np.ndarray, continua: tuple[Family, ...]
+) -> np.ndarray:
+    """The slots (8, 6) with free joints where their nearest family has them."""
+    factors = determinant_factors(robot, q)
+    exact = {"wrist": np.abs(factors.wrist) < FREE, "shoulder": np.abs(factors.shoulder) < FREE}
+    exact["elbow"] = np.ones(len(q), dtype=bool)
+    reference, moved = np.tile(q_ref, (len(q), 1)), np.zeros(len(q), dtype=bool)
+    for family in reversed(continua):
+        for slot in family.branches:
+            if exact[family.kind][slot]:
+                reference[slot], moved[slot] = family.q0, True
+    again = solve_slots(robot, np.broadcast_to(T, (len(q), 4, 4)), reference, apart=True, twins=True)[0]
+    return np.where(moved[:, None], again[np.arange(len(q)), np.arange(len(q))], q)
 
 
 def _rows_of_branch(robot: Robot, q: np.ndarray, q_ref: np.ndarray) -> np.ndarray:
-    low, high = _turn_bounds(robot, q)
+    low, high = turn_bounds(robot, q)
     if (low > high).any():
         return nearest_turns(robot, q, q_ref)[None]
     if np.prod(high - low + 1) > MOST_ROWS:

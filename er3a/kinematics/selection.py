@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.kinematics.inverse import Solutions, branch_labels
+from er3a.kinematics.branch import branch_labels
+from er3a.kinematics.inverse import Solutions
 from er3a.robots.robot import Robot
 
 NEAREST_RULE = (

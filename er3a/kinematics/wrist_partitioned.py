@@ -12,8 +12,9 @@ from functools import lru_cache
 import numpy as np
 
 from er3a.errors import NotWristPartitionedError
+from er3a.kinematics.block_inverse import BlockConstants, block_constants
 from er3a.kinematics.chain import axes_at_zero_theta
-from er3a.kinematics.closed_form import BOUNDARY_M, SLOTS, ArmConstants, solve
+from er3a.kinematics.closed_form import APART, BOUNDARY_M, BOUNDARY_RAD, SLOTS, ArmConstants, solve
 from er3a.kinematics.vectors import Vector, signed_angle, unsigned_angle
 from er3a.robots.robot import Robot
 
@@ -110,6 +111,9 @@ def _constants(robot: Robot) -> ArmConstants:
     beside_6 = np.cross(arm.axes[5], np.eye(3)[np.argmin(np.abs(arm.axes[5]))])
     beside_6 /= np.linalg.norm(beside_6)
     upper_arm, forearm = _vector(arm.upper_arm), _vector(arm.forearm)
+    least = abs(arm.upper_arm_length - arm.forearm_length)
+    angle_45, angle_56 = float(unsigned_angle(w[3], w[4])), float(unsigned_angle(w[4], w[5]))
+    oblique = abs(angle_45 - angle_56) > BOUNDARY_RAD, abs(angle_45 + angle_56 - np.pi) > BOUNDARY_RAD
     return ArmConstants(
         axis_1=w[0],
         axis_2=w[1],
@@ -125,15 +129,18 @@ def _constants(robot: Robot) -> ArmConstants:
         axis_6_in_tool=_vector(arm.tool_rotation.T @ arm.axes[5]),
         beside_6_in_tool=_vector(arm.tool_rotation.T @ beside_6),
         reach=arm.wrist_reach,
-        least=abs(arm.upper_arm_length - arm.forearm_length),
+        least=least,
         cos_12=float(arm.axes[0] @ arm.axes[1]),
         sin_12=float(np.linalg.norm(np.cross(arm.axes[0], arm.axes[1]))),
         shoulder_offset=arm.shoulder_offset,
         elbow_sign=arm.elbow_sign,
         elbow_angle=float(signed_angle(upper_arm, forearm, w[1])),
         wrist_angle=float(signed_angle(w[3], w[5], w[4])),
-        angle_45=float(unsigned_angle(w[3], w[4])),
-        angle_56=float(unsigned_angle(w[4], w[5])),
+        angle_45=angle_45,
+        angle_56=angle_56,
+        folded_apart=APART * min(1.0, least / arm.forearm_length) if least > BOUNDARY_M else 0.0,
+        least_tilt_apart=APART if oblique[0] else 0.0,
+        most_tilt_apart=APART if oblique[1] else 0.0,
     )
 
 
@@ -141,13 +148,29 @@ def _vector(array: np.ndarray) -> Vector:
     return tuple(array.tolist())
 
 
-def solve_slots(robot: Robot, T: np.ndarray, q_ref: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+@lru_cache(maxsize=256)
+def constants_for_blocks(robot: Robot) -> BlockConstants:
+    """The arm as the kernel for many poses takes it.
+
+    Raises
+    ------
+    NotWristPartitionedError
+    """
+    arm = wrist_partitioned_arm(robot)
+    return block_constants(arm.axes, arm.points, arm.wrist, arm.tool_rotation, arm.wrist_in_tool, arm.elbow_sign)
+
+
+def solve_slots(
+    robot: Robot, T: np.ndarray, q_ref: np.ndarray, apart: bool = False, twins: bool = False
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """All branches for a batch of poses.
 
     Parameters
     ----------
     T : (N, 4, 4), T_base_tool, valid rigid transforms
     q_ref : (N, 6), rad; supplies the joint that is free where a continuum solves the pose
+    apart, twins : keep branches that meet at a fold, or where a joint is free, as two different rows (see
+        :mod:`closed_form`); else both are one
 
     Returns
     -------
@@ -160,5 +183,5 @@ def solve_slots(robot: Robot, T: np.ndarray, q_ref: np.ndarray) -> tuple[np.ndar
     fault = np.zeros((count, SLOTS), dtype=np.int8)
     gap = np.zeros((count, SLOTS))
     T, q_ref = np.ascontiguousarray(T), np.ascontiguousarray(q_ref)
-    solve(_constants(robot), robot.direction, robot.offset, T, q_ref, q, fault, gap)
+    solve(_constants(robot), robot.direction, robot.offset, T, q_ref, apart, twins, q, fault, gap)
     return q, fault, gap

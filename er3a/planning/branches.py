@@ -16,8 +16,8 @@ import numpy as np
 
 from er3a.kinematics.closed_form import REACHED, SLOTS
 from er3a.kinematics.forward import frames
-from er3a.kinematics.inverse import principal
 from er3a.kinematics.singularity import determinant_factors
+from er3a.kinematics.turns import principal
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from er3a.planning.moves import Line
 from er3a.robots.robot import Robot

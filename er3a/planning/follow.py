@@ -22,8 +22,8 @@ import numpy as np
 
 from er3a.errors import PoseError
 from er3a.kinematics.closed_form import SLOTS
-from er3a.kinematics.inverse import LIMIT_TOLERANCE, TURN, nearest_turns, within
 from er3a.kinematics.jit import kernel
+from er3a.kinematics.turns import LIMIT_TOLERANCE, TURN, nearest_turns, within
 from er3a.planning.branches import WIDE_STEP, Branches, branches_along, turned_difference
 from er3a.planning.followed import Followed, Jump
 from er3a.planning.moves import Line

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from er3a.kinematics.inverse import LIMIT_TOLERANCE, inverse
+from er3a.kinematics.inverse import inverse
+from er3a.kinematics.turns import LIMIT_TOLERANCE
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.planning.followed import Followed
 from er3a.planning.singular_events import Joints, runs

@@ -9,8 +9,8 @@ import numpy as np
 from er3a.errors import InputError
 from er3a.inputs.yaml_file import load
 from er3a.kinematics.transforms import transform
-from er3a.robots.robot import Robot, Source
-from er3a.robots.schema import Placement, RobotFile
+from er3a.robots.robot import Envelope, Robot, Source
+from er3a.robots.schema import Envelopes, Placement, RobotFile
 
 DATA = Path(__file__).resolve().parents[2] / "data"
 ROBOTS = DATA / "robots"
@@ -45,7 +45,7 @@ def robot_path(name_or_path: str | Path) -> Path:
 
 def robot_of(content: RobotFile) -> Robot:
     """The model behind a checked file: metres and radians."""
-    groups = ("dh", "zero", "limits", "speeds", "base", "tool")
+    groups = ("dh", "zero", "limits", "speeds", "base", "tool", "envelopes")
     present = {group: getattr(content, group) for group in groups if getattr(content, group) is not None}
     speeds = [row.speed_deg_s for row in content.speeds.rows] if content.speeds else [np.nan] * 6
     return Robot(
@@ -65,8 +65,17 @@ def robot_of(content: RobotFile) -> Robot:
         tool=placement_transform(content.tool),
         zero_pose=content.zero_pose,
         references=tuple(content.references),
+        envelopes=_envelopes(content.envelopes),
         sources={group: Source(value.source, value.grade) for group, value in present.items()},
     )
+
+
+def _envelopes(group: Envelopes | None) -> tuple[Envelope, ...]:
+    def metres(values: list[float]) -> tuple[float, float, float]:
+        return tuple(value / 1000 for value in values)
+
+    capsules = group.capsules if group else []
+    return tuple(Envelope(c.link, metres(c.from_mm), metres(c.to_mm), c.radius_mm / 1000) for c in capsules)
 
 
 def placement_transform(placement: Placement | None) -> np.ndarray:

@@ -30,6 +30,22 @@ class Source:
     grade: Grade
 
 
+@dataclass(frozen=True)
+class Envelope:
+    """A capsule around a link, for clearance: all points within ``radius`` (m) of a line from ``start`` to ``end``.
+
+    Attributes
+    ----------
+    link : 0 for the base, 1..6 for the link that joint 1..6 turns (the tool belongs to 6)
+    start, end : points (m) in the frame on that joint's axis that turns with it; for link 0 in the base's frame
+    """
+
+    link: int
+    start: tuple[float, float, float]
+    end: tuple[float, float, float]
+    radius: float
+
+
 @dataclass(frozen=True, eq=False)
 class Robot:
     """A six-revolute serial arm. SI units; angles are in rad, arrays are read-only.
@@ -49,7 +65,8 @@ class Robot:
     base : (4, 4), T_world_base; tool : (4, 4), T_flange_tool
     zero_pose : what the arm looks like at q = 0, in words
     references : names of the reference sets (folders of data/manual_refs) that it is checked against
-    sources : per group of values ("dh", "zero", "limits", "speeds", "base", "tool") its source and grade
+    envelopes : capsules around the links; empty where the file gives none
+    sources : per group of values ("dh", "zero", "limits", "speeds", "base", "tool", "envelopes") its source and grade
     """
 
     name: str
@@ -68,6 +85,7 @@ class Robot:
     tool: np.ndarray = field(default_factory=lambda: np.eye(4))
     zero_pose: str = ""
     references: tuple[str, ...] = ()
+    envelopes: tuple[Envelope, ...] = ()
     sources: Mapping[str, Source] = field(default_factory=dict)
 
     def __post_init__(self):

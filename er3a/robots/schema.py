@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from er3a.inputs.yaml_file import StrictModel
 from er3a.robots.robot import Grade
@@ -94,6 +94,28 @@ class SourcedPlacement(Placement, Sourced):
     pass
 
 
+class Capsule(StrictModel):
+    """All points within ``radius_mm`` of the line between two points, in the frame that turns with joint ``link``."""
+
+    link: Annotated[int, Field(ge=0, le=6)]
+    from_mm: Triple
+    to_mm: Triple
+    radius_mm: Annotated[float, Field(ge=SHORTEST_PLAIN_LENGTH_MM, le=LONGEST_LENGTH_MM)]
+
+    @field_validator("from_mm", "to_mm")
+    @classmethod
+    def _plain_lengths(cls, values):
+        if 0 < max(map(abs, values)) < SHORTEST_PLAIN_LENGTH_MM:
+            raise ValueError(f"{values} mm can only be metres | Multiply by 1000")
+        return values
+
+
+class Envelopes(Sourced):
+    """Capsules around links and tool, for clearance."""
+
+    capsules: Annotated[list[Capsule], Field(min_length=1, max_length=100)]
+
+
 class RobotFile(StrictModel):
     """A robot file: data/robots/NAME.yaml."""
 
@@ -108,6 +130,7 @@ class RobotFile(StrictModel):
     speeds: Speeds | None = None
     base: SourcedPlacement | None = None
     tool: SourcedPlacement | None = None
+    envelopes: Envelopes | None = None
 
     @model_validator(mode="before")
     @classmethod

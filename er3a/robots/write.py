@@ -57,6 +57,17 @@ def robot_file(robot: Robot) -> RobotFile:
     }
     if np.isfinite(robot.speed).all():
         content["speeds"] = sourced("speeds") | {"rows": rows(speed_deg_s=np.degrees(robot.speed))}
+    if robot.envelopes:
+        capsules = [
+            {
+                "link": envelope.link,
+                "from_mm": [_tidy(value * 1000) for value in envelope.start],
+                "to_mm": [_tidy(value * 1000) for value in envelope.end],
+                "radius_mm": _tidy(envelope.radius * 1000),
+            }
+            for envelope in robot.envelopes
+        ]
+        content["envelopes"] = sourced("envelopes") | {"capsules": capsules}
     for key in ("base", "tool"):
         T = getattr(robot, key)
         if not np.array_equal(T, np.eye(4)):

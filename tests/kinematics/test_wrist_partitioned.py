@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import NotWristPartitionedError
+from er3a.kinematics.branch import branch_labels
 from er3a.kinematics.closed_form import OFF_AXIS, ORIENTATION, TOO_FAR, TOO_NEAR
 from er3a.kinematics.forward import forward, frames
-from er3a.kinematics.inverse import branch_labels, inverse
+from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from tests.kinematics.arms import DEG, joints_at_random, make_arm, number, placement, pose_errors
 
@@ -179,7 +180,7 @@ def test_the_text_for_a_wrist_that_can_t_tilt_far_enough():
 def test_other_arms_are_told_what_they_lack(change, lacks):
     arm = make_arm(**change)
     with pytest.raises(NotWristPartitionedError, match=f"^made: no closed-form inverse, because {lacks}") as caught:
-        inverse(arm, forward(arm, np.full(6, 0.3)))
+        wrist_partitioned_arm(arm)
     assert caught.value.property_missing.startswith(lacks)
 
 

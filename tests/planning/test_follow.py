@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from er3a.errors import PoseError
 from er3a.kinematics.forward import forward, jacobian
-from er3a.kinematics.inverse import nearest_turns, within
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.transforms import transform
+from er3a.kinematics.turns import nearest_turns, within
 from er3a.planning.follow import follow
 from er3a.planning.intervals import out_of_limits, too_fast, unreachable
 from er3a.planning.moves import JointMove, line

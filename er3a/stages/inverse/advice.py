@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from er3a.kinematics.inverse import nearest_turns, within
+from er3a.kinematics.turns import nearest_turns, within
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.robots.robot import Robot
 

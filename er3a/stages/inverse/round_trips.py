@@ -8,8 +8,8 @@ import numpy as np
 
 from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.forward import forward
-from er3a.kinematics.inverse import nearest_turns, principal, within
 from er3a.kinematics.transforms import rotation_angle
+from er3a.kinematics.turns import nearest_turns, principal, within
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.robots.robot import Robot
 

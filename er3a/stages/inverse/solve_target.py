@@ -8,12 +8,14 @@ import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
+from er3a.kinematics.branch import branch_labels
 from er3a.kinematics.closed_form import ORIENTATION
 from er3a.kinematics.forward import forward
-from er3a.kinematics.inverse import LIMIT_TOLERANCE, Solutions, branch_labels, inverse
+from er3a.kinematics.inverse import Solutions, inverse
 from er3a.kinematics.selection import Choice, limit_margin, nearest
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
 from er3a.kinematics.transforms import rotation_angle, rpy_of
+from er3a.kinematics.turns import LIMIT_TOLERANCE
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.robots.robot import Robot
 from er3a.stages.inverse.advice import Neighbours, neighbours
@@ -169,13 +171,13 @@ def _what_to_know(row: pd.Series) -> list[str]:
     texts = []
     if "wrist" in row["singular"]:
         texts.append(
-            "Wrist singularity: axes 4 and 6 lie in one line, so J4 and J6 can be traded against one another without "
-            "end; J4 stays where the reference has it. Leave this pose by a joint move, not along a straight line."
+            "Wrist singularity: axes 4 and 6 lie in one line, so J4 and J6 can be traded against one another; the "
+            "pair nearest to the reference is taken. Leave this pose by a joint move, not along a straight line."
         )
     if "elbow" in row["singular"]:
         texts.append("Elbow singularity: the arm is stretched or folded; it can't move further along itself.")
     if "shoulder" in row["singular"]:
-        texts.append("Shoulder singularity: the wrist centre is on axis 1, so J1 is free; it stays at the reference.")
+        texts.append("Shoulder singularity: the wrist centre is on axis 1, so J1 is free while the wrist follows.")
     if row["limit_margin_deg"] < LITTLE_MARGIN_DEG:
         texts.append(f"Little room: one joint is {row['limit_margin_deg']:.2g} deg from its limit.")
     return texts

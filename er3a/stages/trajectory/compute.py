@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from er3a.kinematics.inverse import within
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
+from er3a.kinematics.turns import within
 from er3a.planning.path_file import load_paths
 from er3a.results import Figure, Verdict, write_summary, write_table
 from er3a.robots.robot import Robot

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from er3a.kinematics.inverse import branch_labels
+from er3a.kinematics.branch import branch_labels
 from er3a.planning.intervals import Interval, out_of_limits, too_fast, unreachable
 from er3a.planning.singular_events import SingularEvent, singular_events
 from er3a.robots.robot import Robot

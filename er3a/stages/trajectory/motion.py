@@ -11,8 +11,8 @@ from scipy.integrate import cumulative_simpson
 from scipy.interpolate import CubicHermiteSpline
 
 from er3a.errors import InputError, PoseError
+from er3a.kinematics.branch import branch_labels
 from er3a.kinematics.forward import forward, jacobian
-from er3a.kinematics.inverse import branch_labels
 from er3a.kinematics.transforms import transform
 from er3a.planning.follow import follow
 from er3a.planning.followed import Followed

@@ -8,9 +8,9 @@ import numpy as np
 
 from er3a.errors import NotWristPartitionedError
 from er3a.kinematics.forward import forward
-from er3a.kinematics.inverse import principal
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.transforms import rotation_angle
+from er3a.kinematics.turns import principal
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from er3a.robots.robot import Robot
 from er3a.stages.validation.checks import Check, against_itself, nothing_to_compare

@@ -1,0 +1,57 @@
+"""Capsules around the links: those of the robot's file, else a default from its table.
+
+The default puts a capsule around each straight piece of a link, along its joint's axis and across to the next. Its
+radius is a share of the arm's size (the sum of all link lengths): 5.5 % at the shoulder, falling to 3 % at the wrist,
+which is about how thick small industrial arms are: an estimate. The column below axis 2 counts as base.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from er3a.kinematics.chain import ALONG_Z, JOINTS, TO_NEXT_AXIS, link_parts
+from er3a.kinematics.forward import frames
+from er3a.robots.robot import Envelope, Robot
+
+BASE, TOOL_LINK = 0, 6
+RADIUS_SHARES = (0.055, 0.055, 0.05, 0.045, 0.04, 0.035, 0.03)
+SHORTEST = 1e-6
+
+
+def envelopes_of(robot: Robot) -> tuple[Envelope, ...]:
+    """The file's capsules, or the default ones."""
+    return robot.envelopes or default_envelopes(robot)
+
+
+def default_envelopes(robot: Robot) -> tuple[Envelope, ...]:
+    """Capsules along the table's link lengths (see the module's text)."""
+    size = float(np.abs(robot.a).sum() + np.abs(robot.d).sum())
+    parts, found = link_parts(robot), []
+    for k in range(JOINTS):
+        along = parts[k + 1, ALONG_Z, :3, 3]
+        across = along + parts[k + 1, TO_NEXT_AXIS, :3, 3]
+        if k == 0:
+            found += _pieces(BASE, size, [(np.zeros(3), along)])
+            found += _pieces(1, size, [(along, across)])
+        else:
+            found += _pieces(k + 1, size, [(np.zeros(3), along), (along, across)])
+    tool = np.linalg.inv(frames(robot, np.zeros(6))[5]) @ frames(robot, np.zeros(6))[6]
+    found += _pieces(TOOL_LINK, size, [(across, tool[:3, 3])])
+    return tuple(found)
+
+
+def capsule_poses(robot: Robot, capsules: tuple[Envelope, ...], q: np.ndarray) -> np.ndarray:
+    """End points (..., n, 2, 3) of the capsules' lines in the base's surroundings, m, at joint angles (..., 6)."""
+    T = frames(robot, q)
+    base = np.broadcast_to(robot.base, (*T.shape[:-3], 1, 4, 4))
+    T = np.concatenate([base, T[..., :JOINTS, :, :]], axis=-3)[..., [c.link for c in capsules], :, :]
+    ends = np.array([(c.start, c.end) for c in capsules])
+    return np.einsum("...nij,nkj->...nki", T[..., :3, :3], ends) + T[..., None, :3, 3]
+
+
+def _pieces(link: int, size: float, lines: list[tuple[np.ndarray, np.ndarray]]) -> list[Envelope]:
+    return [
+        Envelope(link, tuple(start.tolist()), tuple(end.tolist()), RADIUS_SHARES[link] * size)
+        for start, end in lines
+        if np.linalg.norm(end - start) > SHORTEST
+    ]

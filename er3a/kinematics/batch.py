@@ -1,0 +1,120 @@
+"""All joint solutions of many poses in one array."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from er3a.errors import PoseError, ShapeError
+from er3a.kinematics.block_inverse import BLOCK, count_turns, solve_blocks
+from er3a.kinematics.closed_form import REACHED, SLOTS
+from er3a.kinematics.forward import checked_joints
+from er3a.kinematics.transforms import check_poses
+from er3a.kinematics.turns import nearest_turns, within
+from er3a.kinematics.wrist_partitioned import constants_for_blocks, solve_slots
+from er3a.robots.robot import Robot
+
+SMALLEST_SHARE = 16 * BLOCK
+
+
+@dataclass(frozen=True, eq=False)
+class BatchSolutions:
+    """Joint solutions of N poses, one slot for each branch.
+
+    Attributes
+    ----------
+    q : (N, 8, 6), rad, maker's angles; NaN in empty slots. Slot ``4 * shoulder + 2 * elbow + wrist``; of the turns
+        within the limits the nearest to the reference, else the nearest to the limits
+    valid : (N, 8) bool, whether the slot has a solution
+    within_limits : (N, 8) bool, whether it is within the limits by any turn
+    turns : (N, 8, 6, 2) int8, least and greatest number of whole turns that can be added to each joint within its
+        limits (least above greatest: none); None unless asked for
+    """
+
+    q: np.ndarray
+    valid: np.ndarray
+    within_limits: np.ndarray
+    turns: np.ndarray | None = None
+
+
+def inverse_batch(
+    robot: Robot, T: np.ndarray, q_ref: np.ndarray | None = None, turns: bool = False, threads: int = 1
+) -> BatchSolutions:
+    """All closed-form solutions of a wrist-partitioned arm for many poses of the tool.
+
+    At a singularity both branches that meet keep their slots: a free joint has its value of ``q_ref`` in one and half a
+    turn more in the other. The numbers do not depend on the number of threads, nor on a pose's place in the batch.
+
+    Parameters
+    ----------
+    T : (N, 4, 4), T_base_tool, m
+    q_ref : (6,) or (N, 6), rad, what turns and free joints are chosen by; None means zeros
+    turns : also tell in how many turns each joint can stand
+    threads : how many to use
+
+    Raises
+    ------
+    ShapeError, PoseError
+        naming the first pose that is no rigid transform, or the wrong shape
+    NotWristPartitionedError
+        if the arm has no closed form here
+    """
+    arm = constants_for_blocks(robot)
+    T = np.ascontiguousarray(T, dtype=float)
+    if T.ndim != 3 or T.shape[1:] != (4, 4):
+        raise ShapeError("T", T.shape, "(N, 4, 4)")
+    reference = _checked_reference(q_ref, len(T))
+    count = len(T)
+    q = np.empty((count, SLOTS, 6))
+    valid, inside = np.empty((count, SLOTS), dtype=bool), np.empty((count, SLOTS), dtype=bool)
+    rigid, marked = np.empty(count, dtype=bool), np.empty(count, dtype=bool)
+
+    def solve(part: slice) -> None:
+        own = reference if len(reference) == 1 else reference[part]
+        rows = (q[part], valid[part], inside[part], rigid[part], marked[part])
+        solve_blocks(arm, robot.direction, robot.offset, robot.lower, robot.upper, T[part], own, *rows)
+
+    parts = _parts(count, threads)
+    if len(parts) > 1:
+        with ThreadPoolExecutor(len(parts)) as pool:
+            list(pool.map(solve, parts))
+    else:
+        solve(slice(None))
+    if not rigid.all():
+        check_poses(T)
+    left = np.flatnonzero(marked)
+    if left.size:
+        own = np.broadcast_to(reference, (count, 6))[left]
+        found, fault, _ = solve_slots(robot, T[left], own, apart=True, twins=True)
+        q[left] = nearest_turns(robot, found, own[:, None])
+        valid[left] = fault == REACHED
+        inside[left] = within(robot, q[left])
+    return BatchSolutions(q, valid, inside, _turns(robot, q) if turns else None)
+
+
+def _checked_reference(q_ref: np.ndarray | None, count: int) -> np.ndarray:
+    """Reference joints (1 or N, 6)."""
+    reference = checked_joints(np.zeros(6) if q_ref is None else q_ref, "q_ref")
+    if reference.shape not in ((6,), (count, 6)):
+        raise ShapeError("q_ref", reference.shape, f"(6,) or ({count}, 6)")
+    reference = reference.reshape(-1, 6)
+    bad = np.flatnonzero(~np.isfinite(reference).all(axis=1))
+    if bad.size:
+        raise PoseError(f"q_ref{f'[{bad[0]}]' if len(reference) > 1 else ''} holds NaN or infinity")
+    return reference
+
+
+def _parts(count: int, threads: int) -> list[slice]:
+    """Even shares, none too small to be worth a thread."""
+    shares = max(1, min(threads, count // SMALLEST_SHARE))
+    ends = [count * k // shares for k in range(shares + 1)]
+    return [slice(start, end) for start, end in pairwise(ends)]
+
+
+def _turns(robot: Robot, q: np.ndarray) -> np.ndarray:
+    turns = np.empty((*q.shape, 2), dtype=np.int8)
+    count_turns(q.reshape(-1, 6), robot.lower, robot.upper, turns.reshape(-1, 6, 2))
+    return turns

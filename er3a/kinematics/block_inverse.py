@@ -1,0 +1,400 @@
+"""The closed form again, for many poses at once: the same steps as :mod:`closed_form`, over blocks of poses.
+
+A block holds one number of ``BLOCK`` poses per row, so that each loop is straight-line arithmetic that becomes vector
+instructions. Joint angles are taken from points (cosine, sine) by one arctangent each; no sine or cosine is evaluated.
+The arm is put into frames in which most constants vanish:
+
+- frame 1: z on axis 1, x across axes 1 and 2, the origin at the foot of axis 2's point;
+- the plane across axis 2: first direction x of frame 1, turned so that axis 2 is its normal;
+- the wrist as ``Rz(phi_4) Rx(b) Rz(phi_5) Rx(-c) Rz(phi_6)``, b and c the angles between axes 4, 5 and 5, 6.
+
+Poses at or next to a singularity or the edge of reach are marked and left to :mod:`closed_form`, which knows about free
+joints, boundaries and why a pose is refused.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from er3a.kinematics.fast_math import arctan2
+from er3a.kinematics.jit import kernel
+from er3a.kinematics.transforms import ORTHONORMAL_TOLERANCE
+from er3a.kinematics.turns import LIMIT_TOLERANCE, TURN
+from er3a.kinematics.vectors import Vector
+
+BLOCK = 64
+NEAR = 1e-6  # m or rad from where a joint becomes free
+PER_TURN = 1 / TURN
+EDGE = 2e-9  # m or rad from where two branches meet or end
+
+# Rows of scratch memory; a row holds one number of each pose of the block. Offsets are constants, so that the compiler
+# sees that rows don't overlap.
+_Z6, _X6, _PLANE, _MARK, _RIGID, _POSE_ROWS = 12, 15, 18, 19, 20, 21  # the pose itself (3 x 4) comes first
+_COS_1, _SIN_1, _ACROSS, _BEND, _COS_BEND, _SIN_BEND, _REACHED, _SIDE_ROWS = range(8)
+_VALID, _WITHIN, _PAIR_ROWS = 12, 13, 15  # two slots of a wrist: six angles each, whether solved, each within limits
+
+
+class BlockConstants(NamedTuple):
+    """What the block kernel takes of an arm; lengths in m, angles in rad.
+
+    ``to_frame_1`` and ``origin`` place frame 1, ``*_in_tool`` are vectors in the tool frame, ``point_2`` is the point
+    on axis 2 in the plane across it, ``sideways`` the wrist centre's constant component along axis 2. ``turn_2``,
+    ``turn_3``, ``turn_4``, ``turn_5`` are what the geometric angles have too much. ``lean`` is the angle between axis 4
+    and the plane across axis 2; ``edges`` tells whether the wrist's tilt ends before 0 and before pi.
+    """
+
+    to_frame_1: tuple[Vector, Vector, Vector]
+    origin: Vector
+    wrist_in_tool: Vector
+    axis_6_in_tool: Vector
+    beside_6_in_tool: Vector
+    cos_12: float
+    sin_12: float
+    point_2: tuple[float, float]
+    sideways: float
+    upper_arm: float
+    forearm: float
+    elbow_sign: float
+    turn_2: float
+    turn_3: float
+    turn_4: float
+    turn_5: float
+    cos_forearm: float
+    sin_forearm: float
+    cos_lean: float
+    sin_lean: float
+    cos_45: float
+    sin_45: float
+    cos_56: float
+    sin_56: float
+    half_sum: tuple[float, float]
+    half_difference: tuple[float, float]
+    sin_difference: float
+    edges: tuple[float, float]
+
+
+@kernel
+def solve_blocks(arm, direction, offset, lower, upper, T, q_ref, q, valid, within, rigid, marked):
+    """Solve poses ``T`` (N, 4, 4).
+
+    Fills ``q`` (N, 8, 6), the maker's angles by the turns within the limits that are nearest to ``q_ref`` (N or 1, 6),
+    NaN where a slot has no solution, and per slot ``valid`` and ``within`` the limits (N, 8). ``rigid`` (N,) tells
+    which poses are rigid transforms, ``marked`` (N,) which are left to the careful solver.
+    """
+    pose, sides = np.empty(_POSE_ROWS * BLOCK), np.empty((2, _SIDE_ROWS * BLOCK))
+    pairs, reference = np.empty((4, _PAIR_ROWS * BLOCK)), np.empty(6 * BLOCK)
+    for start in range(0, T.shape[0], BLOCK):
+        size = min(BLOCK, T.shape[0] - start)
+        for i in range(BLOCK):
+            n = start + min(i, size - 1)
+            for r in range(3):
+                for c in range(4):
+                    pose[(4 * r + c) * BLOCK + i] = T[n, r, c]
+            last = abs(T[n, 3, 0]) + abs(T[n, 3, 1]) + abs(T[n, 3, 2]) + abs(T[n, 3, 3] - 1.0)
+            pose[_RIGID * BLOCK + i] = last
+        if start == 0 or q_ref.shape[0] > 1:
+            for i in range(BLOCK):
+                n = min(start + min(i, size - 1), q_ref.shape[0] - 1)
+                for j in range(6):
+                    reference[j * BLOCK + i] = q_ref[n, j]
+        _check(pose)
+        _shoulder(arm, pose, sides[0], sides[1])
+        for pair in range(4):
+            side = sides[pair // 2]
+            if pair % 2 == 0:
+                _elbow(arm, pose, side)
+            _wrist(arm, pose, side, 1.0 - 2.0 * (pair % 2), pairs[pair])
+            _as_the_maker_counts(direction, offset, lower, upper, reference, pairs[pair])
+            for i in range(size):
+                for row in range(6):
+                    q[start + i, 2 * pair, row] = pairs[pair, row * BLOCK + i]
+                    q[start + i, 2 * pair + 1, row] = pairs[pair, (6 + row) * BLOCK + i]
+                for k in range(2):
+                    valid[start + i, 2 * pair + k] = pairs[pair, _VALID * BLOCK + i] > 0.0
+                    within[start + i, 2 * pair + k] = pairs[pair, (_WITHIN + k) * BLOCK + i] > 0.0
+        for i in range(size):
+            rigid[start + i] = pose[_RIGID * BLOCK + i] > 0.0
+            marked[start + i] = pose[_MARK * BLOCK + i] > 0.0
+
+
+@kernel
+def _check(w):
+    """1 where the pose is a rigid transform, to the tolerances of ``transforms.check_poses``."""
+    for i in range(BLOCK):
+        a, b, c, x = w[i], w[BLOCK + i], w[2 * BLOCK + i], w[3 * BLOCK + i]
+        d, e, f, y = w[4 * BLOCK + i], w[5 * BLOCK + i], w[6 * BLOCK + i], w[7 * BLOCK + i]
+        g, h, k, z = w[8 * BLOCK + i], w[9 * BLOCK + i], w[10 * BLOCK + i], w[11 * BLOCK + i]
+        first, second, third = a * a + b * b + c * c - 1.0, d * d + e * e + f * f - 1.0, g * g + h * h + k * k - 1.0
+        off_1, off_2, off_3 = a * d + b * e + c * f, a * g + b * h + c * k, d * g + e * h + f * k
+        volume = a * (e * k - f * h) + b * (f * g - d * k) + c * (d * h - e * g)
+        straight = (abs(first) <= ORTHONORMAL_TOLERANCE) & (abs(second) <= ORTHONORMAL_TOLERANCE)
+        straight = straight & (abs(third) <= ORTHONORMAL_TOLERANCE) & (abs(off_1) <= ORTHONORMAL_TOLERANCE)
+        straight = straight & (abs(off_2) <= ORTHONORMAL_TOLERANCE) & (abs(off_3) <= ORTHONORMAL_TOLERANCE)
+        placed = (abs(x) < np.inf) & (abs(y) < np.inf) & (abs(z) < np.inf) & (w[_RIGID * BLOCK + i] <= 1e-12)
+        w[_RIGID * BLOCK + i] = 1.0 if straight & placed & (volume > 0.0) else 0.0
+
+
+@kernel
+def _as_the_maker_counts(direction, offset, lower, upper, reference, pair):
+    """Angles theta into maker's angles by the nearest turn within the limits; see ``turns.nearest_turns``."""
+    for i in range(BLOCK):
+        pair[_WITHIN * BLOCK + i] = pair[_VALID * BLOCK + i]
+        pair[(_WITHIN + 1) * BLOCK + i] = pair[_VALID * BLOCK + i]
+    for k in range(2):
+        for j in range(6):
+            row = (6 * k + j) * BLOCK
+            sign, zero, least, most = direction[j], offset[j], lower[j], upper[j]
+            inside = (_WITHIN + k) * BLOCK
+            for i in range(BLOCK):
+                angle = sign * (pair[row + i] - zero)
+                near = angle - TURN * np.floor((angle - reference[j * BLOCK + i]) * PER_TURN + 0.5)
+                low = np.ceil((least - LIMIT_TOLERANCE - near) * PER_TURN)
+                high = np.floor((most + LIMIT_TOLERANCE - near) * PER_TURN)
+                fits = low <= high
+                turns = low if low > 0.0 else high if high < 0.0 else 0.0
+                below = near + TURN * (low - 1.0)
+                above = near + TURN * low
+                outside = below if least - below < above - most else above
+                chosen = near + TURN * turns if fits else outside
+                pair[inside + i] = pair[inside + i] if fits else 0.0
+                pair[row + i] = chosen if pair[_VALID * BLOCK + i] > 0.0 else np.nan
+
+
+@kernel
+def count_turns(q, lower, upper, turns):
+    """Least and greatest number of turns (n, 6, 2) to add to angles (n, 6) within the limits; 0 and -1 for NaN."""
+    for n in range(q.shape[0]):
+        for j in range(6):
+            low = np.ceil((lower[j] - LIMIT_TOLERANCE - q[n, j]) * PER_TURN)
+            high = np.floor((upper[j] + LIMIT_TOLERANCE - q[n, j]) * PER_TURN)
+            known = q[n, j] == q[n, j]
+            turns[n, j, 0], turns[n, j, 1] = np.int8(low if known else 0.0), np.int8(high if known else -1.0)
+
+
+@kernel
+def _in_frame_1(rows, x, y, z):
+    a, b, c = rows
+    return (
+        a[0] * x + a[1] * y + a[2] * z,
+        b[0] * x + b[1] * y + b[2] * z,
+        c[0] * x + c[1] * y + c[2] * z,
+    )
+
+
+@kernel
+def _shoulder(arm, w, near, far):
+    """Wrist centre and wrist axes in frame 1; both roots of theta_1."""
+    for i in range(BLOCK):
+        t00, t01, t02, t03 = w[i], w[BLOCK + i], w[2 * BLOCK + i], w[3 * BLOCK + i]
+        t10, t11, t12, t13 = w[4 * BLOCK + i], w[5 * BLOCK + i], w[6 * BLOCK + i], w[7 * BLOCK + i]
+        t20, t21, t22, t23 = w[8 * BLOCK + i], w[9 * BLOCK + i], w[10 * BLOCK + i], w[11 * BLOCK + i]
+        a, b, c = arm.wrist_in_tool
+        vx, vy, vz = _in_frame_1(
+            arm.to_frame_1,
+            t00 * a + t01 * b + t02 * c + (t03 - arm.origin[0]),
+            t10 * a + t11 * b + t12 * c + (t13 - arm.origin[1]),
+            t20 * a + t21 * b + t22 * c + (t23 - arm.origin[2]),
+        )
+        a, b, c = arm.axis_6_in_tool
+        x, y, z = t00 * a + t01 * b + t02 * c, t10 * a + t11 * b + t12 * c, t20 * a + t21 * b + t22 * c
+        w[_Z6 * BLOCK + i], w[(_Z6 + 1) * BLOCK + i], w[(_Z6 + 2) * BLOCK + i] = _in_frame_1(arm.to_frame_1, x, y, z)
+        a, b, c = arm.beside_6_in_tool
+        x, y, z = t00 * a + t01 * b + t02 * c, t10 * a + t11 * b + t12 * c, t20 * a + t21 * b + t22 * c
+        w[_X6 * BLOCK + i], w[(_X6 + 1) * BLOCK + i], w[(_X6 + 2) * BLOCK + i] = _in_frame_1(arm.to_frame_1, x, y, z)
+
+        k = (arm.sideways - arm.cos_12 * vz) / arm.sin_12
+        square = vx * vx + vy * vy
+        radius = np.sqrt(square)
+        spare = radius - abs(k)
+        ahead = np.sqrt(max(spare * (radius + abs(k)), 0.0))
+        per = 1.0 / square
+        w[_PLANE * BLOCK + i] = arm.cos_12 * k - arm.sin_12 * vz - arm.point_2[1]
+        w[_MARK * BLOCK + i] = 1.0 if (radius < NEAR) | (abs(spare) < EDGE) else 0.0
+        near[_COS_1 * BLOCK + i], near[_SIN_1 * BLOCK + i] = (vy * k + vx * ahead) * per, (vy * ahead - vx * k) * per
+        far[_COS_1 * BLOCK + i], far[_SIN_1 * BLOCK + i] = (vy * k - vx * ahead) * per, -(vy * ahead + vx * k) * per
+        near[_ACROSS * BLOCK + i] = ahead - arm.point_2[0]
+        far[_ACROSS * BLOCK + i] = -ahead - arm.point_2[0]
+        reached = 1.0 if spare > 0.0 else 0.0
+        near[_REACHED * BLOCK + i] = reached
+        far[_REACHED * BLOCK + i] = reached
+
+
+@kernel
+def _elbow(arm, w, side):
+    """The triangle of upper arm and forearm for one shoulder branch."""
+    longest, shortest = arm.upper_arm + arm.forearm, abs(arm.upper_arm - arm.forearm)
+    for i in range(BLOCK):
+        x, y = side[_ACROSS * BLOCK + i], w[_PLANE * BLOCK + i]
+        distance = np.sqrt(x * x + y * y)
+        far, near = longest - distance, distance - shortest
+        upper, lower = max(far * (longest + distance), 0.0), max(near * (distance + shortest), 0.0)
+        a, d, per = np.sqrt(upper), np.sqrt(lower), 1.0 / (upper + lower)
+        side[_BEND * BLOCK + i] = 2.0 * arctan2(a, d)
+        side[_COS_BEND * BLOCK + i] = (lower - upper) * per
+        side[_SIN_BEND * BLOCK + i] = 2.0 * a * d * per
+        reached = side[_REACHED * BLOCK + i]
+        edge = (abs(far) < EDGE) | (abs(near) < EDGE) | (distance < NEAR)
+        w[_MARK * BLOCK + i] = 1.0 if edge & (reached > 0.0) else w[_MARK * BLOCK + i]
+        side[_REACHED * BLOCK + i] = reached if (far > 0.0) & (near > 0.0) else 0.0
+
+
+@kernel
+def _wrist(arm, w, side, sign, pair):
+    """All angles of both wrist branches, for the elbow root of that sign."""
+    half_s, half_c = arm.half_sum
+    less_s, less_c = arm.half_difference
+    for i in range(BLOCK):
+        x, y = side[_ACROSS * BLOCK + i], w[_PLANE * BLOCK + i]
+        cos_bend, sin_bend = side[_COS_BEND * BLOCK + i], sign * side[_SIN_BEND * BLOCK + i]
+        along, beside = arm.upper_arm + arm.forearm * cos_bend, arm.forearm * sin_bend
+        c, s_ = x * along + y * beside, y * along - x * beside
+        per = 1.0 / np.sqrt(c * c + s_ * s_)
+        theta_2 = arctan2(s_, c) - arm.turn_2
+        theta_3 = arm.elbow_sign * (sign * side[_BEND * BLOCK + i] - arm.turn_3)
+        pair[BLOCK + i], pair[7 * BLOCK + i] = theta_2, theta_2
+        pair[2 * BLOCK + i], pair[8 * BLOCK + i] = theta_3, theta_3
+        # Direction of the forearm, then of axis 4, in the plane across axis 2.
+        c, s_ = c * per, s_ * per
+        c, s_ = c * cos_bend - s_ * sin_bend, s_ * cos_bend + c * sin_bend
+        c, s_ = c * arm.cos_forearm - s_ * arm.sin_forearm, s_ * arm.cos_forearm + c * arm.sin_forearm
+        theta_1 = arctan2(side[_SIN_1 * BLOCK + i], side[_COS_1 * BLOCK + i])
+        pair[i], pair[6 * BLOCK + i] = theta_1, theta_1
+        cos_1, sin_1 = side[_COS_1 * BLOCK + i], side[_SIN_1 * BLOCK + i]
+        zx, zy, zz = _undone(
+            arm, w[_Z6 * BLOCK + i], w[(_Z6 + 1) * BLOCK + i], w[(_Z6 + 2) * BLOCK + i], cos_1, sin_1, c, s_
+        )
+        xx, xy, xz = _undone(
+            arm, w[_X6 * BLOCK + i], w[(_X6 + 1) * BLOCK + i], w[(_X6 + 2) * BLOCK + i], cos_1, sin_1, c, s_
+        )
+        # Half the angle between axes 4 and 6 as a point, then half of phi_5 by the spherical triangle.
+        tilt = np.sqrt(zx * zx + zy * zy)
+        length = np.sqrt(tilt * tilt + zz * zz)
+        sum_ = length + abs(zz)
+        cos_half, sin_half = tilt if zz < 0.0 else sum_, sum_ if zz < 0.0 else tilt
+        upper = (cos_half * less_s + sin_half * less_c) * (sin_half * less_c - cos_half * less_s)
+        lower = (cos_half * half_s + sin_half * half_c) * (cos_half * half_s - sin_half * half_c)
+        edge = (abs(upper) < arm.edges[0] * sum_ * sum_) | (abs(lower) < arm.edges[1] * sum_ * sum_)
+        marked = (edge | (tilt < NEAR * length)) & (side[_REACHED * BLOCK + i] > 0.0)
+        w[_MARK * BLOCK + i] = 1.0 if marked else w[_MARK * BLOCK + i]
+        valid = side[_REACHED * BLOCK + i] if (upper > 0.0) & (lower > 0.0) else 0.0
+        pair[_VALID * BLOCK + i] = valid
+        upper, lower = max(upper, 0.0), max(lower, 0.0)
+        a, d, per = np.sqrt(upper), np.sqrt(lower), 1.0 / (upper + lower)
+        phi_5 = 2.0 * arctan2(a, d)
+        cos_5, sin_5 = (lower - upper) * per, 2.0 * a * d * per
+        py = arm.sin_difference - 2.0 * arm.cos_45 * arm.sin_56 * upper * per
+        px = -arm.sin_56 * sin_5
+        pair[4 * BLOCK + i], pair[10 * BLOCK + i] = phi_5 - arm.turn_5, -phi_5 - arm.turn_5
+        phi_4, phi_6 = _outer_angles(arm, zx, zy, xx, xy, xz, px, py, cos_5, sin_5)
+        pair[3 * BLOCK + i], pair[5 * BLOCK + i] = phi_4 - arm.turn_4, phi_6
+        phi_4, phi_6 = _outer_angles(arm, zx, zy, xx, xy, xz, -px, py, cos_5, -sin_5)
+        pair[9 * BLOCK + i], pair[11 * BLOCK + i] = phi_4 - arm.turn_4, phi_6
+
+
+@kernel
+def _undone(arm, x, y, z, cos_1, sin_1, c, s):
+    """A vector of frame 1 as the wrist sees it: turned back by the first three joints, z along axis 4."""
+    x, y = x * cos_1 + y * sin_1, y * cos_1 - x * sin_1
+    y, z = arm.cos_12 * y - arm.sin_12 * z, arm.sin_12 * y + arm.cos_12 * z
+    x, y = x * c + y * s, y * c - x * s
+    return arm.sin_lean * x - arm.cos_lean * z, y, arm.cos_lean * x + arm.sin_lean * z
+
+
+@kernel
+def _outer_angles(arm, zx, zy, xx, xy, xz, px, py, cos_5, sin_5):
+    """phi_4 turns (px, py) to axis 6 as seen along axis 4; phi_6 is what is left for the vector beside axis 6."""
+    c, s = zx * px + zy * py, zy * px - zx * py
+    per = 1.0 / np.sqrt(c * c + s * s)
+    phi_4 = arctan2(s, c)
+    c, s = c * per, s * per
+    x, y = xx * c + xy * s, xy * c - xx * s
+    y, z = y * arm.cos_45 + xz * arm.sin_45, xz * arm.cos_45 - y * arm.sin_45
+    x, y = x * cos_5 + y * sin_5, y * cos_5 - x * sin_5
+    return phi_4, arctan2(y * arm.cos_56 - z * arm.sin_56, x)
+
+
+def block_constants(
+    axes: np.ndarray,
+    points: np.ndarray,
+    wrist: np.ndarray,
+    tool_rotation: np.ndarray,
+    wrist_in_tool: np.ndarray,
+    elbow_sign: float,
+) -> BlockConstants:
+    """Constants of an arm given as its axis lines with all theta at 0 (see ``WristPartitionedArm``), base frame."""
+    w1, w2, w4, w5, w6 = (axes[k] for k in (0, 1, 3, 4, 5))
+    cos_12, sin_12 = w1 @ w2, np.linalg.norm(np.cross(w1, w2))
+    x1 = np.cross(w2, w1) / sin_12
+    frame_1 = np.stack([x1, np.cross(w1, x1), w1])
+    origin = points[0] + w1 * (w1 @ (points[1] - points[0]))
+    y2 = np.cross(w2, x1)
+    plane = np.stack([x1, y2])
+    upper_arm, forearm = plane @ (points[2] - points[1]), plane @ (wrist - points[2])
+    angle_upper, angle_forearm = np.arctan2(upper_arm[1], upper_arm[0]), np.arctan2(forearm[1], forearm[0])
+
+    level = plane @ w4
+    flat = np.linalg.norm(level)
+    level = level / flat if flat > 1e-9 else forearm / np.linalg.norm(forearm)
+    angle_4 = np.arctan2(level[1], level[0])
+    lean = np.arctan2(w4 @ w2, level @ plane @ w4)
+    f1 = level @ plane
+    g = np.stack([np.sin(lean) * f1 - np.cos(lean) * w2, np.cross(w2, f1), w4])
+    b, c = (np.arctan2(np.linalg.norm(np.cross(p, q)), p @ q) for p, q in ((w4, w5), (w5, w6)))
+    v = g @ w5
+    phi_4 = np.arctan2(v[0], -v[1])
+    v = _rx(-b) @ _rz(-phi_4) @ g @ w6
+    phi_5 = np.arctan2(-v[0], v[1])
+    end = g.T @ _rz(phi_4) @ _rx(b) @ _rz(phi_5) @ _rx(-c)
+    in_tool = tool_rotation.T @ end
+    half_sum, half_difference = (b + c) / 2, (b - c) / 2
+    return BlockConstants(
+        to_frame_1=tuple(map(_floats, frame_1)),
+        origin=_floats(origin),
+        wrist_in_tool=_floats(wrist_in_tool),
+        axis_6_in_tool=_floats(in_tool[:, 2]),
+        beside_6_in_tool=_floats(in_tool[:, 0]),
+        cos_12=_clean(cos_12),
+        sin_12=float(sin_12),
+        point_2=_floats(plane @ (points[1] - origin)),
+        sideways=_clean(w2 @ (wrist - origin)),
+        upper_arm=float(np.linalg.norm(upper_arm)),
+        forearm=float(np.linalg.norm(forearm)),
+        elbow_sign=float(elbow_sign),
+        turn_2=float(angle_upper),
+        turn_3=float(angle_forearm - angle_upper),
+        turn_4=float(phi_4),
+        turn_5=float(phi_5),
+        cos_forearm=_clean(np.cos(angle_4 - angle_forearm)),
+        sin_forearm=_clean(np.sin(angle_4 - angle_forearm)),
+        cos_lean=_clean(np.cos(lean)),
+        sin_lean=_clean(np.sin(lean)),
+        cos_45=_clean(np.cos(b)),
+        sin_45=float(np.sin(b)),
+        cos_56=_clean(np.cos(c)),
+        sin_56=float(np.sin(c)),
+        half_sum=(float(np.sin(half_sum)), _clean(np.cos(half_sum))),
+        half_difference=(_clean(np.sin(half_difference)), float(np.cos(half_difference))),
+        sin_difference=_clean(np.sin(c - b)),
+        edges=(EDGE if _clean(np.sin(half_difference)) else -1.0, EDGE if _clean(np.cos(half_sum)) else -1.0),
+    )
+
+
+def _floats(values: np.ndarray) -> tuple[float, ...]:
+    return tuple(_clean(value) for value in values)
+
+
+def _clean(value: float) -> float:
+    """Without the rounding noise of a right angle."""
+    return 0.0 if abs(value) < 1e-15 else float(value)
+
+
+def _rx(angle: float) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+
+
+def _rz(angle: float) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])

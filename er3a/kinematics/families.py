@@ -1,0 +1,215 @@
+"""Continua of joint solutions: where a joint can turn with the tool at rest.
+
+Three kinds exist for a wrist-partitioned arm, each a line or curve of solutions in joint space:
+
+- *wrist*: axes 4 and 6 in one line; joints 4 and 6 turn against each other, a straight line;
+- *shoulder*: the wrist centre on axis 1; joint 1 turns and the wrist follows;
+- *elbow*: upper arm and forearm of equal length folded onto each other; joint 2 turns and the wrist follows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from er3a.kinematics.aligned_wrist import (
+    SOLVES_M,
+    SOLVES_RAD,
+    aligned_arms,
+    arm_folds_fully,
+    wrist_centre_on_axis,
+    wrist_line,
+)
+from er3a.kinematics.closed_form import SLOTS
+from er3a.kinematics.forward import jacobian
+from er3a.kinematics.singularity import determinant_factors
+from er3a.kinematics.turns import LIMIT_TOLERANCE, TURN, nearest_turns, principal, within
+from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.robots.robot import Robot
+
+GRID = np.radians(2.0)
+BISECTIONS = 40
+SAME_FAMILY = 1e-8
+FREE_JOINT = {"shoulder": 0, "elbow": 1}
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """A continuum of solutions of one pose.
+
+    For kind *wrist* its members are ``q0 + t * direction``. For the others joint 1 (*shoulder*) or 2 (*elbow*) is that
+    of q0 plus t and the wrist follows on a curve with the tangent ``direction`` at q0;
+    :meth:`members` gives both.
+
+    Attributes
+    ----------
+    kind : wrist, shoulder or elbow
+    q0 : (6,), rad, the member nearest to the reference (least root of summed squares), within the limits if any is
+    direction : (6,), rad per rad of t
+    range : (2,), rad, least and greatest t whose members stay within the limits, all between them too; a full circle
+        if no member is within them
+    within_limits : whether any member is
+    branches : slots that the family belongs to
+    """
+
+    kind: str
+    q0: np.ndarray
+    direction: np.ndarray
+    range: np.ndarray
+    within_limits: bool
+    branches: tuple[int, ...]
+    robot: Robot
+    T: np.ndarray
+
+    def members(self, t: np.ndarray) -> np.ndarray:
+        """Joint angles (..., 6) in rad at parameters (...,)."""
+        t = np.asarray(t, float)
+        if self.kind == "wrist":
+            return self.q0 + t[..., None] * self.direction
+        joint = FREE_JOINT[self.kind]
+        q = _on_curve(self.robot, self.T, joint, self.q0[joint] + t.reshape(-1), self.q0, self.branches[0])
+        q = nearest_turns(self.robot, _nearest_wrists(self.robot, q, self.q0), self.q0)
+        q[:, joint] = self.q0[joint] + t.reshape(-1)
+        return q.reshape(*t.shape, 6)
+
+
+def families(robot: Robot, T: np.ndarray, q: np.ndarray, q_ref: np.ndarray) -> tuple[Family, ...]:
+    """All continua that solve a pose to 1e-9 m and rad, nearest to the reference first within each kind.
+
+    Parameters
+    ----------
+    T : (4, 4); q : (8, 6), rad, its closed-form solutions, NaN where a slot has none; q_ref : (6,), rad
+    """
+    found: list[Family] = []
+    for pair, on_line in aligned_arms(robot, T, q):
+        _add(found, _wrist_families(robot, T, on_line, q_ref, pair))
+    solved, slots = np.isfinite(q[:, 0]), np.arange(SLOTS)
+    for kind, step, joint in (("shoulder", 4, 0), ("elbow", 2, 1)):
+        for slot in slots[(slots // step % 2 == 0) & solved]:
+            moved = wrist_centre_on_axis(robot, T, q[slot], joint)
+            if np.linalg.norm(moved[:3, 3] - T[:3, 3]) < SOLVES_M and (joint == 0 or arm_folds_fully(robot)):
+                _add(found, [_curve_family(robot, moved, kind, q_ref, (int(slot), int(slot) + step))])
+    return tuple(found)
+
+
+def _add(found: list[Family], new: list[Family]) -> None:
+    for family in new:
+        for k, known in enumerate(found):
+            same = known.kind == family.kind and np.abs(known.q0 - family.q0).max() < SAME_FAMILY
+            if same and np.abs(known.direction - family.direction).max() < SAME_FAMILY:
+                both = tuple(sorted({*known.branches, *family.branches}))
+                found[k] = replace(known, branches=both)
+                break
+        else:
+            found.append(family)
+
+
+def _wrist_families(
+    robot: Robot, T: np.ndarray, q: np.ndarray, q_ref: np.ndarray, branches: tuple[int, ...]
+) -> list[Family]:
+    """One family for each sum (or difference) of joints 4 and 6 that the limits admit."""
+    q, direction = wrist_line(robot, q)
+    rest = nearest_turns(robot, q, q_ref)
+    rest[[3, 5]] = q[[3, 5]] + TURN * np.round((q_ref - q) / TURN)[[3, 5]]
+    families = []
+    fits = within(robot, np.where(direction != 0, np.clip(rest, robot.lower, robot.upper), rest))
+    most = int(np.ceil((robot.upper - robot.lower)[[3, 5]].sum() / TURN)) + 2
+    for k in range(-most, most + 1) if fits else ():
+        start = rest + TURN * k * np.eye(6)[5]
+        low, high = -np.inf, np.inf
+        for j in (3, 5):
+            ends = np.sort(np.array([robot.lower[j] - start[j], robot.upper[j] - start[j]]) * direction[j])
+            low, high = max(low, ends[0]), min(high, ends[1])
+        if low <= high + LIMIT_TOLERANCE:
+            high = max(low, high)
+            t = float(np.clip(_nearest_on_line(start, direction, q_ref), low, high))
+            span = np.array([low - t, high - t])
+            families.append(Family("wrist", start + t * direction, direction, span, True, branches, robot, T))
+    if not families:
+        t = _nearest_on_line(rest, direction, q_ref)
+        span = np.array([-np.pi, np.pi])
+        families = [Family("wrist", rest + t * direction, direction, span, False, branches, robot, T)]
+    return sorted(families, key=lambda family: float(np.linalg.norm(family.q0 - q_ref)))
+
+
+def _nearest_on_line(q: np.ndarray, direction: np.ndarray, q_ref: np.ndarray) -> float:
+    return float((q_ref - q) @ direction / (direction @ direction))
+
+
+def _on_curve(robot: Robot, T: np.ndarray, joint: int, values: np.ndarray, q_ref: np.ndarray, slot: int) -> np.ndarray:
+    """Solutions (n, 6) of one slot with the free joint at given angles (n,)."""
+    reference = np.tile(q_ref, (len(values), 1))
+    reference[:, joint] = values
+    return solve_slots(robot, np.broadcast_to(T, (len(values), 4, 4)), reference, apart=True)[0][:, slot]
+
+
+def _curve_family(robot: Robot, T: np.ndarray, kind: str, q_ref: np.ndarray, branches: tuple[int, ...]) -> Family:
+    joint, slot = FREE_JOINT[kind], branches[0]
+    grid = np.arange(robot.lower[joint], robot.upper[joint] + GRID, GRID)
+    grid = np.unique(np.append(np.minimum(grid, robot.upper[joint]), np.clip(q_ref, robot.lower, robot.upper)[joint]))
+
+    def members(values: np.ndarray) -> np.ndarray:
+        q = nearest_turns(robot, _nearest_wrists(robot, _on_curve(robot, T, joint, values, q_ref, slot), q_ref), q_ref)
+        q[:, joint] = values
+        return q
+
+    def away(value: float) -> float:
+        return float(np.sum((members(np.array([value]))[0] - q_ref) ** 2))
+
+    q = members(grid)
+    inside = within(robot, q)
+    cost = np.where(inside | ~inside.any(), np.sum((q - q_ref) ** 2, axis=1), np.inf)
+    best = int(cost.argmin())
+    bounds = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
+    q0 = q[best]
+    if bounds[0] < bounds[1]:
+        finer = minimize_scalar(away, bounds=bounds, method="bounded", options={"xatol": 1e-10})
+        candidate = members(np.array([finer.x]))[0]
+        if finer.fun < cost[best] and (within(robot, candidate) or not inside[best]):
+            q0 = candidate
+    family = Family(kind, q0, _tangent(robot, q0, joint), np.zeros(2), bool(inside.any()), branches, robot, T)
+    span = _range(family, grid) if family.within_limits else np.array([-np.pi, np.pi])
+    return replace(family, range=span)
+
+
+def _nearest_wrists(robot: Robot, q: np.ndarray, q_ref: np.ndarray) -> np.ndarray:
+    """Rows (n, 6) with an aligned wrist moved along their line to the member nearest to the reference."""
+    aligned = np.abs(determinant_factors(robot, q).wrist) < SOLVES_RAD
+    for row in np.flatnonzero(aligned):
+        on_line, direction = wrist_line(robot, q[row])
+        on_line = q_ref + principal(on_line - q_ref)
+        q[row] = on_line + _nearest_on_line(on_line, direction, q_ref) * direction
+    return q
+
+
+def _tangent(robot: Robot, q: np.ndarray, joint: int) -> np.ndarray:
+    """Joint rates that leave the tool at rest while the free joint turns at rate 1: the wrist undoes its rotation."""
+    spin = jacobian(robot, q)[3:]
+    direction = np.zeros(6)
+    direction[joint] = 1.0
+    held = spin[:, joint]
+    direction[3:] = -np.linalg.lstsq(spin[:, 3:], held, rcond=1e-9)[0]
+    return direction
+
+
+def _range(family: Family, grid: np.ndarray) -> np.ndarray:
+    """Ends of the connected part within the limits around q0, by the grid and bisection."""
+    joint = FREE_JOINT[family.kind]
+    steps = grid - family.q0[joint]
+    inside = within(family.robot, family.members(steps))
+    ends = []
+    for side in (-1, 1):
+        outward = steps[steps * side > 0][::side]
+        ok = inside[steps * side > 0][::side]
+        if ok.all():
+            ends.append(outward[-1] if len(outward) else 0.0)
+            continue
+        first = int(ok.argmin())
+        good, bad = (outward[first - 1] if first else 0.0), outward[first]
+        for _ in range(BISECTIONS):
+            middle = (good + bad) / 2
+            good, bad = (middle, bad) if within(family.robot, family.members(middle)) else (good, middle)
+        ends.append(good)
+    return np.array(ends)

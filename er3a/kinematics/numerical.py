@@ -1,0 +1,191 @@
+"""The numerical inverse: any six-axis arm, from a start guess, with or without limits, for parts of a pose."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from er3a.errors import Er3aError, PoseError, ShapeError
+from er3a.kinematics.chain import JOINTS, axes_at_zero_theta, constant_links
+from er3a.kinematics.forward import checked_joints, jacobian
+from er3a.kinematics.iteration import solve_numerically
+from er3a.kinematics.transforms import check_poses
+from er3a.kinematics.turns import limit_reason, nearest_turns, principal, within
+from er3a.robots.robot import Robot
+
+SOLVED, UNREACHABLE, SINGULAR, LIMIT_BOUND, BAD_GUESS = "solved", "unreachable", "singular", "limit-bound", "bad guess"
+RESTARTS = 500
+DIAGNOSIS_RESTARTS = 100
+NEARLY = 1e-6  # m (in parts of the arm's length) or rad: so near, only a singularity keeps the iteration from its end
+RANK = 1e-3  # smallest singular value below which the end of an iteration counts as singular
+SAME_ARM = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class NumericalSolutions:
+    """One arm for each pose, or the nearest that was found; leading dimensions are those of the poses.
+
+    Attributes
+    ----------
+    q : (..., 6), rad, maker's angles
+    solved : (...,) bool, whether both errors are within the tolerances
+    position_error : (...,), m; rotation_error : (...,), rad, of the degrees of freedom asked for
+    starts : (...,) int, starts used; 0 where none succeeded
+    outcome : (...,) texts: solved, unreachable, singular, limit-bound or bad guess
+    reason : (...,) texts, empty where solved
+    """
+
+    q: np.ndarray
+    solved: np.ndarray
+    position_error: np.ndarray
+    rotation_error: np.ndarray
+    starts: np.ndarray
+    outcome: np.ndarray
+    reason: np.ndarray
+
+
+def solve(
+    robot: Robot,
+    T: np.ndarray,
+    q0: np.ndarray | None = None,
+    mask: np.ndarray | None = None,
+    respect_limits: bool = True,
+    restarts: int = RESTARTS,
+    position_tolerance: float = 1e-10,
+    rotation_tolerance: float = 1e-10,
+    seed: int = 0,
+    threads: int = 1,
+) -> NumericalSolutions:
+    """Solve poses by iteration from a start guess, then from random ones.
+
+    Parameters
+    ----------
+    T : (..., 4, 4), T_base_tool, m
+    q0 : (6,) or (..., 6), rad, where to start; None means the middle of the limits
+    mask : 6 of 1 or 0: which of x, y, z and the rotations about x, y, z of the target's tool frame must be met; None
+        means all. ``[1, 1, 1, 1, 1, 0]`` leaves the rotation about the tool's axis free.
+    respect_limits : keep to the joint limits inside the iteration; else angles come in (-pi, pi]
+    restarts : how many random starts to try after ``q0`` (0 to 65535)
+    position_tolerance : m; rotation_tolerance : rad
+    seed : of the random starts; equal seeds give equal results, whatever the number of threads
+
+    Raises
+    ------
+    ShapeError, PoseError, Er3aError
+        naming the argument that can't be used
+    """
+    T = np.ascontiguousarray(check_poses(T))
+    shape = T.shape[:-2]
+    mask = _checked_mask(mask)
+    if not 0 <= restarts < 65536:
+        raise Er3aError(f"restarts is {restarts}; expected a whole number from 0 to 65535")
+    for name, value in (("position_tolerance", position_tolerance), ("rotation_tolerance", rotation_tolerance)):
+        if not value > 0:
+            raise Er3aError(f"{name} is {value!r}; expected a number above 0")
+    q0 = (robot.lower + robot.upper) / 2 if q0 is None else checked_joints(q0, "q0")
+    if q0.shape not in ((6,), (*shape, 6)):
+        raise ShapeError("q0", q0.shape, f"(6,) or {(*shape, 6)}")
+    if not np.isfinite(q0).all():
+        raise PoseError("q0 holds NaN or infinity")
+    search = _Search(robot, mask, np.array([position_tolerance, rotation_tolerance]), seed)
+    poses = T.reshape(-1, 4, 4)
+    starts_at = np.broadcast_to(q0, (*shape, 6)).reshape(-1, 6)
+    q, error, starts = search.run(poses, starts_at, respect_limits, restarts, threads)
+    outcome = np.full(len(poses), SOLVED, dtype=object)
+    reason = np.full(len(poses), "", dtype=object)
+    for n in np.flatnonzero(starts == 0):
+        outcome[n], reason[n] = search.explain(poses[n], q[n], error[n], respect_limits, restarts)
+    fields = (q.reshape(*shape, 6), starts > 0, error[:, 0], error[:, 1], starts, outcome, reason)
+    return NumericalSolutions(fields[0], *(field.reshape(shape) for field in fields[1:]))
+
+
+def all_found(robot: Robot, T: np.ndarray, starts: int, seed: int = 0) -> tuple[np.ndarray, NumericalSolutions]:
+    """Different arms (n, 6), rad in (-pi, pi], found from that many random starts for one pose, and the first search.
+
+    There may be more: a search from random starts can't prove that it has found all.
+    """
+    first = solve(robot, T, respect_limits=False, seed=seed)
+    if not first.solved:
+        return np.empty((0, 6)), first
+    search = _Search(robot, np.ones(6), np.array([1e-10, 1e-10]), seed + 1)
+    random = np.random.default_rng([seed, 2])
+    begin = random.uniform(-np.pi, np.pi, (starts, 6))
+    q, _, used = search.run(np.tile(T, (starts, 1, 1)), begin, False, 0, 1)
+    distinct = [principal(first.q)]
+    for row in q[used > 0]:
+        if min(np.abs(principal(row - other)).max() for other in distinct) > SAME_ARM:
+            distinct.append(row)
+    return np.array(distinct), first
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    robot: Robot
+    mask: np.ndarray
+    tolerances: np.ndarray
+    seed: int
+
+    def run(
+        self, T: np.ndarray, q0: np.ndarray, respect: bool, restarts: int, threads: int
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Arms (N, 6), errors (N, 2) in m and rad, and starts (N,) for poses (N, 4, 4)."""
+        robot, count = self.robot, len(T)
+        q, error, starts = np.empty((count, 6)), np.empty((count, 2)), np.empty(count, dtype=np.int64)
+        arm = robot.direction, robot.offset, constant_links(robot)
+        limits = (robot.lower, robot.upper, True) if respect else (np.full(6, -np.pi), np.full(6, np.pi), False)
+        q0 = np.ascontiguousarray(q0)
+
+        def part(rows: slice) -> None:
+            first = 0 if rows.start is None else rows.start
+            own = (q[rows], error[rows], starts[rows])
+            constants = (self.mask, self.tolerances, arm_length(robot), restarts, np.uint64(self.seed), first)
+            solve_numerically(arm, limits, T[rows], q0[rows], *constants, *own)
+
+        if threads > 1 and count > 1:
+            ends = np.linspace(0, count, min(threads, count) + 1).astype(int)
+            with ThreadPoolExecutor(threads) as pool:
+                list(pool.map(part, (slice(int(a), int(b)) for a, b in pairwise(ends))))
+        else:
+            part(slice(None))
+        return (q if respect else principal(q)), error, starts
+
+    def explain(self, T: np.ndarray, q: np.ndarray, error: np.ndarray, respect: bool, restarts: int) -> tuple[str, str]:
+        """Why one pose was not solved: its nearest arm and a search without what may have hindered it."""
+        miss = f"the nearest arm found misses by {error[0] * 1000:.3g} mm and {np.degrees(error[1]):.3g} deg"
+        if restarts < DIAGNOSIS_RESTARTS:
+            _, _, starts = self.run(T[None], q[None], respect, DIAGNOSIS_RESTARTS, 1)
+            if starts[0]:
+                return BAD_GUESS, f"bad guess: from the start given {miss}; other starts solve it, so allow restarts"
+        if respect:
+            free, _, starts = self.run(T[None], q[None], False, DIAGNOSIS_RESTARTS, 1)
+            if starts[0]:
+                turned = nearest_turns(self.robot, free[0], q)
+                if within(self.robot, turned):
+                    return BAD_GUESS, f"bad guess: {miss}; without limits an arm within them was found, start there"
+                beyond = limit_reason(self.robot, turned)
+                return LIMIT_BOUND, f"limit-bound: {miss}; an arm that leaves the limits solves it: {beyond}"
+        length = arm_length(self.robot)
+        J = jacobian(self.robot, q)
+        J[:3] /= length
+        singular = np.linalg.svd(J[self.mask > 0], compute_uv=False)[-1] < RANK
+        if singular and max(error[0] / length, error[1]) < NEARLY:
+            return SINGULAR, f"singular: the iteration creeps towards a singular arm, where it ends: {miss}"
+        return UNREACHABLE, f"unreachable: {miss}, whatever the start"
+
+
+def arm_length(robot: Robot) -> float:
+    """Half the distance along all links (m), which makes position and rotation errors comparable."""
+    points = axes_at_zero_theta(robot)[1]
+    return 0.5 * float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) or 1.0
+
+
+def _checked_mask(mask: np.ndarray | None) -> np.ndarray:
+    values = np.ones(JOINTS) if mask is None else np.asarray(mask, dtype=float)
+    if values.shape != (6,):
+        raise ShapeError("mask", values.shape, "(6,)")
+    if not np.isin(values, (0.0, 1.0)).all() or not values.any():
+        raise Er3aError(f"mask is {values.tolist()}; expected six of 0 or 1, at least one 1")
+    return values

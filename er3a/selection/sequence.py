@@ -1,0 +1,116 @@
+"""Joint solutions for a sequence of poses that are best as a whole.
+
+Bellman's recursion over the solutions of each pose, turns included [1]_: the cost to reach a solution is the least,
+over those of the pose before, of its cost plus that of the move between the two.
+
+References
+----------
+.. [1] R. Bellman, *Dynamic Programming*, 1957, chapter III.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from er3a.collision.clearance import clearance
+from er3a.collision.scene import SceneFile
+from er3a.errors import Er3aError
+from er3a.kinematics.inverse import Solutions
+from er3a.robots.robot import Robot
+from er3a.selection.rules import joint_weights
+
+MOVES = ("nearest", "weighted", "time")
+
+
+@dataclass(frozen=True, eq=False)
+class SequenceChoice:
+    """Solutions of a sequence of poses.
+
+    Attributes
+    ----------
+    rows : (N,) int, the row taken of each pose's solutions; q : (N, 6), rad
+    cost : sum of the moves' costs from the reference on (deg, or s for *time*)
+    greedy_rows : (N,) int, what taking the cheapest next move each time would take; greedy_cost : what that costs
+    """
+
+    rows: np.ndarray
+    q: np.ndarray
+    cost: float
+    greedy_rows: np.ndarray
+    greedy_cost: float
+
+
+def select_sequence(
+    robot: Robot,
+    poses: Sequence[Solutions],
+    q_ref: np.ndarray,
+    rule: str = "nearest",
+    scene: SceneFile | None = None,
+) -> SequenceChoice:
+    """Choose one solution of each pose so that all moves together cost least.
+
+    Parameters
+    ----------
+    poses : the solutions of each pose, in order; rows outside the limits or in collision are left out
+    q_ref : (6,), rad, where the arm starts
+    rule : how a move costs: "nearest" (greatest joint move), "weighted" or "time"
+
+    Raises
+    ------
+    Er3aError
+        for an unknown rule, no poses, or a pose without a usable solution (it is named by its number)
+    """
+    if rule not in MOVES:
+        raise Er3aError(f"a sequence can't be ranked by '{rule}'; moves are ranked by: {', '.join(MOVES)}")
+    if not poses:
+        raise Er3aError("the sequence is empty; give at least one pose")
+    usable = [_usable(robot, solutions, scene, number) for number, solutions in enumerate(poses)]
+    sets = [solutions.q[rows] for solutions, rows in zip(poses, usable)]
+    total = _move_costs(robot, np.asarray(q_ref, float)[None], sets[0], rule)[0]
+    came_from = []
+    for before, after in pairwise(sets):
+        through = total[:, None] + _move_costs(robot, before, after, rule)
+        came_from.append(through.argmin(axis=0))
+        total = through.min(axis=0)
+    best = [int(total.argmin())]
+    for origin in reversed(came_from):
+        best.append(int(origin[best[-1]]))
+    best.reverse()
+    greedy, greedy_cost, at = [], 0.0, np.asarray(q_ref, float)
+    for q in sets:
+        costs = _move_costs(robot, at[None], q, rule)[0]
+        greedy.append(int(costs.argmin()))
+        greedy_cost += float(costs.min())
+        at = q[greedy[-1]]
+    return SequenceChoice(
+        rows=np.array([rows[k] for rows, k in zip(usable, best)]),
+        q=np.array([q[k] for q, k in zip(sets, best)]),
+        cost=float(total.min()),
+        greedy_rows=np.array([rows[k] for rows, k in zip(usable, greedy)]),
+        greedy_cost=greedy_cost,
+    )
+
+
+def _usable(robot: Robot, solutions: Solutions, scene: SceneFile | None, number: int) -> np.ndarray:
+    rows = np.flatnonzero(solutions.within_limits)
+    if scene is not None and rows.size:
+        rows = rows[clearance(robot, solutions.q[rows], scene).distance >= 0]
+    if not rows.size:
+        raise Er3aError(f"pose {number} of the sequence has no solution within the limits and free of collisions")
+    return rows
+
+
+def _move_costs(robot: Robot, before: np.ndarray, after: np.ndarray, rule: str) -> np.ndarray:
+    """Cost (n, m) of each move from joint angles (n, 6) to (m, 6)."""
+    moves = np.abs(before[:, None] - after[None])
+    if rule == "nearest":
+        return np.degrees(moves.max(axis=2))
+    if rule == "weighted":
+        return np.degrees(np.linalg.norm(joint_weights(robot) * moves, axis=2))
+    if not np.isfinite(robot.speed).all():
+        raise Er3aError(f"{robot.name}: the rule 'time' needs joint speeds, and the robot's file gives none")
+    return (moves / robot.speed).max(axis=2)

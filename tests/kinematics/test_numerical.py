@@ -1,0 +1,183 @@
+"""The numerical inverse: all reachable poses, limits inside the iteration, masks, and why it fails."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import er3a
+from er3a.errors import Er3aError, PoseError, ShapeError
+from er3a.kinematics.chain import constant_links
+from er3a.kinematics.forward import forward
+from er3a.kinematics.inverse import inverse
+from er3a.kinematics.iteration import _error_and_jacobian, uniform
+from er3a.kinematics.numerical import BAD_GUESS, LIMIT_BOUND, SOLVED, UNREACHABLE, solve
+from tests.kinematics.arms import DEG, arms, joints_at_random, joints_within, make_arm, placement, pose_errors
+from tests.kinematics.singular_poses import CLASSES, joints_near
+
+UR5 = {
+    "a": [0, -0.425, -0.39225, 0, 0, 0],
+    "alpha": np.array([90, 0, 0, 90, -90, 0]) * DEG,
+    "d": [0.089159, 0, 0, 0.10915, 0.09465, 0.0823],
+}
+
+
+@pytest.mark.parametrize("respect_limits", [True, False])
+def test_all_reachable_poses_are_solved(robot, random, respect_limits):
+    T = forward(robot, joints_at_random(robot, random, 2000))
+    found = solve(robot, T, respect_limits=respect_limits)
+    assert found.solved.all()
+    assert (found.outcome == SOLVED).all()
+    distance, angle = pose_errors(forward(robot, found.q), T)
+    assert max(distance.max(), angle.max()) < 1e-9
+    np.testing.assert_allclose(found.position_error, distance, atol=1e-13)
+    np.testing.assert_allclose(found.rotation_error, angle, atol=1e-13)
+    if respect_limits:
+        assert ((found.q >= robot.lower) & (found.q <= robot.upper)).all()
+
+
+@settings(max_examples=60, deadline=None)
+@given(data=st.data(), robot=arms())
+def test_random_arms_are_solved_within_their_limits(data, robot):
+    q = data.draw(joints_within(robot))
+    found = solve(robot, forward(robot, q))
+    assert found.solved
+    assert max(part.max() for part in pose_errors(forward(robot, found.q), forward(robot, q))) < 1e-9
+    assert ((found.q >= robot.lower) & (found.q <= robot.upper)).all()
+
+
+@pytest.mark.parametrize("kind", CLASSES)
+def test_singular_poses_are_solved(robot, random, kind):
+    q = joints_near(robot, kind, random, 50)
+    T = forward(robot, q)
+    found = solve(robot, T, respect_limits=False, position_tolerance=1e-9, rotation_tolerance=1e-9)
+    assert found.solved.mean() >= (0.9 if kind == "folded" else 1.0)  # folded arms are a needle in the joint space
+    errors = pose_errors(forward(robot, found.q[found.solved]), T[found.solved])
+    assert max(part.max() for part in errors) < 1.1e-9
+
+
+def test_jacobian_of_the_error_is_its_derivative(robot, random):
+    arm = robot.direction, robot.offset, constant_links(robot)
+    for q, other in joints_at_random(robot, random, 40).reshape(20, 2, 6):
+        T, mask = forward(robot, other), np.ones(6)
+        J, e = np.empty((6, 6)), np.empty(6)
+
+        def error(joints, T=T, mask=mask, e=e, arm=arm):
+            _error_and_jacobian(arm, T, mask, 0.7, joints, np.empty((6, 6)), e)
+            return e.copy()
+
+        _error_and_jacobian(arm, T, mask, 0.7, q, J, e)
+        if np.linalg.norm(e[3:]) < 2.8:
+            steps = [(error(q + 1e-6 * row) - error(q - 1e-6 * row)) / 2e-6 for row in np.eye(6)]
+            np.testing.assert_allclose(J, np.array(steps).T, atol=1e-6)
+
+
+def test_start_guess_decides_which_arm_is_found(robot, random):
+    for q in joints_at_random(robot, random, 50):
+        near = np.clip(q + random.uniform(-0.01, 0.01, 6), robot.lower, robot.upper)
+        found = solve(robot, forward(robot, q), near, restarts=0)
+        if found.solved:
+            assert pose_errors(forward(robot, found.q), forward(robot, q))[0] < 1e-9
+    T = forward(robot, np.full(6, 0.3))
+    found = solve(robot, T, np.full(6, 0.31))
+    np.testing.assert_allclose(found.q, np.full(6, 0.3), atol=1e-6)
+    assert found.starts == 1
+
+
+def test_free_rotation_about_the_tool_axis(robot, random):
+    T = forward(robot, joints_at_random(robot, random, 200))
+    found = solve(robot, T, mask=[1, 1, 1, 1, 1, 0])
+    assert found.solved.all()
+    reached = forward(robot, found.q)
+    np.testing.assert_allclose(reached[:, :3, 3], T[:, :3, 3], atol=1e-9)
+    np.testing.assert_allclose(reached[:, :3, 2], T[:, :3, 2], atol=1e-9)
+    assert np.abs(reached[:, :3, 0] - T[:, :3, 0]).max() > 0.1
+
+
+def test_free_height_and_free_orientation(robot, random):
+    T = forward(robot, joints_at_random(robot, random, 100))
+    position_only = solve(robot, T, mask=[1, 1, 1, 0, 0, 0])
+    np.testing.assert_allclose(forward(robot, position_only.q)[:, :3, 3], T[:, :3, 3], atol=1e-9)
+    free_z = solve(robot, T, mask=[1, 1, 0, 1, 1, 1])
+    apart = np.einsum("nji,nj->ni", T[:, :3, :3], forward(robot, free_z.q)[:, :3, 3] - T[:, :3, 3])
+    assert np.abs(apart[:, :2]).max() < 1e-9
+
+
+def test_results_do_not_depend_on_threads_and_follow_the_seed(robot, random):
+    T = forward(robot, joints_at_random(robot, random, 300))
+    one, two = solve(robot, T, seed=5), solve(robot, T, seed=5, threads=2)
+    np.testing.assert_array_equal(one.q, two.q)
+    assert not np.array_equal(one.q, solve(robot, T, seed=6).q)
+
+
+def test_random_starts_are_uniform():
+    draws = np.array([[uniform(3, n, s, j) for j in range(6)] for n in range(40) for s in range(1, 20)])
+    assert abs(draws.mean() - 0.5) < 0.02
+    assert abs(draws.var() - 1 / 12) < 0.005
+    assert len(np.unique(draws)) == draws.size
+
+
+def test_why_it_fails(robot, random):
+    q = joints_at_random(robot, random, 60)
+    far = forward(robot, q[0])
+    far[:3, 3] += [5, 0, 0]
+    found = solve(robot, far, restarts=20)
+    assert (found.outcome, bool(found.solved), int(found.starts)) == (UNREACHABLE, False, 0)
+    assert "the nearest arm found misses by" in str(found.reason)
+    outcomes = solve(robot, forward(robot, q), joints_at_random(robot, random, 60), restarts=0).outcome
+    assert set(outcomes) == {SOLVED, BAD_GUESS}
+    narrow = robot.replace(lower=np.full(6, -0.05), upper=np.full(6, 0.05))
+    found = solve(narrow, forward(robot, np.full(6, 0.2)), restarts=20)
+    assert found.outcome == LIMIT_BOUND
+    assert "above its limit of 2.86479 deg" in str(found.reason)
+
+
+def test_nearest_arm_of_an_unreachable_pose_is_near(robot):
+    T = forward(robot, np.zeros(6))
+    reached = solve(robot, T, mask=[1, 1, 1, 0, 0, 0], restarts=20)
+    assert reached.solved
+    T[:3, 3] = [0, 0, 50.0]
+    found = solve(robot, T, mask=[1, 1, 1, 0, 0, 0], restarts=20)
+    assert found.position_error == pytest.approx(50 - forward(robot, found.q)[2, 3], abs=1e-3)
+
+
+def test_arms_without_closed_form_are_solved_by_iteration(random):
+    arm = make_arm(**UR5)
+    for q in joints_at_random(arm, random, 5):
+        T = forward(arm, q)
+        solution = inverse(arm, T, q)
+        assert solution.method.startswith("iteration from 400 random starts")
+        assert "axes 4, 5 and 6 miss a common point" in solution.method
+        assert max(part.max() for part in pose_errors(forward(arm, solution.q), T)) < 1e-9
+        assert (np.abs(solution.q - q).max(axis=1) < 1e-6).any()
+        assert solution.label[0] == "arm 1"
+    T[:3, 3] += 9
+    nothing = inverse(arm, T)
+    assert len(nothing.q) == 0
+    assert nothing.unsolved[0].startswith("unreachable")
+
+
+def test_bad_arguments_are_refused(robot):
+    T = placement([0.3, 0, 0.4], [0, 0, 0])
+    with pytest.raises(ShapeError, match=r"q0 has shape \(5,\)"):
+        solve(robot, T, np.zeros(5))
+    with pytest.raises(ShapeError, match=r"q0 has shape \(2, 6\); expected \(6,\) or \(3, 6\)"):
+        solve(robot, np.tile(T, (3, 1, 1)), np.zeros((2, 6)))
+    with pytest.raises(PoseError, match="q0 holds NaN"):
+        solve(robot, T, np.full(6, np.nan))
+    with pytest.raises(ShapeError, match=r"mask has shape \(3,\)"):
+        solve(robot, T, mask=[1, 1, 1])
+    with pytest.raises(Er3aError, match="expected six of 0 or 1"):
+        solve(robot, T, mask=[1, 1, 1, 0.5, 0, 0])
+    with pytest.raises(Er3aError, match="restarts is -1"):
+        solve(robot, T, restarts=-1)
+    with pytest.raises(Er3aError, match="position_tolerance is 0"):
+        solve(robot, T, position_tolerance=0)
+    with pytest.raises(PoseError, match=r"T\[1\] has a mirrored"):
+        solve(robot, np.array([T, T * [1, 1, -1, 1]]))
+
+
+def test_public_name():
+    assert er3a.solve is solve

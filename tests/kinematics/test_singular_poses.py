@@ -1,0 +1,145 @@
+"""At and next to singularities: nothing lost, nothing twice, continua in explicit form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from er3a.kinematics.branch import branch_of
+from er3a.kinematics.families import Family
+from er3a.kinematics.forward import forward
+from er3a.kinematics.inverse import inverse
+from er3a.kinematics.singularity import determinant_factors
+from tests.kinematics.arms import DEG, joints_at_random, make_arm, margin, pose_errors
+from tests.kinematics.singular_poses import (
+    CLASSES,
+    admissible_slots,
+    family_holds,
+    joints_near,
+    tolerance,
+    turned,
+)
+
+
+@pytest.mark.parametrize("kind", CLASSES)
+def test_the_generating_branch_is_found(robot, random, kind):
+    q = joints_near(robot, kind, random, 25)
+    assert len(q) > 8
+    poses, allowed, slack = forward(robot, q), admissible_slots(robot, q), tolerance(robot, q, random)
+    for T, joints, slots, most in zip(poses, q, allowed, slack):
+        for q_ref in (joints, np.zeros(6)):
+            solution = inverse(robot, T, q_ref)
+            assert np.isfinite(solution.q).all()
+            distance, angle = pose_errors(forward(robot, solution.q), T)
+            assert max(distance.max(), angle.max()) < 1.001e-9
+            apart = np.abs(solution.q[:, None] - solution.q[None]).max(axis=-1) + np.eye(len(solution.q))
+            assert apart.min() > 1e-9
+            found = (turned(solution.q - joints).max(axis=1) <= most) & slots[solution.branch]
+            assert found.any() or any(family_holds(family, joints, slots, most) for family in solution.families)
+
+
+@pytest.mark.parametrize("kind", ["wrist", "shoulder", "wrist shoulder", "all"])
+def test_family_members_solve_the_pose_within_the_limits(robot, random, kind):
+    q = joints_near(robot, kind, random, 20)
+    seen = 0
+    for T, joints in zip(forward(robot, q), q):
+        for family in inverse(robot, T, joints).families:
+            seen += 1
+            members = family.members(np.linspace(*family.range, 9))
+            assert max(part.max() for part in pose_errors(forward(robot, members), T)) < 1e-9
+            np.testing.assert_allclose(family.members(np.array(0.0)), family.q0, rtol=0, atol=1e-7)
+            if family.within_limits:
+                assert ((family.q0 <= robot.upper + 2e-9) & (family.q0 >= robot.lower - 2e-9)).all()
+            assert family.range[0] <= 0 <= family.range[1]
+    assert seen > 3
+
+
+def test_wrist_family_is_a_line_whose_ends_are_the_limits(robot):
+    q = np.array([20, -30, 10, 35, 0, -20]) * DEG
+    solution = inverse(robot, forward(robot, q))
+    lines = [family for family in solution.families if family.kind == "wrist" and 0 in family.branches]
+    sums = sorted(np.degrees(family.q0[3] + family.q0[5]) for family in lines)
+    np.testing.assert_allclose(np.diff(sums), 360)
+    first = lines[0]
+    np.testing.assert_allclose(np.degrees(first.q0[[3, 5]]), [7.5, 7.5], atol=1e-9)
+    np.testing.assert_allclose(first.direction, [0, 0, 0, 1, 0, -1])
+    for end in first.members(first.range):
+        slack = np.minimum(robot.upper - end, end - robot.lower)[[3, 5]]
+        assert slack.min() == pytest.approx(0, abs=1e-12)
+
+
+def test_nearest_member_is_the_nearest_of_many(robot, random):
+    for joints in joints_near(robot, "shoulder", random, 8):
+        q_ref = joints_at_random(robot, random, 1)[0]
+        for family in inverse(robot, forward(robot, joints), q_ref).families:
+            if family.kind == "shoulder" and family.within_limits:
+                members = family.members(np.linspace(*family.range, 200))
+                nearest = np.linalg.norm(family.q0 - q_ref)
+                assert nearest <= np.linalg.norm(members - q_ref, axis=1).min() + 1e-6
+
+
+def test_tangent_leaves_the_tool_at_rest(robot, random):
+    for joints in joints_near(robot, "shoulder", random, 20):
+        T = forward(robot, joints)
+        for family in inverse(robot, T, joints).families:
+            moved = forward(robot, family.q0 + 1e-6 * family.direction)
+            assert max(part.max() for part in pose_errors(moved, forward(robot, family.q0))) < 1e-10
+
+
+def test_arm_straight_up_has_both_continua():
+    """Axes 1, 4 and 6 in one line, elbow straight: what peers return nothing for."""
+    arm = make_arm(a=[0, 0.4, 0, 0, 0, 0], offset=np.array([0, -90, -90, 0, 0, 0]) * DEG)
+    q = np.array([0.3, 0, 0, 0.2, 0, -0.1])
+    T = forward(arm, q)
+    assert np.hypot(*T[:2, 3]) < 1e-12
+    solution = inverse(arm, T, q)
+    assert {family.kind for family in solution.families} == {"wrist", "shoulder"}
+    assert (np.abs(solution.q - q).max(axis=1) < 1e-8).any()
+    assert len(np.unique(solution.branch)) == 8
+    assert max(part.max() for part in pose_errors(forward(arm, solution.q), T)) < 1e-12
+
+
+def test_arm_that_folds_onto_itself_turns_about_axis_two(random):
+    arm = make_arm(a=[0.2, 0.35, 0, 0, 0, 0])
+    for q in joints_near(arm, "folded", random, 30):
+        solution = inverse(arm, forward(arm, q), q)
+        if abs(abs(np.sin(determinant_factors(arm, q).elbow)) * 0.35) < 5e-10:
+            assert any(family.kind == "elbow" for family in solution.families)
+
+
+def test_ordinary_poses_have_no_family(robot, random):
+    q = joints_at_random(robot, random, 100)
+    for T in forward(robot, q[margin(robot, q) > 0.01]):
+        assert inverse(robot, T).families == ()
+
+
+@pytest.mark.parametrize("q_1", [90.0, -90.0])
+def test_joint_one_at_a_right_angle(robot, random, q_1):
+    q = joints_at_random(robot, random, 100)
+    q[:, 0] = q_1 * DEG
+    for T, joints in zip(forward(robot, q), q):
+        assert (np.abs(inverse(robot, T).q - joints).max(axis=1) < 1e-9 / min(1, margin(robot, joints))).any()
+
+
+def test_branch_numbers_are_those_of_the_rows(robot, random):
+    for T in forward(robot, joints_at_random(robot, random, 100)):
+        solution = inverse(robot, T)
+        np.testing.assert_array_equal(branch_of(robot, solution.q), solution.branch)
+
+
+def test_slots_are_continuous_along_a_path(robot, random):
+    """Between crossings of a singularity, a path in joint space keeps its slot."""
+    start, end = joints_at_random(robot, random, 2)
+    t = np.linspace(0, 1, 2000)[:, None]
+    q = (1 - t) * start + t * end
+    slots = branch_of(robot, q)
+    signs = np.sign([factor for factor in vars(determinant_factors(robot, q)).values()])
+    crossings = (np.diff(signs, axis=1) != 0).any(axis=0)
+    assert (np.diff(slots)[~crossings] == 0).all()
+
+
+def test_family_is_plain_data(robot):
+    family = inverse(robot, forward(robot, np.zeros(6))).families[0]
+    assert isinstance(family, Family)
+    assert family.kind == "wrist"
+    assert family.q0.shape == family.direction.shape == (6,)
