@@ -35,7 +35,7 @@ def placed(arm, theta_2, tau):
 
 
 @kernel
-def stances(arm, steps_2, steps_3, out):
+def fill_stances(arm, steps_2, steps_3, out):
     """Fill ``out`` (steps_2 * steps_3, 9) with stances on a grid over the limits of joints 2 and 3, ends included."""
     for i in range(steps_2):
         theta_2 = arm.theta_2[0] + (arm.theta_2[1] - arm.theta_2[0]) * i / max(1, steps_2 - 1)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.workspace.arcs import MOST_ARCS, TURN
-from er3a.workspace.filled import stances
+from er3a.workspace.filled import fill_stances
 from er3a.workspace.judge import judge_cells
 from er3a.workspace.section_arm import SectionArm
 
@@ -84,19 +84,11 @@ def prove(arm: SectionArm, target: float, most_cells: int, across: int = 32) -> 
     most_cells : how many cells may be looked at; the first grid is always finished
     across : cells along the height of the first grid
     """
-    grid = np.empty((_STANCES * _STANCES, 9))
-    steps_2 = _STANCES if arm.theta_2[1] > arm.theta_2[0] else 1
-    steps_3 = _STANCES if arm.tau[1] > arm.tau[0] else 1
-    grid = grid[: steps_2 * steps_3]
-    stances(arm, steps_2, steps_3, grid)
-    steps = (
-        (arm.theta_2[1] - arm.theta_2[0]) / max(1, steps_2 - 1),
-        (arm.tau[1] - arm.tau[0]) / max(1, steps_3 - 1),
-    )
+    stances = _stance_grid(arm)
     cells = _first_cells(arm, across)
     level, looked, boxes, done, settled = 0, 0, 0, [], np.zeros(2)
     while len(cells):
-        judged = _judge(arm, cells, grid, steps, level)
+        judged = _judge(arm, cells, stances, level)
         looked, boxes = looked + len(cells), boxes + judged.boxes
         volumes, reached = judged.volumes, 1 - np.stack([judged.unfilled_share, judged.empty_share])
         undecided = volumes * (reached[1] - reached[0])
@@ -112,6 +104,29 @@ def prove(arm: SectionArm, target: float, most_cells: int, across: int = 32) -> 
         cells, level = _quarters(cells[split]), level + 1
     columns = (np.concatenate([getattr(part, key) for part in done]) for key in _COLUMNS)
     return Proof(*columns, boxes)
+
+
+def sharpen(arm: SectionArm, proof: Proof, chosen: np.ndarray) -> Proof:
+    """Split the chosen cells (mask) of a proof into four each, and judge those."""
+    finer = _judge(arm, _quarters(proof.cells[chosen]), _stance_grid(arm), 0)
+    level = np.repeat(proof.level[chosen] + 1, 4)
+    columns = [np.concatenate([getattr(proof, key)[~chosen], getattr(finer, key)]) for key in _COLUMNS if key != "level"]
+    columns.insert(3, np.concatenate([proof.level[~chosen], level]))
+    return Proof(*columns, proof.boxes + finer.boxes)
+
+
+def judge(arm: SectionArm, cells: np.ndarray) -> Proof:
+    """Judge given cells (n, 4) once, without splitting any."""
+    return _judge(arm, np.ascontiguousarray(cells, dtype=float), _stance_grid(arm), 0)
+
+
+def _stance_grid(arm: SectionArm) -> tuple[np.ndarray, tuple[float, float]]:
+    """Stances of joints 2 and 3 over their limits, and the grid's steps (rad)."""
+    spans = (arm.theta_2[1] - arm.theta_2[0], arm.tau[1] - arm.tau[0])
+    counts = [_STANCES if span > 0 else 1 for span in spans]
+    grid = np.empty((counts[0] * counts[1], 9))
+    fill_stances(arm, counts[0], counts[1], grid)
+    return grid, tuple(span / max(1, count - 1) for span, count in zip(spans, counts))
 
 
 def _first_cells(arm: SectionArm, across: int) -> np.ndarray:
@@ -134,11 +149,11 @@ def _quarters(cells: np.ndarray) -> np.ndarray:
     return np.stack(rows, axis=1).reshape(-1, 4)
 
 
-def _judge(arm: SectionArm, cells: np.ndarray, grid: np.ndarray, steps: tuple[float, float], level: int) -> Proof:
+def _judge(arm: SectionArm, cells: np.ndarray, stances: tuple, level: int) -> Proof:
     n = len(cells)
     unfilled, empty = np.full((n, MOST_ARCS, 2), np.nan), np.full((n, MOST_ARCS, 2), np.nan)
     counts, witness = np.zeros((2, n), dtype=np.int64), np.zeros((n, 4))
-    boxes = judge_cells(arm, cells, grid, steps, _MOST_BOXES, unfilled, counts[0], empty, counts[1], witness)
+    boxes = judge_cells(arm, cells, *stances, _MOST_BOXES, unfilled, counts[0], empty, counts[1], witness)
     for arcs, count in ((unfilled, counts[0]), (empty, counts[1])):
         arcs[np.arange(MOST_ARCS) >= count[:, None]] = np.nan
     return Proof(cells, unfilled, empty, np.full(n, level), witness, boxes)
