@@ -45,7 +45,7 @@ class WorkspaceSettings(StrictModel):
 
     ``samples`` are drawn in ``blocks`` seeded blocks, ``cells_across`` cells span the bounding box's longest side,
     the hull is taken over the extreme samples in ``hull_directions`` directions, the recording shows ``cloud_points``.
-    The proof looks at ``proof_cells`` cells of the section; ``volume_points`` uniform points give the volume's estimate.
+    The proof looks at ``proof_cells`` cells of the section; ``volume_points`` uniform points estimate the volume.
     """
 
     samples: Annotated[int, Field(ge=1, le=100_000_000_000)]

@@ -88,7 +88,7 @@ def pockets(blocks: Blocks, inside: np.ndarray) -> list[np.ndarray]:
     around = np.concatenate([around[:1], around], axis=0)
     core = ndimage.binary_erosion(around, _CUBE)
     body = (ndimage.binary_dilation(core, _CUBE) & around)[1:, :, 2:-2]
-    labels, count = ndimage.label(body)
+    labels, _ = ndimage.label(body)
     for i, j in _wraps(labels):
         labels[labels == max(i, j)] = min(i, j)
     volumes = blocks.volumes * blocks.empty

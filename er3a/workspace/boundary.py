@@ -79,7 +79,9 @@ def _candidates(arm: SectionArm):
     upper, forearm, tool = (complex(v[0], v[2]) for v in (arm.upper, arm.forearm, arm.direction))
     tool = arm.d * tool
     tilts = _tilts(arm)
-    tilt_ends = sorted({end for low, high in tilts for end in (low, high) if abs(end) > _ANGLE and end < np.pi}) or [0.0]
+    tilt_ends = sorted({end for low, high in tilts for end in (low, high) if abs(end) > _ANGLE and end < np.pi}) or [
+        0.0
+    ]
 
     def in_line(fixed: complex, moving: complex, ranges: list[tuple[float, float]]) -> list[float]:
         """Angles within the ranges at which e^(-i angle) moving points along or against ``fixed``."""
@@ -101,7 +103,9 @@ def _candidates(arm: SectionArm):
 
     stands = [(tau, gamma) for tau in arm.tau for gamma in tilt_ends]
     for tau in arm.tau:
-        stands += [(tau, gamma) for gamma in in_line(upper + np.exp(-1j * tau) * forearm, np.exp(-1j * tau) * tool, tilts)]
+        stands += [
+            (tau, gamma) for gamma in in_line(upper + np.exp(-1j * tau) * forearm, np.exp(-1j * tau) * tool, tilts)
+        ]
     for gamma in [*tilt_ends, *in_line(forearm, tool, tilts)]:
         stands += [(tau, gamma) for tau in in_line(upper, forearm + np.exp(-1j * gamma) * tool, [arm.tau])]
     for tau, gamma in stands:

@@ -1,8 +1,8 @@
 """Proof that the tool point can't enter a cell: branch and bound over joints 1 to 3.
 
 A cell is a ring about axis 1 with a rectangle as section, of middle (rho, z) and half sides h; only the angle phi
-between the cell's azimuth and the arm's plane matters, so the box is over (phi, theta_2, tau). A tool point at x + delta
-in the cell needs, with v = x - W (see :mod:`er3a.workspace.section_arm`),
+between the cell's azimuth and the arm's plane matters, so the box is over (phi, theta_2, tau). A tool point at
+x + delta in the cell needs, with v = x - W (see :mod:`er3a.workspace.section_arm`),
 
     |v + delta|^2 = d^2     and     d low <= (v + delta) . f <= d high.
 
@@ -139,4 +139,3 @@ def is_empty(arm, cell, phi_low, phi_high, most_boxes, stack):
         stack[count + 1, k] += half
         count += 2
     return True, boxes
-

@@ -1,15 +1,15 @@
 """Proof that the tool point can be brought to every point of a cell.
 
-Hold joints 2 and 3 still: W and f stand in the arm's plane, and the tool point moves on its zone while joint 1 turns the
-cell towards it. A point (rho, z) of the section is reached at an azimuth phi from the arm's plane with
+Hold joints 2 and 3 still: W and f stand in the arm's plane, and the tool point moves on its zone while joint 1 turns
+the cell towards it. A point (rho, z) of the section is reached at an azimuth phi from the arm's plane with
 
     |x(phi) - W| = d:    X = rho cos(phi - phi_W) = (rho^2 + z^2 - 2 z W_z + |W|^2 - d^2) / (2 rho_W)
 
 if |X| <= rho, and if the direction lies in the zone: ``d low <= (x - W) . f <= d high``. X is monotone in rho and
-quadratic in z, so its range over a rectangle of the section is exact, and so is that of ``(x - W) . f`` where f lies in
-W's half plane; the rest is interval arithmetic. A pair (theta_2, tau) for which all conditions hold over the rectangle
-proves the ring filled, at every azimuth that joint 1 brings phi to for all of its points: from ``theta_1_low + max phi``
-to ``theta_1_high + min phi``. Joints 2 and 3 may stand on their limits, so borders that a limit makes cost nothing.
+quadratic in z, so its range over a rectangle of the section is exact, and so is that of ``(x - W) . f`` where f lies
+in W's half plane; the rest is interval arithmetic. A pair (theta_2, tau) for which all conditions hold over the
+rectangle proves the ring filled, at every azimuth that joint 1 brings phi to for all of its points: from
+``theta_1_low + max phi`` to ``theta_1_high + min phi``. Joints 2 and 3 may stand on their limits, so borders that a limit makes cost nothing.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def fill_stances(arm, steps_2, steps_3, out):
 
 @kernel
 def slack(arm, stance, side, rho, z):
-    """How deep (m, roughly) the point (rho, z) lies in what the stance reaches, and X; negative by how far it misses."""
+    """How deep (m, roughly) the point (rho, z) lies in what the stance reaches (negative: misses by that), and X."""
     rho_W, W_z, _, f_cos, f_sin, f_z, W_f, _, _ = stance
     dz = z - W_z
     inner = arm.d - np.sqrt((rho - rho_W) ** 2 + dz * dz)

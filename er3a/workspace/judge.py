@@ -203,4 +203,3 @@ def _exclude(arm, rho_0, rho_1, z_0, z_1, most_boxes, arcs, count, stack, splits
         if arm.mirrored:
             count = remove(arcs, count, a - high - 1e-11, b - low + 1e-11, True)
     return count, boxes
-

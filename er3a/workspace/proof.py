@@ -110,7 +110,9 @@ def sharpen(arm: SectionArm, proof: Proof, chosen: np.ndarray) -> Proof:
     """Split the chosen cells (mask) of a proof into four each, and judge those."""
     finer = _judge(arm, _quarters(proof.cells[chosen]), _stance_grid(arm), 0)
     level = np.repeat(proof.level[chosen] + 1, 4)
-    columns = [np.concatenate([getattr(proof, key)[~chosen], getattr(finer, key)]) for key in _COLUMNS if key != "level"]
+    columns = [
+        np.concatenate([getattr(proof, key)[~chosen], getattr(finer, key)]) for key in _COLUMNS if key != "level"
+    ]
     columns.insert(3, np.concatenate([proof.level[~chosen], level]))
     return Proof(*columns, proof.boxes + finer.boxes)
 

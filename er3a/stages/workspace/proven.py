@@ -107,6 +107,7 @@ def proof_table(proof: Proof) -> pd.DataFrame:
         filled_share=1 - unfilled,
         empty_share=empty,
         empty_arcs_deg=[_arcs(row) for row in proof.empty],
+        unfilled_arcs_deg=[_arcs(row) for row in proof.unfilled],
     )
 
 
@@ -115,7 +116,7 @@ def _arcs(row: np.ndarray) -> list[float]:
 
 
 def border_table(robot: Robot, proven: Proven) -> pd.DataFrame:
-    """Exact borders of the section for the tool point and the wrist centre, with the joints (as theta) that make them."""
+    """Exact borders of the section, of tool point and wrist centre, with the joints (as theta) that make them."""
     arms = {"tool point": proven.arm, "wrist centre": section_arm(robot, wrist_centre=True)} if proven.arm else {}
     tables = []
     for point, arm in arms.items():

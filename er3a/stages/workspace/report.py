@@ -10,7 +10,8 @@ from markupsafe import Markup
 
 from er3a.results import read_summary, read_table
 from er3a.robots.robot import Robot
-from er3a.stages.workspace.plots import convergence, sections, slices, top_view
+from er3a.stages.workspace.plots import convergence, top_view
+from er3a.stages.workspace.proof_plots import sections, slices
 from er3a.stages.workspace.turning import turning_figure
 from er3a.study import Study
 from er3a.viewing.page import Picture, fixed, number, render
@@ -40,9 +41,7 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
         top=Picture(
             top_view(robot, summary, cells), "The cloud from above with the limits of joint 1", _top_caption(robot)
         ),
-        slices=Picture(
-            slices(summary, cells, proof), "Three level slices of the proof", _slices_caption(summary, enclosed)
-        ),
+        slices=Picture(slices(summary, proof), "Three level slices of the proof", _slices_caption(summary, enclosed)),
         convergence=Picture(
             convergence(summary, curve),
             "Touched volume over the number of samples for three cell sizes, with the proven bounds and the estimate",
@@ -71,7 +70,9 @@ def _void_row(row: int, void: dict[str, Any]) -> list[str]:
 
 
 def _section_caption(summary: dict[str, Any], enclosed: list[dict[str, Any]]) -> str:
-    text = "What is white on the right is proven unreachable from every side; blank cells on the left only were not hit. "
+    text = (
+        "What is white on the right is proven unreachable from every side; blank cells on the left only were not hit. "
+    )
     if enclosed:
         where = "about the shoulder" if enclosed[0]["holds_shoulder"] else "away from the shoulder"
         text += f"The largest closed hollow lies {where}. "

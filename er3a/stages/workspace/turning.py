@@ -25,7 +25,12 @@ def turning_figure(
     figure = go.Figure()
     far = cloud[cloud["y_m"] >= summary["axis"]["point_m"][1]][:POINTS]
     value = far["manipulability_m3"].to_numpy()
-    marker = {"size": 1.6, "color": np.round(value, 6), "colorscale": "Viridis", "cmax": float(np.quantile(value, 0.99))}
+    marker = {
+        "size": 1.6,
+        "color": np.round(value, 6),
+        "colorscale": "Viridis",
+        "cmax": float(np.quantile(value, 0.99)),
+    }
     x, y, z = (np.round(far[key].to_numpy() * 1000, 1) for key in _XYZ)
     figure.add_scatter3d(x=x, y=y, z=z, mode="markers", marker=marker, name="cloud, far half", hoverinfo="skip")
     for number, void in enumerate(summary["voids"], start=1):
@@ -44,7 +49,9 @@ def turning_figure(
         )
     x, y, z = (skeleton(robot, np.zeros(6)) * 1000).T
     line = {"color": INK, "width": 9}
-    figure.add_scatter3d(x=x, y=y, z=z, mode="lines+markers", line=line, marker={"size": 4, "color": INK}, name="arm at 0")
+    figure.add_scatter3d(
+        x=x, y=y, z=z, mode="lines+markers", line=line, marker={"size": 4, "color": INK}, name="arm at 0"
+    )
     axis = {"backgroundcolor": "white", "gridcolor": "#dddddd"}
     figure.update_layout(
         scene={
