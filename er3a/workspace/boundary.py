@@ -24,8 +24,8 @@ from er3a.workspace.empty import STACK, is_empty
 from er3a.workspace.section_arm import SectionArm
 
 SAMPLES = 241
-_BESIDE = 2e-3
-_MOST_BOXES = 60_000
+_BESIDE = 4e-3
+_MOST_BOXES = 20_000
 _ANGLE = 1e-9
 
 

@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import connected_components
 
 from er3a.workspace.arcs import TURN
 from er3a.workspace.lookup import SectionMap
-from er3a.workspace.proof import ring_volumes
+from er3a.workspace.proof import MOST_LEVEL, ring_volumes
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,11 +100,12 @@ def cavities(section: SectionMap) -> tuple[list[Cavity], Cavity]:
 def rim(section: SectionMap, enclosed: list[Cavity]) -> np.ndarray:
     """Which cells (n,) of the proof are undecided and belong to enclosed cavities."""
     chosen = np.zeros(len(section.proof.cells), dtype=bool)
+    splittable = section.proof.level < MOST_LEVEL
     for cavity in enclosed:
         middle = cavity.cells.reshape(-1, 2, 2).mean(axis=2)
         open_arcs = cavity.empty < 1 - 1e-9
         chosen[section.cell_of(*middle[open_arcs].T)] = True
-    return chosen
+    return chosen & splittable
 
 
 def _overlaps(neighbours: np.ndarray, arcs: np.ndarray, number: np.ndarray) -> np.ndarray:

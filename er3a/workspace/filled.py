@@ -9,7 +9,8 @@ if |X| <= rho, and if the direction lies in the zone: ``d low <= (x - W) . f <= 
 quadratic in z, so its range over a rectangle of the section is exact, and so is that of ``(x - W) . f`` where f lies
 in W's half plane; the rest is interval arithmetic. A pair (theta_2, tau) for which all conditions hold over the
 rectangle proves the ring filled, at every azimuth that joint 1 brings phi to for all of its points: from
-``theta_1_low + max phi`` to ``theta_1_high + min phi``. Joints 2 and 3 may stand on their limits, so borders that a limit makes cost nothing.
+``theta_1_low + max phi`` to ``theta_1_high + min phi``. Joints 2 and 3 may stand on their limits, so borders that a
+limit makes cost nothing.
 """
 
 from __future__ import annotations

@@ -14,6 +14,8 @@ from er3a.workspace.section_arm import SectionArm
 _STANCES = 96
 _MOST_BOXES = 20_000
 _OPEN = 1e-9
+MOST_LEVEL = 7
+"""Cells are not split further than this: a set without volume would never be decided."""
 _COLUMNS = ("cells", "unfilled", "empty", "level", "witness")
 
 
@@ -94,7 +96,7 @@ def prove(arm: SectionArm, target: float, most_cells: int, across: int = 32) -> 
         undecided = volumes * (reached[1] - reached[0])
         split = undecided > _OPEN * volumes
         lower, upper = settled + reached @ volumes
-        if upper - lower <= target * upper:
+        if upper - lower <= target * upper or level == MOST_LEVEL:
             split[:] = False
         room = max(0, most_cells - looked) // 4
         if split.sum() > room:

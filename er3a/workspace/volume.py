@@ -79,4 +79,4 @@ def wilson(hits: int, points: int) -> tuple[float, float]:
     share, z2 = hits / points, _NORMAL_95**2
     middle = (share + z2 / (2 * points)) / (1 + z2 / points)
     half = _NORMAL_95 / (1 + z2 / points) * np.sqrt(share * (1 - share) / points + z2 / (4 * points**2))
-    return max(0.0, middle - half), min(1.0, middle + half)
+    return (max(0.0, middle - half) if hits else 0.0), (min(1.0, middle + half) if hits < points else 1.0)
