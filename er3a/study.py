@@ -106,7 +106,7 @@ class Study(StrictModel):
         """The files that a stage reads for a robot."""
         entry = self.entry(name)
         files = [self.robot_file(name)]
-        if stage == "validation":
+        if stage in ("validation", "workspace"):
             for reference in load_robot(files[0]).references:
                 files += sorted((REFERENCES / reference).glob("*.csv"))
         if stage == "inverse":

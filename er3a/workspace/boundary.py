@@ -23,9 +23,9 @@ from er3a.kinematics.jit import kernel
 from er3a.workspace.empty import STACK, is_empty
 from er3a.workspace.section_arm import SectionArm
 
-SAMPLES = 241
+SAMPLES = 121
 _BESIDE = 4e-3
-_MOST_BOXES = 20_000
+_MOST_BOXES = 12_000
 _ANGLE = 1e-9
 
 

@@ -391,6 +391,7 @@ def test_results_do_not_depend_on_the_parts(tmp_path):
         "hull_triangles.parquet",
         "proof.parquet",
         "border.parquet",
+        "drawing.parquet",
         "void_vertices.parquet",
         "void_triangles.parquet",
         "summary.json",

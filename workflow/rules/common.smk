@@ -34,6 +34,7 @@ TABLES = {
         "hull_triangles",
         "proof",
         "border",
+        "drawing",
         "void_vertices",
         "void_triangles",
     ],

@@ -12,10 +12,11 @@ from scipy import ndimage
 from er3a.kinematics.forward import forward, jacobian
 from er3a.results import Figure, write_summary, write_table
 from er3a.robots.robot import Robot
+from er3a.stages.workspace.drawing import drawing_table
 from er3a.stages.workspace.grid import Grid, make_grid
 from er3a.stages.workspace.hull import Hull, cells_inside, convex_hull
 from er3a.stages.workspace.parts import gather
-from er3a.stages.workspace.proven import border_table, find_proven_voids, proof_table, prove_robot
+from er3a.stages.workspace.proven import border_table, count_in_empty, find_proven_voids, proof_table, prove_robot
 from er3a.stages.workspace.random_joints import joint_vectors
 from er3a.stages.workspace.reach import reach_figures
 from er3a.stages.workspace.sample import sampled
@@ -61,6 +62,8 @@ def compute(study: Study, name: str, folder: Path, parts: list[Path] | None = No
         records = _sampled_records(voids, grid, shoulder)
     write_table(folder / "proof.parquet", proof_table(proven.proof))
     write_table(folder / "border.parquet", border_table(robot, proven))
+    height = float((shoulder - grid.axis_point) @ grid.axis)
+    write_table(folder / "drawing.parquet", drawing_table(robot, height))
     write_table(folder / "void_vertices.parquet", vertices)
     write_table(folder / "void_triangles.parquet", triangles)
 
@@ -100,7 +103,15 @@ def compute(study: Study, name: str, folder: Path, parts: list[Path] | None = No
         volume_m3={"lower": lower, "upper": upper, "estimate": guess.value, "ci95": [guess.low, guess.high]},
         volume_points={"drawn": guess.points, "reached": guess.reached, "undecided": guess.undecided},
         touched_m3=touched,
-        proof={"method": proven.method, "cells": len(proven.proof.cells), "width": proven.proof.width},
+        proof={
+            "method": proven.method,
+            "cells": len(proven.proof.cells),
+            "width": proven.proof.width,
+            "points_checked": len(q_extreme) + len(q_cloud),
+            "points_in_empty_cells": count_in_empty(
+                proven, forward(robot, np.concatenate([q_extreme, q_cloud]))[:, :3, 3]
+            ),
+        },
         hull={
             "volume_m3": hull.volume,
             "area_m2": hull.area,

@@ -17,16 +17,23 @@ from er3a.stages.workspace.plots import DENSITY, log_norm, masked
 from er3a.viewing.arm import skeleton
 from er3a.viewing.figures import equal_scale, new_figure
 from er3a.viewing.page import fixed
-from er3a.viewing.palette import HIGHLIGHT, INK, MUTED, REFERENCE
+from er3a.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED, REFERENCE
 
 PROOF = {"filled": "#9ecae1", "filled but for a wedge": "#d6e6f2", "undecided": HIGHLIGHT, "empty": "#ffffff"}
 FILLED, WEDGE, UNDECIDED, EMPTY = range(4)
 BORDERS = {"tool point": INK, "wrist centre": REFERENCE}
+DRAWN = JOINTS[2]
 SLICE_PIXELS = 321
 
 
-def sections(robot: Robot, summary: dict[str, Any], section: pd.DataFrame, proof: pd.DataFrame, border: pd.DataFrame):
-    """Side sections about axis 1: what the samples show, and what is proven."""
+def sections(robot: Robot, summary: dict[str, Any], tables: dict[str, pd.DataFrame]):
+    """Side sections about axis 1: what the samples show, and what is proven.
+
+    Parameters
+    ----------
+    tables : the stage's ``section``, ``proof``, ``border`` and ``drawing``
+    """
+    section, proof, border, drawing = (tables[name] for name in ("section", "proof", "border", "drawing"))
     figure, (left, right) = new_figure(1, 2, width=11.5, height=9.0, sharey=True, sharex=True)
     _draw_density(left, summary, section)
     _draw_proof(right, proof)
@@ -37,11 +44,14 @@ def sections(robot: Robot, summary: dict[str, Any], section: pd.DataFrame, proof
         axes.set_aspect("equal", adjustable="box")
         axes.grid(False)
         axes.set_xlim(0, None)
+    _draw_labels(right, drawing)
     left.set_title("Samples, all azimuths folded in")
     right.set_title("Proof")
     handles = [Line2D([], [], color=INK, marker="o", markersize=4, linewidth=2.4, label="arm, all joints 0")]
     if len(border):
         handles += [Line2D([], [], color=colour, label=f"exact border, {name}") for name, colour in BORDERS.items()]
+    if len(drawing):
+        handles.append(Line2D([], [], color=DRAWN, marker="o", linestyle=":", label="maker's drawing, wrist centre"))
     handles += [Patch(facecolor=colour, edgecolor=MUTED, label=label) for label, colour in PROOF.items()]
     figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return figure
@@ -74,6 +84,19 @@ def _draw_proof(axes: Axes, proof: pd.DataFrame) -> None:
 def _draw_border(axes: Axes, border: pd.DataFrame) -> None:
     for (point, _), rows in border.groupby(["point", "arc"]):
         axes.plot(rows["rho_m"] * 1000, rows["z_m"] * 1000, color=BORDERS[point], linewidth=1.3)
+
+
+def _draw_labels(axes: Axes, drawing: pd.DataFrame) -> None:
+    """Extents as dotted lines, corners as dots."""
+    for row in drawing.itertuples():
+        if np.isnan(row.z_m):
+            axes.axvline(row.rho_m * 1000, color=DRAWN, linestyle=":", linewidth=1.2)
+        elif np.isnan(row.rho_m):
+            axes.axhline(row.z_m * 1000, color=DRAWN, linestyle=":", linewidth=1.2)
+        else:
+            at = (row.rho_m * 1000, row.z_m * 1000)
+            axes.plot(*at, "o", color=DRAWN, markersize=5)
+            axes.annotate(row.label, at, (6, -11), textcoords="offset points", fontsize=8, color=DRAWN)
 
 
 def _draw_arm(axes: Axes, robot: Robot, summary: dict[str, Any]) -> None:

@@ -17,7 +17,7 @@ from er3a.workspace.boundary import border
 from er3a.workspace.causes import describe, relaxations
 from er3a.workspace.cavities import Cavity, cavities, rim
 from er3a.workspace.general import bound_section
-from er3a.workspace.lookup import SectionMap
+from er3a.workspace.lookup import EMPTY, SectionMap
 from er3a.workspace.proof import Proof, prove, sharpen
 from er3a.workspace.section_arm import SectionArm, section_arm, section_frame
 from er3a.workspace.volume import VolumeEstimate, estimate_volume
@@ -88,6 +88,12 @@ def _about(axis: np.ndarray) -> np.ndarray:
     x = np.cross(np.eye(3)[np.argmin(np.abs(axis))], axis)
     x = x / np.linalg.norm(x)
     return np.stack([x, np.cross(axis, x), axis])
+
+
+def count_in_empty(proven: Proven, points: np.ndarray) -> int:
+    """How many points (n, 3), m, base frame, lie where nothing can be reached; more than none would refute the proof."""
+    x, y, z = proven.R @ (points - proven.origin).T
+    return int((proven.section.status(np.hypot(x, y), np.arctan2(y, x), z) == EMPTY).sum())
 
 
 def proof_table(proof: Proof) -> pd.DataFrame:

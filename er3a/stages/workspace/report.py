@@ -17,16 +17,14 @@ from er3a.study import Study
 from er3a.viewing.page import Picture, fixed, number, render
 
 LISTED = 12
+TABLES = ("section", "cells", "curve", "proof", "border", "drawing", "cloud", "void_vertices", "void_triangles")
 KINDS = {"enclosed": "enclosed", "open": "open pocket"}
 
 
 def report(study: Study, name: str, folder: Path, output: Path) -> None:
     """Render the workspace page of a robot from its results in ``folder``."""
     robot, summary = study.robot(name), read_summary(folder)
-    section, cells, curve, proof, border, cloud, vertices, triangles = (
-        read_table(folder / f"{table}.parquet")
-        for table in ("section", "cells", "curve", "proof", "border", "cloud", "void_vertices", "void_triangles")
-    )
+    tables = {table: read_table(folder / f"{table}.parquet") for table in TABLES}
     enclosed = [void for void in summary["voids"] if void["kind"] == "enclosed"]
     render(
         Path(__file__).with_name("report.html.j2"),
@@ -34,20 +32,26 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
         summary,
         robot=robot,
         section=Picture(
-            sections(robot, summary, section, proof, border),
+            sections(robot, summary, tables),
             "Side sections about axis 1: density of the samples, and proven cells with the exact border",
-            _section_caption(summary, enclosed),
+            _section_caption(summary, enclosed, len(tables["drawing"]) > 0),
         ),
         top=Picture(
-            top_view(robot, summary, cells), "The cloud from above with the limits of joint 1", _top_caption(robot)
+            top_view(robot, summary, tables["cells"]),
+            "The cloud from above with the limits of joint 1",
+            _top_caption(robot),
         ),
-        slices=Picture(slices(summary, proof), "Three level slices of the proof", _slices_caption(summary, enclosed)),
+        slices=Picture(
+            slices(summary, tables["proof"]), "Three level slices of the proof", _slices_caption(summary, enclosed)
+        ),
         convergence=Picture(
-            convergence(summary, curve),
+            convergence(summary, tables["curve"]),
             "Touched volume over the number of samples for three cell sizes, with the proven bounds and the estimate",
-            _curve_caption(summary, curve),
+            _curve_caption(summary, tables["curve"]),
         ),
-        turning=Markup(turning_figure(robot, summary, cloud, vertices, triangles)),
+        turning=Markup(
+            turning_figure(robot, summary, *(tables[name] for name in ("cloud", "void_vertices", "void_triangles")))
+        ),
         void_rows=[_void_row(n, void) for n, void in enumerate(summary["voids"][:LISTED], start=1)],
         voids_more=max(0, len(summary["voids"]) - LISTED),
         astray=summary["verdict"]["code"] == "workspace.void_unexpected",
@@ -69,13 +73,17 @@ def _void_row(row: int, void: dict[str, Any]) -> list[str]:
     ]
 
 
-def _section_caption(summary: dict[str, Any], enclosed: list[dict[str, Any]]) -> str:
+def _section_caption(summary: dict[str, Any], enclosed: list[dict[str, Any]], drawn: bool) -> str:
     text = (
         "What is white on the right is proven unreachable from every side; blank cells on the left only were not hit. "
     )
     if enclosed:
         where = "about the shoulder" if enclosed[0]["holds_shoulder"] else "away from the shoulder"
         text += f"The largest closed hollow lies {where}. "
+    if drawn:
+        text += (
+            "The wrist centre's exact border meets the extents and corners of the maker's drawing where they agree. "
+        )
     return text + "Plan with the filled area; the samples agree with it and add no reach."
 
 
