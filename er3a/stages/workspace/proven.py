@@ -91,7 +91,7 @@ def _about(axis: np.ndarray) -> np.ndarray:
 
 
 def count_in_empty(proven: Proven, points: np.ndarray) -> int:
-    """How many points (n, 3), m, base frame, lie where nothing can be reached; more than none would refute the proof."""
+    """How many points (n, 3), m, base frame, lie where nothing is reached; more than none would refute the proof."""
     x, y, z = proven.R @ (points - proven.origin).T
     return int((proven.section.status(np.hypot(x, y), np.arctan2(y, x), z) == EMPTY).sum())
 

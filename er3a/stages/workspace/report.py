@@ -82,9 +82,11 @@ def _section_caption(summary: dict[str, Any], enclosed: list[dict[str, Any]], dr
         text += f"The largest closed hollow lies {where}. "
     if drawn:
         text += (
-            "The wrist centre's exact border meets the extents and corners of the maker's drawing where they agree. "
+            "Green are the maker's labels of the wrist centre: extents touch its border, corners are single stances. "
         )
-    return text + "Plan with the filled area; the samples agree with it and add no reach."
+    proof = summary["proof"]
+    inside = proof["points_in_empty_cells"] or "none"
+    return f"{text}Of {number(proof['points_checked'])} recorded samples, {inside} lie in an empty cell."
 
 
 def _top_caption(robot: Robot) -> str:
