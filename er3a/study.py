@@ -106,9 +106,10 @@ class Study(StrictModel):
         """The files that a stage reads for a robot."""
         entry = self.entry(name)
         files = [self.robot_file(name)]
-        if stage in ("validation", "workspace"):
+        kinds = {"validation": "*.csv", "workspace": "envelope.csv"}
+        if stage in kinds:
             for reference in load_robot(files[0]).references:
-                files += sorted((REFERENCES / reference).glob("*.csv"))
+                files += sorted((REFERENCES / reference).glob(kinds[stage]))
         if stage == "inverse":
             files.append(Path(entry.targets))
         if stage == "trajectory":

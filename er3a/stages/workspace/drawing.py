@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from er3a.references.load import load_references
+from er3a.references.load import MANUAL_REFS, check_reference_file
 from er3a.robots.robot import Robot
 
 _ACROSS = {"greatest_x": 1.0, "least_x": -1.0}
@@ -20,7 +20,8 @@ def drawing_table(robot: Robot, shoulder_m: float) -> pd.DataFrame:
     """
     marks, corners = [], {}
     for reference in robot.references:
-        for row in load_references(reference).rows.get("envelope", ()):
+        file = MANUAL_REFS / reference / "envelope.csv"
+        for row in check_reference_file(file) if file.is_file() else ():
             if row.corner_deg is not None:
                 value = row.value_mm / 1000
                 corner = corners.setdefault(row.corner_deg, {})
