@@ -45,6 +45,7 @@ class WorkspaceSettings(StrictModel):
 
     ``samples`` are drawn in ``blocks`` seeded blocks, ``cells_across`` cells span the bounding box's longest side,
     the hull is taken over the extreme samples in ``hull_directions`` directions, the recording shows ``cloud_points``.
+    The proof looks at ``proof_cells`` cells of the section; ``volume_points`` uniform points estimate the volume.
     """
 
     samples: Annotated[int, Field(ge=1, le=100_000_000_000)]
@@ -52,6 +53,8 @@ class WorkspaceSettings(StrictModel):
     cells_across: Annotated[int, Field(ge=8, le=1024)]
     hull_directions: Annotated[int, Field(ge=100, le=100_000)]
     cloud_points: Annotated[int, Field(ge=1, le=300_000)]
+    proof_cells: Annotated[int, Field(ge=1, le=10_000_000)] = 8000
+    volume_points: Annotated[int, Field(ge=100, le=10_000_000)] = 100_000
 
     @model_validator(mode="after")
     def _a_sample_per_block(self):
@@ -103,9 +106,10 @@ class Study(StrictModel):
         """The files that a stage reads for a robot."""
         entry = self.entry(name)
         files = [self.robot_file(name)]
-        if stage == "validation":
+        kinds = {"validation": "*.csv", "workspace": "envelope.csv"}
+        if stage in kinds:
             for reference in load_robot(files[0]).references:
-                files += sorted((REFERENCES / reference).glob("*.csv"))
+                files += sorted((REFERENCES / reference).glob(kinds[stage]))
         if stage == "inverse":
             files.append(Path(entry.targets))
         if stage == "trajectory":

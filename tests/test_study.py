@@ -104,7 +104,7 @@ def test_a_file_of_one_s_own(study_with, tmp_path):
     own.write_text(text, encoding="utf-8")
     study = study_with(lambda content: content["robots"]["er3_600"].update(file=str(own)))
     assert study.robot("er3_600").name == "er3_600"
-    assert study.inputs("er3_600", "workspace") == [own]
+    assert study.inputs("er3_600", "workspace")[0] == own
     missing = study_with(lambda content: content["robots"]["er3_600"].update(file="no/such/file.yaml"))
     with pytest.raises(InputError, match=r"^no/such/file\.yaml: there is no such file"):
         missing.robot("er3_600")

@@ -43,6 +43,7 @@ def make_study(files: dict[str, Path] | None = None, **workspace) -> Study:
     entry = {"targets": "targets.yaml", "paths": "paths.yaml"}
     robots = {name: {**entry, "file": str(file)} for name, file in (files or {}).items()} or {"er3_600": entry}
     small = {"samples": 60_001, "blocks": 7, "cells_across": 16, "hull_directions": 200, "cloud_points": 500}
+    small |= {"proof_cells": 400, "volume_points": 2000}
     return Study.model_validate(
         {
             "kind": "study",
@@ -67,6 +68,16 @@ def locked_file(folder: Path, locked: dict[int, float]) -> Path:
         content["limits"]["rows"][joint - 1] |= {"lower_deg": angle, "upper_deg": angle}
     content["name"] = "locked"
     path = folder / "locked.yaml"
+    path.write_text(yaml.safe_dump(content), encoding="utf-8")
+    return path
+
+
+def skew_file(folder: Path) -> Path:
+    """A copy of the ER3-600's file whose wrist axes don't meet."""
+    content = yaml.safe_load((ROBOTS / "er3_600.yaml").read_text(encoding="utf-8"))
+    content["dh"]["rows"][4]["a_mm"] = 40
+    content["name"] = "skew"
+    path = folder / "skew.yaml"
     path.write_text(yaml.safe_dump(content), encoding="utf-8")
     return path
 
@@ -318,13 +329,14 @@ def test_unseen_cells_are_predicted_or_understated(random):
 
 
 def void_record(status: str, at_shoulder: bool) -> dict:
-    volume, centre = {"untouched": 0.002}, [0.1, -0.2, 0.0004]
+    volume, centre = {"lower": 0.002, "upper": 0.003}, [0.1, -0.2, 0.0004]
     return {
         "kind": "enclosed",
         "status": status,
         "volume_m3": volume,
         "centroid_m": centre,
         "holds_shoulder": at_shoulder,
+        "cause": "vanishes when joint 3 may exceed +75 deg by 15 deg",
     }
 
 
@@ -332,15 +344,15 @@ def void_record(status: str, at_shoulder: bool) -> dict:
     ("voids", "status", "code"),
     [
         ([], "pass", "no_void"),
-        ([void_record("sampled", True)], "pass", "void_at_shoulder"),
+        ([void_record("proven empty", True)], "pass", "void_at_shoulder"),
         ([void_record("undersampled", True)], "pass", "void_at_shoulder"),
-        ([void_record("sampled", True), void_record("undersampled", False)], "caution", "void_uncertain"),
-        ([void_record("undersampled", False), void_record("sampled", False)], "caution", "void_unexpected"),
+        ([void_record("proven empty", True), void_record("undersampled", False)], "caution", "void_uncertain"),
+        ([void_record("undersampled", False), void_record("proven empty", False)], "caution", "void_unexpected"),
     ],
 )
 def test_an_enclosed_void_away_from_the_shoulder_is_never_passed_over(voids, status, code):
     hull = convex_hull(np.r_[np.eye(3), np.zeros((1, 3))])
-    verdict = judge(hull, voids, {"touched": 1000}, 0.0)
+    verdict = judge(hull, voids, {"touched": 1000}, 0.0, True)
     assert (verdict.status, verdict.code) == (status, f"workspace.{code}")
     assert code == "no_void" or "2 L" in verdict.text
 
@@ -377,6 +389,11 @@ def test_results_do_not_depend_on_the_parts(tmp_path):
         "cloud.parquet",
         "hull_vertices.parquet",
         "hull_triangles.parquet",
+        "proof.parquet",
+        "border.parquet",
+        "drawing.parquet",
+        "void_vertices.parquet",
+        "void_triangles.parquet",
         "summary.json",
     }
     for parts in (1, 3, 9):
@@ -399,7 +416,7 @@ def test_tables_agree_with_the_summary(tmp_path):
         assert rows["touched_m3"].is_monotonic_increasing
         assert rows["samples"].iloc[-1] == 60_001
     finest = curve[curve["cell_mm"] == curve["cell_mm"].min()]
-    assert finest["touched_m3"].iloc[-1] == pytest.approx(summary["volume_m3"]["touched"], rel=1e-12)
+    assert finest["touched_m3"].iloc[-1] == pytest.approx(summary["touched_m3"], rel=1e-12)
     assert len(cloud) == 500
     assert (cloud["manipulability_m3"] >= 0).all()
     q = np.radians(hull[[f"q{k}_deg" for k in range(1, 7)]].to_numpy())
@@ -415,8 +432,7 @@ def test_void_centres_have_no_inverse_solution(tmp_path, random):
     summary, robot = read_summary(tmp_path), study.robot("er3a_c60_article")
     assert summary["verdict"]["code"] == "workspace.void_unexpected"
     assert summary["verdict"]["status"] == "caution"
-    (void,) = (void for void in summary["voids"] if void["kind"] == "enclosed")
-    assert not void["holds_shoulder"]
+    (void,) = (void for void in summary["voids"] if void["kind"] == "enclosed" and not void["holds_shoulder"])
 
     def solvable(position):
         T = np.eye(4)
@@ -458,9 +474,14 @@ def test_locked_joints_run_through_all_three_verbs(tmp_path, locked, code):
 
 
 def test_too_few_samples_are_called_so(tmp_path):
-    study = make_study(samples=10_000, cells_across=64)
-    compute(study, "er3_600", tmp_path)
-    assert read_summary(tmp_path)["verdict"]["code"] == "workspace.undersampled"
+    """On an arm whose build allows no proof, the samples are all there is."""
+    study = make_study({"skew": skew_file(tmp_path)}, samples=10_000, cells_across=64)
+    compute(study, "skew", tmp_path)
+    summary = read_summary(tmp_path)
+    assert summary["verdict"]["code"] == "workspace.undersampled"
+    assert summary["volume_m3"]["lower"] == 0
+    assert summary["volume_m3"]["upper"] > summary["hull"]["volume_m3"]
+    assert "axes 4, 5 and 6 miss a common point" in summary["proof"]["method"]
 
 
 # --- bad parts ---

@@ -25,7 +25,19 @@ ROBOTS = list(STUDY.robots)
 # The tables that each stage writes beside its summary.json.
 TABLES = {
     "validation": ["checks", "axes", "key_poses", "section", "residuals", "corrections"],
-    "workspace": ["cells", "section", "curve", "cloud", "hull_vertices", "hull_triangles"],
+    "workspace": [
+        "cells",
+        "section",
+        "curve",
+        "cloud",
+        "hull_vertices",
+        "hull_triangles",
+        "proof",
+        "border",
+        "drawing",
+        "void_vertices",
+        "void_triangles",
+    ],
     "inverse": ["solutions"],
     "trajectory": ["checks", "samples"],
 }

@@ -12,9 +12,11 @@ from scipy import ndimage
 from er3a.kinematics.forward import forward, jacobian
 from er3a.results import Figure, write_summary, write_table
 from er3a.robots.robot import Robot
+from er3a.stages.workspace.drawing import drawing_table
 from er3a.stages.workspace.grid import Grid, make_grid
 from er3a.stages.workspace.hull import Hull, cells_inside, convex_hull
 from er3a.stages.workspace.parts import gather
+from er3a.stages.workspace.proven import border_table, count_in_empty, find_proven_voids, proof_table, prove_robot
 from er3a.stages.workspace.random_joints import joint_vectors
 from er3a.stages.workspace.reach import reach_figures
 from er3a.stages.workspace.sample import sampled
@@ -53,6 +55,17 @@ def compute(study: Study, name: str, folder: Path, parts: list[Path] | None = No
     inside = cells_inside(hull, grid)
     voids = find_voids(tally.counts, inside)
     q_cloud = _cloud_joints(study, robot)
+    shoulder = _shoulder(robot, grid)
+    proven = prove_robot(robot, settings.proof_cells, settings.volume_points, study.seed)
+    records, vertices, triangles = find_proven_voids(robot, proven, hull, shoulder)
+    if proven.arm is None:
+        records = _sampled_records(voids, grid, shoulder)
+    write_table(folder / "proof.parquet", proof_table(proven.proof))
+    write_table(folder / "border.parquet", border_table(robot, proven))
+    height = float((shoulder - grid.axis_point) @ grid.axis)
+    write_table(folder / "drawing.parquet", drawing_table(robot, height))
+    write_table(folder / "void_vertices.parquet", vertices)
+    write_table(folder / "void_triangles.parquet", triangles)
 
     write_table(folder / "cells.parquet", _cells(tally, inside, voids))
     write_table(folder / "section.parquet", _section(tally, grid))
@@ -63,32 +76,42 @@ def compute(study: Study, name: str, folder: Path, parts: list[Path] | None = No
     cells = {"touched": int((tally.counts > 0).sum()), "inside_hull": int(inside.sum())}
     cells["touched_inside_hull"] = int(((tally.counts > 0) & inside).sum())
     unseen = unseen_cells(tally.counts)
-    shoulder = _shoulder(robot, grid)
-    records = _void_records(voids, grid, shoulder)
     reach = reach_figures(robot, grid, np.concatenate([q_extreme, q_cloud]))
     filled = cells["touched_inside_hull"] / cells["inside_hull"] if cells["inside_hull"] else None
-    enclosed = sum(record["volume_m3"]["untouched"] for record in records if record["kind"] == "enclosed")
-    volume = {"touched": cells["touched"] * grid.cell_volume}
-    volume["touched_in_hull"] = cells["touched_inside_hull"] * grid.cell_volume
+    lower, upper = proven.proof.bounds
+    enclosed = [record["volume_m3"] for record in records if record["kind"] == "enclosed"]
+    touched = cells["touched"] * grid.cell_volume
+    guess = proven.estimate
     figures = [
         Figure("greatest reach from axis 1", reach["furthest_from_axis"] * 1000, "mm"),
-        Figure("enclosed voids", enclosed * 1000, "L"),
+        Figure("enclosed voids, at least", 1000 * sum(volume["lower"] for volume in enclosed), "L"),
+        Figure("reached volume", guess.value, "m³", max(guess.value - guess.low, guess.high - guess.value)),
+        Figure("reached volume, at least", lower, "m³"),
+        Figure("reached volume, at most", upper, "m³"),
         Figure("convex hull", hull.volume, "m³"),
-        Figure("touched within the hull", volume["touched_in_hull"], "m³"),
-        Figure("share of the hull touched", None if filled is None else 100 * filled, "%"),
         Figure("least distance from axis 1", reach["nearest_to_axis"] * 1000, "mm"),
         Figure("samples", settings.samples, ""),
-        Figure("cell size", grid.cell * 1000, "mm"),
     ]
     write_summary(
         folder,
         study,
         name,
         "workspace",
-        judge(hull, records, cells, unseen),
+        judge(hull, records, cells, unseen, proven.arm is not None),
         figures,
         samples=settings.samples,
-        volume_m3=volume,
+        volume_m3={"lower": lower, "upper": upper, "estimate": guess.value, "ci95": [guess.low, guess.high]},
+        volume_points={"drawn": guess.points, "reached": guess.reached, "undecided": guess.undecided},
+        touched_m3=touched,
+        proof={
+            "method": proven.method,
+            "cells": len(proven.proof.cells),
+            "width": proven.proof.width,
+            "points_checked": len(q_extreme) + len(q_cloud),
+            "points_in_empty_cells": count_in_empty(
+                proven, forward(robot, np.concatenate([q_extreme, q_cloud]))[:, :3, 3]
+            ),
+        },
         hull={
             "volume_m3": hull.volume,
             "area_m2": hull.area,
@@ -182,17 +205,16 @@ def _shoulder(robot: Robot, grid: Grid) -> np.ndarray:
     return grid.axis_point + ((joint_2 - grid.axis_point) @ grid.axis) * grid.axis
 
 
-def _void_records(voids: Voids, grid: Grid, shoulder: np.ndarray) -> list[dict[str, Any]]:
+def _sampled_records(voids: Voids, grid: Grid, shoulder: np.ndarray) -> list[dict[str, Any]]:
     cell_of_shoulder = np.floor((shoulder - grid.origin) / grid.cell)
     return [
         {
             "kind": void.kind,
-            "status": void.status,
-            "volume_m3": {"untouched": len(void.cells) * grid.cell_volume},
+            "status": "undersampled",
+            "volume_m3": {"lower": 0.0, "upper": len(void.cells) * grid.cell_volume},
             **shape_of(void, grid),
-            "cells": len(void.cells),
-            "expected_samples": void.expected_samples,
-            "unseen_cells": void.unseen_cells,
+            "cause": "unknown: only samples tell of it",
+            "relaxed": [],
             "holds_shoulder": bool(np.any(np.all(np.abs(void.cells - cell_of_shoulder) <= 1, axis=1))),
         }
         for void in voids.listed

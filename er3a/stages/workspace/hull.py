@@ -78,3 +78,18 @@ def cells_inside(hull: Hull, grid: Grid) -> np.ndarray:
         outside = (room[:, upright] < 0).any(axis=1)
         inside[i] = (z >= bottom[:, None]) & (z <= top[:, None]) & ~outside[:, None]
     return inside
+
+
+def depth_inside(hull: Hull, points: np.ndarray) -> np.ndarray:
+    """Distance (...,) in m of points (..., 3) to the nearest face's plane, negative outside, -inf for a flat hull."""
+    flat = points.reshape(-1, 3)
+    depth = np.full(len(flat), np.inf if len(hull.triangles) else -np.inf)
+    if len(hull.triangles):
+        a, b, c = (hull.vertices[hull.triangles[:, i]] for i in range(3))
+        normals = np.cross(b - a, c - a)
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        offsets = np.einsum("ij,ij->i", normals, a)
+        for start in range(0, len(flat), 4096):
+            part = slice(start, start + 4096)
+            depth[part] = (offsets - flat[part] @ normals.T).min(axis=1)
+    return depth.reshape(points.shape[:-1])

@@ -61,17 +61,28 @@ def _log_hull(stream: rr.RecordingStream, folder: Path) -> None:
 
 
 def _log_voids(stream: rr.RecordingStream, folder: Path, summary: dict[str, Any]) -> None:
-    cells = read_table(folder / "cells.parquet")
-    origin, cell = np.array(summary["grid"]["origin_m"]), summary["grid"]["cell_m"]
+    vertices, triangles = (read_table(folder / f"void_{name}.parquet") for name in ("vertices", "triangles"))
     for number, void in enumerate(summary["voids"], start=1):
-        index = cells.loc[cells["void"] == number, ["ix", "iy", "iz"]].to_numpy()
-        boxes = rr.Boxes3D(
-            centers=origin + (index + 0.5) * cell,
-            half_sizes=np.full((len(index), 3), cell / 2),
-            colors=[rgb(_COLOURS[void["kind"]])],
-            fill_mode="solid" if void["status"] == "sampled" else "majorwireframe",
-        )
-        stream.log(f"voids/{void['kind']}_{number}", boxes, static=True)
+        faces = triangles.loc[triangles["void"] == number, ["a", "b", "c"]].to_numpy()
+        if len(faces):
+            corners = vertices.loc[vertices["void"] == number, _XYZ].to_numpy()
+            mesh = rr.Mesh3D(
+                vertex_positions=corners,
+                triangle_indices=faces,
+                albedo_factor=(*rgb(_COLOURS[void["kind"]]), 255),
+                vertex_normals=_normals(corners, faces),
+            )
+            stream.log(f"voids/{void['kind']}_{number}", mesh, static=True)
+
+
+def _normals(corners: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Unit normals (V, 3): sums over the faces at each corner."""
+    a, b, c = (corners[faces[:, i]] for i in range(3))
+    across = np.cross(b - a, c - a)
+    normals = np.zeros_like(corners)
+    for i in range(3):
+        np.add.at(normals, faces[:, i], across)
+    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
 
 
 def _note(summary: dict[str, Any]) -> str:
@@ -89,6 +100,6 @@ def _note(summary: dict[str, Any]) -> str:
     ]
     for number, void in enumerate(voids[:5], start=1):
         centre = ", ".join(fixed(1000 * value, 0) for value in void["centroid_m"])
-        litres = 1000 * void["volume_m3"]["untouched"]
-        lines.append(f"| {void['kind']}_{number}, {void['status']} | {litres:.3g} | {centre} |")
+        low, high = (1000 * void["volume_m3"][key] for key in ("lower", "upper"))
+        lines.append(f"| {void['kind']}_{number}, {void['status']} | {low:.3g} to {high:.3g} | {centre} |")
     return "\n".join(lines if voids else lines[:5])

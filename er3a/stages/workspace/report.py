@@ -6,22 +6,25 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from er3a.results import read_summary, read_table
 from er3a.robots.robot import Robot
-from er3a.stages.workspace.plots import convergence, section_and_top, slices
+from er3a.stages.workspace.plots import convergence, top_view
+from er3a.stages.workspace.proof_plots import sections, slices
+from er3a.stages.workspace.turning import turning_figure
 from er3a.study import Study
 from er3a.viewing.page import Picture, fixed, number, render
 
 LISTED = 12
+TABLES = ("section", "cells", "curve", "proof", "border", "drawing", "cloud", "void_vertices", "void_triangles")
 KINDS = {"enclosed": "enclosed", "open": "open pocket"}
-STATUSES = {"sampled": "sampled, not proven", "undersampled": "undersampled"}
 
 
 def report(study: Study, name: str, folder: Path, output: Path) -> None:
     """Render the workspace page of a robot from its results in ``folder``."""
     robot, summary = study.robot(name), read_summary(folder)
-    section, cells, curve = (read_table(folder / f"{table}.parquet") for table in ("section", "cells", "curve"))
+    tables = {table: read_table(folder / f"{table}.parquet") for table in TABLES}
     enclosed = [void for void in summary["voids"] if void["kind"] == "enclosed"]
     render(
         Path(__file__).with_name("report.html.j2"),
@@ -29,76 +32,84 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
         summary,
         robot=robot,
         section=Picture(
-            section_and_top(robot, summary, section, cells),
-            "Density of the tool point in a half plane through axis 1, with the arm at zero, and seen from above",
-            _section_caption(section, enclosed) + _top_caption(robot),
+            sections(robot, summary, tables),
+            "Side sections about axis 1: density of the samples, and proven cells with the exact border",
+            _section_caption(summary, enclosed, len(tables["drawing"]) > 0),
+        ),
+        top=Picture(
+            top_view(robot, summary, tables["cells"]),
+            "The cloud from above with the limits of joint 1",
+            _top_caption(robot),
         ),
         slices=Picture(
-            slices(summary, cells),
-            "One upright and three level slices of the voxel grid, voids marked",
-            _slices_caption(summary, enclosed),
+            slices(summary, tables["proof"]), "Three level slices of the proof", _slices_caption(summary, enclosed)
         ),
         convergence=Picture(
-            convergence(summary, curve),
-            "Touched volume over the number of samples for three cell sizes, with the hull's volume",
-            _curve_caption(summary, curve),
+            convergence(summary, tables["curve"]),
+            "Touched volume over the number of samples for three cell sizes, with the proven bounds and the estimate",
+            _curve_caption(summary, tables["curve"]),
         ),
-        void_rows=[_void_row(void) for void in summary["voids"][:LISTED]],
+        turning=Markup(
+            turning_figure(robot, summary, *(tables[name] for name in ("cloud", "void_vertices", "void_triangles")))
+        ),
+        void_rows=[_void_row(n, void) for n, void in enumerate(summary["voids"][:LISTED], start=1)],
         voids_more=max(0, len(summary["voids"]) - LISTED),
         astray=summary["verdict"]["code"] == "workspace.void_unexpected",
+        wide=100 * summary["proof"]["width"],
     )
 
 
-def _void_row(void: dict[str, Any]) -> list[str]:
+def _void_row(row: int, void: dict[str, Any]) -> list[str]:
+    low, high = (1000 * void["volume_m3"][key] for key in ("lower", "upper"))
     return [
+        str(row),
         KINDS[void["kind"]],
-        STATUSES[void["status"]],
-        number(void["volume_m3"]["untouched"] * 1000, 3),
-        number(100 * void["unseen_cells"] / void["cells"], 2),
+        void["status"],
+        f"{number(low, 3)} to {number(high, 3)}",
         ", ".join(fixed(1000 * value, 0) for value in void["centroid_m"]),
         " × ".join(fixed(1000 * value, 0) for value in void["extent_m"]),
+        void["cause"],
         "yes" if void["holds_shoulder"] else "no",
     ]
 
 
-def _section_caption(section: Any, enclosed: list[dict[str, Any]]) -> str:
-    if not section["void"].any():
-        return "All azimuths are folded into the section. It has no gap: the arm reaches throughout its outline."
+def _section_caption(summary: dict[str, Any], enclosed: list[dict[str, Any]], drawn: bool) -> str:
+    text = (
+        "What is white on the right is proven unreachable from every side; blank cells on the left only were not hit. "
+    )
     if enclosed:
         where = "about the shoulder" if enclosed[0]["holds_shoulder"] else "away from the shoulder"
-        return (
-            "All azimuths are folded into the section, so what stays blank is blank all around. The outlined hollow "
-            f"{where} was reached from no side."
+        text += f"The largest closed hollow lies {where}. "
+    if drawn:
+        text += (
+            "Green are the maker's labels of the wrist centre: extents touch its border, corners are single stances. "
         )
-    return (
-        "All azimuths are folded into the section. The outlined gap is closed in this plane, but in space "
-        "it is open to the outside, so it counts as a pocket."
-    )
+    proof = summary["proof"]
+    inside = proof["points_in_empty_cells"] or "none"
+    return f"{text}Of {number(proof['points_checked'])} recorded samples, {inside} lie in an empty cell."
 
 
 def _top_caption(robot: Robot) -> str:
     if robot.upper[0] - robot.lower[0] >= 2 * np.pi - 1e-9:
-        return " From above, density depends on the distance from axis 1 alone, as a full turn of joint 1 demands."
-    return " Between the limits of joint 1 the tool gets only by leaning back or turning the wrist aside, and less far."
+        return "Density depends on the distance from axis 1 alone, as a full turn of joint 1 demands."
+    return "Between the limits of joint 1 the tool gets only by leaning back or turning the wrist aside, and less far."
 
 
 def _slices_caption(summary: dict[str, Any], enclosed: list[dict[str, Any]]) -> str:
     pockets = sum(void["kind"] == "open" for void in summary["voids"])
     inner = f"{len(enclosed)} enclosed void{'s' * (len(enclosed) != 1)}" if enclosed else "no enclosed void"
     return (
-        f"The hull holds {inner} and {pockets} open pocket{'s' * (pockets != 1)} at this cell size. Don't place "
-        "work in the coloured cells; pale cells next to them are reached by few joint vectors only."
+        f"The hull holds {inner} and {pockets} open pocket{'s' * (pockets != 1)}. Every point of the blue area can be "
+        "reached by some joint vector within the limits; place nothing in the white."
     )
 
 
 def _curve_caption(summary: dict[str, Any], curve: Any) -> str:
-    finest = curve[curve["cell_mm"] == curve["cell_mm"].min()]["touched_m3"].to_numpy()
-    gain = 100 * (finest[-1] / finest[len(finest) // 2 - 1] - 1) if len(finest) > 1 else None
-    unseen = 100 * summary["cells"]["unseen_estimate"] / summary["cells"]["touched"]
-    start = f"The second half of the samples added {number(gain, 2)} % to the touched volume, and " if gain else ""
-    text = (
-        f"{start}about {number(unseen, 2)} % more cells would be touched by further samples. The touched volume counts "
-        "cells on the border whole, so coarse cells overstate it, even past the hull; it is no estimate of the "
-        "reachable volume."
+    volume = summary["volume_m3"]
+    finest = curve[curve["cell_mm"] == curve["cell_mm"].min()]["touched_m3"].to_numpy()[-1]
+    over = finest > volume["upper"]
+    verb = "overstates the volume: cells on the border count whole" if over else "is no estimate of the volume"
+    return (
+        f"The touched volume depends on cell size and number of samples and {verb}. Use the band: the reached volume "
+        f"lies between {number(volume['lower'])} and {number(volume['upper'])} m³."
     )
-    return text[0].upper() + text[1:]

@@ -8,8 +8,10 @@ from er3a.results import Verdict
 from er3a.stages.workspace.hull import Hull
 from er3a.stages.workspace.voids import UNSEEN_SHARE
 
+PROVEN = "proven empty"
 
-def judge(hull: Hull, voids: list[dict[str, Any]], cells: dict[str, int], unseen: float) -> Verdict:
+
+def judge(hull: Hull, voids: list[dict[str, Any]], cells: dict[str, int], unseen: float, proof: bool) -> Verdict:
     """The stage's verdict.
 
     An enclosed void about the shoulder is what every arm leaves that can't fold onto itself. Any other one is a hole
@@ -18,11 +20,12 @@ def judge(hull: Hull, voids: list[dict[str, Any]], cells: dict[str, int], unseen
     Parameters
     ----------
     voids : the summary's records; cells : numbers of cells; unseen : cells that more samples would touch
+    proof : whether the arm's build allowed a proof
     """
     if hull.volume == 0:
         text = "The tool point moves on a plane, a line or not at all, so there is no volume to speak of."
         return Verdict("caution", "workspace.flat", text)
-    if unseen > UNSEEN_SHARE * cells["touched"]:
+    if not proof and unseen > UNSEEN_SHARE * cells["touched"]:
         share = 100 * unseen / (unseen + cells["touched"])
         text = (
             f"Too few samples for cells this small: about {share:.0f} % of the reachable cells were not touched yet, "
@@ -31,22 +34,22 @@ def judge(hull: Hull, voids: list[dict[str, Any]], cells: dict[str, int], unseen
         return Verdict("caution", "workspace.undersampled", text, {"unseen_percent": share})
     enclosed = [void for void in voids if void["kind"] == "enclosed"]
     elsewhere = [void for void in enclosed if not void["holds_shoulder"]]
-    astray = [void for void in elsewhere if void["status"] == "sampled"]
+    astray = [void for void in elsewhere if void["status"] == PROVEN]
     if astray:
         return _about(
             astray[0],
             "caution",
             "workspace.void_unexpected",
-            "An enclosed void of {litres:.3g} L lies at ({x}, {y}, {z}) mm, away from the shoulder: check the limits, "
-            "the zero and the direction of joints 2 and 3.",
+            "An enclosed void of {litres:.3g} L lies at ({x}, {y}, {z}) mm, away from the shoulder, proven empty. It "
+            "{cause}: check the limits, the zero and the direction of joints 2 and 3.",
         )
     if elsewhere:
         return _about(
             elsewhere[0],
             "caution",
             "workspace.void_uncertain",
-            "An enclosed void of {litres:.3g} L may lie at ({x}, {y}, {z}) mm, away from the shoulder; the samples "
-            "around it are too thin to tell. Draw more of them.",
+            "An enclosed void of {litres:.3g} L may lie at ({x}, {y}, {z}) mm, away from the shoulder; there is no "
+            "proof, and the samples can't tell.",
         )
     if enclosed:
         return _about(
@@ -56,12 +59,16 @@ def judge(hull: Hull, voids: list[dict[str, Any]], cells: dict[str, int], unseen
             "An enclosed void of {litres:.3g} L surrounds the arm's own shoulder, where it can't fold to; none "
             "elsewhere points to a wrong joint range.",
         )
-    return Verdict("pass", "workspace.no_void", "The samples leave no enclosed void inside the hull.")
+    if not proof:
+        return Verdict("pass", "workspace.no_void", "The samples leave no enclosed void inside the hull; no proof.")
+    return Verdict("pass", "workspace.no_void", "The workspace holds no enclosed void.")
 
 
 def _about(void: dict[str, Any], status: str, code: str, text: str) -> Verdict:
-    litres = 1000 * void["volume_m3"]["untouched"]
+    volume = void["volume_m3"]
+    litres = 1000 * (volume["lower"] or volume["upper"])
     x, y, z = (1000 * value for value in void["centroid_m"])
     shown = {key: str(round(value)).replace("-", "−") for key, value in (("x", x), ("y", y), ("z", z))}
     params = {"litres": litres, "x_mm": x, "y_mm": y, "z_mm": z}
-    return Verdict(status, code, text.format(litres=litres, **shown), params)
+    cause = void["cause"] if void["cause"].startswith(("vanishes", "shrinks")) else "has this cause: " + void["cause"]
+    return Verdict(status, code, text.format(litres=litres, cause=cause, **shown), params)

@@ -1,0 +1,1 @@
+"""What an arm can reach, with proof: pure functions and kernels, no stage and no files."""

@@ -1,0 +1,112 @@
+"""What makes a void: each limit is widened by itself, and the void's cells are judged again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from er3a.robots.robot import Robot
+from er3a.workspace.cavities import Cavity
+from er3a.workspace.proof import judge, ring_volumes
+from er3a.workspace.section_arm import FULL_TURN, section_arm
+
+PROBES = 300
+STEPS = (15.0, 30.0, 60.0, 90.0, 180.0)
+"""By how much a limit is widened, deg, until the void vanishes."""
+_GONE, _SHRUNK = 0.98, 0.10
+
+
+@dataclass(frozen=True)
+class Relaxed:
+    """One limit widened.
+
+    Attributes
+    ----------
+    joint : 1 to 6, or 0 for all joints; side : "lower", "upper" or "both"
+    limit_deg : the limit as it is, deg; None for all joints
+    by_deg : by how much it is widened: the least of ``STEPS`` that makes the void vanish, or the most there is
+    filled : share of the void that is then reached
+    """
+
+    joint: int
+    side: str
+    limit_deg: float | None
+    by_deg: float | None
+    filled: float
+
+
+def relaxations(robot: Robot, cavity: Cavity) -> list[Relaxed]:
+    """Judge a void's cells with each limit widened, strongest first; then with all of them."""
+    chosen = _probes(cavity)
+    before = _open_angle(robot, cavity, chosen)
+    found = []
+    for joint in range(1, 6):
+        if robot.upper[joint - 1] - robot.lower[joint - 1] >= FULL_TURN:
+            continue
+        for side in ("lower", "upper"):
+            limit = float(getattr(robot, side)[joint - 1])
+            for step in STEPS:
+                share = _share_filled(_widened(robot, [joint], side, np.radians(step)), cavity, chosen, before)
+                if share >= _GONE:
+                    break
+            found.append(Relaxed(joint, side, float(np.degrees(limit)), step, share))
+    found.sort(key=lambda relaxed: (relaxed.filled < _GONE, relaxed.by_deg, -relaxed.filled, relaxed.joint))
+    free = _share_filled(_widened(robot, [1, 2, 3, 4, 5, 6], "both", 2 * np.pi), cavity, chosen, before)
+    return [*found, Relaxed(0, "both", None, None, free)]
+
+
+def describe(relaxed: list[Relaxed]) -> str:
+    """The cause in one clause."""
+    *single, everything = relaxed
+    gone = [limit for limit in single if limit.filled >= _GONE]
+    if gone:
+        nearest = [limit for limit in gone if limit.by_deg == gone[0].by_deg]
+        return f"vanishes when {' or '.join(_exceed(limit) for limit in nearest[:2])}"
+    single.sort(key=lambda limit: -limit.filled)
+    part = [limit for limit in single if limit.filled >= _SHRUNK]
+    shrinks = f"shrinks by {100 * part[0].filled:.0f} % when {_exceed(part[0])}" if part else ""
+    if everything.filled >= _GONE:
+        return shrinks + "; only several limits together make it" if shrinks else "made by several limits together"
+    left = f"geometry: {100 * (1 - everything.filled):.0f} % of it stays without any joint limit"
+    return f"{left}; {shrinks}" if shrinks else left
+
+
+def _exceed(limit: Relaxed) -> str:
+    word = "exceed" if limit.side == "upper" else "fall below"
+    text = f"joint {limit.joint} may {word} {limit.limit_deg:+.4g} deg by {limit.by_deg:.3g} deg"
+    return text.replace("-", "−")
+
+
+def _widened(robot: Robot, joints: list[int], side: str, by: float) -> Robot:
+    lower, upper = robot.lower.copy(), robot.upper.copy()
+    for joint in joints:
+        if side in ("upper", "both"):
+            upper[joint - 1] += by
+        if side in ("lower", "both"):
+            lower[joint - 1] -= by
+    return robot.replace(lower=lower, upper=upper)
+
+
+def _probes(cavity: Cavity) -> np.ndarray:
+    """Numbers of the arcs that hold most of what is proven empty."""
+    weight = cavity.volumes * cavity.empty
+    chosen = np.argsort(-weight, kind="stable")[:PROBES]
+    return chosen[weight[chosen] > 0]
+
+
+def _open_angle(robot: Robot, cavity: Cavity, chosen: np.ndarray) -> np.ndarray:
+    """How much (rad) of each chosen arc an arm leaves open, at the middle of its cell."""
+    middle = cavity.cells[chosen].reshape(-1, 2, 2).mean(axis=2)
+    half = np.minimum(1e-6, middle[:, 0] / 2)
+    probes = np.stack([middle[:, 0] - half, middle[:, 0] + half, middle[:, 1] - half, middle[:, 1] + half], axis=1)
+    looked = judge(section_arm(robot), probes)
+    low, high = cavity.arcs[chosen].T
+    a, b = np.maximum(looked.unfilled[..., 0], low[:, None]), np.minimum(looked.unfilled[..., 1], high[:, None])
+    return np.nansum(np.maximum(0, b - a), axis=1)
+
+
+def _share_filled(robot: Robot, cavity: Cavity, chosen: np.ndarray, before: np.ndarray) -> float:
+    """Share of what was open in the chosen arcs, by volume, that another arm fills."""
+    section = ring_volumes(cavity.cells[chosen])
+    return float(1 - (section @ _open_angle(robot, cavity, chosen)) / (section @ before))

@@ -1,0 +1,72 @@
+"""Which cell of a proof a point lies in, and which cells touch."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from er3a.workspace.arcs import TURN
+from er3a.workspace.proof import Proof
+
+OUTSIDE = -1
+FILLED, EMPTY, UNDECIDED = 0, 1, 2
+
+
+class SectionMap:
+    """A raster as fine as the smallest cell, with the number of the cell that covers it.
+
+    Attributes
+    ----------
+    proof : the cells
+    size : m, edge of the raster; low : (2,), m, its lowest (rho, z)
+    owner : (n_rho, n_z), number of the cell
+    """
+
+    def __init__(self, proof: Proof):
+        self.proof = proof
+        cells = proof.cells
+        self.size = float((cells[:, 1] - cells[:, 0]).min())
+        self.low = np.array([cells[:, 0].min(), cells[:, 2].min()])
+        low = np.rint((cells[:, [0, 2]] - self.low) / self.size).astype(np.int64)
+        high = np.rint((cells[:, [1, 3]] - self.low) / self.size).astype(np.int64)
+        self.owner = np.full(high.max(axis=0), OUTSIDE, dtype=np.int32)
+        for n, ((a, c), (b, d)) in enumerate(zip(low.tolist(), high.tolist())):
+            self.owner[a:b, c:d] = n
+
+    def cell_of(self, rho: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Numbers (n,) of the cells that hold points of the section, ``OUTSIDE`` where none does."""
+        index = np.stack([(rho - self.low[0]) // self.size, (z - self.low[1]) // self.size]).astype(np.int64)
+        inside = ((index >= 0) & (index < np.array(self.owner.shape)[:, None])).all(axis=0)
+        index = np.where(inside, index, 0)
+        return np.where(inside, self.owner[index[0], index[1]], OUTSIDE)
+
+    def status(self, rho: np.ndarray, azimuth: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """FILLED, EMPTY or UNDECIDED for points (n,) about axis 1 (m, rad, m); outside of all cells is empty."""
+        cell, azimuth = self.cell_of(rho, z), np.asarray(azimuth) % TURN
+        unfilled = _within(self.proof.unfilled[cell], azimuth)
+        empty = _within(self.proof.empty[cell], azimuth) | (cell == OUTSIDE)
+        return np.where(empty, EMPTY, np.where(unfilled, UNDECIDED, FILLED))
+
+    @cached_property
+    def neighbours(self) -> np.ndarray:
+        """Pairs (m, 2) of cells that share a stretch of border."""
+        pairs = [
+            np.stack([self.owner[:-1].ravel(), self.owner[1:].ravel()]),
+            np.stack([self.owner[:, :-1].ravel(), self.owner[:, 1:].ravel()]),
+        ]
+        found = np.concatenate(pairs, axis=1)
+        found = np.sort(found[:, found[0] != found[1]], axis=0)
+        return np.unique(found, axis=1).T
+
+    @cached_property
+    def outermost(self) -> np.ndarray:
+        """Whether each cell (n,) lies on the outer border of the map (the axis is none)."""
+        touches = np.zeros(len(self.proof.cells), dtype=bool)
+        for edge in (self.owner[-1], self.owner[:, 0], self.owner[:, -1]):
+            touches[edge] = True
+        return touches
+
+
+def _within(arcs: np.ndarray, azimuth: np.ndarray) -> np.ndarray:
+    return ((arcs[..., 0] <= azimuth[:, None]) & (azimuth[:, None] <= arcs[..., 1])).any(axis=1)

@@ -1,0 +1,163 @@
+"""The adaptive proof: rings of the section, split where they are neither filled nor empty."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from er3a.workspace.arcs import MOST_ARCS, TURN
+from er3a.workspace.filled import fill_stances
+from er3a.workspace.judge import judge_cells
+from er3a.workspace.section_arm import SectionArm
+
+_STANCES = 96
+_MOST_BOXES = 20_000
+_OPEN = 1e-9
+MOST_LEVEL = 7
+"""Cells are not split further than this: a set without volume would never be decided."""
+_COLUMNS = ("cells", "unfilled", "empty", "level", "witness")
+
+
+@dataclass(frozen=True, eq=False)
+class Proof:
+    """Cells that tile the half plane's rectangle, each a ring about axis 1, and what is known of its azimuths.
+
+    Attributes
+    ----------
+    cells : (n, 4), m: rho_0, rho_1, z_0, z_1 about the section's origin
+    unfilled, empty : (n, MOST_ARCS, 2), rad in [0, 2 pi]: arcs of azimuth that are not proven filled, and those of them
+        that are proven empty; unused rows are NaN
+    level : (n,), how often the cell was split off
+    witness : (n, 4): theta_2, tau, phi of a stance that reaches the cell's middle, and 1; or zeros
+    boxes : how many boxes the emptiness proofs looked at
+    """
+
+    cells: np.ndarray
+    unfilled: np.ndarray
+    empty: np.ndarray
+    level: np.ndarray
+    witness: np.ndarray
+    boxes: int
+
+    def rows(self, chosen: np.ndarray) -> Proof:
+        """The same with some of the cells."""
+        return Proof(*(getattr(self, key)[chosen] for key in _COLUMNS), self.boxes)
+
+    @property
+    def volumes(self) -> np.ndarray:
+        """Volume of each ring, (n,), m^3."""
+        return ring_volumes(self.cells)
+
+    @property
+    def unfilled_share(self) -> np.ndarray:
+        """Share of each ring that is not proven filled, (n,)."""
+        return np.nansum(self.unfilled[..., 1] - self.unfilled[..., 0], axis=1) / TURN
+
+    @property
+    def empty_share(self) -> np.ndarray:
+        """Share of each ring that is proven empty, (n,)."""
+        return np.nansum(self.empty[..., 1] - self.empty[..., 0], axis=1) / TURN
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Bounds of the reached volume, m^3."""
+        volumes = self.volumes
+        return float(volumes @ (1 - self.unfilled_share)), float(volumes @ (1 - self.empty_share))
+
+    @property
+    def width(self) -> float:
+        """Width of the bracket, (upper - lower) / upper."""
+        lower, upper = self.bounds
+        return (upper - lower) / upper if upper > 0 else 0.0
+
+
+def ring_volumes(cells: np.ndarray) -> np.ndarray:
+    """Volumes (n,) in m^3 of rings with the sections (n, 4)."""
+    return np.pi * (cells[:, 1] ** 2 - cells[:, 0] ** 2) * (cells[:, 3] - cells[:, 2])
+
+
+def prove(arm: SectionArm, target: float, most_cells: int, across: int = 32) -> Proof:
+    """Decide the section of an arm.
+
+    Parameters
+    ----------
+    target : wanted width of the bracket, (upper - lower) / upper
+    most_cells : how many cells may be looked at; the first grid is always finished
+    across : cells along the height of the first grid
+    """
+    stances = _stance_grid(arm)
+    cells = _first_cells(arm, across)
+    level, looked, boxes, done, settled = 0, 0, 0, [], np.zeros(2)
+    while len(cells):
+        judged = _judge(arm, cells, stances, level)
+        looked, boxes = looked + len(cells), boxes + judged.boxes
+        volumes, reached = judged.volumes, 1 - np.stack([judged.unfilled_share, judged.empty_share])
+        undecided = volumes * (reached[1] - reached[0])
+        split = undecided > _OPEN * volumes
+        lower, upper = settled + reached @ volumes
+        if upper - lower <= target * upper or level == MOST_LEVEL:
+            split[:] = False
+        room = max(0, most_cells - looked) // 4
+        if split.sum() > room:
+            split[np.argsort(-undecided * split, kind="stable")[room:]] = False
+        settled += (reached * volumes)[:, ~split].sum(axis=1)
+        done.append(judged.rows(~split))
+        cells, level = _quarters(cells[split]), level + 1
+    columns = (np.concatenate([getattr(part, key) for part in done]) for key in _COLUMNS)
+    return Proof(*columns, boxes)
+
+
+def sharpen(arm: SectionArm, proof: Proof, chosen: np.ndarray) -> Proof:
+    """Split the chosen cells (mask) of a proof into four each, and judge those."""
+    finer = _judge(arm, _quarters(proof.cells[chosen]), _stance_grid(arm), 0)
+    level = np.repeat(proof.level[chosen] + 1, 4)
+    columns = [
+        np.concatenate([getattr(proof, key)[~chosen], getattr(finer, key)]) for key in _COLUMNS if key != "level"
+    ]
+    columns.insert(3, np.concatenate([proof.level[~chosen], level]))
+    return Proof(*columns, proof.boxes + finer.boxes)
+
+
+def judge(arm: SectionArm, cells: np.ndarray) -> Proof:
+    """Judge given cells (n, 4) once, without splitting any."""
+    return _judge(arm, np.ascontiguousarray(cells, dtype=float), _stance_grid(arm), 0)
+
+
+def _stance_grid(arm: SectionArm) -> tuple[np.ndarray, tuple[float, float]]:
+    """Stances of joints 2 and 3 over their limits, and the grid's steps (rad)."""
+    spans = (arm.theta_2[1] - arm.theta_2[0], arm.tau[1] - arm.tau[0])
+    counts = [_STANCES if span > 0 else 1 for span in spans]
+    grid = np.empty((counts[0] * counts[1], 9))
+    fill_stances(arm, counts[0], counts[1], grid)
+    return grid, tuple(span / max(1, count - 1) for span, count in zip(spans, counts))
+
+
+def _first_cells(arm: SectionArm, across: int) -> np.ndarray:
+    """Square cells over the rectangle that the arm can't leave."""
+    low, high = arm.heights
+    size = (high - low) * (1 + 1e-9) / across
+    wide = int(np.ceil(arm.reach * (1 + 1e-9) / size))
+    i, j = (index.ravel() for index in np.indices((wide, across)))
+    middle = (low + high) / 2 - size * across / 2
+    return np.stack([i * size, (i + 1) * size, middle + j * size, middle + (j + 1) * size], axis=1)
+
+
+def _quarters(cells: np.ndarray) -> np.ndarray:
+    rho, z = cells[:, :2].mean(axis=1), cells[:, 2:].mean(axis=1)
+    rows = [
+        np.stack([a, b, c, d], axis=1)
+        for a, b in ((cells[:, 0], rho), (rho, cells[:, 1]))
+        for c, d in ((cells[:, 2], z), (z, cells[:, 3]))
+    ]
+    return np.stack(rows, axis=1).reshape(-1, 4)
+
+
+def _judge(arm: SectionArm, cells: np.ndarray, stances: tuple, level: int) -> Proof:
+    n = len(cells)
+    unfilled, empty = np.full((n, MOST_ARCS, 2), np.nan), np.full((n, MOST_ARCS, 2), np.nan)
+    counts, witness = np.zeros((2, n), dtype=np.int64), np.zeros((n, 4))
+    boxes = judge_cells(arm, cells, *stances, _MOST_BOXES, unfilled, counts[0], empty, counts[1], witness)
+    for arcs, count in ((unfilled, counts[0]), (empty, counts[1])):
+        arcs[np.arange(MOST_ARCS) >= count[:, None]] = np.nan
+    return Proof(cells, unfilled, empty, np.full(n, level), witness, boxes)
