@@ -23,6 +23,8 @@ rule all:
         expand("reports/{robot}/{stage}.rrd", robot=ROBOTS, stage=STAGES),
         # Named too, so that a result that was deleted is made again although its views are still there.
         [expand(path, robot=ROBOTS) for stage in STAGES for path in results_of(stage)],
+    message:
+        "all results, recordings and reports are there"
 
 
 onsuccess:
