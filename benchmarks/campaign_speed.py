@@ -186,7 +186,7 @@ def table() -> str:
             "# Speed beside the peers, with accuracy",
             "",
             "Random poses of joints within the limits; one thread, pinned to one processor, unless said otherwise;",
-            f"least wall time of {RUNS} runs. *Times* is how many times faster than the first row of its group. Errors:",
+            f"least wall time of {RUNS} runs. *Times*: how many times faster than the first row of its group. Errors:",
             f"worst position (m) / rotation (rad). {peers}; seed {SEED}.",
             "Written by `make campaigns ARGS=speed`; times differ between machines, and where other work shares the",
             "processors.",

@@ -26,7 +26,7 @@ ROBOTS = list(STUDY.robots)
 TABLES = {
     "validation": ["checks", "axes", "key_poses", "section", "residuals", "corrections"],
     "workspace": ["cells", "section", "curve", "cloud", "hull_vertices", "hull_triangles"],
-    "inverse": ["solutions"],
+    "inverse": ["solutions", "rankings", "map"],
     "trajectory": ["checks", "samples"],
 }
 
