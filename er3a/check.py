@@ -38,6 +38,9 @@ _WORDS = {"robot": "a robot", "study": "a study", "targets": "targets", "paths":
 
 def check_file(path: Path) -> str:
     """Check a file and return in words what it is; :class:`er3a.errors.InputError` if something is wrong with it."""
+    if path.suffix == ".csv" and path.parent.name == "targets":
+        load_targets(path)
+        return _WORDS["targets"]
     if path.suffix == ".csv":
         return _check_table(path)
     if path.suffix not in (".yaml", ".yml"):

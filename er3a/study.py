@@ -17,6 +17,9 @@ STAGES = ("validation", "workspace", "inverse", "trajectory")
 REFERENCES = DATA / "manual_refs"
 
 
+RuleName = Literal["nearest", "weighted", "time", "manipulability", "limits", "clearance"]
+
+
 class RobotEntry(StrictModel):
     """One robot of the study. ``base`` and ``tool`` replace those of the robot's file."""
 
@@ -72,6 +75,19 @@ class TrajectorySettings(StrictModel):
     near_shoulder_mm: Annotated[float, Field(gt=0, le=10_000)]
 
 
+class InverseSettings(StrictModel):
+    """``round_trips``: random poses solved back. ``map_cells``: cells across the maps of the number of solutions.
+
+    ``scene`` holds the obstacles that clearance is measured from; ``mix`` weighs rules against each other as one more
+    rule (names: er3a/selection/rules.py).
+    """
+
+    round_trips: Annotated[int, Field(ge=1, le=10_000_000)] = 2000
+    map_cells: Annotated[int, Field(ge=8, le=512)] = 80
+    scene: Text | None = None
+    mix: Annotated[dict[RuleName, Annotated[float, Field(ge=0, le=1000)]], Field(min_length=1)] = {"nearest": 1}
+
+
 class Study(StrictModel):
     """config/config.yaml."""
 
@@ -80,6 +96,7 @@ class Study(StrictModel):
     robots: Annotated[dict[Name, RobotEntry], Field(min_length=1)]
     validation: ValidationSettings
     workspace: WorkspaceSettings
+    inverse: InverseSettings = InverseSettings()
     trajectory: TrajectorySettings
 
     def entry(self, name: str) -> RobotEntry:
@@ -112,6 +129,8 @@ class Study(StrictModel):
                 files += sorted((REFERENCES / reference).glob(kinds[stage]))
         if stage == "inverse":
             files.append(Path(entry.targets))
+            if self.inverse.scene:
+                files.append(Path(self.inverse.scene))
         if stage == "trajectory":
             files.append(Path(entry.paths))
         return files

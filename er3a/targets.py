@@ -1,7 +1,8 @@
-"""Target files: the poses that the inverse-kinematics study asks for."""
+"""Target files (YAML or CSV): the poses that the inverse-kinematics study asks for."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -9,12 +10,14 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 from scipy.spatial.transform import Rotation
 
+from er3a.errors import InputError
 from er3a.inputs.units import check_degrees, check_millimetres
-from er3a.inputs.yaml_file import StrictModel, load
+from er3a.inputs.yaml_file import StrictModel, load, parse
 from er3a.kinematics.forward import forward
 from er3a.kinematics.transforms import ORTHONORMAL_TOLERANCE, transform
 from er3a.robots.robot import Robot
 from er3a.robots.schema import Name, Triple
+from er3a.target_table import FORMS, POSITION, REFERENCE, read_target_table
 
 MOST_TARGETS = 50
 UNIT_LENGTH_TOLERANCE = 1e-6
@@ -169,14 +172,33 @@ class TargetFile(StrictModel):
 
 
 def load_targets(path: str | Path) -> tuple[Target, ...]:
-    """The targets of a file, in its order.
+    """The targets of a YAML or CSV file, in its order.
 
     Raises
     ------
     InputError
-        naming file, field and remedy
+        naming file, field (or row and column) and remedy
     """
+    if str(path).endswith(".csv"):
+        return _targets_of_table(Path(path))
     return tuple(load(TargetFile, path).targets)
+
+
+def _targets_of_table(path: Path) -> tuple[Target, ...]:
+    rows = read_target_table(path)
+    lines = [row.pop("row") for row in rows]
+    try:
+        return tuple(parse(TargetFile, {"kind": "targets", "targets": rows}, path).targets)
+    except InputError as error:
+        where = re.match(r"targets\[(\d+)\]\.?(\w*)", error.field or "")
+        if where is None:
+            raise
+        column = f", column {', '.join(_columns_of(where[2]))}" if where[2] else ""
+        raise InputError(path, f"row {lines[int(where[1])]}{column}", error.problem, error.remedy) from None
+
+
+def _columns_of(field: str) -> tuple[str, ...]:
+    return {"xyz_mm": POSITION, "q_ref_deg": REFERENCE, **FORMS}.get(field, (field,))
 
 
 def _zyz_turns(zyz_deg: list[float]) -> np.ndarray:

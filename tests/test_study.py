@@ -137,7 +137,8 @@ def test_each_stage_s_inputs_exist_and_are_its_own(study, monkeypatch):
     monkeypatch.chdir(ROOT)
     robot = ROBOTS / "er3a_c60_article.yaml"
     assert study.inputs("er3a_c60_article", "workspace") == [robot]
-    assert study.inputs("er3a_c60_article", "inverse") == [robot, Path("data/targets/er3a_c60_article.yaml")]
+    scene = Path("data/scenes/table_and_post.yaml")
+    assert study.inputs("er3a_c60_article", "inverse") == [robot, Path("data/targets/er3a_c60_article.yaml"), scene]
     assert study.inputs("er3a_c60_article", "trajectory") == [robot, Path("data/paths/er3a_c60_article.yaml")]
     references = study.inputs("er3a_c60_article", "validation")[1:]
     assert {path.parent.name for path in references} == {"er3a_c60_article", "er3a_c60"}

@@ -145,3 +145,72 @@ def test_small_angles_that_are_degrees_pass(rpy):
 
 def test_target_at_the_origin_passes():
     assert Target(name="a", xyz_mm=[0, 0, 0], rpy_deg=[0, 0, 0]).xyz_mm == [0, 0, 0]
+
+
+TABLE = "name,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg,note\na,400,0,300,0,90,0,first\nb,400,50,300,10,20,30,\n"
+
+
+@pytest.fixture
+def table(tmp_path):
+    def write(text: str) -> Path:
+        path = tmp_path / "targets" / "some.csv"
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+def test_table_holds_the_same_targets_as_yaml(table):
+    first, second = load_targets(table(TABLE))
+    assert first == Target(**TURNED, note="first")
+    assert second == Target(name="b", xyz_mm=[400.0, 50, 300], rpy_deg=[10.0, 20, 30])
+
+
+@pytest.mark.parametrize(
+    ("form", "header", "values"),
+    [
+        ("zyz_deg", "z1_deg,y_deg,z2_deg", [10.0, 20, 30]),
+        ("quaternion_wxyz", "qw,qx,qy,qz", [0.0, 1, 0, 0]),
+        ("matrix", "r11,r12,r13,r21,r22,r23,r31,r32,r33", [0.0, -1, 0, 1, 0, 0, 0, 0, 1]),
+    ],
+)
+def test_table_takes_each_form_of_orientation(table, form, header, values):
+    reference = ",".join(f"q{joint}_ref_deg" for joint in range(1, 7))
+    text = f"name,x_mm,y_mm,z_mm,{header},{reference}\na,400,0,300,{','.join(map(str, values))},1,2,3,4,5,60\n"
+    (target,) = load_targets(table(text))
+    expected = [values[0:3], values[3:6], values[6:9]] if form == "matrix" else values
+    np.testing.assert_allclose(target.pose(ROBOT), pose(**{form: expected}))
+    assert target.q_ref_deg == [1, 2, 3, 4, 5, 60]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "where", "what"),
+    [
+        ("b,400,50,300", "b,0.4,0.05,0.3", "row 3, column x_mm, y_mm, z_mm", "mm can only be metres"),
+        ("b,400,50", "b,nan,50", "row 3, column x_mm", "not a finite number"),
+        ("b,400,50", "b,,50", "row 3, column x_mm", "empty"),
+        ("0,90,0,first", "0,1.5708,0,first", "row 2, column roll_deg, pitch_deg, yaw_deg", "can only be radians"),
+        ("b,400", "a,400", "row 3, column name", "is also that of"),
+        ("x_mm", "x_m", "column x_m", "not a unit"),
+        ("roll_deg,pitch_deg,yaw_deg", "rx,ry,rz", "header", "the table has no orientation"),
+        ("note", "qw", "header", "two forms of orientation"),
+    ],
+)
+def test_bad_table_names_row_and_column(table, old, new, where, what):
+    path = table(TABLE.replace(old, new))
+    with pytest.raises(InputError, match=what) as caught:
+        load_targets(path)
+    assert caught.value.field == where
+    assert str(caught.value).startswith(f"{path}: {where}: ")
+
+
+def test_table_with_quaternion_off_unit_length_names_its_row(table):
+    path = table("name,x_mm,y_mm,z_mm,qw,qx,qy,qz\na,400,0,300,1,0,0,0\nb,400,0,300,1,1,0,0\n")
+    with pytest.raises(InputError, match=r"row 3, column qw, qx, qy, qz: the quaternion's length is 1.41421"):
+        load_targets(path)
+
+
+def test_table_without_rows_is_refused(table):
+    with pytest.raises(InputError, match="the list is empty"):
+        load_targets(table(TABLE.splitlines()[0] + "\n"))

@@ -42,6 +42,11 @@ class Clearance:
     pair: tuple[str, ...]
 
 
+def can_measure() -> bool:
+    """Whether the Coal library is there."""
+    return coal is not None
+
+
 def clearance(robot: Robot, q: np.ndarray, scene: SceneFile | None) -> Clearance:
     """Least distance of each arm (N, 6) in rad from the scene's solids and from itself.
 

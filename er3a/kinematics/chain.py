@@ -97,3 +97,9 @@ def axes_at_zero_theta(robot: Robot) -> tuple[np.ndarray, np.ndarray, np.ndarray
     for array in (directions, points, T):
         array.setflags(write=False)
     return directions, points, T
+
+
+def arm_length(robot: Robot) -> float:
+    """Half the distance along all links (m), which makes position and rotation errors comparable."""
+    points = axes_at_zero_theta(robot)[1]
+    return 0.5 * float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) or 1.0

@@ -5,6 +5,9 @@ as a rotation vector [1]_. The damping falls with the squared error [2]_, so tha
 limit that the step would leave are held there (projected Gauss-Newton). A start that stalls is given up for a random
 one; random numbers depend on seed, pose and start alone [3]_.
 
+``LANES`` poses are iterated side by side, so that the arithmetic becomes vector instructions; a lane that is done takes
+the next pose. What a lane computes depends on its own pose alone.
+
 References
 ----------
 .. [1] R. M. Murray, Z. Li, S. S. Sastry, *A Mathematical Introduction to Robotic Manipulation*, 1994, equation 2.18;
@@ -18,51 +21,78 @@ from __future__ import annotations
 
 import numpy as np
 
+from er3a.kinematics.cholesky import LANES, solve_by_cholesky
 from er3a.kinematics.fast_math import arctan2, cos_sin
-from er3a.kinematics.forward import rows_of, step_row, turn_row
 from er3a.kinematics.jit import kernel
 
 DAMPING = 0.1
 MOST_ITERATIONS = 40
 LONGEST_STEP = 1.0  # rad
 STALLED = 0.9  # the squared error must fall by this factor ...
-PATIENCE = 3
+PATIENCE = 3  # ... within so many iterations
+LEAST_DAMPING = 1e-15
+
+# Rows of scratch memory, one number of each lane in a row: the arm's frame (3 x 4), the target (3 x 4), then vectors.
+_FRAME, _TARGET, _Q, _E, _W, _SQUARED, _POSITION, _ROTATION = 0, 12, 24, 30, 36, 39, 40, 41
+_STEP, _FREE, _SCALE, _TURNS, _ROWS = 42, 48, 54, 55, 57
 
 
 @kernel
 def solve_numerically(arm, limits, T, q0, mask, tolerances, length, restarts, seed, first, q, error, starts):
     """Fill ``q`` (N, 6), ``error`` (N, 2) in m and rad, ``starts`` (N,), for poses ``T`` (N, 4, 4); see ``solve``.
-    ``first`` is the number of the first pose, which its random starts depend on.
 
-    Where no start reaches the tolerances, ``q`` is the nearest arm found and ``starts`` is 0.
+    ``first`` is the number of the first pose, which its random starts depend on. Where no start reaches the tolerances,
+    ``q`` is the nearest arm found and ``starts`` is 0.
     """
     lower, upper, respect = limits
-    J, e, work, trial, step = np.empty((6, 6)), np.empty(6), np.empty((6, 6)), np.empty(6), np.empty(6)
-    for n in range(T.shape[0]):
-        best = np.inf
-        starts[n] = 0
-        for start in range(1 + restarts):
-            for j in range(6):
-                if start == 0:
-                    trial[j] = q0[n, j]
-                else:
-                    trial[j] = lower[j] + uniform(seed, first + n, start, j) * (upper[j] - lower[j])
-                if respect:
-                    trial[j] = min(max(trial[j], lower[j]), upper[j])
-            position, rotation = _iterate(
-                arm, lower, upper, respect, T[n], mask, tolerances, length, trial, J, e, work, step
-            )
+    w, J, A = np.zeros(_ROWS * LANES), np.zeros(36 * LANES), np.zeros(36 * LANES)
+    pose, start, count = np.full(LANES, -1), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64)
+    mark, since, best = np.empty(LANES), np.zeros(LANES, np.int64), np.empty(LANES)
+    taken, active = 0, 0
+    for i in range(LANES):
+        _take(w, i, T, min(taken, T.shape[0] - 1))
+        if taken < T.shape[0]:
+            pose[i], start[i], count[i], mark[i], since[i], best[i] = taken, 0, 0, np.inf, 0, np.inf
+            _begin(w, i, q0, taken, 0, lower, upper, respect, seed, first)
+            taken += 1
+            active += 1
+    while active > 0:
+        _evaluate(arm, mask, length, w, J)
+        for i in range(LANES):
+            n = pose[i]
+            w[_SCALE * LANES + i] = 1.0
+            if n < 0:
+                continue
+            position, rotation = w[_POSITION * LANES + i], w[_ROTATION * LANES + i]
             square = (position / length) ** 2 + rotation**2
-            if square < best:
-                best = square
-                error[n, 0], error[n, 1] = position, rotation
+            solved = position <= tolerances[0] and rotation <= tolerances[1]
+            if square < STALLED * mark[i]:
+                mark[i], since[i] = square, 0
+            else:
+                since[i] += 1
+            count[i] += 1
+            if not (solved or since[i] > PATIENCE or count[i] > MOST_ITERATIONS):
+                continue
+            if solved or square < best[i] or start[i] == 0:
+                best[i], error[n, 0], error[n, 1], starts[n] = square, position, rotation, 0
                 for j in range(6):
-                    q[n, j] = trial[j]
-            if position <= tolerances[0] and rotation <= tolerances[1]:
-                error[n, 0], error[n, 1], starts[n] = position, rotation, start + 1
-                for j in range(6):
-                    q[n, j] = trial[j]
-                break
+                    q[n, j] = w[(_Q + j) * LANES + i]
+            w[_SCALE * LANES + i] = 0.0
+            count[i], mark[i], since[i] = 0, np.inf, 0
+            if not solved and start[i] < restarts:
+                start[i] += 1
+                _begin(w, i, q0, n, start[i], lower, upper, respect, seed, first)
+                continue
+            starts[n] = start[i] + 1 if solved else 0
+            pose[i], start[i], best[i] = -1, 0, np.inf
+            active -= 1
+            if taken < T.shape[0]:
+                pose[i] = taken
+                _take(w, i, T, taken)
+                _begin(w, i, q0, taken, 0, lower, upper, respect, seed, first)
+                taken += 1
+                active += 1
+        _step(lower, upper, respect, w, J, A)
 
 
 @kernel
@@ -76,158 +106,172 @@ def uniform(seed, pose, start, joint):
 
 
 @kernel
-def _iterate(arm, lower, upper, respect, T, mask, tolerances, length, q, J, e, work, step):
-    """Improve ``q`` in place until it solves the pose or stalls; returns position (m) and rotation (rad) error."""
-    position, rotation = _error_and_jacobian(arm, T, mask, length, q, J, e)
-    mark, since = np.inf, 0
-    for _ in range(MOST_ITERATIONS):
-        if position <= tolerances[0] and rotation <= tolerances[1]:
-            break
-        square = (position / length) ** 2 + rotation**2
-        if square < STALLED * mark:
-            mark, since = square, 0
-        else:
-            since += 1
-            if since > PATIENCE:
-                break
-        if not _step(J, e, square, lower, upper, respect, q, work, step):
-            break
-        for j in range(6):
-            q[j] += step[j]
-            if respect:
-                q[j] = min(max(q[j], lower[j]), upper[j])
-        position, rotation = _error_and_jacobian(arm, T, mask, length, q, J, e)
-    return position, rotation
+def _take(w, i, T, n):
+    for r in range(3):
+        for c in range(4):
+            w[(_TARGET + 4 * r + c) * LANES + i] = T[n, r, c]
 
 
 @kernel
-def _step(J, e, square, lower, upper, respect, q, A, step):
-    """Damped step by Cholesky factors; joints that press against a limit are left out."""
-    for i in range(6):
-        gradient = 0.0
-        for k in range(6):
-            gradient += J[k, i] * e[k]
-        step[i] = -gradient
-    held = np.uint64(0)
-    if respect:
-        for i in range(6):
-            if (q[i] <= lower[i] and step[i] < 0.0) or (q[i] >= upper[i] and step[i] > 0.0):
-                held |= np.uint64(1) << np.uint64(i)
-    for i in range(6):
-        for j in range(i + 1):
-            total = 0.0
-            for k in range(6):
-                total += J[k, i] * J[k, j]
-            A[i, j] = total
-        A[i, i] += DAMPING * square + 1e-15
-        if held >> np.uint64(i) & np.uint64(1):
-            step[i] = 0.0
-            for j in range(i):
-                A[i, j] = 0.0
-            A[i, i] = 1.0
-        for j in range(i):
-            if held >> np.uint64(j) & np.uint64(1):
-                A[i, j] = 0.0
-    for i in range(6):
-        for j in range(i + 1):
-            total = A[i, j]
-            for k in range(j):
-                total -= A[i, k] * A[j, k]
-            if i == j:
-                if total <= 0.0:
-                    return False
-                A[i, i] = 1.0 / np.sqrt(total)  # the factor's diagonal as its reciprocal
-            else:
-                A[i, j] = total * A[j, j]
-    for i in range(6):
-        for k in range(i):
-            step[i] -= A[i, k] * step[k]
-        step[i] *= A[i, i]
-    longest = 0.0
-    for i in range(5, -1, -1):
-        for k in range(i + 1, 6):
-            step[i] -= A[k, i] * step[k]
-        step[i] *= A[i, i]
-        longest = max(longest, abs(step[i]))
-    if longest > LONGEST_STEP:
-        for i in range(6):
-            step[i] *= LONGEST_STEP / longest
-    return longest > 1e-16
+def _begin(w, i, q0, n, start, lower, upper, respect, seed, first):
+    for j in range(6):
+        angle = q0[n, j] if start == 0 else lower[j] + uniform(seed, first + n, start, j) * (upper[j] - lower[j])
+        if respect:
+            angle = min(max(angle, lower[j]), upper[j])
+        w[(_Q + j) * LANES + i] = angle
 
 
 @kernel
-def _error_and_jacobian(arm, T, mask, length, q, J, e):
-    """Pose error ``e`` in the target's tool frame and its derivative ``J``, masked; position (m), rotation (rad)."""
+def _evaluate(arm, mask, length, w, J):
+    """Pose errors in the target's tool frame and their derivatives by the joints, masked; J[k] holds 6 rows."""
     direction, offset, links = arm
-    x, y, z = rows_of(links[0])
+    for r in range(3):
+        for c in range(4):
+            w[(4 * r + c) * LANES : (4 * r + c + 1) * LANES] = links[0, r, c]
     for k in range(6):
-        J[0, k], J[1, k], J[2, k] = x[3], y[3], z[3]
-        J[3, k], J[4, k], J[5, k] = x[2] * direction[k], y[2] * direction[k], z[2] * direction[k]
-        angle, link = direction[k] * q[k] + offset[k], links[k + 1]
-        c, s = cos_sin(angle)
-        x, y, z = (
-            step_row(turn_row(x, c, s), link),
-            step_row(turn_row(y, c, s), link),
-            step_row(turn_row(z, c, s), link),
-        )
-    # Rotation vector w of (arm's rotation)^T (target's rotation), by its quaternion-free half-angle form.
-    r00, r01, r02 = _column_products(x, y, z, T, 0)
-    r10, r11, r12 = _column_products(x, y, z, T, 1)
-    r20, r21, r22 = _column_products(x, y, z, T, 2)
-    wx, wy, wz = 0.5 * (r21 - r12), 0.5 * (r02 - r20), 0.5 * (r10 - r01)
-    sine, cosine = np.sqrt(wx * wx + wy * wy + wz * wz), 0.5 * (r00 + r11 + r22 - 1.0)
-    theta = arctan2(sine, cosine)
-    if sine > 1e-8:
-        wx, wy, wz = wx * theta / sine, wy * theta / sine, wz * theta / sine
-        squared = 1.0 / (theta * theta) - (1.0 + cosine) / (2.0 * theta * sine)
-    elif cosine < 0.0:
-        wx, wy, wz = _half_turn_axis(r00, r11, r22, r01, r02, r12)
-        wx, wy, wz = wx * np.pi, wy * np.pi, wz * np.pi
-        squared = 1.0 / (np.pi * np.pi)
-    else:
-        squared = 1.0 / 12.0
-    dx, dy, dz = x[3] - T[0, 3], y[3] - T[1, 3], z[3] - T[2, 3]
-    e[0] = (T[0, 0] * dx + T[1, 0] * dy + T[2, 0] * dz) * mask[0] / length
-    e[1] = (T[0, 1] * dx + T[1, 1] * dy + T[2, 1] * dz) * mask[1] / length
-    e[2] = (T[0, 2] * dx + T[1, 2] * dy + T[2, 2] * dz) * mask[2] / length
-    e[3], e[4], e[5] = wx * mask[3], wy * mask[4], wz * mask[5]
+        _joint(direction[k], offset[k], links[k + 1], k, w, J[6 * k * LANES : (6 * k + 6) * LANES])
+    _pose_error(mask, length, w)
     for k in range(6):
-        rx, ry, rz = x[3] - J[0, k], y[3] - J[1, k], z[3] - J[2, k]
-        ax, ay, az = J[3, k], J[4, k], J[5, k]
+        _column(mask, length, w, J[6 * k * LANES : (6 * k + 6) * LANES])
+
+
+@kernel
+def _joint(sign, zero, link, k, w, column):
+    """Keep the joint's point and axis, then go over its rotation and its link."""
+    angles, turns = w[(_Q + k) * LANES : (_Q + k + 1) * LANES], w[_TURNS * LANES : (_TURNS + 2) * LANES]
+    for i in range(LANES):
+        turns[i], turns[LANES + i] = cos_sin(sign * angles[i] + zero)
+    a, b, c, x = link[0, 0], link[0, 1], link[0, 2], link[0, 3]
+    d, e, f, y = link[1, 0], link[1, 1], link[1, 2], link[1, 3]
+    g, h, m, z = link[2, 0], link[2, 1], link[2, 2], link[2, 3]
+    for r in range(3):
+        row = w[4 * r * LANES : (4 * r + 4) * LANES]
+        point, axis = column[r * LANES : (r + 1) * LANES], column[(3 + r) * LANES : (4 + r) * LANES]
+        for i in range(LANES):
+            cosine, sine = turns[i], turns[LANES + i]
+            p, s, t = row[i], row[LANES + i], row[2 * LANES + i]
+            point[i], axis[i] = row[3 * LANES + i], t * sign
+            p, s = p * cosine + s * sine, s * cosine - p * sine
+            row[i] = p * a + s * d + t * g
+            row[LANES + i] = p * b + s * e + t * h
+            row[2 * LANES + i] = p * c + s * f + t * m
+            row[3 * LANES + i] += p * x + s * y + t * z
+
+
+@kernel
+def _pose_error(mask, length, w):
+    m0, m1, m2, m3, m4, m5 = mask[0], mask[1], mask[2], mask[3], mask[4], mask[5]
+    for i in range(LANES):
+        a0, a1, a2, px = w[i], w[LANES + i], w[2 * LANES + i], w[3 * LANES + i]
+        b0, b1, b2, py = w[4 * LANES + i], w[5 * LANES + i], w[6 * LANES + i], w[7 * LANES + i]
+        c0, c1, c2, pz = w[8 * LANES + i], w[9 * LANES + i], w[10 * LANES + i], w[11 * LANES + i]
+        d0, d1, d2, tx = w[12 * LANES + i], w[13 * LANES + i], w[14 * LANES + i], w[15 * LANES + i]
+        e0, e1, e2, ty = w[16 * LANES + i], w[17 * LANES + i], w[18 * LANES + i], w[19 * LANES + i]
+        f0, f1, f2, tz = w[20 * LANES + i], w[21 * LANES + i], w[22 * LANES + i], w[23 * LANES + i]
+        # Rotation vector of (arm's rotation)^T (target's rotation).
+        cosine = 0.5 * (a0 * d0 + b0 * e0 + c0 * f0 + a1 * d1 + b1 * e1 + c1 * f1 + a2 * d2 + b2 * e2 + c2 * f2 - 1.0)
+        wx = 0.5 * ((a2 * d1 + b2 * e1 + c2 * f1) - (a1 * d2 + b1 * e2 + c1 * f2))
+        wy = 0.5 * ((a0 * d2 + b0 * e2 + c0 * f2) - (a2 * d0 + b2 * e0 + c2 * f0))
+        wz = 0.5 * ((a1 * d0 + b1 * e0 + c1 * f0) - (a0 * d1 + b0 * e1 + c0 * f1))
+        sine = np.sqrt(wx * wx + wy * wy + wz * wz)
+        safe = max(sine, 1e-8)
+        theta = arctan2(safe, cosine)
+        small = (sine <= 1e-8) & (cosine > 0.0)
+        stretch = 1.0 if small else theta / safe
+        squared = 1.0 / 12.0 if small else 1.0 / (theta * theta) - (1.0 + cosine) / (2.0 * theta * safe)
+        # Next to half a turn the axis is lost; whatever it is, the error is to be seen as half a turn.
+        half_turn = (sine <= 1e-8) & (cosine <= 0.0)
+        wx, wy, wz = np.pi if half_turn else wx * stretch, wy * stretch, wz * stretch
+        dx, dy, dz = px - tx, py - ty, pz - tz
+        u = (d0 * dx + e0 * dy + f0 * dz) * m0
+        v = (d1 * dx + e1 * dy + f1 * dz) * m1
+        s = (d2 * dx + e2 * dy + f2 * dz) * m2
+        w[_E * LANES + i], w[(_E + 1) * LANES + i], w[(_E + 2) * LANES + i] = u / length, v / length, s / length
+        w[(_E + 3) * LANES + i], w[(_E + 4) * LANES + i], w[(_E + 5) * LANES + i] = wx * m3, wy * m4, wz * m5
+        w[_W * LANES + i], w[(_W + 1) * LANES + i], w[(_W + 2) * LANES + i] = wx, wy, wz
+        w[_SQUARED * LANES + i] = squared
+        w[_POSITION * LANES + i] = np.sqrt(u * u + v * v + s * s)
+        wx, wy, wz = wx * m3, wy * m4, wz * m5
+        w[_ROTATION * LANES + i] = np.sqrt(wx * wx + wy * wy + wz * wz)
+
+
+@kernel
+def _column(mask, length, w, column):
+    """One joint's column: a point and an axis in, the derivative of the pose error out."""
+    m0, m1, m2, m3, m4, m5 = mask[0] / length, mask[1] / length, mask[2] / length, mask[3], mask[4], mask[5]
+    for i in range(LANES):
+        rx, ry, rz = w[3 * LANES + i] - column[i], w[7 * LANES + i] - column[LANES + i], w[11 * LANES + i]
+        rz = rz - column[2 * LANES + i]
+        ax, ay, az = column[3 * LANES + i], column[4 * LANES + i], column[5 * LANES + i]
         vx, vy, vz = ay * rz - az * ry, az * rx - ax * rz, ax * ry - ay * rx
-        J[0, k] = (T[0, 0] * vx + T[1, 0] * vy + T[2, 0] * vz) * mask[0] / length
-        J[1, k] = (T[0, 1] * vx + T[1, 1] * vy + T[2, 1] * vz) * mask[1] / length
-        J[2, k] = (T[0, 2] * vx + T[1, 2] * vy + T[2, 2] * vz) * mask[2] / length
-        # Angular velocity in the arm's tool frame, then minus the inverse left Jacobian at w.
-        bx = x[0] * ax + y[0] * ay + z[0] * az
-        by = x[1] * ax + y[1] * ay + z[1] * az
-        bz = x[2] * ax + y[2] * ay + z[2] * az
+        column[i] = (w[12 * LANES + i] * vx + w[16 * LANES + i] * vy + w[20 * LANES + i] * vz) * m0
+        column[LANES + i] = (w[13 * LANES + i] * vx + w[17 * LANES + i] * vy + w[21 * LANES + i] * vz) * m1
+        column[2 * LANES + i] = (w[14 * LANES + i] * vx + w[18 * LANES + i] * vy + w[22 * LANES + i] * vz) * m2
+        # Angular velocity in the arm's tool frame, then minus the inverse left Jacobian of the rotation vector.
+        bx = w[i] * ax + w[4 * LANES + i] * ay + w[8 * LANES + i] * az
+        by = w[LANES + i] * ax + w[5 * LANES + i] * ay + w[9 * LANES + i] * az
+        bz = w[2 * LANES + i] * ax + w[6 * LANES + i] * ay + w[10 * LANES + i] * az
+        wx, wy, wz = w[_W * LANES + i], w[(_W + 1) * LANES + i], w[(_W + 2) * LANES + i]
+        squared = w[_SQUARED * LANES + i]
         cx, cy, cz = wy * bz - wz * by, wz * bx - wx * bz, wx * by - wy * bx
-        J[3, k] = -(bx - 0.5 * cx + squared * (wy * cz - wz * cy)) * mask[3]
-        J[4, k] = -(by - 0.5 * cy + squared * (wz * cx - wx * cz)) * mask[4]
-        J[5, k] = -(bz - 0.5 * cz + squared * (wx * cy - wy * cx)) * mask[5]
-    position = length * np.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
-    return position, np.sqrt(e[3] * e[3] + e[4] * e[4] + e[5] * e[5])
+        column[3 * LANES + i] = -(bx - 0.5 * cx + squared * (wy * cz - wz * cy)) * m3
+        column[4 * LANES + i] = -(by - 0.5 * cy + squared * (wz * cx - wx * cz)) * m4
+        column[5 * LANES + i] = -(bz - 0.5 * cz + squared * (wx * cy - wy * cx)) * m5
 
 
 @kernel
-def _column_products(x, y, z, T, i):
-    """Column i of the arm's rotation times each column of the target's."""
-    return (
-        x[i] * T[0, 0] + y[i] * T[1, 0] + z[i] * T[2, 0],
-        x[i] * T[0, 1] + y[i] * T[1, 1] + z[i] * T[2, 1],
-        x[i] * T[0, 2] + y[i] * T[1, 2] + z[i] * T[2, 2],
-    )
+def _dot_rows(a, b, out):
+    """Sum over 6 rows of the products of two columns."""
+    for i in range(LANES):
+        total = a[i] * b[i] + a[LANES + i] * b[LANES + i] + a[2 * LANES + i] * b[2 * LANES + i]
+        total = total + a[3 * LANES + i] * b[3 * LANES + i] + a[4 * LANES + i] * b[4 * LANES + i]
+        out[i] = total + a[5 * LANES + i] * b[5 * LANES + i]
 
 
 @kernel
-def _half_turn_axis(r00, r11, r22, r01, r02, r12):
-    """Axis of a rotation by half a turn, from the largest diagonal entry."""
-    if r00 >= r11 and r00 >= r22:
-        a = np.sqrt(max(0.5 * (1.0 + r00), 0.0))
-        return a, 0.5 * r01 / a, 0.5 * r02 / a
-    if r11 >= r22:
-        a = np.sqrt(max(0.5 * (1.0 + r11), 0.0))
-        return 0.5 * r01 / a, a, 0.5 * r12 / a
-    a = np.sqrt(max(0.5 * (1.0 + r22), 0.0))
-    return 0.5 * r02 / a, 0.5 * r12 / a, a
+def _step(lower, upper, respect, w, J, A):
+    """Move by a damped step, by Cholesky factors; joints that press against a limit stay."""
+    e, damping = w[_E * LANES : (_E + 6) * LANES], w[_SQUARED * LANES : (_SQUARED + 1) * LANES]
+    for i in range(LANES):
+        total = 0.0
+        for r in range(6):
+            total += e[r * LANES + i] * e[r * LANES + i]
+        damping[i] = DAMPING * total + LEAST_DAMPING
+    for k in range(6):
+        column = J[6 * k * LANES : (6 * k + 6) * LANES]
+        gradient = w[(_STEP + k) * LANES : (_STEP + k + 1) * LANES]
+        free, angle = w[(_FREE + k) * LANES : (_FREE + k + 1) * LANES], w[(_Q + k) * LANES : (_Q + k + 1) * LANES]
+        _dot_rows(column, e, gradient)
+        low, high = lower[k], upper[k]
+        for i in range(LANES):
+            pressed = ((angle[i] <= low) & (gradient[i] > 0.0)) | ((angle[i] >= high) & (gradient[i] < 0.0))
+            free[i] = 0.0 if pressed & respect else 1.0
+            gradient[i] = -gradient[i] * free[i]
+        for j in range(k + 1):
+            entry = A[(6 * k + j) * LANES : (6 * k + j + 1) * LANES]
+            _dot_rows(column, J[6 * j * LANES : (6 * j + 6) * LANES], entry)
+            other = w[(_FREE + j) * LANES : (_FREE + j + 1) * LANES]
+            for i in range(LANES):
+                entry[i] = entry[i] * free[i] * other[i]
+        pivot = A[7 * k * LANES : (7 * k + 1) * LANES]
+        for i in range(LANES):
+            pivot[i] = pivot[i] + damping[i] + (1.0 - free[i])
+    solve_by_cholesky(A, w[_STEP * LANES : (_STEP + 6) * LANES])
+    _move(lower, upper, respect, w)
+
+
+@kernel
+def _move(lower, upper, respect, w):
+    """Add the step, at most ``LONGEST_STEP`` for any joint, to the lanes that are to move."""
+    scale = w[_SCALE * LANES : (_SCALE + 1) * LANES]
+    step = w[_STEP * LANES : (_STEP + 6) * LANES]
+    for i in range(LANES):
+        longest = LONGEST_STEP
+        for k in range(6):
+            longest = max(longest, abs(step[k * LANES + i]))
+        scale[i] = scale[i] * (LONGEST_STEP / longest)
+    for k in range(6):
+        angle, low, high = w[(_Q + k) * LANES : (_Q + k + 1) * LANES], lower[k], upper[k]
+        for i in range(LANES):
+            moved = angle[i] + scale[i] * step[k * LANES + i]
+            angle[i] = min(max(moved, low), high) if respect else moved

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from er3a.errors import Er3aError, PoseError, ShapeError
-from er3a.kinematics.chain import JOINTS, axes_at_zero_theta, constant_links
+from er3a.kinematics.chain import JOINTS, arm_length, constant_links
 from er3a.kinematics.forward import checked_joints, jacobian
 from er3a.kinematics.iteration import solve_numerically
 from er3a.kinematics.transforms import check_poses
@@ -174,12 +174,6 @@ class _Search:
         if singular and max(error[0] / length, error[1]) < NEARLY:
             return SINGULAR, f"singular: the iteration creeps towards a singular arm, where it ends: {miss}"
         return UNREACHABLE, f"unreachable: {miss}, whatever the start"
-
-
-def arm_length(robot: Robot) -> float:
-    """Half the distance along all links (m), which makes position and rotation errors comparable."""
-    points = axes_at_zero_theta(robot)[1]
-    return 0.5 * float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) or 1.0
 
 
 def _checked_mask(mask: np.ndarray | None) -> np.ndarray:

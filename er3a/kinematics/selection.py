@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.kinematics.branch import branch_labels
 from er3a.kinematics.inverse import Solutions
 from er3a.robots.robot import Robot
 
@@ -100,19 +99,21 @@ def _why_first(robot: Robot, solutions: Solutions, order: np.ndarray, moves: np.
 def _told_apart(robot: Robot, solutions: Solutions, chosen: int, other: int) -> str:
     turns = solutions.turn[other] - solutions.turn[chosen]
     if solutions.branch[other] != solutions.branch[chosen]:
-        return branch_labels(robot)[solutions.branch[other]]
+        return solutions.label[other]
     words = [f"J{j + 1} turned by {360 * turns[j]:+d} deg" for j in np.flatnonzero(turns)]
-    return "the same branch, " + ", ".join(words)
+    return "the same branch, " + (", ".join(words) or "its free joint at another angle")
 
 
 def _why_none(robot: Robot, solutions: Solutions) -> str:
     if not len(solutions.q):
+        if len(solutions.unsolved) == 1:
+            return solutions.unsolved[0]
         sides = [text.split(": ", 1) for text in solutions.unsolved]
         if len({text for _, text in sides}) == 1:
             return f"out of reach: {sides[0][1]}"
         return "out of reach: " + "; ".join(f"{side}, {text}" for side, text in sides)
     least = int(limit_margin(robot, solutions.q).argmax())
-    label = branch_labels(robot)[solutions.branch[least]]
+    label = solutions.label[least]
     count = len(solutions.q)
     start = (
         f"all {count} solutions leave the limits; the least so is" if count > 1 else "the only solution leaves them:"

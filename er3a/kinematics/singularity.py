@@ -16,6 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.errors import NotWristPartitionedError
+from er3a.kinematics.chain import arm_length
 from er3a.kinematics.forward import frames, jacobian
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
 from er3a.robots.robot import Robot
@@ -57,8 +59,14 @@ class DeterminantFactors:
 
 
 def characteristic_length(robot: Robot) -> float:
-    """Length (m) that makes linear and angular rows comparable: the wrist centre's reach from axis 2."""
-    return wrist_partitioned_arm(robot).wrist_reach
+    """Length (m) that makes linear and angular rows comparable: the wrist centre's reach from axis 2.
+
+    For arms without a wrist centre it is half the length along all links.
+    """
+    try:
+        return wrist_partitioned_arm(robot).wrist_reach
+    except NotWristPartitionedError:
+        return arm_length(robot)
 
 
 def conditioning(robot: Robot, q: np.ndarray, length: float) -> Conditioning:

@@ -12,8 +12,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import PoseError, ShapeError
+from er3a.kinematics.jit import kernel
 
 ORTHONORMAL_TOLERANCE = 1e-6
+BOTTOM_ROW_TOLERANCE = 1e-12
 
 
 def cos_sin(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -93,11 +95,16 @@ def check_poses(T: np.ndarray, argument: str = "T") -> np.ndarray:
     T = np.asarray(T, dtype=float)
     if T.ndim < 2 or T.shape[-2:] != (4, 4):
         raise ShapeError(argument, T.shape, "(..., 4, 4)")
+    if _all_rigid(np.ascontiguousarray(T).reshape(-1, 4, 4)):
+        return T
     finite = np.isfinite(T).all(axis=(-1, -2))
     R = np.where(finite[..., None, None], T[..., :3, :3], np.eye(3))
     faults = (
         (~finite, "holds NaN or infinity"),
-        (np.abs(T[..., 3, :] - [0, 0, 0, 1]).max(axis=-1) > 1e-12, "has a bottom row other than 0 0 0 1"),
+        (
+            np.abs(T[..., 3, :] - [0, 0, 0, 1]).max(axis=-1) > BOTTOM_ROW_TOLERANCE,
+            "has a bottom row other than 0 0 0 1",
+        ),
         (
             np.abs(R @ np.swapaxes(R, -1, -2) - np.eye(3)).max(axis=(-1, -2)) > ORTHONORMAL_TOLERANCE,
             f"has a rotation part that is not orthonormal to {ORTHONORMAL_TOLERANCE:g}",
@@ -110,3 +117,24 @@ def check_poses(T: np.ndarray, argument: str = "T") -> np.ndarray:
             where = f"{argument}[{', '.join(map(str, index))}]" if index else argument
             raise PoseError(f"{where} {what}")
     return T
+
+
+@kernel
+def _all_rigid(T):
+    """Whether all matrices (N, 4, 4) are rigid transforms."""
+    for n in range(T.shape[0]):
+        last = abs(T[n, 3, 0]) + abs(T[n, 3, 1]) + abs(T[n, 3, 2]) + abs(T[n, 3, 3] - 1.0)
+        worst, far = last * ORTHONORMAL_TOLERANCE / BOTTOM_ROW_TOLERANCE, 0.0
+        for r in range(3):
+            far += abs(T[n, r, 3])
+            for s in range(r + 1):
+                product = T[n, r, 0] * T[n, s, 0] + T[n, r, 1] * T[n, s, 1] + T[n, r, 2] * T[n, s, 2]
+                worst = max(worst, abs(product - (1.0 if r == s else 0.0)))
+        volume = (
+            T[n, 0, 0] * (T[n, 1, 1] * T[n, 2, 2] - T[n, 1, 2] * T[n, 2, 1])
+            + T[n, 0, 1] * (T[n, 1, 2] * T[n, 2, 0] - T[n, 1, 0] * T[n, 2, 2])
+            + T[n, 0, 2] * (T[n, 1, 0] * T[n, 2, 1] - T[n, 1, 1] * T[n, 2, 0])
+        )
+        if not (worst <= ORTHONORMAL_TOLERANCE and far < np.inf and volume > 0.0):
+            return False
+    return True

@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 
 from er3a.errors import NotWristPartitionedError
-from er3a.kinematics.block_inverse import BlockConstants, block_constants
+from er3a.kinematics.block_constants import BlockConstants, block_constants
 from er3a.kinematics.chain import axes_at_zero_theta
 from er3a.kinematics.closed_form import APART, BOUNDARY_M, BOUNDARY_RAD, SLOTS, ArmConstants, solve
 from er3a.kinematics.vectors import Vector, signed_angle, unsigned_angle

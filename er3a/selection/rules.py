@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.collision.clearance import clearance
+from er3a.collision.clearance import can_measure, clearance
 from er3a.collision.scene import SceneFile
 from er3a.errors import Er3aError
 from er3a.kinematics.selection import limit_margin
@@ -90,8 +90,9 @@ RULES: dict[str, Rule] = {
 
 
 def available_rules(robot: Robot) -> tuple[str, ...]:
-    """Names of the rules whose data the robot has."""
-    return tuple(name for name in RULES if name != "time" or np.isfinite(robot.speed).all())
+    """Names of the rules whose data the robot has, and whose library this machine."""
+    known = {"time": bool(np.isfinite(robot.speed).all()), "clearance": can_measure()}
+    return tuple(name for name in RULES if known.get(name, True))
 
 
 def checked_weights(rule: str | Mapping[str, float]) -> dict[str, float]:

@@ -12,7 +12,7 @@ from er3a.errors import Er3aError, PoseError, ShapeError
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
-from er3a.kinematics.iteration import _error_and_jacobian, uniform
+from er3a.kinematics.iteration import _E, _Q, _ROWS, _TARGET, LANES, _evaluate, uniform
 from er3a.kinematics.numerical import BAD_GUESS, LIMIT_BOUND, SOLVED, UNREACHABLE, solve
 from tests.kinematics.arms import DEG, arms, joints_at_random, joints_within, make_arm, placement, pose_errors
 from tests.kinematics.singular_poses import CLASSES, joints_near
@@ -59,19 +59,19 @@ def test_singular_poses_are_solved(robot, random, kind):
 
 
 def test_jacobian_of_the_error_is_its_derivative(robot, random):
+    """Lane k of the scratch memory holds the arm with joint k moved a little."""
     arm = robot.direction, robot.offset, constant_links(robot)
-    for q, other in joints_at_random(robot, random, 40).reshape(20, 2, 6):
-        T, mask = forward(robot, other), np.ones(6)
-        J, e = np.empty((6, 6)), np.empty(6)
-
-        def error(joints, T=T, mask=mask, e=e, arm=arm):
-            _error_and_jacobian(arm, T, mask, 0.7, joints, np.empty((6, 6)), e)
-            return e.copy()
-
-        _error_and_jacobian(arm, T, mask, 0.7, q, J, e)
-        if np.linalg.norm(e[3:]) < 2.8:
-            steps = [(error(q + 1e-6 * row) - error(q - 1e-6 * row)) / 2e-6 for row in np.eye(6)]
-            np.testing.assert_allclose(J, np.array(steps).T, atol=1e-6)
+    step, targets = 1e-6, joints_at_random(robot, random, 20)
+    for q, target in zip(joints_at_random(robot, random, 20), targets):
+        w, J = np.zeros((_ROWS, LANES)), np.zeros((6, 6, LANES))
+        w[_TARGET : _TARGET + 12] = forward(robot, target)[:3].reshape(12, 1)
+        moves = np.concatenate([step * np.eye(6), -step * np.eye(6), np.zeros((LANES - 12, 6))])
+        w[_Q : _Q + 6] = (q + moves).T
+        _evaluate(arm, np.ones(6), 0.7, w.reshape(-1), J.reshape(-1))
+        errors = w[_E : _E + 6]
+        if np.linalg.norm(errors[3:, 12]) < 2.8:
+            by_differences = (errors[:, :6] - errors[:, 6:12]) / (2 * step)
+            np.testing.assert_allclose(J[:, :, 12].T, by_differences, atol=1e-6)
 
 
 def test_start_guess_decides_which_arm_is_found(robot, random):

@@ -196,15 +196,15 @@ def test_round_trips_lose_nothing(computed):
 def test_round_trips_tell_when_the_solver_fails(monkeypatch):
     from er3a.stages.inverse import round_trips as module
 
-    solve = module.solve_slots
+    solve = module.inverse_batch
 
-    def broken(robot, T, q_ref):
-        q, fault, gap = solve(robot, T, q_ref)
-        q[0] += 1e-3
-        return q, fault, gap
+    def broken(robot, T):
+        solved = solve(robot, T)
+        solved.q[0] += 1e-3
+        return solved
 
-    monkeypatch.setattr(module, "solve_slots", broken)
-    trips = round_trips(load_robot("er3_600"), np.random.default_rng(1))
+    monkeypatch.setattr(module, "inverse_batch", broken)
+    trips = round_trips(load_robot("er3_600"), np.random.default_rng(1), 500)
     assert trips.own_found == trips.poses - 1
     assert trips.worst_own == pytest.approx(1e-3)
     assert trips.worst_position > 1e-5
@@ -223,7 +223,8 @@ def test_results_are_the_same_bytes_in_another_process(tmp_path, monkeypatch):
 def solutions_of(q, within, branch) -> Solutions:
     q = np.array(q, dtype=float)
     reason = tuple("" if ok else "J1 beyond" for ok in within)
-    return Solutions(q, np.array(within), np.array(branch), np.zeros((len(q), 6), int), reason, ())
+    label = tuple(f"branch {number}" for number in branch)
+    return Solutions(q, np.array(within), np.array(branch), np.zeros((len(q), 6), int), reason, (), label=label)
 
 
 def test_nearest_breaks_ties_by_all_joints_then_branch():
@@ -301,7 +302,50 @@ def test_all_targets_solved_is_a_pass_and_none_a_fail(tmp_path):
         assert read_summary(tmp_path / status)["verdict"]["status"] == status
 
 
-def test_arm_without_closed_form_is_said_so(tmp_path):
+def test_each_rule_ranks_the_branches(computed, folders):
+    name, summary, _ = computed
+    ranked = read_table(folders[name] / "rankings.parquet")
+    for target in summary["targets"]:
+        rows = ranked[ranked["target"] == target["name"]]
+        assert rows["branch"].nunique() == target["within_limits"]
+        for rule, group in rows.groupby("rule"):
+            assert group["place"].min() == 1
+            greatest = summary["rules"].get(rule, {}).get("best") == "greatest"
+            best = group["measure"].max() if greatest else group["measure"].min()
+            assert group.loc[group["place"] == 1, "measure"].to_numpy() == pytest.approx(best, abs=1e-8)
+        if target["chosen_deg"] is not None:
+            nearest_first = rows[(rows["rule"] == "nearest") & (rows["place"] == 1)]
+            assert target["chosen_branch"] in set(nearest_first["branch"])
+
+
+def test_map_counts_what_the_solver_finds(computed, folders):
+    name, _, _ = computed
+    robot, table = load_robot(name), read_table(folders[name] / "map.parquet")
+    assert table["within_limits"].le(table["solutions"]).all()
+    for _, row in table.sample(40, random_state=1).iterrows():
+        T = np.eye(4)
+        turn = {"tool straight down": ("x", 180), "tool level, outward": ("y", 90)}[row["orientation"]]
+        T[:3, :3] = Rotation.from_euler(*turn, degrees=True).as_matrix()
+        T[:3, 3] = np.array([row["x_mm"], 0, row["z_mm"]]) / 1000
+        solved = inverse(robot, T)
+        assert len(set(solved.branch[solved.within_limits])) == row["within_limits"]
+
+
+def test_sequence_is_no_worse_than_greed(computed):
+    _, summary, _ = computed
+    sequence = summary["sequence"]
+    assert sequence["cost"] <= sequence["greedy_cost"] + 1e-9
+    assert sequence["targets"] == [t["name"] for t in summary["targets"] if t["chosen_deg"] is not None]
+
+
+def test_families_are_in_the_summary(computed):
+    _, summary, _ = computed
+    target = next(target for target in summary["targets"] if target["name"] == "wrist_aligned")
+    assert {family["kind"] for family in target["families"]} == {"wrist"}
+    assert np.array(target["families"][0]["q0_deg"])[[3, 5]] == pytest.approx(7.5)
+
+
+def test_arm_without_closed_form_is_solved_by_iteration_and_said_so(tmp_path):
     text = (ROBOTS / "er3_600.yaml").read_text(encoding="utf-8").replace("er3_600", "bent")
     file = tmp_path / "bent.yaml"
     file.write_text(text.replace("joint: 5, a_mm: 0,", "joint: 5, a_mm: 30,"), encoding="utf-8")
@@ -309,11 +353,18 @@ def test_arm_without_closed_form_is_said_so(tmp_path):
     folder = tmp_path / "bent"
     compute(study, "bent", folder)
     summary = read_summary(folder)
-    assert summary["verdict"]["code"] == "inverse.no_closed_form"
-    assert "axes 4, 5 and 6" in summary["verdict"]["text"]
+    solved = [target for target in summary["targets"] if target["chosen_deg"] is not None]
+    assert len(solved) >= 4
+    assert all("no closed form, because axes 4, 5 and 6" in target["method"] for target in summary["targets"])
+    assert summary["round_trips"] is None
+    for target in solved:
+        T = forward(study.robot("bent"), np.radians(target["chosen_deg"]))
+        np.testing.assert_allclose(T[:3, 3] * 1000, target["xyz_mm"], atol=1e-6)
+    far = next(target for target in summary["targets"] if target["name"] == "too_far")
+    assert far["reason"].startswith("unreachable")
     report(study, "bent", folder, tmp_path / "page.html")
     record(study, "bent", folder, tmp_path / "bent.rrd")
-    assert "no closed-form inverse" in (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "no closed form" in (tmp_path / "page.html").read_text(encoding="utf-8")
 
 
 def test_empty_target_list_is_one_clear_error(tmp_path):
@@ -335,7 +386,7 @@ def test_page_and_recording_show_every_target(folders, tmp_path):
     summary = read_summary(folders[name])
     for target in summary["targets"]:
         assert f'<section id="{target["name"]}">' in page
-    assert page.count("data:image/svg+xml") == len(summary["targets"]) + 1
+    assert page.count("data:image/svg+xml") == len(summary["targets"]) + 2
     assert "nan" not in page.split("<main>")[1].split("data:image")[0]
     record(make_study(), name, folders[name], tmp_path / "inverse.rrd")
     rerun = Path(sys.executable).with_name("rerun")

@@ -38,7 +38,7 @@ TABLES = {
         "void_vertices",
         "void_triangles",
     ],
-    "inverse": ["solutions"],
+    "inverse": ["solutions", "rankings", "map"],
     "trajectory": ["checks", "samples"],
 }
 

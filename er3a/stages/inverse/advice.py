@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from er3a.kinematics.turns import nearest_turns, within
-from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.kinematics.batch import inverse_batch
 from er3a.robots.robot import Robot
 
 DIRECTIONS = 400
@@ -41,9 +40,7 @@ class Neighbours:
 
 def solvable(robot: Robot, T: np.ndarray) -> np.ndarray:
     """Whether poses (N, 4, 4) have a solution within the limits, (N,)."""
-    zeros = np.zeros((len(T), 6))
-    q, _, _ = solve_slots(robot, T, zeros)
-    return within(robot, nearest_turns(robot, q, zeros[:, None])).any(axis=1)
+    return inverse_batch(robot, T).within_limits.any(axis=1)
 
 
 def neighbours(robot: Robot, T: np.ndarray, random: np.random.Generator) -> Neighbours:

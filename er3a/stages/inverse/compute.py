@@ -8,16 +8,17 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from er3a.errors import NotWristPartitionedError
+from er3a.collision.scene import load_scene
+from er3a.kinematics.inverse import CLOSED_FORM
 from er3a.kinematics.selection import NEAREST_RULE
-from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
 from er3a.results import Figure, Verdict, write_summary, write_table
-from er3a.robots.robot import Robot
-from er3a.stages.inverse.columns import COLUMNS
+from er3a.selection.rules import RULES
+from er3a.stages.inverse.rankings import rankings, sequence
 from er3a.stages.inverse.round_trips import SAME_JOINTS_RAD, RoundTrips, round_trips
-from er3a.stages.inverse.solve_target import refused_target, solve_target
+from er3a.stages.inverse.solution_map import MAP_COLUMNS, solution_map
+from er3a.stages.inverse.solve_target import solve_target
 from er3a.study import Study
-from er3a.targets import Target, load_targets
+from er3a.targets import load_targets
 
 STAGE = "inverse"
 REPRODUCED_M = 1e-9
@@ -27,22 +28,32 @@ ADVICE_STREAM, ROUND_TRIP_STREAM = 0, 1
 
 
 def compute(study: Study, name: str, folder: Path) -> None:
-    """Write ``summary.json`` and ``solutions.parquet`` (columns: ``columns.COLUMNS``) for a robot of the study."""
+    """Write ``summary.json`` and three tables for a robot of the study.
+
+    ``solutions.parquet`` (columns: ``columns.COLUMNS``), ``rankings.parquet`` (``rankings.RANKING_COLUMNS``) and
+    ``map.parquet`` (see ``solution_map.solution_map``; empty for arms without a closed form).
+    """
     robot = study.robot(name)
     targets = load_targets(study.entry(name).targets)
-    try:
-        wrist_partitioned_arm(robot)
-    except NotWristPartitionedError as error:
-        _write_without_closed_form(study, name, folder, robot, targets, error)
-        return
-    entries, tables = [], []
+    settings = study.inverse
+    scene = load_scene(settings.scene) if settings.scene else None
+    entries, tables, ranked, solved = [], [], [], []
     for number, target in enumerate(targets):
-        entry, table = solve_target(robot, target, np.random.default_rng([study.seed, ADVICE_STREAM, number]))
+        random = np.random.default_rng([study.seed, ADVICE_STREAM, number])
+        entry, table, found = solve_target(robot, target, random)
+        first = table["first_of_branch"].to_numpy(bool)
+        ranked.append(rankings(robot, target.name, found, first, target.reference(), scene, settings.mix))
         entries.append(entry)
         tables.append(table)
+        solved.append(found)
     solutions = pd.concat(tables, ignore_index=True)
-    trips = round_trips(robot, np.random.default_rng([study.seed, ROUND_TRIP_STREAM]))
+    closed = all(found.method == CLOSED_FORM for found in solved)
+    random = np.random.default_rng([study.seed, ROUND_TRIP_STREAM])
+    trips = round_trips(robot, random, settings.round_trips) if closed else None
+    number_of_ways = solution_map(robot, settings.map_cells) if closed else pd.DataFrame(columns=MAP_COLUMNS)
     write_table(folder / "solutions.parquet", solutions)
+    write_table(folder / "rankings.parquet", pd.concat(ranked, ignore_index=True))
+    write_table(folder / "map.parquet", number_of_ways)
     write_summary(
         folder,
         study,
@@ -51,39 +62,22 @@ def compute(study: Study, name: str, folder: Path) -> None:
         _verdict(entries, solutions, trips),
         _figures(entries, solutions, trips),
         rule=NEAREST_RULE,
+        rules={key: {"title": rule.title, "unit": rule.unit, "best": rule.best} for key, rule in RULES.items()},
+        mix=settings.mix,
+        scene=scene.title if scene else None,
         targets=entries,
-        round_trips=_plain(trips),
+        sequence=sequence(robot, [target.name for target in targets], solved, targets[0].reference()),
+        round_trips=_plain(trips) if trips else None,
     )
 
 
-def _write_without_closed_form(
-    study: Study,
-    name: str,
-    folder: Path,
-    robot: Robot,
-    targets: tuple[Target, ...],
-    error: NotWristPartitionedError,
-) -> None:
-    lacking = error.property_missing
-    verdict = Verdict(
-        "caution",
-        "inverse.no_closed_form",
-        f"The targets were not solved: this arm has no closed-form inverse, because {lacking}.",
-        {"property_missing": lacking},
-    )
-    write_table(folder / "solutions.parquet", pd.DataFrame(columns=COLUMNS))
-    entries = [refused_target(robot, target, f"no closed form: {lacking}") for target in targets]
-    figures = [Figure("targets solved within limits", 0, f"of {len(entries)}")]
-    write_summary(folder, study, name, STAGE, verdict, figures, rule=NEAREST_RULE, targets=entries, round_trips=None)
-
-
-def _verdict(entries: list[dict[str, Any]], solutions: pd.DataFrame, trips: RoundTrips) -> Verdict:
+def _verdict(entries: list[dict[str, Any]], solutions: pd.DataFrame, trips: RoundTrips | None) -> Verdict:
     position, orientation = _worst_residuals(solutions, trips)
-    lost = trips.poses - trips.own_found
+    lost = trips.poses - trips.own_found if trips else 0
     if lost or position > REPRODUCED_M or orientation > REPRODUCED_RAD:
         text = (
             f"The solver can't be trusted here: worst residual {position * 1000:.2g} mm and "
-            f"{np.degrees(orientation):.2g} deg, own joint angles lost for {lost} of {trips.poses} random poses."
+            f"{np.degrees(orientation):.2g} deg, own joint angles lost for {lost} random poses."
         )
         params = {"worst_mm": position * 1000, "worst_deg": float(np.degrees(orientation)), "lost": lost}
         return Verdict("fail", "inverse.not_reproduced", text, params)
@@ -104,28 +98,33 @@ def _verdict(entries: list[dict[str, Any]], solutions: pd.DataFrame, trips: Roun
     return Verdict("caution", "inverse.some_unsolved", text, params)
 
 
-def _figures(entries: list[dict[str, Any]], solutions: pd.DataFrame, trips: RoundTrips) -> list[Figure]:
+def _figures(entries: list[dict[str, Any]], solutions: pd.DataFrame, trips: RoundTrips | None) -> list[Figure]:
     position, orientation = _worst_residuals(solutions, trips)
     solved = sum(entry["chosen_deg"] is not None for entry in entries)
-    counts = trips.counts_within_limits
-    mean = float(counts @ np.arange(len(counts)) / trips.poses)
-    spread = float(np.sqrt(counts @ (np.arange(len(counts)) - mean) ** 2 / (trips.poses - 1)))
+    of_random = []
+    if trips:
+        counts = trips.counts_within_limits
+        mean = float(counts @ np.arange(len(counts)) / trips.poses)
+        spread = float(np.sqrt(counts @ (np.arange(len(counts)) - mean) ** 2 / max(trips.poses - 1, 1)))
+        of_random = [
+            Figure("ways to a random reachable pose, mean", mean, "of 8", 1.96 * spread / trips.poses**0.5),
+            Figure("random poses solved back to their joints", 100.0 * trips.own_found / trips.poses, "%"),
+        ]
     return [
         Figure("targets solved within limits", solved, f"of {len(entries)}"),
-        Figure("ways to a random reachable pose, mean", mean, "of 8", 1.96 * spread / trips.poses**0.5),
-        Figure("random poses solved back to their joints", 100.0 * trips.own_found / trips.poses, "%"),
+        *of_random,
         Figure("worst position residual", position * 1000, "mm"),
         Figure("worst orientation residual", float(np.degrees(orientation)), "deg"),
     ]
 
 
-def _worst_residuals(solutions: pd.DataFrame, trips: RoundTrips) -> tuple[float, float]:
+def _worst_residuals(solutions: pd.DataFrame, trips: RoundTrips | None) -> tuple[float, float]:
     """Over all targets' solutions and all round trips, m and rad."""
     position_m = solutions["position_residual_mm"].to_numpy(float) / 1000
     orientation = np.radians(solutions["orientation_residual_deg"].to_numpy(float))
     return (
-        float(position_m.max(initial=trips.worst_position)),
-        float(orientation.max(initial=trips.worst_orientation)),
+        float(position_m.max(initial=trips.worst_position if trips else 0.0)),
+        float(orientation.max(initial=trips.worst_orientation if trips else 0.0)),
     )
 
 

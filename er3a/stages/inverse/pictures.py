@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
+import matplotlib
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 
 from er3a.robots.robot import Robot
 from er3a.stages.inverse.columns import JOINT_COLUMNS
-from er3a.stages.inverse.shape_colours import SHAPE_COLOURS
+from er3a.stages.inverse.shape_colours import colour_of, shape_of
 from er3a.viewing.arm import skeleton
 from er3a.viewing.figures import equal_scale, new_figure
 from er3a.viewing.page import Picture
@@ -62,6 +64,41 @@ def histogram(trips: dict[str, Any]) -> Picture:
     )
 
 
+def ways(table: pd.DataFrame) -> Picture:
+    """Maps of the number of branches within the limits, one for each orientation of the tool."""
+    orientations = list(dict.fromkeys(table["orientation"]))
+    figure, axes = new_figure(1, len(orientations), width=10.5, height=4.8, squeeze=False)
+    colours = ListedColormap(["#ffffff", *matplotlib.colormaps["viridis_r"](np.linspace(0.08, 0.95, 8))])
+    shares = []
+    for panel, words in zip(axes[0], orientations):
+        rows = table[table["orientation"] == words]
+        x, z = np.unique(rows["x_mm"]), np.unique(rows["z_mm"])
+        counts = rows["within_limits"].to_numpy().reshape(len(x), len(z)).T
+        reached = rows["solutions"].to_numpy().reshape(len(x), len(z)).T > 0
+        image = panel.pcolormesh(x, z, counts, cmap=colours, vmin=-0.5, vmax=8.5, rasterized=True)
+        panel.contour(x, z, reached, levels=[0.5], colors=INK, linewidths=1.0)
+        panel.plot([0], [0], marker="P", markersize=9, color=HIGHLIGHT, markeredgecolor="white", linestyle="none")
+        panel.set_title(words[0].upper() + words[1:], **TITLE)
+        panel.set_aspect("equal")
+        panel.set_xlabel("x (mm)")
+        panel.set_ylabel("z (mm)")
+        columns, heights = np.flatnonzero(reached.any(axis=0)), np.flatnonzero(reached.any(axis=1))
+        if columns.size:
+            edge = 2 * (x[1] - x[0])
+            panel.set_xlim(x[columns[0]] - edge, x[columns[-1]] + edge)
+            panel.set_ylim(min(z[heights[0]] - edge, -edge), z[heights[-1]] + edge)
+        panel.grid(visible=False)
+        shares.append(f"{words}: {100 * (counts > 0).sum() / max(reached.sum(), 1):.0f} %")
+    bar = figure.colorbar(image, ax=axes[0].tolist(), ticks=range(9), shrink=0.85)
+    bar.set_label("branches within the limits")
+    return Picture(
+        figure,
+        "Maps of the number of solutions in the vertical plane through axis 1",
+        "Of the tool positions inside the line, which the arm reaches when limits are left aside, the limits leave at "
+        f"least one branch for {'; '.join(shares)}. White inside it: forbidden by limits alone. Pink cross: base.",
+    )
+
+
 def _conclude(target: dict[str, Any]) -> str:
     if target["chosen_deg"] is not None:
         return (
@@ -87,17 +124,19 @@ def _draw_arms(side: Axes, top: Axes, robot: Robot, target: dict[str, Any], bran
         top.plot(points[:, 0], points[:, 1], solid_joinstyle="round", marker="o", **style)
 
     handles = []
-    shapes = branches.groupby(branches["branch"] // 2, sort=True) if len(branches) else ()
+    shape = [shape_of(branch, label) for branch, label in zip(branches["branch"], branches["label"])]
+    shapes = branches.groupby(np.array(shape), sort=True) if len(branches) else ()
     for shape, rows in shapes:
         allowed, chosen = int(rows["within_limits"].sum()), bool((rows["rank"] == 1).any())
-        style = {"color": SHAPE_COLOURS[shape], "linewidth": 2, "markersize": 4, "zorder": 4}
+        style = {"color": colour_of(shape), "linewidth": 2, "markersize": 4, "zorder": 4}
         if chosen:
             style |= {"linewidth": 5, "markersize": 7, "zorder": 6}
         if not allowed:
             style = {"color": MUTED, "linewidth": 1.3, "linestyle": "--", "markersize": 3, "zorder": 3}
         draw(in_base(skeleton(robot, np.radians(rows[JOINT_COLUMNS].to_numpy(float)[0]))), **style)
         if allowed:
-            label = rows["label"].iloc[0].rpartition(",")[0] + (" (chosen)" if chosen else "")
+            words = rows["label"].iloc[0]
+            label = (words.rpartition(",")[0] or words) + (" (chosen)" if chosen else "")
             handles.append(Line2D([], [], label=label, **style))
     if not len(branches):
         style = {"color": MUTED, "linewidth": 3, "markersize": 5}
@@ -137,7 +176,7 @@ def _draw_joints(axes: Axes, robot: Robot, target: dict[str, Any], branches: pd.
             y = joint + 0.8 * ((place + 0.5) / max(len(branches), 1) - 0.5)
             x = angles[place, joint]
             outside = not lower[joint] - 1e-6 <= x <= upper[joint] + 1e-6
-            colour = SHAPE_COLOURS[row["branch"] // 2] if row["within_limits"] else MUTED
+            colour = colour_of(shape_of(row["branch"], row["label"])) if row["within_limits"] else MUTED
             style = {"marker": "o", "markersize": 4.5, "color": colour}
             if row["rank"] == 1:
                 style |= {"marker": "D", "markersize": 8}

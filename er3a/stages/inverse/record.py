@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from er3a.results import read_summary, read_table
 from er3a.robots.robot import Robot
 from er3a.stages.inverse.columns import JOINT_COLUMNS
-from er3a.stages.inverse.shape_colours import SHAPE_COLOURS
+from er3a.stages.inverse.shape_colours import colour_of, shape_of
 from er3a.study import Study
 from er3a.viewing.arm import arm_view, log_arm, send_motion, size_of, skeleton
 from er3a.viewing.palette import HIGHLIGHT, MUTED, rgb
@@ -81,7 +81,7 @@ def _log_target(stream: rr.RecordingStream, robot: Robot, target: dict[str, Any]
         if not branch["within_limits"]:
             stream.log(entity, rr.LineStrips3D([points], radii=0.003 * size, colors=rgb(MUTED)))
         elif branch["rank"] != 1:
-            stream.log(entity, _ghost(points, 0.014 * size, SHAPE_COLOURS[branch["branch"] // 2]))
+            stream.log(entity, _ghost(points, 0.014 * size, colour_of(shape_of(branch["branch"], branch["label"]))))
 
 
 def _ghost(points: np.ndarray, radius: float, colour: str) -> rr.Capsules3D:

@@ -9,9 +9,10 @@ import pandas as pd
 
 from er3a.results import read_summary, read_table
 from er3a.stages.inverse.columns import JOINT_COLUMNS
-from er3a.stages.inverse.pictures import histogram, overlay
+from er3a.stages.inverse.pictures import histogram, overlay, ways
+from er3a.stages.inverse.symptoms import SYMPTOM_COLUMNS, symptoms
 from er3a.study import Study
-from er3a.viewing.page import fixed, render
+from er3a.viewing.page import fixed, number, render
 
 NO_BREAK_SPACE = "\u00a0"
 
@@ -21,6 +22,7 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
     robot = study.robot(name)
     summary = read_summary(folder)
     solutions = read_table(folder / "solutions.parquet")
+    ranked, ways_table = read_table(folder / "rankings.parquet"), read_table(folder / "map.parquet")
     sections = []
     for target in summary["targets"]:
         rows = solutions[solutions["target"] == target["name"]]
@@ -33,6 +35,9 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
                 "orientation": _listed(target["rpy_deg"]),
                 "reference": _listed(target["q_ref_deg"]),
                 "rows": _branch_rows(rows, branches),
+                "rules": _rule_rows(ranked[ranked["target"] == target["name"]]),
+                "rule_columns": ["Branch", *(_rule_title(rule, summary) for rule in _rules_of(ranked))],
+                "families": [_family_words(family) for family in target["families"]],
                 "residual_mm": rows["position_residual_mm"].max() if len(rows) else None,
                 "residual_deg": rows["orientation_residual_deg"].max() if len(rows) else None,
             }
@@ -47,7 +52,67 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
         sections=sections,
         trips=trips,
         histogram=histogram(trips) if trips else None,
+        ways=ways(ways_table) if len(ways_table) else None,
+        symptom_columns=SYMPTOM_COLUMNS,
+        symptoms=symptoms(summary),
+        mix=", ".join(f"{rule} {weight:g}" for rule, weight in summary["mix"].items()),
+        stops=_stops(summary["sequence"]),
     )
+
+
+def _rules_of(ranked: pd.DataFrame) -> list[str]:
+    return list(dict.fromkeys(ranked["rule"]))
+
+
+def _rule_title(rule: str, summary: dict[str, Any]) -> str:
+    unit = summary["rules"][rule]["unit"] if rule in summary["rules"] else "1"
+    return f"{rule}{'' if unit == '1' else f' ({unit})'}>"
+
+
+def _rule_rows(ranked: pd.DataFrame) -> list[list[str]]:
+    """One row for each branch: the measure of each rule, with its place."""
+    rows = []
+    for _, group in ranked.groupby("branch", sort=True):
+        cells = [
+            f"{number(_no_noise(row['measure']), 3)}{NO_BREAK_SPACE}({row['place']})" for _, row in group.iterrows()
+        ]
+        rows.append([group["label"].iloc[0].replace("elbow ", "").replace(" ", NO_BREAK_SPACE), *cells])
+    return rows
+
+
+def _no_noise(measure: float) -> float:
+    """0 for what is nothing but rounding."""
+    return 0.0 if abs(measure) < 1e-9 else float(measure)
+
+
+def _family_words(family: dict[str, Any]) -> str:
+    moving = [
+        f"J{j + 1} {'+' if rate > 0 else ''}{fixed(rate, 2)}"
+        for j, rate in enumerate(family["direction"])
+        if abs(rate) > 1e-9
+    ]
+    low, high = family["range_deg"]
+    words = {"wrist": "axes 4 and 6 in line", "shoulder": "wrist centre on axis 1", "elbow": "arm folded onto itself"}
+    room = (
+        f"for {fixed(low, 1)} to {fixed(high, 1)} deg"
+        if family["within_limits"]
+        else "but every member leaves the limits"
+    )
+    return (
+        f"{words[family['kind']]}: from ({_listed(family['q0_deg'])}) deg, nearest to the reference, joints turn with "
+        f"the tool at rest in the ratio {', '.join(moving)}, {room}"
+    )
+
+
+def _stops(sequence: dict[str, Any] | None) -> list[list[str]]:
+    if sequence is None:
+        return []
+    return [
+        [target, label.replace("elbow ", ""), greedy.replace("elbow ", ""), _listed(q)]
+        for target, label, greedy, q in zip(
+            sequence["targets"], sequence["labels"], sequence["greedy_labels"], sequence["q_deg"]
+        )
+    ]
 
 
 def _overview_row(target: dict[str, Any]) -> list[str]:

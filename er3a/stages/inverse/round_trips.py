@@ -6,14 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.forward import forward
 from er3a.kinematics.transforms import rotation_angle
-from er3a.kinematics.turns import nearest_turns, principal, within
-from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.kinematics.turns import principal
 from er3a.robots.robot import Robot
 
-POSES = 2000
 SAME_JOINTS_RAD = 1e-6
 
 
@@ -40,23 +39,22 @@ class RoundTrips:
     counts_within_limits: np.ndarray
 
 
-def round_trips(robot: Robot, random: np.random.Generator) -> RoundTrips:
-    """Send ``POSES`` joint vectors, uniform within the limits, to poses and back."""
-    own = random.uniform(robot.lower, robot.upper, size=(POSES, 6))
+def round_trips(robot: Robot, random: np.random.Generator, poses: int) -> RoundTrips:
+    """Send that many joint vectors, uniform within the limits, to poses and back."""
+    own = random.uniform(robot.lower, robot.upper, size=(poses, 6))
     T = forward(robot, own)
-    q, _, _ = solve_slots(robot, T, np.zeros_like(own))
-    valid = np.isfinite(q).all(axis=2)
+    solved = inverse_batch(robot, T)
+    q, valid = solved.q, solved.valid
     back = forward(robot, q[valid])
     asked = np.repeat(T, valid.sum(axis=1), axis=0)
     apart = np.abs(principal(q - own[:, None])).max(axis=2)
     apart = np.where(valid, apart, np.inf).min(axis=1)
-    inside = within(robot, nearest_turns(robot, q, np.zeros((1, 1, 6)))) & valid
     return RoundTrips(
-        poses=POSES,
+        poses=poses,
         solutions=int(valid.sum()),
         worst_position=float(np.linalg.norm(back[:, :3, 3] - asked[:, :3, 3], axis=1).max(initial=0.0)),
         worst_orientation=float(rotation_angle(back[:, :3, :3], asked[:, :3, :3]).max(initial=0.0)),
         own_found=int((apart < SAME_JOINTS_RAD).sum()),
         worst_own=float(apart.max()),
-        counts_within_limits=np.bincount(inside.sum(axis=1), minlength=SLOTS + 1),
+        counts_within_limits=np.bincount(solved.within_limits.sum(axis=1), minlength=SLOTS + 1),
     )

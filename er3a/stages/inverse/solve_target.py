@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
-from er3a.kinematics.branch import branch_labels
 from er3a.kinematics.closed_form import ORIENTATION
+from er3a.kinematics.families import Family
 from er3a.kinematics.forward import forward
-from er3a.kinematics.inverse import Solutions, inverse
+from er3a.kinematics.inverse import CLOSED_FORM, Solutions, inverse
 from er3a.kinematics.selection import Choice, limit_margin, nearest
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
 from er3a.kinematics.transforms import rotation_angle, rpy_of
@@ -26,13 +26,16 @@ SINGULAR = 1e-6
 LITTLE_MARGIN_DEG = 2.0
 
 
-def solve_target(robot: Robot, target: Target, random: np.random.Generator) -> tuple[dict[str, Any], pd.DataFrame]:
+def solve_target(
+    robot: Robot, target: Target, random: np.random.Generator
+) -> tuple[dict[str, Any], pd.DataFrame, Solutions]:
     """Solve, choose, explain.
 
     Returns
     -------
     entry : plain data for the summary
     table : one row per solution, turns included
+    solutions : what the table was made from
     """
     T, q_ref = target.pose(robot), target.reference()
     solutions = inverse(robot, T, q_ref)
@@ -43,18 +46,21 @@ def solve_target(robot: Robot, target: Target, random: np.random.Generator) -> t
     entry["within_limits"] = int(table.loc[table["within_limits"], "branch"].nunique())
     entry["rows_within_limits"] = int(table["within_limits"].sum())
     entry["unsolved"] = list(solutions.unsolved)
+    entry["method"] = solutions.method
+    entry["families"] = [_family(family) for family in solutions.families]
     if choice.chosen is None:
-        missing = _missing(robot, T, q_ref) if not len(solutions.q) else None
-        entry["neighbours"] = _plain(near := neighbours(robot, T, random))
+        missing = _missing(robot, T, q_ref, solutions) if not len(solutions.q) else None
         entry["short_reason"] = _short_reason(entry["solutions"], missing)
-        entry["advice"] = _what_would_help(near)
-        return entry, table
+        if solutions.method == CLOSED_FORM:
+            entry["neighbours"] = _plain(near := neighbours(robot, T, random))
+            entry["advice"] = _what_would_help(near)
+        return entry, table, solutions
     row = table.iloc[choice.chosen]
     entry["chosen_deg"] = row[JOINT_COLUMNS].astype(float).tolist()
     entry["chosen_branch"] = int(row["branch"])
     entry["short_reason"] = "nearest" if choice.runner_up is not None else "the only one"
     entry["advice"] = _what_to_know(row)
-    return entry, table
+    return entry, table, solutions
 
 
 def refused_target(robot: Robot, target: Target, reason: str) -> dict[str, Any]:
@@ -75,6 +81,8 @@ def refused_target(robot: Robot, target: Target, reason: str) -> dict[str, Any]:
         "short_reason": "not solved",
         "reason": reason,
         "unsolved": [],
+        "method": None,
+        "families": [],
         "neighbours": None,
         "advice": [],
     }
@@ -83,16 +91,14 @@ def refused_target(robot: Robot, target: Target, reason: str) -> dict[str, Any]:
 def _table(robot: Robot, target: Target, T: np.ndarray, solutions: Solutions, choice: Choice) -> pd.DataFrame:
     q, count = solutions.q, len(solutions.q)
     back = forward(robot, q)
-    labels = np.array(branch_labels(robot), dtype=object)
-    factors = determinant_factors(robot, q)
-    singular = [" ".join(kind for kind in TYPES if abs(getattr(factors, kind)[row]) < SINGULAR) for row in range(count)]
+    singular = _singularities(robot, solutions)
     rank = np.zeros(count, dtype=int)
     rank[choice.order] = np.arange(1, len(choice.order) + 1)
     table = pd.DataFrame(
         {
             "target": target.name,
             "branch": solutions.branch,
-            "label": labels[solutions.branch],
+            "label": list(solutions.label),
             **dict(zip(JOINT_COLUMNS, np.degrees(q).T + 0.0)),
             **dict(zip(TURN_COLUMNS, solutions.turn.reshape(-1, 6).T)),
             "within_limits": solutions.within_limits,
@@ -110,6 +116,27 @@ def _table(robot: Robot, target: Target, T: np.ndarray, solutions: Solutions, ch
         }
     )
     return table[COLUMNS].astype(dict.fromkeys(("target", "label", "reason", "beyond", "singular"), object))
+
+
+def _singularities(robot: Robot, solutions: Solutions) -> list[str]:
+    """Names of the singularities that each row stands on; for arms without closed form by the Jacobian's rank."""
+    if solutions.method != CLOSED_FORM:
+        smallest = conditioning(robot, solutions.q, characteristic_length(robot)).smallest_singular_value
+        return ["rank" if value < SINGULAR else "" for value in smallest]
+    factors = determinant_factors(robot, solutions.q)
+    rows = range(len(solutions.q))
+    return [" ".join(kind for kind in TYPES if abs(getattr(factors, kind)[row]) < SINGULAR) for row in rows]
+
+
+def _family(family: Family) -> dict[str, Any]:
+    return {
+        "kind": family.kind,
+        "q0_deg": np.degrees(family.q0).tolist(),
+        "direction": family.direction.tolist(),
+        "range_deg": np.degrees(family.range).tolist(),
+        "within_limits": family.within_limits,
+        "branches": list(family.branches),
+    }
 
 
 def _beyond(robot: Robot, q: np.ndarray) -> str:
@@ -131,14 +158,18 @@ def _first_of_branch(branch: np.ndarray, rank: np.ndarray) -> np.ndarray:
     return first
 
 
-def _missing(robot: Robot, T: np.ndarray, q_ref: np.ndarray) -> tuple[float, bool]:
-    """By how much the pose is missed (m, or rad if True): the least over the branches."""
+def _missing(robot: Robot, T: np.ndarray, q_ref: np.ndarray, solutions: Solutions) -> tuple[float, bool] | None:
+    """By how much the pose is missed (m, or rad if True): the least over the branches; None without closed form."""
+    if solutions.method != CLOSED_FORM:
+        return None
     _, fault, gap = (batch[0] for batch in solve_slots(robot, T[None], q_ref[None]))
     least = int(gap.argmin())
     return float(gap[least]), bool(fault[least] == ORIENTATION)
 
 
 def _short_reason(solutions: int, missing: tuple[float, bool] | None) -> str:
+    if missing is None and not solutions:
+        return "no solution found"
     if missing is None:
         return f"all {solutions} solutions leave the limits"
     amount, is_angle = missing
