@@ -20,22 +20,6 @@ from er3a.robots.robot import Robot
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 
 
-PIPELINE_TESTS = ("integration", "browser", "viewing")
-
-
-@pytest.hookimpl(wrapper=True, tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]):
-    """Tests that share the small study run in one worker, so that it is run once; they start first.
-
-    A wrapper, because xdist reads the groups in a hook of its own that would otherwise come before this one.
-    """
-    for item in items:
-        if item.path.parent.name in PIPELINE_TESTS:
-            item.add_marker(pytest.mark.xdist_group("pipeline"))
-    items.sort(key=lambda item: item.path.parent.name not in PIPELINE_TESTS)
-    return (yield)
-
-
 @pytest.fixture(params=ROBOTS)
 def robot(request: pytest.FixtureRequest) -> Robot:
     """Each of the project's robots in turn."""

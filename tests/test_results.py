@@ -60,10 +60,8 @@ def test_shape_of_a_summary(tmp_path, study):
     assert summary["figures"][1] == {"name": "reach", "value": None, "unit": "mm", "uncertainty": None}
     assert summary["provenance"] == {
         "inputs": [
-            {
-                "path": "data/robots/er3_600.yaml",
-                "sha256": hashlib.sha256((ROBOTS / "er3_600.yaml").read_bytes()).hexdigest(),
-            }
+            {"path": path, "sha256": hashlib.sha256((ROBOTS.parents[1] / path).read_bytes()).hexdigest()}
+            for path in ("data/robots/er3_600.yaml", "data/manual_refs/er3_600/envelope.csv")
         ],
         "config": study.settings("er3_600", "workspace"),
         "seed": study.seed,
