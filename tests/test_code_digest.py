@@ -76,7 +76,7 @@ def before(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     [
         ("stages/made/compute.py", True, False),
         ("kinematics/forward.py", True, False),
-        ("kinematics/jit.py", True, False),
+        ("kinematics/jit.py", True, True),
         ("robots/robot.py", True, True),
         ("kinematics/chain.py", True, True),
         ("stages/made/parts.py", False, True),
