@@ -13,7 +13,7 @@ class Er3aError(Exception):
 
 
 class InputError(Er3aError):
-    """A file holds something that can't be used.
+    """A file holds something that can't be used; the message is one line, whatever the file holds.
 
     Parameters
     ----------
@@ -24,12 +24,13 @@ class InputError(Er3aError):
     """
 
     def __init__(self, file: str | Path | None, field: str | None, problem: str, remedy: str):
-        self.file = None if file is None else str(file)
-        self.field = field
-        self.problem = problem
-        self.remedy = remedy
-        where = ": ".join(part for part in (self.file, field) if part)
-        super().__init__(f"{where}: {problem}. {remedy}" if where else f"{problem}. {remedy}")
+        self.file = None if file is None else _line(str(file))
+        self.field = field if field is None else _line(field, 120)
+        self.problem = _line(problem, 300)
+        self.remedy = _line(remedy, 400)
+        where = ": ".join(part for part in (self.file, self.field) if part)
+        told = f"{self.problem}. {self.remedy}"
+        super().__init__(f"{where}: {told}" if where else told)
 
 
 class ShapeError(Er3aError, ValueError):
@@ -62,3 +63,18 @@ class ResultError(Er3aError):
     def __init__(self, file: str | Path, problem: str):
         self.file = str(file)
         super().__init__(f"{file}: {problem}. Delete the file and run `make run`, which computes it again")
+
+
+class WriteError(Er3aError):
+    """A file can't be written: the disk is full, or the folder does not allow it. What was there before stays."""
+
+    def __init__(self, file: str | Path, error: OSError):
+        self.file = str(file)
+        told = error.strerror or str(error)
+        super().__init__(f"{_line(str(file))}: can't be written ({told}). Make room or mend the rights, then run again")
+
+
+def _line(text: str, most: int | None = None) -> str:
+    """Text from a file made fit for one line of a terminal: no control characters, and shortened."""
+    shown = "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
+    return shown if most is None or len(shown) <= most else f"{shown[: most - 40]} ... {shown[-30:]}"

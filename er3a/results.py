@@ -15,10 +15,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from er3a.code_digest import code_digest
-from er3a.errors import ResultError
+from er3a.errors import ResultError, WriteError
 from er3a.study import Study
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+CHECKSUMS = "SHA256SUMS"
 
 Status = Literal["pass", "caution", "fail", "no_reference"]
 
@@ -51,14 +52,25 @@ class Figure:
 
 
 def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
-    """Call ``write`` with a temporary path beside ``path``, then move the finished file into place."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    """Call ``write`` with a temporary path beside ``path``, then move the finished file, kept on disk, into place.
+
+    Raises
+    ------
+    WriteError
+        naming ``path``, if the system refuses; the file that was there before stays
+    """
     temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
-        write(temporary)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            write(temporary)
+            with temporary.open("rb") as written:
+                os.fsync(written.fileno())
+            os.replace(temporary, path)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except OSError as error:
+        raise WriteError(path, error) from None
 
 
 def write_table(path: Path, table: pd.DataFrame) -> None:
@@ -68,11 +80,12 @@ def write_table(path: Path, table: pd.DataFrame) -> None:
 
 
 def read_table(path: Path) -> pd.DataFrame:
-    """Read a Parquet file of ours, or raise :class:`ResultError`."""
+    """Read a Parquet file of ours, or raise :class:`ResultError`; its checksum is compared if there is one."""
+    content = _content(path)
+    if (path.parent / CHECKSUMS).is_file():
+        _compare(path, content, checksums(path.parent))
     try:
-        return pq.read_table(path, partitioning=None).to_pandas()
-    except FileNotFoundError:
-        raise ResultError(path, "missing") from None
+        return pq.read_table(pa.BufferReader(content)).to_pandas()
     except (OSError, pa.ArrowException) as error:
         raise ResultError(path, f"damaged ({' '.join(str(error).split())})") from None
 
@@ -86,7 +99,8 @@ def write_summary(
     figures: Iterable[Figure],
     **stage_keys: Any,
 ) -> None:
-    """Write ``summary.json``: the shape shared by all stages, then the stage's own keys (plain data)."""
+    """Write ``summary.json`` (the shape shared by all stages, then the stage's own keys, plain data), then the checksums
+    of all files of the folder: nothing may be written there afterwards."""
     summary = {
         "format_version": FORMAT_VERSION,
         "robot": robot,
@@ -103,16 +117,18 @@ def write_summary(
     }
     text = json.dumps(summary, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     write_atomically(folder / "summary.json", lambda file: file.write_text(text, encoding="utf-8"))
+    files = sorted(path for path in folder.iterdir() if path.is_file() and path.name != CHECKSUMS and path.name[0] != ".")
+    sums = "".join(f"{sha256(path)}  {path.name}\n" for path in files)
+    write_atomically(folder / CHECKSUMS, lambda file: file.write_text(sums, encoding="utf-8"))
 
 
 def read_summary(folder: Path) -> dict[str, Any]:
     """Read a stage's ``summary.json``, or raise :class:`ResultError` if missing, damaged or of another version."""
     path = folder / "summary.json"
+    content = _content(path)
     try:
-        summary = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise ResultError(path, "missing") from None
-    except (ValueError, OSError) as error:
+        summary = json.loads(content)
+    except ValueError as error:
         raise ResultError(path, f"damaged ({error})") from None
     version = summary.get("format_version") if isinstance(summary, dict) else None
     if version != FORMAT_VERSION:
@@ -120,7 +136,46 @@ def read_summary(folder: Path) -> dict[str, Any]:
     for key in ("robot", "stage", "verdict", "figures", "provenance"):
         if key not in summary:
             raise ResultError(path, f"damaged (no '{key}' in it)")
+    _compare(path, content, checksums(folder))
     return summary
+
+
+def check_results(folder: Path) -> None:
+    """Check that a stage's results are whole, unchanged and of this version.
+
+    Raises
+    ------
+    ResultError
+        naming the first file that is not
+    """
+    read_summary(folder)
+    sums = checksums(folder)
+    for name in sums:
+        _compare(folder / name, _content(folder / name), sums)
+
+
+def checksums(folder: Path) -> dict[str, str]:
+    """The checksums that a stage wrote, by file name; :class:`ResultError` if they can't be read."""
+    path = folder / CHECKSUMS
+    try:
+        lines = _content(path).decode("ascii").splitlines()
+        return {name: checksum for checksum, name in (line.split("  ") for line in lines)}
+    except ValueError:
+        raise ResultError(path, "damaged (no list of checksums)") from None
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return Path(path).read_bytes()
+    except FileNotFoundError:
+        raise ResultError(path, "missing") from None
+    except OSError as error:
+        raise ResultError(path, f"can't be read ({error.strerror})") from None
+
+
+def _compare(path: Path, content: bytes, sums: dict[str, str]) -> None:
+    if sums.get(path.name) != hashlib.sha256(content).hexdigest():
+        raise ResultError(path, f"damaged (not the bytes that {CHECKSUMS} beside it tells of)")
 
 
 def sha256(path: Path) -> str:

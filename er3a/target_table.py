@@ -6,14 +6,11 @@ Columns: ``name``, ``x_mm``, ``y_mm``, ``z_mm``; the columns of one form (``FORM
 
 from __future__ import annotations
 
-import csv
-import io
 from pathlib import Path
 from typing import Any
 
 from er3a.errors import InputError
-from er3a.inputs.csv_file import Column, read_csv
-from er3a.inputs.yaml_file import read_text
+from er3a.inputs.csv_file import Column, read_csv, read_header
 
 POSITION = ("x_mm", "y_mm", "z_mm")
 FORMS: dict[str, tuple[str, ...]] = {
@@ -34,8 +31,7 @@ def read_target_table(path: str | Path) -> list[dict[str, Any]]:
         naming row and column; for a header without a known form of orientation, or with two
     """
     path = Path(path)
-    header = next(csv.reader(io.StringIO(read_text(path))), [])
-    present = {name.strip() for name in header}
+    present = set(read_header(path))
     forms = [form for form, columns in FORMS.items() if present & set(columns)]
     if len(forms) != 1:
         known = "; or ".join(

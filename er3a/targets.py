@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 from typing import Annotated, Literal
@@ -81,7 +82,7 @@ class Target(StrictModel):
     @field_validator("quaternion_wxyz")
     @classmethod
     def _unit_length(cls, values):
-        length = 1.0 if values is None else float(np.linalg.norm(values))
+        length = 1.0 if values is None else math.hypot(*values)
         if abs(length - 1) > UNIT_LENGTH_TOLERANCE:
             raise ValueError(f"the quaternion's length is {length:.9g}, not 1 | Divide w, x, y and z by it")
         return values
@@ -92,7 +93,8 @@ class Target(StrictModel):
         if rows is None:
             return rows
         R = np.array(rows)
-        worst = np.abs(R @ R.T - np.eye(3)).max()
+        with np.errstate(over="ignore", invalid="ignore"):
+            worst = np.abs(R @ R.T - np.eye(3)).max()
         if not worst <= ORTHONORMAL_TOLERANCE:
             raise ValueError(
                 f"the matrix is no rotation: R R^T differs from 1 by {worst:.3g} | "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -89,8 +90,8 @@ class Plane(StrictModel):
     @field_validator("normal")
     @classmethod
     def _has_direction(cls, values):
-        if np.linalg.norm(values) < 1e-6:
-            raise ValueError("the normal has no direction | Write a vector that points out of the solid")
+        if not 1e-6 <= math.hypot(*values) <= 1e6:
+            raise ValueError("the normal has no direction | Write a vector of about unit length out of the solid")
         return values
 
     def unit_normal(self) -> np.ndarray:

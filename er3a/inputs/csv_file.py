@@ -12,7 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from er3a.errors import InputError
-from er3a.inputs.yaml_file import read_text
+from er3a.inputs.yaml_file import read_text, vanished
+
+
+LARGEST = 1e9
 
 
 class Written(float):
@@ -52,11 +55,7 @@ def read_csv(path: str | Path, columns: Mapping[str, Column]) -> list[dict[str, 
         for a missing or unknown column, a wrong unit in a column name, an empty or non-finite number, a ragged row
     """
     path = Path(path)
-    reader = csv.reader(io.StringIO(read_text(path)))
-    try:
-        lines = [(reader.line_num, line) for line in reader if any(field.strip() for field in line)]
-    except csv.Error as error:
-        raise InputError(path, f"line {reader.line_num}", f"not valid CSV ({error})", "Mend this line") from None
+    lines = _lines(path)
     if not lines:
         raise InputError(path, None, "the file is empty", f"Write a header: {','.join(columns)}")
     header = [name.strip() for name in lines[0][1]]
@@ -69,6 +68,21 @@ def read_csv(path: str | Path, columns: Mapping[str, Column]) -> list[dict[str, 
         row = {name: _value(path, number, name, text.strip(), columns[name]) for name, text in zip(header, line)}
         rows.append({"row": number, **row})
     return rows
+
+
+def read_header(path: str | Path) -> list[str]:
+    """The column names of a CSV file, [] if it is empty; :class:`InputError` if it is not CSV."""
+    lines = _lines(Path(path))
+    return [name.strip() for name in lines[0][1]] if lines else []
+
+
+def _lines(path: Path) -> list[tuple[int, list[str]]]:
+    """Lines of a CSV file that aren't blank, with their numbers."""
+    reader = csv.reader(io.StringIO(read_text(path)))
+    try:
+        return [(reader.line_num, line) for line in reader if any(field.strip() for field in line)]
+    except csv.Error as error:
+        raise InputError(path, f"line {reader.line_num}", f"not valid CSV ({error})", "Mend this line") from None
 
 
 def _check_header(path: Path, header: list[str], columns: Mapping[str, Column]) -> None:
@@ -103,13 +117,19 @@ def _value(path: Path, row: int, name: str, text: str, column: Column) -> Any:
         if column.choices and text not in column.choices:
             raise InputError(path, where, f"'{text}' is not known", "Write" + _allowed(column))
         return text
+    number = "a whole number" if column.type is int else "a number"
+    plain = text.isascii() and "_" not in text  # Python would read 1_000 as 1000, and the digits of any script
     try:
-        value = column.type(text.replace("_", "?"))  # Python would read 1_000 as 1000
+        value = column.type(text) if plain else None
     except ValueError:
-        number = "a whole number" if column.type is int else "a number"
-        raise InputError(path, where, f"'{text}' is not {number}", f"Write {number} without a unit") from None
+        value = None
+    if value is None:
+        raise InputError(path, where, f"'{text}' is not {number}", f"Write {number} without a unit")
     if not math.isfinite(value):
         raise InputError(path, where, f"'{text}' is not a finite number", "Write a number, or remove the row")
+    if abs(value) > LARGEST or vanished(text, value):
+        problem = f"'{text}' is too {'large' if value else 'small'} for any length or angle"
+        raise InputError(path, where, problem, "Check its exponent")
     return value
 
 

@@ -36,16 +36,26 @@ class StrictModel(BaseModel):
 
 
 class _PlainLoader(yaml.SafeLoader):
-    """Safe YAML loader with numbers as in YAML 1.2, which refuses a key written twice and aliases.
+    """Safe YAML loader with numbers as in YAML 1.2, which refuses a key written twice, aliases and tags.
 
-    YAML 1.1 would read ``0650`` as octal 424, ``1:30`` as 90, and ``1e3`` as a text.
+    YAML 1.1 would read ``0650`` as octal 424, ``1:30`` as 90, and ``1e3`` as a text; a tag (``!!int 0650``) would
+    bring that back.
     """
 
     def compose_node(self, parent, index):
-        if self.check_event(yaml.AliasEvent):
-            mark = self.peek_event().start_mark
-            raise yaml.constructor.ConstructorError(None, None, "aliases (*name) are not supported", mark)
+        event = self.peek_event()
+        unsupported = "aliases (*name)" if isinstance(event, yaml.AliasEvent) else "tags (!name)"
+        if isinstance(event, yaml.AliasEvent) or getattr(event, "tag", None) is not None:
+            raise yaml.constructor.ConstructorError(
+                None, None, f"{unsupported} are not supported", event.start_mark
+            )
         return super().compose_node(parent, index)
+
+    def construct_yaml_float(self, node):
+        value = super().construct_yaml_float(node)
+        if vanished(node.value, value):
+            raise yaml.constructor.ConstructorError(None, None, f"{node.value} would be read as 0", node.start_mark)
+        return value
 
     def construct_mapping(self, node, deep=False):
         seen = set()
@@ -72,8 +82,14 @@ _PlainLoader.yaml_implicit_resolvers = {
     first: [(tag, pattern) for tag, pattern in resolvers if tag not in _NUMBERS]
     for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
 }
+_PlainLoader.add_constructor("tag:yaml.org,2002:float", _PlainLoader.construct_yaml_float)
 for _tag, _pattern in _NUMBERS.items():
     _PlainLoader.add_implicit_resolver(_tag, re.compile(_pattern), list("-+.0123456789"))
+
+
+def vanished(text: str, value: float) -> bool:
+    """Whether a number that is not written as zero is too small to be held as another."""
+    return value == 0 and re.search("[1-9]", text.lower().partition("e")[0]) is not None
 
 
 def read_yaml(path: str | Path) -> dict[str, Any]:

@@ -7,12 +7,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
+from er3a.inputs.units import FARTHEST_MM, MOST_DEG
 from er3a.inputs.yaml_file import StrictModel
 from er3a.robots.robot import Grade
 
 NAME_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 SHORTEST_PLAIN_LENGTH_MM = 2.0
 LONGEST_LENGTH_MM = 20_000.0
+FASTEST_DEG_S = 36_000.0
 
 Text = Annotated[str, Field(min_length=1, max_length=2000)]
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
@@ -58,7 +60,7 @@ class LimitRow(StrictModel):
 
 class SpeedRow(StrictModel):
     joint: JointNumber
-    speed_deg_s: Annotated[float, Field(gt=0)]
+    speed_deg_s: Annotated[float, Field(gt=0, le=FASTEST_DEG_S)]
 
 
 class DhTable(Sourced):
@@ -107,6 +109,8 @@ class Capsule(StrictModel):
     def _plain_lengths(cls, values):
         if 0 < max(map(abs, values)) < SHORTEST_PLAIN_LENGTH_MM:
             raise ValueError(f"{values} mm can only be metres | Multiply by 1000")
+        if max(map(abs, values)) > LONGEST_LENGTH_MM:
+            raise ValueError(f"{values} mm is longer than any robot's link | Write the point in mm")
         return values
 
 
@@ -161,11 +165,12 @@ class RobotFile(StrictModel):
         for i, row in enumerate(self.dh.rows):
             for key in ("a_mm", "d_mm"):
                 _check_length(f"dh.rows[{i}].{key}", getattr(row, key), self.dh.calibrated)
-            _check_not_radians(f"dh.rows[{i}].alpha_deg", row.alpha_deg)
+            _check_angle(f"dh.rows[{i}].alpha_deg", row.alpha_deg)
+            _check_angle(f"dh.rows[{i}].beta_deg", row.beta_deg or 0.0)
             if row.beta_deg and not self.dh.calibrated:
                 problem = f"dh.rows[{i}].beta_deg: {row.beta_deg:g} deg in a table that is not calibrated"
                 raise ValueError(f"{problem} | Set dh.calibrated: true, or remove it")
-            _check_not_radians(f"zero.rows[{i}].offset_deg", self.zero.rows[i].offset_deg)
+            _check_angle(f"zero.rows[{i}].offset_deg", self.zero.rows[i].offset_deg)
         check_placement("base", self.base)
         check_placement("tool", self.tool)
         longest = max(max(abs(row.a_mm), abs(row.d_mm)) for row in self.dh.rows)
@@ -183,7 +188,7 @@ class RobotFile(StrictModel):
                     f"limits.rows[{i}]: joint {row.joint} has lower_deg {row.lower_deg:g} above "
                     f"upper_deg {row.upper_deg:g} | Swap them"
                 )
-            if max(abs(row.lower_deg), abs(row.upper_deg)) > 3600:
+            if max(abs(row.lower_deg), abs(row.upper_deg)) > MOST_DEG:
                 raise ValueError(f"limits.rows[{i}]: joint {row.joint} turns more than ten times | Check the value")
         widest = max(max(abs(row.lower_deg), abs(row.upper_deg)) for row in self.limits.rows)
         if 0 < widest <= 2.01 * math.pi:
@@ -199,8 +204,10 @@ def check_placement(field: str, placement: Placement | None) -> None:
         return
     if 0 < max(abs(value) for value in placement.xyz_mm) < SHORTEST_PLAIN_LENGTH_MM:
         raise ValueError(f"{field}.xyz_mm: {placement.xyz_mm} can only be metres | Multiply by 1000")
+    if max(abs(value) for value in placement.xyz_mm) > FARTHEST_MM:
+        raise ValueError(f"{field}.xyz_mm: {placement.xyz_mm} is more than 100 m | Write mm, not micrometres")
     for i, value in enumerate(placement.rpy_deg):
-        _check_not_radians(f"{field}.rpy_deg[{i}]", value)
+        _check_angle(f"{field}.rpy_deg[{i}]", value)
 
 
 def _check_length(field: str, value: float, calibrated: bool) -> None:
@@ -213,7 +220,9 @@ def _check_length(field: str, value: float, calibrated: bool) -> None:
         )
 
 
-def _check_not_radians(field: str, value: float) -> None:
+def _check_angle(field: str, value: float) -> None:
+    if abs(value) > MOST_DEG:
+        raise ValueError(f"{field}: {value:g} deg is more than ten turns | Write degrees within +-{MOST_DEG:g}")
     quarter = value / (math.pi / 2)
     if 0 < abs(value) < 6.3 and round(quarter) and abs(value - round(quarter) * math.pi / 2) < 2e-3:
         raise ValueError(f"{field}: {value:g} deg looks like radians | Write {round(quarter) * 90:g}")

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
-import zipfile
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +19,8 @@ from er3a.stages.workspace.extremes import Extremes
 from er3a.stages.workspace.tally import UNTOUCHED, Tally
 from er3a.study import Study
 
-FORMAT = "er3a workspace part 1"
-_DAMAGE = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error)
+FORMAT = "er3a workspace part 2"
+DIGEST_BYTES = hashlib.sha256().digest_size
 
 
 def identity(study: Study, robot: Robot) -> dict[str, Any]:
@@ -39,26 +38,24 @@ def identity(study: Study, robot: Robot) -> dict[str, Any]:
 
 
 def write_part(path: Path, identity: dict[str, Any], tally: Tally) -> None:
-    """Write a tally; equal tallies give equal bytes."""
+    """Write a tally behind its checksum; equal tallies give equal bytes."""
     touched = np.flatnonzero(tally.counts)
-
-    def write(file: Path) -> None:
-        with file.open("wb") as stream:
-            np.savez_compressed(
-                stream,
-                identity=np.frombuffer(json.dumps(identity, sort_keys=True).encode(), dtype=np.uint8),
-                blocks=tally.blocks,
-                shape=np.array(tally.counts.shape),
-                cells=touched,
-                counts=tally.counts.ravel()[touched],
-                first_block=tally.first_block.ravel()[touched],
-                section=tally.section,
-                support=tally.extremes.support,
-                extreme_block=tally.extremes.block,
-                extreme_sample=tally.extremes.sample,
-            )
-
-    write_atomically(path, write)
+    stream = io.BytesIO()
+    np.savez_compressed(
+        stream,
+        identity=np.frombuffer(json.dumps(identity, sort_keys=True).encode(), dtype=np.uint8),
+        blocks=tally.blocks,
+        shape=np.array(tally.counts.shape),
+        cells=touched,
+        counts=tally.counts.ravel()[touched],
+        first_block=tally.first_block.ravel()[touched],
+        section=tally.section,
+        support=tally.extremes.support,
+        extreme_block=tally.extremes.block,
+        extreme_sample=tally.extremes.sample,
+    )
+    content = stream.getvalue()
+    write_atomically(path, lambda file: file.write_bytes(hashlib.sha256(content).digest() + content))
 
 
 def read_part(path: Path, expected: dict[str, Any]) -> Tally:
@@ -69,21 +66,23 @@ def read_part(path: Path, expected: dict[str, Any]) -> Tally:
     ResultError
         naming the file, if it is missing, damaged, or of another run
     """
-    if not Path(path).is_file():
-        raise ResultError(path, "missing")
     try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {key: file[key] for key in file.files}
-        found = json.loads(arrays["identity"].tobytes())
-        _check_identity(path, found, expected)
-        counts = np.zeros(arrays["shape"], dtype=np.int64)
-        first_block = np.full(arrays["shape"], UNTOUCHED, dtype=np.int32)
-        counts.flat[arrays["cells"]] = arrays["counts"]
-        first_block.flat[arrays["cells"]] = arrays["first_block"]
-        extremes = Extremes(arrays["support"], arrays["extreme_block"], arrays["extreme_sample"])
-        return Tally(arrays["blocks"], counts, first_block, arrays["section"], extremes)
-    except _DAMAGE as error:
-        raise ResultError(path, f"damaged ({type(error).__name__}: {error})") from None
+        content = Path(path).read_bytes()
+    except FileNotFoundError:
+        raise ResultError(path, "missing") from None
+    except OSError as error:
+        raise ResultError(path, f"can't be read ({error.strerror})") from None
+    if hashlib.sha256(content[DIGEST_BYTES:]).digest() != content[:DIGEST_BYTES]:
+        raise ResultError(path, "damaged (its checksum does not agree)")
+    with np.load(io.BytesIO(content[DIGEST_BYTES:]), allow_pickle=False) as file:
+        arrays = {key: file[key] for key in file.files}
+    _check_identity(path, json.loads(arrays["identity"].tobytes()), expected)
+    counts = np.zeros(arrays["shape"], dtype=np.int64)
+    first_block = np.full(arrays["shape"], UNTOUCHED, dtype=np.int32)
+    counts.flat[arrays["cells"]] = arrays["counts"]
+    first_block.flat[arrays["cells"]] = arrays["first_block"]
+    extremes = Extremes(arrays["support"], arrays["extreme_block"], arrays["extreme_sample"])
+    return Tally(arrays["blocks"], counts, first_block, arrays["section"], extremes)
 
 
 def _check_identity(path: Path, found: dict[str, Any], expected: dict[str, Any]) -> None:

@@ -1,0 +1,308 @@
+"""Damaged input files: each is refused in one line that names the file, or read as exactly what is written in it.
+
+What is written is read a second time by other software (libyaml's parser with all scalars as text, pandas' CSV parser,
+exact fractions), and a robot's pose is worked out again from that text.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import signal
+import tempfile
+import time
+import traceback
+from collections import Counter
+from dataclasses import dataclass, fields, is_dataclass
+from fractions import Fraction
+from io import StringIO
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import pandas as pd
+import yaml
+from mutants import mutant
+from pydantic import BaseModel
+from scipy.spatial.transform import Rotation
+
+from er3a.check import check_file
+from er3a.collision.scene import load_scene
+from er3a.errors import InputError
+from er3a.identification.measurements import load_measurements
+from er3a.inputs.yaml_file import load
+from er3a.kinematics.forward import forward
+from er3a.planning.path_file import load_paths
+from er3a.references.load import check_reference_file
+from er3a.robots.load import load_robot
+from er3a.robots.schema import RobotFile
+from er3a.study import load_study
+from er3a.targets import load_targets
+
+ROOT = Path(__file__).resolve().parents[1]
+SEED, MUTANTS = 20261120, 6000
+MOST_SECONDS = 5.0  # of processor time, for one file
+LONGEST_MESSAGE = 1000
+NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
+WORDS_OF = {None: ("", "~", "null", "Null", "NULL"), True: ("true", "yes", "on"), False: ("false", "no", "off")}
+
+ALL_OF_A_ROBOT = """
+base: {source: fitted, grade: inferred, xyz_mm: [100.5, 0, 50], rpy_deg: [0, 0, 30]}
+tool: {source: fitted, grade: inferred, xyz_mm: [0, 12.25, 80], rpy_deg: [10, 20, 40]}
+envelopes:
+  source: drawn
+  grade: inferred
+  capsules:
+    - {link: 2, from_mm: [0, 0, 0], to_mm: [0, 0, 200], radius_mm: 60}
+    - {link: 6, from_mm: [0, 0, 0], to_mm: [5, 0, 40], radius_mm: 30.5}
+"""
+SCENE = """kind: scene
+title: all shapes
+boxes:
+  - {name: table, xyz_mm: [400, 0, -50], rpy_deg: [0, 0, 12], size_mm: [600, 800, 40]}
+cylinders:
+  - {name: post, xyz_mm: [300.5, 200, 100], radius_mm: 25, length_mm: 400}
+spheres:
+  - {name: ball, xyz_mm: [0, -450, 300], radius_mm: 80.25}
+planes:
+  - {name: floor, normal: [0, 0, 1], offset_mm: -400}
+"""
+TARGETS = """kind: targets
+targets:
+  - {name: a, note: by hand, xyz_mm: [400, 0, 300], rpy_deg: [0, 90, 12.5]}
+  - {name: b, xyz_mm: [350.25, 100, 300], zyz_deg: [0, 90, 30], q_ref_deg: [0, 10, 0, 0, 45, 0]}
+  - {name: c, xyz_mm: [400, 0, 350], quaternion_wxyz: [0.5, 0.5, 0.5, 0.5]}
+  - {name: d, xyz_mm: [400, 10, 350], matrix: [[0, 0, 1], [1, 0, 0], [0, 1, 0]]}
+  - {name: e, q_deg: [10, 20, 30, 40, 50, 60]}
+"""
+TARGET_TABLE = """name,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg,note,q1_ref_deg,q2_ref_deg,q3_ref_deg,q4_ref_deg,q5_ref_deg,q6_ref_deg
+a,400,0,300.5,0,90,0,first,0,0,0,0,0,0
+b,350,100.25,280,10,80,30,,10,20,0,0,45,0
+"""
+MEASUREMENTS = """q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,point,x_mm,y_mm,z_mm,standard_deviation_mm
+0,0,0,0,0,0,flange,329.5,0.25,630,0.1
+30,20,-10,40,50,60,flange,210.5,140,,0.1
+-30,40,10,20,-50,10,tool,312,-180.75,512,0.2
+"""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a damaged file; ``fault`` is None if that is as it should be."""
+
+    accepted: bool
+    seconds: float
+    fault: str | None
+
+
+def seeds() -> list[tuple[str, bytes]]:
+    """Sound files, as path (relative) and content: all committed inputs, and ones that use every optional part."""
+    paths = [*ROOT.glob("data/**/*.yaml"), *ROOT.glob("config/*.yaml"), *ROOT.glob("data/**/*.csv")]
+    found = [(path.relative_to(ROOT).as_posix(), path.read_bytes()) for path in sorted(paths)]
+    robot = (ROOT / "data/robots/er3_600.yaml").read_text(encoding="utf-8").replace("name: er3_600", "name: full")
+    more = {"full.yaml": robot + ALL_OF_A_ROBOT, "scene.yaml": SCENE, "targets.yaml": TARGETS}
+    more |= {"targets/table.csv": TARGET_TABLE, "measured.csv": MEASUREMENTS}
+    return found + [(name, text.encode()) for name, text in more.items()]
+
+
+def mutants(count: int, seed: int) -> list[tuple[str, bytes, str]]:
+    """Path, content and what was done to it, of damaged files; the same for the same seed."""
+    random, sound = Random(seed), seeds()
+    return [(name, *mutant(content, Path(name).suffix, random)) for name, content in (
+        sound[n % len(sound)] for n in range(count)
+    )]  # fmt: skip
+
+
+def judge(path: Path) -> Outcome:
+    """Check a file and look for what must not happen: a traceback, a hang, an unclear message, other numbers."""
+    start = time.process_time()
+    before = signal.signal(signal.SIGVTALRM, _stop)
+    signal.setitimer(signal.ITIMER_VIRTUAL, MOST_SECONDS)
+    accepted, fault = False, None
+    try:
+        check_file(path)
+        accepted = True
+    except InputError as error:
+        fault = unclear(str(error), path)
+    except TimeoutError:
+        fault = f"hang: more than {MOST_SECONDS:g} s"
+    except Exception:
+        fault = "traceback: " + " / ".join(traceback.format_exc().strip().splitlines()[-3:])
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+        signal.signal(signal.SIGVTALRM, before)
+    seconds = time.process_time() - start
+    if accepted:
+        try:
+            differences = differing_table(path) if path.suffix == ".csv" else differing_file(path)
+            fault = f"read otherwise: {differences[0]}" if differences else None
+        except Exception:
+            fault = "second reading: " + " / ".join(traceback.format_exc().strip().splitlines()[-3:])
+    return Outcome(accepted, seconds, fault)
+
+
+def _stop(*_):
+    raise TimeoutError
+
+
+def unclear(message: str, path: Path) -> str | None:
+    """What is wrong with an error message, if anything."""
+    if path.name not in message:
+        return f"message without the file's name: {message[:200]!r}"
+    if not message.isprintable():
+        return f"message with line ends or control characters: {message[:200]!r}"
+    return f"message of {len(message)} characters" if len(message) > LONGEST_MESSAGE else None
+
+
+def differing_file(path: Path) -> list[str]:
+    """Where what er3a read from a YAML file is not what libyaml says is written there."""
+    node = yaml.compose(path.read_bytes(), Loader=yaml.CBaseLoader)
+    written = {key.value: value for key, value in node.value}
+    kind = written["kind"].value
+    if kind == "robot":
+        robot, content = load_robot(path), load(RobotFile, path)
+        return [*_differing(content, node, ""), *_differing_poses(robot, written)]
+    if kind == "targets":
+        targets, nodes = load_targets(path), written["targets"].value
+        found = [] if len(targets) == len(nodes) else [f"{len(targets)} targets of {len(nodes)}"]
+        return found + [word for target, each in zip(targets, nodes) for word in _differing(target, each, each.tag)]
+    loaders = {"study": load_study, "paths": load_paths, "scene": load_scene}
+    return _differing(loaders[kind](path), node, "")
+
+
+def _differing(value: object, node: yaml.Node, where: str) -> list[str]:
+    if isinstance(value, BaseModel | dict):
+        if not isinstance(node, yaml.MappingNode):
+            return [f"{where}: a group from {node.value!r:.80}"]
+        names = [key.value for key, _ in node.value]
+        members = value if isinstance(value, dict) else {name: getattr(value, name) for name in value.model_fields_set}
+        if sorted(names) != sorted(members):
+            return [f"{where}: keys {sorted(names)} read as {sorted(members)}"]
+        return [word for key, part in node.value for word in _differing(members[key.value], part, f"{where}.{key.value}")]
+    if isinstance(value, list | tuple):
+        if not isinstance(node, yaml.SequenceNode) or len(node.value) != len(value):
+            return [f"{where}: a list of {len(value)} from {node.value!r:.80}"]
+        return [word for i, part in enumerate(node.value) for word in _differing(value[i], part, f"{where}[{i}]")]
+    text = node.value
+    plain = isinstance(node, yaml.ScalarNode) and not node.style
+    if value is None or isinstance(value, bool):
+        same = plain and (text if value is None else text.lower()) in WORDS_OF[value]
+    elif isinstance(value, int | float):
+        same = plain and same_number(value, text)
+    else:
+        same = value == text
+    return [] if same else [f"{where}: {text!r:.80} read as {value!r:.80}"]
+
+
+def same_number(value: float, text: str) -> bool:
+    """Whether a number is the nearest to a text in decimal notation, and not zero unless that is."""
+    if not NUMBER.fullmatch(text):
+        return False
+    exact = Fraction(text)
+    return math.isfinite(value) and float(exact) == value and (exact == 0) == (value == 0)
+
+
+def _differing_poses(robot, written: dict[str, yaml.Node]) -> list[str]:
+    """The tool's pose by the model, and by plain products of matrices from the text's own numbers."""
+
+    def column(group: str, name: str, default: str = "0") -> list[float]:
+        members = {key.value: value for key, value in written[group].value}
+        rows = [{key.value: value.value for key, value in row.value} for row in members["rows"].value]
+        return [float(row.get(name) or default) for row in rows]
+
+    def placement(group: str) -> np.ndarray:
+        T = np.eye(4)
+        if group in written and isinstance(written[group], yaml.MappingNode):
+            members = {key.value: value for key, value in written[group].value}
+            triples = {name: [float(part.value) for part in members[name].value] for name in members if name[3] == "_"}
+            T[:3, 3] = np.array(triples.get("xyz_mm", [0, 0, 0])) / 1000
+            T[:3, :3] = Rotation.from_euler("xyz", triples.get("rpy_deg", [0, 0, 0]), degrees=True).as_matrix()
+        return T
+
+    convention = {key.value: value.value for key, value in written["dh"].value}["convention"]
+    low, high = np.array(column("limits", "lower_deg")), np.array(column("limits", "upper_deg"))
+    q_deg = low + (high - low) * np.array([0.3, 0.6, 0.2, 0.8, 0.4, 0.7])
+    T = placement("base")
+    rows = zip(column("dh", "a_mm"), column("dh", "alpha_deg"), column("dh", "d_mm"), column("dh", "beta_deg"), strict=True)
+    turns = zip(column("zero", "direction"), column("zero", "offset_deg"), strict=True)
+    for (a, alpha, d, beta), (direction, offset), angle in zip(rows, turns, q_deg, strict=True):
+        about_z, across = np.eye(4), np.eye(4)
+        about_z[:3, :3] = Rotation.from_euler("z", direction * angle + offset, degrees=True).as_matrix()
+        about_z[2, 3] = d / 1000
+        across[:3, :3] = Rotation.from_euler("XY", [alpha, beta], degrees=True).as_matrix()
+        across[0, 3] = a / 1000
+        T = T @ about_z @ across if convention == "standard" else T @ across @ about_z
+    worst = np.abs(forward(robot, np.radians(q_deg)) - T @ placement("tool")).max()
+    return [] if worst < 1e-9 else [f"the pose differs from that of the written table by {worst:.3g} m"]
+
+
+def differing_table(path: Path) -> list[str]:
+    """Where what er3a read from a CSV file is not what pandas says is written there."""
+    text = path.read_bytes().decode("utf-8-sig")
+    table = pd.read_csv(StringIO(text, newline=""), dtype=str, keep_default_na=False, skip_blank_lines=True)
+    table = table.map(str.strip)
+    table = table[(table != "").any(axis=1)]
+    if path.parent.name == "targets":
+        rows: list = list(load_targets(path))
+    else:
+        rows = list(load_measurements(path) if "q1_deg" in table and "grade" not in table else check_reference_file(path))
+    if len(rows) != len(table):
+        return [f"{len(rows)} rows of {len(table)}"]
+    return [word for row, (_, line) in zip(rows, table.iterrows()) for word in _differing_row(row, line)]
+
+
+def _differing_row(row: object, line: pd.Series) -> list[str]:
+    """Words and numbers that are written in a line and not held by the row that was read from it."""
+    held = Counter(_leaves(row))
+    for name, text in line.items():
+        numbers = [value for value in held if isinstance(value, int | float) and same_number(value, text)]
+        candidates = [text] if held[text] else numbers
+        if text and not candidates:
+            return [f"column {name}: {text!r:.80} is not among {sorted(map(str, held))}"]
+        if text:
+            held[candidates[0]] -= 1
+            held = +held
+    return []
+
+
+def _leaves(value: object) -> list:
+    if isinstance(value, BaseModel):
+        return [leaf for name in value.model_fields_set for leaf in _leaves(getattr(value, name))]
+    if is_dataclass(value):
+        return [leaf for field in fields(value) if field.name not in ("line", "row") for leaf in _leaves(getattr(value, field.name))]
+    if isinstance(value, list | tuple):
+        return [leaf for part in value for leaf in _leaves(part)]
+    if isinstance(value, bool):
+        return ["yes" if value else "no"]
+    return [] if value is None else [value]
+
+
+def run(count: int, seed: int, folder: Path) -> list[tuple[str, str, bytes, Outcome]]:
+    """Judge ``count`` damaged files: path, damage, content and outcome of each."""
+    found = []
+    for name, content, damage in mutants(count, seed):
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+        found.append((name, damage, content, judge(path)))
+    return found
+
+
+def main() -> None:
+    import sys
+    with tempfile.TemporaryDirectory() as folder:
+        found = run(int(sys.argv[1]), int(sys.argv[2]), Path(folder))
+    print(len(found), "accepted", sum(o.accepted for *_, o in found), "slowest", max(o.seconds for *_, o in found))
+    seen = Counter()
+    for name, damage, content, outcome in found:
+        if outcome.fault:
+            key = outcome.fault[:60]
+            seen[key] += 1
+            if seen[key] <= 2:
+                print(name, "|", damage, "|", outcome.fault[:500])
+                Path(f"/tmp/reliability/found").mkdir(exist_ok=True)
+                Path(f"/tmp/reliability/found/{len(seen)}_{seen[key]}{Path(name).suffix}").write_bytes(content)
+    for k, v in seen.most_common(): print(v, k)
+
+if __name__ == "__main__":
+    main()
