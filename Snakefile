@@ -27,5 +27,9 @@ rule all:
         "all results, recordings and reports are there"
 
 
+onerror:
+    print("\nWhat failed, in short:", *errors_told(), sep="\n")
+
+
 onsuccess:
     print("\nOpen reports/index.html in a browser; `make view` opens the recordings.")

@@ -178,7 +178,9 @@ def _differing(value: object, node: yaml.Node, where: str) -> list[str]:
         members = value if isinstance(value, dict) else {name: getattr(value, name) for name in value.model_fields_set}
         if sorted(names) != sorted(members):
             return [f"{where}: keys {sorted(names)} read as {sorted(members)}"]
-        return [word for key, part in node.value for word in _differing(members[key.value], part, f"{where}.{key.value}")]
+        return [
+            word for key, part in node.value for word in _differing(members[key.value], part, f"{where}.{key.value}")
+        ]
     if isinstance(value, list | tuple):
         if not isinstance(node, yaml.SequenceNode) or len(node.value) != len(value):
             return [f"{where}: a list of {len(value)} from {node.value!r:.80}"]
@@ -223,7 +225,9 @@ def _differing_poses(robot, written: dict[str, yaml.Node]) -> list[str]:
     low, high = np.array(column("limits", "lower_deg")), np.array(column("limits", "upper_deg"))
     q_deg = low + (high - low) * np.array([0.3, 0.6, 0.2, 0.8, 0.4, 0.7])
     T = placement("base")
-    rows = zip(column("dh", "a_mm"), column("dh", "alpha_deg"), column("dh", "d_mm"), column("dh", "beta_deg"), strict=True)
+    rows = zip(
+        column("dh", "a_mm"), column("dh", "alpha_deg"), column("dh", "d_mm"), column("dh", "beta_deg"), strict=True
+    )
     turns = zip(column("zero", "direction"), column("zero", "offset_deg"), strict=True)
     for (a, alpha, d, beta), (direction, offset), angle in zip(rows, turns, q_deg, strict=True):
         about_z, across = np.eye(4), np.eye(4)
@@ -245,7 +249,9 @@ def differing_table(path: Path) -> list[str]:
     if path.parent.name == "targets":
         rows: list = list(load_targets(path))
     else:
-        rows = list(load_measurements(path) if "q1_deg" in table and "grade" not in table else check_reference_file(path))
+        rows = list(
+            load_measurements(path) if "q1_deg" in table and "grade" not in table else check_reference_file(path)
+        )
     if len(rows) != len(table):
         return [f"{len(rows)} rows of {len(table)}"]
     return [word for row, (_, line) in zip(rows, table.iterrows()) for word in _differing_row(row, line)]
@@ -269,7 +275,12 @@ def _leaves(value: object) -> list:
     if isinstance(value, BaseModel):
         return [leaf for name in value.model_fields_set for leaf in _leaves(getattr(value, name))]
     if is_dataclass(value):
-        return [leaf for field in fields(value) if field.name not in ("line", "row") for leaf in _leaves(getattr(value, field.name))]
+        return [
+            leaf
+            for field in fields(value)
+            if field.name not in ("line", "row")
+            for leaf in _leaves(getattr(value, field.name))
+        ]
     if isinstance(value, list | tuple):
         return [leaf for part in value for leaf in _leaves(part)]
     if isinstance(value, bool):
@@ -290,6 +301,7 @@ def run(count: int, seed: int, folder: Path) -> list[tuple[str, str, bytes, Outc
 
 def main() -> None:
     import sys
+
     with tempfile.TemporaryDirectory() as folder:
         found = run(int(sys.argv[1]), int(sys.argv[2]), Path(folder))
     print(len(found), "accepted", sum(o.accepted for *_, o in found), "slowest", max(o.seconds for *_, o in found))
@@ -300,9 +312,11 @@ def main() -> None:
             seen[key] += 1
             if seen[key] <= 2:
                 print(name, "|", damage, "|", outcome.fault[:500])
-                Path(f"/tmp/reliability/found").mkdir(exist_ok=True)
+                Path("/tmp/reliability/found").mkdir(exist_ok=True)
                 Path(f"/tmp/reliability/found/{len(seen)}_{seen[key]}{Path(name).suffix}").write_bytes(content)
-    for k, v in seen.most_common(): print(v, k)
+    for k, v in seen.most_common():
+        print(v, k)
+
 
 if __name__ == "__main__":
     main()

@@ -281,4 +281,14 @@ _CSV = (
     *(replace_cell, replace_cell, replace_cell, nudge_cell, nudge_cell, change_header, change_columns, change_rows),
     *(change_separators, decimal_commas, loose_quote),
 )
-_BYTES = (truncate, flip_bit, flip_bit, insert_bytes, encode_otherwise, other_line_ends, other_line, twice, nothing_left)
+_BYTES = (
+    truncate,
+    flip_bit,
+    flip_bit,
+    insert_bytes,
+    encode_otherwise,
+    other_line_ends,
+    other_line,
+    twice,
+    nothing_left,
+)

@@ -70,4 +70,6 @@ def check_study(path: Path) -> Study:
             load_references(reference)
         load_targets(entry.targets)
         load_paths(entry.paths)
+    if study.inverse.scene:
+        load_scene(study.inverse.scene)
     return study

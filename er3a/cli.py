@@ -93,7 +93,7 @@ def record(
 ):
     """Write a stage's Rerun recording from its results."""
     loaded, folder = _folder(study, results, robot, stage)
-    _verb("record", stage)(loaded, robot, folder, reports / robot / f"{stage}.rrd")
+    _sealed(_verb("record", stage), loaded, robot, folder, reports / robot / f"{stage}.rrd")
 
 
 @app.command()
@@ -106,15 +106,18 @@ def report(
 ):
     """Write a stage's page from its results."""
     loaded, folder = _folder(study, results, robot, stage)
-    _verb("report", stage)(loaded, robot, folder, reports / robot / f"{stage}.html")
+    _sealed(_verb("report", stage), loaded, robot, folder, reports / robot / f"{stage}.html")
 
 
 @app.command()
 def index(study: StudyFile = DEFAULT_STUDY, results: Results = DEFAULT_RESULTS, reports: Reports = DEFAULT_REPORTS):
     """Write the pages over all robots and stages: the index and the comparison of two robots."""
+    from er3a.seals import OVERALL, seal
     from er3a.viewing.index import write_index
 
     write_index(load_study(study), results, reports)
+    for page in OVERALL:
+        seal(reports / page)
 
 
 @app.command()
@@ -160,11 +163,17 @@ def view(
     reports: Reports = DEFAULT_REPORTS,
 ):
     """Open the recordings in the Rerun viewer."""
-    recordings = sorted(str(path) for path in reports.glob(f"{robot or '*'}/*.rrd"))
+    from er3a.seals import check_seal
+    from er3a.viewing.viewer import viewer_command, without_statistics
+
+    recordings = sorted(reports.glob(f"{robot or '*'}/*.rrd"))
     if not recordings:
         raise Er3aError(f"no recordings below {reports / (robot or '')}; `make run` writes them")
-    viewer = Path(sys.executable).with_name("rerun")
-    raise typer.Exit(subprocess.run([viewer, *recordings], check=False).returncode)
+    for recording in recordings:
+        check_seal(recording)
+    with without_statistics() as environment:
+        done = subprocess.run(viewer_command(recordings), env=environment, check=False)
+    raise typer.Exit(done.returncode)
 
 
 @app.command()
@@ -235,11 +244,25 @@ def main() -> None:
         app(standalone_mode=True)
     except Er3aError as error:
         _complain(error)
-        raise SystemExit(2) from None
+    except MemoryError:
+        _complain(
+            f"out of memory in `er3a {' '.join(sys.argv[1:])}`; give it more, lower the study's budgets or --cores"
+        )
+    except OSError as error:
+        _complain(f"{error.filename or 'the system'}: {error.strerror or error}")
+    raise SystemExit(2)
 
 
-def _complain(error: Er3aError) -> None:
+def _complain(error: Er3aError | str) -> None:
     print(f"error: {error}", file=sys.stderr)
+
+
+def _sealed(verb, study: Study, robot: str, folder: Path, output: Path) -> None:
+    """Have a verb write a view, and keep its checksum."""
+    from er3a.seals import seal
+
+    verb(study, robot, folder, output)
+    seal(output)
 
 
 def _folder(study_file: Path, results: Path, robot: str, stage: str) -> tuple[Study, Path]:

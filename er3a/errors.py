@@ -62,7 +62,8 @@ class ResultError(Er3aError):
 
     def __init__(self, file: str | Path, problem: str):
         self.file = str(file)
-        super().__init__(f"{file}: {problem}. Delete the file and run `make run`, which computes it again")
+        self.problem = _line(problem, 300)
+        super().__init__(f"{file}: {self.problem}. Delete the file and run `make run`, which computes it again")
 
 
 class WriteError(Er3aError):

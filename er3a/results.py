@@ -99,8 +99,10 @@ def write_summary(
     figures: Iterable[Figure],
     **stage_keys: Any,
 ) -> None:
-    """Write ``summary.json`` (the shape shared by all stages, then the stage's own keys, plain data), then the checksums
-    of all files of the folder: nothing may be written there afterwards."""
+    """Write ``summary.json``: the shape shared by all stages, then the stage's own keys (plain data).
+
+    It comes last: with it the checksums of all files in the folder are written.
+    """
     summary = {
         "format_version": FORMAT_VERSION,
         "robot": robot,
@@ -117,8 +119,13 @@ def write_summary(
     }
     text = json.dumps(summary, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     write_atomically(folder / "summary.json", lambda file: file.write_text(text, encoding="utf-8"))
-    files = sorted(path for path in folder.iterdir() if path.is_file() and path.name != CHECKSUMS and path.name[0] != ".")
-    sums = "".join(f"{sha256(path)}  {path.name}\n" for path in files)
+    write_checksums(folder)
+
+
+def write_checksums(folder: Path) -> None:
+    """Write the checksums of a stage's files, in the form that ``sha256sum --check`` reads."""
+    files = sorted(path for path in folder.iterdir() if path.is_file() and path.name[0] != ".")
+    sums = "".join(f"{sha256(path)}  {path.name}\n" for path in files if path.name != CHECKSUMS)
     write_atomically(folder / CHECKSUMS, lambda file: file.write_text(sums, encoding="utf-8"))
 
 
@@ -158,7 +165,7 @@ def checksums(folder: Path) -> dict[str, str]:
     """The checksums that a stage wrote, by file name; :class:`ResultError` if they can't be read."""
     path = folder / CHECKSUMS
     try:
-        lines = _content(path).decode("ascii").splitlines()
+        lines = _content(path).decode("ascii").removesuffix("\n").split("\n")
         return {name: checksum for checksum, name in (line.split("  ") for line in lines)}
     except ValueError:
         raise ResultError(path, "damaged (no list of checksums)") from None

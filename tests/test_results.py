@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +13,13 @@ import pandas as pd
 import pytest
 
 from er3a.code_digest import code_digest
-from er3a.errors import ResultError
+from er3a.errors import ResultError, WriteError
 from er3a.results import (
+    CHECKSUMS,
     FORMAT_VERSION,
     Figure,
     Verdict,
+    check_results,
     read_summary,
     read_table,
     sha256,
@@ -90,7 +94,7 @@ def test_a_number_that_is_none_is_refused_and_the_old_file_stays(tmp_path, study
     with pytest.raises(ValueError, match="not JSON compliant"):
         write_summary(tmp_path, study, "er3_600", "workspace", verdict, figures, x=bad if where == "stage key" else 1)
     assert path.read_bytes() == before
-    assert leftovers(tmp_path) == ["summary.json"]
+    assert leftovers(tmp_path) == [CHECKSUMS, "summary.json"]
 
 
 def test_a_failing_write_leaves_the_old_file_and_no_temporary(tmp_path):
@@ -99,9 +103,9 @@ def test_a_failing_write_leaves_the_old_file_and_no_temporary(tmp_path):
 
     def fail(file):
         file.write_text("half")
-        raise OSError("disk full")
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(WriteError, match=r"file\.txt: can't be written .No space left on device.\. Make room"):
         write_atomically(path, fail)
     assert path.read_text() == "old"
     assert leftovers(path.parent) == ["file.txt"]
@@ -157,9 +161,9 @@ def test_missing_files_are_told(tmp_path):
         (b"", "damaged"),
         (b"{", "damaged"),
         (b"\xff\xfe", "damaged"),
-        (b"[]", "format version None, this er3a reads 1"),
-        (b'{"format_version": 2}', "format version 2, this er3a reads 1"),
-        (b'{"format_version": 1, "robot": "x", "stage": "y"}', "damaged .no 'verdict' in it"),
+        (b"[]", "format version None, this er3a reads 2"),
+        (b'{"format_version": 1}', "format version 1, this er3a reads 2"),
+        (b'{"format_version": 2, "robot": "x", "stage": "y"}', "damaged .no 'verdict' in it"),
     ],
 )
 def test_a_damaged_summary_is_told(tmp_path, content, problem):
@@ -174,6 +178,42 @@ def test_a_summary_cut_short_is_told(tmp_path, study):
     path.write_bytes(path.read_bytes()[:-20])
     with pytest.raises(ResultError, match="damaged"):
         read_summary(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["summary.json", "t.parquet", CHECKSUMS])
+@pytest.mark.parametrize("at", [0, 0.3, 0.7, 0.999])
+def test_one_flipped_bit_anywhere_is_told(tmp_path, study, name, at):
+    write_table(tmp_path / "t.parquet", TABLE)
+    write(tmp_path, study)
+    check_results(tmp_path)
+    content = bytearray((tmp_path / name).read_bytes())
+    content[int(at * len(content))] ^= 1
+    (tmp_path / name).write_bytes(bytes(content))
+    with pytest.raises(ResultError, match=r": (damaged|missing)"):
+        check_results(tmp_path)
+    with pytest.raises(ResultError, match=r": (damaged|missing)"):
+        read_summary(tmp_path), read_table(tmp_path / "t.parquet")
+
+
+def test_a_table_of_another_run_is_told(tmp_path, study):
+    write_table(tmp_path / "t.parquet", TABLE)
+    write(tmp_path, study)
+    write_table(tmp_path / "t.parquet", TABLE.iloc[:1])
+    with pytest.raises(ResultError, match=r"t\.parquet: damaged .not the bytes that SHA256SUMS"):
+        read_table(tmp_path / "t.parquet")
+
+
+def test_results_without_checksums_are_not_read(tmp_path, study):
+    write(tmp_path, study).with_name(CHECKSUMS).unlink()
+    with pytest.raises(ResultError, match=r"SHA256SUMS: missing"):
+        read_summary(tmp_path)
+
+
+@pytest.mark.parametrize("folder", ["file/stage", "file"])
+def test_a_folder_that_cannot_be_made_is_told(tmp_path, folder):
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(WriteError, match=r"t\.parquet: can't be written"):
+        write_table(tmp_path / folder / "t.parquet", TABLE)
 
 
 def test_format_version_is_what_is_written(tmp_path, study):

@@ -14,7 +14,6 @@ from typing import Any
 from er3a.errors import InputError
 from er3a.inputs.yaml_file import read_text, vanished
 
-
 LARGEST = 1e9
 
 

@@ -46,9 +46,7 @@ class _PlainLoader(yaml.SafeLoader):
         event = self.peek_event()
         unsupported = "aliases (*name)" if isinstance(event, yaml.AliasEvent) else "tags (!name)"
         if isinstance(event, yaml.AliasEvent) or getattr(event, "tag", None) is not None:
-            raise yaml.constructor.ConstructorError(
-                None, None, f"{unsupported} are not supported", event.start_mark
-            )
+            raise yaml.constructor.ConstructorError(None, None, f"{unsupported} are not supported", event.start_mark)
         return super().compose_node(parent, index)
 
     def construct_yaml_float(self, node):

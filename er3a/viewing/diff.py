@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from er3a.errors import ResultError
-from er3a.results import read_summary, sha256
+from er3a.results import CHECKSUMS, read_summary, sha256
 from er3a.viewing import page
 from er3a.viewing.numbers import number
 
@@ -112,7 +112,8 @@ def _moved(a: dict[str, Any] | None, b: dict[str, Any] | None) -> tuple[str, str
 
 def _in_tables(robot: str, stage: str, old: Path, new: Path) -> list[Change]:
     found = []
-    names = {path.name for folder in (old, new) for path in folder.iterdir() if path.is_file()} - {"summary.json"}
+    names = {path.name for folder in (old, new) for path in folder.iterdir() if path.is_file()}
+    names -= {"summary.json", CHECKSUMS}
     for name in sorted(names):
         sums = [sha256(folder / name)[:12] if (folder / name).is_file() else "–" for folder in (old, new)]
         if sums[0] != sums[1]:

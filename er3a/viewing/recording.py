@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -36,27 +36,25 @@ def recording(output: Path, robot: str, stage: str, *views: rrb.View | rrb.Conta
         auto_views=False,
     )
 
-    def finish(file: Path) -> None:
-        stream.flush()
-        stream.disconnect()
-        os.replace(partial, file)
-
-    output.parent.mkdir(parents=True, exist_ok=True)
-    partial = output.with_name(f".{output.stem}.{os.getpid()}.partial")
     # No chunk is cut by the clock: recordings of equal data then compare equal on a busy machine too.
     never = rr.ChunkBatcherConfig.NEVER()
     stream = rr.RecordingStream(
         APPLICATION, recording_id=f"{robot}-{stage}", send_properties=False, batcher_config=never
     )
-    try:
-        with stream:
-            stream.save(partial, default_blueprint=blueprint)
-            stream.set_log_time_enabled(False)
-            stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-            yield stream
-        write_atomically(output, finish)
-    finally:
-        partial.unlink(missing_ok=True)
+    with stream:
+        # Rerun's own file writer waits for ever when the disk is full; bytes can be written like any other file.
+        collected = stream.binary_stream()
+        stream.send_blueprint(blueprint, make_active=False, make_default=True)
+        stream.set_log_time_enabled(False)
+        stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        yield stream
+        content = collected.read(flush=True)
+    write_atomically(output, lambda file: file.write_bytes(content))
+
+
+def escaped(text: str) -> str:
+    """A text from an input file for a Markdown document: shown as it is, on one line, with nothing fetched for it."""
+    return re.sub(r"([\\`*_{}\[\]<>#!|~])", r"\\\1", " ".join(text.split()))
 
 
 def seconds(times: np.ndarray) -> rr.TimeColumn:

@@ -28,7 +28,8 @@ def test_page_opens_clean(browser, small_study, page):
     assert all(alt for alt, _ in images)
     assert page in OVER_ALL or images, "a stage's page shows at least one figure"
     assert browser.execute_script("return document.documentElement.scrollWidth <= window.innerWidth")
-    assert 'src="http' not in path.read_text(encoding="utf-8")
+    loaded = browser.execute_script("return performance.getEntriesByType('resource').map(entry => entry.name)")
+    assert [address for address in loaded if not address.startswith(("data:", "blob:"))] == []
 
 
 @pytest.mark.parametrize("page", PAGES)

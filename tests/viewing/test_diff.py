@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from er3a.cli import app
 from er3a.errors import ResultError
-from er3a.results import Figure, Verdict, write_summary, write_table
+from er3a.results import Figure, Verdict, write_checksums, write_summary, write_table
 from er3a.study import load_study
 from er3a.viewing.diff import changes, write_diff
 
@@ -22,8 +22,8 @@ def folders(tmp_path):
     for name in ("old", "new"):
         folder = tmp_path / name / "er3_600" / "workspace"
         figures = [Figure("volume", 1.5, "m³", 0.01), Figure("reach", 700.0, "mm"), Figure("voids", 1, "")]
-        write_summary(folder, study, "er3_600", "workspace", Verdict("pass", "workspace.fine", "All is fine."), figures)
         write_table(folder / "cells.parquet", pd.DataFrame({"x_m": [0.0, 1.0]}))
+        write_summary(folder, study, "er3_600", "workspace", Verdict("pass", "workspace.fine", "All is fine."), figures)
     return tmp_path / "old", tmp_path / "new"
 
 
@@ -32,6 +32,7 @@ def edit(folder, change):
     summary = json.loads(path.read_text())
     change(summary)
     path.write_text(json.dumps(summary))
+    write_checksums(path.parent)
 
 
 def test_equal_folders_differ_in_nothing(folders):

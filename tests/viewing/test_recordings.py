@@ -17,6 +17,7 @@ from PIL import Image
 from rerun.experimental import ViewerClient
 
 from er3a.viewing.palette import JOINTS, rgb
+from tests.conftest import viewer_on
 
 RERUN = Path(sys.executable).with_name("rerun")
 RECORDINGS = [
@@ -47,23 +48,16 @@ def test_recording_is_sound_and_holds_an_arm(small_study, recording):
 
 @pytest.mark.parametrize("recording", RECORDINGS)
 def test_recording_is_drawn(small_study, recording, vulkan, tmp_path):
-    picture = tmp_path / "drawn.png"
+    path, picture = small_study.folder / "reports" / recording, tmp_path / "drawn.png"
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    command = [RERUN, small_study.folder / "reports" / recording, "--headless", "--port", str(port)]
-    viewer = subprocess.Popen(
-        [*command, "--window-size", "1200x800"], stdout=subprocess.DEVNULL, stderr=subprocess.STDOUT
-    )
-    try:
+    with viewer_on(path, "--port", str(port), "--window-size", "1200x800") as viewer:
         deadline = time.monotonic() + 90
         while joints_drawn(port, picture) < 4:  # it takes a while to load
             assert time.monotonic() < deadline, "the picture shows no arm: fewer than four joint colours"
             assert viewer.poll() is None, "the viewer ended early"
             time.sleep(0.5)
-    finally:
-        viewer.kill()
-        viewer.wait()
 
 
 def joints_drawn(port: int, picture: Path) -> int:

@@ -1,12 +1,15 @@
 import math
 import os
+import shlex
 import sys
+import time
 
 from er3a.code_digest import code_digest
 from er3a.errors import Er3aError
 from er3a.study import STAGES, load_study
 
 DEFAULT_STUDY = "config/config.yaml"
+STARTED = time.time()
 
 # A study is one file as a whole: several would be merged key by key, and single values set on the command line would
 # reach the rules but not the stages, which read the file.
@@ -48,17 +51,30 @@ wildcard_constraints:
     stage="|".join(STAGES),
 
 
+def _for_shell(path):
+    """A path as one word of a shell command, in which Snakemake finds nothing to fill in."""
+    return shlex.quote(str(path)).replace("{", "{{").replace("}", "}}")
+
+
 # Jobs find the commands of the environment that Snakemake runs in, read the same study, and use one thread each:
 # the pipeline runs jobs side by side instead.
 shell.prefix(
-    f'export PATH="{Path(sys.executable).parent}:$PATH" ER3A_STUDY="{STUDY_FILE}" '
+    f"export PATH={_for_shell(Path(sys.executable).parent)}:$PATH ER3A_STUDY={_for_shell(STUDY_FILE)} "
     "OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 PYTHONHASHSEED=0; "
 )
 
 
+def errors_told():
+    """The lines with which jobs of this run ended that could not do their work, each once."""
+    logs = [path for path in Path("logs").rglob("*.log") if path.stat().st_mtime >= STARTED - 1]
+    lines = [line for path in sorted(logs) for line in path.read_text(errors="replace").splitlines()]
+    return list(dict.fromkeys(line for line in lines if line.startswith("error: ")))
+
+
 def tables(stage):
-    """Paths of a stage's tables, the robot as wildcard."""
-    return [f"results/{{robot}}/{stage}/{table}.parquet" for table in TABLES[stage]]
+    """Paths of a stage's tables and their checksums, the robot as wildcard."""
+    folder = f"results/{{robot}}/{stage}"
+    return [*(f"{folder}/{table}.parquet" for table in TABLES[stage]), f"{folder}/SHA256SUMS"]
 
 
 def inputs(stage):

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from er3a.check import check_study
 from er3a.errors import Er3aError
+from er3a.seals import unsound
 
 
 def main() -> int:
@@ -24,15 +25,22 @@ def main() -> int:
     arguments = parser.parse_args()
 
     state = Path(".snakemake")
-    state.mkdir(exist_ok=True)
-    lock = os.open(state / "er3a.lock", os.O_RDWR | os.O_CREAT)
+    try:
+        state.mkdir(exist_ok=True)
+        lock = os.open(state / "er3a.lock", os.O_RDWR | os.O_CREAT)
+    except OSError as error:
+        print(f"error: {error.filename}: {error.strerror}; a run writes into this folder", file=sys.stderr)
+        return 2
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         print("error: another run is active in this folder; wait for its end, or stop it", file=sys.stderr)
         return 2
     try:
-        check_study(Path(arguments.study))
+        study = check_study(Path(arguments.study))
+        for path, fault in unsound(study, Path("results"), Path("reports")):
+            print(f"{fault.file}: {fault.problem}; it is made again")
+            path.unlink()
     except Er3aError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

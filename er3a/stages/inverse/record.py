@@ -17,7 +17,7 @@ from er3a.stages.inverse.shape_colours import colour_of, shape_of
 from er3a.study import Study
 from er3a.viewing.arm import arm_view, capsules, log_arm, send_motion, size_of
 from er3a.viewing.palette import HIGHLIGHT, MUTED, rgb
-from er3a.viewing.recording import TIMELINE, recording
+from er3a.viewing.recording import TIMELINE, escaped, recording
 from er3a.viewing.skeleton import skeleton
 
 NOTE = """# Ways to reach each target
@@ -86,7 +86,7 @@ def _log_target(stream: rr.RecordingStream, robot: Robot, target: dict[str, Any]
 
 
 def _about(target: dict[str, Any], branches: pd.DataFrame) -> str:
-    lines = [f"# {target['name']}", target["note"] or ""]
+    lines = [f"# {target['name']}", escaped(target["note"] or "")]
     verdict = "Taken" if target["chosen_deg"] is not None else "None taken"
     lines.append(f"**{verdict}:** {target['reason']}.")
     lines += target["advice"]

@@ -17,7 +17,7 @@ from er3a.robots.robot import Robot
 from er3a.study import Study
 from er3a.viewing.arm import log_arm, send_motion, size_of
 from er3a.viewing.palette import HIGHLIGHT, JOINT_NAMES, JOINTS, MODEL, MUTED, REFERENCE, rgb
-from er3a.viewing.recording import recording, send_series
+from er3a.viewing.recording import escaped, recording, send_series
 from er3a.viewing.skeleton import skeleton
 
 PAUSE = 1.0  # s between two paths
@@ -90,7 +90,7 @@ def _path(stream: rr.RecordingStream, robot: Robot, path: dict[str, Any], rows: 
     points = rows[["x_mm", "y_mm", "z_mm"]].to_numpy() / 1000
     reached = rows["reachable"].to_numpy()
     stream.set_time("t", duration=start)
-    sentence = f"## {path['name']}\n**{path['verdict']}**: {path['text']}.\n\n{path['title']}."
+    sentence = f"## {path['name']}\n**{path['verdict']}**: {path['text']}.\n\n{escaped(path['title'])}."
     stream.log("now", rr.TextDocument(sentence, media_type=rr.MediaType.MARKDOWN))
     stream.log("events", rr.TextLog(f"{path['name']}: {path['verdict']}", level=LEVELS[path["verdict"]]))
     stream.log("target", _target(path, points, rows["condition_number"].to_numpy()))
@@ -165,7 +165,7 @@ def _note(robot: Robot, summary: dict[str, Any]) -> str:
     rows = [f"| {start:.0f} s | {path['name']} | {path['verdict']} |" for start, path in zip(starts, summary["paths"])]
     return "\n".join(
         [
-            f"# {robot.title}: paths",
+            f"# {escaped(robot.title)}: paths",
             summary["verdict"]["text"],
             "",
             "Press play: the arm runs along one path after another. The line that it follows is dark where the arm is "

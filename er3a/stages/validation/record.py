@@ -16,7 +16,7 @@ from er3a.stages.validation.model import model_of
 from er3a.study import Study
 from er3a.viewing.arm import log_arm, send_motion, size_of
 from er3a.viewing.palette import HIGHLIGHT, MODEL, REFERENCE, rgb
-from er3a.viewing.recording import TIMELINE, recording, send_series
+from er3a.viewing.recording import TIMELINE, escaped, recording, send_series
 from er3a.viewing.skeleton import skeleton
 
 HOLD_S, MOVE_S, STEPS = 2.0, 1.0, 30
@@ -57,7 +57,7 @@ def record(study: Study, name: str, folder: Path, output: Path) -> None:
         ),
     )
     with recording(output, name, "validation", *views) as stream:
-        note = NOTE.format(title=robot.title, text=summary["verdict"]["text"], hold=HOLD_S)
+        note = NOTE.format(title=escaped(robot.title), text=summary["verdict"]["text"], hold=HOLD_S)
         note += f"\nThe see-through arm has the most likely fault {fault}.\n" if mended is not None else ""
         stream.log("note", rr.TextDocument(note, media_type=rr.MediaType.MARKDOWN), static=True)
         _log_axes(stream, axes, size_of(robot), end=starts[1] - MOVE_S if len(starts) > 1 else None)
@@ -99,10 +99,10 @@ def _motion(stations: list[pd.DataFrame], starts: np.ndarray) -> tuple[np.ndarra
 def _log_station(stream: rr.RecordingStream, start: float, rows: pd.DataFrame, radius: float) -> None:
     stream.set_time(TIMELINE, duration=start)
     angles = ", ".join(f"{angle:g}" for angle in rows.iloc[0][Q].to_numpy(float).round(3))
-    lines = [f"### {' / '.join(dict.fromkeys(rows['name']))}", f"joints ({angles}) deg", ""]
+    lines = [f"### {' / '.join(map(escaped, dict.fromkeys(rows['name'])))}", f"joints ({angles}) deg", ""]
     for row in rows.dropna(subset=["deviation_mm"]).itertuples():
         point = row.point.replace("_", " ")
-        lines.append(f"- {point}: off by **{row.deviation_mm:.2f} mm**, {row.source} ({row.grade})")
+        lines.append(f"- {point}: off by **{row.deviation_mm:.2f} mm**, {escaped(row.source)} ({row.grade})")
     stream.log("pose", rr.TextDocument("\n".join(lines), media_type=rr.MediaType.MARKDOWN))
     stated = rows.dropna(subset=XYZ)
     points, model = stated[XYZ].to_numpy() / 1000, stated[MODEL_XYZ].to_numpy() / 1000

@@ -1,0 +1,55 @@
+"""Checksums of pages and recordings, in a hidden file beside each, and the search for files that are not as written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from er3a.errors import ResultError
+from er3a.results import check_results, sha256, write_atomically
+from er3a.study import STAGES, Study
+
+OVERALL = ("index.html", "compare.html")
+
+
+def seal(path: Path) -> None:
+    """Write the checksum of a finished page or recording beside it."""
+    checksum = sha256(path)
+    write_atomically(_seal_of(path), lambda file: file.write_text(checksum, encoding="ascii"))
+
+
+def check_seal(path: Path) -> None:
+    """Raise :class:`ResultError` if a page or recording is not the one that was sealed."""
+    try:
+        sealed = _seal_of(path).read_bytes()
+    except OSError:
+        raise ResultError(path, "no checksum of it was kept") from None
+    if sealed != sha256(path).encode("ascii"):
+        raise ResultError(path, "damaged (its checksum does not agree)")
+
+
+def unsound(study: Study, results: Path, reports: Path) -> Iterator[tuple[Path, ResultError]]:
+    """Files that are there and not as they were written, or of another format version, each with what is wrong.
+
+    Of a stage's results it is the summary that is named, without which the stage counts as not done.
+    """
+    for robot in study.robots:
+        for stage in STAGES:
+            summary = results / robot / stage / "summary.json"
+            if summary.is_file():
+                try:
+                    check_results(summary.parent)
+                except ResultError as error:
+                    yield summary, error
+    folders = [reports / robot for robot in study.robots]
+    views = [folder / f"{stage}.{kind}" for folder in folders for stage in STAGES for kind in ("html", "rrd")]
+    for view in (*views, *(reports / page for page in OVERALL)):
+        if view.is_file():
+            try:
+                check_seal(view)
+            except ResultError as error:
+                yield view, error
+
+
+def _seal_of(path: Path) -> Path:
+    return path.with_name(f".{path.name}.sha256")

@@ -1,0 +1,124 @@
+"""Texts from input files in pages and recordings: shown as they are, never carried out, never fetched."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from html.parser import HTMLParser
+from importlib import import_module
+
+import pandas as pd
+import pytest
+import yaml
+
+from er3a.errors import InputError
+from er3a.results import write_checksums, write_table
+from er3a.study import STAGES, load_study
+from er3a.viewing.index import write_index
+from er3a.viewing.recording import escaped
+
+ROBOT = "er3_600"
+HOSTILE = """ <script>alert("x")</script><img src=http://x/y onerror=alert(1)> $x^$ {{ 7*7 }} </style> ' " &amp;"""
+FROM_FILES = ("title", "note", "text", "source", "reason")
+LOADED = {"src", "srcset", "data", "poster", "background", "action"}
+
+
+class Tags(HTMLParser):
+    """Counts of elements, and what a browser would load or carry out on account of their attributes."""
+
+    def __init__(self, html: str):
+        super().__init__()
+        self.counts: dict[str, int] = {}
+        self.loaded: list[str] = []
+        self.handlers: list[str] = []
+        self.feed(html)
+
+    def handle_starttag(self, tag, attrs):
+        self.counts[tag] = self.counts.get(tag, 0) + 1
+        self.handlers += [name for name, _ in attrs if name.startswith("on")]
+        self.loaded += [value for name, value in attrs if name in LOADED or (tag == "link" and name == "href")]
+
+
+@pytest.fixture(scope="module")
+def hostile(small_study, tmp_path_factory):
+    """The small study's results with hostile texts in them, and a study whose robot has them in its file."""
+    folder = tmp_path_factory.mktemp("hostile")
+    shutil.copytree(small_study.folder / "results" / ROBOT, folder / "results" / ROBOT)
+    robot = yaml.safe_load((small_study.folder / f"data/robots/{ROBOT}.yaml").read_text(encoding="utf-8"))
+    robot |= {"title": "Arm" + HOSTILE, "zero_pose": HOSTILE}
+    for group in ("dh", "zero", "limits", "speeds"):
+        robot[group]["source"] = HOSTILE
+    (folder / f"{ROBOT}.yaml").write_text(yaml.safe_dump(robot), encoding="utf-8")
+    study = yaml.safe_load((small_study.folder / "config/small.yaml").read_text(encoding="utf-8"))
+    study["robots"] = {ROBOT: study["robots"][ROBOT] | {"file": str(folder / f"{ROBOT}.yaml")}}
+    (folder / "study.yaml").write_text(yaml.safe_dump(study), encoding="utf-8")
+    for stage in STAGES:
+        results = folder / "results" / ROBOT / stage
+        summary = results / "summary.json"
+        summary.write_text(json.dumps(_with_hostile(json.loads(summary.read_text()))), encoding="utf-8")
+        for table in results.glob("*.parquet"):
+            content = pd.read_parquet(table)
+            for column in set(FROM_FILES) & set(content):
+                content[column] = content[column].astype(str) + HOSTILE
+            write_table(table, content)
+        write_checksums(results)
+    return load_study(folder / "study.yaml"), folder
+
+
+def _with_hostile(value):
+    if isinstance(value, dict):
+        return {
+            key: part + HOSTILE if key in FROM_FILES and isinstance(part, str) else _with_hostile(part)
+            for key, part in value.items()
+        }
+    return [_with_hostile(part) for part in value] if isinstance(value, list) else value
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_a_page_shows_hostile_texts_and_does_not_act_on_them(hostile, small_study, stage, tmp_path):
+    study, folder = hostile
+    page = tmp_path / "page.html"
+    import_module(f"er3a.stages.{stage}.report").report(study, ROBOT, folder / "results" / ROBOT / stage, page)
+    html = page.read_text(encoding="utf-8")
+    found = Tags(html)
+    usual = Tags((small_study.folder / f"reports/{ROBOT}/{stage}.html").read_text(encoding="utf-8"))
+    assert found.counts == usual.counts
+    assert found.handlers == usual.handlers
+    assert all(address.startswith("data:") for address in found.loaded)
+    assert "&lt;script&gt;alert(" in html
+    assert "{{ 7*7 }}" in html
+
+
+def test_the_pages_over_all_robots_do_neither(hostile, small_study, tmp_path):
+    study, folder = hostile
+    write_index(study, folder / "results", tmp_path)
+    for name in ("index.html", "compare.html"):
+        html = (tmp_path / name).read_text(encoding="utf-8")
+        found, usual = Tags(html), Tags((small_study.folder / "reports" / name).read_text(encoding="utf-8"))
+        assert found.counts["script"] == usual.counts["script"]
+        assert found.handlers == []
+        assert all(address.startswith("data:") for address in found.loaded)
+
+
+def test_no_page_names_anything_to_load(small_study):
+    for page in (small_study.folder / "reports").rglob("*.html"):
+        html = page.read_text(encoding="utf-8")
+        assert all(address.startswith("data:") for address in Tags(html).loaded), page
+        styles = "".join(re.findall(r"<style>(.*?)</style>", html, flags=re.DOTALL))
+        assert not re.search(r"@import|url\(\s*['\"]?(?!data:)", styles), page
+
+
+def test_markdown_in_a_text_is_shown_as_it_is_written():
+    assert escaped("![x](http://x/y.png)\n# a_b") == r"\!\[x\](http://x/y.png) \# a\_b"
+
+
+@pytest.mark.parametrize(
+    "name", ["../x", "..", "a/b", "a\\b", "a\0b", "x" * 65, "", "Ä", "a b", "-x", "<b>", "A", "x\n"]
+)
+def test_a_name_that_would_become_part_of_a_path_is_refused(small_study, tmp_path, name):
+    study = yaml.safe_load((small_study.folder / "config/small.yaml").read_text(encoding="utf-8"))
+    study["robots"] = {name: study["robots"][ROBOT]}
+    (tmp_path / "study.yaml").write_text(yaml.safe_dump(study), encoding="utf-8")
+    with pytest.raises(InputError, match=r"study\.yaml: .*refused"):
+        load_study(tmp_path / "study.yaml")

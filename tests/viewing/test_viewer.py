@@ -1,0 +1,113 @@
+"""The viewer that `er3a view` starts: reachable from this machine alone, and telling nobody of its use."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import psutil
+import pytest
+
+from er3a.cli import app
+from er3a.errors import ResultError
+from er3a.seals import check_seal, seal
+from er3a.viewing.viewer import without_statistics
+from tests.conftest import viewer_on
+
+RERUN = Path(sys.executable).with_name("rerun")
+RECORDING = """
+import rerun as rr
+with rr.RecordingStream("er3a") as stream:
+    stream.save("{path}")
+    stream.log("a", rr.Points3D([[0, 0, 0]]))
+"""
+
+
+@pytest.fixture
+def home(tmp_path):
+    """An environment with an empty home, in which Rerun would begin to collect statistics."""
+    (tmp_path / "home").mkdir()
+    kept = {key: value for key, value in os.environ.items() if not key.startswith("XDG_")}
+    return kept | {"HOME": str(tmp_path / "home")}
+
+
+@pytest.fixture
+def recording(home, tmp_path):
+    """A recording, written with that home."""
+    path = tmp_path / "a.rrd"
+    subprocess.run([sys.executable, "-c", RECORDING.format(path=path)], env=home, check=True, timeout=60)
+    return path
+
+
+def kept_in(home) -> list[str]:
+    return [str(path) for path in Path(home["HOME"]).rglob("*rerun*")]
+
+
+def test_writing_a_recording_leaves_no_statistics(home, recording):
+    assert recording.stat().st_size > 0
+    assert kept_in(home) == []
+
+
+def test_rerun_collects_statistics_by_itself(home, recording):
+    subprocess.run([RERUN, "rrd", "verify", recording], env=home, check=True, capture_output=True, timeout=60)
+    assert kept_in(home), "if this fails, Rerun has changed its ways, and without_statistics() may be of no use"
+
+
+def test_without_statistics_it_does_not(home, recording):
+    with without_statistics() as environment:
+        quiet = home | {"XDG_CONFIG_HOME": environment["XDG_CONFIG_HOME"]}
+        told = subprocess.run([RERUN, "analytics", "config"], env=quiet, check=True, capture_output=True, timeout=60)
+        subprocess.run([RERUN, "rrd", "verify", recording], env=quiet, check=True, capture_output=True, timeout=60)
+        folder = Path(environment["XDG_CONFIG_HOME"])
+        assert [path.name for path in folder.rglob("*") if path.is_file()] == ["analytics.json"]
+    assert json.loads(told.stdout)["analytics_enabled"] is False
+    assert kept_in(home) == []
+    assert not folder.exists()
+
+
+def listened_to(process: psutil.Process) -> list:
+    """Addresses that a process or one that it started listens on."""
+    connections = []
+    for each in (process, *process.children(recursive=True)):
+        with suppress(psutil.NoSuchProcess):
+            connections += each.net_connections()
+    return [connection.laddr for connection in connections if connection.status == psutil.CONN_LISTEN]
+
+
+def test_it_listens_on_the_loopback_address_alone(recording):
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    with viewer_on(recording, "--port", str(port)) as viewer:
+        deadline = time.monotonic() + 60
+        listening: list = []
+        while port not in [address.port for address in listening]:
+            assert time.monotonic() < deadline
+            assert viewer.poll() is None, "the viewer ended early"
+            time.sleep(0.1)
+            listening = listened_to(psutil.Process(viewer.pid))
+    assert {address.ip for address in listening} == {"127.0.0.1"}
+
+
+def test_a_recording_cut_in_half_is_one_line_and_is_not_opened(recording, monkeypatch):
+    from typer.testing import CliRunner
+
+    reports = recording.parent
+    folder = reports / "er3_600"
+    folder.mkdir()
+    path = recording.rename(folder / "inverse.rrd")
+    seal(path)
+    check_seal(path)
+    started = []
+    monkeypatch.setattr(subprocess, "run", lambda command, **_: started.append(command))
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    done = CliRunner().invoke(app, ["view", "--reports", str(reports)])
+    assert isinstance(done.exception, ResultError)
+    assert str(done.exception).startswith(f"{path}: damaged (its checksum does not agree). Delete the file")
+    assert started == []
