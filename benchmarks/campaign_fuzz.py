@@ -12,6 +12,7 @@ import signal
 import tempfile
 import time
 import traceback
+import warnings
 from collections import Counter
 from dataclasses import dataclass, fields, is_dataclass
 from fractions import Fraction
@@ -43,6 +44,12 @@ ROOT = Path(__file__).resolve().parents[1]
 SEED, MUTANTS = 20261120, 6000
 MOST_SECONDS = 5.0  # of processor time, for one file
 LONGEST_MESSAGE = 1000
+KINDS = {
+    "traceback": "a traceback, or a warning of a library",
+    "hang": f"more than {MOST_SECONDS:g} s of processor time",
+    "message": "a message of more than one line, too long, or without the file's name",
+    "read otherwise": "accepted, and read as other numbers or words than are written",
+}
 NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
 WORDS_OF = {None: ("", "~", "null", "Null", "NULL"), True: ("true", "yes", "on"), False: ("false", "no", "off")}
 
@@ -75,7 +82,7 @@ targets:
   - {name: d, xyz_mm: [400, 10, 350], matrix: [[0, 0, 1], [1, 0, 0], [0, 1, 0]]}
   - {name: e, q_deg: [10, 20, 30, 40, 50, 60]}
 """
-TARGET_TABLE = """name,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg,note,q1_ref_deg,q2_ref_deg,q3_ref_deg,q4_ref_deg,q5_ref_deg,q6_ref_deg
+TARGET_TABLE = f"""name,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg,note,{",".join(f"q{k}_ref_deg" for k in range(1, 7))}
 a,400,0,300.5,0,90,0,first,0,0,0,0,0,0
 b,350,100.25,280,10,80,30,,10,20,0,0,45,0
 """
@@ -120,7 +127,8 @@ def judge(path: Path) -> Outcome:
     signal.setitimer(signal.ITIMER_VIRTUAL, MOST_SECONDS)
     accepted, fault = False, None
     try:
-        check_file(path)
+        with warnings.catch_warnings(action="error"):
+            check_file(path)
         accepted = True
     except InputError as error:
         fault = unclear(str(error), path)
@@ -137,7 +145,7 @@ def judge(path: Path) -> Outcome:
             differences = differing_table(path) if path.suffix == ".csv" else differing_file(path)
             fault = f"read otherwise: {differences[0]}" if differences else None
         except Exception:
-            fault = "second reading: " + " / ".join(traceback.format_exc().strip().splitlines()[-3:])
+            fault = "read otherwise: " + " / ".join(traceback.format_exc().strip().splitlines()[-3:])
     return Outcome(accepted, seconds, fault)
 
 
@@ -299,24 +307,24 @@ def run(count: int, seed: int, folder: Path) -> list[tuple[str, str, bytes, Outc
     return found
 
 
-def main() -> None:
-    import sys
-
+def table() -> str:
+    """The evidence as Markdown."""
+    start = time.process_time()
     with tempfile.TemporaryDirectory() as folder:
-        found = run(int(sys.argv[1]), int(sys.argv[2]), Path(folder))
-    print(len(found), "accepted", sum(o.accepted for *_, o in found), "slowest", max(o.seconds for *_, o in found))
-    seen = Counter()
-    for name, damage, content, outcome in found:
-        if outcome.fault:
-            key = outcome.fault[:60]
-            seen[key] += 1
-            if seen[key] <= 2:
-                print(name, "|", damage, "|", outcome.fault[:500])
-                Path("/tmp/reliability/found").mkdir(exist_ok=True)
-                Path(f"/tmp/reliability/found/{len(seen)}_{seen[key]}{Path(name).suffix}").write_bytes(content)
-    for k, v in seen.most_common():
-        print(v, k)
-
-
-if __name__ == "__main__":
-    main()
+        found = run(MUTANTS, SEED, Path(folder))
+    spent = time.process_time() - start
+    kinds = Counter((outcome.fault or "").partition(":")[0] for *_, outcome in found if outcome.fault)
+    accepted = sum(outcome.accepted for *_, outcome in found)
+    slowest = max(outcome.seconds for *_, outcome in found)
+    lines = [
+        f"Damaged files: **{len(found):,}** (seed {SEED}), made from {len(seeds())} sound ones; refused "
+        f"{len(found) - accepted:,}, accepted {accepted:,}; the slowest took {slowest:.2f} s, all together "
+        f"{spent:.0f} s of processor time.",
+        "",
+        "| what must not happen | seen |",
+        "|---|---|",
+        *(f"| {words} | {kinds[kind]} |" for kind, words in KINDS.items()),
+        "",
+        *(f"- `{name}` ({damage}): {outcome.fault}" for name, damage, _, outcome in found if outcome.fault),
+    ]
+    return "\n".join(lines).rstrip("\n") + "\n"

@@ -1,4 +1,4 @@
-"""Evidence at full size: each campaign writes its table in docs/evidence/ again.
+"""Evidence at full size: each campaign writes its page in docs/evidence/, or its part of docs/reliability.md, again.
 
 make campaigns                       all of them
 make campaigns ARGS="kinematics"     one
@@ -10,8 +10,18 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
-EVIDENCE = Path(__file__).resolve().parents[1] / "docs" / "evidence"
-CAMPAIGNS = ("kinematics", "singularities", "speed", "diagnosis", "identification", "workspace")
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+EVIDENCE, RELIABILITY = DOCS / "evidence", DOCS / "reliability.md"
+PARTS = ("fuzz", "faults", "kills")
+CAMPAIGNS = ("kinematics", "singularities", "speed", "diagnosis", "identification", "workspace", *PARTS)
+
+
+def write_part(name: str, text: str) -> None:
+    """Replace a campaign's part of docs/reliability.md, between the comments that mark it."""
+    start, end = f"<!-- written by: make campaigns ARGS={name} -->\n", f"<!-- end of {name} -->"
+    before, _, rest = RELIABILITY.read_text(encoding="utf-8").partition(start)
+    after = rest.partition(end)[2]
+    RELIABILITY.write_text(f"{before}{start}\n{text}\n{end}{after}", encoding="utf-8")
 
 
 def main(names: list[str]) -> int:
@@ -22,7 +32,10 @@ def main(names: list[str]) -> int:
     for name in names or CAMPAIGNS:
         print(f"{name} ...", flush=True)
         text = import_module(f"campaign_{name}").table()
-        (EVIDENCE / f"{name}.md").write_text(text, encoding="utf-8")
+        if name in PARTS:
+            write_part(name, text)
+        else:
+            (EVIDENCE / f"{name}.md").write_text(text, encoding="utf-8")
         print(text)
     return 0
 

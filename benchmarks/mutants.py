@@ -10,14 +10,15 @@ from random import Random
 import yaml
 
 VALUES = (
-    *("nan", ".nan", "NaN", ".inf", "-.INF", "inf", "1e400", "-1e400", "1e308", "1e-300", "1e-400", "4.9e-324", "0e400", "1e1000000000"),
-    *("0", "-0.0", "+5", "5.", ".5", "1e3", "1E+2", "-1", "1.5", "0.1e1", "12345678901234567890", "9" * 5000),
-    *("0650", "0x1F", "0b11", "0o17", "1_000", "1:30", "190:20:30.15", "1,5", "5 mm", "１２", "٣", "½", "5\u00a0", "--5"),
-    *("!!int 0650", "!!float 1:30", "!!float '5'", "!!str 5", "!!bool 1", "!!binary aGk=", "!!python/name:os.system"),
-    *("'5'", '"5"', "yes", "off", "true", "null", "~", "", "''", "[]", "{}", "[1]", "{a: 1}", "2020-01-01", "=", "<<"),
-    *("&a 5", "*a", "|", ">-", "'", '"', "#", "%", "@", "`", "-", "?", "...", "---", "\t", "é", "空洞", "😀", "\ufeff", "\u2028"),
-    *("\x00", "\x1b[2J", "\x85", '"a\\nb"', '"\\x1b[31m"', "../../etc/passwd", "'..'", "/", "a/b", "C:\\x", "<script>alert(1)</script>"),
-    *("{{ 7*7 }}", "$(reboot)", "x" * 3000, "a b", "A", "[" * 3000, "{a: " * 400, "- " * 400),
+    "nan", ".nan", "NaN", ".inf", "-.INF", "inf", "1e400", "-1e400", "1e308", "1e-300", "1e-400", "4.9e-324",
+    "0e400", "1e1000000000", "0", "-0.0", "+5", "5.", ".5", "1e3", "1E+2", "-1", "1.5", "0.1e1",
+    "12345678901234567890", "9" * 5000, "0650", "0x1F", "0b11", "0o17", "1_000", "1:30", "190:20:30.15", "1,5",
+    "5 mm", "１２", "٣", "½", "5\xa0", "--5", "!!int 0650", "!!float 1:30", "!!float '5'", "!!str 5", "!!bool 1",
+    "!!binary aGk=", "!!python/name:os.system", "'5'", '"5"', "yes", "off", "true", "null", "~", "", "''", "[]",
+    "{}", "[1]", "{a: 1}", "2020-01-01", "=", "<<", "&a 5", "*a", "|", ">-", "'", '"', "#", "%", "@", "`", "-", "?",
+    "...", "---", "\t", "é", "空洞", "😀", "\ufeff", "\u2028", "\x00", "\x1b[2J", "\x85", '"a\\nb"', '"\\x1b[31m"',
+    "../../etc/passwd", "'..'", "/", "a/b", "C:\\x", "<script>alert(1)</script>", "{{ 7*7 }}", "$(reboot)",
+    "x" * 3000, "a b", "A", "[" * 3000, "{a: " * 400, "- " * 400,
 )  # fmt: skip
 HEADER_NAMES = ("x_cm", "x_m", "q1_rad", "", "name", "source", '"a\nb"', "\x1b[2J", "x" * 3000, "空洞")
 BOMB = "bomb: &a [x, x, x, x, x, x, x, x, x]\nb: &b [*a, *a, *a, *a, *a, *a, *a, *a]\nc: [*b, *b, *b, *b, *b, *b]\n"
@@ -104,7 +105,7 @@ def rename_key(text: str, random: Random) -> str:
 
 @_on_text
 def delete_entry(text: str, random: Random) -> str:
-    parent, key, node = random.choice([entry for entry in _nodes(text) if entry[0]])
+    _, key, node = random.choice([entry for entry in _nodes(text) if entry[0]])
     start = (key or node).start_mark.index
     return text[:start] + text[node.end_mark.index :]
 

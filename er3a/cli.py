@@ -245,9 +245,11 @@ def main() -> None:
     except Er3aError as error:
         _complain(error)
     except MemoryError:
-        _complain(
-            f"out of memory in `er3a {' '.join(sys.argv[1:])}`; give it more, lower the study's budgets or --cores"
-        )
+        _complain_of_memory()
+    except ImportError as error:
+        if "failed to map" not in str(error):
+            raise
+        _complain_of_memory()
     except OSError as error:
         _complain(f"{error.filename or 'the system'}: {error.strerror or error}")
     raise SystemExit(2)
@@ -255,6 +257,10 @@ def main() -> None:
 
 def _complain(error: Er3aError | str) -> None:
     print(f"error: {error}", file=sys.stderr)
+
+
+def _complain_of_memory() -> None:
+    _complain(f"out of memory in `er3a {' '.join(sys.argv[1:])}`; give it more, lower the study's budgets or --cores")
 
 
 def _sealed(verb, study: Study, robot: str, folder: Path, output: Path) -> None:

@@ -5,6 +5,7 @@ The command line prints such an error as one line and ends with exit code 2; any
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 
@@ -71,7 +72,7 @@ class WriteError(Er3aError):
 
     def __init__(self, file: str | Path, error: OSError):
         self.file = str(file)
-        told = error.strerror or str(error)
+        told = os.strerror(error.errno) if error.errno else str(error)
         super().__init__(f"{_line(str(file))}: can't be written ({told}). Make room or mend the rights, then run again")
 
 

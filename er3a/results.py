@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -20,6 +21,7 @@ from er3a.study import Study
 
 FORMAT_VERSION = 2
 CHECKSUMS = "SHA256SUMS"
+_TEMPORARY = re.compile(r"\..+\.[0-9]+(\.\w+)?")  # as `write_atomically` names them
 
 Status = Literal["pass", "caution", "fail", "no_reference"]
 
@@ -71,6 +73,11 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
             temporary.unlink(missing_ok=True)
     except OSError as error:
         raise WriteError(path, error) from None
+
+
+def half_written(folder: Path) -> list[Path]:
+    """The temporary files that killed processes left below a folder."""
+    return [path for path in sorted(folder.rglob(".*")) if _TEMPORARY.fullmatch(path.name)]
 
 
 def write_table(path: Path, table: pd.DataFrame) -> None:

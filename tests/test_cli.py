@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from er3a.cli import main
+
 ROOT = Path(__file__).resolve().parents[1]
 
 
@@ -48,6 +50,27 @@ def test_a_wrong_call_is_one_line_and_exit_code_2(words, told):
     assert told in done.stderr
     assert done.stderr.startswith("error: ")
     assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("fault", "told"),
+    [
+        (MemoryError("Unable to allocate 9 GiB"), "out of memory in `er3a "),
+        (ImportError("numpy.so: failed to map segment from shared object"), "out of memory in `er3a "),
+        (PermissionError(13, "Permission denied", "reports/x"), "reports/x: Permission denied"),
+    ],
+)
+def test_a_machine_at_its_limits_is_one_line_and_exit_code_2(monkeypatch, capsys, fault, told):
+    def fail(**_):
+        raise fault
+
+    monkeypatch.setattr("er3a.cli.app", fail)
+    with pytest.raises(SystemExit) as caught:
+        main()
+    error = capsys.readouterr().err
+    assert caught.value.code == 2
+    assert error.startswith(f"error: {told}")
+    assert error.count("\n") == 1
 
 
 def test_urdf_out_and_in(tmp_path):

@@ -6,6 +6,8 @@ import errno
 import hashlib
 import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +22,7 @@ from er3a.results import (
     Figure,
     Verdict,
     check_results,
+    half_written,
     read_summary,
     read_table,
     sha256,
@@ -109,6 +112,21 @@ def test_a_failing_write_leaves_the_old_file_and_no_temporary(tmp_path):
         write_atomically(path, fail)
     assert path.read_text() == "old"
     assert leftovers(path.parent) == ["file.txt"]
+
+
+def test_what_a_killed_process_left_is_found(tmp_path):
+    killed = (
+        "import os, sys; from pathlib import Path; from er3a.results import write_atomically\n"
+        "for name in ('t.parquet', 'SHA256SUMS', '.page.html.sha256'):\n"
+        "    if os.fork() == 0: write_atomically(Path(sys.argv[1]) / 'x' / name, lambda f: (f.touch(), os._exit(9)))\n"
+        "    os.wait()"
+    )
+    subprocess.run([sys.executable, "-c", killed, tmp_path], check=True)
+    for name in ("t.parquet", "SHA256SUMS", ".page.html.sha256", ".validation.rrd.sha256"):
+        (tmp_path / "x" / name).touch()
+    found = [path.name for path in half_written(tmp_path)]
+    assert len(found) == 3
+    assert not {"t.parquet", "SHA256SUMS", ".page.html.sha256", ".validation.rrd.sha256"} & set(found)
 
 
 def test_while_writing_the_file_is_not_there_yet(tmp_path):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -134,12 +133,16 @@ def _check_contradictions(path: Path, rows: list[Measurement]) -> None:
     by_pose: dict[tuple, list[Measurement]] = {}
     for row in rows:
         by_pose.setdefault((row.pose, row.point), []).append(row)
-    for first, second in (pair for same in by_pose.values() for pair in combinations(same, 2)):
-        for coordinate, a, b in zip("xyz", first.xyz_mm, second.xyz_mm):
-            allowed = APART_DEVIATIONS * np.hypot(first.deviation_mm, second.deviation_mm)
-            if a is not None and b is not None and abs(a - b) > allowed:
+    for same in (rows for rows in by_pose.values() if len(rows) > 1):
+        xyz = np.array([row.xyz_mm for row in same], dtype=float)  # None becomes NaN, which is never far from anything
+        deviation = np.array([row.deviation_mm for row in same])
+        for n, row in enumerate(same):
+            apart = np.abs(xyz[:n] - xyz[n])
+            far = np.argwhere(apart > APART_DEVIATIONS * np.hypot(deviation[:n], deviation[n])[:, None])
+            if len(far):
+                k, c = far[0]
                 problem = (
-                    f"contradicts row {first.row}: same joints, {abs(a - b):.3g} mm apart in {coordinate}, "
+                    f"contradicts row {same[k].row}: same joints, {apart[k, c]:.3g} mm apart in {'xyz'[c]}, "
                     f"far beyond the stated standard deviations"
                 )
-                raise InputError(path, f"row {second.row}", problem, "Remove the wrong one, or state its deviation")
+                raise InputError(path, f"row {row.row}", problem, "Remove the wrong one, or state its deviation")

@@ -14,7 +14,8 @@ from typing import Any
 from er3a.errors import InputError
 from er3a.inputs.yaml_file import read_text, vanished
 
-LARGEST = 1e9
+LARGEST_DIGITS = 9
+LARGEST = 10.0**LARGEST_DIGITS
 
 
 class Written(float):
@@ -25,7 +26,7 @@ class Written(float):
     def __new__(cls, text: str) -> Written:
         number = super().__new__(cls, text)
         mantissa, _, exponent = text.lower().partition("e")
-        number.decimals = len(mantissa.partition(".")[2]) - int(exponent or 0)
+        number.decimals = max(len(mantissa.partition(".")[2]) - int(exponent or 0), -LARGEST_DIGITS)
         return number
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -14,8 +15,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
-from er3a.results import FORMAT_VERSION
+from er3a.cli import app
+from er3a.errors import ResultError
+from er3a.results import FORMAT_VERSION, check_results, read_summary, write_checksums
+from tests.conftest import ALL_THERE
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 STAGES = ("validation", "workspace", "inverse", "trajectory")
@@ -135,14 +140,39 @@ def test_results_are_the_same_bytes_on_one_core_and_with_another_scatter(small_s
         assert done.returncode == 0, f"{path}: {done.stderr[-500:]}"
 
 
-def test_half_deleted_results_are_made_again(small_study, tmp_path):
+def test_what_is_missing_damaged_or_of_an_older_version_is_made_again(small_study, tmp_path):
     run = replace(small_study, folder=shutil.copytree(small_study.folder, tmp_path / "project"))
-    summary = run.folder / "results/er3a_c60/inverse/summary.json"
-    before = summary.read_bytes()
-    summary.unlink()
-    assert "er3a_c60: compute inverse" in run.planned()
-    run.make_run("--cores", "2")
-    assert summary.read_bytes() == before
+    results, reports = run.folder / "results", run.folder / "reports"
+    before = {path: path.read_bytes() for path in results.rglob("*") if path.is_file()}
+    (results / "er3a_c60/inverse/summary.json").unlink()
+    old = results / "er3a_c60_article/trajectory/summary.json"
+    old.write_text(old.read_text().replace(f'"format_version": {FORMAT_VERSION}', '"format_version": 1', 1))
+    write_checksums(old.parent)
+    damaged = [results / "er3_600/trajectory/samples.parquet", reports / "er3_600/workspace.html"]
+    for path in damaged:
+        content = bytearray(path.read_bytes())
+        content[len(content) // 2] ^= 4
+        path.write_bytes(bytes(content))
+    half = reports / "er3_600/validation.rrd"
+    half.write_bytes(half.read_bytes()[: half.stat().st_size // 2])
+
+    told = CliRunner().invoke(app, ["view", "er3_600", "--reports", str(reports)])
+    assert str(told.exception).startswith(f"{half}: damaged")
+    with pytest.raises(ResultError, match=r"er3_600/trajectory/samples\.parquet: damaged"):
+        check_results(results / "er3_600/trajectory")
+    with pytest.raises(ResultError, match=f"format version 1, this er3a reads {FORMAT_VERSION}"):
+        read_summary(old.parent)
+
+    done = run.make_run("--cores", "2", "--nocolor")
+    for path in (old, *damaged, half):
+        (line,) = (line for line in done.stdout.splitlines() if line.startswith(f"{path.relative_to(run.folder)}: "))
+        assert line.endswith("; it is made again")
+    jobs = set(re.findall(r"^Job \d+: (.+)$", done.stdout + done.stderr, flags=re.MULTILINE)) - {ALL_THERE}
+    expected = {"er3_600: record validation", "er3_600: report workspace", "write the index"}
+    for robot, stage in (("er3a_c60", "inverse"), ("er3a_c60_article", "trajectory"), ("er3_600", "trajectory")):
+        expected |= {f"{robot}: compute {stage}", *views(robot, stage)}
+    assert jobs == expected
+    assert {path: path.read_bytes() for path in results.rglob("*") if path.is_file()} == before
     assert run.planned() == set()
 
 

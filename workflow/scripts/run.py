@@ -15,6 +15,7 @@ from pathlib import Path
 
 from er3a.check import check_study
 from er3a.errors import Er3aError
+from er3a.results import half_written
 from er3a.seals import unsound
 
 
@@ -38,11 +39,17 @@ def main() -> int:
         return 2
     try:
         study = check_study(Path(arguments.study))
-        for path, fault in unsound(study, Path("results"), Path("reports")):
+        results, reports = Path("results"), Path("reports")
+        for path in (*half_written(results), *half_written(reports)):
+            path.unlink()
+        for path, fault in unsound(study, results, reports):
             print(f"{fault.file}: {fault.problem}; it is made again")
             path.unlink()
     except Er3aError as error:
         print(f"error: {error}", file=sys.stderr)
+        return 2
+    except OSError as error:
+        print(f"error: {error.filename}: {error.strerror}", file=sys.stderr)
         return 2
 
     snakemake = [sys.executable, "-m", "snakemake", "--configfile", arguments.study]

@@ -1,0 +1,56 @@
+"""Copies of the project in which campaigns run the small study, and do what they like to it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+STUDY = "config/small.yaml"
+PARTS = ("Snakefile", "workflow", "er3a", "config", "data", "profiles")
+
+
+def fresh(folder: Path) -> Path:
+    """A copy of the project without results."""
+    folder.mkdir(parents=True)
+    for part in PARTS:
+        source = ROOT / part
+        if source.is_dir():
+            shutil.copytree(source, folder / part, ignore=shutil.ignore_patterns("__pycache__"))
+        else:
+            shutil.copy2(source, folder / part)
+    return folder
+
+
+def environment(folder: Path) -> dict[str, str]:
+    """The environment in which the copy's package is the one that is imported."""
+    single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+    return os.environ | {"PYTHONPATH": str(folder), "ER3A_STUDY": STUDY, **single}
+
+
+def run_command(*words: str) -> list[str]:
+    """What `make run` runs on the small study."""
+    return [sys.executable, "workflow/scripts/run.py", "--study", STUDY, "--", "--cores", "2", *words]
+
+
+def run(folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run the small study in a copy, to its end."""
+    command = run_command()
+    return subprocess.run(command, cwd=folder, env=environment(folder), capture_output=True, text=True, check=False)
+
+
+def finished(folder: Path) -> Path:
+    """A copy of the project with the small study run in it."""
+    done = run(fresh(folder))
+    if done.returncode != 0:
+        raise SystemExit(f"the small study does not run:\n{done.stdout}\n{done.stderr}")
+    return folder
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """Results and pages by path; sampled blocks, which go when a run is done, left out."""
+    found = [*folder.glob("results/*/*/*"), *folder.glob("reports/**/*.html")]
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in found if path.is_file()}
