@@ -31,7 +31,7 @@ from tests.robots.test_conventions import random_arm
 
 NAMES = ("er3a_c60", "er3a_c60_article", "er3_600")
 TABLES = {f"{name}.parquet" for name in ("checks", "axes", "key_poses", "section", "residuals", "corrections")}
-WRITTEN = TABLES | {"summary.json"}
+WRITTEN = TABLES | {"summary.json", "SHA256SUMS"}
 
 
 @pytest.fixture(scope="module")

@@ -395,6 +395,7 @@ def test_results_do_not_depend_on_the_parts(tmp_path):
         "void_vertices.parquet",
         "void_triangles.parquet",
         "summary.json",
+        "SHA256SUMS",
     }
     for parts in (1, 3, 9):
         paths = [tmp_path / f"{parts}-{part}.npz" for part in range(1, parts + 1)]
@@ -499,7 +500,9 @@ def parts(tmp_path):
 def test_a_damaged_part_is_named(parts, tmp_path):
     study, (first, second) = parts
     whole = second.read_bytes()
-    for damaged in (b"", b"no archive", whole[: len(whole) // 2], whole[:200] + b"\xff\x00\xff" + whole[203:]):
+    places = (0, 40, len(whole) // 2, len(whole) - 1)
+    flipped = [whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :] for at in places]
+    for damaged in (b"", b"no archive", whole[: len(whole) // 2], *flipped):
         second.write_bytes(damaged)
         with pytest.raises(ResultError, match=r"part_2\.npz: damaged"):
             compute(study, "er3_600", tmp_path / "results", [first, second])
