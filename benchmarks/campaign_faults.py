@@ -16,6 +16,7 @@ from pathlib import Path
 from small_study import contents, environment, finished, run, run_command
 
 ROBOT = "er3_600"
+BLOCKS = f"results/{ROBOT}/workspace/parts/1-of-1.npz"
 MEMORY = 700_000 * 1024  # bytes of address space
 
 
@@ -52,10 +53,11 @@ def halve(name: str) -> Callable[[Path, ExitStack], None]:
 
 
 def sampled(damage: Callable[[Path, ExitStack], None]) -> Callable[[Path, ExitStack], None]:
-    """Draw the blocks into a file, then damage it."""
+    """As if a run had been cut off after it drew its blocks; then damage their file."""
 
     def make(folder: Path, stack: ExitStack) -> None:
-        words = ("sample", ROBOT, "--part", "1-of-1", "--output", "block.npz")
+        (folder / f"results/{ROBOT}/workspace/summary.json").unlink()
+        words = ("sample", ROBOT, "--part", "1-of-1", "--output", BLOCKS)
         er3a(folder, words).check_returncode()
         damage(folder, stack)
 
@@ -103,7 +105,7 @@ STAGE = f"results/{ROBOT}/trajectory"
 REPORT = ("report", "trajectory", ROBOT)
 COMPUTE = ("compute", "trajectory", ROBOT)
 RECORD = ("record", "trajectory", ROBOT)
-GATHER = ("compute", "workspace", ROBOT, "block.npz")
+GATHER = ("compute", "workspace", ROBOT, BLOCKS)
 VIEW = f"reports/{ROBOT}/trajectory"
 FAULTS = (
     Fault("disk full: results", disk(STAGE, "size=16k"), COMPUTE, f"{STAGE}/checks.parquet", root=True),
@@ -114,8 +116,8 @@ FAULTS = (
     Fault("a file where a folder must be", in_the_way, (*COMPUTE, "--results", "elsewhere"), "elsewhere"),
     Fault("memory limit (ulimit -v)", lambda *_: None, ("sample", ROBOT, "--part", "1-of-1", "--output", "b.npz",
           "--study", "large.yaml"), "er3a sample er3_600", memory=MEMORY),
-    Fault("block file cut in half", sampled(halve("block.npz")), GATHER, "block.npz: damaged"),
-    Fault("block file with a flipped bit", sampled(flip("block.npz")), GATHER, "block.npz: damaged"),
+    Fault("block file cut in half", sampled(halve(BLOCKS)), GATHER, f"{BLOCKS}: damaged"),
+    Fault("block file with a flipped bit", sampled(flip(BLOCKS)), GATHER, f"{BLOCKS}: damaged"),
     Fault("table cut in half", halve(f"{STAGE}/samples.parquet"), REPORT, "samples.parquet: damaged"),
     Fault("table with a flipped bit", flip(f"{STAGE}/samples.parquet"), REPORT, "samples.parquet: damaged"),
     Fault("summary cut in half", halve(f"{STAGE}/summary.json"), REPORT, "summary.json: damaged"),

@@ -21,6 +21,7 @@ from er3a.study import Study
 
 FORMAT_VERSION = 2
 CHECKSUMS = "SHA256SUMS"
+_DIGEST_BYTES = hashlib.sha256().digest_size
 _TEMPORARY = re.compile(r"\..+\.[0-9]+(\.\w+)?")  # as `write_atomically` names them
 
 Status = Literal["pass", "caution", "fail", "no_reference"]
@@ -73,6 +74,20 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
             temporary.unlink(missing_ok=True)
     except OSError as error:
         raise WriteError(path, error) from None
+
+
+def write_checked(path: Path, content: bytes) -> None:
+    """Write bytes behind their checksum."""
+    write_atomically(path, lambda file: file.write_bytes(hashlib.sha256(content).digest() + content))
+
+
+def read_checked(path: Path) -> bytes:
+    """Read what :func:`write_checked` wrote, or raise :class:`ResultError` if it is missing or damaged."""
+    content = _content(path)
+    checksum, content = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
+    if hashlib.sha256(content).digest() != checksum:
+        raise ResultError(path, "damaged (its checksum does not agree)")
+    return content
 
 
 def half_written(folder: Path) -> list[Path]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from er3a.errors import ResultError
-from er3a.results import check_results, sha256, write_atomically
+from er3a.results import check_results, read_checked, sha256, write_atomically
 from er3a.study import STAGES, Study
 
 OVERALL = ("index.html", "compare.html")
@@ -31,7 +31,7 @@ def check_seal(path: Path) -> None:
 def unsound(study: Study, results: Path, reports: Path) -> Iterator[tuple[Path, ResultError]]:
     """Files that are there and not as they were written, or of another format version, each with what is wrong.
 
-    Of a stage's results it is the summary that is named, without which the stage counts as not done.
+    These are results, blocks that a run which was cut off has sampled, pages and recordings. Of a stage's results it is the summary that is named, without which the stage counts as not done.
     """
     for robot in study.robots:
         for stage in STAGES:
@@ -41,6 +41,11 @@ def unsound(study: Study, results: Path, reports: Path) -> Iterator[tuple[Path, 
                     check_results(summary.parent)
                 except ResultError as error:
                     yield summary, error
+        for part in sorted((results / robot).glob("*/parts/*.npz")):
+            try:
+                read_checked(part)
+            except ResultError as error:
+                yield part, error
     folders = [reports / robot for robot in study.robots]
     views = [folder / f"{stage}.{kind}" for folder in folders for stage in STAGES for kind in ("html", "rrd")]
     for view in (*views, *(reports / page for page in OVERALL)):

@@ -13,14 +13,13 @@ import numpy as np
 from er3a.code_digest import code_digest
 from er3a.errors import ResultError
 from er3a.kinematics.chain import constant_links
-from er3a.results import write_atomically
+from er3a.results import read_checked, write_checked
 from er3a.robots.robot import Robot
 from er3a.stages.workspace.extremes import Extremes
 from er3a.stages.workspace.tally import UNTOUCHED, Tally
 from er3a.study import Study
 
 FORMAT = "er3a workspace part 2"
-DIGEST_BYTES = hashlib.sha256().digest_size
 
 
 def identity(study: Study, robot: Robot) -> dict[str, Any]:
@@ -54,8 +53,7 @@ def write_part(path: Path, identity: dict[str, Any], tally: Tally) -> None:
         extreme_block=tally.extremes.block,
         extreme_sample=tally.extremes.sample,
     )
-    content = stream.getvalue()
-    write_atomically(path, lambda file: file.write_bytes(hashlib.sha256(content).digest() + content))
+    write_checked(path, stream.getvalue())
 
 
 def read_part(path: Path, expected: dict[str, Any]) -> Tally:
@@ -66,15 +64,7 @@ def read_part(path: Path, expected: dict[str, Any]) -> Tally:
     ResultError
         naming the file, if it is missing, damaged, or of another run
     """
-    try:
-        content = Path(path).read_bytes()
-    except FileNotFoundError:
-        raise ResultError(path, "missing") from None
-    except OSError as error:
-        raise ResultError(path, f"can't be read ({error.strerror})") from None
-    if hashlib.sha256(content[DIGEST_BYTES:]).digest() != content[:DIGEST_BYTES]:
-        raise ResultError(path, "damaged (its checksum does not agree)")
-    with np.load(io.BytesIO(content[DIGEST_BYTES:]), allow_pickle=False) as file:
+    with np.load(io.BytesIO(read_checked(path)), allow_pickle=False) as file:
         arrays = {key: file[key] for key in file.files}
     _check_identity(path, json.loads(arrays["identity"].tobytes()), expected)
     counts = np.zeros(arrays["shape"], dtype=np.int64)
