@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from er3a.errors import ResultError
@@ -31,29 +31,21 @@ def check_seal(path: Path) -> None:
 def unsound(study: Study, results: Path, reports: Path) -> Iterator[tuple[Path, ResultError]]:
     """Files that are there and not as they were written, or of another format version, each with what is wrong.
 
-    These are results, blocks that a run which was cut off has sampled, pages and recordings. Of a stage's results it is the summary that is named, without which the stage counts as not done.
+    These are results, blocks that a run which was cut off has sampled, pages and recordings. Of a stage's results it is
+    the summary that is named, without which the stage counts as not done.
     """
+    checks: list[tuple[Path, Callable[[Path], object]]] = [(reports / page, check_seal) for page in OVERALL]
     for robot in study.robots:
         for stage in STAGES:
-            summary = results / robot / stage / "summary.json"
-            if summary.is_file():
-                try:
-                    check_results(summary.parent)
-                except ResultError as error:
-                    yield summary, error
-        for part in sorted((results / robot).glob("*/parts/*.npz")):
+            checks.append((results / robot / stage / "summary.json", lambda path: check_results(path.parent)))
+            checks += [(reports / robot / f"{stage}.{kind}", check_seal) for kind in ("html", "rrd")]
+        checks += [(part, read_checked) for part in sorted((results / robot).glob("*/parts/*.npz"))]
+    for path, check in checks:
+        if path.is_file():
             try:
-                read_checked(part)
+                check(path)
             except ResultError as error:
-                yield part, error
-    folders = [reports / robot for robot in study.robots]
-    views = [folder / f"{stage}.{kind}" for folder in folders for stage in STAGES for kind in ("html", "rrd")]
-    for view in (*views, *(reports / page for page in OVERALL)):
-        if view.is_file():
-            try:
-                check_seal(view)
-            except ResultError as error:
-                yield view, error
+                yield path, error
 
 
 def _seal_of(path: Path) -> Path:
