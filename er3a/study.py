@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from er3a.errors import InputError
-from er3a.inputs.yaml_file import StrictModel, load
+from er3a.inputs.yaml_file import StrictModel, load, read_yaml
 from er3a.robots.load import DATA, load_robot, placement_transform, robot_path
 from er3a.robots.robot import Robot
 from er3a.robots.schema import Name, Placement, Text, check_placement
@@ -132,7 +132,7 @@ class Study(StrictModel):
             if self.inverse.scene:
                 files.append(Path(self.inverse.scene))
         if stage == "trajectory":
-            files.append(Path(entry.paths))
+            files += [Path(entry.paths), *_tables_of(entry.paths)]
         return files
 
     def settings(self, name: str, stage: str) -> dict[str, Any]:
@@ -140,6 +140,13 @@ class Study(StrictModel):
         entry = self.entry(name).model_dump(exclude={"targets", "paths", "file"}, exclude_none=True)
         own = getattr(self, stage, None)
         return {"seed": self.seed, "robot": entry, stage: own.model_dump() if own else {}}
+
+
+def _tables_of(path_file: str) -> list[Path]:
+    """The CSV tables that a path file names; the file is checked elsewhere."""
+    paths = read_yaml(path_file).get("paths")
+    named = [path.get("file") for path in paths if isinstance(path, dict)] if isinstance(paths, list) else []
+    return [Path(file) for file in named if isinstance(file, str)]
 
 
 def load_study(path: str | Path) -> Study:

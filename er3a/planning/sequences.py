@@ -105,10 +105,8 @@ class SegmentPath:
         """Position and rotation vector (..., 6) with derivatives by progress."""
         x, dx, ddx = self.curve(progress)
         i, u = self.curve.piece(progress)
-        for k, arc in enumerate(self.arcs):
+        for k, arc in ((k, arc) for k, arc in enumerate(self.arcs) if arc is not None):
             here = i == k
-            if arc is None or not here.any():
-                continue
             start, end = self.arc_shares[k]
             rate = (end - start) / (self.curve.edges[k + 1] - self.curve.edges[k])
             share = start + (end - start) * u[here]

@@ -74,7 +74,7 @@ def test_the_articles_line_starts_at_a_singular_pose_and_meets_a_second(folders)
     assert all(event["crossing"] for event in path["singularities"])
     assert path["singularities"][0]["t_s"] == 0
     assert path["singularities"][1]["t_s"] == pytest.approx(0.941177, abs=1e-5)
-    assert path["half_turn_axis"] == [0, 0, 1]
+    assert path["half_turns"] == [{"segment": 1, "axis": [0, 0, 1]}]
     assert path["start_turn_deg"] == [0] * 6
     assert path["out_of_limits"] == path["unreachable"] == []
     assert path["max_joint_speed_ratio"] is None

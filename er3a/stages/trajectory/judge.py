@@ -90,11 +90,11 @@ def path_record(robot: Robot, motion: Motion, found: Judgement) -> dict[str, Any
         "kind": entry.kind,
         "verdict": found.word,
         "text": found.text,
-        "duration_s": float(entry.duration_s),
+        "duration_s": float(motion.built.duration),
         "samples": entry.samples,
         "length_m": float(motion.way(motion.samples[-1:])[0]),
         "branches": [labels[slot] for slot in slots],
-        "half_turn_axis": _half_turn_axis(motion),
+        "half_turns": _half_turns(motion),
         "start_turn_deg": None if followed is None else _degrees(followed.start_turn),
         "singularities": [_event_record(event) for event in found.events],
         "out_of_limits": _interval_records(motion, found.limits),
@@ -181,7 +181,7 @@ def _stretch(part: Interval) -> str:
 
 
 def _velocity_check(motion: Motion) -> float:
-    step = SPEED_STEP * motion.entry.duration_s
+    step = SPEED_STEP * motion.built.duration
     inner = motion.samples[1:-1]
     if not inner.size:
         return 0.0
@@ -190,11 +190,12 @@ def _velocity_check(motion: Motion) -> float:
     return float(np.nanmax(difference)) if np.isfinite(difference).any() else 0.0
 
 
-def _half_turn_axis(motion: Motion) -> list[float] | None:
-    if motion.followed is None or not motion.followed.line.half_turn:
-        return None
-    rotation = motion.followed.line.rotation
-    return [float(value) for value in np.round(rotation / np.linalg.norm(rotation), 12) + 0.0]
+def _half_turns(motion: Motion) -> list[dict[str, Any]]:
+    """Rotations by exactly 180 deg, which have two ways round, and the axis of the one taken."""
+    if motion.built.tool is None:
+        return []
+    turns = motion.built.tool.half_turns()
+    return [{"segment": k, "axis": [float(x) for x in np.round(axis, 12) + 0.0]} for k, axis in turns]
 
 
 def _event_record(event: SingularEvent) -> dict[str, Any]:

@@ -23,7 +23,14 @@ STATUS = {
     "unreachable": "fail",
 }
 FAULTS = {"unreachable": "not reachable", "out_of_limits": "outside limits", "too_fast": "too fast"}
-KINDS = {"joint": "joint move", "line": "straight line"}
+KINDS = {
+    "joint": "joint move",
+    "joint_sequence": "joint moves in sequence",
+    "line": "straight line",
+    "arc": "circular arc",
+    "sequence": "lines and arcs in sequence",
+    "table": "path from a table",
+}
 
 
 def report(study: Study, name: str, folder: Path, output: Path) -> None:
