@@ -6,17 +6,15 @@ import re
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from er3a.errors import InputError
-from er3a.inputs.units import check_degrees, check_millimetres
+from er3a.inputs.units import JointsDeg, PositionMm, RpyDeg, Six, Triple
 from er3a.inputs.yaml_file import StrictModel, load
-from er3a.robots.schema import Name, Text, Triple
+from er3a.robots.schema import Name, Text
 
-WHOLE_DEGREES = "round them to whole degrees"
 TRAPEZOID_RAMP = 1 / 3  # of a motion's time, on the way up and on the way down
 
-SixAngles = Annotated[list[float], Field(min_length=6, max_length=6)]
 Duration = Annotated[float, Field(gt=0, le=3600)]
 Samples = Annotated[int, Field(ge=2, le=100_000)]
 Blend = Annotated[float, Field(ge=0, le=10_000)]
@@ -25,20 +23,8 @@ Blend = Annotated[float, Field(ge=0, le=10_000)]
 class PoseEntry(StrictModel):
     """A pose of the tool in the base frame; R = Rz(yaw) Ry(pitch) Rx(roll)."""
 
-    xyz_mm: Triple
-    rpy_deg: Triple
-
-    @field_validator("xyz_mm")
-    @classmethod
-    def _millimetres(cls, values):
-        check_millimetres(values)
-        return values
-
-    @field_validator("rpy_deg")
-    @classmethod
-    def _degrees(cls, values):
-        check_degrees(values, WHOLE_DEGREES)
-        return values
+    xyz_mm: PositionMm
+    rpy_deg: RpyDeg
 
 
 class NamedPath(StrictModel):
@@ -76,19 +62,13 @@ class JointPath(NamedPath):
     """A joint move: quintic in time, all joints together; at rest at the ends unless their rates are given."""
 
     kind: Literal["joint"]
-    start_deg: SixAngles
-    end_deg: SixAngles
-    start_velocity_deg_s: SixAngles | None = None
-    end_velocity_deg_s: SixAngles | None = None
-    start_acceleration_deg_s2: SixAngles | None = None
-    end_acceleration_deg_s2: SixAngles | None = None
+    start_deg: JointsDeg
+    end_deg: JointsDeg
+    start_velocity_deg_s: Six | None = None
+    end_velocity_deg_s: Six | None = None
+    start_acceleration_deg_s2: Six | None = None
+    end_acceleration_deg_s2: Six | None = None
     duration_s: Duration
-
-    @field_validator("start_deg", "end_deg")
-    @classmethod
-    def _degrees(cls, values):
-        check_degrees(values, WHOLE_DEGREES)
-        return values
 
 
 class JointSequencePath(Profiled):
@@ -98,14 +78,8 @@ class JointSequencePath(Profiled):
     """
 
     kind: Literal["joint_sequence"]
-    points_deg: Annotated[list[SixAngles], Field(min_length=2)]
+    points_deg: Annotated[list[JointsDeg], Field(min_length=2)]
     blend_deg: Blend = 0.0
-
-    @field_validator("points_deg")
-    @classmethod
-    def _degrees(cls, points):
-        check_degrees([angle for point in points for angle in point], WHOLE_DEGREES)
-        return points
 
 
 class ToolStart(Profiled):
@@ -114,7 +88,7 @@ class ToolStart(Profiled):
     ``start_branch`` (only with a start pose) fixes the branch to begin on, in the words of the inverse's solutions.
     """
 
-    start_deg: SixAngles | None = None
+    start_deg: JointsDeg | None = None
     start: PoseEntry | None = None
     start_branch: Text | None = None
 
@@ -125,13 +99,6 @@ class ToolStart(Profiled):
         if self.start_branch is not None and self.start is None:
             raise ValueError("start_branch: start_deg already fixes the branch | Remove start_branch")
         return self
-
-    @field_validator("start_deg")
-    @classmethod
-    def _degrees(cls, values):
-        if values is not None:
-            check_degrees(values, WHOLE_DEGREES)
-        return values
 
 
 class LineTo(StrictModel):
@@ -144,13 +111,7 @@ class LineTo(StrictModel):
 class ArcTo(LineTo):
     """A circular arc through a point to a pose."""
 
-    via_mm: Triple
-
-    @field_validator("via_mm")
-    @classmethod
-    def _millimetres(cls, values):
-        check_millimetres(values)
-        return values
+    via_mm: PositionMm
 
 
 class LinePath(ToolStart, LineTo):
