@@ -14,7 +14,7 @@ from er3a.planning.singular_events import SingularEvent, singular_events
 from er3a.robots.robot import Robot
 from er3a.stages.trajectory.motion import Motion
 
-WORDS = ("unreachable", "leaves limits", "too fast", "singular", "near-singular", "safe")
+WORDS = ("unreachable", "leaves limits", "collides", "too fast", "singular", "near-singular", "safe")
 SPEED_STEP = 1e-5  # share of the duration
 
 
@@ -97,9 +97,9 @@ def path_record(robot: Robot, motion: Motion, found: Judgement) -> dict[str, Any
         "half_turns": _half_turns(motion),
         "start_turn_deg": None if followed is None else _degrees(followed.start_turn),
         "singularities": [_event_record(event) for event in found.events],
-        "out_of_limits": _interval_records(motion, found.limits),
-        "unreachable": _interval_records(motion, found.beyond),
-        "too_fast": _interval_records(motion, found.fast),
+        "out_of_limits": interval_records(motion, found.limits),
+        "unreachable": interval_records(motion, found.beyond),
+        "too_fast": interval_records(motion, found.fast),
         "jumps": [
             {"t_s": jump.t, "joint": jump.joint, "angle_deg": float(np.degrees(jump.angle))}
             for jump in (followed.jumps if followed else ())
@@ -142,9 +142,9 @@ def _text(
     bounded: bool,
 ) -> str:
     if word == "unreachable":
-        return "; ".join(_stretch(part) for part in beyond)
+        return "; ".join(stretch_text(part) for part in beyond)
     if word in ("leaves limits", "too fast"):
-        faults = [f"{_stretch(part)}: {part.cause}" for part in (limits or fast)]
+        faults = [f"{stretch_text(part)}: {part.cause}" for part in (limits or fast)]
         return "; ".join(filter(None, [*faults, _places(events)]))
     if motion.followed is None:
         places = _places([event for event in events if event.crossing])
@@ -176,7 +176,8 @@ def distance_text(event: SingularEvent) -> str:
     return f"{np.degrees(event.distance):.3g} deg"
 
 
-def _stretch(part: Interval) -> str:
+def stretch_text(part: Interval) -> str:
+    """When a stretch starts and ends."""
     return f"from t = {part.start:.4g} to {part.end:.4g} s"
 
 
@@ -210,7 +211,8 @@ def _event_record(event: SingularEvent) -> dict[str, Any]:
     }
 
 
-def _interval_records(motion: Motion, intervals: list[Interval]) -> list[dict[str, Any]]:
+def interval_records(motion: Motion, intervals: list[Interval]) -> list[dict[str, Any]]:
+    """Intervals in time and on the tool point's way."""
     records = []
     for interval in intervals:
         s0, s1 = (float(value) for value in motion.way(np.array([interval.start, interval.end])))
