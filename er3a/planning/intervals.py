@@ -6,11 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.turns import LIMIT_TOLERANCE
 from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.planning.branches import vertex
 from er3a.planning.followed import Followed
 from er3a.planning.singular_events import Joints, runs
 from er3a.robots.robot import Robot
@@ -40,8 +41,8 @@ def out_of_limits(robot: Robot, t: np.ndarray, q: np.ndarray, joints: Joints) ->
                 return sign * (joints(at)[..., j] - limit) - LIMIT_TOLERANCE
 
             values = sign * (q[:, j] - limit) - LIMIT_TOLERANCE
-            for start, end, worst in _where_positive(t, values, beyond):
-                reached, bound = np.degrees([q[worst, j], limit])
+            for start, end, most in _where_positive(t, values, beyond):
+                reached, bound = np.degrees([limit + sign * most, limit])
                 cause = f"J{j + 1} goes to {reached:.1f} deg; its {word} limit is {bound:g} deg"
                 found.append(Interval(start, end, cause))
     return sorted(found, key=lambda interval: (interval.start, interval.cause))
@@ -63,8 +64,8 @@ def too_fast(
             return float(np.abs(speed(np.array([at]))[0, j]) - robot.speed[j])
 
         values = np.abs(velocity[:, j]) - robot.speed[j]
-        for start, end, worst in _where_positive(t, values, excess):
-            needed, able = np.degrees([abs(velocity[worst, j]), robot.speed[j]])
+        for start, end, most in _where_positive(t, values, excess):
+            needed, able = np.degrees([robot.speed[j] + most, robot.speed[j]])
             found.append(Interval(start, end, f"J{j + 1} would need {needed:.0f} deg/s; it can do {able:g} deg/s"))
     return sorted(found, key=lambda interval: (interval.start, interval.cause))
 
@@ -83,14 +84,42 @@ def unreachable(followed: Followed) -> list[Interval]:
 
 def _where_positive(
     t: np.ndarray, values: np.ndarray, function: Callable[[float], float]
-) -> list[tuple[float, float, int]]:
-    """Stretches of positive values: start, end (roots of ``function``), index of the greatest value."""
+) -> list[tuple[float, float, float]]:
+    """Stretches of positive values, those between two grid points too: start, end (roots), and the greatest value."""
     found = []
     for first, last in runs(values > 0):
         start = _root(function, t, values, first - 1, first) if first > 0 else t[0]
         end = _root(function, t, values, last - 1, last) if last < len(t) else t[-1]
-        found.append((float(start), float(end), first + int(np.argmax(values[first:last]))))
+        found.append((float(start), float(end), float(values[first:last].max())))
+    return found + _peaks_between(t, values, function)
+
+
+def _peaks_between(
+    t: np.ndarray, values: np.ndarray, function: Callable[[float], float]
+) -> list[tuple[float, float, float]]:
+    """Stretches of positive values about a peak between grid points that are not positive themselves.
+
+    A peak is looked for where the parabola through a highest point and its neighbours comes half way to zero.
+    """
+    inner = values[1:-1]
+    tops = 1 + np.flatnonzero((inner <= 0) & (inner > values[:-2]) & (inner >= values[2:]))
+    found = []
+    for i in tops:
+        rise = float(np.polynomial.Polynomial.fit(t[i - 1 : i + 2], values[i - 1 : i + 2], 2)(_top(t, values, i)))
+        if values[i] + 2 * (rise - values[i]) <= 0:
+            continue
+        near = {"bounds": (t[i - 1], t[i + 1]), "method": "bounded", "options": {"xatol": 1e-10 * (t[-1] - t[0])}}
+        best = minimize_scalar(lambda at: -function(at), **near)
+        if best.fun >= 0:
+            continue
+        ends = [brentq(function, *sorted((side, best.x)), xtol=1e-12 * (t[-1] - t[0])) for side in t[[i - 1, i + 1]]]
+        found.append((float(ends[0]), float(ends[1]), float(-best.fun)))
     return found
+
+
+def _top(t: np.ndarray, values: np.ndarray, i: int) -> float:
+    """Where the parabola through three points is highest."""
+    return float(vertex(t, -values, np.array([i]))[0])
 
 
 def _root(function: Callable[[float], float], t: np.ndarray, values: np.ndarray, a: int, b: int) -> float:

@@ -84,7 +84,7 @@ class SegmentPath:
         return np.concatenate([dx[..., :3], omega], axis=-1), np.concatenate([ddx[..., :3], slope], axis=-1)
 
     def way(self, progress: np.ndarray) -> np.ndarray:
-        """See :class:`er3a.planning.moves.ToolPath`; by Gauss quadrature of 12 points per piece."""
+        """See :class:`er3a.planning.moves.ToolPath`; by Gauss quadrature with 12 points per piece."""
         progress = np.asarray(progress, float)
         edges = self.curve.edges
         whole = np.concatenate([[0.0], np.cumsum(self._lengths(edges[:-1], edges[1:]))])
