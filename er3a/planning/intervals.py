@@ -11,7 +11,6 @@ from scipy.optimize import brentq, minimize_scalar
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.turns import LIMIT_TOLERANCE
 from er3a.kinematics.wrist_partitioned import solve_slots
-from er3a.planning.branches import vertex
 from er3a.planning.followed import Followed
 from er3a.planning.singular_events import Joints, runs
 from er3a.robots.robot import Robot
@@ -99,14 +98,16 @@ def _peaks_between(
 ) -> list[tuple[float, float, float]]:
     """Stretches of positive values about a peak between grid points that are not positive themselves.
 
-    A peak is looked for where the parabola through a highest point and its neighbours comes half way to zero.
+    A peak is looked for where the parabola through a highest point and its neighbours rises half way to zero at least.
     """
     inner = values[1:-1]
     tops = 1 + np.flatnonzero((inner <= 0) & (inner > values[:-2]) & (inner >= values[2:]))
     found = []
     for i in tops:
-        rise = float(np.polynomial.Polynomial.fit(t[i - 1 : i + 2], values[i - 1 : i + 2], 2)(_top(t, values, i)))
-        if values[i] + 2 * (rise - values[i]) <= 0:
+        before, after = t[i] - t[i - 1], t[i + 1] - t[i]
+        rising, falling = (values[i] - values[i - 1]) / before, (values[i + 1] - values[i]) / after
+        slope, bend = (rising * after + falling * before) / (before + after), (rising - falling) / (before + after)
+        if values[i] + slope**2 / (2 * bend) <= 0:
             continue
         near = {"bounds": (t[i - 1], t[i + 1]), "method": "bounded", "options": {"xatol": 1e-10 * (t[-1] - t[0])}}
         best = minimize_scalar(lambda at: -function(at), **near)
@@ -115,11 +116,6 @@ def _peaks_between(
         ends = [brentq(function, *sorted((side, best.x)), xtol=1e-12 * (t[-1] - t[0])) for side in t[[i - 1, i + 1]]]
         found.append((float(ends[0]), float(ends[1]), float(-best.fun)))
     return found
-
-
-def _top(t: np.ndarray, values: np.ndarray, i: int) -> float:
-    """Where the parabola through three points is highest."""
-    return float(vertex(t, -values, np.array([i]))[0])
 
 
 def _root(function: Callable[[float], float], t: np.ndarray, values: np.ndarray, a: int, b: int) -> float:
