@@ -118,6 +118,30 @@ def index(study: StudyFile = DEFAULT_STUDY, results: Results = DEFAULT_RESULTS, 
 
 
 @app.command()
+def diff(
+    old: Annotated[Path, typer.Argument(help="a results folder")],
+    new: Annotated[Path, typer.Argument(help="another results folder")],
+    output: Annotated[Path | None, typer.Option(help="also write them as a page")] = None,
+):
+    """Compare two results folders: verdicts, key figures and tables that moved."""
+    from dataclasses import astuple
+
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    from er3a.viewing.diff import changes, write_diff
+
+    found = changes(old, new)
+    table = Table("robot", "stage", "what", "old", "new", "difference", "note", box=box.SIMPLE)
+    for change in found:
+        table.add_row(*astuple(change))
+    Console().print(table if found else "Nothing differs.")
+    if output:
+        write_diff(old, new, found, output)
+
+
+@app.command()
 def view(
     robot: Annotated[str | None, typer.Argument(help="one robot; all if absent")] = None,
     reports: Reports = DEFAULT_REPORTS,
