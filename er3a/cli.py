@@ -142,6 +142,19 @@ def diff(
 
 
 @app.command()
+def archive(
+    output: Annotated[Path, typer.Option(help="the zip to write")] = Path("er3a-study.zip"),
+    study: StudyFile = DEFAULT_STUDY,
+    results: Results = DEFAULT_RESULTS,
+    reports: Reports = DEFAULT_REPORTS,
+):
+    """Pack a finished study into one zip with RO-Crate metadata."""
+    from er3a.archive import archive as pack
+
+    print(f"{output}: written, {pack(study, results, reports, output)} files with RO-Crate metadata")
+
+
+@app.command()
 def view(
     robot: Annotated[str | None, typer.Argument(help="one robot; all if absent")] = None,
     reports: Reports = DEFAULT_REPORTS,
