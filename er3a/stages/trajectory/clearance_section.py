@@ -27,6 +27,8 @@ def clearance_section(summary: dict[str, Any], rows: pd.DataFrame) -> dict[str, 
         caption = f"Below zero bodies overlap: {', '.join(colliding)} can't be driven as planned."
     else:
         caption = "No path comes to zero: none meets its surroundings or the arm itself."
+    if any(record["unreachable"] for record in records):
+        caption += " Grey: not reachable."
     return {
         "picture": Picture(
             _curves(records, rows), f"Least clearance over time, one panel per path. {caption}", caption

@@ -95,6 +95,8 @@ def path_record(robot: Robot, motion: Motion, found: Judgement) -> dict[str, Any
         "length_m": float(motion.way(motion.samples[-1:])[0]),
         "branches": [labels[slot] for slot in slots],
         "half_turns": _half_turns(motion),
+        **_corners(motion),
+        "repeated_rows": list(motion.built.repeated_rows),
         "start_turn_deg": None if followed is None else _degrees(followed.start_turn),
         "singularities": [_event_record(event) for event in found.events],
         "out_of_limits": interval_records(motion, found.limits),
@@ -197,6 +199,16 @@ def _half_turns(motion: Motion) -> list[dict[str, Any]]:
         return []
     turns = motion.built.tool.half_turns()
     return [{"segment": k, "axis": [float(x) for x in np.round(axis, 12) + 0.0]} for k, axis in turns]
+
+
+def _corners(motion: Motion) -> dict[str, float | None]:
+    """By how much the motion passes the corner that it rounds the most; None for paths without corners."""
+    joints = np.degrees(getattr(motion.built.joints, "deviation", []))
+    tool = 1000 * np.asarray(getattr(motion.built.tool, "deviation", []))
+    return {
+        "corner_deviation_mm": float(tool.max()) if tool.size else None,
+        "corner_deviation_deg": float(joints.max()) if joints.size else None,
+    }
 
 
 def _event_record(event: SingularEvent) -> dict[str, Any]:
