@@ -132,9 +132,11 @@ class Line:
     def poses(self, progress: np.ndarray) -> np.ndarray:
         """See :class:`ToolPath`."""
         progress = np.asarray(progress, float)
-        return _poses(
-            self.T_start, self.T_start[:3, 3] + progress[..., None] * self.translation, self.rotation, progress
-        )
+        return _poses(self.T_start, self.points(progress), self.rotation, progress)
+
+    def points(self, progress: np.ndarray) -> np.ndarray:
+        """The tool point (..., 3), m, at shares of the way (...,)."""
+        return self.T_start[:3, 3] + np.asarray(progress)[..., None] * self.translation
 
     def twists(self, progress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See :class:`ToolPath`."""
@@ -194,7 +196,11 @@ class Arc:
     def poses(self, progress: np.ndarray) -> np.ndarray:
         """See :class:`ToolPath`."""
         progress = np.asarray(progress, float)
-        return _poses(self.T_start, self.centre + self._spokes(progress), self.rotation, progress)
+        return _poses(self.T_start, self.points(progress), self.rotation, progress)
+
+    def points(self, progress: np.ndarray) -> np.ndarray:
+        """The tool point (..., 3), m, at shares of the way (...,)."""
+        return self.centre + self._spokes(np.asarray(progress, float))
 
     def twists(self, progress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See :class:`ToolPath`."""

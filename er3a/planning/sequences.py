@@ -111,7 +111,7 @@ class SegmentPath:
             rate = (end - start) / (self.curve.edges[k + 1] - self.curve.edges[k])
             share = start + (end - start) * u[here]
             first, second = arc.twists(share)
-            x[here, :3] = arc.poses(share)[..., :3, 3]
+            x[here, :3] = arc.points(share)
             dx[here, :3], ddx[here, :3] = rate * first[..., :3], rate**2 * second[..., :3]
         return x, dx, ddx
 
@@ -190,7 +190,7 @@ def segment_path(
     for k, part in enumerate(segments):
         origin, u = part.T_start[:3, :3], np.array([starts[k], ends[k]])
         if u[1] - u[0] > RUNS_ON:
-            points = np.hstack([part.poses(u)[:, :3, 3], u[:, None] * part.rotation])
+            points = np.hstack([part.points(u), u[:, None] * part.rotation])
             add((u[1] - u[0]) * sizes[k], straight(*points), origin, part if isinstance(part, Arc) else None, u)
         if k + 1 < len(segments) and blends[k] > 0:
             onward = segments[k + 1]
@@ -212,9 +212,8 @@ def segment_path(
     )
     points = [part.T_start[:3, 3] for part in segments[1:]]
     near = _passes(corners, np.asarray(blends) / sizes.sum())
-    way = path.poses(near)[..., :3, 3]
-    passed = [np.linalg.norm(way[k] - point, axis=-1).min() for k, point in enumerate(points)]
-    return replace(path, deviation=np.array(passed))
+    away = path._values(near)[0][..., :3] - np.reshape(points, (-1, 1, 3))
+    return replace(path, deviation=np.linalg.norm(away, axis=-1).min(axis=-1))
 
 
 def joint_sequence(
@@ -263,8 +262,8 @@ def _check(sizes: np.ndarray, blends: np.ndarray, unit: float, name: str) -> Non
 def _beside(part: Segment, share: float, size: float, turn: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Position and rotation vector (6,) of a segment beside a corner, with derivatives by its way."""
     first, second = part.twists(np.array(share))
-    position = part.poses(np.array(share))[:3, 3]
-    return np.concatenate([position, turn * part.rotation]), first / size, second / size**2
+    value = np.concatenate([part.points(np.array(share)), turn * part.rotation])
+    return value, first / size, second / size**2
 
 
 def _curve(spans: list[float], coefficients: list[np.ndarray]) -> Curve:
