@@ -39,8 +39,10 @@ def compute(study: Study, name: str, folder: Path) -> None:
     scene = load_scene(scene_file) if scene_file else None
     bodies = Bodies(robot, scene) if can_measure() else None
     tables, clearances, records = [], [], []
+    ends: dict[str, np.ndarray] = {}
     for i, entry in enumerate(load_paths(file).paths):
-        motion = motion_of(robot, entry, settings.checks_per_sample, f"paths[{i}]", file)
+        motion = motion_of(robot, entry, settings.checks_per_sample, f"paths[{i}]", file, ends)
+        ends[entry.name] = motion.q[-1]
         found = judge(robot, motion, near)
         tables.append(_table(robot, motion, found, near, length))
         along = measured(bodies, motion, settings.overlap_mm) if bodies else None
