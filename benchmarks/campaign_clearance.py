@@ -11,15 +11,15 @@ from er3a.collision.scene import SceneFile
 from er3a.planning.moves import JointMove
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
-MOTIONS, DENSE, SEED, DEPTH = 200, 501, 20261120, 1e-3
+MOTIONS, DENSE, SEED, DEPTH = 400, 501, 20261120, 1e-3
 ENDS = np.array([0.0, 1.0])
 
 
 def past_an_obstacle(robot, random) -> tuple[JointMove, SceneFile]:
-    """A move of up to 60 deg per joint, and a bead or a wire within 250 mm of the tool's way."""
+    """A move of up to 60 deg per joint, and a bead or a wire within 120 mm, along each axis, of the tool's way."""
     a = random.uniform(robot.lower, robot.upper) * 0.7
     move = JointMove(a, a + random.uniform(-1.05, 1.05, 6), 1.0)
-    at = forward(robot, move.joints(np.array(random.uniform(0.2, 0.8)))[0])[:3, 3] + random.uniform(-0.25, 0.25, 3)
+    at = forward(robot, move.joints(np.array(random.uniform(0.2, 0.8)))[0])[:3, 3] + random.uniform(-0.12, 0.12, 3)
     solid = {"name": "obstacle", "xyz_mm": (1000 * at).tolist(), "radius_mm": float(random.uniform(0.2, 5))}
     if random.uniform() < 0.5:
         return move, SceneFile(kind="scene", title="bead", spheres=[solid | {"radius_mm": solid["radius_mm"] + 1}])
