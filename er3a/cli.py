@@ -111,10 +111,10 @@ def report(
 
 @app.command()
 def index(study: StudyFile = DEFAULT_STUDY, results: Results = DEFAULT_RESULTS, reports: Reports = DEFAULT_REPORTS):
-    """Write the index page over all robots and stages."""
+    """Write the pages over all robots and stages: the index and the comparison of two robots."""
     from er3a.viewing.index import write_index
 
-    write_index(load_study(study), results, reports / "index.html")
+    write_index(load_study(study), results, reports)
 
 
 @app.command()
