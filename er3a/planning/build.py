@@ -13,7 +13,8 @@ from er3a.errors import InputError, PathError, PoseError
 from er3a.kinematics.branch import branch_labels
 from er3a.kinematics.forward import forward
 from er3a.kinematics.transforms import transform
-from er3a.planning.moves import JointMove, Line, ToolPath, arc, line, rotation_between
+from er3a.planning.arcs import arc
+from er3a.planning.moves import JointMove, Line, ToolPath, line, rotation_between
 from er3a.planning.path_file import (
     ArcPath,
     ArcTo,

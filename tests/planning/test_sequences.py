@@ -12,7 +12,8 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from er3a.errors import PathError, PoseError
 from er3a.kinematics.transforms import transform
-from er3a.planning.moves import arc, line
+from er3a.planning.arcs import arc
+from er3a.planning.moves import line
 from er3a.planning.rotation_curves import spin
 from er3a.planning.sequences import Times, joint_sequence, segment_path
 
