@@ -146,8 +146,8 @@ def test_each_stage_s_inputs_exist_and_are_its_own(study, monkeypatch):
     assert study.inputs("er3a_c60_article", "workspace") == [robot]
     scene = Path("data/scenes/table_and_post.yaml")
     assert study.inputs("er3a_c60_article", "inverse") == [robot, Path("data/targets/er3a_c60_article.yaml"), scene]
-    pedestal = Path("data/scenes/high_pedestal.yaml")
-    article = [robot, Path("data/paths/er3a_c60_article.yaml"), pedestal]
+    low_floor = Path("data/scenes/wall_and_low_floor.yaml")
+    article = [robot, Path("data/paths/er3a_c60_article.yaml"), low_floor]
     assert study.inputs("er3a_c60_article", "trajectory") == article
     tables = [Path("data/paths/er3a_c60.yaml"), Path("data/paths/er3a_c60_seam.csv"), scene]
     assert study.inputs("er3a_c60", "trajectory") == [ROBOTS / "er3a_c60.yaml", *tables]
