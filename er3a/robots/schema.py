@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from er3a.inputs.units import FARTHEST_MM, MOST_DEG
+from er3a.inputs.units import FARTHEST_MM, MOST_DEG, Triple
 from er3a.inputs.yaml_file import StrictModel
 from er3a.robots.robot import Grade
 
@@ -19,7 +19,6 @@ FASTEST_DEG_S = 36_000.0
 Text = Annotated[str, Field(min_length=1, max_length=2000)]
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 JointNumber = Annotated[int, Field(ge=1, le=6)]
-Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
 class Sourced(StrictModel):
