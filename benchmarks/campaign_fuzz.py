@@ -34,6 +34,7 @@ from er3a.identification.measurements import load_measurements
 from er3a.inputs.yaml_file import load
 from er3a.kinematics.forward import forward
 from er3a.planning.path_file import load_paths
+from er3a.planning.path_table import PathTable, read_path_table
 from er3a.references.load import check_reference_file
 from er3a.robots.load import load_robot
 from er3a.robots.schema import RobotFile
@@ -86,6 +87,15 @@ TARGET_TABLE = f"""name,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg,note,{",".join
 a,400,0,300.5,0,90,0,first,0,0,0,0,0,0
 b,350,100.25,280,10,80,30,,10,20,0,0,45,0
 """
+PATH_TABLE = """t_s,x_mm,y_mm,z_mm,qw,qx,qy,qz
+0,400,0,300.5,0.5,0.5,0.5,0.5
+0.5,400,20,300,0.5,0.5,0.5,0.5
+1.25,400,20,320,1,0,0,0
+"""
+MOTION_TABLE = """q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg
+0,0,0,0,0,0
+10.5,20,-30,0,45,0
+"""
 MEASUREMENTS = """q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,point,x_mm,y_mm,z_mm,standard_deviation_mm
 0,0,0,0,0,0,flange,329.5,0.25,630,0.1
 30,20,-10,40,50,60,flange,210.5,140,,0.1
@@ -109,6 +119,7 @@ def seeds() -> list[tuple[str, bytes]]:
     robot = (ROOT / "data/robots/er3_600.yaml").read_text(encoding="utf-8").replace("name: er3_600", "name: full")
     more = {"full.yaml": robot + ALL_OF_A_ROBOT, "scene.yaml": SCENE, "targets.yaml": TARGETS}
     more |= {"targets/table.csv": TARGET_TABLE, "measured.csv": MEASUREMENTS}
+    more |= {"paths/tool.csv": PATH_TABLE, "paths/joints.csv": MOTION_TABLE}
     return found + [(name, text.encode()) for name, text in more.items()]
 
 
@@ -254,6 +265,8 @@ def differing_table(path: Path) -> list[str]:
     table = pd.read_csv(StringIO(text, newline=""), dtype=str, keep_default_na=False, skip_blank_lines=True)
     table = table.map(str.strip)
     table = table[(table != "").any(axis=1)]
+    if path.parent.name == "paths":
+        return _differing_points(read_path_table(path), table)
     if path.parent.name == "targets":
         rows: list = list(load_targets(path))
     else:
@@ -263,6 +276,28 @@ def differing_table(path: Path) -> list[str]:
     if len(rows) != len(table):
         return [f"{len(rows)} rows of {len(table)}"]
     return [word for row, (_, line) in zip(rows, table.iterrows()) for word in _differing_row(row, line)]
+
+
+def _differing_points(points: PathTable, table: pd.DataFrame) -> list[str]:
+    """The rows of a path's table whose times, joints, positions or orientations were read otherwise."""
+    if len(points.rows) != len(table):
+        return [f"{len(points.rows)} rows of {len(table)}"]
+
+    def written(*names: str) -> np.ndarray:
+        return np.array([[float(text) for text in table[name]] for name in names]).T
+
+    differences = [] if points.times is None else [points.times - written("t_s")[:, 0]]
+    if points.joints is not None:
+        differences.append(np.degrees(points.joints) - written(*(f"q{joint}_deg" for joint in range(1, 7))))
+    else:
+        differences.append(points.poses[:, :3, 3] * 1000 - written("x_mm", "y_mm", "z_mm"))
+        if "qw" in table:
+            turns = Rotation.from_quat(written("qx", "qy", "qz", "qw")).as_matrix()
+        else:
+            turns = Rotation.from_euler("xyz", written("roll_deg", "pitch_deg", "yaw_deg"), degrees=True).as_matrix()
+        differences.append((points.poses[:, :3, :3] - turns).reshape(len(turns), 9))
+    worst = max(np.abs(difference).max() for difference in differences)
+    return [] if worst < 1e-6 else [f"points differ by {worst:.3g}"]
 
 
 def _differing_row(row: object, line: pd.Series) -> list[str]:

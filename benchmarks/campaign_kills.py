@@ -13,6 +13,8 @@ from random import Random
 
 from small_study import contents, environment, finished, fresh, run_command
 
+from er3a.viewing.viewer import without_statistics
+
 KILLS, SEED = 50, 20261120
 LONGEST_S = 40.0  # a kill comes at a moment drawn evenly from this long after each start
 RERUN = Path(sys.executable).with_name("rerun")
@@ -41,7 +43,9 @@ def faults_of(folder: Path, sound: dict[str, bytes], whole: bool) -> list[str]:
         faults += [f"{name}: missing" for name in sorted(set(sound) - names)]
     recordings = [str(path) for path in folder.glob("reports/*/*.rrd")]
     if recordings:
-        done = subprocess.run([RERUN, "rrd", "verify", *recordings], capture_output=True, text=True, check=False)
+        command = [RERUN, "rrd", "verify", *recordings]
+        with without_statistics() as quiet:
+            done = subprocess.run(command, env=quiet, capture_output=True, text=True, check=False)
         faults += [] if done.returncode == 0 else [f"recordings: {done.stderr[-200:]}"]
     return faults
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from random import Random
 
 import pytest
-from campaign_fuzz import MEASUREMENTS, SCENE, TARGET_TABLE, TARGETS, judge, run, seeds, unclear
+from campaign_fuzz import MEASUREMENTS, PATH_TABLE, SCENE, TARGET_TABLE, TARGETS, judge, run, seeds, unclear
 from mutants import mutant
 
 from er3a.check import check_file, check_study
@@ -54,6 +54,7 @@ FOUND = [
     ("targets/table.csv", TARGET_TABLE, "x_mm,", "x_mm\rx,", "not valid CSV"),  # was a traceback
     ("targets/table.csv", TARGET_TABLE, "300.5", "\u0661\u0662", "is not a number"),  # was 12
     ("targets/table.csv", TARGET_TABLE, "first,0", "first,1e-400", "too small"),  # was 0
+    ("paths/tool.csv", PATH_TABLE, "x_mm,", "x_mm\rx,", "not valid CSV"),  # was a traceback
     ("measured.csv", MEASUREMENTS, "210.5", "1e300", "too large"),
     ("measured.csv", MEASUREMENTS, "210.5", "210\x00", r"210\x00"),  # a control character on the terminal
     ("limits.csv", LIMITS, "source", '"sou\nrce"', r"sou\nrce"),  # a message of two lines

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from er3a.errors import InputError
-from er3a.inputs.units import JointsDeg, PositionMm, RpyDeg, Six, Triple
+from er3a.inputs.units import JointsDeg, PositionMm, RpyDeg, Triple
 from er3a.inputs.yaml_file import StrictModel, load
 from er3a.robots.schema import Name, Text
 
@@ -17,6 +17,7 @@ TRAPEZOID_RAMP = 1 / 3  # of a motion's time, on the way up and on the way down
 
 Duration = Annotated[float, Field(gt=0, le=3600)]
 Samples = Annotated[int, Field(ge=2, le=100_000)]
+Rates = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=6, max_length=6)]
 Blend = Annotated[float, Field(ge=0, le=10_000)]
 
 
@@ -68,10 +69,10 @@ class JointPath(NamedPath):
     start_deg: JointsDeg | None = None
     after: Name | None = None
     end_deg: JointsDeg
-    start_velocity_deg_s: Six | None = None
-    end_velocity_deg_s: Six | None = None
-    start_acceleration_deg_s2: Six | None = None
-    end_acceleration_deg_s2: Six | None = None
+    start_velocity_deg_s: Rates | None = None
+    end_velocity_deg_s: Rates | None = None
+    start_acceleration_deg_s2: Rates | None = None
+    end_acceleration_deg_s2: Rates | None = None
     duration_s: Duration
 
     @model_validator(mode="after")

@@ -7,8 +7,6 @@ Columns of the tool: ``x_mm``, ``y_mm``, ``z_mm`` and those of one form of orien
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,9 +16,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import InputError
-from er3a.inputs.csv_file import Column, read_csv
+from er3a.inputs.csv_file import Column, read_csv, read_header
 from er3a.inputs.units import check_degrees, check_millimetres
-from er3a.inputs.yaml_file import read_text
 from er3a.kinematics.transforms import ORTHONORMAL_TOLERANCE, transform
 from er3a.target_table import FORMS, POSITION
 
@@ -62,7 +59,7 @@ def read_path_table(path: str | Path) -> PathTable:
         orientation that is none
     """
     path = Path(path)
-    header = {name.strip() for name in next(csv.reader(io.StringIO(read_text(path))), [])}
+    header = set(read_header(path))
     forms = [form for form, columns in FORMS.items() if header & set(columns)]
     of_joints = bool(header & set(JOINT_COLUMNS))
     if of_joints and (forms or header & set(POSITION)):
