@@ -348,7 +348,8 @@ def table() -> str:
     with tempfile.TemporaryDirectory() as folder:
         found = run(MUTANTS, SEED, Path(folder))
     spent = time.process_time() - start
-    kinds = Counter((outcome.fault or "").partition(":")[0] for *_, outcome in found if outcome.fault)
+    faults = [outcome.fault for *_, outcome in found if outcome.fault]
+    kinds = {kind: sum(fault.startswith(kind) for fault in faults) for kind in KINDS}
     accepted = sum(outcome.accepted for *_, outcome in found)
     slowest = max(outcome.seconds for *_, outcome in found)
     lines = [
