@@ -263,7 +263,7 @@ def differing_table(path: Path) -> list[str]:
     """Where what er3a read from a CSV file is not what pandas says is written there."""
     text = path.read_bytes().decode("utf-8-sig")
     table = pd.read_csv(StringIO(text, newline=""), dtype=str, keep_default_na=False, skip_blank_lines=True)
-    table = table.map(str.strip)
+    table = table.map(str.strip).rename(columns=str.strip)
     table = table[(table != "").any(axis=1)]
     if path.parent.name == "paths":
         return _differing_points(read_path_table(path), table)

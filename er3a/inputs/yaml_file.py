@@ -16,6 +16,7 @@ from er3a.errors import InputError
 Model = TypeVar("Model", bound=BaseModel)
 
 MAX_BYTES = 1_000_000
+MAX_YAML_BYTES = 250_000  # of which the worst takes seconds to read
 
 _FIELD = re.compile(r"([A-Za-z_]\w*(?:\.\w+|\[\d+\])*): ")
 _REMEDIES = {
@@ -99,7 +100,7 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
         if the file is missing, too large, not UTF-8, not YAML, or holds a key twice (with line and column)
     """
     path = Path(path)
-    text = read_text(path)
+    text = read_text(path, MAX_YAML_BYTES)
     try:
         data = yaml.load(text, Loader=_PlainLoader)
     except yaml.MarkedYAMLError as error:
@@ -117,20 +118,20 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
     return data
 
 
-def read_text(path: Path) -> str:
-    """Read a UTF-8 text file of at most 1 MB, or raise :class:`InputError`."""
+def read_text(path: Path, most: int = MAX_BYTES) -> str:
+    """Read a UTF-8 text file of at most so many bytes, or raise :class:`InputError`."""
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
             raise InputError(path, None, "not a file", "Check the path")
-        raw = path.read_bytes() if status.st_size <= MAX_BYTES else None
+        raw = path.read_bytes() if status.st_size <= most else None
     except FileNotFoundError:
         raise InputError(path, None, "there is no such file", "Check the path") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(path, None, f"can't be read ({reason})", "Check the path and its permissions") from None
     if raw is None:
-        raise InputError(path, None, f"larger than {MAX_BYTES} bytes", "Input tables are small text files")
+        raise InputError(path, None, f"larger than {most} bytes", "Input tables are small text files")
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:

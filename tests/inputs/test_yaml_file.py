@@ -9,7 +9,7 @@ import pytest
 from pydantic import Field, model_validator
 
 from er3a.errors import InputError
-from er3a.inputs.yaml_file import MAX_BYTES, StrictModel, load, parse, read_yaml
+from er3a.inputs.yaml_file import MAX_YAML_BYTES, StrictModel, load, parse, read_yaml
 
 
 class Part(StrictModel):
@@ -80,7 +80,7 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\nb: &b [*a, *a, *a, *a, *a, *a, *a, *a
         ("kind: whole\ntitle: 2020-13-45\n", None, "not valid YAML"),
         (b"kind: \xff\xfe\n", "byte 6", "not UTF-8 text"),
         ("kind: whole\n".encode("utf-16"), "byte 0", "not UTF-8 text"),
-        ("#" + " " * MAX_BYTES, None, f"larger than {MAX_BYTES} bytes"),
+        ("#" + " " * MAX_YAML_BYTES, None, f"larger than {MAX_YAML_BYTES} bytes"),
         ("kind: hole\n", "kind", "'hole' is refused"),
         ("kind: hole\nextra: 1\n", "kind", "'hole' is refused"),
         ("count: 1\n", "kind", "missing"),
