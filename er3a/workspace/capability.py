@@ -76,7 +76,7 @@ def map_capability(robot: Robot, middles: np.ndarray, directions: int, roll: Rol
     R, origin = section_frame(robot)
     asked = _joint_1_free(left_to_roll(robot, roll))
     arm = constants_for_blocks(robot)
-    rotations = tool_rotations(fibonacci_sphere(directions) @ R, roll)
+    rotations = R.T @ tool_rotations(fibonacci_sphere(directions), roll)
     sectors = sector_count(robot)
     range_1 = np.sort(robot.direction[0] * np.array([robot.lower[0], robot.upper[0]]) + robot.offset[0])
     out = [np.zeros((len(middles), sectors)) for _ in range(4)]
@@ -103,9 +103,9 @@ def _joint_1_free(robot: Robot) -> Robot:
 def manipulability(arm: BlockConstants, theta: np.ndarray) -> np.ndarray:
     """|det J| in m^3 for the table's angles (..., 6): the product of the shoulder's, elbow's and wrist's factors.
 
-    The determinant is that of the Jacobian at the wrist centre, where it falls into blocks (Siciliano et al., *Robotics*,
-    section 3.3.1): axis 1 moves the wrist by its distance ahead of axis 1, axes 2 and 3 by the triangle's area, and the
-    wrist turns by the volume that axes 4, 5 and 6 span.
+    The determinant is that of the Jacobian at the wrist centre, where it falls into blocks (Siciliano et al.,
+    *Robotics*, section 3.3.1): axis 1 moves the wrist by its distance ahead of axis 1, axes 2 and 3 by the triangle's
+    area, and the wrist turns by the volume that axes 4, 5 and 6 span.
     """
     upper = arm.turn_2 + theta[..., 1]
     bend = arm.turn_3 + arm.elbow_sign * theta[..., 2]

@@ -2,7 +2,7 @@
 
 A ring of the section (or a sector of it) is *in* the core if the sphere of directions falls into patches for each of
 which one branch and roll is good for all points of the ring and all directions of the patch. It is *out* if some
-direction is reached from none of its points. Both are told by :mod:`interval_inverse`; what is neither is split in four.
+direction is reached from none of its points. Both are told by :mod:`interval_inverse`; what is neither is split.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def dexterous_core(robot: Robot, cells: np.ndarray, directions: int, roll: Roll,
     R, origin = section_frame(robot)
     sectors = sector_count(robot)
     order = np.argsort(np.arange(directions) * _STRIDE % 1)
-    against = tool_rotations(fibonacci_sphere(directions)[order] @ R, roll)
+    against = R.T @ tool_rotations(fibonacci_sphere(directions)[order], roll)
     angles = np.array(roll.angles)
     numbers = (roll.half_step, roll.beside, roll.reach, float(arm.upper_arm + arm.forearm))
     open_sectors = np.full(len(cells), _ONE if sectors == 1 else _ALL)
@@ -89,9 +89,7 @@ def dexterous_core(robot: Robot, cells: np.ndarray, directions: int, roll: Roll,
 def _split(cells: np.ndarray) -> np.ndarray:
     a, b, c, d = cells.T
     m, n = (a + b) / 2, (c + d) / 2
-    return np.concatenate(
-        [np.stack(part, axis=1) for part in ((a, m, c, n), (m, b, c, n), (a, m, n, d), (m, b, n, d))]
-    )
+    return np.concatenate([np.stack(part, axis=1) for part in ((a, m, c, n), (m, b, c, n), (a, m, n, d), (m, b, n, d))])
 
 
 @kernel

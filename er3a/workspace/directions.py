@@ -1,7 +1,7 @@
 """Tool directions: even sets over the sphere and over cones, and the poses that a tool takes along them.
 
-The tool's direction is the z axis of its frame. What the roll about it does depends on the tool: if the wrist centre and
-axis 6 lie on the tool's own axis, rolling turns joint 6 alone, and a direction is reached for some roll exactly if it is
+The tool's direction is the z axis of its frame. What the roll about it does depends on the tool: if the wrist centre
+and axis 6 lie on the tool's own axis, rolling turns joint 6 alone, and some roll reaches a direction exactly if it is
 reached without asking joint 6 (*free roll*). Any other tool moves the wrist when it rolls, and rolls are sampled.
 """
 
@@ -68,13 +68,15 @@ def left_to_roll(robot: Robot, roll: Roll) -> Robot:
 def cone_directions(axis: np.ndarray, half_angle: float) -> np.ndarray:
     """Unit vectors (n, 3) of a cone: rings at most 10 deg apart, the outermost (on the cone's edge) first.
 
+    Each ring is its own image under quarter turns.
+
     Parameters
     ----------
     axis : (3,), unit vector; half_angle : rad, up to pi
     """
     rings = int(np.ceil(half_angle / _RING - 1e-9))
     angles = [half_angle * ring / rings for ring in range(rings, 0, -1)]
-    counts = [max(6, int(np.ceil(2 * np.pi * np.sin(min(angle, np.pi / 2)) / _RING))) for angle in angles]
+    counts = [4 * max(2, int(np.ceil(np.pi / 2 * np.sin(min(angle, np.pi / 2)) / _RING))) for angle in angles]
     polar = np.repeat([*angles, 0.0], [*counts, 1])
     around = np.concatenate([*(2 * np.pi * np.arange(count) / count for count in counts), [0.0]])
     return from_polar(axis, polar, around)
@@ -114,7 +116,7 @@ def poses(points: np.ndarray, rotations: np.ndarray) -> np.ndarray:
 
 @kernel
 def point_tool(T, frame, polar, around, c_roll, s_roll):
-    """Turn a pose (4, 4) so that its z axis is at angles (rad) from and around z of a frame (columns x, y, z), rolled."""
+    """Turn a pose (4, 4): its z axis at angles (rad) from and around z of a frame (columns x, y, z), rolled."""
     cp, sp, ca, sa = np.cos(polar), np.sin(polar), np.cos(around), np.sin(around)
     for i in range(3):
         flat = frame[i, 0] * ca + frame[i, 1] * sa

@@ -1,11 +1,11 @@
 """Where a box can stand so that the tool reaches every point of it along every required direction.
 
-A lattice of points is asked for all directions of a cone, branch by branch. A box fits where all lattice points in it are
-good, which sliding minima tell for all places at once. The lattice only proposes; :mod:`placement_proof` decides.
+A lattice of points is asked for all directions of a cone, branch by branch. A box fits where all lattice points in it
+are good, which sliding minima tell for all places at once. The lattice only proposes; :mod:`placement_proof` decides.
 
-Criterion: places where one branch serves the whole box come first, then those with the largest least manipulability over
-the box and the cone, which keeps away from singularities; equals by the room to the joint limits. Distance from limits
-is a demand of its own: the task narrows them.
+Criterion: places where one branch serves the whole box come first, then those with the largest least manipulability
+over the box and the cone, which keeps away from singularities; equals by the room to the joint limits. Distance from
+limits is a demand of its own: the task narrows them.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Task:
 
 
 def narrowed(robot: Robot, margin: float) -> Robot:
-    """The robot with the limits of joints with less than a full turn drawn in by ``margin`` (rad), to a point at most."""
+    """The robot with the limits of joints that have less than a full turn drawn in by ``margin`` (rad)."""
     span = robot.upper - robot.lower
     inward = np.where(span < FREE, np.minimum(margin, span / 2), 0.0)
     return robot.replace(lower=robot.lower + inward, upper=robot.upper - inward)
@@ -65,7 +65,7 @@ class Field:
     origin : (3,), m; spacing : (3,), m; shape of the arrays : (nx, ny, nz)
     least : (nx, ny, nz, 8), m^3, least manipulability over the directions by branch, NO where it misses one
     least_any : (nx, ny, nz), the same by the best branch for each direction
-    room : (nx, ny, nz, 8), rad, least distance from a limit over the directions by branch (joints with less than a turn)
+    room : (nx, ny, nz, 8), rad, least distance of joints with less than a full turn from their limits, by branch
     """
 
     origin: np.ndarray
@@ -125,7 +125,7 @@ def survey(robot: Robot, task: Task, roll: Roll, coarsest: float) -> Field:
     local = (points - origin) @ R.T
     near = np.hypot(local[:, 0], local[:, 1])
     asked = np.flatnonzero(
-        (near >= task.clear)
+        (near >= task.clear - 1e-9)
         & (points[:, 2] >= task.lowest - 1e-9)
         & (np.linalg.norm(points - middle, axis=1) <= arm.reach)
     )

@@ -21,7 +21,8 @@ PROVEN, REFUTED, UNDECIDED = "proven", "refuted", "undecided"
 _ANSWERS = (UNDECIDED, PROVEN, REFUTED)
 _STACK = 512
 _MOST_TRIES = 200
-_POSES_PER_BRICK = 256
+_POSES_PER_BRICK = 512
+_SMALLEST = (0.2, 0.05, 0.0125, 0.003, 0.0)  # half-widths, rad or length per lever, of pieces to split
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,8 +99,15 @@ def prove_place(
     NotWristPartitionedError
     """
     half = (task.box[[1, 0, 2]] if turned else task.box) / 2
-    answer, used = _prove(*_constants(robot, task, roll), np.asarray(centre, float), half, slot, most_poses)
-    return _ANSWERS[answer], int(used)
+    constants, centre = _constants(robot, task, roll), np.asarray(centre, float)
+    answer = used = 0
+    # Coarse pieces first, everywhere: what refutes a place is found before effort goes into its rims.
+    for smallest in _SMALLEST:
+        answer, spent = _prove(*constants, centre, half, slot, most_poses - used, smallest)
+        used += int(spent)
+        if answer or used >= most_poses:
+            break
+    return _ANSWERS[answer], used
 
 
 def proven_bricks(robot: Robot, task: Task, field: Field, roll: Roll) -> np.ndarray:
@@ -134,18 +142,18 @@ def _constants(robot: Robot, task: Task, roll: Roll):
 @kernel
 def _prove_all(arm, ranges, frame, half_angle, angles, reach, scale, centres, half, slot, most_poses, good):
     for n in range(centres.shape[0]):
-        numbers = (centres[n], half, slot, most_poses)
+        numbers = (centres[n], half, slot, most_poses, 0.0)
         good[n] = _prove(arm, ranges, frame, half_angle, angles, reach, scale, *numbers)[0] == 1
 
 
 @kernel
-def _prove(arm, ranges, frame, half_angle, angles, reach, scale, centre, half, slot, most_poses):
+def _prove(arm, ranges, frame, half_angle, angles, reach, scale, centre, half, slot, most_poses, smallest):
     T, state, theta_1 = np.eye(4), np.empty(SLOTS, dtype=np.int8), np.empty((SLOTS, 2))
     stack, size = np.empty((_STACK, 10)), np.empty(5)
     for k in range(3):
         stack[0, 2 * k], stack[0, 2 * k + 1] = centre[k] - half[k], centre[k] + half[k]
     stack[0, 6], stack[0, 7], stack[0, 8], stack[0, 9] = 0.0, half_angle, 0.0, 2.0 * np.pi
-    top, used = 1, 0
+    top, used, answer = 1, 0, 1
     while top > 0:
         top -= 1
         piece = stack[top]
@@ -179,12 +187,15 @@ def _prove(arm, ranges, frame, half_angle, angles, reach, scale, centre, half, s
         for k in range(5):
             if size[k] > size[widest]:
                 widest = k
+        if size[widest] < smallest:
+            answer = 0
+            continue
         middle = 0.5 * (piece[2 * widest] + piece[2 * widest + 1])
         stack[top + 1] = piece
         stack[top + 1, 2 * widest] = middle
         stack[top, 2 * widest + 1] = middle
         top += 2
-    return 1, used
+    return answer, used
 
 
 @kernel

@@ -141,6 +141,7 @@ def _placement(robot: Robot, settings: CapabilitySettings, roll: Roll, cell: flo
     field = survey(robot, task, roll, cell)
     places = fitting_places(field, proven_bricks(robot, task, field, roll), task.box)
     chosen = choose_places(robot, task, places, roll, LISTED, settings.proof_poses)
+    places.proven[[row for row, proven in zip(chosen.row, chosen.proven) if proven]] = True
     summary = {
         "computed": True,
         "spacing_m": field.spacing.tolist(),
