@@ -101,13 +101,14 @@ class BoxTask(StrictModel):
 class CapabilitySettings(StrictModel):
     """What the tool can do in each cell of the workspace.
 
-    ``directions`` are spread over the sphere, with ``rolls`` about each where the roll matters. The proofs of the
-    dexterous core and of the places may look at ``proof_poses`` neighbourhoods of poses each.
+    ``directions`` are spread over the sphere, with ``rolls`` about each where the roll matters (a tool beside axis 6,
+    which takes as many times longer). The proofs of the dexterous core and of the listed places may look at
+    ``proof_poses`` neighbourhoods of poses each.
     """
 
     directions: Annotated[int, Field(ge=12, le=10_000)] = 300
     rolls: Annotated[int, Field(ge=1, le=360)] = 8
-    proof_poses: Annotated[int, Field(ge=1, le=1_000_000_000)] = 1_000_000
+    proof_poses: Annotated[int, Field(ge=1, le=1_000_000_000)] = 100_000
     placement: BoxTask = BoxTask()
 
 

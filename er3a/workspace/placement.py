@@ -153,6 +153,8 @@ def serve(robot: Robot, points: np.ndarray, rotations: np.ndarray, roll: Roll):
     room = np.full((len(points), SLOTS), np.inf)
     alive = np.arange(len(points))
     for direction in rotations:
+        if not alive.size:
+            break
         for part in np.array_split(alive, max(1, len(alive) * len(direction) // _POSES)):
             found = inverse_batch(asked, poses(points[part][:, None], direction).reshape(-1, 4, 4))
             value = manipulability(arm, robot.direction * found.q + robot.offset)

@@ -10,7 +10,6 @@ import pandas as pd
 
 from er3a.errors import NotWristPartitionedError
 from er3a.kinematics.branch import branch_labels
-from er3a.results import Figure
 from er3a.robots.robot import Robot
 from er3a.study import CapabilitySettings
 from er3a.workspace.capability import Capability, map_capability
@@ -29,11 +28,10 @@ _PLACES = ["x_m", "y_m", "z_m", "turned", "slot", "manipulability_m3", "room_deg
 
 @dataclass(frozen=True)
 class CanDo:
-    """Results of this part: its tables ``capability`` and ``places``, summary keys, and key figures."""
+    """Results of this part: its tables ``capability`` and ``places``, and its keys of the summary."""
 
     tables: dict[str, pd.DataFrame]
     summary: dict[str, Any]
-    figures: list[Figure]
 
 
 def can_do(robot: Robot, settings: CapabilitySettings, cell: float) -> CanDo:
@@ -50,9 +48,9 @@ def can_do(robot: Robot, settings: CapabilitySettings, cell: float) -> CanDo:
         empty = {"capability": pd.DataFrame(columns=_CELLS, dtype=float)}
         empty["places"] = pd.DataFrame(columns=_PLACES, dtype=float)
         none = {"computed": False, "reason": reason}
-        return CanDo(empty, {"capability": none, "placement": none}, [])
+        return CanDo(empty, {"capability": none, "placement": none})
     cell = max(cell, 2 * (arm.upper_length + arm.forearm_length + arm.d) / MOST_ACROSS)
-    cells = _rings(arm.reach, arm.heights, cell)
+    cells = rings(arm.reach, arm.heights, cell)
     middles = np.stack([cells[:, :2].mean(axis=1), cells[:, 2:].mean(axis=1)], axis=1)
     capability = map_capability(robot, middles, settings.directions, roll)
     core = dexterous_core(robot, cells, settings.directions, roll, settings.proof_poses)
@@ -72,14 +70,10 @@ def can_do(robot: Robot, settings: CapabilitySettings, cell: float) -> CanDo:
     return CanDo(
         {"capability": _cell_table(middles, capability), "places": places},
         {"capability": summary, "placement": placed},
-        [
-            Figure("tool directions reached, on average", 100 * summary["share"]["mean"], "%"),
-            Figure("dexterous core, at most", 1000 * core.upper, "L"),
-        ],
     )
 
 
-def _rings(reach: float, heights: tuple[float, float], cell: float) -> np.ndarray:
+def rings(reach: float, heights: tuple[float, float], cell: float) -> np.ndarray:
     """Square cells (n, 4) of the section that cover everything within reach."""
     count = int(np.ceil(reach / cell)), int(np.ceil((heights[1] - heights[0]) / cell))
     rho, z = np.arange(count[0]) * cell, (heights[0] + heights[1] - count[1] * cell) / 2 + np.arange(count[1]) * cell

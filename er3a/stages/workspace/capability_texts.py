@@ -20,21 +20,7 @@ def capability_context(robot: Robot, summary: dict[str, Any], cells: pd.DataFram
     return {
         "can": can,
         "placed": placed,
-        "can_pictures": [
-            Picture(
-                upright_slices(robot, summary, cells),
-                "Slices through axis 1: share of tool directions, ways, manipulability",
-                _slices_caption(can),
-            ),
-            Picture(
-                level_slices(summary, cells),
-                "Slices across axis 1: share of tool directions",
-                "Where joint 1 is limited, the sector behind the arm loses directions first: "
-                "put work that needs many tool angles in front."
-                if can["sectors"] > 1
-                else "Joint 1 makes a full turn, so what counts is the distance from axis 1 and the height alone.",
-            ),
-        ],
+        "can_pictures": _pictures(robot, summary, cells) if len(cells) else [],
         "core_text": _core_text(can),
         "roll_text": _roll_text(can),
         "task_text": _task_text(can["settings"]["placement"]),
@@ -47,6 +33,25 @@ def capability_context(robot: Robot, summary: dict[str, Any], cells: pd.DataFram
         if len(places)
         else None,
     }
+
+
+def _pictures(robot: Robot, summary: dict[str, Any], cells: pd.DataFrame) -> list[Picture]:
+    can = summary["capability"]
+    return [
+        Picture(
+            upright_slices(robot, summary, cells),
+            "Slices through axis 1: share of tool directions, ways, manipulability",
+            _slices_caption(can),
+        ),
+        Picture(
+            level_slices(summary, cells),
+            "Slices across axis 1: share of tool directions",
+            "Where joint 1 is limited, the sector behind the arm loses directions first: "
+            "put work that needs many tool angles in front."
+            if can["sectors"] > 1
+            else "Joint 1 makes a full turn, so what counts is the distance from axis 1 and the height alone.",
+        ),
+    ]
 
 
 def _slices_caption(can: dict[str, Any]) -> str:

@@ -95,7 +95,6 @@ def compute(study: Study, name: str, folder: Path, parts: list[Path] | None = No
         Figure("reached volume, at most", upper, "m³"),
         Figure("convex hull", hull.volume, "m³"),
         Figure("least distance from axis 1", reach["nearest_to_axis"] * 1000, "mm"),
-        *doing.figures,
         Figure("samples", settings.samples, ""),
     ]
     write_summary(
