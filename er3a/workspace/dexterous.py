@@ -37,7 +37,7 @@ class Core:
     Attributes
     ----------
     lower, upper : proven bounds
-    estimate : the proven part, and the undecided rings whose middles reach all sampled directions
+    estimate : the proven part, and the undecided rings whose middles no sampled direction refuses
     cells, poses : how many rings and neighbourhoods of poses the proof looked at
     """
 
@@ -133,7 +133,7 @@ def _judge(arm, ranges, R, origin, cells, against, angles, numbers, most_poses, 
     """Judge the open sectors of cells; returns how many neighbourhoods of poses were looked at.
 
     ``open_sectors`` keeps those that stay undecided, ``good`` is set to those in the core, ``likely`` to the undecided
-    ones whose middles reach all of ``against``.
+    ones whose middles none of ``against`` refuses.
     """
     half_step, beside, reach, length = numbers
     T, state, theta_1 = np.eye(4), np.empty(SLOTS, dtype=np.int8), np.empty((SLOTS, 2))
@@ -187,7 +187,8 @@ def _not_out(arm, ranges, T, against, radius, half_step, beside, rest, state, th
             break
         missed = rest
         for j in range(against.shape[1]):
-            T[:3, :3] = against[d, j]
+            for i in range(3):
+                T[i, 0], T[i, 1], T[i, 2] = against[d, j, i, 0], against[d, j, i, 1], against[d, j, i, 2]
             branches(arm, ranges, T, radius, half_step, beside, state, theta_1)
             _, none = _sectors(ranges, state, theta_1)
             missed &= none

@@ -117,6 +117,7 @@ def survey(robot: Robot, task: Task, roll: Roll, coarsest: float) -> Field:
     middle = origin + arm.centre[2] * R[2]
     spacing = lattice_spacing(task.box, coarsest)
     count = np.ceil(arm.reach / spacing).astype(int)
+    count[2] += 1
     start = middle - count * spacing
     # Heights count from the lowest place, so that the lowest box lies on lattice points.
     start[2] += (task.lowest - start[2]) % spacing[2]

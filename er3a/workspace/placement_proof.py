@@ -191,7 +191,8 @@ def _prove(arm, ranges, frame, half_angle, angles, reach, scale, centre, half, s
             answer = 0
             continue
         middle = 0.5 * (piece[2 * widest] + piece[2 * widest + 1])
-        stack[top + 1] = piece
+        for k in range(10):
+            stack[top + 1, k] = piece[k]
         stack[top + 1, 2 * widest] = middle
         stack[top, 2 * widest + 1] = middle
         top += 2

@@ -171,7 +171,7 @@ def _listed(robot: Robot, task: Task, places: Places, chosen: Chosen, agile: flo
 
 def _place_table(places: Places, field: Field) -> pd.DataFrame:
     """The better of both turns at each centre (the table's first row there)."""
-    key = np.round(places.centre / field.spacing * 2).astype(np.int64)
+    key = np.round((places.centre - field.origin) / field.spacing * 2).astype(np.int64)
     _, first = np.unique(key, axis=0, return_index=True)
     rows = np.sort(first)
     table = pd.DataFrame(places.centre[rows], columns=_PLACES[:3])
