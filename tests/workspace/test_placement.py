@@ -15,7 +15,8 @@ from er3a.robots.robot import Robot
 from er3a.workspace.directions import cone_directions, from_polar, poses, roll_of, tool_rotations
 from er3a.workspace.placement import MIXED, NO, Places, Task, fitting_places, lattice_spacing, narrowed, survey
 from er3a.workspace.placement_proof import PROVEN, REFUTED, choose_places, prove_place, proven_bricks
-from tests.workspace.test_capability import NARROW, OFFSET_TOOL, full_arm, made_arm, placement
+from tests.kinematics.arms import placement
+from tests.workspace.shell_arm import NARROW, TOOL_ASIDE, shell_arm
 
 DOWN = np.array([0.0, 0.0, -1.0])
 TRAY = Task(np.array([0.2, 0.15, 0.05]), DOWN, np.radians(20), 0.0, 0.15, np.radians(2))
@@ -132,7 +133,7 @@ def test_harder_tasks_are_never_easier():
 def test_a_turned_base_turns_the_places():
     task = replace(TRAY, half_angle=np.radians(10))
     robot = load_robot("er3_600")
-    turned = robot.replace(base=placement([0, 0, 0], [0, 0, 90]))
+    turned = robot.replace(base=placement([0, 0, 0], [0, 0, np.pi / 2]))
     one, other = places_of(robot, task), places_of(turned, task)
     assert len(one.slot) == len(other.slot)
     assert np.sort(one.least) == pytest.approx(np.sort(other.least), rel=1e-6)
@@ -146,14 +147,14 @@ def test_a_turned_base_turns_the_places():
 )
 def test_an_arm_without_limits_serves_what_lies_in_its_shell(height, answer):
     """All directions at every point: the ball of 0.1 m about each must lie between 0.2 and 1.0 m from the shoulder."""
-    robot = full_arm()
+    robot = shell_arm()
     task = Task(np.array([0.3, 0.2, 0.1]), np.array([0.0, 0.6, 0.8]), np.pi, -9, 0)
     centre = np.array([0.05, -0.02, height])
     assert prove_place(robot, task, centre, False, MIXED, roll_of(robot, 1), 400_000)[0] == answer
 
 
 def test_a_tool_aside_is_proven_by_rolls(random):
-    robot = made_arm(*NARROW, tool=OFFSET_TOOL)
+    robot = shell_arm(*NARROW, tool=TOOL_ASIDE)
     roll = roll_of(robot, 6)
     assert not roll.free
     task = Task(np.array([0.08, 0.06, 0.04]), DOWN, np.radians(5), 0.0, 0.15)
