@@ -82,8 +82,7 @@ def placement_views(robot: Robot, summary: dict[str, Any], places: pd.DataFrame)
         panel.pcolormesh(*extent, unproven.T, cmap=ListedColormap([GRID]), rasterized=True)
         sure = np.ma.masked_where(~proven, value)
         mesh = panel.pcolormesh(*extent, sure.T, cmap=SHADES, vmin=0, vmax=top, rasterized=True)
-        for number, place in enumerate(listed, start=1):
-            _draw_box(panel, place, "xyz".index(across), "xyz".index(up), number)
+        _draw_boxes(panel, listed, ["xyz".index(across), "xyz".index(up)])
         panel.plot(*_shadow(robot, across, up), color=INK, linewidth=2.2, marker="o", markersize=3)
         equal_scale(panel, f"{across} (mm)", f"{up} (mm)")
         panel.set_title(title)
@@ -131,8 +130,15 @@ def _raster(points: np.ndarray, steps: list[float], share: np.ndarray, proven: n
     return [start + (np.arange(n + 1) - 0.5) * step for start, step, n in zip(low, steps, shape)], value, sure
 
 
-def _draw_box(axes: Axes, place: dict[str, Any], i: int, j: int, number: int) -> None:
-    centre, size = 1000 * np.array(place["centre_m"]), 1000 * np.array(place["size_m"])
-    low = centre - size / 2
-    axes.add_patch(Rectangle((low[i], low[j]), size[i], size[j], fill=False, edgecolor=HIGHLIGHT, linewidth=1.6))
-    axes.annotate(str(number), (low[i], low[j] + size[j]), (2, -9), textcoords="offset points", color=HIGHLIGHT)
+def _draw_boxes(axes: Axes, listed: list[dict[str, Any]], shown: list[int]) -> None:
+    """Outlines with their numbers; boxes that fall on each other share a label."""
+    labels: dict[tuple[float, ...], list[str]] = {}
+    for number, place in enumerate(listed, start=1):
+        centre, size = (1000 * np.array(place[key])[shown] for key in ("centre_m", "size_m"))
+        low = centre - size / 2
+        axes.add_patch(Rectangle(low, *size, fill=False, edgecolor=HIGHLIGHT, linewidth=1.6))
+        labels.setdefault((low[0].round(3), (low[1] + size[1]).round(3)), []).append(str(number))
+    shade = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1}
+    for corner, numbers in labels.items():
+        text = ", ".join(numbers)
+        axes.annotate(text, corner, (3, -10), textcoords="offset points", color=HIGHLIGHT, fontsize=8, bbox=shade)
