@@ -13,7 +13,17 @@ from pathlib import Path
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 EVIDENCE, RELIABILITY = DOCS / "evidence", DOCS / "reliability.md"
 PARTS = ("fuzz", "faults", "kills")
-CAMPAIGNS = ("kinematics", "singularities", "speed", "diagnosis", "identification", "workspace", "clearance", *PARTS)
+CAMPAIGNS = (
+    "kinematics",
+    "singularities",
+    "speed",
+    "diagnosis",
+    "identification",
+    "workspace",
+    "clearance",
+    "capability",
+    *PARTS,
+)
 
 
 def write_part(name: str, text: str) -> None:
