@@ -32,12 +32,12 @@ class Fault:
     memory: int | None = None
 
 
-def flip(name: str) -> Callable[[Path, ExitStack], None]:
-    """Turn one bit in the middle of a file."""
+def flip(name: str, share: float = 0.5) -> Callable[[Path, ExitStack], None]:
+    """Turn one bit of a file, in the middle or at another share of its length."""
 
     def make(folder: Path, _: ExitStack) -> None:
         content = bytearray((folder / name).read_bytes())
-        content[len(content) // 2] ^= 1
+        content[int(share * len(content))] ^= 1
         (folder / name).write_bytes(bytes(content))
 
     return make
@@ -122,7 +122,7 @@ FAULTS = (
     Fault("table with a flipped bit", flip(f"{STAGE}/checks.parquet"), REPORT, "checks.parquet: damaged"),
     Fault("summary cut in half", halve(f"{STAGE}/summary.json"), REPORT, "summary.json: damaged"),
     Fault("summary with a flipped bit", flip(f"{STAGE}/summary.json"), REPORT, "summary.json: damaged"),
-    Fault("checksums with a flipped bit", flip(f"{STAGE}/SHA256SUMS"), REPORT, STAGE),
+    Fault("checksums with a flipped bit", flip(f"{STAGE}/SHA256SUMS", 0), REPORT, f"{STAGE}/checks.parquet: damaged"),
     Fault("results of an older version", older, REPORT, "summary.json: format version 1"),
     Fault("recording cut in half", halve(f"{VIEW}.rrd"), ("view", ROBOT), f"{VIEW}.rrd: damaged"),
     Fault("two runs at once", taken, (), "another run is active in this folder"),
