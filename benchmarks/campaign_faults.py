@@ -176,7 +176,10 @@ def table() -> str:
         "",
         "| fault | what is said | one line | mended |",
         "|---|---|---|---|",
-        *(f"| {fault.name} | `{line}` | {_word(clear)} | {_word(mended)} |" for fault, line, clear, mended in found),
+        *(
+            f"| {fault.name} | {line.replace('`', '*')} | {_word(clear)} | {_word(mended)} |"
+            for fault, line, clear, mended in found
+        ),
     ]
     if not root:
         skipped = ", ".join(fault.name for fault in FAULTS if fault.root)
