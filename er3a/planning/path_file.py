@@ -6,16 +6,13 @@ import re
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from er3a.errors import InputError
-from er3a.inputs.units import check_degrees, check_millimetres
+from er3a.inputs.units import JointsDeg, PositionMm, RpyDeg, Triple
 from er3a.inputs.yaml_file import StrictModel, load
-from er3a.robots.schema import Name, Text, Triple
+from er3a.robots.schema import Name, Text
 
-WHOLE_DEGREES = "round them to whole degrees"
-
-SixAngles = Annotated[list[float], Field(min_length=6, max_length=6)]
 Duration = Annotated[float, Field(gt=0, le=3600)]
 Samples = Annotated[int, Field(ge=2, le=100_000)]
 
@@ -23,20 +20,8 @@ Samples = Annotated[int, Field(ge=2, le=100_000)]
 class PoseEntry(StrictModel):
     """A pose of the tool in the base frame; R = Rz(yaw) Ry(pitch) Rx(roll)."""
 
-    xyz_mm: Triple
-    rpy_deg: Triple
-
-    @field_validator("xyz_mm")
-    @classmethod
-    def _millimetres(cls, values):
-        check_millimetres(values)
-        return values
-
-    @field_validator("rpy_deg")
-    @classmethod
-    def _degrees(cls, values):
-        check_degrees(values, WHOLE_DEGREES)
-        return values
+    xyz_mm: PositionMm
+    rpy_deg: RpyDeg
 
 
 class JointPath(StrictModel):
@@ -45,16 +30,10 @@ class JointPath(StrictModel):
     kind: Literal["joint"]
     name: Name
     title: Text
-    start_deg: SixAngles
-    end_deg: SixAngles
+    start_deg: JointsDeg
+    end_deg: JointsDeg
     duration_s: Duration
     samples: Samples
-
-    @field_validator("start_deg", "end_deg")
-    @classmethod
-    def _degrees(cls, values):
-        check_degrees(values, WHOLE_DEGREES)
-        return values
 
 
 class LinePath(StrictModel):
@@ -67,7 +46,7 @@ class LinePath(StrictModel):
     kind: Literal["line"]
     name: Name
     title: Text
-    start_deg: SixAngles | None = None
+    start_deg: JointsDeg | None = None
     start: PoseEntry | None = None
     start_branch: Text | None = None
     end: PoseEntry
@@ -82,13 +61,6 @@ class LinePath(StrictModel):
         if self.start_branch is not None and self.start is None:
             raise ValueError("start_branch: start_deg already fixes the branch | Remove start_branch")
         return self
-
-    @field_validator("start_deg")
-    @classmethod
-    def _degrees(cls, values):
-        if values is not None:
-            check_degrees(values, WHOLE_DEGREES)
-        return values
 
 
 PathEntry = JointPath | LinePath
