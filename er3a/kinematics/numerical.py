@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -12,6 +10,7 @@ from er3a.errors import Er3aError, PoseError, ShapeError
 from er3a.kinematics.chain import JOINTS, arm_length, constant_links
 from er3a.kinematics.forward import checked_joints, jacobian
 from er3a.kinematics.iteration import solve_numerically
+from er3a.kinematics.threads import share_out
 from er3a.kinematics.transforms import check_poses
 from er3a.kinematics.turns import limit_reason, nearest_turns, principal, within
 from er3a.robots.robot import Robot
@@ -22,6 +21,7 @@ DIAGNOSIS_RESTARTS = 100
 NEARLY = 1e-6  # m (in parts of the arm's length) or rad: so near, only a singularity keeps the iteration from its end
 RANK = 1e-3  # smallest singular value below which the end of an iteration counts as singular
 SAME_ARM = 1e-6
+SMALLEST_SHARE = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,17 +139,11 @@ class _Search:
         q0 = np.ascontiguousarray(q0)
 
         def part(rows: slice) -> None:
-            first = 0 if rows.start is None else rows.start
             own = (q[rows], error[rows], starts[rows])
-            constants = (self.mask, self.tolerances, arm_length(robot), restarts, np.uint64(self.seed), first)
+            constants = (self.mask, self.tolerances, arm_length(robot), restarts, np.uint64(self.seed), rows.start)
             solve_numerically(arm, limits, T[rows], q0[rows], *constants, *own)
 
-        if threads > 1 and count > 1:
-            ends = np.linspace(0, count, min(threads, count) + 1).astype(int)
-            with ThreadPoolExecutor(threads) as pool:
-                list(pool.map(part, (slice(int(a), int(b)) for a, b in pairwise(ends))))
-        else:
-            part(slice(None))
+        share_out(count, threads, SMALLEST_SHARE, part)
         return (q if respect else principal(q)), error, starts
 
     def explain(self, T: np.ndarray, q: np.ndarray, error: np.ndarray, respect: bool, restarts: int) -> tuple[str, str]:
