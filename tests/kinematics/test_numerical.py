@@ -53,9 +53,10 @@ def test_singular_poses_are_solved(robot, random, kind):
     q = joints_near(robot, kind, random, 50)
     T = forward(robot, q)
     found = solve(robot, T, respect_limits=False, position_tolerance=1e-9, rotation_tolerance=1e-9)
-    assert found.solved.mean() >= (0.9 if kind == "folded" else 1.0)  # folded arms are a needle in the joint space
+    lost = np.count_nonzero(~found.solved)
+    assert lost <= (0.1 * len(q) if "folded" in kind else 0)  # folded arms are a needle in the joint space
     errors = pose_errors(forward(robot, found.q[found.solved]), T[found.solved])
-    assert max(part.max() for part in errors) < 1.1e-9
+    assert max(part.max(initial=0) for part in errors) < 1.1e-9
 
 
 def test_jacobian_of_the_error_is_its_derivative(robot, random):
