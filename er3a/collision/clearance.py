@@ -53,10 +53,12 @@ def clearance(robot: Robot, q: np.ndarray, scene: SceneFile | None) -> Clearance
     Raises
     ------
     Er3aError
-        if the Coal library is missing
+        if the Coal library is missing, or the scene is none
     """
     if coal is None:
         raise Er3aError("clearance needs the Coal library, which has no wheels for this platform; leave the scene out")
+    if not isinstance(scene, SceneFile | None):
+        raise Er3aError(f"the scene is a {type(scene).__name__}; expected what er3a.load_scene returns")
     capsules = envelopes_of(robot)
     shapes = [coal.Capsule(c.radius, float(np.linalg.norm(np.subtract(c.end, c.start)))) for c in capsules]
     solids = _solids(scene) if scene else []

@@ -11,7 +11,7 @@ from er3a.kinematics.block_inverse import BLOCK, count_turns, solve_blocks
 from er3a.kinematics.closed_form import REACHED, SLOTS
 from er3a.kinematics.forward import checked_joints
 from er3a.kinematics.threads import share_out
-from er3a.kinematics.transforms import check_poses
+from er3a.kinematics.transforms import as_floats, check_poses
 from er3a.kinematics.turns import nearest_turns, within
 from er3a.kinematics.wrist_partitioned import constants_for_blocks, solve_slots
 from er3a.robots.robot import Robot
@@ -56,13 +56,13 @@ def inverse_batch(
 
     Raises
     ------
-    ShapeError, PoseError
-        naming the first pose that is no rigid transform, or the wrong shape
+    ShapeError, PoseError, Er3aError
+        naming the first pose that is no rigid transform, the wrong shape, or the argument that can't be used
     NotWristPartitionedError
         if the arm has no closed form here
     """
     arm = constants_for_blocks(robot)
-    T = np.ascontiguousarray(T, dtype=float)
+    T = np.ascontiguousarray(as_floats(T, "T"))
     if T.ndim != 3 or T.shape[1:] != (4, 4):
         raise ShapeError("T", T.shape, "(N, 4, 4)")
     reference = _checked_reference(q_ref, len(T))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Integral
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from er3a.kinematics.chain import JOINTS, arm_length, constant_links
 from er3a.kinematics.forward import checked_joints, jacobian
 from er3a.kinematics.iteration import solve_numerically
 from er3a.kinematics.threads import share_out
-from er3a.kinematics.transforms import check_poses
+from er3a.kinematics.transforms import as_floats, check_poses
 from er3a.kinematics.turns import limit_reason, nearest_turns, principal, within
 from er3a.robots.robot import Robot
 
@@ -80,8 +81,9 @@ def solve(
     T = np.ascontiguousarray(check_poses(T))
     shape = T.shape[:-2]
     mask = _checked_mask(mask)
-    if not 0 <= restarts < 65536:
-        raise Er3aError(f"restarts is {restarts}; expected a whole number from 0 to 65535")
+    for name, value, most in (("restarts", restarts, 65535), ("seed", seed, 2**63 - 1)):
+        if not (isinstance(value, Integral) and 0 <= value <= most):
+            raise Er3aError(f"{name} is {value!r}; expected a whole number from 0 to {most}")
     for name, value in (("position_tolerance", position_tolerance), ("rotation_tolerance", rotation_tolerance)):
         if not value > 0:
             raise Er3aError(f"{name} is {value!r}; expected a number above 0")
@@ -171,7 +173,7 @@ class _Search:
 
 
 def _checked_mask(mask: np.ndarray | None) -> np.ndarray:
-    values = np.ones(JOINTS) if mask is None else np.asarray(mask, dtype=float)
+    values = np.ones(JOINTS) if mask is None else as_floats(mask, "mask")
     if values.shape != (6,):
         raise ShapeError("mask", values.shape, "(6,)")
     if not np.isin(values, (0.0, 1.0)).all() or not values.any():

@@ -174,6 +174,12 @@ def test_bad_arguments_are_refused(robot):
         solve(robot, T, mask=[1, 1, 1, 0.5, 0, 0])
     with pytest.raises(Er3aError, match="restarts is -1"):
         solve(robot, T, restarts=-1)
+    with pytest.raises(Er3aError, match=r"restarts is 1\.5; expected a whole number from 0 to 65535"):
+        solve(robot, T, restarts=1.5)
+    with pytest.raises(Er3aError, match="seed is -1"):
+        solve(robot, T, seed=-1)
+    with pytest.raises(PoseError, match="mask holds something that is no real number"):
+        solve(robot, T, mask="xyz")
     with pytest.raises(Er3aError, match="position_tolerance is 0"):
         solve(robot, T, position_tolerance=0)
     with pytest.raises(PoseError, match=r"T\[1\] has a mirrored"):
