@@ -21,11 +21,12 @@ RuleName = Literal["nearest", "weighted", "time", "manipulability", "limits", "c
 
 
 class RobotEntry(StrictModel):
-    """One robot of the study. ``base`` and ``tool`` replace those of the robot's file."""
+    """One robot of the study. ``base`` and ``tool`` replace those of its file, ``scene`` that of the inverse stage."""
 
     file: Text | None = None
     targets: Text
     paths: Text
+    scene: Text | None = None
     base: Placement | None = None
     tool: Placement | None = None
 
@@ -78,8 +79,8 @@ class TrajectorySettings(StrictModel):
 class InverseSettings(StrictModel):
     """``round_trips``: random poses solved back. ``map_cells``: cells across the maps of the number of solutions.
 
-    ``scene`` holds the obstacles that clearance is measured from; ``mix`` weighs rules against each other as one more
-    rule (names: er3a/selection/rules.py).
+    ``scene`` holds the obstacles that clearance is measured from and that solutions may not touch; ``mix`` weighs
+    rules against each other as one more rule (names: er3a/selection/rules.py).
     """
 
     round_trips: Annotated[int, Field(ge=1, le=10_000_000)] = 2000
@@ -105,6 +106,10 @@ class Study(StrictModel):
             raise InputError(None, f"robots.{name}", "the study has no such robot", f"Known: {', '.join(self.robots)}")
         return self.robots[name]
 
+    def scene(self, name: str) -> str | None:
+        """The scene file for a robot; None for open space."""
+        return self.entry(name).scene or self.inverse.scene
+
     def robot_file(self, name: str) -> Path:
         """The robot's file; :class:`InputError` naming the entry if there is none."""
         try:
@@ -129,15 +134,15 @@ class Study(StrictModel):
                 files += sorted((REFERENCES / reference).glob(kinds[stage]))
         if stage == "inverse":
             files.append(Path(entry.targets))
-            if self.inverse.scene:
-                files.append(Path(self.inverse.scene))
+            if scene := self.scene(name):
+                files.append(Path(scene))
         if stage == "trajectory":
             files.append(Path(entry.paths))
         return files
 
     def settings(self, name: str, stage: str) -> dict[str, Any]:
         """The resolved part of the study that a stage's numbers depend on; plain data."""
-        entry = self.entry(name).model_dump(exclude={"targets", "paths", "file"}, exclude_none=True)
+        entry = self.entry(name).model_dump(exclude={"targets", "paths", "file", "scene"}, exclude_none=True)
         own = getattr(self, stage, None)
         return {"seed": self.seed, "robot": entry, stage: own.model_dump() if own else {}}
 

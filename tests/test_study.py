@@ -137,7 +137,7 @@ def test_each_stage_s_inputs_exist_and_are_its_own(study, monkeypatch):
     monkeypatch.chdir(ROOT)
     robot = ROBOTS / "er3a_c60_article.yaml"
     assert study.inputs("er3a_c60_article", "workspace") == [robot]
-    scene = Path("data/scenes/table_and_post.yaml")
+    scene = Path("data/scenes/post_and_lamp.yaml")
     assert study.inputs("er3a_c60_article", "inverse") == [robot, Path("data/targets/er3a_c60_article.yaml"), scene]
     assert study.inputs("er3a_c60_article", "trajectory") == [robot, Path("data/paths/er3a_c60_article.yaml")]
     references = study.inputs("er3a_c60_article", "validation")[1:]
