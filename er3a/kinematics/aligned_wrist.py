@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from er3a.kinematics.closed_form import BOUNDARY_M
 from er3a.kinematics.forward import forward, frames, jacobian
@@ -115,8 +114,9 @@ def _in_line(robot: Robot, T: np.ndarray, q: np.ndarray) -> np.ndarray | None:
     best, least, before = None, SOLVES_M, np.inf
     for _ in range(MOST_STEPS):
         reached = forward(robot, q)
-        turn = Rotation.from_matrix(T[:3, :3] @ reached[:3, :3].T).as_rotvec()
-        miss = np.concatenate([T[:3, 3] - reached[:3, 3], turn])
+        R = T[:3, :3] @ reached[:3, :3].T  # a small turn, so its sine will do
+        turn = [R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]
+        miss = np.append(T[:3, 3] - reached[:3, 3], np.multiply(turn, 0.5))
         far = max(np.linalg.norm(miss[:3]), np.linalg.norm(miss[3:]))
         if far < least:
             best, least = q.copy(), far
