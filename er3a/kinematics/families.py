@@ -29,7 +29,7 @@ from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.robots.robot import Robot
 
 GRID = np.radians(2.0)
-SPLIT, ROUNDS = 32, 8  # an interval is cut into so many parts, so often
+SPLIT, ROUNDS = 16, 10  # an interval is cut into so many parts, so often
 SAME_FAMILY = 1e-8
 FREE_JOINT = {"shoulder": 0, "elbow": 1}
 
@@ -154,18 +154,17 @@ def _curve_family(robot: Robot, T: np.ndarray, kind: str, q_ref: np.ndarray, bra
         q[:, joint] = values
         return q
 
-    def nearest_of(values: np.ndarray) -> tuple[np.ndarray, int]:
-        q = members(values)
-        inside = within(robot, q)
-        return q, int(np.where(inside | ~any_inside, np.sum((q - q_ref) ** 2, axis=1), np.inf).argmin())
+    def costs(q: np.ndarray) -> np.ndarray:
+        return np.where(within(robot, q) | ~any_inside, np.sum((q - q_ref) ** 2, axis=1), np.inf)
 
-    any_inside = within(robot, members(grid)).any()
-    values = grid
-    q, best = nearest_of(values)
+    q = members(grid)
+    any_inside = within(robot, q).any()
+    values, best = grid, int(costs(q).argmin())
     for _ in range(ROUNDS):
         between = np.linspace(values[max(best - 1, 0)], values[min(best + 1, len(values) - 1)], SPLIT + 1)
         values = np.unique(np.append(between, values[best]))
-        q, best = nearest_of(values)
+        q = members(values)
+        best = int(costs(q).argmin())
     q0 = q[best]
     family = Family(kind, q0, _tangent(robot, q0, joint), np.zeros(2), bool(any_inside), branches, robot, T)
     span = _range(family, grid) if family.within_limits else np.array([-np.pi, np.pi])
