@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from er3a.errors import InputError
-from er3a.inputs.yaml_file import StrictModel, load
+from er3a.inputs.yaml_file import StrictModel, load, read_yaml
 from er3a.robots.load import DATA, load_robot, placement_transform, robot_path
 from er3a.robots.robot import Robot
 from er3a.robots.schema import Name, Placement, Text, check_placement
@@ -21,7 +21,7 @@ RuleName = Literal["nearest", "weighted", "time", "manipulability", "limits", "c
 
 
 class RobotEntry(StrictModel):
-    """One robot of the study. ``base`` and ``tool`` replace those of its file, ``scene`` that of the inverse stage."""
+    """One robot of the study. ``base`` and ``tool`` replace those of its file, ``scene`` those of the stages."""
 
     file: Text | None = None
     targets: Text
@@ -68,12 +68,17 @@ class WorkspaceSettings(StrictModel):
 
 
 class TrajectorySettings(StrictModel):
-    """Where a path counts as near-singular, and how many points are checked between two samples."""
+    """Where a path counts as near-singular, and how many points are checked between two samples.
+
+    ``scene`` holds the obstacles; no overlap with them deeper than ``overlap_mm`` goes unnoticed between points.
+    """
 
     checks_per_sample: Annotated[int, Field(ge=1, le=1000)]
     near_wrist_deg: Annotated[float, Field(gt=0, le=90)]
     near_elbow_deg: Annotated[float, Field(gt=0, le=90)]
     near_shoulder_mm: Annotated[float, Field(gt=0, le=10_000)]
+    scene: Text | None = None
+    overlap_mm: Annotated[float, Field(ge=0.05, le=100)] = 1.0
 
 
 class InverseSettings(StrictModel):
@@ -106,10 +111,6 @@ class Study(StrictModel):
             raise InputError(None, f"robots.{name}", "the study has no such robot", f"Known: {', '.join(self.robots)}")
         return self.robots[name]
 
-    def scene(self, name: str) -> str | None:
-        """The scene file for a robot; None for open space."""
-        return self.entry(name).scene or self.inverse.scene
-
     def robot_file(self, name: str) -> Path:
         """The robot's file; :class:`InputError` naming the entry if there is none."""
         try:
@@ -134,17 +135,35 @@ class Study(StrictModel):
                 files += sorted((REFERENCES / reference).glob(kinds[stage]))
         if stage == "inverse":
             files.append(Path(entry.targets))
-            if scene := self.scene(name):
-                files.append(Path(scene))
+            if scene := self.scene(name, stage):
+                files.append(scene)
         if stage == "trajectory":
-            files.append(Path(entry.paths))
+            files += [Path(entry.paths), *_tables_of(entry.paths)]
+            if scene := self.scene(name, stage):
+                files.append(scene)
         return files
 
     def settings(self, name: str, stage: str) -> dict[str, Any]:
         """The resolved part of the study that a stage's numbers depend on; plain data."""
         entry = self.entry(name).model_dump(exclude={"targets", "paths", "file", "scene"}, exclude_none=True)
         own = getattr(self, stage, None)
-        return {"seed": self.seed, "robot": entry, stage: own.model_dump() if own else {}}
+        settings = own.model_dump() if own else {}
+        if "scene" in settings:
+            scene = self.scene(name, stage)
+            settings["scene"] = str(scene) if scene else None
+        return {"seed": self.seed, "robot": entry, stage: settings}
+
+    def scene(self, name: str, stage: str) -> Path | None:
+        """The file of the solids that a robot may not touch in a stage; None for open space."""
+        scene = self.entry(name).scene or getattr(self, stage).scene
+        return Path(scene) if scene else None
+
+
+def _tables_of(path_file: str) -> list[Path]:
+    """The CSV tables that a path file names; the file is checked elsewhere."""
+    paths = read_yaml(path_file).get("paths")
+    named = [path.get("file") for path in paths if isinstance(path, dict)] if isinstance(paths, list) else []
+    return [Path(file) for file in named if isinstance(file, str)]
 
 
 def load_study(path: str | Path) -> Study:

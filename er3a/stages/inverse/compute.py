@@ -36,7 +36,7 @@ def compute(study: Study, name: str, folder: Path) -> None:
     robot = study.robot(name)
     targets = load_targets(study.entry(name).targets)
     settings = study.inverse
-    scene_file = study.scene(name)
+    scene_file = study.scene(name, STAGE)
     scene = load_scene(scene_file) if scene_file else None
     entries, tables, ranked, solved = [], [], [], []
     for number, target in enumerate(targets):
