@@ -1,8 +1,9 @@
 """Arms that solve a pose with axes 4 and 6 in one line, so that joints 4 and 6 can turn against each other.
 
 The closed form alone does not show them all. Where the arm is nearly straight, rounding moves the elbow by 1e-8 rad
-without moving the wrist centre, and with it axis 4; where the wrist centre is on axis 1, joint 1 is free and only one
-of its angles may put the axes in line. So the first three joints are first moved within what leaves the pose solved.
+without moving the wrist centre, and with it axis 4; where the wrist centre is on axis 1 (or 2), that joint is free and
+only one of its angles may put the axes in line. So joint 5 is set to where they are in line, and joints 1, 2, 3 and 6
+make up for it by least squares.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ from er3a.kinematics.aligned_wrist import (
     wrist_line,
 )
 from er3a.kinematics.closed_form import SLOTS
-from er3a.kinematics.forward import jacobian
+from er3a.kinematics.forward import frames, jacobian
 from er3a.kinematics.turns import LIMIT_TOLERANCE, TURN, nearest_turns, principal, within
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.robots.robot import Robot
@@ -175,6 +175,9 @@ def _nearest_wrists(robot: Robot, q: np.ndarray, q_ref: np.ndarray) -> np.ndarra
     """Rows (n, 6) with an aligned wrist moved along their line to the member nearest to the reference."""
     for row in np.flatnonzero(np.abs(bend_of_wrist(robot, q)) < SOLVES_RAD):
         on_line, direction = wrist_line(robot, q[row])
+        axis_4, axis_6 = frames(robot, on_line)[[3, 5], :3, 2]
+        if np.linalg.norm(np.cross(axis_4, axis_6)) > SOLVES_RAD:  # an oblique wrist is never in line
+            continue
         on_line = q_ref + principal(on_line - q_ref)
         q[row] = on_line + _nearest_on_line(on_line, direction, q_ref) * direction
     return q
