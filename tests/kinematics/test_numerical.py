@@ -10,10 +10,11 @@ from hypothesis import strategies as st
 import er3a
 from er3a.errors import Er3aError, PoseError, ShapeError
 from er3a.kinematics.chain import constant_links
-from er3a.kinematics.forward import forward
+from er3a.kinematics.forward import forward, frames
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.iteration import _E, _Q, _ROWS, _TARGET, LANES, _evaluate, uniform
-from er3a.kinematics.numerical import BAD_GUESS, LIMIT_BOUND, SOLVED, UNREACHABLE, solve
+from er3a.kinematics.numerical import BAD_GUESS, LIMIT_BOUND, SINGULAR, SOLVED, UNREACHABLE, solve
+from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
 from tests.kinematics.arms import DEG, arms, joints_at_random, joints_within, make_arm, placement, pose_errors
 from tests.kinematics.singular_poses import CLASSES, joints_near
 
@@ -129,6 +130,12 @@ def test_why_it_fails(robot, random):
     assert "the nearest arm found misses by" in str(found.reason)
     outcomes = solve(robot, forward(robot, q), joints_at_random(robot, random, 60), restarts=0).outcome
     assert set(outcomes) == {SOLVED, BAD_GUESS}
+    straight = joints_near(robot, "elbow", random, 1)[0]
+    beyond = forward(robot, straight)
+    arm = wrist_partitioned_arm(robot)
+    along = beyond[:3, :3] @ arm.wrist_in_tool + beyond[:3, 3] - frames(robot, straight)[2, :3, 3]
+    beyond[:3, 3] += 5e-9 * along / np.linalg.norm(along)
+    assert solve(robot, beyond, straight, respect_limits=False, restarts=20).outcome == SINGULAR
     narrow = robot.replace(lower=np.full(6, -0.05), upper=np.full(6, 0.05))
     found = solve(narrow, forward(robot, np.full(6, 0.2)), restarts=20)
     assert found.outcome == LIMIT_BOUND
