@@ -1,7 +1,8 @@
 """Plan and check every path of a robot: where it is singular, leaves the limits, or can't be reached.
 
 Writes ``samples.parquet`` (the paths' own points), ``checks.parquet`` (the same columns, with the points checked
-between them and the closest passes) and ``summary.json``.
+between them and the closest passes), ``repairs.parquet`` (the ways around, and each path at its fastest) and
+``summary.json``.
 """
 
 from __future__ import annotations
@@ -15,10 +16,12 @@ import pandas as pd
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
 from er3a.kinematics.turns import within
 from er3a.planning.path_file import load_paths
+from er3a.planning.timing import JointLimits, joint_limits
 from er3a.results import Figure, Verdict, write_summary, write_table
 from er3a.robots.robot import Robot
 from er3a.stages.trajectory.judge import WORDS, Judgement, judge, path_record
 from er3a.stages.trajectory.motion import Motion, motion_of
+from er3a.stages.trajectory.ways import limits_record, speed_share, ways_around
 from er3a.study import Study
 
 
@@ -32,15 +35,20 @@ def compute(study: Study, name: str, folder: Path) -> None:
         "shoulder": settings.near_shoulder_mm / 1000,
     }
     length = characteristic_length(robot)
-    tables, records = [], []
+    limits = joint_limits(robot, np.radians(settings.assumed_speed_deg_s), settings.full_speed_after_s)
+    chosen = None if settings.repair == "compare" else settings.repair
+    tables, records, repairs = [], [], []
     for i, entry in enumerate(load_paths(file).paths):
         motion = motion_of(robot, entry, settings.checks_per_sample, f"paths[{i}]", file)
         found = judge(robot, motion, near)
-        tables.append(_table(robot, motion, found, near, length))
-        records.append(path_record(robot, motion, found))
+        ways = ways_around(robot, motion, found, near, limits, chosen)
+        tables.append(_table(robot, motion, found, near, length, limits))
+        records.append(path_record(robot, motion, found) | ways.record)
+        repairs += ways.rows
     checks = pd.concat(tables, ignore_index=True)
     write_table(folder / "checks.parquet", checks)
     write_table(folder / "samples.parquet", checks[checks["sample"]].drop(columns="sample"))
+    write_table(folder / "repairs.parquet", pd.concat(repairs, ignore_index=True))
     write_summary(
         folder,
         study,
@@ -51,11 +59,14 @@ def compute(study: Study, name: str, folder: Path) -> None:
         characteristic_length_m=length,
         near={"wrist_deg": settings.near_wrist_deg, "elbow_deg": settings.near_elbow_deg}
         | {"shoulder_mm": settings.near_shoulder_mm},
+        joint_limits=limits_record(robot, limits, settings.full_speed_after_s),
         paths=records,
     )
 
 
-def _table(robot: Robot, motion: Motion, found: Judgement, near: dict[str, float], length: float) -> pd.DataFrame:
+def _table(
+    robot: Robot, motion: Motion, found: Judgement, near: dict[str, float], length: float, limits: JointLimits
+) -> pd.DataFrame:
     """One row per check point; joint columns are NaN where the path can't be reached."""
     reached = np.isfinite(found.q[:, 0])
     measures = np.full((len(found.q), 3), np.nan)
@@ -73,6 +84,7 @@ def _table(robot: Robot, motion: Motion, found: Judgement, near: dict[str, float
         columns |= {f"q{j + 1}_{unit}": np.degrees(values[:, j]) for j in range(6)}
     columns |= {f"{axis}_mm": tool[:, k] for k, axis in enumerate("xyz")}
     columns |= {
+        "speed_share": speed_share(found.velocity, limits),
         "manipulability": measures[:, 0],
         "condition_number": measures[:, 1],
         "smallest_singular_value": measures[:, 2],
