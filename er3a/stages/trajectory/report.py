@@ -10,7 +10,8 @@ import pandas as pd
 
 from er3a.results import read_summary, read_table
 from er3a.robots.robot import Robot
-from er3a.stages.trajectory.drawings import curves, views
+from er3a.stages.trajectory.drawings import path_figure
+from er3a.stages.trajectory.turning import turning_figure
 from er3a.study import Study
 from er3a.viewing.page import Picture, fixed, number, render
 
@@ -23,6 +24,15 @@ STATUS = {
     "unreachable": "fail",
 }
 FAULTS = {"unreachable": "not reachable", "out_of_limits": "outside limits", "too_fast": "too fast"}
+WAYS = {
+    "slow": "slow down on the path",
+    "branch": "another solution of the arm first",
+    "via_shift": "via point, tool point shifted",
+    "via_tilt": "via point, tool tilted",
+    "damped": "damped least squares",
+    "detour": "joint move across the region",
+    "stop": "stop before it, with an alarm",
+}
 KINDS = {"joint": "joint move", "line": "straight line"}
 
 
@@ -30,20 +40,29 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
     """Write the trajectory page of a robot from the results in ``folder``."""
     robot = study.robot(name)
     summary = read_summary(folder)
-    checks = read_table(folder / "checks.parquet")
+    checks, repairs = read_table(folder / "checks.parquet"), read_table(folder / "repairs.parquet")
+    sections = []
+    for record in summary["paths"]:
+        rows, ways = (table[table["path"] == record["name"]] for table in (checks, repairs))
+        sections.append(_section(robot, record, rows, ways, summary["near"]))
+    limits = summary["joint_limits"]
     render(
         Path(__file__).with_name("report.html.j2"),
         output,
         summary,
         robot=robot,
-        paths=[_section(robot, record, checks[checks["path"] == record["name"]]) for record in summary["paths"]],
+        paths=sections,
         near=summary["near"],
         length_mm=summary["characteristic_length_m"] * 1000,
-        speeds_known=bool(np.isfinite(robot.speed).any()),
+        limits=limits,
+        assumed=[f"J{j + 1}" for j in range(6) if limits["speed_assumed"][j]],
+        turning=turning_figure(robot, summary, checks, repairs),
     )
 
 
-def _section(robot: Robot, record: dict[str, Any], rows: pd.DataFrame) -> dict[str, Any]:
+def _section(
+    robot: Robot, record: dict[str, Any], rows: pd.DataFrame, ways: pd.DataFrame, near: dict[str, float]
+) -> dict[str, Any]:
     return {
         **record,
         "status": STATUS[record["verdict"]],
@@ -59,18 +78,52 @@ def _section(robot: Robot, record: dict[str, Any], rows: pd.DataFrame) -> dict[s
             )
             for part in record[key]
         ],
-        "curves": Picture(
-            curves(robot, record, rows),
-            f"Six panels over time for {record['name']}: joint angles, velocities and accelerations; manipulability, "
-            f"condition number and smallest singular value. {record['text']}.",
+        "ways": _ways(record),
+        "figure": Picture(
+            path_figure(robot, record, rows, ways, near),
+            f"Panels over time for {record['name']}: joint angles, velocities and accelerations; distances from the "
+            f"singular sets, condition number, manipulability; the path in space; joint speeds against their limits. "
+            f"{record['text']}.",
             _conclusion(record, rows),
         ),
-        "views": Picture(
-            views(robot, record, rows),
-            f"The path {record['name']} from above and from the side, coloured by the condition number.",
-            "The darker the path, the worse a small tool motion maps to joint motion.",
-        ),
     }
+
+
+def _ways(record: dict[str, Any]) -> list[list[str]]:
+    """Rows of the comparison: the programme, each way around, and the exact path at its fastest."""
+    if not record["repairs"]:
+        return []
+    duration = fixed(record["duration_s"], 2)
+    shares = (record[f"max_joint_{kind}_ratio"] for kind in ("speed", "acceleration"))
+    rows = [["as programmed", "0", "0", *(_share(share) for share in shares), duration, "the path to be repaired"]]
+    for price in record["repairs"]:
+        name = WAYS[price["way"]] + (" ←" if price["way"] == record["repair"] else "")
+        if price["duration_s"] is None:
+            rows.append([name, *["–"] * 5, f"not possible: {price['reason']}"])
+            continue
+        remark = f"not usable: {price['reason']}" if price["reason"] else _remark(price)
+        cells = (price["max_deviation_mm"], price["max_deviation_deg"])
+        shares = (_share(price[f"max_joint_{kind}_ratio"]) for kind in ("speed", "acceleration"))
+        rows.append([name, *(_small(cell) for cell in cells), *shares, fixed(price["duration_s"], 2), remark])
+    if record["fastest_s"]:
+        rows.append(
+            ["the path at its fastest", "0", "0", "1.00", "1.00", fixed(record["fastest_s"], 2), "for comparison"]
+        )
+    return rows
+
+
+def _remark(price: dict[str, Any]) -> str:
+    if price["way"] == "detour":
+        return "a joint move takes no harm from singular poses"
+    return "keeps its distance from singular poses" if price["keeps_clear"] else "goes through the region"
+
+
+def _share(value: float | None) -> str:
+    return "no bound" if value is None else fixed(value, 2)
+
+
+def _small(value: float) -> str:
+    return "0" if value < 5e-4 else number(value, 3)
 
 
 def _conclusion(record: dict[str, Any], rows: pd.DataFrame) -> str:

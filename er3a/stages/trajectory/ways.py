@@ -56,6 +56,7 @@ def ways_around(
     known = found.velocity[np.isfinite(found.velocity[:, 0])] if found.speed_bounded else found.velocity[:0]
     record = {
         "max_joint_speed_ratio": float(np.abs(known / limits.speed).max()) if len(known) else None,
+        "max_joint_acceleration_ratio": _pull(found, limits),
         "fastest_s": quickest and quickest.duration,
         "repairs": [_record(price) for price in prices],
         "repair": taken and taken.name,
@@ -80,6 +81,11 @@ def limits_record(robot: Robot, limits: JointLimits, full_speed_after: float) ->
 def speed_share(velocity: np.ndarray, limits: JointLimits) -> np.ndarray:
     """Greatest share of a joint's speed limit (N,), of velocities (N, 6) in rad/s; NaN where they are unknown."""
     return np.abs(velocity / limits.speed).max(axis=1)
+
+
+def _pull(found: Judgement, limits: JointLimits) -> float | None:
+    known = found.acceleration[np.isfinite(found.acceleration[:, 0])]
+    return float(np.abs(known / limits.acceleration).max()) if found.speed_bounded and len(known) else None
 
 
 def _joint_move(motion: Motion, found: Judgement, limits: JointLimits) -> tuple[Timed | None, list[Price]]:
@@ -140,8 +146,12 @@ def _text(motion: Motion, found: Judgement, prices: list[Price], taken: Price | 
             f"{SENTENCES[taken.name]}: the tool {f'leaves the path by {leaves}' if leaves else 'stays on the path'}, "
             f"and it takes {time} than programmed"
         )
-    causes = [part.cause for part in (found.beyond or found.limits)]
-    why = "; ".join(dict.fromkeys(causes or [price.reason for price in prices if price.reason]))
+    if found.beyond:
+        parts = [f"from t = {part.start:.4g} to {part.end:.4g} s" for part in found.beyond]
+        why = f"it is out of reach {' and '.join(parts)}"
+    else:
+        causes = [part.cause for part in found.limits] or [price.reason for price in prices if price.reason]
+        why = "; ".join(dict.fromkeys(causes))
     if len(prices) == 1:
         return f"{SENTENCES[prices[0].name]}, as the study asks for, does not repair it: {prices[0].reason}"
     return f"No way around completes this path: {why}"
