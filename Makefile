@@ -9,6 +9,8 @@ ROBOT  ?=
 ARGS   ?=
 
 .DEFAULT_GOAL := help
+# A run starts dozens of short processes: without compiled modules kept on disk each would compile them anew.
+unexport PYTHONDONTWRITEBYTECODE
 .PHONY: help run test view lint format schema lock clean distclean campaigns
 
 help:  ## list the targets

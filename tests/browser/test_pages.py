@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from axe_core_python.selenium import Axe
 
 PAGES = ["index.html"] + [
     f"{robot}/{stage}.html"
@@ -23,6 +24,14 @@ def test_page_opens_clean(browser, small_study, page):
     assert page == "index.html" or images, "a stage's page shows at least one figure"
     assert browser.execute_script("return document.documentElement.scrollWidth <= window.innerWidth")
     assert 'src="http' not in path.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_page_is_accessible(browser, small_study, page):
+    browser.get((small_study.folder / "reports" / page).as_uri())
+    found = Axe().run(browser)["violations"]
+    serious = [fault for fault in found if fault["impact"] in ("serious", "critical")]
+    assert [(fault["id"], [node["html"][:200] for node in fault["nodes"][:3]]) for fault in serious] == []
 
 
 def test_index_leads_to_every_page(browser, small_study):

@@ -54,13 +54,3 @@ def test_kill_9_in_mid_run_then_run_again(small_study, fresh_project):
     assert compared >= 6
     for path, changed in finished.items():
         assert path.stat().st_mtime_ns == changed, f"{path} was finished and yet made again"
-
-
-def test_two_runs_at_once_are_refused(small_study):
-    import fcntl
-
-    with open(small_study.folder / ".snakemake/er3a.lock") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        done = small_study.make_run(check=False)
-    assert done.returncode == 2
-    assert done.stderr == "error: another run is active in this folder; wait for its end, or stop it\n"

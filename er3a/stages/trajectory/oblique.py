@@ -11,8 +11,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 
 from er3a.robots.robot import Robot
-from er3a.viewing.arm import skeleton
 from er3a.viewing.palette import BODY, GRID, HIGHLIGHT, INK, LINK, MODEL, MUTED
+from er3a.viewing.skeleton import skeleton
 
 CONDITION_SCALE = LogNorm(3, 300)
 COLOURS = "viridis_r"

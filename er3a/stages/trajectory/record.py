@@ -15,9 +15,10 @@ from matplotlib.colors import LogNorm
 from er3a.results import read_summary, read_table
 from er3a.robots.robot import Robot
 from er3a.study import Study
-from er3a.viewing.arm import log_arm, send_motion, size_of, skeleton
+from er3a.viewing.arm import log_arm, send_motion, size_of
 from er3a.viewing.palette import HIGHLIGHT, JOINT_NAMES, JOINTS, MODEL, MUTED, REFERENCE, rgb
 from er3a.viewing.recording import recording, send_series
+from er3a.viewing.skeleton import skeleton
 
 PAUSE = 1.0  # s between two paths
 FRAMES_PER_SECOND = 50

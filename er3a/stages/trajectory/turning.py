@@ -10,8 +10,8 @@ import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
 from er3a.robots.robot import Robot
-from er3a.viewing.arm import skeleton
 from er3a.viewing.palette import HIGHLIGHT, INK, LINK, MODEL
+from er3a.viewing.skeleton import skeleton
 
 POINTS = 250
 LOG_RANGE = (0.5, 2.5)  # of the condition number
