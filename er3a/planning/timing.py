@@ -13,6 +13,7 @@ References
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -169,9 +170,11 @@ def _toppra(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Speed along the way at its nodes (N,), and acceleration (N - 1,) between them."""
     try:
-        from toppra.algorithm import TOPPRA
-        from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint, LinearConstraint
-        from toppra.interpolator import AbstractGeometricPath
+        with warnings.catch_warnings():  # of escapes in docstrings, when Python compiles the library
+            warnings.simplefilter("ignore")
+            from toppra.algorithm import TOPPRA
+            from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint, LinearConstraint
+            from toppra.interpolator import AbstractGeometricPath
     except ModuleNotFoundError:
         raise TimingError("the library toppra is not installed; it has wheels for Linux on x86-64 only") from None
 
