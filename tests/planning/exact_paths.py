@@ -6,19 +6,29 @@ the table's lengths by plane trigonometry, in numpy's long double; it needs no i
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
+from er3a.errors import PoseError
+from er3a.kinematics.branch import branch_labels
+from er3a.kinematics.forward import forward
+from er3a.planning.follow import follow
+from er3a.planning.moves import line
+from er3a.planning.singular_events import singular_events
+
 REAL = np.longdouble
+NEAR = {"wrist": np.radians(30), "elbow": np.radians(30), "shoulder": 0.2}
 
 
-def line_distances(robot, line, progress, elbow_up: bool) -> dict[str, np.ndarray]:
+def line_distances(robot, way, progress, elbow_up: bool) -> dict[str, np.ndarray]:
     """Distances (rad, rad, m) of a straight line's poses from the wrist, elbow and shoulder sets, arm to the front."""
     s = np.asarray(progress, REAL)[:, None]
-    angle = np.sqrt((np.asarray(line.rotation, REAL) ** 2).sum())
-    axis = np.asarray(line.rotation, REAL) / (angle if angle > 0 else REAL(1))
-    start = np.asarray(line.T_start, REAL)
+    angle = np.sqrt((np.asarray(way.rotation, REAL) ** 2).sum())
+    axis = np.asarray(way.rotation, REAL) / (angle if angle > 0 else REAL(1))
+    start = np.asarray(way.T_start, REAL)
     approach = turned(start[:3, 2], axis, s * angle)
-    tool = start[:3, 3] + s * np.asarray(line.translation, REAL)
+    tool = start[:3, 3] + s * np.asarray(way.translation, REAL)
     wrist = tool - REAL(robot.d[5]) * approach
     return _distances(robot, wrist, approach, elbow_up)
 
@@ -34,9 +44,9 @@ def _distances(robot, wrist, approach, elbow_up):
     lean = np.arctan2(x, z) - (inner if elbow_up else -inner)  # of the upper arm from the vertical, outwards
     to_wrist = np.stack([x - a2 * np.sin(lean), z - a2 * np.cos(lean)], axis=1)
     # Axis 4 is the forearm's line less the elbow offset a3, square to it on the upper side.
-    line = np.arctan2(to_wrist[:, 0], to_wrist[:, 1]) + np.arctan2(a3, d4)
+    pitch = np.arctan2(to_wrist[:, 0], to_wrist[:, 1]) + np.arctan2(a3, d4)
     radial = np.stack([wrist[:, 0], wrist[:, 1]], axis=1) / outward[:, None]
-    axis_4 = np.concatenate([np.sin(line)[:, None] * radial, np.cos(line)[:, None]], axis=1)
+    axis_4 = np.concatenate([np.sin(pitch)[:, None] * radial, np.cos(pitch)[:, None]], axis=1)
     sine = np.sqrt((np.cross(axis_4, approach) ** 2).sum(axis=1))
     bend = (far**2 - a2**2 - forearm**2) / (2 * a2 * forearm)
     return {"wrist": np.arcsin(sine), "elbow": np.arccos(np.abs(bend)), "shoulder": outward}
@@ -72,3 +82,37 @@ def quintic_time(share):
         t = (low + high) / 2
         low, high = (low, t) if t**3 * (10 - 15 * t + 6 * t**2) > share else (t, high)
     return (low + high) / 2
+
+
+def _one(robot, way, elbow_up, kind, progress):
+    return line_distances(robot, way, progress, elbow_up)[kind]
+
+
+def worst_location(robot, random, lines: int) -> dict[str, tuple[int, float]]:
+    """Random lines: per type how many closest passes, and the greatest error of their place, as a share of the way.
+
+    Passes within 30 deg or 200 mm count, on the branches that reach to the front, away from the ends of the lines.
+    """
+    found = {kind: (0, 0.0) for kind in NEAR}
+    grid, labels = np.linspace(0, 1, 201), branch_labels(robot)
+    for _ in range(lines):
+        q = random.uniform(robot.lower, robot.upper)
+        way = line(*forward(robot, np.stack([q, q + random.uniform(-0.4, 0.4, 6)])), 1.0)
+        for slot in (0, 2):
+            if not labels[slot].startswith("front"):
+                slot += 4
+            try:
+                followed = follow(robot, way, grid, start_slot=slot)
+            except PoseError:
+                continue
+            if np.isnan(followed.q).any() or len(set(followed.slot)) > 1:
+                continue
+            up = "elbow up" in labels[slot]
+            for event in singular_events(robot, followed.t, followed.q, followed.joints, NEAR):
+                if 0.01 < event.t < 0.99:
+                    at = float(way.progress(np.array(event.t))[0])
+                    exact = nearest(partial(_one, robot, way, up, event.type), at)
+                    error = np.inf if exact is None else abs(float(exact - at))
+                    count, worst = found[event.type]
+                    found[event.type] = count + 1, max(worst, error)
+    return found
