@@ -94,7 +94,7 @@ def test_slowing_down_costs_nothing_where_nothing_is_too_fast():
 def test_detour_leaves_the_path_only_between_good_poses(prices, name):
     case, price = trouble(name), prices[name]["detour"]
     off = price.distance > 1e-7
-    at = deviation(case.followed.line, forward(case.robot, price.motion.q), characteristic_length(case.robot))[2]
+    at = deviation(case.followed.line, forward(case.robot, price.motion.q))[2]
     (first, last) = case.regions[0]
     share = case.followed.line.progress(case.t[[first - 1, last]])[0]
     assert off.any()
@@ -224,6 +224,6 @@ def test_deviation_is_the_distance_across_and_the_angle(random):
     T = way.poses(random.uniform(0.1, 0.9, 50))
     T[:, :3, 3] += [0.003, 0, 0.004]
     T[:, :3, :3] = Rotation.from_rotvec([0, 0, 0.01]).as_matrix() @ T[:, :3, :3]
-    distance, angle, _ = deviation(way, T, 0.5)
+    distance, angle, _ = deviation(way, T)
     np.testing.assert_allclose(distance, 0.005, rtol=1e-9)
     np.testing.assert_allclose(angle, 0.01, rtol=1e-9)

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.kinematics.forward import forward
-from er3a.kinematics.singularity import characteristic_length
 from er3a.kinematics.turns import limit_reason, within
 from er3a.planning.repairs.branch import branch
 from er3a.planning.repairs.damped import damped
@@ -68,7 +67,7 @@ def compare(trouble: Trouble, chosen: str | None = None) -> list[Price]:
 
 
 def best(prices: list[Price], meets: bool) -> Price | None:
-    """Of the usable ways the one that leaves the path least, then the quickest; None if none is usable.
+    """Of the usable ways the one that leaves the path least (mm and deg added), then the quickest; else None.
 
     Parameters
     ----------
@@ -79,7 +78,11 @@ def best(prices: list[Price], meets: bool) -> Price | None:
     def cost(price: Price) -> tuple[bool, float, float]:
         far, turned = price.distance.max(), price.angle.max()
         on_path = far < ON_PATH[0] and turned < ON_PATH[1]
-        return meets and not price.clear, 0.0 if on_path else float(far + turned), price.motion.duration
+        return (
+            meets and not price.clear,
+            0.0 if on_path else float(far * 1000 + np.degrees(turned)),
+            price.motion.duration,
+        )
 
     return min(usable, key=cost, default=None)
 
@@ -93,7 +96,7 @@ def _priced(trouble: Trouble, name: str, way: Callable[[Trouble], WayAround]) ->
         return Price(name, None, False, found.reason)
     robot, motion, line = trouble.robot, found.motion, trouble.followed.line
     T = forward(robot, motion.q)
-    distance, angle, _ = deviation(line, T, characteristic_length(robot))
+    distance, angle, _ = deviation(line, T)
     speed, acceleration = motion.share(trouble.limits)
     faults = []
     last = line.poses(np.array(1.0))

@@ -8,24 +8,22 @@ from scipy.spatial import cKDTree
 from er3a.planning.moves import Line
 
 POINTS = 2001
+LENGTH = 0.001 / np.radians(1.0)  # m per rad
 
 
-def deviation(line: Line, T: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Distance and angle of poses from the path's nearest pose.
-
-    Nearest is what has the least sum of the squares of distance (in parts of ``length``) and of the rotation's chord.
+def deviation(line: Line, T: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Distance and angle of poses from the path's nearest pose, where 1 mm weighs as much as 1 deg.
 
     Parameters
     ----------
     T : (N, 4, 4), T_base_tool
-    length : m
 
     Returns
     -------
     distance : (N,), m; angle : (N,), rad; progress : (N,), the nearest pose's share of the way
     """
     progress = np.linspace(0.0, 1.0, POINTS)
-    on_path, at = _points(line.poses(progress), length), _points(T, length)
+    on_path, at = _points(line.poses(progress)), _points(T)
     _, near = cKDTree(on_path).query(at)
     middle = np.clip(near, 1, POINTS - 2)
     squares = np.stack([((at - on_path[middle + k]) ** 2).sum(axis=1) for k in (-1, 0, 1)])
@@ -38,5 +36,5 @@ def deviation(line: Line, T: np.ndarray, length: float) -> tuple[np.ndarray, np.
     return distance, 2 * np.arcsin(np.minimum(chord, 1.0)), refined
 
 
-def _points(T: np.ndarray, length: float) -> np.ndarray:
-    return np.concatenate([T[:, :3, 3] / length, T[:, :3, :3].reshape(-1, 9) / np.sqrt(2.0)], axis=1)
+def _points(T: np.ndarray) -> np.ndarray:
+    return np.concatenate([T[:, :3, 3] / LENGTH, T[:, :3, :3].reshape(-1, 9) / np.sqrt(2.0)], axis=1)
