@@ -39,7 +39,7 @@ TABLES = {
         "void_triangles",
     ],
     "inverse": ["solutions", "rankings", "map"],
-    "trajectory": ["checks", "repairs", "samples"],
+    "trajectory": ["checks", "clearance", "repairs", "samples"],
 }
 
 

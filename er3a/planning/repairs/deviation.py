@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from er3a.planning.moves import Line
+from er3a.planning.moves import ToolPath
 
 POINTS = 2001
 LENGTH = 0.001 / np.radians(1.0)  # m per rad
 
 
-def deviation(line: Line, T: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def deviation(line: ToolPath, T: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Distance and angle of poses from the path's nearest pose, where 1 mm weighs as much as 1 deg.
 
     Parameters

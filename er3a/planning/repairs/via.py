@@ -20,7 +20,7 @@ from er3a.kinematics.singularity import TYPES, characteristic_length, determinan
 from er3a.kinematics.turns import within
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from er3a.planning.follow import follow
-from er3a.planning.moves import Line
+from er3a.planning.moves import ToolPath
 from er3a.planning.profiles import quintic
 from er3a.planning.repairs.trouble import AT_REST, Trouble, WayAround, coarse, margin, trouble_of
 from er3a.planning.timing import Timed, joined, straight
@@ -68,7 +68,7 @@ class Bend:
 class BentPath:
     """A path of the tool with bends, on the path's own time law."""
 
-    path: Line
+    path: ToolPath
     bends: tuple[Bend, ...] = field(default=())
 
     @property

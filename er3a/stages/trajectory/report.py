@@ -10,6 +10,7 @@ import pandas as pd
 
 from er3a.results import read_summary, read_table
 from er3a.robots.robot import Robot
+from er3a.stages.trajectory.clearance_section import clearance_section
 from er3a.stages.trajectory.drawings import path_figure
 from er3a.stages.trajectory.turning import turning_figure
 from er3a.study import Study
@@ -21,9 +22,9 @@ STATUS = {
     "singular": "caution",
     "too fast": "fail",
     "leaves limits": "fail",
+    "collides": "fail",
     "unreachable": "fail",
 }
-FAULTS = {"unreachable": "not reachable", "out_of_limits": "outside limits", "too_fast": "too fast"}
 WAYS = {
     "slow": "slow down on the path",
     "branch": "another solution of the arm first",
@@ -33,7 +34,14 @@ WAYS = {
     "detour": "joint move across the region",
     "stop": "stop before it, with an alarm",
 }
-KINDS = {"joint": "joint move", "line": "straight line"}
+KINDS = {
+    "joint": "joint move",
+    "joint_sequence": "joint moves in sequence",
+    "line": "straight line",
+    "arc": "circular arc",
+    "sequence": "lines and arcs in sequence",
+    "table": "path from a table",
+}
 
 
 def report(study: Study, name: str, folder: Path, output: Path) -> None:
@@ -52,6 +60,7 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
         summary,
         robot=robot,
         paths=sections,
+        clearance=clearance_section(summary, read_table(folder / "clearance.parquet")),
         near=summary["near"],
         length_mm=summary["characteristic_length_m"] * 1000,
         limits=limits,
@@ -75,6 +84,7 @@ def _section(
                 ("not reachable", "unreachable"),
                 ("outside limits", "out_of_limits"),
                 ("too fast", "too_fast"),
+                ("collision", "collisions"),
             )
             for part in record[key]
         ],

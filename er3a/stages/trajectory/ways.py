@@ -47,8 +47,7 @@ def ways_around(
     if motion.followed is None:
         quickest, prices = _joint_move(motion, found, limits)
     else:
-        fixed = getattr(motion.entry, "start_deg", None) is not None
-        trouble = trouble_of(motion.followed, near, limits, found.events, fixed)
+        trouble = trouble_of(motion.followed, near, limits, found.events, motion.built.q_start is not None)
         quickest = _quickest(trouble)
         if found.word != "safe":
             prices = compare(trouble, chosen)
@@ -140,7 +139,7 @@ def _text(motion: Motion, found: Judgement, prices: list[Price], taken: Price | 
         far, turned = taken.distance.max() * 1000, np.degrees(taken.angle.max())
         price = [f"{far:.2g} mm" if far >= 0.005 else "", f"{turned:.2g} deg" if turned >= 0.005 else ""]
         leaves = " and ".join(filter(None, price))
-        longer = taken.motion.duration - motion.entry.duration_s
+        longer = taken.motion.duration - motion.built.duration
         time = f"{abs(longer):.2f} s {'more' if longer > 0 else 'less'}" if abs(longer) >= 0.005 else "no more time"
         return (
             f"{SENTENCES[taken.name]}: the tool {f'leaves the path by {leaves}' if leaves else 'stays on the path'}, "
