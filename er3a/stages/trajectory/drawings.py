@@ -17,6 +17,7 @@ from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 
 from er3a.robots.robot import Robot
 from er3a.stages.trajectory.oblique import draw_path
+from er3a.viewing.figures import svg_data_uri
 from er3a.viewing.palette import HIGHLIGHT, INK, JOINT_NAMES, MODEL, MUTED, REFERENCE, VERDICTS
 from er3a.viewing.palette import JOINTS as COLOURS
 
@@ -34,41 +35,70 @@ COLUMNS, GAP = (0.275, 0.275, 0.265), 0.06
 FONT = 9.0
 
 
-def path_figure(
-    robot: Robot, record: dict[str, Any], rows: pd.DataFrame, ways: pd.DataFrame, near: dict[str, float]
-) -> Figure:
-    """Joint curves on the left, measures in the middle, the path in space and the joints' effort on the right."""
-    figure = Figure(figsize=(13.2, 7.0), layout="none")
-    t = rows["t_s"].to_numpy()
-    joints = [_axes(figure, 0, row) for row in range(3)]
-    measures = [_axes(figure, 1, row) for row in range(3)]
-    _joint_curves(joints, robot, record, rows)
-    _distances(measures[0], rows, near)
-    _condition(measures[1], rows)
-    _small_measures(measures[2], rows)
-    for ax in (*joints, *measures):
-        _mark(ax, record)
-        ax.set_xlim(t[0], t[-1])
-        ax.yaxis.set_label_coords(-0.15, 0.5)
-    for column in (joints, measures):
-        for ax in column[:-1]:
-            ax.tick_params(labelbottom=False)
-        column[-1].set_xlabel("time (s)", fontsize=FONT)
-    _effort(_axes(figure, 2, 2), record, rows, ways)
-    space = figure.add_axes((LEFT + sum(COLUMNS[:2]) + 2 * GAP - 0.02, 0.40, COLUMNS[2] + 0.02, TOP - 0.41))
-    draw_path(space, robot, record, rows, ways[ways["way"] == record["repair"]])
-    figure.legend(handles=_legend(record), loc="upper center", bbox_to_anchor=(0.5, 1.0), ncols=9, fontsize=FONT)
-    return figure
+class PathFigure:
+    """Joint curves on the left, measures in the middle, the path in space and the joints' effort on the right.
+
+    One figure serves all paths of a page: making axes and their ticks takes longer than drawing the curves.
+    """
+
+    def __init__(self):
+        self.figure = Figure(figsize=(13.2, 7.0), layout="none")
+        self.joints = [self._axes(0, row) for row in range(3)]
+        self.measures = [self._axes(1, row) for row in range(3)]
+        self.effort = self._axes(2, 2)
+        left = LEFT + sum(COLUMNS[:2]) + 2 * GAP - 0.02
+        self.space = self.figure.add_axes((left, 0.40, COLUMNS[2] + 0.02, TOP - 0.41))
+        for column in (self.joints, self.measures):
+            for ax in column:
+                ax.yaxis.set_label_coords(-0.15, 0.5)
+            for ax in column[:-1]:
+                ax.tick_params(labelbottom=False)
+            column[-1].set_xlabel("time (s)", fontsize=FONT)
+
+    def draw(
+        self, robot: Robot, record: dict[str, Any], rows: pd.DataFrame, ways: pd.DataFrame, near: dict[str, float]
+    ) -> str:
+        """The figure of a path as the data address of an image."""
+        for ax in self.figure.axes:
+            _clear(ax)
+        t = rows["t_s"].to_numpy()
+        _joint_curves(self.joints, robot, record, rows)
+        _distances(self.measures[0], rows, near)
+        _condition(self.measures[1], rows)
+        _small_measures(self.measures[2], rows)
+        for ax in (*self.joints, *self.measures):
+            _mark(ax, record)
+            ax.set_xlim(t[0], t[-1])
+        _effort(self.effort, record, rows, ways)
+        draw_path(self.space, robot, record, rows, ways[ways["way"] == record["repair"]])
+        handles = _legend(record)
+        legend = self.figure.legend(
+            handles=handles, loc="upper center", bbox_to_anchor=(0.5, 1.0), ncols=9, fontsize=FONT
+        )
+        self.figure.set_layout_engine("none")  # saving the figure before has set the default one
+        image = svg_data_uri(self.figure)
+        legend.remove()
+        return image
+
+    def _axes(self, column: int, row: int) -> Axes:
+        height = (TOP - BOTTOM) / 3
+        x = LEFT + sum(COLUMNS[:column]) + column * GAP
+        ax = self.figure.add_axes((x, BOTTOM + (2 - row) * height, COLUMNS[column], height - 0.03))
+        ax.tick_params(labelsize=FONT, length=2)
+        ax.xaxis.set_major_locator(MaxNLocator(5))
+        ax.yaxis.set_major_locator(MaxNLocator(4))
+        return ax
 
 
-def _axes(figure: Figure, column: int, row: int) -> Axes:
-    height = (TOP - BOTTOM) / 3
-    x = LEFT + sum(COLUMNS[:column]) + column * GAP
-    ax = figure.add_axes((x, BOTTOM + (2 - row) * height, COLUMNS[column], height - 0.03))
-    ax.tick_params(labelsize=FONT, length=2)
-    ax.xaxis.set_major_locator(MaxNLocator(5))
-    ax.yaxis.set_major_locator(MaxNLocator(4))
-    return ax
+def _clear(ax: Axes) -> None:
+    """Take a path's curves out of axes, and leave their ticks."""
+    for artist in (*ax.lines, *ax.collections, *ax.patches, *ax.texts):
+        artist.remove()
+    if ax.get_legend() is not None:
+        ax.get_legend().remove()
+    ax.relim()
+    ax.margins(0.05)
+    ax.autoscale(True)
 
 
 def _joint_curves(axes: list[Axes], robot: Robot, record: dict[str, Any], rows: pd.DataFrame) -> None:
@@ -113,7 +143,7 @@ def _logarithmic(ax: Axes, low: float, high: float) -> None:
     ticks = 10.0 ** (decades if len(decades) < 6 else decades[::2])
     ax.yaxis.set_minor_locator(NullLocator())
     ax.yaxis.set_major_locator(FixedLocator(ticks))
-    ax.yaxis.set_major_formatter(lambda value, _: f"{value:,.10g}")
+    ax.yaxis.set_major_formatter(lambda value, _: f"{value:.10g}" if value < 1e5 else f"1e{round(np.log10(value))}")
 
 
 def _small_measures(ax: Axes, rows: pd.DataFrame) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,12 @@ import pandas as pd
 from er3a.results import read_summary, read_table
 from er3a.robots.robot import Robot
 from er3a.stages.trajectory.clearance_section import clearance_section
-from er3a.stages.trajectory.drawings import path_figure
+from er3a.stages.trajectory.drawings import PathFigure
 from er3a.stages.trajectory.turning import turning_figure
 from er3a.study import Study
-from er3a.viewing.page import Picture, fixed, number, render
+from er3a.viewing.page import fixed, number, render
 
+DRAWN = 250
 STATUS = {
     "safe": "pass",
     "near-singular": "caution",
@@ -44,15 +46,24 @@ KINDS = {
 }
 
 
+@dataclass(frozen=True)
+class Drawing:
+    """A drawn image for the ``picture`` macro: its data address, what it shows, what to conclude."""
+
+    uri: str
+    alt: str
+    caption: str
+
+
 def report(study: Study, name: str, folder: Path, output: Path) -> None:
     """Write the trajectory page of a robot from the results in ``folder``."""
     robot = study.robot(name)
     summary = read_summary(folder)
     checks, repairs = read_table(folder / "checks.parquet"), read_table(folder / "repairs.parquet")
-    sections = []
+    sections, figure = [], PathFigure()
     for record in summary["paths"]:
         rows, ways = (table[table["path"] == record["name"]] for table in (checks, repairs))
-        sections.append(_section(robot, record, rows, ways, summary["near"]))
+        sections.append(_section(robot, record, rows, ways, summary["near"], figure))
     limits = summary["joint_limits"]
     render(
         Path(__file__).with_name("report.html.j2"),
@@ -70,7 +81,12 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
 
 
 def _section(
-    robot: Robot, record: dict[str, Any], rows: pd.DataFrame, ways: pd.DataFrame, near: dict[str, float]
+    robot: Robot,
+    record: dict[str, Any],
+    rows: pd.DataFrame,
+    ways: pd.DataFrame,
+    near: dict[str, float],
+    figure: PathFigure,
 ) -> dict[str, Any]:
     return {
         **record,
@@ -89,14 +105,23 @@ def _section(
             for part in record[key]
         ],
         "ways": _ways(record),
-        "figure": Picture(
-            path_figure(robot, record, rows, ways, near),
+        "figure": Drawing(
+            figure.draw(robot, record, _drawn(record, rows), ways, near),
             f"Panels over time for {record['name']}: joint angles, velocities and accelerations; distances from the "
             f"singular sets, condition number, manipulability; the path in space; joint speeds against their limits. "
             f"{record['text']}.",
             _conclusion(record, rows),
         ),
     }
+
+
+def _drawn(record: dict[str, Any], rows: pd.DataFrame) -> pd.DataFrame:
+    """The rows that a curve needs: evenly spread ones, those at singular poses, and the greatest speeds."""
+    kept = [np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round()]
+    kept.append([int(np.argmin(np.abs(rows["t_s"].to_numpy() - event["t_s"]))) for event in record["singularities"]])
+    speed = np.nan_to_num(rows["speed_share"].to_numpy())
+    kept.append(np.flatnonzero(speed > 0.5 * speed.max())[:: max(1, len(rows) // DRAWN // 2)])
+    return rows.iloc[np.unique(np.concatenate(kept).astype(int))]
 
 
 def _ways(record: dict[str, Any]) -> list[list[str]]:
