@@ -59,6 +59,11 @@ class Branches:
         return self.free_wrist | self.free_shoulder | self.straight
 
     @property
+    def doors(self) -> np.ndarray:
+        """(N, 8), bits of the branch number (:mod:`er3a.kinematics.branch`) in which the branch met there differs."""
+        return self.free_wrist + 2 * self.straight + 4 * self.free_shoulder
+
+    @property
     def reached(self) -> np.ndarray:
         """(N, 8) bool, whether a branch has a solution."""
         return np.isfinite(self.q[..., 0])

@@ -130,6 +130,10 @@ def _on_set(times: np.ndarray, f: np.ndarray, a: int, b: int, factor: Joints, du
 
 
 def _root(factor: Joints, start: float, end: float, duration: float) -> float:
+    """Where the factor changes sign; the end nearer to 0 if, next to the set, it is evaluated on one side only."""
+    low, high = float(factor(start)), float(factor(end))
+    if not low * high < 0:
+        return start if abs(low) < abs(high) else end
     return brentq(factor, start, end, xtol=1e-14 * duration, rtol=4 * np.finfo(float).eps)
 
 

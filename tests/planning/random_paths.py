@@ -24,7 +24,7 @@ class Path:
 
     joints: Callable[[np.ndarray], np.ndarray]
     events: list[SingularEvent]
-    jumps: tuple[float, ...]
+    jumps: tuple[tuple[float, float], ...]  # grid points before and behind them
 
 
 def random_joint_move(robot, random) -> Path:
@@ -50,7 +50,11 @@ def random_plane_line(robot, random) -> Path:
 def _followed(robot, start, end) -> Path:
     followed = follow(robot, line(*forward(robot, np.stack([start, end])), 1.0), np.linspace(0, 1, COARSE), start)
     events = singular_events(robot, followed.t, followed.q, followed.joints, NEAR)
-    return Path(followed.joints, events, tuple(jump.t for jump in followed.jumps))
+    return Path(
+        followed.joints,
+        events,
+        tuple((float(followed.t[np.searchsorted(followed.t, j.t) - 1]), j.t) for j in followed.jumps),
+    )
 
 
 @dataclass
@@ -70,13 +74,15 @@ class Found:
             f = getattr(factors, kind)
             events = [event for event in path.events if event.type == kind]
             for i in np.flatnonzero(f[:-1] * f[1:] < 0):
-                if any(t[i] <= jump <= t[i + 1] for jump in path.jumps) or abs(f[i + 1] - f[i]) > 0.5:
+                if any(t[i + 1] >= before and t[i] <= behind for before, behind in path.jumps):
                     continue
                 self.crossings += 1
                 self.missed_crossings += not any(
                     event.crossing and t[i] - 1e-9 <= event.t <= t[i + 1] + 1e-9 for event in events
                 )
             for first, last in runs(np.abs(f) < NEAR[kind]):
+                if any(t[last - 1] >= before and t[first] <= behind for before, behind in path.jumps):
+                    continue
                 self.passes += 1
                 least = np.abs(f[first:last]).min()
                 spans = t[max(first - 1, 0)], t[min(last, len(t) - 1)]

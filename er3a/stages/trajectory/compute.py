@@ -24,7 +24,7 @@ from er3a.robots.robot import Robot
 from er3a.stages.trajectory.collisions import clearance_table, measured, with_collisions
 from er3a.stages.trajectory.judge import WORDS, Judgement, judge, path_record
 from er3a.stages.trajectory.motion import Motion, motion_of
-from er3a.stages.trajectory.ways import limits_record, speed_share, ways_around
+from er3a.stages.trajectory.ways import Surroundings, limits_record, speed_share, ways_around
 from er3a.study import Study
 
 
@@ -43,11 +43,12 @@ def compute(study: Study, name: str, folder: Path) -> None:
     scene_file = study.path_scene(name)
     scene = load_scene(scene_file) if scene_file else None
     bodies = Bodies(robot, scene) if can_measure() else None
+    surroundings = Surroundings(bodies, settings.overlap_mm / 1000) if bodies else None
     tables, clearances, repairs, records = [], [], [], []
     for i, entry in enumerate(load_paths(file).paths):
         motion = motion_of(robot, entry, settings.checks_per_sample, f"paths[{i}]", file)
         found = judge(robot, motion, near)
-        ways = ways_around(robot, motion, found, near, limits, chosen)
+        ways = ways_around(robot, motion, found, near, limits, chosen, surroundings)
         tables.append(_table(robot, motion, found, near, length, limits))
         along = measured(bodies, motion, settings.overlap_mm) if bodies else None
         clearances.append(clearance_table(entry.name, along))

@@ -130,21 +130,26 @@ def _ways(record: dict[str, Any]) -> list[list[str]]:
         return []
     duration = fixed(record["duration_s"], 2)
     shares = (record[f"max_joint_{kind}_ratio"] for kind in ("speed", "acceleration"))
-    rows = [["as programmed", "0", "0", *(_share(share) for share in shares), duration, "the path to be repaired"]]
+    clearance = record["clearance"] and record["clearance"]["least_mm"]
+    cells = ["0", "0", *(_share(share) for share in shares), _clearance(clearance), duration]
+    rows = [["as programmed", *cells, "the path to be repaired"]]
     for price in record["repairs"]:
         name = WAYS[price["way"]] + (" ←" if price["way"] == record["repair"] else "")
         if price["duration_s"] is None:
-            rows.append([name, *["–"] * 5, f"not possible: {price['reason']}"])
+            rows.append([name, *["–"] * 6, f"not possible: {price['reason']}"])
             continue
         remark = f"not usable: {price['reason']}" if price["reason"] else _remark(price)
-        cells = (price["max_deviation_mm"], price["max_deviation_deg"])
+        off = (_small(price["max_deviation_mm"]), _small(price["max_deviation_deg"]))
         shares = (_share(price[f"max_joint_{kind}_ratio"]) for kind in ("speed", "acceleration"))
-        rows.append([name, *(_small(cell) for cell in cells), *shares, fixed(price["duration_s"], 2), remark])
+        rows.append([name, *off, *shares, _clearance(price["clearance_mm"]), fixed(price["duration_s"], 2), remark])
     if record["fastest_s"]:
-        rows.append(
-            ["the path at its fastest", "0", "0", "1.00", "1.00", fixed(record["fastest_s"], 2), "for comparison"]
-        )
+        cells = ["0", "0", "1.00", "1.00", _clearance(clearance), fixed(record["fastest_s"], 2)]
+        rows.append(["the path at its fastest", *cells, "for comparison"])
     return rows
+
+
+def _clearance(value: float | None) -> str:
+    return "–" if value is None else fixed(value, 0)
 
 
 def _remark(price: dict[str, Any]) -> str:

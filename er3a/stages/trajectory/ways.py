@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from er3a.collision.along import clearance_along
+from er3a.collision.bodies import Bodies
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.planning.repairs.compare import Price, best, compare
@@ -20,6 +22,7 @@ from er3a.stages.trajectory.motion import Motion
 
 ROWS = 250  # of each way in the table
 FASTEST = "fastest"
+CLEARANCE_TIMES = 41
 SENTENCES = {
     "slow": "Keep the path and slow down",
     "branch": "Change to another solution of the arm first",
@@ -39,10 +42,27 @@ class Ways:
     rows: list[pd.DataFrame]
 
 
+@dataclass(frozen=True)
+class Surroundings:
+    """What motions must not meet: bodies, and the overlap (m) that may go unnoticed."""
+
+    bodies: Bodies
+    depth: float
+
+
 def ways_around(
-    robot: Robot, motion: Motion, found: Judgement, near: Mapping[str, float], limits: JointLimits, chosen: str | None
+    robot: Robot,
+    motion: Motion,
+    found: Judgement,
+    near: Mapping[str, float],
+    limits: JointLimits,
+    chosen: str | None,
+    surroundings: Surroundings | None = None,
 ) -> Ways:
-    """Compare the ways around where a path is not safe; find its fastest time law where it can be run as it is."""
+    """Compare the ways around where a path is not safe; find its fastest time law where it can be run as it is.
+
+    A way on which the arm meets its surroundings or itself is not usable; without ``surroundings`` that is unknown.
+    """
     prices: list[Price] = []
     if motion.followed is None:
         quickest, prices = _joint_move(motion, found, limits)
@@ -51,13 +71,18 @@ def ways_around(
         quickest = _quickest(trouble)
         if found.word != "safe":
             prices = compare(trouble, chosen)
+    clearances = {}
+    if surroundings:
+        for i, price in enumerate(prices):
+            if price.motion:
+                prices[i], clearances[price.name] = _measured(price, surroundings)
     taken = best(prices, meets=any(event.crossing for event in found.events) and motion.followed is not None)
     known = found.velocity[np.isfinite(found.velocity[:, 0])] if found.speed_bounded else found.velocity[:0]
     record = {
         "max_joint_speed_ratio": float(np.abs(known / limits.speed).max()) if len(known) else None,
         "max_joint_acceleration_ratio": _pull(found, limits),
         "fastest_s": quickest and quickest.duration,
-        "repairs": [_record(price) for price in prices],
+        "repairs": [_record(price) | {"clearance_mm": clearances.get(price.name)} for price in prices],
         "repair": taken and taken.name,
         "repair_text": _text(motion, found, prices, taken),
     }
@@ -65,6 +90,25 @@ def ways_around(
     if quickest:
         rows.append(_rows(robot, motion, FASTEST, quickest, None, limits))
     return Ways(record, rows)
+
+
+def _measured(price: Price, surroundings: Surroundings) -> tuple[Price, float | None]:
+    """The way, no longer usable if it meets something, and its least clearance in mm (None if nothing can meet)."""
+    t, q = price.motion.t, price.motion.q
+
+    def joints(at: np.ndarray) -> np.ndarray:
+        return np.stack([np.interp(at, t, q[:, j]) for j in range(6)], axis=-1)
+
+    grid = np.linspace(0.0, t[-1], CLEARANCE_TIMES)
+    along = clearance_along(surroundings.bodies, joints, grid, grid, surroundings.depth)
+    if along.least < 0:
+        return price, None
+    least = float(along.distance[along.least] * 1000)
+    if along.contacts:
+        meets = f"{along.pair[along.least]} overlap by {-least:.1f} mm"
+        reason = "; ".join(filter(None, [price.reason, meets]))
+        price = replace(price, usable=False, reason=reason)
+    return price, least
 
 
 def limits_record(robot: Robot, limits: JointLimits, full_speed_after: float) -> dict[str, Any]:
