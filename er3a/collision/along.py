@@ -32,6 +32,7 @@ from er3a.collision.envelopes import link_frames
 
 SHORTEST = 1e-9  # share of the duration; motion that is wide over less is a jump
 LOCATED = 1e-10  # share of the duration
+CHUNK = 20_000  # points whose ends are held in memory at a time
 
 Joints = Callable[[np.ndarray], np.ndarray]
 
@@ -152,10 +153,8 @@ def _fine(motion: _Motion, t: np.ndarray, step: float) -> tuple[np.ndarray, np.n
     while True:
         middle = (times[:-1] + times[1:]) / 2
         q_middle = motion.joints(middle)
-        here, half = motion.tracked(q), motion.tracked(q_middle)
-        chords = np.linalg.norm(half - here[:-1], axis=-1) + np.linalg.norm(here[1:] - half, axis=-1)
-        bulge = np.linalg.norm(here[:-1] - 2 * half + here[1:], axis=-1)
-        steps = (chords + bulge).max(axis=-1)
+        cuts = range(0, len(middle), CHUNK)
+        steps = np.concatenate([_steps(motion, q[k : k + CHUNK + 1], q_middle[k : k + CHUNK]) for k in cuts])
         wide = (steps.max(axis=1) > step) & (np.diff(times) > SHORTEST * (t[-1] - t[0]))
         if not wide.any():
             break
@@ -164,6 +163,14 @@ def _fine(motion: _Motion, t: np.ndarray, step: float) -> tuple[np.ndarray, np.n
         times, q = times[order], np.concatenate([q, q_middle[wide]])[order]
     steps = np.nan_to_num(steps, nan=0.0)  # beside an unknown pose; stretches between them are summed up apart
     return times, q, np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
+
+
+def _steps(motion: _Motion, q: np.ndarray, q_middle: np.ndarray) -> np.ndarray:
+    """How far the tracked ends move at most between neighbours (n + 1, 6), by way of the middles; (n, tracks)."""
+    here, half = motion.tracked(q), motion.tracked(q_middle)
+    chords = np.linalg.norm(half - here[:-1], axis=-1) + np.linalg.norm(here[1:] - half, axis=-1)
+    bulge = np.linalg.norm(here[:-1] - 2 * half + here[1:], axis=-1)
+    return (chords + bulge).max(axis=-1)
 
 
 def _refine(motion: _Motion, times: np.ndarray, q: np.ndarray, way: np.ndarray, step: float) -> None:

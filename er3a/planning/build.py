@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -12,7 +13,8 @@ from er3a.errors import InputError, PathError, PoseError
 from er3a.kinematics.branch import branch_labels
 from er3a.kinematics.forward import forward
 from er3a.kinematics.transforms import transform
-from er3a.planning.moves import JointMove, Line, ToolPath, arc, line, rotation_between
+from er3a.planning.arcs import arc
+from er3a.planning.moves import JointMove, Line, ToolPath, line, rotation_between
 from er3a.planning.path_file import (
     ArcPath,
     ArcTo,
@@ -65,15 +67,20 @@ class Built:
         return move.duration
 
 
-def build(robot: Robot, entry: PathEntry, field: str, file: Path) -> Built:
+def build(robot: Robot, entry: PathEntry, field: str, file: Path, ends: Mapping[str, np.ndarray]) -> Built:
     """Make a path of an entry; ``field`` names it in the file.
+
+    Parameters
+    ----------
+    ends : joint angles (6,) in rad at the end of each earlier path of the file, NaN where it is not reached
 
     Raises
     ------
     InputError
         for a start branch that this robot has not, a half-turn axis that can't choose, points that fix no circle, a
-        corner that can't be rounded so far, a table that can't be read
+        corner that can't be rounded so far, a table that can't be read, an earlier path without end
     """
+    q_start = _start(entry, field, file, ends)
     if isinstance(entry, JointPath):
         rates = (
             entry.start_velocity_deg_s,
@@ -81,8 +88,8 @@ def build(robot: Robot, entry: PathEntry, field: str, file: Path) -> Built:
             entry.start_acceleration_deg_s2,
             entry.end_acceleration_deg_s2,
         )
-        ends = np.radians(entry.start_deg), np.radians(entry.end_deg)
-        return Built(joints=JointMove(*ends, entry.duration_s, *(0.0 if r is None else np.radians(r) for r in rates)))
+        given = (0.0 if rate is None else np.radians(rate) for rate in rates)
+        return Built(joints=JointMove(q_start, np.radians(entry.end_deg), entry.duration_s, *given))
     if isinstance(entry, JointSequencePath):
         points = np.radians(entry.points_deg)
         blends = np.full(len(points) - 2, np.radians(entry.blend_deg))
@@ -93,11 +100,22 @@ def build(robot: Robot, entry: PathEntry, field: str, file: Path) -> Built:
             raise InputError(file, where, f"its way there {error.problem}", "Mend the point or blend_deg") from None
     if isinstance(entry, TablePath):
         return _table(robot, entry, field, file)
-    return _tool(robot, entry, field, file)
+    return _tool(robot, entry, q_start, field, file)
 
 
-def _tool(robot: Robot, entry: LinePath | ArcPath | SequencePath, field: str, file: Path) -> Built:
-    q_start = None if entry.start_deg is None else np.radians(entry.start_deg)
+def _start(entry: PathEntry, field: str, file: Path, ends: Mapping[str, np.ndarray]) -> np.ndarray | None:
+    """Joint angles (6,) at the start in rad, where the entry gives them or names the path before."""
+    after = getattr(entry, "after", None)
+    if after is not None and np.isnan(ends[after]).any():
+        remedy = "Mend that path, or start from a pose"
+        raise InputError(file, f"{field}.after", f"the path '{after}' does not reach its end", remedy)
+    given = getattr(entry, "start_deg", None)
+    return ends[after] if after else None if given is None else np.radians(given)
+
+
+def _tool(
+    robot: Robot, entry: LinePath | ArcPath | SequencePath, q_start: np.ndarray | None, field: str, file: Path
+) -> Built:
     T_start = _pose(entry.start) if q_start is None else forward(robot, q_start)
     slot = _slot(robot, entry.start_branch, field, file)
     if not isinstance(entry, SequencePath):

@@ -59,16 +59,28 @@ class Profiled(NamedPath):
 
 
 class JointPath(NamedPath):
-    """A joint move: quintic in time, all joints together; at rest at the ends unless their rates are given."""
+    """A joint move: quintic in time, all joints together; at rest at the ends unless their rates are given.
+
+    It starts at ``start_deg``, or where the arm stands ``after`` an earlier path of the file.
+    """
 
     kind: Literal["joint"]
-    start_deg: JointsDeg
+    start_deg: JointsDeg | None = None
+    after: Name | None = None
     end_deg: JointsDeg
     start_velocity_deg_s: Six | None = None
     end_velocity_deg_s: Six | None = None
     start_acceleration_deg_s2: Six | None = None
     end_acceleration_deg_s2: Six | None = None
     duration_s: Duration
+
+    @model_validator(mode="after")
+    def _one_start(self):
+        if (self.start_deg is None) == (self.after is None):
+            raise ValueError(
+                "give either start_deg (six joint angles) or after (an earlier path) | Keep one of the two"
+            )
+        return self
 
 
 class JointSequencePath(Profiled):
@@ -83,21 +95,24 @@ class JointSequencePath(Profiled):
 
 
 class ToolStart(Profiled):
-    """Where a path of the tool starts: at joint angles or at a pose.
+    """Where a path of the tool starts: at joint angles, at a pose, or where the arm stands ``after`` an earlier path.
 
     ``start_branch`` (only with a start pose) fixes the branch to begin on, in the words of the inverse's solutions.
     """
 
     start_deg: JointsDeg | None = None
     start: PoseEntry | None = None
+    after: Name | None = None
     start_branch: Text | None = None
 
     @model_validator(mode="after")
     def _one_start(self):
-        if (self.start is None) == (self.start_deg is None):
-            raise ValueError("give either start_deg (six joint angles) or start (a pose) | Keep one of the two")
+        if [self.start, self.start_deg, self.after].count(None) != 2:
+            ways = "start_deg (six joint angles) or start (a pose) or after (an earlier path)"
+            raise ValueError(f"give either {ways} | Keep one of them")
         if self.start_branch is not None and self.start is None:
-            raise ValueError("start_branch: start_deg already fixes the branch | Remove start_branch")
+            what = "after" if self.after else "start_deg"
+            raise ValueError(f"start_branch: {what} already fixes the branch | Remove start_branch")
         return self
 
 
@@ -187,6 +202,9 @@ class PathFile(StrictModel):
         for i, name in enumerate(names):
             if name in names[:i]:
                 raise ValueError(f"paths[{i}].name: '{name}' names an earlier path too | Give each path its own name")
+            after = getattr(self.paths[i], "after", None)
+            if after and after not in names[:i]:
+                raise ValueError(f"paths[{i}].after: no earlier path is named '{after}' | Name one that stands above")
         return self
 
 

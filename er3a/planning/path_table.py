@@ -88,7 +88,7 @@ def read_path_table(path: str | Path) -> PathTable:
     lines = np.array([row["row"] for row in rows])
     times = _times(path, lines, rows) if timed else None
     if of_joints:
-        joints = np.radians(_block(path, rows, JOINT_COLUMNS, degrees=True))
+        joints = np.radians(_block(path, rows, JOINT_COLUMNS, "give the path as poses of the tool"))
         size, poses = np.abs(np.diff(joints, axis=0)).max(axis=1), None
     else:
         poses, joints = _poses(path, lines, rows, forms[0]), None
@@ -113,11 +113,11 @@ def _times(path: Path, lines: np.ndarray, rows: list[dict[str, Any]]) -> np.ndar
 
 
 def _poses(path: Path, lines: np.ndarray, rows: list[dict[str, Any]], form: str) -> np.ndarray:
-    position = _block(path, rows, POSITION, degrees=False)
+    position = _block(path, rows, POSITION)
     T = transform(position / 1000, np.zeros_like(position))
     names = FORMS[form]
     if form in ("rpy_deg", "zyz_deg"):
-        angles = _block(path, rows, names, degrees=True)
+        angles = _block(path, rows, names, "give the orientation as a quaternion or a matrix")
         order = "ZYX" if form == "rpy_deg" else "ZYZ"
         T[:, :3, :3] = Rotation.from_euler(
             order, angles[:, ::-1] if form == "rpy_deg" else angles, degrees=True
@@ -143,19 +143,23 @@ def _poses(path: Path, lines: np.ndarray, rows: list[dict[str, Any]], form: str)
     return T
 
 
-def _block(path: Path, rows: list[dict[str, Any]], names: Sequence[str], degrees: bool) -> np.ndarray:
-    """The values of columns of one kind, their unit judged over the whole table: single rows may well be small."""
+def _block(path: Path, rows: list[dict[str, Any]], names: Sequence[str], otherwise: str | None = None) -> np.ndarray:
+    """The values of columns of one kind, their unit judged by the largest row: others may well be small.
+
+    Parameters
+    ----------
+    otherwise : for degrees, how to write such small angles if degrees are meant; None for millimetres
+    """
     values = np.array([[row[name] for name in names] for row in rows])
-    largest = values[np.argmax(np.abs(values).max(axis=1))].tolist()
+    top = int(np.argmax(np.abs(values).max(axis=1)))
     try:
-        if degrees:
-            check_degrees(largest, "give the orientation as a quaternion or a matrix")
+        if otherwise:
+            check_degrees(values[top].tolist(), otherwise)
         else:
-            check_millimetres(largest)
+            check_millimetres(values[top].tolist())
     except ValueError as error:
         problem, _, remedy = str(error).partition(" | ")
-        row = rows[int(np.argmax(np.abs(values).max(axis=1)))]["row"]
-        raise InputError(path, _where(row, names), problem, remedy) from None
+        raise InputError(path, _where(rows[top]["row"], names), problem, remedy) from None
     return values
 
 

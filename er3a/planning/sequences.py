@@ -15,8 +15,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import PathError
+from er3a.planning.arcs import Arc
 from er3a.planning.curves import GAUSS_POINTS, GAUSS_WEIGHTS, POWERS, Curve, joining, straight
-from er3a.planning.moves import Arc, Line
+from er3a.planning.moves import Line
 from er3a.planning.profiles import FromRestToRest, Rates, TimeLaw, Timetable
 from er3a.planning.rotation_curves import spin
 

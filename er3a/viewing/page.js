@@ -35,13 +35,15 @@ function makeSortable(table) {
   if (written.length < 2) return;
   const headers = [...table.tHead.rows[0].cells];
   headers.forEach((header, column) => {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.className = "sort";
-    button.title = WORDS.sort;
-    button.append(...header.childNodes);
-    header.append(button);
-    button.addEventListener("click", () => {
+    // No button element: browsers leave those out of a header that is repeated on the next printed sheet.
+    const control = document.createElement("span");
+    control.role = "button";
+    control.tabIndex = 0;
+    control.className = "sort";
+    control.title = WORDS.sort;
+    control.append(...header.childNodes);
+    header.append(control);
+    const turn = () => {
       const next = { none: "ascending", ascending: "descending", descending: "none" }[header.ariaSort || "none"];
       headers.forEach((other) => other.removeAttribute("aria-sort"));
       if (next !== "none") header.setAttribute("aria-sort", next);
@@ -49,6 +51,12 @@ function makeSortable(table) {
       const keys = new Map(written.map((row) => [row, row.cells[column] ? textOf(row.cells[column]) : ""]));
       const rows = next === "none" ? written : [...written].sort((a, b) => compare(keys.get(a), keys.get(b), sign));
       body.append(...rows);
+    };
+    control.addEventListener("click", turn);
+    control.addEventListener("keydown", (event) => {
+      if (event.key !== "Enter" && event.key !== " ") return;
+      event.preventDefault();
+      turn();
     });
   });
 }

@@ -36,7 +36,7 @@ def column(page, number: int) -> list[str]:
 
 
 def test_sorting_by_keyboard_goes_by_value_and_back(page):
-    button = page.find_elements(By.CSS_SELECTOR, "th button")[1]
+    button = page.find_elements(By.CSS_SELECTOR, "th .sort")[1]
     header = page.find_elements(By.CSS_SELECTOR, "th")[1]
     written = column(page, 2)
     button.send_keys(Keys.ENTER)

@@ -27,13 +27,14 @@ JOINTS = HEAD | {"kind": "joint_sequence", "points_deg": [[0] * 6, [30] * 6, [30
 TABLE = HEAD | {"kind": "table", "duration_s": 2}
 
 
-def built(folder: Path, entry: dict, table: str | None = None):
+def built(folder: Path, entry: dict, table: str | None = None, ends=None):
     if table is not None:
         (folder / "table.csv").write_text(table)
         entry = entry | {"file": str(folder / "table.csv")}
     file = folder / "paths.yaml"
-    file.write_text(json.dumps({"kind": "paths", "paths": [entry]}))
-    return build(load_robot("er3a_c60"), load_paths(file).paths[0], "paths[0]", file)
+    before = [JOINTS | {"name": name} for name in ends or {}]
+    file.write_text(json.dumps({"kind": "paths", "paths": [*before, entry]}))
+    return build(load_robot("er3a_c60"), load_paths(file).paths[-1], f"paths[{len(before)}]", file, ends or {})
 
 
 def test_line_and_arc_start_and_end_where_they_say(tmp_path):
@@ -53,6 +54,22 @@ def test_joint_start_is_the_pose_there(tmp_path):
     np.testing.assert_allclose(
         found.tool.poses(np.array(0.0)), forward(load_robot("er3a_c60"), np.radians(q)), atol=1e-12
     )
+
+
+def test_path_goes_on_where_another_ended(tmp_path):
+    q = np.radians([10, 10, -20, 30, 40, 50])
+    after = {key: value for key, value in LINE.items() if key != "start"} | {"after": "before"}
+    found = built(tmp_path, after, ends={"before": q})
+    np.testing.assert_array_equal(found.q_start, q)
+    np.testing.assert_allclose(found.tool.poses(np.array(0.0)), forward(load_robot("er3a_c60"), q), atol=1e-12)
+    move = HEAD | {"kind": "joint", "after": "before", "end_deg": [0] * 6, "duration_s": 2}
+    np.testing.assert_allclose(built(tmp_path, move, ends={"before": q}).joints.joints(np.array(0.0))[0], q)
+    with pytest.raises(InputError, match=r"paths\[1\]\.after: the path 'before' does not reach its end"):
+        built(tmp_path, after, ends={"before": q * np.nan})
+    with pytest.raises(InputError, match=r"paths\[1\]\.after: no earlier path is named 'other'"):
+        built(tmp_path, move | {"after": "other"}, ends={"before": q})
+    with pytest.raises(InputError, match=r"paths\[1\]: give either start_deg .* or after"):
+        built(tmp_path, move | {"start_deg": [0] * 6}, ends={"before": q})
 
 
 def test_joint_move_takes_its_boundary_rates(tmp_path):

@@ -12,7 +12,8 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from er3a.errors import PathError, PoseError
 from er3a.kinematics.transforms import transform
-from er3a.planning.moves import arc, line
+from er3a.planning.arcs import arc
+from er3a.planning.moves import line
 from er3a.planning.rotation_curves import spin
 from er3a.planning.sequences import Times, joint_sequence, segment_path
 
@@ -46,10 +47,10 @@ def test_arc_runs_on_the_circle_through_its_three_points(random):
         np.testing.assert_allclose(T[0], a, atol=1e-12)
         np.testing.assert_allclose(T[-1], b, atol=1e-10)
         np.testing.assert_allclose(np.linalg.norm(T[:, :3, 3] - way.centre, axis=1), way.radius, rtol=1e-12)
-        share = np.linspace(0, 1, 20001)
-        assert np.linalg.norm(way.poses(share)[:, :3, 3] - via, axis=1).min() < 1e-3 * way.length
-        chords = np.linalg.norm(np.diff(way.poses(share)[:, :3, 3], axis=0), axis=1).sum()
-        assert chords == pytest.approx(way.length, rel=1e-7)
+        share = np.linspace(0, 1, 5001)
+        assert np.linalg.norm(way.points(share) - via, axis=1).min() < 1e-3 * way.length
+        chords = np.linalg.norm(np.diff(way.points(share), axis=0), axis=1).sum()
+        assert chords == pytest.approx(way.length, rel=1e-5)
         slerp = Slerp([0, 1], Rotation.from_matrix([a[:3, :3], b[:3, :3]]))(progress).as_matrix()
         np.testing.assert_allclose(T[:, :3, :3], slerp, atol=1e-12)
         check_rates(way, progress[1:-1])
@@ -87,7 +88,7 @@ def three_segments(random):
 
 
 def test_rounded_sequence_has_the_rates_that_differences_give_also_across_its_joins(random):
-    for _ in range(8):
+    for _ in range(5):
         segments = three_segments(random)
         path = segment_path(segments, np.array([0.08, 0.1]), 4.0)
         check_rates(path, np.linspace(0.001, 0.999, 200))
@@ -99,9 +100,9 @@ def test_rounded_sequence_has_the_rates_that_differences_give_also_across_its_jo
         np.testing.assert_allclose(
             path.poses(np.array([0.0, 1.0])), [segments[0].T_start, segments[2].poses(np.array(1.0))], atol=1e-12
         )
-        share = np.linspace(0, 1, 40001)
+        share = np.linspace(0, 1, 5001)
         chords = np.linalg.norm(np.diff(path.poses(share)[:, :3, 3], axis=0), axis=1)
-        np.testing.assert_allclose(path.way(share[1:]), np.cumsum(chords), atol=5e-5)
+        np.testing.assert_allclose(path.way(share[1:]), np.cumsum(chords), atol=1e-4)
 
 
 def test_motion_in_time_of_a_rounded_sequence_has_continuous_rates(random):

@@ -306,3 +306,22 @@ def test_extreme_paths_give_results(study, tmp_path):
     json.dumps(found, allow_nan=False)
     report(changed, "er3a_c60", tmp_path, tmp_path / "page.html")
     record(changed, "er3a_c60", tmp_path, tmp_path / "recording.rrd")
+
+
+def test_paths_that_are_nowhere_reached_have_a_page_too(study, tmp_path):
+    far = {"xyz_mm": [5000, 0, 300], "rpy_deg": [180, 0, 0]}
+    changed = with_paths(study, tmp_path, LINE | {"start": far, "end": far})
+    compute(changed, "er3a_c60", tmp_path)
+    report(changed, "er3a_c60", tmp_path, tmp_path / "page.html")
+    assert "No path has a pose that can be reached" in (tmp_path / "page.html").read_text()
+
+
+def test_path_that_goes_on_from_one_that_does_not_end_is_refused(study, tmp_path):
+    far = LINE | {"end": {"xyz_mm": [5000, 0, 300], "rpy_deg": [180, 0, 0]}}
+    after = {key: value for key, value in LINE.items() if key != "start"} | {"name": "next", "after": "line"}
+    with pytest.raises(InputError, match=r"paths\[1\]\.after: the path 'line' does not reach its end"):
+        compute(with_paths(study, tmp_path, far, after), "er3a_c60", tmp_path)
+    compute(with_paths(study, tmp_path, LINE, after), "er3a_c60", tmp_path)
+    checks = read_table(tmp_path / "checks.parquet")
+    last, first = (checks[checks["path"] == name][JOINTS] for name in ("line", "next"))
+    np.testing.assert_allclose(last.iloc[-1], first.iloc[0], atol=1e-9)

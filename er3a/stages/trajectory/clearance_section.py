@@ -22,6 +22,8 @@ def clearance_section(summary: dict[str, Any], rows: pd.DataFrame) -> dict[str, 
     if not summary["clearance_measured"]:
         return None
     records = [record for record in summary["paths"] if record["clearance"]]
+    if not records:
+        return {"picture": None, "rows": []}
     colliding = [record["name"] for record in records if record["collisions"]]
     if colliding:
         caption = f"Below zero bodies overlap: {', '.join(colliding)} can't be driven as planned."
@@ -44,7 +46,7 @@ def _row(record: dict[str, Any]) -> list[Any]:
 
 
 def _curves(records: list[dict[str, Any]], rows: pd.DataFrame) -> Figure:
-    count = -(-max(len(records), 1) // COLUMNS)
+    count = -(-len(records) // COLUMNS)
     figure, axes = new_figure(count, COLUMNS, width=11.0, height=ROW_HEIGHT * count + 0.4, sharey=True, squeeze=False)
     for ax, record in zip(axes.flat, records):
         part = rows[rows["path"] == record["name"]]

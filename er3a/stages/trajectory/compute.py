@@ -45,8 +45,10 @@ def compute(study: Study, name: str, folder: Path) -> None:
     bodies = Bodies(robot, scene) if can_measure() else None
     surroundings = Surroundings(bodies, settings.overlap_mm / 1000) if bodies else None
     tables, clearances, repairs, records = [], [], [], []
+    ends: dict[str, np.ndarray] = {}
     for i, entry in enumerate(load_paths(file).paths):
-        motion = motion_of(robot, entry, settings.checks_per_sample, f"paths[{i}]", file)
+        motion = motion_of(robot, entry, settings.checks_per_sample, f"paths[{i}]", file, ends)
+        ends[entry.name] = motion.q[-1]
         found = judge(robot, motion, near)
         ways = ways_around(robot, motion, found, near, limits, chosen, surroundings)
         tables.append(_table(robot, motion, found, near, length, limits))

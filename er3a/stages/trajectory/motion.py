@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -50,15 +50,17 @@ class Motion:
     followed: Followed | None
 
 
-def motion_of(robot: Robot, entry: PathEntry, checks_per_sample: int, field: str, file: Path) -> Motion:
-    """Plan a path, and follow it if it is one of the tool.
+def motion_of(
+    robot: Robot, entry: PathEntry, checks_per_sample: int, field: str, file: Path, ends: Mapping[str, np.ndarray]
+) -> Motion:
+    """Plan a path, and follow it if it is one of the tool; ``ends`` as for :func:`er3a.planning.build.build`.
 
     Raises
     ------
     InputError
         for what :func:`er3a.planning.build.build` refuses, and a start branch that has no solution at the start
     """
-    built = build(robot, entry, field, file)
+    built = build(robot, entry, field, file, ends)
     samples = np.linspace(0.0, built.duration, entry.samples)
     checks = np.linspace(0.0, built.duration, (entry.samples - 1) * (checks_per_sample + 1) + 1)
     checks[:: checks_per_sample + 1] = samples
