@@ -24,7 +24,7 @@ from er3a.robots.robot import Robot
 from er3a.stages.trajectory.collisions import clearance_table, measured, with_collisions
 from er3a.stages.trajectory.judge import WORDS, Judgement, judge, path_record
 from er3a.stages.trajectory.motion import Motion, motion_of
-from er3a.stages.trajectory.ways import Surroundings, limits_record, speed_share, ways_around
+from er3a.stages.trajectory.ways import Surroundings, limits_record, repairs_table, speed_share, ways_around
 from er3a.study import Study
 
 
@@ -60,7 +60,7 @@ def compute(study: Study, name: str, folder: Path) -> None:
     write_table(folder / "checks.parquet", checks)
     write_table(folder / "samples.parquet", checks[checks["sample"]].drop(columns="sample"))
     write_table(folder / "clearance.parquet", pd.concat(clearances, ignore_index=True))
-    write_table(folder / "repairs.parquet", pd.concat(repairs, ignore_index=True))
+    write_table(folder / "repairs.parquet", repairs_table(repairs))
     write_summary(
         folder,
         study,

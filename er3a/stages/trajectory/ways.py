@@ -22,6 +22,9 @@ from er3a.stages.trajectory.motion import Motion
 
 ROWS = 250  # of each way in the table
 FASTEST = "fastest"
+_PER_JOINT = [f"q{j + 1}_{unit}" for unit in ("deg", "deg_s", "deg_s2") for j in range(6)]
+_MEASURES = ["deviation_mm", "deviation_deg", "speed_share", "condition_number", "smallest_singular_value"]
+NUMBERS = ("t_s", *_PER_JOINT, "x_mm", "y_mm", "z_mm", *_MEASURES)
 CLEARANCE_TIMES = 41
 SENTENCES = {
     "slow": "Keep the path and slow down",
@@ -119,6 +122,13 @@ def limits_record(robot: Robot, limits: JointLimits, full_speed_after: float) ->
         "acceleration_deg_s2": [float(value) for value in np.degrees(limits.acceleration)],
         "full_speed_after_s": full_speed_after,
     }
+
+
+def repairs_table(parts: list[pd.DataFrame]) -> pd.DataFrame:
+    """The rows of all ways; an empty table where no path can be driven at all."""
+    if parts:
+        return pd.concat(parts, ignore_index=True)
+    return pd.DataFrame({"path": [], "way": []} | {name: np.empty(0) for name in NUMBERS})
 
 
 def speed_share(velocity: np.ndarray, limits: JointLimits) -> np.ndarray:
