@@ -48,7 +48,9 @@ def turning_figure(robot: Robot, summary: dict[str, Any], checks: pd.DataFrame, 
         legend={"x": 0.0, "y": 0.0},
         updatemenus=[{"buttons": buttons, "active": names.index(first), "x": 0.0, "xanchor": "left", "y": 1.0}],
     )
-    body = figure.to_html(full_html=False, include_plotlyjs=False, div_id="turning", config={"displaylogo": False})
+    body = figure.to_html(
+        full_html=False, include_plotlyjs=False, div_id="turning", config={"displaylogo": False, "responsive": True}
+    )
     return f"<script>{get_plotlyjs()}</script>{body}"
 
 
