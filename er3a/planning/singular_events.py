@@ -24,7 +24,7 @@ from er3a.robots.robot import Robot
 ON_SET = 1e-9  # rad or m: this near counts as on the singular set
 EDGE = 1e-3  # rad or m: a branch that ends this near to a singular set ends on it
 FLAT = 1e-9  # relative, by which rounding may raise the distance at its minimum
-SLOPE_STEP = 1e-4  # share of the duration
+SLOPE_STEP = 5e-5  # share of the duration
 SAME_EVENT = 1e-8  # share of the duration
 LONG_STAY = 0.01  # share of the duration
 

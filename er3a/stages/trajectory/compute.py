@@ -67,7 +67,7 @@ def compute(study: Study, name: str, folder: Path) -> None:
         name,
         "trajectory",
         _verdict(records),
-        _figures(records, length, bodies is not None),
+        _figures(records, length, bodies is not None, bool(np.isnan(robot.speed).any())),
         characteristic_length_m=length,
         near={"wrist_deg": settings.near_wrist_deg, "elbow_deg": settings.near_elbow_deg}
         | {"shoulder_mm": settings.near_shoulder_mm},
@@ -126,7 +126,7 @@ def _verdict(records: list[dict[str, Any]]) -> Verdict:
     return Verdict("pass", "trajectory.safe", text, params)
 
 
-def _figures(records: list[dict[str, Any]], length: float, clear: bool) -> list[Figure]:
+def _figures(records: list[dict[str, Any]], length: float, clear: bool, assumed: bool) -> list[Figure]:
     events = [event for record in records for event in record["singularities"]]
     bounded = [record for record in records if record["max_joint_speed_deg_s"]]
     ratios = [record["max_joint_speed_ratio"] for record in bounded if record["max_joint_speed_ratio"] is not None]
@@ -139,7 +139,7 @@ def _figures(records: list[dict[str, Any]], length: float, clear: bool) -> list[
         Figure("Near passes", sum(not event["crossing"] for event in events), ""),
         Figure("Paths that collide", _colliding(records) if clear else None, ""),
         Figure("Greatest joint speed needed, where bounded", fastest, "deg/s"),
-        Figure("Share of the joint's greatest speed", max(ratios, default=None), ""),
+        Figure(f"Share of the joint's {'assumed' if assumed else 'greatest'} speed", max(ratios, default=None), ""),
         Figure("Velocity by Jacobian against differences, within", agreement, "µdeg/s"),
         Figure("Characteristic length of the Jacobian", length * 1000, "mm"),
     ]
