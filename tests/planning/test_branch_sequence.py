@@ -56,7 +56,7 @@ def every_sequence(grid):
 def test_no_other_sequence_stays_within_limits_for_longer(name):
     robot, random = load_robot(name), np.random.default_rng(6)
     compared, switched = 0, 0
-    while compared < 12:
+    while compared < 8:
         path = through_aligned_wrist(robot, random)
         grid = branches_along(robot, path, GRID)
         if not grid.reached.all() or grid.meeting.any(axis=1).sum() > 4 or grid.free_shoulder.any():
