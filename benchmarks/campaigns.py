@@ -20,6 +20,7 @@ CAMPAIGNS = (
     "workspace",
     "paths",
     "clearance",
+    "capability",
 )
 
 

@@ -37,6 +37,8 @@ TABLES = {
         "drawing",
         "void_vertices",
         "void_triangles",
+        "capability",
+        "places",
     ],
     "inverse": ["solutions", "rankings", "map"],
     "trajectory": ["checks", "clearance", "repairs", "samples"],
