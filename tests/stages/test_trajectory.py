@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from er3a.errors import InputError
 from er3a.kinematics.forward import forward
@@ -170,28 +172,26 @@ def test_assumed_speeds_are_marked_and_change_the_times(study, folders, tmp_path
     assert assumed["speed_assumed"] == [True] * 6
     assert assumed["speed_deg_s"] == pytest.approx([180, 180, 180, 360, 360, 360])
     slower = study.trajectory.model_copy(update={"assumed_speed_deg_s": [90.0] * 6, "repair": "slow"})
-    compute(study.model_copy(update={"trajectory": slower}), "er3a_c60", tmp_path)
+    few = with_paths(study, tmp_path, *own_paths("line_clean", "line_wrist_near"))
+    compute(few.model_copy(update={"trajectory": slower}), "er3a_c60", tmp_path)
     before, after = by_name(folders["er3a_c60"]), by_name(tmp_path)
     assert after["line_clean"]["fastest_s"] > 1.3 * before["line_clean"]["fastest_s"]
     assert [price["way"] for price in after["line_wrist_near"]["repairs"]] == ["slow"]
     assert after["line_wrist_near"]["repair"] == "slow"
-    assert (
-        after["line_out"]["repair_text"].startswith("No way") or "does not repair" in after["line_out"]["repair_text"]
-    )
 
 
-def test_a_repair_that_meets_something_is_not_taken(study, tmp_path):
-    """A ball just above the via point of the line past axis 1."""
+def test_a_repair_that_meets_something_is_not_taken(study, folders, tmp_path):
+    """A ball at the via point of the line past axis 1."""
     name = "er3a_c60"
-    compute(study, name, tmp_path)
-    rows = read_table(tmp_path / "repairs.parquet")
+    rows = read_table(folders[name] / "repairs.parquet")
     bent = rows[(rows["path"] == "line_shoulder") & (rows["way"] == "via_shift")]
     at = bent.loc[bent["deviation_mm"].idxmax()]
     ball = {"name": "ball", "xyz_mm": [float(at[f"{axis}_mm"]) for axis in "xyz"], "radius_mm": 5}
     scene = tmp_path / "scene.yaml"
     scene.write_text(json.dumps({"kind": "scene", "title": "A ball", "spheres": [ball]}))
     settings = study.trajectory.model_copy(update={"scene": str(scene)})
-    compute(study.model_copy(update={"trajectory": settings}), name, tmp_path / "again")
+    few = with_paths(study, tmp_path, *own_paths("line_shoulder"))
+    compute(few.model_copy(update={"trajectory": settings}), name, tmp_path / "again")
     path = by_name(tmp_path / "again")["line_shoulder"]
     (price,) = [price for price in path["repairs"] if price["way"] == "via_shift"]
     assert not price["usable"]
@@ -239,6 +239,12 @@ def test_page_and_recording_are_written(study, folders, tmp_path):
     assert "article_line" in html
     assert html.count('<img src="data:image/svg+xml') == len(by_name(folders[name])) + 1
     assert (tmp_path / "trajectory.rrd").stat().st_size > 100_000
+
+
+def own_paths(*names):
+    """Entries of the project's paths of the real arm, as they stand in its file."""
+    entries = yaml.safe_load(Path("data/paths/er3a_c60.yaml").read_text(encoding="utf-8"))["paths"]
+    return [entry for entry in entries if entry["name"] in names]
 
 
 def with_paths(study, tmp_path, *paths):
