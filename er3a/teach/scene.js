@@ -68,15 +68,14 @@ export class Picture {
     this.context.stroke();
   }
 
-  /** The shadow of solids that stand at `poses` on the floor at height `z`. */
+  /** The shadow of solids that stand at `poses`, straight below them on the floor at height `z`. */
   shadow(solids, poses, z, colour) {
     this.context.fillStyle = colour;
     this.context.beginPath();
     for (const solid of solids) {
       const points = solid.points.map((point) => moved(poses[solid.frame], point));
-      const fallen = points.map((p) => [p[0] - (LAMP[0] / LAMP[2]) * (p[2] - z), p[1] - (LAMP[1] / LAMP[2]) * (p[2] - z), z]);
       for (const face of solid.faces) {
-        if (dot(normalOf(points, face), LAMP) > 0) this.#trace(face.corners.map((i) => fallen[i]));
+        if (normalOf(points, face)[2] > 0) this.#trace(face.corners.map((i) => [points[i][0], points[i][1], z]));
       }
     }
     this.context.fill();
@@ -94,7 +93,7 @@ export class Picture {
           if (dot(normal, subtract(this.eye.position, points[face.corners[0]])) <= 0) continue;
           const light = AMBIENT + (1 - AMBIENT) * Math.max(0, dot(unit(normal), LAMP));
           const corners = face.corners.map((i) => flat[i]);
-          const depth = corners.reduce((sum, corner) => sum + corner[2], 0) / corners.length;
+          const depth = corners.reduce((sum, corner) => sum + corner[2], 0) / corners.length - solid.before;
           painted.push({ corners, depth, ghost, fill: shaded(face.colour, light) });
         }
       }

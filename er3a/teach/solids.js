@@ -1,8 +1,8 @@
 /**
  * The arm's shapes, made from its table as recordings make them: rods along the links, drums on the joints' axes.
  *
- * A solid is `{frame, colour, points, faces}`: it moves with `frame` (0 the base, k the frame that joint k turns, 7 the
- * tool); a face is `{corners, colour}` with the corners (indices of points) counter-clockwise as seen from outside.
+ * A solid is `{frame, before, points, faces}`: it moves with `frame` (0 the base, k the frame that joint k turns, 7 the
+ * tool) and is painted as if `before` (m) nearer, so that a drum hides the rod in it; a face is `{corners, colour}` with the corners (indices of points) counter-clockwise as seen from outside.
  */
 
 import { add, beside, column, cross, moved, norm, scaled, subtract, unit } from "er3a/algebra";
@@ -30,7 +30,7 @@ export function armSolids(table, size, colours) {
     const half = [0, 0, 1.3 * thick];
     solids.push(rod(k + 1, [0, 0, 0], along, 0.75 * thick, colours.link, ROD_SIDES));
     solids.push(rod(k + 1, along, corner, 0.75 * thick, colours.link, ROD_SIDES));
-    solids.push(rod(k + 1, subtract(middle, half), add(middle, half), thick, colours.joints[k], DRUM_SIDES, colours.mark));
+    solids.push(rod(k + 1, subtract(middle, half), add(middle, half), thick, colours.joints[k], DRUM_SIDES, colours.mark, thick));
   }
   const flange = column(table.tool, 3);
   const thin = 0.3 * radius;
@@ -52,7 +52,7 @@ export function drums(table, size) {
  * A rod with flat ends, cut into rings about as long as they are thick so that they sort well by distance; null where it
  * has no length. `mark` colours a stripe along it, which shows its turning.
  */
-function rod(frame, start, end, radius, colour, sides, mark = colour) {
+function rod(frame, start, end, radius, colour, sides, mark = colour, before = 0) {
   const vector = subtract(end, start);
   const length = norm(vector);
   if (length < SHORT) return null;
@@ -79,5 +79,5 @@ function rod(frame, start, end, radius, colour, sides, mark = colour) {
   const ends = Array.from({ length: sides }, (_, i) => i);
   faces.push({ corners: [...ends].reverse(), colour });
   faces.push({ corners: ends.map((i) => rings * sides + i), colour });
-  return { frame, colour, points, faces };
+  return { frame, before, points, faces };
 }

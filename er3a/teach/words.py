@@ -91,7 +91,8 @@ WORDS: dict[str, Any] = {
     "solutions": "All ways to this pose",
     "solutions_help": (
         "Choose one and the arm goes there; the tool stays. Point at one to see it as a pale arm. Branches: "
-        "wrist before axis 1 or over the head (back), elbow up or down, wrist flipped or not. Numbers are J1 to J6 in degrees."
+        "wrist before axis 1 or over the head (back), elbow up or down, wrist flipped or not. "
+        "Numbers are J1 to J6 in degrees."
     ),
     "previous": "Previous",
     "next": "Next",
