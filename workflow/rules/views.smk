@@ -53,9 +53,11 @@ rule teach:
 rule index:
     input:
         expand("results/{robot}/{stage}/summary.json", robot=ROBOTS, stage=STAGES),
+        expand("results/{robot}/workspace/border.parquet", robot=ROBOTS),
         expand("reports/{robot}/{page}.html", robot=ROBOTS, page=[*STAGES, "teach"]),
     output:
         "reports/index.html",
+        "reports/compare.html",
     log:
         "logs/index.log",
     conda:
