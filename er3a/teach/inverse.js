@@ -88,7 +88,7 @@ function offFolds(angle, toLow, toHigh, apartLow, apartHigh) {
  * "orientation") with the `gap` (m; rad for orientation) by which it fails. Where a joint is free it is taken from
  * `near` (rad), for the branch that meets there half a turn further, and `free` names it: "shoulder", "elbow", "wrist".
  */
-export function solveSlots(table, arm, T, near) {
+function solveSlots(table, arm, T, near) {
   const slots = Array.from({ length: 8 }, () => ({ q: null, fault: null, gap: 0, free: [] }));
   const [w1, w2] = arm.axes;
   const nearTheta = (k) => table.direction[k] * near[k] + table.offset[k];

@@ -23,7 +23,7 @@ export function showPose(T) {
     rpy: () => rollPitchYaw(T).map((angle) => inDegrees(angle, 3)),
     zyz: () => eulerZYZ(T).map((angle) => inDegrees(angle, 3)),
     quaternion: () => quaternion(T).map((value) => fixed(value, 6)),
-    matrix: () => T.flatMap((row, r) => row.map((value, c) => (c === 3 && r < 3 ? fixed(1000 * value, 2) : fixed(value, 6)))),
+    matrix: () => T.flatMap((row, r) => row.map((value, c) => (c < 3 || r === 3 ? fixed(value, 6) : fixed(1000 * value, 2)))),
   }[chosen]();
   const cells = byId(`orientation-${chosen}`).querySelectorAll(".value");
   values.forEach((text, i) => write(cells[i], text));
@@ -39,7 +39,8 @@ export function showMeasures(data, arm, T) {
   write(byId("condition"), significant(measures.conditionNumber));
   if (!arm) {
     const value = measures.smallestSingularValue;
-    warn(value < near.value ? "near" : "clear", value < near.value ? fill(words.near_unnamed, { value: significant(value) }) : words.clear);
+    if (value < near.value) warn("near", fill(words.near_unnamed, { value: significant(value) }));
+    else warn("clear", words.clear);
     return;
   }
   const factors = determinantFactors(T, arm.wristInTool);

@@ -10,6 +10,10 @@ const AMBIENT = 0.55;
 const MOST_PIXELS = 1.6e6; // more can't be painted often enough without a graphics processor
 const GRID_STEPS = 6; // lines of the floor on each side of the base
 const GHOST = 0.3;
+// Where a word may stand, in its widths and heights from its point: there, beside, at a corner, farther off.
+const PLACES = [
+  [0, 0], [0, -1], [1, 0], [-1, 0], [0, 1], [1, -1], [-1, -1], [1, 1], [-1, 1], [0, -2], [0, 2], [2, 0], [-2, 0],
+];
 const WORD = 0.82; // height of words, in letters of the page
 const FIELD = 1.9; // distance of the eye, in heights of the picture at the target
 
@@ -52,7 +56,8 @@ export class Picture {
     const from = subtract(point, this.eye.position);
     const depth = -dot(from, this.eye.back);
     const zoom = this.scale / Math.max(depth, 1e-6);
-    return [this.canvas.width / 2 + zoom * dot(from, this.eye.right), this.canvas.height / 2 - zoom * dot(from, this.eye.up), depth];
+    const { width, height } = this.canvas;
+    return [width / 2 + zoom * dot(from, this.eye.right), height / 2 - zoom * dot(from, this.eye.up), depth];
   }
 
   /** A square floor at height `z` around a point. */
@@ -106,7 +111,7 @@ export class Picture {
       context.fillStyle = fill;
       context.strokeStyle = fill;
       context.beginPath();
-      corners.forEach(([x, y], i) => (i ? context.lineTo(x, y) : context.moveTo(x, y)));
+      this.#join(corners);
       context.closePath();
       context.fill();
       if (!ghost) context.stroke(); // closes the hair lines between neighbours
@@ -119,8 +124,7 @@ export class Picture {
     this.context.strokeStyle = colour;
     this.context.lineWidth = width * this.ratio;
     this.context.beginPath();
-    const flat = points.map((point) => this.seen(point));
-    flat.forEach(([x, y], i) => (i ? this.context.lineTo(x, y) : this.context.moveTo(x, y)));
+    this.#trace(points);
     this.context.stroke();
   }
 
@@ -133,20 +137,23 @@ export class Picture {
     context.textBaseline = "middle";
     const [x, y] = this.seen(point);
     const [width, height] = [context.measureText(text).width + 0.3 * size, 1.2 * size];
-    const places = [[0, 0], [0, -1], [1, 0], [-1, 0], [0, 1], [1, -1], [-1, -1], [1, 1], [-1, 1], [0, -2], [0, 2], [2, 0], [-2, 0]];
-    const free = ([i, j]) =>
-      this.taken.every(([a, b, w]) => Math.abs(x + i * width - a) > (width + w) / 2 || Math.abs(y + j * height - b) > height);
-    const [i, j] = places.find(free) ?? [0, 0];
-    this.taken.push([x + i * width, y + j * height, width]);
+    const places = PLACES.map(([i, j]) => [x + i * width, y + j * height]);
+    const free = ([u, v]) => this.taken.every(([a, b, w]) => Math.abs(u - a) > (width + w) / 2 || Math.abs(v - b) > height);
+    const [u, v] = places.find(free) ?? [x, y];
+    this.taken.push([u, v, width]);
     context.lineWidth = 4 * ratio;
     context.strokeStyle = halo;
-    context.strokeText(text, x + i * width, y + j * height);
+    context.strokeText(text, u, v);
     context.fillStyle = colour;
-    context.fillText(text, x + i * width, y + j * height);
+    context.fillText(text, u, v);
   }
 
   #trace(points) {
-    points.map((point) => this.seen(point)).forEach(([x, y], i) => (i ? this.context.lineTo(x, y) : this.context.moveTo(x, y)));
+    this.#join(points.map((point) => this.seen(point)));
+  }
+
+  #join(flat) {
+    flat.forEach(([x, y], i) => (i ? this.context.lineTo(x, y) : this.context.moveTo(x, y)));
   }
 }
 

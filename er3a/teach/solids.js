@@ -2,10 +2,11 @@
  * The arm's shapes, made from its table as recordings make them: rods along the links, drums on the joints' axes.
  *
  * A solid is `{frame, before, points, faces}`: it moves with `frame` (0 the base, k the frame that joint k turns, 7 the
- * tool) and is painted as if `before` (m) nearer, so that a drum hides the rod in it; a face is `{corners, colour}` with the corners (indices of points) counter-clockwise as seen from outside.
+ * tool) and is painted as if it were nearer by `before` (m), so that a drum hides the rod in it. A face is
+ * `{corners, colour}`, the corners (indices of points) counter-clockwise as seen from outside.
  */
 
-import { add, beside, column, cross, moved, norm, scaled, subtract, unit } from "er3a/algebra";
+import { add, beside, column, cross, moved, norm, scaled, subtract, turnedBack, unit } from "er3a/algebra";
 import { JOINTS, linkParts } from "er3a/kinematics";
 
 const TAPER = [1.0, 0.92, 0.8, 0.66, 0.55, 0.45]; // how much thinner the arm is at each joint
@@ -17,25 +18,26 @@ const SHORT = 1e-6; // m
 /** Everything that is drawn of an arm of the given size (m). */
 export function armSolids(table, size, colours) {
   const parts = linkParts(table);
-  const radius = THICKNESS * size;
+  const thickest = THICKNESS * size;
+  const body = { colour: colours.body, sides: ROD_SIDES };
+  const link = { colour: colours.link, sides: ROD_SIDES };
+  const origin = [0, 0, 0];
   const solids = [
-    rod(0, [0, 0, 0], [0, 0, 0.9 * radius], 2.3 * radius, colours.body, DRUM_SIDES),
-    rod(0, [0, 0, 0], parts[0].across.slice(0, 3).map((row) => row[3]), 0.75 * radius, colours.body, ROD_SIDES),
+    rod(0, origin, [0, 0, 0.9 * thickest], 2.3 * thickest, { ...body, sides: DRUM_SIDES }),
+    rod(0, origin, column(parts[0].across, 3), 0.75 * thickest, body),
   ];
-  for (const k of JOINTS) {
+  drums(table, size).forEach(({ middle, half }, k) => {
+    const radius = thickest * TAPER[k];
     const along = column(parts[k + 1].along, 3);
     const corner = moved(parts[k + 1].along, column(parts[k + 1].across, 3));
-    const thick = radius * TAPER[k];
-    const middle = scaled(along, 0.5);
-    const half = [0, 0, 1.3 * thick];
-    solids.push(rod(k + 1, [0, 0, 0], along, 0.75 * thick, colours.link, ROD_SIDES));
-    solids.push(rod(k + 1, along, corner, 0.75 * thick, colours.link, ROD_SIDES));
-    solids.push(rod(k + 1, subtract(middle, half), add(middle, half), thick, colours.joints[k], DRUM_SIDES, colours.mark, thick));
-  }
-  const flange = column(table.tool, 3);
-  const thin = 0.3 * radius;
-  solids.push(rod(7, scaled(flange, -1), [0, 0, 0], thin, colours.body, ROD_SIDES));
-  solids.push(rod(7, [0, 0, -0.25 * thin], [0, 0, 0.25 * thin], 2 * thin, colours.body, DRUM_SIDES));
+    const ends = [[0, 0, -half], [0, 0, half]].map((end) => add(middle, end));
+    const drum = { colour: colours.joints[k], sides: DRUM_SIDES, mark: colours.mark, before: radius };
+    solids.push(rod(k + 1, origin, along, 0.75 * radius, link), rod(k + 1, along, corner, 0.75 * radius, link));
+    solids.push(rod(k + 1, ...ends, radius, drum));
+  });
+  const thin = 0.3 * thickest;
+  solids.push(rod(7, scaled(turnedBack(table.tool, column(table.tool, 3)), -1), origin, thin, body));
+  solids.push(rod(7, [0, 0, -0.25 * thin], [0, 0, 0.25 * thin], 2 * thin, { ...body, sides: DRUM_SIDES }));
   return solids.filter(Boolean);
 }
 
@@ -49,10 +51,10 @@ export function drums(table, size) {
 }
 
 /**
- * A rod with flat ends, cut into rings about as long as they are thick so that they sort well by distance; null where it
- * has no length. `mark` colours a stripe along it, which shows its turning.
+ * A rod with flat ends, cut into rings about as long as they are thick so that they sort well by distance; null where
+ * it has no length. `mark` colours a stripe along it, which shows its turning.
  */
-function rod(frame, start, end, radius, colour, sides, mark = colour, before = 0) {
+function rod(frame, start, end, radius, { colour, sides, mark = colour, before = 0 }) {
   const vector = subtract(end, start);
   const length = norm(vector);
   if (length < SHORT) return null;

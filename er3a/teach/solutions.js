@@ -41,7 +41,8 @@ export class SolutionList {
       if (fault) items.push(this.#missing(fault));
     }
     byId("branches").replaceChildren(...items);
-    write(byId("count"), fill(words.count, { within: rows.filter((row) => row.withinLimits).length, total: rows.length }));
+    const within = rows.filter((row) => row.withinLimits).length;
+    write(byId("count"), fill(words.count, { within, total: rows.length }));
     write(byId("free"), free.map((kind) => words.free[kind]).join(" "));
     this.ghost(null);
     this.mark(q);
@@ -50,7 +51,7 @@ export class SolutionList {
   /** Marks the solution that the arm is in. */
   mark(q) {
     this.current = this.rows.findIndex((row) => JOINTS.every((k) => Math.abs(row.q[k] - q[k]) < SAME_ARM));
-    this.buttons.forEach((button) => button.setAttribute("aria-pressed", String(button.dataset.row === String(this.current))));
+    for (const button of this.buttons) button.ariaPressed = String(Number(button.dataset.row) === this.current);
   }
 
   #label(row) {
@@ -60,15 +61,15 @@ export class SolutionList {
   #branch(turns) {
     const { words, joint_names: names } = this.data;
     const [first, ...further] = turns;
-    const joints = element("span", "row-joints", "", JOINTS.map((k) => element("span", "", fixed(toDegrees(first.q[k]), 1))));
+    const joints = element("span", "row-joints", "", first.q.map((angle) => element("span", "", fixed(toDegrees(angle)))));
     const verdict = element("span", first.withinLimits ? "row-verdict pass" : "row-verdict fail", this.#verdict(first));
     const button = this.#button(first, [element("b", "", this.#label(first)), joints, verdict]);
     const item = element("li", "branch", "", [button]);
     if (further.length) {
       const chips = further.map((row) => {
-        const moved = JOINTS.filter((k) => Math.abs(row.q[k] - first.q[k]) > 1);
-        const text = moved.map((k) => fill(words.turn, { joint: names[k], turn: signed(row.q[k] - first.q[k]) })).join(", ");
-        return this.#button(row, [text]);
+        const turns = JOINTS.map((k) => [names[k], row.q[k] - first.q[k]]).filter(([, turn]) => Math.abs(turn) > 1);
+        const texts = turns.map(([joint, turn]) => fill(words.turn, { joint, turn: signed(turn) }));
+        return this.#button(row, [texts.join(", ")]);
       });
       item.append(element("p", "turns", `${words.other_turns} `, chips));
     }

@@ -29,7 +29,8 @@ export class ArmView {
     this.base = column(table.base, 3);
     const atZero = frames(table, links, [0, 0, 0, 0, 0, 0]);
     this.target = column(atZero[1], 3);
-    this.length = [2, 3, 4, 5, 6].reduce((sum, k) => sum + norm(subtract(column(atZero[k], 3), column(atZero[k - 1], 3))), 0);
+    const apart = (k) => norm(subtract(column(atZero[k], 3), column(atZero[k - 1], 3)));
+    this.length = [2, 3, 4, 5, 6].reduce((sum, k) => sum + apart(k), 0);
     this.distance = DISTANCE * this.length;
     this.readColours();
     this.look("overview");

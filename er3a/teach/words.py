@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 WORDS: dict[str, Any] = {
-    "page": "teach",
     "title": "teach panel",
     "lead": (
         "Move the joints and watch the tool: its pose, the limits, how near the arm comes to a singularity, and which "

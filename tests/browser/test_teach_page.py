@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.wait import WebDriverWait
@@ -124,9 +125,33 @@ def test_a_link_restores_the_joints(panel):
     panel.browser.get("about:blank")
     panel.browser.get(link)
     assert panel.joints() == pytest.approx(angles, abs=1e-8)
+    panel.browser.execute_script("location.hash = '#q=1,2,3,4,5,6'")
+    panel.until(lambda: panel.joints() == pytest.approx([1, 2, 3, 4, 5, 6]))
+    panel.move(*angles)
     panel.one("#link").click()
     panel.until(lambda: panel.text("#message"))
     assert panel.text("#message") == WORDS["link_copied"] or link in panel.text("#message")
+
+
+def test_the_view_turns_by_pointer_keys_and_buttons(panel):
+    def picture() -> str:
+        return panel.browser.execute_async_script(
+            "const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(() =>"
+            "done(document.getElementById('arm').toDataURL())))"
+        )
+
+    canvas = panel.one("#arm")
+    pictures = [picture()]
+    ActionChains(panel.browser).drag_and_drop_by_offset(canvas, 60, 20).perform()
+    pictures.append(picture())
+    canvas.send_keys(Keys.ARROW_LEFT)
+    pictures.append(picture())
+    canvas.send_keys("+")
+    pictures.append(picture())
+    panel.one("[data-view=top]").click()
+    pictures.append(picture())
+    assert len(set(pictures)) == len(pictures)
+    assert panel.joints() == [0] * 6
 
 
 @pytest.mark.parametrize(
