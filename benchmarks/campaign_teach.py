@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import statistics
 import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
+import psutil
 
 from er3a import forward, inverse, load_robot
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
@@ -42,8 +44,8 @@ import("er3a/panel").then((panel) => {
 """
 
 
-def speed(browser, file: Path, width: int, height: int) -> tuple[float, float, float]:
-    """Time to usable (ms, median), frames per second, and the frame time (ms) that 95 % keep."""
+def speed(browser, file: Path, width: int, height: int) -> list[float]:
+    """Time to usable (ms, median), frames/s, the frame time (ms) that 95 % keep, processor time per frame (ms)."""
     browser.execute_cdp_cmd(
         "Emulation.setDeviceMetricsOverride",
         {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False},
@@ -53,8 +55,17 @@ def speed(browser, file: Path, width: int, height: int) -> tuple[float, float, f
         browser.get("about:blank")
         browser.get(file.as_uri())
         usable.append(browser.execute_script("return performance.getEntriesByName('usable')[0].startTime"))
+    before = processor_time(browser)
     frames = browser.execute_async_script(ANIMATE, SECONDS)
-    return statistics.median(usable), 1000 * len(frames) / sum(frames), float(np.quantile(frames, 0.95))
+    used = processor_time(browser) - before
+    rate, slow = 1000 * len(frames) / sum(frames), float(np.quantile(frames, 0.95))
+    return [statistics.median(usable), rate, slow, 1000 * used / len(frames)]
+
+
+def processor_time(browser) -> float:
+    """Seconds that all processes of the browser have computed."""
+    processes = psutil.Process(browser.service.process.pid).children(recursive=True)
+    return sum(sum(process.cpu_times()[:2]) for process in processes)
 
 
 def agreement(browser, name: str) -> tuple[int, list[float]]:
@@ -97,11 +108,14 @@ def table() -> str:
         "",
         "Headless Chromium with `--disable-gpu`: every pixel is painted by the processor. *Usable*: from the start of",
         f"the navigation until controls, picture and list are there, median of {OPENINGS} openings. *Frames*: all six",
-        f"joints move for {SECONDS} s, picture and read-outs follow in every frame, the list every 120 ms; the",
-        "browser draws 60 frames/s at most. Written by `make campaigns ARGS=teach`.",
+        f"joints move for {SECONDS} s, picture and read-outs follow in every frame, the list every 120 ms; the browser",
+        "draws 60 frames/s at most. *Processor*: what all processes of the browser computed for a frame, which load",
+        "hardly changes; below 33 ms one processor makes 30 frames/s.",
+        f"Load average at the start: {os.getloadavg()[0]:.1f} on {os.cpu_count()} processors; rates suffer from load.",
+        "Written by `make campaigns ARGS=teach`.",
         "",
-        "| robot | screen | page (kB) | usable (ms) | frames/s | 95 % of frames within (ms) |",
-        "|---|---|---|---|---|---|",
+        "| robot | screen | page (kB) | usable (ms) | frames/s | 95 % of frames within (ms) | processor (ms) |",
+        "|---|---|---|---|---|---|---|",
     ]
     agreed = []
     with tempfile.TemporaryDirectory() as folder:
@@ -111,10 +125,12 @@ def table() -> str:
                 file = Path(folder) / f"{name}.html"
                 write_teach_page(study, name, file)
                 for screen, (width, height) in SCREENS.items():
-                    usable, rate, slow = speed(browser, file, width, height)
+                    usable, rate, slow, used = speed(browser, file, width, height)
                     where = f"{screen}, {width} x {height}"
                     size = file.stat().st_size / 1000
-                    lines.append(f"| {name} | {where} | {size:.0f} | {usable:.0f} | {rate:.1f} | {slow:.1f} |")
+                    lines.append(
+                        f"| {name} | {where} | {size:.0f} | {usable:.0f} | {rate:.1f} | {slow:.1f} | {used:.1f} |"
+                    )
                     print(lines[-1], flush=True)
                 rows, worst = agreement(browser, name)
                 agreed.append(f"| {name} | {POSES:,} | {rows:,} | {' | '.join(f'{value:.1e}' for value in worst)} |")
