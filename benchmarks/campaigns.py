@@ -11,7 +11,17 @@ from importlib import import_module
 from pathlib import Path
 
 EVIDENCE = Path(__file__).resolve().parents[1] / "docs" / "evidence"
-CAMPAIGNS = ("kinematics", "singularities", "speed", "diagnosis", "identification", "workspace", "teach")
+CAMPAIGNS = (
+    "kinematics",
+    "singularities",
+    "speed",
+    "diagnosis",
+    "identification",
+    "workspace",
+    "clearance",
+    "capability",
+    "teach",
+)
 
 
 def main(names: list[str]) -> int:

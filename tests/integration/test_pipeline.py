@@ -124,6 +124,13 @@ def test_changing_the_workspace_budget_reruns_only_workspaces(small_study):
     assert all("workspace" in job for job in planned - {"write the index"})
 
 
+def test_changing_the_box_reruns_only_workspaces(small_study):
+    with edited(small_study.folder / "config/small.yaml", "cone_deg: 30", "cone_deg: 25"):
+        planned = small_study.planned()
+    assert {f"{robot}: compute workspace" for robot in ROBOTS} <= planned
+    assert all("workspace" in job or job.startswith("write") for job in planned)
+
+
 def test_results_are_the_same_bytes_on_one_core_and_with_another_scatter(small_study, fresh_project):
     again = fresh_project("again")
     again.snakemake("--cores", "1", "--set-scatter", "blocks=3", "--until", "record")

@@ -37,9 +37,11 @@ TABLES = {
         "drawing",
         "void_vertices",
         "void_triangles",
+        "capability",
+        "places",
     ],
     "inverse": ["solutions", "rankings", "map"],
-    "trajectory": ["checks", "samples"],
+    "trajectory": ["checks", "samples", "clearance"],
 }
 
 

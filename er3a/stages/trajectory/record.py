@@ -32,6 +32,7 @@ LEVELS = {
     "singular": rr.TextLogLevel.WARN,
     "too fast": rr.TextLogLevel.ERROR,
     "leaves limits": rr.TextLogLevel.ERROR,
+    "collides": rr.TextLogLevel.ERROR,
     "unreachable": rr.TextLogLevel.ERROR,
 }
 
@@ -154,7 +155,12 @@ def _events(stream: rr.RecordingStream, path: dict[str, Any], start: float) -> N
         how = "meets" if event["crossing"] else "passes near"
         text = f"{how} the {event['type']} singularity"
         stream.log("events", rr.TextLog(text, level=rr.TextLogLevel.WARN))
-    for key, word in (("unreachable", "not reachable"), ("out_of_limits", "limit"), ("too_fast", "speed")):
+    for key, word in (
+        ("unreachable", "not reachable"),
+        ("out_of_limits", "limit"),
+        ("too_fast", "speed"),
+        ("collisions", "collision"),
+    ):
         for part in path[key]:
             stream.set_time("t", duration=start + part["t0_s"])
             stream.log("events", rr.TextLog(f"{word}: {part['cause']}", level=rr.TextLogLevel.ERROR))

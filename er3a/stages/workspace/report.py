@@ -10,6 +10,7 @@ from markupsafe import Markup
 
 from er3a.results import read_summary, read_table
 from er3a.robots.robot import Robot
+from er3a.stages.workspace.capability_texts import capability_context
 from er3a.stages.workspace.plots import convergence, top_view
 from er3a.stages.workspace.proof_plots import sections, slices
 from er3a.stages.workspace.turning import turning_figure
@@ -18,6 +19,7 @@ from er3a.viewing.page import Picture, fixed, number, render
 
 LISTED = 12
 TABLES = ("section", "cells", "curve", "proof", "border", "drawing", "cloud", "void_vertices", "void_triangles")
+CAN_DO = ("capability", "places")
 KINDS = {"enclosed": "enclosed", "open": "open pocket"}
 
 
@@ -56,6 +58,7 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
         voids_more=max(0, len(summary["voids"]) - LISTED),
         astray=summary["verdict"]["code"] == "workspace.void_unexpected",
         wide=100 * summary["proof"]["width"],
+        **capability_context(robot, summary, *(read_table(folder / f"{name}.parquet") for name in CAN_DO)),
     )
 
 
