@@ -21,6 +21,7 @@ CAMPAIGNS = (
     "paths",
     "clearance",
     "capability",
+    "teach",
 )
 
 
