@@ -18,8 +18,10 @@ CAMPAIGNS = (
     "diagnosis",
     "identification",
     "workspace",
+    "paths",
     "clearance",
     "capability",
+    "teach",
 )
 
 

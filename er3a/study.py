@@ -111,9 +111,14 @@ class CapabilitySettings(StrictModel):
     placement: BoxTask = BoxTask()
 
 
+WayName = Literal["slow", "branch", "via_shift", "via_tilt", "damped", "detour", "stop"]
+
+
 class TrajectorySettings(StrictModel):
     """Where a path counts as near-singular, and how many points are checked between two samples.
 
+    ``repair`` chooses the way around singular regions, or compares all of them. Joints of unknown speed are taken to do
+    ``assumed_speed_deg_s``; all joints to reach full speed in ``full_speed_after_s``.
     ``scene`` holds the obstacles; no overlap with them deeper than ``overlap_mm`` goes unnoticed between points.
     """
 
@@ -121,6 +126,11 @@ class TrajectorySettings(StrictModel):
     near_wrist_deg: Annotated[float, Field(gt=0, le=90)]
     near_elbow_deg: Annotated[float, Field(gt=0, le=90)]
     near_shoulder_mm: Annotated[float, Field(gt=0, le=10_000)]
+    repair: Literal["compare"] | WayName = "compare"
+    assumed_speed_deg_s: Annotated[
+        list[Annotated[float, Field(gt=0, le=10_000)]], Field(min_length=6, max_length=6)
+    ] = [180, 180, 180, 360, 360, 360]
+    full_speed_after_s: Annotated[float, Field(gt=0, le=10)] = 0.25
     scene: Text | None = None
     overlap_mm: Annotated[float, Field(ge=0.05, le=100)] = 1.0
 

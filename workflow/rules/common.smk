@@ -41,7 +41,7 @@ TABLES = {
         "places",
     ],
     "inverse": ["solutions", "rankings", "map"],
-    "trajectory": ["checks", "samples", "clearance"],
+    "trajectory": ["checks", "clearance", "repairs", "samples"],
 }
 
 
