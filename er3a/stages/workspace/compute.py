@@ -16,16 +16,18 @@ from er3a.stages.workspace.drawing import drawing_table
 from er3a.stages.workspace.grid import Grid, make_grid
 from er3a.stages.workspace.hull import Hull, cells_inside, convex_hull
 from er3a.stages.workspace.parts import gather
-from er3a.stages.workspace.proven import border_table, count_in_empty, find_proven_voids, proof_table, prove_robot
-from er3a.stages.workspace.random_joints import joint_vectors
+from er3a.stages.workspace.proven import Proven, border_table, count_in_empty, find_proven_voids, proof_table, prove_robot
+from er3a.stages.workspace.point_chain import at_wrist_centre
+from er3a.stages.workspace.random_joints import Draw
 from er3a.stages.workspace.reach import reach_figures
-from er3a.stages.workspace.sample import sampled
-from er3a.stages.workspace.tally import UNTOUCHED, Tally, block_sizes
+from er3a.stages.workspace.sample import draw_of, sampled
+from er3a.stages.workspace.tally import UNTOUCHED, Tally, tally_blocks
 from er3a.stages.workspace.verdict import judge
 from er3a.stages.workspace.voids import Voids, find_voids, shape_of, unseen_cells
 from er3a.study import Study
 
 COARSER = (1, 2, 4)
+WRIST_SAMPLES = 4_000_000
 SECTION_VOID_CELLS = 16
 UNLISTED = -1
 
@@ -50,11 +52,12 @@ def compute(study: Study, name: str, folder: Path, parts: list[Path] | None = No
         tally = sampled(study, robot, grid, range(settings.blocks))
     else:
         tally = gather([Path(part) for part in parts], study, robot)
-    q_extreme = joint_vectors(robot, study.seed, tally.extremes.block, tally.extremes.sample)
+    draw = draw_of(study)
+    q_extreme = draw.joints(robot, tally.extremes.block, tally.extremes.sample)
     hull = convex_hull(forward(robot, q_extreme)[:, :3, 3])
     inside = cells_inside(hull, grid)
     voids = find_voids(tally.counts, inside)
-    q_cloud = _cloud_joints(study, robot)
+    q_cloud = _cloud_joints(robot, draw, settings.cloud_points)
     shoulder = _shoulder(robot, grid)
     proven = prove_robot(robot, settings.proof_cells, settings.volume_points, study.seed)
     records, vertices, triangles = find_proven_voids(robot, proven, hull, shoulder)
@@ -69,7 +72,8 @@ def compute(study: Study, name: str, folder: Path, parts: list[Path] | None = No
 
     write_table(folder / "cells.parquet", _cells(tally, inside, voids))
     write_table(folder / "section.parquet", _section(tally, grid))
-    write_table(folder / "curve.parquet", _curve(study, tally, grid))
+    write_table(folder / "side_view.parquet", _side_view(robot, proven, tally, grid, draw))
+    write_table(folder / "curve.parquet", _curve(draw, tally, grid))
     write_table(folder / "cloud.parquet", _cloud(robot, q_cloud))
     _write_hull(folder, hull, q_extreme)
 
@@ -100,6 +104,7 @@ def compute(study: Study, name: str, folder: Path, parts: list[Path] | None = No
         judge(hull, records, cells, unseen, proven.arm is not None),
         figures,
         samples=settings.samples,
+        sampling=settings.sampling,
         volume_m3={"lower": lower, "upper": upper, "estimate": guess.value, "ci95": [guess.low, guess.high]},
         volume_points={"drawn": guess.points, "reached": guess.reached, "undecided": guess.undecided},
         touched_m3=touched,
@@ -130,13 +135,12 @@ def compute(study: Study, name: str, folder: Path, parts: list[Path] | None = No
     )
 
 
-def _cloud_joints(study: Study, robot: Robot) -> np.ndarray:
+def _cloud_joints(robot: Robot, draw: Draw, points: int) -> np.ndarray:
     """The first samples of each block, drawn again: (n, 6)."""
-    settings = study.workspace
-    wanted = block_sizes(min(settings.cloud_points, settings.samples), settings.blocks)
-    blocks = np.repeat(np.arange(settings.blocks), wanted)
+    wanted = Draw(draw.seed, min(points, draw.samples), draw.blocks).sizes
+    blocks = np.repeat(np.arange(draw.blocks), wanted)
     samples = np.concatenate([np.arange(count) for count in wanted])
-    return joint_vectors(robot, study.seed, blocks, samples)
+    return draw.joints(robot, blocks, samples)
 
 
 def _cloud(robot: Robot, q: np.ndarray) -> pd.DataFrame:
@@ -174,9 +178,27 @@ def _section(tally: Tally, grid: Grid) -> pd.DataFrame:
     return pd.DataFrame({"rho_m": rho, "z_m": z, "samples": tally.section[shown], "void": void[shown]})
 
 
-def _curve(study: Study, tally: Tally, grid: Grid) -> pd.DataFrame:
+def _side_view(robot: Robot, proven: Proven, tally: Tally, grid: Grid, draw: Draw) -> pd.DataFrame:
+    """Touched cells of the side view, of the tool point and, with fewer samples, of the wrist centre."""
+    views = {"tool point": (grid, tally.side)}
+    if proven.arm is not None:
+        bare = at_wrist_centre(robot)
+        wrist_grid = make_grid(bare, max(grid.shape))
+        fewer = Draw(draw.seed, min(draw.samples, WRIST_SAMPLES), 1, draw.sampling)
+        views["wrist centre"] = wrist_grid, tally_blocks(bare, wrist_grid, fewer, [0], 0).side
+    tables = []
+    for point, (own, side) in views.items():
+        index = np.argwhere(side > 0)
+        x = (index[:, 0] - own.section_shape[0] + 0.5) * own.section_cell
+        z = own.section_origin[1] + (index[:, 1] + 0.5) * own.section_cell
+        table = pd.DataFrame({"x_m": x, "z_m": z, "cell_m": own.section_cell, "samples": side[side > 0]})
+        tables.append(table.assign(point=point))
+    return pd.concat(tables, ignore_index=True)
+
+
+def _curve(draw: Draw, tally: Tally, grid: Grid) -> pd.DataFrame:
     """Touched volume after each block, at several cell sizes."""
-    drawn = np.cumsum(block_sizes(study.workspace.samples, study.workspace.blocks))
+    drawn = np.cumsum(draw.sizes)
     tables = []
     for factor in COARSER:
         first = tally.first_block
