@@ -62,8 +62,8 @@ def compute(study: Study, name: str, folder: Path, parts: list[Path] | None = No
     proven = prove_robot(robot, settings.proof_cells, settings.volume_points, study.seed)
     records, vertices, triangles = find_proven_voids(robot, proven, hull, shoulder)
     if proven.arm is None:
-        records = _sampled_records(voids, grid, shoulder)
-    write_table(folder / "proof.parquet", proof_table(proven.proof))
+        records += _sampled_records(voids, grid, shoulder, records)
+    write_table(folder / "proof.parquet", proof_table(proven))
     write_table(folder / "border.parquet", border_table(robot, proven))
     height = float((shoulder - grid.axis_point) @ grid.axis)
     write_table(folder / "drawing.parquet", drawing_table(robot, height))
@@ -227,7 +227,10 @@ def _shoulder(robot: Robot, grid: Grid) -> np.ndarray:
     return grid.axis_point + ((joint_2 - grid.axis_point) @ grid.axis) * grid.axis
 
 
-def _sampled_records(voids: Voids, grid: Grid, shoulder: np.ndarray) -> list[dict[str, Any]]:
+def _sampled_records(
+    voids: Voids, grid: Grid, shoulder: np.ndarray, proven: list[dict[str, Any]]
+) -> list[dict[str, Any]]:
+    """Voids that only the samples tell of: those that lie in no proven one's box."""
     cell_of_shoulder = np.floor((shoulder - grid.origin) / grid.cell)
     return [
         {
@@ -240,4 +243,10 @@ def _sampled_records(voids: Voids, grid: Grid, shoulder: np.ndarray) -> list[dic
             "holds_shoulder": bool(np.any(np.all(np.abs(void.cells - cell_of_shoulder) <= 1, axis=1))),
         }
         for void in voids.listed
+        if not any(_in_box(shape_of(void, grid)["centroid_m"], record) for record in proven)
     ]
+
+
+def _in_box(point: list[float], record: dict[str, Any]) -> bool:
+    away = np.abs(np.array(point) - record["centroid_m"])
+    return bool((away <= np.array(record["extent_m"]) / 2).all())
