@@ -43,8 +43,8 @@ def relaxations(robot: Robot, cavity: Cavity, in_section: Callable[[np.ndarray],
 
     Parameters
     ----------
-    in_section : for an arm without a section form: from points (n, 3), m, in the base frame to their radius, azimuth and
-        height about axis 1. Cells then count as reached if a random sample of the widened arm lies in them.
+    in_section : for an arm without a section form: from points (n, 3), m, in the base frame to their radius, azimuth
+        and height about axis 1. Cells then count as reached if a random sample of the widened arm lies in them.
     """
     chosen = _probes(cavity)
     if in_section is None:

@@ -58,9 +58,7 @@ def prove_general(
     return proof, witness.reshape(n, -1)
 
 
-def _outer(
-    arm: GeneralArm, size: float, low: float, most_boxes: int, touched: np.ndarray
-) -> tuple[np.ndarray, int]:
+def _outer(arm: GeneralArm, size: float, low: float, most_boxes: int, touched: np.ndarray) -> tuple[np.ndarray, int]:
     """Marks of all cells that may be reached, with boxes as fine as the budget allows, and how many were looked at."""
     marked, total = np.ones_like(touched), 0
     for smallest in _SMALLEST:

@@ -46,7 +46,7 @@ class GeneralArm(NamedTuple):
 
 
 def general_arm(robot: Robot) -> tuple[GeneralArm, np.ndarray, np.ndarray]:
-    """The chain of a robot, and the frame about axis 1: rotation (3, 3; rows x, y, z in the base frame), origin (3,)."""
+    """The chain of a robot, and the frame about axis 1: x, y, z in the base frame as rows (3, 3), and origin (3,)."""
     links = constant_links(robot)
     last, tip = JOINTS - 1, links[JOINTS, :3, 3]
     while last > 0 and np.hypot(tip[0], tip[1]) <= _SMALL:

@@ -1,12 +1,13 @@
 """What any six-revolute arm reaches at least: each regular joint vector reaches a ball around its tool point.
 
-Let J be the 3 x n Jacobian of the tool point at a joint vector and B a right inverse of it (J B = 1). Move the joints by
-B s. Then the point moves by ``F(s) = s + R(s)`` with ``|R(s)| <= K |s|^2 / 2``, ``K = sum_ij b_i b_j lever_max(i,j)``, b the
-lengths of the rows of B (the second derivatives are bounded as in :mod:`.general_outer`). For a target y with
-``|y| <= sigma - K sigma^2 / 2`` the map ``s -> y - R(s)`` takes the ball of radius sigma into itself, so it has a fixed
-point (Brouwer), and there F(s) = y. So the whole ball of that radius is reached, if sigma keeps all joints within their
-limits: ``b_i sigma <= margin_i``. This is the existence half of the Newton-Kantorovich theorem [1]_, without a condition
-on higher derivatives.
+Let J be the 3 x n Jacobian of the tool point at a joint vector and B a right inverse of it (J B = 1). Move the joints
+by B s. Then the point moves by ``F(s) = s + R(s)`` with ``|R(s)| <= K |s|^2 / 2``, where
+``K = sum_ij b_i b_j lever_max(i,j)`` with the lengths b of the rows of B (second derivatives are bounded as in
+:mod:`.general_outer`). For a target y with ``|y| <= sigma - K sigma^2 / 2`` the map ``s -> y - R(s)`` takes the ball of
+radius sigma into itself, so it has a fixed point (Brouwer), and there F(s) = y. So the whole ball of that radius is
+reached, if sigma keeps all joints within their limits: ``b_i sigma <= margin_i``. This is the existence half of the
+Newton-Kantorovich theorem [1]_, without a condition on higher derivatives. Joint 1 takes part without a limit; what it
+turns narrows the azimuths that count as filled.
 
 References
 ----------

@@ -1,11 +1,12 @@
 """What any six-revolute arm may reach at most: branch and bound over boxes of its joints.
 
 Within a box of half-widths e about its middle the tool point moves by at most ``sum chord(e_k) lever_k`` (each joint in
-turn), and along a fixed direction u by at most ``sum |u . dp/dtheta_k| e_k + 1/2 sum_ij e_i e_j lever_max(i,j)``, because
-``|d2p / dtheta_i dtheta_j|`` is the distance of the point from the outer of the two axes, at most. Levers within the box
-exceed those at its middle by at most what the joints behind move. So each box comes with a range of radius, height and
-angle; where all cells of that range are marked already (a sample lies in them, say) the box adds nothing, otherwise it
-is halved, and marks its range when it has become small. Cells that stay unmarked are empty (Merlet [1]_).
+turn), and along a fixed direction u by at most ``sum |u . dp/dtheta_k| e_k + 1/2 sum_ij e_i e_j lever_max(i,j)``,
+because ``|d2p / dtheta_i dtheta_j|`` is at most the distance of the point from the outer one of the two axes. Levers
+within the box exceed those at its middle by at most what the joints behind move. So each box comes with a range of
+radius, height and angle; where all cells of that range are marked already (a sample lies in them, say) the box adds
+nothing, otherwise it is halved, and marks its range when it has become small. Cells that stay unmarked are empty
+(Merlet [1]_).
 
 References
 ----------
@@ -44,7 +45,7 @@ def _spread(arm, middle, half, radii, columns, frame, moves, levers):
         moves[k] = chord * levers[k]
         behind += moves[k]
     total = behind
-    second, outer = 0.0, 0.0
+    second = 0.0
     for k in range(n - 1, 0, -1):
         # Pairs (i, k) with i <= k: the lever of the outer joint k counts.
         inner = 0.0

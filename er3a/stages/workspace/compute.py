@@ -16,18 +16,17 @@ from er3a.stages.workspace.drawing import drawing_table
 from er3a.stages.workspace.grid import Grid, make_grid
 from er3a.stages.workspace.hull import Hull, cells_inside, convex_hull
 from er3a.stages.workspace.parts import gather
-from er3a.stages.workspace.proven import Proven, border_table, count_in_empty, find_proven_voids, proof_table, prove_robot
-from er3a.stages.workspace.point_chain import at_wrist_centre
+from er3a.stages.workspace.proven import count_in_empty, find_proven_voids, pocket_block, proof_table, prove_robot
 from er3a.stages.workspace.random_joints import Draw
 from er3a.stages.workspace.reach import reach_figures
 from er3a.stages.workspace.sample import draw_of, sampled
-from er3a.stages.workspace.tally import UNTOUCHED, Tally, tally_blocks
+from er3a.stages.workspace.side_view import border_table, side_view_table
+from er3a.stages.workspace.tally import UNTOUCHED, Tally
 from er3a.stages.workspace.verdict import judge
 from er3a.stages.workspace.voids import Voids, find_voids, shape_of, unseen_cells
 from er3a.study import Study
 
 COARSER = (1, 2, 4)
-WRIST_SAMPLES = 4_000_000
 SECTION_VOID_CELLS = 16
 UNLISTED = -1
 
@@ -64,7 +63,7 @@ def compute(study: Study, name: str, folder: Path, parts: list[Path] | None = No
     if proven.arm is None:
         records += _sampled_records(voids, grid, shoulder, records)
     write_table(folder / "proof.parquet", proof_table(proven))
-    write_table(folder / "border.parquet", border_table(robot, proven))
+    write_table(folder / "border.parquet", border_table(robot))
     height = float((shoulder - grid.axis_point) @ grid.axis)
     write_table(folder / "drawing.parquet", drawing_table(robot, height))
     write_table(folder / "void_vertices.parquet", vertices)
@@ -72,7 +71,7 @@ def compute(study: Study, name: str, folder: Path, parts: list[Path] | None = No
 
     write_table(folder / "cells.parquet", _cells(tally, inside, voids))
     write_table(folder / "section.parquet", _section(tally, grid))
-    write_table(folder / "side_view.parquet", _side_view(robot, proven, tally, grid, draw))
+    write_table(folder / "side_view.parquet", side_view_table(robot, tally, grid, draw))
     write_table(folder / "curve.parquet", _curve(draw, tally, grid))
     write_table(folder / "cloud.parquet", _cloud(robot, q_cloud))
     _write_hull(folder, hull, q_extreme)
@@ -130,6 +129,7 @@ def compute(study: Study, name: str, folder: Path, parts: list[Path] | None = No
         section_cell_m=grid.section_cell,
         cells={**cells, "unseen_estimate": unseen},
         voids=records,
+        pocket_block_m=pocket_block(proven),
         specks={"count": voids.specks, "volume_m3": voids.speck_cells * grid.cell_volume},
         skin_m3=voids.skin_cells * grid.cell_volume,
     )
@@ -176,24 +176,6 @@ def _section(tally: Tally, grid: Grid) -> pd.DataFrame:
     index = np.argwhere(shown)
     rho, z = (grid.section_origin + (index + 0.5) * grid.section_cell).T
     return pd.DataFrame({"rho_m": rho, "z_m": z, "samples": tally.section[shown], "void": void[shown]})
-
-
-def _side_view(robot: Robot, proven: Proven, tally: Tally, grid: Grid, draw: Draw) -> pd.DataFrame:
-    """Touched cells of the side view, of the tool point and, with fewer samples, of the wrist centre."""
-    views = {"tool point": (grid, tally.side)}
-    if proven.arm is not None:
-        bare = at_wrist_centre(robot)
-        wrist_grid = make_grid(bare, max(grid.shape))
-        fewer = Draw(draw.seed, min(draw.samples, WRIST_SAMPLES), 1, draw.sampling)
-        views["wrist centre"] = wrist_grid, tally_blocks(bare, wrist_grid, fewer, [0], 0).side
-    tables = []
-    for point, (own, side) in views.items():
-        index = np.argwhere(side > 0)
-        x = (index[:, 0] - own.section_shape[0] + 0.5) * own.section_cell
-        z = own.section_origin[1] + (index[:, 1] + 0.5) * own.section_cell
-        table = pd.DataFrame({"x_m": x, "z_m": z, "cell_m": own.section_cell, "samples": side[side > 0]})
-        tables.append(table.assign(point=point))
-    return pd.concat(tables, ignore_index=True)
 
 
 def _curve(draw: Draw, tally: Tally, grid: Grid) -> pd.DataFrame:

@@ -75,7 +75,9 @@ def point_chain(robot: Robot) -> PointChain:
     # Near a turn around zero, single precision is finest.
     first, span = first / turn, span / turn
     first -= np.round(first + span / 2)
-    return PointChain(last, *(np.array(part, dtype=np.float32) for part in (point, first, span, steps)), links[0, :3].copy())
+    return PointChain(
+        last, *(np.array(part, dtype=np.float32) for part in (point, first, span, steps)), links[0, :3].copy()
+    )
 
 
 def at_wrist_centre(robot: Robot) -> Robot:
@@ -102,7 +104,8 @@ def _z_x_z(R: np.ndarray) -> tuple[float, float, float]:
 @kernel
 def cos_sin_turns(turns):
     """Cosine and sine of an angle in turns, all in single precision."""
-    # The quarter angle lies in [-pi/4, pi/4]; both polynomials (interpolated at Chebyshev nodes) carry a factor sqrt(2).
+    # The quarter angle lies in [-pi/4, pi/4]; both polynomials (interpolated at Chebyshev nodes) carry a factor
+    # sqrt(2).
     w = turns - np.floor(turns + _HALF)
     z = w * w
     s = w * (_S0 + z * (_S1 + z * (_S2 + z * _S3)))

@@ -41,7 +41,11 @@ def _lines(total: int, what: str) -> Callable[[int], None]:
         done, now = done + count, time.monotonic()
         if now - last >= EVERY_S:
             left = (now - start) * (total - done) / done
-            print(f"{what}: {done:,} of {total:,} ({done / total:.0%}), about {left:.0f} s left", file=sys.stderr, flush=True)
+            print(
+                f"{what}: {done:,} of {total:,} ({done / total:.0%}), about {left:.0f} s left",
+                file=sys.stderr,
+                flush=True,
+            )
             last = now
 
     return advance

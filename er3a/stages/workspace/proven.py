@@ -12,7 +12,6 @@ from er3a.errors import NotWristPartitionedError
 from er3a.robots.robot import Robot
 from er3a.stages.workspace.hull import Hull, depth_inside
 from er3a.workspace.blocks import Blocks, blocks_of, mesh, pockets
-from er3a.workspace.boundary import border
 from er3a.workspace.causes import describe, relaxations
 from er3a.workspace.cavities import Cavity, cavities, rim
 from er3a.workspace.general import prove_general
@@ -141,22 +140,6 @@ def _arcs(row: np.ndarray) -> list[float]:
     return np.degrees(row[np.isfinite(row[:, 0])]).ravel().tolist()
 
 
-def border_table(robot: Robot, proven: Proven) -> pd.DataFrame:
-    """Exact borders of the section, of tool point and wrist centre, with the joints (as theta) that make them."""
-    arms = {"tool point": proven.arm, "wrist centre": section_arm(robot, wrist_centre=True)} if proven.arm else {}
-    tables = []
-    for point, arm in arms.items():
-        for number, arc in enumerate(border(arm), start=1):
-            table = pd.DataFrame(arc.points, columns=["rho_m", "z_m"])
-            for k, name in enumerate(("theta_2_deg", "tau_deg", "tilt_deg")):
-                table[name] = np.degrees(arc.joints[:, k])
-            tables.append(table.assign(point=point, arc=number, sweeps=arc.sweeps))
-    if not tables:
-        columns = ["rho_m", "z_m", "theta_2_deg", "tau_deg", "tilt_deg", "point", "arc", "sweeps"]
-        return pd.DataFrame({name: pd.Series(dtype=str if name in columns[-3::2] else float) for name in columns})
-    return pd.concat(tables, ignore_index=True)
-
-
 def find_proven_voids(robot: Robot, proven: Proven, hull: Hull, shoulder: np.ndarray):
     """Voids inside the hull, the largest first.
 
@@ -226,7 +209,8 @@ def _outline(proven: Proven, cavity: Cavity) -> tuple[Blocks, np.ndarray]:
     return blocks, mask if mask.any() else blocks.empty > 0
 
 
-def _pocket_blocks(proven: Proven, outside: Cavity) -> Blocks:
+def pocket_block(proven: Proven) -> float:
+    """Edge (m) of the blocks that open pockets are looked for on."""
     cells = proven.proof.cells
     low, high = cells[:, [0, 2]].min(axis=0), cells[:, [1, 3]].max(axis=0)
     size = float((cells[:, 1] - cells[:, 0]).max())
@@ -234,6 +218,12 @@ def _pocket_blocks(proven: Proven, outside: Cavity) -> Blocks:
         size *= 2
     while size > 1.01 * (high - low).max() / POCKET_BLOCKS and size > 1.5 * proven.section.size:
         size /= 2
+    return size
+
+
+def _pocket_blocks(proven: Proven, outside: Cavity) -> Blocks:
+    cells, size = proven.proof.cells, pocket_block(proven)
+    low, high = cells[:, [0, 2]].min(axis=0), cells[:, [1, 3]].max(axis=0)
     return blocks_of(outside, size, low, low + np.ceil((high - low) / size - 1e-6) * size, TURNS)
 
 

@@ -1,10 +1,11 @@
 """Joint vectors that can be drawn again one by one: Philox4x32-10, a counter-based generator [1]_, or Sobol' points.
 
-*uniform*: the counter is (sample within the block, block), the key is the seed, and the four words of one draw give six
-numbers of 21 bits (steps below 0.0002 deg for a full turn). So the joint vector of sample n of block b depends on nothing
-else: not on what was drawn before it, nor on how blocks are shared out among processes.
+*uniform*: the counter is (sample within the block, block), the key is the seed, and the four words of one draw give
+six numbers of 21 bits (steps below 0.0002 deg for a full turn). So the joint vector of sample n of block b depends on
+nothing else: not on what was drawn before it, nor on how blocks are shared out among processes.
 
-*sobol*: the samples of all blocks, numbered through, are points of one Sobol' sequence (:mod:`.sobol`), shifted at random.
+*sobol*: the samples of all blocks, numbered through, are points of one Sobol' sequence (:mod:`.sobol`), shifted at
+random.
 
 References
 ----------

@@ -17,8 +17,6 @@ from er3a.stages.workspace.grid import Grid
 from er3a.stages.workspace.point_chain import (
     ROWS,
     X,
-    Y,
-    Z,
     cos_sin_turns,
     point_chain,
     point_in_base,
