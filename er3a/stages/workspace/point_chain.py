@@ -80,6 +80,13 @@ def point_chain(robot: Robot) -> PointChain:
     )
 
 
+def plane_direction(robot: Robot) -> np.ndarray:
+    """Unit vector (3,) in the base frame, at theta_1 = 0, of the x axis of the frame that turns with joint 1."""
+    links = constant_links(robot)
+    turn = _z_x_z(links[1, :3, :3])[0] if point_chain(robot).last > 0 else 0.0
+    return links[0, :3, :3] @ [np.cos(turn), np.sin(turn), 0.0]
+
+
 def at_wrist_centre(robot: Robot) -> Robot:
     """The robot with its tool point in the wrist centre, so that joints 4 to 6 don't move it.
 

@@ -11,7 +11,7 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
 from er3a.robots.robot import Robot
 from er3a.stages.workspace.grid import Grid, make_grid
-from er3a.stages.workspace.point_chain import at_wrist_centre
+from er3a.stages.workspace.point_chain import at_wrist_centre, plane_direction
 from er3a.stages.workspace.random_joints import Draw
 from er3a.stages.workspace.tally import Tally, tally_blocks
 from er3a.workspace.boundary import border
@@ -32,7 +32,7 @@ def side_view_table(robot: Robot, tally: Tally, grid: Grid, draw: Draw) -> pd.Da
         views["wrist centre"] = wrist_grid, tally_blocks(bare, wrist_grid, fewer, [0], 0).side
     except NotWristPartitionedError:
         pass
-    front = _front(robot, constant_links(robot)[0, :3, 0])
+    front = _front(robot, plane_direction(robot))
     tables = []
     for point, (own, side) in views.items():
         index = np.argwhere(side > 0)
@@ -81,10 +81,12 @@ def _joints_2_3(robot: Robot, theta: np.ndarray) -> np.ndarray:
 
 
 def corner_side(robot: Robot, q2: float, q3: float) -> float:
-    """+1 if the wrist centre lies in front of axis 1 with joints 2 and 3 (rad) at these values, else -1."""
-    bare, q = at_wrist_centre(robot), np.array([0, q2, q3, 0, 0, 0])
-    links = constant_links(bare)
-    away = forward(bare, q)[:3, 3] - links[0, :3, 3]
+    """-1 if the wrist centre lies behind axis 1 with joints 2 and 3 (rad) at these values, else +1."""
+    try:
+        bare = at_wrist_centre(robot)
+    except NotWristPartitionedError:
+        return 1.0
+    away = forward(bare, np.array([0, q2, q3, 0, 0, 0]))[:3, 3] - constant_links(bare)[0, :3, 3]
     return 1.0 if away @ robot.base[:3, 0] >= 0 else -1.0
 
 
