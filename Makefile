@@ -9,7 +9,9 @@ ROBOT  ?=
 ARGS   ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help run test view lint format schema lock clean distclean campaigns
+# A run starts dozens of short processes: without compiled modules kept on disk each would compile them anew.
+unexport PYTHONDONTWRITEBYTECODE
+.PHONY: help run test view archive lint format schema lock clean distclean campaigns
 
 help:  ## list the targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):[^#]*## /  make \1\t/' | expand -t 18
@@ -22,6 +24,9 @@ test: $(VENV)/dev.stamp  ## set up and run the tests (ARGS="-k workspace")
 
 view: $(VENV)/run.stamp  ## open the recordings in the Rerun viewer (ROBOT=er3a_c60 for one arm)
 	@$(BIN)/er3a view $(ROBOT)
+
+archive: $(VENV)/run.stamp  ## pack the finished study into er3a-study.zip, with RO-Crate metadata
+	@$(BIN)/er3a archive --study $(STUDY)
 
 lint: $(VENV)/dev.stamp  ## check format and lint of Python and Snakemake code
 	$(BIN)/ruff format --check .

@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 
 EVIDENCE = Path(__file__).resolve().parents[1] / "docs" / "evidence"
-CAMPAIGNS = ("kinematics", "singularities", "speed", "diagnosis", "identification", "workspace")
+CAMPAIGNS = ("kinematics", "singularities", "speed", "diagnosis", "identification", "workspace", "clearance")
 
 
 def main(names: list[str]) -> int:

@@ -10,7 +10,8 @@ from er3a.collision.scene import SceneFile, load_scene
 from er3a.errors import InputError
 from er3a.identification.measurements import load_measurements
 from er3a.inputs.yaml_file import read_text, read_yaml
-from er3a.planning.path_file import PathFile, load_paths
+from er3a.planning.path_file import PathFile, TablePath, load_paths
+from er3a.planning.path_table import read_path_table
 from er3a.references.load import check_reference_file, load_references
 from er3a.references.rows import COLUMNS
 from er3a.robots.load import load_robot
@@ -41,6 +42,9 @@ def check_file(path: Path) -> str:
     if path.suffix == ".csv" and path.parent.name == "targets":
         load_targets(path)
         return _WORDS["targets"]
+    if path.suffix == ".csv" and path.parent.name == "paths":
+        read_path_table(path)
+        return "a path"
     if path.suffix == ".csv":
         return _check_table(path)
     if path.suffix not in (".yaml", ".yml"):
@@ -69,5 +73,10 @@ def check_study(path: Path) -> Study:
         for reference in robot.references:
             load_references(reference)
         load_targets(entry.targets)
-        load_paths(entry.paths)
+        for path in load_paths(entry.paths).paths:
+            if isinstance(path, TablePath):
+                read_path_table(path.file)
+        for scene in (study.inverse.scene, study.path_scene(name)):
+            if scene:
+                load_scene(scene)
     return study

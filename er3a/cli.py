@@ -111,10 +111,47 @@ def report(
 
 @app.command()
 def index(study: StudyFile = DEFAULT_STUDY, results: Results = DEFAULT_RESULTS, reports: Reports = DEFAULT_REPORTS):
-    """Write the index page over all robots and stages."""
+    """Write the pages over all robots and stages: the index and the comparison of two robots."""
     from er3a.viewing.index import write_index
 
-    write_index(load_study(study), results, reports / "index.html")
+    write_index(load_study(study), results, reports)
+
+
+@app.command()
+def diff(
+    old: Annotated[Path, typer.Argument(help="a results folder")],
+    new: Annotated[Path, typer.Argument(help="another results folder")],
+    output: Annotated[Path | None, typer.Option(help="also write them as a page")] = None,
+):
+    """Compare two results folders: verdicts, key figures and tables that moved."""
+    from dataclasses import astuple
+
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    from er3a.viewing.diff import changes, write_diff
+
+    found = changes(old, new)
+    table = Table("robot", "stage", "what", "old", "new", "difference", "note", box=box.SIMPLE)
+    for change in found:
+        table.add_row(*astuple(change))
+    Console().print(table if found else "Nothing differs.")
+    if output:
+        write_diff(old, new, found, output)
+
+
+@app.command()
+def archive(
+    output: Annotated[Path, typer.Option(help="the zip to write")] = Path("er3a-study.zip"),
+    study: StudyFile = DEFAULT_STUDY,
+    results: Results = DEFAULT_RESULTS,
+    reports: Reports = DEFAULT_REPORTS,
+):
+    """Pack a finished study into one zip with RO-Crate metadata."""
+    from er3a.archive import archive as pack
+
+    print(f"{output}: written, {pack(study, results, reports, output)} files with RO-Crate metadata")
 
 
 @app.command()

@@ -18,7 +18,7 @@ VIEWS = ("report.py", "page.py", "index.py")
 @cache
 def code_digest(module: str) -> str:
     """SHA-256 over the sources of ``module``, of all modules of er3a it imports (transitively), and of templates
-    (``*.j2``, ``*.css``) that stand beside those that are part of a view."""
+    (``*.j2``, ``*.css``, ``*.js``) that stand beside those that are part of a view."""
     reached = _reached(module)
     if not reached:
         raise ModuleNotFoundError(f"er3a has no module '{module}'")
@@ -37,7 +37,7 @@ def _reached(module: str) -> set[Path]:
             continue
         found.add(path)
         if path.name in VIEWS:
-            found |= {*path.parent.glob("*.j2"), *path.parent.glob("*.css")}
+            found |= {file for kind in ("j2", "css", "js") for file in path.parent.glob(f"*.{kind}")}
         todo += _imports(path)
     return found
 

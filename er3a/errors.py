@@ -44,6 +44,14 @@ class PoseError(Er3aError, ValueError):
     """A 4x4 matrix is no rigid transform, or holds NaN."""
 
 
+class PathError(Er3aError, ValueError):
+    """A segment (numbered from 1) that no sequence can hold."""
+
+    def __init__(self, segment: int, problem: str):
+        self.segment, self.problem = segment, problem
+        super().__init__(f"segment {segment} {problem}")
+
+
 class NotWristPartitionedError(Er3aError):
     """The closed-form inverse does not apply to this arm; ``property_missing`` says which property it lacks."""
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from er3a.errors import InputError
-from er3a.inputs.yaml_file import StrictModel, load
+from er3a.inputs.yaml_file import StrictModel, load, read_yaml
 from er3a.robots.load import DATA, load_robot, placement_transform, robot_path
 from er3a.robots.robot import Robot
 from er3a.robots.schema import Name, Placement, Text, check_placement
@@ -21,11 +21,12 @@ RuleName = Literal["nearest", "weighted", "time", "manipulability", "limits", "c
 
 
 class RobotEntry(StrictModel):
-    """One robot of the study. ``base`` and ``tool`` replace those of the robot's file."""
+    """One robot of the study. ``base`` and ``tool`` replace those of its file, ``scene`` that of ``trajectory``."""
 
     file: Text | None = None
     targets: Text
     paths: Text
+    scene: Text | None = None
     base: Placement | None = None
     tool: Placement | None = None
 
@@ -69,12 +70,17 @@ class WorkspaceSettings(StrictModel):
 
 
 class TrajectorySettings(StrictModel):
-    """Where a path counts as near-singular, and how many points are checked between two samples."""
+    """Where a path counts as near-singular, and how many points are checked between two samples.
+
+    ``scene`` holds the obstacles; no overlap with them deeper than ``overlap_mm`` goes unnoticed between points.
+    """
 
     checks_per_sample: Annotated[int, Field(ge=1, le=1000)]
     near_wrist_deg: Annotated[float, Field(gt=0, le=90)]
     near_elbow_deg: Annotated[float, Field(gt=0, le=90)]
     near_shoulder_mm: Annotated[float, Field(gt=0, le=10_000)]
+    scene: Text | None = None
+    overlap_mm: Annotated[float, Field(ge=0.05, le=100)] = 1.0
 
 
 class InverseSettings(StrictModel):
@@ -134,14 +140,32 @@ class Study(StrictModel):
             if self.inverse.scene:
                 files.append(Path(self.inverse.scene))
         if stage == "trajectory":
-            files.append(Path(entry.paths))
+            files += [Path(entry.paths), *_tables_of(entry.paths)]
+            if scene := self.path_scene(name):
+                files.append(scene)
         return files
 
     def settings(self, name: str, stage: str) -> dict[str, Any]:
         """The resolved part of the study that a stage's numbers depend on; plain data."""
-        entry = self.entry(name).model_dump(exclude={"targets", "paths", "file"}, exclude_none=True)
+        entry = self.entry(name).model_dump(exclude={"targets", "paths", "file", "scene"}, exclude_none=True)
         own = getattr(self, stage, None)
-        return {"seed": self.seed, "robot": entry, stage: own.model_dump() if own else {}}
+        settings = own.model_dump() if own else {}
+        if stage == "trajectory":
+            scene = self.path_scene(name)
+            settings["scene"] = str(scene) if scene else None
+        return {"seed": self.seed, "robot": entry, stage: settings}
+
+    def path_scene(self, name: str) -> Path | None:
+        """The scene file that a robot's paths are checked against."""
+        scene = self.entry(name).scene or self.trajectory.scene
+        return Path(scene) if scene else None
+
+
+def _tables_of(path_file: str) -> list[Path]:
+    """The CSV tables that a path file names; the file is checked elsewhere."""
+    paths = read_yaml(path_file).get("paths")
+    named = [path.get("file") for path in paths if isinstance(path, dict)] if isinstance(paths, list) else []
+    return [Path(file) for file in named if isinstance(file, str)]
 
 
 def load_study(path: str | Path) -> Study:

@@ -11,19 +11,19 @@ from pydantic import Field, field_validator, model_validator
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import InputError
-from er3a.inputs.units import check_degrees, check_millimetres
+from er3a.inputs.units import JointsDeg, PositionMm, Six, Triple, as_degrees
 from er3a.inputs.yaml_file import StrictModel, load, parse
 from er3a.kinematics.forward import forward
 from er3a.kinematics.transforms import ORTHONORMAL_TOLERANCE, transform
 from er3a.robots.robot import Robot
-from er3a.robots.schema import Name, Triple
+from er3a.robots.schema import Name
 from er3a.target_table import FORMS, POSITION, REFERENCE, read_target_table
 
 MOST_TARGETS = 50
 UNIT_LENGTH_TOLERANCE = 1e-6
 ORIENTATION_FORMS = ("rpy_deg", "zyz_deg", "quaternion_wxyz", "matrix")
 
-Joints = Annotated[list[float], Field(min_length=6, max_length=6)]
+Angles = Annotated[Triple, as_degrees("give the orientation as a quaternion or a matrix")]
 Line = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\r\n]*$")]
 
 
@@ -43,40 +43,13 @@ class Target(StrictModel):
 
     name: Name
     note: Line | None = None
-    xyz_mm: Triple | None = None
-    rpy_deg: Triple | None = None
-    zyz_deg: Triple | None = None
+    xyz_mm: PositionMm | None = None
+    rpy_deg: Angles | None = None
+    zyz_deg: Angles | None = None
     quaternion_wxyz: Annotated[list[float], Field(min_length=4, max_length=4)] | None = None
     matrix: Annotated[list[Triple], Field(min_length=3, max_length=3)] | None = None
-    q_deg: Joints | None = None
-    q_ref_deg: Joints = [0.0] * 6
-
-    @field_validator("xyz_mm")
-    @classmethod
-    def _millimetres(cls, values):
-        if values is not None:
-            check_millimetres(values)
-        return values
-
-    @field_validator("rpy_deg", "zyz_deg")
-    @classmethod
-    def _degrees(cls, values):
-        if values is not None:
-            check_degrees(values, "give the orientation as a quaternion or a matrix")
-        return values
-
-    @field_validator("q_deg")
-    @classmethod
-    def _joint_degrees(cls, values):
-        if values is not None:
-            check_degrees(values, "give the pose by xyz_mm and an orientation")
-        return values
-
-    @field_validator("q_ref_deg")
-    @classmethod
-    def _reference_degrees(cls, values):
-        check_degrees(values, "round them to whole degrees")
-        return values
+    q_deg: Annotated[Six, as_degrees("give the pose by xyz_mm and an orientation")] | None = None
+    q_ref_deg: JointsDeg = [0.0] * 6
 
     @field_validator("quaternion_wxyz")
     @classmethod

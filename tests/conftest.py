@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -83,15 +85,41 @@ def copy_of_project(source_folder: Path, folder: Path) -> StudyRun:
 
 
 @pytest.fixture(scope="session")
-def fresh_project(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], StudyRun]:
-    """Makes copies, without results, of the project as it stands at the start of the tests."""
-    snapshot = copy_of_project(ROOT, tmp_path_factory.mktemp("snapshot") / "project").folder
-    return lambda name: copy_of_project(snapshot, tmp_path_factory.mktemp(name) / "project")
+def shared_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder that all processes of this test run share, with the project as it stood when the first one asked."""
+    own = tmp_path_factory.getbasetemp()
+    shared = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+    with once(shared / "snapshot") as wanted:
+        if wanted:
+            copy_of_project(ROOT, shared / "snapshot")
+    return shared
 
 
 @pytest.fixture(scope="session")
-def small_study(fresh_project: Callable[[str], StudyRun]) -> StudyRun:
+def fresh_project(shared_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], StudyRun]:
+    """Makes copies, without results, of the project as it stands at the start of the tests."""
+    return lambda name: copy_of_project(shared_folder / "snapshot", tmp_path_factory.mktemp(name) / "project")
+
+
+@pytest.fixture(scope="session")
+def small_study(shared_folder: Path) -> StudyRun:
     """The small study, run once from nothing with two cores; tests must leave it as they found it."""
-    run = fresh_project("small_study")
-    run.make_run("--cores", "2")
-    return run
+    folder = shared_folder / "small_study"
+    with once(folder) as wanted:
+        if wanted:
+            copy_of_project(shared_folder / "snapshot", folder).make_run("--cores", "2")
+    return StudyRun(folder)
+
+
+@contextmanager
+def once(folder: Path) -> Iterator[bool]:
+    """Whether this process is the one to make the folder; the others wait until it is made."""
+    finished = folder.with_suffix(".finished")
+    with open(folder.with_suffix(".lock"), "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not finished.exists():
+            shutil.rmtree(folder, ignore_errors=True)
+            yield True
+            finished.touch()
+        else:
+            yield False

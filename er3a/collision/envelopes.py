@@ -42,11 +42,16 @@ def default_envelopes(robot: Robot) -> tuple[Envelope, ...]:
 
 def capsule_poses(robot: Robot, capsules: tuple[Envelope, ...], q: np.ndarray) -> np.ndarray:
     """End points (..., n, 2, 3) of the capsules' lines in the base's surroundings, m, at joint angles (..., 6)."""
-    T = frames(robot, q)
-    base = np.broadcast_to(robot.base, (*T.shape[:-3], 1, 4, 4))
-    T = np.concatenate([base, T[..., :JOINTS, :, :]], axis=-3)[..., [c.link for c in capsules], :, :]
+    T = link_frames(robot, q)[..., [c.link for c in capsules], :, :]
     ends = np.array([(c.start, c.end) for c in capsules])
     return np.einsum("...nij,nkj->...nki", T[..., :3, :3], ends) + T[..., None, :3, 3]
+
+
+def link_frames(robot: Robot, q: np.ndarray) -> np.ndarray:
+    """Frames (..., 7, 4, 4) of the base and the six links at joint angles (..., 6)."""
+    T = frames(robot, q)
+    base = np.broadcast_to(robot.base, (*T.shape[:-3], 1, 4, 4))
+    return np.concatenate([base, T[..., :JOINTS, :, :]], axis=-3)
 
 
 def _pieces(link: int, size: float, lines: list[tuple[np.ndarray, np.ndarray]]) -> list[Envelope]:

@@ -8,9 +8,9 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from er3a.inputs.units import FARTHEST_MM, check_degrees, check_millimetres
+from er3a.inputs.units import FARTHEST_MM, PositionMm, RpyDeg, Triple
 from er3a.inputs.yaml_file import StrictModel, load
-from er3a.robots.schema import Name, Placement, Text, Triple
+from er3a.robots.schema import Name, Text
 
 SMALLEST_OBSTACLE_MM = 2.0
 SHAPES = ("boxes", "cylinders", "spheres", "planes")
@@ -18,23 +18,12 @@ SHAPES = ("boxes", "cylinders", "spheres", "planes")
 Length = Annotated[float, Field(gt=0, le=FARTHEST_MM)]
 
 
-class Obstacle(Placement):
+class Obstacle(StrictModel):
     """A named solid; its own axes lie at ``xyz_mm`` (the solid's centre), turned by ``rpy_deg``."""
 
     name: Name
-    xyz_mm: Triple
-
-    @field_validator("xyz_mm")
-    @classmethod
-    def _millimetres(cls, values):
-        check_millimetres(values)
-        return values
-
-    @field_validator("rpy_deg")
-    @classmethod
-    def _degrees(cls, values):
-        check_degrees(values, "round them to whole degrees")
-        return values
+    xyz_mm: PositionMm
+    rpy_deg: RpyDeg = [0.0, 0.0, 0.0]
 
 
 class Box(Obstacle):
@@ -63,14 +52,8 @@ class Cylinder(Obstacle):
 
 class Sphere(StrictModel):
     name: Name
-    xyz_mm: Triple
+    xyz_mm: PositionMm
     radius_mm: Length
-
-    @field_validator("xyz_mm")
-    @classmethod
-    def _millimetres(cls, values):
-        check_millimetres(values)
-        return values
 
     @field_validator("radius_mm")
     @classmethod

@@ -1,17 +1,21 @@
-"""Checks that catch a file written in metres or radians where mm and degrees are asked for.
+"""Types and checks of file fields that catch metres or radians where mm and degrees are asked for.
 
-Each raises ``ValueError`` with a text ``problem | remedy``, which the YAML reader turns into an InputError.
+A check raises ``ValueError`` with a text ``problem | remedy``, which the YAML reader turns into an InputError.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Annotated
+
+from pydantic import AfterValidator, Field
 
 METRES_BELOW_MM = 5.0
 FARTHEST_MM = 100_000.0
 RADIANS_BELOW_DEG = 6.3
 MOST_DEG = 3600.0
+WHOLE_DEGREES = "round them to whole degrees"
 
 
 def check_millimetres(values: Sequence[float]) -> None:
@@ -47,3 +51,25 @@ def _is_part_of_pi(value: float) -> bool:
     parts = round(value / (math.pi / 12))
     tolerance = 2e-3 if parts % 6 == 0 else 5e-4
     return parts != 0 and value != round(value) and abs(value - parts * math.pi / 12) < tolerance
+
+
+def as_degrees(otherwise: str) -> AfterValidator:
+    """:func:`check_degrees` for a list of angles, as part of a type."""
+
+    def checked(values: list[float]) -> list[float]:
+        check_degrees(values, otherwise)
+        return values
+
+    return AfterValidator(checked)
+
+
+def _as_millimetres(values: list[float]) -> list[float]:
+    check_millimetres(values)
+    return values
+
+
+Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
+Six = Annotated[list[float], Field(min_length=6, max_length=6)]
+PositionMm = Annotated[Triple, AfterValidator(_as_millimetres)]
+RpyDeg = Annotated[Triple, as_degrees(WHOLE_DEGREES)]
+JointsDeg = Annotated[Six, as_degrees(WHOLE_DEGREES)]

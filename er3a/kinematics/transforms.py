@@ -9,7 +9,6 @@ References
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from er3a.errors import PoseError, ShapeError
 from er3a.kinematics.jit import kernel
@@ -78,10 +77,13 @@ def rpy_of(T: np.ndarray) -> np.ndarray:
 
 
 def rotation_angle(R_a: np.ndarray, R_b: np.ndarray) -> np.ndarray:
-    """Angle (...,) in rad of the rotation from R_a to R_b, each (..., 3, 3)."""
-    relative = np.swapaxes(R_a, -1, -2) @ R_b
-    flat = relative.reshape(-1, 3, 3)
-    return Rotation.from_matrix(flat).magnitude().reshape(relative.shape[:-2])
+    """Angle (...,) in rad, 0 to pi, of the rotation from R_a to R_b, each (..., 3, 3).
+
+    From sine and cosine both, so that neither small turns nor half turns lose digits.
+    """
+    R = np.swapaxes(R_a, -1, -2) @ R_b
+    skew = np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1)
+    return np.arctan2(np.linalg.norm(skew, axis=-1), np.trace(R, axis1=-2, axis2=-1) - 1.0)
 
 
 def check_poses(T: np.ndarray, argument: str = "T") -> np.ndarray:

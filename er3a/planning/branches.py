@@ -19,7 +19,7 @@ from er3a.kinematics.forward import frames
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.turns import principal
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
-from er3a.planning.moves import Line
+from er3a.planning.moves import ToolPath
 from er3a.robots.robot import Robot
 
 WIDE_STEP = np.radians(20.0)
@@ -62,7 +62,7 @@ class Branches:
         return np.isfinite(self.q[..., 0])
 
 
-def branches_along(robot: Robot, line: Line, t: np.ndarray) -> Branches:
+def branches_along(robot: Robot, line: ToolPath, t: np.ndarray) -> Branches:
     """Solve a line at times (N,) in s (rising, both ends included) and at as many more as its branches need."""
     grid = _solve_at(robot, line, t)
     grid = _merge(grid, _solve_at(robot, line, _closest_passes(robot, line, grid)))
@@ -103,7 +103,7 @@ def onto_axis_1(robot: Robot, T: np.ndarray) -> np.ndarray:
     return moved
 
 
-def _solve_at(robot: Robot, line: Line, t: np.ndarray) -> Branches:
+def _solve_at(robot: Robot, line: ToolPath, t: np.ndarray) -> Branches:
     progress = line.progress(t)[0]
     q, fault, gap = solve_slots(robot, line.poses(progress), np.zeros((len(t), 6)))
     return Branches(t, progress, q, np.where(fault == REACHED, 0.0, gap), *_free(robot, q))
@@ -121,7 +121,7 @@ def _merge(a: Branches, b: Branches) -> Branches:
     return Branches(t, *rest)
 
 
-def _closest_passes(robot: Robot, line: Line, grid: Branches) -> np.ndarray:
+def _closest_passes(robot: Robot, line: ToolPath, grid: Branches) -> np.ndarray:
     """Times at which a branch comes nearest to a singularity between grid points, by a parabola through three."""
     factors = determinant_factors(robot, grid.q)
     found = [np.empty(0)]
@@ -155,7 +155,7 @@ def _unclear(grid: Branches) -> np.ndarray:
     return (wide | (grid.reached[:-1] != grid.reached[1:])).any(axis=-1)
 
 
-def _fill_free_shoulder(robot: Robot, line: Line, grid: Branches) -> None:
+def _fill_free_shoulder(robot: Robot, line: ToolPath, grid: Branches) -> None:
     for side in (slice(0, 4), slice(4, 8)):
         free = grid.free_shoulder[:, side].any(axis=1)
         if not free.any():

@@ -26,7 +26,7 @@ from er3a.kinematics.jit import kernel
 from er3a.kinematics.turns import LIMIT_TOLERANCE, TURN, nearest_turns, within
 from er3a.planning.branches import WIDE_STEP, Branches, branches_along, turned_difference
 from er3a.planning.followed import Followed, Jump
-from er3a.planning.moves import Line
+from er3a.planning.moves import ToolPath
 from er3a.robots.robot import Robot
 
 JUMP_COST = 1e7
@@ -46,7 +46,7 @@ class _Sequence:
 
 
 def follow(
-    robot: Robot, line: Line, t: np.ndarray, q_start: np.ndarray | None = None, start_slot: int | None = None
+    robot: Robot, line: ToolPath, t: np.ndarray, q_start: np.ndarray | None = None, start_slot: int | None = None
 ) -> Followed:
     """Follow a line.
 

@@ -15,7 +15,7 @@ from er3a.kinematics.forward import jacobian
 from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.planning.branches import FREE_SHOULDER, FREE_WRIST, align_wrist, onto_axis_1, turned_difference
-from er3a.planning.moves import Line
+from er3a.planning.moves import ToolPath
 from er3a.robots.robot import Robot
 
 REGULAR = 1e-6  # smallest singular value (scaled) down to which the Jacobian is solved
@@ -52,7 +52,7 @@ class Followed:
     """
 
     robot: Robot
-    line: Line
+    line: ToolPath
     t: np.ndarray
     progress: np.ndarray
     q: np.ndarray
@@ -109,16 +109,16 @@ class Followed:
     def derivatives(self, progress: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Joint angles and their first and second derivative by progress, at shares of the way (n,) [1]_.
 
-        The tool's twist per unit of progress is constant along a line, so J q' = twist and J q'' = -J' q'. Where the
-        Jacobian is singular, the derivatives are those just beside, if both sides agree; else NaN: no finite joint
-        speed follows the line through there.
+        With the tool's twist per unit of progress, J q' = twist and J q'' = twist' - J' q'. Where the Jacobian is
+        singular, the derivatives are those just beside, if both sides agree; else NaN: no finite joint speed follows
+        the line through there.
 
         Returns
         -------
         q, dq, ddq : (n, 6), rad
         """
         q = self.joints_at(progress)
-        dq, ddq = self._through_jacobian(q)
+        dq, ddq = self._through_jacobian(q, progress)
         for aside in BESIDE:
             rows = np.flatnonzero(np.isnan(dq[:, 0]) & np.isfinite(q[:, 0]))
             if rows.size:
@@ -134,13 +134,13 @@ class Followed:
     @property
     def _size(self) -> float:
         """Size of the line in rad, for comparing derivatives."""
-        return self.line.length / characteristic_length(self.robot) + float(np.linalg.norm(self.line.rotation))
+        return self.line.length / characteristic_length(self.robot) + self.line.turned
 
     def _beside(self, progress: np.ndarray, aside: float) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives on both sides of points of the way, averaged where they agree; NaN elsewhere."""
         before = np.where(progress < aside, progress + aside, progress - aside)
         after = np.where(progress > 1 - aside, progress - aside, progress + aside)
-        sides = [self._through_jacobian(self.joints_at(side)) for side in (before, after)]
+        sides = [self._through_jacobian(self.joints_at(side), side) for side in (before, after)]
         merged = []
         for a, b in zip(*sides):
             scale = np.maximum(np.abs(a).max(axis=1), np.abs(b).max(axis=1)) + self._size
@@ -148,7 +148,7 @@ class Followed:
             merged.append(np.where(agree[:, None], (a + b) / 2, np.nan))
         return merged[0], merged[1]
 
-    def _through_jacobian(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _through_jacobian(self, q: np.ndarray, progress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         length = characteristic_length(self.robot)
         dq, ddq = np.full_like(q, np.nan), np.full_like(q, np.nan)
         rows = np.flatnonzero(np.isfinite(q[:, 0]))
@@ -156,10 +156,11 @@ class Followed:
         rows = rows[smallest > REGULAR]
         scale = np.array([1 / length] * 3 + [1.0] * 3)[:, None]
         J = jacobian(self.robot, q[rows]) * scale
-        first = np.linalg.solve(J, np.broadcast_to(self.line.twist[:, None] * scale, (len(rows), 6, 1)))
+        twist, slope = (part[..., None] * scale for part in self.line.twists(progress[rows]))
+        first = np.linalg.solve(J, twist)
         step = JACOBIAN_STEP / np.maximum(1.0, np.abs(first).max(axis=1, keepdims=True))
         ahead = jacobian(self.robot, q[rows] + (step * first)[..., 0])
         behind = jacobian(self.robot, q[rows] - (step * first)[..., 0])
         dJ = (ahead - behind) * scale / (2 * step)
-        dq[rows], ddq[rows] = first[..., 0], -np.linalg.solve(J, dJ @ first)[..., 0]
+        dq[rows], ddq[rows] = first[..., 0], np.linalg.solve(J, slope - dJ @ first)[..., 0]
         return dq, ddq

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.turns import LIMIT_TOLERANCE
@@ -40,8 +40,8 @@ def out_of_limits(robot: Robot, t: np.ndarray, q: np.ndarray, joints: Joints) ->
                 return sign * (joints(at)[..., j] - limit) - LIMIT_TOLERANCE
 
             values = sign * (q[:, j] - limit) - LIMIT_TOLERANCE
-            for start, end, worst in _where_positive(t, values, beyond):
-                reached, bound = np.degrees([q[worst, j], limit])
+            for start, end, most in _where_positive(t, values, beyond):
+                reached, bound = np.degrees([limit + sign * most, limit])
                 cause = f"J{j + 1} goes to {reached:.1f} deg; its {word} limit is {bound:g} deg"
                 found.append(Interval(start, end, cause))
     return sorted(found, key=lambda interval: (interval.start, interval.cause))
@@ -63,8 +63,8 @@ def too_fast(
             return float(np.abs(speed(np.array([at]))[0, j]) - robot.speed[j])
 
         values = np.abs(velocity[:, j]) - robot.speed[j]
-        for start, end, worst in _where_positive(t, values, excess):
-            needed, able = np.degrees([abs(velocity[worst, j]), robot.speed[j]])
+        for start, end, most in _where_positive(t, values, excess):
+            needed, able = np.degrees([robot.speed[j] + most, robot.speed[j]])
             found.append(Interval(start, end, f"J{j + 1} would need {needed:.0f} deg/s; it can do {able:g} deg/s"))
     return sorted(found, key=lambda interval: (interval.start, interval.cause))
 
@@ -83,13 +83,38 @@ def unreachable(followed: Followed) -> list[Interval]:
 
 def _where_positive(
     t: np.ndarray, values: np.ndarray, function: Callable[[float], float]
-) -> list[tuple[float, float, int]]:
-    """Stretches of positive values: start, end (roots of ``function``), index of the greatest value."""
+) -> list[tuple[float, float, float]]:
+    """Stretches of positive values, those between two grid points too: start, end (roots), and the greatest value."""
     found = []
     for first, last in runs(values > 0):
         start = _root(function, t, values, first - 1, first) if first > 0 else t[0]
         end = _root(function, t, values, last - 1, last) if last < len(t) else t[-1]
-        found.append((float(start), float(end), first + int(np.argmax(values[first:last]))))
+        found.append((float(start), float(end), float(values[first:last].max())))
+    return found + _peaks_between(t, values, function)
+
+
+def _peaks_between(
+    t: np.ndarray, values: np.ndarray, function: Callable[[float], float]
+) -> list[tuple[float, float, float]]:
+    """Stretches of positive values about a peak between grid points that are not positive themselves.
+
+    A peak is looked for where the parabola through a highest point and its neighbours rises half way to zero at least.
+    """
+    inner = values[1:-1]
+    tops = 1 + np.flatnonzero((inner <= 0) & (inner > values[:-2]) & (inner >= values[2:]))
+    found = []
+    for i in tops:
+        before, after = t[i] - t[i - 1], t[i + 1] - t[i]
+        rising, falling = (values[i] - values[i - 1]) / before, (values[i + 1] - values[i]) / after
+        slope, bend = (rising * after + falling * before) / (before + after), (rising - falling) / (before + after)
+        if values[i] + slope**2 / (2 * bend) <= 0:
+            continue
+        near = {"bounds": (t[i - 1], t[i + 1]), "method": "bounded", "options": {"xatol": 1e-10 * (t[-1] - t[0])}}
+        best = minimize_scalar(lambda at: -function(at), **near)
+        if best.fun >= 0:
+            continue
+        ends = [brentq(function, *sorted((side, best.x)), xtol=1e-12 * (t[-1] - t[0])) for side in t[[i - 1, i + 1]]]
+        found.append((float(ends[0]), float(ends[1]), float(-best.fun)))
     return found
 
 

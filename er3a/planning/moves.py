@@ -1,6 +1,6 @@
 """Moves between two points: in joint space, and along a straight line of the tool.
 
-Both run on the quintic time law with rest at either end. On a line the position is linear and the orientation turns
+Joint moves run on a quintic; lines on a quintic or a trapezoid, from rest to rest. The orientation turns
 about one fixed axis at a rate proportional to the position's (slerp [1]_), the shorter way round.
 
 A rotation by exactly half a turn is equally short both ways. It is then taken counter-clockwise as seen from above:
@@ -15,15 +15,50 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import PoseError
 from er3a.kinematics.transforms import check_poses
-from er3a.planning.profiles import quintic
+from er3a.planning.profiles import Rates, one_go, quintic
 
 HALF_TURN_TOLERANCE = 1e-9
+
+
+class ToolPath(Protocol):
+    """A way of the tool in space, and when it is where: what :func:`er3a.planning.follow.follow` can follow.
+
+    Attributes
+    ----------
+    duration : s
+    length : of the tool point's way, m
+    turned : by how much the tool turns in all, rad
+    """
+
+    duration: float
+
+    @property
+    def length(self) -> float: ...
+
+    @property
+    def turned(self) -> float: ...
+
+    def progress(self, t: np.ndarray) -> Rates:
+        """Share of the way done (0..1, never falling) at times (...,) in s, with first and second derivative."""
+
+    def poses(self, progress: np.ndarray) -> np.ndarray:
+        """T_base_tool (..., 4, 4) at shares of the way (...,)."""
+
+    def twists(self, progress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Velocity of the tool per unit of progress, and its derivative by progress: (..., 6), m then rad, base."""
+
+    def way(self, progress: np.ndarray) -> np.ndarray:
+        """Length of the tool point's way so far, m, at shares of the way (...,)."""
+
+    def half_turns(self) -> tuple[tuple[int, np.ndarray], ...]:
+        """Turns by exactly 180 deg: number of the segment (from 1), and the axis (3,) in the base frame taken."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,15 +69,23 @@ class JointMove:
     ----------
     start, end : (6,), rad, maker's angles
     duration : s
+    start_velocity, end_velocity : (6,), rad/s, or 0
+    start_acceleration, end_acceleration : (6,), rad/s^2, or 0
     """
 
     start: np.ndarray
     end: np.ndarray
     duration: float
+    start_velocity: np.ndarray | float = 0.0
+    end_velocity: np.ndarray | float = 0.0
+    start_acceleration: np.ndarray | float = 0.0
+    end_acceleration: np.ndarray | float = 0.0
 
     def joints(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles (rad), velocities (rad/s) and accelerations (rad/s^2) at times (...,) in s; each (..., 6)."""
-        return quintic(t, self.duration, self.start, self.end)
+        velocities = self.start_velocity, self.end_velocity
+        accelerations = self.start_acceleration, self.end_acceleration
+        return quintic(t, self.duration, self.start, self.end, *velocities, *accelerations)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +99,7 @@ class Line:
     rotation : (3,), rad, rotation vector from start to end in the base frame
     duration : s
     half_turn : whether the rotation is half a turn, so that its sense had to be chosen
+    ramp : share of the time of each ramp of a trapezoid; None for the quintic
     """
 
     T_start: np.ndarray
@@ -63,6 +107,7 @@ class Line:
     rotation: np.ndarray
     duration: float
     half_turn: bool = False
+    ramp: float | None = None
 
     @property
     def length(self) -> float:
@@ -70,29 +115,49 @@ class Line:
         return float(np.linalg.norm(self.translation))
 
     @property
+    def turned(self) -> float:
+        """See :class:`ToolPath`."""
+        return float(np.linalg.norm(self.rotation))
+
+    @property
     def twist(self) -> np.ndarray:
         """Velocity of the tool per unit of progress, (6,): m, then rad, in the base frame; the same all along."""
         return np.concatenate([self.translation, self.rotation])
 
-    def progress(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Share of the way done (0..1) at times (...,) in s, with its first and second derivative by time."""
-        return quintic(t, self.duration, np.array(0.0), np.array(1.0))
+    def progress(self, t: np.ndarray) -> Rates:
+        """See :class:`ToolPath`."""
+        return one_go(self.duration, self.ramp)(t)
 
     def poses(self, progress: np.ndarray) -> np.ndarray:
-        """T_base_tool (..., 4, 4) at shares of the way (...,)."""
+        """See :class:`ToolPath`."""
         progress = np.asarray(progress, float)
-        turns = Rotation.from_rotvec(progress.reshape(-1, 1) * self.rotation).as_matrix().reshape(*progress.shape, 3, 3)
-        T = np.zeros((*progress.shape, 4, 4))
-        T[..., :3, :3] = turns @ self.T_start[:3, :3]
-        T[..., :3, 3] = self.T_start[:3, 3] + progress[..., None] * self.translation
-        T[..., 3, 3] = 1.0
-        return T
+        return turning_poses(self.T_start, self.points(progress), self.rotation, progress)
+
+    def points(self, progress: np.ndarray) -> np.ndarray:
+        """The tool point (..., 3), m, at shares of the way (...,)."""
+        return self.T_start[:3, 3] + np.asarray(progress)[..., None] * self.translation
+
+    def twists(self, progress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """See :class:`ToolPath`."""
+        shape = (*np.shape(progress), 6)
+        return np.broadcast_to(self.twist, shape), np.zeros(shape)
+
+    def way(self, progress: np.ndarray) -> np.ndarray:
+        """See :class:`ToolPath`."""
+        return self.length * np.asarray(progress)
+
+    def half_turns(self) -> tuple[tuple[int, np.ndarray], ...]:
+        """See :class:`ToolPath`."""
+        return ((1, self.rotation / np.pi),) if self.half_turn else ()
 
 
-Move = JointMove | Line
-
-
-def line(T_start: np.ndarray, T_end: np.ndarray, duration: float, half_turn_axis: np.ndarray | None = None) -> Line:
+def line(
+    T_start: np.ndarray,
+    T_end: np.ndarray,
+    duration: float,
+    half_turn_axis: np.ndarray | None = None,
+    ramp: float | None = None,
+) -> Line:
     """The straight line between two poses of the tool.
 
     Parameters
@@ -100,6 +165,7 @@ def line(T_start: np.ndarray, T_end: np.ndarray, duration: float, half_turn_axis
     T_start, T_end : (4, 4), T_base_tool, m
     duration : s
     half_turn_axis : (3,), base frame; for rotations by exactly half a turn, the side to which the axis shall point
+    ramp : share of the time of each ramp of a trapezoid; None for the quintic
 
     Raises
     ------
@@ -107,6 +173,20 @@ def line(T_start: np.ndarray, T_end: np.ndarray, duration: float, half_turn_axis
         if a pose is no rigid transform, or ``half_turn_axis`` can't choose
     """
     T_start, T_end = check_poses(T_start, "T_start"), check_poses(T_end, "T_end")
+    rotation, half_turn = rotation_between(T_start, T_end, half_turn_axis)
+    return Line(T_start, T_end[:3, 3] - T_start[:3, 3], rotation, duration, half_turn, ramp)
+
+
+def rotation_between(
+    T_start: np.ndarray, T_end: np.ndarray, half_turn_axis: np.ndarray | None = None
+) -> tuple[np.ndarray, bool]:
+    """Rotation vector (3,) in rad in the base frame, the shorter way round, and whether it is half a turn.
+
+    Raises
+    ------
+    PoseError
+        if ``half_turn_axis`` can't choose
+    """
     rotation = Rotation.from_matrix(T_end[:3, :3] @ T_start[:3, :3].T).as_rotvec()
     angle = np.linalg.norm(rotation)
     half_turn = bool(abs(angle - np.pi) < HALF_TURN_TOLERANCE)
@@ -114,7 +194,17 @@ def line(T_start: np.ndarray, T_end: np.ndarray, duration: float, half_turn_axis
         raise PoseError(f"half_turn_axis is given, but the rotation is by {np.degrees(angle):.6g} deg, not by 180 deg")
     if half_turn:
         rotation = rotation * _sense(rotation / angle, half_turn_axis)
-    return Line(T_start, T_end[:3, 3] - T_start[:3, 3], rotation, duration, half_turn)
+    return rotation, half_turn
+
+
+def turning_poses(T_start: np.ndarray, points: np.ndarray, rotation: np.ndarray, progress: np.ndarray) -> np.ndarray:
+    """T_base_tool (..., 4, 4) at points (..., 3), turned from ``T_start`` by shares (...,) of a rotation vector."""
+    turns = Rotation.from_rotvec(progress.reshape(-1, 1) * rotation).as_matrix().reshape(*progress.shape, 3, 3)
+    T = np.zeros((*progress.shape, 4, 4))
+    T[..., :3, :3] = turns @ T_start[:3, :3]
+    T[..., :3, 3] = points
+    T[..., 3, 3] = 1.0
+    return T
 
 
 def _sense(axis: np.ndarray, wanted: np.ndarray | None) -> float:

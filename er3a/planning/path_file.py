@@ -6,92 +6,188 @@ import re
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from er3a.errors import InputError
-from er3a.inputs.units import check_degrees, check_millimetres
+from er3a.inputs.units import JointsDeg, PositionMm, RpyDeg, Six, Triple
 from er3a.inputs.yaml_file import StrictModel, load
-from er3a.robots.schema import Name, Text, Triple
+from er3a.robots.schema import Name, Text
 
-WHOLE_DEGREES = "round them to whole degrees"
+TRAPEZOID_RAMP = 1 / 3  # of a motion's time, on the way up and on the way down
 
-SixAngles = Annotated[list[float], Field(min_length=6, max_length=6)]
 Duration = Annotated[float, Field(gt=0, le=3600)]
 Samples = Annotated[int, Field(ge=2, le=100_000)]
+Blend = Annotated[float, Field(ge=0, le=10_000)]
 
 
 class PoseEntry(StrictModel):
     """A pose of the tool in the base frame; R = Rz(yaw) Ry(pitch) Rx(roll)."""
 
-    xyz_mm: Triple
-    rpy_deg: Triple
-
-    @field_validator("xyz_mm")
-    @classmethod
-    def _millimetres(cls, values):
-        check_millimetres(values)
-        return values
-
-    @field_validator("rpy_deg")
-    @classmethod
-    def _degrees(cls, values):
-        check_degrees(values, WHOLE_DEGREES)
-        return values
+    xyz_mm: PositionMm
+    rpy_deg: RpyDeg
 
 
-class JointPath(StrictModel):
-    """A joint move: quintic in time, all joints together."""
+class NamedPath(StrictModel):
+    """What every path has."""
 
-    kind: Literal["joint"]
     name: Name
     title: Text
-    start_deg: SixAngles
-    end_deg: SixAngles
-    duration_s: Duration
     samples: Samples
 
-    @field_validator("start_deg", "end_deg")
-    @classmethod
-    def _degrees(cls, values):
-        check_degrees(values, WHOLE_DEGREES)
-        return values
 
+class Profiled(NamedPath):
+    """A path that runs from rest to rest, or from halt to halt.
 
-class LinePath(StrictModel):
-    """A straight line of the tool, from joint angles or from a pose.
-
-    ``start_branch`` (only with a start pose) fixes the branch to begin on, in the words of the inverse's solutions.
-    ``half_turn_axis`` chooses the sense of a rotation by exactly 180 deg.
+    ``profile`` is the position's law of time; ``ramp_share`` is the share of the time of each ramp of a trapezoid
+    (1/3 if left out).
     """
 
-    kind: Literal["line"]
-    name: Name
-    title: Text
-    start_deg: SixAngles | None = None
-    start: PoseEntry | None = None
-    start_branch: Text | None = None
-    end: PoseEntry
-    half_turn_axis: Triple | None = None
     duration_s: Duration
-    samples: Samples
+    profile: Literal["quintic", "trapezoid"] = "quintic"
+    ramp_share: Annotated[float, Field(gt=0, le=0.5)] | None = None
+
+    @model_validator(mode="after")
+    def _ramp_of_a_trapezoid(self):
+        if self.ramp_share is not None and self.profile != "trapezoid":
+            raise ValueError("ramp_share: a quintic has no ramps | Remove it, or write profile: trapezoid")
+        return self
+
+    @property
+    def ramp(self) -> float | None:
+        """The trapezoid's share of time per ramp; None for the quintic."""
+        return (self.ramp_share or TRAPEZOID_RAMP) if self.profile == "trapezoid" else None
+
+
+class JointPath(NamedPath):
+    """A joint move: quintic in time, all joints together; at rest at the ends unless their rates are given.
+
+    It starts at ``start_deg``, or where the arm stands ``after`` an earlier path of the file.
+    """
+
+    kind: Literal["joint"]
+    start_deg: JointsDeg | None = None
+    after: Name | None = None
+    end_deg: JointsDeg
+    start_velocity_deg_s: Six | None = None
+    end_velocity_deg_s: Six | None = None
+    start_acceleration_deg_s2: Six | None = None
+    end_acceleration_deg_s2: Six | None = None
+    duration_s: Duration
 
     @model_validator(mode="after")
     def _one_start(self):
-        if (self.start is None) == (self.start_deg is None):
-            raise ValueError("give either start_deg (six joint angles) or start (a pose) | Keep one of the two")
-        if self.start_branch is not None and self.start is None:
-            raise ValueError("start_branch: start_deg already fixes the branch | Remove start_branch")
+        if (self.start_deg is None) == (self.after is None):
+            raise ValueError(
+                "give either start_deg (six joint angles) or after (an earlier path) | Keep one of the two"
+            )
         return self
 
-    @field_validator("start_deg")
-    @classmethod
-    def _degrees(cls, values):
-        if values is not None:
-            check_degrees(values, WHOLE_DEGREES)
-        return values
+
+class JointSequencePath(Profiled):
+    """Joint moves through points, all joints together; each corner rounded over ``blend_deg`` on either side.
+
+    ``blend_deg`` counts in the joint that turns most; with 0 the arm stops at each corner.
+    """
+
+    kind: Literal["joint_sequence"]
+    points_deg: Annotated[list[JointsDeg], Field(min_length=2)]
+    blend_deg: Blend = 0.0
 
 
-PathEntry = JointPath | LinePath
+class ToolStart(Profiled):
+    """Where a path of the tool starts: at joint angles, at a pose, or where the arm stands ``after`` an earlier path.
+
+    ``start_branch`` (only with a start pose) fixes the branch to begin on, in the words of the inverse's solutions.
+    """
+
+    start_deg: JointsDeg | None = None
+    start: PoseEntry | None = None
+    after: Name | None = None
+    start_branch: Text | None = None
+
+    @model_validator(mode="after")
+    def _one_start(self):
+        if [self.start, self.start_deg, self.after].count(None) != 2:
+            ways = "start_deg (six joint angles) or start (a pose) or after (an earlier path)"
+            raise ValueError(f"give either {ways} | Keep one of them")
+        if self.start_branch is not None and self.start is None:
+            what = "after" if self.after else "start_deg"
+            raise ValueError(f"start_branch: {what} already fixes the branch | Remove start_branch")
+        return self
+
+
+class LineTo(StrictModel):
+    """A straight line to a pose; ``half_turn_axis`` chooses the sense of a rotation by exactly 180 deg."""
+
+    end: PoseEntry
+    half_turn_axis: Triple | None = None
+
+
+class ArcTo(LineTo):
+    """A circular arc through a point to a pose."""
+
+    via_mm: PositionMm
+
+
+class LinePath(ToolStart, LineTo):
+    """A straight line of the tool."""
+
+    kind: Literal["line"]
+
+
+class ArcPath(ToolStart, ArcTo):
+    """A circular arc of the tool."""
+
+    kind: Literal["arc"]
+
+
+class LineSegment(LineTo):
+    """A line of a sequence; ``blend_mm`` rounds the corner at its end over that length on either side."""
+
+    kind: Literal["line"]
+    blend_mm: Blend = 0.0
+
+
+class ArcSegment(ArcTo):
+    """An arc of a sequence; ``blend_mm`` rounds the corner at its end over that length on either side."""
+
+    kind: Literal["arc"]
+    blend_mm: Blend = 0.0
+
+
+class SequencePath(ToolStart):
+    """Lines and arcs one after another; the tool stops at each corner that is not rounded."""
+
+    kind: Literal["sequence"]
+    segments: Annotated[
+        list[Annotated[LineSegment | ArcSegment, Field(discriminator="kind")]], Field(min_length=1, max_length=1000)
+    ]
+
+    @model_validator(mode="after")
+    def _no_corner_at_the_end(self):
+        if self.segments[-1].blend_mm:
+            last = len(self.segments) - 1
+            raise ValueError(f"segments[{last}].blend_mm: the last segment has no corner at its end | Remove it")
+        return self
+
+
+class TablePath(NamedPath):
+    """A path through the rows of a CSV table (:mod:`er3a.planning.path_table`).
+
+    ``duration_s`` is for tables without times. Corners are rounded over ``blend_mm`` (``blend_deg`` for joint angles)
+    on either side, less where half of a side is shorter; left out, over half of the shorter side.
+    """
+
+    kind: Literal["table"]
+    file: Text
+    duration_s: Duration | None = None
+    blend_mm: Blend | None = None
+    blend_deg: Blend | None = None
+    start_branch: Text | None = None
+    half_turn_axis: Triple | None = None
+
+
+PathEntry = JointPath | JointSequencePath | LinePath | ArcPath | SequencePath | TablePath
 
 
 class PathFile(StrictModel):
@@ -106,6 +202,9 @@ class PathFile(StrictModel):
         for i, name in enumerate(names):
             if name in names[:i]:
                 raise ValueError(f"paths[{i}].name: '{name}' names an earlier path too | Give each path its own name")
+            after = getattr(self.paths[i], "after", None)
+            if after and after not in names[:i]:
+                raise ValueError(f"paths[{i}].after: no earlier path is named '{after}' | Name one that stands above")
         return self
 
 
@@ -120,5 +219,6 @@ def load_paths(path: str | Path) -> PathFile:
     try:
         return load(PathFile, path)
     except InputError as error:
-        field = error.field and re.sub(r"(paths\[\d+\])\.(?:joint|line)\b", r"\1", error.field)
+        kinds = "joint_sequence|joint|line|arc|sequence|table"
+        field = error.field and re.sub(rf"((?:paths|segments)\[\d+\])\.(?:{kinds})\b", r"\1", error.field)
         raise InputError(error.file, field, error.problem, error.remedy) from None

@@ -3,11 +3,19 @@
 References
 ----------
 .. [1] J. J. Craig, *Introduction to Robotics*, 3rd ed., section 7.3, equations 7.17 and 7.18.
+.. [2] B. Siciliano et al., *Robotics: Modelling, Planning and Control*, section 4.2.1 (trapezoidal velocity profile).
+.. [3] F. N. Fritsch, R. E. Carlson, "Monotone piecewise cubic interpolation", SIAM J. Numer. Anal. 17, 1980.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Protocol
+
 import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+Rates = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def quintic(
@@ -19,7 +27,7 @@ def quintic(
     end_velocity: np.ndarray | float = 0.0,
     start_acceleration: np.ndarray | float = 0.0,
     end_acceleration: np.ndarray | float = 0.0,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+) -> Rates:
     """Polynomial of fifth degree that meets position, velocity and acceleration at both ends [1]_.
 
     Parameters
@@ -45,3 +53,90 @@ def quintic(
     dx = v0 + tau * (a0 + tau * (3 * c3 + tau * (4 * c4 + tau * 5 * c5)))
     ddx = a0 + tau * (6 * c3 + tau * (12 * c4 + tau * 20 * c5))
     return x, dx / duration, ddx / duration**2
+
+
+def trapezoid(t: np.ndarray, duration: float, ramp: float) -> Rates:
+    """Progress from 0 to 1 at a velocity that rises, stays and falls, each ramp taking its share of the time [2]_.
+
+    Parameters
+    ----------
+    t : (...,), s, from 0 to ``duration``
+    ramp : share of the time, greater than 0, at most 1/2
+
+    Returns
+    -------
+    progress, its first and second derivative : (...,), in 1, 1/s and 1/s^2; where the acceleration steps, it is that
+    of the ramp
+    """
+    tau = np.asarray(t, float) / duration
+    top = 1 / (1 - ramp)
+    steep, rising, falling = top / ramp, tau <= ramp, tau >= 1 - ramp
+    x = np.where(rising, steep * tau**2 / 2, np.where(falling, 1 - steep * (1 - tau) ** 2 / 2, top * (tau - ramp / 2)))
+    dx = np.where(rising, steep * tau, np.where(falling, steep * (1 - tau), top))
+    ddx = np.where(rising, steep, np.where(falling, -steep, 0.0))
+    return x, dx / duration, ddx / duration**2
+
+
+class TimeLaw(Protocol):
+    """Share of the way done (0..1) at times (...,) in s, with its first and second derivative by time."""
+
+    def __call__(self, t: np.ndarray) -> Rates: ...
+
+
+@dataclass(frozen=True, eq=False)
+class FromRestToRest:
+    """From one halt to the next, on the quintic, or on the trapezoid if ``ramp`` is given.
+
+    Attributes
+    ----------
+    times, progress : (k,), s and shares of the way, of the halts, start and end among them; both rise
+    ramp : share of the time of each ramp of a trapezoid
+    """
+
+    times: np.ndarray
+    progress: np.ndarray
+    ramp: float | None = None
+
+    def __call__(self, t: np.ndarray) -> Rates:
+        """See :class:`TimeLaw`."""
+        t = np.asarray(t, float)
+        i = np.clip(np.searchsorted(self.times, t, side="right"), 1, len(self.times) - 1)
+        duration = self.times[i] - self.times[i - 1]
+        tau = np.clip((t - self.times[i - 1]) / duration, 0.0, 1.0)
+        one, zero = np.array(1.0), np.array(0.0)
+        x, dx, ddx = quintic(tau, 1.0, zero, one) if self.ramp is None else trapezoid(tau, 1.0, self.ramp)
+        step = self.progress[i] - self.progress[i - 1]
+        return self.progress[i - 1] + step * x, step * dx / duration, step * ddx / duration**2
+
+
+def one_go(duration: float, ramp: float | None = None) -> FromRestToRest:
+    """From rest at 0 to rest at ``duration`` (s) without a halt."""
+    return FromRestToRest(np.array([0.0, duration]), np.array([0.0, 1.0]), ramp)
+
+
+class Timetable:
+    """Through given shares of the way at given times: cubic between them, never backwards [3]_, at rest at both ends.
+
+    Parameters
+    ----------
+    times, progress : (k,), s (rising) and shares of the way from 0 to 1 (not falling)
+    halts : (k,) bool, where the motion has to stop besides
+    """
+
+    def __init__(self, times: np.ndarray, progress: np.ndarray, halts: np.ndarray):
+        self.times, self.progress = np.asarray(times, float), np.asarray(progress, float)
+        slopes = PchipInterpolator(self.times, self.progress).derivative()(self.times)
+        slopes[np.asarray(halts, bool)] = 0.0
+        slopes[[0, -1]] = 0.0
+        self._slopes = slopes
+
+    def __call__(self, t: np.ndarray) -> Rates:
+        """See :class:`TimeLaw`."""
+        t = np.clip(np.asarray(t, float), self.times[0], self.times[-1])
+        i = np.clip(np.searchsorted(self.times, t, side="right"), 1, len(self.times) - 1)
+        h, start = self.times[i] - self.times[i - 1], self.progress[i - 1]
+        step, v0, v1 = self.progress[i] - start, h * self._slopes[i - 1], h * self._slopes[i]
+        u = (t - self.times[i - 1]) / h
+        c2, c3 = 3 * step - 2 * v0 - v1, v0 + v1 - 2 * step
+        x = start + u * (v0 + u * (c2 + u * c3))
+        return x, (v0 + u * (2 * c2 + 3 * u * c3)) / h, (2 * c2 + 6 * u * c3) / h**2

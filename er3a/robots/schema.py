@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
+from er3a.inputs.units import Triple
 from er3a.inputs.yaml_file import StrictModel
 from er3a.robots.robot import Grade
 
@@ -17,7 +18,6 @@ LONGEST_LENGTH_MM = 20_000.0
 Text = Annotated[str, Field(min_length=1, max_length=2000)]
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 JointNumber = Annotated[int, Field(ge=1, le=6)]
-Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
 class Sourced(StrictModel):

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.collision.clearance import can_measure, clearance
+from er3a.collision.bodies import can_measure
+from er3a.collision.clearance import clearance
 from er3a.collision.scene import SceneFile
 from er3a.errors import Er3aError
 from er3a.kinematics.selection import limit_margin

@@ -9,10 +9,9 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-from scipy.spatial.transform import Rotation
 
 from er3a.kinematics.chain import ALONG_Z, JOINTS, TO_NEXT_AXIS, link_parts
-from er3a.kinematics.forward import forward, frames
+from er3a.kinematics.forward import frames
 from er3a.robots.robot import Robot
 from er3a.viewing.palette import BODY, JOINT_NAMES, LINK, rgb
 from er3a.viewing.palette import JOINTS as JOINT_COLOURS
@@ -100,35 +99,8 @@ def send_motion(
     poses = frames(robot, q)
     for k, path in enumerate(_moving_entities(entity)):
         T = poses[:, k]
-        columns = rr.Transform3D.columns(
-            translation=T[:, :3, 3], quaternion=Rotation.from_matrix(T[:, :3, :3]).as_quat()
-        )
+        columns = rr.Transform3D.columns(translation=T[:, :3, 3], mat3x3=T[:, :3, :3])
         stream.send_columns(path, [seconds(times)], columns)
-
-
-def skeleton(robot: Robot, q: np.ndarray) -> np.ndarray:
-    """Corner points of the links from base to tool, for side views.
-
-    Parameters
-    ----------
-    q : (6,), rad
-
-    Returns
-    -------
-    points : (n, 3), m, base frame, without repeated points
-    """
-    T, parts = frames(robot, q), link_parts(robot)
-    points = [robot.base[:3, 3]]
-    for k in range(JOINTS):
-        along = parts[k + 1, ALONG_Z, :3, 3]
-        for local in (np.zeros(3), along, along + parts[k + 1, TO_NEXT_AXIS, :3, 3]):
-            points.append(T[k, :3, :3] @ local + T[k, :3, 3])
-    points += [forward(robot, q, frame=JOINTS)[:3, 3], T[JOINTS, :3, 3]]
-    kept = [points[0]]
-    for point in points[1:]:
-        if np.linalg.norm(point - kept[-1]) > 1e-9:
-            kept.append(point)
-    return np.array(kept)
 
 
 def _moving_entities(entity: str) -> list[str]:
@@ -157,13 +129,24 @@ def _log_segments(
         return
     starts = np.array([start for start, _ in solid])
     vectors = np.array([vector for _, vector in solid])
-    turns = [Rotation.align_vectors([vector / np.linalg.norm(vector)], [[0, 0, 1]])[0].as_quat() for vector in vectors]
-    capsules = rr.Capsules3D(
-        lengths=np.linalg.norm(vectors, axis=1),
-        radii=np.full(len(solid), radius),
+    colour = (*rgb(BODY), 60) if ghost else (*rgb(LINK), 255)
+    stream.log(entity, capsules(starts, vectors, radius, colour, solid=not ghost), static=True)
+
+
+def capsules(
+    starts: np.ndarray, vectors: np.ndarray, radius: float, colour: tuple[int, ...], solid: bool
+) -> rr.Capsules3D:
+    """Rods with round ends from starts (n, 3) along vectors (n, 3), none of them zero, all in m."""
+    lengths = np.linalg.norm(vectors, axis=1)
+    x, y, z = (vectors / lengths[:, None]).T
+    # The shortest turn from z to the vector; straight down it is half a turn about x.
+    quaternions = np.stack([-y, x, np.zeros_like(x), 1.0 + z], axis=1)
+    quaternions[1.0 + z < 1e-12] = 1.0, 0.0, 0.0, 0.0
+    return rr.Capsules3D(
+        lengths=lengths,
+        radii=np.full(len(lengths), radius),
         translations=starts,
-        quaternions=turns,
-        colors=[(*rgb(BODY), 60) if ghost else (*rgb(LINK), 255)] * len(solid),
-        fill_mode="transparentfillmajorwireframe" if ghost else "solid",
+        quaternions=quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True),
+        colors=[colour] * len(lengths),
+        fill_mode="solid" if solid else "transparentfillmajorwireframe",
     )
-    stream.log(entity, capsules, static=True)

@@ -1,4 +1,4 @@
-"""The index page: robots x stages, with verdicts and key figures."""
+"""The pages over all robots: the index (robots x stages, verdicts and key figures) and the comparison of two."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 from er3a.results import read_summary
 from er3a.study import STAGES, Study
 from er3a.viewing import page
+from er3a.viewing.compare import write_compare
 
 SHOWN_FIGURES = 3
 QUESTIONS = {
@@ -17,17 +18,18 @@ QUESTIONS = {
 }
 
 
-def write_index(study: Study, results: Path, output: Path) -> None:
-    """Render ``index.html`` from the summaries of all robots and stages."""
+def write_index(study: Study, results: Path, folder: Path) -> None:
+    """Render ``index.html`` and ``compare.html`` into a folder, from the results of all robots and stages."""
     robots = [
         {"robot": study.robot(name), "summaries": [read_summary(results / name / stage) for stage in STAGES]}
         for name in study.robots
     ]
     page.render(
         Path(__file__).with_name("index.html.j2"),
-        output,
+        folder / "index.html",
         robots=robots,
         stages=STAGES,
         questions=QUESTIONS,
         shown_figures=SHOWN_FIGURES,
     )
+    write_compare(study, results, folder / "compare.html")

@@ -28,6 +28,14 @@ VERDICT_WORDS = {
     "no_reference": "no reference",
 }
 
+SCRIPT_WORDS = {
+    "sort": "sort by this column",
+    "csv": "download as CSV",
+    "svg": "download",
+    "enlarge": "enlarge",
+    "close": "close",
+}
+
 
 @dataclass(frozen=True)
 class Picture:
@@ -62,6 +70,8 @@ def render(template: Path, output: Path, summary: dict[str, Any] | None = None, 
     environment.filters |= {"number": number, "fixed": fixed}
     html = environment.get_template(template.name).render(
         style=(_HERE / "style.css").read_text(encoding="utf-8"),
+        script=(_HERE / "page.js").read_text(encoding="utf-8"),
+        script_words=SCRIPT_WORDS,
         verdict_words=VERDICT_WORDS,
         summary=summary,
         versions=_versions(),

@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 import pytest
+from axe_core_python.selenium import Axe
+from selenium.webdriver.common.by import By
+from selenium.webdriver.support.ui import Select
 
-PAGES = ["index.html"] + [
+from er3a.robots.load import load_robot
+
+OVER_ALL = ["index.html", "compare.html"]
+PAGES = OVER_ALL + [
     f"{robot}/{stage}.html"
     for robot in ("er3a_c60", "er3a_c60_article", "er3_600")
     for stage in ("validation", "workspace", "inverse", "trajectory")
@@ -20,13 +26,50 @@ def test_page_opens_clean(browser, small_study, page):
     images = browser.execute_script("return [...document.images].map(i => [i.alt, i.complete && i.naturalWidth > 0])")
     assert all(loaded for _, loaded in images)
     assert all(alt for alt, _ in images)
-    assert page == "index.html" or images, "a stage's page shows at least one figure"
+    assert page in OVER_ALL or images, "a stage's page shows at least one figure"
     assert browser.execute_script("return document.documentElement.scrollWidth <= window.innerWidth")
     assert 'src="http' not in path.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_page_is_accessible(browser, small_study, page):
+    browser.get((small_study.folder / "reports" / page).as_uri())
+    found = Axe().run(browser)["violations"]
+    serious = [fault for fault in found if fault["impact"] in ("serious", "critical")]
+    assert [(fault["id"], [node["html"][:200] for node in fault["nodes"][:3]]) for fault in serious] == []
 
 
 def test_index_leads_to_every_page(browser, small_study):
     browser.get((small_study.folder / "reports/index.html").as_uri())
     links = browser.execute_script("return [...document.querySelectorAll('td a')].map(a => a.href)")
     found = {link.rsplit("/", 2)[-2] + "/" + link.rsplit("/", 1)[-1] for link in links}
-    assert found == set(PAGES) - {"index.html"}
+    assert found == set(PAGES) - set(OVER_ALL)
+
+
+def test_comparison_shows_the_pair_that_is_picked(browser, small_study):
+    browser.get((small_study.folder / "reports/compare.html").as_uri())
+
+    def cells(what: str) -> list[str]:
+        script = (
+            "return [...document.querySelectorAll('#comparison tbody tr')].map(r => [...r.cells].map(c => c.innerText))"
+        )
+        return next(row[3:] for row in browser.execute_script(script) if row[1] == what)
+
+    def shown() -> list[str]:
+        groups = browser.find_elements(By.CSS_SELECTOR, "#borders g[data-robot]")
+        return [
+            group.get_attribute("data-robot")
+            for group in groups
+            if group.value_of_css_property("visibility") == "visible"
+        ]
+
+    assert cells("J2 a") == ["270", "650", "380"]
+    assert shown() == ["er3a_c60", "er3a_c60_article"]
+    Select(browser.find_element(By.ID, "robot-b")).select_by_value("er3_600")
+    robots = [load_robot(name) for name in ("er3a_c60", "er3_600")]
+    assert [float(text) for text in cells("J1 d")[:2]] == [round(robot.d[0] * 1000, 6) for robot in robots]
+    assert shown() == ["er3a_c60", "er3_600"]
+    browser.find_element(By.ID, "only-differences").click()
+    rows = [row for row in browser.find_elements(By.CSS_SELECTOR, "#comparison tbody tr") if row.is_displayed()]
+    assert rows
+    assert all(row.find_elements(By.TAG_NAME, "td")[5].text for row in rows)

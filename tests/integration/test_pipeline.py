@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -132,14 +135,15 @@ def test_results_are_the_same_bytes_on_one_core_and_with_another_scatter(small_s
         assert done.returncode == 0, f"{path}: {done.stderr[-500:]}"
 
 
-def test_half_deleted_results_are_made_again(small_study):
-    folder = small_study.folder / "results/er3a_c60/inverse"
-    before = (folder / "summary.json").read_bytes()
-    (folder / "summary.json").unlink()
-    assert "er3a_c60: compute inverse" in small_study.planned()
-    small_study.make_run("--cores", "2")
-    assert (folder / "summary.json").read_bytes() == before
-    assert small_study.planned() == set()
+def test_half_deleted_results_are_made_again(small_study, tmp_path):
+    run = replace(small_study, folder=shutil.copytree(small_study.folder, tmp_path / "project"))
+    summary = run.folder / "results/er3a_c60/inverse/summary.json"
+    before = summary.read_bytes()
+    summary.unlink()
+    assert "er3a_c60: compute inverse" in run.planned()
+    run.make_run("--cores", "2")
+    assert summary.read_bytes() == before
+    assert run.planned() == set()
 
 
 @pytest.mark.parametrize(
@@ -158,3 +162,11 @@ def test_bad_input_is_one_error_before_anything_runs(small_study, path, old, new
     assert Path(path).name in done.stderr
     assert done.stderr.count("\n") == 1
     assert small_study.planned() == set()
+
+
+def test_two_runs_at_once_are_refused(small_study):
+    with open(small_study.folder / ".snakemake/er3a.lock") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        done = small_study.make_run(check=False)
+    assert done.returncode == 2
+    assert done.stderr == "error: another run is active in this folder; wait for its end, or stop it\n"

@@ -11,9 +11,11 @@ from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.transforms import transform
 from er3a.kinematics.turns import nearest_turns, within
+from er3a.planning.arcs import arc
 from er3a.planning.follow import follow
 from er3a.planning.intervals import out_of_limits, too_fast, unreachable
 from er3a.planning.moves import JointMove, line
+from er3a.planning.sequences import segment_path
 from er3a.planning.singular_events import singular_events
 from er3a.robots.load import load_robot
 
@@ -61,6 +63,21 @@ def test_velocities_satisfy_the_jacobian_and_the_differences_of_the_angles(robot
     scale = np.abs(v).max()
     np.testing.assert_allclose((after[0] - before[0]) / (2 * step), v, atol=1e-6 * scale)
     np.testing.assert_allclose((after[1] - before[1]) / (2 * step), a, atol=1e-5 * np.abs(a).max())
+
+
+@pytest.mark.parametrize("kind", ["arc", "rounded"])
+def test_velocities_and_accelerations_along_arcs_and_rounded_corners_are_those_of_the_angles(robot, kind):
+    q_start = np.radians([10, 10, -10, 10, 40, 20])
+    T = forward(robot, q_start)
+    middle, end = shifted(T, [0.03, -0.06, 0.04], [0.3, 0.1, -0.3]), shifted(T, [-0.02, -0.1, 0.03], [0.1, 0.5, -0.2])
+    bow = arc(T, T[:3, 3] + [0.03, -0.02, 0.0], middle, 1.0, ramp=None if kind == "arc" else 0.3)
+    way = bow if kind == "arc" else segment_path([bow, line(middle, end, 1.0)], np.array([0.02]), 1.0)
+    followed = follow(robot, way, GRID, q_start)
+    t, step = np.linspace(0.1, 0.9, 37), 1e-5
+    _, v, a = followed.rates(t)
+    before, after = followed.rates(t - step), followed.rates(t + step)
+    np.testing.assert_allclose((after[0] - before[0]) / (2 * step), v, atol=1e-6 * np.abs(v).max())
+    np.testing.assert_allclose((after[1] - before[1]) / (2 * step), a, atol=1e-4 * np.abs(a).max())
 
 
 def planar_crossing(robot):

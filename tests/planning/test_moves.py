@@ -49,6 +49,15 @@ def test_positions_agree_with_robotics_toolbox(random):
     np.testing.assert_allclose(way.poses(progress)[:, :3, 3], theirs.t, atol=1e-9)
 
 
+def test_trapezoid_with_a_number_of_steps_is_that_of_robotics_toolbox(random):
+    rtb, sm = pytest.importorskip("roboticstoolbox"), pytest.importorskip("spatialmath")
+    a, b = random_pose(random), random_pose(random)
+    way = line(a, b, 2.0, ramp=1 / 3)
+    T = way.poses(way.progress(np.linspace(0, 2, 50))[0])
+    theirs = rtb.ctraj(sm.SE3(a), sm.SE3(b), 50)
+    np.testing.assert_allclose(T, theirs.A, atol=1e-9)
+
+
 def test_twist_is_the_derivative_of_the_pose(random):
     way, step = line(random_pose(random), random_pose(random), 2.0), 1e-6
     before, here, after = way.poses(np.array([0.4 - step, 0.4, 0.4 + step]))

@@ -9,6 +9,8 @@ import pytest
 
 from er3a.errors import InputError
 from er3a.kinematics.forward import forward
+from er3a.kinematics.singularity import characteristic_length, conditioning
+from er3a.kinematics.transforms import transform
 from er3a.results import read_summary, read_table
 from er3a.stages.trajectory.compute import compute
 from er3a.stages.trajectory.record import record
@@ -40,13 +42,56 @@ def by_name(folder):
 @pytest.mark.parametrize("name", ROBOTS)
 def test_each_kind_of_path_is_in_the_study(folders, name):
     paths = by_name(folders[name])
-    assert paths["line_clean"]["verdict"] == "safe"
+    assert paths["line_clean"]["verdict"] == paths["arc_clean"]["verdict"] == "safe"
     assert paths["line_wrist"]["verdict"] == "singular"
+    (wrist,) = paths["line_wrist"]["singularities"]
+    assert (wrist["type"], wrist["crossing"], wrist["distance_deg"]) == ("wrist", True, 0)
     assert paths["line_shoulder"]["verdict"] in ("near-singular", "too fast")
+    (shoulder,) = paths["line_shoulder"]["singularities"]
+    assert (shoulder["type"], shoulder["crossing"]) == ("shoulder", False)
+    assert shoulder["distance_mm"] == pytest.approx(20, abs=1e-6)
     assert paths["line_limits"]["verdict"] == "leaves limits"
     assert paths["line_out"]["verdict"] == "unreachable"
-    (shoulder,) = paths["line_shoulder"]["singularities"]
-    assert shoulder["distance_mm"] == pytest.approx(20, abs=1e-6)
+    (out,) = paths["line_out"]["unreachable"]
+    assert 0 < out["t0_s"] < out["t1_s"] == paths["line_out"]["duration_s"]
+    assert 0 < out["s0_m"] < out["s1_m"] == pytest.approx(paths["line_out"]["length_m"])
+    assert "mm too far" in out["cause"]
+    assert paths["line_collides"]["verdict"] == "collides"
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_paths_are_what_they_claim_by_the_joints_alone(study, folders, name):
+    """The default study's paths, judged from their tables without the stage's own measures."""
+    robot, checks = study.robot(name), read_table(folders[name] / "checks.parquet")
+
+    def angles(path):
+        return np.radians(checks.loc[checks["path"] == path, JOINTS].to_numpy())
+
+    clean, crossing, beside, out = (angles(f"line_{path}") for path in ("clean", "wrist", "shoulder", "out"))
+    length = characteristic_length(robot)
+    assert conditioning(robot, clean, length).smallest_singular_value.min() > 0.02
+    bent = np.sin(np.pi + robot.direction[4] * crossing[:, 4] + robot.offset[4])
+    assert bent.min() < 0 < bent.max() or np.abs(bent).min() < 1e-6
+    centre = forward(robot, beside)
+    axis = centre[:, :3, 3] - robot.d[5] * centre[:, :3, 2]
+    assert np.hypot(axis[:, 0], axis[:, 1]).min() == pytest.approx(0.02, abs=1e-6)
+    assert np.isnan(out[-1]).all()
+    assert np.isfinite(out[0]).all()
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_collisions_are_told_with_what_is_met_and_where(study, folders, name):
+    path = by_name(folders[name])["line_collides"]
+    (meeting,) = path["collisions"]
+    assert 0 < meeting["t0_s"] < meeting["t1_s"] <= path["duration_s"]
+    assert 0 < meeting["s0_m"] < meeting["s1_m"]
+    assert ("wall" if name == "er3a_c60_article" else "post") in meeting["cause"]
+    clearances = read_table(folders[name] / "clearance.parquet")
+    rows = clearances[clearances["path"] == "line_collides"]
+    assert path["clearance"]["least_mm"] == rows["clearance_mm"].min() < 0
+    inside = rows["t_s"].between(meeting["t0_s"], meeting["t1_s"])
+    assert (rows["clearance_mm"][inside] < 1e-3).all()
+    assert (rows["clearance_mm"][~inside] > 0).all()
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -55,7 +100,10 @@ def test_samples_meet_the_poses_that_the_path_asks_for(study, folders, name):
     reached = samples[samples["reachable"]]
     tool = forward(robot, np.radians(reached[JOINTS].to_numpy()))[:, :3, 3] * 1000
     np.testing.assert_allclose(tool, reached[["x_mm", "y_mm", "z_mm"]], atol=1e-6)
-    assert set(samples.groupby("path").size()) == {50}
+    sizes = samples.groupby("path").size()
+    assert {path: sizes[path] for path in sizes.index} == {
+        path["name"]: path["samples"] for path in by_name(folders[name]).values()
+    }
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -74,7 +122,7 @@ def test_the_articles_line_starts_at_a_singular_pose_and_meets_a_second(folders)
     assert all(event["crossing"] for event in path["singularities"])
     assert path["singularities"][0]["t_s"] == 0
     assert path["singularities"][1]["t_s"] == pytest.approx(0.941177, abs=1e-5)
-    assert path["half_turn_axis"] == [0, 0, 1]
+    assert path["half_turns"] == [{"segment": 1, "axis": [0, 0, 1]}]
     assert path["start_turn_deg"] == [0] * 6
     assert path["out_of_limits"] == path["unreachable"] == []
     assert path["max_joint_speed_ratio"] is None
@@ -85,6 +133,25 @@ def test_speeds_are_judged_where_they_are_known(folders):
     assert paths["line_shoulder"]["max_joint_speed_ratio"] > 1
     assert paths["line_shoulder"]["too_fast"]
     assert paths["line_clean"]["max_joint_speed_ratio"] < 1
+
+
+def test_articles_moves_are_those_of_robotics_toolbox(study, folders):
+    """jtraj and ctraj at the article's 50 samples of 5 s, ctraj on our law of time."""
+    rtb, sm = pytest.importorskip("roboticstoolbox"), pytest.importorskip("spatialmath")
+    samples = read_table(folders["er3a_c60_article"] / "samples.parquet")
+    joint = samples[samples["path"] == "article_joint"]
+    t = np.linspace(0, 5, 50)
+    theirs = rtb.jtraj(np.zeros(6), np.radians([45, 30, -22.5, 60, -45, 90]), t)
+    np.testing.assert_array_equal(joint["t_s"], t)
+    for unit, values in (("deg", theirs.q), ("deg_s", theirs.qd), ("deg_s2", theirs.qdd)):
+        ours = np.radians(joint[[f"q{j + 1}_{unit}" for j in range(6)]].to_numpy())
+        np.testing.assert_allclose(ours, values, atol=1e-9)
+    line = samples[samples["path"] == "article_line"]
+    start = forward(study.robot("er3a_c60_article"), np.zeros(6))
+    end = transform([0.6, 0.3, 0.5], [0, np.pi, 0])
+    share = rtb.jtraj(np.array([0.0]), np.array([1.0]), t).q[:, 0]
+    ctraj = rtb.ctraj(sm.SE3(start), sm.SE3(end), s=share)
+    np.testing.assert_allclose(line[["x_mm", "y_mm", "z_mm"]] / 1000, ctraj.t, atol=1e-9)
 
 
 def test_equal_inputs_give_equal_bytes(study, folders, tmp_path):
@@ -99,7 +166,7 @@ def test_page_and_recording_are_written(study, folders, tmp_path):
     record(study, name, folders[name], tmp_path / "trajectory.rrd")
     html = (tmp_path / "trajectory.html").read_text()
     assert "article_line" in html
-    assert html.count("data:image/svg+xml") == 2 * len(by_name(folders[name]))
+    assert html.count("data:image/svg+xml") == 2 * len(by_name(folders[name])) + 1
     assert (tmp_path / "trajectory.rrd").stat().st_size > 100_000
 
 
@@ -139,6 +206,7 @@ def test_extreme_paths_give_results(study, tmp_path):
         LINE | {"name": "still", "end": LINE["start"]},
         LINE | {"name": "far", "start": far, "end": far},
         LINE | {"name": "outside", "start": None, "start_deg": [170, 0, 0, 0, 30, 0]},
+        LINE | {"name": "singular-start", "start": None, "start_deg": [0, 10, -20, 0, 0, 0]},
         {
             "name": "joint-still",
             "kind": "joint",
@@ -155,7 +223,34 @@ def test_extreme_paths_give_results(study, tmp_path):
     assert found["still"]["verdict"] == "safe"
     assert found["far"]["unreachable"][0]["t1_s"] == 2
     assert found["outside"]["out_of_limits"][0]["t0_s"] == 0
+    assert found["outside"]["out_of_limits"][0]["cause"].startswith("J1 goes to")
+    assert found["singular-start"]["singularities"][0] | {"until_s": 0} == {
+        "t_s": 0,
+        "until_s": 0,
+        "type": "wrist",
+        "crossing": True,
+        "distance_deg": 0,
+    }
     assert found["joint-still"]["singularities"][0]["until_s"] == 1
     json.dumps(found, allow_nan=False)
     report(changed, "er3a_c60", tmp_path, tmp_path / "page.html")
     record(changed, "er3a_c60", tmp_path, tmp_path / "recording.rrd")
+
+
+def test_paths_that_are_nowhere_reached_have_a_page_too(study, tmp_path):
+    far = {"xyz_mm": [5000, 0, 300], "rpy_deg": [180, 0, 0]}
+    changed = with_paths(study, tmp_path, LINE | {"start": far, "end": far})
+    compute(changed, "er3a_c60", tmp_path)
+    report(changed, "er3a_c60", tmp_path, tmp_path / "page.html")
+    assert "No path has a pose that can be reached" in (tmp_path / "page.html").read_text()
+
+
+def test_path_that_goes_on_from_one_that_does_not_end_is_refused(study, tmp_path):
+    far = LINE | {"end": {"xyz_mm": [5000, 0, 300], "rpy_deg": [180, 0, 0]}}
+    after = {key: value for key, value in LINE.items() if key != "start"} | {"name": "next", "after": "line"}
+    with pytest.raises(InputError, match=r"paths\[1\]\.after: the path 'line' does not reach its end"):
+        compute(with_paths(study, tmp_path, far, after), "er3a_c60", tmp_path)
+    compute(with_paths(study, tmp_path, LINE, after), "er3a_c60", tmp_path)
+    checks = read_table(tmp_path / "checks.parquet")
+    last, first = (checks[checks["path"] == name][JOINTS] for name in ("line", "next"))
+    np.testing.assert_allclose(last.iloc[-1], first.iloc[0], atol=1e-9)

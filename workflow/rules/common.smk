@@ -40,7 +40,7 @@ TABLES = {
         "void_triangles",
     ],
     "inverse": ["solutions", "rankings", "map"],
-    "trajectory": ["checks", "samples"],
+    "trajectory": ["checks", "samples", "clearance"],
 }
 
 

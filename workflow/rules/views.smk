@@ -35,9 +35,11 @@ rule report:
 rule index:
     input:
         expand("results/{robot}/{stage}/summary.json", robot=ROBOTS, stage=STAGES),
+        expand("results/{robot}/workspace/border.parquet", robot=ROBOTS),
         expand("reports/{robot}/{stage}.html", robot=ROBOTS, stage=STAGES),
     output:
         "reports/index.html",
+        "reports/compare.html",
     log:
         "logs/index.log",
     conda:

@@ -14,10 +14,10 @@ from matplotlib.lines import Line2D
 from er3a.robots.robot import Robot
 from er3a.stages.inverse.columns import JOINT_COLUMNS
 from er3a.stages.inverse.shape_colours import colour_of, shape_of
-from er3a.viewing.arm import skeleton
 from er3a.viewing.figures import equal_scale, new_figure
 from er3a.viewing.page import Picture
 from er3a.viewing.palette import GRID, HIGHLIGHT, INK, JOINT_NAMES, MODEL, MUTED
+from er3a.viewing.skeleton import skeleton
 
 TITLE = {"loc": "left", "fontsize": 11, "fontweight": "bold"}
 

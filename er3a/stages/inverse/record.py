@@ -9,16 +9,16 @@ import numpy as np
 import pandas as pd
 import rerun as rr
 import rerun.blueprint as rrb
-from scipy.spatial.transform import Rotation
 
 from er3a.results import read_summary, read_table
 from er3a.robots.robot import Robot
 from er3a.stages.inverse.columns import JOINT_COLUMNS
 from er3a.stages.inverse.shape_colours import colour_of, shape_of
 from er3a.study import Study
-from er3a.viewing.arm import arm_view, log_arm, send_motion, size_of, skeleton
+from er3a.viewing.arm import arm_view, capsules, log_arm, send_motion, size_of
 from er3a.viewing.palette import HIGHLIGHT, MUTED, rgb
 from er3a.viewing.recording import TIMELINE, recording
+from er3a.viewing.skeleton import skeleton
 
 NOTE = """# Ways to reach each target
 
@@ -81,22 +81,8 @@ def _log_target(stream: rr.RecordingStream, robot: Robot, target: dict[str, Any]
         if not branch["within_limits"]:
             stream.log(entity, rr.LineStrips3D([points], radii=0.003 * size, colors=rgb(MUTED)))
         elif branch["rank"] != 1:
-            stream.log(entity, _ghost(points, 0.014 * size, colour_of(shape_of(branch["branch"], branch["label"]))))
-
-
-def _ghost(points: np.ndarray, radius: float, colour: str) -> rr.Capsules3D:
-    vectors = np.diff(points, axis=0)
-    lengths = np.linalg.norm(vectors, axis=1)
-    up = np.array([[0.0, 0.0, 1.0]])
-    turns = [Rotation.align_vectors([vector], up)[0].as_quat() for vector in vectors / lengths[:, None]]
-    return rr.Capsules3D(
-        lengths=lengths,
-        radii=np.full(len(lengths), radius),
-        translations=points[:-1],
-        quaternions=turns,
-        colors=[(*rgb(colour), 150)] * len(lengths),
-        fill_mode="transparentfillmajorwireframe",
-    )
+            colour = (*rgb(colour_of(shape_of(branch["branch"], branch["label"]))), 150)
+            stream.log(entity, capsules(points[:-1], np.diff(points, axis=0), 0.014 * size, colour, solid=False))
 
 
 def _about(target: dict[str, Any], branches: pd.DataFrame) -> str:

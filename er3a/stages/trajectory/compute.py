@@ -1,7 +1,7 @@
-"""Plan and check every path of a robot: where it is singular, leaves the limits, or can't be reached.
+"""Plan and check every path of a robot: where it is singular, leaves the limits, collides, or can't be reached.
 
 Writes ``samples.parquet`` (the paths' own points), ``checks.parquet`` (the same columns, with the points checked
-between them and the closest passes) and ``summary.json``.
+between them and the closest passes), ``clearance.parquet`` and ``summary.json``.
 """
 
 from __future__ import annotations
@@ -12,11 +12,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from er3a.collision.bodies import Bodies, can_measure
+from er3a.collision.scene import load_scene
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
 from er3a.kinematics.turns import within
 from er3a.planning.path_file import load_paths
 from er3a.results import Figure, Verdict, write_summary, write_table
 from er3a.robots.robot import Robot
+from er3a.stages.trajectory.collisions import clearance_table, measured, with_collisions
 from er3a.stages.trajectory.judge import WORDS, Judgement, judge, path_record
 from er3a.stages.trajectory.motion import Motion, motion_of
 from er3a.study import Study
@@ -32,25 +35,36 @@ def compute(study: Study, name: str, folder: Path) -> None:
         "shoulder": settings.near_shoulder_mm / 1000,
     }
     length = characteristic_length(robot)
-    tables, records = [], []
+    scene_file = study.path_scene(name)
+    scene = load_scene(scene_file) if scene_file else None
+    bodies = Bodies(robot, scene) if can_measure() else None
+    tables, clearances, records = [], [], []
+    ends: dict[str, np.ndarray] = {}
     for i, entry in enumerate(load_paths(file).paths):
-        motion = motion_of(robot, entry, settings.checks_per_sample, f"paths[{i}]", file)
+        motion = motion_of(robot, entry, settings.checks_per_sample, f"paths[{i}]", file, ends)
+        ends[entry.name] = motion.q[-1]
         found = judge(robot, motion, near)
         tables.append(_table(robot, motion, found, near, length))
-        records.append(path_record(robot, motion, found))
+        along = measured(bodies, motion, settings.overlap_mm) if bodies else None
+        clearances.append(clearance_table(entry.name, along))
+        records.append(with_collisions(path_record(robot, motion, found), motion, along))
     checks = pd.concat(tables, ignore_index=True)
     write_table(folder / "checks.parquet", checks)
     write_table(folder / "samples.parquet", checks[checks["sample"]].drop(columns="sample"))
+    write_table(folder / "clearance.parquet", pd.concat(clearances, ignore_index=True))
     write_summary(
         folder,
         study,
         name,
         "trajectory",
         _verdict(records),
-        _figures(records, length),
+        _figures(records, length, bodies is not None),
         characteristic_length_m=length,
         near={"wrist_deg": settings.near_wrist_deg, "elbow_deg": settings.near_elbow_deg}
         | {"shoulder_mm": settings.near_shoulder_mm},
+        scene=scene.title if scene else None,
+        clearance_measured=bodies is not None,
+        overlap_mm=settings.overlap_mm,
         paths=records,
     )
 
@@ -99,7 +113,7 @@ def _verdict(records: list[dict[str, Any]]) -> Verdict:
     return Verdict("pass", "trajectory.safe", text, params)
 
 
-def _figures(records: list[dict[str, Any]], length: float) -> list[Figure]:
+def _figures(records: list[dict[str, Any]], length: float, clear: bool) -> list[Figure]:
     events = [event for record in records for event in record["singularities"]]
     bounded = [record for record in records if record["max_joint_speed_deg_s"]]
     ratios = [record["max_joint_speed_ratio"] for record in bounded if record["max_joint_speed_ratio"] is not None]
@@ -110,8 +124,13 @@ def _figures(records: list[dict[str, Any]], length: float) -> list[Figure]:
         Figure("Paths safe as they are", sum(record["verdict"] == "safe" for record in records), ""),
         Figure("Singular poses met", sum(event["crossing"] for event in events), ""),
         Figure("Near passes", sum(not event["crossing"] for event in events), ""),
+        Figure("Paths that collide", _colliding(records) if clear else None, ""),
         Figure("Greatest joint speed needed, where bounded", fastest, "deg/s"),
         Figure("Share of the joint's greatest speed", max(ratios, default=None), ""),
         Figure("Velocity by Jacobian against differences, within", agreement, "µdeg/s"),
         Figure("Characteristic length of the Jacobian", length * 1000, "mm"),
     ]
+
+
+def _colliding(records: list[dict[str, Any]]) -> int:
+    return sum(bool(record["collisions"]) for record in records)

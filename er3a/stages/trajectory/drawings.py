@@ -14,10 +14,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from er3a.robots.robot import Robot
-from er3a.viewing.arm import skeleton
 from er3a.viewing.figures import equal_scale, new_figure
 from er3a.viewing.palette import HIGHLIGHT, INK, JOINT_NAMES, LINK, MODEL, MUTED, VERDICTS
 from er3a.viewing.palette import JOINTS as COLOURS
+from er3a.viewing.skeleton import skeleton
 
 WIDTHS = (3.2, 2.8, 2.4, 2.0, 1.6, 1.2)  # so that curves that coincide all show
 NEAR_LIMIT_DEG = 20.0

@@ -14,7 +14,7 @@ from er3a.planning.singular_events import SingularEvent, singular_events
 from er3a.robots.robot import Robot
 from er3a.stages.trajectory.motion import Motion
 
-WORDS = ("unreachable", "leaves limits", "too fast", "singular", "near-singular", "safe")
+WORDS = ("unreachable", "leaves limits", "collides", "too fast", "singular", "near-singular", "safe")
 SPEED_STEP = 1e-5  # share of the duration
 
 
@@ -90,16 +90,18 @@ def path_record(robot: Robot, motion: Motion, found: Judgement) -> dict[str, Any
         "kind": entry.kind,
         "verdict": found.word,
         "text": found.text,
-        "duration_s": float(entry.duration_s),
+        "duration_s": float(motion.built.duration),
         "samples": entry.samples,
         "length_m": float(motion.way(motion.samples[-1:])[0]),
         "branches": [labels[slot] for slot in slots],
-        "half_turn_axis": _half_turn_axis(motion),
+        "half_turns": _half_turns(motion),
+        **_corners(motion),
+        "repeated_rows": list(motion.built.repeated_rows),
         "start_turn_deg": None if followed is None else _degrees(followed.start_turn),
         "singularities": [_event_record(event) for event in found.events],
-        "out_of_limits": _interval_records(motion, found.limits),
-        "unreachable": _interval_records(motion, found.beyond),
-        "too_fast": _interval_records(motion, found.fast),
+        "out_of_limits": interval_records(motion, found.limits),
+        "unreachable": interval_records(motion, found.beyond),
+        "too_fast": interval_records(motion, found.fast),
         "jumps": [
             {"t_s": jump.t, "joint": jump.joint, "angle_deg": float(np.degrees(jump.angle))}
             for jump in (followed.jumps if followed else ())
@@ -142,9 +144,9 @@ def _text(
     bounded: bool,
 ) -> str:
     if word == "unreachable":
-        return "; ".join(_stretch(part) for part in beyond)
+        return "; ".join(stretch_text(part) for part in beyond)
     if word in ("leaves limits", "too fast"):
-        faults = [f"{_stretch(part)}: {part.cause}" for part in (limits or fast)]
+        faults = [f"{stretch_text(part)}: {part.cause}" for part in (limits or fast)]
         return "; ".join(filter(None, [*faults, _places(events)]))
     if motion.followed is None:
         places = _places([event for event in events if event.crossing])
@@ -176,12 +178,13 @@ def distance_text(event: SingularEvent) -> str:
     return f"{np.degrees(event.distance):.3g} deg"
 
 
-def _stretch(part: Interval) -> str:
+def stretch_text(part: Interval) -> str:
+    """When a stretch starts and ends."""
     return f"from t = {part.start:.4g} to {part.end:.4g} s"
 
 
 def _velocity_check(motion: Motion) -> float:
-    step = SPEED_STEP * motion.entry.duration_s
+    step = SPEED_STEP * motion.built.duration
     inner = motion.samples[1:-1]
     if not inner.size:
         return 0.0
@@ -190,11 +193,22 @@ def _velocity_check(motion: Motion) -> float:
     return float(np.nanmax(difference)) if np.isfinite(difference).any() else 0.0
 
 
-def _half_turn_axis(motion: Motion) -> list[float] | None:
-    if motion.followed is None or not motion.followed.line.half_turn:
-        return None
-    rotation = motion.followed.line.rotation
-    return [float(value) for value in np.round(rotation / np.linalg.norm(rotation), 12) + 0.0]
+def _half_turns(motion: Motion) -> list[dict[str, Any]]:
+    """Rotations by exactly 180 deg, which have two ways round, and the axis of the one taken."""
+    if motion.built.tool is None:
+        return []
+    turns = motion.built.tool.half_turns()
+    return [{"segment": k, "axis": [float(x) for x in np.round(axis, 12) + 0.0]} for k, axis in turns]
+
+
+def _corners(motion: Motion) -> dict[str, float | None]:
+    """By how much the motion passes the corner that it rounds the most; None for paths without corners."""
+    joints = np.degrees(getattr(motion.built.joints, "deviation", []))
+    tool = 1000 * np.asarray(getattr(motion.built.tool, "deviation", []))
+    return {
+        "corner_deviation_mm": float(tool.max()) if tool.size else None,
+        "corner_deviation_deg": float(joints.max()) if joints.size else None,
+    }
 
 
 def _event_record(event: SingularEvent) -> dict[str, Any]:
@@ -209,7 +223,8 @@ def _event_record(event: SingularEvent) -> dict[str, Any]:
     }
 
 
-def _interval_records(motion: Motion, intervals: list[Interval]) -> list[dict[str, Any]]:
+def interval_records(motion: Motion, intervals: list[Interval]) -> list[dict[str, Any]]:
+    """Intervals in time and on the tool point's way."""
     records = []
     for interval in intervals:
         s0, s1 = (float(value) for value in motion.way(np.array([interval.start, interval.end])))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,13 +11,11 @@ from scipy.integrate import cumulative_simpson
 from scipy.interpolate import CubicHermiteSpline
 
 from er3a.errors import InputError, PoseError
-from er3a.kinematics.branch import branch_labels
 from er3a.kinematics.forward import forward, jacobian
-from er3a.kinematics.transforms import transform
+from er3a.planning.build import Built, build
 from er3a.planning.follow import follow
 from er3a.planning.followed import Followed
-from er3a.planning.moves import JointMove, Line, line
-from er3a.planning.path_file import JointPath, LinePath, PathEntry, PoseEntry
+from er3a.planning.path_file import PathEntry
 from er3a.robots.robot import Robot
 
 Times = np.ndarray
@@ -29,16 +27,18 @@ class Motion:
 
     Attributes
     ----------
+    built : what the entry was made into
     samples, checks : times in s of the path's own points, and with the points checked between them
     t, q : (N,) s and (N, 6) rad, the checks and whatever the branches of a line needed besides; q NaN where unreachable
     joints : angles (..., 6) at times (...,)
     rates : angles, velocities and accelerations, each (n, 6), at times (n,)
     tool : T_base_tool (n, 4, 4) that the path asks for at times (n,)
     way : length of the tool point's way (n,) in m at times (n,)
-    followed : how a line is followed; None for a joint move
+    followed : how a path of the tool is followed; None for one in joint space
     """
 
     entry: PathEntry
+    built: Built
     samples: Times
     checks: Times
     t: Times
@@ -50,29 +50,33 @@ class Motion:
     followed: Followed | None
 
 
-def motion_of(robot: Robot, entry: PathEntry, checks_per_sample: int, field: str, file: Path) -> Motion:
-    """Plan a path, and follow it if it is a line.
+def motion_of(
+    robot: Robot, entry: PathEntry, checks_per_sample: int, field: str, file: Path, ends: Mapping[str, np.ndarray]
+) -> Motion:
+    """Plan a path, and follow it if it is one of the tool; ``ends`` as for :func:`er3a.planning.build.build`.
 
     Raises
     ------
     InputError
-        for a start branch that this robot or pose has not, or a half-turn axis that can't choose; ``field`` names it
+        for what :func:`er3a.planning.build.build` refuses, and a start branch that has no solution at the start
     """
-    samples = np.linspace(0.0, entry.duration_s, entry.samples)
-    checks = np.linspace(0.0, entry.duration_s, (entry.samples - 1) * (checks_per_sample + 1) + 1)
+    built = build(robot, entry, field, file, ends)
+    samples = np.linspace(0.0, built.duration, entry.samples)
+    checks = np.linspace(0.0, built.duration, (entry.samples - 1) * (checks_per_sample + 1) + 1)
     checks[:: checks_per_sample + 1] = samples
-    if isinstance(entry, JointPath):
-        return _joint_motion(robot, entry, samples, checks)
-    return _line_motion(robot, entry, samples, checks, field, file)
+    if built.joints is not None:
+        return _joint_motion(robot, entry, built, samples, checks)
+    return _tool_motion(robot, entry, built, samples, checks, field, file)
 
 
-def _joint_motion(robot: Robot, entry: JointPath, samples: Times, checks: Times) -> Motion:
-    move = JointMove(np.radians(entry.start_deg), np.radians(entry.end_deg), entry.duration_s)
+def _joint_motion(robot: Robot, entry: PathEntry, built: Built, samples: Times, checks: Times) -> Motion:
+    move = built.joints
     q, velocity, _ = move.joints(checks)
     speed = np.linalg.norm(np.einsum("nij,nj->ni", jacobian(robot, q)[:, :3], velocity), axis=1)
     way = CubicHermiteSpline(checks, cumulative_simpson(speed, x=checks, initial=0.0), speed)
     return Motion(
         entry=entry,
+        built=built,
         samples=samples,
         checks=checks,
         t=checks,
@@ -85,42 +89,25 @@ def _joint_motion(robot: Robot, entry: JointPath, samples: Times, checks: Times)
     )
 
 
-def _line_motion(robot: Robot, entry: LinePath, samples: Times, checks: Times, field: str, file: Path) -> Motion:
-    q_start, slot = None, None
-    if entry.start_deg is not None:
-        q_start = np.radians(entry.start_deg)
-        T_start = forward(robot, q_start)
-    else:
-        T_start = _pose(entry.start)
-    if entry.start_branch is not None:
-        labels = branch_labels(robot)
-        if entry.start_branch not in labels:
-            problem = f"this robot has no branch '{entry.start_branch}'"
-            raise InputError(file, f"{field}.start_branch", problem, f"Known: {'; '.join(labels)}")
-        slot = labels.index(entry.start_branch)
-    axis = None if entry.half_turn_axis is None else np.array(entry.half_turn_axis)
+def _tool_motion(
+    robot: Robot, entry: PathEntry, built: Built, samples: Times, checks: Times, field: str, file: Path
+) -> Motion:
+    path = built.tool
     try:
-        way: Line = line(T_start, _pose(entry.end), entry.duration_s, axis)
-    except PoseError as error:
-        raise InputError(file, f"{field}.half_turn_axis", str(error), "Remove it, or name the turn's axis") from None
-    try:
-        followed = follow(robot, way, checks, q_start, slot)
+        followed = follow(robot, path, checks, built.q_start, built.start_slot)
     except PoseError:
         problem = f"'{entry.start_branch}' has no solution at the start pose"
         raise InputError(file, f"{field}.start_branch", problem, "Choose another branch, or leave it out") from None
     return Motion(
         entry=entry,
+        built=built,
         samples=samples,
         checks=checks,
         t=followed.t,
         q=followed.q,
         joints=followed.joints,
         rates=followed.rates,
-        tool=lambda t: way.poses(way.progress(t)[0]),
-        way=lambda t: way.length * way.progress(t)[0],
+        tool=lambda t: path.poses(path.progress(t)[0]),
+        way=lambda t: path.way(path.progress(t)[0]),
         followed=followed,
     )
-
-
-def _pose(entry: PoseEntry) -> np.ndarray:
-    return transform(np.array(entry.xyz_mm) / 1000, np.radians(entry.rpy_deg))

@@ -15,9 +15,10 @@ from matplotlib.colors import LogNorm
 from er3a.results import read_summary, read_table
 from er3a.robots.robot import Robot
 from er3a.study import Study
-from er3a.viewing.arm import log_arm, send_motion, size_of, skeleton
+from er3a.viewing.arm import log_arm, send_motion, size_of
 from er3a.viewing.palette import HIGHLIGHT, JOINT_NAMES, JOINTS, MODEL, MUTED, REFERENCE, rgb
 from er3a.viewing.recording import recording, send_series
+from er3a.viewing.skeleton import skeleton
 
 PAUSE = 1.0  # s between two paths
 FRAMES_PER_SECOND = 50
@@ -31,6 +32,7 @@ LEVELS = {
     "singular": rr.TextLogLevel.WARN,
     "too fast": rr.TextLogLevel.ERROR,
     "leaves limits": rr.TextLogLevel.ERROR,
+    "collides": rr.TextLogLevel.ERROR,
     "unreachable": rr.TextLogLevel.ERROR,
 }
 
@@ -153,7 +155,12 @@ def _events(stream: rr.RecordingStream, path: dict[str, Any], start: float) -> N
         how = "meets" if event["crossing"] else "passes near"
         text = f"{how} the {event['type']} singularity"
         stream.log("events", rr.TextLog(text, level=rr.TextLogLevel.WARN))
-    for key, word in (("unreachable", "not reachable"), ("out_of_limits", "limit"), ("too_fast", "speed")):
+    for key, word in (
+        ("unreachable", "not reachable"),
+        ("out_of_limits", "limit"),
+        ("too_fast", "speed"),
+        ("collisions", "collision"),
+    ):
         for part in path[key]:
             stream.set_time("t", duration=start + part["t0_s"])
             stream.log("events", rr.TextLog(f"{word}: {part['cause']}", level=rr.TextLogLevel.ERROR))

@@ -10,6 +10,7 @@ import pandas as pd
 
 from er3a.results import read_summary, read_table
 from er3a.robots.robot import Robot
+from er3a.stages.trajectory.clearance_section import clearance_section
 from er3a.stages.trajectory.drawings import curves, views
 from er3a.study import Study
 from er3a.viewing.page import Picture, fixed, number, render
@@ -20,10 +21,17 @@ STATUS = {
     "singular": "caution",
     "too fast": "fail",
     "leaves limits": "fail",
+    "collides": "fail",
     "unreachable": "fail",
 }
-FAULTS = {"unreachable": "not reachable", "out_of_limits": "outside limits", "too_fast": "too fast"}
-KINDS = {"joint": "joint move", "line": "straight line"}
+KINDS = {
+    "joint": "joint move",
+    "joint_sequence": "joint moves in sequence",
+    "line": "straight line",
+    "arc": "circular arc",
+    "sequence": "lines and arcs in sequence",
+    "table": "path from a table",
+}
 
 
 def report(study: Study, name: str, folder: Path, output: Path) -> None:
@@ -37,6 +45,7 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
         summary,
         robot=robot,
         paths=[_section(robot, record, checks[checks["path"] == record["name"]]) for record in summary["paths"]],
+        clearance=clearance_section(summary, read_table(folder / "clearance.parquet")),
         near=summary["near"],
         length_mm=summary["characteristic_length_m"] * 1000,
         speeds_known=bool(np.isfinite(robot.speed).any()),
@@ -56,6 +65,7 @@ def _section(robot: Robot, record: dict[str, Any], rows: pd.DataFrame) -> dict[s
                 ("not reachable", "unreachable"),
                 ("outside limits", "out_of_limits"),
                 ("too fast", "too_fast"),
+                ("collision", "collisions"),
             )
             for part in record[key]
         ],

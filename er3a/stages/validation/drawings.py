@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from er3a.kinematics.forward import frames
 from er3a.references.quantities import nearest_on_axis, point_of
 from er3a.robots.robot import Robot
-from er3a.viewing.arm import skeleton
 from er3a.viewing.figures import equal_scale, new_figure
 from er3a.viewing.palette import GRID, HIGHLIGHT, INK, LINK, MODEL, MUTED, REFERENCE
+from er3a.viewing.skeleton import skeleton
 
 REFERENCE_COLOURS = (REFERENCE, HIGHLIGHT)
 MARKERS = (("o", 13), ("s", 18), ("D", 22))

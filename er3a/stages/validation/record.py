@@ -14,9 +14,10 @@ from er3a.robots.robot import WEIGHTY_GRADES, Robot
 from er3a.stages.validation.mended import mended_robot
 from er3a.stages.validation.model import model_of
 from er3a.study import Study
-from er3a.viewing.arm import log_arm, send_motion, size_of, skeleton
+from er3a.viewing.arm import log_arm, send_motion, size_of
 from er3a.viewing.palette import HIGHLIGHT, MODEL, REFERENCE, rgb
 from er3a.viewing.recording import TIMELINE, recording, send_series
+from er3a.viewing.skeleton import skeleton
 
 HOLD_S, MOVE_S, STEPS = 2.0, 1.0, 30
 STATION_S = HOLD_S + MOVE_S

@@ -14,10 +14,10 @@ from matplotlib.patches import Patch
 
 from er3a.robots.robot import Robot
 from er3a.stages.workspace.plots import DENSITY, log_norm, masked
-from er3a.viewing.arm import skeleton
 from er3a.viewing.figures import equal_scale, new_figure
 from er3a.viewing.page import fixed
 from er3a.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED, REFERENCE
+from er3a.viewing.skeleton import skeleton
 
 PROOF = {"filled": "#9ecae1", "filled but for a wedge": "#d6e6f2", "undecided": HIGHLIGHT, "empty": "#ffffff"}
 FILLED, WEDGE, UNDECIDED, EMPTY = range(4)

@@ -10,8 +10,8 @@ import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
 from er3a.robots.robot import Robot
-from er3a.viewing.arm import skeleton
 from er3a.viewing.palette import HIGHLIGHT, INK, REFERENCE
+from er3a.viewing.skeleton import skeleton
 
 POINTS = 12_000
 _XYZ = ["x_m", "y_m", "z_m"]

@@ -1,0 +1,226 @@
+"""Clearance along a motion, with nothing skipped between the points at which it is measured.
+
+The distance of two bodies changes by no more than they move against each other. If they are d0 apart at one time and
+d1 at another, and move by M in between, they stay (d0 + d1 - M) / 2 apart [1]_: an interval in which that is positive
+for every pair is free as a whole. Overlap counts as negative distance (the depth), for which the same holds: an
+interval in which a pair overlaps at both ends by more than M in sum overlaps as a whole. Any other one is halved.
+Halving ends where M is twice the ``depth`` asked for, so that no overlap deeper than that is missed, however small or
+thin the obstacle, and the least clearance is found to within it.
+
+M is the longer way of a capsule's two ends (its other points move no farther), in space for a solid, in the frame of
+the other link for two links. The way is measured on a grid of the motion so fine that no end moves by more than
+twice the depth from point to point, as chords through the middle plus the bulge of the parabola through the three
+points: that the motion is no more curved than this between two grid points is assumed.
+
+References
+----------
+.. [1] F. Schwarzer, M. Saha, J.-C. Latombe, "Adaptive dynamic collision checking for single and multiple articulated
+   robots in complex environments", IEEE Trans. Robotics 21, 2005.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.optimize import brentq
+
+from er3a.collision.bodies import Bodies
+from er3a.collision.envelopes import link_frames
+
+SHORTEST = 1e-9  # share of the duration; motion that is wide over less is a jump
+LOCATED = 1e-10  # share of the duration
+CHUNK = 20_000  # points whose ends are held in memory at a time
+
+Joints = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A stretch of overlap.
+
+    Attributes
+    ----------
+    start, end : s
+    pairs : what overlaps, the deepest first
+    depth, at : of the deepest overlap measured, m, and its time, s
+    """
+
+    start: float
+    end: float
+    pairs: tuple[str, ...]
+    depth: float
+    at: float
+
+
+@dataclass(frozen=True, eq=False)
+class ClearanceAlong:
+    """Clearance along a motion.
+
+    Attributes
+    ----------
+    t : (K,), s, rising; distance : (K,), m, negative by the depth of overlap, NaN where the motion is unknown
+    pair : K texts, what is nearest to what
+    contacts : stretches of overlap, in order of time
+    measured : number of arm poses at which distances were measured
+    """
+
+    t: np.ndarray
+    distance: np.ndarray
+    pair: tuple[str, ...]
+    contacts: tuple[Contact, ...]
+    measured: int
+
+    @property
+    def least(self) -> int:
+        """Index of the least clearance; -1 if none is known."""
+        return -1 if np.isnan(self.distance).all() else int(np.nanargmin(self.distance))
+
+
+class _Motion:
+    """Distances along a motion, remembered per time."""
+
+    def __init__(self, bodies: Bodies, joints: Joints):
+        self.bodies, self.joints = bodies, joints
+        self.known: dict[float, np.ndarray] = {}
+        own = np.flatnonzero(bodies.second >= 0)
+        solid = np.flatnonzero(bodies.second < 0)
+        moving, track = np.unique(bodies.first[solid], return_inverse=True)
+        self._own, self._moving = own, moving
+        self.track = np.empty(len(bodies.names), dtype=int)  # of a pair: which tracked capsule's way counts
+        self.track[own], self.track[solid] = np.arange(len(own)), len(own) + track
+
+    def tracked(self, q: np.ndarray) -> np.ndarray:
+        """End points (..., tracks, 2, 3): of links in other links' frames, then of capsules in space."""
+        bodies, ends = self.bodies, self.bodies.ends(q)
+        links = [bodies.capsules[i].link for i in bodies.first[self._own]]
+        T = link_frames(bodies.robot, q)[..., links, :, :]
+        from_link = ends[..., bodies.second[self._own], :, :] - T[..., None, :3, 3]
+        return np.concatenate([from_link @ T[..., :3, :3], ends[..., self._moving, :, :]], axis=-3)
+
+    def measure(self, t: float, q: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+        """Distances (P,) at a time, those of ``pairs`` known, the others perhaps NaN."""
+        found = self.known.setdefault(t, np.full(len(self.bodies.names), np.nan))
+        missing = pairs[np.isnan(found[pairs])]
+        if missing.size:
+            found[missing] = self.bodies.distances(self.bodies.ends(q), missing)
+        return found
+
+
+def clearance_along(bodies: Bodies, joints: Joints, t: np.ndarray, shown: np.ndarray, depth: float) -> ClearanceAlong:
+    """Measure clearance along a motion.
+
+    Parameters
+    ----------
+    joints : angles (n, 6) in rad at times (n,) in s; NaN where the motion is unknown
+    t : (N,), s, rising: where the motion is known or not; refined as needed
+    shown : times (K,) of ``t`` at which the clearance is wanted
+    depth : m; see the module's text
+    """
+    motion = _Motion(bodies, joints)
+    every = np.arange(len(bodies.names))
+    if not every.size:
+        return ClearanceAlong(shown, np.full(len(shown), np.nan), ("nothing near",) * len(shown), (), 0)
+    times, q, way = _fine(motion, t, 2 * depth)
+    reached = np.isfinite(q[:, 0])
+    for i in np.flatnonzero(np.isin(times, shown) & reached):
+        motion.measure(times[i], q[i], every)
+    contacts: list[Contact] = []
+    for first, last in _runs(reached):
+        for i in (first, last - 1):
+            motion.measure(times[i], q[i], every)
+        part = slice(first, last)
+        _refine(motion, times[part], q[part], way[part], 2 * depth)
+        contacts += _contacts(motion, times[part], q[part], (t[-1] - t[0]) * LOCATED)
+    at = np.array(sorted(time for time, found in motion.known.items() if not np.isnan(found).any()))
+    at = np.union1d(at, shown[~np.isin(shown, at)])
+    unknown = np.full(len(every), np.nan)
+    rows = np.array([motion.known.get(time, unknown) for time in at])
+    blind = np.isnan(rows).any(axis=1)
+    distance = np.where(blind, np.nan, rows.min(axis=1))
+    pair = tuple("" if b else bodies.names[int(np.argmin(row))] for b, row in zip(blind, rows))
+    return ClearanceAlong(at, distance, pair, tuple(contacts), len(motion.known))
+
+
+def _fine(motion: _Motion, t: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times so near to one another that no tracked end moves by more than ``step``, joints, and the way so far.
+
+    The way is (N, tracks), that of the end that moves more, summed up; infinite steps where it is unknown.
+    """
+    times, q = t, motion.joints(t)
+    while True:
+        middle = (times[:-1] + times[1:]) / 2
+        q_middle = motion.joints(middle)
+        cuts = range(0, len(middle), CHUNK)
+        steps = np.concatenate([_steps(motion, q[k : k + CHUNK + 1], q_middle[k : k + CHUNK]) for k in cuts])
+        wide = (steps.max(axis=1) > step) & (np.diff(times) > SHORTEST * (t[-1] - t[0]))
+        if not wide.any():
+            break
+        times = np.concatenate([times, middle[wide]])
+        order = np.argsort(times, kind="stable")
+        times, q = times[order], np.concatenate([q, q_middle[wide]])[order]
+    steps = np.nan_to_num(steps, nan=0.0)  # beside an unknown pose; stretches between them are summed up apart
+    return times, q, np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
+
+
+def _steps(motion: _Motion, q: np.ndarray, q_middle: np.ndarray) -> np.ndarray:
+    """How far the tracked ends move at most between neighbours (n + 1, 6), by way of the middles; (n, tracks)."""
+    here, half = motion.tracked(q), motion.tracked(q_middle)
+    chords = np.linalg.norm(half - here[:-1], axis=-1) + np.linalg.norm(here[1:] - half, axis=-1)
+    bulge = np.linalg.norm(here[:-1] - 2 * half + here[1:], axis=-1)
+    return (chords + bulge).max(axis=-1)
+
+
+def _refine(motion: _Motion, times: np.ndarray, q: np.ndarray, way: np.ndarray, step: float) -> None:
+    """Measure between known points until every interval is free as a whole, or overlaps so, or is short."""
+    every = np.arange(len(motion.bodies.names))
+    known = [i for i, time in enumerate(times) if time in motion.known]
+    best = min(float(motion.known[times[i]].min()) for i in known)
+    waiting = [(a, b, every) for a, b in pairwise(known)]
+    while waiting:
+        a, b, pairs = waiting.pop()
+        before, after = motion.known[times[a]], motion.known[times[b]]
+        moved = (way[b] - way[a])[motion.track[pairs]]
+        apart = before[pairs] + after[pairs]
+        if b - a < 2 or (apart <= -moved).any():
+            continue
+        open_ = apart - moved < 2 * max(best, 0.0)
+        pairs, moved = pairs[open_], moved[open_]
+        if not pairs.size or moved.max() <= step:
+            continue
+        middle = int(np.clip(np.searchsorted(way[a : b + 1].sum(axis=1), way[[a, b]].sum() / 2) + a, a + 1, b - 1))
+        found = motion.measure(times[middle], q[middle], pairs)
+        if np.nanmin(found) < best:
+            best = float(np.nanmin(found))
+            motion.measure(times[middle], q[middle], every)
+        waiting += [(a, middle, pairs), (middle, b, pairs)]
+
+
+def _contacts(motion: _Motion, times: np.ndarray, q: np.ndarray, near: float) -> list[Contact]:
+    """Stretches of overlap between known points, their ends located where the least distance is 0."""
+    every = np.arange(len(motion.bodies.names))
+    known = [i for i, time in enumerate(times) if time in motion.known]
+    overlap = np.array([bool(np.nanmin(motion.known[times[i]]) <= 0) for i in known])
+
+    def least(at: float) -> float:
+        return float(motion.bodies.distances(motion.bodies.ends(motion.joints(np.array([at]))[0]), every).min())
+
+    found = []
+    for a, b in _runs(overlap):
+        start = brentq(least, times[known[a - 1]], times[known[a]], xtol=near) if a > 0 else times[known[a]]
+        end = brentq(least, times[known[b - 1]], times[known[b]], xtol=near) if b < len(known) else times[known[b - 1]]
+        rows = np.array([motion.measure(times[i], q[i], every) for i in known[a:b]])
+        deepest = rows.min(axis=0)
+        order = np.argsort(deepest, kind="stable")
+        names = dict.fromkeys(motion.bodies.names[k] for k in order if deepest[k] <= 0)
+        at = times[known[a + int(np.argmin(rows.min(axis=1)))]]
+        found.append(Contact(float(start), float(end), tuple(names), -float(deepest.min()), float(at)))
+    return found
+
+
+def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
+    """Index ranges (first, behind the last) of the stretches of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -1,0 +1,139 @@
+"""An arm's capsules and a scene's solids as shapes of the Coal library [1]_, and the pairs of them that can meet.
+
+Left out are pairs that can't tell anything: links with at most one link between them, pairs joined over a way shorter
+than their two radii (the wrist), and the base with the surroundings that it stands on.
+
+References
+----------
+.. [1] J. Pan et al., Coal (formerly hpp-fcl), an extension of the Flexible Collision Library: GJK and EPA distances.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from er3a.collision.envelopes import BASE, capsule_poses, envelopes_of
+from er3a.collision.scene import SceneFile
+from er3a.errors import Er3aError
+from er3a.kinematics.transforms import transform
+from er3a.robots.robot import Envelope, Robot
+
+try:
+    import coal
+except ImportError:  # no wheels for this platform
+    coal = None
+
+
+def can_measure() -> bool:
+    """Whether the Coal library is there."""
+    return coal is not None
+
+
+class Bodies:
+    """Pairs that can meet, numbered: first those of links with one another, then those of links with solids.
+
+    Attributes
+    ----------
+    capsules : of the arm
+    first : (P,) int, number of the pair's capsule; of two links the one nearer to the base
+    second : (P,) int, number of the other link's capsule, -1 for a solid
+    names : P texts, what meets what
+
+    Raises
+    ------
+    Er3aError
+        if the Coal library is missing
+    """
+
+    def __init__(self, robot: Robot, scene: SceneFile | None):
+        if coal is None:
+            problem = "clearance needs the Coal library, which has no wheels for this platform; leave the scene out"
+            raise Er3aError(problem)
+        self.robot = robot
+        self.capsules = envelopes_of(robot)
+        self._shapes = [
+            coal.Capsule(c.radius, float(np.linalg.norm(np.subtract(c.end, c.start)))) for c in self.capsules
+        ]
+        self._solids = _solids(scene) if scene else []
+        links = [_link_name(capsule) for capsule in self.capsules]
+        own = self_pairs(robot)
+        moving = [i for i, capsule in enumerate(self.capsules) if capsule.link != BASE]
+        self.first = np.array([i for i, _ in own] + [i for _ in self._solids for i in moving], dtype=int)
+        self.second = np.array([j for _, j in own] + [-1 for _ in self._solids for _ in moving], dtype=int)
+        self.names = tuple(
+            [f"{links[i]} and {links[j]}" for i, j in own]
+            + [f"{links[i]} and {name}" for name, _, _ in self._solids for i in moving]
+        )
+        self._solid_of = [-1] * len(own) + [k for k in range(len(self._solids)) for _ in moving]
+
+    def ends(self, q: np.ndarray) -> np.ndarray:
+        """End points (..., capsules, 2, 3) in m of the capsules' lines at joint angles (..., 6) in rad."""
+        return capsule_poses(self.robot, self.capsules, q)
+
+    def distances(self, ends: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+        """Distances (len(pairs),) in m of some pairs, negative by the depth of overlap, for end points (n, 2, 3)."""
+        placed = _placed(ends)
+        found = np.empty(len(pairs))
+        for row, pair in enumerate(pairs):
+            i, j, solid = self.first[pair], self.second[pair], self._solid_of[pair]
+            other, where = (self._shapes[j], placed[j]) if solid < 0 else self._solids[solid][1:]
+            found[row] = coal.distance(
+                self._shapes[i], placed[i], other, where, coal.DistanceRequest(), coal.DistanceResult()
+            )
+        return found
+
+
+@lru_cache(maxsize=64)
+def self_pairs(robot: Robot) -> tuple[tuple[int, int], ...]:
+    """Pairs of capsules (by number) that can come apart, so that their distance means something."""
+    capsules = envelopes_of(robot)
+    lengths = {link: 0.0 for link in range(7)}
+    for capsule in capsules:
+        lengths[capsule.link] += float(np.linalg.norm(np.subtract(capsule.end, capsule.start)))
+    pairs = []
+    for i, first in enumerate(capsules):
+        for j, second in enumerate(capsules[:i]):
+            low, high = sorted((first.link, second.link))
+            between = sum(lengths[link] for link in range(low + 1, high))
+            if high - low > 2 and between > first.radius + second.radius:
+                pairs.append((j, i))
+    return tuple(pairs)
+
+
+def _solids(scene: SceneFile) -> list[tuple[str, object, object]]:
+    """Name, shape and place of each of the scene's solids."""
+    found = []
+    for box in scene.boxes:
+        found.append((box.name, coal.Box(*(np.array(box.size_mm) / 1000)), _place(box.xyz_mm, box.rpy_deg)))
+    for cylinder in scene.cylinders:
+        shape = coal.Cylinder(cylinder.radius_mm / 1000, cylinder.length_mm / 1000)
+        found.append((cylinder.name, shape, _place(cylinder.xyz_mm, cylinder.rpy_deg)))
+    for sphere in scene.spheres:
+        found.append((sphere.name, coal.Sphere(sphere.radius_mm / 1000), _place(sphere.xyz_mm, [0.0] * 3)))
+    for plane in scene.planes:
+        offset = plane.offset_mm / 1000 / np.linalg.norm(plane.normal)
+        found.append((plane.name, coal.Halfspace(plane.unit_normal(), offset), coal.Transform3s.Identity()))
+    return found
+
+
+def _place(xyz_mm: list[float], rpy_deg: list[float]):
+    T = transform(np.array(xyz_mm) / 1000, np.radians(rpy_deg))
+    return coal.Transform3s(T[:3, :3], T[:3, 3])
+
+
+def _placed(ends: np.ndarray) -> list:
+    """Where capsules (n, 2, 3) (along their own z, about their middle) lie."""
+    along = ends[:, 1] - ends[:, 0]
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    z = np.where(length > 0, along / np.where(length > 0, length, 1.0), [0.0, 0.0, 1.0])
+    least = np.eye(3)[np.argmin(np.abs(z), axis=1)]
+    x = np.cross(least, z)
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    R = np.stack([x, np.cross(z, x), z], axis=-1)
+    return [coal.Transform3s(rotation, middle) for rotation, middle in zip(R, ends.mean(axis=1))]
+
+
+def _link_name(capsule: Envelope) -> str:
+    return "base" if capsule.link == BASE else f"link {capsule.link}"

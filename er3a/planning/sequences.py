@@ -1,0 +1,292 @@
+"""Lines and arcs one after another, their corners rounded or stopped at.
+
+The whole runs on one parameter: the way of each segment, where a turn counts as TURN_LENGTH per radian if that is
+more. Position and orientation are both rounded at a corner (:mod:`er3a.planning.curves`); the orientation as rotation
+vector about the corner's own, in which each side is straight. A corner that is not rounded is a halt, unless the
+sides run on into each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Many
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from er3a.errors import PathError
+from er3a.planning.arcs import Arc
+from er3a.planning.curves import GAUSS_POINTS, GAUSS_WEIGHTS, POWERS, Curve, joining, straight
+from er3a.planning.moves import Line
+from er3a.planning.profiles import FromRestToRest, Rates, TimeLaw, Timetable
+from er3a.planning.rotation_curves import spin
+
+TURN_LENGTH = 0.1  # m per rad
+NO_WAY = 1e-12  # m; shorter segments are left out
+RUNS_ON = 1e-9  # relative difference of twists below which a corner is none
+PASSES = 33  # points at which the distance from a corner is taken
+
+Segment = Line | Arc
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentPath:
+    """A sequence as a :class:`er3a.planning.moves.ToolPath`.
+
+    Attributes
+    ----------
+    duration : s
+    law : when the tool is where
+    curve : position and rotation vector (k = 6) over the share of the way
+    origins : (n, 3, 3), the orientation that each piece's rotation vectors start from
+    arcs : per piece the arc that it is a part of, else None
+    arc_shares : (n, 2), where on its arc a piece starts and ends
+    corners : (c,), shares of the way of the corners
+    deviation : (c,), m, by how much the rounded path passes each corner
+    turns : half turns, as of :class:`er3a.planning.moves.ToolPath`
+    """
+
+    duration: float
+    law: TimeLaw
+    curve: Curve
+    origins: np.ndarray
+    arcs: tuple[Arc | None, ...]
+    arc_shares: np.ndarray
+    corners: np.ndarray
+    deviation: np.ndarray
+    turned: float
+    turns: tuple[tuple[int, np.ndarray], ...]
+
+    @property
+    def length(self) -> float:
+        """Length of the tool point's way, m."""
+        return float(self.way(np.array(1.0)))
+
+    def progress(self, t: np.ndarray) -> Rates:
+        """See :class:`er3a.planning.moves.ToolPath`."""
+        return self.law(t)
+
+    def poses(self, progress: np.ndarray) -> np.ndarray:
+        """See :class:`er3a.planning.moves.ToolPath`."""
+        progress = np.asarray(progress, float)
+        values = self._values(progress)[0]
+        i = self.curve.piece(progress)[0]
+        turns = Rotation.from_rotvec(values[..., 3:].reshape(-1, 3)).as_matrix().reshape(*progress.shape, 3, 3)
+        T = np.zeros((*progress.shape, 4, 4))
+        T[..., :3, :3] = turns @ self.origins[i]
+        T[..., :3, 3] = values[..., :3]
+        T[..., 3, 3] = 1.0
+        return T
+
+    def twists(self, progress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """See :class:`er3a.planning.moves.ToolPath`."""
+        x, dx, ddx = self._values(np.asarray(progress, float))
+        omega, slope = spin(x[..., 3:], dx[..., 3:], ddx[..., 3:])
+        return np.concatenate([dx[..., :3], omega], axis=-1), np.concatenate([ddx[..., :3], slope], axis=-1)
+
+    def way(self, progress: np.ndarray) -> np.ndarray:
+        """See :class:`er3a.planning.moves.ToolPath`; by Gauss quadrature with 12 points per piece."""
+        progress = np.asarray(progress, float)
+        edges = self.curve.edges
+        whole = np.concatenate([[0.0], np.cumsum(self._lengths(edges[:-1], edges[1:]))])
+        i = self.curve.piece(progress)[0]
+        return whole[i] + self._lengths(edges[i], progress)
+
+    def half_turns(self) -> tuple[tuple[int, np.ndarray], ...]:
+        """See :class:`er3a.planning.moves.ToolPath`."""
+        return self.turns
+
+    def _lengths(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """Length of the tool point's way (...,) between shares (...,) of the way, both on one piece."""
+        half = (end - start) / 2
+        at = start[..., None] + half[..., None] * (1 + GAUSS_POINTS)
+        return (np.linalg.norm(self._values(at)[1][..., :3], axis=-1) * GAUSS_WEIGHTS).sum(axis=-1) * half
+
+    def _values(self, progress: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Position and rotation vector (..., 6) with derivatives by progress."""
+        x, dx, ddx = self.curve(progress)
+        i, u = self.curve.piece(progress)
+        for k, arc in ((k, arc) for k, arc in enumerate(self.arcs) if arc is not None):
+            here = i == k
+            start, end = self.arc_shares[k]
+            rate = (end - start) / (self.curve.edges[k + 1] - self.curve.edges[k])
+            share = start + (end - start) * u[here]
+            first, second = arc.twists(share)
+            x[here, :3] = arc.points(share)
+            dx[here, :3], ddx[here, :3] = rate * first[..., :3], rate**2 * second[..., :3]
+        return x, dx, ddx
+
+
+@dataclass(frozen=True, eq=False)
+class JointSequence:
+    """Straight sides in joint space, their corners rounded or stopped at; all joints together.
+
+    Attributes
+    ----------
+    duration : s
+    law : when the arm is where
+    curve : joint angles (k = 6), rad, over the share of the way
+    corners : (c,), shares of the way of the corners
+    deviation : (c,), rad, by how much the rounded path passes each corner, in the joint that does it most
+    """
+
+    duration: float
+    law: TimeLaw
+    curve: Curve
+    corners: np.ndarray
+    deviation: np.ndarray
+
+    def joints(self, t: np.ndarray) -> Rates:
+        """Angles (rad), velocities (rad/s) and accelerations (rad/s^2) at times (...,) in s; each (..., 6)."""
+        progress, speed, acceleration = self.law(t)
+        q, dq, ddq = self.curve(progress)
+        speed, acceleration = speed[..., None], acceleration[..., None]
+        return q, dq * speed, ddq * speed**2 + dq * acceleration
+
+
+@dataclass(frozen=True, eq=False)
+class Times:
+    """When a sequence is at its corners; start and end count as corners.
+
+    Attributes
+    ----------
+    times : (m,), s, rising from 0
+    corner : (m,) int, not falling, from 0 to the last; one that stands twice is a halt there
+    """
+
+    times: np.ndarray
+    corner: np.ndarray
+
+
+def segment_path(
+    segments: Many[Segment], blends: np.ndarray, timing: float | Times, ramp: float | None = None
+) -> SegmentPath:
+    """Put segments together.
+
+    Parameters
+    ----------
+    segments : each starting where the one before ends, none without way; their durations are of no account
+    blends : (n - 1,), m, over which length on either side each corner is rounded; 0 for a corner to stop at
+    timing : s, shared between halts by the way; or the times of the corners
+    ramp : share of the time of each ramp of a trapezoid between halts; None for the quintic
+
+    Raises
+    ------
+    PathError
+        for a segment without way, or a rounding longer than half of a side
+    """
+    sizes = np.array([max(part.length, part.turned * TURN_LENGTH) for part in segments])
+    _check(sizes, blends, 1000.0, "mm")
+    firsts, lasts = ([part.twists(np.array(share)) for part in segments] for share in (0.0, 1.0))
+    runs_on = [
+        np.linalg.norm(last[0] / a - first[0] / b) < RUNS_ON * np.linalg.norm(last[0] / a)
+        for last, first, a, b in zip(lasts, firsts[1:], sizes, sizes[1:])
+    ]
+    starts, ends = np.append(0.0, blends) / sizes, 1 - np.append(blends, 0.0) / sizes
+    spans, coefficients, origins, arcs, shares = [], [], [], [], []
+
+    def add(span, piece, origin, arc=None, share=(0.0, 1.0)):
+        spans.append(span), coefficients.append(piece), origins.append(origin), arcs.append(arc), shares.append(share)
+
+    for k, part in enumerate(segments):
+        origin, u = part.T_start[:3, :3], np.array([starts[k], ends[k]])
+        if u[1] - u[0] > RUNS_ON:
+            points = np.hstack([part.points(u), u[:, None] * part.rotation])
+            add((u[1] - u[0]) * sizes[k], straight(*points), origin, part if isinstance(part, Arc) else None, u)
+        if k + 1 < len(segments) and blends[k] > 0:
+            onward = segments[k + 1]
+            before = _beside(part, ends[k], sizes[k], -1 + ends[k])
+            after = _beside(onward, starts[k + 1], sizes[k + 1], starts[k + 1])
+            add(2 * blends[k], joining(before, after, 2 * blends[k]), onward.T_start[:3, :3])
+    corners, law, duration = _timed(sizes, np.asarray(blends) == 0, np.array(runs_on, bool), timing, ramp)
+    path = SegmentPath(
+        duration=duration,
+        law=law,
+        curve=_curve(spans, coefficients),
+        origins=np.array(origins),
+        arcs=tuple(arcs),
+        arc_shares=np.array(shares),
+        corners=corners[1:-1],
+        deviation=np.zeros(len(segments) - 1),
+        turned=float(sum(part.turned for part in segments)),
+        turns=tuple((k + 1, axis) for k, part in enumerate(segments) for _, axis in part.half_turns()),
+    )
+    points = [part.T_start[:3, 3] for part in segments[1:]]
+    near = _passes(corners, np.asarray(blends) / sizes.sum())
+    away = path._values(near)[0][..., :3] - np.reshape(points, (-1, 1, 3))
+    return replace(path, deviation=np.linalg.norm(away, axis=-1).min(axis=-1))
+
+
+def joint_sequence(
+    points: np.ndarray, blends: np.ndarray, timing: float | Times, ramp: float | None = None
+) -> JointSequence:
+    """The way through joint angles ``points`` (n, 6) in rad; ``blends`` in rad of the joint that turns most.
+
+    The rest is as for :func:`segment_path`.
+    """
+    steps = np.diff(points, axis=0)
+    sizes = np.abs(steps).max(axis=1)
+    _check(sizes, blends, np.degrees(1.0), "deg")
+    rates = steps / sizes[:, None]
+    runs_on = np.abs(np.diff(rates, axis=0)).max(axis=1) < RUNS_ON
+    spans, coefficients = [], []
+    still = np.zeros(points.shape[1])
+    cut = np.concatenate([[0.0], blends, [0.0]])
+    for k in range(len(steps)):
+        a, b = points[k] + cut[k] * rates[k], points[k + 1] - cut[k + 1] * rates[k]
+        rest = sizes[k] - cut[k] - cut[k + 1]
+        if rest > RUNS_ON * sizes[k]:
+            spans.append(rest), coefficients.append(straight(a, b))
+        if cut[k + 1] > 0:
+            onward = points[k + 1] + cut[k + 1] * rates[k + 1]
+            span = 2 * cut[k + 1]
+            spans.append(span)
+            coefficients.append(joining((b, rates[k], still), (onward, rates[k + 1], still), span))
+    corners, law, duration = _timed(sizes, np.asarray(blends) == 0, runs_on, timing, ramp)
+    curve = _curve(spans, coefficients)
+    way = curve(_passes(corners, np.asarray(blends) / sizes.sum()))[0]
+    passed = np.abs(way - points[1:-1, None]).max(axis=-1).min(axis=-1)
+    return JointSequence(duration, law, curve, corners[1:-1], passed)
+
+
+def _check(sizes: np.ndarray, blends: np.ndarray, unit: float, name: str) -> None:
+    for k, size in enumerate(sizes):
+        if not size > NO_WAY:
+            raise PathError(k + 1, "has no way: it ends where it starts")
+    for k, blend in enumerate(blends):
+        most = min(sizes[k], sizes[k + 1]) / 2
+        if blend > most * (1 + RUNS_ON):
+            problem = f"its corner can't be rounded over {blend * unit:g} {name}: half of the shorter side is "
+            raise PathError(k + 1, problem + f"{most * unit:.4g} {name}")
+
+
+def _beside(part: Segment, share: float, size: float, turn: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Position and rotation vector (6,) of a segment beside a corner, with derivatives by its way."""
+    first, second = part.twists(np.array(share))
+    value = np.concatenate([part.points(np.array(share)), turn * part.rotation])
+    return value, first / size, second / size**2
+
+
+def _curve(spans: list[float], coefficients: list[np.ndarray]) -> Curve:
+    edges = np.concatenate([[0.0], np.cumsum(spans)])
+    edges /= edges[-1]
+    edges[-1] = 1.0
+    return Curve(edges, np.array(coefficients).reshape(len(spans), POWERS, -1))
+
+
+def _timed(
+    sizes: np.ndarray, sharp: np.ndarray, runs_on: np.ndarray, timing: float | Times, ramp: float | None
+) -> tuple[np.ndarray, TimeLaw, float]:
+    """Shares of the way of all corners with start and end, the law of time, and the duration."""
+    corners = np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum()
+    corners[-1] = 1.0
+    halt = np.concatenate([[True], sharp & ~runs_on, [True]])
+    if isinstance(timing, Times):
+        law: TimeLaw = Timetable(timing.times, corners[timing.corner], halt[timing.corner])
+        return corners, law, float(timing.times[-1])
+    return corners, FromRestToRest(timing * corners[halt], corners[halt], ramp), float(timing)
+
+
+def _passes(corners: np.ndarray, blends: np.ndarray) -> np.ndarray:
+    """Shares of the way (c, PASSES) about each corner."""
+    return corners[1:-1, None] + blends[:, None] * np.linspace(-1, 1, PASSES)

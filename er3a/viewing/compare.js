@@ -1,0 +1,35 @@
+// Two robots side by side: fills the table and colours the borders for the pair that is picked.
+"use strict";
+
+const compared = JSON.parse(document.getElementById("compared").textContent);
+const pickers = ["a", "b"].map((side) => document.getElementById(`robot-${side}`));
+const onlyDifferences = document.getElementById("only-differences");
+const comparedRows = [...document.querySelectorAll("#comparison tbody tr")].map((row, index) => ({ row, index }));
+
+// Up to six significant digits, a typographic minus, no trailing zeros.
+function shownValue(value) {
+  if (value === null || value === undefined) return "–";
+  return typeof value === "number" ? String(Number(value.toPrecision(6))).replace("-", "−") : value;
+}
+
+function shownDifference(a, b) {
+  if (typeof a === "number" && typeof b === "number") return a === b ? "" : shownValue(b - a);
+  return a === b ? "" : "differs";
+}
+
+function compareRobots() {
+  const [a, b] = pickers.map((picker) => compared[picker.value]);
+  document.getElementById("title-a").textContent = a.title;
+  document.getElementById("title-b").textContent = b.title;
+  for (const { row, index } of comparedRows) {
+    const cells = [shownValue(a.values[index]), shownValue(b.values[index]), shownDifference(a.values[index], b.values[index])];
+    cells.forEach((text, column) => (row.cells[column + 3].textContent = text));
+    row.hidden = onlyDifferences.checked && cells[2] === "";
+  }
+  for (const group of document.querySelectorAll("#borders g[data-robot]")) {
+    group.setAttribute("class", pickers.map((picker, side) => (picker.value === group.dataset.robot ? "ab"[side] : "")).join(" ").trim());
+  }
+}
+
+[...pickers, onlyDifferences].forEach((control) => control.addEventListener("change", compareRobots));
+compareRobots();

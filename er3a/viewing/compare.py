@@ -1,0 +1,77 @@
+"""The page that sets two robots side by side: parameters, key figures, exact section borders."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from er3a.results import read_summary, read_table
+from er3a.robots.robot import Robot
+from er3a.study import STAGES, Study
+from er3a.viewing import page
+
+BORDER = "workspace/border.parquet"
+BORDER_POINT = "tool point"
+
+
+def write_compare(study: Study, results: Path, output: Path) -> None:
+    """Render ``compare.html`` from the tables and summaries of all robots."""
+    entries = {}
+    for name in study.robots:
+        robot = study.robot(name)
+        values = parameters(robot) | key_figures(results / name)
+        entries[name] = {
+            "title": robot.title,
+            "values": values,
+            "border": border_mm(read_table(results / name / BORDER)),
+        }
+    rows = list(dict.fromkeys(key for entry in entries.values() for key in entry["values"]))
+    data = {name: entry | {"values": [entry["values"].get(row) for row in rows]} for name, entry in entries.items()}
+    corners = np.array([point for entry in entries.values() for line in entry["border"] for point in line] or [[0, 0]])
+    page.render(
+        Path(__file__).with_name("compare.html.j2"),
+        output,
+        rows=rows,
+        data=data,
+        low=corners.min(axis=0).tolist(),
+        high=corners.max(axis=0).tolist(),
+        compare_script=Path(__file__).with_name("compare.js").read_text(encoding="utf-8"),
+    )
+
+
+def parameters(robot: Robot) -> dict[tuple[str, str, str], float | str | None]:
+    """Values of a robot's table by (group, name, unit); None where unknown."""
+    columns = (
+        ("D-H table", "a", "mm", robot.a * 1000),
+        ("D-H table", "alpha", "deg", np.degrees(robot.alpha)),
+        ("D-H table", "d", "mm", robot.d * 1000),
+        ("zero", "offset", "deg", np.degrees(robot.offset)),
+        ("zero", "direction", "", robot.direction),
+        ("limits", "lower limit", "deg", np.degrees(robot.lower)),
+        ("limits", "upper limit", "deg", np.degrees(robot.upper)),
+        ("speeds", "greatest speed", "deg/s", np.degrees(robot.speed)),
+    )
+    found: dict[tuple[str, str, str], float | str | None] = {("D-H table", "convention", ""): robot.convention}
+    for group, name, unit, values in columns:
+        for joint, value in enumerate(values, start=1):
+            found[group, f"J{joint} {name}", unit] = None if np.isnan(value) else round(float(value), 9)
+    return found
+
+
+def key_figures(folder: Path) -> dict[tuple[str, str, str], float | str | None]:
+    """Verdicts and key figures of a robot's stages by (stage, name, unit)."""
+    found: dict[tuple[str, str, str], float | str | None] = {}
+    for stage in STAGES:
+        summary: dict[str, Any] = read_summary(folder / stage)
+        found[stage, "verdict", ""] = page.VERDICT_WORDS[summary["verdict"]["status"]]
+        found |= {(stage, figure["name"], figure["unit"]): figure["value"] for figure in summary["figures"]}
+    return found
+
+
+def border_mm(border: pd.DataFrame) -> list[list[list[float]]]:
+    """The arcs of the tool point's border in the section through axis 1: lists of (radius, height) in mm."""
+    arcs = border[border["point"] == BORDER_POINT].groupby("arc", sort=False)
+    return [(arc[["rho_m", "z_m"]].to_numpy() * 1000).round(2).tolist() for _, arc in arcs]

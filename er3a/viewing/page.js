@@ -1,0 +1,123 @@
+// What a page's tables and figures can do beyond being read. Without scripts the page loses nothing but these.
+"use strict";
+
+const WORDS = JSON.parse(document.getElementById("script-words").textContent);
+
+// "−1 234.5" as "-1234.5" and "5.0·10⁻³" as "5.0e-3"; what is no number stays as it is.
+function plain(text) {
+  const superscripts = "⁰¹²³⁴⁵⁶⁷⁸⁹";
+  const exponent = (shown) => "e" + shown.slice(3).replace("⁻", "-").replace(/[⁰-⁹¹²³]/g, (digit) => superscripts.indexOf(digit));
+  const candidate = text.replace(/[\s\u202f]/g, "").replace("−", "-").replace(/·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+$/, exponent);
+  return candidate !== "" && Number.isFinite(Number(candidate)) ? candidate : text;
+}
+
+function numberIn(text) {
+  return text === "" ? NaN : Number(plain(text));
+}
+
+function textOf(cell) {
+  return cell.innerText.replace(/\s*\n\s*/g, " ").trim();
+}
+
+// Numbers by value, then words by letter; empty cells and dashes come last either way.
+function compare(a, b, sign) {
+  const [x, y] = [numberIn(a), numberIn(b)];
+  const rank = (text, number) => (Number.isNaN(number) ? (text === "" || text === "–" ? 2 : 1) : 0);
+  const ranks = rank(a, x) - rank(b, y);
+  if (ranks !== 0) return ranks;
+  return sign * (rank(a, x) === 0 ? x - y : a.localeCompare(b));
+}
+
+// A header's button turns the order: rising, falling, as written.
+function makeSortable(table) {
+  const body = table.tBodies[0];
+  const written = [...body.rows];
+  if (written.length < 2) return;
+  const headers = [...table.tHead.rows[0].cells];
+  headers.forEach((header, column) => {
+    // No button element: browsers leave those out of a header that is repeated on the next printed sheet.
+    const control = document.createElement("span");
+    control.role = "button";
+    control.tabIndex = 0;
+    control.className = "sort";
+    control.title = WORDS.sort;
+    control.append(...header.childNodes);
+    header.append(control);
+    const turn = () => {
+      const next = { none: "ascending", ascending: "descending", descending: "none" }[header.ariaSort || "none"];
+      headers.forEach((other) => other.removeAttribute("aria-sort"));
+      if (next !== "none") header.setAttribute("aria-sort", next);
+      const sign = next === "descending" ? -1 : 1;
+      const keys = new Map(written.map((row) => [row, row.cells[column] ? textOf(row.cells[column]) : ""]));
+      const rows = next === "none" ? written : [...written].sort((a, b) => compare(keys.get(a), keys.get(b), sign));
+      body.append(...rows);
+    };
+    control.addEventListener("click", turn);
+    control.addEventListener("keydown", (event) => {
+      if (event.key !== "Enter" && event.key !== " ") return;
+      event.preventDefault();
+      turn();
+    });
+  });
+}
+
+function csvOf(table) {
+  const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
+  return [...table.rows].map((row) => [...row.cells].map((cell) => quoted(plain(textOf(cell)))).join(",")).join("\n") + "\n";
+}
+
+function nameFor(element) {
+  const heading = document.querySelector("h1").innerText;
+  const title = element.querySelector("caption, img")?.innerText || element.querySelector("img")?.alt || "table";
+  return `${heading} ${title}`.toLowerCase().replace(/[^\p{L}\p{N}]+/gu, "_").slice(0, 80);
+}
+
+function download(text, type, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([text], { type }));
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+function toolButton(label, action) {
+  const button = document.createElement("button");
+  button.type = "button";
+  button.className = "tool";
+  button.textContent = label;
+  button.addEventListener("click", action);
+  return button;
+}
+
+function enlarge(image) {
+  const dialog = document.createElement("dialog");
+  dialog.className = "enlarged";
+  dialog.setAttribute("aria-label", image.alt);
+  const close = toolButton(WORDS.close, () => dialog.close());
+  dialog.append(close, image.cloneNode());
+  dialog.addEventListener("close", () => dialog.remove());
+  dialog.addEventListener("click", (event) => event.target === dialog && dialog.close());
+  document.body.append(dialog);
+  dialog.showModal();
+}
+
+for (const table of document.querySelectorAll("table")) {
+  if (!table.classList.contains("index")) makeSortable(table);
+  const tools = document.createElement("p");
+  tools.className = "tools";
+  tools.append(toolButton(WORDS.csv, () => download(csvOf(table), "text/csv", `${nameFor(table)}.csv`)));
+  (table.closest(".scroll") || table).after(tools);
+}
+
+for (const figure of document.querySelectorAll("figure")) {
+  const image = figure.querySelector("img");
+  if (!image) continue;
+  const tools = document.createElement("p");
+  tools.className = "tools";
+  const save = document.createElement("a");
+  save.href = image.src;
+  save.download = `${nameFor(figure)}.svg`;
+  save.textContent = WORDS.svg;
+  tools.append(toolButton(WORDS.enlarge, () => enlarge(image)), save);
+  image.after(tools);
+}

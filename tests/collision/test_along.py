@@ -1,0 +1,120 @@
+"""Clearance along motions: against dense sampling, and with obstacles that lie between the points shown."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from er3a.collision.along import clearance_along
+from er3a.collision.bodies import Bodies
+from er3a.collision.clearance import clearance
+from er3a.collision.scene import SceneFile
+from er3a.kinematics.forward import forward
+from er3a.kinematics.transforms import transform
+from er3a.planning.follow import follow
+from er3a.planning.moves import JointMove, line
+from er3a.robots.load import load_robot
+
+DEPTH = 1e-3
+ENDS = np.array([0.0, 1.0])
+
+
+def scene_of(**shapes) -> SceneFile:
+    return SceneFile.model_validate({"kind": "scene", "title": "made"} | shapes)
+
+
+def swing(robot):
+    """A quarter turn about axis 1 with the arm held out, and where the tool is half way."""
+    held = np.radians([0, 20, 10, 0, 40, 0])
+    a, b = held + np.radians([-45, 0, 0, 0, 0, 0]), held + np.radians([45, 0, 0, 0, 0, 0])
+    return JointMove(a, b, 1.0), forward(robot, held)[:3, 3] * 1000
+
+
+def along(robot, scene, move, shown=ENDS):
+    return clearance_along(Bodies(robot, scene), lambda t: move.joints(t)[0], shown, shown, DEPTH)
+
+
+@pytest.mark.parametrize(
+    "obstacle",
+    [
+        {"cylinders": {"name": "wire", "radius_mm": 0.2, "length_mm": 200}},
+        {"boxes": {"name": "foil", "size_mm": [150, 0.1, 150]}},
+        {"spheres": {"name": "bead", "radius_mm": 1.5}},
+    ],
+)
+def test_thin_obstacle_between_two_points_is_found(robot, obstacle):
+    move, at = swing(robot)
+    ((kind, solid),) = obstacle.items()
+    scene = scene_of(**{kind: [solid | {"xyz_mm": at.tolist()}]})
+    found = along(robot, scene, move)
+    assert (clearance(robot, move.joints(ENDS)[0], scene).distance > 0.05).all()
+    (contact,) = found.contacts
+    assert any(pair.endswith(solid["name"]) for pair in contact.pairs)
+    assert 0 < contact.start < 0.5 < contact.end < 1
+    edges = clearance(robot, move.joints(np.array([contact.start, contact.end]))[0], scene)
+    np.testing.assert_allclose(edges.distance, 0, atol=1e-6)
+    assert found.measured < 150
+
+
+def test_obstacle_that_is_passed_by_is_not_met(robot):
+    move, at = swing(robot)
+    wire = {"name": "wire", "radius_mm": 0.2, "length_mm": 2}
+    times = np.linspace(0, 1, 501)
+    for height in (200, 100):
+        scene = scene_of(cylinders=[wire | {"xyz_mm": (at + np.array([0, 0, height])).tolist()}])
+        least = clearance(robot, move.joints(times)[0], scene).distance.min()
+        found = along(robot, scene, move)
+        assert bool(found.contacts) == (least < 0)
+        assert least - DEPTH < found.distance[found.least] < least + DEPTH
+
+
+def test_random_motions_among_random_balls_agree_with_dense_sampling(robot, random):
+    times = np.linspace(0, 1, 301)
+    met = 0
+    for _ in range(6):
+        a = random.uniform(robot.lower, robot.upper) * 0.6
+        move = JointMove(a, a + random.uniform(-0.6, 0.6, 6), 1.0)
+        centres = forward(robot, move.joints(np.array([0.3, 0.7]))[0])[:, :3, 3] + random.uniform(-0.15, 0.15, (2, 3))
+        balls = [
+            {"name": f"ball{k}", "radius_mm": 5 + 20 * k, "xyz_mm": (1000 * centre).tolist()}
+            for k, centre in enumerate(centres)
+        ]
+        scene = scene_of(spheres=balls)
+        dense = clearance(robot, move.joints(times)[0], scene).distance
+        found = along(robot, scene, move, np.linspace(0, 1, 5))
+        inside = np.zeros(len(times), bool)
+        for contact in found.contacts:
+            inside |= (times >= contact.start) & (times <= contact.end)
+        assert inside[dense < -DEPTH].all()
+        assert not inside[dense > DEPTH].any()
+        if not found.contacts:
+            assert found.distance[found.least] < dense.min() + DEPTH
+        shown = clearance(robot, move.joints(found.t)[0], scene).distance
+        np.testing.assert_allclose(found.distance, shown, atol=1e-6)
+        met += bool(found.contacts)
+    assert met > 0
+
+
+def test_arm_that_folds_into_itself_is_found():
+    robot = load_robot("er3a_c60")
+    path = line(transform([0.3, 0, 0.25], [np.pi, 0, 0]), transform([0.12, 0, 0.25], [np.pi, 0, 0]), 4.0)
+    t = np.linspace(0, 4, 50)
+    followed = follow(robot, path, t)
+    found = clearance_along(Bodies(robot, None), followed.joints, followed.t, t, DEPTH)
+    (contact,) = found.contacts
+    assert all("link" in pair for pair in contact.pairs)
+    edge = clearance(robot, followed.joints(np.array([contact.start])), None).distance
+    np.testing.assert_allclose(edge, 0, atol=1e-6)
+
+
+def test_stretch_out_of_reach_has_no_clearance():
+    robot = load_robot("er3a_c60")
+    start = transform([0.35, 0, 0.4], [0, np.radians(135), 0])
+    end = start.copy()
+    end[0, 3] += 1.0
+    t = np.linspace(0, 1, 30)
+    followed = follow(robot, line(start, end, 1.0), t)
+    found = clearance_along(Bodies(robot, None), followed.joints, followed.t, t, DEPTH)
+    reached = np.isfinite(followed.joints(found.t)[:, 0])
+    np.testing.assert_array_equal(np.isfinite(found.distance), reached)
+    assert 0 < reached.sum() < len(reached)

@@ -1,0 +1,73 @@
+"""Stretches outside limits or too fast: found between check points too, their ends located."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from er3a.kinematics.transforms import transform
+from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.planning.arcs import arc
+from er3a.planning.follow import follow
+from er3a.planning.intervals import out_of_limits, too_fast, unreachable
+from er3a.planning.moves import JointMove
+from er3a.robots.load import load_robot
+
+GRID = np.linspace(0, 1, 21)
+
+
+def test_limit_that_is_left_between_two_check_points_only():
+    robot = load_robot("er3_600")
+    top = robot.upper[0] + np.radians(0.01)
+
+    def joints(t):
+        q = np.zeros((*np.shape(t), 6))
+        q[..., 0] = top - 4 * (np.asarray(t) - 0.525) ** 2
+        return q
+
+    assert (joints(GRID)[:, 0] < robot.upper[0]).all()
+    (interval,) = out_of_limits(robot, GRID, joints(GRID), joints)
+    half = np.sqrt(np.radians(0.01) / 4)
+    assert (interval.start, interval.end) == pytest.approx((0.525 - half, 0.525 + half), abs=1e-7)
+    assert interval.cause == "J1 goes to 170.0 deg; its upper limit is 170 deg"
+
+
+def test_speed_that_is_passed_between_two_check_points_only():
+    robot = load_robot("er3_600")
+    move = JointMove(np.zeros(6), np.radians([0, 0, 0, 0, 0, 840.2 / 15 * 8]), 1.0)
+    even = np.linspace(0, 1, 20)  # the quintic is fastest half way
+    velocity = move.joints(even)[1]
+    assert (np.abs(velocity) < robot.speed).all()
+    (interval,) = too_fast(robot, even, velocity, lambda t: move.joints(t)[1])
+    np.testing.assert_allclose(move.joints(np.array([interval.start, interval.end]))[1][:, 5], robot.speed[5])
+    assert interval.cause == "J6 would need 840 deg/s; it can do 840 deg/s"
+
+
+def test_motion_that_stays_below_has_no_interval():
+    robot = load_robot("er3_600")
+    move = JointMove(np.zeros(6), np.radians([0, 0, 0, 0, 0, 839.9 / 15 * 8]), 1.0)
+    even = np.linspace(0, 1, 20)
+    assert too_fast(robot, even, move.joints(even)[1], lambda t: move.joints(t)[1]) == []
+
+
+def test_short_stretch_out_of_reach_between_check_points_is_found():
+    """An arc that bulges out of reach for some 10 mm of its way only, between two check points."""
+    robot = load_robot("er3a_c60")
+
+    def across(x):
+        start, end = (transform([x - 0.25, y, 0.5], [0, np.pi / 2, 0]) for y in (-0.3, 0.3))
+        return arc(start, [x, 0, 0.5], end, 1.0)
+
+    inside, outside = 0.5, 0.8
+    for _ in range(40):  # how far out the middle of the line may lie
+        x = (inside + outside) / 2
+        reached = np.isfinite(solve_slots(robot, across(x).poses(np.array([0.5])), np.zeros((1, 6)))[0]).any()
+        inside, outside = (x, outside) if reached else (inside, x)
+    path, even = across(inside + 2e-5), np.linspace(0, 1, 20)
+    assert np.isfinite(follow(robot, path, even).joints(even)).all()
+    (interval,) = unreachable(follow(robot, path, even))
+    y = path.poses(path.progress(np.array([interval.start, interval.end]))[0])[:, 1, 3]
+    assert y[0] == pytest.approx(-y[1], abs=1e-9)
+    reach = inside - 0.0785  # the wrist centre's greatest distance from axis 1 at this height
+    assert y[1] == pytest.approx(np.sqrt(2 * 2e-5 / (1 / path.radius - 1 / reach)), rel=1e-3)
+    assert "mm too far" in interval.cause

@@ -1,0 +1,106 @@
+"""Paths as CSV tables: what they may hold, and every way to get one wrong."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from er3a.errors import InputError
+from er3a.kinematics.transforms import transform
+from er3a.planning.path_table import read_path_table
+
+RPY = "x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg"
+POSES = [[300, -50, 250, 175, 5, 10], [320, 0, 250, 180, 10, 20], [300, 50, 260, 175, 0, 40]]
+
+
+def write(folder, header, *rows):
+    file = folder / "path.csv"
+    file.write_text("\n".join([header, *(",".join(map(str, row)) for row in rows)]) + "\n")
+    return file
+
+
+def test_every_form_of_orientation_gives_the_same_poses(tmp_path):
+    T = np.array([transform(np.array(row[:3]) / 1000, np.radians(row[3:])) for row in POSES])
+    turns = Rotation.from_matrix(T[:, :3, :3])
+    forms = {
+        "roll_deg,pitch_deg,yaw_deg": [row[3:] for row in POSES],
+        "z1_deg,y_deg,z2_deg": turns.as_euler("ZYZ", degrees=True).tolist(),
+        "qw,qx,qy,qz": turns.as_quat(scalar_first=True).tolist(),
+        "r11,r12,r13,r21,r22,r23,r31,r32,r33": T[:, :3, :3].reshape(3, 9).tolist(),
+    }
+    for columns, values in forms.items():
+        table = read_path_table(
+            write(tmp_path, "x_mm,y_mm,z_mm," + columns, *(row[:3] + part for row, part in zip(POSES, values)))
+        )
+        np.testing.assert_allclose(table.poses, T, atol=1e-12)
+        assert table.times is None
+        assert table.joints is None
+        assert not table.repeated.any()
+
+
+def test_joint_angles_and_times(tmp_path):
+    header = "t_s," + ",".join(f"q{j}_deg" for j in range(1, 7))
+    table = read_path_table(write(tmp_path, header, [0, *[0.0] * 6], [1.5, 10, 20, 30, 40, 50, 60]))
+    np.testing.assert_allclose(table.joints[1], np.radians([10, 20, 30, 40, 50, 60]))
+    np.testing.assert_array_equal(table.times, [0, 1.5])
+
+
+def test_rows_that_repeat_the_point_before_are_marked(tmp_path):
+    table = read_path_table(write(tmp_path, RPY, POSES[0], POSES[0], POSES[1], POSES[1], POSES[0]))
+    np.testing.assert_array_equal(table.repeated, [False, True, False, True, False])
+    np.testing.assert_array_equal(table.rows, [2, 3, 4, 5, 6])
+
+
+def test_small_angles_are_admitted_where_the_table_also_has_larger_ones(tmp_path):
+    rows = [[300, 0, 250, 0.5, 0.25, 0.125], [300, 50, 250, 0.7, 0.1, 90]]
+    assert read_path_table(write(tmp_path, RPY, *rows)).poses.shape == (2, 4, 4)
+
+
+BAD = {
+    "NaN": (RPY, [POSES[0], [300, "nan", 250, 180, 0, 0]], "row 3, column y_mm", "not a finite number"),
+    "empty field": (RPY, [POSES[0], [300, "", 250, 180, 0, 0]], "row 3, column y_mm", "empty"),
+    "word": (RPY, [POSES[0], [300, "left", 250, 180, 0, 0]], "row 3, column y_mm", "is not a number"),
+    "one point": (RPY, [POSES[0]], None, "the path has one point"),
+    "no point": (RPY, [], None, "the path has no point"),
+    "same points": (RPY, [POSES[0]] * 3, None, "all 3 points are the same"),
+    "time stands": ("t_s," + RPY, [[0, *POSES[0]], [1, *POSES[1]], [1, *POSES[2]]], "row 4, column t_s", "not later"),
+    "time falls": ("t_s," + RPY, [[0, *POSES[0]], [-1, *POSES[1]]], "row 3, column t_s", "not later"),
+    "time starts late": ("t_s," + RPY, [[1, *POSES[0]], [2, *POSES[1]]], "row 2, column t_s", "Start at 0"),
+    "milliseconds": ("t_s," + RPY, [[0, *POSES[0]], [50000, *POSES[1]]], "row 3, column t_s", "not ms"),
+    "no orientation": ("x_mm,y_mm,z_mm", [[1, 2, 3]] * 2, "header", "no orientation"),
+    "nothing known": ("a,b", [[1, 2]] * 2, "header", "neither joint angles nor poses"),
+    "two forms": (RPY + ",qw,qx,qy,qz", [POSES[0] + [1, 0, 0, 0]], "header", "two forms of orientation"),
+    "joints and poses": (RPY + ",q1_deg", [POSES[0] + [0]], "header", "both joint angles and poses"),
+    "metres in the name": (RPY.replace("x_mm", "x_m"), [POSES[0]], "column x_m", "not a unit"),
+    "metres": (RPY, [[0.3, 0, 0.25, 180, 0, 0], [0.4, 0, 0.25, 180, 0, 0]], "row 3, column x_mm", "only be metres"),
+    "radians": (RPY, [[300, 0, 250, 3.14159, 0, 0], [310, 0, 250, 1.5708, 0, 0]], "row 2", "only be radians"),
+    "quaternion": (
+        "x_mm,y_mm,z_mm,qw,qx,qy,qz",
+        [[300, 0, 250, 1, 0, 0, 0], [310, 0, 250, 1, 0, 0, 0.1]],
+        "row 3, column qw",
+        "length is 1.004",
+    ),
+    "mirror": (
+        "x_mm,y_mm,z_mm,r11,r12,r13,r21,r22,r23,r31,r32,r33",
+        [[300, 0, 250, 1, 0, 0, 0, 1, 0, 0, 0, -1]] * 2,
+        "row 2, column r11",
+        "mirrors",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_tables_are_refused_by_row_and_column(tmp_path, case):
+    header, rows, field, words = BAD[case]
+    file = write(tmp_path, header, *rows)
+    with pytest.raises(InputError) as caught:
+        read_path_table(file)
+    assert caught.value.file == str(file)
+    assert (caught.value.field or "").startswith(field or "")
+    assert words in str(caught.value)
+
+
+def test_missing_table_is_named(tmp_path):
+    with pytest.raises(InputError, match="no such file"):
+        read_path_table(tmp_path / "none.csv")
