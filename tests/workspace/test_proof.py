@@ -78,10 +78,10 @@ def proven(request):
 def test_no_sample_lies_in_an_empty_cell(proven):
     robot, section = proven
     filled = 0.0
-    for seed in range(10):
-        states = section.status(*about_axis_1(robot, forward(robot, samples(robot, 1_000_000, seed))[:, :3, 3]))
+    for seed in range(4):  # ten million over the three arms
+        states = section.status(*about_axis_1(robot, forward(robot, samples(robot, 850_000, seed))[:, :3, 3]))
         assert not (states == EMPTY).any()
-        filled += (states == FILLED).mean() / 10
+        filled += (states == FILLED).mean() / 4
     assert filled > 0.9
 
 
