@@ -11,7 +11,18 @@ from importlib import import_module
 from pathlib import Path
 
 EVIDENCE = Path(__file__).resolve().parents[1] / "docs" / "evidence"
-CAMPAIGNS = ("kinematics", "singularities", "speed", "diagnosis", "identification", "workspace", "clearance")
+CAMPAIGNS = (
+    "kinematics",
+    "singularities",
+    "speed",
+    "diagnosis",
+    "identification",
+    "workspace",
+    "paths",
+    "clearance",
+    "capability",
+    "teach",
+)
 
 
 def main(names: list[str]) -> int:

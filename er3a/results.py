@@ -95,7 +95,7 @@ def write_summary(
         "figures": [asdict(figure) for figure in figures],
         **stage_keys,
         "provenance": {
-            "inputs": [{"path": _shown_path(file), "sha256": sha256(file)} for file in study.inputs(robot, stage)],
+            "inputs": input_records(study.inputs(robot, stage)),
             "config": study.settings(robot, stage),
             "seed": study.seed,
             "code": code_digest(f"er3a.stages.{stage}.compute"),
@@ -121,6 +121,11 @@ def read_summary(folder: Path) -> dict[str, Any]:
         if key not in summary:
             raise ResultError(path, f"damaged (no '{key}' in it)")
     return summary
+
+
+def input_records(files: Iterable[Path]) -> list[dict[str, str]]:
+    """What provenance says of input files: path from the project's root, and checksum."""
+    return [{"path": _shown_path(file), "sha256": sha256(file)} for file in files]
 
 
 def sha256(path: Path) -> str:

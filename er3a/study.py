@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from er3a.errors import InputError
+from er3a.inputs.units import FARTHEST_MM, Triple, check_millimetres
 from er3a.inputs.yaml_file import StrictModel, load, read_yaml
 from er3a.robots.load import DATA, load_robot, placement_transform, robot_path
 from er3a.robots.robot import Robot
@@ -69,9 +70,57 @@ class WorkspaceSettings(StrictModel):
         return self
 
 
+class BoxTask(StrictModel):
+    """A box that the tool must serve, in the frame that the robot's base is placed in.
+
+    ``box_mm`` are its edges along x, y and z (it may stand turned by 90 deg about z), ``lowest_mm`` the least height of
+    its underside, ``clear_of_axis_mm`` the least distance of its points from axis 1. At every point the tool must reach
+    all directions within ``cone_deg`` of ``tool_direction`` (z of the tool frame), ``limit_margin_deg`` within limits.
+    """
+
+    box_mm: Annotated[list[Annotated[float, Field(gt=0)]], Field(min_length=3, max_length=3)] = [200, 150, 50]
+    tool_direction: Triple = [0, 0, -1]
+    cone_deg: Annotated[float, Field(ge=0, le=180)] = 30
+    limit_margin_deg: Annotated[float, Field(ge=0, le=45)] = 2
+    lowest_mm: Annotated[float, Field(ge=-FARTHEST_MM, le=FARTHEST_MM)] = 0
+    clear_of_axis_mm: Annotated[float, Field(ge=0, le=FARTHEST_MM)] = 150
+
+    @field_validator("box_mm")
+    @classmethod
+    def _no_metres(cls, values):
+        check_millimetres(values)
+        return values
+
+    @field_validator("tool_direction")
+    @classmethod
+    def _has_length(cls, values):
+        if max(map(abs, values)) < 1e-6:
+            raise ValueError("the vector has no direction | Write for example [0, 0, -1]: the tool points down")
+        return values
+
+
+class CapabilitySettings(StrictModel):
+    """What the tool can do in each cell of the workspace.
+
+    ``directions`` are spread over the sphere, with ``rolls`` about each where the roll matters (a tool beside axis 6,
+    which takes as many times longer). The proofs of the dexterous core and of the listed places may look at
+    ``proof_poses`` neighbourhoods of poses each.
+    """
+
+    directions: Annotated[int, Field(ge=12, le=10_000)] = 300
+    rolls: Annotated[int, Field(ge=1, le=360)] = 8
+    proof_poses: Annotated[int, Field(ge=1, le=1_000_000_000)] = 100_000
+    placement: BoxTask = BoxTask()
+
+
+WayName = Literal["slow", "branch", "via_shift", "via_tilt", "damped", "detour", "stop"]
+
+
 class TrajectorySettings(StrictModel):
     """Where a path counts as near-singular, and how many points are checked between two samples.
 
+    ``repair`` chooses the way around singular regions, or compares all of them. Joints of unknown speed are taken to do
+    ``assumed_speed_deg_s``; all joints to reach full speed in ``full_speed_after_s``.
     ``scene`` holds the obstacles; no overlap with them deeper than ``overlap_mm`` goes unnoticed between points.
     """
 
@@ -79,6 +128,11 @@ class TrajectorySettings(StrictModel):
     near_wrist_deg: Annotated[float, Field(gt=0, le=90)]
     near_elbow_deg: Annotated[float, Field(gt=0, le=90)]
     near_shoulder_mm: Annotated[float, Field(gt=0, le=10_000)]
+    repair: Literal["compare"] | WayName = "compare"
+    assumed_speed_deg_s: Annotated[
+        list[Annotated[float, Field(gt=0, le=10_000)]], Field(min_length=6, max_length=6)
+    ] = [180, 180, 180, 360, 360, 360]
+    full_speed_after_s: Annotated[float, Field(gt=0, le=10)] = 0.25
     scene: Text | None = None
     overlap_mm: Annotated[float, Field(ge=0.05, le=100)] = 1.0
 
@@ -104,6 +158,7 @@ class Study(StrictModel):
     robots: Annotated[dict[Name, RobotEntry], Field(min_length=1)]
     validation: ValidationSettings
     workspace: WorkspaceSettings
+    capability: CapabilitySettings = CapabilitySettings()
     inverse: InverseSettings = InverseSettings()
     trajectory: TrajectorySettings
 

@@ -46,6 +46,8 @@ def test_results_do_not_depend_on_the_parts(tmp_path):
         "drawing.parquet",
         "void_vertices.parquet",
         "void_triangles.parquet",
+        "capability.parquet",
+        "places.parquet",
         "summary.json",
     }
     for parts in (1, 3, 9):

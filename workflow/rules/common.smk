@@ -38,9 +38,11 @@ TABLES = {
         "drawing",
         "void_vertices",
         "void_triangles",
+        "capability",
+        "places",
     ],
     "inverse": ["solutions", "rankings", "map"],
-    "trajectory": ["checks", "samples", "clearance"],
+    "trajectory": ["checks", "clearance", "repairs", "samples"],
 }
 
 

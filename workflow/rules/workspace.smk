@@ -42,6 +42,7 @@ rule compute_workspace:
         "../envs/er3a.yaml"
     params:
         settings=settings("workspace"),
+        capability=settings("capability"),
         code=code_of("workspace", "compute"),
     message:
         "{wildcards.robot}: compute workspace"

@@ -12,6 +12,7 @@ from scipy import ndimage
 from er3a.kinematics.forward import forward, jacobian
 from er3a.results import Figure, write_summary, write_table
 from er3a.robots.robot import Robot
+from er3a.stages.workspace.capability_numbers import can_do
 from er3a.stages.workspace.drawing import drawing_table
 from er3a.stages.workspace.grid import Grid, make_grid
 from er3a.stages.workspace.hull import Hull, cells_inside, convex_hull
@@ -68,6 +69,10 @@ def compute(study: Study, name: str, folder: Path, parts: list[Path] | None = No
     write_table(folder / "drawing.parquet", drawing_table(robot, height))
     write_table(folder / "void_vertices.parquet", vertices)
     write_table(folder / "void_triangles.parquet", triangles)
+
+    doing = can_do(robot, study.capability, grid.cell)
+    for table_name, table in doing.tables.items():
+        write_table(folder / f"{table_name}.parquet", table)
 
     write_table(folder / "cells.parquet", _cells(tally, inside, voids))
     write_table(folder / "section.parquet", _section(tally, grid))
@@ -132,6 +137,7 @@ def compute(study: Study, name: str, folder: Path, parts: list[Path] | None = No
         pocket_block_m=pocket_block(proven),
         specks={"count": voids.specks, "volume_m3": voids.speck_cells * grid.cell_volume},
         skin_m3=voids.skin_cells * grid.cell_volume,
+        **doing.summary,
     )
 
 

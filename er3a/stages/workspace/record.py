@@ -11,6 +11,7 @@ import rerun.blueprint as rrb
 from matplotlib import colormaps
 
 from er3a.results import read_summary, read_table
+from er3a.stages.workspace.capability_record import VIEW, log_capability
 from er3a.study import Study
 from er3a.viewing.arm import arm_view, log_arm
 from er3a.viewing.numbers import fixed
@@ -27,6 +28,7 @@ def record(study: Study, name: str, folder: Path, output: Path) -> None:
     reach = summary["reach_m"]["furthest_from_axis"]
     views = (
         arm_view(robot, "Cloud, near half cut away", ["/arm/**", "/cloud/far"], reach * 1.7),
+        arm_view(robot, "Share of tool directions, places for the box", VIEW, reach * 2.7),
         rrb.Vertical(
             arm_view(robot, "Voids inside the hull", ["/arm/**", "/hull/**", "/voids/**"], reach * 2.1),
             rrb.TextDocumentView(origin="/note", name="What to look at"),
@@ -38,6 +40,7 @@ def record(study: Study, name: str, folder: Path, output: Path) -> None:
         _log_cloud(stream, folder, summary, reach)
         _log_hull(stream, folder)
         _log_voids(stream, folder, summary)
+        log_capability(stream, folder, summary)
         stream.log("note", rr.TextDocument(_note(summary), media_type=rr.MediaType.MARKDOWN), static=True)
 
 
@@ -93,6 +96,9 @@ def _note(summary: dict[str, Any]) -> str:
         "Left: tool positions, the half between you and the arm cut away (switch on `cloud/near` for the rest). "
         "Yellow: high manipulability; dark: near-singular.",
         "",
+        "Middle: cells by the share of tool directions reached there, dark blue none to yellow all (switch classes "
+        "off below `capability`, or `capability/near` on); the best places for the box, magenta if proven.",
+        "",
         "Right: the convex hull as wires, with enclosed voids in magenta and open pockets in orange.",
         "",
         "| void | volume (L) | centre x, y, z (mm) |",
@@ -102,4 +108,4 @@ def _note(summary: dict[str, Any]) -> str:
         centre = ", ".join(fixed(1000 * value, 0) for value in void["centroid_m"])
         low, high = (1000 * void["volume_m3"][key] for key in ("lower", "upper"))
         lines.append(f"| {void['kind']}_{number}, {void['status']} | {low:.3g} to {high:.3g} | {centre} |")
-    return "\n".join(lines if voids else lines[:5])
+    return "\n".join(lines if voids else lines[:7])

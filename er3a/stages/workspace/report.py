@@ -10,6 +10,7 @@ from markupsafe import Markup
 
 from er3a.results import read_summary, read_table
 from er3a.robots.robot import Robot
+from er3a.stages.workspace.capability_texts import capability_context
 from er3a.stages.workspace.plots import convergence, top_view
 from er3a.stages.workspace.proof_plots import sections, slices
 from er3a.stages.workspace.side_plots import arc_rows, side_view
@@ -30,6 +31,7 @@ TABLES = (
     "void_vertices",
     "void_triangles",
 )
+CAN_DO = ("capability", "places")
 KINDS = {"enclosed": "enclosed", "open": "open pocket"}
 
 
@@ -72,6 +74,7 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
         voids_more=max(0, len(summary["voids"]) - LISTED),
         astray=summary["verdict"]["code"] == "workspace.void_unexpected",
         wide=100 * summary["proof"]["width"],
+        **capability_context(robot, summary, *(read_table(folder / f"{name}.parquet") for name in CAN_DO)),
     )
 
 

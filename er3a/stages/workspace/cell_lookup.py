@@ -1,0 +1,36 @@
+"""Which row of the table of cells a point lies in, for slices and voxels."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+
+class CellLookup:
+    """The cells of ``capability`` on their raster (radius, height, sector of azimuth).
+
+    Attributes
+    ----------
+    reach : m, edge of the outermost cell; heights : m, lowest and highest edge along axis 1
+    """
+
+    def __init__(self, summary: dict[str, Any], cells: pd.DataFrame):
+        self.cell, self.sectors = summary["capability"]["cell_m"], summary["capability"]["sectors"]
+        rho, z = cells["rho_m"].to_numpy(), cells["z_m"].to_numpy()
+        self.reach = float(rho.max() + self.cell / 2)
+        self.heights = float(z.min() - self.cell / 2), float(z.max() + self.cell / 2)
+        index = self._index(rho, np.radians(cells["azimuth_deg"].to_numpy()), z)
+        self.rows = np.full((index[0].max() + 1, index[1].max() + 1, self.sectors), -1)
+        self.rows[index] = np.arange(len(cells))
+
+    def _index(self, rho: np.ndarray, azimuth: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, ...]:
+        sector = np.rint(azimuth / (2 * np.pi) * self.sectors).astype(np.int64) % self.sectors
+        return (rho // self.cell).astype(np.int64), np.floor((z - self.heights[0]) / self.cell).astype(np.int64), sector
+
+    def row(self, rho: np.ndarray, azimuth: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Row numbers for points about axis 1 (m, rad, m; any shape), -1 where nothing is reached."""
+        index = self._index(rho, azimuth, z)
+        inside = np.all([(part >= 0) & (part < size) for part, size in zip(index, self.rows.shape)], axis=0)
+        return np.where(inside, self.rows[tuple(np.where(inside, part, 0) for part in index)], -1)

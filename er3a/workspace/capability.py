@@ -1,0 +1,151 @@
+"""What a tool can do in each cell: the share of directions it reaches, in how many ways, and how agile it is there.
+
+The share is the reachability index of Zacharias, Borst and Hirzinger [1]_: directions spread evenly over the sphere, a
+direction counts if some roll about it has an inverse solution within limits. Here all directions are asked of the
+cell's middle.
+
+Joint 1 only turns everything about its axis. So each cell of the section is solved once, at azimuth 0 and with joint 1
+free; what another azimuth has follows by turning joint 1 on, exactly. With a limited joint 1 azimuths are told apart
+in sectors, by their middles.
+
+References
+----------
+.. [1] F. Zacharias, C. Borst, G. Hirzinger, "Capturing robot workspace structure: representing robot capabilities",
+   IEEE/RSJ Int. Conf. on Intelligent Robots and Systems (IROS), 2007.
+.. [2] T. Yoshikawa, "Manipulability of robotic mechanisms", Int. J. Robotics Research 4(2), 1985.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from er3a.kinematics.batch import inverse_batch
+from er3a.kinematics.block_constants import BlockConstants
+from er3a.kinematics.jit import kernel
+from er3a.kinematics.turns import LIMIT_TOLERANCE
+from er3a.kinematics.wrist_partitioned import constants_for_blocks
+from er3a.robots.robot import Robot
+from er3a.workspace.directions import Roll, left_to_roll, poses, tool_rotations
+from er3a.workspace.interval_inverse import FREE, SLOTS
+from er3a.workspace.section_arm import section_frame
+from er3a.workspace.sphere import fibonacci_sphere
+
+SECTORS = 64
+"""Sectors of azimuth with a limited joint 1, the first about azimuth 0; one bit each in a proof's masks."""
+_POSES = 50_000
+_TURN = 2 * np.pi
+
+
+@dataclass(frozen=True, eq=False)
+class Capability:
+    """Numbers per cell and sector of azimuth, both (n, sectors); a full turn of joint 1 makes one sector.
+
+    Attributes
+    ----------
+    share : of the directions that are reached
+    ways : branches within limits, the mean over reached directions (0 where none is), of the roll that has most
+    most_ways : the most branches that any direction has
+    manipulability : m^3, the greatest |det J| [2]_ of any reached pose
+    """
+
+    share: np.ndarray
+    ways: np.ndarray
+    most_ways: np.ndarray
+    manipulability: np.ndarray
+
+
+def sector_count(robot: Robot) -> int:
+    """How many sectors of azimuth differ."""
+    return 1 if robot.upper[0] - robot.lower[0] >= FREE else SECTORS
+
+
+def map_capability(robot: Robot, middles: np.ndarray, directions: int, roll: Roll) -> Capability:
+    """Ask cells for their directions.
+
+    Parameters
+    ----------
+    middles : (n, 2), m, radius and height of the cells' middles about axis 1 (see ``section_arm.section_frame``)
+    directions : how many, over the sphere; roll : how the roll is treated
+
+    Raises
+    ------
+    NotWristPartitionedError
+    """
+    R, origin = section_frame(robot)
+    asked = _joint_1_free(left_to_roll(robot, roll))
+    arm = constants_for_blocks(robot)
+    rotations = R.T @ tool_rotations(fibonacci_sphere(directions), roll)
+    sectors = sector_count(robot)
+    range_1 = np.sort(robot.direction[0] * np.array([robot.lower[0], robot.upper[0]]) + robot.offset[0])
+    out = [np.zeros((len(middles), sectors)) for _ in range(4)]
+    per_cell = directions * len(roll.angles)
+    points = np.stack([middles[:, 0], np.zeros(len(middles)), middles[:, 1]], axis=1) @ R + origin
+    for start in range(0, len(middles), step := max(1, _POSES // per_cell)):
+        part = slice(start, start + step)
+        T = poses(points[part][:, None, None], rotations)
+        found = inverse_batch(asked, T.reshape(-1, 4, 4))
+        theta = robot.direction * found.q + robot.offset
+        shape = (len(T), directions, len(roll.angles), SLOTS)
+        values = manipulability(arm, theta).reshape(shape)
+        within = found.within_limits.reshape(shape)
+        _tally(theta[..., 0].reshape(shape), within, values, range_1, *(array[part] for array in out))
+    return Capability(*out)
+
+
+def _joint_1_free(robot: Robot) -> Robot:
+    lower, upper = robot.lower.copy(), robot.upper.copy()
+    lower[0], upper[0] = -np.pi, np.pi
+    return robot.replace(lower=lower, upper=upper)
+
+
+def manipulability(arm: BlockConstants, theta: np.ndarray) -> np.ndarray:
+    """|det J| in m^3 for the table's angles (..., 6): the product of the shoulder's, elbow's and wrist's factors.
+
+    The determinant is that of the Jacobian at the wrist centre, where it falls into blocks (Siciliano et al.,
+    *Robotics*, section 3.3.1): axis 1 moves the wrist by its distance ahead of axis 1, axes 2 and 3 by the triangle's
+    area, and the wrist turns by the volume that axes 4, 5 and 6 span.
+    """
+    upper = arm.turn_2 + theta[..., 1]
+    bend = arm.turn_3 + arm.elbow_sign * theta[..., 2]
+    ahead = arm.point_2[0] + arm.upper_arm * np.cos(upper) + arm.forearm * np.cos(upper + bend)
+    size = arm.sin_12 * arm.upper_arm * arm.forearm * arm.sin_45 * arm.sin_56
+    return np.abs(size * ahead * np.sin(bend) * np.sin(theta[..., 4] + arm.turn_5))
+
+
+@kernel
+def _tally(theta_1, within, values, range_1, share, ways, most_ways, best):
+    """Sum up cells: ``theta_1``, ``within``, ``values`` are (cells, directions, rolls, slots), the rest is filled."""
+    sectors = share.shape[1]
+    width = _TURN / sectors
+    count, reached = np.zeros(sectors, dtype=np.int64), np.zeros(sectors, dtype=np.int64)
+    for cell in range(theta_1.shape[0]):
+        for d in range(theta_1.shape[1]):
+            reached[:] = 0
+            for roll in range(theta_1.shape[2]):
+                count[:] = 0
+                for slot in range(theta_1.shape[3]):
+                    if not within[cell, d, roll, slot]:
+                        continue
+                    first, many = 0, sectors
+                    if range_1[1] - range_1[0] < FREE:
+                        at = theta_1[cell, d, roll, slot]
+                        first = int(np.ceil((range_1[0] - LIMIT_TOLERANCE - at) / width))
+                        last = int(np.floor((range_1[1] + LIMIT_TOLERANCE - at) / width))
+                        many = min(sectors, last - first + 1)
+                    value = values[cell, d, roll, slot]
+                    for i in range(many):
+                        sector = (first + i) % sectors
+                        count[sector] += 1
+                        best[cell, sector] = max(best[cell, sector], value)
+                for sector in range(sectors):
+                    reached[sector] = max(reached[sector], count[sector])
+            for sector in range(sectors):
+                if reached[sector]:
+                    share[cell, sector] += 1.0
+                    ways[cell, sector] += reached[sector]
+                    most_ways[cell, sector] = max(most_ways[cell, sector], reached[sector])
+        for sector in range(sectors):
+            ways[cell, sector] /= max(share[cell, sector], 1.0)
+            share[cell, sector] /= theta_1.shape[1]

@@ -1,0 +1,125 @@
+"""Tool directions: even sets over the sphere and over cones, and the poses that a tool takes along them.
+
+The tool's direction is the z axis of its frame. What the roll about it does depends on the tool: if the wrist centre
+and axis 6 lie on the tool's own axis, rolling turns joint 6 alone, and some roll reaches a direction exactly if it is
+reached without asking joint 6 (*free roll*). Any other tool moves the wrist when it rolls, and rolls are sampled.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from er3a.kinematics.jit import kernel
+from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
+from er3a.robots.robot import Robot
+
+_ON_AXIS = 1e-12
+_RING = np.radians(10)
+
+
+@dataclass(frozen=True)
+class Roll:
+    """How the roll about the tool's direction is treated.
+
+    Attributes
+    ----------
+    free : whether it is left to joint 6
+    angles : rad, the rolls to try; one if it is free
+    reach : m, distance of the wrist centre from the tool point; beside : m, from the tool's axis
+    """
+
+    free: bool
+    angles: tuple[float, ...]
+    reach: float
+    beside: float
+
+    @property
+    def half_step(self) -> float:
+        """Half the angle between two rolls, rad; 0 if the roll is free."""
+        return 0.0 if self.free else np.pi / len(self.angles)
+
+
+def roll_of(robot: Robot, rolls: int) -> Roll:
+    """Whether the robot's roll is free, else ``rolls`` even ones.
+
+    Raises
+    ------
+    NotWristPartitionedError
+    """
+    arm = wrist_partitioned_arm(robot)
+    axis_6 = arm.tool_rotation.T @ arm.axes[5]
+    reach, beside = float(np.linalg.norm(arm.wrist_in_tool)), float(np.hypot(*arm.wrist_in_tool[:2]))
+    free = max(beside, float(np.hypot(*axis_6[:2]))) < _ON_AXIS
+    angles = (0.0,) if free else tuple((2 * np.pi * np.arange(rolls) / rolls).tolist())
+    return Roll(free, angles, reach, beside)
+
+
+def left_to_roll(robot: Robot, roll: Roll) -> Robot:
+    """The robot with a full turn of joint 6 if it is what a free roll is made of."""
+    if not roll.free:
+        return robot
+    lower, upper = robot.lower.copy(), robot.upper.copy()
+    lower[5], upper[5] = -np.pi, np.pi
+    return robot.replace(lower=lower, upper=upper)
+
+
+def cone_directions(axis: np.ndarray, half_angle: float) -> np.ndarray:
+    """Unit vectors (n, 3) of a cone: rings at most 10 deg apart, the outermost (on the cone's edge) first.
+
+    Each ring is its own image under quarter turns.
+
+    Parameters
+    ----------
+    axis : (3,), unit vector; half_angle : rad, up to pi
+    """
+    rings = int(np.ceil(half_angle / _RING - 1e-9))
+    angles = [half_angle * ring / rings for ring in range(rings, 0, -1)]
+    counts = [4 * max(2, int(np.ceil(np.pi / 2 * np.sin(min(angle, np.pi / 2)) / _RING))) for angle in angles]
+    polar = np.repeat([*angles, 0.0], [*counts, 1])
+    around = np.concatenate([*(2 * np.pi * np.arange(count) / count for count in counts), [0.0]])
+    return from_polar(axis, polar, around)
+
+
+def from_polar(axis: np.ndarray, polar: np.ndarray, around: np.ndarray) -> np.ndarray:
+    """Unit vectors (n, 3) at angles (n,) in rad from an axis and around it."""
+    x, y = across(axis[None])
+    flat = np.cos(around)[:, None] * x + np.sin(around)[:, None] * y
+    return np.sin(polar)[:, None] * flat + np.cos(polar)[:, None] * axis
+
+
+def across(directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors x, y (n, 3) that make a right-handed frame with each direction (n, 3) as z."""
+    helper = np.eye(3)[np.argmin(np.abs(directions), axis=1)]
+    x = np.cross(helper, directions)
+    x = x / np.linalg.norm(x, axis=1, keepdims=True)
+    return x, np.cross(directions, x)
+
+
+def tool_rotations(directions: np.ndarray, roll: Roll) -> np.ndarray:
+    """Orientations (n, rolls, 3, 3) of the tool frame with z along each direction (n, 3)."""
+    x, y = across(directions)
+    c, s = np.cos(roll.angles)[:, None], np.sin(roll.angles)[:, None]
+    rolled_x, rolled_y = c * x[:, None] + s * y[:, None], c * y[:, None] - s * x[:, None]
+    z = np.broadcast_to(directions[:, None], rolled_x.shape)
+    return np.stack([rolled_x, rolled_y, z], axis=-1)
+
+
+def poses(points: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+    """Poses (..., 4, 4) from points (..., 3) in m and rotations (..., 3, 3), broadcast against each other."""
+    shape = np.broadcast_shapes(points.shape[:-1], rotations.shape[:-2])
+    T = np.zeros((*shape, 4, 4))
+    T[..., :3, :3], T[..., :3, 3], T[..., 3, 3] = rotations, points, 1.0
+    return T
+
+
+@kernel
+def point_tool(T, frame, polar, around, c_roll, s_roll):
+    """Turn a pose (4, 4): its z axis at angles (rad) from and around z of a frame (columns x, y, z), rolled."""
+    cp, sp, ca, sa = np.cos(polar), np.sin(polar), np.cos(around), np.sin(around)
+    for i in range(3):
+        flat = frame[i, 0] * ca + frame[i, 1] * sa
+        X, Y = flat * cp - frame[i, 2] * sp, frame[i, 1] * ca - frame[i, 0] * sa
+        T[i, 0], T[i, 1] = X * c_roll + Y * s_roll, Y * c_roll - X * s_roll
+        T[i, 2] = flat * sp + frame[i, 2] * cp

@@ -1,0 +1,265 @@
+"""The closed-form inverse over a neighbourhood of poses: is a branch good for all of them, or for none?
+
+A neighbourhood is a pose whose tool point may move by ``rho`` and whose orientation may turn by ``delta`` (about any
+axis). The wrist centre then stays in a ball, from which the ranges of joints 1 to 3 follow one after the other, as in
+the inverse itself; axis 4 turns by no more than joints 1 to 3 turn it, which gives the range of the angle between axes
+4 and 6 and so of joint 5. Joints 4 and 6 turn by no more than a vector seen along the other axis does. All ranges are
+outer ones (interval arithmetic [1]_ with the geometry's own monotone functions), so both answers are proofs.
+
+References
+----------
+.. [1] R. Moore, R. B. Kearfott, M. Cloud, *Introduction to Interval Analysis*, SIAM 2009.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from er3a.kinematics.jit import kernel
+from er3a.robots.robot import Robot
+
+SLOTS = 8
+GOOD, OPEN, NEVER = 1, 0, -1
+PAD = 1e-9
+"""Added to every range (m and rad), far above the rounding of a length or an angle here."""
+FREE = 2 * np.pi - 1e-12
+_TURN = 2 * np.pi
+
+
+def theta_ranges(robot: Robot) -> np.ndarray:
+    """Ranges (6, 2) in rad of the table's angles theta; a full turn or more is ``-inf`` to ``inf``."""
+    ends = robot.direction[:, None] * np.stack([robot.lower, robot.upper], axis=1) + robot.offset[:, None]
+    ends.sort(axis=1)
+    ends[ends[:, 1] - ends[:, 0] >= FREE] = [-np.inf, np.inf]
+    return ends
+
+
+@kernel
+def holds(ranges, joint, low, high):
+    """Whether all angles from ``low`` to ``high`` are within the joint's range, by one same turn."""
+    least, most = ranges[joint, 0], ranges[joint, 1]
+    if most == np.inf:
+        return True
+    shift = np.ceil((least - low) / _TURN) * _TURN
+    return low + shift >= least and high + shift <= most
+
+
+@kernel
+def misses(ranges, joint, low, high):
+    """Whether no angle from ``low`` to ``high`` is within the joint's range, by any turn."""
+    least, most = ranges[joint, 0], ranges[joint, 1]
+    if most == np.inf or high - low >= _TURN:
+        return False
+    shift = np.ceil((least - low) / _TURN) * _TURN
+    return low + shift > most and high + shift - _TURN < least
+
+
+@kernel
+def _to_frame_1(arm, T, v):
+    x = T[0, 0] * v[0] + T[0, 1] * v[1] + T[0, 2] * v[2]
+    y = T[1, 0] * v[0] + T[1, 1] * v[1] + T[1, 2] * v[2]
+    z = T[2, 0] * v[0] + T[2, 1] * v[1] + T[2, 2] * v[2]
+    return _rows(arm.to_frame_1, x, y, z)
+
+
+@kernel
+def _rows(rows, x, y, z):
+    a, b, c = rows
+    return (
+        a[0] * x + a[1] * y + a[2] * z,
+        b[0] * x + b[1] * y + b[2] * z,
+        c[0] * x + c[1] * y + c[2] * z,
+    )
+
+
+@kernel
+def _opposite(a, b, opposite):
+    """Angle of a triangle between the sides a and b; 0 or pi where there is no triangle."""
+    s = 0.5 * (a + b + opposite)
+    return 2.0 * np.arctan2(np.sqrt(max((s - a) * (s - b), 0.0)), np.sqrt(max(s * (s - opposite), 0.0)))
+
+
+@kernel
+def _angle_range(link, other, low, high):
+    """Range of the angle between ``link`` and the line from axis 2 to the wrist centre, whose length is in a range."""
+    first, last = _opposite(low, link, other), _opposite(high, link, other)
+    least, most = min(first, last), max(first, last)
+    turning = link * link - other * other
+    if turning > 0.0 and low * low < turning < high * high:
+        most = max(most, np.arcsin(other / link))
+    return least, most
+
+
+@kernel
+def _swing(move, radius):
+    """By how much a vector of length ``radius`` can turn when its tip moves by ``move``."""
+    return np.arcsin(move / radius) if move < radius else np.pi
+
+
+@kernel
+def _tilt_to_phi_5(arm, tilt):
+    """Angle of joint 5, 0 to pi, for the angle between axes 4 and 6 (spherical triangle)."""
+    b, c = np.arctan2(arm.sin_45, arm.cos_45), np.arctan2(arm.sin_56, arm.cos_56)
+    upper = np.sin(0.5 * (tilt - b + c)) * np.sin(0.5 * (tilt + b - c))
+    lower = np.sin(0.5 * (b + c - tilt)) * np.sin(0.5 * (b + c + tilt))
+    return 2.0 * np.arctan2(np.sqrt(max(upper, 0.0)), np.sqrt(max(lower, 0.0)))
+
+
+@kernel
+def branches(arm, ranges, T, rho, delta, lever, state, theta_1):
+    """Judge the eight branches over a neighbourhood.
+
+    Parameters
+    ----------
+    arm : ``BlockConstants``; ranges : see :func:`theta_ranges`
+    T : (4, 4), the pose in the middle, base frame
+    rho, delta : how far (m, rad) the tool point may move and the tool may turn
+    lever : m, distance of the wrist centre from the tool point, across the axis of the turn if that is known
+    state : (8,) int8, set to GOOD (all poses have it, joints 2 to 6 within limits), NEVER (none has), or OPEN
+    theta_1 : (8, 2), rad, set to the range of joint 1
+    """
+    vx, vy, vz = _to_frame_1(arm, T, arm.wrist_in_tool)
+    px, py, pz = _rows(arm.to_frame_1, T[0, 3] - arm.origin[0], T[1, 3] - arm.origin[1], T[2, 3] - arm.origin[2])
+    vx, vy, vz = vx + px, vy + py, vz + pz
+    move = rho + 2.0 * lever * np.sin(0.5 * min(delta, np.pi)) + PAD
+    state[:], theta_1[:, 0], theta_1[:, 1] = NEVER, 0.0, 0.0
+
+    # Joint 1: the wrist centre at the distance r from axis 1 stands k beside the arm's plane.
+    r = np.sqrt(vx * vx + vy * vy)
+    r_low, r_high = max(r - move, 0.0), r + move
+    k = (arm.sideways - arm.cos_12 * vz) / arm.sin_12
+    k_move = abs(arm.cos_12) / arm.sin_12 * move
+    k_low, k_high = k - k_move, k + k_move
+    k_most = max(abs(k_low), abs(k_high))
+    k_least = 0.0 if k_low < 0.0 < k_high else min(abs(k_low), abs(k_high))
+    if r_high < k_least:
+        return
+    beside = r_low >= k_most
+    ahead = np.sqrt(max(r * r - k * k, 0.0))
+    ahead_low = np.sqrt(max(r_low * r_low - k_most * k_most, 0.0))
+    ahead_high = np.sqrt(max(r_high * r_high - k_least * k_least, 0.0))
+    beta, beta_low, beta_high = np.arctan2(k, ahead), -0.5 * np.pi, 0.5 * np.pi
+    if k_most == 0.0:
+        beta_low, beta_high = 0.0, 0.0
+    elif r_low > k_most:
+        beta_low = np.arcsin(k_low / (r_low if k_low < 0.0 else r_high))
+        beta_high = np.arcsin(k_high / (r_low if k_high > 0.0 else r_high))
+    azimuth, azimuth_move = np.arctan2(vy, vx), _swing(move, r) + PAD
+    turn_1 = azimuth_move + max(beta_high - beta, beta - beta_low)
+
+    y, y_move = arm.cos_12 * k - arm.sin_12 * vz - arm.point_2[1], move / arm.sin_12
+    plane_move = np.hypot(max(ahead_high - ahead, ahead - ahead_low), y_move)
+    if arm.cos_12 == 0.0 and (k_most == 0.0 or ahead_low > 0.0):
+        plane_move = min(plane_move, move if k_most == 0.0 else move * r_low / ahead_low)
+
+    zx, zy, zz = _to_frame_1(arm, T, arm.axis_6_in_tool)
+    polar_6 = np.arctan2(np.hypot(zx, zy), zz)
+    bx, by, bz = _to_frame_1(arm, T, arm.beside_6_in_tool)
+    longest, shortest = arm.upper_arm + arm.forearm, abs(arm.upper_arm - arm.forearm)
+    orthogonal = arm.cos_45 == 0.0 and arm.cos_56 == 0.0
+    angle_45, angle_56 = np.arctan2(arm.sin_45, arm.cos_45), np.arctan2(arm.sin_56, arm.cos_56)
+    tilt_least, tilt_most = abs(angle_45 - angle_56), min(angle_45 + angle_56, _TURN - angle_45 - angle_56)
+
+    for side in range(2):
+        front = 1.0 - 2.0 * side
+        middle_1 = azimuth - beta if side == 0 else azimuth + np.pi + beta
+        low_1 = -beta_high if side == 0 else np.pi + beta_low
+        high_1 = -beta_low if side == 0 else np.pi + beta_high
+        low_1, high_1 = azimuth + low_1 - azimuth_move, azimuth + high_1 + azimuth_move
+
+        # The triangle of upper arm and forearm.
+        x = front * ahead - arm.point_2[0]
+        x_least = (ahead_low if side == 0 else -ahead_high) - arm.point_2[0]
+        x_most = (ahead_high if side == 0 else -ahead_low) - arm.point_2[0]
+        x_near = 0.0 if x_least < 0.0 < x_most else min(abs(x_least), abs(x_most))
+        far = np.hypot(x, y)
+        far_low = max(np.hypot(x_near, max(abs(y) - y_move, 0.0)), far - plane_move) - PAD
+        far_high = min(np.hypot(max(abs(x_least), abs(x_most)), abs(y) + y_move), far + plane_move) + PAD
+        if far_low > longest or far_high < shortest:
+            continue
+        elbow = beside and far_low >= shortest and far_high <= longest
+        far_low, far_high = max(far_low, shortest, 1e-12), min(far_high, longest)
+        known = min(max(far, far_low), far_high)
+        up, swing = np.arctan2(y, x), _swing(plane_move, far) + PAD
+        bend_low = np.pi - _opposite(arm.upper_arm, arm.forearm, far_high)
+        bend_high = np.pi - _opposite(arm.upper_arm, arm.forearm, far_low)
+        alpha_low, alpha_high = _angle_range(arm.upper_arm, arm.forearm, far_low, far_high)
+        gamma_low, gamma_high = _angle_range(arm.forearm, arm.upper_arm, far_low, far_high)
+        gamma = _opposite(known, arm.forearm, arm.upper_arm)
+        turn_2 = swing + max(gamma_high - gamma, gamma - gamma_low) + PAD
+        cos_1, sin_1 = np.cos(middle_1), np.sin(middle_1)
+
+        for root in range(2):
+            sign = 1.0 - 2.0 * root
+            low_2 = up - swing - (alpha_high if root == 0 else -alpha_low) - arm.turn_2 - PAD
+            high_2 = up + swing - (alpha_low if root == 0 else -alpha_high) - arm.turn_2 + PAD
+            low_3, high_3 = (bend_low, bend_high) if root == 0 else (-bend_high, -bend_low)
+            low_3, high_3 = low_3 - arm.turn_3 - PAD, high_3 - arm.turn_3 + PAD
+            if arm.elbow_sign < 0.0:
+                low_3, high_3 = -high_3, -low_3
+            if misses(ranges, 1, low_2, high_2) or misses(ranges, 2, low_3, high_3):
+                continue
+            sound = elbow and holds(ranges, 1, low_2, high_2) and holds(ranges, 2, low_3, high_3)
+
+            # Axis 6 as the forearm sees it, and the forearm's own angle to axis 1.
+            angle = up + sign * gamma
+            c, s = np.cos(angle), np.sin(angle)
+            c, s = c * arm.cos_forearm - s * arm.sin_forearm, s * arm.cos_forearm + c * arm.sin_forearm
+            fx, fy, fz = _seen(arm, zx, zy, zz, cos_1, sin_1, c, s)
+            height_4 = arm.cos_lean * -arm.sin_12 * s + arm.sin_lean * arm.cos_12
+            polar_4 = np.arccos(min(1.0, max(-1.0, height_4)))
+            about = turn_2 + delta + 2.0 * PAD
+            turned = turn_1 + about
+            flat = np.hypot(fx, fy)
+            tilt = np.arctan2(flat, fz)
+            tilt_low = max(0.0, tilt - turned, abs(polar_4 - polar_6) - about - 1e-7)
+            tilt_high = min(np.pi, tilt + turned, min(polar_4 + polar_6, _TURN - polar_4 - polar_6) + about + 1e-7)
+            if tilt_low > tilt_most + PAD or tilt_high < tilt_least - PAD:
+                continue
+            if not orthogonal:
+                sound = sound and tilt_low >= tilt_least + PAD and tilt_high <= tilt_most - PAD
+            phi_low = _tilt_to_phi_5(arm, max(tilt_low, tilt_least)) - PAD
+            phi_high = _tilt_to_phi_5(arm, min(tilt_high, tilt_most)) + PAD
+            swing_46 = _swing(np.sin(turned), np.sin(tilt)) + PAD if turned < min(tilt, np.pi - tilt) else np.pi
+            gx, gy = _beside(arm, bx, by, bz, zx, zy, zz, cos_1, sin_1, c, s)
+
+            for flip in range(2):
+                low_5 = (phi_low if flip == 0 else -phi_high) - arm.turn_5
+                high_5 = (phi_high if flip == 0 else -phi_low) - arm.turn_5
+                if misses(ranges, 4, low_5, high_5):
+                    continue
+                whole = sound and holds(ranges, 4, low_5, high_5)
+                if ranges[3, 1] < np.inf or ranges[5, 1] < np.inf:
+                    way = 2.0 * flip - 1.0
+                    theta_4 = np.arctan2(way * fy, way * fx) - arm.turn_4
+                    theta_6 = np.arctan2(way * gy, -way * gx)
+                    if orthogonal:
+                        if misses(ranges, 3, theta_4 - swing_46, theta_4 + swing_46):
+                            continue
+                        if misses(ranges, 5, theta_6 - swing_46, theta_6 + swing_46):
+                            continue
+                        whole = whole and holds(ranges, 3, theta_4 - swing_46, theta_4 + swing_46)
+                        whole = whole and holds(ranges, 5, theta_6 - swing_46, theta_6 + swing_46)
+                    else:
+                        whole = False
+                slot = 4 * side + 2 * root + flip
+                state[slot] = GOOD if whole else OPEN
+                theta_1[slot, 0], theta_1[slot, 1] = low_1, high_1
+
+
+@kernel
+def _seen(arm, x, y, z, cos_1, sin_1, c, s):
+    """A vector of frame 1 as the wrist sees it: turned back by the first three joints, z along axis 4."""
+    x, y = x * cos_1 + y * sin_1, y * cos_1 - x * sin_1
+    y, z = arm.cos_12 * y - arm.sin_12 * z, arm.sin_12 * y + arm.cos_12 * z
+    x, y = x * c + y * s, y * c - x * s
+    return arm.sin_lean * x - arm.cos_lean * z, y, arm.cos_lean * x + arm.sin_lean * z
+
+
+@kernel
+def _beside(arm, bx, by, bz, zx, zy, zz, cos_1, sin_1, c, s):
+    """Axis 4 as the tool sees it: its parts along the vector beside axis 6, and along axis 6 times that vector."""
+    _, _, along = _seen(arm, bx, by, bz, cos_1, sin_1, c, s)
+    wx, wy, wz = zy * bz - zz * by, zz * bx - zx * bz, zx * by - zy * bx
+    _, _, across = _seen(arm, wx, wy, wz, cos_1, sin_1, c, s)
+    return along, across

@@ -1,0 +1,218 @@
+"""Where a box can stand so that the tool reaches every point of it along every required direction.
+
+A lattice of points is asked for all directions of a cone, branch by branch. A box fits where all lattice points in it
+are good, which sliding minima tell for all places at once. The lattice only proposes; :mod:`placement_proof` decides.
+
+Criterion: places where one branch serves the whole box come first, then those with the largest least manipulability
+over the box and the cone, which keeps away from singularities; equals by the room to the joint limits. Distance from
+limits is a demand of its own: the task narrows them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from er3a.kinematics.batch import inverse_batch
+from er3a.kinematics.wrist_partitioned import constants_for_blocks
+from er3a.robots.robot import Robot
+from er3a.workspace.capability import manipulability
+from er3a.workspace.directions import Roll, cone_directions, left_to_roll, poses, tool_rotations
+from er3a.workspace.interval_inverse import FREE, SLOTS
+from er3a.workspace.section_arm import section_arm, section_frame
+
+NO = -1.0
+MIXED = -1
+"""The branch of a box that no single branch serves."""
+_POSES = 50_000
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What is asked, in the frame that the robot's base is placed in.
+
+    Attributes
+    ----------
+    box : (3,), m, edges along x, y, z
+    axis : (3,), unit vector, middle of the tool's directions; half_angle : rad, how far around it they reach
+    lowest : m, least height of the box's underside; clear : m, least distance of its points from axis 1
+    margin : rad, how far joints with less than a full turn keep within their limits
+    """
+
+    box: np.ndarray
+    axis: np.ndarray
+    half_angle: float
+    lowest: float
+    clear: float
+    margin: float = 0.0
+
+
+def narrowed(robot: Robot, margin: float) -> Robot:
+    """The robot with the limits of joints that have less than a full turn drawn in by ``margin`` (rad)."""
+    span = robot.upper - robot.lower
+    inward = np.where(span < FREE, np.minimum(margin, span / 2), 0.0)
+    return robot.replace(lower=robot.lower + inward, upper=robot.upper - inward)
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """Lattice points and how well each serves the task.
+
+    Attributes
+    ----------
+    origin : (3,), m; spacing : (3,), m; shape of the arrays : (nx, ny, nz)
+    least : (nx, ny, nz, 8), m^3, least manipulability over the directions by branch, NO where it misses one
+    least_any : (nx, ny, nz), the same by the best branch for each direction
+    room : (nx, ny, nz, 8), rad, least distance of joints with less than a full turn from their limits, by branch
+    """
+
+    origin: np.ndarray
+    spacing: np.ndarray
+    least: np.ndarray
+    least_any: np.ndarray
+    room: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Boxes whose lattice points are all good, one row each, the best first.
+
+    Attributes
+    ----------
+    centre : (n, 3), m; turned : (n,), whether the box stands turned by 90 deg about z
+    slot : (n,), the branch that serves it all, or MIXED
+    least : (n,), m^3, the criterion; room : (n,), rad (NaN with MIXED)
+    proven : (n,), whether all bricks of the lattice in it are proven, by any mix of branches
+    """
+
+    centre: np.ndarray
+    turned: np.ndarray
+    slot: np.ndarray
+    least: np.ndarray
+    room: np.ndarray
+    proven: np.ndarray
+
+
+def lattice_spacing(box: np.ndarray, coarsest: float) -> np.ndarray:
+    """Spacing (3,) in m that divides the box's height and its shorter side evenly, about as fine as asked."""
+    sides = np.array([min(box[:2]), min(box[:2]), box[2]])
+    return np.maximum(sides / np.maximum(1, np.round(sides / coarsest)), coarsest / 2)
+
+
+def survey(robot: Robot, task: Task, roll: Roll, coarsest: float) -> Field:
+    """Ask a lattice over the arm's reach.
+
+    Parameters
+    ----------
+    robot : with the limits that hold, see :func:`narrowed`
+    coarsest : m, about the spacing
+
+    Raises
+    ------
+    NotWristPartitionedError
+    """
+    arm, (R, origin) = section_arm(robot), section_frame(robot)
+    middle = origin + arm.centre[2] * R[2]
+    spacing = lattice_spacing(task.box, coarsest)
+    count = np.ceil(arm.reach / spacing).astype(int)
+    count[2] += 1
+    start = middle - count * spacing
+    # Heights count from the lowest place, so that the lowest box lies on lattice points.
+    start[2] += (task.lowest - start[2]) % spacing[2]
+    shape = tuple(2 * count + 1)
+    points = start + np.stack(np.indices(shape), axis=-1).reshape(-1, 3) * spacing
+    local = (points - origin) @ R.T
+    near = np.hypot(local[:, 0], local[:, 1])
+    asked = np.flatnonzero(
+        (near >= task.clear - 1e-9)
+        & (points[:, 2] >= task.lowest - 1e-9)
+        & (np.linalg.norm(points - middle, axis=1) <= arm.reach)
+    )
+    least, least_any = np.full((len(points), SLOTS), NO), np.full(len(points), NO)
+    room = np.zeros((len(points), SLOTS))
+    rotations = tool_rotations(cone_directions(task.axis, task.half_angle), roll)
+    least[asked], least_any[asked], room[asked] = serve(robot, points[asked], rotations, roll)
+    return Field(start, spacing, least.reshape(*shape, SLOTS), least_any.reshape(shape), room.reshape(*shape, SLOTS))
+
+
+def serve(robot: Robot, points: np.ndarray, rotations: np.ndarray, roll: Roll):
+    """How each branch serves points over all directions.
+
+    Parameters
+    ----------
+    points : (n, 3), m; rotations : (k, rolls, 3, 3), see ``directions.tool_rotations``
+
+    Returns
+    -------
+    least, least_any, room : (n, 8), (n,), (n, 8), as in :class:`Field`
+    """
+    asked, arm = left_to_roll(robot, roll), constants_for_blocks(robot)
+    limited = np.flatnonzero(asked.upper - asked.lower < FREE)
+    least, least_any = np.full((len(points), SLOTS), np.inf), np.full(len(points), np.inf)
+    room = np.full((len(points), SLOTS), np.inf)
+    alive = np.arange(len(points))
+    for direction in rotations:
+        if not alive.size:
+            break
+        for part in np.array_split(alive, max(1, len(alive) * len(direction) // _POSES)):
+            found = inverse_batch(asked, poses(points[part][:, None], direction).reshape(-1, 4, 4))
+            value = manipulability(arm, robot.direction * found.q + robot.offset)
+            value = np.where(found.within_limits, value, NO).reshape(len(part), -1, SLOTS)
+            q = found.q[..., limited]
+            free = np.minimum(q - asked.lower[limited], asked.upper[limited] - q).min(axis=-1, initial=np.inf)
+            rolled = value.argmax(axis=1)[:, None]
+            value = np.take_along_axis(value, rolled, axis=1)[:, 0]
+            free = np.take_along_axis(free.reshape(len(part), -1, SLOTS), rolled, axis=1)[:, 0]
+            least[part] = np.minimum(least[part], value)
+            least_any[part] = np.minimum(least_any[part], value.max(axis=1))
+            room[part] = np.fmin(room[part], free)
+        alive = np.flatnonzero(least_any > NO)
+    return least, least_any, np.where(least > NO, room, 0.0)
+
+
+def fitting_places(field: Field, bricks: np.ndarray, box: np.ndarray) -> Places:
+    """All boxes on the lattice whose points are good; the box is taken up to one spacing larger.
+
+    Parameters
+    ----------
+    bricks : (nx - 1, ny - 1, nz - 1), which bricks of the lattice are proven; box : (3,), m
+    """
+    found = [_places(field, bricks, box, False)]
+    if abs(box[0] - box[1]) > 1e-9:
+        found.append(_places(field, bricks, box[[1, 0, 2]], True))
+    places = Places(*(np.concatenate([getattr(part, key) for part in found]) for key in Places.__annotations__))
+    merit = (-np.round(np.nan_to_num(places.room), 6), -np.round(places.least, 9), places.slot == MIXED)
+    order = np.lexsort((*np.round(places.centre.T, 6), -np.round(places.centre[:, 0], 6), *merit))
+    return Places(*(getattr(places, key)[order] for key in Places.__annotations__))
+
+
+def _places(field: Field, bricks: np.ndarray, box: np.ndarray, turned: bool) -> Places:
+    points = np.maximum(1, np.ceil(box / field.spacing - 1e-6)).astype(int) + 1
+    any_branch = _sliding_least(field.least_any, points)
+    where = np.nonzero(any_branch > NO)
+    used = np.flatnonzero((field.least > NO).any(axis=(0, 1, 2)))
+    by_slot = np.full((len(where[0]), SLOTS), NO)
+    room = np.zeros((len(where[0]), SLOTS))
+    for slot in used:
+        by_slot[:, slot] = _sliding_least(field.least[..., slot], points)[where]
+        room[:, slot] = _sliding_least(field.room[..., slot], points)[where]
+    slot = np.round(by_slot, 9).argmax(axis=1)
+    rows = np.arange(len(slot))
+    one = by_slot[rows, slot] > NO
+    return Places(
+        centre=field.origin + (np.stack(where, axis=1) + (points - 1) / 2) * field.spacing,
+        turned=np.full(len(slot), turned),
+        slot=np.where(one, slot, MIXED),
+        least=np.where(one, by_slot[rows, slot], any_branch[where]),
+        room=np.where(one, room[rows, slot], np.nan),
+        proven=_sliding_least(bricks.astype(float), points - 1)[where] > 0,
+    )
+
+
+def _sliding_least(values: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Least value over ``points`` (3,) lattice points from each one on; NO where the box leaves the lattice."""
+    for axis, size in enumerate(points):
+        values = ndimage.minimum_filter1d(values, int(size), axis, mode="constant", cval=NO, origin=-(int(size) // 2))
+    return values

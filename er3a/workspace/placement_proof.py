@@ -1,0 +1,217 @@
+"""Proof that a box can be served: every point of it, every direction of the cone.
+
+The box times the cone is split into bricks with patches of directions until one branch and roll is good for each whole
+piece (:mod:`interval_inverse`), or the middle of a piece turns out to be out of reach.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from er3a.kinematics.jit import kernel
+from er3a.kinematics.wrist_partitioned import constants_for_blocks
+from er3a.robots.robot import Robot
+from er3a.workspace.directions import Roll, across, left_to_roll, point_tool
+from er3a.workspace.interval_inverse import GOOD, NEVER, SLOTS, branches, holds, misses, theta_ranges
+from er3a.workspace.placement import MIXED, NO, Field, Places, Task
+
+PROVEN, REFUTED, UNDECIDED = "proven", "refuted", "undecided"
+_ANSWERS = (UNDECIDED, PROVEN, REFUTED)
+_STACK = 512
+_MOST_TRIES = 200
+_POSES_PER_BRICK = 512
+_SMALLEST = (0.2, 0.05, 0.0125, 0.003, 0.0)  # half-widths, rad or length per lever, of pieces to split
+
+
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """The best places that don't overlap.
+
+    Attributes
+    ----------
+    row : their rows of the places; slot : the branch that serves each, or MIXED
+    proven : whether each is proven, or else rests on samples; branch_proven : whether that one branch serves it all is
+    refuted : how many better-ranked places the proof refused; poses : how many neighbourhoods it looked at
+    """
+
+    row: list[int]
+    slot: list[int]
+    proven: list[bool]
+    branch_proven: list[bool]
+    refuted: int
+    poses: int
+
+
+def choose_places(robot: Robot, task: Task, places: Places, roll: Roll, count: int, most_poses: int) -> Chosen:
+    """Take up to ``count`` places in their order, none overlapping one before it, each put to the proof.
+
+    A place whose one branch is refuted is tried with any mix of branches.
+
+    Raises
+    ------
+    NotWristPartitionedError
+    """
+    rows, slots, proven, branch_proven, refuted, used = [], [], [], [], 0, 0
+    sizes = np.where(places.turned[:, None], task.box[[1, 0, 2]], task.box)
+    free = np.ones(len(places.slot), dtype=bool)
+    while len(rows) < count and refuted < _MOST_TRIES and free.any():
+        row = int(np.argmax(free))
+        share = (most_poses - used) // (count - len(rows))
+        slot = int(places.slot[row])
+        answer, spent = prove_place(robot, task, places.centre[row], places.turned[row], slot, roll, share)
+        used += spent
+        if answer == REFUTED and slot != MIXED:
+            slot = MIXED
+            answer, spent = prove_place(robot, task, places.centre[row], places.turned[row], slot, roll, share)
+            used += spent
+        if answer == REFUTED:
+            free[row], refuted = False, refuted + 1
+            continue
+        rows.append(row)
+        slots.append(slot)
+        proven.append(answer == PROVEN or bool(places.proven[row]))
+        branch_proven.append(answer == PROVEN and slot != MIXED)
+        apart = np.abs(places.centre - places.centre[row]) >= (sizes + sizes[row]) / 2 - 1e-9
+        free &= apart.any(axis=1)
+    return Chosen(rows, slots, proven, branch_proven, refuted, used)
+
+
+def prove_place(
+    robot: Robot, task: Task, centre: np.ndarray, turned: bool, slot: int, roll: Roll, most_poses: int
+) -> tuple[str, int]:
+    """Decide one place.
+
+    Parameters
+    ----------
+    centre : (3,), m, of the box; turned : whether it stands turned by 90 deg about z
+    slot : the branch that must serve it all, or MIXED for any
+    most_poses : how many neighbourhoods of poses to look at
+
+    Returns
+    -------
+    answer : PROVEN; REFUTED (a point and direction that no branch reaches, with any of the rolls); or UNDECIDED
+    used : how many neighbourhoods were looked at
+
+    Raises
+    ------
+    NotWristPartitionedError
+    """
+    half = (task.box[[1, 0, 2]] if turned else task.box) / 2
+    constants, centre = _constants(robot, task, roll), np.asarray(centre, float)
+    answer = used = 0
+    # Coarse pieces first, everywhere: what refutes a place is found before effort goes into its rims.
+    for smallest in _SMALLEST:
+        answer, spent = _prove(*constants, centre, half, slot, most_poses - used, smallest)
+        used += int(spent)
+        if answer or used >= most_poses:
+            break
+    return _ANSWERS[answer], used
+
+
+def proven_bricks(robot: Robot, task: Task, field: Field, roll: Roll) -> np.ndarray:
+    """Which bricks between eight lattice points are served at every point, by any mix of branches: (nx-1, ny-1, nz-1).
+
+    Raises
+    ------
+    NotWristPartitionedError
+    """
+    serving = field.least_any > NO
+    for axis in range(3):
+        serving = np.minimum(np.delete(serving, -1, axis), np.delete(serving, 0, axis))
+    bricks = np.argwhere(serving)
+    good = np.zeros(len(bricks), dtype=bool)
+    centres = field.origin + (bricks + 0.5) * field.spacing
+    _prove_all(*_constants(robot, task, roll), centres, field.spacing / 2, MIXED, _POSES_PER_BRICK, good)
+    proven = np.zeros(serving.shape, dtype=bool)
+    proven[tuple(bricks.T)] = good
+    return proven
+
+
+def _constants(robot: Robot, task: Task, roll: Roll):
+    """What the kernels take of an arm and a task."""
+    asked = left_to_roll(robot, roll)
+    arm, ranges = constants_for_blocks(asked), theta_ranges(asked)
+    x, y = across(task.axis[None])
+    frame = np.stack([x[0], y[0], task.axis], axis=1)
+    scale = 2.0 / float(arm.upper_arm + arm.forearm)
+    return arm, ranges, frame, task.half_angle, np.array(roll.angles), roll.reach, scale
+
+
+@kernel
+def _prove_all(arm, ranges, frame, half_angle, angles, reach, scale, centres, half, slot, most_poses, good):
+    for n in range(centres.shape[0]):
+        numbers = (centres[n], half, slot, most_poses, 0.0)
+        good[n] = _prove(arm, ranges, frame, half_angle, angles, reach, scale, *numbers)[0] == 1
+
+
+@kernel
+def _prove(arm, ranges, frame, half_angle, angles, reach, scale, centre, half, slot, most_poses, smallest):
+    T, state, theta_1 = np.eye(4), np.empty(SLOTS, dtype=np.int8), np.empty((SLOTS, 2))
+    stack, size = np.empty((_STACK, 10)), np.empty(5)
+    for k in range(3):
+        stack[0, 2 * k], stack[0, 2 * k + 1] = centre[k] - half[k], centre[k] + half[k]
+    stack[0, 6], stack[0, 7], stack[0, 8], stack[0, 9] = 0.0, half_angle, 0.0, 2.0 * np.pi
+    top, used, answer = 1, 0, 1
+    while top > 0:
+        top -= 1
+        piece = stack[top]
+        p_0, p_1 = piece[6], piece[7]
+        wide = 1.0 if p_0 < 0.5 * np.pi < p_1 else max(np.sin(p_0), np.sin(p_1))
+        square = 0.0
+        for k in range(3):
+            size[k] = 0.5 * (piece[2 * k + 1] - piece[2 * k])
+            square += size[k] * size[k]
+            size[k] *= scale
+            T[k, 3] = 0.5 * (piece[2 * k + 1] + piece[2 * k])
+        size[3], size[4] = 0.5 * (p_1 - p_0), 0.5 * (piece[9] - piece[8]) * wide
+        rho, delta = np.sqrt(square), np.hypot(size[3], size[4])
+        good, lost = False, True
+        for j in range(angles.shape[0]):
+            point_tool(T, frame, 0.5 * (p_0 + p_1), 0.5 * (piece[8] + piece[9]), np.cos(angles[j]), np.sin(angles[j]))
+            used += 2
+            branches(arm, ranges, T, rho, delta, reach, state, theta_1)
+            if _some(ranges, state, theta_1, slot):
+                good = True
+                break
+            branches(arm, ranges, T, 0.0, 0.0, reach, state, theta_1)
+            lost = lost and _none(ranges, state, theta_1, slot)
+        if good:
+            continue
+        if lost:
+            return 2, used
+        if used >= most_poses or top + 2 > _STACK:
+            return 0, used
+        widest = 0
+        for k in range(5):
+            if size[k] > size[widest]:
+                widest = k
+        if size[widest] < smallest:
+            answer = 0
+            continue
+        middle = 0.5 * (piece[2 * widest] + piece[2 * widest + 1])
+        for k in range(10):
+            stack[top + 1, k] = piece[k]
+        stack[top + 1, 2 * widest] = middle
+        stack[top, 2 * widest + 1] = middle
+        top += 2
+    return answer, used
+
+
+@kernel
+def _some(ranges, state, theta_1, slot):
+    """Whether some branch, or the one asked for, is good with joint 1 too."""
+    for k in range(SLOTS):
+        if (slot == MIXED or k == slot) and state[k] == GOOD and holds(ranges, 0, theta_1[k, 0], theta_1[k, 1]):
+            return True
+    return False
+
+
+@kernel
+def _none(ranges, state, theta_1, slot):
+    """Whether no branch, or not the one asked for, is possible."""
+    for k in range(SLOTS):
+        if (slot == MIXED or k == slot) and state[k] != NEVER and not misses(ranges, 0, theta_1[k, 0], theta_1[k, 1]):
+            return False
+    return True

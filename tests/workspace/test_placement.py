@@ -1,0 +1,179 @@
+"""Where a box can stand, against brute force, closed forms and random poses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from er3a.kinematics.batch import inverse_batch
+from er3a.kinematics.forward import jacobian
+from er3a.kinematics.inverse import inverse
+from er3a.robots.load import load_robot
+from er3a.robots.robot import Robot
+from er3a.workspace.directions import cone_directions, from_polar, poses, roll_of, tool_rotations
+from er3a.workspace.placement import MIXED, NO, Places, Task, fitting_places, lattice_spacing, narrowed, survey
+from er3a.workspace.placement_proof import PROVEN, REFUTED, choose_places, prove_place, proven_bricks
+from tests.kinematics.arms import placement
+from tests.workspace.shell_arm import NARROW, TOOL_ASIDE, shell_arm
+
+DOWN = np.array([0.0, 0.0, -1.0])
+TRAY = Task(np.array([0.2, 0.15, 0.05]), DOWN, np.radians(20), 0.0, 0.15, np.radians(2))
+
+
+def places_of(robot: Robot, task: Task, coarsest: float = 0.06) -> Places:
+    roll, robot = roll_of(robot, 2), narrowed(robot, task.margin)
+    field = survey(robot, task, roll, coarsest)
+    return fitting_places(field, proven_bricks(robot, task, field, roll), task.box)
+
+
+def lattice_in(centre: np.ndarray, size: np.ndarray, spacing: np.ndarray) -> np.ndarray:
+    axes = [
+        c + np.linspace(-s / 2, s / 2, max(2, int(np.ceil(s / h - 1e-6)) + 1)) for c, s, h in zip(centre, size, spacing)
+    ]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def random_service(task: Task, centre: np.ndarray, size: np.ndarray, roll, random, count: int) -> np.ndarray:
+    """Poses at random points of the box along random directions of the cone: (count, rolls, 4, 4)."""
+    points = centre + (random.random((count, 3)) - 0.5) * size
+    polar = np.arccos(1 - random.random(count) * (1 - np.cos(task.half_angle)))
+    rotations = tool_rotations(from_polar(task.axis, polar, random.random(count) * 2 * np.pi), roll)
+    return poses(points[:, None], rotations)
+
+
+def test_places_agree_with_brute_force_one_pose_at_a_time():
+    robot = load_robot("er3_600")
+    task = Task(np.array([0.2, 0.1, 0.1]), DOWN, 0.0, 0.2, 0.15)
+    field = survey(robot, task, roll_of(robot, 1), 0.1)
+    assert field.spacing == pytest.approx([0.1, 0.1, 0.1])
+    (rotation,) = tool_rotations(cone_directions(DOWN, 0.0), roll_of(robot, 1))[:, 0]
+    good = np.zeros(field.least_any.shape, dtype=bool)
+    for index in np.ndindex(good.shape):
+        point = field.origin + index * field.spacing
+        if point[2] < 0.2 - 1e-9 or np.hypot(*point[:2]) < 0.15 or np.hypot(*point[:2]) > 0.5 or point[2] > 0.8:
+            good[index] = field.least_any[index] > NO
+            continue
+        good[index] = inverse(robot, poses(point, rotation)).within_limits.any()
+    assert np.array_equal(good, field.least_any > NO)
+    expected = set()
+    for turned, (a, b, c) in ((False, (3, 2, 2)), (True, (2, 3, 2))):
+        for i, j, k in np.ndindex(good.shape):
+            window = good[i : i + a, j : j + b, k : k + c]
+            if window.shape == (a, b, c) and window.all():
+                middle = field.origin + (np.array([i, j, k]) + (np.array([a, b, c]) - 1) / 2) * field.spacing
+                expected.add((turned, *np.round(middle, 6).tolist()))
+    places = fitting_places(field, np.zeros(np.array(good.shape) - 1, dtype=bool), task.box)
+    found = {(bool(t), *np.round(c, 6).tolist()) for t, c in zip(places.turned, places.centre)}
+    assert len(expected) > 50
+    assert found == expected
+
+
+@pytest.mark.parametrize("name", ["er3a_c60", "er3_600"])
+def test_proven_places_serve_random_points_and_directions(name, random):
+    robot = load_robot(name)
+    places, roll, tight = places_of(robot, TRAY), roll_of(robot, 1), narrowed(robot, TRAY.margin)
+    chosen = choose_places(tight, TRAY, places, roll, 3, 300_000)
+    assert len(chosen.row) == 3
+    assert chosen.branch_proven[0]
+    for row, slot, proven, one in zip(chosen.row, chosen.slot, chosen.proven, chosen.branch_proven):
+        size = TRAY.box[[1, 0, 2]] if places.turned[row] else TRAY.box
+        T = random_service(TRAY, places.centre[row], size, roll, random, 3000)
+        found = inverse_batch(robot.replace(lower=tight.lower, upper=tight.upper), T[:, 0])
+        assert found.within_limits.any(axis=1).all() or not proven
+        assert not one or found.within_limits[:, slot].all()
+    proven = np.flatnonzero(places.proven)
+    assert len(proven) > 0.5 * len(places.slot)
+    for row in random.choice(proven, 20):
+        size = TRAY.box[[1, 0, 2]] if places.turned[row] else TRAY.box
+        T = random_service(TRAY, places.centre[row], size, roll, random, 100)
+        assert inverse_batch(tight, T[:, 0]).within_limits.any(axis=1).all()
+
+
+def test_the_criterion_is_the_least_over_box_and_cone(random):
+    robot = narrowed(load_robot("er3_600"), TRAY.margin)
+    places, roll = places_of(load_robot("er3_600"), TRAY), roll_of(robot, 1)
+    assert places.slot[0] != MIXED
+    assert (np.diff(places.least[places.slot != MIXED]) < 1e-8).all()
+    size = TRAY.box[[1, 0, 2]] if places.turned[0] else TRAY.box
+    spacing = lattice_spacing(TRAY.box, 0.06)
+    points = lattice_in(places.centre[0], np.ceil(size / spacing - 1e-6) * spacing, spacing)
+    T = poses(points[:, None], tool_rotations(cone_directions(DOWN, TRAY.half_angle), roll)[:, 0]).reshape(-1, 4, 4)
+    found = inverse_batch(robot, T)
+    q = found.q[:, places.slot[0]]
+    assert found.within_limits[:, places.slot[0]].all()
+    assert np.abs(np.linalg.det(jacobian(robot, q))).min() == pytest.approx(places.least[0], rel=1e-9)
+    room = np.minimum(q - robot.lower, robot.upper - q)[:, [0, 1, 2, 4]].min()
+    assert room == pytest.approx(places.room[0], abs=1e-9)
+
+
+def test_harder_tasks_are_never_easier():
+    robot = load_robot("er3a_c60")
+    easy = places_of(robot, TRAY)
+
+    def lattice(places: Places) -> dict:
+        return {(bool(t), *np.round(c, 6)): v for t, c, v in zip(places.turned, places.centre, places.least)}
+
+    most = lattice(easy)
+    for harder in (replace(TRAY, half_angle=np.radians(35)), replace(TRAY, margin=np.radians(8))):
+        fewer = lattice(places_of(robot, harder))
+        assert len(fewer) < len(most)
+        if harder.half_angle == TRAY.half_angle:
+            assert set(fewer) <= set(most)
+    larger = replace(TRAY, box=np.array([0.3, 0.15, 0.1]))
+    fields = [survey(robot, task, roll_of(robot, 1), 0.05) for task in (TRAY, larger)]
+    assert fields[0].spacing == pytest.approx(fields[1].spacing)
+    bricks = np.zeros(np.array(fields[0].least_any.shape) - 1, dtype=bool)
+    small, large = (fitting_places(fields[0], bricks, task.box) for task in (TRAY, larger))
+    assert 0 < len(large.slot) < len(small.slot)
+    assert large.least.max() <= small.least.max()
+
+
+def test_a_turned_base_turns_the_places():
+    task = replace(TRAY, half_angle=np.radians(10))
+    robot = load_robot("er3_600")
+    turned = robot.replace(base=placement([0, 0, 0], [0, 0, np.pi / 2]))
+    one, other = places_of(robot, task), places_of(turned, task)
+    assert len(one.slot) == len(other.slot)
+    assert np.sort(one.least) == pytest.approx(np.sort(other.least), rel=1e-6)
+    key = {(bool(t), *(np.round(c, 4) + 0.0)) for t, c in zip(other.turned, other.centre)}
+    expected = {(not t, *(np.round([-c[1], c[0], c[2]], 4) + 0.0)) for t, c in zip(one.turned, one.centre)}
+    assert key == expected
+
+
+@pytest.mark.parametrize(
+    ("height", "answer"), [(0.3 + 0.55, PROVEN), (0.3 + 0.85, REFUTED), (0.3 + 0.30, REFUTED), (0.3 - 0.55, PROVEN)]
+)
+def test_an_arm_without_limits_serves_what_lies_in_its_shell(height, answer):
+    """All directions at every point: the ball of 0.1 m about each must lie between 0.2 and 1.0 m from the shoulder."""
+    robot = shell_arm()
+    task = Task(np.array([0.3, 0.2, 0.1]), np.array([0.0, 0.6, 0.8]), np.pi, -9, 0)
+    centre = np.array([0.05, -0.02, height])
+    assert prove_place(robot, task, centre, False, MIXED, roll_of(robot, 1), 400_000)[0] == answer
+
+
+def test_a_tool_aside_is_proven_by_rolls(random):
+    robot = shell_arm(*NARROW, tool=TOOL_ASIDE)
+    roll = roll_of(robot, 6)
+    assert not roll.free
+    task = Task(np.array([0.08, 0.06, 0.04]), DOWN, np.radians(5), 0.0, 0.15)
+    field = survey(robot, task, roll, 0.1)
+    places = fitting_places(field, proven_bricks(robot, task, field, roll), task.box)
+    chosen = choose_places(robot, task, places, roll, 1, 300_000)
+    assert chosen.proven == [True]
+    row = chosen.row[0]
+    size = task.box[[1, 0, 2]] if places.turned[row] else task.box
+    # What a patch's middle reaches by one roll, its members reach by a roll turned with them: ask many rolls.
+    many = roll_of(robot, 120)
+    T = random_service(task, places.centre[row], size, many, random, 300)
+    within = inverse_batch(robot, T.reshape(-1, 4, 4)).within_limits.reshape(300, 120, 8)
+    assert within.any(axis=(1, 2)).all()
+
+
+def test_a_box_too_large_stands_nowhere():
+    task = replace(TRAY, box=np.array([1.5, 1.5, 0.5]))
+    places = places_of(load_robot("er3_600"), task, 0.2)
+    assert len(places.slot) == 0
+    robot = load_robot("er3_600")
+    assert choose_places(robot, task, places, roll_of(robot, 1), 5, 1000).row == []
