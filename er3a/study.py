@@ -48,7 +48,8 @@ class ValidationSettings(StrictModel):
 class WorkspaceSettings(StrictModel):
     """Monte Carlo budget and grid.
 
-    ``samples`` are drawn in ``blocks`` seeded blocks, ``cells_across`` cells span the bounding box's longest side,
+    ``samples`` are drawn in ``blocks`` seeded blocks, uniform in the joints or (``sampling: sobol``) more evenly than
+    chance as points of a Sobol' sequence; ``cells_across`` cells span the bounding box's longest side,
     the hull is taken over the extreme samples in ``hull_directions`` directions, the recording shows ``cloud_points``.
     The proof looks at ``proof_cells`` cells of the section; ``volume_points`` uniform points estimate the volume.
     """
@@ -56,10 +57,11 @@ class WorkspaceSettings(StrictModel):
     samples: Annotated[int, Field(ge=1, le=100_000_000_000)]
     blocks: Annotated[int, Field(ge=1, le=100_000)]
     cells_across: Annotated[int, Field(ge=8, le=1024)]
-    hull_directions: Annotated[int, Field(ge=100, le=100_000)]
+    hull_directions: Annotated[int, Field(ge=1000, le=100_000)]
     cloud_points: Annotated[int, Field(ge=1, le=300_000)]
     proof_cells: Annotated[int, Field(ge=1, le=10_000_000)] = 8000
     volume_points: Annotated[int, Field(ge=100, le=10_000_000)] = 100_000
+    sampling: Literal["uniform", "sobol"] = "uniform"
 
     @model_validator(mode="after")
     def _a_sample_per_block(self):

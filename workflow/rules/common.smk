@@ -28,6 +28,7 @@ TABLES = {
     "workspace": [
         "cells",
         "section",
+        "side_view",
         "curve",
         "cloud",
         "hull_vertices",

@@ -20,7 +20,7 @@ from er3a.stages.workspace.extremes import Extremes
 from er3a.stages.workspace.tally import UNTOUCHED, Tally
 from er3a.study import Study
 
-FORMAT = "er3a workspace part 1"
+FORMAT = "er3a workspace part 2"
 _DAMAGE = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error)
 
 
@@ -52,7 +52,7 @@ def write_part(path: Path, identity: dict[str, Any], tally: Tally) -> None:
                 cells=touched,
                 counts=tally.counts.ravel()[touched],
                 first_block=tally.first_block.ravel()[touched],
-                section=tally.section,
+                side=tally.side,
                 support=tally.extremes.support,
                 extreme_block=tally.extremes.block,
                 extreme_sample=tally.extremes.sample,
@@ -81,7 +81,7 @@ def read_part(path: Path, expected: dict[str, Any]) -> Tally:
         counts.flat[arrays["cells"]] = arrays["counts"]
         first_block.flat[arrays["cells"]] = arrays["first_block"]
         extremes = Extremes(arrays["support"], arrays["extreme_block"], arrays["extreme_sample"])
-        return Tally(arrays["blocks"], counts, first_block, arrays["section"], extremes)
+        return Tally(arrays["blocks"], counts, first_block, arrays["side"], extremes)
     except _DAMAGE as error:
         raise ResultError(path, f"damaged ({type(error).__name__}: {error})") from None
 
