@@ -26,3 +26,26 @@ void forward(size_t n,const double*restrict q,const double*restrict dir,const do
     double*o=out+16*i; for(int j=0;j<12;j++) o[j]=T[j]; o[12]=o[13]=o[14]=0; o[15]=1;
   }
 }
+
+/* The same over blocks of poses, one number of all poses in a row, so that each inner loop becomes vector instructions. */
+enum { B = 64 };
+void forward_blocks(size_t n,const double*restrict q,const double*restrict dir,const double*restrict off,const double*restrict links,double*restrict out){
+  double T[12][B], co[B], si[B];
+  for(size_t start=0;start<n;start+=B){
+    size_t size = n-start<B ? n-start : B;
+    for(int j=0;j<12;j++) for(int i=0;i<B;i++) T[j][i]=links[j];
+    for(int k=0;k<6;k++){
+      for(size_t i=0;i<B;i++) co[i]=dir[k]*q[6*(start+(i<size?i:size-1))+k]+off[k];
+      for(int i=0;i<B;i++){ double c,s; cs(co[i],&c,&s); co[i]=c; si[i]=s; }
+      const double*L=links+16*(k+1);
+      for(int r=0;r<3;r++){
+        double*restrict x=T[4*r],*restrict y=T[4*r+1],*restrict z=T[4*r+2],*restrict w=T[4*r+3];
+        for(int i=0;i<B;i++){
+          double p=x[i]*co[i]+y[i]*si[i], u=y[i]*co[i]-x[i]*si[i], t=z[i];
+          x[i]=p*L[0]+u*L[4]+t*L[8]; y[i]=p*L[1]+u*L[5]+t*L[9]; z[i]=p*L[2]+u*L[6]+t*L[10]; w[i]+=p*L[3]+u*L[7]+t*L[11];
+        }}}
+    for(size_t i=0;i<size;i++){
+      double*o=out+16*(start+i); for(int j=0;j<12;j++) o[j]=T[j][i]; o[12]=o[13]=o[14]=0; o[15]=1;
+    }
+  }
+}

@@ -1,17 +1,20 @@
 """Times beside the peers' in the same run, with accuracy beside each time.
 
-One thread, pinned to one processor, except where the table says two. Times are the least of several runs of wall time.
+One thread, pinned to one processor, except where the table says two. What is compared runs in turn, round by round, so
+that other work on the machine meets all alike; times are the least of all rounds, wall time.
 """
 
 from __future__ import annotations
 
 import ctypes
 import os
+import platform
 import shutil
 import subprocess
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
@@ -22,22 +25,25 @@ from campaign_kinematics import pinocchio_model
 from eaik.IK_DH import DhRobot
 
 from er3a import forward, inverse_batch, jacobian, load_robot, solve
+from er3a.kinematics.batch import BatchSolutions
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.transforms import rotation_angle
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
-POSES, FORWARD_POSES, NUMERICAL_POSES, PEER_POSES, SEED, RUNS = 100_000, 1_000_000, 10_000, 5_000, 20261120, 7
+POSES, FORWARD_POSES, NUMERICAL_POSES, PEER_POSES, SEED, ROUNDS = 100_000, 1_000_000, 10_000, 5_000, 20261120, 7
+THREAD_ROUNDS = 40
 
 
-def least_time(run: Callable[[], object], count: int, runs: int = RUNS) -> float:
-    """Least time of several runs, ns for each of ``count`` items; the first run is not counted."""
-    run()
-    times = []
-    for _ in range(runs):
-        start = time.perf_counter()
-        run()
-        times.append(time.perf_counter() - start)
-    return min(times) / count * 1e9
+def least_times(count: int, *runs: Callable[[], object], rounds: int = ROUNDS) -> list[float]:
+    """Least time of each run over several rounds, ns for each of ``count`` items; a first round is not counted."""
+    least = [np.inf] * len(runs)
+    for number in range(rounds + 1):
+        for k, run in enumerate(runs):
+            start = time.perf_counter()
+            run()
+            if number:
+                least[k] = min(least[k], time.perf_counter() - start)
+    return [value / count * 1e9 for value in least]
 
 
 def pinned(processors: set[int]):
@@ -54,34 +60,49 @@ def errors(T: np.ndarray, asked: np.ndarray) -> str:
 
 def inverse_rows(robot, random) -> list[str]:
     """All solutions of random reachable poses: EAIK, one thread, two threads."""
-    q = random.uniform(robot.lower, robot.upper, (POSES, 6))
-    T = forward(robot, q)
+    T = forward(robot, random.uniform(robot.lower, robot.upper, (POSES, 6)))
     peer = DhRobot(np.array(robot.alpha), np.array(robot.a), np.array(robot.d))
-    theirs = least_time(lambda: peer.IK_batched(T, 1), POSES, runs=3)
     found = peer.IK_batched(T[:PEER_POSES], 1)
     rows = [
         (n, np.asarray(theta)) for n, each in enumerate(found) for theta, rough in zip(each.Q, each.is_LS) if not rough
     ]
     back = forward(robot, robot.direction * (np.array([theta for _, theta in rows]) - robot.offset))
-    lines = [
-        f"| {robot.name} | EAIK `IK_batched`, singular handling on | {theirs:.0f} | 1 "
-        f"| {errors(back, T[[n for n, _ in rows]])} |"
-    ]
-    one = least_time(lambda: inverse_batch(robot, T), POSES)
+    theirs, one, turns = least_times(
+        POSES,
+        lambda: peer.IK_batched(T, 1),
+        lambda: inverse_batch(robot, T),
+        lambda: inverse_batch(robot, T, turns=True),
+    )
     solved = inverse_batch(robot, T)
     index, slot = np.nonzero(solved.valid)
     accuracy = errors(forward(robot, solved.q[index, slot]), T[index])
-    lines.append(f"| {robot.name} | er3a `inverse_batch` | {one:.0f} | {theirs / one:.1f} | {accuracy} |")
-    turns = least_time(lambda: inverse_batch(robot, T, turns=True), POSES)
-    lines.append(f"| {robot.name} | the same, with turns | {turns:.0f} | {theirs / turns:.1f} | {accuracy} |")
-    if os.cpu_count() > 1:
-        pinned({0, 1})
-        pair = least_time(lambda: inverse_batch(robot, T, threads=2), POSES)
-        pinned({0})
-        equal = np.array_equal(inverse_batch(robot, T, threads=2).q, solved.q, equal_nan=True)
-        note = "equal bits" if equal else "DIFFERS"
-        lines.append(f"| {robot.name} | the same, two threads ({one / pair:.2f} times one) | {pair:.0f} | | {note} |")
-    return lines
+    asked = T[[n for n, _ in rows]]
+    lines = [
+        f"| {robot.name} | EAIK `IK_batched`, singular handling on | {theirs:.0f} | 1 | {errors(back, asked)} |",
+        f"| {robot.name} | er3a `inverse_batch` | {one:.0f} | {theirs / one:.1f} | {accuracy} |",
+        f"| {robot.name} | the same, with turns | {turns:.0f} | {theirs / turns:.1f} | {accuracy} |",
+    ]
+    return lines + (two_thread_rows(robot, T, solved.q) if os.cpu_count() > 1 else [])
+
+
+def two_thread_rows(robot, T: np.ndarray, q: np.ndarray) -> list[str]:
+    """Two threads on two processors against one, in turn, and how much more work two do in all."""
+    work = {1: np.inf, 2: np.inf}
+
+    def run(threads: int) -> BatchSolutions:
+        start = time.process_time()
+        solved = inverse_batch(robot, T, threads=threads)
+        work[threads] = min(work[threads], time.process_time() - start)
+        return solved
+
+    pinned({0, 1})
+    one, two = least_times(POSES, lambda: run(1), lambda: run(2), rounds=THREAD_ROUNDS)
+    equal = np.array_equal(run(2).q, q, equal_nan=True)
+    pinned({0})
+    return [
+        f"| {robot.name} | two threads: {one / two:.2f} times one; processor time {work[2] / work[1]:.2f} of one's "
+        f"| {two:.0f} | | {'equal bits' if equal else 'DIFFERS'} |"
+    ]
 
 
 def elementary(robot):
@@ -97,57 +118,72 @@ def elementary(robot):
     return sequence
 
 
-def bare_loop() -> Callable | None:
-    """The same forward kinematics as a plain C loop; None without a compiler."""
+def bare_loops() -> dict[str, Callable]:
+    """The same forward kinematics as bare C loops, pose by pose and over blocks; none without a compiler."""
     compiler = shutil.which("gcc") or shutil.which("cc")
     if compiler is None:
-        return None
-    folder = tempfile.mkdtemp()
-    library = Path(folder) / "bare_loop.so"
+        return {}
+    library = Path(tempfile.mkdtemp()) / "bare_loop.so"
+    flags = ["-O3", "-march=native", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-shared", "-fPIC"]
+    if platform.machine() == "x86_64":
+        flags.append("-mprefer-vector-width=512")
     source = Path(__file__).with_name("bare_loop.c")
-    flags = ["-O3", "-march=native", "-ffp-contract=off", "-shared", "-fPIC"]
     subprocess.run([compiler, *flags, str(source), "-o", str(library), "-lm"], check=True)
-    function = ctypes.CDLL(str(library)).forward
-    function.restype = None
+    loaded = ctypes.CDLL(str(library))
 
-    def run(robot, q, out):
+    def call(function, robot, q, out):
+        function.restype = None
         arrays = (q, robot.direction, robot.offset, constant_links(robot), out)
         function(ctypes.c_size_t(len(q)), *(a.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for a in arrays))
 
-    return run
+    words = {"pose by pose": loaded.forward, "over blocks of poses": loaded.forward_blocks}
+    return {key: partial(call, function) for key, function in words.items()}
 
 
 def forward_rows(robot, random) -> list[str]:
-    """Forward kinematics of a million poses, and Jacobians."""
+    """Forward kinematics of a million poses."""
     q = random.uniform(robot.lower, robot.upper, (FORWARD_POSES, 6))
-    sequence, model_and_frame = elementary(robot), pinocchio_model(robot)
-    theirs = least_time(lambda: sequence.eval(q), FORWARD_POSES, runs=2)
-    T, out = forward(robot, q), np.empty((FORWARD_POSES, 4, 4))
-    few = sequence.eval(q[:PEER_POSES])
-    lines = [f"| {robot.name} | Robotics Toolbox `ets.eval` | {theirs:.1f} | 1 | |"]
-    reused = least_time(lambda: forward(robot, q, out=out), FORWARD_POSES)
-    fresh = least_time(lambda: forward(robot, q), FORWARD_POSES)
-    agree = errors(T[:PEER_POSES], few)
-    lines.append(f"| {robot.name} | er3a `forward`, `out=` reused | {reused:.1f} | {theirs / reused:.1f} | {agree} |")
-    lines.append(f"| {robot.name} | er3a `forward`, new output | {fresh:.1f} | {theirs / fresh:.1f} | {agree} |")
-    if (loop := bare_loop()) is not None:
-        other = np.empty_like(out)
-        bare = least_time(lambda: loop(robot, q, other), FORWARD_POSES)
-        agree = errors(other[:PEER_POSES], T[:PEER_POSES])
-        lines.append(f"| {robot.name} | bare C loop (er3a takes {reused / bare:.2f} of it) | {bare:.1f} | | {agree} |")
-    model, frame = model_and_frame
+    sequence, loops = elementary(robot), bare_loops()
+    T, out, other = forward(robot, q), np.empty((FORWARD_POSES, 4, 4)), np.empty((FORWARD_POSES, 4, 4))
+    theirs, fresh, reused, *bare = least_times(
+        FORWARD_POSES,
+        lambda: sequence.eval(q),
+        lambda: forward(robot, q),
+        lambda: forward(robot, q, out=out),
+        *(partial(loop, robot, q, other) for loop in loops.values()),
+    )
+    agree = errors(T[:PEER_POSES], sequence.eval(q[:PEER_POSES]))
+    lines = [
+        f"| {robot.name} | Robotics Toolbox `ets.eval` | {theirs:.1f} | 1 | |",
+        f"| {robot.name} | er3a `forward`, new output | {fresh:.1f} | {theirs / fresh:.1f} | {agree} |",
+        f"| {robot.name} | er3a `forward`, `out=` reused | {reused:.1f} | {theirs / reused:.1f} | {agree} |",
+    ]
+    for words, loop, value in zip(loops, loops.values(), bare):
+        loop(robot, q, other)
+        note = "equal bits" if np.array_equal(other, T) else f"{errors(other[:PEER_POSES], T[:PEER_POSES])}"
+        lines.append(
+            f"| {robot.name} | bare C loop {words}: er3a takes {reused / value:.2f} of it | {value:.1f} | | {note} |"
+        )
+    return lines
+
+
+def jacobian_rows(robot, random) -> list[str]:
+    """Jacobians: er3a's batch against Pinocchio in a loop."""
+    q = random.uniform(robot.lower, robot.upper, (POSES, 6))
+    model, frame = pinocchio_model(robot)
     data, world = model.createData(), pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED
     theta = robot.direction * q[:PEER_POSES] + robot.offset
 
     def peer():
         return [pinocchio.computeFrameJacobian(model, data, row, frame, world) for row in theta]
 
-    theirs = least_time(peer, PEER_POSES, runs=3)
-    ours = least_time(lambda: jacobian(robot, q[:POSES]), POSES)
+    ours, theirs = least_times(1, lambda: jacobian(robot, q), peer)
+    ours, theirs = ours / POSES, theirs / PEER_POSES
     apart = np.abs(jacobian(robot, q[:PEER_POSES]) - np.array(peer()) * robot.direction).max()
-    lines.append(f"| {robot.name} | Pinocchio `computeFrameJacobian`, in a loop | {theirs:.0f} | 1 | |")
-    lines.append(f"| {robot.name} | er3a `jacobian` | {ours:.0f} | {theirs / ours:.1f} | {apart:.1e} (m, 1) |")
-    return lines
+    return [
+        f"| {robot.name} | Pinocchio `computeFrameJacobian`, in a loop | {theirs:.0f} | 1 | |",
+        f"| {robot.name} | er3a `jacobian` | {ours:.0f} | {theirs / ours:.1f} | {apart:.1e} (m, 1) |",
+    ]
 
 
 def numerical_rows(robot, random) -> list[str]:
@@ -157,22 +193,33 @@ def numerical_rows(robot, random) -> list[str]:
     few = T[:PEER_POSES]
     for respect in (True, False):
         options = {"q0": q0, "k": 0.1, "tol": 1e-12, "joint_limits": respect}
-
-        def peer(options=options):
-            return [sequence.ik_LM(pose, **options) for pose in few]
-
-        theirs = least_time(peer, PEER_POSES, runs=1)
-        found = peer()
-        good = np.array([bool(np.all(each.success)) for each in found])
-        q = np.array([np.ravel(each.q) for each in found])[good]
-        words = "within limits" if respect else "any angles"
-        accuracy = f"{good.mean():.2%}, {errors(forward(robot, q), few[good])}"
-        lines.append(f"| {robot.name} | Robotics Toolbox `ik_LM`, {words} | {theirs / 1000:.1f} | 1 | {accuracy} |")
-        ours = least_time(lambda respect=respect: solve(robot, T, q0, respect_limits=respect), NUMERICAL_POSES)
+        found = [sequence.ik_LM(pose, **options) for pose in few]
+        theirs, ours = least_times(
+            1,
+            lambda options=options: [sequence.ik_LM(pose, **options) for pose in few],
+            lambda respect=respect: solve(robot, T, q0, respect_limits=respect),
+        )
+        theirs, ours = theirs / PEER_POSES, ours / NUMERICAL_POSES
         result = solve(robot, T, q0, respect_limits=respect)
-        accuracy = f"{result.solved.mean():.2%}, {errors(forward(robot, result.q), T)}"
-        lines.append(f"| {robot.name} | er3a `solve`, {words} | {ours / 1000:.1f} | {theirs / ours:.1f} | {accuracy} |")
+        said = np.array([bool(np.all(each.success)) for each in found])
+        words = "within limits" if respect else "any angles"
+        for name, value, q, asked, solved in (
+            ("Robotics Toolbox `ik_LM`", theirs, np.array([np.ravel(each.q) for each in found]), few, said),
+            ("er3a `solve`", ours, result.q, T, result.solved),
+        ):
+            lines.append(
+                f"| {robot.name} | {name}, {words} | {value / 1000:.1f} | {theirs / value:.1f} "
+                f"| {solved.mean():.2%} | {to_a_nanometre(robot, q, asked):.2%} "
+                f"| {errors(forward(robot, q[solved]), asked[solved])} |"
+            )
     return lines
+
+
+def to_a_nanometre(robot, q: np.ndarray, asked: np.ndarray) -> float:
+    """Share of poses reached to 1e-9 m and rad."""
+    T = forward(robot, q)
+    near = np.linalg.norm(T[:, :3, 3] - asked[:, :3, 3], axis=1) < 1e-9
+    return float((near & (rotation_angle(T[:, :3, :3], asked[:, :3, :3]) < 1e-9)).mean())
 
 
 def table() -> str:
@@ -186,10 +233,11 @@ def table() -> str:
             "# Speed beside the peers, with accuracy",
             "",
             "Random poses of joints within the limits; one thread, pinned to one processor, unless said otherwise;",
-            f"least wall time of {RUNS} runs. *Times*: how many times faster than the first row of its group. Errors:",
-            f"worst position (m) / rotation (rad). {peers}; seed {SEED}.",
-            "Written by `make campaigns ARGS=speed`; times differ between machines, and where other work shares the",
-            "processors.",
+            f"least wall time of {ROUNDS} rounds (two threads: {THREAD_ROUNDS}), in which all of a group run in turn.",
+            "*Times*: how many times faster than the first row of its group. Errors: worst position (m) / rotation",
+            f"(rad). {peers}; seed {SEED}.",
+            f"Written by `make campaigns ARGS=speed`, while {os.getloadavg()[0]:.1f} processes wanted the "
+            f"{os.cpu_count()} processors; times differ between machines.",
             "",
             f"## All closed-form solutions ({POSES:,} poses; 8 slots, limit verdicts)",
             "",
@@ -197,18 +245,22 @@ def table() -> str:
             "|---|---|---|---|---|",
             *(line for robot in robots for line in inverse_rows(robot, random)),
             "",
-            f"## Forward kinematics ({FORWARD_POSES:,} poses) and Jacobians",
+            f"## Forward kinematics ({FORWARD_POSES:,} poses) and Jacobians ({POSES:,})",
+            "",
+            "The C loops (benchmarks/bare_loop.c) do the same arithmetic into memory that is used again.",
             "",
             "| robot | what | ns a pose | times | difference from the peer |",
             "|---|---|---|---|---|",
             *(line for robot in robots for line in forward_rows(robot, random)),
+            *(line for robot in robots for line in jacobian_rows(robot, random)),
             "",
             f"## Numerical inverse ({NUMERICAL_POSES:,} poses)",
             "",
-            "Robotics Toolbox at its best setting (k = 0.1, tol = 1e-12); er3a to 1e-10 m and rad.",
+            "Robotics Toolbox at its best setting (k = 0.1, tol = 1e-12); er3a to 1e-10 m and rad. *Solved* is what",
+            "each says of itself.",
             "",
-            "| robot | what | us a pose | times | solved, errors |",
-            "|---|---|---|---|---|",
+            "| robot | what | us a pose | times | solved | reached to 1e-9 m and rad | errors of the solved |",
+            "|---|---|---|---|---|---|---|",
             *(line for robot in robots for line in numerical_rows(robot, random)),
             "",
         ]

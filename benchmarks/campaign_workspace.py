@@ -1,25 +1,36 @@
-"""The workspace proof at full size: brackets and their cost, samples against empty cells, the stratified estimate."""
+"""The workspace proof at full size: brackets and their cost, samples against empty cells, the stratified estimate.
+
+And the sampling loop's speed beside its parts and Robotics Toolbox, with its peak memory.
+"""
 
 from __future__ import annotations
 
+import resource
+import subprocess
+import sys
 import time
 
 import numpy as np
+import roboticstoolbox as rtb
 
-from er3a import load_robot
-from er3a.kinematics.chain import JOINTS, constant_links
+from er3a import forward, load_robot
 from er3a.kinematics.jit import kernel
-from er3a.stages.workspace.tally import _points
+from er3a.stages.workspace.grid import make_grid
+from er3a.stages.workspace.random_joints import Draw
+from er3a.stages.workspace.tally import tally_blocks
 from er3a.workspace.arcs import TURN
+from er3a.workspace.general import prove_general
+from er3a.workspace.general_arm import general_arm
 from er3a.workspace.lookup import SectionMap
 from er3a.workspace.proof import prove
 from er3a.workspace.section_arm import section_arm, section_frame
 from er3a.workspace.volume import estimate_volume, stratified_volume
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
-CELLS = (6_000, 25_000, 60_000)
-SAMPLES, SEED, RUNS, POINTS = 1_000_000_000 // 3 + 1, 20261120, 12, 2000
-_BLOCK = 1 << 20
+CELLS = {name: (6_000, 25_000, 60_000) for name in ROBOTS} | {"er3a_c60": (6_000, 60_000, 400_000)}
+SAMPLES, SEED, RUNS, POINTS = 1_000_000_000, 20261120, 12, 2000
+_BLOCK = 1 << 18
+_SPEED_SAMPLES, _MEMORY_SAMPLES, _GENERAL_CELLS = 100_000_000, 1_000_000_000, 32_000
 
 
 @kernel
@@ -47,38 +58,112 @@ def _in_empty(points, R, origin, low, per_length, owner, arcs):
 def samples_in_empty(robot, section: SectionMap) -> int:
     """How many of ``SAMPLES`` random samples fall into cells (or arcs of them) that are proven empty."""
     R, origin = section_frame(robot)
-    q, points = np.empty(JOINTS), np.empty((_BLOCK, 3))
-    found = 0
-    for block in range(-(-SAMPLES // _BLOCK)):
-        span, links = robot.upper - robot.lower, constant_links(robot)
-        _points(np.uint64(SEED), block, 0, robot.lower, span, robot.direction, robot.offset, links, q, points)
+    random, found = np.random.Generator(np.random.Philox(key=SEED)), 0
+    q, T = np.empty((_BLOCK, 6)), np.empty((_BLOCK, 4, 4))
+    for _ in range(-(-SAMPLES // _BLOCK)):
+        random.random(out=q)
+        q *= robot.upper - robot.lower
+        q += robot.lower
+        points = forward(robot, q, out=T)[:, :3, 3]
         found += _in_empty(points, R, origin, section.low, 1 / section.size, section.owner, section.proof.empty)
     return found
+
+
+def cpu_time(run) -> float:
+    """Least processor time of three runs after a first one, s: less disturbed than wall time on a shared machine."""
+    run()
+    times = []
+    for _ in range(3):
+        start = time.thread_time()
+        run()
+        times.append(time.thread_time() - start)
+    return min(times)
+
+
+def speed_row(name: str) -> str:
+    """The loop against its parts made from public pieces, per sample, one thread."""
+    robot = load_robot(name)
+    grid, draw = make_grid(robot, 64), Draw(SEED, _SPEED_SAMPLES, 1)
+    q, T = np.empty((1 << 20, 6)), np.empty((1 << 20, 4, 4))
+    random = np.random.default_rng(SEED)
+    peer = rtb.DHRobot([rtb.RevoluteDH(a=a, d=d, alpha=b) for a, d, b in zip(robot.a, robot.d, robot.alpha)])
+
+    def plain():
+        random.random(out=q)
+        forward(robot, q, out=T)
+
+    def loop():
+        for row in q[:300]:
+            peer.fkine(row)
+
+    base = cpu_time(plain) / len(q)
+    bare = cpu_time(lambda: tally_blocks(robot, grid, draw, [0], 0)) / _SPEED_SAMPLES
+    whole = cpu_time(lambda: tally_blocks(robot, grid, draw, [0], 2000)) / _SPEED_SAMPLES
+    theirs = cpu_time(loop) / 300
+    times = f"{base * 1e9:.1f} | {bare * 1e9:.1f} | {base / bare:.1f} | {whole * 1e9:.1f} | {base / whole:.1f}"
+    return f"| {name} | {times} | {theirs / whole:,.0f} |"
+
+
+def scaling() -> float:
+    """Wall time of two processes one after the other, over that of both side by side."""
+    command = [sys.executable, __file__, "sample"]
+
+    def timed(groups: list[int]) -> float:
+        start = time.perf_counter()
+        for count in groups:
+            for process in [subprocess.Popen([*command, str(10 * _SPEED_SAMPLES)]) for _ in range(count)]:
+                process.wait()
+        return time.perf_counter() - start
+
+    return timed([1, 1]) / timed([2])
+
+
+def peak_memory() -> int:
+    """Peak resident memory (MiB) of a process that draws ``_MEMORY_SAMPLES``."""
+    command = [sys.executable, __file__, "sample", str(_MEMORY_SAMPLES)]
+    return int(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+
+
+def sample(count: int) -> None:
+    """Draw and count, and print the peak resident memory in MiB."""
+    robot = load_robot("er3a_c60")
+    tally_blocks(robot, make_grid(robot, 64), Draw(SEED, count, 32), range(32), 2000)
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024)
 
 
 def table() -> str:
     """The evidence as Markdown."""
     lines = [
-        "# The workspace proof at full size",
+        "# The workspace at full size",
         "",
-        "One thread on a shared machine, so times are upper bounds. Seed 20261120. Written by",
-        "`make campaigns ARGS=workspace`. Width is (upper - lower) / upper of the reached volume.",
+        "On a shared machine. Seed 20261120. Written by `make campaigns ARGS=workspace`. Width is",
+        "(upper - lower) / upper of the reached volume; two threads.",
         "",
-        "| robot | cells looked at | lower (m³) | upper (m³) | width | time (s) |",
-        "|---|---|---|---|---|---|",
+        "| robot | cells looked at | lower (m³) | upper (m³) | width | wall time (s) | processor time (s) |",
+        "|---|---|---|---|---|---|---|",
     ]
     maps = {}
     for name in ROBOTS:
         arm = section_arm(load_robot(name))
         prove(arm, 0.0, 1)
-        for cells in CELLS:
-            start = time.perf_counter()
-            proof = prove(arm, 0.0, cells)
-            elapsed = time.perf_counter() - start
+        for cells in CELLS[name]:
+            start, busy = time.perf_counter(), time.process_time()
+            proof = prove(arm, 0.0, cells, threads=2)
+            elapsed, busy = time.perf_counter() - start, time.process_time() - busy
             lower, upper = proof.bounds
-            lines.append(f"| {name} | {cells:,} | {lower:.4f} | {upper:.4f} | {proof.width:.2%} | {elapsed:.0f} |")
+            lines.append(
+                f"| {name} | {cells:,} | {lower:.4f} | {upper:.4f} | {proof.width:.2%} | {elapsed:.0f} | {busy:.0f} |"
+            )
         maps[name] = SectionMap(proof)
+    plain = load_robot("er3_600")
+    skew = plain.replace(a=plain.a + np.array([0, 0, 0, 0, 0.04, 0]))
+    start = time.process_time()
+    proof = prove_general(general_arm(skew)[0], _GENERAL_CELLS, SEED)[0]
+    (lower, upper), busy = proof.bounds, time.process_time() - start
     lines += [
+        "",
+        f"The general method, on the ER3-600 with axes 5 and 6 set 40 mm apart, {_GENERAL_CELLS:,} cells:",
+        f"{lower:.3f} to {upper:.3f} m³ ({proof.width:.0%} wide) in {busy:.0f} s of processor time.",
         "",
         f"Random samples ({SAMPLES:,} per robot, joints uniform within their limits) in the cells of the last row that",
         f"are proven empty; and the root mean square error of the volume over {RUNS} runs of {POINTS:,} points,",
@@ -93,10 +178,30 @@ def table() -> str:
         arm = section_arm(robot)
         coarse = SectionMap(prove(arm, 0.0, 6000))
         exact = sum(section.proof.bounds) / 2
-        plain = [
+        plain_errors = [
             estimate_volume(arm, coarse, arm.reach, arm.heights, POINTS, seed).value - exact for seed in range(RUNS)
         ]
         strata = [stratified_volume(arm, coarse, POINTS, seed) - exact for seed in range(RUNS)]
-        a, b = (float(np.sqrt(np.mean(np.square(errors)))) for errors in (plain, strata))
+        a, b = (float(np.sqrt(np.mean(np.square(errors)))) for errors in (plain_errors, strata))
         lines.append(f"| {name} | {samples_in_empty(robot, section)} | {a:.5f} | {b:.5f} | {a / b:.0f} |")
+    lines += [
+        "",
+        "## Sampling",
+        "",
+        "Nanoseconds of processor time per sample, one thread. *Plain* is `Generator.random(out=)` and er3a's",
+        "`forward` with `out=`, without counting anything. *Loop* draws, places and counts voxels and the side view;",
+        "*whole loop* also keeps the furthest sample in 2000 directions. The last column is against Robotics",
+        "Toolbox's `fkine` in a Python loop.",
+        "",
+        "| robot | plain | loop | times | whole loop | times | times `fkine` |",
+        "|---|---|---|---|---|---|---|",
+        *map(speed_row, ROBOTS),
+        "",
+        f"Two processes side by side: {scaling():.2f} times one after the other. Peak memory at {_MEMORY_SAMPLES:,}",
+        f"samples: {peak_memory()} MiB, libraries included.",
+    ]
     return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    sample(int(sys.argv[2]))

@@ -20,8 +20,10 @@ CAMPAIGNS = (
     "diagnosis",
     "identification",
     "workspace",
+    "paths",
     "clearance",
     "capability",
+    "teach",
     *PARTS,
 )
 

@@ -15,6 +15,8 @@ _PUBLIC = {
     "solve": "er3a.kinematics.numerical",
     "select": "er3a.selection.select",
     "select_sequence": "er3a.selection.sequence",
+    "load_scene": "er3a.collision.scene",
+    "load_targets": "er3a.targets",
     "diagnose": "er3a.diagnosis.diagnose",
     "identify": "er3a.identification.identify",
     "load_measurements": "er3a.identification.measurements",

@@ -53,6 +53,7 @@ def archive(study_file: Path, results: Path, reports: Path, output: Path) -> int
             files |= {_place(file): file for file in study.inputs(name, stage)}
             for view in (f"{stage}.html", f"{stage}.rrd"):
                 files[Path("reports") / name / view] = _there(reports / name / view)
+        files[Path("reports") / name / "teach.html"] = _there(reports / name / "teach.html")
     files |= {Path("reports") / name: _there(reports / name) for name in ("index.html", "compare.html")}
     files |= {Path(name): _ROOT / name for name in KEPT if (_ROOT / name).is_file()}
     crate = _crate(study.robots)

@@ -76,7 +76,7 @@ def check_study(path: Path) -> Study:
         for path in load_paths(entry.paths).paths:
             if isinstance(path, TablePath):
                 read_path_table(path.file)
-        for scene in (study.inverse.scene, study.path_scene(name)):
-            if scene:
+        for stage in ("inverse", "trajectory"):
+            if scene := study.scene(name, stage):
                 load_scene(scene)
     return study

@@ -110,6 +110,17 @@ def report(
 
 
 @app.command()
+def teach(robot: RobotName, study: StudyFile = DEFAULT_STUDY, reports: Reports = DEFAULT_REPORTS):
+    """Write a robot's teach panel: sliders, the arm in 3-D, its pose and all ways to it, in one page."""
+    from er3a.seals import seal
+    from er3a.teach.page import write_teach_page
+
+    page = reports / robot / "teach.html"
+    write_teach_page(load_study(study), robot, page)
+    seal(page)
+
+
+@app.command()
 def index(study: StudyFile = DEFAULT_STUDY, results: Results = DEFAULT_RESULTS, reports: Reports = DEFAULT_REPORTS):
     """Write the pages over all robots and stages: the index and the comparison of two robots."""
     from er3a.seals import OVERALL, seal

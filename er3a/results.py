@@ -133,7 +133,7 @@ def write_summary(
         "figures": [asdict(figure) for figure in figures],
         **stage_keys,
         "provenance": {
-            "inputs": [{"path": _shown_path(file), "sha256": sha256(file)} for file in study.inputs(robot, stage)],
+            "inputs": input_records(study.inputs(robot, stage)),
             "config": study.settings(robot, stage),
             "seed": study.seed,
             "code": code_digest(f"er3a.stages.{stage}.compute"),
@@ -205,6 +205,11 @@ def _content(path: Path) -> bytes:
 def _compare(path: Path, content: bytes, sums: dict[str, str]) -> None:
     if sums.get(path.name) != hashlib.sha256(content).hexdigest():
         raise ResultError(path, f"damaged (not the bytes that {CHECKSUMS} beside it tells of)")
+
+
+def input_records(files: Iterable[Path]) -> list[dict[str, str]]:
+    """What provenance says of input files: path from the project's root, and checksum."""
+    return [{"path": _shown_path(file), "sha256": sha256(file)} for file in files]
 
 
 def sha256(path: Path) -> str:

@@ -36,6 +36,7 @@ def unsound(study: Study, results: Path, reports: Path) -> Iterator[tuple[Path, 
     """
     checks: list[tuple[Path, Callable[[Path], object]]] = [(reports / page, check_seal) for page in OVERALL]
     for robot in study.robots:
+        checks.append((reports / robot / "teach.html", check_seal))
         for stage in STAGES:
             checks.append((results / robot / stage / "summary.json", lambda path: check_results(path.parent)))
             checks += [(reports / robot / f"{stage}.{kind}", check_seal) for kind in ("html", "rrd")]

@@ -22,7 +22,7 @@ RuleName = Literal["nearest", "weighted", "time", "manipulability", "limits", "c
 
 
 class RobotEntry(StrictModel):
-    """One robot of the study. ``base`` and ``tool`` replace those of its file, ``scene`` that of ``trajectory``."""
+    """One robot of the study. ``base`` and ``tool`` replace those of its file, ``scene`` those of the stages."""
 
     file: Text | None = None
     targets: Text
@@ -48,7 +48,8 @@ class ValidationSettings(StrictModel):
 class WorkspaceSettings(StrictModel):
     """Monte Carlo budget and grid.
 
-    ``samples`` are drawn in ``blocks`` seeded blocks, ``cells_across`` cells span the bounding box's longest side,
+    ``samples`` are drawn in ``blocks`` seeded blocks, uniform in the joints or (``sampling: sobol``) more evenly than
+    chance as points of a Sobol' sequence; ``cells_across`` cells span the bounding box's longest side,
     the hull is taken over the extreme samples in ``hull_directions`` directions, the recording shows ``cloud_points``.
     The proof looks at ``proof_cells`` cells of the section; ``volume_points`` uniform points estimate the volume.
     """
@@ -56,10 +57,11 @@ class WorkspaceSettings(StrictModel):
     samples: Annotated[int, Field(ge=1, le=100_000_000_000)]
     blocks: Annotated[int, Field(ge=1, le=100_000)]
     cells_across: Annotated[int, Field(ge=8, le=1024)]
-    hull_directions: Annotated[int, Field(ge=100, le=100_000)]
+    hull_directions: Annotated[int, Field(ge=1000, le=100_000)]
     cloud_points: Annotated[int, Field(ge=1, le=300_000)]
     proof_cells: Annotated[int, Field(ge=1, le=10_000_000)] = 8000
     volume_points: Annotated[int, Field(ge=100, le=10_000_000)] = 100_000
+    sampling: Literal["uniform", "sobol"] = "uniform"
 
     @model_validator(mode="after")
     def _a_sample_per_block(self):
@@ -111,9 +113,14 @@ class CapabilitySettings(StrictModel):
     placement: BoxTask = BoxTask()
 
 
+WayName = Literal["slow", "branch", "via_shift", "via_tilt", "damped", "detour", "stop"]
+
+
 class TrajectorySettings(StrictModel):
     """Where a path counts as near-singular, and how many points are checked between two samples.
 
+    ``repair`` chooses the way around singular regions, or compares all of them. Joints of unknown speed are taken to do
+    ``assumed_speed_deg_s``; all joints to reach full speed in ``full_speed_after_s``.
     ``scene`` holds the obstacles; no overlap with them deeper than ``overlap_mm`` goes unnoticed between points.
     """
 
@@ -121,6 +128,11 @@ class TrajectorySettings(StrictModel):
     near_wrist_deg: Annotated[float, Field(gt=0, le=90)]
     near_elbow_deg: Annotated[float, Field(gt=0, le=90)]
     near_shoulder_mm: Annotated[float, Field(gt=0, le=10_000)]
+    repair: Literal["compare"] | WayName = "compare"
+    assumed_speed_deg_s: Annotated[
+        list[Annotated[float, Field(gt=0, le=10_000)]], Field(min_length=6, max_length=6)
+    ] = [180, 180, 180, 360, 360, 360]
+    full_speed_after_s: Annotated[float, Field(gt=0, le=10)] = 0.25
     scene: Text | None = None
     overlap_mm: Annotated[float, Field(ge=0.05, le=100)] = 1.0
 
@@ -128,8 +140,8 @@ class TrajectorySettings(StrictModel):
 class InverseSettings(StrictModel):
     """``round_trips``: random poses solved back. ``map_cells``: cells across the maps of the number of solutions.
 
-    ``scene`` holds the obstacles that clearance is measured from; ``mix`` weighs rules against each other as one more
-    rule (names: er3a/selection/rules.py).
+    ``scene`` holds the obstacles that clearance is measured from and that solutions may not touch; ``mix`` weighs
+    rules against each other as one more rule (names: er3a/selection/rules.py).
     """
 
     round_trips: Annotated[int, Field(ge=1, le=10_000_000)] = 2000
@@ -180,11 +192,11 @@ class Study(StrictModel):
                 files += sorted((REFERENCES / reference).glob(kinds[stage]))
         if stage == "inverse":
             files.append(Path(entry.targets))
-            if self.inverse.scene:
-                files.append(Path(self.inverse.scene))
+            if scene := self.scene(name, stage):
+                files.append(scene)
         if stage == "trajectory":
             files += [Path(entry.paths), *_tables_of(entry.paths)]
-            if scene := self.path_scene(name):
+            if scene := self.scene(name, stage):
                 files.append(scene)
         return files
 
@@ -193,14 +205,14 @@ class Study(StrictModel):
         entry = self.entry(name).model_dump(exclude={"targets", "paths", "file", "scene"}, exclude_none=True)
         own = getattr(self, stage, None)
         settings = own.model_dump() if own else {}
-        if stage == "trajectory":
-            scene = self.path_scene(name)
+        if "scene" in settings:
+            scene = self.scene(name, stage)
             settings["scene"] = str(scene) if scene else None
         return {"seed": self.seed, "robot": entry, stage: settings}
 
-    def path_scene(self, name: str) -> Path | None:
-        """The scene file that a robot's paths are checked against."""
-        scene = self.entry(name).scene or self.trajectory.scene
+    def scene(self, name: str, stage: str) -> Path | None:
+        """The file of the solids that a robot may not touch in a stage; None for open space."""
+        scene = self.entry(name).scene or getattr(self, stage).scene
         return Path(scene) if scene else None
 
 

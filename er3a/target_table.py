@@ -31,14 +31,14 @@ def read_target_table(path: str | Path) -> list[dict[str, Any]]:
         naming row and column; for a header without a known form of orientation, or with two
     """
     path = Path(path)
-    present = set(read_header(path))
+    header = read_header(path)
+    present = set(header)
     forms = [form for form, columns in FORMS.items() if present & set(columns)]
     if len(forms) != 1:
         known = "; or ".join(
             ", ".join(columns[:4]) + (" ..." if len(columns) > 4 else "") for columns in FORMS.values()
         )
-        problem = "no orientation" if not forms else f"two forms of orientation, {forms[0]} and {forms[1]}"
-        raise InputError(path, "header", f"the table has {problem}", f"Give the columns {known}")
+        raise InputError(path, "header", _without_one_form(header, forms), f"Give the columns {known}")
     form = forms[0]
     columns = {"name": Column(str)} | {name: Column() for name in (*POSITION, *FORMS[form])}
     if "note" in present:
@@ -46,6 +46,17 @@ def read_target_table(path: str | Path) -> list[dict[str, Any]]:
     if present & set(REFERENCE):
         columns |= {name: Column() for name in REFERENCE}
     return [_target(row, form) for row in read_csv(path, columns)]
+
+
+def _without_one_form(header: list[str], forms: list[str]) -> str:
+    if not header:
+        return "the file is empty"
+    if len(header) == 1 and ";" in header[0]:
+        return "its columns are separated by semicolons instead of commas"
+    if forms:
+        return f"the table has two forms of orientation, {forms[0]} and {forms[1]}"
+    strange = [name for name in header if name.strip() not in ("name", "note", *POSITION, *REFERENCE)]
+    return "the table has no orientation" + (f" that is known, but {', '.join(strange)}" if strange else "")
 
 
 def _target(row: dict[str, Any], form: str) -> dict[str, Any]:

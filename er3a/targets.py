@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -22,6 +22,7 @@ from er3a.target_table import FORMS, POSITION, REFERENCE, read_target_table
 
 MOST_TARGETS = 50
 UNIT_LENGTH_TOLERANCE = 1e-6
+EULER_KEY = re.compile(r"euler\w*|[xyz]{3}(_(deg|rad))?", re.IGNORECASE)
 ORIENTATION_FORMS = ("rpy_deg", "zyz_deg", "quaternion_wxyz", "matrix")
 
 Angles = Annotated[Triple, as_degrees("give the orientation as a quaternion or a matrix")]
@@ -51,6 +52,17 @@ class Target(StrictModel):
     matrix: Annotated[list[Triple], Field(min_length=3, max_length=3)] | None = None
     q_deg: Annotated[Six, as_degrees("give the pose by xyz_mm and an orientation")] | None = None
     q_ref_deg: JointsDeg = [0.0] * 6
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_euler_order(cls, content: Any) -> Any:
+        for key in content if isinstance(content, dict) else ():
+            if key != "zyz_deg" and EULER_KEY.fullmatch(str(key)):
+                raise ValueError(
+                    f"{key}: this order of Euler angles is not known | Write rpy_deg (roll, pitch, yaw: R = Rz Ry Rx, "
+                    "the order ZYX), zyz_deg, quaternion_wxyz or matrix"
+                )
+        return content
 
     @field_validator("quaternion_wxyz")
     @classmethod
@@ -167,9 +179,10 @@ def _targets_of_table(path: Path) -> tuple[Target, ...]:
     except InputError as error:
         where = re.match(r"targets\[(\d+)\]\.?(\w*)", error.field or "")
         if where is None:
-            raise
+            raise InputError(path, "rows", error.problem, error.remedy) from None
         column = f", column {', '.join(_columns_of(where[2]))}" if where[2] else ""
-        raise InputError(path, f"row {lines[int(where[1])]}{column}", error.problem, error.remedy) from None
+        problem = re.sub(r"targets\[(\d+)\]", lambda other: f"row {lines[int(other[1])]}", error.problem)
+        raise InputError(path, f"row {lines[int(where[1])]}{column}", problem, error.remedy) from None
 
 
 def _columns_of(field: str) -> tuple[str, ...]:

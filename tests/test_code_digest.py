@@ -54,6 +54,7 @@ def package_with_a_stage(folder: Path) -> Copy:
     copy.write("stages/made/report.py", "from er3a.viewing.page import Picture\nimport er3a.stages.made.parts\n")
     copy.write("stages/made/parts.py", "from er3a.kinematics import chain\n")
     copy.write("stages/made/report.html.j2", "a template")
+    copy.write("stages/made/script.js", "a script")
     return copy
 
 
@@ -83,6 +84,7 @@ def before(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
         ("stages/made/report.html.j2", False, True),
         ("viewing/base.html.j2", False, True),
         ("viewing/style.css", False, True),
+        ("stages/made/script.js", False, True),
         ("kinematics/inverse.py", False, False),
         ("stages/workspace/report.html.j2", False, False),
         ("stages/workspace/compute.py", False, False),

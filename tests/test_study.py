@@ -133,20 +133,21 @@ def test_settings_are_plain_and_hold_just_what_the_stage_depends_on(study_with, 
         assert study.settings("er3a_c60", stage)["robot"] == {}
 
 
-def test_a_robot_s_own_scene_replaces_that_of_the_paths_only(study_with):
+def test_a_robot_s_own_scene_replaces_those_of_the_stages(study_with):
     study = study_with(lambda content: content["robots"]["er3_600"].update(scene="other.yaml"))
-    assert study.settings("er3_600", "trajectory")["trajectory"]["scene"] == "other.yaml"
-    assert study.settings("er3a_c60", "trajectory")["trajectory"]["scene"] == "data/scenes/table_and_post.yaml"
-    assert "other.yaml" not in str(study.settings("er3_600", "inverse"))
+    for stage in ("inverse", "trajectory"):
+        assert study.settings("er3_600", stage)[stage]["scene"] == "other.yaml"
+        assert study.settings("er3a_c60", stage)[stage]["scene"] == "data/scenes/table_and_post.yaml"
+    assert "other.yaml" not in str(study.settings("er3_600", "workspace"))
 
 
 def test_each_stage_s_inputs_exist_and_are_its_own(study, monkeypatch):
     monkeypatch.chdir(ROOT)
     robot = ROBOTS / "er3a_c60_article.yaml"
     assert study.inputs("er3a_c60_article", "workspace") == [robot]
-    scene = Path("data/scenes/table_and_post.yaml")
-    assert study.inputs("er3a_c60_article", "inverse") == [robot, Path("data/targets/er3a_c60_article.yaml"), scene]
-    low_floor = Path("data/scenes/wall_and_low_floor.yaml")
+    scene, low_floor = Path("data/scenes/table_and_post.yaml"), Path("data/scenes/wall_and_low_floor.yaml")
+    targets = Path("data/targets/er3a_c60_article.yaml")
+    assert study.inputs("er3a_c60_article", "inverse") == [robot, targets, low_floor]
     article = [robot, Path("data/paths/er3a_c60_article.yaml"), low_floor]
     assert study.inputs("er3a_c60_article", "trajectory") == article
     tables = [Path("data/paths/er3a_c60.yaml"), Path("data/paths/er3a_c60_seam.csv"), scene]

@@ -99,7 +99,7 @@ BAD = {
     "NaN": ([PLACE | {"rpy_deg": [0, float("nan"), 0]}], "targets[0].rpy_deg[1]", "not a finite number"),
     "infinite position": ([TURNED | {"xyz_mm": [float("inf"), 0, 0]}], "targets[0].xyz_mm[0]", "not a finite number"),
     "text for a number": ([TURNED | {"xyz_mm": ["400", 0, 0]}], "targets[0].xyz_mm[0]", "'400' is refused"),
-    "two numbers": ([TURNED | {"xyz_mm": [400, 0]}], "targets[0].xyz_mm", "refused"),
+    "two numbers": ([TURNED | {"xyz_mm": [400, 0]}], "targets[0].xyz_mm", "2 items where at least 3"),
     "no orientation": ([PLACE], "targets[0]", "the orientation is missing"),
     "two orientations": ([TURNED | {"zyz_deg": [0, 90, 0]}], "targets[0]", "rpy_deg and zyz_deg"),
     "no position": ([{"name": "a", "rpy_deg": [0, 90, 0]}], "targets[0]", "the position is missing"),
@@ -120,8 +120,9 @@ BAD = {
     "zero quaternion": ([PLACE | {"quaternion_wxyz": [0, 0, 0, 0]}], "targets[0].quaternion_wxyz", "length is 0"),
     "skew matrix": ([PLACE | {"matrix": [[1, 0.01, 0], [0, 1, 0], [0, 0, 1]]}], "targets[0].matrix", "no rotation"),
     "mirror": ([PLACE | {"matrix": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}], "targets[0].matrix", "mirrors"),
-    "two rows": ([PLACE | {"matrix": [[1, 0, 0], [0, 1, 0]]}], "targets[0].matrix", "refused"),
-    "unknown Euler order": ([PLACE | {"xyz_deg": [0, 90, 0]}], "targets[0].xyz_deg", "Did you mean"),
+    "two rows": ([PLACE | {"matrix": [[1, 0, 0], [0, 1, 0]]}], "targets[0].matrix", "2 items where at least 3"),
+    "unknown Euler order": ([PLACE | {"xyz_deg": [0, 90, 0]}], "targets[0].xyz_deg", "this order of Euler angles"),
+    "words for an Euler order": ([PLACE | {"euler_order": "XZX"}], "targets[0].euler_order", "this order of Euler"),
 }
 
 
@@ -191,9 +192,9 @@ def test_table_takes_each_form_of_orientation(table, form, header, values):
         ("b,400,50", "b,nan,50", "row 3, column x_mm", "not a finite number"),
         ("b,400,50", "b,,50", "row 3, column x_mm", "empty"),
         ("0,90,0,first", "0,1.5708,0,first", "row 2, column roll_deg, pitch_deg, yaw_deg", "can only be radians"),
-        ("b,400", "a,400", "row 3, column name", "is also that of"),
+        ("b,400", "a,400", "row 3, column name", "'a' is also that of row 2"),
         ("x_mm", "x_m", "column x_m", "not a unit"),
-        ("roll_deg,pitch_deg,yaw_deg", "rx,ry,rz", "header", "the table has no orientation"),
+        ("roll_deg,pitch_deg,yaw_deg", "rx,ry,rz", "header", "no orientation that is known, but rx, ry, rz"),
         ("note", "qw", "header", "two forms of orientation"),
     ],
 )
@@ -212,5 +213,9 @@ def test_table_with_quaternion_off_unit_length_names_its_row(table):
 
 
 def test_table_without_rows_is_refused(table):
-    with pytest.raises(InputError, match="the list is empty"):
+    with pytest.raises(InputError, match=r"some\.csv: rows: the list is empty"):
         load_targets(table(TABLE.splitlines()[0] + "\n"))
+    with pytest.raises(InputError, match=r"some\.csv: header: the file is empty"):
+        load_targets(table(""))
+    with pytest.raises(InputError, match=r"some\.csv: header: its columns are separated by semicolons"):
+        load_targets(table(TABLE.replace(",", ";")))

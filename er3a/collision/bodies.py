@@ -44,13 +44,15 @@ class Bodies:
     Raises
     ------
     Er3aError
-        if the Coal library is missing
+        if the Coal library is missing, or the scene is none
     """
 
     def __init__(self, robot: Robot, scene: SceneFile | None):
         if coal is None:
             problem = "clearance needs the Coal library, which has no wheels for this platform; leave the scene out"
             raise Er3aError(problem)
+        if not isinstance(scene, SceneFile | None):
+            raise Er3aError(f"the scene is a {type(scene).__name__}; expected what er3a.load_scene returns")
         self.robot = robot
         self.capsules = envelopes_of(robot)
         self._shapes = [

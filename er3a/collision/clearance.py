@@ -31,7 +31,7 @@ def clearance(robot: Robot, q: np.ndarray, scene: SceneFile | None) -> Clearance
     Raises
     ------
     Er3aError
-        if the Coal library is missing
+        if the Coal library is missing, or the scene is none
     """
     bodies = Bodies(robot, scene)
     pairs = np.arange(len(bodies.names))

@@ -185,8 +185,15 @@ def _explain(fault: dict[str, Any], model: type[BaseModel]) -> tuple[str, str]:
         return problem, remedy or "Mend the value"
     if kind == "finite_number":
         return f"{fault['input']} is not a finite number", "Write a number"
+    if kind in ("too_short", "too_long") and isinstance(fault["input"], list):
+        problem = f"a list of {len(fault['input'])} items where {_asked(fault['ctx'])} items belong"
+        return problem, "Write as many, in brackets"
     given = repr(fault["input"])
     return f"{given[:80]} is refused", _REMEDIES.get(kind, fault["msg"])
+
+
+def _asked(bounds: dict[str, Any]) -> str:
+    return f"at least {bounds['min_length']}" if "min_length" in bounds else f"at most {bounds['max_length']}"
 
 
 def _known_keys(model: type[BaseModel]) -> list[str]:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -12,12 +10,13 @@ from er3a.errors import PoseError, ShapeError
 from er3a.kinematics.block_inverse import BLOCK, count_turns, solve_blocks
 from er3a.kinematics.closed_form import REACHED, SLOTS
 from er3a.kinematics.forward import checked_joints
-from er3a.kinematics.transforms import check_poses
+from er3a.kinematics.threads import share_out
+from er3a.kinematics.transforms import as_floats, check_poses
 from er3a.kinematics.turns import nearest_turns, within
 from er3a.kinematics.wrist_partitioned import constants_for_blocks, solve_slots
 from er3a.robots.robot import Robot
 
-SMALLEST_SHARE = 16 * BLOCK
+SMALLEST_SHARE = 8 * BLOCK
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,13 +56,13 @@ def inverse_batch(
 
     Raises
     ------
-    ShapeError, PoseError
-        naming the first pose that is no rigid transform, or the wrong shape
+    ShapeError, PoseError, Er3aError
+        naming the first pose that is no rigid transform, the wrong shape, or the argument that can't be used
     NotWristPartitionedError
         if the arm has no closed form here
     """
     arm = constants_for_blocks(robot)
-    T = np.ascontiguousarray(T, dtype=float)
+    T = np.ascontiguousarray(as_floats(T, "T"))
     if T.ndim != 3 or T.shape[1:] != (4, 4):
         raise ShapeError("T", T.shape, "(N, 4, 4)")
     reference = _checked_reference(q_ref, len(T))
@@ -77,12 +76,7 @@ def inverse_batch(
         rows = (q[part], valid[part], inside[part], rigid[part], marked[part])
         solve_blocks(arm, robot.direction, robot.offset, robot.lower, robot.upper, T[part], own, *rows)
 
-    parts = _parts(count, threads)
-    if len(parts) > 1:
-        with ThreadPoolExecutor(len(parts)) as pool:
-            list(pool.map(solve, parts))
-    else:
-        solve(slice(None))
+    share_out(count, threads, SMALLEST_SHARE, solve)
     if not rigid.all():
         check_poses(T)
     left = np.flatnonzero(marked)
@@ -105,13 +99,6 @@ def _checked_reference(q_ref: np.ndarray | None, count: int) -> np.ndarray:
     if bad.size:
         raise PoseError(f"q_ref{f'[{bad[0]}]' if len(reference) > 1 else ''} holds NaN or infinity")
     return reference
-
-
-def _parts(count: int, threads: int) -> list[slice]:
-    """Even shares, none too small to be worth a thread."""
-    shares = max(1, min(threads, count // SMALLEST_SHARE))
-    ends = [count * k // shares for k in range(shares + 1)]
-    return [slice(start, end) for start, end in pairwise(ends)]
 
 
 def _turns(robot: Robot, q: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ import numpy as np
 from er3a.kinematics.block_constants import EDGE
 from er3a.kinematics.fast_math import arctan2
 from er3a.kinematics.jit import kernel
-from er3a.kinematics.transforms import ORTHONORMAL_TOLERANCE
+from er3a.kinematics.transforms import FARTHEST_M, ORTHONORMAL_TOLERANCE
 from er3a.kinematics.turns import LIMIT_TOLERANCE, TURN
 
 BLOCK = 64
@@ -86,8 +86,8 @@ def _check(w):
         straight = (abs(first) <= ORTHONORMAL_TOLERANCE) & (abs(second) <= ORTHONORMAL_TOLERANCE)
         straight = straight & (abs(third) <= ORTHONORMAL_TOLERANCE) & (abs(off_1) <= ORTHONORMAL_TOLERANCE)
         straight = straight & (abs(off_2) <= ORTHONORMAL_TOLERANCE) & (abs(off_3) <= ORTHONORMAL_TOLERANCE)
-        placed = (abs(x) < np.inf) & (abs(y) < np.inf) & (abs(z) < np.inf) & (w[_RIGID * BLOCK + i] <= 1e-12)
-        w[_RIGID * BLOCK + i] = 1.0 if straight & placed & (volume > 0.0) else 0.0
+        near = (abs(x) <= FARTHEST_M) & (abs(y) <= FARTHEST_M) & (abs(z) <= FARTHEST_M)
+        w[_RIGID * BLOCK + i] = 1.0 if straight & near & (w[_RIGID * BLOCK + i] <= 1e-12) & (volume > 0.0) else 0.0
 
 
 @kernel

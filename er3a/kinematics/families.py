@@ -12,25 +12,24 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from er3a.kinematics.aligned_wrist import (
     SOLVES_M,
     SOLVES_RAD,
     aligned_arms,
     arm_folds_fully,
+    bend_of_wrist,
     wrist_centre_on_axis,
     wrist_line,
 )
 from er3a.kinematics.closed_form import SLOTS
-from er3a.kinematics.forward import jacobian
-from er3a.kinematics.singularity import determinant_factors
+from er3a.kinematics.forward import frames, jacobian
 from er3a.kinematics.turns import LIMIT_TOLERANCE, TURN, nearest_turns, principal, within
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.robots.robot import Robot
 
 GRID = np.radians(2.0)
-BISECTIONS = 40
+SPLIT, ROUNDS = 16, 10  # an interval is cut into so many parts, so often
 SAME_FAMILY = 1e-8
 FREE_JOINT = {"shoulder": 0, "elbow": 1}
 
@@ -155,30 +154,30 @@ def _curve_family(robot: Robot, T: np.ndarray, kind: str, q_ref: np.ndarray, bra
         q[:, joint] = values
         return q
 
-    def away(value: float) -> float:
-        return float(np.sum((members(np.array([value]))[0] - q_ref) ** 2))
+    def costs(q: np.ndarray) -> np.ndarray:
+        return np.where(within(robot, q) | ~any_inside, np.sum((q - q_ref) ** 2, axis=1), np.inf)
 
     q = members(grid)
-    inside = within(robot, q)
-    cost = np.where(inside | ~inside.any(), np.sum((q - q_ref) ** 2, axis=1), np.inf)
-    best = int(cost.argmin())
-    bounds = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
+    any_inside = within(robot, q).any()
+    values, best = grid, int(costs(q).argmin())
+    for _ in range(ROUNDS):
+        between = np.linspace(values[max(best - 1, 0)], values[min(best + 1, len(values) - 1)], SPLIT + 1)
+        values = np.unique(np.append(between, values[best]))
+        q = members(values)
+        best = int(costs(q).argmin())
     q0 = q[best]
-    if bounds[0] < bounds[1]:
-        finer = minimize_scalar(away, bounds=bounds, method="bounded", options={"xatol": 1e-10})
-        candidate = members(np.array([finer.x]))[0]
-        if finer.fun < cost[best] and (within(robot, candidate) or not inside[best]):
-            q0 = candidate
-    family = Family(kind, q0, _tangent(robot, q0, joint), np.zeros(2), bool(inside.any()), branches, robot, T)
+    family = Family(kind, q0, _tangent(robot, q0, joint), np.zeros(2), bool(any_inside), branches, robot, T)
     span = _range(family, grid) if family.within_limits else np.array([-np.pi, np.pi])
     return replace(family, range=span)
 
 
 def _nearest_wrists(robot: Robot, q: np.ndarray, q_ref: np.ndarray) -> np.ndarray:
     """Rows (n, 6) with an aligned wrist moved along their line to the member nearest to the reference."""
-    aligned = np.abs(determinant_factors(robot, q).wrist) < SOLVES_RAD
-    for row in np.flatnonzero(aligned):
+    for row in np.flatnonzero(np.abs(bend_of_wrist(robot, q)) < SOLVES_RAD):
         on_line, direction = wrist_line(robot, q[row])
+        axis_4, axis_6 = frames(robot, on_line)[[3, 5], :3, 2]
+        if np.linalg.norm(np.cross(axis_4, axis_6)) > SOLVES_RAD:  # an oblique wrist is never in line
+            continue
         on_line = q_ref + principal(on_line - q_ref)
         q[row] = on_line + _nearest_on_line(on_line, direction, q_ref) * direction
     return q
@@ -208,8 +207,9 @@ def _range(family: Family, grid: np.ndarray) -> np.ndarray:
             continue
         first = int(ok.argmin())
         good, bad = (outward[first - 1] if first else 0.0), outward[first]
-        for _ in range(BISECTIONS):
-            middle = (good + bad) / 2
-            good, bad = (middle, bad) if within(family.robot, family.members(middle)) else (good, middle)
+        for _ in range(ROUNDS):
+            parts = np.linspace(good, bad, SPLIT + 1)
+            last = int(np.append(within(family.robot, family.members(parts[1:-1])), False).argmin())
+            good, bad = parts[last], parts[last + 1]
         ends.append(good)
     return np.array(ends)

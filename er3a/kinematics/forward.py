@@ -13,6 +13,7 @@ from er3a.errors import ShapeError
 from er3a.kinematics.chain import JOINTS, constant_links
 from er3a.kinematics.fast_math import LARGEST_ANGLE, cos_sin
 from er3a.kinematics.jit import kernel
+from er3a.kinematics.transforms import as_floats
 from er3a.robots.robot import Robot
 
 BLOCK = 64
@@ -85,8 +86,8 @@ def jacobian(robot: Robot, q: np.ndarray) -> np.ndarray:
 
 
 def checked_joints(q: np.ndarray, argument: str = "q") -> np.ndarray:
-    """Return q as contiguous float array (..., 6), or raise :class:`ShapeError`."""
-    q = np.ascontiguousarray(q, dtype=float)
+    """Return q as contiguous float array (..., 6), or raise :class:`ShapeError` or :class:`PoseError`."""
+    q = np.ascontiguousarray(as_floats(q, argument))
     if q.ndim == 0 or q.shape[-1] != JOINTS:
         raise ShapeError(argument, q.shape, "(..., 6)")
     return q

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import pairwise
+from numbers import Integral
 
 import numpy as np
 
@@ -12,7 +11,8 @@ from er3a.errors import Er3aError, PoseError, ShapeError
 from er3a.kinematics.chain import JOINTS, arm_length, constant_links
 from er3a.kinematics.forward import checked_joints, jacobian
 from er3a.kinematics.iteration import solve_numerically
-from er3a.kinematics.transforms import check_poses
+from er3a.kinematics.threads import share_out
+from er3a.kinematics.transforms import as_floats, check_poses
 from er3a.kinematics.turns import limit_reason, nearest_turns, principal, within
 from er3a.robots.robot import Robot
 
@@ -22,6 +22,7 @@ DIAGNOSIS_RESTARTS = 100
 NEARLY = 1e-6  # m (in parts of the arm's length) or rad: so near, only a singularity keeps the iteration from its end
 RANK = 1e-3  # smallest singular value below which the end of an iteration counts as singular
 SAME_ARM = 1e-6
+SMALLEST_SHARE = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +81,9 @@ def solve(
     T = np.ascontiguousarray(check_poses(T))
     shape = T.shape[:-2]
     mask = _checked_mask(mask)
-    if not 0 <= restarts < 65536:
-        raise Er3aError(f"restarts is {restarts}; expected a whole number from 0 to 65535")
+    for name, value, most in (("restarts", restarts, 65535), ("seed", seed, 2**63 - 1)):
+        if not (isinstance(value, Integral) and 0 <= value <= most):
+            raise Er3aError(f"{name} is {value!r}; expected a whole number from 0 to {most}")
     for name, value in (("position_tolerance", position_tolerance), ("rotation_tolerance", rotation_tolerance)):
         if not value > 0:
             raise Er3aError(f"{name} is {value!r}; expected a number above 0")
@@ -139,17 +141,11 @@ class _Search:
         q0 = np.ascontiguousarray(q0)
 
         def part(rows: slice) -> None:
-            first = 0 if rows.start is None else rows.start
             own = (q[rows], error[rows], starts[rows])
-            constants = (self.mask, self.tolerances, arm_length(robot), restarts, np.uint64(self.seed), first)
+            constants = (self.mask, self.tolerances, arm_length(robot), restarts, np.uint64(self.seed), rows.start)
             solve_numerically(arm, limits, T[rows], q0[rows], *constants, *own)
 
-        if threads > 1 and count > 1:
-            ends = np.linspace(0, count, min(threads, count) + 1).astype(int)
-            with ThreadPoolExecutor(threads) as pool:
-                list(pool.map(part, (slice(int(a), int(b)) for a, b in pairwise(ends))))
-        else:
-            part(slice(None))
+        share_out(count, threads, SMALLEST_SHARE, part)
         return (q if respect else principal(q)), error, starts
 
     def explain(self, T: np.ndarray, q: np.ndarray, error: np.ndarray, respect: bool, restarts: int) -> tuple[str, str]:
@@ -177,7 +173,7 @@ class _Search:
 
 
 def _checked_mask(mask: np.ndarray | None) -> np.ndarray:
-    values = np.ones(JOINTS) if mask is None else np.asarray(mask, dtype=float)
+    values = np.ones(JOINTS) if mask is None else as_floats(mask, "mask")
     if values.shape != (6,):
         raise ShapeError("mask", values.shape, "(6,)")
     if not np.isin(values, (0.0, 1.0)).all() or not values.any():

@@ -23,7 +23,7 @@ class Choice:
 
     Attributes
     ----------
-    order : (k,) int, rows of the solutions that are within the limits, best first
+    order : (k,) int, rows of the solutions to choose from, best first
     greatest_move : (n,), rad, the farthest that any joint turns from the reference to each solution
     distance : (n,), rad, root of the summed squares of the joint moves
     reason : why the first was taken, or why none
@@ -45,17 +45,18 @@ class Choice:
         return int(self.order[1]) if len(self.order) > 1 else None
 
 
-def nearest(robot: Robot, solutions: Solutions, q_ref: np.ndarray) -> Choice:
+def nearest(robot: Robot, solutions: Solutions, q_ref: np.ndarray, allowed: np.ndarray | None = None) -> Choice:
     """Order the solutions within the limits by ``NEAREST_RULE``.
 
     Parameters
     ----------
     q_ref : (6,), rad, the joint angles that the arm comes from
+    allowed : (n,) bool, the rows to choose from instead of those within the limits
     """
     moves = np.abs(solutions.q - q_ref)
     greatest = moves.max(axis=1, initial=0.0)
     distance = np.linalg.norm(moves, axis=1)
-    left = [int(row) for row in np.flatnonzero(solutions.within_limits)]
+    left = [int(row) for row in np.flatnonzero(solutions.within_limits if allowed is None else allowed)]
     order = []
     while left:
         best = _first(left, greatest, distance, solutions.branch)

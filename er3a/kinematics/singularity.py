@@ -17,8 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.errors import NotWristPartitionedError
-from er3a.kinematics.chain import arm_length
-from er3a.kinematics.forward import frames, jacobian
+from er3a.kinematics.chain import JOINTS, arm_length, constant_links
+from er3a.kinematics.forward import checked_joints, jacobian, rows_of, step_row, turn_row
+from er3a.kinematics.jit import kernel
+from er3a.kinematics.vectors import cross, dot, subtract
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
 from er3a.robots.robot import Robot
 
@@ -94,28 +96,42 @@ def determinant_factors(robot: Robot, q: np.ndarray) -> DeterminantFactors:
         if the arm's determinant does not factor this way
     """
     arm = wrist_partitioned_arm(robot)
-    T = frames(robot, q)
-    axes, points = T[..., :6, :3, 2], T[..., :6, :3, 3]
-    tool = T[..., 6, :, :]
-    wrist = tool[..., :3, 3] + np.einsum("...ij,j->...i", tool[..., :3, :3], arm.wrist_in_tool)
-    w1, w2, w5 = axes[..., 0, :], axes[..., 1, :], axes[..., 4, :]
-    upper_arm = points[..., 2, :] - points[..., 1, :]
-    forearm = wrist - points[..., 2, :]
-    sideways = np.cross(w1, w2)
-    sideways = sideways / np.linalg.norm(sideways, axis=-1, keepdims=True)
-    return DeterminantFactors(
-        wrist=_angle_short_of_line(axes[..., 3, :], axes[..., 5, :], w5),
-        elbow=_angle_short_of_line(upper_arm, forearm, w2),
-        shoulder=_dot(sideways, wrist - points[..., 0, :]),
-    )
+    q = checked_joints(q)
+    out = np.empty((q.size // JOINTS, 3))
+    links = constant_links(robot)
+    _factors(q.reshape(-1, JOINTS), robot.direction, robot.offset, links, arm.wrist_in_tool, out)
+    return DeterminantFactors(*(out[:, k].reshape(q.shape[:-1]) for k in range(3)))
 
 
-def _angle_short_of_line(a: np.ndarray, b: np.ndarray, axis: np.ndarray) -> np.ndarray:
+@kernel
+def _factors(q, direction, offset, links, wrist_in_tool, out):
+    """Fill ``out`` (N, 3): wrist, elbow and shoulder at joint angles ``q`` (N, 6)."""
+    w, p = np.empty((6, 3)), np.empty((6, 3))
+    for n in range(q.shape[0]):
+        x, y, z = rows_of(links[0])
+        for k in range(6):
+            w[k, 0], w[k, 1], w[k, 2] = x[2], y[2], z[2]
+            p[k, 0], p[k, 1], p[k, 2] = x[3], y[3], z[3]
+            angle, link = direction[k] * q[n, k] + offset[k], links[k + 1]
+            c, s = np.cos(angle), np.sin(angle)
+            x, y, z = turn_row(x, c, s), turn_row(y, c, s), turn_row(z, c, s)
+            x, y, z = step_row(x, link), step_row(y, link), step_row(z, link)
+        i, j, k = wrist_in_tool[0], wrist_in_tool[1], wrist_in_tool[2]
+        wrist = (
+            x[0] * i + x[1] * j + x[2] * k + x[3],
+            y[0] * i + y[1] * j + y[2] * k + y[3],
+            z[0] * i + z[1] * j + z[2] * k + z[3],
+        )
+        w1, w2, w5 = (w[0, 0], w[0, 1], w[0, 2]), (w[1, 0], w[1, 1], w[1, 2]), (w[4, 0], w[4, 1], w[4, 2])
+        p2, p3 = (p[1, 0], p[1, 1], p[1, 2]), (p[2, 0], p[2, 1], p[2, 2])
+        sideways = cross(w1, w2)
+        out[n, 0] = _angle_short_of_line((w[3, 0], w[3, 1], w[3, 2]), (w[5, 0], w[5, 1], w[5, 2]), w5)
+        out[n, 1] = _angle_short_of_line(subtract(p3, p2), subtract(wrist, p3), w2)
+        from_axis = subtract(wrist, (p[0, 0], p[0, 1], p[0, 2]))
+        out[n, 2] = dot(sideways, from_axis) / np.sqrt(dot(sideways, sideways))
+
+
+@kernel
+def _angle_short_of_line(a, b, axis):
     """Signed angle from the line of a to the line of b, in (-pi/2, pi/2], as seen along the axis."""
-    along_a, along_b = _dot(a, axis), _dot(b, axis)
-    angle = np.arctan2(_dot(axis, np.cross(a, b)), np.abs(_dot(a, b) - along_a * along_b))
-    return angle
-
-
-def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.einsum("...i,...i->...", a, b)
+    return np.arctan2(dot(axis, cross(a, b)), abs(dot(a, b) - dot(a, axis) * dot(b, axis)))

@@ -15,6 +15,7 @@ from er3a.kinematics.jit import kernel
 
 ORTHONORMAL_TOLERANCE = 1e-6
 BOTTOM_ROW_TOLERANCE = 1e-12
+FARTHEST_M = 100.0  # from the origin: farther off, a position was meant in mm
 
 
 def cos_sin(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -86,49 +87,68 @@ def rotation_angle(R_a: np.ndarray, R_b: np.ndarray) -> np.ndarray:
     return np.arctan2(np.linalg.norm(skew, axis=-1), np.trace(R, axis1=-2, axis2=-1) - 1.0)
 
 
+def as_floats(values: np.ndarray, argument: str) -> np.ndarray:
+    """Values as a float array; :class:`PoseError` if some are no real numbers, or rows differ in length."""
+    try:
+        array = np.asarray(values)
+        if np.iscomplexobj(array):
+            raise TypeError
+        return array.astype(float, copy=False)
+    except (TypeError, ValueError):
+        raise PoseError(f"{argument} holds something that is no real number, or rows that differ in length") from None
+
+
 def check_poses(T: np.ndarray, argument: str = "T") -> np.ndarray:
-    """Return T as float array (..., 4, 4), or raise if any matrix is no rigid transform.
+    """Return T as float array (..., 4, 4), or raise if any matrix is no rigid transform, or farther off than 100 m.
 
     Raises
     ------
     ShapeError, PoseError
-        the message names the first offending index and what is wrong with it
+        the message names the first offending index, what is wrong with it, and in which row and column
     """
-    T = np.asarray(T, dtype=float)
+    T = as_floats(T, argument)
     if T.ndim < 2 or T.shape[-2:] != (4, 4):
         raise ShapeError(argument, T.shape, "(..., 4, 4)")
     if _all_rigid(np.ascontiguousarray(T).reshape(-1, 4, 4)):
         return T
-    finite = np.isfinite(T).all(axis=(-1, -2))
-    R = np.where(finite[..., None, None], T[..., :3, :3], np.eye(3))
-    faults = (
-        (~finite, "holds NaN or infinity"),
-        (
-            np.abs(T[..., 3, :] - [0, 0, 0, 1]).max(axis=-1) > BOTTOM_ROW_TOLERANCE,
-            "has a bottom row other than 0 0 0 1",
-        ),
-        (
-            np.abs(R @ np.swapaxes(R, -1, -2) - np.eye(3)).max(axis=(-1, -2)) > ORTHONORMAL_TOLERANCE,
-            f"has a rotation part that is not orthonormal to {ORTHONORMAL_TOLERANCE:g}",
-        ),
-        (np.linalg.det(R) < 0, "has a mirrored (left-handed) rotation part"),
-    )
-    for bad, what in faults:
-        if np.any(bad):
-            index = tuple(int(i) for i in np.argwhere(bad)[0])
+    for index in np.ndindex(T.shape[:-2]):
+        if fault := _fault_of(T[index]):
             where = f"{argument}[{', '.join(map(str, index))}]" if index else argument
-            raise PoseError(f"{where} {what}")
+            raise PoseError(f"{where} {fault}")
     return T
+
+
+def _fault_of(T: np.ndarray) -> str:
+    """What keeps a matrix (4, 4) from being a rigid transform; empty if nothing does."""
+    if not np.isfinite(T).all():
+        row, column = np.argwhere(~np.isfinite(T))[0]
+        return f"holds NaN or infinity in row {row}, column {column}"
+    if np.abs(T[3] - [0, 0, 0, 1]).max() > BOTTOM_ROW_TOLERANCE:
+        return f"has a bottom row other than 0 0 0 1: {' '.join(f'{value:g}' for value in T[3])}"
+    R = T[:3, :3]
+    off = np.abs(R @ R.T - np.eye(3))
+    if off.max() > ORTHONORMAL_TOLERANCE:
+        i, j = sorted(int(k) for k in np.unravel_index(off.argmax(), (3, 3)))
+        rows = (
+            f"row {i} has length {np.linalg.norm(R[i]):.9g}" if i == j else f"rows {i} and {j} are not at right angles"
+        )
+        return f"has a rotation part that is not orthonormal to {ORTHONORMAL_TOLERANCE:g}: {rows}"
+    if np.linalg.det(R) < 0:
+        return "has a mirrored (left-handed) rotation part: turn the sign of one column"
+    if np.abs(T[:3, 3]).max() > FARTHEST_M:
+        x, y, z = T[:3, 3]
+        return f"has a position of ({x:g}, {y:g}, {z:g}) m in column 3, which can only be mm: divide it by 1000"
+    return ""
 
 
 @kernel
 def _all_rigid(T):
-    """Whether all matrices (N, 4, 4) are rigid transforms."""
+    """Whether all matrices (N, 4, 4) are rigid transforms, not too far off."""
     for n in range(T.shape[0]):
         last = abs(T[n, 3, 0]) + abs(T[n, 3, 1]) + abs(T[n, 3, 2]) + abs(T[n, 3, 3] - 1.0)
-        worst, far = last * ORTHONORMAL_TOLERANCE / BOTTOM_ROW_TOLERANCE, 0.0
+        worst, near = last * ORTHONORMAL_TOLERANCE / BOTTOM_ROW_TOLERANCE, True
         for r in range(3):
-            far += abs(T[n, r, 3])
+            near = near and abs(T[n, r, 3]) <= FARTHEST_M
             for s in range(r + 1):
                 product = T[n, r, 0] * T[n, s, 0] + T[n, r, 1] * T[n, s, 1] + T[n, r, 2] * T[n, s, 2]
                 worst = max(worst, abs(product - (1.0 if r == s else 0.0)))
@@ -137,6 +157,6 @@ def _all_rigid(T):
             + T[n, 0, 1] * (T[n, 1, 2] * T[n, 2, 0] - T[n, 1, 0] * T[n, 2, 2])
             + T[n, 0, 2] * (T[n, 1, 0] * T[n, 2, 1] - T[n, 1, 1] * T[n, 2, 0])
         )
-        if not (worst <= ORTHONORMAL_TOLERANCE and far < np.inf and volume > 0.0):
+        if not (worst <= ORTHONORMAL_TOLERANCE and near and volume > 0.0):
             return False
     return True

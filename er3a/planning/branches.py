@@ -41,6 +41,7 @@ class Branches:
     free_wrist : (N, 8) bool, whether joints 4 and 6 can turn against each other with the tool at rest
     free_shoulder : (N, 8) bool, whether joint 1 can turn with the wrist centre at rest
     straight : (N, 8) bool, whether the arm is stretched or folded, so that both elbow branches are one
+    factors : (N, 8, 3), distances from the wrist, elbow and shoulder singularities (rad, rad, m)
     """
 
     t: np.ndarray
@@ -50,11 +51,17 @@ class Branches:
     free_wrist: np.ndarray
     free_shoulder: np.ndarray
     straight: np.ndarray
+    factors: np.ndarray
 
     @property
     def meeting(self) -> np.ndarray:
         """(N, 8) bool, whether a branch meets another one there."""
         return self.free_wrist | self.free_shoulder | self.straight
+
+    @property
+    def doors(self) -> np.ndarray:
+        """(N, 8), bits of the branch number (:mod:`er3a.kinematics.branch`) in which the branch met there differs."""
+        return self.free_wrist + 2 * self.straight + 4 * self.free_shoulder
 
     @property
     def reached(self) -> np.ndarray:
@@ -65,7 +72,7 @@ class Branches:
 def branches_along(robot: Robot, line: ToolPath, t: np.ndarray) -> Branches:
     """Solve a line at times (N,) in s (rising, both ends included) and at as many more as its branches need."""
     grid = _solve_at(robot, line, t)
-    grid = _merge(grid, _solve_at(robot, line, _closest_passes(robot, line, grid)))
+    grid = _merge(grid, _solve_at(robot, line, _closest_passes(grid)))
     while True:
         wide = _unclear(grid) & (np.diff(grid.t) > SHORTEST_INTERVAL * line.duration)
         if not wide.any():
@@ -109,10 +116,11 @@ def _solve_at(robot: Robot, line: ToolPath, t: np.ndarray) -> Branches:
     return Branches(t, progress, q, np.where(fault == REACHED, 0.0, gap), *_free(robot, q))
 
 
-def _free(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _free(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     factors = determinant_factors(robot, q)
     wrist, elbow, shoulder = (np.abs(value) for value in (factors.wrist, factors.elbow, factors.shoulder))
-    return wrist < FREE_WRIST, shoulder < FREE_SHOULDER, elbow < STRAIGHT_ELBOW
+    distances = np.stack([wrist, elbow, shoulder], axis=-1)
+    return wrist < FREE_WRIST, shoulder < FREE_SHOULDER, elbow < STRAIGHT_ELBOW, distances
 
 
 def _merge(a: Branches, b: Branches) -> Branches:
@@ -121,13 +129,12 @@ def _merge(a: Branches, b: Branches) -> Branches:
     return Branches(t, *rest)
 
 
-def _closest_passes(robot: Robot, line: ToolPath, grid: Branches) -> np.ndarray:
+def _closest_passes(grid: Branches) -> np.ndarray:
     """Times at which a branch comes nearest to a singularity between grid points, by a parabola through three."""
-    factors = determinant_factors(robot, grid.q)
     found = [np.empty(0)]
-    for values in (factors.wrist**2, factors.elbow**2, factors.shoulder**2):
+    for kind in range(3):
         for slot in range(SLOTS):
-            y = values[:, slot]
+            y = grid.factors[:, slot, kind] ** 2
             i = 1 + np.flatnonzero((y[1:-1] < y[:-2]) & (y[1:-1] <= y[2:]))
             found.append(vertex(grid.t, y, i))
     return np.unique(np.concatenate(found))

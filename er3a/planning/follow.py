@@ -104,7 +104,7 @@ def _best(robot: Robot, grid: Branches, part: slice, starts: np.ndarray, before:
     share = np.gradient(t) / grid.t[-1] if len(t) > 1 else np.zeros(1)
     fits = within(robot, nearest_turns(robot, q, np.zeros(6)))
     price = np.where(fits, 0.0, OUTSIDE_COST * share[:, None])
-    onward, leaps = _costs_to_go(q, price, grid.meeting[part])
+    onward, leaps = _costs_to_go(q, price, grid.doors[part])
     sequences = []
     for start in starts:
         slot = _walk(onward, start)
@@ -145,10 +145,11 @@ def _jump(t: np.ndarray, q: np.ndarray, i: int) -> Jump:
 
 
 @kernel
-def _costs_to_go(q, price, meeting):
+def _costs_to_go(q, price, doors):
     """The branch to take next from each point and branch, and whether that is a jump; both (n - 1, 8).
 
-    Going from one branch to another is no jump only where they meet, or are the same to SWITCH_STEP.
+    Going from one branch to another is no jump only where they meet, or are the same to SWITCH_STEP. Branches meet in
+    what is singular there: passing an aligned wrist does not change the side of the elbow.
     """
     count = q.shape[0]
     cost = np.full(SLOTS, np.inf)
@@ -172,7 +173,7 @@ def _costs_to_go(q, price, meeting):
                     step -= 2 * np.pi * np.round(step / (2 * np.pi))
                     travel += step * step
                     farthest = max(farthest, abs(step))
-                together = a == b or meeting[i, a] or meeting[i + 1, b]
+                together = (a ^ b) & ~(doors[i, a] | doors[i + 1, b]) == 0
                 jump = farthest > (WIDE_STEP if together else SWITCH_STEP)
                 total = price[i, a] + np.sqrt(travel) + behind[b] + (JUMP_COST if jump else 0.0)
                 if total < cost[a]:

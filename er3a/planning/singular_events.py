@@ -23,7 +23,8 @@ from er3a.robots.robot import Robot
 
 ON_SET = 1e-9  # rad or m: this near counts as on the singular set
 EDGE = 1e-3  # rad or m: a branch that ends this near to a singular set ends on it
-SLOPE_STEP = 1e-5  # share of the duration
+FLAT = 1e-9  # relative, by which rounding may raise the distance at its minimum
+SLOPE_STEP = 5e-5  # share of the duration
 SAME_EVENT = 1e-8  # share of the duration
 LONG_STAY = 0.01  # share of the duration
 
@@ -129,6 +130,10 @@ def _on_set(times: np.ndarray, f: np.ndarray, a: int, b: int, factor: Joints, du
 
 
 def _root(factor: Joints, start: float, end: float, duration: float) -> float:
+    """Where the factor changes sign; the end nearer to 0 if, next to the set, it is evaluated on one side only."""
+    low, high = float(factor(start)), float(factor(end))
+    if not low * high < 0:
+        return start if abs(low) < abs(high) else end
     return brentq(factor, start, end, xtol=1e-14 * duration, rtol=4 * np.finfo(float).eps)
 
 
@@ -139,11 +144,12 @@ def _minima(
     size = np.abs(f)
     padded = np.concatenate([[np.inf], size, [np.inf]])
     peaks = find_peaks(-padded)[0] - 1
-    step = SLOPE_STEP * duration
+    step, last = SLOPE_STEP * duration, len(f) - 1
 
     def slope(at):
-        a, b = factor(np.array([at - step, at + step]))
-        return b * b - a * a
+        """Of the squared distance, by differences of fourth order."""
+        a, b, c, d = factor(at + step * np.array([-2.0, -1.0, 1.0, 2.0])) ** 2
+        return 8 * (c - b) - (d - a)
 
     found = []
     for i in peaks:
@@ -151,12 +157,14 @@ def _minima(
         if size[i] > 2 * near or size[beside].min() <= ON_SET or np.ptp(np.sign(f[beside])) > 0:
             continue
         low, distance = times[i], size[i]
-        left, right = times[max(i - 1, 0)], times[min(i + 1, len(f) - 1)]
-        left, right = max(left, times[0] + step), min(right, times[-1] - step)
-        if 0 < i < len(f) - 1 and right > left and slope(left) < 0 < slope(right):
+        # Points nearer than the slope's own step say nothing of its sign.
+        before, after = np.searchsorted(times, [low - 4 * step, low + 4 * step], side="right")
+        left = max(times[max(before - 1, 0)], times[0] + 2 * step)
+        right = min(times[min(after, last)], times[-1] - 2 * step)
+        if 0 < i < last and right > left and slope(left) < 0 < slope(right):
             at = brentq(slope, left, right, xtol=1e-13 * duration)
             refined = abs(float(factor(at)))
-            if refined <= distance:
+            if refined <= distance * (1 + FLAT):
                 low, distance = at, refined
         if distance < near:
             found.append((float(low), float(distance)))

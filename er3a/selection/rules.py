@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 
@@ -104,13 +105,15 @@ def checked_weights(rule: str | Mapping[str, float]) -> dict[str, float]:
     Er3aError
         naming the unknown rule or the weight that can't be used
     """
+    if not isinstance(rule, str | Mapping):
+        raise Er3aError(f"the rule is {rule!r}; expected a name ({', '.join(RULES)}) or weights of several")
     weights = {rule: 1.0} if isinstance(rule, str) else dict(rule)
     if not weights:
         raise Er3aError(f"the mix of rules is empty; give weights to some of: {', '.join(RULES)}")
     for name, weight in weights.items():
         if name not in RULES:
             raise Er3aError(f"there is no rule '{name}'; known: {', '.join(RULES)}")
-        if not (np.isfinite(weight) and weight >= 0):
+        if not (isinstance(weight, Real) and np.isfinite(weight) and weight >= 0):
             raise Er3aError(f"the weight of rule '{name}' is {weight!r}; expected a number of at least 0")
     if not sum(weights.values()) > 0:
         raise Er3aError("all weights of the mix of rules are 0; raise one")

@@ -68,7 +68,8 @@ def select(
     if solutions.q.ndim != 2:
         raise ShapeError("solutions.q", solutions.q.shape, "(n, 6)")
     measured = {name: RULES[name].measure(robot, solutions.q, q_ref, scene) for name in weights}
-    allowed, refused = _refusals(robot, solutions, scene)
+    refused = refusals(robot, solutions, scene)
+    allowed = np.array([not text for text in refused], dtype=bool)
     cost = _cost(weights, measured, allowed)
     order = _ordered(robot, solutions, weights, cost, allowed, q_ref)
     place = {int(row): rank + 1 for rank, row in enumerate(order)}
@@ -77,7 +78,8 @@ def select(
     return Ranking(order, measured, cost, reason, _chosen_reason(robot, solutions, order, refused, words, q_ref))
 
 
-def _refusals(robot: Robot, solutions: Solutions, scene: SceneFile | None) -> tuple[np.ndarray, list[str]]:
+def refusals(robot: Robot, solutions: Solutions, scene: SceneFile | None) -> list[str]:
+    """Why each row is refused: limits that it leaves or, with a scene, what overlaps; empty texts for the others."""
     refused = list(solutions.reason)
     inside = np.flatnonzero(solutions.within_limits)
     if scene is not None and inside.size:
@@ -85,7 +87,14 @@ def _refusals(robot: Robot, solutions: Solutions, scene: SceneFile | None) -> tu
         for row, distance, pair in zip(inside, clear.distance, clear.pair):
             if distance < COLLIDES:
                 refused[row] = f"{pair} overlap by {-distance * 1000:.0f} mm"
-    return np.array([not text for text in refused], dtype=bool), refused
+    return refused
+
+
+def all_collide(robot: Robot, solutions: Solutions, refused: list[str]) -> str:
+    """Why nothing can be chosen where all rows within the limits collide: in the words of the roomiest of them."""
+    collide = np.flatnonzero(solutions.within_limits)
+    best = max(collide, key=lambda row: limit_margin(robot, solutions.q[row]))
+    return f"all {len(collide)} solutions within the limits collide: {refused[best]}"
 
 
 def _cost(weights: dict[str, float], measured: dict[str, np.ndarray], allowed: np.ndarray) -> np.ndarray:
@@ -125,6 +134,4 @@ def _chosen_reason(
         return f"{words[order[0]]}; the only solution that nothing speaks against"
     if not solutions.within_limits.any():
         return nearest(robot, solutions, q_ref).reason
-    collide = [row for row in np.flatnonzero(solutions.within_limits) if refused[row]]
-    best = max(collide, key=lambda row: limit_margin(robot, solutions.q[row]))
-    return f"all {len(collide)} solutions within the limits collide: {refused[best]}"
+    return all_collide(robot, solutions, refused)

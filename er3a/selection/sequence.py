@@ -19,7 +19,7 @@ import numpy as np
 from er3a.collision.clearance import clearance
 from er3a.collision.scene import SceneFile
 from er3a.errors import Er3aError
-from er3a.kinematics.inverse import Solutions
+from er3a.kinematics.inverse import Solutions, checked_reference
 from er3a.robots.robot import Robot
 from er3a.selection.rules import joint_weights
 
@@ -69,8 +69,9 @@ def select_sequence(
     if not poses:
         raise Er3aError("the sequence is empty; give at least one pose")
     usable = [_usable(robot, solutions, scene, number) for number, solutions in enumerate(poses)]
+    q_ref = checked_reference(q_ref)
     sets = [solutions.q[rows] for solutions, rows in zip(poses, usable)]
-    total = _move_costs(robot, np.asarray(q_ref, float)[None], sets[0], rule)[0]
+    total = _move_costs(robot, q_ref[None], sets[0], rule)[0]
     came_from = []
     for before, after in pairwise(sets):
         through = total[:, None] + _move_costs(robot, before, after, rule)
@@ -80,7 +81,7 @@ def select_sequence(
     for origin in reversed(came_from):
         best.append(int(origin[best[-1]]))
     best.reverse()
-    greedy, greedy_cost, at = [], 0.0, np.asarray(q_ref, float)
+    greedy, greedy_cost, at = [], 0.0, q_ref
     for q in sets:
         costs = _move_costs(robot, at[None], q, rule)[0]
         greedy.append(int(costs.argmin()))

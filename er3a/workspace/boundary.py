@@ -35,7 +35,8 @@ class BorderArc:
 
     Attributes
     ----------
-    points : (n, 2), m, radius and height; joints : (n, 3), rad, theta_2, tau and gamma
+    points : (n, 2), m, radius (in a side view: x, negative behind axis 1) and height
+    joints : (n, 3), rad, theta_2, tau and gamma
     sweeps : "theta_2", "tau" or "gamma"
     """
 
@@ -44,10 +45,11 @@ class BorderArc:
     sweeps: str
 
 
-def border(arm: SectionArm) -> list[BorderArc]:
+def border(arm: SectionArm, side_view: bool = False) -> list[BorderArc]:
     """Arcs of the border of the section; none if the arm is no mirror image of itself.
 
-    A limited joint 1 is left out of account: what counts is whether any azimuth reaches the ring.
+    A limited joint 1 is left out of account: what counts is whether any azimuth reaches the ring, or, in a side view,
+    whether the arm reaches the point of its own plane without joint 1, as makers draw it.
     """
     if not arm.mirrored or arm.inner_low > arm.inner_high:
         return []
@@ -58,9 +60,10 @@ def border(arm: SectionArm) -> list[BorderArc]:
         if key in seen or np.ptp(np.abs(points - points.mean())) == 0:
             continue
         seen.add(key)
-        kept = _on_border(arm, points)
+        kept = _on_border(arm, points, side_view)
         for run in _runs(kept):
-            section = np.stack([np.abs(points[run].real), points[run].imag], axis=1)
+            across = points[run].real if side_view else np.abs(points[run].real)
+            section = np.stack([across, points[run].imag], axis=1)
             arcs.append(BorderArc(section, joints[run], sweeps))
     return arcs
 
@@ -126,24 +129,27 @@ def _tilts(arm: SectionArm) -> list[tuple[float, float]]:
     return [(-most, most)] if least < _ANGLE else [(-most, -least), (least, most)]
 
 
-def _on_border(arm: SectionArm, points: np.ndarray) -> np.ndarray:
-    """Which points have a proven unreachable ring close beside them, on either side of the arc."""
+def _on_border(arm: SectionArm, points: np.ndarray, side_view: bool) -> np.ndarray:
+    """Which points have a proven unreachable ring (or point of the plane) close beside them, on either side."""
     along = np.gradient(points)
     length = np.abs(along)
     normal = np.where(length > 0, 1j * along / np.where(length > 0, length, 1), 0)
     beside = np.concatenate([points + s * _BESIDE * arm.reach * normal for s in (1, -1)])
     rings = np.stack([np.abs(beside.real), beside.imag], axis=1)
+    angles = np.tile([0.0, np.pi], (len(rings), 1))
+    if side_view:
+        angles[:] = np.where(beside.real >= 0, 0.0, np.pi)[:, None]
     free = np.zeros(len(rings), dtype=bool)
-    _unreachable(arm, rings, free)
+    _unreachable(arm, rings, angles, free)
     return free[: len(points)] | free[len(points) :]
 
 
 @kernel
-def _unreachable(arm, rings, out):
+def _unreachable(arm, rings, angles, out):
     stack = np.empty((STACK, 6))
     for n in range(rings.shape[0]):
         rho, z = rings[n, 0], rings[n, 1]
-        out[n], _ = is_empty(arm, (rho, rho, z, z), 0.0, np.pi, _MOST_BOXES, stack)
+        out[n], _ = is_empty(arm, (rho, rho, z, z), angles[n, 0], angles[n, 1], _MOST_BOXES, stack)
 
 
 def _runs(kept: np.ndarray) -> list[slice]:

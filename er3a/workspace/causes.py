@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.kinematics.forward import forward
 from er3a.robots.robot import Robot
 from er3a.workspace.cavities import Cavity
 from er3a.workspace.proof import judge, ring_volumes
 from er3a.workspace.section_arm import FULL_TURN, section_arm
 
-PROBES = 300
+PROBES, SAMPLES = 300, 400_000
 STEPS = (15.0, 30.0, 60.0, 90.0, 180.0)
 """By how much a limit is widened, deg, until the void vanishes."""
 _GONE, _SHRUNK = 0.98, 0.10
@@ -36,23 +38,40 @@ class Relaxed:
     filled: float
 
 
-def relaxations(robot: Robot, cavity: Cavity) -> list[Relaxed]:
-    """Judge a void's cells with each limit widened, strongest first; then with all of them."""
+def relaxations(robot: Robot, cavity: Cavity, in_section: Callable[[np.ndarray], tuple] | None = None) -> list[Relaxed]:
+    """Judge a void's cells with each limit widened, strongest first; then with all of them.
+
+    Parameters
+    ----------
+    in_section : for an arm without a section form: from points (n, 3), m, in the base frame to their radius, azimuth
+        and height about axis 1. Cells then count as reached if a random sample of the widened arm lies in them.
+    """
     chosen = _probes(cavity)
-    before = _open_angle(robot, cavity, chosen)
+    if in_section is None:
+        before = _open_angle(robot, cavity, chosen)
+        joints = range(1, 6)
+
+        def share_filled(widened: Robot) -> float:
+            return _share_filled(widened, cavity, chosen, before)
+    else:
+        joints = range(1, 7)
+
+        def share_filled(widened: Robot) -> float:
+            return _share_sampled(robot, widened, cavity, chosen, in_section)
+
     found = []
-    for joint in range(1, 6):
+    for joint in joints:
         if robot.upper[joint - 1] - robot.lower[joint - 1] >= FULL_TURN:
             continue
         for side in ("lower", "upper"):
             limit = float(getattr(robot, side)[joint - 1])
             for step in STEPS:
-                share = _share_filled(_widened(robot, [joint], side, np.radians(step)), cavity, chosen, before)
+                share = share_filled(_widened(robot, [joint], side, np.radians(step)))
                 if share >= _GONE:
                     break
             found.append(Relaxed(joint, side, float(np.degrees(limit)), step, share))
     found.sort(key=lambda relaxed: (relaxed.filled < _GONE, relaxed.by_deg, -relaxed.filled, relaxed.joint))
-    free = _share_filled(_widened(robot, [1, 2, 3, 4, 5, 6], "both", 2 * np.pi), cavity, chosen, before)
+    free = share_filled(_widened(robot, [1, 2, 3, 4, 5, 6], "both", 2 * np.pi))
     return [*found, Relaxed(0, "both", None, None, free)]
 
 
@@ -110,3 +129,25 @@ def _share_filled(robot: Robot, cavity: Cavity, chosen: np.ndarray, before: np.n
     """Share of what was open in the chosen arcs, by volume, that another arm fills."""
     section = ring_volumes(cavity.cells[chosen])
     return float(1 - (section @ _open_angle(robot, cavity, chosen)) / (section @ before))
+
+
+def _share_sampled(robot: Robot, widened: Robot, cavity: Cavity, chosen: np.ndarray, in_section: Callable) -> float:
+    """Share by volume of the chosen arcs that samples of a widened arm lie in; fewer samples can only lower it."""
+    random = np.random.Generator(np.random.Philox(key=len(chosen)))
+    q = random.uniform(widened.lower, widened.upper, (SAMPLES, 6))
+    # The arm as it is does not come here: at least one joint must be beyond its limit.
+    q = q[((q < robot.lower) | (q > robot.upper)).any(axis=1)]
+    rho, azimuth, z = in_section(forward(widened, q)[:, :3, 3])
+    a, b, c, d = cavity.cells[chosen].T
+    low, high = cavity.arcs[chosen].T
+    inside = (rho > a.min()) & (rho < b.max()) & (z > c.min()) & (z < d.max())
+    rho, azimuth, z = rho[inside], azimuth[inside] % (2 * np.pi), z[inside]
+    hit = np.array(
+        [
+            ((rho > a[n]) & (rho < b[n]) & (z > c[n]) & (z < d[n]) & (azimuth >= low[n]) & (azimuth <= high[n])).any()
+            for n in range(len(chosen))
+        ],
+        dtype=bool,
+    )
+    volumes = cavity.volumes[chosen]
+    return float(volumes[hit].sum() / volumes.sum()) if len(chosen) else 0.0

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.kinematics.jit import kernel
-from er3a.workspace.arcs import TURN, measure, meets, remove
+from er3a.workspace.arcs import MOST_ARCS, TURN, measure, meets, remove
 from er3a.workspace.empty import STACK, is_empty
 from er3a.workspace.filled import climb, reached_angles, slack, turn_aside
 from er3a.workspace.sweep import swept_angles
@@ -22,35 +22,37 @@ _SPLITS = 256
 
 @kernel
 def judge_cells(arm, cells, stances, steps, most_boxes, unfilled, unfilled_count, empty, empty_count, witness):
-    """Decide cells as far as one look goes.
+    """Decide cells as far as one look goes, beginning from what is known of them.
 
     Parameters
     ----------
     cells : (n, 4), m: rho_0, rho_1, z_0, z_1
     stances : (m, 9), see :func:`er3a.workspace.filled.stances`; steps : their spacing in theta_2 and tau, rad
     most_boxes : of one emptiness proof
-    unfilled, empty : (n, MOST_ARCS, 2), set to the azimuths (rad) that are not proven filled, and to those of them that
-        are proven empty; their counts (n,) beside them
+    unfilled, empty : (n, MOST_ARCS, 2), azimuths (rad) that are not proven filled, and those of them that are proven
+        empty, with their counts (n,): at first of the cell that this one was split off, on return of the cell itself
     witness : (n, 4), set to theta_2, tau, phi of a stance that reaches the cell's middle, and 1 (0 if none is known)
 
     Returns
     -------
     boxes : how many the emptiness proofs looked at
     """
-    stack, splits = np.empty((STACK, 6)), np.empty((_SPLITS, 2))
+    stack, splits, known = np.empty((STACK, 6)), np.empty((_SPLITS, 2)), np.empty((MOST_ARCS, 2))
     best_of, stance_of = np.empty(2 * _SECTORS), np.empty(2 * _SECTORS, dtype=np.int64)
     boxes = 0
     for n in range(cells.shape[0]):
         rho_0, rho_1, z_0, z_1 = cells[n, 0], cells[n, 1], cells[n, 2], cells[n, 3]
-        unfilled[n, 0, 0], unfilled[n, 0, 1] = 0.0, TURN
-        count = _fill(arm, rho_0, rho_1, z_0, z_1, stances, steps, unfilled[n], 1, best_of, stance_of, witness[n])
+        count, known_count = unfilled_count[n], empty_count[n]
+        known[:known_count] = empty[n, :known_count]
+        count = _fill(arm, rho_0, rho_1, z_0, z_1, stances, steps, unfilled[n], count, best_of, stance_of, witness[n])
         unfilled_count[n] = count
         if count == 0:
             empty_count[n] = 0
             continue
         for k in range(count):
             empty[n, k, 0], empty[n, k, 1] = unfilled[n, k, 0], unfilled[n, k, 1]
-        empty_count[n], used = _exclude(arm, rho_0, rho_1, z_0, z_1, most_boxes, empty[n], count, stack, splits)
+        cell, parent = (rho_0, rho_1, z_0, z_1), (known, known_count)
+        empty_count[n], used = _exclude(arm, cell, most_boxes, empty[n], count, parent, stack, splits)
         boxes += used
     return boxes
 
@@ -166,9 +168,14 @@ def _fill(arm, rho_0, rho_1, z_0, z_1, stances, steps, arcs, count, best_of, sta
 
 
 @kernel
-def _exclude(arm, rho_0, rho_1, z_0, z_1, most_boxes, arcs, count, stack, splits):
-    """Take what the arm may reach out of the arcs, so that what is left is empty; returns their count and the boxes."""
-    rho, cell = 0.5 * (rho_0 + rho_1), (rho_0, rho_1, z_0, z_1)
+def _exclude(arm, cell, most_boxes, arcs, count, parent, stack, splits):
+    """Take what the arm may reach out of the arcs, so that what is left is empty; returns their count and the boxes.
+
+    Parameters
+    ----------
+    parent : arcs that are known to be empty, and their count
+    """
+    rho, (known, known_count) = 0.5 * (cell[0] + cell[1]), parent
     most = np.pi if arm.mirrored else TURN
     proven, boxes = is_empty(arm, cell, 0.0, most, most_boxes, stack)
     if proven:
@@ -176,7 +183,7 @@ def _exclude(arm, rho_0, rho_1, z_0, z_1, most_boxes, arcs, count, stack, splits
     if arm.full_turn:
         return 0, boxes
     # Where nothing is known to be filled, the border of the section runs through, and fine angles would gain little.
-    finest = min(0.01, max(0.001, 0.1 * (rho_1 - rho_0) / rho)) if measure(arcs, count) < TURN - 1e-9 else 0.05
+    finest = min(0.01, max(0.001, 0.1 * (cell[1] - cell[0]) / rho)) if measure(arcs, count) < TURN - 1e-9 else 0.05
     pieces = 8
     for k in range(pieces):
         splits[k, 0], splits[k, 1] = most * (k + 0.5) / pieces, 0.5 * most / pieces + 1e-12
@@ -186,6 +193,9 @@ def _exclude(arm, rho_0, rho_1, z_0, z_1, most_boxes, arcs, count, stack, splits
         middle, width = splits[waiting, 0], splits[waiting, 1]
         low, high = middle - width, middle + width
         a, b = arm.theta_1
+        # Each angle of this piece would bring the tool to all of the azimuths between these.
+        if b + low - a - high > 2e-9 and meets(known, known_count, a + high + 1e-9, b + low - 1e-9):
+            continue
         here = meets(arcs, count, a + low, b + high)
         there = arm.mirrored and meets(arcs, count, a - high, b - low)
         if not here and not there:

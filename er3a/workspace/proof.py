@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ _MOST_BOXES = 20_000
 _OPEN = 1e-9
 MOST_LEVEL = 7
 """Cells are not split further than this: a set without volume would never be decided."""
+_SHARE = 64
 _COLUMNS = ("cells", "unfilled", "empty", "level", "witness")
 
 
@@ -77,7 +79,7 @@ def ring_volumes(cells: np.ndarray) -> np.ndarray:
     return np.pi * (cells[:, 1] ** 2 - cells[:, 0] ** 2) * (cells[:, 3] - cells[:, 2])
 
 
-def prove(arm: SectionArm, target: float, most_cells: int, across: int = 32) -> Proof:
+def prove(arm: SectionArm, target: float, most_cells: int, across: int = 32, threads: int = 1) -> Proof:
     """Decide the section of an arm.
 
     Parameters
@@ -85,12 +87,14 @@ def prove(arm: SectionArm, target: float, most_cells: int, across: int = 32) -> 
     target : wanted width of the bracket, (upper - lower) / upper
     most_cells : how many cells may be looked at; the first grid is always finished
     across : cells along the height of the first grid
+    threads : how many to use; the result does not depend on it
     """
     stances = _stance_grid(arm)
     cells = _first_cells(arm, across)
     level, looked, boxes, done, settled = 0, 0, 0, [], np.zeros(2)
+    parents = None
     while len(cells):
-        judged = _judge(arm, cells, stances, level)
+        judged = _judge(arm, cells, stances, level, parents, threads)
         looked, boxes = looked + len(cells), boxes + judged.boxes
         volumes, reached = judged.volumes, 1 - np.stack([judged.unfilled_share, judged.empty_share])
         undecided = volumes * (reached[1] - reached[0])
@@ -103,14 +107,15 @@ def prove(arm: SectionArm, target: float, most_cells: int, across: int = 32) -> 
             split[np.argsort(-undecided * split, kind="stable")[room:]] = False
         settled += (reached * volumes)[:, ~split].sum(axis=1)
         done.append(judged.rows(~split))
-        cells, level = _quarters(cells[split]), level + 1
+        cells, parents, level = _quarters(cells[split]), judged.rows(np.repeat(np.flatnonzero(split), 4)), level + 1
     columns = (np.concatenate([getattr(part, key) for part in done]) for key in _COLUMNS)
     return Proof(*columns, boxes)
 
 
 def sharpen(arm: SectionArm, proof: Proof, chosen: np.ndarray) -> Proof:
     """Split the chosen cells (mask) of a proof into four each, and judge those."""
-    finer = _judge(arm, _quarters(proof.cells[chosen]), _stance_grid(arm), 0)
+    parents = proof.rows(np.repeat(np.flatnonzero(chosen), 4))
+    finer = _judge(arm, _quarters(proof.cells[chosen]), _stance_grid(arm), 0, parents)
     level = np.repeat(proof.level[chosen] + 1, 4)
     columns = [
         np.concatenate([getattr(proof, key)[~chosen], getattr(finer, key)]) for key in _COLUMNS if key != "level"
@@ -153,11 +158,26 @@ def _quarters(cells: np.ndarray) -> np.ndarray:
     return np.stack(rows, axis=1).reshape(-1, 4)
 
 
-def _judge(arm: SectionArm, cells: np.ndarray, stances: tuple, level: int) -> Proof:
+def _judge(
+    arm: SectionArm, cells: np.ndarray, stances: tuple, level: int, parents: Proof | None = None, threads: int = 1
+) -> Proof:
+    """Judge cells, beginning from what is known of those they were split off."""
     n = len(cells)
-    unfilled, empty = np.full((n, MOST_ARCS, 2), np.nan), np.full((n, MOST_ARCS, 2), np.nan)
-    counts, witness = np.zeros((2, n), dtype=np.int64), np.zeros((n, 4))
-    boxes = judge_cells(arm, cells, *stances, _MOST_BOXES, unfilled, counts[0], empty, counts[1], witness)
+    unfilled, empty = np.full((2, n, MOST_ARCS, 2), np.nan)
+    unfilled[:, 0] = 0.0, TURN
+    counts, witness = np.array([np.ones(n), np.zeros(n)]).astype(np.int64), np.zeros((n, 4))
+    if parents is not None:
+        unfilled[:], empty[:] = parents.unfilled, parents.empty
+        counts = np.isfinite([unfilled[..., 0], empty[..., 0]]).sum(axis=2)
+
+    def work(part: slice) -> int:
+        known = (unfilled[part], counts[0, part], empty[part], counts[1, part])
+        return judge_cells(arm, cells[part], *stances, _MOST_BOXES, *known, witness[part])
+
+    # Neighbours cost alike: small shares keep the threads busy to the end.
+    parts = [slice(k, k + _SHARE) for k in range(0, n, _SHARE)]
+    with ThreadPoolExecutor(threads) as pool:
+        boxes = sum(pool.map(work, parts)) if threads > 1 else sum(map(work, parts))
     for arcs, count in ((unfilled, counts[0]), (empty, counts[1])):
         arcs[np.arange(MOST_ARCS) >= count[:, None]] = np.nan
     return Proof(cells, unfilled, empty, np.full(n, level), witness, boxes)

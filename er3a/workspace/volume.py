@@ -7,6 +7,7 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,13 +37,19 @@ class VolumeEstimate:
 
 
 def estimate_volume(
-    arm: SectionArm | None, section: SectionMap, reach: float, heights: tuple[float, float], points: int, seed: int
+    search: SectionArm | Callable[[np.ndarray], np.ndarray],
+    section: SectionMap,
+    reach: float,
+    heights: tuple[float, float],
+    points: int,
+    seed: int,
 ) -> VolumeEstimate:
     """Estimate the reached volume from uniform points in the cylinder about axis 1 that holds the workspace.
 
     Parameters
     ----------
-    arm : what to search with where the section leaves a point open; None to leave it open
+    search : what decides a point that the section leaves open: an arm in its section form, or a function of points
+        (n, 3) about axis 1 (m) that tells which are reached for certain
     reach, heights : m, the cylinder
     """
     random = np.random.Generator(np.random.Philox(key=seed))
@@ -51,17 +58,13 @@ def estimate_volume(
     rho, azimuth = reach * np.sqrt(unit[:, 0]), 2 * np.pi * unit[:, 1]
     z = low + (high - low) * unit[:, 2]
     status = section.status(rho, azimuth, z)
-    for n in range(2):
-        open_points = np.flatnonzero((status != FILLED) & (status != EMPTY))
-        if arm is None or not len(open_points):
-            break
-        half = POINT * 10.0 ** (-n) / 2
-        r, h = np.maximum(rho[open_points], 2 * half), z[open_points]
-        looked = judge(arm, np.stack([r - half, r + half, h - half, h + half], axis=1))
-        turn = azimuth[open_points][:, None]
-        unfilled = ((looked.unfilled[..., 0] <= turn) & (turn <= looked.unfilled[..., 1])).any(axis=1)
-        empty = ((looked.empty[..., 0] <= turn) & (turn <= looked.empty[..., 1])).any(axis=1)
-        status[open_points] = np.where(empty, EMPTY, np.where(unfilled, status[open_points], FILLED))
+    open_points = np.flatnonzero((status != FILLED) & (status != EMPTY))
+    if isinstance(search, SectionArm):
+        _decide(search, rho, azimuth, z, status)
+    elif len(open_points):
+        r, turn = rho[open_points], azimuth[open_points]
+        found = search(np.stack([r * np.cos(turn), r * np.sin(turn), z[open_points]], axis=1))
+        status[open_points[found]] = FILLED
     reached, undecided = int((status == FILLED).sum()), int(((status != FILLED) & (status != EMPTY)).sum())
     solid = np.pi * reach**2 * (high - low)
     return VolumeEstimate(
@@ -72,6 +75,21 @@ def estimate_volume(
         float(solid * wilson(reached, points)[0]),
         float(solid * wilson(reached + undecided, points)[1]),
     )
+
+
+def _decide(arm: SectionArm, rho: np.ndarray, azimuth: np.ndarray, z: np.ndarray, status: np.ndarray) -> None:
+    """Judge open points as cells of next to no size."""
+    for n in range(2):
+        left = np.flatnonzero((status != FILLED) & (status != EMPTY))
+        if not len(left):
+            return
+        half = POINT * 10.0 ** (-n) / 2
+        r, h = np.maximum(rho[left], 2 * half), z[left]
+        looked = judge(arm, np.stack([r - half, r + half, h - half, h + half], axis=1))
+        turn = azimuth[left][:, None]
+        unfilled = ((looked.unfilled[..., 0] <= turn) & (turn <= looked.unfilled[..., 1])).any(axis=1)
+        empty = ((looked.empty[..., 0] <= turn) & (turn <= looked.empty[..., 1])).any(axis=1)
+        status[left] = np.where(empty, EMPTY, np.where(unfilled, status[left], FILLED))
 
 
 def wilson(hits: int, points: int) -> tuple[float, float]:

@@ -24,6 +24,7 @@ from tests.conftest import ALL_THERE
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 STAGES = ("validation", "workspace", "inverse", "trajectory")
+PANELS = {f"{robot}: write the teach panel" for robot in ROBOTS}
 
 
 @contextmanager
@@ -55,6 +56,7 @@ def test_every_stage_leaves_results_a_page_and_a_recording(small_study):
             assert summary["provenance"]["inputs"][0]["path"] == f"data/robots/{robot}.yaml"
             for suffix in ("html", "rrd"):
                 assert (small_study.folder / "reports" / robot / f"{stage}.{suffix}").stat().st_size > 1000
+        assert (small_study.folder / "reports" / robot / "teach.html").stat().st_size > 1000
     assert (small_study.folder / "reports/index.html").is_file()
     assert not list((small_study.folder / "results").glob("*/workspace/parts/*"))
 
@@ -82,8 +84,13 @@ def test_editing_a_template_renders_reports_only(small_study):
 
 def test_editing_the_base_template_renders_all_pages_and_no_number(small_study):
     with edited(small_study.folder / "er3a/viewing/base.html.j2", "<main>", "<main >"):
-        expected = {f"{robot}: report {stage}" for robot in ROBOTS for stage in STAGES}
+        expected = {f"{robot}: report {stage}" for robot in ROBOTS for stage in STAGES} | PANELS
         assert small_study.planned() == expected | {"write the index"}
+
+
+def test_editing_a_script_writes_the_teach_panels_only(small_study):
+    with edited(small_study.folder / "er3a/teach/kinematics.js", "/**", "/** Edited."):
+        assert small_study.planned() == PANELS | {"write the index"}
 
 
 def test_editing_a_kinematics_module_reruns_what_uses_it(small_study):

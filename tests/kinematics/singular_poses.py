@@ -11,15 +11,32 @@ from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from er3a.robots.robot import Robot
 
-CLASSES = ("wrist", "elbow", "folded", "shoulder", "wrist elbow", "wrist shoulder", "elbow shoulder", "all")
-OFFSETS = np.array([0.0, *(10.0**k for k in range(-12, -2))])
+CLASSES = (
+    "wrist",
+    "elbow",
+    "folded",
+    "shoulder",
+    "wrist elbow",
+    "wrist folded",
+    "wrist shoulder",
+    "elbow shoulder",
+    "folded shoulder",
+    "wrist elbow shoulder",
+    "wrist folded shoulder",
+)
 
 
 def joints_near(robot: Robot, kind: str, random: np.random.Generator, count: int) -> np.ndarray:
-    """Joint angles (count, 6) at 0, +-1e-12 ... +-1e-3 (rad, or so in m) from the singularities that ``kind`` names."""
+    """Joint angles (n, 6), n at most ``count``, at and next to the singularities that ``kind`` names.
+
+    The joints concerned are at 0 (one in eight), at a power of ten from 1e-12 to 1e-3, or anywhere between, either way
+    (rad). Rows that can't stand so are left out: all of them where the arm can't.
+    """
     q = random.uniform(robot.lower, robot.upper, (count, 6))
-    offset = random.choice(OFFSETS, (count, 3)) * random.choice([-1.0, 1.0], (count, 3))
-    kinds = ("wrist", "elbow", "shoulder") if kind == "all" else kind.split()
+    power = random.uniform(-12.0, -3.0, (count, 3))
+    power = np.where(random.random((count, 3)) < 0.5, np.round(power), power)
+    offset = 10.0**power * random.choice([-1.0, 1.0], (count, 3)) * (random.random((count, 3)) > 0.125)
+    kinds = kind.split()
     if "wrist" in kinds:
         q[:, 4] = _zero(robot, q, 4, "wrist") + offset[:, 0]
     if "elbow" in kinds or "folded" in kinds:
@@ -57,7 +74,7 @@ def _shoulder_zero(robot: Robot, q: np.ndarray, random: np.random.Generator) -> 
     C, A = (values[0] + values[2]) / 2, (values[0] - values[2]) / 2
     B = values[1] - C
     H = np.hypot(A, B)
-    ratio = np.where(np.abs(C) <= H, -C / H, np.nan)
+    ratio = np.divide(-C, H, out=np.full_like(H, np.nan), where=(np.abs(C) <= H) & (H > 0))
     root = np.arctan2(B, A) + np.arccos(ratio) * random.choice([-1.0, 1.0], len(q))
     for _ in range(2):  # Newton: arccos alone leaves 1e-16 at the wrong place
         root -= (C + A * np.cos(root) + B * np.sin(root)) / (B * np.cos(root) - A * np.sin(root))

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import er3a
-from er3a.errors import NotWristPartitionedError, PoseError, ShapeError
+from er3a.errors import Er3aError, NotWristPartitionedError, PoseError, ShapeError
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.branch import branch_of
 from er3a.kinematics.forward import forward
@@ -111,6 +111,7 @@ def test_no_poses_give_no_solutions(robot):
         (1, 1, np.inf, "NaN or infinity"),
         (3, 0, 0.1, "bottom row"),
         (0, 0, 7.0, "not orthonormal"),
+        (2, 3, 700.0, "700.* m in column 3, which can only be mm"),
     ],
 )
 def test_the_first_bad_pose_is_named(robot, random, row, column, value, what):
@@ -131,6 +132,9 @@ def test_wrong_shapes_are_refused(robot):
     with pytest.raises(ShapeError, match=r"T has shape \(4, 4\); expected \(N, 4, 4\)"):
         inverse_batch(robot, np.eye(4))
     T = forward(robot, np.zeros((3, 6)))
+    for threads in (0, -1, 1.5, "two"):
+        with pytest.raises(Er3aError, match=r"threads is .*; expected a whole number of at least 1"):
+            inverse_batch(robot, T, threads=threads)
     with pytest.raises(ShapeError, match=r"q_ref has shape \(2, 6\); expected \(6,\) or \(3, 6\)"):
         inverse_batch(robot, T, np.zeros((2, 6)))
     with pytest.raises(PoseError, match=r"q_ref\[1\] holds NaN"):

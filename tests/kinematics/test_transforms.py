@@ -69,10 +69,17 @@ def test_rotation_angle_of_small_turns_keeps_its_digits(random):
 
 
 BAD = {
-    "holds NaN or infinity": lambda T: T.__setitem__((0, 3), np.nan),
-    "has a bottom row other than 0 0 0 1": lambda T: T.__setitem__((3, 0), 0.1),
-    "has a rotation part that is not orthonormal to 1e-06": lambda T: T.__setitem__((0, 0), T[0, 0] + 1e-3),
-    "has a mirrored (left-handed) rotation part": lambda T: T.__setitem__(slice(0, 3), -T[0:3]),
+    "holds NaN or infinity in row 0, column 3": lambda T: T.__setitem__((0, 3), np.nan),
+    "has a bottom row other than 0 0 0 1: 0.1 0 0 1": lambda T: T.__setitem__((3, 0), 0.1),
+    "has a rotation part that is not orthonormal to 1e-06: row 0 has length 1.0009": lambda T: T.__setitem__(
+        (0, 0), T[0, 0] + 1e-3
+    ),
+    "has a mirrored (left-handed) rotation part: turn the sign of one column": lambda T: T.__setitem__(
+        slice(0, 3), -T[0:3]
+    ),
+    "has a position of (500, 200, 700) m in column 3, which can only be mm: divide it by 1000": lambda T: T.__setitem__(
+        (slice(0, 3), 3), [500, 200, 700]
+    ),
 }
 
 
@@ -84,7 +91,13 @@ def test_the_first_bad_pose_is_named(what, index):
     with pytest.raises(PoseError) as caught:
         check_poses(T, "poses")
     where = f"poses[{', '.join(map(str, index))}]" if index else "poses"
-    assert str(caught.value) == f"{where} {what}"
+    assert str(caught.value).startswith(f"{where} {what}")
+
+
+@pytest.mark.parametrize("values", ["pose", [[1, 2], [3]], [[1j] * 4] * 4, [None, "a"]])
+def test_what_is_no_number_is_refused(values):
+    with pytest.raises(PoseError, match="poses holds something that is no real number"):
+        check_poses(values, "poses")
 
 
 def test_infinity_is_refused_without_warnings():

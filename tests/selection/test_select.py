@@ -127,6 +127,14 @@ def test_bad_rules_are_refused(arm, solutions):
         select(arm, solutions, "quickest", zeros)
     with pytest.raises(Er3aError, match="the weight of rule 'time' is -1"):
         select(arm, solutions, {"time": -1}, zeros)
+    with pytest.raises(Er3aError, match="the weight of rule 'time' is 'high'"):
+        select(arm, solutions, {"time": "high"}, zeros)
+    with pytest.raises(Er3aError, match="the rule is None; expected a name"):
+        select(arm, solutions, None, zeros)
+    with pytest.raises(Er3aError, match=r"the scene is a str; expected what er3a\.load_scene returns"):
+        select(arm, solutions, "clearance", zeros, "scene.yaml")
+    with pytest.raises(Er3aError, match=r"q_ref has shape \(5,\)"):
+        select_sequence(arm, [solutions], np.zeros(5))
     with pytest.raises(Er3aError, match="all weights of the mix"):
         select(arm, solutions, {"time": 0.0}, zeros)
     with pytest.raises(Er3aError, match="the mix of rules is empty"):

@@ -13,6 +13,8 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
+from er3a.collision.clearance import clearance
+from er3a.collision.scene import load_scene
 from er3a.errors import InputError, ResultError
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import Solutions, inverse
@@ -300,6 +302,42 @@ def test_all_targets_solved_is_a_pass_and_none_a_fail(tmp_path):
         study = make_study(er3_600={"targets": str(file), "paths": "unused.yaml"})
         compute(study, "er3_600", tmp_path / status)
         assert read_summary(tmp_path / status)["verdict"]["status"] == status
+
+
+def test_colliding_solutions_are_named_and_not_chosen(tmp_path):
+    """A low ceiling keeps the elbow down, a floor under which the target lies leaves nothing."""
+    robot, q = load_robot("er3_600"), [20, -30, 10, 35, 40, -20]
+    targets = tmp_path / "targets.yaml"
+    targets.write_text(json.dumps({"kind": "targets", "targets": [{"name": "a", "q_deg": q}]}), encoding="utf-8")
+    height = float(forward(robot, np.radians(q))[2, 3] * 1000)
+    blocks = {
+        "ceiling": {"planes": [{"name": "ceiling", "normal": [0, 0, -1], "offset_mm": -640}]},
+        "floor": {"planes": [{"name": "floor", "normal": [0, 0, 1], "offset_mm": height + 40}]},
+    }
+    for name, solids in blocks.items():
+        scene = tmp_path / f"{name}.yaml"
+        scene.write_text(json.dumps({"kind": "scene", "title": name, **solids}), encoding="utf-8")
+        study = make_study(er3_600={"targets": str(targets), "paths": "unused.yaml", "scene": str(scene)})
+        folder = tmp_path / name
+        compute(study, "er3_600", folder)
+        (target,) = read_summary(folder)["targets"]
+        rows = read_table(folder / "solutions.parquet")
+        hit = rows["collision"].str.contains(name)
+        assert (rows.loc[hit, "rank"] == 0).all()
+        assert target["collide"] == rows.loc[hit, "branch"].nunique() > 0
+        clear = clearance(robot, np.radians(rows[JOINTS].to_numpy(float)), load_scene(scene)).distance
+        np.testing.assert_array_equal(hit, rows["within_limits"] & (clear < 0))
+        report(study, "er3_600", folder, tmp_path / "page.html")
+        page = (tmp_path / "page.html").read_text(encoding="utf-8")
+        assert f"and {name} overlap by" in page
+        if name == "ceiling":
+            assert "elbow down" in rows.loc[rows["rank"] == 1, "label"].item()
+            ranked = read_table(folder / "rankings.parquet")
+            assert (ranked.loc[ranked["place"] == 0, "branch"].nunique()) == target["collide"]
+        else:
+            assert target["chosen_deg"] is None
+            assert "solutions within the limits collide" in target["reason"]
+            record(study, "er3_600", folder, tmp_path / "floor.rrd")
 
 
 def test_each_rule_ranks_the_branches(computed, folders):

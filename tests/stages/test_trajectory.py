@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from er3a.errors import InputError
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.kinematics.transforms import transform
+from er3a.planning.repairs.compare import WAYS
 from er3a.results import read_summary, read_table
 from er3a.stages.trajectory.compute import compute
 from er3a.stages.trajectory.record import record
@@ -125,7 +128,75 @@ def test_the_articles_line_starts_at_a_singular_pose_and_meets_a_second(folders)
     assert path["half_turns"] == [{"segment": 1, "axis": [0, 0, 1]}]
     assert path["start_turn_deg"] == [0] * 6
     assert path["out_of_limits"] == path["unreachable"] == []
-    assert path["max_joint_speed_ratio"] is None
+    assert 0 < path["max_joint_speed_ratio"] < 1
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_repairs_are_listed_with_their_prices(folders, name):
+    paths = by_name(folders[name])
+    assert paths["line_clean"]["repairs"] == []
+    for key in ("line_wrist", "line_shoulder"):
+        prices = {price["way"]: price for price in paths[key]["repairs"]}
+        assert set(prices) == set(WAYS)
+        taken = prices[paths[key]["repair"]]
+        assert taken["usable"]
+        assert taken["max_joint_speed_ratio"] <= 1 + 1e-6
+        assert taken["max_joint_acceleration_ratio"] <= 1 + 1e-6
+        assert taken["clearance_mm"] > 0
+        assert not prices["stop"]["usable"]
+        assert 0 < prices["stop"]["done_share"] < 1
+    assert paths["line_out"]["repair"] is None
+    assert "out of reach from t =" in paths["line_out"]["repair_text"]
+    assert "limit" in paths["line_limits"]["repair_text"]
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_repaired_motions_in_the_table_lead_along_the_stated_deviation(study, folders, name):
+    robot, rows = study.robot(name), read_table(folders[name] / "repairs.parquet")
+    prices = {path["name"]: path for path in read_summary(folders[name])["paths"]}
+    for (path, way), part in rows.groupby(["path", "way"]):
+        tool = forward(robot, np.radians(part[JOINTS].to_numpy()))[:, :3, 3] * 1000
+        np.testing.assert_allclose(tool, part[["x_mm", "y_mm", "z_mm"]], atol=1e-6)
+        if way == "fastest":
+            assert part["t_s"].max() == pytest.approx(prices[path]["fastest_s"])
+            continue
+        (price,) = [price for price in prices[path]["repairs"] if price["way"] == way]
+        assert part["deviation_mm"].max() == pytest.approx(price["max_deviation_mm"])
+        assert part["speed_share"].max() == pytest.approx(price["max_joint_speed_ratio"])
+        assert part["t_s"].max() == pytest.approx(price["duration_s"])
+
+
+def test_assumed_speeds_are_marked_and_change_the_times(study, folders, tmp_path):
+    known, assumed = (read_summary(folders[name])["joint_limits"] for name in ("er3_600", "er3a_c60"))
+    assert known["speed_assumed"] == [False] * 6
+    assert assumed["speed_assumed"] == [True] * 6
+    assert assumed["speed_deg_s"] == pytest.approx([180, 180, 180, 360, 360, 360])
+    slower = study.trajectory.model_copy(update={"assumed_speed_deg_s": [90.0] * 6, "repair": "slow"})
+    few = with_paths(study, tmp_path, *own_paths("line_clean", "line_wrist_near"))
+    compute(few.model_copy(update={"trajectory": slower}), "er3a_c60", tmp_path)
+    before, after = by_name(folders["er3a_c60"]), by_name(tmp_path)
+    assert after["line_clean"]["fastest_s"] > 1.3 * before["line_clean"]["fastest_s"]
+    assert [price["way"] for price in after["line_wrist_near"]["repairs"]] == ["slow"]
+    assert after["line_wrist_near"]["repair"] == "slow"
+
+
+def test_a_repair_that_meets_something_is_not_taken(study, folders, tmp_path):
+    """A ball at the via point of the line past axis 1."""
+    name = "er3a_c60"
+    rows = read_table(folders[name] / "repairs.parquet")
+    bent = rows[(rows["path"] == "line_shoulder") & (rows["way"] == "via_shift")]
+    at = bent.loc[bent["deviation_mm"].idxmax()]
+    ball = {"name": "ball", "xyz_mm": [float(at[f"{axis}_mm"]) for axis in "xyz"], "radius_mm": 5}
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(json.dumps({"kind": "scene", "title": "A ball", "spheres": [ball]}))
+    settings = study.trajectory.model_copy(update={"scene": str(scene)})
+    few = with_paths(study, tmp_path, *own_paths("line_shoulder"))
+    compute(few.model_copy(update={"trajectory": settings}), name, tmp_path / "again")
+    path = by_name(tmp_path / "again")["line_shoulder"]
+    (price,) = [price for price in path["repairs"] if price["way"] == "via_shift"]
+    assert not price["usable"]
+    assert "ball" in price["reason"]
+    assert path["repair"] != "via_shift"
 
 
 def test_speeds_are_judged_where_they_are_known(folders):
@@ -166,8 +237,14 @@ def test_page_and_recording_are_written(study, folders, tmp_path):
     record(study, name, folders[name], tmp_path / "trajectory.rrd")
     html = (tmp_path / "trajectory.html").read_text()
     assert "article_line" in html
-    assert html.count("data:image/svg+xml") == 2 * len(by_name(folders[name])) + 1
+    assert html.count('<img src="data:image/svg+xml') == len(by_name(folders[name])) + 1
     assert (tmp_path / "trajectory.rrd").stat().st_size > 100_000
+
+
+def own_paths(*names):
+    """Entries of the project's paths of the real arm, as they stand in its file."""
+    entries = yaml.safe_load(Path("data/paths/er3a_c60.yaml").read_text(encoding="utf-8"))["paths"]
+    return [entry for entry in entries if entry["name"] in names]
 
 
 def with_paths(study, tmp_path, *paths):

@@ -31,6 +31,7 @@ TABLES = {
     "workspace": [
         "cells",
         "section",
+        "side_view",
         "curve",
         "cloud",
         "hull_vertices",
@@ -44,7 +45,7 @@ TABLES = {
         "places",
     ],
     "inverse": ["solutions", "rankings", "map"],
-    "trajectory": ["checks", "samples", "clearance"],
+    "trajectory": ["checks", "clearance", "repairs", "samples"],
 }
 
 

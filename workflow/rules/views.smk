@@ -32,11 +32,29 @@ rule report:
         "er3a report {wildcards.stage} {wildcards.robot} 2> {log}"
 
 
+rule teach:
+    input:
+        inputs("teach"),
+    output:
+        "reports/{robot}/teach.html",
+    log:
+        "logs/{robot}/teach.log",
+    conda:
+        "../envs/er3a.yaml"
+    params:
+        settings=settings("trajectory"),
+        code=code_digest("er3a.teach.page"),
+    message:
+        "{wildcards.robot}: write the teach panel"
+    shell:
+        "er3a teach {wildcards.robot} 2> {log}"
+
+
 rule index:
     input:
         expand("results/{robot}/{stage}/summary.json", robot=ROBOTS, stage=STAGES),
         expand("results/{robot}/workspace/border.parquet", robot=ROBOTS),
-        expand("reports/{robot}/{stage}.html", robot=ROBOTS, stage=STAGES),
+        expand("reports/{robot}/{page}.html", robot=ROBOTS, page=[*STAGES, "teach"]),
     output:
         "reports/index.html",
         "reports/compare.html",

@@ -1,5 +1,5 @@
 # Below this a job costs more to start than to do.
-SAMPLES_PER_JOB = 16_000_000
+SAMPLES_PER_JOB = 200_000_000
 
 
 # The seeded blocks are fixed by the study; scattering only groups them into jobs (--set-scatter blocks=N).

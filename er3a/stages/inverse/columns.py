@@ -11,7 +11,8 @@ COLUMNS = [
     "within_limits",
     "reason",  # empty, or which limits are left and by how much
     "beyond",  # the same in short: "J2 17.7 above, J3 27.1 below" (deg)
-    "rank",  # 1 is the chosen one; 0 outside the limits
+    "collision",  # empty, or what overlaps by how much, for rows within the limits
+    "rank",  # 1 is the chosen one; 0 for refused rows
     "first_of_branch",  # the branch's best row by the rule
     "position_residual_mm",
     "orientation_residual_deg",

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from er3a.collision.scene import load_scene
+from er3a.collision.scene import SceneFile, load_scene
 from er3a.kinematics.inverse import CLOSED_FORM
 from er3a.kinematics.selection import NEAREST_RULE
 from er3a.results import Figure, Verdict, write_summary, write_table
@@ -36,18 +36,20 @@ def compute(study: Study, name: str, folder: Path) -> None:
     robot = study.robot(name)
     targets = load_targets(study.entry(name).targets)
     settings = study.inverse
-    scene = load_scene(settings.scene) if settings.scene else None
+    scene_file = study.scene(name, STAGE)
+    scene = load_scene(scene_file) if scene_file else None
     entries, tables, ranked, solved = [], [], [], []
     for number, target in enumerate(targets):
         random = np.random.default_rng([study.seed, ADVICE_STREAM, number])
-        entry, table, found = solve_target(robot, target, random)
-        first = table["first_of_branch"].to_numpy(bool)
-        ranked.append(rankings(robot, target.name, found, first, target.reference(), scene, settings.mix))
+        entry, table, found = solve_target(robot, target, random, scene)
+        first, collides = table["first_of_branch"].to_numpy(bool), (table["collision"] != "").to_numpy(bool)
+        ranked.append(rankings(robot, target.name, found, first, collides, target.reference(), scene, settings.mix))
         entries.append(entry)
         tables.append(table)
         solved.append(found)
     solutions = pd.concat(tables, ignore_index=True)
     closed = all(found.method == CLOSED_FORM for found in solved)
+    reached = [entry["chosen_deg"] is not None for entry in entries]
     random = np.random.default_rng([study.seed, ROUND_TRIP_STREAM])
     trips = round_trips(robot, random, settings.round_trips) if closed else None
     number_of_ways = solution_map(robot, settings.map_cells) if closed else pd.DataFrame(columns=MAP_COLUMNS)
@@ -59,19 +61,21 @@ def compute(study: Study, name: str, folder: Path) -> None:
         study,
         name,
         STAGE,
-        _verdict(entries, solutions, trips),
+        _verdict(entries, solutions, trips, scene),
         _figures(entries, solutions, trips),
         rule=NEAREST_RULE,
         rules={key: {"title": rule.title, "unit": rule.unit, "best": rule.best} for key, rule in RULES.items()},
         mix=settings.mix,
         scene=scene.title if scene else None,
         targets=entries,
-        sequence=sequence(robot, [target.name for target in targets], solved, targets[0].reference()),
+        sequence=sequence(robot, [target.name for target in targets], solved, targets[0].reference(), reached, scene),
         round_trips=_plain(trips) if trips else None,
     )
 
 
-def _verdict(entries: list[dict[str, Any]], solutions: pd.DataFrame, trips: RoundTrips | None) -> Verdict:
+def _verdict(
+    entries: list[dict[str, Any]], solutions: pd.DataFrame, trips: RoundTrips | None, scene: SceneFile | None
+) -> Verdict:
     position, orientation = _worst_residuals(solutions, trips)
     lost = trips.poses - trips.own_found if trips else 0
     if lost or position > REPRODUCED_M or orientation > REPRODUCED_RAD:
@@ -81,20 +85,21 @@ def _verdict(entries: list[dict[str, Any]], solutions: pd.DataFrame, trips: Roun
         )
         params = {"worst_mm": position * 1000, "worst_deg": float(np.degrees(orientation)), "lost": lost}
         return Verdict("fail", "inverse.not_reproduced", text, params)
+    free = " within the limits and free of collisions" if scene else " within the limits"
     unsolved = [entry for entry in entries if entry["chosen_deg"] is None]
     solved = len(entries) - len(unsolved)
     params = {"targets": len(entries), "solved": solved, "unsolved": [entry["name"] for entry in unsolved]}
     if not unsolved:
-        text = f"Every target ({len(entries)}) has a solution within the limits."
+        text = f"Every target ({len(entries)}) has a solution{free}."
         return Verdict("pass", "inverse.all_solved", text, params)
     named = [f"{entry['name']} ({entry['short_reason']})" for entry in unsolved[:NAMED_IN_VERDICT]]
     if len(unsolved) > NAMED_IN_VERDICT:
         named.append(f"{len(unsolved) - NAMED_IN_VERDICT} more")
     none_for = ", ".join(named)
     if not solved:
-        text = f"No target has a solution within the limits: {none_for}."
+        text = f"No target has a solution{free}: {none_for}."
         return Verdict("fail", "inverse.none_solved", text, params)
-    text = f"{solved} of {len(entries)} targets have a solution within the limits; none for {none_for}."
+    text = f"{solved} of {len(entries)} targets have a solution{free}; none for {none_for}."
     return Verdict("caution", "inverse.some_unsolved", text, params)
 
 
@@ -111,7 +116,7 @@ def _figures(entries: list[dict[str, Any]], solutions: pd.DataFrame, trips: Roun
             Figure("random poses solved back to their joints", 100.0 * trips.own_found / trips.poses, "%"),
         ]
     return [
-        Figure("targets solved within limits", solved, f"of {len(entries)}"),
+        Figure("targets solved", solved, f"of {len(entries)}"),
         *of_random,
         Figure("worst position residual", position * 1000, "mm"),
         Figure("worst orientation residual", float(np.degrees(orientation)), "deg"),

@@ -101,10 +101,13 @@ def ways(table: pd.DataFrame) -> Picture:
 
 def _conclude(target: dict[str, Any]) -> str:
     if target["chosen_deg"] is not None:
+        collide = f", of which {target['collide']} collide" if target["collide"] else ""
         return (
             f"The bold arm is the one taken; {target['within_limits']} of {target['solutions']} branches stay within "
-            "the limits. A no-flip and a flip branch look the same from here: they differ in J4, J5 and J6."
+            f"the limits{collide}. A no-flip and a flip branch look the same from here: they differ in J4, J5 and J6."
         )
+    if target["collide"]:
+        return "Every arm that reaches the target (dashed) has a joint beyond its limit or runs into something."
     if target["solutions"]:
         return "Every arm that reaches the target (dashed) has a joint beyond its limit: a cross on the right."
     return "The arm, drawn where it comes from, can't stretch to the target."
@@ -127,7 +130,7 @@ def _draw_arms(side: Axes, top: Axes, robot: Robot, target: dict[str, Any], bran
     shape = [shape_of(branch, label) for branch, label in zip(branches["branch"], branches["label"])]
     shapes = branches.groupby(np.array(shape), sort=True) if len(branches) else ()
     for shape, rows in shapes:
-        allowed, chosen = int(rows["within_limits"].sum()), bool((rows["rank"] == 1).any())
+        allowed, chosen = bool((rows["rank"] > 0).any()), bool((rows["rank"] == 1).any())
         style = {"color": colour_of(shape), "linewidth": 2, "markersize": 4, "zorder": 4}
         if chosen:
             style |= {"linewidth": 5, "markersize": 7, "zorder": 6}
@@ -142,9 +145,10 @@ def _draw_arms(side: Axes, top: Axes, robot: Robot, target: dict[str, Any], bran
         style = {"color": MUTED, "linewidth": 3, "markersize": 5}
         draw(in_base(skeleton(robot, np.radians(target["q_ref_deg"]))), **style)
         handles.append(Line2D([], [], label="arm at the reference", **style))
-    elif not branches["within_limits"].all():
+    elif not (branches["rank"] > 0).all():
         style = {"color": MUTED, "linewidth": 1.3, "linestyle": "--", "marker": "o", "markersize": 3}
-        handles.append(Line2D([], [], label="outside the limits", **style))
+        words = "outside the limits" + (" or colliding" if target["collide"] else "")
+        handles.append(Line2D([], [], label=words, **style))
     cross = {"marker": "P", "markersize": 11, "color": HIGHLIGHT, "markeredgecolor": "white", "linestyle": "none"}
     handles.append(_mark(side, top, goal, level, "target", **cross))
     near = target["neighbours"]
@@ -176,13 +180,13 @@ def _draw_joints(axes: Axes, robot: Robot, target: dict[str, Any], branches: pd.
             y = joint + 0.8 * ((place + 0.5) / max(len(branches), 1) - 0.5)
             x = angles[place, joint]
             outside = not lower[joint] - 1e-6 <= x <= upper[joint] + 1e-6
-            colour = colour_of(shape_of(row["branch"], row["label"])) if row["within_limits"] else MUTED
+            colour = colour_of(shape_of(row["branch"], row["label"])) if row["rank"] else MUTED
             style = {"marker": "o", "markersize": 4.5, "color": colour}
             if row["rank"] == 1:
                 style |= {"marker": "D", "markersize": 8}
             elif outside:
                 style = {"marker": "x", "markersize": 5.5, "color": HIGHLIGHT, "markeredgewidth": 1.6}
-            elif not row["within_limits"]:
+            elif not row["rank"]:
                 style |= {"markerfacecolor": "none"}
             axes.plot([x], [y], linestyle="none", zorder=5 if row["rank"] == 1 else 4, **style)
     axes.set_yticks(range(6), JOINT_NAMES)

@@ -22,7 +22,7 @@ RANKING_COLUMNS = [
     "rule",  # a name in selection/rules.py, or "mix"
     "measure",  # in the rule's unit; for the mix its cost, 0 the best
     "unit",
-    "place",  # 1 is the best
+    "place",  # 1 is the best; 0 for rows that collide
 ]
 
 
@@ -31,13 +31,16 @@ def rankings(
     name: str,
     solutions: Solutions,
     first: np.ndarray,
+    collides: np.ndarray,
     q_ref: np.ndarray,
     scene: SceneFile | None,
     mix: dict[str, float],
 ) -> pd.DataFrame:
-    """Place and measure of each branch's best row within the limits (``first``: (n,) bool), by each rule.
+    """Place and measure of each branch's best row within the limits, by each rule.
 
-    Collisions refuse nothing here: the clearance shows them as negative.
+    Parameters
+    ----------
+    first, collides : (n,) bool, per row of the solutions
     """
     rows = np.flatnonzero(first & solutions.within_limits)
     few = replace(
@@ -52,9 +55,10 @@ def rankings(
     rules = available_rules(robot)
     measured = {rule: RULES[rule].measure(robot, few.q, q_ref, scene) for rule in rules}
     costs = {rule: (RULES[rule].cost(measured[rule]), measured[rule], RULES[rule].unit) for rule in rules}
+    free = ~collides[rows]
     usable = {rule: weight for rule, weight in mix.items() if rule in rules}
-    if usable and len(rows):
-        cost = _mixed(usable, costs)
+    if usable and free.any():
+        cost = _mixed(usable, costs, free)
         costs[MIX] = (cost, cost, "1")
     table = [
         [
@@ -64,7 +68,7 @@ def rankings(
             rule,
             float(values[row]),
             unit,
-            int((cost < cost[row] - 1e-9).sum()) + 1,
+            int((cost[free] < cost[row] - 1e-9).sum()) + 1 if free[row] else 0,
         ]
         for rule, (cost, values, unit) in costs.items()
         for row in range(len(rows))
@@ -72,22 +76,30 @@ def rankings(
     return pd.DataFrame(table, columns=RANKING_COLUMNS)
 
 
-def _mixed(weights: dict[str, float], costs: dict[str, tuple]) -> np.ndarray:
+def _mixed(weights: dict[str, float], costs: dict[str, tuple], free: np.ndarray) -> np.ndarray:
+    """Costs stretched to 0..1 over the rows that don't collide, weighted and added."""
     total = 0.0
     for rule, weight in weights.items():
         cost = costs[rule][0]
-        total = total + weight * (cost - cost.min()) / (np.ptp(cost) or 1.0)
+        total = total + weight * (cost - cost[free].min()) / (np.ptp(cost[free]) or 1.0)
     return total
 
 
-def sequence(robot: Robot, names: list[str], poses: list[Solutions], q_ref: np.ndarray) -> dict[str, Any] | None:
-    """Visiting all targets that can be reached, in order: the best rows as a whole, against the greedy ones."""
-    usable = [k for k, solutions in enumerate(poses) if solutions.within_limits.any()]
+def sequence(
+    robot: Robot,
+    names: list[str],
+    poses: list[Solutions],
+    q_ref: np.ndarray,
+    reached: list[bool],
+    scene: SceneFile | None,
+) -> dict[str, Any] | None:
+    """Visiting all targets that are reached, in order: the best rows as a whole, against the greedy ones."""
+    usable = np.flatnonzero(reached)
     if len(usable) < 2:
         return None
     rule = "time" if "time" in available_rules(robot) else "nearest"
     chosen = [poses[k] for k in usable]
-    found = select_sequence(robot, chosen, q_ref, rule)
+    found = select_sequence(robot, chosen, q_ref, rule, scene)
     return {
         "rule": rule,
         "unit": RULES[rule].unit,

@@ -26,12 +26,12 @@ Drag the time line: **one second for each target**.
 
 - **Solid arm**: the solution taken; where none is, the arm where it comes from.
 - **Translucent arms**: the other branches within the limits, coloured as on the page.
-- **Thin grey arms**: branches that leave a joint limit.
+- **Thin grey arms**: branches that leave a joint limit or collide.
 - **Pink ball with axes**: the target's frame.
 
-Look first at how differently the arm can stand for one and the same tool pose. Each branch is an entity
-`/targets/<name>/branch_<number>` and can be switched off in the entity tree. A flip and a no-flip branch lie on one
-another.
+Look first at how differently the arm can stand for one and the same tool pose. Each branch, the one taken too, is an
+entity `/targets/<name>/branch_<number>` and can be switched off in the tree on the left. A flip and a no-flip branch
+lie on one another.
 """
 
 
@@ -78,9 +78,9 @@ def _log_target(stream: rr.RecordingStream, robot: Robot, target: dict[str, Any]
     for _, branch in branches.iterrows():
         points = skeleton(robot, np.radians(branch[JOINT_COLUMNS].astype(float).to_numpy()))
         entity = f"{root}/branch_{branch['branch']}"
-        if not branch["within_limits"]:
+        if not branch["rank"]:
             stream.log(entity, rr.LineStrips3D([points], radii=0.003 * size, colors=rgb(MUTED)))
-        elif branch["rank"] != 1:
+        else:
             colour = (*rgb(colour_of(shape_of(branch["branch"], branch["label"]))), 150)
             stream.log(entity, capsules(points[:-1], np.diff(points, axis=0), 0.014 * size, colour, solid=False))
 
@@ -93,7 +93,7 @@ def _about(target: dict[str, Any], branches: pd.DataFrame) -> str:
     if len(branches):
         rows = [
             f"| {row['branch']} | {row['label']} | "
-            f"{'taken' if row['rank'] == 1 else 'within limits' if row['within_limits'] else row['beyond']} |"
+            f"{'taken' if row['rank'] == 1 else row['beyond'] or row['collision'] or 'within limits'} |"
             for _, row in branches.sort_values("branch").iterrows()
         ]
         lines.append("\n".join(["| no. | branch | outcome (deg) |", "|---|---|---|", *rows]))

@@ -74,7 +74,8 @@ def _rule_rows(ranked: pd.DataFrame) -> list[list[str]]:
     rows = []
     for _, group in ranked.groupby("branch", sort=True):
         cells = [
-            f"{number(_no_noise(row['measure']), 3)}{NO_BREAK_SPACE}({row['place']})" for _, row in group.iterrows()
+            f"{number(_no_noise(row['measure']), 3)}{NO_BREAK_SPACE}({row['place'] or 'collides'})"
+            for _, row in group.iterrows()
         ]
         rows.append([group["label"].iloc[0].replace("elbow ", "").replace(" ", NO_BREAK_SPACE), *cells])
     return rows
@@ -128,7 +129,7 @@ def _overview_row(target: dict[str, Any]) -> list[str]:
 
 def _branch_rows(rows: pd.DataFrame, branches: pd.DataFrame) -> list[list[str]]:
     turns = rows[rows["within_limits"].astype(bool)].groupby("branch").size()
-    ranks = branches.loc[branches["within_limits"].astype(bool), "rank"]
+    ranks = branches.loc[branches["rank"] > 0, "rank"]
     return [
         [
             branch["label"].replace("elbow ", "").replace(" ", NO_BREAK_SPACE),
@@ -145,6 +146,8 @@ def _branch_rows(rows: pd.DataFrame, branches: pd.DataFrame) -> list[list[str]]:
 def _outcome(branch: pd.Series, place: int, turns: int) -> str:
     if not branch["within_limits"]:
         return branch["beyond"]
+    if branch["collision"]:
+        return branch["collision"]
     words = "chosen" if branch["rank"] == 1 else f"place {place}"
     words += f", {turns} turns" if turns > 1 else ""
     return f"{words}; {branch['singular'].replace(' ', ', ')} singularity" if branch["singular"] else words

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
+from er3a.collision.scene import SceneFile
 from er3a.kinematics.closed_form import ORIENTATION
 from er3a.kinematics.families import Family
 from er3a.kinematics.forward import forward
@@ -18,6 +19,7 @@ from er3a.kinematics.transforms import rotation_angle, rpy_of
 from er3a.kinematics.turns import LIMIT_TOLERANCE
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.robots.robot import Robot
+from er3a.selection.select import all_collide, refusals
 from er3a.stages.inverse.advice import Neighbours, neighbours
 from er3a.stages.inverse.columns import COLUMNS, JOINT_COLUMNS, TURN_COLUMNS
 from er3a.targets import Target
@@ -27,9 +29,9 @@ LITTLE_MARGIN_DEG = 2.0
 
 
 def solve_target(
-    robot: Robot, target: Target, random: np.random.Generator
+    robot: Robot, target: Target, random: np.random.Generator, scene: SceneFile | None = None
 ) -> tuple[dict[str, Any], pd.DataFrame, Solutions]:
-    """Solve, choose, explain.
+    """Solve, choose, explain; solutions that collide with the scene or with themselves are not chosen.
 
     Returns
     -------
@@ -39,15 +41,22 @@ def solve_target(
     """
     T, q_ref = target.pose(robot), target.reference()
     solutions = inverse(robot, T, q_ref)
-    choice = nearest(robot, solutions, q_ref)
-    table = _table(robot, target, T, solutions, choice)
-    entry = refused_target(robot, target, choice.reason)
+    refused = refusals(robot, solutions, scene)
+    choice = nearest(robot, solutions, q_ref, np.array([not text for text in refused], dtype=bool))
+    table = _table(robot, target, T, solutions, choice, refused)
+    collide = choice.chosen is None and bool(solutions.within_limits.any())
+    entry = refused_target(robot, target, all_collide(robot, solutions, refused) if collide else choice.reason)
     entry["solutions"] = int(table["branch"].nunique())
     entry["within_limits"] = int(table.loc[table["within_limits"], "branch"].nunique())
     entry["rows_within_limits"] = int(table["within_limits"].sum())
+    entry["collide"] = int(table.loc[table["collision"] != "", "branch"].nunique())
     entry["unsolved"] = list(solutions.unsolved)
     entry["method"] = solutions.method
     entry["families"] = [_family(family) for family in solutions.families]
+    if collide:
+        entry["short_reason"] = f"all {entry['within_limits']} branches within the limits collide"
+        entry["advice"] = ["Move the part, the obstacle or the base: limits leave this pose reachable."]
+        return entry, table, solutions
     if choice.chosen is None:
         missing = _missing(robot, T, q_ref, solutions) if not len(solutions.q) else None
         entry["short_reason"] = _short_reason(entry["solutions"], missing)
@@ -76,6 +85,7 @@ def refused_target(robot: Robot, target: Target, reason: str) -> dict[str, Any]:
         "solutions": 0,
         "within_limits": 0,
         "rows_within_limits": 0,
+        "collide": 0,
         "chosen_deg": None,
         "chosen_branch": None,
         "short_reason": "not solved",
@@ -88,7 +98,9 @@ def refused_target(robot: Robot, target: Target, reason: str) -> dict[str, Any]:
     }
 
 
-def _table(robot: Robot, target: Target, T: np.ndarray, solutions: Solutions, choice: Choice) -> pd.DataFrame:
+def _table(
+    robot: Robot, target: Target, T: np.ndarray, solutions: Solutions, choice: Choice, refused: list[str]
+) -> pd.DataFrame:
     q, count = solutions.q, len(solutions.q)
     back = forward(robot, q)
     singular = _singularities(robot, solutions)
@@ -104,6 +116,7 @@ def _table(robot: Robot, target: Target, T: np.ndarray, solutions: Solutions, ch
             "within_limits": solutions.within_limits,
             "reason": list(solutions.reason),
             "beyond": [_beyond(robot, row) for row in q],
+            "collision": [text if ok else "" for text, ok in zip(refused, solutions.within_limits)],
             "rank": rank,
             "first_of_branch": _first_of_branch(solutions.branch, rank),
             "position_residual_mm": np.linalg.norm(back[:, :3, 3] - T[:3, 3], axis=1) * 1000,
@@ -115,7 +128,9 @@ def _table(robot: Robot, target: Target, T: np.ndarray, solutions: Solutions, ch
             "distance_deg": np.degrees(choice.distance),
         }
     )
-    return table[COLUMNS].astype(dict.fromkeys(("target", "label", "reason", "beyond", "singular"), object))
+    return table[COLUMNS].astype(
+        dict.fromkeys(("target", "label", "reason", "beyond", "collision", "singular"), object)
+    )
 
 
 def _singularities(robot: Robot, solutions: Solutions) -> list[str]:

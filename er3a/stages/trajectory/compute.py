@@ -1,7 +1,8 @@
 """Plan and check every path of a robot: where it is singular, leaves the limits, collides, or can't be reached.
 
 Writes ``samples.parquet`` (the paths' own points), ``checks.parquet`` (the same columns, with the points checked
-between them and the closest passes), ``clearance.parquet`` and ``summary.json``.
+between them and the closest passes), ``clearance.parquet``, ``repairs.parquet`` (the ways around, and each path at its
+fastest) and ``summary.json``.
 """
 
 from __future__ import annotations
@@ -17,11 +18,13 @@ from er3a.collision.scene import load_scene
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
 from er3a.kinematics.turns import within
 from er3a.planning.path_file import load_paths
+from er3a.planning.timing import JointLimits, joint_limits
 from er3a.results import Figure, Verdict, write_summary, write_table
 from er3a.robots.robot import Robot
 from er3a.stages.trajectory.collisions import clearance_table, measured, with_collisions
 from er3a.stages.trajectory.judge import WORDS, Judgement, judge, path_record
 from er3a.stages.trajectory.motion import Motion, motion_of
+from er3a.stages.trajectory.ways import Surroundings, limits_record, repairs_table, speed_share, ways_around
 from er3a.study import Study
 
 
@@ -35,33 +38,40 @@ def compute(study: Study, name: str, folder: Path) -> None:
         "shoulder": settings.near_shoulder_mm / 1000,
     }
     length = characteristic_length(robot)
-    scene_file = study.path_scene(name)
+    limits = joint_limits(robot, np.radians(settings.assumed_speed_deg_s), settings.full_speed_after_s)
+    chosen = None if settings.repair == "compare" else settings.repair
+    scene_file = study.scene(name, "trajectory")
     scene = load_scene(scene_file) if scene_file else None
     bodies = Bodies(robot, scene) if can_measure() else None
-    tables, clearances, records = [], [], []
+    surroundings = Surroundings(bodies, settings.overlap_mm / 1000) if bodies else None
+    tables, clearances, repairs, records = [], [], [], []
     ends: dict[str, np.ndarray] = {}
     for i, entry in enumerate(load_paths(file).paths):
         motion = motion_of(robot, entry, settings.checks_per_sample, f"paths[{i}]", file, ends)
         ends[entry.name] = motion.q[-1]
         found = judge(robot, motion, near)
-        tables.append(_table(robot, motion, found, near, length))
+        ways = ways_around(robot, motion, found, near, limits, chosen, surroundings)
+        tables.append(_table(robot, motion, found, near, length, limits))
         along = measured(bodies, motion, settings.overlap_mm) if bodies else None
         clearances.append(clearance_table(entry.name, along))
-        records.append(with_collisions(path_record(robot, motion, found), motion, along))
+        repairs += ways.rows
+        records.append(with_collisions(path_record(robot, motion, found), motion, along) | ways.record)
     checks = pd.concat(tables, ignore_index=True)
     write_table(folder / "checks.parquet", checks)
     write_table(folder / "samples.parquet", checks[checks["sample"]].drop(columns="sample"))
     write_table(folder / "clearance.parquet", pd.concat(clearances, ignore_index=True))
+    write_table(folder / "repairs.parquet", repairs_table(repairs))
     write_summary(
         folder,
         study,
         name,
         "trajectory",
         _verdict(records),
-        _figures(records, length, bodies is not None),
+        _figures(records, length, bodies is not None, bool(np.isnan(robot.speed).any())),
         characteristic_length_m=length,
         near={"wrist_deg": settings.near_wrist_deg, "elbow_deg": settings.near_elbow_deg}
         | {"shoulder_mm": settings.near_shoulder_mm},
+        joint_limits=limits_record(robot, limits, settings.full_speed_after_s),
         scene=scene.title if scene else None,
         clearance_measured=bodies is not None,
         overlap_mm=settings.overlap_mm,
@@ -69,7 +79,9 @@ def compute(study: Study, name: str, folder: Path) -> None:
     )
 
 
-def _table(robot: Robot, motion: Motion, found: Judgement, near: dict[str, float], length: float) -> pd.DataFrame:
+def _table(
+    robot: Robot, motion: Motion, found: Judgement, near: dict[str, float], length: float, limits: JointLimits
+) -> pd.DataFrame:
     """One row per check point; joint columns are NaN where the path can't be reached."""
     reached = np.isfinite(found.q[:, 0])
     measures = np.full((len(found.q), 3), np.nan)
@@ -87,6 +99,7 @@ def _table(robot: Robot, motion: Motion, found: Judgement, near: dict[str, float
         columns |= {f"q{j + 1}_{unit}": np.degrees(values[:, j]) for j in range(6)}
     columns |= {f"{axis}_mm": tool[:, k] for k, axis in enumerate("xyz")}
     columns |= {
+        "speed_share": speed_share(found.velocity, limits),
         "manipulability": measures[:, 0],
         "condition_number": measures[:, 1],
         "smallest_singular_value": measures[:, 2],
@@ -113,7 +126,7 @@ def _verdict(records: list[dict[str, Any]]) -> Verdict:
     return Verdict("pass", "trajectory.safe", text, params)
 
 
-def _figures(records: list[dict[str, Any]], length: float, clear: bool) -> list[Figure]:
+def _figures(records: list[dict[str, Any]], length: float, clear: bool, assumed: bool) -> list[Figure]:
     events = [event for record in records for event in record["singularities"]]
     bounded = [record for record in records if record["max_joint_speed_deg_s"]]
     ratios = [record["max_joint_speed_ratio"] for record in bounded if record["max_joint_speed_ratio"] is not None]
@@ -126,7 +139,7 @@ def _figures(records: list[dict[str, Any]], length: float, clear: bool) -> list[
         Figure("Near passes", sum(not event["crossing"] for event in events), ""),
         Figure("Paths that collide", _colliding(records) if clear else None, ""),
         Figure("Greatest joint speed needed, where bounded", fastest, "deg/s"),
-        Figure("Share of the joint's greatest speed", max(ratios, default=None), ""),
+        Figure(f"Share of the joint's {'assumed' if assumed else 'greatest'} speed", max(ratios, default=None), ""),
         Figure("Velocity by Jacobian against differences, within", agreement, "µdeg/s"),
         Figure("Characteristic length of the Jacobian", length * 1000, "mm"),
     ]

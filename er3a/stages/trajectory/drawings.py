@@ -1,4 +1,7 @@
-"""Figures of the trajectory page: curves over time, and the path in two views."""
+"""The figure of a path: curves and measures over one time, the joints' effort before and after, and the path in space.
+
+Layout is fixed, so that matplotlib draws each figure once.
+"""
 
 from __future__ import annotations
 
@@ -7,114 +10,173 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
-from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 
 from er3a.robots.robot import Robot
-from er3a.viewing.figures import equal_scale, new_figure
-from er3a.viewing.palette import HIGHLIGHT, INK, JOINT_NAMES, LINK, MODEL, MUTED, VERDICTS
+from er3a.stages.trajectory.oblique import draw_path
+from er3a.viewing.figures import svg_data_uri
+from er3a.viewing.palette import HIGHLIGHT, INK, JOINT_NAMES, MODEL, MUTED, REFERENCE, VERDICTS
 from er3a.viewing.palette import JOINTS as COLOURS
-from er3a.viewing.skeleton import skeleton
 
 WIDTHS = (3.2, 2.8, 2.4, 2.0, 1.6, 1.2)  # so that curves that coincide all show
 NEAR_LIMIT_DEG = 20.0
-CONDITION_SCALE = LogNorm(3, 300)
 EVENT_STYLES = {True: "-", False: ":"}
+TYPE_COLOURS = {"wrist": COLOURS[4], "elbow": COLOURS[2], "shoulder": COLOURS[3]}
 SHADES = {
     "out_of_limits": (VERDICTS["caution"], 0.16, "outside a joint limit"),
     "too_fast": (VERDICTS["fail"], 0.14, "joint too fast"),
     "unreachable": (INK, 0.14, "not reachable"),
 }
+LEFT, BOTTOM, TOP = 0.055, 0.07, 0.925
+COLUMNS, GAP = (0.275, 0.275, 0.265), 0.06
+FONT = 9.0
 
 
-def curves(robot: Robot, record: dict[str, Any], rows: pd.DataFrame) -> Figure:
-    """Joint angle, velocity and acceleration on the left, the Jacobian's measures on the right, over time."""
-    figure, axes = new_figure(3, 2, width=11.0, height=7.6, sharex=True)
+class PathFigure:
+    """Joint curves on the left, measures in the middle, the path in space and the joints' effort on the right.
+
+    One figure serves all paths of a page: making axes and their ticks takes longer than drawing the curves.
+    """
+
+    def __init__(self):
+        self.figure = Figure(figsize=(13.2, 7.0), layout="none")
+        self.joints = [self._axes(0, row) for row in range(3)]
+        self.measures = [self._axes(1, row) for row in range(3)]
+        self.effort = self._axes(2, 2)
+        left = LEFT + sum(COLUMNS[:2]) + 2 * GAP - 0.02
+        self.space = self.figure.add_axes((left, 0.40, COLUMNS[2] + 0.02, TOP - 0.41))
+        for column in (self.joints, self.measures):
+            for ax in column:
+                ax.yaxis.set_label_coords(-0.15, 0.5)
+            for ax in column[:-1]:
+                ax.tick_params(labelbottom=False)
+            column[-1].set_xlabel("time (s)", fontsize=FONT)
+
+    def draw(
+        self, robot: Robot, record: dict[str, Any], rows: pd.DataFrame, ways: pd.DataFrame, near: dict[str, float]
+    ) -> str:
+        """The figure of a path as the data address of an image."""
+        for ax in self.figure.axes:
+            _clear(ax)
+        t = rows["t_s"].to_numpy()
+        _joint_curves(self.joints, robot, record, rows)
+        _distances(self.measures[0], rows, near)
+        _condition(self.measures[1], rows)
+        _small_measures(self.measures[2], rows)
+        for ax in (*self.joints, *self.measures):
+            _mark(ax, record)
+            ax.set_xlim(t[0], t[-1])
+        _effort(self.effort, record, rows, ways)
+        draw_path(self.space, robot, record, rows, ways[ways["way"] == record["repair"]])
+        handles = _legend(record)
+        legend = self.figure.legend(
+            handles=handles, loc="upper center", bbox_to_anchor=(0.5, 1.0), ncols=9, fontsize=FONT
+        )
+        self.figure.set_layout_engine("none")  # saving the figure before has set the default one
+        image = svg_data_uri(self.figure)
+        legend.remove()
+        return image
+
+    def _axes(self, column: int, row: int) -> Axes:
+        height = (TOP - BOTTOM) / 3
+        x = LEFT + sum(COLUMNS[:column]) + column * GAP
+        ax = self.figure.add_axes((x, BOTTOM + (2 - row) * height, COLUMNS[column], height - 0.03))
+        ax.tick_params(labelsize=FONT, length=2)
+        ax.xaxis.set_major_locator(MaxNLocator(5))
+        ax.yaxis.set_major_locator(MaxNLocator(4))
+        return ax
+
+
+def _clear(ax: Axes) -> None:
+    """Take a path's curves out of axes, and leave their ticks."""
+    for artist in (*ax.lines, *ax.collections, *ax.patches, *ax.texts):
+        artist.remove()
+    if ax.get_legend() is not None:
+        ax.get_legend().remove()
+    ax.relim()
+    ax.margins(0.05)
+    ax.autoscale(True)
+
+
+def _joint_curves(axes: list[Axes], robot: Robot, record: dict[str, Any], rows: pd.DataFrame) -> None:
     t = rows["t_s"].to_numpy()
-    for row, (unit, label) in enumerate(
-        (("deg", "joint angle (deg)"), ("deg_s", "velocity (deg/s)"), ("deg_s2", "acceleration (deg/s²)"))
-    ):
+    labels = (("deg", "joint angle (deg)"), ("deg_s", "velocity (deg/s)"), ("deg_s2", "acceleration (deg/s²)"))
+    for ax, (unit, label) in zip(axes, labels):
         values = rows[[f"q{j + 1}_{unit}" for j in range(6)]].to_numpy()
         for j in range(6):
-            axes[row, 0].plot(t, values[:, j], color=COLOURS[j], linewidth=WIDTHS[j])
-        axes[row, 0].set_ylabel(label)
-        if row == 0:
-            _limits(axes[0, 0], robot, values)
+            ax.plot(t, values[:, j], color=COLOURS[j], linewidth=WIDTHS[j])
+        ax.set_ylabel(label, fontsize=FONT)
+        if unit == "deg":
+            _limits(ax, robot, values)
         elif not record["joint_speed_bounded"]:
-            _cut(axes[row, 0], values)
-    measures = (
-        ("manipulability", "manipulability"),
-        ("condition_number", "condition number"),
-        ("smallest_singular_value", "smallest singular value"),
-    )
-    for row, (column, label) in enumerate(measures):
-        axes[row, 1].plot(t, rows[column].replace(np.inf, np.nan), color=MODEL)
-        axes[row, 1].set_ylabel(label)
-        if column == "condition_number":
-            axes[row, 1].set_yscale("log")
-            axes[row, 1].set_ylim(1, min(1e6, 2 * rows[column].fillna(0.0).clip(lower=50.0).max()))
-        else:
-            axes[row, 1].set_ylim(bottom=0)
-    for ax in axes.flat:
-        _mark(ax, record)
-        ax.set_xlim(t[0], t[-1])
-    for ax in axes[-1]:
-        ax.set_xlabel("time (s)")
-    figure.align_ylabels()
-    figure.legend(handles=_legend(record), loc="outside upper center", ncols=9, frameon=False)
-    return figure
+            _cut(ax, values)
 
 
-def views(robot: Robot, record: dict[str, Any], rows: pd.DataFrame) -> Figure:
-    """The tool's path from above and from the side on which it shows, coloured by the condition number."""
-    figure, (top, side) = new_figure(1, 2, width=11.0, height=4.4)
-    points = rows[["x_mm", "y_mm", "z_mm"]].to_numpy()
-    along = 0 if np.ptp(points[:, 0]) >= np.ptp(points[:, 1]) else 1
-    condition = rows["condition_number"].fillna(np.nan).to_numpy()
-    ends = _end_poses(rows)
-    for ax, (i, k), title in (
-        (top, (0, 1), "From above"),
-        (side, (along, 2), "From the side" if along == 0 else "From the front"),
-    ):
-        for q, style in zip(ends, ("-", "--")):
-            links = skeleton(robot, np.radians(q)) * 1000
-            ax.plot(
-                links[:, i], links[:, k], color=LINK, linewidth=3, linestyle=style, solid_capstyle="round", zorder=1
-            )
-        lines = _coloured(ax, points[:, [i, k]], condition)
-        ax.plot(*points[0, [i, k]], "o", color=INK, markersize=6, zorder=4)
-        ax.plot(*points[-1, [i, k]], "s", color=INK, markersize=6, zorder=4)
-        for event in record["singularities"]:
-            at = points[np.argmin(np.abs(rows["t_s"].to_numpy() - event["t_s"]))]
-            marker = "X" if event["crossing"] else "D"
-            ax.plot(*at[[i, k]], marker, color=HIGHLIGHT, markersize=9, markeredgecolor="white", zorder=5)
-        ax.set_title(title, loc="left", fontsize=11, fontweight="bold")
-        equal_scale(ax, f"{'xyz'[i]} (mm)", f"{'xyz'[k]} (mm)")
-        ax.margins(0.12)
-    figure.colorbar(lines, ax=[top, side], label="condition number", extend="both", shrink=0.9, pad=0.015)
-    handles = _view_legend(record, bool(ends), bool(np.isnan(condition).any()))
-    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), frameon=False)
-    return figure
+def _distances(ax: Axes, rows: pd.DataFrame, near: dict[str, float]) -> None:
+    """Distance from each singular set, in parts of the distance below which a pass counts as near."""
+    t = rows["t_s"].to_numpy()
+    columns = (("wrist", "wrist_deg"), ("elbow", "elbow_deg"), ("shoulder", "shoulder_mm"))
+    for kind, column in columns:
+        share = np.abs(rows[column].to_numpy()) / near[column]
+        ax.plot(t, np.maximum(share, 1e-4), color=TYPE_COLOURS[kind], label=kind)
+    ax.axhline(1.0, color=INK, linewidth=1, linestyle="--")
+    _logarithmic(ax, 0.01, 100.0)
+    ax.set_ylabel("distance / threshold", fontsize=FONT)
+    _key(ax, "lower left")
 
 
-def _coloured(ax: Axes, points: np.ndarray, condition: np.ndarray) -> LineCollection:
-    segments = np.stack([points[:-1], points[1:]], axis=1)
-    known = np.isfinite(condition[:-1]) | np.isinf(condition[:-1])
-    grey = LineCollection(segments[~known], colors=MUTED, linewidths=2, linestyles=":", zorder=2)
-    lines = LineCollection(segments[known], cmap="viridis_r", norm=CONDITION_SCALE, linewidths=4, zorder=3)
-    lines.set_array(np.minimum(condition[:-1][known], 1e12))
-    lines.set_rasterized(True)
-    ax.add_collection(grey)
-    ax.add_collection(lines)
-    return lines
+def _condition(ax: Axes, rows: pd.DataFrame) -> None:
+    values = rows["condition_number"].replace(np.inf, np.nan)
+    ax.plot(rows["t_s"], values, color=MODEL)
+    _logarithmic(ax, 1.0, min(1e6, 2 * values.fillna(0.0).clip(lower=50.0).max()))
+    ax.set_ylabel("condition number", fontsize=FONT)
 
 
-def _end_poses(rows: pd.DataFrame) -> list[np.ndarray]:
-    reached = rows.loc[rows["reachable"], [f"q{j + 1}_deg" for j in range(6)]].to_numpy()
-    return [reached[0], reached[-1]] if len(reached) else []
+def _logarithmic(ax: Axes, low: float, high: float) -> None:
+    """A logarithmic axis with plain numbers at powers of ten: matplotlib's own ticks take longer than all curves."""
+    ax.set_yscale("log")
+    ax.set_ylim(low, high)
+    decades = np.arange(np.ceil(np.log10(low) - 1e-9), np.floor(np.log10(high) + 1e-9) + 1)
+    ticks = 10.0 ** (decades if len(decades) < 6 else decades[::2])
+    ax.yaxis.set_minor_locator(NullLocator())
+    ax.yaxis.set_major_locator(FixedLocator(ticks))
+    ax.yaxis.set_major_formatter(lambda value, _: f"{value:.10g}" if value < 1e5 else f"1e{round(np.log10(value))}")
+
+
+def _small_measures(ax: Axes, rows: pd.DataFrame) -> None:
+    ax.plot(rows["t_s"], rows["smallest_singular_value"], color=REFERENCE, label="smallest singular value")
+    ax.plot(rows["t_s"], rows["manipulability"], color=MODEL, label="manipulability")
+    most = rows[["smallest_singular_value", "manipulability"]].max().max()
+    ax.set_ylim(0, 1.35 * most if most > 0 else 1)
+    ax.set_ylabel("measure", fontsize=FONT)
+    _key(ax, "upper left")
+
+
+def _effort(ax: Axes, record: dict[str, Any], rows: pd.DataFrame, ways: pd.DataFrame) -> None:
+    """Share of the joints' speed limits over the share of the time: as programmed, repaired, at its fastest."""
+    programmed = rows["speed_share"].to_numpy()
+    ax.plot(rows["t_s"] / rows["t_s"].iloc[-1], programmed, color=HIGHLIGHT, label="as programmed")
+    shown = [programmed]
+    for way, colour, label in ((record["repair"], MODEL, "repaired"), ("fastest", MUTED, "at its fastest")):
+        part = ways[ways["way"] == way]
+        if len(part):
+            ax.plot(part["t_s"] / part["t_s"].iloc[-1], part["speed_share"], color=colour, label=label, linewidth=1.3)
+            shown.append(part["speed_share"].to_numpy())
+    ax.axhline(1.0, color=INK, linewidth=1, linestyle="--")
+    size = np.concatenate(shown)
+    most = np.nanmax(size) if np.isfinite(size).any() else 1.0
+    ax.set_ylim(0, 1.35 * max(1.0, most) if record["joint_speed_bounded"] else 3.0)
+    ax.set_xlim(0, 1)
+    ax.set_xlabel("share of each motion's time", fontsize=FONT)
+    ax.set_ylabel("joint speed / limit", fontsize=FONT)
+    _key(ax, "upper left")
+
+
+def _key(ax: Axes, corner: str) -> None:
+    ax.legend(loc=corner, ncols=3, fontsize=8, handlelength=1.2, columnspacing=1.0, borderpad=0.1)
 
 
 def _limits(ax: Axes, robot: Robot, degrees: np.ndarray) -> None:
@@ -122,22 +184,14 @@ def _limits(ax: Axes, robot: Robot, degrees: np.ndarray) -> None:
     if np.isnan(degrees).all():
         return
     low, high = np.nanmin(degrees, axis=0), np.nanmax(degrees, axis=0)
+    lower, upper = np.degrees(robot.lower), np.degrees(robot.upper)
     for j in range(6):
-        for limit, gap in (
-            (np.degrees(robot.lower[j]), low[j] - np.degrees(robot.lower[j])),
-            (np.degrees(robot.upper[j]), np.degrees(robot.upper[j]) - high[j]),
-        ):
+        for limit, gap, side in ((lower[j], low[j] - lower[j], "top"), (upper[j], upper[j] - high[j], "bottom")):
             if gap < NEAR_LIMIT_DEG:
                 ax.axhline(limit, color=COLOURS[j], linestyle="--", linewidth=1)
-                ax.annotate(
-                    f"limit of {JOINT_NAMES[j]}",
-                    (0.01, limit),
-                    xycoords=("axes fraction", "data"),
-                    xytext=(0, 2),
-                    textcoords="offset points",
-                    fontsize=8,
-                    color=COLOURS[j],
-                )
+                text = f"limit of {JOINT_NAMES[j]}"
+                ax.text(0.01, limit, text, transform=ax.get_yaxis_transform(), va=side, fontsize=8, color=COLOURS[j])
+                ax.margins(y=0.18)
 
 
 def _cut(ax: Axes, values: np.ndarray) -> None:
@@ -146,7 +200,7 @@ def _cut(ax: Axes, values: np.ndarray) -> None:
     if size.size:
         reach = 1.6 * np.percentile(size, 97)
         ax.set_ylim(-reach, reach)
-        ax.annotate("cut: grows without bound", (0.99, 0.04), xycoords="axes fraction", ha="right", fontsize=8)
+        ax.text(0.99, 0.04, "cut: grows without bound", transform=ax.transAxes, ha="right", fontsize=8)
 
 
 def _mark(ax: Axes, record: dict[str, Any]) -> None:
@@ -156,7 +210,7 @@ def _mark(ax: Axes, record: dict[str, Any]) -> None:
     for event in record["singularities"]:
         ax.axvline(event["t_s"], color=HIGHLIGHT, linestyle=EVENT_STYLES[event["crossing"]], linewidth=1.4)
         at = (event["t_s"], 1.0)
-        ax.plot(*at, "v", color=HIGHLIGHT, markersize=7, transform=ax.get_xaxis_transform(), clip_on=False, zorder=5)
+        ax.plot(*at, "v", color=HIGHLIGHT, markersize=6, transform=ax.get_xaxis_transform(), clip_on=False, zorder=5)
 
 
 def _legend(record: dict[str, Any]) -> list[Line2D | Patch]:
@@ -170,30 +224,4 @@ def _legend(record: dict[str, Any]) -> list[Line2D | Patch]:
     for key, (colour, alpha, label) in SHADES.items():
         if record[key]:
             handles.append(Patch(color=colour, alpha=2 * alpha, label=label))
-    return handles
-
-
-def _view_legend(record: dict[str, Any], arm: bool, gap: bool) -> list[Line2D]:
-    handles = [
-        Line2D([], [], color=INK, marker="o", linestyle="", label="start"),
-        Line2D([], [], color=INK, marker="s", linestyle="", label="end"),
-    ]
-    if arm:
-        handles.append(Line2D([], [], color=LINK, linewidth=3, label="arm at start"))
-        handles.append(
-            Line2D(
-                [],
-                [],
-                color=LINK,
-                linewidth=3,
-                linestyle="--",
-                label="arm at the last point reached" if gap else "arm at end",
-            )
-        )
-    if any(event["crossing"] for event in record["singularities"]):
-        handles.append(Line2D([], [], color=HIGHLIGHT, marker="X", linestyle="", label="singular"))
-    if any(not event["crossing"] for event in record["singularities"]):
-        handles.append(Line2D([], [], color=HIGHLIGHT, marker="D", linestyle="", label="near-singular"))
-    if gap:
-        handles.append(Line2D([], [], color=MUTED, linestyle=":", linewidth=2, label="not reachable"))
     return handles

@@ -1,4 +1,4 @@
-"""The trajectory recording: the arm runs along each path in turn, its curves beside it in step."""
+"""The trajectory recording: the arm runs along each path in turn, as programmed and repaired, its curves in step."""
 
 from __future__ import annotations
 
@@ -24,6 +24,8 @@ PAUSE = 1.0  # s between two paths
 FRAMES_PER_SECOND = 50
 TRAIL_POINTS = 60
 SKELETON_EVERY = 100
+GHOST_ALPHA = 110
+GHOST_WIDTH = 0.006  # of the arm's size
 EYE_DIRECTION = np.array([0.6, -0.7, 0.35])
 CONDITION_SCALE = LogNorm(3, 300)
 LEVELS = {
@@ -41,6 +43,7 @@ def record(study: Study, name: str, folder: Path, output: Path) -> None:
     """Write the trajectory recording of a robot from the results in ``folder``."""
     robot = study.robot(name)
     summary, checks = read_summary(folder), read_table(folder / "checks.parquet")
+    repairs = read_table(folder / "repairs.parquet").assign(reachable=True)
     no_legend = rrb.PlotLegend(visible=False)
     series = rrb.Vertical(
         rrb.TimeSeriesView(origin="/curves/angle", name="joint angle (deg)"),
@@ -58,11 +61,31 @@ def record(study: Study, name: str, folder: Path, output: Path) -> None:
         stream.log("note", rr.TextDocument(_note(robot, summary), media_type=rr.MediaType.MARKDOWN), static=True)
         first = checks.loc[checks["reachable"], [f"q{j + 1}_deg" for j in range(6)]].to_numpy()
         log_arm(stream, robot, np.radians(first[0]) if len(first) else np.zeros(6))
-        start = 0.0
-        for path in summary["paths"]:
-            rows = _frames(checks[checks["path"] == path["name"]])
-            _path(stream, robot, path, rows, start)
-            start += path["duration_s"] + PAUSE
+        for path, start, repaired in _timetable(summary):
+            table = repairs[repairs["way"] == path["repair"]] if repaired else checks
+            rows = table[table["path"] == path["name"]]
+            if not repaired:
+                _announce(stream, robot, path, rows, start)
+            else:
+                stream.set_time("t", duration=start)
+                sentence = f"## {path['name']}, repaired\n{path['repair_text']}."
+                stream.log("now", rr.TextDocument(sentence, media_type=rr.MediaType.MARKDOWN))
+                text = f"{path['name']}, repaired: {path['repair_text']}"
+                stream.log("events", rr.TextLog(text, level=rr.TextLogLevel.INFO))
+            _run(stream, robot, _frames(rows), start, MODEL if repaired else HIGHLIGHT)
+
+
+def _timetable(summary: dict[str, Any]) -> list[tuple[dict[str, Any], float, bool]]:
+    """Each path with the time (s) at which it starts, followed by its repaired form where there is one."""
+    runs, start = [], 0.0
+    for path in summary["paths"]:
+        runs.append((path, start, False))
+        start += path["duration_s"] + PAUSE
+        taken = [price for price in path["repairs"] if price["way"] == path["repair"]]
+        if taken:
+            runs.append((path, start, True))
+            start += taken[0]["duration_s"] + PAUSE
+    return runs
 
 
 def _view(robot: Robot, checks: pd.DataFrame) -> rrb.Spatial3DView:
@@ -86,22 +109,28 @@ def _frames(rows: pd.DataFrame) -> pd.DataFrame:
     return rows[kept | (rows["condition_number"].to_numpy() > 1e6)]
 
 
-def _path(stream: rr.RecordingStream, robot: Robot, path: dict[str, Any], rows: pd.DataFrame, start: float) -> None:
-    times = start + rows["t_s"].to_numpy()
-    points = rows[["x_mm", "y_mm", "z_mm"]].to_numpy() / 1000
-    reached = rows["reachable"].to_numpy()
+def _announce(stream: rr.RecordingStream, robot: Robot, path: dict[str, Any], rows: pd.DataFrame, start: float) -> None:
+    """What is known of a path: its line, its singular poses with ghosts of the arm, its verdict and events."""
     stream.set_time("t", duration=start)
     sentence = f"## {path['name']}\n**{path['verdict']}**: {path['text']}.\n\n{escaped(path['title'])}."
     stream.log("now", rr.TextDocument(sentence, media_type=rr.MediaType.MARKDOWN))
     stream.log("events", rr.TextLog(f"{path['name']}: {path['verdict']}", level=LEVELS[path["verdict"]]))
-    stream.log("target", _target(path, points, rows["condition_number"].to_numpy()))
-    _marks(stream, path, rows, points)
+    shown = _frames(rows)
+    points = shown[["x_mm", "y_mm", "z_mm"]].to_numpy() / 1000
+    stream.log("target", _target(path, points, shown["condition_number"].to_numpy()))
+    _ghosts(stream, robot, path, rows)
+    _events(stream, path, start)
+
+
+def _run(stream: rr.RecordingStream, robot: Robot, rows: pd.DataFrame, start: float, colour: str) -> None:
+    """The arm, its trail and its curves over time."""
+    times = start + rows["t_s"].to_numpy()
+    points = rows[["x_mm", "y_mm", "z_mm"]].to_numpy() / 1000
+    reached = rows["reachable"].to_numpy()
     if reached.any():
         send_motion(stream, robot, times[reached], np.radians(_columns(rows, "deg")[reached]))
-    _trail(stream, times, points, reached)
-    _events(stream, path, start)
-    end = start + path["duration_s"]
-    broken = np.append(times, end + 1e-3)
+    _trail(stream, times, points, reached, colour)
+    broken = np.append(times, times[-1] + 1e-3)
 
     def send(entity: str, values: np.ndarray, names: list[str], colours: list[str]) -> None:
         gap = np.full((1, values.shape[1]), np.nan)
@@ -128,17 +157,23 @@ def _target(path: dict[str, Any], points: np.ndarray, condition: np.ndarray) -> 
     return rr.LineStrips3D(strips, colors=colours[:-1], radii=0.004)
 
 
-def _marks(stream: rr.RecordingStream, path: dict[str, Any], rows: pd.DataFrame, points: np.ndarray) -> None:
-    """Points at singular poses, with their type."""
+def _ghosts(stream: rr.RecordingStream, robot: Robot, path: dict[str, Any], rows: pd.DataFrame) -> None:
+    """The arm as a line at each singular pose, and a point with its type at the tool; none left of the path before."""
     at = [int(np.argmin(np.abs(rows["t_s"].to_numpy() - event["t_s"]))) for event in path["singularities"]]
-    labels = [event["type"] if event["crossing"] else f"near {event['type']}" for event in path["singularities"]]
-    stream.log(
-        "marks",
-        rr.Points3D(points[at].reshape(-1, 3), radii=0.012, colors=[rgb(HIGHLIGHT)] * len(at), labels=labels),
-    )
+    labels = [
+        f"{'' if event['crossing'] else 'near '}{event['type']}, t = {event['t_s']:.3f} s"
+        for event in path["singularities"]
+    ]
+    points = rows[["x_mm", "y_mm", "z_mm"]].to_numpy()[at].reshape(-1, 3) / 1000
+    colours = [rgb(HIGHLIGHT)] * len(at)
+    stream.log("marks", rr.Points3D(points, radii=0.012, colors=colours, labels=labels))
+    q = np.radians(_columns(rows, "deg")[at]).reshape(-1, 6)
+    strips = [skeleton(robot, joints) for joints in q if np.isfinite(joints).all()]
+    ghost = [(*rgb(HIGHLIGHT), GHOST_ALPHA)] * len(strips)
+    stream.log("ghosts", rr.LineStrips3D(strips, colors=ghost, radii=GHOST_WIDTH * size_of(robot)))
 
 
-def _trail(stream: rr.RecordingStream, times: np.ndarray, points: np.ndarray, reached: np.ndarray) -> None:
+def _trail(stream: rr.RecordingStream, times: np.ndarray, points: np.ndarray, reached: np.ndarray, colour: str) -> None:
     """The way the tool has come so far, in TRAIL_POINTS steps; empty at the start."""
     stream.set_time("t", duration=float(times[0]))
     stream.log("trail", rr.LineStrips3D([]))
@@ -146,7 +181,7 @@ def _trail(stream: rr.RecordingStream, times: np.ndarray, points: np.ndarray, re
         so_far = points[: i + 1][reached[: i + 1]]
         if len(so_far) > 1:
             stream.set_time("t", duration=float(times[i]))
-            stream.log("trail", rr.LineStrips3D([so_far], colors=[rgb(HIGHLIGHT)], radii=0.007))
+            stream.log("trail", rr.LineStrips3D([so_far], colors=[rgb(colour)], radii=0.007))
 
 
 def _events(stream: rr.RecordingStream, path: dict[str, Any], start: float) -> None:
@@ -167,15 +202,18 @@ def _events(stream: rr.RecordingStream, path: dict[str, Any], start: float) -> N
 
 
 def _note(robot: Robot, summary: dict[str, Any]) -> str:
-    starts = np.cumsum([0.0] + [path["duration_s"] + PAUSE for path in summary["paths"]])
-    rows = [f"| {start:.0f} s | {path['name']} | {path['verdict']} |" for start, path in zip(starts, summary["paths"])]
+    rows = []
+    for path, start, repaired in _timetable(summary):
+        name, verdict = (f"{path['name']}, repaired", "–") if repaired else (path["name"], path["verdict"])
+        rows.append(f"| {start:.0f} s | {name} | {verdict} |")
     return "\n".join(
         [
             f"# {escaped(robot.title)}: paths",
             summary["verdict"]["text"],
             "",
             "Press play: the arm runs along one path after another. The line that it follows is dark where the arm is "
-            "badly conditioned and grey where it can't go; its trail grows behind the tool.",
+            "badly conditioned and grey where it can't go; its trail grows behind the tool. Where the path is singular "
+            "stands a ghost of the arm. A path that can be repaired runs a second time, repaired, with a blue trail.",
             "",
             "| from | path | verdict |",
             "|---|---|---|",

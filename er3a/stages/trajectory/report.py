@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +12,12 @@ import pandas as pd
 from er3a.results import read_summary, read_table
 from er3a.robots.robot import Robot
 from er3a.stages.trajectory.clearance_section import clearance_section
-from er3a.stages.trajectory.drawings import curves, views
+from er3a.stages.trajectory.drawings import PathFigure
+from er3a.stages.trajectory.turning import turning_figure
 from er3a.study import Study
-from er3a.viewing.page import Picture, fixed, number, render
+from er3a.viewing.page import fixed, number, render
 
+DRAWN = 250
 STATUS = {
     "safe": "pass",
     "near-singular": "caution",
@@ -23,6 +26,15 @@ STATUS = {
     "leaves limits": "fail",
     "collides": "fail",
     "unreachable": "fail",
+}
+WAYS = {
+    "slow": "slow down on the path",
+    "branch": "another solution of the arm first",
+    "via_shift": "via point, tool point shifted",
+    "via_tilt": "via point, tool tilted",
+    "damped": "damped least squares",
+    "detour": "joint move across the region",
+    "stop": "stop before it, with an alarm",
 }
 KINDS = {
     "joint": "joint move",
@@ -34,25 +46,48 @@ KINDS = {
 }
 
 
+@dataclass(frozen=True)
+class Drawing:
+    """A drawn image for the ``picture`` macro: its data address, what it shows, what to conclude."""
+
+    uri: str
+    alt: str
+    caption: str
+
+
 def report(study: Study, name: str, folder: Path, output: Path) -> None:
     """Write the trajectory page of a robot from the results in ``folder``."""
     robot = study.robot(name)
     summary = read_summary(folder)
-    checks = read_table(folder / "checks.parquet")
+    checks, repairs = read_table(folder / "checks.parquet"), read_table(folder / "repairs.parquet")
+    sections, figure = [], PathFigure()
+    for record in summary["paths"]:
+        rows, ways = (table[table["path"] == record["name"]] for table in (checks, repairs))
+        sections.append(_section(robot, record, rows, ways, summary["near"], figure))
+    limits = summary["joint_limits"]
     render(
         Path(__file__).with_name("report.html.j2"),
         output,
         summary,
         robot=robot,
-        paths=[_section(robot, record, checks[checks["path"] == record["name"]]) for record in summary["paths"]],
+        paths=sections,
         clearance=clearance_section(summary, read_table(folder / "clearance.parquet")),
         near=summary["near"],
         length_mm=summary["characteristic_length_m"] * 1000,
-        speeds_known=bool(np.isfinite(robot.speed).any()),
+        limits=limits,
+        assumed=[f"J{j + 1}" for j in range(6) if limits["speed_assumed"][j]],
+        turning=turning_figure(robot, summary, checks, repairs),
     )
 
 
-def _section(robot: Robot, record: dict[str, Any], rows: pd.DataFrame) -> dict[str, Any]:
+def _section(
+    robot: Robot,
+    record: dict[str, Any],
+    rows: pd.DataFrame,
+    ways: pd.DataFrame,
+    near: dict[str, float],
+    figure: PathFigure,
+) -> dict[str, Any]:
     return {
         **record,
         "status": STATUS[record["verdict"]],
@@ -69,18 +104,66 @@ def _section(robot: Robot, record: dict[str, Any], rows: pd.DataFrame) -> dict[s
             )
             for part in record[key]
         ],
-        "curves": Picture(
-            curves(robot, record, rows),
-            f"Six panels over time for {record['name']}: joint angles, velocities and accelerations; manipulability, "
-            f"condition number and smallest singular value. {record['text']}.",
+        "ways": _ways(record),
+        "figure": Drawing(
+            figure.draw(robot, record, _drawn(record, rows), ways, near),
+            f"Panels over time for {record['name']}: joint angles, velocities and accelerations; distances from the "
+            f"singular sets, condition number, manipulability; the path in space; joint speeds against their limits. "
+            f"{record['text']}.",
             _conclusion(record, rows),
         ),
-        "views": Picture(
-            views(robot, record, rows),
-            f"The path {record['name']} from above and from the side, coloured by the condition number.",
-            "The darker the path, the worse a small tool motion maps to joint motion.",
-        ),
     }
+
+
+def _drawn(record: dict[str, Any], rows: pd.DataFrame) -> pd.DataFrame:
+    """The rows that a curve needs: evenly spread ones, those at singular poses, and the greatest speeds."""
+    kept = [np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round()]
+    kept.append([int(np.argmin(np.abs(rows["t_s"].to_numpy() - event["t_s"]))) for event in record["singularities"]])
+    speed = np.nan_to_num(rows["speed_share"].to_numpy())
+    kept.append(np.flatnonzero(speed > 0.5 * speed.max())[:: max(1, len(rows) // DRAWN // 2)])
+    return rows.iloc[np.unique(np.concatenate(kept).astype(int))]
+
+
+def _ways(record: dict[str, Any]) -> list[list[str]]:
+    """Rows of the comparison: the programme, each way around, and the exact path at its fastest."""
+    if not record["repairs"]:
+        return []
+    duration = fixed(record["duration_s"], 2)
+    shares = (record[f"max_joint_{kind}_ratio"] for kind in ("speed", "acceleration"))
+    clearance = record["clearance"] and record["clearance"]["least_mm"]
+    cells = ["0", "0", *(_share(share) for share in shares), _clearance(clearance), duration]
+    rows = [["as programmed", *cells, "the path to be repaired"]]
+    for price in record["repairs"]:
+        name = WAYS[price["way"]] + (" ←" if price["way"] == record["repair"] else "")
+        if price["duration_s"] is None:
+            rows.append([name, *["–"] * 6, f"not possible: {price['reason']}"])
+            continue
+        remark = f"not usable: {price['reason']}" if price["reason"] else _remark(price)
+        off = (_small(price["max_deviation_mm"]), _small(price["max_deviation_deg"]))
+        shares = (_share(price[f"max_joint_{kind}_ratio"]) for kind in ("speed", "acceleration"))
+        rows.append([name, *off, *shares, _clearance(price["clearance_mm"]), fixed(price["duration_s"], 2), remark])
+    if record["fastest_s"]:
+        cells = ["0", "0", "1.00", "1.00", _clearance(clearance), fixed(record["fastest_s"], 2)]
+        rows.append(["the path at its fastest", *cells, "for comparison"])
+    return rows
+
+
+def _clearance(value: float | None) -> str:
+    return "–" if value is None else fixed(value, 0)
+
+
+def _remark(price: dict[str, Any]) -> str:
+    if price["way"] == "detour":
+        return "a joint move takes no harm from singular poses"
+    return "keeps its distance from singular poses" if price["keeps_clear"] else "goes through the region"
+
+
+def _share(value: float | None) -> str:
+    return "no bound" if value is None else fixed(value, 2)
+
+
+def _small(value: float) -> str:
+    return "0" if value < 5e-4 else number(value, 3)
 
 
 def _conclusion(record: dict[str, Any], rows: pd.DataFrame) -> str:

@@ -17,11 +17,12 @@ from er3a.stages.workspace.drawing import drawing_table
 from er3a.stages.workspace.grid import Grid, make_grid
 from er3a.stages.workspace.hull import Hull, cells_inside, convex_hull
 from er3a.stages.workspace.parts import gather
-from er3a.stages.workspace.proven import border_table, count_in_empty, find_proven_voids, proof_table, prove_robot
-from er3a.stages.workspace.random_joints import joint_vectors
+from er3a.stages.workspace.proven import count_in_empty, find_proven_voids, pocket_block, proof_table, prove_robot
+from er3a.stages.workspace.random_joints import Draw
 from er3a.stages.workspace.reach import reach_figures
-from er3a.stages.workspace.sample import sampled
-from er3a.stages.workspace.tally import UNTOUCHED, Tally, block_sizes
+from er3a.stages.workspace.sample import draw_of, sampled
+from er3a.stages.workspace.side_view import border_table, side_view_table
+from er3a.stages.workspace.tally import UNTOUCHED, Tally
 from er3a.stages.workspace.verdict import judge
 from er3a.stages.workspace.voids import Voids, find_voids, shape_of, unseen_cells
 from er3a.study import Study
@@ -51,18 +52,19 @@ def compute(study: Study, name: str, folder: Path, parts: list[Path] | None = No
         tally = sampled(study, robot, grid, range(settings.blocks))
     else:
         tally = gather([Path(part) for part in parts], study, robot)
-    q_extreme = joint_vectors(robot, study.seed, tally.extremes.block, tally.extremes.sample)
+    draw = draw_of(study)
+    q_extreme = draw.joints(robot, tally.extremes.block, tally.extremes.sample)
     hull = convex_hull(forward(robot, q_extreme)[:, :3, 3])
     inside = cells_inside(hull, grid)
     voids = find_voids(tally.counts, inside)
-    q_cloud = _cloud_joints(study, robot)
+    q_cloud = _cloud_joints(robot, draw, settings.cloud_points)
     shoulder = _shoulder(robot, grid)
     proven = prove_robot(robot, settings.proof_cells, settings.volume_points, study.seed)
     records, vertices, triangles = find_proven_voids(robot, proven, hull, shoulder)
     if proven.arm is None:
-        records = _sampled_records(voids, grid, shoulder)
-    write_table(folder / "proof.parquet", proof_table(proven.proof))
-    write_table(folder / "border.parquet", border_table(robot, proven))
+        records += _sampled_records(voids, grid, shoulder, records)
+    write_table(folder / "proof.parquet", proof_table(proven))
+    write_table(folder / "border.parquet", border_table(robot))
     height = float((shoulder - grid.axis_point) @ grid.axis)
     write_table(folder / "drawing.parquet", drawing_table(robot, height))
     write_table(folder / "void_vertices.parquet", vertices)
@@ -74,7 +76,8 @@ def compute(study: Study, name: str, folder: Path, parts: list[Path] | None = No
 
     write_table(folder / "cells.parquet", _cells(tally, inside, voids))
     write_table(folder / "section.parquet", _section(tally, grid))
-    write_table(folder / "curve.parquet", _curve(study, tally, grid))
+    write_table(folder / "side_view.parquet", side_view_table(robot, tally, grid, draw))
+    write_table(folder / "curve.parquet", _curve(draw, tally, grid))
     write_table(folder / "cloud.parquet", _cloud(robot, q_cloud))
     _write_hull(folder, hull, q_extreme)
 
@@ -105,6 +108,7 @@ def compute(study: Study, name: str, folder: Path, parts: list[Path] | None = No
         judge(hull, records, cells, unseen, proven.arm is not None),
         figures,
         samples=settings.samples,
+        sampling=settings.sampling,
         volume_m3={"lower": lower, "upper": upper, "estimate": guess.value, "ci95": [guess.low, guess.high]},
         volume_points={"drawn": guess.points, "reached": guess.reached, "undecided": guess.undecided},
         touched_m3=touched,
@@ -130,19 +134,19 @@ def compute(study: Study, name: str, folder: Path, parts: list[Path] | None = No
         section_cell_m=grid.section_cell,
         cells={**cells, "unseen_estimate": unseen},
         voids=records,
+        pocket_block_m=pocket_block(proven),
         specks={"count": voids.specks, "volume_m3": voids.speck_cells * grid.cell_volume},
         skin_m3=voids.skin_cells * grid.cell_volume,
         **doing.summary,
     )
 
 
-def _cloud_joints(study: Study, robot: Robot) -> np.ndarray:
+def _cloud_joints(robot: Robot, draw: Draw, points: int) -> np.ndarray:
     """The first samples of each block, drawn again: (n, 6)."""
-    settings = study.workspace
-    wanted = block_sizes(min(settings.cloud_points, settings.samples), settings.blocks)
-    blocks = np.repeat(np.arange(settings.blocks), wanted)
+    wanted = Draw(draw.seed, min(points, draw.samples), draw.blocks).sizes
+    blocks = np.repeat(np.arange(draw.blocks), wanted)
     samples = np.concatenate([np.arange(count) for count in wanted])
-    return joint_vectors(robot, study.seed, blocks, samples)
+    return draw.joints(robot, blocks, samples)
 
 
 def _cloud(robot: Robot, q: np.ndarray) -> pd.DataFrame:
@@ -180,9 +184,9 @@ def _section(tally: Tally, grid: Grid) -> pd.DataFrame:
     return pd.DataFrame({"rho_m": rho, "z_m": z, "samples": tally.section[shown], "void": void[shown]})
 
 
-def _curve(study: Study, tally: Tally, grid: Grid) -> pd.DataFrame:
+def _curve(draw: Draw, tally: Tally, grid: Grid) -> pd.DataFrame:
     """Touched volume after each block, at several cell sizes."""
-    drawn = np.cumsum(block_sizes(study.workspace.samples, study.workspace.blocks))
+    drawn = np.cumsum(draw.sizes)
     tables = []
     for factor in COARSER:
         first = tally.first_block
@@ -211,7 +215,10 @@ def _shoulder(robot: Robot, grid: Grid) -> np.ndarray:
     return grid.axis_point + ((joint_2 - grid.axis_point) @ grid.axis) * grid.axis
 
 
-def _sampled_records(voids: Voids, grid: Grid, shoulder: np.ndarray) -> list[dict[str, Any]]:
+def _sampled_records(
+    voids: Voids, grid: Grid, shoulder: np.ndarray, proven: list[dict[str, Any]]
+) -> list[dict[str, Any]]:
+    """Voids that only the samples tell of: those that lie in no proven one's box."""
     cell_of_shoulder = np.floor((shoulder - grid.origin) / grid.cell)
     return [
         {
@@ -224,4 +231,10 @@ def _sampled_records(voids: Voids, grid: Grid, shoulder: np.ndarray) -> list[dic
             "holds_shoulder": bool(np.any(np.all(np.abs(void.cells - cell_of_shoulder) <= 1, axis=1))),
         }
         for void in voids.listed
+        if not any(_in_box(shape_of(void, grid)["centroid_m"], record) for record in proven)
     ]
+
+
+def _in_box(point: list[float], record: dict[str, Any]) -> bool:
+    away = np.abs(np.array(point) - record["centroid_m"])
+    return bool((away <= np.array(record["extent_m"]) / 2).all())

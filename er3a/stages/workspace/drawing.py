@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pandas as pd
 
 from er3a.references.load import MANUAL_REFS, check_reference_file
 from er3a.robots.robot import Robot
+from er3a.stages.workspace.side_view import corner_side
 
 _ACROSS = {"greatest_x": 1.0, "least_x": -1.0}
 _UP = ("greatest_z", "least_z")
@@ -13,6 +15,8 @@ _UP = ("greatest_z", "least_z")
 
 def drawing_table(robot: Robot, shoulder_m: float) -> pd.DataFrame:
     """Labels of the wrist centre's envelope: extents (one coordinate) and corners (both).
+
+    ``x_m`` is ``rho_m`` with a sign: positive in front of axis 1.
 
     Parameters
     ----------
@@ -28,12 +32,16 @@ def drawing_table(robot: Robot, shoulder_m: float) -> pd.DataFrame:
                 corner |= {"z": value} if row.quantity == "z" else {"rho": abs(value)}
             elif row.quantity in _ACROSS:
                 rho = abs(row.value_mm) / 1000
-                marks.append((rho, None, f"{row.quantity.replace('_', ' ')} {row.value_mm:g}"))
+                text = f"{row.quantity.replace('_', ' ')} {row.value_mm:g}"
+                marks.append((rho, _ACROSS[row.quantity] * rho, None, text))
             elif row.quantity in _UP:
                 marks.append(
-                    (None, shoulder_m + row.value_mm / 1000, f"{row.quantity.replace('_', ' ')} {row.value_mm:g}")
+                    (None, None, shoulder_m + row.value_mm / 1000, f"{row.quantity.replace('_', ' ')} {row.value_mm:g}")
                 )
     for (q2, q3), values in corners.items():
         if {"rho", "z"} <= set(values):
-            marks.append((values["rho"], shoulder_m + values["z"], f"J2 {q2:g}, J3 {q3:g} deg"))
-    return pd.DataFrame(marks, columns=["rho_m", "z_m", "label"]).astype({"rho_m": float, "z_m": float, "label": str})
+            x = values["rho"] * corner_side(robot, np.radians(q2), np.radians(q3))
+            marks.append((values["rho"], x, shoulder_m + values["z"], f"J2 {q2:g}, J3 {q3:g} deg"))
+    return pd.DataFrame(marks, columns=["rho_m", "x_m", "z_m", "label"]).astype(
+        {"rho_m": float, "x_m": float, "z_m": float, "label": str}
+    )

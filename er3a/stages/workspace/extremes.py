@@ -3,8 +3,9 @@
 A sample at distance r from an inner point can only be a new extreme if r exceeds a threshold that depends on the way
 it points. The ways are sorted into the patches of a cube map; with s_d the best support so far in direction d, seen
 from the inner point, and theta the least angle between d and the patch, no sample of the patch below
-``min_d s_d / cos(theta)`` improves anything. The thresholds are refreshed as the support grows. They only skip
-samples that could not matter, so the result is that of comparing each sample with each direction.
+``min_d s_d / cos(theta)`` improves anything. Each cell of the grid gets such a threshold, and each patch a list of the
+directions that come into question first. Both are refreshed as the support grows. They only skip what could not matter,
+so the result is that of comparing each sample with each direction.
 """
 
 from __future__ import annotations
@@ -15,8 +16,9 @@ import numpy as np
 
 from er3a.kinematics.jit import kernel
 
-_PATCHES = 24
-_SAFETY = 1 - 1e-9
+_PATCHES = 16
+_SAFETY = 1 - 1e-5
+_LISTED, _LONGEST = 0.06, 128
 NONE = -1
 
 
@@ -66,8 +68,8 @@ def fibonacci_sphere(count: int) -> np.ndarray:
     return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), z], axis=1)
 
 
-def cube_map() -> tuple[np.ndarray, np.ndarray]:
-    """Centres (P, 3) and angular radii (P,) in rad of the patches that :func:`_patch` numbers."""
+def cube_map() -> np.ndarray:
+    """Centres (unit vectors) and angular radii (rad) of the patches that :func:`_patch` numbers, as rows (4, P)."""
     edge = np.linspace(-1, 1, _PATCHES + 1)
     middle = (edge[1:] + edge[:-1]) / 2
     centres, radii = [], []
@@ -87,7 +89,7 @@ def cube_map() -> tuple[np.ndarray, np.ndarray]:
         )
         centres.append(centre.reshape(-1, 3))
         radii.append(np.arccos(np.minimum(cosine, 1)).ravel())
-    return np.concatenate(centres), np.concatenate(radii) + 1e-6
+    return np.concatenate([np.concatenate(centres).T, np.concatenate(radii)[None] + 1e-6])
 
 
 @kernel
@@ -107,31 +109,113 @@ def _patch(x, y, z):
 
 
 @kernel
-def refresh_thresholds(directions, support, inner, centres, cos_radius, sin_radius, threshold):
-    """Set the squared distance per patch below which no sample improves any direction."""
-    for p in range(centres.shape[0]):
-        least = np.inf
-        for d in range(directions.shape[0]):
-            dx, dy, dz = directions[d, 0], directions[d, 1], directions[d, 2]
-            s = max(0.0, support[d] - (inner[0] * dx + inner[1] * dy + inner[2] * dz))
-            c = centres[p, 0] * dx + centres[p, 1] * dy + centres[p, 2] * dz
-            least_angle_cosine = 1.0
-            if c < cos_radius[p]:
-                least_angle_cosine = c * cos_radius[p] + np.sqrt(max(0.0, 1.0 - c * c)) * sin_radius[p]
-            if least_angle_cosine > 0.0:
-                least = min(least, s / least_angle_cosine)
-        threshold[p] = (least * _SAFETY) ** 2
+def _set_thresholds(directions, seen, patches, widen, threshold):
+    """Squared distance per patch, grown by the angle ``widen`` (rad), below which nothing improves any direction."""
+    cos_widen, sin_widen = np.cos(widen), np.sin(widen)
+    count = patches.shape[1]
+    threshold[:] = np.inf
+    for d in range(directions.shape[0]):
+        dx, dy, dz, s = directions[d, 0], directions[d, 1], directions[d, 2], seen[d]
+        for p in range(count):
+            c = patches[0, p] * dx + patches[1, p] * dy + patches[2, p] * dz
+            cos_radius = patches[3, p] * cos_widen - patches[4, p] * sin_widen
+            sin_radius = patches[4, p] * cos_widen + patches[3, p] * sin_widen
+            nearest = c * cos_radius + np.sqrt(max(0.0, 1.0 - c * c)) * sin_radius
+            nearest = 1.0 if c >= cos_radius else nearest
+            limit = s / nearest if nearest > 0.0 else np.inf
+            threshold[p] = limit if limit < threshold[p] else threshold[p]
+    for p in range(count):
+        threshold[p] = (threshold[p] * _SAFETY) ** 2
 
 
 @kernel
-def update_extremes(points, block, first_sample, directions, inner, threshold, support, blocks, samples):
-    """Take the points (N, 3) of a block, in the order of their samples, into the extremes."""
-    for n in range(points.shape[0]):
-        px, py, pz = points[n, 0], points[n, 1], points[n, 2]
-        x, y, z = px - inner[0], py - inner[1], pz - inner[2]
-        if x * x + y * y + z * z < threshold[_patch(x, y, z)]:
-            continue
+def _set_lists(directions, seen, patches, least, lists):
+    """List for each patch the directions that may be improved there, by the distance from which on they are.
+
+    Parameters
+    ----------
+    least : (P,), lower bounds (squared, m^2) of the distances from which on anything is improved
+    """
+    complete, count, near, limits = lists
+    lowest = seen.min()
+    for p in range(patches.shape[1]):
+        limit = np.sqrt(least[p]) * (1.0 + _LISTED)
+        complete[p], count[p] = limit * limit, 0
+        widest = np.arccos(min(1.0, lowest / limit)) + np.arccos(patches[3, p]) if limit > 0.0 else np.pi
+        enough = np.cos(min(np.pi, widest)) - 1e-9
         for d in range(directions.shape[0]):
-            along = px * directions[d, 0] + py * directions[d, 1] + pz * directions[d, 2]
-            if along > support[d]:
-                support[d], blocks[d], samples[d] = along, block, first_sample + n
+            c = patches[0, p] * directions[d, 0] + patches[1, p] * directions[d, 1] + patches[2, p] * directions[d, 2]
+            if c < enough:
+                continue
+            nearest = 1.0
+            if c < patches[3, p]:
+                nearest = c * patches[3, p] + np.sqrt(max(0.0, 1.0 - c * c)) * patches[4, p]
+            if seen[d] >= limit * nearest:
+                continue
+            if count[p] == near.shape[1]:
+                complete[p] = 0.0
+                break
+            n, own = count[p], (seen[d] / nearest * _SAFETY) ** 2
+            while n > 0 and limits[p, n - 1] > own:
+                limits[p, n], near[p, n] = limits[p, n - 1], near[p, n - 1]
+                n -= 1
+            limits[p, n], near[p, n] = own, d
+            count[p] += 1
+
+
+@kernel
+def refresh(directions, support, inner, patches, lists, grid, idle):
+    """Set the lists of the patches, and where samples of each cell are idle, from the support so far.
+
+    Parameters
+    ----------
+    inner : (3,), m, the inner point; patches : (5, P), centres, cosines and sines of the radii of the cube map
+    lists : see :func:`near_lists`, set
+    grid : origin (3,), cell (m), shape
+    idle : (cells,), set to the squared distance (m^2) from the inner point below which a sample improves nothing
+    """
+    origin, cell, (nx, ny, nz) = grid
+    seen = np.empty(directions.shape[0])
+    for d in range(directions.shape[0]):
+        along = inner[0] * directions[d, 0] + inner[1] * directions[d, 1] + inner[2] * directions[d, 2]
+        seen[d] = max(0.0, support[d] - along)
+    least, half = seen.min() * _SAFETY, 0.5 * np.sqrt(3.0) * cell
+    small = least > 3.0 * half
+    # A cell that holds a place beyond ``least`` is seen from the inner point under at most this angle.
+    widen, wider = np.arcsin(half / (least - 2.0 * half)) if small else 0.0, np.empty(patches.shape[1])
+    _set_thresholds(directions, seen, patches, widen, wider)
+    _set_lists(directions, seen, patches, wider, lists)
+    if not small:
+        return
+    for i in range(nx):
+        x = origin[0] + (i + 0.5) * cell - inner[0]
+        for j in range(ny):
+            y = origin[1] + (j + 0.5) * cell - inner[1]
+            for k in range(nz):
+                z = origin[2] + (k + 0.5) * cell - inner[2]
+                inside = np.sqrt(x * x + y * y + z * z) + half < least
+                idle[(i * ny + j) * nz + k] = np.inf if inside else wider[_patch(x, y, z)]
+
+
+def near_lists(patches: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Per patch: squared distance (m^2) up to which its list is complete, length of the list, directions, and the
+    squared distances from which on each may be improved. Before the first refresh no list is complete.
+    """
+    shape = (patches, _LONGEST)
+    return np.zeros(patches), np.zeros(patches, np.int64), np.zeros(shape, np.int64), np.zeros(shape)
+
+
+@kernel
+def take_point(point, block, sample, directions, inner, lists, support, blocks, samples):
+    """Take one point (x, y, z) into the extremes; samples of a block come in their order."""
+    complete, count, near, limits = lists
+    x, y, z = point[0] - inner[0], point[1] - inner[1], point[2] - inner[2]
+    squared, patch = x * x + y * y + z * z, _patch(x, y, z)
+    listed = squared < complete[patch]
+    for n in range(count[patch] if listed else directions.shape[0]):
+        if listed and limits[patch, n] > squared:
+            break
+        d = near[patch, n] if listed else n
+        along = point[0] * directions[d, 0] + point[1] * directions[d, 1] + point[2] * directions[d, 2]
+        if along > support[d]:
+            support[d], blocks[d], samples[d] = along, block, sample

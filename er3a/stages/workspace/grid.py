@@ -14,7 +14,7 @@ from er3a.robots.robot import Robot
 BYTES_PER_CELL = 64
 """Peak over sampling and gathering: counts, first blocks, masks, labels and their copies."""
 SECTION_REFINEMENT = 4
-_MARGIN = 1e-9
+_MARGIN = 2e-5  # the sampling loop works in single precision
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,7 @@ class Grid:
     ----------
     origin : (3,), m, lowest corner; cell : m, edge of the cubic cells; shape : cells along x, y, z
     axis_point, axis : (3,), m and unit vector, the line of joint 1; the section's height z is measured from the point
-    section_origin : (2,), m, lowest (rho, z); section_cell : m; section_shape : cells along rho and z
+    section_origin : (2,), m, lowest (rho, z); section_cell : m; section_shape : cells along rho (from the axis) and z
     """
 
     origin: np.ndarray

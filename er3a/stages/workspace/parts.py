@@ -19,7 +19,7 @@ from er3a.stages.workspace.extremes import Extremes
 from er3a.stages.workspace.tally import UNTOUCHED, Tally
 from er3a.study import Study
 
-FORMAT = "er3a workspace part 2"
+FORMAT = "er3a workspace part 3"
 
 
 def identity(study: Study, robot: Robot) -> dict[str, Any]:
@@ -48,7 +48,7 @@ def write_part(path: Path, identity: dict[str, Any], tally: Tally) -> None:
         cells=touched,
         counts=tally.counts.ravel()[touched],
         first_block=tally.first_block.ravel()[touched],
-        section=tally.section,
+        side=tally.side,
         support=tally.extremes.support,
         extreme_block=tally.extremes.block,
         extreme_sample=tally.extremes.sample,
@@ -72,7 +72,7 @@ def read_part(path: Path, expected: dict[str, Any]) -> Tally:
     counts.flat[arrays["cells"]] = arrays["counts"]
     first_block.flat[arrays["cells"]] = arrays["first_block"]
     extremes = Extremes(arrays["support"], arrays["extreme_block"], arrays["extreme_sample"])
-    return Tally(arrays["blocks"], counts, first_block, arrays["section"], extremes)
+    return Tally(arrays["blocks"], counts, first_block, arrays["side"], extremes)
 
 
 def _check_identity(path: Path, found: dict[str, Any], expected: dict[str, Any]) -> None:

@@ -21,7 +21,7 @@ from er3a.viewing.skeleton import skeleton
 
 PROOF = {"filled": "#9ecae1", "filled but for a wedge": "#d6e6f2", "undecided": HIGHLIGHT, "empty": "#ffffff"}
 FILLED, WEDGE, UNDECIDED, EMPTY = range(4)
-BORDERS = {"tool point": INK, "wrist centre": REFERENCE}
+BORDERS = {"tool point": INK, "wrist centre": REFERENCE, "flange": JOINTS[3]}
 DRAWN = JOINTS[2]
 SLICE_PIXELS = 321
 
@@ -34,6 +34,7 @@ def sections(robot: Robot, summary: dict[str, Any], tables: dict[str, pd.DataFra
     tables : the stage's ``section``, ``proof``, ``border`` and ``drawing``
     """
     section, proof, border, drawing = (tables[name] for name in ("section", "proof", "border", "drawing"))
+    border = border[border["view"] == "section"]
     figure, (left, right) = new_figure(1, 2, width=11.5, height=9.0, sharey=True, sharex=True)
     _draw_density(left, summary, section)
     _draw_proof(right, proof)
@@ -49,7 +50,11 @@ def sections(robot: Robot, summary: dict[str, Any], tables: dict[str, pd.DataFra
     right.set_title("Proof")
     handles = [Line2D([], [], color=INK, marker="o", markersize=4, linewidth=2.4, label="arm, all joints 0")]
     if len(border):
-        handles += [Line2D([], [], color=colour, label=f"exact border, {name}") for name, colour in BORDERS.items()]
+        handles += [
+            Line2D([], [], color=colour, label=f"exact border, {name}")
+            for name, colour in BORDERS.items()
+            if (border["point"] == name).any()
+        ]
     if len(drawing):
         handles.append(Line2D([], [], color=DRAWN, marker="o", linestyle=":", label="maker's drawing, wrist centre"))
     handles += [Patch(facecolor=colour, edgecolor=MUTED, label=label) for label, colour in PROOF.items()]

@@ -10,20 +10,22 @@ import pandas as pd
 
 from er3a.errors import NotWristPartitionedError
 from er3a.robots.robot import Robot
-from er3a.stages.workspace.grid import tool_bound
 from er3a.stages.workspace.hull import Hull, depth_inside
 from er3a.workspace.blocks import Blocks, blocks_of, mesh, pockets
-from er3a.workspace.boundary import border
 from er3a.workspace.causes import describe, relaxations
 from er3a.workspace.cavities import Cavity, cavities, rim
-from er3a.workspace.general import bound_section
+from er3a.workspace.general import prove_general
+from er3a.workspace.general_arm import general_arm
 from er3a.workspace.lookup import EMPTY, SectionMap
 from er3a.workspace.proof import Proof, prove, sharpen
 from er3a.workspace.section_arm import SectionArm, section_arm, section_frame
 from er3a.workspace.volume import VolumeEstimate, estimate_volume
+from er3a.workspace.witness import lies_in_cell, reach_points, witness_joints
 
 TARGET = 0.002
 VOID_SHARE = 0.25
+GENERAL_CELLS, GENERAL_SAMPLES, GENERAL_BOXES = 4, 250, 1000
+"""For each cell of the budget, where the general method is all there is: its cells, samples and boxes."""
 POCKET_BLOCKS, TURNS = 64, 180
 MESH_BLOCKS, MESH_TURNS = 24, 72
 STATES = ("filled", "touched", "empty", "undecided", "partly filled")
@@ -39,6 +41,7 @@ class Proven:
     arm : in its section form; None if it is not wrist-partitioned
     proof, section : its cells, and their map
     R, origin : frame about axis 1, see :func:`er3a.workspace.section_arm.section_frame`
+    witness : (cells, 6), rad, a joint vector that reaches into each cell, NaN where none is known
     estimate : of the volume; method : how cells were decided, in words
     """
 
@@ -47,6 +50,7 @@ class Proven:
     section: SectionMap
     R: np.ndarray
     origin: np.ndarray
+    witness: np.ndarray
     estimate: VolumeEstimate
     method: str
 
@@ -54,23 +58,44 @@ class Proven:
         """Points (..., 3) from the frame about axis 1 to the base frame."""
         return points @ self.R + self.origin
 
+    def in_section(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Distance from axis 1 (m), azimuth (rad) and height (m) of points (n, 3) in the base frame."""
+        x, y, z = self.R @ (points - self.origin).T
+        return np.hypot(x, y), np.arctan2(y, x), z
+
 
 def prove_robot(robot: Robot, most_cells: int, points: int, seed: int) -> Proven:
     """Run the proof and the estimate that rests on it; bounds by lengths alone where the arm's build gives no more."""
     try:
         arm = section_arm(robot)
     except NotWristPartitionedError as error:
-        bound = tool_bound(robot)
-        proof = bound_section(bound.height, bound.offset, max(bound.radius, 1e-6))
-        section = SectionMap(proof)
-        low, high = bound.height - bound.radius, bound.height + bound.radius
-        estimate = estimate_volume(None, section, bound.reach, (low, high), points, seed)
-        method = f"by lengths alone, because {error.property_missing}"
-        return Proven(None, proof, section, _about(bound.axis), bound.axis_point, estimate, method)
+        return _prove_general(robot, most_cells, points, seed, error.property_missing)
     section = SectionMap(prove(arm, TARGET, int((1 - VOID_SHARE) * most_cells)))
     section = _about_voids(arm, section, int(VOID_SHARE * most_cells))
     estimate = estimate_volume(arm, section, arm.reach, arm.heights, points, seed)
-    return Proven(arm, section.proof, section, *section_frame(robot), estimate, "spherical wrist")
+    witness = witness_joints(robot, arm, section.proof)
+    return Proven(arm, section.proof, section, *section_frame(robot), witness, estimate, "spherical wrist")
+
+
+def _prove_general(robot: Robot, most_cells: int, points: int, seed: int, lacks: str) -> Proven:
+    arm, R, origin = general_arm(robot)
+    budgets = (GENERAL_SAMPLES * most_cells, GENERAL_BOXES * most_cells)
+    proof, theta = prove_general(arm, GENERAL_CELLS * most_cells, seed, *budgets)
+    section = SectionMap(proof)
+    q = np.tile((robot.lower + robot.upper) / 2, (len(theta), 1))
+    count = theta.shape[1]
+    turned = robot.direction[:count] * (theta - robot.offset[:count])
+    middle = q[:, :count]
+    q[:, :count] = turned + 2 * np.pi * np.round((middle - turned) / (2 * np.pi))
+    q = np.where(lies_in_cell(robot, q, proof, R, origin)[:, None], q, np.nan)
+
+    def search(local: np.ndarray) -> np.ndarray:
+        cells = section.cell_of(np.hypot(local[:, 0], local[:, 1]), local[:, 2])
+        starts = np.where(np.isfinite(q[cells]), q[cells], (robot.lower + robot.upper) / 2)
+        return np.isfinite(reach_points(robot, local @ R + origin, starts)[:, 0])
+
+    estimate = estimate_volume(search, section, arm.reach, arm.heights, points, seed)
+    return Proven(None, proof, section, R, origin, q, estimate, f"general method, because {lacks}")
 
 
 def _about_voids(arm: SectionArm, section: SectionMap, most_cells: int) -> SectionMap:
@@ -83,23 +108,16 @@ def _about_voids(arm: SectionArm, section: SectionMap, most_cells: int) -> Secti
         section = SectionMap(sharpen(arm, section.proof, chosen))
 
 
-def _about(axis: np.ndarray) -> np.ndarray:
-    """A frame (rows x, y, z) with z along the axis."""
-    x = np.cross(np.eye(3)[np.argmin(np.abs(axis))], axis)
-    x = x / np.linalg.norm(x)
-    return np.stack([x, np.cross(axis, x), axis])
-
-
 def count_in_empty(proven: Proven, points: np.ndarray) -> int:
     """How many points (n, 3), m, base frame, lie where nothing is reached; more than none would refute the proof."""
-    x, y, z = proven.R @ (points - proven.origin).T
-    return int((proven.section.status(np.hypot(x, y), np.arctan2(y, x), z) == EMPTY).sum())
+    return int((proven.section.status(*proven.in_section(points)) == EMPTY).sum())
 
 
-def proof_table(proof: Proof) -> pd.DataFrame:
-    """All cells: section, volume, status, shares and arcs."""
+def proof_table(proven: Proven) -> pd.DataFrame:
+    """All cells: section, volume, status, shares and arcs, and a joint vector that reaches into the cell."""
+    proof = proven.proof
     unfilled, empty = proof.unfilled_share, proof.empty_share
-    touched = proof.witness[:, 3] > 0
+    touched = np.isfinite(proven.witness[:, 0])
     state = np.select(
         [unfilled <= 0, empty >= 1 - 1e-12, unfilled < 1 - 1e-12, touched],
         [STATES[0], STATES[2], STATES[4], STATES[1]],
@@ -114,27 +132,12 @@ def proof_table(proof: Proof) -> pd.DataFrame:
         empty_share=empty,
         empty_arcs_deg=[_arcs(row) for row in proof.empty],
         unfilled_arcs_deg=[_arcs(row) for row in proof.unfilled],
+        **{f"q{k}_deg": np.degrees(angles) for k, angles in enumerate(proven.witness.T, start=1)},
     )
 
 
 def _arcs(row: np.ndarray) -> list[float]:
     return np.degrees(row[np.isfinite(row[:, 0])]).ravel().tolist()
-
-
-def border_table(robot: Robot, proven: Proven) -> pd.DataFrame:
-    """Exact borders of the section, of tool point and wrist centre, with the joints (as theta) that make them."""
-    arms = {"tool point": proven.arm, "wrist centre": section_arm(robot, wrist_centre=True)} if proven.arm else {}
-    tables = []
-    for point, arm in arms.items():
-        for number, arc in enumerate(border(arm), start=1):
-            table = pd.DataFrame(arc.points, columns=["rho_m", "z_m"])
-            for k, name in enumerate(("theta_2_deg", "tau_deg", "tilt_deg")):
-                table[name] = np.degrees(arc.joints[:, k])
-            tables.append(table.assign(point=point, arc=number, sweeps=arc.sweeps))
-    if not tables:
-        columns = ["rho_m", "z_m", "theta_2_deg", "tau_deg", "tilt_deg", "point", "arc", "sweeps"]
-        return pd.DataFrame({name: pd.Series(dtype=str if name in columns[-3::2] else float) for name in columns})
-    return pd.concat(tables, ignore_index=True)
 
 
 def find_proven_voids(robot: Robot, proven: Proven, hull: Hull, shoulder: np.ndarray):
@@ -172,7 +175,7 @@ def find_proven_voids(robot: Robot, proven: Proven, hull: Hull, shoulder: np.nda
 
 
 def _record(kind: str, robot: Robot, proven: Proven, cavity: Cavity, shoulder: np.ndarray) -> dict[str, Any]:
-    relaxed = relaxations(robot, cavity)
+    relaxed = relaxations(robot, cavity, None if proven.arm is not None else proven.in_section)
     low, high = cavity.box()
     corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
     extent = np.ptp(proven.in_base(corners), axis=0)
@@ -206,13 +209,22 @@ def _outline(proven: Proven, cavity: Cavity) -> tuple[Blocks, np.ndarray]:
     return blocks, mask if mask.any() else blocks.empty > 0
 
 
-def _pocket_blocks(proven: Proven, outside: Cavity) -> Blocks:
+def pocket_block(proven: Proven) -> float:
+    """Edge (m) of the blocks that open pockets are looked for on."""
     cells = proven.proof.cells
     low, high = cells[:, [0, 2]].min(axis=0), cells[:, [1, 3]].max(axis=0)
     size = float((cells[:, 1] - cells[:, 0]).max())
+    while 2 * size < 1.01 * (high - low).max() / POCKET_BLOCKS:
+        size *= 2
     while size > 1.01 * (high - low).max() / POCKET_BLOCKS and size > 1.5 * proven.section.size:
         size /= 2
-    return blocks_of(outside, size, low, high, TURNS)
+    return size
+
+
+def _pocket_blocks(proven: Proven, outside: Cavity) -> Blocks:
+    cells, size = proven.proof.cells, pocket_block(proven)
+    low, high = cells[:, [0, 2]].min(axis=0), cells[:, [1, 3]].max(axis=0)
+    return blocks_of(outside, size, low, low + np.ceil((high - low) / size - 1e-6) * size, TURNS)
 
 
 def _as_cavity(blocks: Blocks, mask: np.ndarray) -> Cavity:

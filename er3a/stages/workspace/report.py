@@ -13,12 +13,24 @@ from er3a.robots.robot import Robot
 from er3a.stages.workspace.capability_texts import capability_context
 from er3a.stages.workspace.plots import convergence, top_view
 from er3a.stages.workspace.proof_plots import sections, slices
+from er3a.stages.workspace.side_plots import arc_rows, side_view
 from er3a.stages.workspace.turning import turning_figure
 from er3a.study import Study
 from er3a.viewing.page import Picture, fixed, number, render
 
 LISTED = 12
-TABLES = ("section", "cells", "curve", "proof", "border", "drawing", "cloud", "void_vertices", "void_triangles")
+TABLES = (
+    "section",
+    "side_view",
+    "cells",
+    "curve",
+    "proof",
+    "border",
+    "drawing",
+    "cloud",
+    "void_vertices",
+    "void_triangles",
+)
 CAN_DO = ("capability", "places")
 KINDS = {"enclosed": "enclosed", "open": "open pocket"}
 
@@ -38,6 +50,10 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
             "Side sections about axis 1: density of the samples, and proven cells with the exact border",
             _section_caption(summary, enclosed, len(tables["drawing"]) > 0),
         ),
+        side=_side(robot, tables),
+        arc_rows=arc_rows(tables["border"]),
+        rule=_rule(enclosed),
+        pocket_mm=3000 * summary["pocket_block_m"],
         top=Picture(
             top_view(robot, summary, tables["cells"]),
             "The cloud from above with the limits of joint 1",
@@ -59,6 +75,36 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
         astray=summary["verdict"]["code"] == "workspace.void_unexpected",
         wide=100 * summary["proof"]["width"],
         **capability_context(robot, summary, *(read_table(folder / f"{name}.parquet") for name in CAN_DO)),
+    )
+
+
+def _side(robot: Robot, tables: dict[str, Any]) -> Picture | None:
+    """The side view, where the arm has a wrist centre and an exact border."""
+    if not len(tables["border"]):
+        return None
+    text = "The border's arcs are exact (numbered on the left); samples fill them and none lies beyond. "
+    if len(tables["drawing"]):
+        text += "The maker's labels (green) should meet the orange border: extents touch it, corners lie on it."
+    else:
+        text += "No drawing of this arm's envelope is on file to compare with."
+    return Picture(
+        side_view(tables, not np.array_equal(robot.tool, np.eye(4))),
+        "Side views of wrist centre and flange in the arm's plane, with exact borders and the maker's labels",
+        text,
+    )
+
+
+def _rule(enclosed: list[dict[str, Any]]) -> str:
+    """The rule that an unexpected hole points to joints 2 and 3, applied."""
+    rule = "The rule that an unexpected hole points to a wrong limit or direction of joint 2 or 3 was applied: "
+    astray = [void for void in enclosed if not void["holds_shoulder"]]
+    if not astray:
+        return rule + "no enclosed void lies away from the shoulder, so it accuses nothing."
+    named = sum("joint 2" in void["cause"] or "joint 3" in void["cause"] for void in astray)
+    lie = "void lies" if len(astray) == 1 else "voids lie"
+    return (
+        f"{rule}{len(astray)} enclosed {lie} away from the shoulder, and relaxing one limit at a time names joint 2 or "
+        f"3 for {named} of them."
     )
 
 

@@ -8,7 +8,9 @@ from er3a.errors import InputError
 from er3a.robots.robot import Robot
 from er3a.stages.workspace.grid import Grid, make_grid
 from er3a.stages.workspace.parts import identity, write_part
-from er3a.stages.workspace.tally import Tally, block_sizes, tally_blocks
+from er3a.stages.workspace.progress import shown_progress
+from er3a.stages.workspace.random_joints import Draw
+from er3a.stages.workspace.tally import Tally, tally_blocks
 from er3a.study import Study
 
 
@@ -33,8 +35,15 @@ def sample(study: Study, name: str, part: int, parts: int, output: Path) -> None
     write_part(Path(output), identity(study, robot), sampled(study, robot, grid, blocks))
 
 
-def sampled(study: Study, robot: Robot, grid: Grid, blocks: range) -> Tally:
-    """The tally of some blocks of the study."""
+def draw_of(study: Study) -> Draw:
+    """How the study draws its samples."""
     settings = study.workspace
-    sizes = block_sizes(settings.samples, settings.blocks)
-    return tally_blocks(robot, grid, study.seed, blocks, sizes, settings.hull_directions)
+    return Draw(study.seed, settings.samples, settings.blocks, settings.sampling)
+
+
+def sampled(study: Study, robot: Robot, grid: Grid, blocks: range) -> Tally:
+    """The tally of some blocks of the study, with progress on standard error."""
+    draw = draw_of(study)
+    total = int(draw.sizes[blocks.start : blocks.stop].sum())
+    with shown_progress(total, f"{robot.name}: samples") as advance:
+        return tally_blocks(robot, grid, draw, blocks, study.workspace.hull_directions, advance)

@@ -1,0 +1,128 @@
+"""Where a followed path is in trouble, and what a way around it yields."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from er3a.kinematics.singularity import TYPES, determinant_factors
+from er3a.planning.followed import Followed
+from er3a.planning.singular_events import SingularEvent, runs
+from er3a.planning.timing import JointLimits, Timed, fastest, nodes_along, straight
+from er3a.robots.robot import Robot
+
+AT_REST = 1e-6  # rad
+POINTS = 501
+
+
+@dataclass(frozen=True, eq=False)
+class WayAround:
+    """One way around, carried out: ``motion`` is None where it is not possible, and ``reason`` then says why.
+
+    Attributes
+    ----------
+    done : share of the path that is done, 0..1
+    """
+
+    name: str
+    motion: Timed | None
+    done: float = 1.0
+    reason: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Trouble:
+    """A path that comes nearer to a singular set than ``near``, or leaves the arm's reach.
+
+    Attributes
+    ----------
+    followed : the path as it is followed
+    t, q : (N,) s and (N, 6) rad, along the path; q NaN where unreachable
+    near : per type of singularity the distance in rad or m that the path is to keep
+    limits : of the joints
+    fixed_start : whether the joints at the start are given, or only the tool's pose
+    """
+
+    followed: Followed
+    t: np.ndarray
+    q: np.ndarray
+    near: Mapping[str, float]
+    limits: JointLimits
+    fixed_start: bool
+
+    @property
+    def robot(self) -> Robot:
+        """The arm."""
+        return self.followed.robot
+
+    @cached_property
+    def good(self) -> np.ndarray:
+        """(N,) bool, whether the path can be reached and keeps its distance, away from places where a branch ends."""
+        good = clear(self.robot, self.q, self.near)
+        for jump in self.followed.jumps:
+            after = np.searchsorted(self.t, jump.t)
+            good[max(after - 1, 0) : after + 1] = False
+        return good
+
+    @cached_property
+    def regions(self) -> list[tuple[int, int]]:
+        """Stretches that are not good: index ranges (first, behind the last)."""
+        return runs(~self.good)
+
+    @cached_property
+    def first_joints(self) -> np.ndarray:
+        """Joints (6,) at which the arm waits before the path begins; the path's own unless its start is singular."""
+        return self.q[0] - self.followed.start_turn
+
+    def begin(self) -> list[Timed]:
+        """The turn at rest that a singular start may ask for; no part where none is needed."""
+        if not np.abs(self.followed.start_turn).max() > AT_REST:
+            return []
+        return [straight(self.first_joints, self.q[0], self.limits)]
+
+    def along(self, first: int, last: int, programmed: bool = True) -> Timed:
+        """The path from grid point ``first`` to ``last``, from rest to rest.
+
+        As programmed or slower; if not ``programmed``, as fast as the joints can.
+        """
+        kept = np.unique(np.linspace(first, last, min(POINTS, last - first + 1)).round().astype(int))
+        t, q = nodes_along(self.followed.joints, self.t[kept], self.q[kept], self.limits)
+        return fastest(q, self.limits, t if programmed else None)
+
+
+def coarse(t: np.ndarray) -> np.ndarray:
+    """About POINTS of the times (N,), with both ends."""
+    return t[np.unique(np.linspace(0, len(t) - 1, min(POINTS, len(t))).round().astype(int))]
+
+
+def trouble_of(
+    followed: Followed,
+    near: Mapping[str, float],
+    limits: JointLimits,
+    events: list[SingularEvent] | None = None,
+    fixed_start: bool = False,
+) -> Trouble:
+    """What is to be repaired on a path, at its own grid points and at its events."""
+    inner = [event.t for event in events or [] if 0 < event.t < followed.t[-1]]
+    t = np.unique(np.concatenate([followed.t, inner]))
+    q = followed.q
+    if len(t) > len(followed.t):
+        new = ~np.isin(t, followed.t)
+        q = np.empty((len(t), 6))
+        q[~new], q[new] = followed.q, followed.joints(t[new])
+    return Trouble(followed, t, q, near, limits, fixed_start)
+
+
+def clear(robot: Robot, q: np.ndarray, near: Mapping[str, float]) -> np.ndarray:
+    """Whether arms (N, 6), NaN where unreachable, keep their distance from all singular sets; (N,) bool."""
+    return margin(robot, q, near) >= 1.0
+
+
+def margin(robot: Robot, q: np.ndarray, near: Mapping[str, float]) -> np.ndarray:
+    """Least distance from a singular set, in parts of the distance to keep; (N,), -1 where unreachable."""
+    factors = determinant_factors(robot, q)
+    parts = np.stack([np.abs(getattr(factors, kind)) / near[kind] for kind in TYPES])
+    return np.where(np.isnan(parts[0]), -1.0, parts.min(axis=0))

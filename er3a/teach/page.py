@@ -1,0 +1,86 @@
+"""The teach panel's page: a robot's table, the words and the scripts, put into one file that works offline."""
+
+from __future__ import annotations
+
+import base64
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from er3a.code_digest import code_digest
+from er3a.errors import NotWristPartitionedError
+from er3a.kinematics.branch import branch_labels
+from er3a.kinematics.singularity import characteristic_length
+from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
+from er3a.results import input_records
+from er3a.robots.robot import Robot
+from er3a.study import Study
+from er3a.teach.words import WORDS
+from er3a.viewing.page import render
+from er3a.viewing.palette import BODY, INK, JOINT_NAMES, JOINTS, LINK
+
+_HERE = Path(__file__).parent
+MODULES = tuple(sorted(path.stem for path in _HERE.glob("*.js")))
+TABLE = ("a", "alpha", "d", "beta", "direction", "offset", "lower", "upper", "base", "tool")
+NEAR_LIMIT = np.radians(5.0)
+NEAR_SINGULAR = 1e-2  # smallest singular value below which an arm without named singularities is warned of one
+
+
+def write_teach_page(study: Study, name: str, output: Path) -> None:
+    """Write the teach panel of a robot of the study to ``output``."""
+    robot = study.robot(name)
+    settings = study.trajectory
+    near = {
+        "wrist": np.radians(settings.near_wrist_deg),
+        "elbow": np.radians(settings.near_elbow_deg),
+        "shoulder": settings.near_shoulder_mm / 1000,
+    }
+    render(
+        _HERE / "teach.html.j2",
+        output,
+        robot=robot,
+        joint_names=JOINT_NAMES,
+        joint_colours=JOINTS,
+        degrees=float(np.degrees(1.0)),
+        words=WORDS,
+        panel=panel_data(robot, near),
+        modules=json.dumps({"imports": {f"er3a/{module}": _module(module) for module in MODULES}}),
+        provenance={
+            "inputs": input_records(study.inputs(name, "teach")),
+            "config": study.settings(name, "trajectory"),
+            "code": code_digest(__name__),
+        },
+    )
+
+
+def panel_data(robot: Robot, near: dict[str, float]) -> dict[str, Any]:
+    """What the scripts take of a robot, as plain data; SI units.
+
+    Parameters
+    ----------
+    near : per type of singularity the distance (rad; m for shoulder) below which the panel warns
+    """
+    try:
+        wrist_partitioned_arm(robot)
+        labels, reason = list(branch_labels(robot)), None
+    except NotWristPartitionedError as error:
+        labels, reason = [], error.property_missing
+    return {
+        "name": robot.name,
+        "table": {"convention": robot.convention} | {key: getattr(robot, key).tolist() for key in TABLE},
+        "characteristic_length": characteristic_length(robot),
+        "no_closed_form": reason,
+        "branch_labels": labels,
+        "near": {**near, "limit": NEAR_LIMIT, "value": NEAR_SINGULAR},
+        "joint_names": JOINT_NAMES,
+        "colours": {"joints": JOINTS, "link": LINK, "body": BODY, "mark": INK},
+        "words": WORDS,
+    }
+
+
+def _module(name: str) -> str:
+    """A script as an address of its own, so that the scripts of one file can import each other."""
+    source = (_HERE / f"{name}.js").read_bytes()
+    return "data:text/javascript;base64," + base64.b64encode(source).decode("ascii")

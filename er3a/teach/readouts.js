@@ -1,0 +1,69 @@
+/** The tool's pose and the measures of the Jacobian, written into the page. */
+
+import { column, eulerZYZ, quaternion, rollPitchYaw } from "er3a/algebra";
+import { conditioning, determinantFactors } from "er3a/kinematics";
+import { fill, fixed, inDegrees, inMillimetres, significant } from "er3a/text";
+
+const MET = { wrist: 1e-6, elbow: 1e-6, shoulder: 1e-6 }; // rad, rad, m: so near counts as singular
+const SHOWN = { wrist: inDegrees, elbow: inDegrees, shoulder: inMillimetres };
+
+const byId = (id) => document.getElementById(id);
+
+/** Sets a text only where it changed, so that screen readers speak it once. */
+export function write(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
+/** Writes a pose in the representation that is chosen on the page. */
+export function showPose(T) {
+  column(T, 3).forEach((value, i) => write(byId(`position-${"xyz"[i]}`), fixed(1000 * value, 2)));
+  const chosen = document.querySelector("input[name=orientation]:checked").value;
+  for (const part of document.querySelectorAll(".orientation")) part.hidden = part.id !== `orientation-${chosen}`;
+  const values = {
+    rpy: () => rollPitchYaw(T).map((angle) => inDegrees(angle, 3)),
+    zyz: () => eulerZYZ(T).map((angle) => inDegrees(angle, 3)),
+    quaternion: () => quaternion(T).map((value) => fixed(value, 6)),
+    matrix: () => T.flatMap((row, r) => row.map((value, c) => (c < 3 || r === 3 ? fixed(value, 6) : fixed(1000 * value, 2)))),
+  }[chosen]();
+  const cells = byId(`orientation-${chosen}`).querySelectorAll(".value");
+  values.forEach((text, i) => write(cells[i], text));
+}
+
+/** Writes the measures at frames `T`, and the warning that names what is near. */
+export function showMeasures(data, arm, T) {
+  const { words, near } = data;
+  const measures = conditioning(data.table, T, data.characteristic_length);
+  const singular = measures.conditionNumber === Infinity; // what is left of the values then is rounding
+  write(byId("manipulability"), significant(singular ? 0 : measures.manipulability));
+  write(byId("smallest"), significant(singular ? 0 : measures.smallestSingularValue));
+  write(byId("condition"), significant(measures.conditionNumber));
+  if (!arm) {
+    const value = measures.smallestSingularValue;
+    if (value < near.value) warn("near", fill(words.near_unnamed, { value: significant(value) }));
+    else warn("clear", words.clear);
+    return;
+  }
+  const factors = determinantFactors(T, arm.wristInTool);
+  const full = { wrist: Math.PI / 2, elbow: Math.PI / 2, shoulder: arm.reach };
+  const texts = { at: [], near: [] };
+  for (const kind of Object.keys(factors)) {
+    const distance = Math.abs(factors[kind]);
+    const shown = SHOWN[kind](distance);
+    const state = distance < MET[kind] ? "at" : distance < near[kind] ? "near" : "clear";
+    texts[state]?.push(fill(words[state][kind], { distance: shown }));
+    const row = byId(`factor-${kind}`);
+    row.dataset.state = state;
+    write(row.querySelector(".value"), shown);
+    write(row.querySelector(".state"), words.states[state]);
+    row.querySelector(".fill").style.width = `${Math.min(100, (100 * distance) / full[kind])}%`;
+    row.querySelector(".mark").style.left = `${(100 * near[kind]) / full[kind]}%`;
+  }
+  const state = ["at", "near"].find((word) => texts[word].length) ?? "clear";
+  warn(state, [...texts.at, ...texts.near].join(" ") || words.clear);
+}
+
+function warn(state, text) {
+  const warning = byId("warning");
+  warning.dataset.state = state;
+  write(warning, text);
+}

@@ -1,0 +1,85 @@
+/**
+ * The arm's shapes, made from its table as recordings make them: rods along the links, drums on the joints' axes.
+ *
+ * A solid is `{frame, before, points, faces}`: it moves with `frame` (0 the base, k the frame that joint k turns, 7 the
+ * tool) and is painted as if it were nearer by `before` (m), so that a drum hides the rod in it. A face is
+ * `{corners, colour}`, the corners (indices of points) counter-clockwise as seen from outside.
+ */
+
+import { add, beside, column, cross, moved, norm, scaled, subtract, turnedBack, unit } from "er3a/algebra";
+import { JOINTS, linkParts } from "er3a/kinematics";
+
+const TAPER = [1.0, 0.92, 0.8, 0.66, 0.55, 0.45]; // how much thinner the arm is at each joint
+const THICKNESS = 0.046; // radius of the first joint's rods, in parts of the arm's size
+const ROD_SIDES = 14;
+const DRUM_SIDES = 22;
+const SHORT = 1e-6; // m
+
+/** Everything that is drawn of an arm of the given size (m). */
+export function armSolids(table, size, colours) {
+  const parts = linkParts(table);
+  const thickest = THICKNESS * size;
+  const body = { colour: colours.body, sides: ROD_SIDES };
+  const link = { colour: colours.link, sides: ROD_SIDES };
+  const origin = [0, 0, 0];
+  const solids = [
+    rod(0, origin, [0, 0, 0.9 * thickest], 2.3 * thickest, { ...body, sides: DRUM_SIDES }),
+    rod(0, origin, column(parts[0].across, 3), 0.75 * thickest, body),
+  ];
+  drums(table, size).forEach(({ middle, half }, k) => {
+    const radius = thickest * TAPER[k];
+    const along = column(parts[k + 1].along, 3);
+    const corner = moved(parts[k + 1].along, column(parts[k + 1].across, 3));
+    const ends = [[0, 0, -half], [0, 0, half]].map((end) => add(middle, end));
+    const drum = { colour: colours.joints[k], sides: DRUM_SIDES, mark: colours.mark, before: radius };
+    solids.push(rod(k + 1, origin, along, 0.75 * radius, link), rod(k + 1, along, corner, 0.75 * radius, link));
+    solids.push(rod(k + 1, ...ends, radius, drum));
+  });
+  const thin = 0.3 * thickest;
+  solids.push(rod(7, scaled(turnedBack(table.tool, column(table.tool, 3)), -1), origin, thin, body));
+  solids.push(rod(7, [0, 0, -0.25 * thin], [0, 0, 0.25 * thin], 2 * thin, { ...body, sides: DRUM_SIDES }));
+  return solids.filter(Boolean);
+}
+
+/** Middles (m, in the frame that the joint turns) of the joints' drums, and their half length. */
+export function drums(table, size) {
+  const parts = linkParts(table);
+  return JOINTS.map((k) => ({
+    middle: scaled(column(parts[k + 1].along, 3), 0.5),
+    half: 1.3 * THICKNESS * size * TAPER[k],
+  }));
+}
+
+/**
+ * A rod with flat ends, cut into rings about as long as they are thick so that they sort well by distance; null where
+ * it has no length. `mark` colours a stripe along it, which shows its turning.
+ */
+function rod(frame, start, end, radius, { colour, sides, mark = colour, before = 0 }) {
+  const vector = subtract(end, start);
+  const length = norm(vector);
+  if (length < SHORT) return null;
+  const axis = unit(vector);
+  const u = beside(axis);
+  const v = cross(axis, u);
+  const rings = Math.max(1, Math.round(length / (1.5 * radius)));
+  const points = [];
+  for (let ring = 0; ring <= rings; ring++) {
+    const middle = add(start, scaled(vector, ring / rings));
+    for (let i = 0; i < sides; i++) {
+      const angle = (2 * Math.PI * i) / sides;
+      const spoke = add(scaled(u, Math.cos(angle)), scaled(v, Math.sin(angle)));
+      points.push(add(middle, scaled(spoke, radius)));
+    }
+  }
+  const faces = [];
+  for (let ring = 0; ring < rings; ring++) {
+    for (let i = 0; i < sides; i++) {
+      const [a, b] = [ring * sides + i, ring * sides + ((i + 1) % sides)];
+      faces.push({ corners: [a, b, b + sides, a + sides], colour: i < 2 ? mark : colour });
+    }
+  }
+  const ends = Array.from({ length: sides }, (_, i) => i);
+  faces.push({ corners: [...ends].reverse(), colour });
+  faces.push({ corners: ends.map((i) => rings * sides + i), colour });
+  return { frame, before, points, faces };
+}

@@ -1,0 +1,116 @@
+/** The list of all joint solutions of the tool's pose, to click through. */
+
+import { excesses, inverse } from "er3a/inverse";
+import { JOINTS } from "er3a/kinematics";
+import { write } from "er3a/readouts";
+import { fill, fixed, inDegrees, inMillimetres, toDegrees } from "er3a/text";
+
+const SAME_ARM = 1e-6; // rad
+
+const byId = (id) => document.getElementById(id);
+
+function element(tag, className, text = "", parts = []) {
+  const made = document.createElement(tag);
+  made.className = className;
+  made.textContent = text;
+  made.append(...parts);
+  return made;
+}
+
+export class SolutionList {
+  /** `choose(q)` moves the arm; `ghost(q)` shows a pale one, null takes it away. */
+  constructor(data, arm, choose, ghost) {
+    Object.assign(this, { data, arm, choose, ghost });
+    byId("previous").addEventListener("click", () => this.#step(-1));
+    byId("next").addEventListener("click", () => this.#step(1));
+  }
+
+  /** Lists the solutions of pose `T`, which the arm has at joint angles `q`. */
+  list(T, q) {
+    const { table, words } = this.data;
+    const { rows, unsolved, free } = inverse(table, this.arm, T, q);
+    const here = (row) => JOINTS.every((k) => Math.abs(row.q[k] - q[k]) < SAME_ARM);
+    if (!rows.some(here)) rows.push({ slot: null, q: [...q], withinLimits: true });
+    this.rows = rows;
+    this.buttons = [];
+    const items = [];
+    for (const slot of [0, 1, 2, 3, 4, 5, 6, 7, null]) {
+      const turns = rows.filter((row) => row.slot === slot);
+      if (turns.length) items.push(this.#branch(turns));
+      const fault = unsolved.find((branch) => branch.slot === slot);
+      if (fault) items.push(this.#missing(fault));
+    }
+    byId("branches").replaceChildren(...items);
+    const within = rows.filter((row) => row.withinLimits).length;
+    write(byId("count"), fill(words.count, { within, total: rows.length }));
+    write(byId("free"), free.map((kind) => words.free[kind]).join(" "));
+    this.ghost(null);
+    this.mark(q);
+  }
+
+  /** Marks the solution that the arm is in. */
+  mark(q) {
+    this.current = this.rows.findIndex((row) => JOINTS.every((k) => Math.abs(row.q[k] - q[k]) < SAME_ARM));
+    for (const button of this.buttons) button.ariaPressed = String(Number(button.dataset.row) === this.current);
+  }
+
+  #label(row) {
+    return row.slot === null ? this.data.words.current : this.data.branch_labels[row.slot];
+  }
+
+  #branch(turns) {
+    const { words, joint_names: names } = this.data;
+    const [first, ...further] = turns;
+    const joints = element("span", "row-joints", "", first.q.map((angle) => element("span", "", fixed(toDegrees(angle)))));
+    const verdict = element("span", first.withinLimits ? "row-verdict pass" : "row-verdict fail", this.#verdict(first));
+    const button = this.#button(first, [element("b", "", this.#label(first)), joints, verdict]);
+    const item = element("li", "branch", "", [button]);
+    if (further.length) {
+      const chips = further.map((row) => {
+        const turns = JOINTS.map((k) => [names[k], row.q[k] - first.q[k]]).filter(([, turn]) => Math.abs(turn) > 1);
+        const texts = turns.map(([joint, turn]) => fill(words.turn, { joint, turn: signed(turn) }));
+        return this.#button(row, [texts.join(", ")]);
+      });
+      item.append(element("p", "turns", `${words.other_turns} `, chips));
+    }
+    return item;
+  }
+
+  #missing({ slot, fault, gap }) {
+    const { words, branch_labels: labels } = this.data;
+    const amount = fault === "orientation" ? inDegrees(gap) : inMillimetres(gap);
+    const reason = `${words.missing}: ${fill(words.faults[fault], { gap: amount })}`;
+    return element("li", "branch missing", "", [element("b", "", labels[slot]), element("span", "row-verdict", reason)]);
+  }
+
+  #verdict(row) {
+    const { words, table, joint_names: names } = this.data;
+    if (row.withinLimits) return words.within;
+    const reasons = excesses(table, row.q).map(({ joint, angle, excess, above, limit }) =>
+      fill(words[above ? "above" : "below"], {
+        joint: names[joint], angle: inDegrees(angle), excess: inDegrees(excess), limit: inDegrees(limit, 0),
+      }),
+    );
+    return fill(words.leaves, { reasons: reasons.join("; ") });
+  }
+
+  #button(row, parts) {
+    const button = element("button", "solution", "", parts);
+    button.type = "button";
+    button.dataset.row = this.rows.indexOf(row);
+    button.setAttribute("aria-disabled", String(!row.withinLimits));
+    button.addEventListener("click", () => row.withinLimits && this.choose(row.q));
+    for (const event of ["pointerenter", "focus"]) button.addEventListener(event, () => this.ghost(row.q));
+    for (const event of ["pointerleave", "blur"]) button.addEventListener(event, () => this.ghost(null));
+    this.buttons.push(button);
+    return button;
+  }
+
+  #step(by) {
+    const order = this.buttons.map((button) => Number(button.dataset.row)).filter((row) => this.rows[row].withinLimits);
+    const at = order.indexOf(this.current);
+    this.choose(this.rows[order[(at + by + order.length) % order.length]].q);
+  }
+}
+
+const signed = (angle) => `${angle > 0 ? "+" : ""}${inDegrees(angle, 0)}`;

@@ -1,0 +1,251 @@
+"""The teach panel as a person uses it: keys, typing, links, solutions, warnings; every word translatable."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.wait import WebDriverWait
+
+from er3a.kinematics.forward import forward
+from er3a.robots.load import load_robot
+from er3a.study import load_study
+from er3a.teach import page as teach_page
+from er3a.teach.words import WORDS
+from tests.kinematics.arms import make_arm, pose_errors
+
+LARGEST_PAGE = 8_000_000
+SELECT_ALL = Keys.CONTROL + "a" + Keys.NULL
+PAUSE = 5.0  # s to wait for what the page does within 0.3 s on an idle machine
+
+
+class Panel:
+    """A teach panel opened in the browser."""
+
+    def __init__(self, browser, file: Path, name: str = "er3a_c60"):
+        self.browser, self.file = browser, file
+        if not file.exists():
+            teach_page.write_teach_page(load_study("config/small.yaml"), name, file)
+
+    def open(self, fragment: str = "") -> Panel:
+        self.browser.get("about:blank")
+        self.browser.get(self.file.as_uri() + fragment)
+        self.joints()
+        return self
+
+    def one(self, selector: str):
+        return self.browser.find_element(By.CSS_SELECTOR, selector)
+
+    def text(self, selector: str) -> str:
+        return self.one(selector).text
+
+    def joints(self) -> list[float]:
+        """Joint angles in degrees."""
+        ask = "const done = arguments[0]; import('er3a/panel').then((panel) => done(panel.joints()))"
+        return np.degrees(self.browser.execute_async_script(ask)).tolist()
+
+    def move(self, *degrees: float) -> None:
+        ask = "const [q, done] = arguments; import('er3a/panel').then((panel) => done(panel.moveTo(q)))"
+        self.browser.execute_async_script(ask, np.radians(degrees).tolist())
+
+    def until(self, holds: Callable[[], Any]) -> None:
+        WebDriverWait(self.browser, PAUSE, 0.05).until(lambda _: holds())
+
+    def clean(self) -> bool:
+        return [entry for entry in self.browser.get_log("browser") if entry["level"] == "SEVERE"] == []
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("teach")
+
+
+@pytest.fixture
+def panel(browser, folder) -> Panel:
+    return Panel(browser, folder / "er3a_c60.html").open()
+
+
+@pytest.mark.parametrize("name", ["er3a_c60", "er3a_c60_article", "er3_600"])
+def test_opens_clean_in_one_small_file(browser, folder, name):
+    panel = Panel(browser, folder / f"{name}.html", name).open()
+    panel.until(lambda: panel.browser.find_elements(By.CSS_SELECTOR, "#branches .solution"))
+    assert panel.clean()
+    assert panel.file.stat().st_size < LARGEST_PAGE
+    text = panel.file.read_text(encoding="utf-8")
+    assert not re.search(r"(src|href)=.?(https?:)?//", text)
+    assert browser.execute_script("return document.documentElement.scrollWidth <= window.innerWidth")
+    drawn = (
+        "const c = document.getElementById('arm'); const d = c.getContext('2d').getImageData(0, 0, c.width, c.height)"
+    )
+    colours = browser.execute_script(drawn + ".data; return new Set(new Uint32Array(d.buffer)).size")
+    assert colours > 50, "the picture shows a shaded arm"
+
+
+def test_keys_move_a_joint_and_stop_at_its_limits(panel):
+    slider = panel.one("#joint-J2 input[type=range]")
+    slider.send_keys(Keys.ARROW_RIGHT, Keys.ARROW_UP, Keys.ARROW_LEFT, Keys.ARROW_UP)
+    assert panel.joints()[1] == pytest.approx(2)
+    slider.send_keys(Keys.SHIFT + Keys.ARROW_RIGHT)
+    assert panel.joints()[1] == pytest.approx(2.1)
+    slider.send_keys(Keys.PAGE_DOWN)
+    assert panel.joints()[1] == pytest.approx(-7.9)
+    slider.send_keys(Keys.END, Keys.ARROW_RIGHT)
+    assert panel.joints()[1] == pytest.approx(90)
+    assert panel.text("#joint-J2 .room") == WORDS["at_limit"]
+    slider.send_keys(Keys.HOME)
+    assert panel.joints()[1] == pytest.approx(-130)
+    assert slider.get_attribute("aria-valuetext") == "−130.0 degrees"
+
+
+def test_typing_moves_a_joint_and_says_why_not(panel):
+    field = panel.one("#joint-J3 input[type=number]")
+    field.send_keys(SELECT_ALL, "42.5")
+    assert panel.joints()[2] == pytest.approx(42.5)
+    field.send_keys(SELECT_ALL, "106")
+    assert panel.joints()[2] == pytest.approx(10)
+    assert panel.text("#message") == "J3 stays between −75.0° and 105.0°."
+    assert field.get_attribute("aria-invalid") == "true"
+    field.send_keys(Keys.TAB)
+    assert field.get_attribute("value") == "10"
+
+
+def test_a_link_restores_the_joints(panel):
+    angles = [12.5, -30.25, 7, 100, -45.123456, 200]
+    panel.move(*angles)
+    panel.until(lambda: "#q=" in panel.browser.current_url)
+    link = panel.browser.current_url
+    panel.browser.get("about:blank")
+    panel.browser.get(link)
+    assert panel.joints() == pytest.approx(angles, abs=1e-8)
+    panel.browser.execute_script("location.hash = '#q=1,2,3,4,5,6'")
+    panel.until(lambda: panel.joints() == pytest.approx([1, 2, 3, 4, 5, 6]))
+    panel.move(*angles)
+    panel.one("#link").click()
+    panel.until(lambda: panel.text("#message"))
+    assert panel.text("#message") == WORDS["link_copied"] or link in panel.text("#message")
+
+
+def test_the_view_turns_by_pointer_keys_and_buttons(panel):
+    def picture() -> str:
+        return panel.browser.execute_async_script(
+            "const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(() =>"
+            "done(document.getElementById('arm').toDataURL())))"
+        )
+
+    canvas = panel.one("#arm")
+    pictures = [picture()]
+    ActionChains(panel.browser).drag_and_drop_by_offset(canvas, 60, 20).perform()
+    pictures.append(picture())
+    canvas.send_keys(Keys.ARROW_LEFT)
+    pictures.append(picture())
+    canvas.send_keys("+")
+    pictures.append(picture())
+    panel.one("[data-view=top]").click()
+    pictures.append(picture())
+    assert len(set(pictures)) == len(pictures)
+    assert panel.joints() == [0] * 6
+
+
+@pytest.mark.parametrize(
+    ("fragment", "told"),
+    [
+        ("#q=0,0,106,0,0,0", "J3 stays between −75.0° and 105.0°."),
+        ("#q=0,0,0,0,0", "it names 5 numbers where six are needed."),
+        ("#q=0,0,x,0,0,0", "J3 needs a number, in degrees."),
+        ("#q=0,0,,0,0,0", "J3 needs a number, in degrees."),
+    ],
+)
+def test_a_link_that_can_t_be_taken_is_refused_with_its_reason(panel, fragment, told):
+    panel.open(fragment)
+    assert told in panel.text("#message")
+    assert panel.joints() == [0] * 6
+
+
+def test_the_joints_are_copied(panel):
+    panel.move(1.5, 2, 3, 4, 5, -6)
+    panel.one("#copy").click()
+    panel.until(lambda: panel.text("#message"))
+    assert "[1.5, 2, 3, 4, 5, -6]" in panel.text("#message")
+
+
+def test_every_solution_keeps_the_tool_in_place(panel):
+    robot = load_robot("er3a_c60")
+    start = [30, -20, 15, 40, 60, 10]
+    panel.move(*start)
+    panel.until(lambda: panel.text("#count") == "4 of 6 within the limits")
+    T = forward(robot, np.radians(start))
+    visited = []
+    for _ in range(4):
+        panel.one("#next").click()
+        visited.append(panel.joints())
+        for errors in pose_errors(forward(robot, np.radians(visited[-1])), T):
+            assert errors.max() < 1e-9
+        pressed = panel.browser.find_elements(By.CSS_SELECTOR, '[aria-pressed="true"]')
+        assert len(pressed) == 1
+    assert len({tuple(np.round(q, 6)) for q in visited}) == 4
+    assert visited[-1] == pytest.approx(start)
+    outside = panel.one('.solution[aria-disabled="true"]')
+    assert re.search(r"J3 at 138\.\d° is \d+\.\d° above its limit of 105°", outside.text)
+    panel.browser.execute_script("arguments[0].click()", outside)
+    assert panel.joints() == pytest.approx(start)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "state", "told"),
+    [
+        ((10, 20, 30, 40, 3, 0), "near", "Near the wrist singularity: axes 4 and 6 are 3.0° short of one line."),
+        ((10, 20, 30, 40, 0, 0), "at", "At the wrist singularity"),
+        ((0, 0, 76.824, 0, 50, 0), "near", "Near the elbow singularity"),
+        ((0, 0, 0, 0, 50, 0), "clear", "No singularity is near."),
+        ((0, 60.5, -30, 0, 50, 0), "clear", "No singularity is near."),
+    ],
+)
+def test_the_warning_names_what_is_near(panel, degrees, state, told):
+    panel.move(*degrees)
+    panel.until(lambda: panel.one("#warning").get_attribute("data-state") == state)
+    assert panel.text("#warning").startswith(told)
+
+
+def test_an_arm_outside_the_class_says_why_it_has_no_solutions(browser, folder, monkeypatch):
+    skew = make_arm(alpha=np.radians([-90, 5, -90, 90, -90, 0]))
+    monkeypatch.setattr("er3a.study.Study.robot", lambda study, name: skew)
+    panel = Panel(browser, folder / "skew.html").open("#q=10,20,30,40,50,60")
+    assert "axes 2 and 3 are not parallel" in panel.text(".solutions")
+    assert panel.text("#warning") == WORDS["clear"]
+    assert panel.joints() == pytest.approx([10, 20, 30, 40, 50, 60])
+    assert panel.clean()
+
+
+def marked(words: Any) -> Any:
+    """The words between brackets, as a stand-in for another language."""
+    if isinstance(words, dict):
+        return {key: marked(value) for key, value in words.items()}
+    return [marked(value) for value in words] if isinstance(words, list) else f"⟦{words}⟧"
+
+
+def test_every_word_of_the_panel_is_in_the_dictionary(browser, folder, monkeypatch):
+    monkeypatch.setattr(teach_page, "WORDS", marked(WORDS))
+    panel = Panel(browser, folder / "marked.html").open()
+    labels = teach_page.branch_labels(load_robot("er3a_c60"))
+    for degrees in ([0] * 6, [30, -20, 15, 40, 60, 10], [167, 90, 105, 180, 2, 360]):
+        panel.move(*degrees)
+        time.sleep(0.3)
+        texts = panel.browser.execute_script(
+            """const walker = document.createTreeWalker(document.querySelector("main"), NodeFilter.SHOW_TEXT);
+            const texts = [...document.querySelectorAll("main [aria-label]")].map((e) => e.ariaLabel);
+            while (walker.nextNode()) {
+              if (walker.currentNode.parentNode.localName !== "script") texts.push(walker.currentNode.data.trim());
+            }
+            return texts;"""
+        )
+        assert len(texts) > 100
+        words = [text for text in texts if re.search("[A-Za-z]{3}", text) and not re.match("(<p>)?⟦", text)]
+        assert set(words) <= set(labels)

@@ -1,0 +1,176 @@
+"""The workspace's sampling loop against forward kinematics, published numbers and other implementations."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import stats
+from scipy.stats import qmc
+
+from er3a.errors import InputError, NotWristPartitionedError
+from er3a.kinematics.forward import forward
+from er3a.kinematics.transforms import transform
+from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
+from er3a.robots.load import load_robot
+from er3a.stages.workspace import grid as grid_module
+from er3a.stages.workspace.extremes import fibonacci_sphere
+from er3a.stages.workspace.grid import make_grid, tool_bound
+from er3a.stages.workspace.point_chain import at_wrist_centre, point_chain
+from er3a.stages.workspace.progress import shown_progress
+from er3a.stages.workspace.random_joints import Draw, philox4x32
+from er3a.stages.workspace.sobol import direction_numbers
+from er3a.stages.workspace.tally import tally_blocks
+from tests.stages.workspace_arms import SEED, extreme_points, tally_of
+
+# --- random numbers ---
+
+
+@pytest.mark.parametrize(
+    ("counter", "key", "expected"),
+    [
+        ([0] * 4, [0] * 2, [0x6627E8D5, 0xE169C58D, 0xBC57AC4C, 0x9B00DBD8]),
+        ([0xFFFFFFFF] * 4, [0xFFFFFFFF] * 2, [0x408F276D, 0x41C83B0E, 0xA20BC7C6, 0x6D5451FD]),
+        (
+            [0x243F6A88, 0x85A308D3, 0x13198A2E, 0x03707344],
+            [0xA4093822, 0x299F31D0],
+            [0xD16CFE09, 0x94FDCCEB, 0x5001E420, 0x24126EA1],
+        ),
+    ],
+)
+def test_philox_gives_the_published_vectors(counter, key, expected):
+    """Known answers of Random123 (kat_vectors, philox4x32 with 10 rounds)."""
+    assert [int(word) for word in philox4x32(*map(np.uint64, counter + key))] == expected
+
+
+def test_joints_are_uniform_independent_and_drawn_again_alone(robot):
+    n, draw = 20_000, Draw(SEED, 200_000, 10)
+    q = draw.joints(robot, np.full(n, 3), np.arange(n))
+    unit = (q - robot.lower) / (robot.upper - robot.lower)
+    assert all(stats.kstest(unit[:, k], "uniform").pvalue > 1e-4 for k in range(6))
+    assert np.abs(np.corrcoef(unit.T) - np.eye(6)).max() < 0.03
+    assert np.array_equal(draw.joints(robot, [3], [777]), q[777:778])
+    for other in (Draw(SEED + 2**40, 200_000, 10).joints(robot, [3], [777]), draw.joints(robot, [4], [777])):
+        assert not np.any(other == q[777])
+
+
+def test_sobol_points_are_those_of_scipy(robot):
+    """Unshifted, and with a seed shifted by one exclusive or per dimension."""
+    ours = direction_numbers()[:, :30] >> np.uint64(10)
+    theirs = qmc.Sobol(6, scramble=False, bits=30)
+    number, point = np.arange(1, 65), np.zeros((64, 6), dtype=np.uint64)
+    gray = number ^ (number >> 1)
+    for bit in range(8):
+        point[(gray >> bit) & 1 == 1] ^= ours[:, bit]
+    assert np.array_equal(point / 2**30, theirs.random(65)[1:])
+    draw = Draw(SEED, 1024, 8, "sobol")
+    block, sample = np.repeat(np.arange(8), 128), np.tile(np.arange(128), 8)
+    unit = (draw.joints(robot, block, sample) - robot.lower) / (robot.upper - robot.lower)
+    for k in range(6):
+        assert np.array_equal(np.sort((unit[:, k] * 1024).astype(int)), np.arange(1024))
+    assert not np.array_equal(unit, (Draw(1, 1024, 8, "sobol").joints(robot, block, sample) - robot.lower))
+
+
+# --- sampling loop ---
+
+
+def odd_robots():
+    plain = load_robot("er3_600")
+    lower, upper = plain.lower.copy(), plain.upper.copy()
+    lower[2] = upper[2] = 0.3
+    tool, base = transform([0.1, -0.05, 0.4], [0.3, 0.4, 0.5]), transform([1, 2, -0.5], [0.5, -1.0, 2.0])
+    return [
+        plain.replace(tool=tool, base=base),
+        plain.replace(lower=lower, upper=upper, tool=tool),
+        plain.replace(convention="modified", base=base),
+        plain.replace(lower=plain.lower * 3, upper=plain.upper * 3),
+    ]
+
+
+@pytest.mark.parametrize("sampling", ["uniform", "sobol"])
+@pytest.mark.parametrize("robot", odd_robots(), ids=["base and tool", "locked joint", "modified", "many turns"])
+def test_the_loop_counts_what_forward_gives(robot, sampling):
+    """The loop works in single precision, so a sample next to a border may fall to the other side of it."""
+    samples, blocks = 9_001, 3
+    grid, draw, tally = tally_of(robot, samples, blocks, 20, sampling=sampling)
+    block = np.repeat(np.arange(blocks), draw.sizes)
+    number = np.concatenate([np.arange(size) for size in draw.sizes])
+    points = forward(robot, draw.joints(robot, block, number))[:, :3, 3]
+    edges = [grid.origin[i] + np.arange(grid.shape[i] + 1) * grid.cell for i in range(3)]
+    assert np.abs(np.histogramdd(points, edges)[0] - tally.counts).sum() <= 4
+    assert tally.counts.sum() == tally.side.sum() == samples
+    assert ((np.histogramdd(points[block == 0], edges)[0] > 0) != (tally.first_block == 0)).sum() <= 4
+
+    along = (points - grid.axis_point) @ grid.axis
+    rho = np.linalg.norm(points - grid.axis_point - along[:, None] * grid.axis, axis=1)
+    section_edges = [
+        grid.section_origin[i] + np.arange(grid.section_shape[i] + 1) * grid.section_cell for i in range(2)
+    ]
+    assert np.abs(np.histogram2d(rho, along, section_edges)[0] - tally.section).sum() <= 8
+
+    reached = (points @ fibonacci_sphere(200).T).max(axis=0)
+    found = np.einsum("di,di->d", extreme_points(robot, draw, tally.extremes), fibonacci_sphere(200))
+    assert np.abs(found - reached).max() < 1e-5
+
+
+def test_the_wrist_centre_can_be_sampled(robot):
+    bare = at_wrist_centre(robot)
+    assert point_chain(bare).last == 2
+    q = Draw(SEED, 500, 1).joints(robot, np.zeros(500), np.arange(500))
+    T, arm = forward(robot, q), wrist_partitioned_arm(robot)
+    wrist = T[:, :3, 3] + T[:, :3, :3] @ arm.wrist_in_tool
+    assert np.abs(forward(bare, q)[:, :3, 3] - wrist).max() < 1e-12
+    skew = robot.replace(a=robot.a + np.array([0, 0, 0, 0, 0.04, 0]))
+    with pytest.raises(NotWristPartitionedError, match="miss a common point"):
+        at_wrist_centre(skew)
+
+
+def test_progress_is_shown_as_lines_in_a_log(robot, capsys, monkeypatch):
+    monkeypatch.setattr("er3a.stages.workspace.progress.EVERY_S", 0.0)
+    draw = Draw(SEED, 30_000, 3)
+    with shown_progress(30_000, "robot: samples") as advance:
+        tally_blocks(robot, make_grid(robot, 8), draw, range(3), 0, advance)
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 3
+    assert "robot: samples: 20,000 of 30,000 (67%)" in lines[1]
+
+
+lengths = st.lists(st.floats(-1, 1), min_size=6, max_size=6)
+angles = st.lists(st.floats(-3.2, 3.2), min_size=6, max_size=6)
+
+
+@settings(max_examples=40, deadline=None)
+@given(a=lengths, d=lengths, alpha=angles, q=angles, tool=st.tuples(lengths, angles), modified=st.booleans())
+def test_no_tool_point_leaves_the_grid(a, d, alpha, q, tool, modified):
+    robot = load_robot("er3_600").replace(
+        convention="modified" if modified else "standard",
+        a=a,
+        d=np.array(d) + 0.01,
+        alpha=alpha,
+        tool=transform(tool[0][:3], tool[1][:3]),
+        base=transform(tool[0][3:], tool[1][3:]),
+    )
+    grid, point = make_grid(robot, 16), forward(robot, np.array(q))[:3, 3]
+    index = (point - grid.origin) / grid.cell
+    assert np.all(index >= 0)
+    assert np.all(index < grid.shape)
+    assert max(grid.shape) == 16
+    from_axis = np.linalg.norm(np.cross(point - grid.axis_point, grid.axis))
+    assert from_axis <= tool_bound(robot).reach * (1 + 1e-9)
+
+
+def test_the_bound_is_tight_where_the_arm_can_stretch():
+    assert tool_bound(load_robot("er3_600")).reach == pytest.approx(0.5928 + 0.0785, abs=5e-5)
+    assert tool_bound(load_robot("er3a_c60_article")).reach == pytest.approx(0.65 + 0.65161 + 0.1256, abs=1e-12)
+
+
+def test_a_grid_too_fine_says_how_fine_is_possible(monkeypatch):
+    robot = load_robot("er3_600")  # its grid is a cube
+    monkeypatch.setattr(grid_module, "memory_budget", lambda: 200**3 * grid_module.BYTES_PER_CELL)
+    with pytest.raises(
+        InputError, match=r"workspace.cells_across: 1000 cells across need .* GiB.*Write 200 or less"
+    ) as error:
+        make_grid(robot, 1000)
+    possible = int(str(error.value).split("Write ")[1].split()[0])
+    assert max(make_grid(robot, possible).shape) == possible
