@@ -115,7 +115,8 @@ def seeds() -> list[tuple[str, bytes]]:
     """Sound files, as path (relative) and content: all committed inputs, and ones that use every optional part."""
     paths = [*ROOT.glob("data/**/*.yaml"), *ROOT.glob("config/*.yaml"), *ROOT.glob("data/**/*.csv")]
     found = [(path.relative_to(ROOT).as_posix(), path.read_bytes()) for path in sorted(paths)]
-    robot = (ROOT / "data/robots/er3_600.yaml").read_text(encoding="utf-8").replace("name: er3_600", "name: full")
+    robot = (ROOT / "data/robots/er3a_c60_article.yaml").read_text(encoding="utf-8")
+    robot = robot.replace("name: er3a_c60_article", "name: full")
     more = {"full.yaml": robot + ALL_OF_A_ROBOT, "scene.yaml": SCENE, "targets.yaml": TARGETS}
     more |= {"targets/table.csv": TARGET_TABLE, "measured.csv": MEASUREMENTS}
     more |= {"paths/tool.csv": PATH_TABLE, "paths/joints.csv": MOTION_TABLE}

@@ -55,6 +55,7 @@ FOUND = [
     ("targets/table.csv", TARGET_TABLE, "300.5", "\u0661\u0662", "is not a number"),  # was 12
     ("targets/table.csv", TARGET_TABLE, "first,0", "first,1e-400", "too small"),  # was 0
     ("paths/tool.csv", PATH_TABLE, "x_mm,", "x_mm\rx,", "not valid CSV"),  # was a traceback
+    ("measured.csv", MEASUREMENTS, "512,0.2", '512,"0.2', "not valid CSV"),  # a quote that is never closed
     ("measured.csv", MEASUREMENTS, "210.5", "1e300", "too large"),
     ("measured.csv", MEASUREMENTS, "210.5", "210\x00", r"210\x00"),  # a control character on the terminal
     ("limits.csv", LIMITS, "source", '"sou\nrce"', r"sou\nrce"),  # a message of two lines

@@ -78,7 +78,7 @@ def read_header(path: str | Path) -> list[str]:
 
 def _lines(path: Path) -> list[tuple[int, list[str]]]:
     """Lines of a CSV file that aren't blank, with their numbers."""
-    reader = csv.reader(io.StringIO(read_text(path)))
+    reader = csv.reader(io.StringIO(read_text(path)), strict=True)
     try:
         return [(reader.line_num, line) for line in reader if any(field.strip() for field in line)]
     except csv.Error as error:

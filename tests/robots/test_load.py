@@ -154,7 +154,8 @@ def test_the_three_files_hold_the_gathered_numbers(robot):
 
 def test_every_group_has_a_source_and_a_grade(robot):
     speeds = {"speeds"} if np.isfinite(robot.speed).all() else set()
-    assert set(robot.sources) == {"dh", "zero", "limits"} | speeds
+    envelopes = {"envelopes"} if robot.envelopes else set()
+    assert set(robot.sources) == {"dh", "zero", "limits"} | speeds | envelopes
     for source in robot.sources.values():
         assert source.grade in GRADES
         assert len(source.source) > 10
