@@ -36,6 +36,8 @@ class Copy:
     def run(self, code: str) -> str:
         environment = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
         environment |= {"PYTHONPATH": str(self.folder), "XDG_CACHE_HOME": str(self.folder / "cache")}
+        # Python takes a module for unchanged if size and second of change are the same, which they are in a test.
+        environment["PYTHONDONTWRITEBYTECODE"] = "1"
         done = subprocess.run(
             [sys.executable, "-c", code], cwd=self.folder, env=environment, capture_output=True, text=True, check=False
         )
