@@ -135,7 +135,11 @@ def checked_reference(q_ref: np.ndarray | None) -> np.ndarray:
 def _free_joints_near(
     robot: Robot, T: np.ndarray, q: np.ndarray, q_ref: np.ndarray, continua: tuple[Family, ...]
 ) -> np.ndarray:
-    """The slots (8, 6) with free joints where their nearest family has them."""
+    """The slots (8, 6) with free joints where their nearest family has them, unless they are nearer as they are.
+
+    A family solves the pose to 1e-9, so next to a second singularity its nearest member can lie 1e-8 rad from arms
+    that solve it to rounding.
+    """
     factors = determinant_factors(robot, q)
     exact = {"wrist": np.abs(factors.wrist) < FREE, "shoulder": np.abs(factors.shoulder) < FREE}
     exact["elbow"] = np.ones(len(q), dtype=bool)
@@ -145,7 +149,9 @@ def _free_joints_near(
             if exact[family.kind][slot]:
                 reference[slot], moved[slot] = family.q0, True
     again = solve_slots(robot, np.broadcast_to(T, (len(q), 4, 4)), reference, apart=True, twins=True)[0]
-    return np.where(moved[:, None], again[np.arange(len(q)), np.arange(len(q))], q)
+    again = again[np.arange(len(q)), np.arange(len(q))]
+    away, away_again = (np.abs(principal(rows - q_ref)).max(axis=1) for rows in (q, again))
+    return np.where((moved & (away_again < away))[:, None], again, q)
 
 
 def _rows_of_branch(robot: Robot, q: np.ndarray, q_ref: np.ndarray) -> np.ndarray:
