@@ -145,7 +145,7 @@ def judge(path: Path) -> Outcome:
         fault = unclear(str(error), path)
     except TimeoutError:
         fault = f"hang: more than {MOST_SECONDS:g} s"
-    except Exception:
+    except Exception:  # whatever else comes out is what the campaign looks for
         fault = "traceback: " + " / ".join(traceback.format_exc().strip().splitlines()[-3:])
     finally:
         signal.setitimer(signal.ITIMER_VIRTUAL, 0)
@@ -155,7 +155,7 @@ def judge(path: Path) -> Outcome:
         try:
             differences = differing_table(path) if path.suffix == ".csv" else differing_file(path)
             fault = f"read otherwise: {differences[0]}" if differences else None
-        except Exception:
+        except Exception:  # an accepted file that the independent reader can't read is a finding too
             fault = "read otherwise: " + " / ".join(traceback.format_exc().strip().splitlines()[-3:])
     return Outcome(accepted, seconds, fault)
 

@@ -13,11 +13,11 @@ STUDY = "config/small.yaml"
 PARTS = ("Snakefile", "workflow", "er3a", "config", "data", "profiles")
 
 
-def fresh(folder: Path) -> Path:
+def fresh(folder: Path, project: Path = ROOT) -> Path:
     """A copy of the project without results."""
     folder.mkdir(parents=True)
     for part in PARTS:
-        source = ROOT / part
+        source = project / part
         if source.is_dir():
             shutil.copytree(source, folder / part, ignore=shutil.ignore_patterns("__pycache__"))
         else:

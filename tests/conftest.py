@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.small_study import fresh
 from er3a.robots.load import load_robot
 from er3a.robots.robot import Robot
 from er3a.viewing.viewer import viewer_command, without_statistics
@@ -59,7 +60,6 @@ def random() -> np.random.Generator:
 
 ROOT = Path(__file__).resolve().parents[1]
 ALL_THERE = "all results, recordings and reports are there"  # the message of rule all, which does nothing
-PROJECT_PARTS = ("Snakefile", "workflow", "er3a", "config", "data", "profiles")
 
 
 @dataclass(frozen=True)
@@ -97,14 +97,7 @@ class StudyRun:
 
 def copy_of_project(source_folder: Path, folder: Path) -> StudyRun:
     """Copy what a run needs, without results."""
-    folder.mkdir(parents=True)
-    for part in PROJECT_PARTS:
-        source = source_folder / part
-        if source.is_dir():
-            shutil.copytree(source, folder / part, ignore=shutil.ignore_patterns("__pycache__"))
-        else:
-            shutil.copy2(source, folder / part)
-    return StudyRun(folder)
+    return StudyRun(fresh(folder, source_folder))
 
 
 @pytest.fixture(scope="session")

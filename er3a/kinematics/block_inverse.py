@@ -128,7 +128,8 @@ def count_turns(q, lower, upper, turns):
 
 
 @kernel
-def _in_frame_1(rows, x, y, z):
+def in_frame_1(rows, x, y, z):
+    """A vector turned by a rotation given as three rows."""
     a, b, c = rows
     return (
         a[0] * x + a[1] * y + a[2] * z,
@@ -145,7 +146,7 @@ def _shoulder(arm, w, near, far):
         t10, t11, t12, t13 = w[4 * BLOCK + i], w[5 * BLOCK + i], w[6 * BLOCK + i], w[7 * BLOCK + i]
         t20, t21, t22, t23 = w[8 * BLOCK + i], w[9 * BLOCK + i], w[10 * BLOCK + i], w[11 * BLOCK + i]
         a, b, c = arm.wrist_in_tool
-        vx, vy, vz = _in_frame_1(
+        vx, vy, vz = in_frame_1(
             arm.to_frame_1,
             t00 * a + t01 * b + t02 * c + (t03 - arm.origin[0]),
             t10 * a + t11 * b + t12 * c + (t13 - arm.origin[1]),
@@ -153,10 +154,10 @@ def _shoulder(arm, w, near, far):
         )
         a, b, c = arm.axis_6_in_tool
         x, y, z = t00 * a + t01 * b + t02 * c, t10 * a + t11 * b + t12 * c, t20 * a + t21 * b + t22 * c
-        w[_Z6 * BLOCK + i], w[(_Z6 + 1) * BLOCK + i], w[(_Z6 + 2) * BLOCK + i] = _in_frame_1(arm.to_frame_1, x, y, z)
+        w[_Z6 * BLOCK + i], w[(_Z6 + 1) * BLOCK + i], w[(_Z6 + 2) * BLOCK + i] = in_frame_1(arm.to_frame_1, x, y, z)
         a, b, c = arm.beside_6_in_tool
         x, y, z = t00 * a + t01 * b + t02 * c, t10 * a + t11 * b + t12 * c, t20 * a + t21 * b + t22 * c
-        w[_X6 * BLOCK + i], w[(_X6 + 1) * BLOCK + i], w[(_X6 + 2) * BLOCK + i] = _in_frame_1(arm.to_frame_1, x, y, z)
+        w[_X6 * BLOCK + i], w[(_X6 + 1) * BLOCK + i], w[(_X6 + 2) * BLOCK + i] = in_frame_1(arm.to_frame_1, x, y, z)
 
         k = (arm.sideways - arm.cos_12 * vz) / arm.sin_12
         square = vx * vx + vy * vy

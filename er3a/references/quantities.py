@@ -10,6 +10,7 @@ and still defined on a table with a fault.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
 
@@ -66,7 +67,7 @@ class AxisLines:
 
 
 @dataclass(frozen=True)
-class Quantity:
+class Quantity(ABC):
     """One number about an arm."""
 
     unit = "mm"
@@ -76,9 +77,9 @@ class Quantity:
         """The pose (deg) at which it looks at the arm."""
         return ZERO_POSE
 
+    @abstractmethod
     def value(self, state: ModelState) -> np.ndarray:
         """The model's value, shape (...,), in this quantity's unit."""
-        raise NotImplementedError
 
     @property
     def vector(self) -> Hashable:

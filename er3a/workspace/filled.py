@@ -133,21 +133,26 @@ def _tilted(k, rho, fixed, z, W_z, f_z):
 
 
 @kernel
+def _neighbour(arm, stance, move, step_2, step_3):
+    """The stance one step of joints 2 and 3 away, within their limits, in one of eight ways."""
+    da = (1.0, -1.0, 0.0, 0.0, 1.0, 1.0, -1.0, -1.0)[move] * step_2
+    dt = (0.0, 0.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0)[move] * step_3
+    a = min(max(stance[7] + da, arm.theta_2[0]), arm.theta_2[1])
+    t = min(max(stance[8] + dt, arm.tau[0]), arm.tau[1])
+    return placed(arm, a, t)
+
+
+@kernel
 def climb(arm, stance, side, rho, z, step_2, step_3):
     """Move joints 2 and 3 within their limits to where (rho, z) lies deepest; returns the stance."""
     best, _ = slack(arm, stance, side, rho, z)
-    a, t = stance[7], stance[8]
     for _ in range(REFINEMENTS):
         improved = False
         for move in range(8):
-            da = (1.0, -1.0, 0.0, 0.0, 1.0, 1.0, -1.0, -1.0)[move] * step_2
-            dt = (0.0, 0.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0)[move] * step_3
-            new_a = min(max(a + da, arm.theta_2[0]), arm.theta_2[1])
-            new_t = min(max(t + dt, arm.tau[0]), arm.tau[1])
-            tried = placed(arm, new_a, new_t)
+            tried = _neighbour(arm, stance, move, step_2, step_3)
             value, _ = slack(arm, tried, side, rho, z)
             if value > best:
-                best, stance, a, t, improved = value, tried, new_a, new_t, True
+                best, stance, improved = value, tried, True
                 break
         if not improved:
             step_2, step_3 = 0.5 * step_2, 0.5 * step_3
@@ -164,19 +169,14 @@ def turn_aside(arm, stance, side, cell, step_2, step_3, sense):
     """
     filled, low, high = reached_angles(arm, stance, side, cell[0], cell[1], cell[2], cell[3])
     best = low if sense > 0 else -high
-    a, t = stance[7], stance[8]
     for _ in range(REFINEMENTS):
         improved = False
         for move in range(8):
-            da = (1.0, -1.0, 0.0, 0.0, 1.0, 1.0, -1.0, -1.0)[move] * step_2
-            dt = (0.0, 0.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0)[move] * step_3
-            new_a = min(max(a + da, arm.theta_2[0]), arm.theta_2[1])
-            new_t = min(max(t + dt, arm.tau[0]), arm.tau[1])
-            tried = placed(arm, new_a, new_t)
+            tried = _neighbour(arm, stance, move, step_2, step_3)
             filled, low, high = reached_angles(arm, tried, side, cell[0], cell[1], cell[2], cell[3])
             value = low if sense > 0 else -high
             if filled and value > best:
-                best, stance, a, t, improved = value, tried, new_a, new_t, True
+                best, stance, improved = value, tried, True
                 break
         if not improved:
             step_2, step_3 = 0.5 * step_2, 0.5 * step_3

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from er3a.kinematics.block_inverse import in_frame_1
 from er3a.kinematics.jit import kernel
 from er3a.robots.robot import Robot
 
@@ -59,17 +60,7 @@ def _to_frame_1(arm, T, v):
     x = T[0, 0] * v[0] + T[0, 1] * v[1] + T[0, 2] * v[2]
     y = T[1, 0] * v[0] + T[1, 1] * v[1] + T[1, 2] * v[2]
     z = T[2, 0] * v[0] + T[2, 1] * v[1] + T[2, 2] * v[2]
-    return _rows(arm.to_frame_1, x, y, z)
-
-
-@kernel
-def _rows(rows, x, y, z):
-    a, b, c = rows
-    return (
-        a[0] * x + a[1] * y + a[2] * z,
-        b[0] * x + b[1] * y + b[2] * z,
-        c[0] * x + c[1] * y + c[2] * z,
-    )
+    return in_frame_1(arm.to_frame_1, x, y, z)
 
 
 @kernel
@@ -119,7 +110,7 @@ def branches(arm, ranges, T, rho, delta, lever, state, theta_1):
     theta_1 : (8, 2), rad, set to the range of joint 1
     """
     vx, vy, vz = _to_frame_1(arm, T, arm.wrist_in_tool)
-    px, py, pz = _rows(arm.to_frame_1, T[0, 3] - arm.origin[0], T[1, 3] - arm.origin[1], T[2, 3] - arm.origin[2])
+    px, py, pz = in_frame_1(arm.to_frame_1, T[0, 3] - arm.origin[0], T[1, 3] - arm.origin[1], T[2, 3] - arm.origin[2])
     vx, vy, vz = vx + px, vy + py, vz + pz
     move = rho + 2.0 * lever * np.sin(0.5 * min(delta, np.pi)) + PAD
     state[:], theta_1[:, 0], theta_1[:, 1] = NEVER, 0.0, 0.0

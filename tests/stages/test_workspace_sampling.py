@@ -15,13 +15,13 @@ from er3a.kinematics.transforms import transform
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
 from er3a.robots.load import load_robot
 from er3a.stages.workspace import grid as grid_module
-from er3a.stages.workspace.extremes import fibonacci_sphere
 from er3a.stages.workspace.grid import make_grid, tool_bound
 from er3a.stages.workspace.point_chain import at_wrist_centre, point_chain
 from er3a.stages.workspace.progress import shown_progress
 from er3a.stages.workspace.random_joints import Draw, philox4x32
 from er3a.stages.workspace.sobol import direction_numbers
 from er3a.stages.workspace.tally import tally_blocks
+from er3a.workspace.sphere import fibonacci_sphere
 from tests.stages.workspace_arms import SEED, extreme_points, tally_of
 
 # --- random numbers ---

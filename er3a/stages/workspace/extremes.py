@@ -53,21 +53,6 @@ class Extremes:
         return self.support, self.block, self.sample
 
 
-def fibonacci_sphere(count: int) -> np.ndarray:
-    """Nearly even unit vectors (count, 3) [1]_.
-
-    References
-    ----------
-    .. [1] A. Gonzalez, "Measurement of areas on a sphere using Fibonacci and latitude-longitude lattices",
-       Mathematical Geosciences 42, 2010.
-    """
-    n = np.arange(count)
-    z = 1 - (2 * n + 1) / count
-    azimuth = 2 * np.pi * n * (2 / (1 + np.sqrt(5)))
-    flat = np.sqrt(1 - z * z)
-    return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), z], axis=1)
-
-
 def cube_map() -> np.ndarray:
     """Centres (unit vectors) and angular radii (rad) of the patches that :func:`_patch` numbers, as rows (4, P)."""
     edge = np.linspace(-1, 1, _PATCHES + 1)

@@ -45,7 +45,7 @@ def sections(robot: Robot, summary: dict[str, Any], tables: dict[str, pd.DataFra
         axes.set_aspect("equal", adjustable="box")
         axes.grid(False)
         axes.set_xlim(0, None)
-    _draw_labels(right, drawing)
+    draw_labels(right, drawing)
     left.set_title("Samples, all azimuths folded in")
     right.set_title("Proof")
     handles = [Line2D([], [], color=INK, marker="o", markersize=4, linewidth=2.4, label="arm, all joints 0")]
@@ -91,17 +91,16 @@ def _draw_border(axes: Axes, border: pd.DataFrame) -> None:
         axes.plot(rows["rho_m"] * 1000, rows["z_m"] * 1000, color=BORDERS[point], linewidth=1.3)
 
 
-def _draw_labels(axes: Axes, drawing: pd.DataFrame) -> None:
-    """Extents as dotted lines, corners as dots."""
-    for row in drawing.itertuples():
-        if np.isnan(row.z_m):
-            axes.axvline(row.rho_m * 1000, color=DRAWN, linestyle=":", linewidth=1.2)
-        elif np.isnan(row.rho_m):
-            axes.axhline(row.z_m * 1000, color=DRAWN, linestyle=":", linewidth=1.2)
+def draw_labels(axes: Axes, drawing: pd.DataFrame, across: str = "rho_m") -> None:
+    """The maker's labels: extents as dotted lines, corners as dots; ``across`` is the level coordinate's column."""
+    for x, z, label in zip(drawing[across] * 1000, drawing["z_m"] * 1000, drawing["label"]):
+        if np.isnan(z):
+            axes.axvline(x, color=DRAWN, linestyle=":", linewidth=1.2)
+        elif np.isnan(x):
+            axes.axhline(z, color=DRAWN, linestyle=":", linewidth=1.2)
         else:
-            at = (row.rho_m * 1000, row.z_m * 1000)
-            axes.plot(*at, "o", color=DRAWN, markersize=5)
-            axes.annotate(row.label, at, (6, -11), textcoords="offset points", fontsize=8, color=DRAWN)
+            axes.plot(x, z, "o", color=DRAWN, markersize=5)
+            axes.annotate(label, (x, z), (6, -11), textcoords="offset points", fontsize=8, color=DRAWN)
 
 
 def _draw_arm(axes: Axes, robot: Robot, summary: dict[str, Any]) -> None:

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from er3a.stages.workspace.plots import DENSITY, log_norm, masked
+from er3a.stages.workspace.proof_plots import draw_labels
 from er3a.viewing.figures import equal_scale, new_figure
 from er3a.viewing.page import fixed
 from er3a.viewing.palette import INK, JOINTS, REFERENCE
@@ -39,7 +40,7 @@ def side_view(tables: dict[str, pd.DataFrame], has_tool: bool):
         axes.grid(False)
     left.set_title("Wrist centre")
     right.set_title("Flange" + (" (border), tool point (samples)" if has_tool else ""))
-    _draw_labels(left, tables["drawing"])
+    draw_labels(left, tables["drawing"], across="x_m")
     handles = [
         Line2D([], [], color=WRIST, label="exact border of the wrist centre"),
         Line2D([], [], color=FLANGE, label="exact border of the flange"),
@@ -84,16 +85,3 @@ def _draw_samples(axes: Axes, table: pd.DataFrame, point: str) -> None:
     shown[tuple(index.T)] = rows["samples"] / np.maximum(np.abs(rows["x_m"]), cell / 2)
     x, z = ((low[i] + np.arange(shown.shape[i] + 1) * cell) * 1000 for i in (0, 1))
     axes.pcolormesh(x, z, masked(shown).T, cmap=DENSITY, norm=log_norm(shown), alpha=0.8, rasterized=True)
-
-
-def _draw_labels(axes: Axes, drawing: pd.DataFrame) -> None:
-    """Extents as dotted lines, corners as dots."""
-    for row in drawing.itertuples():
-        if np.isnan(row.z_m):
-            axes.axvline(row.x_m * 1000, color=DRAWN, linestyle=":", linewidth=1.2)
-        elif np.isnan(row.rho_m):
-            axes.axhline(row.z_m * 1000, color=DRAWN, linestyle=":", linewidth=1.2)
-        else:
-            at = (row.x_m * 1000, row.z_m * 1000)
-            axes.plot(*at, "o", color=DRAWN, markersize=5)
-            axes.annotate(row.label, at, (6, -11), textcoords="offset points", fontsize=8, color=DRAWN)

@@ -12,7 +12,7 @@ import numpy as np
 
 from er3a.kinematics.jit import kernel
 from er3a.robots.robot import Robot
-from er3a.stages.workspace.extremes import Extremes, cube_map, fibonacci_sphere, near_lists, refresh, take_point
+from er3a.stages.workspace.extremes import Extremes, cube_map, near_lists, refresh, take_point
 from er3a.stages.workspace.grid import Grid
 from er3a.stages.workspace.point_chain import (
     ROWS,
@@ -24,6 +24,7 @@ from er3a.stages.workspace.point_chain import (
 )
 from er3a.stages.workspace.random_joints import CHUNK, Draw, fill_uniform
 from er3a.stages.workspace.sobol import fill_sobol
+from er3a.workspace.sphere import fibonacci_sphere
 
 UNTOUCHED = np.iinfo(np.int32).max
 PORTION = 1 << 22
