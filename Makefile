@@ -11,7 +11,7 @@ ARGS   ?=
 .DEFAULT_GOAL := help
 # A run starts dozens of short processes: without compiled modules kept on disk each would compile them anew.
 unexport PYTHONDONTWRITEBYTECODE
-.PHONY: help run test view archive lint format schema lock clean distclean campaigns
+.PHONY: help run test view archive lint format schema words lock clean distclean campaigns
 
 help:  ## list the targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):[^#]*## /  make \1\t/' | expand -t 18
@@ -41,6 +41,13 @@ format: $(VENV)/dev.stamp  ## format Python and Snakemake code
 
 schema: $(VENV)/run.stamp  ## write the JSON schemas again from the pydantic models
 	$(BIN)/er3a schema
+
+words: $(VENV)/dev.stamp  ## collect the texts to be translated into er3a/locale/
+	$(BIN)/pybabel -q extract -F er3a/locale/babel.cfg -k said -k tr -k N_ --add-location=file --sort-by-file \
+		--omit-header --no-wrap -o er3a/locale/er3a.pot .
+	$(BIN)/pybabel -q update -D er3a -i er3a/locale/er3a.pot -d er3a/locale -l zh --no-fuzzy-matching --no-wrap \
+		--ignore-obsolete --ignore-pot-creation-date
+	rm er3a/locale/er3a.pot
 
 campaigns: $(VENV)/dev.stamp  ## full-size evidence: writes the tables in docs/evidence/ again
 	$(BIN)/python benchmarks/campaigns.py $(ARGS)

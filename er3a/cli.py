@@ -11,6 +11,7 @@ from typing import Annotated
 
 import typer
 
+from er3a import language
 from er3a.errors import Er3aError
 from er3a.study import STAGES, Study, load_study
 
@@ -116,7 +117,7 @@ def teach(robot: RobotName, study: StudyFile = DEFAULT_STUDY, reports: Reports =
     from er3a.teach.page import write_teach_page
 
     page = reports / robot / "teach.html"
-    write_teach_page(load_study(study), robot, page)
+    write_teach_page(_study_to_show(study), robot, page)
     seal(page)
 
 
@@ -126,7 +127,7 @@ def index(study: StudyFile = DEFAULT_STUDY, results: Results = DEFAULT_RESULTS, 
     from er3a.seals import OVERALL, seal
     from er3a.viewing.index import write_index
 
-    write_index(load_study(study), results, reports)
+    write_index(_study_to_show(study), results, reports)
     for page in OVERALL:
         seal(reports / page)
 
@@ -275,11 +276,19 @@ def _complain_of_memory() -> None:
 
 
 def _sealed(verb, study: Study, robot: str, folder: Path, output: Path) -> None:
-    """Have a verb write a view, and keep its checksum."""
+    """Have a verb write a view in the study's language, and keep its checksum."""
     from er3a.seals import seal
 
+    language.use(study.report.language)
     verb(study, robot, folder, output)
     seal(output)
+
+
+def _study_to_show(file: Path) -> Study:
+    """A study whose language is the one that pages are written in from here on."""
+    study = load_study(file)
+    language.use(study.report.language)
+    return study
 
 
 def _folder(study_file: Path, results: Path, robot: str, stage: str) -> tuple[Study, Path]:

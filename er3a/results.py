@@ -15,11 +15,12 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from er3a import language
 from er3a.code_digest import code_digest
 from er3a.errors import ResultError, WriteError
 from er3a.study import Study
 
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 CHECKSUMS = "SHA256SUMS"
 _DIGEST_BYTES = hashlib.sha256().digest_size
 _TEMPORARY = re.compile(r"\..+\.[0-9]+(\.\w+)?")  # as `write_atomically` names them
@@ -97,6 +98,8 @@ def half_written(folder: Path) -> list[Path]:
 
 def write_table(path: Path, table: pd.DataFrame) -> None:
     """Write a Parquet file (units stand in the column names)."""
+    for column in table.select_dtypes(["object", "string"]):
+        language.note_written(table[column].unique().tolist())
     arrow = pa.Table.from_pandas(table, preserve_index=False).replace_schema_metadata(None)
     write_atomically(path, lambda file: pq.write_table(arrow, file, compression="zstd"))
 
@@ -139,6 +142,8 @@ def write_summary(
             "code": code_digest(f"er3a.stages.{stage}.compute"),
         },
     }
+    language.note_written(summary)
+    summary["sentences"] = language.sentences()
     text = json.dumps(summary, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     write_atomically(folder / "summary.json", lambda file: file.write_text(text, encoding="utf-8"))
     write_checksums(folder)
@@ -162,10 +167,11 @@ def read_summary(folder: Path) -> dict[str, Any]:
     version = summary.get("format_version") if isinstance(summary, dict) else None
     if version != FORMAT_VERSION:
         raise ResultError(path, f"format version {version}, this er3a reads {FORMAT_VERSION}")
-    for key in ("robot", "stage", "verdict", "figures", "provenance"):
+    for key in ("robot", "stage", "verdict", "figures", "provenance", "sentences"):
         if key not in summary:
             raise ResultError(path, f"damaged (no '{key}' in it)")
     _compare(path, content, checksums(folder))
+    language.know(summary["sentences"])
     return summary
 
 

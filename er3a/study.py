@@ -150,6 +150,12 @@ class InverseSettings(StrictModel):
     mix: Annotated[dict[RuleName, Annotated[float, Field(ge=0, le=1000)]], Field(min_length=1)] = {"nearest": 1}
 
 
+class ReportSettings(StrictModel):
+    """How pages and recordings are written; no number depends on it."""
+
+    language: Literal["en", "zh"] = "en"
+
+
 class Study(StrictModel):
     """config/config.yaml."""
 
@@ -161,6 +167,7 @@ class Study(StrictModel):
     capability: CapabilitySettings = CapabilitySettings()
     inverse: InverseSettings = InverseSettings()
     trajectory: TrajectorySettings
+    report: ReportSettings = ReportSettings()
 
     def entry(self, name: str) -> RobotEntry:
         """The study's entry for a robot; :class:`InputError` if it has none."""

@@ -57,7 +57,8 @@ def leftovers(folder):
 def test_shape_of_a_summary(tmp_path, study):
     write(tmp_path, study, voids=[{"volume_m3": 0.25}])
     summary = read_summary(tmp_path)
-    assert list(summary) == ["format_version", "robot", "stage", "verdict", "figures", "voids", "provenance"]
+    shared = ["format_version", "robot", "stage", "verdict", "figures"]
+    assert list(summary) == [*shared, "voids", "provenance", "sentences"]
     assert summary["verdict"] == {
         "status": "fail",
         "code": "workspace.void_enclosed",
@@ -179,9 +180,9 @@ def test_missing_files_are_told(tmp_path):
         (b"", "damaged"),
         (b"{", "damaged"),
         (b"\xff\xfe", "damaged"),
-        (b"[]", "format version None, this er3a reads 2"),
-        (b'{"format_version": 1}', "format version 1, this er3a reads 2"),
-        (b'{"format_version": 2, "robot": "x", "stage": "y"}', "damaged .no 'verdict' in it"),
+        (b"[]", "format version None, this er3a reads 3"),
+        (b'{"format_version": 1}', "format version 1, this er3a reads 3"),
+        (b'{"format_version": 3, "robot": "x", "stage": "y"}', "damaged .no 'verdict' in it"),
     ],
 )
 def test_a_damaged_summary_is_told(tmp_path, content, problem):

@@ -14,7 +14,7 @@ function shownValue(value) {
 
 function shownDifference(a, b) {
   if (typeof a === "number" && typeof b === "number") return a === b ? "" : shownValue(b - a);
-  return a === b ? "" : "differs";
+  return a === b ? "" : document.querySelector("[data-differs]").dataset.differs;
 }
 
 function compareRobots() {

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from er3a.language import N_, tr
 from er3a.results import read_summary, read_table
 from er3a.robots.robot import Robot
 from er3a.study import STAGES, Study
@@ -15,6 +16,7 @@ from er3a.viewing import page
 
 BORDER = "workspace/border.parquet"
 BORDER_POINT = "tool point"
+CONVENTIONS = {"standard": N_("standard"), "modified": N_("modified")}
 
 
 def write_compare(study: Study, results: Path, output: Path) -> None:
@@ -45,16 +47,18 @@ def write_compare(study: Study, results: Path, output: Path) -> None:
 def parameters(robot: Robot) -> dict[tuple[str, str, str], float | str | None]:
     """Values of a robot's table by (group, name, unit); None where unknown."""
     columns = (
-        ("D-H table", "a", "mm", robot.a * 1000),
-        ("D-H table", "alpha", "deg", np.degrees(robot.alpha)),
-        ("D-H table", "d", "mm", robot.d * 1000),
-        ("zero", "offset", "deg", np.degrees(robot.offset)),
-        ("zero", "direction", "", robot.direction),
-        ("limits", "lower limit", "deg", np.degrees(robot.lower)),
-        ("limits", "upper limit", "deg", np.degrees(robot.upper)),
-        ("speeds", "greatest speed", "deg/s", np.degrees(robot.speed)),
+        (N_("D-H table"), "a", "mm", robot.a * 1000),
+        (N_("D-H table"), "alpha", "deg", np.degrees(robot.alpha)),
+        (N_("D-H table"), "d", "mm", robot.d * 1000),
+        (N_("zero"), tr("offset"), "deg", np.degrees(robot.offset)),
+        (N_("zero"), tr("direction"), "", robot.direction),
+        (N_("limits"), tr("lower limit"), "deg", np.degrees(robot.lower)),
+        (N_("limits"), tr("upper limit"), "deg", np.degrees(robot.upper)),
+        (N_("speeds"), tr("greatest speed"), "deg/s", np.degrees(robot.speed)),
     )
-    found: dict[tuple[str, str, str], float | str | None] = {("D-H table", "convention", ""): robot.convention}
+    found: dict[tuple[str, str, str], float | str | None] = {
+        ("D-H table", N_("convention"), ""): tr(CONVENTIONS[robot.convention])
+    }
     for group, name, unit, values in columns:
         for joint, value in enumerate(values, start=1):
             found[group, f"J{joint} {name}", unit] = None if np.isnan(value) else round(float(value), 9)
@@ -66,7 +70,7 @@ def key_figures(folder: Path) -> dict[tuple[str, str, str], float | str | None]:
     found: dict[tuple[str, str, str], float | str | None] = {}
     for stage in STAGES:
         summary: dict[str, Any] = read_summary(folder / stage)
-        found[stage, "verdict", ""] = page.VERDICT_WORDS[summary["verdict"]["status"]]
+        found[stage, N_("verdict"), ""] = page.status_word(summary["verdict"]["status"])
         found |= {(stage, figure["name"], figure["unit"]): figure["value"] for figure in summary["figures"]}
     return found
 

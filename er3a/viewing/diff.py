@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from er3a.errors import ResultError
+from er3a.language import tr
 from er3a.results import CHECKSUMS, read_summary, sha256
 from er3a.viewing import page
 from er3a.viewing.numbers import number
@@ -49,7 +50,9 @@ def changes(old: Path, new: Path) -> list[Change]:
         if key not in stages[old] or key not in stages[new]:
             there = key in stages[new]
             found.append(
-                Change(robot, stage, "stage", "–" if there else "there", "there" if there else "–", "only here")
+                Change(
+                    robot, stage, tr("stage"), *(("–", tr("there")) if there else (tr("there"), "–")), tr("only here")
+                )
             )
             continue
         folders = old / robot / stage, new / robot / stage
@@ -73,17 +76,18 @@ def _stages(folder: Path) -> set[tuple[str, str]]:
 
 def _in_summaries(robot: str, stage: str, old: dict[str, Any], new: dict[str, Any]) -> list[Change]:
     found = []
-    statuses = [page.VERDICT_WORDS[summary["verdict"]["status"]] for summary in (old, new)]
-    texts = [summary["verdict"]["text"] for summary in (old, new)]
+    verdicts = [summary["verdict"] for summary in (old, new)]
+    statuses = [page.status_word(verdict["status"]) for verdict in verdicts]
+    texts = [tr(text) for text in (verdict["text"] for verdict in verdicts)]
     if statuses[0] != statuses[1]:
-        found.append(Change(robot, stage, "verdict", *statuses, "turned", texts[1]))
+        found.append(Change(robot, stage, tr("verdict"), *statuses, tr("turned"), texts[1]))
     elif texts[0] != texts[1]:
-        found.append(Change(robot, stage, "verdict's text", *texts, "reworded"))
+        found.append(Change(robot, stage, tr("verdict's text"), *texts, tr("reworded")))
     before, after = ({figure["name"]: figure for figure in summary["figures"]} for summary in (old, new))
     for name in {**before, **after}:
         a, b = before.get(name), after.get(name)
         if a != b:
-            found.append(Change(robot, stage, name, _shown(a), _shown(b), *_moved(a, b)))
+            found.append(Change(robot, stage, tr(name), _shown(a), _shown(b), *_moved(a, b)))
     return found
 
 
@@ -97,9 +101,9 @@ def _shown(figure: dict[str, Any] | None) -> str:
 def _moved(a: dict[str, Any] | None, b: dict[str, Any] | None) -> tuple[str, str]:
     """The difference in words and what it means."""
     if a is None or b is None:
-        return ("new" if a is None else "gone"), ""
+        return tr("new") if a is None else tr("gone"), ""
     if a["unit"] != b["unit"]:
-        return "another unit", "not to be compared"
+        return tr("another unit"), tr("not to be compared")
     if a["value"] is None or b["value"] is None:
         return "–", ""
     difference = b["value"] - a["value"]
@@ -107,7 +111,7 @@ def _moved(a: dict[str, Any] | None, b: dict[str, Any] | None) -> tuple[str, str
     if a["uncertainty"] is None or b["uncertainty"] is None:
         return shown, ""
     within = abs(difference) <= math.hypot(a["uncertainty"], b["uncertainty"])
-    return shown, "within the 95 % interval of the difference" if within else "more than the intervals explain"
+    return shown, tr("within the 95 % interval of the difference") if within else tr("more than the intervals explain")
 
 
 def _in_tables(robot: str, stage: str, old: Path, new: Path) -> list[Change]:
@@ -117,5 +121,5 @@ def _in_tables(robot: str, stage: str, old: Path, new: Path) -> list[Change]:
     for name in sorted(names):
         sums = [sha256(folder / name)[:12] if (folder / name).is_file() else "–" for folder in (old, new)]
         if sums[0] != sums[1]:
-            found.append(Change(robot, stage, name, *sums, "other bytes"))
+            found.append(Change(robot, stage, name, *sums, tr("other bytes")))
     return found

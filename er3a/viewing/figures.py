@@ -4,13 +4,26 @@ from __future__ import annotations
 
 import base64
 import io
+from typing import Any
 
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.font_manager import fontManager
 
+from er3a import language
 from er3a.viewing.palette import GRID, INK, JOINTS, MUTED
 
+CHINESE_FONTS = (
+    "Noto Sans CJK SC",
+    "Noto Sans CJK JP",  # as matplotlib names the collection of all of Noto's
+    "Source Han Sans SC",
+    "WenQuanYi Zen Hei",
+    "WenQuanYi Micro Hei",
+    "Microsoft YaHei",
+    "PingFang SC",
+    "SimHei",
+)
 matplotlib.rcParams |= {
     "axes.edgecolor": MUTED,
     "axes.grid": True,
@@ -49,8 +62,19 @@ def equal_scale(axes: Axes, x_label: str, y_label: str) -> None:
     axes.set_ylabel(y_label)
 
 
+def _fonts() -> dict[str, Any]:
+    """Settings for the language in use: Chinese signs from a font of this machine, or else left to the browser's."""
+    if language.current() != "zh":
+        return {}
+    present = {font.name for font in fontManager.ttflist}
+    chinese = [name for name in CHINESE_FONTS if name in present][:1]
+    families = ["DejaVu Sans", *chinese]
+    return {"font.family": families, "svg.fonttype": "path" if chinese else "none"}
+
+
 def svg_data_uri(figure: Figure) -> str:
     """The figure as a ``data:`` address of an SVG image (dense clouds rasterised at 160 dpi)."""
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="svg", dpi=160, metadata={"Date": None})
+    with matplotlib.rc_context(_fonts()):
+        figure.savefig(buffer, format="svg", dpi=160, metadata={"Date": None})
     return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")

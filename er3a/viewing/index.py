@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from er3a.language import N_
 from er3a.results import read_summary
 from er3a.study import STAGES, Study
 from er3a.viewing import page
@@ -11,10 +12,10 @@ from er3a.viewing.compare import write_compare
 
 SHOWN_FIGURES = 3
 QUESTIONS = {
-    "validation": "Does the table match the maker's data?",
-    "workspace": "What can it reach, where are the voids?",
-    "inverse": "Which joint solutions reach a pose?",
-    "trajectory": "Do the paths run into singularities?",
+    "validation": N_("Does the table match the maker's data?"),
+    "workspace": N_("What can it reach, where are the voids?"),
+    "inverse": N_("Which joint solutions reach a pose?"),
+    "trajectory": N_("Do the paths run into singularities?"),
 }
 
 

@@ -13,6 +13,8 @@ from typing import Any
 import jinja2
 from matplotlib.figure import Figure
 
+from er3a import language
+from er3a.language import N_, tr
 from er3a.results import write_atomically
 from er3a.viewing.figures import svg_data_uri
 from er3a.viewing.numbers import fixed, number
@@ -21,19 +23,27 @@ _HERE = Path(__file__).parent
 _ROOT = _HERE.parents[1]
 SHOWN_VERSIONS = ("numpy", "scipy", "numba", "open3d-cpu", "rerun-sdk", "matplotlib")
 VERDICT_WORDS = {
-    "pass": "pass",
-    "caution": "caution",
-    "fail": "fail",
-    "conflict": "conflict",
-    "no_reference": "no reference",
+    "pass": N_("pass"),
+    "caution": N_("caution"),
+    "fail": N_("fail"),
+    "conflict": N_("conflict"),
+    "no_reference": N_("no reference"),
+}
+
+PAGES = {
+    "validation": N_("validation"),
+    "workspace": N_("workspace"),
+    "inverse": N_("inverse"),
+    "trajectory": N_("trajectory"),
+    "teach": N_("teach panel"),
 }
 
 SCRIPT_WORDS = {
-    "sort": "sort by this column",
-    "csv": "download as CSV",
-    "svg": "download",
-    "enlarge": "enlarge",
-    "close": "close",
+    "sort": N_("sort by this column"),
+    "csv": N_("download as CSV"),
+    "svg": N_("download"),
+    "enlarge": N_("enlarge"),
+    "close": N_("close"),
 }
 
 
@@ -66,19 +76,29 @@ def render(template: Path, output: Path, summary: dict[str, Any] | None = None, 
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
+        extensions=["jinja2.ext.i18n"],
     )
-    environment.filters |= {"number": number, "fixed": fixed}
+    environment.install_gettext_translations(language.translations(), newstyle=False)
+    environment.policies["ext.i18n.trimmed"] = True
+    environment.filters |= {"number": number, "fixed": fixed, "tr": tr}
     html = environment.get_template(template.name).render(
         style=(_HERE / "style.css").read_text(encoding="utf-8"),
         script=(_HERE / "page.js").read_text(encoding="utf-8"),
-        script_words=SCRIPT_WORDS,
+        script_words={key: tr(word) for key, word in SCRIPT_WORDS.items()},
         verdict_words=VERDICT_WORDS,
+        pages=PAGES,
+        language=language.current(),
         summary=summary,
         versions=_versions(),
         commit=_commit(),
         **context,
     )
     write_atomically(output, lambda file: file.write_text(html, encoding="utf-8"))
+
+
+def status_word(status: str) -> str:
+    """A verdict's status as a page shows it."""
+    return tr(VERDICT_WORDS[status])
 
 
 def rows_of(records: Sequence[dict[str, Any]], *columns: str) -> list[list[Any]]:

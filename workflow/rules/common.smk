@@ -6,6 +6,7 @@ import time
 
 from er3a.code_digest import code_digest
 from er3a.errors import Er3aError
+from er3a.language import catalogue_file
 from er3a.study import STAGES, load_study
 
 DEFAULT_STUDY = "config/config.yaml"
@@ -24,6 +25,10 @@ except Er3aError as error:
     raise WorkflowError(str(error)) from None
 
 ROBOTS = list(STUDY.robots)
+
+# Pages and recordings depend on the words of their language, results don't.
+LANGUAGE = STUDY.report.language
+CATALOGUE = [] if LANGUAGE == "en" else os.path.relpath(catalogue_file(LANGUAGE))
 
 # The tables that each stage writes beside its summary.json.
 TABLES = {

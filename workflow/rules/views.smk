@@ -1,6 +1,7 @@
 rule record:
     input:
         viewed,
+        CATALOGUE,
     output:
         "reports/{robot}/{stage}.rrd",
     log:
@@ -8,6 +9,7 @@ rule record:
     conda:
         "../envs/er3a.yaml"
     params:
+        language=LANGUAGE,
         code=lambda wildcards: code_of(wildcards.stage, "record"),
     message:
         "{wildcards.robot}: record {wildcards.stage}"
@@ -18,6 +20,7 @@ rule record:
 rule report:
     input:
         viewed,
+        CATALOGUE,
     output:
         "reports/{robot}/{stage}.html",
     log:
@@ -25,6 +28,7 @@ rule report:
     conda:
         "../envs/er3a.yaml"
     params:
+        language=LANGUAGE,
         code=lambda wildcards: code_of(wildcards.stage, "report"),
     message:
         "{wildcards.robot}: report {wildcards.stage}"
@@ -35,6 +39,7 @@ rule report:
 rule teach:
     input:
         inputs("teach"),
+        CATALOGUE,
     output:
         "reports/{robot}/teach.html",
     log:
@@ -42,6 +47,7 @@ rule teach:
     conda:
         "../envs/er3a.yaml"
     params:
+        language=LANGUAGE,
         settings=settings("trajectory"),
         code=code_digest("er3a.teach.page"),
     message:
@@ -55,6 +61,7 @@ rule index:
         expand("results/{robot}/{stage}/summary.json", robot=ROBOTS, stage=STAGES),
         expand("results/{robot}/workspace/border.parquet", robot=ROBOTS),
         expand("reports/{robot}/{page}.html", robot=ROBOTS, page=[*STAGES, "teach"]),
+        CATALOGUE,
     output:
         "reports/index.html",
         "reports/compare.html",
@@ -63,6 +70,7 @@ rule index:
     conda:
         "../envs/er3a.yaml"
     params:
+        language=LANGUAGE,
         code=code_digest("er3a.viewing.index"),
     message:
         "write the index"

@@ -11,6 +11,7 @@ import pandas as pd
 from er3a.collision.scene import SceneFile, load_scene
 from er3a.kinematics.inverse import CLOSED_FORM
 from er3a.kinematics.selection import NEAREST_RULE
+from er3a.language import keeps_sentences
 from er3a.results import Figure, Verdict, write_summary, write_table
 from er3a.selection.rules import RULES
 from er3a.stages.inverse.rankings import rankings, sequence
@@ -27,6 +28,7 @@ NAMED_IN_VERDICT = 3
 ADVICE_STREAM, ROUND_TRIP_STREAM = 0, 1
 
 
+@keeps_sentences
 def compute(study: Study, name: str, folder: Path) -> None:
     """Write ``summary.json`` and three tables for a robot of the study.
 

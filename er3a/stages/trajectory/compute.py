@@ -17,6 +17,7 @@ from er3a.collision.bodies import Bodies, can_measure
 from er3a.collision.scene import load_scene
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
 from er3a.kinematics.turns import within
+from er3a.language import keeps_sentences
 from er3a.planning.path_file import load_paths
 from er3a.planning.timing import JointLimits, joint_limits
 from er3a.results import Figure, Verdict, write_summary, write_table
@@ -28,6 +29,7 @@ from er3a.stages.trajectory.ways import Surroundings, limits_record, repairs_tab
 from er3a.study import Study
 
 
+@keeps_sentences
 def compute(study: Study, name: str, folder: Path) -> None:
     """Compute the trajectory stage of a robot into ``folder``."""
     robot, settings = study.robot(name), study.trajectory

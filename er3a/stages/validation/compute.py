@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from er3a.language import keeps_sentences
 from er3a.references.extremes import search
 from er3a.references.load import load_references
 from er3a.references.predict import read, state_of
@@ -36,6 +37,7 @@ ALWAYS_SEARCHED = (
 )
 
 
+@keeps_sentences
 def compute(study: Study, name: str, folder: Path) -> None:
     """Write ``summary.json``, and the tables ``checks``, ``axes``, ``key_poses``, ``section``, ``residuals`` and
     ``corrections`` as Parquet.

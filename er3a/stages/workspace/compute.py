@@ -10,6 +10,7 @@ import pandas as pd
 from scipy import ndimage
 
 from er3a.kinematics.forward import forward, jacobian
+from er3a.language import keeps_sentences
 from er3a.results import Figure, write_summary, write_table
 from er3a.robots.robot import Robot
 from er3a.stages.workspace.capability_numbers import can_do
@@ -32,6 +33,7 @@ SECTION_VOID_CELLS = 16
 UNLISTED = -1
 
 
+@keeps_sentences
 def compute(study: Study, name: str, folder: Path, parts: list[Path] | None = None) -> None:
     """Write tables and ``summary.json`` of a robot's workspace into ``folder``.
 

@@ -1,0 +1,89 @@
+"""Every word of a view goes through the catalogues, and the Chinese one is complete."""
+
+from __future__ import annotations
+
+import re
+from importlib import import_module
+from pathlib import Path
+from string import Formatter
+
+import pytest
+from babel.messages.extract import extract_from_dir
+from babel.messages.frontend import parse_mapping_cfg
+from babel.messages.pofile import read_po
+
+from er3a import language
+from er3a.study import STAGES, load_study
+from er3a.teach.page import write_teach_page
+from er3a.viewing.index import write_index
+from tests.conftest import ROBOTS, ROOT
+from tests.viewing.untranslated import PageTexts, plain_words, texts_from_files, wide_letters
+
+KEYWORDS = {"said": None, "tr": None, "N_": None, "_": None, "gettext": None, "ngettext": (1, 2)}
+CHINESE = re.compile("[\u4e00-\u9fff]")
+UPDATE = "`make words` collects texts; translate the new ones in er3a/locale/zh"
+
+
+@pytest.fixture(scope="module")
+def catalogue():
+    with language.catalogue_file("zh").open("rb") as file:
+        return {_forms(entry.id): entry for entry in read_po(file) if entry.id}
+
+
+def test_the_chinese_catalogue_has_the_texts_of_the_code_and_no_others(catalogue):
+    with (ROOT / "er3a/locale/babel.cfg").open() as file:
+        methods, options = parse_mapping_cfg(file)
+    found = extract_from_dir(str(ROOT), methods, options, keywords=KEYWORDS, strip_comment_tags=False)
+    in_code = {_forms(message) for _, _, message, _, _ in found if message}
+    assert in_code - set(catalogue) == set(), UPDATE
+    assert set(catalogue) - in_code == set(), UPDATE
+
+
+def test_each_entry_is_translated_with_all_its_fields(catalogue):
+    for texts, entry in catalogue.items():
+        translated = _forms(entry.string)
+        assert not entry.fuzzy, texts
+        assert all(translated), f"not translated: {texts}"
+        for text in translated:
+            assert _fields(text) == _fields(texts[-1]), f"other fields: {text}"
+            assert CHINESE.search(text) or not re.search(r"[a-z]{4,}", _without_fields(texts[-1])), texts
+
+
+@pytest.fixture(scope="module")
+def own_texts(small_study):
+    return texts_from_files(small_study.folder / "data") | texts_from_files(small_study.folder / "config") | set(ROBOTS)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("stage", STAGES)
+def test_each_word_of_a_stage_s_page_can_be_translated(stage, name, small_study, own_texts, tmp_path, monkeypatch):
+    monkeypatch.chdir(small_study.folder)
+    study, page = load_study("config/small.yaml"), tmp_path / "page.html"
+    report = import_module(f"er3a.stages.{stage}.report").report
+    with wide_letters() as shown:
+        report(study, name, Path("results") / name / stage, page)
+    assert plain_words([*PageTexts(page.read_text(encoding="utf-8")).texts, *shown], own_texts) == []
+
+
+def test_each_word_of_the_other_pages_can_be_translated(small_study, own_texts, tmp_path, monkeypatch):
+    monkeypatch.chdir(small_study.folder)
+    study = load_study("config/small.yaml")
+    with wide_letters():
+        write_index(study, Path("results"), tmp_path)
+        for name in ROBOTS:
+            write_teach_page(study, name, tmp_path / f"{name}.html")
+    for page in tmp_path.glob("*.html"):
+        assert plain_words(PageTexts(page.read_text(encoding="utf-8")).texts, own_texts) == [], page.name
+
+
+def _forms(text: str | tuple[str, ...]) -> tuple[str, ...]:
+    return (text,) if isinstance(text, str) else tuple(text)
+
+
+def _fields(text: str) -> set[str]:
+    named = {name for _, name, _, _ in Formatter().parse(re.sub(r"\{\{|\}\}", "", text)) if name}
+    return named | set(re.findall(r"%\((\w+)\)s", text))
+
+
+def _without_fields(text: str) -> str:
+    return re.sub(r"\{[^}]*\}|%\(\w+\)s|<[^>]*>", "", text)

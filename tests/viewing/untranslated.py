@@ -1,0 +1,159 @@
+"""Finds words in views that no catalogue has: every text that goes through one is written in wide letters, and words in
+plain letters that are left come from elsewhere."""
+
+from __future__ import annotations
+
+import csv
+import gettext
+import json
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import matplotlib.text
+import plotly.graph_objects as go
+import pytest
+import yaml
+from babel.messages.pofile import read_po
+from matplotlib.figure import Figure
+
+from er3a import language
+
+KEPT = re.compile(r"(\{[^}]*\}|%\(\w+\)s|<[^>]*>|&\w+;)")
+WIDE = {ord(letter): ord(letter) + 0xFEE0 for letter in "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"}
+WORD = re.compile(r"[A-Za-z]{3,}")
+# Units, and names that are the same in every language.
+SAME_EVERYWHERE = {"deg", "rad", "er3a", "csv", "sha", "rrd", "rpm"}
+SPOKEN = {"alt", "aria-label", "title", "placeholder", "data-differs"}
+FIGURE_TEXTS = {"text", "name", "title", "label", "hovertemplate", "ticktext", "hovertext"}
+
+
+class Wide(gettext.NullTranslations):
+    """A catalogue whose language is English in wide letters."""
+
+    def __init__(self, texts: set[str]):
+        super().__init__()
+        self._texts = texts
+
+    def gettext(self, message: str) -> str:
+        """The message in wide letters if the catalogue has it; fields and tags as they are."""
+        if message not in self._texts:
+            return message
+        return "".join(part if KEPT.fullmatch(part) else part.translate(WIDE) for part in KEPT.split(message))
+
+    def ngettext(self, msgid1: str, msgid2: str, n: int) -> str:
+        """As :meth:`gettext`, of the form for n."""
+        return self.gettext(msgid1 if n == 1 else msgid2)
+
+
+def catalogue_texts() -> set[str]:
+    """All texts that the Chinese catalogue has an entry for."""
+    with language.catalogue_file("zh").open("rb") as file:
+        entries = [entry.id for entry in read_po(file) if entry.id]
+    return {text for entry in entries for text in ([entry] if isinstance(entry, str) else entry)}
+
+
+@contextmanager
+def wide_letters() -> Iterator[list[str]]:
+    """Views written in here are in wide letters; the list collects the texts of their figures."""
+    shown: list[str] = []
+    save, to_html = Figure.savefig, go.Figure.to_html
+
+    def saved(figure, *arguments, **named):
+        shown.extend(text.get_text() for text in figure.findobj(matplotlib.text.Text) if text.get_visible())
+        return save(figure, *arguments, **named)
+
+    def drawn(figure, *arguments, **named):
+        shown.extend(_texts_of_figure(figure.to_dict()))
+        return to_html(figure, *arguments, **named)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(language, "_catalogue", Wide(catalogue_texts()))
+        patch.setattr(language, "_language", "zh")
+        patch.setattr(Figure, "savefig", saved)
+        patch.setattr(go.Figure, "to_html", drawn)
+        yield shown
+
+
+def plain_words(texts: Iterable[str], own_texts: set[str]) -> list[str]:
+    """Texts with words in plain letters that do not come from the study's own files."""
+    own = sorted(own_texts, key=len, reverse=True)
+    found = []
+    for text in texts:
+        rest = text
+        for piece in own:
+            rest = rest.replace(piece, " ")
+        rest = re.sub(r"\$[^$]*\$|\\\w+", " ", rest)  # formulas
+        if any(word.lower() not in SAME_EVERYWHERE for word in WORD.findall(rest)):
+            found.append(" ".join(text.split()))
+    return list(dict.fromkeys(found))
+
+
+def texts_from_files(folder: Path) -> set[str]:
+    """All texts that people wrote into the input files below a folder."""
+    found: set[str] = set()
+    for file in folder.rglob("*.yaml"):
+        found.update(_leaves(yaml.safe_load(file.read_text(encoding="utf-8"))))
+    for file in folder.rglob("*.csv"):
+        with file.open(encoding="utf-8", newline="") as lines:
+            found.update(cell for row in csv.reader(lines) for cell in row)
+    return {text for text in found if WORD.search(text)}
+
+
+class PageTexts(HTMLParser):
+    """What a page says: its text and spoken attributes, without styles, scripts and code."""
+
+    def __init__(self, html: str):
+        super().__init__()
+        self.texts: list[str] = []
+        self._silent: list[str] = []
+        self.feed(html)
+
+    def handle_starttag(self, tag, attrs):
+        if tag in ("style", "script", "code"):
+            self._silent.append(tag)
+            self._words = dict(attrs).get("type") == "application/json"
+        self.texts += [value for name, value in attrs if name in SPOKEN and value]
+
+    def handle_endtag(self, tag):
+        if self._silent and self._silent[-1] == tag:
+            self._silent.pop()
+
+    def handle_data(self, data):
+        if not self._silent:
+            self.texts.append(data)
+        elif self._silent[-1] == "script" and self._words:
+            self.texts += _words_of(json.loads(data))
+
+
+def _words_of(data: Any) -> list[str]:
+    """Texts that a page hands to its scripts: all below a key ``words``, or all if there are no further levels."""
+    if "words" in data:
+        return list(_leaves(data["words"]))
+    return list(data.values()) if all(isinstance(value, str) for value in data.values()) else []
+
+
+def _leaves(data: Any) -> Iterator[str]:
+    if isinstance(data, str):
+        yield data
+    elif isinstance(data, dict):
+        for key, value in data.items():
+            yield str(key)
+            yield from _leaves(value)
+    elif isinstance(data, list):
+        for value in data:
+            yield from _leaves(value)
+
+
+def _texts_of_figure(data: Any, key: str = "") -> Iterator[str]:
+    if isinstance(data, dict):
+        for name, value in data.items():
+            yield from _texts_of_figure(value, key if name in ("text", "label") and key else name)
+    elif isinstance(data, (list, tuple)):
+        for value in data:
+            yield from _texts_of_figure(value, key)
+    elif isinstance(data, str) and key in FIGURE_TEXTS:
+        yield re.sub(r"%\{[^}]*\}|<[^>]*>", " ", data)
