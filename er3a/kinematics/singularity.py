@@ -22,9 +22,10 @@ from er3a.kinematics.forward import checked_joints, jacobian, rows_of, step_row,
 from er3a.kinematics.jit import kernel
 from er3a.kinematics.vectors import cross, dot, subtract
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
+from er3a.language import N_
 from er3a.robots.robot import Robot
 
-TYPES = ("wrist", "elbow", "shoulder")
+TYPES = (N_("wrist"), N_("elbow"), N_("shoulder"))
 ROUNDING = 6 * np.finfo(float).eps
 
 

@@ -11,9 +11,13 @@ from scipy.optimize import brentq, minimize_scalar
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.turns import LIMIT_TOLERANCE
 from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.language import N_, joined, said
 from er3a.planning.followed import Followed
 from er3a.planning.singular_events import Joints, runs
 from er3a.robots.robot import Robot
+
+_ABOVE = N_("J{joint} goes to {reached:.1f} deg; its upper limit is {bound:g} deg")
+_BELOW = N_("J{joint} goes to {reached:.1f} deg; its lower limit is {bound:g} deg")
 
 
 @dataclass(frozen=True)
@@ -34,7 +38,7 @@ def out_of_limits(robot: Robot, t: np.ndarray, q: np.ndarray, joints: Joints) ->
     """
     found = []
     for j in range(6):
-        for sign, limit, word in ((1.0, robot.upper[j], "upper"), (-1.0, robot.lower[j], "lower")):
+        for sign, limit, cause in ((1.0, robot.upper[j], _ABOVE), (-1.0, robot.lower[j], _BELOW)):
 
             def beyond(at, j=j, sign=sign, limit=limit):
                 return sign * (joints(at)[..., j] - limit) - LIMIT_TOLERANCE
@@ -42,8 +46,7 @@ def out_of_limits(robot: Robot, t: np.ndarray, q: np.ndarray, joints: Joints) ->
             values = sign * (q[:, j] - limit) - LIMIT_TOLERANCE
             for start, end, most in _where_positive(t, values, beyond):
                 reached, bound = np.degrees([limit + sign * most, limit])
-                cause = f"J{j + 1} goes to {reached:.1f} deg; its {word} limit is {bound:g} deg"
-                found.append(Interval(start, end, cause))
+                found.append(Interval(start, end, said(cause, joint=j + 1, reached=reached, bound=bound)))
     return sorted(found, key=lambda interval: (interval.start, interval.cause))
 
 
@@ -65,7 +68,9 @@ def too_fast(
         values = np.abs(velocity[:, j]) - robot.speed[j]
         for start, end, most in _where_positive(t, values, excess):
             needed, able = np.degrees([robot.speed[j] + most, robot.speed[j]])
-            found.append(Interval(start, end, f"J{j + 1} would need {needed:.0f} deg/s; it can do {able:g} deg/s"))
+            speeds = {"needed": needed, "able": able}
+            cause = said("J{joint} would need {needed:.0f} deg/s; it can do {able:g} deg/s", joint=j + 1, **speeds)
+            found.append(Interval(start, end, cause))
     return sorted(found, key=lambda interval: (interval.start, interval.cause))
 
 
@@ -76,7 +81,7 @@ def unreachable(followed: Followed) -> list[Interval]:
         poses = followed.line.poses(followed.progress[first:last])
         gap = solve_slots(robot, poses, np.zeros((len(poses), 6)))[2]
         worst = int(np.argmax(gap.min(axis=1)))
-        cause = "; ".join(inverse(robot, poses[worst]).unsolved)
+        cause = joined(inverse(robot, poses[worst]).unsolved)
         found.append(Interval(float(followed.t[first]), float(followed.t[last - 1]), cause))
     return found
 

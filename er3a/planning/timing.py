@@ -21,6 +21,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from er3a.errors import Er3aError
+from er3a.language import N_
 from er3a.robots.robot import Robot
 
 LONGEST_STEP = 0.02  # share of the whole way between two nodes
@@ -131,7 +132,7 @@ def fastest(q: np.ndarray, limits: JointLimits, programmed: np.ndarray | None = 
     speed, pull = _toppra(way, spline, limits, cap)
     pace = (speed[:-1] + speed[1:]) / 2
     if (pace <= 0).any():
-        raise TimingError("the arm would have to stand still on the way")
+        raise TimingError(N_("the arm would have to stand still on the way"))
     t = np.concatenate([[0.0], np.cumsum(np.maximum(np.diff(way) / pace, least))])
     slope, bend = spline(way, 1), spline(way, 2)
     pull = np.append(pull, pull[-1])
@@ -176,7 +177,7 @@ def _toppra(
             from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint, LinearConstraint
             from toppra.interpolator import AbstractGeometricPath
     except ModuleNotFoundError:
-        raise TimingError("the library toppra is not installed; it has wheels for Linux on x86-64 only") from None
+        raise TimingError(N_("the library toppra is not installed; it has wheels for Linux on x86-64 only")) from None
 
     class Way(AbstractGeometricPath):
         dof, waypoints = 6, None
@@ -204,5 +205,5 @@ def _toppra(
     solver = TOPPRA(constraints, Way(), gridpoints=way, solver_wrapper="seidel")
     pull, speed, _ = solver.compute_parameterization(0, 0)
     if speed is None or not np.isfinite(speed).all():
-        raise TimingError("the time-optimal parametrisation found no time law under the joints' limits")
+        raise TimingError(N_("the time-optimal parametrisation found no time law under the joints' limits"))
     return speed, pull

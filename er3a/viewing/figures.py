@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import base64
 import io
-from typing import Any
 
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.font_manager import fontManager
+from matplotlib.text import Text
 
 from er3a import language
 from er3a.viewing.palette import GRID, INK, JOINTS, MUTED
@@ -36,7 +36,7 @@ matplotlib.rcParams |= {
     "axes.titleweight": "bold",
     "figure.constrained_layout.use": True,
     "figure.facecolor": "white",
-    "font.family": "DejaVu Sans",
+    "font.family": ["DejaVu Sans"],
     "font.size": 10,
     "grid.color": GRID,
     "grid.linewidth": 0.7,
@@ -62,19 +62,20 @@ def equal_scale(axes: Axes, x_label: str, y_label: str) -> None:
     axes.set_ylabel(y_label)
 
 
-def _fonts() -> dict[str, Any]:
-    """Settings for the language in use: Chinese signs from a font of this machine, or else left to the browser's."""
-    if language.current() != "zh":
-        return {}
+def _chinese_font() -> list[str]:
+    """The name of a font of this machine that has Chinese signs; none if there is none."""
     present = {font.name for font in fontManager.ttflist}
-    chinese = [name for name in CHINESE_FONTS if name in present][:1]
-    families = ["DejaVu Sans", *chinese]
-    return {"font.family": families, "svg.fonttype": "path" if chinese else "none"}
+    return [name for name in CHINESE_FONTS if name in present][:1]
 
 
 def svg_data_uri(figure: Figure) -> str:
     """The figure as a ``data:`` address of an SVG image (dense clouds rasterised at 160 dpi)."""
+    chinese = _chinese_font() if language.current() == "zh" else []
+    for text in figure.findobj(Text):
+        text.set_fontfamily([*matplotlib.rcParams["font.family"], *chinese])
+    # Without a font for it here, Chinese stays text, for which the reader's browser finds one.
+    glyphs = "none" if language.current() == "zh" and not chinese else "path"
     buffer = io.BytesIO()
-    with matplotlib.rc_context(_fonts()):
+    with matplotlib.rc_context({"svg.fonttype": glyphs}):
         figure.savefig(buffer, format="svg", dpi=160, metadata={"Date": None})
     return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")

@@ -80,7 +80,7 @@ def render(template: Path, output: Path, summary: dict[str, Any] | None = None, 
     )
     environment.install_gettext_translations(language.translations(), newstyle=False)
     environment.policies["ext.i18n.trimmed"] = True
-    environment.filters |= {"number": number, "fixed": fixed, "tr": tr}
+    environment.filters |= {"number": number, "fixed": fixed, "tr": tr, "sentence": sentence}
     html = environment.get_template(template.name).render(
         style=(_HERE / "style.css").read_text(encoding="utf-8"),
         script=(_HERE / "page.js").read_text(encoding="utf-8"),
@@ -94,6 +94,12 @@ def render(template: Path, output: Path, summary: dict[str, Any] | None = None, 
         **context,
     )
     write_atomically(output, lambda file: file.write_text(html, encoding="utf-8"))
+
+
+def sentence(finding: str) -> str:
+    """A finding as a sentence of its own."""
+    text = tr("{finding}.", finding=finding)
+    return text[:1].upper() + text[1:] if language.current() == "en" else text
 
 
 def status_word(status: str) -> str:

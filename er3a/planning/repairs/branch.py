@@ -7,6 +7,7 @@ import numpy as np
 from er3a.errors import PoseError
 from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.turns import within
+from er3a.language import N_
 from er3a.planning.follow import follow
 from er3a.planning.followed import Followed
 from er3a.planning.repairs.trouble import Trouble, WayAround, coarse, margin, trouble_of
@@ -24,7 +25,7 @@ def branch(trouble: Trouble) -> WayAround:
     """
     bad = ~(trouble.good & within(trouble.robot, trouble.q))
     if not bad.any():
-        return WayAround("branch", None, 0.0, "there is nothing to avoid")
+        return WayAround("branch", None, 0.0, N_("there is nothing to avoid"))
     few = np.linspace(0.0, trouble.followed.line.duration, COARSE)
     others = [_follow(trouble, slot, few) for slot in range(SLOTS) if slot != trouble.followed.slot[0]]
     begin = max(int(np.argmax(bad)) - 1, 0)
@@ -40,7 +41,8 @@ def branch(trouble: Trouble) -> WayAround:
             other = _follow(trouble, slot, times)
             if _keeps_clear(trouble, other, trouble.t[index]):
                 return _changed(trouble, other, index, leave)
-    return WayAround("branch", None, 0.0, "the other branches are singular, beyond a limit or out of reach there too")
+    reason = N_("the other branches are singular, beyond a limit or out of reach there too")
+    return WayAround("branch", None, 0.0, reason)
 
 
 def _follow(trouble: Trouble, slot: int, t: np.ndarray) -> Followed | None:

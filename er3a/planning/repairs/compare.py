@@ -9,6 +9,7 @@ import numpy as np
 
 from er3a.kinematics.forward import forward
 from er3a.kinematics.turns import limit_reason, within
+from er3a.language import joined, said
 from er3a.planning.repairs.branch import branch
 from er3a.planning.repairs.damped import damped
 from er3a.planning.repairs.detour import detour
@@ -103,19 +104,21 @@ def _priced(trouble: Trouble, name: str, way: Callable[[Trouble], WayAround]) ->
     left = float(np.linalg.norm(T[-1, :3, 3] - last[:3, 3]))
     twisted = 2 * np.arcsin(min(1.0, float(np.linalg.norm(T[-1, :3, :3] - last[:3, :3])) / np.sqrt(8.0)))
     if name == "stop":
-        faults.append(f"only {found.done:.0%} of the path is done")
+        faults.append(said("only {share:.0%} of the path is done", share=found.done))
     elif left > ARRIVED[0] or twisted > ARRIVED[1]:
-        faults.append(f"it ends {left * 1000:.3g} mm and {np.degrees(twisted):.3g} deg from the path's end")
+        far = {"mm": left * 1000, "deg": np.degrees(twisted)}
+        faults.append(said("it ends {mm:.3g} mm and {deg:.3g} deg from the path's end", **far))
     outside = ~within(robot, motion.q)
     if outside.any():
         faults.append(limit_reason(robot, motion.q[_worst(trouble, motion.q)]))
-    for share, word in ((speed, "speed"), (acceleration, "acceleration")):
-        if share > 1 + OVER:
-            faults.append(f"a joint needs {share:.2f} times its greatest {word}")
+    if speed > 1 + OVER:
+        faults.append(said("a joint needs {share:.2f} times its greatest speed", share=speed))
+    if acceleration > 1 + OVER:
+        faults.append(said("a joint needs {share:.2f} times its greatest acceleration", share=acceleration))
     keeps = name in ("stop", "detour") or bool(margin(robot, motion.q, trouble.near).min() > 1 - 1e-6)
     if name == "branch":
         keeps = True
-    reason = "; ".join(faults)
+    reason = joined(faults)
     return Price(name, motion, not faults, reason, found.done, distance, angle, speed, acceleration, keeps)
 
 

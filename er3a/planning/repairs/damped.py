@@ -20,6 +20,7 @@ from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import rows_of, step_row, turn_row
 from er3a.kinematics.jit import kernel
 from er3a.kinematics.singularity import characteristic_length
+from er3a.language import N_
 from er3a.planning.repairs.trouble import Trouble, WayAround
 from er3a.planning.timing import Timed, joined
 
@@ -35,7 +36,7 @@ def damped(trouble: Trouble) -> WayAround:
     Where no damping bounds the accelerations too, it is the least that bounds the speeds.
     """
     if np.isnan(trouble.q[0, 0]):
-        return WayAround("damped", None, 0.0, "the path begins out of reach")
+        return WayAround("damped", None, 0.0, N_("the path begins out of reach"))
     line = trouble.followed.line
     t = np.linspace(0.0, line.duration, STEPS + 1)
     T = line.poses(line.progress(t)[0])
@@ -45,7 +46,7 @@ def damped(trouble: Trouble) -> WayAround:
     if not held.size:
         held = np.flatnonzero(shares[:, 0] <= 1.0)
     if not held.size:
-        return WayAround("damped", None, 0.0, "no damping keeps the joint speeds within their limits at this pace")
+        return WayAround("damped", None, 0.0, N_("no damping keeps the joint speeds within their limits at this pace"))
     best = runs[int(held[0])]
     return WayAround("damped", joined([*trouble.begin(), best]))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from er3a.language import N_
 from er3a.planning.repairs.trouble import Trouble, WayAround
 from er3a.planning.timing import joined, straight
 
@@ -14,13 +15,13 @@ def detour(trouble: Trouble) -> WayAround:
     Where the path begins or ends inside a region, its first or last joints take the place of the good pose.
     """
     if not trouble.regions:
-        return WayAround("detour", None, 0.0, "there is no singular region to go around")
+        return WayAround("detour", None, 0.0, N_("there is no singular region to go around"))
     count, parts, at = len(trouble.t), [], 0
     for first, last in trouble.regions:
         before, after = max(first - 1, 0), min(last, count - 1)
-        for index, word in ((before, "begins"), (after, "ends")):
+        for index, reason in ((before, N_("the path begins out of reach")), (after, N_("the path ends out of reach"))):
             if np.isnan(trouble.q[index, 0]):
-                return WayAround("detour", None, 0.0, f"the path {word} out of reach")
+                return WayAround("detour", None, 0.0, reason)
         if before > at:
             parts += [*(trouble.begin() if at == 0 else []), trouble.along(at, before)]
         leave = trouble.q[before] if before > 0 else trouble.first_joints

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from er3a.language import N_, said
 from er3a.planning.repairs.trouble import Trouble, WayAround
 from er3a.planning.timing import joined
 
@@ -11,9 +12,9 @@ from er3a.planning.timing import joined
 def slow(trouble: Trouble) -> WayAround:
     """Follow the path exactly, as programmed wherever the joints can, slower where they can't."""
     if np.isnan(trouble.q[:, 0]).any():
-        return WayAround("slow", None, 0.0, "a part of the path is out of reach")
+        return WayAround("slow", None, 0.0, N_("a part of the path is out of reach"))
     if trouble.followed.jumps:
         jump = trouble.followed.jumps[0]
-        reason = f"at t = {jump.t:.4g} s the branch ends: J{jump.joint} would have to jump"
+        reason = said("at t = {t:.4g} s the branch ends: J{joint} would have to jump", t=jump.t, joint=jump.joint)
         return WayAround("slow", None, 0.0, reason)
     return WayAround("slow", joined([*trouble.begin(), trouble.along(0, len(trouble.t) - 1)]))

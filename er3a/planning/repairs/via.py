@@ -19,6 +19,7 @@ from er3a.kinematics.forward import frames
 from er3a.kinematics.singularity import TYPES, characteristic_length, determinant_factors
 from er3a.kinematics.turns import within
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
+from er3a.language import N_, said
 from er3a.planning.follow import follow
 from er3a.planning.moves import ToolPath
 from er3a.planning.profiles import quintic
@@ -106,15 +107,14 @@ def tilted_via(trouble: Trouble) -> WayAround:
 def _via(trouble: Trouble, kind: str) -> WayAround:
     name = f"via_{kind}"
     if not trouble.regions:
-        return WayAround(name, None, 0.0, "there is no singular region to bend around")
+        return WayAround(name, None, 0.0, N_("there is no singular region to bend around"))
     if trouble.regions[0][0] == 0:
-        return WayAround(name, None, 0.0, "the path begins inside the region, where no bend can help")
+        return WayAround(name, None, 0.0, N_("the path begins inside the region, where no bend can help"))
     if trouble.regions[-1][1] == len(trouble.t):
-        return WayAround(name, None, 0.0, "the path ends inside the region, where no bend can help")
+        return WayAround(name, None, 0.0, N_("the path ends inside the region, where no bend can help"))
     bends = [_bends(trouble, first, last, kind) for first, last in trouble.regions]
     if not all(bends):
-        word = "shift of the tool point" if kind == "shift" else "tilt of the tool"
-        return WayAround(name, None, 0.0, f"no {word} up to {_farthest(trouble, kind)} keeps the distance")
+        return WayAround(name, None, 0.0, _none_far_enough(trouble, kind))
     fallback = None
     for chosen in sorted(product(*bends), key=lambda some: sum(bend.amount for bend in some))[:MOST_SIDES]:
         path = BentPath(trouble.followed.line, chosen)
@@ -125,7 +125,7 @@ def _via(trouble: Trouble, kind: str) -> WayAround:
                 return WayAround(name, _carried_out(trouble, other))
             fallback = fallback or other
     if fallback is None:
-        return WayAround(name, None, 0.0, "the bent path runs into another singular region")
+        return WayAround(name, None, 0.0, N_("the bent path runs into another singular region"))
     return WayAround(name, _carried_out(trouble, fallback))
 
 
@@ -254,7 +254,8 @@ def _least(
     return bend(high)
 
 
-def _farthest(trouble: Trouble, kind: str) -> str:
+def _none_far_enough(trouble: Trouble, kind: str) -> str:
     if kind == "shift":
-        return f"{FARTHEST['shift'] * characteristic_length(trouble.robot) * 1000:.0f} mm"
-    return f"{np.degrees(FARTHEST['tilt']):.0f} deg"
+        far = FARTHEST["shift"] * characteristic_length(trouble.robot) * 1000
+        return said("no shift of the tool point up to {far:.0f} mm keeps the distance", far=far)
+    return said("no tilt of the tool up to {far:.0f} deg keeps the distance", far=np.degrees(FARTHEST["tilt"]))

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from er3a.language import tr
 from er3a.viewing.figures import new_figure
 from er3a.viewing.numbers import fixed
 from er3a.viewing.page import Picture
@@ -26,14 +27,17 @@ def clearance_section(summary: dict[str, Any], rows: pd.DataFrame) -> dict[str, 
         return {"picture": None, "rows": []}
     colliding = [record["name"] for record in records if record["collisions"]]
     if colliding:
-        caption = f"Below zero bodies overlap: {', '.join(colliding)} can't be driven as planned."
+        names = ", ".join(colliding)
+        caption = tr("Below zero bodies overlap: {paths} can't be driven as planned.", paths=names)
     else:
-        caption = "No path comes to zero: none meets its surroundings or the arm itself."
+        caption = tr("No path comes to zero: none meets its surroundings or the arm itself.")
     if any(record["unreachable"] for record in records):
-        caption += " Grey: not reachable."
+        caption += " " + tr("Grey: not reachable.")
     return {
         "picture": Picture(
-            _curves(records, rows), f"Least clearance over time, one panel per path. {caption}", caption
+            _curves(records, rows),
+            tr("Least clearance over time, one panel per path. {conclusion}", conclusion=caption),
+            caption,
         ),
         "rows": [_row(record) for record in records],
     }
@@ -63,10 +67,10 @@ def _curves(records: list[dict[str, Any]], rows: pd.DataFrame) -> Figure:
     for ax in axes.flat[len(records) :]:
         ax.set_visible(False)
     for ax in axes[:, 0]:
-        ax.set_ylabel("clearance (mm)", fontsize=8)
+        ax.set_ylabel(tr("clearance (mm)"), fontsize=8)
     for k, ax in enumerate(axes.flat[: len(records)]):
         if k + COLUMNS >= len(records):
-            ax.set_xlabel("time (s)", fontsize=8)
+            ax.set_xlabel(tr("time (s)"), fontsize=8)
     low, high = np.nanmin(rows["clearance_mm"]), np.nanmax(rows["clearance_mm"])
     axes[0, 0].set_ylim(min(low, 0.0) - 0.05 * (high - low), high + 0.05 * (high - low))
     return figure

@@ -9,8 +9,9 @@ import pandas as pd
 
 from er3a.collision.along import ClearanceAlong, Contact, clearance_along
 from er3a.collision.bodies import Bodies
+from er3a.language import joined, said
 from er3a.planning.intervals import Interval
-from er3a.stages.trajectory.judge import WORDS, interval_records, stretch_text
+from er3a.stages.trajectory.judge import WORDS, fault_text, interval_records
 from er3a.stages.trajectory.motion import Motion
 
 MOST_PAIRS = 3
@@ -37,14 +38,14 @@ def with_collisions(record: dict[str, Any], motion: Motion, along: ClearanceAlon
     }
     record = record | {"collisions": interval_records(motion, stretches), "clearance": clearance}
     if stretches:
-        faults = "; ".join(f"{stretch_text(part)}: {part.cause}" for part in stretches)
+        faults = joined(fault_text(part) for part in stretches)
         before = record["verdict"]
         if before == "safe":
             record |= {"verdict": "collides", "text": faults}
         elif WORDS.index(before) > WORDS.index("collides"):
-            record |= {"verdict": "collides", "text": f"{faults}; {record['text']}"}
+            record |= {"verdict": "collides", "text": joined([faults, record["text"]])}
         else:
-            record["text"] = f"{record['text']}; {faults}"
+            record["text"] = joined([record["text"], faults])
     return record
 
 
@@ -58,5 +59,8 @@ def clearance_table(name: str, along: ClearanceAlong | None) -> pd.DataFrame:
 
 
 def _cause(contact: Contact) -> str:
-    shown = ", ".join(contact.pairs[:MOST_PAIRS]) + (" and more" if len(contact.pairs) > MOST_PAIRS else "")
-    return f"{shown} overlap, up to {contact.depth * 1000:.1f} mm at t = {contact.at:.4g} s"
+    pairs = joined(contact.pairs[:MOST_PAIRS], ", ")
+    if len(contact.pairs) > MOST_PAIRS:
+        pairs = said("{pairs} and more", pairs=pairs)
+    worst = {"pairs": pairs, "depth": contact.depth * 1000, "t": contact.at}
+    return said("{pairs} overlap, up to {depth:.1f} mm at t = {t:.4g} s", **worst)

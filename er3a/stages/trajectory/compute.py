@@ -17,7 +17,7 @@ from er3a.collision.bodies import Bodies, can_measure
 from er3a.collision.scene import load_scene
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
 from er3a.kinematics.turns import within
-from er3a.language import keeps_sentences
+from er3a.language import N_, joined, keeps_sentences, said
 from er3a.planning.path_file import load_paths
 from er3a.planning.timing import JointLimits, joint_limits
 from er3a.results import Figure, Verdict, write_summary, write_table
@@ -118,8 +118,13 @@ def _table(
 def _verdict(records: list[dict[str, Any]]) -> Verdict:
     groups = {word: [record["name"] for record in records if record["verdict"] == word] for word in WORDS}
     safe = groups.pop("safe")
-    faults = [f"{len(names)} {word} ({', '.join(names)})" for word, names in groups.items() if names]
-    text = f"{len(safe)} of {len(records)} paths are safe" + (f"; {', '.join(faults)}." if faults else ".")
+    faults = [
+        said("{count} {word} ({names})", count=len(names), word=word, names=", ".join(names))
+        for word, names in groups.items()
+        if names
+    ]
+    text = said("{safe} of {all} paths are safe", safe=len(safe), all=len(records))
+    text = said("{finding}.", finding=joined([text, joined(faults, ", ")]))
     params = {"paths": len(records), "safe": len(safe)} | {word.replace(" ", "_"): n for word, n in groups.items()}
     if not safe:
         return Verdict("fail", "trajectory.none_safe", text, params)
@@ -134,16 +139,17 @@ def _figures(records: list[dict[str, Any]], length: float, clear: bool, assumed:
     ratios = [record["max_joint_speed_ratio"] for record in bounded if record["max_joint_speed_ratio"] is not None]
     agreement = max((record["velocity_check_deg_s"] * 1e6 for record in bounded), default=None)
     fastest = max((max(record["max_joint_speed_deg_s"]) for record in bounded), default=None)
+    share = N_("Share of the joint's assumed speed") if assumed else N_("Share of the joint's greatest speed")
     return [
-        Figure("Paths planned", len(records), ""),
-        Figure("Paths safe as they are", sum(record["verdict"] == "safe" for record in records), ""),
-        Figure("Singular poses met", sum(event["crossing"] for event in events), ""),
-        Figure("Near passes", sum(not event["crossing"] for event in events), ""),
-        Figure("Paths that collide", _colliding(records) if clear else None, ""),
-        Figure("Greatest joint speed needed, where bounded", fastest, "deg/s"),
-        Figure(f"Share of the joint's {'assumed' if assumed else 'greatest'} speed", max(ratios, default=None), ""),
-        Figure("Velocity by Jacobian against differences, within", agreement, "µdeg/s"),
-        Figure("Characteristic length of the Jacobian", length * 1000, "mm"),
+        Figure(N_("Paths planned"), len(records), ""),
+        Figure(N_("Paths safe as they are"), sum(record["verdict"] == "safe" for record in records), ""),
+        Figure(N_("Singular poses met"), sum(event["crossing"] for event in events), ""),
+        Figure(N_("Near passes"), sum(not event["crossing"] for event in events), ""),
+        Figure(N_("Paths that collide"), _colliding(records) if clear else None, ""),
+        Figure(N_("Greatest joint speed needed, where bounded"), fastest, "deg/s"),
+        Figure(share, max(ratios, default=None), ""),
+        Figure(N_("Velocity by Jacobian against differences, within"), agreement, "µdeg/s"),
+        Figure(N_("Characteristic length of the Jacobian"), length * 1000, "mm"),
     ]
 
 

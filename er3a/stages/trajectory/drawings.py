@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 
+from er3a.language import N_, tr
 from er3a.robots.robot import Robot
 from er3a.stages.trajectory.oblique import draw_path
 from er3a.viewing.figures import svg_data_uri
@@ -26,9 +27,9 @@ NEAR_LIMIT_DEG = 20.0
 EVENT_STYLES = {True: "-", False: ":"}
 TYPE_COLOURS = {"wrist": COLOURS[4], "elbow": COLOURS[2], "shoulder": COLOURS[3]}
 SHADES = {
-    "out_of_limits": (VERDICTS["caution"], 0.16, "outside a joint limit"),
-    "too_fast": (VERDICTS["fail"], 0.14, "joint too fast"),
-    "unreachable": (INK, 0.14, "not reachable"),
+    "out_of_limits": (VERDICTS["caution"], 0.16, N_("outside a joint limit")),
+    "too_fast": (VERDICTS["fail"], 0.14, N_("joint too fast")),
+    "unreachable": (INK, 0.14, N_("not reachable")),
 }
 LEFT, BOTTOM, TOP = 0.055, 0.07, 0.925
 COLUMNS, GAP = (0.275, 0.275, 0.265), 0.06
@@ -53,7 +54,7 @@ class PathFigure:
                 ax.yaxis.set_label_coords(-0.15, 0.5)
             for ax in column[:-1]:
                 ax.tick_params(labelbottom=False)
-            column[-1].set_xlabel("time (s)", fontsize=FONT)
+            column[-1].set_xlabel(tr("time (s)"), fontsize=FONT)
 
     def draw(
         self, robot: Robot, record: dict[str, Any], rows: pd.DataFrame, ways: pd.DataFrame, near: dict[str, float]
@@ -103,12 +104,16 @@ def _clear(ax: Axes) -> None:
 
 def _joint_curves(axes: list[Axes], robot: Robot, record: dict[str, Any], rows: pd.DataFrame) -> None:
     t = rows["t_s"].to_numpy()
-    labels = (("deg", "joint angle (deg)"), ("deg_s", "velocity (deg/s)"), ("deg_s2", "acceleration (deg/s²)"))
+    labels = (
+        ("deg", N_("joint angle (deg)")),
+        ("deg_s", N_("velocity (deg/s)")),
+        ("deg_s2", N_("acceleration (deg/s²)")),
+    )
     for ax, (unit, label) in zip(axes, labels):
         values = rows[[f"q{j + 1}_{unit}" for j in range(6)]].to_numpy()
         for j in range(6):
             ax.plot(t, values[:, j], color=COLOURS[j], linewidth=WIDTHS[j])
-        ax.set_ylabel(label, fontsize=FONT)
+        ax.set_ylabel(tr(label), fontsize=FONT)
         if unit == "deg":
             _limits(ax, robot, values)
         elif not record["joint_speed_bounded"]:
@@ -121,10 +126,10 @@ def _distances(ax: Axes, rows: pd.DataFrame, near: dict[str, float]) -> None:
     columns = (("wrist", "wrist_deg"), ("elbow", "elbow_deg"), ("shoulder", "shoulder_mm"))
     for kind, column in columns:
         share = np.abs(rows[column].to_numpy()) / near[column]
-        ax.plot(t, np.maximum(share, 1e-4), color=TYPE_COLOURS[kind], label=kind)
+        ax.plot(t, np.maximum(share, 1e-4), color=TYPE_COLOURS[kind], label=tr(kind))
     ax.axhline(1.0, color=INK, linewidth=1, linestyle="--")
     _logarithmic(ax, 0.01, 100.0)
-    ax.set_ylabel("distance / threshold", fontsize=FONT)
+    ax.set_ylabel(tr("distance / threshold"), fontsize=FONT)
     _key(ax, "lower left")
 
 
@@ -132,7 +137,7 @@ def _condition(ax: Axes, rows: pd.DataFrame) -> None:
     values = rows["condition_number"].replace(np.inf, np.nan)
     ax.plot(rows["t_s"], values, color=MODEL)
     _logarithmic(ax, 1.0, min(1e6, 2 * values.fillna(0.0).clip(lower=50.0).max()))
-    ax.set_ylabel("condition number", fontsize=FONT)
+    ax.set_ylabel(tr("condition number"), fontsize=FONT)
 
 
 def _logarithmic(ax: Axes, low: float, high: float) -> None:
@@ -147,20 +152,20 @@ def _logarithmic(ax: Axes, low: float, high: float) -> None:
 
 
 def _small_measures(ax: Axes, rows: pd.DataFrame) -> None:
-    ax.plot(rows["t_s"], rows["smallest_singular_value"], color=REFERENCE, label="smallest singular value")
-    ax.plot(rows["t_s"], rows["manipulability"], color=MODEL, label="manipulability")
+    ax.plot(rows["t_s"], rows["smallest_singular_value"], color=REFERENCE, label=tr("smallest singular value"))
+    ax.plot(rows["t_s"], rows["manipulability"], color=MODEL, label=tr("manipulability"))
     most = rows[["smallest_singular_value", "manipulability"]].max().max()
     ax.set_ylim(0, 1.35 * most if most > 0 else 1)
-    ax.set_ylabel("measure", fontsize=FONT)
+    ax.set_ylabel(tr("measure"), fontsize=FONT)
     _key(ax, "upper left")
 
 
 def _effort(ax: Axes, record: dict[str, Any], rows: pd.DataFrame, ways: pd.DataFrame) -> None:
     """Share of the joints' speed limits over the share of the time: as programmed, repaired, at its fastest."""
     programmed = rows["speed_share"].to_numpy()
-    ax.plot(rows["t_s"] / rows["t_s"].iloc[-1], programmed, color=HIGHLIGHT, label="as programmed")
+    ax.plot(rows["t_s"] / rows["t_s"].iloc[-1], programmed, color=HIGHLIGHT, label=tr("as programmed"))
     shown = [programmed]
-    for way, colour, label in ((record["repair"], MODEL, "repaired"), ("fastest", MUTED, "at its fastest")):
+    for way, colour, label in ((record["repair"], MODEL, tr("repaired")), ("fastest", MUTED, tr("at its fastest"))):
         part = ways[ways["way"] == way]
         if len(part):
             ax.plot(part["t_s"] / part["t_s"].iloc[-1], part["speed_share"], color=colour, label=label, linewidth=1.3)
@@ -170,8 +175,8 @@ def _effort(ax: Axes, record: dict[str, Any], rows: pd.DataFrame, ways: pd.DataF
     most = np.nanmax(size) if np.isfinite(size).any() else 1.0
     ax.set_ylim(0, 1.35 * max(1.0, most) if record["joint_speed_bounded"] else 3.0)
     ax.set_xlim(0, 1)
-    ax.set_xlabel("share of each motion's time", fontsize=FONT)
-    ax.set_ylabel("joint speed / limit", fontsize=FONT)
+    ax.set_xlabel(tr("share of each motion's time"), fontsize=FONT)
+    ax.set_ylabel(tr("joint speed / limit"), fontsize=FONT)
     _key(ax, "upper left")
 
 
@@ -189,7 +194,7 @@ def _limits(ax: Axes, robot: Robot, degrees: np.ndarray) -> None:
         for limit, gap, side in ((lower[j], low[j] - lower[j], "top"), (upper[j], upper[j] - high[j], "bottom")):
             if gap < NEAR_LIMIT_DEG:
                 ax.axhline(limit, color=COLOURS[j], linestyle="--", linewidth=1)
-                text = f"limit of {JOINT_NAMES[j]}"
+                text = tr("limit of {joint}", joint=JOINT_NAMES[j])
                 ax.text(0.01, limit, text, transform=ax.get_yaxis_transform(), va=side, fontsize=8, color=COLOURS[j])
                 ax.margins(y=0.18)
 
@@ -200,7 +205,7 @@ def _cut(ax: Axes, values: np.ndarray) -> None:
     if size.size:
         reach = 1.6 * np.percentile(size, 97)
         ax.set_ylim(-reach, reach)
-        ax.text(0.99, 0.04, "cut: grows without bound", transform=ax.transAxes, ha="right", fontsize=8)
+        ax.text(0.99, 0.04, tr("cut: grows without bound"), transform=ax.transAxes, ha="right", fontsize=8)
 
 
 def _mark(ax: Axes, record: dict[str, Any]) -> None:
@@ -217,11 +222,11 @@ def _legend(record: dict[str, Any]) -> list[Line2D | Patch]:
     handles: list[Line2D | Patch] = [
         Line2D([], [], color=COLOURS[j], linewidth=WIDTHS[j], label=JOINT_NAMES[j]) for j in range(6)
     ]
-    for crossing, label in ((True, "singular"), (False, "near-singular")):
+    for crossing, label in ((True, tr("singular")), (False, tr("near-singular"))):
         if any(event["crossing"] == crossing for event in record["singularities"]):
             style = {"linestyle": EVENT_STYLES[crossing], "marker": "v"}
             handles.append(Line2D([], [], color=HIGHLIGHT, label=label, **style))
     for key, (colour, alpha, label) in SHADES.items():
         if record[key]:
-            handles.append(Patch(color=colour, alpha=2 * alpha, label=label))
+            handles.append(Patch(color=colour, alpha=2 * alpha, label=tr(label)))
     return handles

@@ -9,12 +9,21 @@ from typing import Any
 import numpy as np
 
 from er3a.kinematics.branch import branch_labels
+from er3a.language import N_, joined, said
 from er3a.planning.intervals import Interval, out_of_limits, too_fast, unreachable
 from er3a.planning.singular_events import SingularEvent, singular_events
 from er3a.robots.robot import Robot
 from er3a.stages.trajectory.motion import Motion
 
-WORDS = ("unreachable", "leaves limits", "collides", "too fast", "singular", "near-singular", "safe")
+WORDS = (
+    N_("unreachable"),
+    N_("leaves limits"),
+    N_("collides"),
+    N_("too fast"),
+    N_("singular"),
+    N_("near-singular"),
+    N_("safe"),
+)
 SPEED_STEP = 1e-5  # share of the duration
 
 
@@ -144,31 +153,37 @@ def _text(
     bounded: bool,
 ) -> str:
     if word == "unreachable":
-        return "; ".join(stretch_text(part) for part in beyond)
+        return joined(stretch_text(part) for part in beyond)
     if word in ("leaves limits", "too fast"):
-        faults = [f"{stretch_text(part)}: {part.cause}" for part in (limits or fast)]
-        return "; ".join(filter(None, [*faults, _places(events)]))
+        return joined([*(fault_text(part) for part in (limits or fast)), _places(events)])
     if motion.followed is None:
         places = _places([event for event in events if event.crossing])
-        return f"passes singular poses ({places}), which a joint move does without harm" if places else "no fault"
+        if not places:
+            return N_("no fault")
+        return said("passes singular poses ({places}), which a joint move does without harm", places=places)
     jumps = [
-        f"the branch in use ends at t = {jump.t:.4g} s, J{jump.joint} would jump" for jump in motion.followed.jumps
+        said("the branch in use ends at t = {t:.4g} s, J{joint} would jump", t=jump.t, joint=jump.joint)
+        for jump in motion.followed.jumps
     ]
     if word == "singular":
         places = _places([event for event in events if event.crossing])
-        speeds = "joint speeds stay finite" if bounded else "no finite joint speed follows the path there"
-        return "; ".join(filter(None, [places, *jumps, speeds]))
+        speeds = N_("joint speeds stay finite") if bounded else N_("no finite joint speed follows the path there")
+        return joined([places, *jumps, speeds])
     if word == "near-singular":
         return _places(events)
-    return "no singular pose near, within limits and reach"
+    return N_("no singular pose near, within limits and reach")
 
 
 def _places(events: list[SingularEvent]) -> str:
     parts = []
     for event in events:
-        when = f"{event.t:.4g}" if event.t == event.until else f"{event.t:.4g} to {event.until:.4g}"
-        parts.append(f"{event.type} at t = {when} s{'' if event.crossing else ', at ' + distance_text(event)}")
-    return "; ".join(parts)
+        when = f"{event.t:.4g}" if event.t == event.until else f"{event.t:.4g} – {event.until:.4g}"
+        if event.crossing:
+            parts.append(said("{type} at t = {when} s", type=event.type, when=when))
+        else:
+            passed = {"type": event.type, "when": when, "distance": distance_text(event)}
+            parts.append(said("{type} at t = {when} s, at {distance}", **passed))
+    return joined(parts)
 
 
 def distance_text(event: SingularEvent) -> str:
@@ -180,7 +195,12 @@ def distance_text(event: SingularEvent) -> str:
 
 def stretch_text(part: Interval) -> str:
     """When a stretch starts and ends."""
-    return f"from t = {part.start:.4g} to {part.end:.4g} s"
+    return said("from t = {start:.4g} to {end:.4g} s", start=part.start, end=part.end)
+
+
+def fault_text(part: Interval) -> str:
+    """When a stretch starts and ends, and what is wrong on it."""
+    return said("{when}: {cause}", when=stretch_text(part), cause=part.cause)
 
 
 def _velocity_check(motion: Motion) -> float:

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 
+from er3a.language import tr
 from er3a.robots.robot import Robot
 from er3a.viewing.palette import BODY, GRID, HIGHLIGHT, INK, LINK, MODEL, MUTED
 from er3a.viewing.skeleton import skeleton
@@ -67,7 +68,7 @@ def _floor(ax: Axes, points: np.ndarray) -> None:
     for k, name in enumerate("xyz"):
         tip = corner + 200.0 * np.eye(3)[k]
         ax.plot(*project(np.stack([corner, tip])).T, color=BODY, linewidth=1.6, zorder=1)
-        label = name if k else "x (squares: 200 mm)"
+        label = name if k else tr("x (squares: 200 mm)")
         ax.text(*project(corner + 235.0 * np.eye(3)[k]), label, fontsize=8, color=MUTED, ha="center", va="center")
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from er3a.language import N_, tr
 from er3a.results import read_summary, read_table
 from er3a.robots.robot import Robot
 from er3a.stages.trajectory.clearance_section import clearance_section
@@ -28,21 +29,21 @@ STATUS = {
     "unreachable": "fail",
 }
 WAYS = {
-    "slow": "slow down on the path",
-    "branch": "another solution of the arm first",
-    "via_shift": "via point, tool point shifted",
-    "via_tilt": "via point, tool tilted",
-    "damped": "damped least squares",
-    "detour": "joint move across the region",
-    "stop": "stop before it, with an alarm",
+    "slow": N_("slow down on the path"),
+    "branch": N_("another solution of the arm first"),
+    "via_shift": N_("via point, tool point shifted"),
+    "via_tilt": N_("via point, tool tilted"),
+    "damped": N_("damped least squares"),
+    "detour": N_("joint move across the region"),
+    "stop": N_("stop before it, with an alarm"),
 }
 KINDS = {
-    "joint": "joint move",
-    "joint_sequence": "joint moves in sequence",
-    "line": "straight line",
-    "arc": "circular arc",
-    "sequence": "lines and arcs in sequence",
-    "table": "path from a table",
+    "joint": N_("joint move"),
+    "joint_sequence": N_("joint moves in sequence"),
+    "line": N_("straight line"),
+    "arc": N_("circular arc"),
+    "sequence": N_("lines and arcs in sequence"),
+    "table": N_("path from a table"),
 }
 
 
@@ -88,28 +89,33 @@ def _section(
     near: dict[str, float],
     figure: PathFigure,
 ) -> dict[str, Any]:
+    kind, finding = record["kind"], record["text"]
+    alt = tr(
+        "Panels over time for {path}: joint angles, velocities and accelerations; distances from the singular sets, "
+        "condition number, manipulability; the path in space; joint speeds against their limits. {finding}.",
+        path=record["name"],
+        finding=finding,
+    )
     return {
         **record,
         "status": STATUS[record["verdict"]],
-        "kind_words": KINDS[record["kind"]],
+        "kind_words": tr(KINDS[kind]),
         "speed": _speed(record),
         "events": [_event_row(event) for event in record["singularities"]],
         "faults": [
             [word, fixed(part["t0_s"], 3), fixed(part["t1_s"], 3), *_way(part), part["cause"]]
             for word, key in (
-                ("not reachable", "unreachable"),
-                ("outside limits", "out_of_limits"),
-                ("too fast", "too_fast"),
-                ("collision", "collisions"),
+                (N_("not reachable"), "unreachable"),
+                (N_("outside limits"), "out_of_limits"),
+                (N_("too fast"), "too_fast"),
+                (N_("collision"), "collisions"),
             )
             for part in record[key]
         ],
         "ways": _ways(record),
         "figure": Drawing(
             figure.draw(robot, record, _drawn(record, rows), ways, near),
-            f"Panels over time for {record['name']}: joint angles, velocities and accelerations; distances from the "
-            f"singular sets, condition number, manipulability; the path in space; joint speeds against their limits. "
-            f"{record['text']}.",
+            alt,
             _conclusion(record, rows),
         ),
     }
@@ -132,19 +138,20 @@ def _ways(record: dict[str, Any]) -> list[list[str]]:
     shares = (record[f"max_joint_{kind}_ratio"] for kind in ("speed", "acceleration"))
     clearance = record["clearance"] and record["clearance"]["least_mm"]
     cells = ["0", "0", *(_share(share) for share in shares), _clearance(clearance), duration]
-    rows = [["as programmed", *cells, "the path to be repaired"]]
+    rows = [[tr("as programmed"), *cells, tr("the path to be repaired")]]
     for price in record["repairs"]:
-        name = WAYS[price["way"]] + (" ←" if price["way"] == record["repair"] else "")
+        way, reason = price["way"], price["reason"]
+        name = tr(WAYS[way]) + (" ←" if way == record["repair"] else "")
         if price["duration_s"] is None:
-            rows.append([name, *["–"] * 6, f"not possible: {price['reason']}"])
+            rows.append([name, *["–"] * 6, tr("not possible: {reason}", reason=reason)])
             continue
-        remark = f"not usable: {price['reason']}" if price["reason"] else _remark(price)
+        remark = tr("not usable: {reason}", reason=reason) if reason else _remark(price)
         off = (_small(price["max_deviation_mm"]), _small(price["max_deviation_deg"]))
         shares = (_share(price[f"max_joint_{kind}_ratio"]) for kind in ("speed", "acceleration"))
         rows.append([name, *off, *shares, _clearance(price["clearance_mm"]), fixed(price["duration_s"], 2), remark])
     if record["fastest_s"]:
         cells = ["0", "0", "1.00", "1.00", _clearance(clearance), fixed(record["fastest_s"], 2)]
-        rows.append(["the path at its fastest", *cells, "for comparison"])
+        rows.append([tr("the path at its fastest"), *cells, tr("for comparison")])
     return rows
 
 
@@ -154,12 +161,12 @@ def _clearance(value: float | None) -> str:
 
 def _remark(price: dict[str, Any]) -> str:
     if price["way"] == "detour":
-        return "a joint move takes no harm from singular poses"
-    return "keeps its distance from singular poses" if price["keeps_clear"] else "goes through the region"
+        return tr("a joint move takes no harm from singular poses")
+    return tr("keeps its distance from singular poses") if price["keeps_clear"] else tr("goes through the region")
 
 
 def _share(value: float | None) -> str:
-    return "no bound" if value is None else fixed(value, 2)
+    return tr("no bound") if value is None else fixed(value, 2)
 
 
 def _small(value: float) -> str:
@@ -173,22 +180,24 @@ def _conclusion(record: dict[str, Any], rows: pd.DataFrame) -> str:
     parts = []
     if fastest:
         joint = int(np.argmax(fastest))
-        parts.append(f"J{joint + 1} is the fastest joint, with {number(fastest[joint], 3)} deg/s.")
+        speed = number(fastest[joint], 3)
+        parts.append(tr("J{joint} is the fastest joint, with {speed} deg/s.", joint=joint + 1, speed=speed))
     elif rows["reachable"].any():
-        parts.append("Towards the edge of reach the joint speeds grow without bound: the path has to end before it.")
+        parts.append(tr("Towards the edge of reach the joint speeds grow without bound: the path must end before it."))
     else:
-        parts.append("No point of the path can be reached.")
+        parts.append(tr("No point of the path can be reached."))
     if np.isinf(condition).any() or any(event["crossing"] for event in record["singularities"]):
-        parts.append("The condition number has no bound at the marked singular poses.")
+        parts.append(tr("The condition number has no bound at the marked singular poses."))
     elif condition.notna().any():
-        parts.append(f"The condition number rises to {number(float(condition.max()), 3)} at most.")
+        most = number(float(condition.max()), 3)
+        parts.append(tr("The condition number rises to {most} at most.", most=most))
     return " ".join(parts)
 
 
 def _speed(record: dict[str, Any]) -> str:
     fastest = record["max_joint_speed_deg_s"]
     if not fastest:
-        return "–" if not record["joint_speed_bounded"] and record["verdict"] == "unreachable" else "unbounded"
+        return "–" if not record["joint_speed_bounded"] and record["verdict"] == "unreachable" else tr("unbounded")
     joint = int(np.argmax(fastest))
     return f"{number(fastest[joint], 3)} (J{joint + 1})"
 
@@ -196,12 +205,12 @@ def _speed(record: dict[str, Any]) -> str:
 def _event_row(event: dict[str, Any]) -> list[str]:
     when = fixed(event["t_s"], 6)
     if event["until_s"] > event["t_s"]:
-        when += f" to {fixed(event['until_s'], 6)}"
+        when += f" – {fixed(event['until_s'], 6)}"
     if event["crossing"]:
-        return [event["type"], when, "meets it", "0"]
+        return [event["type"], when, tr("meets it"), "0"]
     if event["type"] == "shoulder":
-        return [event["type"], when, "passes by", f"{number(event['distance_mm'], 3)} mm"]
-    return [event["type"], when, "passes by", f"{number(event['distance_deg'], 3)} deg"]
+        return [event["type"], when, tr("passes by"), f"{number(event['distance_mm'], 3)} mm"]
+    return [event["type"], when, tr("passes by"), f"{number(event['distance_deg'], 3)} deg"]
 
 
 def _way(part: dict[str, Any]) -> list[str]:

@@ -9,6 +9,7 @@ import pandas as pd
 import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
+from er3a.language import tr
 from er3a.robots.robot import Robot
 from er3a.viewing.palette import HIGHLIGHT, INK, LINK, MODEL
 from er3a.viewing.skeleton import skeleton
@@ -67,25 +68,26 @@ def _add(figure: go.Figure, robot: Robot, record: dict[str, Any], rows: pd.DataF
         "cmin": LOG_RANGE[0],
         "cmax": LOG_RANGE[1],
     }
-    bar = {"title": {"text": "condition number"}, "tickvals": [0.5, 1, 2, 2.5], "len": 0.7}
-    bar["ticktext"] = ["3", "10", "100", "300 or more"]
+    bar = {"title": {"text": tr("condition number")}, "tickvals": [0.5, 1, 2, 2.5], "len": 0.7}
+    bar["ticktext"] = ["3", "10", "100", tr("300 or more")]
     points = np.round(rows[_XYZ].to_numpy(), 1)
-    _line(figure, points[kept], "path", {**colour, "width": 9, "showscale": True, "colorbar": bar})
+    _line(figure, points[kept], tr("path"), {**colour, "width": 9, "showscale": True, "colorbar": bar})
     reached = rows["reachable"].to_numpy()
     if not reached.all():
         out = np.where(reached[:, None], np.nan, points)[kept]
-        _line(figure, out, "not reachable", {"color": "#888888", "width": 10})
+        _line(figure, out, tr("not reachable"), {"color": "#888888", "width": 10})
     if len(ways):
-        _line(figure, np.round(ways[_XYZ].to_numpy(), 1), "repaired", {"color": MODEL, "width": 4})
+        _line(figure, np.round(ways[_XYZ].to_numpy(), 1), tr("repaired"), {"color": MODEL, "width": 4})
     q = np.radians(rows[[f"q{j + 1}_deg" for j in range(6)]].to_numpy())
     index = np.flatnonzero(reached)
-    last = "arm at the end" if reached.all() else "arm at the last point reached"
-    for k, name, shade in ((index[:1], "arm at the start", INK), (index[-1:], last, LINK)):
+    last = tr("arm at the end") if reached.all() else tr("arm at the last point reached")
+    for k, name, shade in ((index[:1], tr("arm at the start"), INK), (index[-1:], last, LINK)):
         for i in k:
             _line(figure, skeleton(robot, q[i]) * 1000, name, {"color": shade, "width": 8})
     for event, i in list(zip(record["singularities"], events))[:MOST_ARMS]:
         if reached[i]:
-            name = f"{'' if event['crossing'] else 'near '}{event['type']}, t = {event['t_s']:.3f} s"
+            singular = tr("{type}, t = {t:.3f} s", type=event["type"], t=event["t_s"])
+            name = singular if event["crossing"] else tr("near {singular}", singular=singular)
             _line(figure, skeleton(robot, q[i]) * 1000, name, {"color": HIGHLIGHT, "width": 4})
     return len(figure.data) - before
 

@@ -13,11 +13,12 @@ from er3a.collision.along import clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import characteristic_length, conditioning
+from er3a.language import N_, joined, said
 from er3a.planning.repairs.compare import Price, best, compare
 from er3a.planning.repairs.trouble import Trouble, trouble_of
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
 from er3a.robots.robot import Robot
-from er3a.stages.trajectory.judge import Judgement
+from er3a.stages.trajectory.judge import Judgement, stretch_text
 from er3a.stages.trajectory.motion import Motion
 
 ROWS = 250  # of each way in the table
@@ -27,13 +28,13 @@ _MEASURES = ["deviation_mm", "deviation_deg", "speed_share", "condition_number",
 NUMBERS = ("t_s", *_PER_JOINT, "x_mm", "y_mm", "z_mm", *_MEASURES)
 CLEARANCE_TIMES = 41
 SENTENCES = {
-    "slow": "Keep the path and slow down",
-    "branch": "Change to another solution of the arm first",
-    "via_shift": "Bend the path through a shifted via point",
-    "via_tilt": "Bend the path through a tilted via point",
-    "damped": "Let damped least squares leave the path",
-    "detour": "Cross the region by a joint move",
-    "stop": "Stop before the region with an alarm",
+    "slow": N_("Keep the path and slow down"),
+    "branch": N_("Change to another solution of the arm first"),
+    "via_shift": N_("Bend the path through a shifted via point"),
+    "via_tilt": N_("Bend the path through a tilted via point"),
+    "damped": N_("Let damped least squares leave the path"),
+    "detour": N_("Cross the region by a joint move"),
+    "stop": N_("Stop before the region with an alarm"),
 }
 
 
@@ -108,8 +109,8 @@ def _measured(price: Price, surroundings: Surroundings) -> tuple[Price, float | 
         return price, None
     least = float(along.distance[along.least] * 1000)
     if along.contacts:
-        meets = f"{along.pair[along.least]} overlap by {-least:.1f} mm"
-        reason = "; ".join(filter(None, [price.reason, meets]))
+        meets = said("{pair} overlap by {depth:.1f} mm", pair=along.pair[along.least], depth=-least)
+        reason = joined([price.reason, meets])
         price = replace(price, usable=False, reason=reason)
     return price, least
 
@@ -190,24 +191,36 @@ def _text(motion: Motion, found: Judgement, prices: list[Price], taken: Price | 
     if not prices:
         return None
     if taken is not None:
-        far, turned = taken.distance.max() * 1000, np.degrees(taken.angle.max())
-        price = [f"{far:.2g} mm" if far >= 0.005 else "", f"{turned:.2g} deg" if turned >= 0.005 else ""]
-        leaves = " and ".join(filter(None, price))
-        longer = taken.motion.duration - motion.built.duration
-        time = f"{abs(longer):.2f} s {'more' if longer > 0 else 'less'}" if abs(longer) >= 0.005 else "no more time"
-        return (
-            f"{SENTENCES[taken.name]}: the tool {f'leaves the path by {leaves}' if leaves else 'stays on the path'}, "
-            f"and it takes {time} than programmed"
-        )
+        cost = {"tool": _leaves(taken), "time": _time(taken.motion.duration - motion.built.duration)}
+        return said("{way}: {tool}, and {time}", way=SENTENCES[taken.name], **cost)
     if found.beyond:
-        parts = [f"from t = {part.start:.4g} to {part.end:.4g} s" for part in found.beyond]
-        why = f"it is out of reach {' and '.join(parts)}"
+        why = said("it is out of reach {when}", when=joined((stretch_text(part) for part in found.beyond), ", "))
     else:
         causes = [part.cause for part in found.limits] or [price.reason for price in prices if price.reason]
-        why = "; ".join(dict.fromkeys(causes))
+        why = joined(dict.fromkeys(causes))
     if len(prices) == 1:
-        return f"{SENTENCES[prices[0].name]}, as the study asks for, does not repair it: {prices[0].reason}"
-    return f"No way around completes this path: {why}"
+        only = {"way": SENTENCES[prices[0].name], "reason": prices[0].reason}
+        return said("{way}, as the study asks for, does not repair it: {reason}", **only)
+    return said("No way around completes this path: {why}", why=why)
+
+
+def _leaves(way: Price) -> str:
+    far, turned = way.distance.max() * 1000, np.degrees(way.angle.max())
+    if far < 0.005 and turned < 0.005:
+        return N_("the tool stays on the path")
+    if turned < 0.005:
+        return said("the tool leaves the path by {far:.2g} mm", far=far)
+    if far < 0.005:
+        return said("the tool leaves the path by {turned:.2g} deg", turned=turned)
+    return said("the tool leaves the path by {far:.2g} mm and {turned:.2g} deg", far=far, turned=turned)
+
+
+def _time(longer: float) -> str:
+    if abs(longer) < 0.005:
+        return N_("it takes no more time than programmed")
+    if longer > 0:
+        return said("it takes {longer:.2f} s more than programmed", longer=longer)
+    return said("it takes {shorter:.2f} s less than programmed", shorter=-longer)
 
 
 def _rows(
