@@ -137,6 +137,7 @@ def diff(
     old: Annotated[Path, typer.Argument(help="a results folder")],
     new: Annotated[Path, typer.Argument(help="another results folder")],
     output: Annotated[Path | None, typer.Option(help="also write them as a page")] = None,
+    words: Annotated[str, typer.Option("--language", help=" | ".join(language.LANGUAGES))] = "en",
 ):
     """Compare two results folders: verdicts, key figures and tables that moved."""
     from dataclasses import astuple
@@ -145,13 +146,16 @@ def diff(
     from rich.console import Console
     from rich.table import Table
 
-    from er3a.viewing.diff import changes, write_diff
+    from er3a.viewing.diff import COLUMNS, changes, write_diff
 
+    if words not in language.LANGUAGES:
+        raise Er3aError(f"--language is '{words}'; known: {', '.join(language.LANGUAGES)}")
+    language.use(words)
     found = changes(old, new)
-    table = Table("robot", "stage", "what", "old", "new", "difference", "note", box=box.SIMPLE)
+    table = Table(*(language.tr(column) for column in COLUMNS), box=box.SIMPLE)
     for change in found:
         table.add_row(*astuple(change))
-    Console().print(table if found else "Nothing differs.")
+    Console().print(table if found else language.tr("Nothing differs."))
     if output:
         write_diff(old, new, found, output)
 

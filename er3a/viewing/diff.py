@@ -8,10 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from er3a.errors import ResultError
-from er3a.language import tr
+from er3a.language import N_, tr
 from er3a.results import CHECKSUMS, read_summary, sha256
 from er3a.viewing import page
 from er3a.viewing.numbers import number
+
+
+COLUMNS = (N_("robot"), N_("stage"), N_("what"), N_("old"), N_("new"), N_("difference"), N_("note"))
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,7 @@ def changes(old: Path, new: Path) -> list[Change]:
 def write_diff(old: Path, new: Path, found: list[Change], output: Path) -> None:
     """Render the changes as a page."""
     rows = [astuple(change) for change in found]
-    page.render(Path(__file__).with_name("diff.html.j2"), output, old=old, new=new, rows=rows)
+    page.render(Path(__file__).with_name("diff.html.j2"), output, old=old, new=new, columns=COLUMNS, rows=rows)
 
 
 def _stages(folder: Path) -> set[tuple[str, str]]:

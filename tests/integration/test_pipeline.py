@@ -88,6 +88,18 @@ def test_editing_the_base_template_renders_all_pages_and_no_number(small_study):
         assert small_study.planned() == expected | {"write the index"}
 
 
+def test_another_language_renders_pages_and_computes_nothing(small_study):
+    with edited(small_study.folder / "config/small.yaml", "\ntrajectory:", "\nreport: {language: zh}\ntrajectory:"):
+        planned = small_study.planned()
+    assert {f"{robot}: report {stage}" for robot in ROBOTS for stage in STAGES} | PANELS <= planned
+    assert not [job for job in planned if "compute" in job or "sample" in job]
+
+
+def test_an_edit_of_the_chinese_catalogue_leaves_english_pages(small_study):
+    with edited(small_study.folder / "er3a/locale/zh/LC_MESSAGES/er3a.po", "所有机器人", "全部机器人"):
+        assert small_study.planned() == set()
+
+
 def test_editing_a_script_writes_the_teach_panels_only(small_study):
     with edited(small_study.folder / "er3a/teach/kinematics.js", "/**", "/** Edited."):
         assert small_study.planned() == PANELS | {"write the index"}
