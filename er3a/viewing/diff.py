@@ -13,7 +13,6 @@ from er3a.results import CHECKSUMS, read_summary, sha256
 from er3a.viewing import page
 from er3a.viewing.numbers import number
 
-
 COLUMNS = (N_("robot"), N_("stage"), N_("what"), N_("old"), N_("new"), N_("difference"), N_("note"))
 
 
