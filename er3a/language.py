@@ -54,7 +54,8 @@ def said(template: str, /, **parts: Any) -> str:
     """A finding in English: ``template`` with its fields filled in as ``str.format`` does.
 
     Within a function that :func:`keeps_sentences`, how the text was composed is remembered. Parts may be findings
-    themselves. Fields are plain names: ``{angle:.1f}``, not ``{joint.angle}``.
+    themselves. Fields are plain names: ``{angle:.1f}``, not ``{joint.angle}``. A field whose name starts with ``own_``
+    holds a name out of an input file: it is never taken for a word of ours.
     """
     text = template.format(**parts)
     findings = _findings.get()
@@ -164,7 +165,8 @@ def tr(text: str, /, **parts: Any) -> str:
 
 
 def _compose(template: str, parts: dict[str, str]) -> str:
-    return _AsIs().format(_catalogue.gettext(template), **{name: tr(part) for name, part in parts.items()})
+    shown = {name: part if name.startswith("own_") else tr(part) for name, part in parts.items()}
+    return _AsIs().format(_catalogue.gettext(template), **shown)
 
 
 def _filled(template: str, parts: dict[str, Any]) -> dict[str, str]:

@@ -29,6 +29,7 @@ from scipy.optimize import brentq
 
 from er3a.collision.bodies import Bodies
 from er3a.collision.envelopes import link_frames
+from er3a.language import N_
 
 SHORTEST = 1e-9  # share of the duration; motion that is wide over less is a jump
 LOCATED = 1e-10  # share of the duration
@@ -122,7 +123,7 @@ def clearance_along(bodies: Bodies, joints: Joints, t: np.ndarray, shown: np.nda
     motion = _Motion(bodies, joints)
     every = np.arange(len(bodies.names))
     if not every.size:
-        return ClearanceAlong(shown, np.full(len(shown), np.nan), ("nothing near",) * len(shown), (), 0)
+        return ClearanceAlong(shown, np.full(len(shown), np.nan), (N_("nothing near"),) * len(shown), (), 0)
     times, q, way = _fine(motion, t, 2 * depth)
     reached = np.isfinite(q[:, 0])
     for i in np.flatnonzero(np.isin(times, shown) & reached):

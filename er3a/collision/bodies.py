@@ -18,6 +18,7 @@ from er3a.collision.envelopes import BASE, capsule_poses, envelopes_of
 from er3a.collision.scene import SceneFile
 from er3a.errors import Er3aError
 from er3a.kinematics.transforms import transform
+from er3a.language import N_, said
 from er3a.robots.robot import Envelope, Robot
 
 try:
@@ -65,8 +66,12 @@ class Bodies:
         self.first = np.array([i for i, _ in own] + [i for _ in self._solids for i in moving], dtype=int)
         self.second = np.array([j for _, j in own] + [-1 for _ in self._solids for _ in moving], dtype=int)
         self.names = tuple(
-            [f"{links[i]} and {links[j]}" for i, j in own]
-            + [f"{links[i]} and {name}" for name, _, _ in self._solids for i in moving]
+            [said("{first} and {second}", first=links[i], second=links[j]) for i, j in own]
+            + [
+                said("{link} and {own_name}", link=links[i], own_name=name)
+                for name, _, _ in self._solids
+                for i in moving
+            ]
         )
         self._solid_of = [-1] * len(own) + [k for k in range(len(self._solids)) for _ in moving]
 
@@ -138,4 +143,4 @@ def _placed(ends: np.ndarray) -> list:
 
 
 def _link_name(capsule: Envelope) -> str:
-    return "base" if capsule.link == BASE else f"link {capsule.link}"
+    return N_("base") if capsule.link == BASE else said("link {number}", number=capsule.link)

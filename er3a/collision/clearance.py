@@ -8,6 +8,7 @@ import numpy as np
 
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import SceneFile
+from er3a.language import N_
 from er3a.robots.robot import Robot
 
 
@@ -40,5 +41,5 @@ def clearance(robot: Robot, q: np.ndarray, scene: SceneFile | None) -> Clearance
         found = bodies.distances(ends, pairs)
         least = int(np.argmin(found)) if found.size else -1
         distances.append(found[least] if found.size else np.inf)
-        names.append(bodies.names[least] if found.size else "nothing near")
+        names.append(bodies.names[least] if found.size else N_("nothing near"))
     return Clearance(np.array(distances), tuple(names))

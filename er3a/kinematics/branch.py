@@ -18,7 +18,19 @@ from er3a.kinematics.closed_form import BOUNDARY_M, SLOTS
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.vectors import signed_angle
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
+from er3a.language import N_
 from er3a.robots.robot import Robot
+
+LABELS = (  # by shoulder, elbow and wrist
+    (
+        (N_("front, elbow up, no flip"), N_("front, elbow up, flip")),
+        (N_("front, elbow down, no flip"), N_("front, elbow down, flip")),
+    ),
+    (
+        (N_("back, elbow up, no flip"), N_("back, elbow up, flip")),
+        (N_("back, elbow down, no flip"), N_("back, elbow down, flip")),
+    ),
+)
 
 
 def branch_of(robot: Robot, q: np.ndarray) -> np.ndarray:
@@ -57,7 +69,6 @@ def branch_labels(robot: Robot) -> tuple[str, ...]:
         side = forward_root * (1.0 if slot < 4 else -1.0)
         outward = side * np.cross(w1, w2)
         bend = 1.0 if slot % 4 < 2 else -1.0
-        up = bend * (np.cross(w2, outward) @ w1) < 0
-        shoulder = "front" if side == zero_side else "back"
-        labels.append(f"{shoulder}, elbow {'up' if up else 'down'}, {'flip' if slot % 2 else 'no flip'}")
+        down = bend * (np.cross(w2, outward) @ w1) >= 0
+        labels.append(LABELS[int(side != zero_side)][int(down)][slot % 2])
     return tuple(labels)

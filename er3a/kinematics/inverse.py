@@ -17,6 +17,7 @@ from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.transforms import check_poses
 from er3a.kinematics.turns import TURN, limit_reason, nearest_turns, principal, turn_bounds, within
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
+from er3a.language import N_, said
 from er3a.robots.robot import Robot
 
 SAME_JOINTS = 1e-9
@@ -24,6 +25,7 @@ SAME_MEMBER = 1e-6
 MOST_ROWS = 10_000
 STARTS = 400
 CLOSED_FORM = "closed form"
+SIDES = N_("front"), N_("back")
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,8 +118,12 @@ def _judged(robot: Robot, branches: list[int], rows: list[np.ndarray], labels: S
 def _by_iteration(robot: Robot, T: np.ndarray, q_ref: np.ndarray, lacking: str) -> Solutions:
     arms, first = all_found(robot, T, STARTS)
     rows = [_rows_of_branch(robot, q, q_ref) for q in arms]
-    labels = [f"arm {number + 1}" for number in range(len(arms))]
-    method = f"iteration from {STARTS} random starts, which may miss solutions; no closed form, because {lacking}"
+    labels = [said("arm {number}", number=number + 1) for number in range(len(arms))]
+    method = said(
+        "iteration from {starts} random starts, which may miss solutions; no closed form, because {lacking}",
+        starts=STARTS,
+        lacking=lacking,
+    )
     unsolved = () if len(arms) else (str(first.reason),)
     return _judged(robot, list(range(len(arms))), rows, labels, unsolved=unsolved, method=method)
 
@@ -172,24 +178,32 @@ def _unsolved(robot: Robot, fault: np.ndarray, gap: np.ndarray) -> tuple[str, ..
         if (fault[part] == REACHED).any():
             continue
         best = 4 * shoulder + int(np.argmin(gap[part]))
-        side = branch_labels(robot)[best].split(",")[0]
-        texts.append(f"{side}: {_fault_text(robot, int(fault[best]), float(gap[best]))}")
+        side = SIDES[branch_labels(robot)[best].startswith("back")]
+        fault_text = _fault_text(robot, int(fault[best]), float(gap[best]))
+        texts.append(said("{side}: {fault}", side=side, fault=fault_text))
     return tuple(texts)
 
 
 def _fault_text(robot: Robot, fault: int, gap: float) -> str:
     arm = wrist_partitioned_arm(robot)
     if fault == ORIENTATION:
-        return f"the wrist can't tilt that far; {np.degrees(gap):.3g} deg are missing"
+        return said("the wrist can't tilt that far; {angle:.3g} deg are missing", angle=np.degrees(gap))
     if fault == OFF_AXIS:
-        return f"the wrist centre would be {_mm(gap)} too near to axis 1 for the arm's sideways offset"
-    if fault == TOO_FAR:
-        return (
-            f"the wrist centre would be {_mm(gap)} too far from axis 2, "
-            f"which the stretched arm reaches to {_mm(arm.wrist_reach)}"
+        return said(
+            "the wrist centre would be {gap} too near to axis 1 for the arm's sideways offset",
+            gap=_mm(gap),
         )
-    least = abs(arm.upper_arm_length - arm.forearm_length)
-    return f"the wrist centre would be {_mm(gap)} too near to axis 2, which the folded arm reaches down to {_mm(least)}"
+    if fault == TOO_FAR:
+        return said(
+            "the wrist centre would be {gap} too far from axis 2, which the stretched arm reaches to {reach}",
+            gap=_mm(gap),
+            reach=_mm(arm.wrist_reach),
+        )
+    return said(
+        "the wrist centre would be {gap} too near to axis 2, which the folded arm reaches down to {least}",
+        gap=_mm(gap),
+        least=_mm(abs(arm.upper_arm_length - arm.forearm_length)),
+    )
 
 
 def _mm(length: float) -> str:

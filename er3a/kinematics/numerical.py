@@ -14,6 +14,7 @@ from er3a.kinematics.iteration import solve_numerically
 from er3a.kinematics.threads import share_out
 from er3a.kinematics.transforms import as_floats, check_poses
 from er3a.kinematics.turns import limit_reason, nearest_turns, principal, within
+from er3a.language import said
 from er3a.robots.robot import Robot
 
 SOLVED, UNREACHABLE, SINGULAR, LIMIT_BOUND, BAD_GUESS = "solved", "unreachable", "singular", "limit-bound", "bad guess"
@@ -150,26 +151,39 @@ class _Search:
 
     def explain(self, T: np.ndarray, q: np.ndarray, error: np.ndarray, respect: bool, restarts: int) -> tuple[str, str]:
         """Why one pose was not solved: its nearest arm and a search without what may have hindered it."""
-        miss = f"the nearest arm found misses by {error[0] * 1000:.3g} mm and {np.degrees(error[1]):.3g} deg"
+        miss = said(
+            "the nearest arm found misses by {position:.3g} mm and {rotation:.3g} deg",
+            position=error[0] * 1000,
+            rotation=np.degrees(error[1]),
+        )
         if restarts < DIAGNOSIS_RESTARTS:
             _, _, starts = self.run(T[None], q[None], respect, DIAGNOSIS_RESTARTS, 1)
             if starts[0]:
-                return BAD_GUESS, f"bad guess: from the start given {miss}; other starts solve it, so allow restarts"
+                return BAD_GUESS, said(
+                    "bad guess: from the start given {miss}; other starts solve it, so allow restarts", miss=miss
+                )
         if respect:
             free, _, starts = self.run(T[None], q[None], False, DIAGNOSIS_RESTARTS, 1)
             if starts[0]:
                 turned = nearest_turns(self.robot, free[0], q)
                 if within(self.robot, turned):
-                    return BAD_GUESS, f"bad guess: {miss}; without limits an arm within them was found, start there"
-                beyond = limit_reason(self.robot, turned)
-                return LIMIT_BOUND, f"limit-bound: {miss}; an arm that leaves the limits solves it: {beyond}"
+                    return BAD_GUESS, said(
+                        "bad guess: {miss}; without limits an arm within them was found, start there", miss=miss
+                    )
+                return LIMIT_BOUND, said(
+                    "limit-bound: {miss}; an arm that leaves the limits solves it: {beyond}",
+                    miss=miss,
+                    beyond=limit_reason(self.robot, turned),
+                )
         length = arm_length(self.robot)
         J = jacobian(self.robot, q)
         J[:3] /= length
         singular = np.linalg.svd(J[self.mask > 0], compute_uv=False)[-1] < RANK
         if singular and max(error[0] / length, error[1]) < NEARLY:
-            return SINGULAR, f"singular: the iteration creeps towards a singular arm, where it ends: {miss}"
-        return UNREACHABLE, f"unreachable: {miss}, whatever the start"
+            return SINGULAR, said(
+                "singular: the iteration creeps towards a singular arm, where it ends: {miss}", miss=miss
+            )
+        return UNREACHABLE, said("unreachable: {miss}, whatever the start", miss=miss)
 
 
 def _checked_mask(mask: np.ndarray | None) -> np.ndarray:

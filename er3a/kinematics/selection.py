@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.kinematics.inverse import Solutions
+from er3a.language import N_, joined, said
 from er3a.robots.robot import Robot
 
-NEAREST_RULE = (
+NEAREST_RULE = N_(
     "Of the solutions within the limits, take the one whose greatest joint move from the reference is least: where all "
     "joints start and stop together, that joint decides how long the move takes. Between equals (to 1e-9 rad) the "
     "least root of the summed squares of all joint moves decides, then the lower branch number."
@@ -83,26 +84,33 @@ def _why_first(robot: Robot, solutions: Solutions, order: np.ndarray, moves: np.
     chosen = order[0]
     joint = int(moves[chosen].argmax())
     most = moves[chosen, joint]
-    text = f"greatest joint move {np.degrees(most):.1f} deg (J{joint + 1})"
+    move = said("greatest joint move {angle:.1f} deg (J{joint})", angle=np.degrees(most), joint=joint + 1)
     if len(order) == 1:
-        return f"{text}; the only solution within the limits"
+        return said("{move}; the only solution within the limits", move=move)
     second = order[1]
-    other = f"the next best ({_told_apart(robot, solutions, chosen, second)})"
+    other = said("the next best ({branch})", branch=_told_apart(robot, solutions, chosen, second))
     margin = moves[second].max() - most
     if margin > SAME_MOVE:
-        return f"{text}, {np.degrees(margin):.3g} deg less than {other}"
+        return said("{move}, {angle:.3g} deg less than {other}", move=move, angle=np.degrees(margin), other=other)
     nearer = distance[second] - distance[chosen]
     if nearer > SAME_MOVE:
-        return f"{text}, as with {other}; all joints taken together move {np.degrees(nearer):.3g} deg less"
-    return f"{text}; {other} is just as near, and the lower branch number decides"
+        return said(
+            "{move}, as with {other}; all joints taken together move {angle:.3g} deg less",
+            move=move,
+            other=other,
+            angle=np.degrees(nearer),
+        )
+    return said("{move}; {other} is just as near, and the lower branch number decides", move=move, other=other)
 
 
 def _told_apart(robot: Robot, solutions: Solutions, chosen: int, other: int) -> str:
     turns = solutions.turn[other] - solutions.turn[chosen]
     if solutions.branch[other] != solutions.branch[chosen]:
         return solutions.label[other]
-    words = [f"J{j + 1} turned by {360 * turns[j]:+d} deg" for j in np.flatnonzero(turns)]
-    return "the same branch, " + (", ".join(words) or "its free joint at another angle")
+    turned = [said("J{joint} turned by {turn:+d} deg", joint=j + 1, turn=360 * turns[j]) for j in np.flatnonzero(turns)]
+    if not turned:
+        return N_("the same branch, its free joint at another angle")
+    return said("the same branch, {turned}", turned=joined(turned, ", "))
 
 
 def _why_none(robot: Robot, solutions: Solutions) -> str:
@@ -111,12 +119,16 @@ def _why_none(robot: Robot, solutions: Solutions) -> str:
             return solutions.unsolved[0]
         sides = [text.split(": ", 1) for text in solutions.unsolved]
         if len({text for _, text in sides}) == 1:
-            return f"out of reach: {sides[0][1]}"
-        return "out of reach: " + "; ".join(f"{side}, {text}" for side, text in sides)
+            return said("out of reach: {fault}", fault=sides[0][1])
+        return said("out of reach: {fault}", fault=joined((joined(side, ", ") for side in sides), "; "))
     least = int(limit_margin(robot, solutions.q).argmax())
     label = solutions.label[least]
-    count = len(solutions.q)
-    start = (
-        f"all {count} solutions leave the limits; the least so is" if count > 1 else "the only solution leaves them:"
+    count, reason = len(solutions.q), solutions.reason[least]
+    if count == 1:
+        return said("the only solution leaves them: {branch}: {reason}", branch=label, reason=reason)
+    return said(
+        "all {count} solutions leave the limits; the least so is {branch}: {reason}",
+        count=count,
+        branch=label,
+        reason=reason,
     )
-    return f"{start} {label}: {solutions.reason[least]}"

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from er3a.language import N_, joined, said
 from er3a.robots.robot import Robot
 
 LIMIT_TOLERANCE = 1e-9
 TURN = 2 * np.pi
+ABOVE = N_("J{joint} at {at:.1f} deg is {by:.3g} deg above its limit of {bound:g} deg")
+BELOW = N_("J{joint} at {at:.1f} deg is {by:.3g} deg below its limit of {bound:g} deg")
 
 
 def within(robot: Robot, q: np.ndarray) -> np.ndarray:
@@ -41,11 +44,11 @@ def limit_reason(robot: Robot, q: np.ndarray) -> str:
     """Which limits the angles (6,) leave, and by how many degrees; empty if none."""
     parts = []
     for j, angle in enumerate(q):
-        for excess, side, limit in (
-            (angle - robot.upper[j], "above", robot.upper[j]),
-            (robot.lower[j] - angle, "below", robot.lower[j]),
+        for excess, text, limit in (
+            (angle - robot.upper[j], ABOVE, robot.upper[j]),
+            (robot.lower[j] - angle, BELOW, robot.lower[j]),
         ):
             if excess > LIMIT_TOLERANCE:
                 at, by, bound = np.degrees([angle, excess, limit])
-                parts.append(f"J{j + 1} at {at:.1f} deg is {by:.3g} deg {side} its limit of {bound:g} deg")
-    return "; ".join(parts)
+                parts.append(said(text, joint=j + 1, at=at, by=by, bound=bound))
+    return joined(parts, "; ")

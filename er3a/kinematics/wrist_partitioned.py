@@ -16,6 +16,7 @@ from er3a.kinematics.block_constants import BlockConstants, block_constants
 from er3a.kinematics.chain import axes_at_zero_theta
 from er3a.kinematics.closed_form import APART, BOUNDARY_M, BOUNDARY_RAD, SLOTS, ArmConstants, solve
 from er3a.kinematics.vectors import Vector, signed_angle, unsigned_angle
+from er3a.language import N_, said
 from er3a.robots.robot import Robot
 
 PARALLEL = 1e-9
@@ -71,18 +72,19 @@ def wrist_partitioned_arm(robot: Robot) -> WristPartitionedArm:
     """
     axes, points, T_base_tool = axes_at_zero_theta(robot)
     if np.linalg.norm(np.cross(axes[1], axes[2])) > PARALLEL:
-        raise NotWristPartitionedError(robot.name, "axes 2 and 3 are not parallel")
+        raise NotWristPartitionedError(robot.name, N_("axes 2 and 3 are not parallel"))
     for i, j in ((0, 1), (3, 4), (4, 5)):
         if np.linalg.norm(np.cross(axes[i], axes[j])) < PARALLEL:
-            raise NotWristPartitionedError(robot.name, f"axes {i + 1} and {j + 1} are parallel")
+            problem = said("axes {first} and {second} are parallel", first=i + 1, second=j + 1)
+            raise NotWristPartitionedError(robot.name, problem)
     wrist, miss = _meeting_point(axes[3:], points[3:])
     if miss > BOUNDARY_M:
-        problem = f"axes 4, 5 and 6 miss a common point by {miss * 1000:.6g} mm"
+        problem = said("axes 4, 5 and 6 miss a common point by {miss:.6g} mm", miss=miss * 1000)
         raise NotWristPartitionedError(robot.name, problem)
     across = np.eye(3) - np.outer(axes[1], axes[1])
     upper_arm, forearm = across @ (points[2] - points[1]), across @ (wrist - points[2])
     if min(np.linalg.norm(upper_arm), np.linalg.norm(forearm)) < BOUNDARY_M:
-        raise NotWristPartitionedError(robot.name, "the upper arm or the forearm has no length")
+        raise NotWristPartitionedError(robot.name, N_("the upper arm or the forearm has no length"))
     return WristPartitionedArm(
         axes=axes,
         points=points,

@@ -18,6 +18,7 @@ from er3a.collision.scene import SceneFile
 from er3a.errors import Er3aError
 from er3a.kinematics.selection import limit_margin
 from er3a.kinematics.singularity import characteristic_length, conditioning
+from er3a.language import N_
 from er3a.robots.robot import Robot
 
 
@@ -80,14 +81,14 @@ def _clearance(robot: Robot, q: np.ndarray, q_ref: np.ndarray, scene: SceneFile 
 
 
 RULES: dict[str, Rule] = {
-    "nearest": Rule("least greatest joint move", "deg", "least", _greatest_move),
-    "weighted": Rule(
-        "least joint moves, weighted by how far each joint swings the tool", "deg", "least", _weighted_move
+    N_("nearest"): Rule(N_("least greatest joint move"), "deg", "least", _greatest_move),
+    N_("weighted"): Rule(
+        N_("least joint moves, weighted by how far each joint swings the tool"), "deg", "least", _weighted_move
     ),
-    "time": Rule("least time at the joint speeds", "s", "least", _time),
-    "manipulability": Rule("farthest from singularities (manipulability)", "1", "greatest", _manipulability),
-    "limits": Rule("farthest from the joint limits", "deg", "greatest", _limit_distance),
-    "clearance": Rule("farthest from obstacles and from itself", "mm", "greatest", _clearance),
+    N_("time"): Rule(N_("least time at the joint speeds"), "s", "least", _time),
+    N_("manipulability"): Rule(N_("farthest from singularities (manipulability)"), "1", "greatest", _manipulability),
+    N_("limits"): Rule(N_("farthest from the joint limits"), "deg", "greatest", _limit_distance),
+    N_("clearance"): Rule(N_("farthest from obstacles and from itself"), "mm", "greatest", _clearance),
 }
 
 

@@ -12,6 +12,7 @@ from er3a.collision.scene import SceneFile
 from er3a.errors import ShapeError
 from er3a.kinematics.inverse import Solutions, checked_reference
 from er3a.kinematics.selection import limit_margin, nearest
+from er3a.language import said
 from er3a.robots.robot import Robot
 from er3a.selection.rules import RULES, checked_weights
 
@@ -86,7 +87,7 @@ def refusals(robot: Robot, solutions: Solutions, scene: SceneFile | None) -> lis
         clear = clearance(robot, solutions.q[inside], scene)
         for row, distance, pair in zip(inside, clear.distance, clear.pair):
             if distance < COLLIDES:
-                refused[row] = f"{pair} overlap by {-distance * 1000:.0f} mm"
+                refused[row] = said("{pair} overlap by {depth:.0f} mm", pair=pair, depth=-distance * 1000)
     return refused
 
 
@@ -94,7 +95,7 @@ def all_collide(robot: Robot, solutions: Solutions, refused: list[str]) -> str:
     """Why nothing can be chosen where all rows within the limits collide: in the words of the roomiest of them."""
     collide = np.flatnonzero(solutions.within_limits)
     best = max(collide, key=lambda row: limit_margin(robot, solutions.q[row]))
-    return f"all {len(collide)} solutions within the limits collide: {refused[best]}"
+    return said("all {count} solutions within the limits collide: {reason}", count=len(collide), reason=refused[best])
 
 
 def _cost(weights: dict[str, float], measured: dict[str, np.ndarray], allowed: np.ndarray) -> np.ndarray:

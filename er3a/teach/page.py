@@ -14,6 +14,7 @@ from er3a.errors import NotWristPartitionedError
 from er3a.kinematics.branch import branch_labels
 from er3a.kinematics.singularity import characteristic_length
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
+from er3a.language import keeps_sentences, know, note_written, sentences, tr
 from er3a.results import input_records
 from er3a.robots.robot import Robot
 from er3a.study import Study
@@ -37,6 +38,7 @@ def write_teach_page(study: Study, name: str, output: Path) -> None:
         "elbow": np.radians(settings.near_elbow_deg),
         "shoulder": settings.near_shoulder_mm / 1000,
     }
+    panel = panel_data(robot, near)
     render(
         _HERE / "teach.html.j2",
         output,
@@ -44,8 +46,8 @@ def write_teach_page(study: Study, name: str, output: Path) -> None:
         joint_names=JOINT_NAMES,
         joint_colours=JOINTS,
         degrees=float(np.degrees(1.0)),
-        words=WORDS,
-        panel=panel_data(robot, near),
+        words=panel["words"],
+        panel=panel,
         modules=json.dumps({"imports": {f"er3a/{module}": _module(module) for module in MODULES}}),
         provenance={
             "inputs": input_records(study.inputs(name, "teach")),
@@ -62,11 +64,8 @@ def panel_data(robot: Robot, near: dict[str, float]) -> dict[str, Any]:
     ----------
     near : per type of singularity the distance (rad; m for shoulder) below which the panel warns
     """
-    try:
-        wrist_partitioned_arm(robot)
-        labels, reason = list(branch_labels(robot)), None
-    except NotWristPartitionedError as error:
-        labels, reason = [], error.property_missing
+    reason = _without_closed_form(robot)
+    labels = [] if reason else [tr(label) for label in branch_labels(robot)]
     return {
         "name": robot.name,
         "table": {"convention": robot.convention} | {key: getattr(robot, key).tolist() for key in TABLE},
@@ -76,8 +75,27 @@ def panel_data(robot: Robot, near: dict[str, float]) -> dict[str, Any]:
         "near": {**near, "limit": NEAR_LIMIT, "value": NEAR_SINGULAR},
         "joint_names": JOINT_NAMES,
         "colours": {"joints": JOINTS, "link": LINK, "body": BODY, "mark": INK},
-        "words": WORDS,
+        "words": _translated(WORDS),
     }
+
+
+def _translated(words: Any) -> Any:
+    """The words, nested as they are, in the page's language."""
+    if isinstance(words, dict):
+        return {key: _translated(word) for key, word in words.items()}
+    return [_translated(word) for word in words] if isinstance(words, list) else tr(words)
+
+
+@keeps_sentences
+def _without_closed_form(robot: Robot) -> str | None:
+    """Why the closed form doesn't hold for the arm, in the page's language; None if it does."""
+    try:
+        wrist_partitioned_arm(robot)
+    except NotWristPartitionedError as error:
+        note_written(error.property_missing)
+        know(sentences())
+        return tr(error.property_missing)
+    return None
 
 
 def _module(name: str) -> str:

@@ -79,7 +79,7 @@ export class SolutionList {
   #missing({ slot, fault, gap }) {
     const { words, branch_labels: labels } = this.data;
     const amount = fault === "orientation" ? inDegrees(gap) : inMillimetres(gap);
-    const reason = `${words.missing}: ${fill(words.faults[fault], { gap: amount })}`;
+    const reason = fill(words.missing, { reason: fill(words.faults[fault], { gap: amount }) });
     return element("li", "branch missing", "", [element("b", "", labels[slot]), element("span", "row-verdict", reason)]);
   }
 
@@ -91,7 +91,7 @@ export class SolutionList {
         joint: names[joint], angle: inDegrees(angle), excess: inDegrees(excess), limit: inDegrees(limit, 0),
       }),
     );
-    return fill(words.leaves, { reasons: reasons.join("; ") });
+    return fill(words.leaves, { reasons: reasons.join(words.separator) });
   }
 
   #button(row, parts) {

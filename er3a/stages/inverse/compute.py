@@ -11,7 +11,7 @@ import pandas as pd
 from er3a.collision.scene import SceneFile, load_scene
 from er3a.kinematics.inverse import CLOSED_FORM
 from er3a.kinematics.selection import NEAREST_RULE
-from er3a.language import keeps_sentences
+from er3a.language import N_, joined, keeps_sentences, said
 from er3a.results import Figure, Verdict, write_summary, write_table
 from er3a.selection.rules import RULES
 from er3a.stages.inverse.rankings import rankings, sequence
@@ -26,6 +26,8 @@ REPRODUCED_M = 1e-9
 REPRODUCED_RAD = 1e-9
 NAMED_IN_VERDICT = 3
 ADVICE_STREAM, ROUND_TRIP_STREAM = 0, 1
+WITHIN_LIMITS = N_("within the limits")
+WITHIN_LIMITS_AND_FREE = N_("within the limits and free of collisions")
 
 
 @keeps_sentences
@@ -81,28 +83,39 @@ def _verdict(
     position, orientation = _worst_residuals(solutions, trips)
     lost = trips.poses - trips.own_found if trips else 0
     if lost or position > REPRODUCED_M or orientation > REPRODUCED_RAD:
-        text = (
-            f"The solver can't be trusted here: worst residual {position * 1000:.2g} mm and "
-            f"{np.degrees(orientation):.2g} deg, own joint angles lost for {lost} random poses."
-        )
         params = {"worst_mm": position * 1000, "worst_deg": float(np.degrees(orientation)), "lost": lost}
+        text = said(
+            "The solver can't be trusted here: worst residual {worst_mm:.2g} mm and {worst_deg:.2g} deg, own joint "
+            "angles lost for {lost} random poses.",
+            **params,
+        )
         return Verdict("fail", "inverse.not_reproduced", text, params)
-    free = " within the limits and free of collisions" if scene else " within the limits"
+    where = WITHIN_LIMITS_AND_FREE if scene else WITHIN_LIMITS
     unsolved = [entry for entry in entries if entry["chosen_deg"] is None]
     solved = len(entries) - len(unsolved)
     params = {"targets": len(entries), "solved": solved, "unsolved": [entry["name"] for entry in unsolved]}
     if not unsolved:
-        text = f"Every target ({len(entries)}) has a solution{free}."
+        text = said("Every target ({count}) has a solution {where}.", count=len(entries), where=where)
         return Verdict("pass", "inverse.all_solved", text, params)
-    named = [f"{entry['name']} ({entry['short_reason']})" for entry in unsolved[:NAMED_IN_VERDICT]]
+    named = [_named(entry["name"], entry["short_reason"]) for entry in unsolved[:NAMED_IN_VERDICT]]
     if len(unsolved) > NAMED_IN_VERDICT:
-        named.append(f"{len(unsolved) - NAMED_IN_VERDICT} more")
-    none_for = ", ".join(named)
+        named.append(said("{count} more", count=len(unsolved) - NAMED_IN_VERDICT))
+    none_for = joined(named, ", ")
     if not solved:
-        text = f"No target has a solution{free}: {none_for}."
+        text = said("No target has a solution {where}: {none_for}.", where=where, none_for=none_for)
         return Verdict("fail", "inverse.none_solved", text, params)
-    text = f"{solved} of {len(entries)} targets have a solution{free}; none for {none_for}."
+    text = said(
+        "{solved} of {count} targets have a solution {where}; none for {none_for}.",
+        solved=solved,
+        count=len(entries),
+        where=where,
+        none_for=none_for,
+    )
     return Verdict("caution", "inverse.some_unsolved", text, params)
+
+
+def _named(name: str, reason: str) -> str:
+    return said("{own_name} ({reason})", own_name=name, reason=reason)
 
 
 def _figures(entries: list[dict[str, Any]], solutions: pd.DataFrame, trips: RoundTrips | None) -> list[Figure]:
@@ -114,14 +127,14 @@ def _figures(entries: list[dict[str, Any]], solutions: pd.DataFrame, trips: Roun
         mean = float(counts @ np.arange(len(counts)) / trips.poses)
         spread = float(np.sqrt(counts @ (np.arange(len(counts)) - mean) ** 2 / max(trips.poses - 1, 1)))
         of_random = [
-            Figure("ways to a random reachable pose, mean", mean, "of 8", 1.96 * spread / trips.poses**0.5),
-            Figure("random poses solved back to their joints", 100.0 * trips.own_found / trips.poses, "%"),
+            Figure(N_("ways to a random reachable pose, mean"), mean, N_("of 8"), 1.96 * spread / trips.poses**0.5),
+            Figure(N_("random poses solved back to their joints"), 100.0 * trips.own_found / trips.poses, "%"),
         ]
     return [
-        Figure("targets solved", solved, f"of {len(entries)}"),
+        Figure(N_("targets solved"), solved, said("of {count}", count=len(entries))),
         *of_random,
-        Figure("worst position residual", position * 1000, "mm"),
-        Figure("worst orientation residual", float(np.degrees(orientation)), "deg"),
+        Figure(N_("worst position residual"), position * 1000, "mm"),
+        Figure(N_("worst orientation residual"), float(np.degrees(orientation)), "deg"),
     ]
 
 

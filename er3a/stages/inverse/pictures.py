@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 
+from er3a.language import N_, tr
 from er3a.robots.robot import Robot
 from er3a.stages.inverse.columns import JOINT_COLUMNS
 from er3a.stages.inverse.shape_colours import colour_of, shape_of
@@ -19,6 +20,11 @@ from er3a.viewing.page import Picture
 from er3a.viewing.palette import GRID, HIGHLIGHT, INK, JOINT_NAMES, MODEL, MUTED
 from er3a.viewing.skeleton import skeleton
 
+SHAPES = (N_("front, elbow up"), N_("front, elbow down"), N_("back, elbow up"), N_("back, elbow down"))
+ORIENTATION_TITLES = {
+    "tool straight down": N_("Tool straight down"),
+    "tool level, outward": N_("Tool level, outward"),
+}
 TITLE = {"loc": "left", "fontsize": 11, "fontweight": "bold"}
 
 
@@ -37,9 +43,9 @@ def overlay(robot: Robot, target: dict[str, Any], branches: pd.DataFrame) -> Pic
     if panels == 3:
         handles += _draw_joints(axes[2], robot, target, branches)
     figure.legend(handles=handles, loc="outside lower center", ncols=5 if panels == 3 else 2, frameon=False, fontsize=9)
-    return Picture(
-        figure, f"{len(branches)} branches for target {target['name']}, drawn over one another", _conclude(target)
-    )
+    name = target["name"]
+    alt = tr("{count} branches for target {own_name}, drawn over one another", count=len(branches), own_name=name)
+    return Picture(figure, alt, _conclude(target))
 
 
 def histogram(trips: dict[str, Any]) -> Picture:
@@ -50,17 +56,22 @@ def histogram(trips: dict[str, Any]) -> Picture:
     bars = axes.bar(np.arange(len(counts)), share, color=MODEL, width=0.7)
     axes.bar_label(bars, labels=[f"{value:.0f} %" if value else "" for value in share], padding=2)
     axes.set_xticks(np.arange(len(counts)))
-    axes.set_xlabel("solutions within the limits")
-    axes.set_ylabel("share of random poses (%)")
+    axes.set_xlabel(tr("solutions within the limits"))
+    axes.set_ylabel(tr("share of random poses (%)"))
     axes.grid(visible=False, axis="x")
     axes.margins(y=0.15)
     several = share[2:].sum()
     most = int(counts.argmax())
     return Picture(
         figure,
-        "Bar chart of the number of solutions within the limits",
-        f"{several:.0f} % of random reachable poses leave a choice between at least two solutions; {most} is the "
-        f"commonest number ({share[most]:.0f} % of the poses).",
+        tr("Bar chart of the number of solutions within the limits"),
+        tr(
+            "{several:.0f} % of random reachable poses leave a choice between at least two solutions; {most} is the "
+            "commonest number ({share:.0f} % of the poses).",
+            several=several,
+            most=most,
+            share=share[most],
+        ),
     )
 
 
@@ -78,7 +89,7 @@ def ways(table: pd.DataFrame) -> Picture:
         image = panel.pcolormesh(x, z, counts, cmap=colours, vmin=-0.5, vmax=8.5, rasterized=True)
         panel.contour(x, z, reached, levels=[0.5], colors=INK, linewidths=1.0)
         panel.plot([0], [0], marker="P", markersize=9, color=HIGHLIGHT, markeredgecolor="white", linestyle="none")
-        panel.set_title(words[0].upper() + words[1:], **TITLE)
+        panel.set_title(tr(ORIENTATION_TITLES[words]), **TITLE)
         panel.set_aspect("equal")
         panel.set_xlabel("x (mm)")
         panel.set_ylabel("z (mm)")
@@ -88,29 +99,41 @@ def ways(table: pd.DataFrame) -> Picture:
             panel.set_xlim(x[columns[0]] - edge, x[columns[-1]] + edge)
             panel.set_ylim(min(z[heights[0]] - edge, -edge), z[heights[-1]] + edge)
         panel.grid(visible=False)
-        shares.append(f"{words}: {100 * (counts > 0).sum() / max(reached.sum(), 1):.0f} %")
+        share = 100 * (counts > 0).sum() / max(reached.sum(), 1)
+        shares.append(tr("{orientation}: {share:.0f} %", orientation=words, share=share))
+    listed = tr("; ").join(shares)
     bar = figure.colorbar(image, ax=axes[0].tolist(), ticks=range(9), shrink=0.85)
-    bar.set_label("branches within the limits")
+    bar.set_label(tr("branches within the limits"))
     return Picture(
         figure,
-        "Maps of the number of solutions in the vertical plane through axis 1",
-        "Of the tool positions inside the line, which the arm reaches when limits are left aside, the limits leave at "
-        f"least one branch for {'; '.join(shares)}. White inside it: forbidden by limits alone. Pink cross: base.",
+        tr("Maps of the number of solutions in the vertical plane through axis 1"),
+        tr(
+            "Of the tool positions inside the line, which the arm reaches when limits are left aside, the limits leave "
+            "at least one branch for {shares}. White inside it: forbidden by limits alone. Pink cross: base.",
+            shares=listed,
+        ),
     )
 
 
 def _conclude(target: dict[str, Any]) -> str:
     if target["chosen_deg"] is not None:
-        collide = f", of which {target['collide']} collide" if target["collide"] else ""
-        return (
-            f"The bold arm is the one taken; {target['within_limits']} of {target['solutions']} branches stay within "
-            f"the limits{collide}. A no-flip and a flip branch look the same from here: they differ in J4, J5 and J6."
+        counts = {"within": target["within_limits"], "all": target["solutions"], "collide": target["collide"]}
+        if not target["collide"]:
+            return tr(
+                "The bold arm is the one taken; {within} of {all} branches stay within the limits. A no-flip and a "
+                "flip branch look the same from here: they differ in J4, J5 and J6.",
+                **counts,
+            )
+        return tr(
+            "The bold arm is the one taken; {within} of {all} branches stay within the limits, of which {collide} "
+            "collide. A no-flip and a flip branch look the same from here: they differ in J4, J5 and J6.",
+            **counts,
         )
     if target["collide"]:
-        return "Every arm that reaches the target (dashed) has a joint beyond its limit or runs into something."
+        return tr("Every arm that reaches the target (dashed) has a joint beyond its limit or runs into something.")
     if target["solutions"]:
-        return "Every arm that reaches the target (dashed) has a joint beyond its limit: a cross on the right."
-    return "The arm, drawn where it comes from, can't stretch to the target."
+        return tr("Every arm that reaches the target (dashed) has a joint beyond its limit: a cross on the right.")
+    return tr("The arm, drawn where it comes from, can't stretch to the target.")
 
 
 def _draw_arms(side: Axes, top: Axes, robot: Robot, target: dict[str, Any], branches: pd.DataFrame) -> list[Line2D]:
@@ -138,27 +161,28 @@ def _draw_arms(side: Axes, top: Axes, robot: Robot, target: dict[str, Any], bran
             style = {"color": MUTED, "linewidth": 1.3, "linestyle": "--", "markersize": 3, "zorder": 3}
         draw(in_base(skeleton(robot, np.radians(rows[JOINT_COLUMNS].to_numpy(float)[0]))), **style)
         if allowed:
-            words = rows["label"].iloc[0]
-            label = (words.rpartition(",")[0] or words) + (" (chosen)" if chosen else "")
+            found = rows["label"].iloc[0]
+            label = next((shape for shape in SHAPES if found.startswith(shape)), found)
+            label = tr("{shape} (chosen)", shape=label) if chosen else tr(label)
             handles.append(Line2D([], [], label=label, **style))
     if not len(branches):
         style = {"color": MUTED, "linewidth": 3, "markersize": 5}
         draw(in_base(skeleton(robot, np.radians(target["q_ref_deg"]))), **style)
-        handles.append(Line2D([], [], label="arm at the reference", **style))
+        handles.append(Line2D([], [], label=tr("arm at the reference"), **style))
     elif not (branches["rank"] > 0).all():
         style = {"color": MUTED, "linewidth": 1.3, "linestyle": "--", "marker": "o", "markersize": 3}
-        words = "outside the limits" + (" or colliding" if target["collide"] else "")
+        words = tr("outside the limits or colliding") if target["collide"] else tr("outside the limits")
         handles.append(Line2D([], [], label=words, **style))
     cross = {"marker": "P", "markersize": 11, "color": HIGHLIGHT, "markeredgecolor": "white", "linestyle": "none"}
-    handles.append(_mark(side, top, goal, level, "target", **cross))
+    handles.append(_mark(side, top, goal, level, tr("target"), **cross))
     near = target["neighbours"]
     if near and near["shifted_to_mm"]:
         ring = {"marker": "o", "markersize": 9, "color": "none", "markeredgecolor": HIGHLIGHT, "linestyle": "none"}
         point = in_base(np.array(near["shifted_to_mm"]) / 1000)
-        handles.append(_mark(side, top, point, level, "nearest position with a solution", **ring))
-    side.set_title("Side, in the target's direction", **TITLE)
-    top.set_title("From above", **TITLE)
-    equal_scale(side, "distance from axis 1 (mm)", "z (mm)")
+        handles.append(_mark(side, top, point, level, tr("nearest position with a solution"), **ring))
+    side.set_title(tr("Side, in the target's direction"), **TITLE)
+    top.set_title(tr("From above"), **TITLE)
+    equal_scale(side, tr("distance from axis 1 (mm)"), "z (mm)")
     equal_scale(top, "x (mm)", "y (mm)")
     return handles
 
@@ -195,10 +219,10 @@ def _draw_joints(axes: Axes, robot: Robot, target: dict[str, Any], branches: pd.
     axes.set_xticks(np.arange(-360, 361, 90))
     widest = max(np.abs([lower, upper]).max(), np.abs(angles).max()) + 15
     axes.set_xlim(-widest, widest)
-    axes.set_xlabel("joint angle (deg); grey: allowed range, line: reference")
-    axes.set_title("Joint angles, one mark a branch", **TITLE)
+    axes.set_xlabel(tr("joint angle (deg); grey: allowed range, line: reference"))
+    axes.set_title(tr("Joint angles, one mark a branch"), **TITLE)
     handles = []
     if not branches["within_limits"].all():
         style = {"marker": "x", "color": HIGHLIGHT, "markeredgewidth": 1.6, "linestyle": "none"}
-        handles.append(Line2D([], [], label="joint beyond its limit", **style))
+        handles.append(Line2D([], [], label=tr("joint beyond its limit"), **style))
     return handles

@@ -10,11 +10,12 @@ import pandas as pd
 
 from er3a.collision.scene import SceneFile
 from er3a.kinematics.inverse import Solutions
+from er3a.language import N_
 from er3a.robots.robot import Robot
 from er3a.selection.rules import RULES, available_rules
 from er3a.selection.sequence import select_sequence
 
-MIX = "mix"
+MIX = N_("mix")
 RANKING_COLUMNS = [
     "target",
     "branch",

@@ -7,14 +7,20 @@ from typing import Any
 
 import pandas as pd
 
+from er3a.language import N_, tr
 from er3a.results import read_summary, read_table
 from er3a.stages.inverse.columns import JOINT_COLUMNS
 from er3a.stages.inverse.pictures import histogram, overlay, ways
-from er3a.stages.inverse.symptoms import SYMPTOM_COLUMNS, symptoms
+from er3a.stages.inverse.symptoms import symptoms
 from er3a.study import Study
 from er3a.viewing.page import fixed, number, render
 
 NO_BREAK_SPACE = "\u00a0"
+FREE_AT = {
+    "wrist": N_("axes 4 and 6 in line"),
+    "shoulder": N_("wrist centre on axis 1"),
+    "elbow": N_("arm folded onto itself"),
+}
 
 
 def report(study: Study, name: str, folder: Path, output: Path) -> None:
@@ -36,7 +42,7 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
                 "reference": _listed(target["q_ref_deg"]),
                 "rows": _branch_rows(rows, branches),
                 "rules": _rule_rows(ranked[ranked["target"] == target["name"]]),
-                "rule_columns": ["Branch", *(_rule_title(rule, summary) for rule in _rules_of(ranked))],
+                "rule_columns": [tr("Branch"), *(_rule_title(rule, summary) for rule in _rules_of(ranked))],
                 "families": [_family_words(family) for family in target["families"]],
                 "residual_mm": rows["position_residual_mm"].max() if len(rows) else None,
                 "residual_deg": rows["orientation_residual_deg"].max() if len(rows) else None,
@@ -53,9 +59,8 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
         trips=trips,
         histogram=histogram(trips) if trips else None,
         ways=ways(ways_table) if len(ways_table) else None,
-        symptom_columns=SYMPTOM_COLUMNS,
         symptoms=symptoms(summary),
-        mix=", ".join(f"{rule} {weight:g}" for rule, weight in summary["mix"].items()),
+        mix=tr(", ").join(f"{tr(rule)} {weight:g}" for rule, weight in summary["mix"].items()),
         stops=_stops(summary["sequence"]),
     )
 
@@ -66,18 +71,18 @@ def _rules_of(ranked: pd.DataFrame) -> list[str]:
 
 def _rule_title(rule: str, summary: dict[str, Any]) -> str:
     unit = summary["rules"][rule]["unit"] if rule in summary["rules"] else "1"
-    return f"{rule}{'' if unit == '1' else f' ({unit})'}>"
+    return f"{tr(rule)}{'' if unit == '1' else f' ({unit})'}>"
 
 
 def _rule_rows(ranked: pd.DataFrame) -> list[list[str]]:
     """One row for each branch: the measure of each rule, with its place."""
-    rows = []
+    rows, collides = [], tr("collides")
     for _, group in ranked.groupby("branch", sort=True):
         cells = [
-            f"{number(_no_noise(row['measure']), 3)}{NO_BREAK_SPACE}({row['place'] or 'collides'})"
+            f"{number(_no_noise(row['measure']), 3)}{NO_BREAK_SPACE}({row['place'] or collides})"
             for _, row in group.iterrows()
         ]
-        rows.append([group["label"].iloc[0].replace("elbow ", "").replace(" ", NO_BREAK_SPACE), *cells])
+        rows.append([_on_one_line(group["label"].iloc[0]), *cells])
     return rows
 
 
@@ -93,15 +98,23 @@ def _family_words(family: dict[str, Any]) -> str:
         if abs(rate) > 1e-9
     ]
     low, high = family["range_deg"]
-    words = {"wrist": "axes 4 and 6 in line", "shoulder": "wrist centre on axis 1", "elbow": "arm folded onto itself"}
-    room = (
-        f"for {fixed(low, 1)} to {fixed(high, 1)} deg"
-        if family["within_limits"]
-        else "but every member leaves the limits"
-    )
-    return (
-        f"{words[family['kind']]}: from ({_listed(family['q0_deg'])}) deg, nearest to the reference, joints turn with "
-        f"the tool at rest in the ratio {', '.join(moving)}, {room}"
+    parts = {
+        "where": FREE_AT[family["kind"]],
+        "joints": _listed(family["q0_deg"]),
+        "rates": ", ".join(moving),
+    }
+    if not family["within_limits"]:
+        return tr(
+            "{where}: from ({joints}) deg, nearest to the reference, joints turn with the tool at rest in the ratio "
+            "{rates}, but every member leaves the limits",
+            **parts,
+        )
+    return tr(
+        "{where}: from ({joints}) deg, nearest to the reference, joints turn with the tool at rest in the ratio "
+        "{rates}, for {low} to {high} deg",
+        low=fixed(low, 1),
+        high=fixed(high, 1),
+        **parts,
     )
 
 
@@ -109,7 +122,7 @@ def _stops(sequence: dict[str, Any] | None) -> list[list[str]]:
     if sequence is None:
         return []
     return [
-        [target, label.replace("elbow ", ""), greedy.replace("elbow ", ""), _listed(q)]
+        [target, _short(label), _short(greedy), _listed(q)]
         for target, label, greedy, q in zip(
             sequence["targets"], sequence["labels"], sequence["greedy_labels"], sequence["q_deg"]
         )
@@ -121,8 +134,8 @@ def _overview_row(target: dict[str, Any]) -> list[str]:
     return [
         target["name"],
         _listed(target["xyz_mm"]),
-        f"{target['within_limits']} of {target['solutions']}",
-        "none" if joints is None else _listed(joints),
+        tr("{within} of {all}", within=target["within_limits"], all=target["solutions"]),
+        tr("none") if joints is None else _listed(joints),
         target["reason"] if target["solutions"] else target["short_reason"],
     ]
 
@@ -132,7 +145,7 @@ def _branch_rows(rows: pd.DataFrame, branches: pd.DataFrame) -> list[list[str]]:
     ranks = branches.loc[branches["rank"] > 0, "rank"]
     return [
         [
-            branch["label"].replace("elbow ", "").replace(" ", NO_BREAK_SPACE),
+            _on_one_line(branch["label"]),
             *(fixed(branch[column], 1) for column in JOINT_COLUMNS),
             fixed(branch["limit_margin_deg"], 1),
             fixed(branch["manipulability"], 3),
@@ -148,9 +161,24 @@ def _outcome(branch: pd.Series, place: int, turns: int) -> str:
         return branch["beyond"]
     if branch["collision"]:
         return branch["collision"]
-    words = "chosen" if branch["rank"] == 1 else f"place {place}"
-    words += f", {turns} turns" if turns > 1 else ""
-    return f"{words}; {branch['singular'].replace(' ', ', ')} singularity" if branch["singular"] else words
+    taken = tr("chosen") if branch["rank"] == 1 else tr("place {place}", place=place)
+    if turns > 1:
+        taken = tr("{taken}, {turns} turns", taken=taken, turns=turns)
+    if not branch["singular"]:
+        return taken
+    if branch["singular"] == "rank":
+        return tr("{taken}; rank singularity", taken=taken)
+    kinds = tr(", ").join(tr(kind) for kind in branch["singular"].split())
+    return tr("{taken}; {kinds} singularity", taken=taken, kinds=kinds)
+
+
+def _short(label: str) -> str:
+    """A branch in words that need little room."""
+    return tr(label).replace("elbow ", "")
+
+
+def _on_one_line(label: str) -> str:
+    return _short(label).replace(" ", NO_BREAK_SPACE)
 
 
 def _listed(values: list[float]) -> str:

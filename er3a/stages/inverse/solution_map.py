@@ -8,10 +8,11 @@ import pandas as pd
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.transforms import transform
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
+from er3a.language import N_
 from er3a.robots.robot import Robot
 
 MAP_COLUMNS = ["orientation", "x_mm", "z_mm", "solutions", "within_limits"]
-ORIENTATIONS = {"tool straight down": (180.0, 0.0, 0.0), "tool level, outward": (0.0, 90.0, 0.0)}
+ORIENTATIONS = {N_("tool straight down"): (180.0, 0.0, 0.0), N_("tool level, outward"): (0.0, 90.0, 0.0)}
 
 
 def solution_map(robot: Robot, cells: int) -> pd.DataFrame:

@@ -18,6 +18,7 @@ from er3a.kinematics.singularity import TYPES, characteristic_length, conditioni
 from er3a.kinematics.transforms import rotation_angle, rpy_of
 from er3a.kinematics.turns import LIMIT_TOLERANCE
 from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.language import N_, joined, said
 from er3a.robots.robot import Robot
 from er3a.selection.select import all_collide, refusals
 from er3a.stages.inverse.advice import Neighbours, neighbours
@@ -54,8 +55,9 @@ def solve_target(
     entry["method"] = solutions.method
     entry["families"] = [_family(family) for family in solutions.families]
     if collide:
-        entry["short_reason"] = f"all {entry['within_limits']} branches within the limits collide"
-        entry["advice"] = ["Move the part, the obstacle or the base: limits leave this pose reachable."]
+        within = entry["within_limits"]
+        entry["short_reason"] = said("all {count} branches within the limits collide", count=within)
+        entry["advice"] = [N_("Move the part, the obstacle or the base: limits leave this pose reachable.")]
         return entry, table, solutions
     if choice.chosen is None:
         missing = _missing(robot, T, q_ref, solutions) if not len(solutions.q) else None
@@ -67,7 +69,7 @@ def solve_target(
     row = table.iloc[choice.chosen]
     entry["chosen_deg"] = row[JOINT_COLUMNS].astype(float).tolist()
     entry["chosen_branch"] = int(row["branch"])
-    entry["short_reason"] = "nearest" if choice.runner_up is not None else "the only one"
+    entry["short_reason"] = N_("nearest") if choice.runner_up is not None else N_("the only one")
     entry["advice"] = _what_to_know(row)
     return entry, table, solutions
 
@@ -88,7 +90,7 @@ def refused_target(robot: Robot, target: Target, reason: str) -> dict[str, Any]:
         "collide": 0,
         "chosen_deg": None,
         "chosen_branch": None,
-        "short_reason": "not solved",
+        "short_reason": N_("not solved"),
         "reason": reason,
         "unsolved": [],
         "method": None,
@@ -157,9 +159,13 @@ def _family(family: Family) -> dict[str, Any]:
 def _beyond(robot: Robot, q: np.ndarray) -> str:
     above, below = np.degrees(q - robot.upper), np.degrees(robot.lower - q)
     out = np.flatnonzero(np.maximum(above, below) > np.degrees(LIMIT_TOLERANCE))
-    return ", ".join(
-        f"J{j + 1} {above[j]:.1f} above" if above[j] > below[j] else f"J{j + 1} {below[j]:.1f} below" for j in out
-    )
+    parts = [
+        said("J{joint} {excess:.1f} above", joint=j + 1, excess=above[j])
+        if above[j] > below[j]
+        else said("J{joint} {excess:.1f} below", joint=j + 1, excess=below[j])
+        for j in out
+    ]
+    return joined(parts, ", ")
 
 
 def _first_of_branch(branch: np.ndarray, rank: np.ndarray) -> np.ndarray:
@@ -184,32 +190,44 @@ def _missing(robot: Robot, T: np.ndarray, q_ref: np.ndarray, solutions: Solution
 
 def _short_reason(solutions: int, missing: tuple[float, bool] | None) -> str:
     if missing is None and not solutions:
-        return "no solution found"
+        return N_("no solution found")
     if missing is None:
-        return f"all {solutions} solutions leave the limits"
+        return said("all {count} solutions leave the limits", count=solutions)
     amount, is_angle = missing
     if is_angle:
-        return f"{np.degrees(amount):.3g} deg of wrist missing"
-    return f"{amount * 1000:.0f} mm out of reach" if amount >= 0.01 else f"{amount * 1000:.2g} mm out of reach"
+        return said("{angle:.3g} deg of wrist missing", angle=np.degrees(amount))
+    if amount >= 0.01:
+        return said("{gap:.0f} mm out of reach", gap=amount * 1000)
+    return said("{gap:.2g} mm out of reach", gap=amount * 1000)
 
 
 def _what_would_help(near: Neighbours) -> list[str]:
     texts = []
     if near.least_turn is not None:
         texts.append(
-            f"Turn the tool: {100 * near.orientation_share:.2g} % of random orientations at this position have a "
-            f"solution within the limits, the nearest one found {np.degrees(near.least_turn):.1f} deg away."
+            said(
+                "Turn the tool: {share:.2g} % of random orientations at this position have a solution within the "
+                "limits, the nearest one found {angle:.1f} deg away.",
+                share=100 * near.orientation_share,
+                angle=np.degrees(near.least_turn),
+            )
         )
     else:
-        texts.append("Turning the tool does not help: no orientation tried at this position has a solution.")
+        texts.append(N_("Turning the tool does not help: no orientation tried at this position has a solution."))
     if near.least_shift is not None:
         x, y, z = near.shifted_to * 1000
         texts.append(
-            f"Move the part or the base: with the tool's orientation kept, a shift of {near.least_shift * 1000:.0f} mm "
-            f"to ({x:.0f}, {y:.0f}, {z:.0f}) mm is enough."
+            said(
+                "Move the part or the base: with the tool's orientation kept, a shift of {shift:.0f} mm to ({x:.0f}, "
+                "{y:.0f}, {z:.0f}) mm is enough.",
+                shift=near.least_shift * 1000,
+                x=x,
+                y=y,
+                z=z,
+            )
         )
     else:
-        texts.append("Moving the part alone does not help: no position tried has a solution with this orientation.")
+        texts.append(N_("Moving the part alone does not help: no position tried has a solution with this orientation."))
     return texts
 
 
@@ -217,15 +235,18 @@ def _what_to_know(row: pd.Series) -> list[str]:
     texts = []
     if "wrist" in row["singular"]:
         texts.append(
-            "Wrist singularity: axes 4 and 6 lie in one line, so J4 and J6 can be traded against one another; the "
-            "pair nearest to the reference is taken. Leave this pose by a joint move, not along a straight line."
+            N_(
+                "Wrist singularity: axes 4 and 6 lie in one line, so J4 and J6 can be traded against one another; the "
+                "pair nearest to the reference is taken. Leave this pose by a joint move, not along a straight line."
+            )
         )
     if "elbow" in row["singular"]:
-        texts.append("Elbow singularity: the arm is stretched or folded; it can't move further along itself.")
+        texts.append(N_("Elbow singularity: the arm is stretched or folded; it can't move further along itself."))
     if "shoulder" in row["singular"]:
-        texts.append("Shoulder singularity: the wrist centre is on axis 1, so J1 is free while the wrist follows.")
-    if row["limit_margin_deg"] < LITTLE_MARGIN_DEG:
-        texts.append(f"Little room: one joint is {row['limit_margin_deg']:.2g} deg from its limit.")
+        texts.append(N_("Shoulder singularity: the wrist centre is on axis 1, so J1 is free while the wrist follows."))
+    margin = row["limit_margin_deg"]
+    if margin < LITTLE_MARGIN_DEG:
+        texts.append(said("Little room: one joint is {margin:.2g} deg from its limit.", margin=margin))
     return texts
 
 
