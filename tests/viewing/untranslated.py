@@ -96,7 +96,7 @@ def texts_from_files(folder: Path) -> set[str]:
     """All texts that people wrote into the input files below a folder."""
     found: set[str] = set()
     for file in folder.rglob("*.yaml"):
-        found.update(_leaves(yaml.safe_load(file.read_text(encoding="utf-8"))))
+        found.update(_leaves(yaml.safe_load(file.read_text(encoding="utf-8")), keys=True))
     for file in folder.rglob("*.csv"):
         with file.open(encoding="utf-8", newline="") as lines:
             found.update(cell for row in csv.reader(lines) for cell in row)
@@ -130,22 +130,24 @@ class PageTexts(HTMLParser):
 
 
 def _words_of(data: Any) -> list[str]:
-    """Texts that a page hands to its scripts: all below a key ``words``, or all if there are no further levels."""
+    """Texts that a page hands to its scripts: all below a key ``words`` (fields left out), or all if there are no
+    further levels."""
     if "words" in data:
-        return list(_leaves(data["words"]))
+        return [re.sub(r"\{\w+\}", " ", text) for text in _leaves(data["words"], keys=False)]
     return list(data.values()) if all(isinstance(value, str) for value in data.values()) else []
 
 
-def _leaves(data: Any) -> Iterator[str]:
+def _leaves(data: Any, keys: bool) -> Iterator[str]:
     if isinstance(data, str):
         yield data
     elif isinstance(data, dict):
         for key, value in data.items():
-            yield str(key)
-            yield from _leaves(value)
+            if keys:
+                yield str(key)
+            yield from _leaves(value, keys)
     elif isinstance(data, list):
         for value in data:
-            yield from _leaves(value)
+            yield from _leaves(value, keys)
 
 
 def _texts_of_figure(data: Any, key: str = "") -> Iterator[str]:
