@@ -15,6 +15,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.wait import WebDriverWait
 
+from er3a import language
 from er3a.kinematics.forward import forward
 from er3a.robots.load import load_robot
 from er3a.study import load_study
@@ -24,6 +25,7 @@ from tests.kinematics.arms import make_arm, pose_errors
 
 LARGEST_PAGE = 8_000_000
 SELECT_ALL = Keys.CONTROL + "a" + Keys.NULL
+KEYS_AND_CODES = {"Shift", "Page", "Down", "Home", "End", "ZYX", "ZYZ", "JavaScript"}
 PAUSE = 5.0  # s to wait for what the page does within 0.3 s on an idle machine
 
 
@@ -58,6 +60,17 @@ class Panel:
 
     def until(self, holds: Callable[[], Any]) -> None:
         WebDriverWait(self.browser, PAUSE, 0.05).until(lambda _: holds())
+
+    def texts(self) -> list[str]:
+        """All that the panel says, in writing or aloud."""
+        return self.browser.execute_script(
+            """const walker = document.createTreeWalker(document.querySelector("main"), NodeFilter.SHOW_TEXT);
+            const texts = [...document.querySelectorAll("main [aria-label]")].map((e) => e.ariaLabel);
+            while (walker.nextNode()) {
+              if (walker.currentNode.parentNode.localName !== "script") texts.push(walker.currentNode.data.trim());
+            }
+            return texts;"""
+        )
 
     def clean(self) -> bool:
         return [entry for entry in self.browser.get_log("browser") if entry["level"] == "SEVERE"] == []
@@ -238,14 +251,42 @@ def test_every_word_of_the_panel_is_in_the_dictionary(browser, folder, monkeypat
     for degrees in ([0] * 6, [30, -20, 15, 40, 60, 10], [167, 90, 105, 180, 2, 360]):
         panel.move(*degrees)
         time.sleep(0.3)
-        texts = panel.browser.execute_script(
-            """const walker = document.createTreeWalker(document.querySelector("main"), NodeFilter.SHOW_TEXT);
-            const texts = [...document.querySelectorAll("main [aria-label]")].map((e) => e.ariaLabel);
-            while (walker.nextNode()) {
-              if (walker.currentNode.parentNode.localName !== "script") texts.push(walker.currentNode.data.trim());
-            }
-            return texts;"""
-        )
+        texts = panel.texts()
         assert len(texts) > 100
         words = [text for text in texts if re.search("[A-Za-z]{3}", text) and not re.match("(<p>)?⟦", text)]
         assert set(words) <= set(labels)
+
+
+@pytest.fixture
+def chinese():
+    language.use("zh")
+    yield
+    language.use("en")
+
+
+def english(texts: list[str]) -> set[str]:
+    return {word for text in texts for word in re.findall("[A-Za-z]{3,}", text)} - KEYS_AND_CODES
+
+
+@pytest.mark.parametrize(
+    ("degrees", "told"),
+    [
+        ((0, 0, 0, 0, 0, 0), "处于腕部奇异：轴 4 与轴 6 共线"),
+        ((10, 20, 30, 40, 3, 0), "接近腕部奇异：轴 4 与轴 6 距共线还差 3.0°。"),
+        ((30, -20, 15, 40, 60, 10), "附近没有奇异。"),
+    ],
+)
+def test_the_chinese_panel_warns_in_chinese_alone(browser, folder, chinese, degrees, told):
+    panel = Panel(browser, folder / "chinese.html").open()
+    panel.move(*degrees)
+    panel.until(lambda: panel.text("#warning").startswith(told))
+    panel.until(lambda: panel.browser.find_elements(By.CSS_SELECTOR, "#branches .solution"))
+    assert english(panel.texts()) == set()
+
+
+def test_the_chinese_panel_says_why_an_arm_has_no_solutions(browser, folder, chinese, monkeypatch):
+    offset_wrist = make_arm(d=[0.3, 0, 0, 0.35, 0.02, 0.08])
+    monkeypatch.setattr("er3a.study.Study.robot", lambda study, name: offset_wrist)
+    panel = Panel(browser, folder / "chinese_offset_wrist.html").open("#q=10,20,30,40,50,60")
+    assert "因为轴 4、5、6 不交于一点，相差 10 mm" in panel.text(".solutions")
+    assert english(panel.texts()) == set()
