@@ -45,6 +45,10 @@ def test_a_finding_is_english_and_can_be_said_again(german):
     assert "9 faults" not in kept
 
 
+def test_names_from_input_files_are_no_words(german):
+    assert tr("{own_name}: {joint}", own_name="elbow", joint="elbow") == "elbow: Ellbogen"
+
+
 def test_equal_findings_are_kept_alike_whatever_was_found_before():
     assert finding() == finding()
     note_written("the elbow is 2.0 deg off; x")
