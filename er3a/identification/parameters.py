@@ -36,7 +36,7 @@ class Parameter:
     @property
     def name(self) -> str:
         """Such as ``d4``."""
-        return f"{self.column}{self.joint}"
+        return said("{column}{joint}", column=self.column, joint=self.joint)
 
     @property
     def unit(self) -> str:

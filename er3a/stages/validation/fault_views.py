@@ -94,7 +94,7 @@ def corrections_figure(rows: pd.DataFrame) -> Figure:
         at = np.arange(len(own))
         axes.axhline(0, color=MUTED, linewidth=1)
         axes.errorbar(at, own["correction"], own["half_width"], fmt="o", color=MODEL, capsize=4, elinewidth=1.4)
-        axes.set_xticks(at, own["name"], rotation=45 if len(own) > 8 else 0)
+        axes.set_xticks(at, [tr(name) for name in own["name"]], rotation=45 if len(own) > 8 else 0)
         axes.set_xlim(-0.6, len(own) - 0.4)
         axes.set_ylabel(tr("correction ({unit})", unit=unit))
         axes.grid(axis="x", visible=False)
