@@ -11,6 +11,7 @@ import numpy as np
 from er3a.diagnosis.next_measurement import what_decides
 from er3a.diagnosis.ranking import MEETS, Ranking, rank
 from er3a.kinematics.table_batch import robot_of
+from er3a.language import said
 from er3a.references.load import load_references
 from er3a.references.reference import Reference, ReferenceSet, expected_of, lengths_of, vectors_of
 from er3a.robots.robot import Robot
@@ -97,20 +98,32 @@ def _described(ranking: Ranking, group: tuple[int, ...], robot: Robot) -> Hypoth
     unit = _telling_unit(ranking, after, uncertainty)
     of_unit = np.array([each == unit for each in units])
     greatest = [float(lengths[of_unit].max()) for lengths in (before_lengths, after_lengths)]
-    faults = " and ".join(pool.faults[best])
     return Hypothesis(
-        hypothesis=f"{faults}; residual falls from {shown(greatest[0])} {unit} to {shown(greatest[1])} {unit}",
+        hypothesis=said(
+            "{faults}; residual falls from {before} {unit} to {after} {unit}",
+            faults=both(pool.faults[best]),
+            before=shown(greatest[0]),
+            after=shown(greatest[1]),
+            unit=unit,
+        ),
         faults=pool.faults[best],
         kinds=pool.kinds[best],
         residual_before=greatest[0],
         residual_after=greatest[1],
         unit=unit,
         explains=bool((np.abs(after) <= uncertainty * MEETS).all()),
-        indistinguishable_from=tuple(" and ".join(pool.faults[i]) for i in group[1:]),
+        indistinguishable_from=tuple(both(pool.faults[i]) for i in group[1:]),
         to_decide=what_decides(pool.tables[list(group)], robot),
         score=float(ranking.score[best]),
         repaired=robot_of(pool.tables, best, robot),
     )
+
+
+def both(faults: Sequence[str]) -> str:
+    """One fault or two as one text."""
+    if len(faults) == 1:
+        return faults[0]
+    return said("{fault} and {second_fault}", fault=faults[0], second_fault=faults[1])
 
 
 def _telling_unit(ranking: Ranking, after: np.ndarray, uncertainty: np.ndarray) -> str:

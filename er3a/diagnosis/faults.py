@@ -13,6 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from er3a.kinematics.table_batch import COLUMNS, Tables
+from er3a.language import N_, said
 
 JOINTS = range(6)
 RADIANS_PER_DEGREE = np.pi / 180
@@ -76,27 +77,35 @@ def _differs(left: Tables, right: Tables) -> bool:
 
 def _units() -> list[Repair]:
     limits = ("lower", "upper")
-    lengths = ((("a",), "column a"), (("d",), "column d"), (("a", "d"), "all lengths"))
+    lengths = ((("a",), N_("column a")), (("d",), N_("column d")), (("a", "d"), N_("all lengths")))
     angles = (
-        (("alpha",), "column alpha"),
-        (("offset",), "column offset"),
-        (limits, "joint limits"),
-        (("alpha", "offset", *limits), "all angles"),
+        (("alpha",), N_("column alpha")),
+        (("offset",), N_("column offset")),
+        (limits, N_("joint limits")),
+        (("alpha", "offset", *limits), N_("all angles")),
     )
     found = []
     for columns, words in lengths:
         for factor, fault in (
-            (1000.0, "metres read as millimetres (1000 times too small)"),
-            (0.001, "millimetres read as metres (1000 times too large)"),
+            (1000.0, N_("metres read as millimetres (1000 times too small)")),
+            (0.001, N_("millimetres read as metres (1000 times too large)")),
         ):
-            found.append(Repair("unit", f"{words}: {fault}", _scaled(columns, factor)))
+            found.append(Repair("unit", _fault_at(words, fault), _scaled(columns, factor)))
     for columns, words in angles:
         for factor, fault in (
-            (1 / RADIANS_PER_DEGREE, "radians read as degrees (57.3 times too small)"),
-            (RADIANS_PER_DEGREE, "degrees read as radians (57.3 times too large)"),
+            (1 / RADIANS_PER_DEGREE, N_("radians read as degrees (57.3 times too small)")),
+            (RADIANS_PER_DEGREE, N_("degrees read as radians (57.3 times too large)")),
         ):
-            found.append(Repair("unit", f"{words}: {fault}", _scaled(columns, factor)))
+            found.append(Repair("unit", _fault_at(words, fault), _scaled(columns, factor)))
     return found
+
+
+def _fault_at(place: str, fault: str) -> str:
+    return said("{place}: {fault}", place=place, fault=fault)
+
+
+def _at_joint(joint: int, fault: str) -> str:
+    return _fault_at(said("joint {joint}", joint=joint + 1), fault)
 
 
 def _scaled(columns: tuple[str, ...], factor: float) -> Callable[[Tables], Tables]:
@@ -107,8 +116,8 @@ def _signs(given: Tables) -> list[Repair]:
     found = []
     for j in JOINTS:
         alpha = np.degrees(given.alpha[0, j])
-        words = f"joint {j + 1}: alpha has the wrong sign ({alpha:g} deg given, {-alpha:g} deg fits)"
-        found.append(Repair("alpha sign", words, _negated("alpha", j)))
+        fault = said("alpha has the wrong sign ({given:g} deg given, {fits:g} deg fits)", given=alpha, fits=-alpha)
+        found.append(Repair("alpha sign", _at_joint(j, fault), _negated("alpha", j)))
     return found
 
 
@@ -116,25 +125,27 @@ def _negated(column: str, joint: int) -> Callable[[Tables], Tables]:
     return lambda tables: tables.with_column(column, [joint], -getattr(tables, column)[:, [joint]])
 
 
+_SHIFTS = (
+    (("a", "alpha", "d"), N_("all rows are shifted down by one joint"), N_("all rows are shifted up by one joint")),
+    (("a",), N_("column a is shifted down by one joint"), N_("column a is shifted up by one joint")),
+    (("alpha",), N_("column alpha is shifted down by one joint"), N_("column alpha is shifted up by one joint")),
+    (("d",), N_("column d is shifted down by one joint"), N_("column d is shifted up by one joint")),
+)
+
+
 def _swaps() -> list[Repair]:
-    found = [Repair("swap", f"joint {j + 1}: a and d are swapped", _columns_swapped([j])) for j in JOINTS]
-    found.append(Repair("swap", "columns a and d are swapped", _columns_swapped(list(JOINTS))))
+    found = [Repair("swap", _at_joint(j, N_("a and d are swapped")), _columns_swapped([j])) for j in JOINTS]
+    found.append(Repair("swap", N_("columns a and d are swapped"), _columns_swapped(list(JOINTS))))
     for i, j in combinations(JOINTS, 2):
         order = list(JOINTS)
         order[i], order[j] = j, i
-        found.append(Repair("rows", f"rows {i + 1} and {j + 1} are swapped", _reordered(("a", "alpha", "d"), order)))
-        words = f"limits of joints {i + 1} and {j + 1} are swapped"
+        words = said("rows {first} and {second} are swapped", first=i + 1, second=j + 1)
+        found.append(Repair("rows", words, _reordered(("a", "alpha", "d"), order)))
+        words = said("limits of joints {first} and {second} are swapped", first=i + 1, second=j + 1)
         found.append(Repair("limits", words, _reordered(("lower", "upper"), order)))
-    for columns, words in (
-        (("a", "alpha", "d"), "all rows are"),
-        (("a",), "column a is"),
-        (("alpha",), "column alpha is"),
-        (("d",), "column d is"),
-    ):
-        for step, way in ((-1, "down"), (1, "up")):
-            found.append(
-                Repair("shift", f"{words} shifted {way} by one joint", _reordered(columns, list(np.roll(JOINTS, step))))
-            )
+    for columns, down, up in _SHIFTS:
+        found.append(Repair("shift", down, _reordered(columns, list(np.roll(JOINTS, -1)))))
+        found.append(Repair("shift", up, _reordered(columns, list(np.roll(JOINTS, 1)))))
     return found
 
 
@@ -155,10 +166,12 @@ def _offsets(given: Tables) -> list[Repair]:
         for step in (90.0, -90.0, 180.0):
             after = (before + step + 180.0) % 360.0 - 180.0 or 0.0
             after = 180.0 if after == -180.0 else after
-            missing = (
-                f"offset {after:g} deg missing" if before == 0 else f"offset is {before:g} deg, {after:g} deg fits"
+            fault = (
+                said("offset {fits:g} deg missing", fits=after)
+                if before == 0
+                else said("offset is {given:g} deg, {fits:g} deg fits", given=before, fits=after)
             )
-            found.append(Repair("offset", f"joint {j + 1}: {missing}", _turned(j, np.radians(step))))
+            found.append(Repair("offset", _at_joint(j, fault), _turned(j, np.radians(step))))
     return found
 
 
@@ -167,27 +180,30 @@ def _turned(joint: int, angle: float) -> Callable[[Tables], Tables]:
 
 
 def _directions() -> list[Repair]:
-    return [Repair("direction", f"joint {j + 1}: direction reversed", _negated("direction", j)) for j in JOINTS]
+    return [Repair("direction", _at_joint(j, N_("direction reversed")), _negated("direction", j)) for j in JOINTS]
 
 
 def _convention(given: Tables) -> list[Repair]:
-    other, this = ("standard", "modified") if given.modified[0] else ("modified", "standard")
-    words = f"the table is a {other} one, read as {this}"
+    words = (
+        N_("the table is a standard one, read as modified")
+        if given.modified[0]
+        else N_("the table is a modified one, read as standard")
+    )
     return [Repair("convention", words, lambda tables: replace(tables, modified=~tables.modified))]
 
 
 _LIMIT_FAULTS = (
-    ("limits crossed", lambda low, high: (high, low)),
-    ("limits signed the wrong way round", lambda low, high: (-high, -low)),
-    ("lower limit has the wrong sign", lambda low, high: (-low, high)),
-    ("upper limit has the wrong sign", lambda low, high: (low, -high)),
+    (N_("limits crossed"), lambda low, high: (high, low)),
+    (N_("limits signed the wrong way round"), lambda low, high: (-high, -low)),
+    (N_("lower limit has the wrong sign"), lambda low, high: (-low, high)),
+    (N_("upper limit has the wrong sign"), lambda low, high: (low, -high)),
 )
 
 
 def _limits() -> list[Repair]:
-    places = [([j], f"joint {j + 1}") for j in JOINTS] + [(list(JOINTS), "every joint")]
+    places = [([j], said("joint {joint}", joint=j + 1)) for j in JOINTS] + [(list(JOINTS), N_("every joint"))]
     return [
-        Repair("limits", f"{place}: {words}", _limits_changed(joints, change))
+        Repair("limits", _fault_at(place, words), _limits_changed(joints, change))
         for joints, place in places
         for words, change in _LIMIT_FAULTS
     ]
@@ -203,12 +219,13 @@ def _limits_changed(joints: list[int], change: Callable) -> Callable[[Tables], T
 
 def _length(column: str, joint: int) -> Slope:
     def fault(before: float, amount: float) -> str:
-        fits = f"{(before + amount) * 1000:.4g} mm fits"
-        return (
-            f"joint {joint + 1}: {column} missing, {fits}"
+        given, fits = before * 1000, (before + amount) * 1000
+        fault = (
+            said("{entry} missing, {fits:.4g} mm fits", entry=column, fits=fits)
             if before == 0
-            else (f"joint {joint + 1}: {column} is {before * 1000:.6g} mm, {fits}")
+            else said("{entry} is {given:.6g} mm, {fits:.4g} mm fits", entry=column, given=given, fits=fits)
         )
+        return _at_joint(joint, fault)
 
     return Slope(
         "length",
@@ -222,7 +239,9 @@ def _length(column: str, joint: int) -> Slope:
 
 _SCALE = Slope(
     "scale",
-    lambda before, amount: f"all lengths: scale wrong, times {1 + amount:.6g} fits",
+    lambda before, amount: _fault_at(
+        N_("all lengths"), said("scale wrong, times {factor:.6g} fits", factor=1 + amount)
+    ),
     lambda tables, amounts: replace(tables, a=tables.a * (1 + amounts[:, None]), d=tables.d * (1 + amounts[:, None])),
     lambda tables: np.ones(len(tables)),
 )

@@ -5,11 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.kinematics.table_batch import Tables, frames_of
+from er3a.language import N_, said
 from er3a.robots.robot import Robot
 
 STEP_DEG = 45.0
 APART_MM = 1.0
 APART_RAD = 1e-3
+LIMITS = {
+    "lower": N_("the lower limit of joint {joint} would tell them apart"),
+    "upper": N_("the upper limit of joint {joint} would tell them apart"),
+}
 
 
 def what_decides(tables: Tables, robot: Robot) -> str:
@@ -35,18 +40,23 @@ def what_decides(tables: Tables, robot: Robot) -> str:
     best = int(np.lexsort((-apart[pairs].max(axis=0), -told))[0])
     if told[best] > 0:
         pose = ", ".join(f"{angle:g}" for angle in poses[best])
-        share = "all" if told[best] == 1 else f"{told[best]:.0%} of the pairs"
-        return f"the flange's position at joints ({pose}) deg would tell {share} apart, by up to " + _length(
-            apart[pairs][:, best].max()
+        template = (
+            N_("the flange's position at joints ({pose}) deg would tell all apart, by up to {most}")
+            if told[best] == 1
+            else N_(
+                "the flange's position at joints ({pose}) deg would tell {share:.0%} of the pairs apart, by up to "
+                "{most}"
+            )
         )
-    for name in ("lower", "upper"):
-        column = getattr(tables, name)
+        return said(template, pose=pose, share=told[best], most=_length(apart[pairs][:, best].max()))
+    for side, template in LIMITS.items():
+        column = getattr(tables, side)
         joints = np.flatnonzero(np.ptp(column, axis=0) > APART_RAD)
         if len(joints):
-            return f"the {name} limit of joint {joints[0] + 1} would tell them apart"
+            return said(template, joint=joints[0] + 1)
     if np.ptp(flanges, axis=0).max() < APART_RAD:
-        return "nothing can, they are the same arm written in different ways"
-    return "no position of the flange does, but its orientation, or a point beside axis 6"
+        return N_("nothing can, they are the same arm written in different ways")
+    return N_("no position of the flange does, but its orientation, or a point beside axis 6")
 
 
 def _candidates(robot: Robot) -> np.ndarray:

@@ -8,9 +8,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from er3a.errors import IdentificationError
-from er3a.identification.parameters import LEVELS, SCALE, Parameter, Subspace, jacobian, parameters_of, subspace
+from er3a.identification.parameters import (
+    LEVELS,
+    SCALE,
+    Parameter,
+    Subspace,
+    jacobian,
+    listed,
+    parameters_of,
+    subspace,
+)
 from er3a.kinematics.spread import spread
 from er3a.kinematics.table_batch import tables_of
+from er3a.language import N_, joined, said
 from er3a.references.quantities import CarriedCoordinate, PointCoordinate
 from er3a.references.reference import Reference
 from er3a.robots.robot import Robot
@@ -48,7 +58,7 @@ def choose_level(robot: Robot, references: tuple[Reference, ...], deviation: np.
         if even the lengths ask for more; the message says what is needed
     """
     if not references:
-        raise IdentificationError("there are no positions of single points to identify anything from")
+        raise IdentificationError(N_("there are no positions of single points to identify anything from"))
     rich = _rich(robot, references)
     more = ""
     for name in LEVELS[::-1]:
@@ -96,14 +106,33 @@ def _what_more(
     lacking = len(best.kept) - len(here.kept)
     undetermined = [parameters[k].name for k in best.kept if k not in here.kept]
     least = -(-max(lacking, len(best.kept) + 1 - len(references)) // 3)
-    text = (
-        f"{len(references)} coordinates at {poses} pose{'s' if poses > 1 else ''} determine {len(here.kept)} of the "
-        f"{len(best.kept)} entries ({name}) that positions of these points can determine; it takes at least "
-        f"{least} more position{'s' if least > 1 else ''}"
+    template = (
+        N_(
+            "{coordinates} coordinates at {poses} poses determine {here} of the {best} entries ({level}) that "
+            "positions of these points can determine"
+        )
+        if poses > 1
+        else N_(
+            "{coordinates} coordinates at 1 pose determine {here} of the {best} entries ({level}) that positions of "
+            "these points can determine"
+        )
+    )
+    known = said(
+        template, coordinates=len(references), poses=poses, here=len(here.kept), best=len(best.kept), level=name
+    )
+    needed = (
+        said("it takes at least {least} more positions", least=least)
+        if least > 1
+        else N_("it takes at least 1 more position")
     )
     if undetermined:
-        text += f" for {', '.join(undetermined)}"
-    return text + f". Spread them over all joints, for example {_examples(robot, parameters, best, references)}."
+        needed = said("{needed} for {entries}", needed=needed, entries=joined(undetermined, ", "))
+    return said(
+        "{known}; {needed}. Spread them over all joints, for example {examples}.",
+        known=known,
+        needed=needed,
+        examples=_examples(robot, parameters, best, references),
+    )
 
 
 def _examples(
@@ -127,4 +156,4 @@ def _examples(
         at = int(np.argmax(gain))
         information += blocks[at].T @ blocks[at]
         chosen.append("(" + ", ".join(f"{angle:g}" for angle in spread[at]) + ") deg")
-    return ", ".join(chosen[:-1]) + f" and {chosen[-1]}"
+    return listed(chosen)

@@ -28,6 +28,7 @@ from er3a.identification.measurements import (
 )
 from er3a.identification.parameters import Parameter, jacobian, moved
 from er3a.kinematics.table_batch import Tables, robot_of, tables_of
+from er3a.language import said
 from er3a.references.predict import predict_tables
 from er3a.references.reference import Reference, ReferenceSet, expected_of
 from er3a.robots.robot import Robot, Source
@@ -151,9 +152,12 @@ def _fit(
         if np.abs(step).max() < SMALL_STEP + 1e-9 * np.abs(amounts).max():
             return amounts, before, rest, J
     raise IdentificationError(
-        f"no corrections make the table fit: after {STEPS} steps the positions are still "
-        f"{np.sqrt(np.mean((rest * deviation) ** 2)):.3g} mm off. The table has a gross fault or is another arm's; "
-        "er3a.diagnose names single faults"
+        said(
+            "no corrections make the table fit: after {steps} steps the positions are still {rest:.3g} mm off. The "
+            "table has a gross fault or is another arm's; er3a.diagnose names single faults",
+            steps=STEPS,
+            rest=np.sqrt(np.mean((rest * deviation) ** 2)),
+        )
     )
 
 

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.kinematics.table_batch import Tables, join, tables_of
+from er3a.language import N_, joined, said
 from er3a.references.predict import predict_tables
 from er3a.references.reference import Reference
 from er3a.robots.robot import Robot
 
-LEVELS = ("lengths", "lengths and joint offsets", "all entries")
+LEVELS = (N_("lengths"), N_("lengths and joint offsets"), N_("all entries"))
 PARALLEL_RAD = np.radians(1.0)
 STEP = 1e-5
 SCALE = 1e-3  # m and rad alike: 1 mm, and 1 mrad, which moves a flange about as far
@@ -35,7 +36,7 @@ class Parameter:
     @property
     def name(self) -> str:
         """Such as ``d4``."""
-        return f"{self.column}{self.joint}"
+        return said("{column}{joint}", column=self.column, joint=self.joint)
 
     @property
     def unit(self) -> str:
@@ -145,13 +146,25 @@ def subspace(
 def _why(robot: Robot, parameters: Sequence[Parameter], k: int, kept: list[int], J: np.ndarray, no_effect: bool) -> str:
     name = parameters[k].name
     if no_effect:
-        return f"{name} moves none of the measured points"
+        return said("{entry} moves none of the measured points", entry=name)
     share = np.linalg.lstsq(J[:, kept], J[:, k], rcond=None)[0] * np.linalg.norm(J[:, kept], axis=0)
     partners = [parameters[i] for i, part in zip(kept, share) if abs(part) > DEPENDENT * np.linalg.norm(J[:, k])]
-    together = ", ".join([name, *(partner.name for partner in partners[:-1])]) + f" and {partners[-1].name}"
+    entries = listed([name, *(partner.name for partner in partners)])
     between = [
         joints for row, joints in parallel_pairs(robot)
         if parameters[k].column == "d" and {parameters[k].joint, partners[-1].joint} == set(joints)
     ]  # fmt: skip
-    reason = f": joints {between[0][0]} and {between[0][1]} are parallel" if between and len(partners) == 1 else ""
-    return f"{together} can't be told apart{reason}"
+    if between and len(partners) == 1:
+        first, second = between[0]
+        return said(
+            "{entries} can't be told apart: joints {first} and {second} are parallel",
+            entries=entries,
+            first=first,
+            second=second,
+        )
+    return said("{entries} can't be told apart", entries=entries)
+
+
+def listed(words: Sequence[str]) -> str:
+    """Two words or more in a row: first, second and last."""
+    return said("{others} and {last}", others=joined(words[:-1], ", "), last=words[-1])

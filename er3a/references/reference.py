@@ -7,11 +7,20 @@ from itertools import combinations
 
 import numpy as np
 
+from er3a.language import N_
 from er3a.references.quantities import Quantity
 from er3a.references.rows import AxisRow, PositionRow, Row
 from er3a.robots.robot import WEIGHTY_GRADES, Grade
 
-GROUPS = ("zero pose", "axes", "key poses", "reach", "envelope", "limits", "speeds")
+GROUPS = (
+    N_("zero pose"),
+    N_("axes"),
+    N_("key poses"),
+    N_("reach"),
+    N_("envelope"),
+    N_("limits"),
+    N_("speeds"),
+)
 
 
 @dataclass(frozen=True)

@@ -10,14 +10,15 @@ from typing import Literal
 import numpy as np
 
 from er3a.errors import ShapeError
+from er3a.language import N_
 
 Grade = Literal["official", "cad", "export", "claim", "inferred"]
 GRADES: dict[str, str] = {
-    "official": "the maker's own document",
-    "cad": "measured on a CAD model that carries the model's name",
-    "export": "a URDF exported from CAD",
-    "claim": "an article's text",
-    "inferred": "reasoned, not stated",
+    N_("official"): N_("the maker's own document"),
+    N_("cad"): N_("measured on a CAD model that carries the model's name"),
+    N_("export"): N_("a URDF exported from CAD"),
+    N_("claim"): N_("an article's text"),
+    N_("inferred"): N_("reasoned, not stated"),
 }
 WEIGHTY_GRADES = ("official", "cad", "export")
 

@@ -93,13 +93,14 @@ def plain_words(texts: Iterable[str], own_texts: set[str]) -> list[str]:
 
 
 def texts_from_files(folder: Path) -> set[str]:
-    """All texts that people wrote into the input files below a folder."""
+    """All texts that people wrote into the input files below a folder, and the titles before a colon in them."""
     found: set[str] = set()
     for file in folder.rglob("*.yaml"):
         found.update(_leaves(yaml.safe_load(file.read_text(encoding="utf-8")), keys=True))
     for file in folder.rglob("*.csv"):
         with file.open(encoding="utf-8", newline="") as lines:
             found.update(cell for row in csv.reader(lines) for cell in row)
+    found.update([text.split(":")[0] for text in found])
     return {text for text in found if WORD.search(text)}
 
 

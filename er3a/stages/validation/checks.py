@@ -8,19 +8,22 @@ from typing import Literal
 
 import numpy as np
 
+from er3a.language import N_, said
 from er3a.references.quantities import Limit, Speed
 from er3a.references.reference import GROUPS, Reference, ReferenceSet, conflicts
+from er3a.references.scalars import axis_name, limit_name, speed_name
 
 Status = Literal["pass", "fail", "no_reference", "conflict"]
 ROUNDING = 1e-9
+THE_MODEL = N_("the model itself")
 MISSING_WORDS = {
-    "zero pose": "zero pose",
-    "axes": "joint axes",
-    "key poses": "key poses",
-    "reach": "reach",
-    "envelope": "labels of a workspace drawing",
-    "limits": "joint limits",
-    "speeds": "joint speeds",
+    "zero pose": N_("zero pose"),
+    "axes": N_("joint axes"),
+    "key poses": N_("key poses"),
+    "reach": N_("reach"),
+    "envelope": N_("labels of a workspace drawing"),
+    "limits": N_("joint limits"),
+    "speeds": N_("joint speeds"),
 }
 
 
@@ -70,7 +73,7 @@ class Conflict:
 def against_itself(name: str, group: str, measured: float, tolerance: float, unit: str, note: str = "") -> Check:
     """A check that needs no document: ``measured`` should be 0."""
     status = "pass" if abs(measured) <= tolerance else "fail"
-    return Check(name, group, None, status, measured, 0.0, measured, tolerance, unit, "the model itself", None, note)
+    return Check(name, group, None, status, measured, 0.0, measured, tolerance, unit, THE_MODEL, None, note)
 
 
 def nothing_to_compare(name: str, group: str, unit: str, note: str, **known) -> Check:
@@ -105,7 +108,7 @@ def _status(i: int, stated: tuple[Reference, ...], met: list[bool], pairs: list[
 def _check(set_name: str, reference: Reference, value: float, status: Status) -> Check:
     if math.isnan(value):
         return nothing_to_compare(
-            reference.name, reference.group, reference.unit, "the robot's file gives no value",
+            reference.name, reference.group, reference.unit, N_("the robot's file gives no value"),
             reference_set=set_name, source=reference.source, grade=reference.grade,
         )  # fmt: skip
     return Check(
@@ -126,27 +129,25 @@ def _check(set_name: str, reference: Reference, value: float, status: Status) ->
 def _gaps(references: ReferenceSet) -> list[Check]:
     gaps = [
         nothing_to_compare(
-            reference.name, reference.group, reference.unit, "the source gives none",
+            reference.name, reference.group, reference.unit, N_("the source gives none"),
             reference_set=references.name, source=reference.source, grade=reference.grade,
         )
         for reference in references.references
         if reference.expected is None
     ]  # fmt: skip
     present = {reference.group for reference in references.references}
+    note = said("{own_set} has no data", own_set=references.name)
     for group in GROUPS:
         if group not in present:
-            note = f"{references.name} has no data"
             gaps.append(nothing_to_compare(MISSING_WORDS[group], group, "", note, reference_set=references.name))
     quantities = {reference.quantity for reference in references.references}
     with_axis = {row.joint for row in references.axes}
-    note = f"{references.name} has no data"
     for joint in range(1, 7):
         if "axes" in present and joint not in with_axis:
-            gaps.append(nothing_to_compare(f"axis {joint}", "axes", "mm", note, reference_set=references.name))
-        per_joint = [("limits", f"{side} limit", Limit(joint, side)) for side in ("lower", "upper")]
-        for group, words, quantity in (*per_joint, ("speeds", "speed", Speed(joint))):
+            gaps.append(nothing_to_compare(axis_name(joint), "axes", "mm", note, reference_set=references.name))
+        limits = [("limits", limit_name(joint, side), Limit(joint, side)) for side in ("lower", "upper")]
+        for group, name, quantity in (*limits, ("speeds", speed_name(joint), Speed(joint))):
             if group in present and quantity not in quantities:
-                name = f"joint {joint} {words}"
                 gaps.append(nothing_to_compare(name, group, quantity.unit, note, reference_set=references.name))
     return gaps
 

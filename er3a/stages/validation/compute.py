@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from er3a.language import keeps_sentences
+from er3a.language import N_, keeps_sentences
 from er3a.references.extremes import search
 from er3a.references.load import load_references
 from er3a.references.predict import read, state_of
@@ -82,8 +82,8 @@ def compute(study: Study, name: str, folder: Path) -> None:
     write_table(folder / "corrections.parquet", corrections)
 
     reach = {
-        "Wrist centre reaches from axis 1": values[WRIST_REACH],
-        "Flange reaches from axis 1": values[FLANGE_REACH],
+        N_("Wrist centre reaches from axis 1"): values[WRIST_REACH],
+        N_("Flange reaches from axis 1"): values[FLANGE_REACH],
     }
     zero = state_of(robot, ()).at(ZERO_POSE)
     write_summary(
@@ -114,7 +114,9 @@ def _without_reference(values: dict[Quantity, float], checks: list[Check]) -> li
     """Reach that no reference speaks about, as measured."""
     named = {check.name for check in checks}
     return [
-        nothing_to_compare(reach_name(quantity), "reach", "mm", "no reference set gives it", measured=values[quantity])
+        nothing_to_compare(
+            reach_name(quantity), "reach", "mm", N_("no reference set gives it"), measured=values[quantity]
+        )
         for quantity in ALWAYS_SEARCHED
         if reach_name(quantity) not in named
     ]

@@ -8,6 +8,7 @@ import pandas as pd
 
 from er3a.errors import IdentificationError
 from er3a.identification.identify import Identification, identify
+from er3a.language import joined, said
 from er3a.references.reference import ReferenceSet
 from er3a.robots.robot import Robot
 
@@ -53,14 +54,22 @@ def _plain(result: Identification) -> dict[str, Any]:
     fits = result.scatter <= MOST_SCATTER
     beyond = [each.name for each in result.estimates if abs(each.correction) > each.half_width]
     if not fits:
-        text = (
-            f"No corrections of its {result.level} make this table meet the positions: {result.rms_after_mm:.3g} mm of "
-            f"{result.rms_before_mm:.3g} mm (root mean square) remain. It is not a matter of calibration."
+        text = said(
+            "No corrections of its {level} make this table meet the positions: {after:.3g} mm of {before:.3g} mm (root "
+            "mean square) remain. It is not a matter of calibration.",
+            level=result.level,
+            after=result.rms_after_mm,
+            before=result.rms_before_mm,
         )
     elif beyond:
-        text = f"The positions ask for corrections of {', '.join(beyond)}, beyond their 95 % intervals."
+        text = said(
+            "The positions ask for corrections of {entries}, beyond their 95 % intervals.",
+            entries=joined(beyond, ", "),
+        )
     else:
-        text = f"The positions ask for no correction: all {len(result.estimates)} intervals (95 %) hold 0."
+        text = said(
+            "The positions ask for no correction: all {count} intervals (95 %) hold 0.", count=len(result.estimates)
+        )
     return {
         "status": "identified" if fits else "misfit",
         "text": text,

@@ -10,7 +10,9 @@ import pandas as pd
 from er3a.diagnosis.diagnose import Hypothesis, described, residuals, shown
 from er3a.diagnosis.ranking import Ranking, rank, usable
 from er3a.kinematics.table_batch import COLUMNS
+from er3a.language import N_, said
 from er3a.references.reference import ReferenceSet, vectors_of
+from er3a.references.scalars import without_coordinate
 from er3a.robots.robot import Robot
 
 MOSTLY = 0.05
@@ -85,19 +87,25 @@ def _status(count: int, ranking: Ranking | None, best: Hypothesis | None) -> str
 
 def _text(status: str, count: int, tried: int, best: Hypothesis | None) -> str:
     if status == "no_reference":
-        return "There is nothing to rest a diagnosis on."
+        return N_("There is nothing to rest a diagnosis on.")
     if status == "met":
-        return f"Nothing to explain: all {count} references about poses, axes and limits are met."
+        return said("Nothing to explain: all {count} references about poses, axes and limits are met.", count=count)
     if status == "named":
-        return f"Most likely fault: {best.hypothesis}."
+        return said("Most likely fault: {hypothesis}.", hypothesis=best.hypothesis)
     if status == "mostly":
-        return f"Most likely fault: {best.hypothesis}, which is still more than the references leave open."
+        return said(
+            "Most likely fault: {hypothesis}, which is still more than the references leave open.",
+            hypothesis=best.hypothesis,
+        )
     if not best:
-        return "No fault stands out: what the references are missed by looks like scatter, not like a wrong number."
-    return (
-        f"No one or two faults explain the data: the best of {tried} hypotheses still leaves "
-        f"{shown(best.residual_after)} {best.unit} of {shown(best.residual_before)} {best.unit}. "
-        "This is another arm, or more than two numbers are wrong."
+        return N_("No fault stands out: what the references are missed by looks like scatter, not like a wrong number.")
+    return said(
+        "No one or two faults explain the data: the best of {tried} hypotheses still leaves {after} {unit} of {before} "
+        "{unit}. This is another arm, or more than two numbers are wrong.",
+        tried=tried,
+        after=shown(best.residual_after),
+        before=shown(best.residual_before),
+        unit=best.unit,
     )
 
 
@@ -115,7 +123,7 @@ def _residuals(set_name: str, ranking: Ranking) -> pd.DataFrame:
     records = []
     for i in order:
         parts = [reference for reference, number in zip(ranking.references, group) if number == i]
-        name = parts[0].name if len(parts) == 1 else parts[0].name.rsplit(" ", 1)[0]
+        name = parts[0].name if len(parts) == 1 else without_coordinate(parts[0].name)
         records.append(
             {
                 "reference_set": set_name,

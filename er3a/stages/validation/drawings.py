@@ -9,6 +9,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 from er3a.kinematics.forward import frames
+from er3a.language import tr
 from er3a.references.quantities import nearest_on_axis, point_of
 from er3a.robots.robot import Robot
 from er3a.viewing.figures import equal_scale, new_figure
@@ -33,18 +34,18 @@ def side_view(robot: Robot, axes_table: pd.DataFrame, mended: Robot | None, mend
         drawn.append(dashed)
     size = float(np.ptp(np.vstack([*drawn, axes_table[["x_mm", "y_mm", "z_mm"]].to_numpy()]), axis=0).max())
     style = {"solid_capstyle": "round", "solid_joinstyle": "round", "zorder": 1}
-    axes.plot(corners[:, 0], corners[:, 2], color=LINK, linewidth=9, label="model's links", **style)
+    axes.plot(corners[:, 0], corners[:, 2], color=LINK, linewidth=9, label=tr("model's links"), **style)
     axes.axhline(0, color=MUTED, linewidth=1, zorder=0)
     for k, (source, rows) in enumerate(axes_table.groupby("source", sort=False)):
         marker, points = MARKERS[k % len(MARKERS)]
         colour = REFERENCE_COLOURS[k % len(REFERENCE_COLOURS)]
         lines = [(row.joint, _vector(row, "direction_{}"), _vector(row, "{}_mm")) for row in rows.itertuples()]
-        _axes_of(axes, lines, size * (0.16 + 0.02 * k), colour, marker, points, f"axes: {_short(source)}", hollow=True)
+        _axes_of(axes, lines, size * (0.16 + 0.02 * k), colour, marker, points, _source_label(source), hollow=True)
         off = rows[rows["distance_mm"] > 0.05 * size]
         if k == 0:
             _label(axes, [(row.joint, _vector(row, "{}_mm")) for row in off.itertuples()], colour, (10, -17))
     lines = _model_axes(robot)
-    _axes_of(axes, lines, size * 0.13, MODEL, "o", 6, "model's axes", hollow=False)
+    _axes_of(axes, lines, size * 0.13, MODEL, "o", 6, tr("model's axes"), hollow=False)
     _label(axes, [(joint, point) for joint, _, point in lines], MODEL, (9, 9))
     equal_scale(axes, "x (mm)", "z (mm)")
     axes.margins(0.12)
@@ -58,7 +59,10 @@ def axis_deviation(axes_table: pd.DataFrame) -> Figure:
     sources = list(dict.fromkeys(axes_table["source"]))
     width = 0.8 / len(sources)
     for axes, value, bound, label in zip(
-        panels, ("distance_mm", "angle_deg"), ("uncertainty_mm", "uncertainty_deg"), ("distance (mm)", "angle (deg)")
+        panels,
+        ("distance_mm", "angle_deg"),
+        ("uncertainty_mm", "uncertainty_deg"),
+        (tr("distance (mm)"), tr("angle (deg)")),
     ):
         for k, source in enumerate(sources):
             rows = axes_table[axes_table["source"] == source]
@@ -77,7 +81,7 @@ def axis_deviation(axes_table: pd.DataFrame) -> Figure:
             axes.annotate(text, at, (0, 2), textcoords="offset points", ha="center", fontsize=8)
     for k, source in enumerate(sources):
         panels[0].bar([0], [0], color=REFERENCE_COLOURS[k % len(REFERENCE_COLOURS)], label=_short(source))
-    panels[0].bar([0], [0], facecolor="none", edgecolor=INK, label="uncertainty of the source")
+    panels[0].bar([0], [0], facecolor="none", edgecolor=INK, label=tr("uncertainty of the source"))
     panels[0].set_xlim(0.4, 6.6)
     figure.legend(loc="outside lower left", ncols=1)
     return figure
@@ -110,7 +114,7 @@ def workspace_drawing(section: pd.DataFrame, labels: pd.DataFrame, origin_mm: li
         axes.plot(*model, ".", color=MODEL, markersize=5, zorder=4)
     room = 0.12 * spread
     axes.plot([x.min() - room, x.max() + room], [z.min() - room, z.max() + room], alpha=0)
-    equal_scale(axes, "x from axis 1 (mm)", "z from axis 2 (mm)")
+    equal_scale(axes, tr("x from axis 1 (mm)"), tr("z from axis 2 (mm)"))
     return figure
 
 
@@ -154,6 +158,10 @@ def _label(axes: Axes, points: list[tuple[int, np.ndarray]], colour: str, shift:
 
 def _vector(row, pattern: str) -> np.ndarray:
     return np.array([getattr(row, pattern.format(c)) for c in "xyz"])
+
+
+def _source_label(source: str) -> str:
+    return tr("axes: {own_source}", own_source=_short(source))
 
 
 def _short(source: str) -> str:

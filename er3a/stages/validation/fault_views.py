@@ -8,7 +8,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from er3a.stages.validation.mended import typographic
+from er3a.language import tr
+from er3a.stages.validation.wording import both_faults, in_a_row, typographic
 from er3a.viewing.figures import new_figure
 from er3a.viewing.page import Picture, fixed
 from er3a.viewing.palette import INK, MODEL, MUTED, REFERENCE
@@ -32,7 +33,9 @@ def culprit_stories(summary: dict[str, Any], residuals: pd.DataFrame) -> list[di
                 "alike": [typographic(words) for words in ranked[0]["indistinguishable_from"]] if named else [],
                 "to_decide": typographic(ranked[0]["to_decide"]) if named else "",
                 "others": [_hypothesis_row(row) for row in ranked[1 if named else 0 : SHOWN_HYPOTHESES]],
-                "others_title": "Next-best hypotheses" if named else "The best hypotheses, none of which will do",
+                "others_title": tr("Next-best hypotheses")
+                if named
+                else tr("The best hypotheses, none of which will do"),
                 "picture": _residual_picture(own, culprit, ranked),
             }
         )
@@ -45,8 +48,14 @@ def correction_stories(summary: dict[str, Any], corrections: pd.DataFrame) -> li
     for found in summary["identification"]:
         own = corrections[corrections["reference_set"] == found["reference_set"]]
         story = found | {"text": typographic(found["text"]), "picture": None, "rows": []}
+        story["close"] = [
+            tr("{first} and {second} ({correlation})", first=first, second=second, correlation=fixed(correlation, 2))
+            for first, second, correlation in found.get("close", ())
+        ]
         if len(own):
-            alt = "Correction of each identified entry of the table with its 95 % interval, lengths and angles apart."
+            alt = tr(
+                "Correction of each identified entry of the table with its 95 % interval, lengths and angles apart."
+            )
             story["picture"] = Picture(corrections_figure(own), alt, story["text"])
             story["rows"] = [
                 [row.name, fixed(row.nominal, 3), fixed(row.correction, 4), fixed(row.half_width, 4), row.unit]
@@ -62,15 +71,15 @@ def residual_figure(rows: pd.DataFrame) -> Figure:
     at = np.arange(len(rows))[::-1]
     before, after = (np.maximum(rows[key].to_numpy(), LEAST_DRAWN) for key in ("before", "after"))
     axes.hlines(at, np.minimum(before, after), np.maximum(before, after), color=MUTED, linewidth=1.2)
-    axes.plot(before, at, "o", color=REFERENCE, label="table as it is")
-    axes.plot(after, at, "D", color=MODEL, markersize=5, label="with the best hypothesis mended")
-    axes.plot(rows["uncertainty"], at, "|", color=INK, markersize=13, label="uncertainty of the reference")
+    axes.plot(before, at, "o", color=REFERENCE, label=tr("table as it is"))
+    axes.plot(after, at, "D", color=MODEL, markersize=5, label=tr("with the best hypothesis mended"))
+    axes.plot(rows["uncertainty"], at, "|", color=INK, markersize=13, label=tr("uncertainty of the reference"))
     axes.set_xscale("log")
-    axes.set_yticks(at, [f"{row.name} ({row.unit})" for row in rows.itertuples(index=False)])
+    axes.set_yticks(at, [f"{tr(row.name)} ({row.unit})" for row in rows.itertuples(index=False)])
     axes.set_ylim(-0.7, len(rows) - 0.3)
     axes.set_xlim(LEAST_DRAWN / 1.5, 2 * max(before.max(), after.max()))
     axes.grid(axis="y", visible=False)
-    axes.set_xlabel(f"residual (mm or deg, as named; {LEAST_DRAWN:g} stands for all that is less)")
+    axes.set_xlabel(tr("residual (mm or deg, as named; {least:g} stands for all that is less)", least=LEAST_DRAWN))
     figure.legend(loc="outside upper left", ncols=3)
     return figure
 
@@ -85,9 +94,9 @@ def corrections_figure(rows: pd.DataFrame) -> Figure:
         at = np.arange(len(own))
         axes.axhline(0, color=MUTED, linewidth=1)
         axes.errorbar(at, own["correction"], own["half_width"], fmt="o", color=MODEL, capsize=4, elinewidth=1.4)
-        axes.set_xticks(at, own["name"], rotation=45 if len(own) > 8 else 0)
+        axes.set_xticks(at, [tr(name) for name in own["name"]], rotation=45 if len(own) > 8 else 0)
         axes.set_xlim(-0.6, len(own) - 0.4)
-        axes.set_ylabel(f"correction ({unit})")
+        axes.set_ylabel(tr("correction ({unit})", unit=unit))
         axes.grid(axis="x", visible=False)
     return figure
 
@@ -98,20 +107,22 @@ def _residual_picture(rows: pd.DataFrame, culprit: dict[str, Any], ranked: list[
         return None
     shown = missed.head(SHOWN_RESIDUALS)
     still = int((missed["after"] > missed["uncertainty"]).sum())
-    more = f" The {len(shown)} farthest off of {len(missed)} are drawn." if len(missed) > len(shown) else ""
     if culprit["status"] == "named":
-        caption = "Mending the named fault takes every residual below the uncertainty of its reference."
+        caption = tr("Mending the named fault takes every residual below the uncertainty of its reference.")
     elif ranked:
-        caption = f"Even the best hypothesis leaves {still} of {len(rows)} references missed."
+        caption = tr("Even the best hypothesis leaves {still} of {all} references missed.", still=still, all=len(rows))
     else:
-        caption = "No hypothesis does better than the table as it is."
-    alt = "Residual of each missed reference before and after the best hypothesis, on a logarithmic axis."
-    return Picture(residual_figure(shown), alt, caption + more)
+        caption = tr("No hypothesis does better than the table as it is.")
+    if len(missed) > len(shown):
+        more = tr("The {drawn} farthest off of {missed} are drawn.", drawn=len(shown), missed=len(missed))
+        caption = in_a_row(caption, more)
+    alt = tr("Residual of each missed reference before and after the best hypothesis, on a logarithmic axis.")
+    return Picture(residual_figure(shown), alt, caption)
 
 
 def _hypothesis_row(row: dict[str, Any]) -> list[str]:
     alike = row["indistinguishable_from"]
-    words = typographic(" and ".join(row["faults"]))
+    words = both_faults(row["faults"])
     if alike:
-        words += f" (or {len(alike)} more that these references can't tell from it)"
+        words = tr("{faults} (or {more} more that these references can't tell from it)", faults=words, more=len(alike))
     return [words, fixed(row["residual_before"], 1), fixed(row["residual_after"], 1), row["unit"]]

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 
 import pandas as pd
 
+from er3a.language import N_, joined, said
 from er3a.references.reference import ReferenceSet
+from er3a.references.scalars import split_at_pose
 from er3a.results import Figure, Verdict
 from er3a.robots.robot import WEIGHTY_GRADES
 from er3a.stages.validation.checks import Check, Conflict
@@ -15,7 +18,8 @@ from er3a.stages.validation.checks import Check, Conflict
 TELLING_GROUPS = ("reach", "zero pose", "axes", "envelope", "key poses", "limits", "speeds")
 TELLING_SHARE = 0.25
 SHOWN_DECIMALS = 9
-MODEL_GROUPS = ("table sanity", "round trips")
+MODEL_GROUPS = (N_("table sanity"), N_("round trips"))
+GRADE_WORDS = {"official": N_("official"), "cad": N_("CAD"), "export": N_("exported")}
 
 
 def weighs(check: Check) -> bool:
@@ -62,34 +66,52 @@ def verdict_of(checks: list[Check], conflicts: list[Conflict], findings: list[di
     own_faults = [check for check in failed if check.group in MODEL_GROUPS]
     if own_faults:
         first = own_faults[0]
-        text = f"The model fails without any document: {first.name} {_value(first.measured, first.unit)}."
+        text = said(
+            "The model fails without any document: {check} {value}.",
+            check=first.name,
+            value=_value(first.measured, first.unit),
+        )
         return Verdict("fail", "validation.model_unsound", text, params | {"check": first.name})
     if failed:
         telling = most_telling(failed)
-        described = f"the {_grades(documented)} data in {telling.reference_set}"
         other = any(finding["another_arm"] for finding in findings if finding["name"] == telling.reference_set)
-        lead = f"This is not the arm that {described} describe" if other else f"The model contradicts {described}"
-        text = (
-            f"{lead}: {params['failed']} of {params['checks']} checks fail; the {_quoted(telling.name)} is "
-            f"{_value(telling.measured, telling.unit)}, not {_value(telling.expected, telling.unit)}."
+        template = (
+            N_(
+                "This is not the arm that the {grades} data in {own_set} describe: {failed} of {checks} checks fail; "
+                "the {quantity} is {measured}, not {expected}."
+            )
+            if other
+            else N_(
+                "The model contradicts the {grades} data in {own_set}: {failed} of {checks} checks fail; the "
+                "{quantity} is {measured}, not {expected}."
+            )
+        )
+        text = said(
+            template,
+            grades=_grades(documented),
+            own_set=telling.reference_set,
+            failed=params["failed"],
+            checks=params["checks"],
+            quantity=_quoted(telling.name),
+            measured=_value(telling.measured, telling.unit),
+            expected=_value(telling.expected, telling.unit),
         )
         culprit = named.get(telling.reference_set, "")
-        text += f" {culprit}{claims}" if culprit else claims
+        text = joined([text, culprit, claims], " ")
         code = "validation.another_arm" if other else "validation.contradicted"
         return Verdict("fail", code, text, params | {"check": telling.name, "culprit": culprit})
     if not documented:
-        text = f"There is no official, CAD or exported data to hold this model against.{claims}"
-        return Verdict("no_reference", "validation.no_reference", text, params)
+        text = N_("There is no official, CAD or exported data to hold this model against.")
+        return Verdict("no_reference", "validation.no_reference", joined([text, claims], " "), params)
     passed = sum(check.status == "pass" for check in documented)
-    can = " that can be met" if conflicts else ""
-    text = f"The model meets all {passed} checks against {_grades(documented)} data{can}."
-    if conflicts:
-        first = conflicts[0]
-        stated = " or ".join(_value(row["expected"], first.unit) for row in first.statements)
-        text += f" The references contradict each other about the {first.name} ({stated})"
-        text += f" and {len(conflicts) - 1} more" if len(conflicts) > 1 else ""
-        text += ", which is not charged to the model."
-    return Verdict("pass", "validation.confirmed", text + claims, params | {"passed": passed})
+    template = (
+        N_("The model meets all {passed} checks against {grades} data that can be met.")
+        if conflicts
+        else N_("The model meets all {passed} checks against {grades} data.")
+    )
+    text = said(template, passed=passed, grades=_grades(documented))
+    text = joined([text, _conflicts_sentence(conflicts), claims], " ")
+    return Verdict("pass", "validation.confirmed", text, params | {"passed": passed})
 
 
 def most_telling(failed: list[Check]) -> Check:
@@ -107,22 +129,22 @@ def key_figures(
     """The stage's key figures."""
     counted = Counter(check.status for check in checks if weighs(check))
     judged = counted["pass"] + counted["fail"]
-    figures = [Figure("Checks that count: passed", counted["pass"], f"of {judged}")]
+    figures = [Figure(N_("Checks that count: passed"), counted["pass"], said("of {total}", total=judged))]
     misses = [(f["weighty"]["total"] > 0, f["zero_pose_flange_off_mm"]) for f in findings]
     misses = [miss for miss in misses if miss[1] is not None]
     if misses:
-        figures.append(Figure("Zero pose: flange off by", max(misses)[1], "mm"))
+        figures.append(Figure(N_("Zero pose: flange off by"), max(misses)[1], "mm"))
     weighty_axes = axes[axes["grade"].isin(WEIGHTY_GRADES)]
     if len(weighty_axes):
-        figures.append(Figure("Joint axes: farthest off", float(weighty_axes["distance_mm"].max()), "mm"))
-        figures.append(Figure("Joint axes: most tilted", float(weighty_axes["angle_deg"].max()), "deg"))
+        figures.append(Figure(N_("Joint axes: farthest off"), float(weighty_axes["distance_mm"].max()), "mm"))
+        figures.append(Figure(N_("Joint axes: most tilted"), float(weighty_axes["angle_deg"].max()), "deg"))
     labels = [abs(check.difference) for check in checks if check.group == "envelope" and check.difference is not None]
     if labels:
-        figures.append(Figure("Workspace drawing: worst label off by", max(labels), "mm"))
+        figures.append(Figure(N_("Workspace drawing: worst label off by"), max(labels), "mm"))
     figures += [Figure(name, value, "mm") for name, value in reach.items()]
     figures = [replace(figure, value=round(figure.value, SHOWN_DECIMALS)) for figure in figures]
     if trips:
-        figures.append(Figure("Round trips: worst joint error", trips["joint_error_deg"], "deg"))
+        figures.append(Figure(N_("Round trips: worst joint error"), trips["joint_error_deg"], "deg"))
     return figures
 
 
@@ -143,21 +165,52 @@ def _claims_sentence(findings: list[dict], named: dict[str, str]) -> str:
         claims = finding["claims"]
         if finding["weighty"]["total"] or not claims["total"]:
             continue
-        sentence = f" Of the {claims['total']} claims in {finding['name']}, {claims['fail']} don't hold"
-        sentences.append(f"{sentence}. {named[finding['name']]}" if finding["name"] in named else f"{sentence}.")
-    return "".join(sentences)
+        sentence = said(
+            "Of the {claims} claims in {own_set}, {failed} don't hold.",
+            claims=claims["total"],
+            own_set=finding["name"],
+            failed=claims["fail"],
+        )
+        sentences += [sentence, named.get(finding["name"], "")]
+    return joined(sentences, " ")
+
+
+def _conflicts_sentence(conflicts: list[Conflict]) -> str:
+    if not conflicts:
+        return ""
+    first = conflicts[0]
+    stated = _chained(N_("{value} or {values}"), [_value(row["expected"], first.unit) for row in first.statements])
+    if len(conflicts) == 1:
+        return said(
+            "The references contradict each other about the {quantity} ({stated}), which is not charged to the model.",
+            quantity=first.name,
+            stated=stated,
+        )
+    return said(
+        "The references contradict each other about the {quantity} ({stated}) and {more} more, which is not charged to "
+        "the model.",
+        quantity=first.name,
+        stated=stated,
+        more=len(conflicts) - 1,
+    )
 
 
 def _quoted(name: str) -> str:
     """A check's name in a sentence: the pose behind what is seen there."""
-    pose, _, seen = name.rpartition(": ")
-    return f"{seen} ({pose})" if pose else name
+    pose, seen = split_at_pose(name)
+    return said("{seen} ({own_pose})", seen=seen, own_pose=pose) if pose else seen
 
 
 def _grades(checks: list[Check]) -> str:
-    words = {"official": "official", "cad": "CAD", "export": "exported"}
-    present = [word for grade, word in words.items() if any(check.grade == grade for check in checks)]
-    return " and ".join(present)
+    present = [word for grade, word in GRADE_WORDS.items() if any(check.grade == grade for check in checks)]
+    return _chained(N_("{value} and {values}"), present)
+
+
+def _chained(pair: str, words: Sequence[str]) -> str:
+    """Words as one text, by a template for a ``{value}`` and the ``{values}`` after it."""
+    if len(words) == 1:
+        return words[0]
+    return said(pair, value=words[0], values=_chained(pair, words[1:]))
 
 
 def _value(value: float, unit: str) -> str:

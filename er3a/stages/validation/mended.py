@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from er3a.kinematics.table_batch import COLUMNS
+from er3a.language import tr
 from er3a.robots.robot import Robot
+from er3a.stages.validation.wording import both_faults
 
 
 def mended_robot(robot: Robot, culprits: list[dict[str, Any]]) -> tuple[Robot | None, str]:
@@ -13,11 +15,6 @@ def mended_robot(robot: Robot, culprits: list[dict[str, Any]]) -> tuple[Robot | 
     for culprit in culprits:
         if culprit["repaired"]:
             columns = {name: culprit["repaired"][name] for name in COLUMNS}
-            label = typographic(f"mended: {' and '.join(culprit['faults'])}")
+            label = tr("mended: {faults}", faults=both_faults(culprit["faults"]))
             return robot.replace(convention=culprit["repaired"]["convention"], **columns), label
     return None, ""
-
-
-def typographic(text: str) -> str:
-    """Minus signs instead of hyphens before numbers."""
-    return text.replace(" -", " −").replace("(-", "(−")

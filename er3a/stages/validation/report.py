@@ -8,19 +8,34 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from er3a.language import N_, tr
+from er3a.references.scalars import SEGMENT_NAMES
 from er3a.results import read_summary, read_table
 from er3a.robots.robot import GRADES, WEIGHTY_GRADES, Robot
+from er3a.stages.validation.checks import THE_MODEL
 from er3a.stages.validation.drawings import axis_deviation, side_view, workspace_drawing
 from er3a.stages.validation.fault_views import correction_stories, culprit_stories
 from er3a.stages.validation.mended import mended_robot
 from er3a.stages.validation.model import model_of
+from er3a.stages.validation.wording import in_a_row, listed
 from er3a.study import Study
 from er3a.viewing.page import Picture, fixed, number, render
 
 SHOWN_FAILURES = 12
 DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "": 0}
-HYPOTHESIS_COLUMNS = ["Hypothesis", "Residual now>", "With it mended>", "Unit"]
-COLUMNS = ["Check", "Model>", "Reference>", "Difference>", "Tolerance>", "Unit", "Source"]
+COLUMNS = (
+    N_("Check"),
+    N_("Model>"),
+    N_("Reference>"),
+    N_("Difference>"),
+    N_("Tolerance>"),
+    N_("Unit"),
+    N_("Source"),
+)
+SEGMENTS = {
+    SEGMENT_NAMES["upper_arm"]: N_("the upper arm stands {measured}° from the vertical where {expected}° is stated"),
+    SEGMENT_NAMES["forearm"]: N_("the forearm stands {measured}° from the vertical where {expected}° is stated"),
+}
 
 
 def report(study: Study, name: str, folder: Path, output: Path) -> None:
@@ -39,7 +54,6 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
         sets=[_set_story(finding, checks, poses) for finding in summary["sets"]],
         culprits=culprit_stories(summary, read_table(folder / "residuals.parquet")),
         corrections=correction_stories(summary, read_table(folder / "corrections.parquet")),
-        hypothesis_columns=HYPOTHESIS_COLUMNS,
         circles=summary["circle_points"],
         groups=_groups(checks),
         failed=[_row(check) for check in failed[:SHOWN_FAILURES]],
@@ -47,7 +61,7 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
         passed={
             title: [_row(check) for check in own if check["status"] == "pass"] for title, own in _by_set(checks).items()
         },
-        columns=COLUMNS,
+        columns=[tr(label) for label in COLUMNS],
         conflicts=summary["conflicts"],
         blanks=[_blank(check) for check in checks if check["status"] == "no_reference"],
         side=_side_picture(robot, axes, summary),
@@ -63,7 +77,7 @@ def _set_story(finding: dict[str, Any], checks: list[dict], poses: pd.DataFrame)
     """What the page says about one reference set, in numbers."""
     own = [check for check in checks if check["reference_set"] == finding["name"]]
     failed_groups = {check["group"] for check in own if check["status"] == "fail"}
-    segments = [check for check in own if check["group"] == "zero pose" and check["unit"] == "deg"]
+    segments = [check for check in own if check["name"] in SEGMENTS]
     zero = poses[(poses["reference_set"] == finding["name"]) & (poses["group"] == "zero pose")]
     zero = zero[zero["point"] == "flange"].head(1)
     counted = finding["weighty"] if finding["weighty"]["total"] else finding["claims"]
@@ -71,13 +85,19 @@ def _set_story(finding: dict[str, Any], checks: list[dict], poses: pd.DataFrame)
         "weighs": finding["weighty"]["total"] > 0,
         "counted": counted,
         "telling": [_row(check) for check in _telling(own)],
-        "failed_groups": sorted(failed_groups),
-        "held_groups": sorted({check["group"] for check in own if check["status"] == "pass"} - failed_groups),
+        "failed_groups": listed(sorted(failed_groups)),
+        "held_groups": listed(sorted({check["group"] for check in own if check["status"] == "pass"} - failed_groups)),
         "zero_model": _point(zero, "model_"),
         "zero_stated": _point(zero, ""),
-        "segments": segments,
+        "segments": listed(_segment(check) for check in segments),
         "segments_hold": all(check["status"] == "pass" for check in segments),
     }
+
+
+def _segment(check: dict) -> str:
+    """How a segment of the arm stands, and how it is stated to."""
+    template = SEGMENTS[check["name"]]
+    return tr(template, measured=fixed(check["measured"], 0), expected=fixed(check["expected"], 0))
 
 
 def _telling(own: list[dict]) -> list[dict]:
@@ -101,7 +121,7 @@ def _point(rows: pd.DataFrame, prefix: str) -> str:
 def _by_set(checks: list[dict]) -> dict[str, list[dict]]:
     found: dict[str, list[dict]] = {}
     for check in checks:
-        found.setdefault(check["reference_set"] or "the model itself", []).append(check)
+        found.setdefault(check["reference_set"] or THE_MODEL, []).append(check)
     return found
 
 
@@ -130,7 +150,8 @@ def _tolerances_off(check: dict) -> float:
 def _row(check: dict) -> list[str]:
     unit = check["unit"]
     values = [_number(check, key) for key in ("measured", "expected", "difference")]
-    source = f"{check['source']} ({check['grade']})" if check["grade"] else check["source"]
+    source, grade = check["source"], check["grade"]
+    source = tr("{own_source} ({grade})", own_source=source, grade=grade) if grade else source
     return [check["name"], *values, f"{check['tolerance']:g}", unit, source]
 
 
@@ -157,20 +178,27 @@ def _side_picture(robot: Robot, axes: pd.DataFrame, summary: dict) -> Picture:
     drawn = _drawn_axes(axes)
     mended, label = mended_robot(robot, summary["culprits"])
     if drawn.empty:
-        caption = "No reference states any axis: there is nothing to hold the model's against."
+        caption = tr("No reference states any axis: there is nothing to hold the model's against.")
     elif (drawn["distance_mm"] <= drawn["uncertainty_mm"]).all() and _directions_hold(drawn):
-        caption = "Each axis of the model lies on the stated one: the links have the right lengths and offsets."
+        caption = tr("Each axis of the model lies on the stated one: the links have the right lengths and offsets.")
     else:
         farthest = drawn["distance_mm"].max()
-        caption = f"The model's axes stand up to {fixed(farthest, 0 if farthest >= 10 else 2)} mm from the stated ones"
-        if any(finding["another_arm"] for finding in summary["sets"]):
-            caption += ": the two arms differ in size and shape, not in a detail"
-        caption += "."
+        template = (
+            N_(
+                "The model's axes stand up to {farthest} mm from the stated ones: the two arms differ in size and "
+                "shape, not in a detail."
+            )
+            if any(finding["another_arm"] for finding in summary["sets"])
+            else N_("The model's axes stand up to {farthest} mm from the stated ones.")
+        )
+        caption = tr(template, farthest=fixed(farthest, 0 if farthest >= 10 else 2))
         if mended is not None and drawn["reference_set"].iloc[0] == _repaired_against(summary):
-            caption += " The dashed arm has the named fault mended: it meets the stated axes."
+            mending = tr("The dashed arm has the named fault mended: it meets the stated axes.")
+            caption = in_a_row(caption, mending)
         elif mended is not None:
-            caption += " The dashed arm has the model's own zero pose put right; it still misses the stated axes."
-    alt = "Side view of the zero pose: links and joint axes of the model, and the axes that references state."
+            mending = tr("The dashed arm has the model's own zero pose put right; it still misses the stated axes.")
+            caption = in_a_row(caption, mending)
+    alt = tr("Side view of the zero pose: links and joint axes of the model, and the axes that references state.")
     return Picture(side_view(robot, drawn, mended, label), alt, caption)
 
 
@@ -189,13 +217,13 @@ def _deviation_picture(axes: pd.DataFrame) -> Picture | None:
     off = axes[(axes["distance_mm"] > axes["uncertainty_mm"]) | (axes["angle_deg"] > axes["uncertainty_deg"])]
     joints = [f"J{joint}" for joint in sorted(set(off["joint"]))]
     if joints:
-        caption = f"Off by more than the source leaves open: {', '.join(joints)}."
+        caption = tr("Off by more than the source leaves open: {joints}.", joints=listed(joints))
         reversed_joints = [f"J{joint}" for joint in sorted(set(off[off["angle_deg"] > 135]["joint"]))]
         if reversed_joints:
-            caption += f" Turning the other way: {', '.join(reversed_joints)}."
+            caption = in_a_row(caption, tr("Turning the other way: {joints}.", joints=listed(reversed_joints)))
     else:
-        caption = "No axis is off by more than its source leaves open (outlined boxes)."
-    alt = "Bars per joint and source: distance and angle between the model's axis and the stated one."
+        caption = tr("No axis is off by more than its source leaves open (outlined boxes).")
+    alt = tr("Bars per joint and source: distance and angle between the model's axis and the stated one.")
     return Picture(axis_deviation(axes), alt, caption)
 
 
@@ -221,10 +249,13 @@ def _drawing_picture(section: pd.DataFrame, labels: pd.DataFrame, summary: dict)
     missed = [c for c in summary["checks"] if c["group"] == "envelope" and c["status"] == "fail"]
     worst = fixed(labels["deviation_mm"].max(), 2)
     caption = (
-        f"The maker's labels lie on the region's edge, off by {worst} mm at most: lengths, limits of J2 and J3 and the "
-        "signs of both joints agree with the drawing."
+        tr(
+            "The maker's labels lie on the region's edge, off by {worst} mm at most: lengths, limits of J2 and J3 and "
+            "the signs of both joints agree with the drawing.",
+            worst=worst,
+        )
         if not missed
-        else f"{len(missed)} labels are missed, by up to {worst} mm."
+        else tr("{count} labels are missed, by up to {worst} mm.", count=len(missed), worst=worst)
     )
-    alt = "Region that the wrist centre sweeps with joints 2 and 3, and the drawing's labels, numbered."
+    alt = tr("Region that the wrist centre sweeps with joints 2 and 3, and the drawing's labels, numbered.")
     return Picture(workspace_drawing(section, labels, summary["section_origin_mm"]), alt, caption)

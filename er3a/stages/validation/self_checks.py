@@ -12,6 +12,7 @@ from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.transforms import rotation_angle
 from er3a.kinematics.turns import principal
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
+from er3a.language import N_, said
 from er3a.robots.robot import Robot
 from er3a.stages.validation.checks import Check, against_itself, nothing_to_compare
 
@@ -51,17 +52,17 @@ def table_checks(robot: Robot) -> list[Check]:
     parts = [robot.a, robot.alpha, robot.d, robot.offset, robot.lower, robot.upper, robot.base]
     lengths, limits = np.abs([robot.a, robot.d]), np.abs([robot.lower, robot.upper])
     faults = {
-        "numbers that are not finite": sum(int((~np.isfinite(part)).sum()) for part in parts),
-        "joints whose limits are crossed": int((robot.lower >= robot.upper).sum()),
-        "joint directions other than +1 and -1": int((np.abs(robot.direction) != 1).sum()),
-        "lengths in another unit (longest below 10 mm or above 20 m)": int(
+        N_("numbers that are not finite"): sum(int((~np.isfinite(part)).sum()) for part in parts),
+        N_("joints whose limits are crossed"): int((robot.lower >= robot.upper).sum()),
+        N_("joint directions other than +1 and -1"): int((np.abs(robot.direction) != 1).sum()),
+        N_("lengths in another unit (longest below 10 mm or above 20 m)"): int(
             not SHORTEST <= np.nanmax(lengths) <= LONGEST
         ),
-        "limits in another unit (widest below 6.3 deg)": int(0 < np.degrees(np.nanmax(limits)) < WIDEST_IN_RADIANS),
+        N_("limits in another unit (widest below 6.3 deg)"): int(0 < np.degrees(np.nanmax(limits)) < WIDEST_IN_RADIANS),
     }
     checks = [against_itself(name, "table sanity", float(count), 0.5, "") for name, count in faults.items()]
-    missing = "numbers are missing" if checks[0].status == "fail" else closed_form(robot)
-    name = "properties lacking for a closed-form inverse (parallel axes 2 and 3, spherical wrist)"
+    missing = N_("numbers are missing") if checks[0].status == "fail" else closed_form(robot)
+    name = N_("properties lacking for a closed-form inverse (parallel axes 2 and 3, spherical wrist)")
     if missing:
         return [*checks, nothing_to_compare(name, "table sanity", "", missing)]
     return [*checks, against_itself(name, "table sanity", 0.0, 0.5, "")]
@@ -94,19 +95,23 @@ def round_trip_checks(robot: Robot, poses: int, seed: int) -> tuple[list[Check],
     """Round trips as checks, and as plain data with the margins; None if the arm has no closed form."""
     missing = closed_form(robot)
     if missing:
-        note = f"no closed-form inverse, because {missing}"
-        return [nothing_to_compare("joints to pose to joints", GROUP, "deg", note)], None
+        note = said("no closed-form inverse, because {missing}", missing=missing)
+        return [nothing_to_compare(N_("joints to pose to joints"), GROUP, "deg", note)], None
     result = round_trips(robot, poses, seed)
-    note = (
-        f"{poses - result.near_singular} of {poses} random poses; the others lie within {NEAR_WRIST_DEG:g} deg (wrist, "
-        f"elbow) or {NEAR_SHOULDER_MM:g} mm (shoulder) of a singularity, where joints follow from a pose less exactly"
+    note = said(
+        "{judged} of {poses} random poses; the others lie within {wrist:g} deg (wrist, elbow) or {shoulder:g} mm "
+        "(shoulder) of a singularity, where joints follow from a pose less exactly",
+        judged=poses - result.near_singular,
+        poses=poses,
+        wrist=NEAR_WRIST_DEG,
+        shoulder=NEAR_SHOULDER_MM,
     )
     checks = [
-        against_itself("random poses without any solution", GROUP, float(result.unsolved), 0.5, ""),
-        against_itself("worst joint error", GROUP, result.joint_error_deg, JOINT_TOLERANCE_DEG, "deg", note),
-        against_itself("worst position error", GROUP, result.position_error_mm, POSITION_TOLERANCE_MM, "mm"),
+        against_itself(N_("random poses without any solution"), GROUP, float(result.unsolved), 0.5, ""),
+        against_itself(N_("worst joint error"), GROUP, result.joint_error_deg, JOINT_TOLERANCE_DEG, "deg", note),
+        against_itself(N_("worst position error"), GROUP, result.position_error_mm, POSITION_TOLERANCE_MM, "mm"),
         against_itself(
-            "worst orientation error", GROUP, result.orientation_error_deg, ORIENTATION_TOLERANCE_DEG, "deg"
+            N_("worst orientation error"), GROUP, result.orientation_error_deg, ORIENTATION_TOLERANCE_DEG, "deg"
         ),
     ]
     margins = {"wrist_deg": NEAR_WRIST_DEG, "elbow_deg": NEAR_ELBOW_DEG, "shoulder_mm": NEAR_SHOULDER_MM}

@@ -20,7 +20,7 @@ from er3a.references.quantities import (
 )
 from er3a.references.reference import ReferenceSet
 from er3a.references.rows import ENVELOPE_CORNERS
-from er3a.references.scalars import reach_name
+from er3a.references.scalars import corner_name, reach_name
 from er3a.robots.robot import Robot
 from er3a.stages.validation.circle_points import CirclePoints
 
@@ -148,7 +148,7 @@ def _corners(robot: Robot, references: ReferenceSet):
             return point
 
         pose = (0.0, q2, q3, 0.0, 0.0, 0.0)
-        yield _record(rows[0], "envelope", f"corner ({q2:g}, {q3:g})", "wrist_centre", pose, stated)
+        yield _record(rows[0], "envelope", corner_name(q2, q3), "wrist_centre", pose, stated)
 
 
 def _extremes(robot: Robot, references: ReferenceSet, extremes: Mapping[Extreme, tuple]):
