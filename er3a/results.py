@@ -99,7 +99,7 @@ def half_written(folder: Path) -> list[Path]:
 def write_table(path: Path, table: pd.DataFrame) -> None:
     """Write a Parquet file (units stand in the column names)."""
     for column in table.select_dtypes(["object", "string"]):
-        language.note_written(table[column].unique().tolist())
+        language.note_written(table[column].tolist())
     arrow = pa.Table.from_pandas(table, preserve_index=False).replace_schema_metadata(None)
     write_atomically(path, lambda file: pq.write_table(arrow, file, compression="zstd"))
 

@@ -147,6 +147,12 @@ def test_tables_come_back_as_written(tmp_path):
     assert np.signbit(table["x_m"][2])
 
 
+def test_a_column_may_hold_lists(tmp_path):
+    path = tmp_path / "t.parquet"
+    write_table(path, pd.DataFrame({"arcs_deg": [[0.0, 90.0], []]}))
+    assert [arcs.tolist() for arcs in read_table(path)["arcs_deg"]] == [[0.0, 90.0], []]
+
+
 @pytest.mark.parametrize("keep", [0, 4, 100, -10, -1])
 def test_a_truncated_table_is_told(tmp_path, keep):
     path = tmp_path / "t.parquet"

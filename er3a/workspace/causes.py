@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.kinematics.forward import forward
+from er3a.language import N_, joined, said
 from er3a.robots.robot import Robot
 from er3a.workspace.cavities import Cavity
 from er3a.workspace.proof import judge, ring_volumes
@@ -81,20 +82,27 @@ def describe(relaxed: list[Relaxed]) -> str:
     gone = [limit for limit in single if limit.filled >= _GONE]
     if gone:
         nearest = [limit for limit in gone if limit.by_deg == gone[0].by_deg]
-        return f"vanishes when {' or '.join(_exceed(limit) for limit in nearest[:2])}"
+        if len(nearest) == 1:
+            return said("vanishes when {widened}", widened=_exceed(nearest[0]))
+        return said("vanishes when {first} or {second}", first=_exceed(nearest[0]), second=_exceed(nearest[1]))
     single.sort(key=lambda limit: -limit.filled)
     part = [limit for limit in single if limit.filled >= _SHRUNK]
-    shrinks = f"shrinks by {100 * part[0].filled:.0f} % when {_exceed(part[0])}" if part else ""
+    shrinks = ""
+    if part:
+        shrinks = said("shrinks by {share:.0f} % when {widened}", share=100 * part[0].filled, widened=_exceed(part[0]))
     if everything.filled >= _GONE:
-        return shrinks + "; only several limits together make it" if shrinks else "made by several limits together"
-    left = f"geometry: {100 * (1 - everything.filled):.0f} % of it stays without any joint limit"
-    return f"{left}; {shrinks}" if shrinks else left
+        if shrinks:
+            return joined([shrinks, N_("only several limits together make it")])
+        return N_("made by several limits together")
+    left = said("geometry: {share:.0f} % of it stays without any joint limit", share=100 * (1 - everything.filled))
+    return joined([left, shrinks])
 
 
 def _exceed(limit: Relaxed) -> str:
-    word = "exceed" if limit.side == "upper" else "fall below"
-    text = f"joint {limit.joint} may {word} {limit.limit_deg:+.4g} deg by {limit.by_deg:.3g} deg"
-    return text.replace("-", "−")
+    told = {"joint": limit.joint, "limit": f"{limit.limit_deg:+.4g}".replace("-", "−"), "by": limit.by_deg}
+    if limit.side == "upper":
+        return said("joint {joint} may exceed {limit} deg by {by:.3g} deg", **told)
+    return said("joint {joint} may fall below {limit} deg by {by:.3g} deg", **told)
 
 
 def _widened(robot: Robot, joints: list[int], side: str, by: float) -> Robot:

@@ -51,7 +51,9 @@ def test_each_entry_is_translated_with_all_its_fields(catalogue):
 
 @pytest.fixture(scope="module")
 def own_texts(small_study):
-    return texts_from_files(small_study.folder / "data") | texts_from_files(small_study.folder / "config") | set(ROBOTS)
+    data = small_study.folder / "data"
+    files = {path.relative_to(small_study.folder).as_posix() for path in data.rglob("*.*")}
+    return files | texts_from_files(data) | texts_from_files(small_study.folder / "config") | set(ROBOTS)
 
 
 @pytest.mark.parametrize("name", ROBOTS)

@@ -10,6 +10,7 @@ import pandas as pd
 
 from er3a.errors import NotWristPartitionedError
 from er3a.kinematics.branch import branch_labels
+from er3a.language import N_, said
 from er3a.robots.robot import Robot
 from er3a.study import CapabilitySettings
 from er3a.workspace.capability import Capability, map_capability
@@ -44,7 +45,7 @@ def can_do(robot: Robot, settings: CapabilitySettings, cell: float) -> CanDo:
     try:
         arm, roll = section_arm(robot), roll_of(robot, settings.rolls)
     except NotWristPartitionedError as error:
-        reason = f"it needs the closed-form inverse, and {error.property_missing}"
+        reason = said("it needs the closed-form inverse, and {lacks}", lacks=error.property_missing)
         empty = {"capability": pd.DataFrame(columns=_CELLS, dtype=float)}
         empty["places"] = pd.DataFrame(columns=_PLACES, dtype=float)
         none = {"computed": False, "reason": reason}
@@ -158,15 +159,19 @@ def _listed(robot: Robot, task: Task, places: Places, chosen: Chosen, agile: flo
             "centre_m": places.centre[row].tolist(),
             "size_m": (task.box[[1, 0, 2]] if places.turned[row] else task.box).tolist(),
             "turned": bool(places.turned[row]),
-            "status": "proven" if proven else "sampled",
+            "status": _status(proven),
             "branch": None if slot == MIXED else labels[slot],
-            "branch_status": "proven" if branch_proven else "sampled",
+            "branch_status": _status(branch_proven),
             "manipulability_m3": float(places.least[row]),
             "share_of_best": float(places.least[row]) / agile if agile > 0 else 0.0,
             "room_deg": None if slot == MIXED else float(np.degrees(places.room[row] + task.margin)),
         }
         for row, slot, proven, branch_proven in zip(chosen.row, chosen.slot, chosen.proven, chosen.branch_proven)
     ]
+
+
+def _status(proven: bool) -> str:
+    return N_("proven") if proven else N_("sampled")
 
 
 def _place_table(places: Places, field: Field) -> pd.DataFrame:

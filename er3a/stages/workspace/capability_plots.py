@@ -11,6 +11,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
+from er3a.language import N_, tr
 from er3a.robots.robot import Robot
 from er3a.stages.workspace.cell_lookup import CellLookup
 from er3a.viewing.figures import equal_scale, new_figure
@@ -21,7 +22,7 @@ from er3a.viewing.skeleton import skeleton
 SHADES = "viridis"
 PIXELS = 301
 _HEIGHTS = (0.25, 0.5, 0.75)
-_PLANE = "from axis 1, in the arm's zero plane (mm)"
+_PLANE = N_("from axis 1, in the arm's zero plane (mm)")
 
 
 def upright_slices(robot: Robot, summary: dict[str, Any], cells: pd.DataFrame):
@@ -31,9 +32,9 @@ def upright_slices(robot: Robot, summary: dict[str, Any], cells: pd.DataFrame):
     grid_x, grid_z = np.meshgrid(x, z, indexing="ij")
     row = lookup.row(np.abs(grid_x), np.where(grid_x < 0, np.pi, 0.0), grid_z)
     panels = (
-        ("share", 100.0, "tool directions reached (%)", (0, 100)),
-        ("ways", 1.0, "ways per reached direction", (0, 8)),
-        ("manipulability_m3", 1e3, "best manipulability (10⁻³ m³)", (0, None)),
+        ("share", 100.0, tr("tool directions reached (%)"), (0, 100)),
+        ("ways", 1.0, tr("ways per reached direction"), (0, 8)),
+        ("manipulability_m3", 1e3, tr("best manipulability (10⁻³ m³)"), (0, None)),
     )
     figure, axes = new_figure(1, 3, width=12.0, height=4.7, sharey=True)
     for panel, (column, factor, label, limits) in zip(axes, panels):
@@ -43,7 +44,8 @@ def upright_slices(robot: Robot, summary: dict[str, Any], cells: pd.DataFrame):
         )
         figure.colorbar(mesh, ax=panel, label=label, location="top", shrink=0.9)
         _draw_arm(panel, robot, summary)
-        equal_scale(panel, _PLANE if panel is axes[1] else "", "height along axis 1 (mm)" if panel is axes[0] else "")
+        up = tr("height along axis 1 (mm)") if panel is axes[0] else ""
+        equal_scale(panel, tr(_PLANE) if panel is axes[1] else "", up)
         panel.set_aspect("equal", adjustable="box")
         panel.grid(False)
     return figure
@@ -59,11 +61,12 @@ def level_slices(summary: dict[str, Any], cells: pd.DataFrame):
         row = lookup.row(np.hypot(x, y), np.arctan2(y, x), np.full(x.shape, height))
         values = _looked_up(cells["share"].to_numpy(), row) * 100
         mesh = panel.pcolormesh(line * 1000, line * 1000, values.T, cmap=SHADES, vmin=0, vmax=100, rasterized=True)
-        panel.set_title(f"{fixed(1000 * height, 0)} mm up axis 1")
-        equal_scale(panel, _PLANE if panel is axes[1] else "", "across it (mm)" if panel is axes[0] else "")
+        panel.set_title(tr("{height} mm up axis 1", height=fixed(1000 * height, 0)))
+        across = tr("across it (mm)") if panel is axes[0] else ""
+        equal_scale(panel, tr(_PLANE) if panel is axes[1] else "", across)
         panel.set_aspect("equal", adjustable="box")
         panel.grid(False)
-    figure.colorbar(mesh, ax=axes, label="tool directions reached (%)", shrink=0.8)
+    figure.colorbar(mesh, ax=axes, label=tr("tool directions reached (%)"), shrink=0.8)
     return figure
 
 
@@ -74,7 +77,7 @@ def placement_views(robot: Robot, summary: dict[str, Any], places: pd.DataFrame)
     share = 100 * places["manipulability_m3"].to_numpy() / best
     figure, axes = new_figure(1, 2, width=12.0, height=5.6)
     top, spacing = float(share.max()), summary["placement"]["spacing_m"]
-    for panel, (across, up, title) in zip(axes, (("x", "y", "From above"), ("x", "z", "From the side"))):
+    for panel, (across, up, title) in zip(axes, (("x", "y", tr("From above")), ("x", "z", tr("From the side")))):
         steps = [spacing["xyz".index(key)] for key in (across, up)]
         edges, value, proven = _raster(places[[f"{across}_m", f"{up}_m"]].to_numpy(), steps, share, places["proven"])
         extent = [1000 * edge for edge in edges]
@@ -87,11 +90,11 @@ def placement_views(robot: Robot, summary: dict[str, Any], places: pd.DataFrame)
         equal_scale(panel, f"{across} (mm)", f"{up} (mm)")
         panel.set_title(title)
         panel.grid(False)
-    figure.colorbar(mesh, ax=axes, label="least manipulability in the box (% of the arm's best)", shrink=0.85)
+    figure.colorbar(mesh, ax=axes, label=tr("least manipulability in the box (% of the arm's best)"), shrink=0.85)
     handles = [
-        Line2D([], [], color=INK, marker="o", markersize=4, linewidth=2.2, label="arm, all joints 0"),
-        Patch(facecolor="none", edgecolor=HIGHLIGHT, label="best places, as numbered in the table"),
-        Patch(facecolor=GRID, label="by samples only"),
+        Line2D([], [], color=INK, marker="o", markersize=4, linewidth=2.2, label=tr("arm, all joints 0")),
+        Patch(facecolor="none", edgecolor=HIGHLIGHT, label=tr("best places, as numbered in the table")),
+        Patch(facecolor=GRID, label=tr("by samples only")),
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure

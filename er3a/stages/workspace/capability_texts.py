@@ -6,6 +6,7 @@ from typing import Any
 
 import pandas as pd
 
+from er3a.language import tr
 from er3a.robots.robot import Robot
 from er3a.stages.workspace.capability_plots import level_slices, placement_views, upright_slices
 from er3a.viewing.numbers import fixed, number
@@ -27,7 +28,7 @@ def capability_context(robot: Robot, summary: dict[str, Any], cells: pd.DataFram
         "place_rows": [_place_row(n, place) for n, place in enumerate(placed["places"], start=1)],
         "place_picture": Picture(
             placement_views(robot, summary, places),
-            "Where the middle of the box can stand, from above and from the side, with the best places",
+            tr("Where the middle of the box can stand, from above and from the side, with the best places"),
             _places_caption(placed),
         )
         if len(places)
@@ -40,66 +41,76 @@ def _pictures(robot: Robot, summary: dict[str, Any], cells: pd.DataFrame) -> lis
     return [
         Picture(
             upright_slices(robot, summary, cells),
-            "Slices through axis 1: share of tool directions, ways, manipulability",
+            tr("Slices through axis 1: share of tool directions, ways, manipulability"),
             _slices_caption(can),
         ),
         Picture(
             level_slices(summary, cells),
-            "Slices across axis 1: share of tool directions",
-            "Where joint 1 is limited, the sector behind the arm loses directions first: "
-            "put work that needs many tool angles in front."
+            tr("Slices across axis 1: share of tool directions"),
+            tr(
+                "Where joint 1 is limited, the sector behind the arm loses directions first: "
+                "put work that needs many tool angles in front."
+            )
             if can["sectors"] > 1
-            else "Joint 1 makes a full turn, so what counts is the distance from axis 1 and the height alone.",
+            else tr("Joint 1 makes a full turn, so what counts is the distance from axis 1 and the height alone."),
         ),
     ]
 
 
 def _slices_caption(can: dict[str, Any]) -> str:
-    return (
-        f"A reached cell offers {number(100 * can['share']['mean'], 2)} % of all tool directions on average, the best "
-        f"one {number(100 * can['share']['best'], 3)} %, each in {number(can['ways']['mean'], 2)} ways on average "
-        f"(of {can['ways']['most']} at most). Plan work where all three are bright; dark rims are reached only with "
-        "the arm stretched, folded or twisted."
+    return tr(
+        "A reached cell offers {mean} % of all tool directions on average, the best one {best} %, each in {ways} ways "
+        "on average (of {most} at most). Plan work where all three are bright; dark rims are reached only with the arm "
+        "stretched, folded or twisted.",
+        mean=number(100 * can["share"]["mean"], 2),
+        best=number(100 * can["share"]["best"], 3),
+        ways=number(can["ways"]["mean"], 2),
+        most=can["ways"]["most"],
     )
 
 
 def _roll_text(can: dict[str, Any]) -> str:
     if can["roll"]["free"]:
-        return (
+        return tr(
             "The roll about the tool's own axis is left free: it turns joint 6 alone, so it takes no part in whether a "
             "direction is reached, nor in the number of ways."
         )
-    rolls = can["roll"]["per_direction"]
-    return (
-        f"The tool stands beside the axis of joint 6, so the roll about the tool's own axis moves the wrist: {rolls} "
-        "rolls are tried, and a direction counts if one of them is reached."
+    return tr(
+        "The tool stands beside the axis of joint 6, so the roll about the tool's own axis moves the wrist: {rolls} "
+        "rolls are tried, and a direction counts if one of them is reached.",
+        rolls=can["roll"]["per_direction"],
     )
 
 
 def _core_text(can: dict[str, Any]) -> str:
     core = {key: 1000 * can["core_m3"][key] for key in ("lower", "upper", "estimate")}
     if core["upper"] == 0:
-        return (
+        return tr(
             "There is no dexterous core: in every part of the workspace some tool direction is proven unreachable at "
             "all its points. Work that needs the tool from every side needs a turntable."
         )
-    return (
-        "The dexterous core, where the tool can take every direction of the sphere, holds at least "
-        f"{number(core['lower'], 2)} L and at most {number(core['upper'], 2)} L: both are proven, for all points and "
-        f"directions in between too. By the {can['settings']['directions']} sampled directions alone it would be "
-        f"{number(core['estimate'], 2)} L."
+    return tr(
+        "The dexterous core, where the tool can take every direction of the sphere, holds at least {lower} L and at "
+        "most {upper} L: both are proven, for all points and directions in between too. By the {directions} sampled "
+        "directions alone it would be {estimate} L.",
+        directions=can["settings"]["directions"],
+        **{key: number(litres, 2) for key, litres in core.items()},
     )
 
 
 def _task_text(task: dict[str, Any]) -> str:
     box = " × ".join(number(value, 4).rstrip(".") for value in map(_whole, task["box_mm"]))
     direction = ", ".join(fixed(value, 2).removesuffix(".00") for value in task["tool_direction"])
-    return (
-        f"A box of {box} mm must be served at every point with the tool's axis anywhere within "
-        f"{fixed(task['cone_deg'], 1).removesuffix('.0')} deg of ({direction}), joints "
-        f"{fixed(task['limit_margin_deg'], 1).removesuffix('.0')} deg within their limits. It stands level, as given "
-        f"or turned by 90 deg, its underside at {fixed(task['lowest_mm'], 0)} mm or higher, and "
-        f"{fixed(task['clear_of_axis_mm'], 0)} mm or more from axis 1."
+    return tr(
+        "A box of {box} mm must be served at every point with the tool's axis anywhere within {cone} deg of "
+        "({direction}), joints {margin} deg within their limits. It stands level, as given or turned by 90 deg, its "
+        "underside at {lowest} mm or higher, and {clear} mm or more from axis 1.",
+        box=box,
+        direction=direction,
+        cone=fixed(task["cone_deg"], 1).removesuffix(".0"),
+        margin=fixed(task["limit_margin_deg"], 1).removesuffix(".0"),
+        lowest=fixed(task["lowest_mm"], 0),
+        clear=fixed(task["clear_of_axis_mm"], 0),
     )
 
 
@@ -108,20 +119,22 @@ def _whole(value: float) -> float | int:
 
 
 def _places_caption(placed: dict[str, Any]) -> str:
-    return (
-        f"Of {number(placed['fitting'])} positions on the lattice that pass by samples, "
-        f"{number(placed['fitting_proven'])} are proven for every point and direction. Stand the box's middle on a "
-        "bright spot; grey ones pass by samples only. The colour shows the best over what lies in the line of sight."
+    return tr(
+        "Of {fitting} positions on the lattice that pass by samples, {proven} are proven for every point and "
+        "direction. Stand the box's middle on a bright spot; grey ones pass by samples only. The colour shows the best "
+        "over what lies in the line of sight.",
+        fitting=number(placed["fitting"]),
+        proven=number(placed["fitting_proven"]),
     )
 
 
 def _place_row(row: int, place: dict[str, Any]) -> list[str]:
     if place["branch"] is None:
-        branch = "changes within the box"
+        branch = tr("changes within the box")
     elif place["status"] == place["branch_status"]:
         branch = place["branch"]
     else:
-        branch = f"{place['branch']} (by samples)"
+        branch = tr("{branch} (by samples)", branch=place["branch"])
     return [
         str(row),
         ", ".join(fixed(1000 * value, 0) for value in place["centre_m"]),

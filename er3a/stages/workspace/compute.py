@@ -10,7 +10,7 @@ import pandas as pd
 from scipy import ndimage
 
 from er3a.kinematics.forward import forward, jacobian
-from er3a.language import keeps_sentences
+from er3a.language import N_, keeps_sentences
 from er3a.results import Figure, write_summary, write_table
 from er3a.robots.robot import Robot
 from er3a.stages.workspace.capability_numbers import can_do
@@ -93,14 +93,14 @@ def compute(study: Study, name: str, folder: Path, parts: list[Path] | None = No
     touched = cells["touched"] * grid.cell_volume
     guess = proven.estimate
     figures = [
-        Figure("greatest reach from axis 1", reach["furthest_from_axis"] * 1000, "mm"),
-        Figure("enclosed voids, at least", 1000 * sum(volume["lower"] for volume in enclosed), "L"),
-        Figure("reached volume", guess.value, "m³", max(guess.value - guess.low, guess.high - guess.value)),
-        Figure("reached volume, at least", lower, "m³"),
-        Figure("reached volume, at most", upper, "m³"),
-        Figure("convex hull", hull.volume, "m³"),
-        Figure("least distance from axis 1", reach["nearest_to_axis"] * 1000, "mm"),
-        Figure("samples", settings.samples, ""),
+        Figure(N_("greatest reach from axis 1"), reach["furthest_from_axis"] * 1000, "mm"),
+        Figure(N_("enclosed voids, at least"), 1000 * sum(volume["lower"] for volume in enclosed), "L"),
+        Figure(N_("reached volume"), guess.value, "m³", max(guess.value - guess.low, guess.high - guess.value)),
+        Figure(N_("reached volume, at least"), lower, "m³"),
+        Figure(N_("reached volume, at most"), upper, "m³"),
+        Figure(N_("convex hull"), hull.volume, "m³"),
+        Figure(N_("least distance from axis 1"), reach["nearest_to_axis"] * 1000, "mm"),
+        Figure(N_("samples"), settings.samples, ""),
     ]
     write_summary(
         folder,
@@ -225,10 +225,10 @@ def _sampled_records(
     return [
         {
             "kind": void.kind,
-            "status": "undersampled",
+            "status": N_("undersampled"),
             "volume_m3": {"lower": 0.0, "upper": len(void.cells) * grid.cell_volume},
             **shape_of(void, grid),
-            "cause": "unknown: only samples tell of it",
+            "cause": N_("unknown: only samples tell of it"),
             "relaxed": [],
             "holds_shoulder": bool(np.any(np.all(np.abs(void.cells - cell_of_shoulder) <= 1, axis=1))),
         }

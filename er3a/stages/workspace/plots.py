@@ -12,8 +12,10 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
 from er3a.kinematics.forward import forward
+from er3a.language import tr
 from er3a.robots.robot import Robot
 from er3a.viewing.figures import equal_scale, new_figure
+from er3a.viewing.numbers import fixed
 from er3a.viewing.palette import INK, JOINTS, MUTED, REFERENCE
 
 DENSITY = "YlGnBu"
@@ -54,20 +56,20 @@ def _draw_top(figure, axes: Axes, robot: Robot, cells: CellMap) -> None:
     mesh = axes.pcolormesh(
         cells.edges(0), cells.edges(1), masked(column).T, cmap=DENSITY, norm=log_norm(column), rasterized=True
     )
-    figure.colorbar(mesh, ax=axes, label="samples per mm²", shrink=0.7)
+    figure.colorbar(mesh, ax=axes, label=tr("samples per mm²"), shrink=0.7)
     axis = robot.base[:2, 3] * 1000
     axes.plot(*axis, "+", color=INK, markersize=10, markeredgewidth=1.6)
-    title = "From above: joint 1 makes a full turn"
+    title = tr("From above: joint 1 makes a full turn")
     if robot.upper[0] - robot.lower[0] < _FULL_TURN:
-        lower, upper = np.degrees([robot.lower[0], robot.upper[0]])
-        title = f"From above: joint 1 turns from {lower:.0f} to {upper:.0f} deg".replace("-", "−")
+        lower, upper = (fixed(limit, 0) for limit in np.degrees([robot.lower[0], robot.upper[0]]))
+        title = tr("From above: joint 1 turns from {lower} to {upper} deg", lower=lower, upper=upper)
         size = max(np.ptp(cells.edges(0)), np.ptp(cells.edges(1))) / 2
         for limit in (robot.lower[0], robot.upper[0]):
             tool = forward(robot, np.array([limit, 0, 0, 0, 0, 0]))[:2, 3] * 1000 - axis
             length = np.linalg.norm(tool)
             if length > 1:
                 axes.plot(*np.transpose([axis, axis + tool / length * size]), color=LIMIT, linewidth=1.8)
-        handles = [Line2D([], [], color=LIMIT, label="the arm's plane at the limits of joint 1")]
+        handles = [Line2D([], [], color=LIMIT, label=tr("the arm's plane at the limits of joint 1"))]
         axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0, 1.0), borderaxespad=0.2)
     axes.set_title(title, pad=42)
     equal_scale(axes, "x (mm)", "y (mm)")
@@ -79,20 +81,21 @@ def convergence(summary: dict[str, Any], curve: pd.DataFrame):
     """Touched volume over the number of samples, by cell size."""
     figure, axes = new_figure(width=9.0, height=4.2)
     for (cell, rows), colour in zip(curve.groupby("cell_mm"), (JOINTS[0], JOINTS[5], JOINTS[2])):
-        axes.plot(rows["samples"] / 1e6, rows["touched_m3"], color=colour, marker=".", label=f"cells of {cell:.0f} mm")
-    axes.axhline(summary["hull"]["volume_m3"], color=MUTED, linestyle="--", label="convex hull")
+        label = tr("cells of {cell:.0f} mm", cell=cell)
+        axes.plot(rows["samples"] / 1e6, rows["touched_m3"], color=colour, marker=".", label=label)
+    axes.axhline(summary["hull"]["volume_m3"], color=MUTED, linestyle="--", label=tr("convex hull"))
     volume = summary["volume_m3"]
-    axes.axhspan(volume["lower"], volume["upper"], color=JOINTS[1], alpha=0.35, label="proven bounds")
+    axes.axhspan(volume["lower"], volume["upper"], color=JOINTS[1], alpha=0.35, label=tr("proven bounds"))
     middle, (low, high) = volume["estimate"], volume["ci95"]
     last = curve["samples"].max() / 1e6
-    spread = [[middle - low], [high - middle]]
-    axes.errorbar([last * 1.3], [middle], yerr=spread, color=INK, fmt="o", capsize=4, label="estimate, 95 % interval")
+    spread, label = [[middle - low], [high - middle]], tr("estimate, 95 % interval")
+    axes.errorbar([last * 1.3], [middle], yerr=spread, color=INK, fmt="o", capsize=4, label=label)
     axes.set_xscale("log")
     axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     axes.xaxis.set_minor_locator(NullLocator())
-    axes.set_xlabel("samples (millions)")
-    axes.set_ylabel("volume (m³)")
+    axes.set_xlabel(tr("samples (millions)"))
+    axes.set_ylabel(tr("volume (m³)"))
     axes.set_ylim(0, None)
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure

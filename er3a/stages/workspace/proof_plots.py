@@ -12,6 +12,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from er3a.language import N_, tr
 from er3a.robots.robot import Robot
 from er3a.stages.workspace.plots import DENSITY, log_norm, masked
 from er3a.viewing.figures import equal_scale, new_figure
@@ -19,9 +20,14 @@ from er3a.viewing.page import fixed
 from er3a.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED, REFERENCE
 from er3a.viewing.skeleton import skeleton
 
-PROOF = {"filled": "#9ecae1", "filled but for a wedge": "#d6e6f2", "undecided": HIGHLIGHT, "empty": "#ffffff"}
+PROOF = {
+    N_("filled"): "#9ecae1",
+    N_("filled but for a wedge"): "#d6e6f2",
+    N_("undecided"): HIGHLIGHT,
+    N_("empty"): "#ffffff",
+}
 FILLED, WEDGE, UNDECIDED, EMPTY = range(4)
-BORDERS = {"tool point": INK, "wrist centre": REFERENCE, "flange": JOINTS[3]}
+BORDERS = {N_("tool point"): INK, N_("wrist centre"): REFERENCE, N_("flange"): JOINTS[3]}
 DRAWN = JOINTS[2]
 SLICE_PIXELS = 321
 
@@ -41,23 +47,24 @@ def sections(robot: Robot, summary: dict[str, Any], tables: dict[str, pd.DataFra
     for axes in (left, right):
         _draw_border(axes, border)
         _draw_arm(axes, robot, summary)
-        equal_scale(axes, "distance from axis 1 (mm)", "height along axis 1 (mm)" if axes is left else "")
+        equal_scale(axes, tr("distance from axis 1 (mm)"), tr("height along axis 1 (mm)") if axes is left else "")
         axes.set_aspect("equal", adjustable="box")
         axes.grid(False)
         axes.set_xlim(0, None)
     draw_labels(right, drawing)
-    left.set_title("Samples, all azimuths folded in")
-    right.set_title("Proof")
-    handles = [Line2D([], [], color=INK, marker="o", markersize=4, linewidth=2.4, label="arm, all joints 0")]
+    left.set_title(tr("Samples, all azimuths folded in"))
+    right.set_title(tr("Proof"))
+    handles = [Line2D([], [], color=INK, marker="o", markersize=4, linewidth=2.4, label=tr("arm, all joints 0"))]
     if len(border):
         handles += [
-            Line2D([], [], color=colour, label=f"exact border, {name}")
+            Line2D([], [], color=colour, label=tr("exact border, {point}", point=name))
             for name, colour in BORDERS.items()
             if (border["point"] == name).any()
         ]
     if len(drawing):
-        handles.append(Line2D([], [], color=DRAWN, marker="o", linestyle=":", label="maker's drawing, wrist centre"))
-    handles += [Patch(facecolor=colour, edgecolor=MUTED, label=label) for label, colour in PROOF.items()]
+        label = tr("maker's drawing, wrist centre")
+        handles.append(Line2D([], [], color=DRAWN, marker="o", linestyle=":", label=label))
+    handles += [Patch(facecolor=colour, edgecolor=MUTED, label=tr(state)) for state, colour in PROOF.items()]
     figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return figure
 
@@ -120,12 +127,13 @@ def slices(summary: dict[str, Any], proof: pd.DataFrame):
         shades = ListedColormap(list(PROOF.values()))
         shown = _slice(proof, x, y, height)
         panel.pcolormesh(line * 1000, line * 1000, shown.T, cmap=shades, vmin=-0.5, vmax=3.5, rasterized=True)
-        panel.set_title(f"{fixed(1000 * height, 0)} mm up axis 1")
-        equal_scale(panel, "from axis 1, in the arm's zero plane (mm)", "across it (mm)" if panel is axes[0] else "")
+        panel.set_title(tr("{height} mm up axis 1", height=fixed(1000 * height, 0)))
+        across = tr("across it (mm)") if panel is axes[0] else ""
+        equal_scale(panel, tr("from axis 1, in the arm's zero plane (mm)"), across)
         panel.set_aspect("equal", adjustable="box")
         panel.grid(False)
-    shown = [label for kind, label in enumerate(PROOF) if kind != WEDGE]
-    handles = [Patch(facecolor=PROOF[label], edgecolor=MUTED, label=label) for label in shown]
+    states = [state for kind, state in enumerate(PROOF) if kind != WEDGE]
+    handles = [Patch(facecolor=PROOF[state], edgecolor=MUTED, label=tr(state)) for state in states]
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
 

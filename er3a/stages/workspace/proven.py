@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from er3a.errors import NotWristPartitionedError
+from er3a.language import N_, said
 from er3a.robots.robot import Robot
 from er3a.stages.workspace.hull import Hull, depth_inside
 from er3a.workspace.blocks import Blocks, blocks_of, mesh, pockets
@@ -74,7 +75,7 @@ def prove_robot(robot: Robot, most_cells: int, points: int, seed: int) -> Proven
     section = _about_voids(arm, section, int(VOID_SHARE * most_cells))
     estimate = estimate_volume(arm, section, arm.reach, arm.heights, points, seed)
     witness = witness_joints(robot, arm, section.proof)
-    return Proven(arm, section.proof, section, *section_frame(robot), witness, estimate, "spherical wrist")
+    return Proven(arm, section.proof, section, *section_frame(robot), witness, estimate, N_("spherical wrist"))
 
 
 def _prove_general(robot: Robot, most_cells: int, points: int, seed: int, lacks: str) -> Proven:
@@ -95,7 +96,8 @@ def _prove_general(robot: Robot, most_cells: int, points: int, seed: int, lacks:
         return np.isfinite(reach_points(robot, local @ R + origin, starts)[:, 0])
 
     estimate = estimate_volume(search, section, arm.reach, arm.heights, points, seed)
-    return Proven(None, proof, section, R, origin, q, estimate, f"general method, because {lacks}")
+    method = said("general method, because {lacks}", lacks=lacks)
+    return Proven(None, proof, section, R, origin, q, estimate, method)
 
 
 def _about_voids(arm: SectionArm, section: SectionMap, most_cells: int) -> SectionMap:
@@ -185,7 +187,7 @@ def _record(kind: str, robot: Robot, proven: Proven, cavity: Cavity, shoulder: n
     near &= (cavity.cells[:, [1, 3]] >= [rho - size, local[2] - size]).all(axis=1)
     return {
         "kind": kind,
-        "status": "proven empty",
+        "status": N_("proven empty"),
         "volume_m3": {"lower": cavity.lower, "upper": cavity.upper},
         "centroid_m": (proven.in_base(cavity.centroid()) + 0.0).tolist(),
         "extent_m": extent.tolist(),

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
+from er3a.language import N_, tr
 from er3a.results import read_summary, read_table
 from er3a.robots.robot import Robot
 from er3a.stages.workspace.capability_texts import capability_context
@@ -32,7 +34,7 @@ TABLES = (
     "void_triangles",
 )
 CAN_DO = ("capability", "places")
-KINDS = {"enclosed": "enclosed", "open": "open pocket"}
+KINDS = {"enclosed": N_("enclosed"), "open": N_("open pocket")}
 
 
 def report(study: Study, name: str, folder: Path, output: Path) -> None:
@@ -47,7 +49,7 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
         robot=robot,
         section=Picture(
             sections(robot, summary, tables),
-            "Side sections about axis 1: density of the samples, and proven cells with the exact border",
+            tr("Side sections about axis 1: density of the samples, and proven cells with the exact border"),
             _section_caption(summary, enclosed, len(tables["drawing"]) > 0),
         ),
         side=_side(robot, tables),
@@ -56,15 +58,20 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
         pocket_mm=3000 * summary["pocket_block_m"],
         top=Picture(
             top_view(robot, summary, tables["cells"]),
-            "The cloud from above with the limits of joint 1",
+            tr("The cloud from above with the limits of joint 1"),
             _top_caption(robot),
         ),
         slices=Picture(
-            slices(summary, tables["proof"]), "Three level slices of the proof", _slices_caption(summary, enclosed)
+            slices(summary, tables["proof"]),
+            tr("Three level slices of the proof"),
+            _slices_caption(summary, len(enclosed)),
         ),
         convergence=Picture(
             convergence(summary, tables["curve"]),
-            "Touched volume over the number of samples for three cell sizes, with the proven bounds and the estimate",
+            tr(
+                "Touched volume over the number of samples for three cell sizes, with the proven bounds and the "
+                "estimate"
+            ),
             _curve_caption(summary, tables["curve"]),
         ),
         turning=Markup(
@@ -82,29 +89,44 @@ def _side(robot: Robot, tables: dict[str, Any]) -> Picture | None:
     """The side view, where the arm has a wrist centre and an exact border."""
     if not len(tables["border"]):
         return None
-    text = "The border's arcs are exact (numbered on the left); samples fill them and none lies beyond. "
+    exact = tr("The border's arcs are exact (numbered on the left); samples fill them and none lies beyond.")
     if len(tables["drawing"]):
-        text += "The maker's labels (green) should meet the orange border: extents touch it, corners lie on it."
+        maker = tr("The maker's labels (green) should meet the orange border: extents touch it, corners lie on it.")
     else:
-        text += "No drawing of this arm's envelope is on file to compare with."
+        maker = tr("No drawing of this arm's envelope is on file to compare with.")
     return Picture(
         side_view(tables, not np.array_equal(robot.tool, np.eye(4))),
-        "Side views of wrist centre and flange in the arm's plane, with exact borders and the maker's labels",
-        text,
+        tr("Side views of wrist centre and flange in the arm's plane, with exact borders and the maker's labels"),
+        _one_after_another(exact, maker),
     )
+
+
+def _one_after_another(*sentences: str) -> str:
+    return reduce(lambda first, rest: tr("{first} {rest}", first=first, rest=rest), sentences)
 
 
 def _rule(enclosed: list[dict[str, Any]]) -> str:
     """The rule that an unexpected hole points to joints 2 and 3, applied."""
-    rule = "The rule that an unexpected hole points to a wrong limit or direction of joint 2 or 3 was applied: "
     astray = [void for void in enclosed if not void["holds_shoulder"]]
     if not astray:
-        return rule + "no enclosed void lies away from the shoulder, so it accuses nothing."
+        return tr(
+            "The rule that an unexpected hole points to a wrong limit or direction of joint 2 or 3 was applied: no "
+            "enclosed void lies away from the shoulder, so it accuses nothing."
+        )
     named = sum("joint 2" in void["cause"] or "joint 3" in void["cause"] for void in astray)
-    lie = "void lies" if len(astray) == 1 else "voids lie"
-    return (
-        f"{rule}{len(astray)} enclosed {lie} away from the shoulder, and relaxing one limit at a time names joint 2 or "
-        f"3 for {named} of them."
+    if len(astray) == 1:
+        return tr(
+            "The rule that an unexpected hole points to a wrong limit or direction of joint 2 or 3 was applied: 1 "
+            "enclosed void lies away from the shoulder, and relaxing one limit at a time names joint 2 or 3 for "
+            "{named} of them.",
+            named=named,
+        )
+    return tr(
+        "The rule that an unexpected hole points to a wrong limit or direction of joint 2 or 3 was applied: {count} "
+        "enclosed voids lie away from the shoulder, and relaxing one limit at a time names joint 2 or 3 for {named} of "
+        "them.",
+        count=len(astray),
+        named=named,
     )
 
 
@@ -114,51 +136,76 @@ def _void_row(row: int, void: dict[str, Any]) -> list[str]:
         str(row),
         KINDS[void["kind"]],
         void["status"],
-        f"{number(low, 3)} to {number(high, 3)}",
+        tr("{low} to {high}", low=number(low, 3), high=number(high, 3)),
         ", ".join(fixed(1000 * value, 0) for value in void["centroid_m"]),
         " × ".join(fixed(1000 * value, 0) for value in void["extent_m"]),
         void["cause"],
-        "yes" if void["holds_shoulder"] else "no",
+        tr("yes") if void["holds_shoulder"] else tr("no"),
     ]
 
 
 def _section_caption(summary: dict[str, Any], enclosed: list[dict[str, Any]], drawn: bool) -> str:
-    text = (
-        "What is white on the right is proven unreachable from every side; blank cells on the left only were not hit. "
-    )
-    if enclosed:
-        where = "about the shoulder" if enclosed[0]["holds_shoulder"] else "away from the shoulder"
-        text += f"The largest closed hollow lies {where}. "
+    told = [
+        tr(
+            "What is white on the right is proven unreachable from every side; blank cells on the left only were not "
+            "hit."
+        )
+    ]
+    if enclosed and enclosed[0]["holds_shoulder"]:
+        told.append(tr("The largest closed hollow lies about the shoulder."))
+    elif enclosed:
+        told.append(tr("The largest closed hollow lies away from the shoulder."))
     if drawn:
-        text += (
-            "Green are the maker's labels of the wrist centre: extents touch its border, corners are single stances. "
+        told.append(
+            tr(
+                "Green are the maker's labels of the wrist centre: extents touch its border, corners are single "
+                "stances."
+            )
         )
     proof = summary["proof"]
-    inside = proof["points_in_empty_cells"] or "none"
-    return f"{text}Of {number(proof['points_checked'])} recorded samples, {inside} lie in an empty cell."
+    checked, inside = number(proof["points_checked"]), proof["points_in_empty_cells"]
+    if inside:
+        told.append(tr("Of {checked} recorded samples, {inside} lie in an empty cell.", checked=checked, inside=inside))
+    else:
+        told.append(tr("Of {checked} recorded samples, none lie in an empty cell.", checked=checked))
+    return _one_after_another(*told)
 
 
 def _top_caption(robot: Robot) -> str:
     if robot.upper[0] - robot.lower[0] >= 2 * np.pi - 1e-9:
-        return "Density depends on the distance from axis 1 alone, as a full turn of joint 1 demands."
-    return "Between the limits of joint 1 the tool gets only by leaning back or turning the wrist aside, and less far."
+        return tr("Density depends on the distance from axis 1 alone, as a full turn of joint 1 demands.")
+    return tr(
+        "Between the limits of joint 1 the tool gets only by leaning back or turning the wrist aside, and less far."
+    )
 
 
-def _slices_caption(summary: dict[str, Any], enclosed: list[dict[str, Any]]) -> str:
+def _slices_caption(summary: dict[str, Any], enclosed: int) -> str:
     pockets = sum(void["kind"] == "open" for void in summary["voids"])
-    inner = f"{len(enclosed)} enclosed void{'s' * (len(enclosed) != 1)}" if enclosed else "no enclosed void"
-    return (
-        f"The hull holds {inner} and {pockets} open pocket{'s' * (pockets != 1)}. Every point of the blue area can be "
-        "reached by some joint vector within the limits; place nothing in the white."
+    if enclosed == 0:
+        inner = tr("no enclosed void")
+    else:
+        inner = tr("1 enclosed void") if enclosed == 1 else tr("{count} enclosed voids", count=enclosed)
+    return tr(
+        "The hull holds {voids} and {pockets}. Every point of the blue area can be reached by some joint vector within "
+        "the limits; place nothing in the white.",
+        voids=inner,
+        pockets=tr("1 open pocket") if pockets == 1 else tr("{count} open pockets", count=pockets),
     )
 
 
 def _curve_caption(summary: dict[str, Any], curve: Any) -> str:
     volume = summary["volume_m3"]
     finest = curve[curve["cell_mm"] == curve["cell_mm"].min()]["touched_m3"].to_numpy()[-1]
-    over = finest > volume["upper"]
-    verb = "overstates the volume: cells on the border count whole" if over else "is no estimate of the volume"
-    return (
-        f"The touched volume depends on cell size and number of samples and {verb}. Use the band: the reached volume "
-        f"lies between {number(volume['lower'])} and {number(volume['upper'])} m³."
+    if finest > volume["upper"]:
+        touched = tr(
+            "The touched volume depends on cell size and number of samples and overstates the volume: cells on the "
+            "border count whole."
+        )
+    else:
+        touched = tr("The touched volume depends on cell size and number of samples and is no estimate of the volume.")
+    band = tr(
+        "Use the band: the reached volume lies between {low} and {high} m³.",
+        low=number(volume["lower"]),
+        high=number(volume["upper"]),
     )
+    return _one_after_another(touched, band)

@@ -9,6 +9,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from er3a.language import tr
 from er3a.stages.workspace.plots import DENSITY, log_norm, masked
 from er3a.stages.workspace.proof_plots import draw_labels
 from er3a.viewing.figures import equal_scale, new_figure
@@ -35,18 +36,18 @@ def side_view(tables: dict[str, pd.DataFrame], has_tool: bool):
             axes.plot(x, z, color=colour, linewidth=1.5)
             if axes is left:
                 axes.annotate(str(number), (x[len(x) // 2], z[len(z) // 2]), **_numbered(colour))
-        equal_scale(axes, "x to the front (mm)", "height along axis 1 (mm)" if axes is left else "")
+        equal_scale(axes, tr("x to the front (mm)"), tr("height along axis 1 (mm)") if axes is left else "")
         axes.set_aspect("equal", adjustable="box")
         axes.grid(False)
-    left.set_title("Wrist centre")
-    right.set_title("Flange" + (" (border), tool point (samples)" if has_tool else ""))
+    left.set_title(tr("Wrist centre"))
+    right.set_title(tr("Flange (border), tool point (samples)") if has_tool else tr("Flange"))
     draw_labels(left, tables["drawing"], across="x_m")
     handles = [
-        Line2D([], [], color=WRIST, label="exact border of the wrist centre"),
-        Line2D([], [], color=FLANGE, label="exact border of the flange"),
+        Line2D([], [], color=WRIST, label=tr("exact border of the wrist centre")),
+        Line2D([], [], color=FLANGE, label=tr("exact border of the flange")),
     ]
     if len(tables["drawing"]):
-        handles.append(Line2D([], [], color=DRAWN, marker="o", linestyle=":", label="maker's labels"))
+        handles.append(Line2D([], [], color=DRAWN, marker="o", linestyle=":", label=tr("maker's labels")))
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
 
@@ -67,7 +68,7 @@ def arc_rows(border: pd.DataFrame) -> list[list[str]]:
 def _swept(angles: pd.Series) -> str:
     first, last = angles.iloc[0], angles.iloc[-1]
     low, high = fixed(min(first, last), 1), fixed(max(first, last), 1)
-    return low if low == high else f"{low} to {high}"
+    return low if low == high else tr("{low} to {high}", low=low, high=high)
 
 
 def _numbered(colour: str) -> dict:

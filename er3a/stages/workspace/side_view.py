@@ -9,6 +9,7 @@ from er3a.errors import NotWristPartitionedError
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
+from er3a.language import N_
 from er3a.robots.robot import Robot
 from er3a.stages.workspace.grid import Grid, make_grid
 from er3a.stages.workspace.point_chain import at_wrist_centre, plane_direction
@@ -18,7 +19,7 @@ from er3a.workspace.boundary import border
 from er3a.workspace.section_arm import section_arm, section_frame
 
 WRIST_SAMPLES = 4_000_000
-_NAMES = {"theta_2": "joint 2", "tau": "joint 3", "gamma": "wrist"}
+_NAMES = {"theta_2": N_("joint 2"), "tau": N_("joint 3"), "gamma": N_("wrist")}
 _COLUMNS = ("rho_m", "z_m", "q2_deg", "q3_deg", "tilt_deg", "arc", "point", "sweeps", "view")
 
 

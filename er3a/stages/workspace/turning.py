@@ -9,6 +9,7 @@ import pandas as pd
 import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
+from er3a.language import N_, tr
 from er3a.robots.robot import Robot
 from er3a.viewing.palette import HIGHLIGHT, INK, REFERENCE
 from er3a.viewing.skeleton import skeleton
@@ -16,6 +17,7 @@ from er3a.viewing.skeleton import skeleton
 POINTS = 12_000
 _XYZ = ["x_m", "y_m", "z_m"]
 _COLOURS = {"enclosed": HIGHLIGHT, "open": REFERENCE}
+_NAMES = {"enclosed": N_("void {number} (enclosed)"), "open": N_("void {number} (open)")}
 
 
 def turning_figure(
@@ -32,25 +34,26 @@ def turning_figure(
         "cmax": float(np.quantile(value, 0.99)),
     }
     x, y, z = (np.round(far[key].to_numpy() * 1000, 1) for key in _XYZ)
-    figure.add_scatter3d(x=x, y=y, z=z, mode="markers", marker=marker, name="cloud, far half", hoverinfo="skip")
+    figure.add_scatter3d(x=x, y=y, z=z, mode="markers", marker=marker, name=tr("cloud, far half"), hoverinfo="skip")
     for number, void in enumerate(summary["voids"], start=1):
         corners = np.round(vertices.loc[vertices["void"] == number, _XYZ].to_numpy() * 1000, 1)
         faces = triangles.loc[triangles["void"] == number, ["a", "b", "c"]].to_numpy()
         if not len(faces):
             continue
+        name = _NAMES[void["kind"]]
         figure.add_mesh3d(
             **dict(zip("xyz", corners.T)),
             **dict(zip("ijk", faces.T)),
             color=_COLOURS[void["kind"]],
             opacity=0.55,
             flatshading=True,
-            name=f"void {number} ({void['kind']})",
+            name=tr(name, number=number),
             showlegend=True,
         )
     x, y, z = (skeleton(robot, np.zeros(6)) * 1000).T
     line = {"color": INK, "width": 9}
     figure.add_scatter3d(
-        x=x, y=y, z=z, mode="lines+markers", line=line, marker={"size": 4, "color": INK}, name="arm at 0"
+        x=x, y=y, z=z, mode="lines+markers", line=line, marker={"size": 4, "color": INK}, name=tr("arm at 0")
     )
     axis = {"backgroundcolor": "white", "gridcolor": "#dddddd"}
     figure.update_layout(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from er3a.language import N_, joined, said
 from er3a.results import Verdict
 from er3a.stages.workspace.hull import Hull
 from er3a.stages.workspace.voids import UNSEEN_SHARE
@@ -23,13 +24,14 @@ def judge(hull: Hull, voids: list[dict[str, Any]], cells: dict[str, int], unseen
     proof : whether the arm's build allowed a proof
     """
     if hull.volume == 0:
-        text = "The tool point moves on a plane, a line or not at all, so there is no volume to speak of."
+        text = N_("The tool point moves on a plane, a line or not at all, so there is no volume to speak of.")
         return Verdict("caution", "workspace.flat", text)
     if not proof and unseen > UNSEEN_SHARE * cells["touched"]:
         share = 100 * unseen / (unseen + cells["touched"])
-        text = (
-            f"Too few samples for cells this small: about {share:.0f} % of the reachable cells were not touched yet, "
-            "so nothing can be said about voids."
+        text = said(
+            "Too few samples for cells this small: about {share:.0f} % of the reachable cells were not touched yet, "
+            "so nothing can be said about voids.",
+            share=share,
         )
         return Verdict("caution", "workspace.undersampled", text, {"unseen_percent": share})
     enclosed = [void for void in voids if void["kind"] == "enclosed"]
@@ -40,35 +42,48 @@ def judge(hull: Hull, voids: list[dict[str, Any]], cells: dict[str, int], unseen
             astray[0],
             "caution",
             "workspace.void_unexpected",
-            "An enclosed void of {litres:.3g} L lies at ({x}, {y}, {z}) mm, away from the shoulder, proven empty. It "
-            "{cause}: check the limits, the zero and the direction of joints 2 and 3.",
+            N_("An enclosed void of {litres:.3g} L lies at ({x}, {y}, {z}) mm, away from the shoulder, proven empty."),
+            _advice(astray[0]["cause"]),
         )
     if elsewhere:
         return _about(
             elsewhere[0],
             "caution",
             "workspace.void_uncertain",
-            "An enclosed void of {litres:.3g} L may lie at ({x}, {y}, {z}) mm, away from the shoulder; there is no "
-            "proof, and the samples can't tell.",
+            N_(
+                "An enclosed void of {litres:.3g} L may lie at ({x}, {y}, {z}) mm, away from the shoulder; there is no "
+                "proof, and the samples can't tell."
+            ),
         )
     if enclosed:
         return _about(
             enclosed[0],
             "pass",
             "workspace.void_at_shoulder",
-            "An enclosed void of {litres:.3g} L surrounds the arm's own shoulder, where it can't fold to; none "
-            "elsewhere points to a wrong joint range.",
+            N_(
+                "An enclosed void of {litres:.3g} L surrounds the arm's own shoulder, where it can't fold to; none "
+                "elsewhere points to a wrong joint range."
+            ),
         )
     if not proof:
-        return Verdict("pass", "workspace.no_void", "The samples leave no enclosed void inside the hull; no proof.")
-    return Verdict("pass", "workspace.no_void", "The workspace holds no enclosed void.")
+        text = N_("The samples leave no enclosed void inside the hull; no proof.")
+        return Verdict("pass", "workspace.no_void", text)
+    return Verdict("pass", "workspace.no_void", N_("The workspace holds no enclosed void."))
 
 
-def _about(void: dict[str, Any], status: str, code: str, text: str) -> Verdict:
+def _advice(cause: str) -> str:
+    """What to check, given a void's cause as :func:`er3a.workspace.causes.describe` words it."""
+    if cause.startswith(("vanishes", "shrinks")):
+        return said("It {cause}: check the limits, the zero and the direction of joints 2 and 3.", cause=cause)
+    return said(
+        "It has this cause: {cause}: check the limits, the zero and the direction of joints 2 and 3.", cause=cause
+    )
+
+
+def _about(void: dict[str, Any], status: str, code: str, finding: str, advice: str = "") -> Verdict:
     volume = void["volume_m3"]
     litres = 1000 * (volume["lower"] or volume["upper"])
     x, y, z = (1000 * value for value in void["centroid_m"])
     shown = {key: str(round(value)).replace("-", "−") for key, value in (("x", x), ("y", y), ("z", z))}
     params = {"litres": litres, "x_mm": x, "y_mm": y, "z_mm": z}
-    cause = void["cause"] if void["cause"].startswith(("vanishes", "shrinks")) else "has this cause: " + void["cause"]
-    return Verdict(status, code, text.format(litres=litres, cause=cause, **shown), params)
+    return Verdict(status, code, joined([said(finding, litres=litres, **shown), advice], " "), params)
