@@ -31,6 +31,8 @@ def write_compare(study: Study, results: Path, output: Path) -> None:
             "border": border_mm(read_table(results / name / BORDER)),
         }
     rows = list(dict.fromkeys(key for entry in entries.values() for key in entry["values"]))
+    groups = list(dict.fromkeys(group for group, _, _ in rows))
+    rows.sort(key=lambda row: groups.index(row[0]))
     data = {name: entry | {"values": [entry["values"].get(row) for row in rows]} for name, entry in entries.items()}
     corners = np.array([point for entry in entries.values() for line in entry["border"] for point in line] or [[0, 0]])
     page.render(
@@ -71,7 +73,11 @@ def key_figures(folder: Path) -> dict[tuple[str, str, str], float | str | None]:
     for stage in STAGES:
         summary: dict[str, Any] = read_summary(folder / stage)
         found[stage, N_("verdict"), ""] = page.status_word(summary["verdict"]["status"])
-        found |= {(stage, figure["name"], figure["unit"]): figure["value"] for figure in summary["figures"]}
+        for figure in summary["figures"]:
+            name, value, unit = figure["name"], figure["value"], figure["unit"]
+            if unit.startswith("of ") and value is not None:  # the total differs from robot to robot
+                value, unit = f"{value} {unit}", ""
+            found[stage, name, unit] = value
     return found
 
 

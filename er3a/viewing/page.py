@@ -60,6 +60,11 @@ class Picture:
         """The image as a data address."""
         return svg_data_uri(self.figure)
 
+    @property
+    def inches(self) -> float:
+        """The width that the figure's letters are meant for."""
+        return float(self.figure.get_figwidth())
+
 
 def render(template: Path, output: Path, summary: dict[str, Any] | None = None, **context: Any) -> None:
     """Render a template to ``output``, whole or not at all.

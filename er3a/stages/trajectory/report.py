@@ -49,11 +49,12 @@ KINDS = {
 
 @dataclass(frozen=True)
 class Drawing:
-    """A drawn image for the ``picture`` macro: its data address, what it shows, what to conclude."""
+    """A drawn image for the ``picture`` macro: its data address, what it shows, what to conclude, its width."""
 
     uri: str
     alt: str
     caption: str
+    inches: float
 
 
 def report(study: Study, name: str, folder: Path, output: Path) -> None:
@@ -117,6 +118,7 @@ def _section(
             figure.draw(robot, record, _drawn(record, rows), ways, near),
             alt,
             _conclusion(record, rows),
+            float(figure.figure.get_figwidth()),
         ),
     }
 

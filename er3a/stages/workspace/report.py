@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 
 from er3a.results import read_summary, read_table
 from er3a.robots.robot import Robot
@@ -67,8 +66,8 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
             "Touched volume over the number of samples for three cell sizes, with the proven bounds and the estimate",
             _curve_caption(summary, tables["curve"]),
         ),
-        turning=Markup(
-            turning_figure(robot, summary, *(tables[name] for name in ("cloud", "void_vertices", "void_triangles")))
+        turning=turning_figure(
+            robot, summary, *(tables[name] for name in ("cloud", "void_vertices", "void_triangles"))
         ),
         void_rows=[_void_row(n, void) for n, void in enumerate(summary["voids"][:LISTED], start=1)],
         voids_more=max(0, len(summary["voids"]) - LISTED),
