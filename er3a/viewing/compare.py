@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from er3a.code_digest import code_digest
 from er3a.language import N_, tr
-from er3a.results import read_summary, read_table
+from er3a.results import input_records, read_summary, read_table, result_records
 from er3a.robots.robot import Robot
 from er3a.study import STAGES, Study
 from er3a.viewing import page
+from er3a.viewing.numbers import number
 
 BORDER = "workspace/border.parquet"
 BORDER_POINT = "tool point"
@@ -38,12 +40,18 @@ def write_compare(study: Study, results: Path, output: Path) -> None:
     page.render(
         Path(__file__).with_name("compare.html.j2"),
         output,
+        command=page.run_command(study, "compare.html"),
+        provenance={"inputs": _inputs(study, results), "code": code_digest(__name__)},
         rows=rows,
         data=data,
         low=corners.min(axis=0).tolist(),
         high=corners.max(axis=0).tolist(),
         compare_script=Path(__file__).with_name("compare.js").read_text(encoding="utf-8"),
     )
+
+
+def _inputs(study: Study, results: Path) -> list[dict[str, Any]]:
+    return input_records(study.robot_file(name) for name in study.robots) + result_records(results, study.robots)
 
 
 def parameters(robot: Robot) -> dict[tuple[str, str, str], float | str | None]:
@@ -76,7 +84,7 @@ def key_figures(folder: Path) -> dict[tuple[str, str, str], float | str | None]:
         for figure in summary["figures"]:
             name, value, unit = figure["name"], figure["value"], figure["unit"]
             if unit.startswith("of ") and value is not None:  # the total differs from robot to robot
-                value, unit = f"{value} {unit}", ""
+                value, unit = f"{number(value)} {tr(unit)}", ""
             found[stage, name, unit] = value
     return found
 

@@ -1,6 +1,8 @@
 // Draws the page's 3-D figure once a reader comes near it, or prints; until then it keeps no one waiting.
 "use strict";
 
+const SHEET_WIDTH = 660; // px, of A4 within its margins
+
 async function unpackPlotly() {
   const packed = await fetch(`data:application/gzip;base64,${document.getElementById("plotly").textContent}`);
   return new Response(packed.body.pipeThrough(new DecompressionStream("gzip"))).text();
@@ -32,5 +34,9 @@ async function unpackPlotly() {
     plotly = text;
     near.observe(place);
   });
-  addEventListener("beforeprint", draw);
+  addEventListener("beforeprint", () => {
+    draw();
+    if (place.hasChildNodes()) Plotly.relayout(place, { width: SHEET_WIDTH });
+  });
+  addEventListener("afterprint", () => place.hasChildNodes() && Plotly.relayout(place, { width: null, autosize: true }));
 }

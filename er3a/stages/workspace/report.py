@@ -15,7 +15,7 @@ from er3a.stages.workspace.proof_plots import sections, slices
 from er3a.stages.workspace.side_plots import arc_rows, side_view
 from er3a.stages.workspace.turning import turning_figure
 from er3a.study import Study
-from er3a.viewing.page import Picture, fixed, number, render
+from er3a.viewing.page import Picture, fixed, number, render, run_command
 
 LISTED = 12
 TABLES = (
@@ -43,6 +43,7 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
         Path(__file__).with_name("report.html.j2"),
         output,
         summary,
+        command=run_command(study, f"{name}/workspace.html"),
         robot=robot,
         section=Picture(
             sections(robot, summary, tables),
