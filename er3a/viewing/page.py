@@ -116,16 +116,15 @@ def render(
     write_atomically(output, lambda file: file.write_text(html, encoding="utf-8"))
 
 
-<<<<<<< HEAD
 def sentence(finding: str) -> str:
     """A finding as a sentence of its own."""
     text = tr("{finding}.", finding=finding)
     return text[:1].upper() + text[1:] if language.current() == "en" else text
-=======
+
+
 def run_command(study: Study, page: str) -> str:
     """The command that makes a page of a study again, results included; ``page`` is its path below the reports."""
     return shlex.join(["make", "run", f"STUDY={os.path.relpath(study.file)}", f"ARGS=reports/{page}"])
->>>>>>> 6b20830 (wip)
 
 
 def status_word(status: str) -> str:
