@@ -28,6 +28,7 @@ def turning_figure(
     value = far["manipulability_m3"].to_numpy()
     marker = {
         "size": 1.6,
+        "symbol": "square",  # two triangles each; a disc has dozens
         "color": np.round(value, 6),
         "colorscale": "Viridis",
         "cmax": float(np.quantile(value, 0.99)),
