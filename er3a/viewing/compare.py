@@ -41,7 +41,7 @@ def write_compare(study: Study, results: Path, output: Path) -> None:
         Path(__file__).with_name("compare.html.j2"),
         output,
         command=page.run_command(study, "compare.html"),
-        provenance={"inputs": _inputs(study, results), "code": code_digest(__name__)},
+        provenance={"inputs": _inputs(study, results), "seed": study.seed, "code": code_digest(__name__)},
         rows=rows,
         data=data,
         low=corners.min(axis=0).tolist(),

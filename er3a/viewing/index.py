@@ -34,6 +34,10 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         questions=QUESTIONS,
         shown_figures=SHOWN_FIGURES,
         command=page.run_command(study, "index.html"),
-        provenance={"inputs": result_records(results, study.robots), "code": code_digest(__name__)},
+        provenance={
+            "inputs": result_records(results, study.robots),
+            "seed": study.seed,
+            "code": code_digest(__name__),
+        },
     )
     write_compare(study, results, folder / "compare.html")
