@@ -30,13 +30,13 @@ const size = parseFloat(getComputedStyle(document.documentElement).fontSize);
 const widths = [...document.querySelectorAll(`main p:not(${arguments[0]})`)].map((p) => p.offsetWidth);
 const { paddingLeft, paddingRight } = getComputedStyle(document.body);
 const inner = document.body.clientWidth - parseFloat(paddingLeft) - parseFloat(paddingRight);
-return [size, inner / innerWidth, Math.max(...widths)];
+return [size, inner / innerWidth, Math.max(0, ...widths)];
 """
 A4 = (595, 842)  # points
 SHEET = 688  # CSS px that are left of A4 between the margins
 RIGHT_EDGES = """
-const parts = document.querySelectorAll("table, figure, img, svg, canvas, dl");
-return [...parts].map((part) => part.getBoundingClientRect().right);
+const parts = [...document.querySelectorAll("table, figure, img, svg, canvas, dl")];
+return parts.filter((part) => !part.closest("#turning")).map((part) => part.getBoundingClientRect().right);
 """
 
 
