@@ -8,6 +8,9 @@ from snakemake.utils import min_version
 min_version("9.10")
 
 
+report: "workflow/report/study.rst"
+
+
 include: "workflow/rules/common.smk"
 include: "workflow/rules/validation.smk"
 include: "workflow/rules/workspace.smk"

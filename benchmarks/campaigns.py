@@ -24,6 +24,7 @@ CAMPAIGNS = (
     "clearance",
     "capability",
     "teach",
+    "pages",
     *PARTS,
 )
 

@@ -18,7 +18,8 @@ import pyarrow.parquet as pq
 from er3a import language
 from er3a.code_digest import code_digest
 from er3a.errors import ResultError, WriteError
-from er3a.study import Study
+from er3a.inputs.grades import grades_in
+from er3a.study import STAGES, Study
 
 FORMAT_VERSION = 3
 CHECKSUMS = "SHA256SUMS"
@@ -213,9 +214,15 @@ def _compare(path: Path, content: bytes, sums: dict[str, str]) -> None:
         raise ResultError(path, f"damaged (not the bytes that {CHECKSUMS} beside it tells of)")
 
 
-def input_records(files: Iterable[Path]) -> list[dict[str, str]]:
-    """What provenance says of input files: path from the project's root, and checksum."""
-    return [{"path": _shown_path(file), "sha256": sha256(file)} for file in files]
+def input_records(files: Iterable[Path]) -> list[dict[str, Any]]:
+    """What provenance says of input files: path from the project's root, checksum, and the grades in them."""
+    return [{"path": _shown_path(file), "sha256": sha256(file), "grades": grades_in(file)} for file in files]
+
+
+def result_records(results: Path, robots: Iterable[str]) -> list[dict[str, Any]]:
+    """What provenance says of the results of robots: their lists of checksums, and the checksum of each."""
+    files = [results / robot / stage / CHECKSUMS for robot in robots for stage in STAGES]
+    return [{"path": file.as_posix(), "sha256": sha256(file), "grades": {}} for file in files if file.is_file()]
 
 
 def sha256(path: Path) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from er3a.errors import InputError
 from er3a.inputs.units import FARTHEST_MM, Triple, check_millimetres
@@ -168,6 +168,12 @@ class Study(StrictModel):
     inverse: InverseSettings = InverseSettings()
     trajectory: TrajectorySettings
     report: ReportSettings = ReportSettings()
+    _file: Path = PrivateAttr()
+
+    @property
+    def file(self) -> Path:
+        """The file that the study was read from."""
+        return self._file
 
     def entry(self, name: str) -> RobotEntry:
         """The study's entry for a robot; :class:`InputError` if it has none."""
@@ -232,4 +238,6 @@ def _tables_of(path_file: str) -> list[Path]:
 
 def load_study(path: str | Path) -> Study:
     """Read and check a study file; the files it names are checked by the stages that read them."""
-    return load(Study, path)
+    study = load(Study, path)
+    study._file = Path(path)
+    return study

@@ -68,8 +68,18 @@ def test_shape_of_a_summary(tmp_path, study):
     assert summary["figures"][1] == {"name": "reach", "value": None, "unit": "mm", "uncertainty": None}
     assert summary["provenance"] == {
         "inputs": [
-            {"path": path, "sha256": hashlib.sha256((ROBOTS.parents[1] / path).read_bytes()).hexdigest()}
-            for path in ("data/robots/er3_600.yaml", "data/manual_refs/er3_600/envelope.csv")
+            {
+                "path": path,
+                "sha256": hashlib.sha256((ROBOTS.parents[1] / path).read_bytes()).hexdigest(),
+                "grades": grades,
+            }
+            for path, grades in (
+                (
+                    "data/robots/er3_600.yaml",
+                    {"official": ["dh", "limits", "speeds"], "inferred": ["zero", "envelopes"]},
+                ),
+                ("data/manual_refs/er3_600/envelope.csv", {"official": 9}),
+            )
         ],
         "config": study.settings("er3_600", "workspace"),
         "seed": study.seed,

@@ -76,6 +76,13 @@ def read_header(path: str | Path) -> list[str]:
     return [name.strip() for name in lines[0][1]] if lines else []
 
 
+def read_column(path: str | Path, column: str) -> list[str]:
+    """The texts in a column of a CSV file that has been checked, [] if it has no such column."""
+    (_, header), *rows = _lines(Path(path))
+    names = [name.strip() for name in header]
+    return [line[names.index(column)].strip() for _, line in rows] if column in names else []
+
+
 def _lines(path: Path) -> list[tuple[int, list[str]]]:
     """Lines of a CSV file that aren't blank, with their numbers."""
     reader = csv.reader(io.StringIO(read_text(path)), strict=True)

@@ -19,7 +19,7 @@ from er3a.results import input_records
 from er3a.robots.robot import Robot
 from er3a.study import Study
 from er3a.teach.words import WORDS
-from er3a.viewing.page import render
+from er3a.viewing.page import render, run_command
 from er3a.viewing.palette import BODY, INK, JOINT_NAMES, JOINTS, LINK
 
 _HERE = Path(__file__).parent
@@ -49,6 +49,7 @@ def write_teach_page(study: Study, name: str, output: Path) -> None:
         words=panel["words"],
         panel=panel,
         modules=json.dumps({"imports": {f"er3a/{module}": _module(module) for module in MODULES}}),
+        command=run_command(study, f"{name}/teach.html"),
         provenance={
             "inputs": input_records(study.inputs(name, "teach")),
             "config": study.settings(name, "trajectory"),

@@ -6,10 +6,14 @@ const pickers = ["a", "b"].map((side) => document.getElementById(`robot-${side}`
 const onlyDifferences = document.getElementById("only-differences");
 const comparedRows = [...document.querySelectorAll("#comparison tbody tr")].map((row, index) => ({ row, index }));
 
-// Up to six significant digits, a typographic minus, no trailing zeros.
+// Up to six significant digits, a typographic minus, no trailing zeros, as the other pages write numbers.
 function shownValue(value) {
   if (value === null || value === undefined) return "–";
-  return typeof value === "number" ? String(Number(value.toPrecision(6))).replace("-", "−") : value;
+  if (typeof value !== "number") return value;
+  const [digits, exponent] = String(Number(value.toPrecision(6))).split("e");
+  const [whole, ...fraction] = digits.split(".");
+  const power = exponent ? "·10" + [...exponent].map((sign) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[sign] ?? (sign === "-" ? "⁻" : "")).join("") : "";
+  return [whole.replace(/\B(?=(\d{3})+$)/g, "\u202f"), ...fraction].join(".").replace("-", "−") + power;
 }
 
 function shownDifference(a, b) {

@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from er3a.code_digest import code_digest
 from er3a.language import N_, tr
-from er3a.results import read_summary, read_table
+from er3a.results import input_records, read_summary, read_table, result_records
 from er3a.robots.robot import Robot
 from er3a.study import STAGES, Study
 from er3a.viewing import page
+from er3a.viewing.numbers import number
 
 BORDER = "workspace/border.parquet"
 BORDER_POINT = "tool point"
@@ -31,17 +33,25 @@ def write_compare(study: Study, results: Path, output: Path) -> None:
             "border": border_mm(read_table(results / name / BORDER)),
         }
     rows = list(dict.fromkeys(key for entry in entries.values() for key in entry["values"]))
+    groups = list(dict.fromkeys(group for group, _, _ in rows))
+    rows.sort(key=lambda row: groups.index(row[0]))
     data = {name: entry | {"values": [entry["values"].get(row) for row in rows]} for name, entry in entries.items()}
     corners = np.array([point for entry in entries.values() for line in entry["border"] for point in line] or [[0, 0]])
     page.render(
         Path(__file__).with_name("compare.html.j2"),
         output,
+        command=page.run_command(study, "compare.html"),
+        provenance={"inputs": _inputs(study, results), "seed": study.seed, "code": code_digest(__name__)},
         rows=rows,
         data=data,
         low=corners.min(axis=0).tolist(),
         high=corners.max(axis=0).tolist(),
         compare_script=Path(__file__).with_name("compare.js").read_text(encoding="utf-8"),
     )
+
+
+def _inputs(study: Study, results: Path) -> list[dict[str, Any]]:
+    return input_records(study.robot_file(name) for name in study.robots) + result_records(results, study.robots)
 
 
 def parameters(robot: Robot) -> dict[tuple[str, str, str], float | str | None]:
@@ -71,7 +81,11 @@ def key_figures(folder: Path) -> dict[tuple[str, str, str], float | str | None]:
     for stage in STAGES:
         summary: dict[str, Any] = read_summary(folder / stage)
         found[stage, N_("verdict"), ""] = page.status_word(summary["verdict"]["status"])
-        found |= {(stage, figure["name"], figure["unit"]): figure["value"] for figure in summary["figures"]}
+        for figure in summary["figures"]:
+            name, value, unit = figure["name"], figure["value"], figure["unit"]
+            if unit.startswith("of ") and value is not None:  # the total differs from robot to robot
+                value, unit = f"{number(value)} {tr(unit)}", ""
+            found[stage, name, unit] = value
     return found
 
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+import shlex
 from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Any
 
+from er3a.code_digest import code_digest
 from er3a.errors import ResultError
 from er3a.language import N_, tr
-from er3a.results import CHECKSUMS, read_summary, sha256
+from er3a.results import CHECKSUMS, read_summary, result_records, sha256
 from er3a.viewing import page
 from er3a.viewing.numbers import number
 
@@ -65,8 +67,20 @@ def changes(old: Path, new: Path) -> list[Change]:
 
 def write_diff(old: Path, new: Path, found: list[Change], output: Path) -> None:
     """Render the changes as a page."""
-    rows = [astuple(change) for change in found]
-    page.render(Path(__file__).with_name("diff.html.j2"), output, old=old, new=new, columns=COLUMNS, rows=rows)
+    page.render(
+        Path(__file__).with_name("diff.html.j2"),
+        output,
+        command=shlex.join(["er3a", "diff", str(old), str(new), "--output", str(output)]),
+        provenance={"inputs": _records(old) + _records(new), "code": code_digest(__name__)},
+        old=old,
+        new=new,
+        columns=COLUMNS,
+        rows=[astuple(change) for change in found],
+    )
+
+
+def _records(folder: Path) -> list[dict[str, Any]]:
+    return result_records(folder, sorted({robot for robot, _ in _stages(folder)}))
 
 
 def _stages(folder: Path) -> set[tuple[str, str]]:

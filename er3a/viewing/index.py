@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from er3a.code_digest import code_digest
 from er3a.language import N_
-from er3a.results import read_summary
+from er3a.results import read_summary, result_records
 from er3a.study import STAGES, Study
 from er3a.viewing import page
 from er3a.viewing.compare import write_compare
@@ -32,5 +33,11 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         stages=STAGES,
         questions=QUESTIONS,
         shown_figures=SHOWN_FIGURES,
+        command=page.run_command(study, "index.html"),
+        provenance={
+            "inputs": result_records(results, study.robots),
+            "seed": study.seed,
+            "code": code_digest(__name__),
+        },
     )
     write_compare(study, results, folder / "compare.html")

@@ -101,6 +101,9 @@ function enlarge(image) {
   dialog.showModal();
 }
 
+// A sheet of paper can't be unfolded.
+addEventListener("beforeprint", () => document.querySelectorAll(".provenance").forEach((details) => (details.open = true)));
+
 for (const table of document.querySelectorAll("table")) {
   if (!table.classList.contains("index")) makeSortable(table);
   const tools = document.createElement("p");

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import platform
+import shlex
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,6 +18,7 @@ from matplotlib.figure import Figure
 from er3a import language
 from er3a.language import N_, tr
 from er3a.results import write_atomically
+from er3a.study import Study
 from er3a.viewing.figures import svg_data_uri
 from er3a.viewing.numbers import fixed, number
 
@@ -60,14 +63,29 @@ class Picture:
         """The image as a data address."""
         return svg_data_uri(self.figure)
 
+    @property
+    def inches(self) -> float:
+        """The width that the figure's letters are meant for."""
+        return float(self.figure.get_figwidth())
 
-def render(template: Path, output: Path, summary: dict[str, Any] | None = None, **context: Any) -> None:
+
+def render(
+    template: Path,
+    output: Path,
+    summary: dict[str, Any] | None = None,
+    *,
+    command: str,
+    provenance: dict[str, Any] | None = None,
+    **context: Any,
+) -> None:
     """Render a template to ``output``, whole or not at all.
 
     Parameters
     ----------
     template : a Jinja file that extends ``base.html.j2``
     summary : the stage's summary; its verdict, figures and provenance frame the page
+    command : the command that makes the page again
+    provenance : of pages without a summary, in the shape that a summary has
     context : what the template needs besides
     """
     environment = jinja2.Environment(
@@ -89,6 +107,8 @@ def render(template: Path, output: Path, summary: dict[str, Any] | None = None, 
         pages=PAGES,
         language=language.current(),
         summary=summary,
+        command=command,
+        provenance=summary["provenance"] if summary else provenance,
         versions=_versions(),
         commit=_commit(),
         **context,
@@ -100,6 +120,11 @@ def sentence(finding: str) -> str:
     """A finding as a sentence of its own."""
     text = tr("{finding}.", finding=finding)
     return text[:1].upper() + text[1:] if language.current() == "en" else text
+
+
+def run_command(study: Study, page: str) -> str:
+    """The command that makes a page of a study again, results included; ``page`` is its path below the reports."""
+    return shlex.join(["make", "run", f"STUDY={os.path.relpath(study.file)}", f"ARGS=reports/{page}"])
 
 
 def status_word(status: str) -> str:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from selenium import webdriver
@@ -33,6 +35,24 @@ def start(profile: Path) -> webdriver.Chrome:
         options.add_argument(f"--{switch}")
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     return webdriver.Chrome(options, webdriver.ChromeService(shutil.which("chromedriver")))
+
+
+@contextmanager
+def emulating(browser: webdriver.Chrome, width: int = 0, height: int = 900, **media: str) -> Iterator[None]:
+    """A screen of another size (CSS px), printed sheets (``type="print"``), or another preference of the reader.
+
+    Preferences are named as in CSS with underscores: ``prefers_color_scheme="dark"``.
+    """
+    features = [{"name": name.replace("_", "-"), "value": value} for name, value in media.items() if name != "type"]
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": media.get("type", ""), "features": features})
+    if width:
+        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    try:
+        yield
+    finally:
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": []})
+        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
 def _binary() -> str | None:

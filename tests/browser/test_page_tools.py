@@ -26,7 +26,14 @@ def page(browser, tmp_path):
     axes.plot([0, 1], [0, 1])
     template = tmp_path / "page.html.j2"
     template.write_text(TEMPLATE, encoding="utf-8")
-    render(template, tmp_path / "page.html", rows=ROWS, picture=Picture(figure, "A line", "It rises."))
+    render(
+        template,
+        tmp_path / "page.html",
+        command="make run",
+        provenance={"inputs": [], "code": "0" * 64},
+        rows=ROWS,
+        picture=Picture(figure, "A line", "It rises."),
+    )
     browser.get((tmp_path / "page.html").as_uri())
     return browser
 

@@ -22,7 +22,12 @@ rule report:
         viewed,
         CATALOGUE,
     output:
-        "reports/{robot}/{stage}.html",
+        report(
+            "reports/{robot}/{stage}.html",
+            caption="../report/stage.rst",
+            category="{robot}",
+            labels={"page": "{stage}"},
+        ),
     log:
         "logs/{robot}/{stage}.report.log",
     conda:
@@ -41,7 +46,12 @@ rule teach:
         inputs("teach"),
         CATALOGUE,
     output:
-        "reports/{robot}/teach.html",
+        report(
+            "reports/{robot}/teach.html",
+            caption="../report/teach.rst",
+            category="{robot}",
+            labels={"page": "teach panel"},
+        ),
     log:
         "logs/{robot}/teach.log",
     conda:
@@ -63,8 +73,18 @@ rule index:
         expand("reports/{robot}/{page}.html", robot=ROBOTS, page=[*STAGES, "teach"]),
         CATALOGUE,
     output:
-        "reports/index.html",
-        "reports/compare.html",
+        report(
+            "reports/index.html",
+            caption="../report/index.rst",
+            category="all robots",
+            labels={"page": "index"},
+        ),
+        report(
+            "reports/compare.html",
+            caption="../report/compare.rst",
+            category="all robots",
+            labels={"page": "two robots side by side"},
+        ),
     log:
         "logs/index.log",
     conda:

@@ -52,13 +52,14 @@ def main() -> int:
         print(f"error: {error.filename}: {error.strerror}", file=sys.stderr)
         return 2
 
-    snakemake = [sys.executable, "-m", "snakemake", "--configfile", arguments.study]
+    snakemake = [sys.executable, "-m", "snakemake"]
+    study_file = ["--configfile", arguments.study]  # last: Snakemake takes all words after it for more such files
     if any((state / "locks").glob("*")):
         print("A run that was cut off left its lock; clearing it and going on where it stopped.")
-        subprocess.run([*snakemake, "--unlock", "--quiet", "all"], check=True)
+        subprocess.run([*snakemake, "--unlock", "--quiet", "all", *study_file], check=True)
     os.set_inheritable(lock, True)  # held until the last job of this run has ended
     sys.stdout.flush()
-    os.execv(sys.executable, [*snakemake, *arguments.words])
+    os.execv(sys.executable, [*snakemake, *arguments.words, *study_file])
 
 
 if __name__ == "__main__":

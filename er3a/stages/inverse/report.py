@@ -13,7 +13,7 @@ from er3a.stages.inverse.columns import JOINT_COLUMNS
 from er3a.stages.inverse.pictures import histogram, overlay, ways
 from er3a.stages.inverse.symptoms import symptoms
 from er3a.study import Study
-from er3a.viewing.page import fixed, number, render
+from er3a.viewing.page import fixed, number, render, run_command
 
 NO_BREAK_SPACE = "\u00a0"
 FREE_AT = {
@@ -53,6 +53,7 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
         Path(__file__).with_name("report.html.j2"),
         output,
         summary,
+        command=run_command(study, f"{name}/inverse.html"),
         robot=robot,
         overview=[_overview_row(target) for target in summary["targets"]],
         sections=sections,

@@ -16,7 +16,7 @@ from er3a.stages.trajectory.clearance_section import clearance_section
 from er3a.stages.trajectory.drawings import PathFigure
 from er3a.stages.trajectory.turning import turning_figure
 from er3a.study import Study
-from er3a.viewing.page import fixed, number, render
+from er3a.viewing.page import fixed, number, render, run_command
 
 DRAWN = 250
 STATUS = {
@@ -49,11 +49,12 @@ KINDS = {
 
 @dataclass(frozen=True)
 class Drawing:
-    """A drawn image for the ``picture`` macro: its data address, what it shows, what to conclude."""
+    """A drawn image for the ``picture`` macro: its data address, what it shows, what to conclude, its width."""
 
     uri: str
     alt: str
     caption: str
+    inches: float
 
 
 def report(study: Study, name: str, folder: Path, output: Path) -> None:
@@ -70,6 +71,7 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
         Path(__file__).with_name("report.html.j2"),
         output,
         summary,
+        command=run_command(study, f"{name}/trajectory.html"),
         robot=robot,
         paths=sections,
         clearance=clearance_section(summary, read_table(folder / "clearance.parquet")),
@@ -117,6 +119,7 @@ def _section(
             figure.draw(robot, record, _drawn(record, rows), ways, near),
             alt,
             _conclusion(record, rows),
+            float(figure.figure.get_figwidth()),
         ),
     }
 

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
-from plotly.offline import get_plotlyjs
+from markupsafe import Markup
 
 from er3a.language import tr
 from er3a.robots.robot import Robot
 from er3a.viewing.palette import HIGHLIGHT, INK, LINK, MODEL
 from er3a.viewing.skeleton import skeleton
+from er3a.viewing.turning import turning_html
 
 POINTS = 250
 LOG_RANGE = (0.5, 2.5)  # of the condition number
@@ -20,7 +21,7 @@ MOST_ARMS = 3
 _XYZ = ["x_mm", "y_mm", "z_mm"]
 
 
-def turning_figure(robot: Robot, summary: dict[str, Any], checks: pd.DataFrame, repairs: pd.DataFrame) -> str:
+def turning_figure(robot: Robot, summary: dict[str, Any], checks: pd.DataFrame, repairs: pd.DataFrame) -> Markup:
     """The figure as HTML with all its script inside; a list chooses the path that is shown."""
     figure, owners = go.Figure(), []
     for record in summary["paths"]:
@@ -45,14 +46,10 @@ def turning_figure(robot: Robot, summary: dict[str, Any], checks: pd.DataFrame, 
             "camera": {"eye": {"x": 1.05, "y": -1.45, "z": 0.5}},
         },
         margin={"l": 0, "r": 0, "t": 0, "b": 0},
-        height=560,
         legend={"x": 0.0, "y": 0.0},
         updatemenus=[{"buttons": buttons, "active": names.index(first), "x": 0.0, "xanchor": "left", "y": 1.0}],
     )
-    body = figure.to_html(
-        full_html=False, include_plotlyjs=False, div_id="turning", config={"displaylogo": False, "responsive": True}
-    )
-    return f"<script>{get_plotlyjs()}</script>{body}"
+    return turning_html(figure)
 
 
 def _add(figure: go.Figure, robot: Robot, record: dict[str, Any], rows: pd.DataFrame, ways: pd.DataFrame) -> int:

@@ -19,7 +19,7 @@ from er3a.stages.validation.mended import mended_robot
 from er3a.stages.validation.model import model_of
 from er3a.stages.validation.wording import in_a_row, listed
 from er3a.study import Study
-from er3a.viewing.page import Picture, fixed, number, render
+from er3a.viewing.page import Picture, fixed, number, render, run_command
 
 SHOWN_FAILURES = 12
 DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "": 0}
@@ -50,6 +50,7 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
         Path(__file__).with_name("report.html.j2"),
         output,
         summary,
+        command=run_command(study, f"{name}/validation.html"),
         robot=robot,
         sets=[_set_story(finding, checks, poses) for finding in summary["sets"]],
         culprits=culprit_stories(summary, read_table(folder / "residuals.parquet")),

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 
 from er3a.language import N_, tr
 from er3a.results import read_summary, read_table
@@ -18,7 +17,7 @@ from er3a.stages.workspace.proof_plots import sections, slices
 from er3a.stages.workspace.side_plots import arc_rows, side_view
 from er3a.stages.workspace.turning import turning_figure
 from er3a.study import Study
-from er3a.viewing.page import Picture, fixed, number, render
+from er3a.viewing.page import Picture, fixed, number, render, run_command
 
 LISTED = 12
 TABLES = (
@@ -46,6 +45,7 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
         Path(__file__).with_name("report.html.j2"),
         output,
         summary,
+        command=run_command(study, f"{name}/workspace.html"),
         robot=robot,
         section=Picture(
             sections(robot, summary, tables),
@@ -74,8 +74,8 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
             ),
             _curve_caption(summary, tables["curve"]),
         ),
-        turning=Markup(
-            turning_figure(robot, summary, *(tables[name] for name in ("cloud", "void_vertices", "void_triangles")))
+        turning=turning_figure(
+            robot, summary, *(tables[name] for name in ("cloud", "void_vertices", "void_triangles"))
         ),
         void_rows=[_void_row(n, void) for n, void in enumerate(summary["voids"][:LISTED], start=1)],
         voids_more=max(0, len(summary["voids"]) - LISTED),

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
-from plotly.offline import get_plotlyjs
+from markupsafe import Markup
 
 from er3a.language import N_, tr
 from er3a.robots.robot import Robot
 from er3a.viewing.palette import HIGHLIGHT, INK, REFERENCE
 from er3a.viewing.skeleton import skeleton
+from er3a.viewing.turning import turning_html
 
 POINTS = 12_000
 _XYZ = ["x_m", "y_m", "z_m"]
@@ -22,13 +23,14 @@ _NAMES = {"enclosed": N_("void {number} (enclosed)"), "open": N_("void {number} 
 
 def turning_figure(
     robot: Robot, summary: dict[str, Any], cloud: pd.DataFrame, vertices: pd.DataFrame, triangles: pd.DataFrame
-) -> str:
+) -> Markup:
     """The figure as HTML with all its script inside."""
     figure = go.Figure()
     far = cloud[cloud["y_m"] >= summary["axis"]["point_m"][1]][:POINTS]
     value = far["manipulability_m3"].to_numpy()
     marker = {
         "size": 1.6,
+        "symbol": "square",  # two triangles each; a disc has dozens
         "color": np.round(value, 6),
         "colorscale": "Viridis",
         "cmax": float(np.quantile(value, 0.99)),
@@ -63,8 +65,6 @@ def turning_figure(
             "camera": {"eye": {"x": 0.6, "y": -1.5, "z": 0.5}},
         },
         margin={"l": 0, "r": 0, "t": 0, "b": 0},
-        height=560,
         legend={"orientation": "h", "y": 0.0},
     )
-    body = figure.to_html(full_html=False, include_plotlyjs=False, div_id="turning", config={"displaylogo": False})
-    return f"<script>{get_plotlyjs()}</script>{body}"
+    return turning_html(figure)

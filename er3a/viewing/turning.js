@@ -1,0 +1,42 @@
+// Draws the page's 3-D figure once a reader comes near it, or prints; until then it keeps no one waiting.
+"use strict";
+
+const SHEET_WIDTH = 660; // px, of A4 within its margins
+
+async function unpackPlotly() {
+  const packed = await fetch(`data:application/gzip;base64,${document.getElementById("plotly").textContent}`);
+  return new Response(packed.body.pipeThrough(new DecompressionStream("gzip"))).text();
+}
+
+{
+  const place = document.getElementById("turning");
+  const near = new IntersectionObserver((entries) => entries.some((entry) => entry.isIntersecting) && draw(), { rootMargin: "50%" });
+  let plotly = null;
+
+  const draw = () => {
+    if (plotly === null || place.hasChildNodes()) return;
+    near.disconnect();
+    const script = document.createElement("script");
+    script.textContent = plotly;
+    document.head.append(script);
+    const { data, layout } = JSON.parse(document.getElementById("turning-figure").textContent);
+    const scale = parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;
+    layout.font = { size: 12 * scale };
+    layout.legend.font = { size: 12 * scale };
+    for (const { marker, line } of data) {
+      if (marker) marker.size *= scale;
+      if (line) line.width *= scale;
+    }
+    Plotly.newPlot(place, data, layout, { displaylogo: false, responsive: true }).then(() => performance.mark("turning"));
+  };
+
+  unpackPlotly().then((text) => {
+    plotly = text;
+    near.observe(place);
+  });
+  addEventListener("beforeprint", () => {
+    draw();
+    if (place.hasChildNodes()) Plotly.relayout(place, { width: SHEET_WIDTH });
+  });
+  addEventListener("afterprint", () => place.hasChildNodes() && Plotly.relayout(place, { width: null, autosize: true }));
+}

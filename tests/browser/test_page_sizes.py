@@ -1,0 +1,59 @@
+"""Every page on a phone, a laptop and a 4K screen, and on sheets of A4."""
+
+from __future__ import annotations
+
+import base64
+import re
+
+import pytest
+from selenium.webdriver.common.by import By
+
+from tests.browser import chromium
+from tests.browser.pages import PAGES
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_page_fits_phone_laptop_and_4k(browser, small_study, page):
+    browser.get((small_study.folder / "reports" / page).as_uri())
+    for width, height, letters in ((390, 844, 16), (1280, 900, 16), (3840, 2160, 26)):
+        with chromium.emulating(browser, width, height):
+            assert browser.execute_script("return document.documentElement.scrollWidth") <= width
+            size, filled, line = browser.execute_script(MEASURES, NOT_PROSE)
+            assert size == pytest.approx(letters, abs=0.5)
+            assert filled > (0.85 if width < 1500 else 0.75)
+            assert line <= 46 * size + 1
+
+
+NOT_PROSE = ".verdict p, .tools, .warning, .turns, .pickers, td p"
+MEASURES = """
+const size = parseFloat(getComputedStyle(document.documentElement).fontSize);
+const widths = [...document.querySelectorAll(`main p:not(${arguments[0]})`)].map((p) => p.offsetWidth);
+const { paddingLeft, paddingRight } = getComputedStyle(document.body);
+const inner = document.body.clientWidth - parseFloat(paddingLeft) - parseFloat(paddingRight);
+return [size, inner / innerWidth, Math.max(0, ...widths)];
+"""
+A4 = (595, 842)  # points
+SHEET = 688  # CSS px that are left of A4 between the margins
+RIGHT_EDGES = """
+const parts = [...document.querySelectorAll("table, figure, img, svg, canvas, dl")];
+return parts.filter((part) => !part.closest("#turning")).map((part) => part.getBoundingClientRect().right);
+"""
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_page_prints_on_a4_with_nothing_cut(browser, small_study, page):
+    browser.get((small_study.folder / "reports" / page).as_uri())
+    pdf = base64.b64decode(browser.execute_cdp_cmd("Page.printToPDF", {"preferCSSPageSize": True})["data"])
+    sizes = re.findall(rb"/MediaBox ?\[0 0 ([\d.]+) ([\d.]+)\]", pdf)
+    assert sizes
+    assert {(round(float(width)), round(float(height))) for width, height in sizes} == {A4}
+    with chromium.emulating(browser, SHEET, type="print"):
+        ends = browser.execute_script(RIGHT_EDGES)
+        assert max(ends) <= SHEET + 1
+        shown = browser.execute_script(
+            "return [...document.querySelectorAll('nav, .tools')].filter((e) => e.offsetHeight)"
+        )
+        assert shown == []
+        assert browser.find_element(By.CSS_SELECTOR, ".provenance dl").is_displayed()
+    if browser.find_elements(By.ID, "turning"):
+        assert browser.find_elements(By.CSS_SELECTOR, "#turning canvas"), "drawn for the printer too"
