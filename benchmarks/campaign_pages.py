@@ -13,7 +13,7 @@ from er3a.study import STAGES, load_study
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from tests.browser import chromium
 
-REPORTS = Path("reports")
+REPORTS = Path("reports").resolve()
 SCREENS = {"laptop": (1280, 900), "4K": (3840, 2160)}
 OPENINGS = 3
 LARGEST_MB, LONGEST_MS = 8.0, 1500

@@ -1,7 +1,7 @@
 // Draws the page's 3-D figure once a reader comes near it, or prints; until then it keeps no one waiting.
 "use strict";
 
-const SHEET_WIDTH = 660; // px, of A4 within its margins
+const ON_A4 = { width: 680, height: 460 };
 
 async function unpackPlotly() {
   const packed = await fetch(`data:application/gzip;base64,${document.getElementById("plotly").textContent}`);
@@ -36,7 +36,7 @@ async function unpackPlotly() {
   });
   addEventListener("beforeprint", () => {
     draw();
-    if (place.hasChildNodes()) Plotly.relayout(place, { width: SHEET_WIDTH });
+    if (place.hasChildNodes()) Plotly.relayout(place, ON_A4);
   });
-  addEventListener("afterprint", () => place.hasChildNodes() && Plotly.relayout(place, { width: null, autosize: true }));
+  addEventListener("afterprint", () => place.hasChildNodes() && Plotly.relayout(place, { width: null, height: null, autosize: true }));
 }

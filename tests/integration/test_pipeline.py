@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import fcntl
+import hashlib
+import html
 import json
 import os
 import re
 import shutil
 import subprocess
 import sys
+import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -20,9 +23,8 @@ from typer.testing import CliRunner
 from er3a.cli import app
 from er3a.errors import ResultError
 from er3a.results import FORMAT_VERSION, check_results, read_summary, write_checksums
-from tests.conftest import ALL_THERE
+from tests.conftest import ALL_THERE, ROBOTS
 
-ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 STAGES = ("validation", "workspace", "inverse", "trajectory")
 PANELS = {f"{robot}: write the teach panel" for robot in ROBOTS}
 
@@ -59,6 +61,40 @@ def test_every_stage_leaves_results_a_page_and_a_recording(small_study):
         assert (small_study.folder / "reports" / robot / "teach.html").stat().st_size > 1000
     assert (small_study.folder / "reports/index.html").is_file()
     assert not list((small_study.folder / "results").glob("*/workspace/parts/*"))
+
+
+def test_snakemake_s_report_holds_every_page_with_its_caption(small_study, tmp_path):
+    small_study.snakemake("--report", str(tmp_path / "report.zip"))
+    with zipfile.ZipFile(tmp_path / "report.zip") as packed:
+        held = sorted(packed.read(name) for name in packed.namelist() if "/data/raw/" in name)
+        text = packed.read("report/report.html").decode("utf-8")
+    assert held == sorted(page.read_bytes() for page in (small_study.folder / "reports").rglob("*.html"))
+    for robot in ROBOTS:
+        for caption in (
+            f"Does the table of {robot} match",
+            f"What can {robot} reach",
+            f"Which joint solutions of {robot} reach",
+            f"Do the paths of {robot} run into",
+            f"{robot} to move by hand",
+        ):
+            assert caption in text
+    assert "Start with the index" in text
+
+
+def test_a_page_s_foot_names_inputs_with_grades_and_the_command_that_makes_it_again(small_study, tmp_path):
+    page = small_study.folder / "reports/er3_600/validation.html"
+    foot = html.unescape(page.read_text(encoding="utf-8").partition('class="provenance"')[2])
+    reach = small_study.folder / "data/manual_refs/er3_600/reach.csv"
+    assert hashlib.sha256(reach.read_bytes()).hexdigest() in foot
+    assert "official (dh, limits, speeds), inferred (zero, envelopes)" in foot
+    command = re.search(r"<code>make run STUDY=config/small.yaml ARGS=(\S+)</code>", foot)
+    assert command[1] == "reports/er3_600/validation.html"
+    page.rename(tmp_path / "kept.html")
+    try:
+        planned = small_study.make_run("--dry-run", "--nocolor", command[1]).stdout
+    finally:
+        (tmp_path / "kept.html").rename(page)
+    assert re.findall(r"^Job \d+: (.+)$", planned, flags=re.MULTILINE) == ["er3_600: report validation"]
 
 
 def test_verdicts_tell_the_article_from_the_real_arm(small_study):
