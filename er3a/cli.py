@@ -144,7 +144,7 @@ def diff(
 
     from rich import box
     from rich.console import Console
-    from rich.table import Table
+    from rich.table import Column, Table
 
     from er3a.viewing.diff import COLUMNS, changes, write_diff
 
@@ -152,7 +152,7 @@ def diff(
         raise Er3aError(f"--language is '{words}'; known: {', '.join(language.LANGUAGES)}")
     language.use(words)
     found = changes(old, new)
-    table = Table(*(language.tr(column) for column in COLUMNS), box=box.SIMPLE)
+    table = Table(*(Column(language.tr(column), overflow="fold") for column in COLUMNS), box=box.SIMPLE, padding=0)
     for change in found:
         table.add_row(*astuple(change))
     Console().print(table if found else language.tr("Nothing differs."))

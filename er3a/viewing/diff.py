@@ -8,6 +8,7 @@ from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Any
 
+from er3a import language
 from er3a.code_digest import code_digest
 from er3a.errors import ResultError
 from er3a.language import N_, tr
@@ -70,7 +71,9 @@ def write_diff(old: Path, new: Path, found: list[Change], output: Path) -> None:
     page.render(
         Path(__file__).with_name("diff.html.j2"),
         output,
-        command=shlex.join(["er3a", "diff", str(old), str(new), "--output", str(output)]),
+        command=shlex.join(
+            ["er3a", "diff", str(old), str(new), "--language", language.current(), "--output", str(output)]
+        ),
         provenance={"inputs": _records(old) + _records(new), "code": code_digest(__name__)},
         old=old,
         new=new,
