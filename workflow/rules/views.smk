@@ -68,9 +68,9 @@ rule teach:
 
 rule index:
     input:
-        expand("results/{robot}/{stage}/summary.json", robot=ROBOTS, stage=STAGES),
-        expand("results/{robot}/workspace/border.parquet", robot=ROBOTS),
-        expand("reports/{robot}/{page}.html", robot=ROBOTS, page=[*STAGES, "teach"]),
+        of_all("results/{robot}/{stage}/summary.json"),
+        expand("results/{robot}/workspace/border.parquet", robot=STUDY.robots),
+        [f"reports/{robot}/{page}.html" for robot in ROBOTS for page in STUDY.pages(robot)],
         CATALOGUE,
     output:
         report(
