@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from er3a.errors import InputError
 from er3a.inputs.yaml_file import StrictModel, parse
+from er3a.language import N_, tr
 from er3a.robots.schema import Name, Placement, RobotFile, Text, check_placement
 
 StageName = Literal["validation", "workspace", "inverse", "trajectory"]
@@ -33,14 +34,15 @@ _JOINT_ENTRIES = {
     "a_mm": Entry("dh", "a_mm", "a", "mm"),
     "alpha_deg": Entry("dh", "alpha_deg", "alpha", "deg"),
     "d_mm": Entry("dh", "d_mm", "d", "mm"),
-    "offset_deg": Entry("zero", "offset_deg", "offset", "deg"),
-    "lower_deg": Entry("limits", "lower_deg", "lower limit", "deg"),
-    "upper_deg": Entry("limits", "upper_deg", "upper limit", "deg"),
-    "speed_deg_s": Entry("speeds", "speed_deg_s", "greatest speed", "deg/s"),
+    "offset_deg": Entry("zero", "offset_deg", N_("offset"), "deg"),
+    "lower_deg": Entry("limits", "lower_deg", N_("lower limit"), "deg"),
+    "upper_deg": Entry("limits", "upper_deg", N_("upper limit"), "deg"),
+    "speed_deg_s": Entry("speeds", "speed_deg_s", N_("greatest speed"), "deg/s"),
 }
+_TURNS = {"roll": N_("roll"), "pitch": N_("pitch"), "yaw": N_("yaw")}
 _TOOL_ENTRIES = {
     **{f"{axis}_mm": Entry("xyz_mm", i, axis, "mm") for i, axis in enumerate("xyz")},
-    **{f"{turn}_deg": Entry("rpy_deg", i, turn, "deg") for i, turn in enumerate(("roll", "pitch", "yaw"))},
+    **{f"{turn}_deg": Entry("rpy_deg", i, word, "deg") for i, (turn, word) in enumerate(_TURNS.items())},
 }
 
 
@@ -73,7 +75,7 @@ class Variant:
 
     @property
     def title(self) -> str:
-        """What is varied, and the value."""
+        """What is varied, and the value, in the language in use."""
         return f"{entry_label(self.vary)} = {self.value:.9g} {entry_unit(self.vary)}"
 
     def table(self, content: RobotFile) -> RobotFile:
@@ -170,9 +172,9 @@ class Sweep(StrictModel):
 
 
 def entry_label(vary: str) -> str:
-    """An entry's path in words."""
-    label = _entry_of(vary).label
-    return f"tool {label}" if vary.startswith(_TOOL) else f"J{_joint_and_key(vary)[0]} {label}"
+    """An entry's path in words, in the language in use."""
+    label = tr(_entry_of(vary).label)
+    return tr("tool {axis}", axis=label) if vary.startswith(_TOOL) else f"J{_joint_and_key(vary)[0]} {label}"
 
 
 def entry_unit(vary: str) -> str:

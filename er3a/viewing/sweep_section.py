@@ -10,12 +10,13 @@ from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from er3a.language import N_, tr
 from er3a.results import read_summary
 from er3a.study import Study
 from er3a.sweeps import entry_label, entry_unit
 from er3a.viewing.figures import new_figure
 from er3a.viewing.numbers import number
-from er3a.viewing.page import VERDICT_WORDS, Picture
+from er3a.viewing.page import PAGES, Picture, status_word
 from er3a.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, VERDICTS
 
 MARKERS = {"pass": "o", "caution": "^", "fail": "X", "conflict": "D", "no_reference": "s"}
@@ -55,7 +56,8 @@ def _section(study: Study, name: str, results: Path) -> dict[str, Any]:
     content, entry = study.table(sweep.robot), study.entry(sweep.robot)
     own = variants[0].replaced(content, entry.tool or content.tool)
     what, unit = entry_label(sweep.vary), entry_unit(sweep.vary)
-    title = f"{content.title}: {what} from {number(min(sweep.resolved))} to {number(max(sweep.resolved))} {unit}"
+    ends = {"low": number(min(sweep.resolved)), "high": number(max(sweep.resolved))}
+    title = tr("{robot}: {what} from {low} to {high} {unit}", robot=content.title, what=what, unit=unit, **ends)
     columns, rows = _table(points, what, unit, sweep.stages)
     return {
         "name": name,
@@ -63,7 +65,7 @@ def _section(study: Study, name: str, results: Path) -> dict[str, Any]:
         "count": len(points),
         "picture": Picture(
             _figure(points, f"{what} ({unit})", own, sweep.stages),
-            f"Results of {len(points)} variants against {what}",
+            tr("Results of {count} variants against {what}", count=len(points), what=what),
             _caption(points, own, unit, "workspace" in sweep.stages),
         ),
         "columns": columns,
@@ -92,10 +94,10 @@ def _draw_volume(axes: Axes, points: list[Point]) -> None:
     volumes = [point.summaries["workspace"]["volume_m3"] for point in _in_order(points)]
     x = [point.value for point in _in_order(points)]
     low, high = ([volume[bound] for volume in volumes] for bound in ("lower", "upper"))
-    axes.fill_between(x, low, high, color=MODEL, alpha=0.25, linewidth=0, label="proven bounds")
+    axes.fill_between(x, low, high, color=MODEL, alpha=0.25, linewidth=0, label=tr("proven bounds"))
     axes.vlines(x, low, high, color=MODEL, linewidth=1)
-    axes.plot(x, [volume["estimate"] for volume in volumes], ".-", color=MODEL, linewidth=0.8, label="estimate")
-    axes.set_ylabel("reached volume (m³)")
+    axes.plot(x, [volume["estimate"] for volume in volumes], ".-", color=MODEL, linewidth=0.8, label=tr("estimate"))
+    axes.set_ylabel(tr("reached volume (m³)"))
     axes.legend(loc="best")
 
 
@@ -105,18 +107,18 @@ def _draw_litres(axes: Axes, points: list[Point]) -> None:
     axes.vlines(x, low, high, color=REFERENCE, linewidth=3)
     axes.plot(x, low, "_", color=REFERENCE)
     axes.set_ylim(bottom=0)
-    axes.set_ylabel("enclosed voids (L)")
+    axes.set_ylabel(tr("enclosed voids (L)"))
 
 
 def _draw_numbers(axes: Axes, points: list[Point]) -> None:
     x = [point.value for point in points]
     numbers = [len(point.enclosed) for point in points]
     pockets = [len(point.summaries["workspace"]["voids"]) - count for point, count in zip(points, numbers)]
-    axes.plot(x, pockets, "o", color=MUTED, markerfacecolor="none", label="open pockets")
-    axes.plot(x, numbers, ".", color=HIGHLIGHT, label="enclosed")
+    axes.plot(x, pockets, "o", color=MUTED, markerfacecolor="none", label=tr("open pockets"))
+    axes.plot(x, numbers, ".", color=HIGHLIGHT, label=tr("enclosed"))
     axes.yaxis.get_major_locator().set_params(integer=True)
     axes.set_ylim(bottom=-0.5, top=max([*pockets, *numbers, 1]) + 0.5)
-    axes.set_ylabel("voids")
+    axes.set_ylabel(tr("voids"))
     axes.legend(loc="best")
 
 
@@ -126,26 +128,31 @@ def _draw_verdicts(axes: Axes, points: list[Point], stages: list[str]) -> None:
     for point in points:
         for row, stage in enumerate(rows):
             status = point.summaries[stage]["verdict"]["status"]
-            label = None if status in seen else VERDICT_WORDS[status]
+            label = None if status in seen else status_word(status)
             seen.add(status)
             axes.plot(point.value, row, MARKERS[status], color=VERDICTS[status], linestyle="none", label=label)
-    axes.set_yticks(range(len(rows)), rows)
+    axes.set_yticks(range(len(rows)), [tr(PAGES[stage]) for stage in rows])
     axes.set_ylim(-0.6, len(rows) - 0.4)
     axes.grid(False, axis="y")
     axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=len(seen), borderpad=0)
 
 
 def _caption(points: list[Point], own: float | None, unit: str, workspace: bool) -> str:
-    text = ""
+    said = []
     if workspace:
         ordered = _in_order(points)
-        first, last = (point.summaries["workspace"]["volume_m3"] for point in (ordered[0], ordered[-1]))
-        text = (
-            f"At {number(ordered[0].value)} {unit} the arm reaches between {number(first['lower'])} and "
-            f"{number(first['upper'])} m³, at {number(ordered[-1].value)} {unit} between {number(last['lower'])} and "
-            f"{number(last['upper'])} m³. "
+        text = N_(
+            "Proven reached volume: {low_1} to {high_1} m³ at {value_1}, {low_2} to {high_2} m³ at {value_2} {unit}."
         )
-    return text if own is None else f"{text}Dotted: the value of the robot itself, {number(own)} {unit}."
+        parts = {"unit": unit}
+        for end, point in enumerate((ordered[0], ordered[-1]), start=1):
+            volume = point.summaries["workspace"]["volume_m3"]
+            parts |= {f"low_{end}": number(volume["lower"]), f"high_{end}": number(volume["upper"])}
+            parts[f"value_{end}"] = number(point.value)
+        said.append(tr(text, **parts))
+    if own is not None:
+        said.append(tr("Dotted: the robot's own value, {value} {unit}.", value=number(own), unit=unit))
+    return " ".join(said)
 
 
 def _in_order(points: list[Point]) -> list[Point]:
@@ -153,17 +160,18 @@ def _in_order(points: list[Point]) -> list[Point]:
 
 
 def _table(points: list[Point], what: str, unit: str, stages: list[str]) -> tuple[list[str], list[list[Any]]]:
-    columns = ["variant", f"{what} ({unit})>", *stages]
+    columns = [tr("variant"), f"{what} ({unit})>", *(tr(PAGES[stage]) for stage in stages)]
     rows = [[point.name, f"{point.value:.9g}", *(_verdict(point, stage) for stage in stages)] for point in points]
     if "workspace" in stages:
-        columns += [
-            "reached volume, at least (m³)>",
-            "at most (m³)>",
-            "enclosed voids>",
-            "their volume, at least (L)>",
-            "open pockets>",
-            "greatest reach from axis 1 (mm)>",
-        ]
+        numbers = (
+            tr("reached volume, at least (m³)"),
+            tr("at most (m³)"),
+            tr("enclosed voids"),
+            tr("their volume, at least (L)"),
+            tr("open pockets"),
+            tr("greatest reach from axis 1 (mm)"),
+        )
+        columns += [f"{label}>" for label in numbers]
         rows = [[*row, *_workspace_cells(point)] for row, point in zip(rows, points)]
     return columns, rows
 
@@ -183,5 +191,5 @@ def _workspace_cells(point: Point) -> list[str]:
 def _verdict(point: Point, stage: str) -> Markup:
     status = point.summaries[stage]["verdict"]["status"]
     return Markup('<a href="{}/{}.html"><span class="badge {}">{}</span></a>').format(
-        point.name, stage, status, VERDICT_WORDS[status]
+        point.name, stage, status, status_word(status)
     )
