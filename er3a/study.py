@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from functools import cached_property
 from pathlib import Path
@@ -19,6 +20,8 @@ from er3a.sweeps import StageName, Sweep, Variant
 
 STAGES: tuple[str, ...] = get_args(StageName)
 REFERENCES = DATA / "manual_refs"
+SAMPLES_PER_JOB = 200_000_000
+"""Below this a job costs more to start than to do."""
 
 
 RuleName = Literal["nearest", "weighted", "time", "manipulability", "limits", "clearance"]
@@ -71,6 +74,11 @@ class WorkspaceSettings(StrictModel):
         if self.samples < self.blocks:
             raise ValueError(f"{self.samples} samples can't fill {self.blocks} blocks | Lower workspace.blocks")
         return self
+
+    @property
+    def parts(self) -> int:
+        """The number of jobs that the blocks are grouped into."""
+        return min(self.blocks, math.ceil(self.samples / SAMPLES_PER_JOB))
 
 
 class BoxTask(StrictModel):
