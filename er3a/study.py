@@ -20,8 +20,8 @@ from er3a.sweeps import StageName, Sweep, Variant
 
 STAGES: tuple[str, ...] = get_args(StageName)
 REFERENCES = DATA / "manual_refs"
-SAMPLES_PER_JOB = 200_000_000
-"""Below this a job costs more to start than to do."""
+SAMPLES_PER_JOB = 1_000_000_000
+"""About ten seconds, of which starting is a tenth."""
 
 
 RuleName = Literal["nearest", "weighted", "time", "manipulability", "limits", "clearance"]

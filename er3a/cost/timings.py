@@ -82,7 +82,7 @@ class Trial:
 
 
 def trial(study: Study, robot: str, whole: bool) -> Trial:
-    """Sample a robot's workspace; ``whole``: also carry out all its stages at the study's budgets, on all cores here."""
+    """Sample a robot's workspace; ``whole``: also carry out its stages at the study's budgets, on all cores here."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         settings = study.workspace.model_copy(update={"samples": FEW_SAMPLES, "blocks": 1})

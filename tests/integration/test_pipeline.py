@@ -226,33 +226,3 @@ def test_two_runs_at_once_are_refused(small_study):
         done = small_study.make_run(check=False)
     assert done.returncode == 2
     assert done.stderr == "error: another run is active in this folder; wait for its end, or stop it\n"
-
-
-def test_a_sweep_s_variants_go_through_its_stages_and_only_changed_values_again(small_study, tmp_path):
-    run = replace(small_study, folder=shutil.copytree(small_study.folder, tmp_path / "project"))
-    study = run.folder / "config/small.yaml"
-    sweep = "sweeps:\n  a3: {robot: er3a_c60, vary: joints.3.a_mm, values: [50, 70, 90], stages: [workspace]}\n"
-    study.write_text(study.read_text() + sweep)
-    variants = [f"er3a_c60-a3-0{number}" for number in (1, 2, 3)]
-    jobs = {f"{name}: {verb} workspace" for name in variants for verb in ("compute", "record", "report")}
-    jobs |= {f"{name}: sample the workspace, part 1-of-1" for name in variants}
-    assert run.planned() == jobs | {"write the index"}
-
-    run.make_run("--cores", "2")
-    base, own = run.folder / "results/er3a_c60/workspace", run.folder / "results/er3a_c60-a3-02/workspace"
-    for table in base.glob("*.parquet"):
-        assert table.read_bytes() == (own / table.name).read_bytes(), "70 mm is the robot's own value"
-    volumes = [read_summary(run.folder / f"results/{name}/workspace")["volume_m3"] for name in variants]
-    assert volumes[0]["upper"] < volumes[1]["lower"] < volumes[1]["upper"] < volumes[2]["lower"]
-    provenance = read_summary(own)["provenance"]
-    assert provenance["config"]["robot"] == {"varied": {"joints.3.a_mm": 70.0}}
-    assert provenance["inputs"][0]["path"] == "data/robots/er3a_c60.yaml"
-    index = (run.folder / "reports/index.html").read_text()
-    assert all(f'<a href="{name}/workspace.html">' in index for name in variants)
-    assert variants[0] not in (run.folder / "reports/compare.html").read_text()
-    page = (run.folder / f"reports/{variants[0]}/workspace.html").read_text()
-    assert re.findall(r'<a href="(\w+)\.html"', page) == ["workspace"]
-
-    assert run.planned() == set()
-    with edited(study, "values: [50, 70, 90]", "values: [50, 75, 90]"):
-        assert run.planned() == {job for job in jobs if variants[1] in job} | {"write the index"}
