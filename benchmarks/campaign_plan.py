@@ -82,11 +82,11 @@ def _page(
     lines = [
         "# What a study takes, predicted and measured",
         "",
-        f"`er3a plan` on the small study with {ROBOT} alone, {CORES} cores. Written by `make campaigns ARGS=plan`, while "
-        f"{os.getloadavg()[2]:.1f} processes wanted the {os.cpu_count()} processors.",
+        f"`er3a plan` on the small study with {ROBOT} alone, {CORES} cores. Written by `make campaigns ARGS=plan`, "
+        f"while {os.getloadavg()[2]:.1f} processes wanted the {os.cpu_count()} processors.",
         "",
-        f"*Trial*: no run was there to learn from, the calibration took {took:.0f} s. *Run*: the timings of the run with "
-        f"{SAMPLES[0]:.0e} samples were there. One core samples {speed.mean / 1e6:.0f} million a second "
+        f"*Trial*: no run was there to learn from, the calibration took {took:.0f} s. *Run*: the timings of the run "
+        f"with {SAMPLES[0]:.0e} samples were there. One core samples {speed.mean / 1e6:.0f} million a second "
         f"({speed.least / 1e6:.0f} to {speed.greatest / 1e6:.0f}).",
         "",
         "| samples | predicted by trial | off by | predicted by run | off by | measured | memory, at most | measured |",

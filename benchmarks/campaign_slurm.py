@@ -14,10 +14,9 @@ import psutil
 import yaml
 from small_study import ROOT, STUDY, environment, fresh, run_command
 
-from er3a.study import SAMPLES_PER_JOB
-
-ROBOT, CORES, SLURM_JOBS = "er3a_c60", 2, 4
-PER_SLURM_JOB = 10  # as profiles/slurm groups them
+ROBOT, CORES, BLOCKS = "er3a_c60", 2, 4
+BLOCK = 10_000_000_000
+"""Samples in a block of the size that docs/cluster.md recommends."""
 PID_FILES = [
     Path("/run", name) for name in ("slurmd.node1.pid", "slurmd.node2.pid", "slurmctld.pid", "munge/munged.pid")
 ]
@@ -27,18 +26,18 @@ SLURM = (
 )
 
 
-def sampling_study(folder: Path, samples: int, blocks: int) -> None:
-    """Leave one robot in the copy's small study, with many samples."""
+def sampling_study(folder: Path, block: int) -> None:
+    """Leave one robot in the copy's small study, with blocks of this many samples."""
     study = yaml.safe_load((folder / STUDY).read_text(encoding="utf-8"))
     study["robots"] = {ROBOT: study["robots"][ROBOT]}
-    study["workspace"] |= {"samples": samples, "blocks": blocks}
+    study["workspace"] |= {"samples": BLOCKS * block, "blocks": BLOCKS}
     (folder / STUDY).write_text(yaml.safe_dump(study), encoding="utf-8")
 
 
 def run_on_slurm(folder: Path) -> list[tuple[float, float]]:
     """Sample on Slurm; begin and end (s) of each Slurm job, by its own books."""
     resources = ["--default-resources", "slurm_partition=main", "mem_mb=500", "slurm_extra='--nodelist=node1'"]
-    command = [*run_command()[:-2], *SLURM.split(), *resources]
+    command = [*run_command()[:-2], *SLURM.split(), "--set-scatter", f"blocks={BLOCKS}", *resources]
     done = subprocess.run(command, cwd=folder, env=environment(folder), capture_output=True, text=True, check=False)
     if done.returncode:
         raise SystemExit(f"the study does not run on Slurm:\n{done.stdout}\n{done.stderr}")
@@ -68,33 +67,32 @@ def _process(pid_file: Path) -> psutil.Process | None:
         return None
 
 
-def table(samples: int = SAMPLES_PER_JOB) -> str:
-    """The evidence as Markdown; ``samples`` per job."""
-    parts = SLURM_JOBS * PER_SLURM_JOB
+def table(block: int = BLOCK) -> str:
+    """The evidence as Markdown, for blocks of this many samples."""
     running = [file for file in PID_FILES if _process(file)]
     subprocess.run([ROOT / ".ci/slurm"], check=True, stdout=subprocess.DEVNULL)
     try:
         with tempfile.TemporaryDirectory() as temporary:
             folder = fresh(Path(temporary).resolve() / "project")
-            sampling_study(folder, parts * samples, parts)
+            sampling_study(folder, block)
             spans, seconds = run_on_slurm(folder), job_seconds(folder)
     finally:
         for process in [_process(file) for file in PID_FILES if file not in running]:
             if process:
                 process.terminate()
-    if len(spans) != SLURM_JOBS or len(seconds) != parts:
-        raise SystemExit(f"{len(spans)} Slurm jobs and {len(seconds)} timings; {SLURM_JOBS} and {parts} were expected")
+    if not len(spans) == len(seconds) == BLOCKS:
+        raise SystemExit(f"{len(spans)} Slurm jobs and {len(seconds)} timings, {BLOCKS} of each were expected")
     work = sum(seconds)
     inside = sum(end - begin for begin, end in spans)
     held = CORES * (max(end for _, end in spans) - min(begin for begin, _ in spans))
     lines = [
-        f"{parts} sampling jobs of {samples:.0e} samples each, {PER_SLURM_JOB} in a Slurm job, on {CORES} cores. While "
-        f" this was measured, {os.getloadavg()[1]:.1f} processes wanted the {os.cpu_count()} processors.",
+        f"{BLOCKS} blocks of {block:.0e} samples, one Slurm job each, on {CORES} cores. While this was measured, "
+        f"{os.getloadavg()[1]:.1f} processes wanted the {os.cpu_count()} processors.",
         "",
         "| | core time (s) | beyond the work |",
         "|---|---|---|",
-        f"| the sampling jobs by themselves, start of the process included | {work:.0f} | |",
-        f"| {len(spans)} Slurm jobs, begin to end | {inside:.0f} | {inside / work - 1:.1%} |",
+        f"| sampling by itself, start of its processes included | {work:.0f} | |",
+        f"| the Slurm jobs, begin to end | {inside:.0f} | {inside / work - 1:.1%} |",
         f"| all {CORES} cores from the first begin to the last end | {held:.0f} | **{held / work - 1:.1%}** |",
     ]
     return "\n".join(lines) + "\n"

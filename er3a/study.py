@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
@@ -204,7 +203,7 @@ class Study(StrictModel):
                 taken.add(variant.name)
         return self
 
-    @cached_property
+    @property
     def variants(self) -> dict[str, Variant]:
         """The robots that the sweeps make, by name."""
         return {variant.name: variant for name, sweep in self.sweeps.items() for variant in sweep.variants(name)}

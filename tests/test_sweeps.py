@@ -179,7 +179,7 @@ def test_a_name_that_is_taken_or_too_long_is_refused(study_with, tmp_path):
     with pytest.raises(InputError, match=r"sweeps\.a{60}: 'er3a_c60-a+-01' is too long for a robot's name"):
         study_with(**{"a" * 60: A3})
     study = yaml.safe_load((ROOT / "config" / "small.yaml").read_text(encoding="utf-8"))
-    study["robots"]["er3a_c60-a3-02"] = study["robots"]["er3_600"]
+    study["robots"]["er3a_c60-a3-02"] = dict(study["robots"]["er3_600"])
     (tmp_path / "study.yaml").write_text(yaml.safe_dump(study | {"sweeps": {"a3": A3}}), encoding="utf-8")
     with pytest.raises(InputError, match=r"sweeps\.a3: 'er3a_c60-a3-02' is the name of another robot already\. Give"):
         load_study(tmp_path / "study.yaml")

@@ -56,7 +56,7 @@ def _section(study: Study, name: str, results: Path) -> dict[str, Any]:
     content, entry = study.table(sweep.robot), study.entry(sweep.robot)
     own = variants[0].replaced(content, entry.tool or content.tool)
     what, unit = entry_label(sweep.vary), entry_unit(sweep.vary)
-    ends = {"low": number(min(sweep.resolved)), "high": number(max(sweep.resolved))}
+    ends = {"low": _plain(min(sweep.resolved)), "high": _plain(max(sweep.resolved))}
     title = tr("{robot}: {what} from {low} to {high} {unit}", robot=content.title, what=what, unit=unit, **ends)
     columns, rows = _table(points, what, unit, sweep.stages)
     return {
@@ -148,11 +148,16 @@ def _caption(points: list[Point], own: float | None, unit: str, workspace: bool)
         for end, point in enumerate((ordered[0], ordered[-1]), start=1):
             volume = point.summaries["workspace"]["volume_m3"]
             parts |= {f"low_{end}": number(volume["lower"]), f"high_{end}": number(volume["upper"])}
-            parts[f"value_{end}"] = number(point.value)
+            parts[f"value_{end}"] = _plain(point.value)
         said.append(tr(text, **parts))
     if own is not None:
-        said.append(tr("Dotted: the robot's own value, {value} {unit}.", value=number(own), unit=unit))
+        said.append(tr("Dotted: the robot's own value, {value} {unit}.", value=_plain(own), unit=unit))
     return " ".join(said)
+
+
+def _plain(value: float) -> str:
+    """A varied value with the digits that it is written with."""
+    return f"{value:.9g}".replace("-", "−")
 
 
 def _in_order(points: list[Point]) -> list[Point]:
@@ -161,7 +166,7 @@ def _in_order(points: list[Point]) -> list[Point]:
 
 def _table(points: list[Point], what: str, unit: str, stages: list[str]) -> tuple[list[str], list[list[Any]]]:
     columns = [tr("variant"), f"{what} ({unit})>", *(tr(PAGES[stage]) for stage in stages)]
-    rows = [[point.name, f"{point.value:.9g}", *(_verdict(point, stage) for stage in stages)] for point in points]
+    rows = [[point.name, _plain(point.value), *(_verdict(point, stage) for stage in stages)] for point in points]
     if "workspace" in stages:
         numbers = (
             tr("reached volume, at least (m³)"),
