@@ -43,7 +43,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         sweeps=sweep_sections(study, results),
         command=page.run_command(study, "index.html"),
         provenance={
-            "inputs": result_records(results, study.robots),
+            "inputs": result_records(results, study.names),
             "seed": study.seed,
             "code": code_digest(__name__),
         },
