@@ -23,9 +23,9 @@ rule all:
     default_target: True
     input:
         "reports/index.html",
-        expand("reports/{robot}/{stage}.rrd", robot=ROBOTS, stage=STAGES),
+        of_all("reports/{robot}/{stage}.rrd"),
         # Named too, so that a result that was deleted is made again although its views are still there.
-        [expand(path, robot=ROBOTS) for stage in STAGES for path in results_of(stage)],
+        [expand(results_of(stage), robot=robot) for robot in ROBOTS for stage in STUDY.stages(robot)],
     message:
         "all results, recordings and reports are there"
 

@@ -1,4 +1,4 @@
-"""Evidence at full size: each campaign writes its page in docs/evidence/, or its part of docs/reliability.md, again.
+"""Evidence at full size: each campaign writes its page in docs/evidence/, or its part of another page of docs/, again.
 
 make campaigns                       all of them
 make campaigns ARGS="kinematics"     one
@@ -11,8 +11,8 @@ from importlib import import_module
 from pathlib import Path
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-EVIDENCE, RELIABILITY = DOCS / "evidence", DOCS / "reliability.md"
-PARTS = ("fuzz", "faults", "kills")
+EVIDENCE = DOCS / "evidence"
+PARTS = {"fuzz": "reliability.md", "faults": "reliability.md", "kills": "reliability.md", "slurm": "cluster.md"}
 CAMPAIGNS = (
     "kinematics",
     "singularities",
@@ -25,16 +25,18 @@ CAMPAIGNS = (
     "capability",
     "teach",
     "pages",
+    "plan",
     *PARTS,
 )
 
 
 def write_part(name: str, text: str) -> None:
-    """Replace a campaign's part of docs/reliability.md, between the comments that mark it."""
+    """Replace a campaign's part of a page of docs/, between the comments that mark it."""
+    page = DOCS / PARTS[name]
     start, end = f"<!-- written by: make campaigns ARGS={name} -->\n", f"<!-- end of {name} -->"
-    before, _, rest = RELIABILITY.read_text(encoding="utf-8").partition(start)
+    before, _, rest = page.read_text(encoding="utf-8").partition(start)
     after = rest.partition(end)[2]
-    RELIABILITY.write_text(f"{before}{start}\n{text}\n{end}{after}", encoding="utf-8")
+    page.write_text(f"{before}{start}\n{text}\n{end}{after}", encoding="utf-8")
 
 
 def main(names: list[str]) -> int:

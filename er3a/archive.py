@@ -15,7 +15,7 @@ from rocrate.rocrate import ROCrate
 
 from er3a.errors import ResultError
 from er3a.results import read_summary, write_atomically
-from er3a.study import STAGES, load_study
+from er3a.study import load_study
 
 _ROOT = Path(__file__).resolve().parents[1]
 WORKFLOW = "Snakefile"
@@ -46,14 +46,14 @@ def archive(study_file: Path, results: Path, reports: Path, output: Path) -> int
     """
     study = load_study(study_file)
     files = {Path("config") / study_file.name: study_file}
-    for name in study.robots:
-        for stage in STAGES:
+    for name in study.names:
+        for stage in study.stages(name):
             read_summary(results / name / stage)
             files |= {Path("results") / name / stage / file.name: file for file in (results / name / stage).iterdir()}
             files |= {_place(file): file for file in study.inputs(name, stage)}
-            for view in (f"{stage}.html", f"{stage}.rrd"):
-                files[Path("reports") / name / view] = _there(reports / name / view)
-        files[Path("reports") / name / "teach.html"] = _there(reports / name / "teach.html")
+            files[Path("reports") / name / f"{stage}.rrd"] = _there(reports / name / f"{stage}.rrd")
+        for page in study.pages(name):
+            files[Path("reports") / name / f"{page}.html"] = _there(reports / name / f"{page}.html")
     files |= {Path("reports") / name: _there(reports / name) for name in ("index.html", "compare.html")}
     files |= {Path(name): _ROOT / name for name in KEPT if (_ROOT / name).is_file()}
     crate = _crate(study.robots)

@@ -68,14 +68,17 @@ def _check_table(path: Path) -> str:
 def check_study(path: Path) -> Study:
     """Check a study file and every file that it leads to, before a run starts."""
     study = load_study(path)
-    for name, entry in study.robots.items():
-        robot = study.robot(name)
+    for name in study.names:
+        try:
+            robot, entry = study.robot(name), study.entry(name)
+        except InputError as error:
+            raise InputError(error.file or path, error.field, error.problem, error.remedy) from None
         for reference in robot.references:
             load_references(reference)
         load_targets(entry.targets)
-        for path in load_paths(entry.paths).paths:
-            if isinstance(path, TablePath):
-                read_path_table(path.file)
+        for planned in load_paths(entry.paths).paths:
+            if isinstance(planned, TablePath):
+                read_path_table(planned.file)
         for stage in ("inverse", "trajectory"):
             if scene := study.scene(name, stage):
                 load_scene(scene)

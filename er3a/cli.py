@@ -133,6 +133,25 @@ def index(study: StudyFile = DEFAULT_STUDY, results: Results = DEFAULT_RESULTS, 
 
 
 @app.command()
+def plan(
+    cores: Annotated[str, typer.Option(help="numbers of cores, of one machine or of nodes together")] = "1,2,8,64",
+    study: StudyFile = DEFAULT_STUDY,
+    results: Results = DEFAULT_RESULTS,
+    reports: Reports = DEFAULT_REPORTS,
+    logs: Annotated[Path, typer.Option(help="folder of a run's timings")] = Path("logs"),
+):
+    """Say what the study will take: samples/s, wall time, memory and disk, from a short calibration on this machine."""
+    from er3a.cost.plan import calibrate
+    from er3a.cost.tables import print_plan
+
+    numbers = cores.split(",")
+    if not all(number.strip().isdigit() and int(number) > 0 for number in numbers):
+        raise Er3aError(f"--cores is '{cores}'; expected numbers such as 1,2,8,64")
+    loaded = load_study(study)
+    print_plan(loaded, calibrate(loaded, study, results, reports, logs), sorted({int(number) for number in numbers}))
+
+
+@app.command()
 def diff(
     old: Annotated[Path, typer.Argument(help="a results folder")],
     new: Annotated[Path, typer.Argument(help="another results folder")],

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from er3a.errors import ResultError
 from er3a.results import check_results, read_checked, sha256, write_atomically
-from er3a.study import STAGES, Study
+from er3a.study import Study
 
 OVERALL = ("index.html", "compare.html")
 
@@ -35,11 +35,11 @@ def unsound(study: Study, results: Path, reports: Path) -> Iterator[tuple[Path, 
     the summary that is named, without which the stage counts as not done.
     """
     checks: list[tuple[Path, Callable[[Path], object]]] = [(reports / page, check_seal) for page in OVERALL]
-    for robot in study.robots:
-        checks.append((reports / robot / "teach.html", check_seal))
-        for stage in STAGES:
+    for robot in study.names:
+        checks += [(reports / robot / f"{page}.html", check_seal) for page in study.pages(robot)]
+        for stage in study.stages(robot):
             checks.append((results / robot / stage / "summary.json", lambda path: check_results(path.parent)))
-            checks += [(reports / robot / f"{stage}.{kind}", check_seal) for kind in ("html", "rrd")]
+            checks.append((reports / robot / f"{stage}.rrd", check_seal))
         checks += [(part, read_checked) for part in sorted((results / robot).glob("*/parts/*.npz"))]
     for path, check in checks:
         if path.is_file():

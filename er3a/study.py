@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import math
+import re
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from er3a.errors import InputError
 from er3a.inputs.units import FARTHEST_MM, Triple, check_millimetres
 from er3a.inputs.yaml_file import StrictModel, load, read_yaml
-from er3a.robots.load import DATA, load_robot, placement_transform, robot_path
+from er3a.robots.load import DATA, placement_transform, read_robot, robot_of, robot_path
 from er3a.robots.robot import Robot
-from er3a.robots.schema import Name, Placement, Text, check_placement
+from er3a.robots.schema import NAME_PATTERN, Name, Placement, RobotFile, Text, check_placement
+from er3a.sweeps import StageName, Sweep, Variant
 
-STAGES = ("validation", "workspace", "inverse", "trajectory")
+STAGES: tuple[str, ...] = get_args(StageName)
 REFERENCES = DATA / "manual_refs"
+SAMPLES_PER_JOB = 1_000_000_000
+"""About ten seconds, of which starting is a tenth."""
 
 
 RuleName = Literal["nearest", "weighted", "time", "manipulability", "limits", "clearance"]
@@ -68,6 +73,11 @@ class WorkspaceSettings(StrictModel):
         if self.samples < self.blocks:
             raise ValueError(f"{self.samples} samples can't fill {self.blocks} blocks | Lower workspace.blocks")
         return self
+
+    @property
+    def parts(self) -> int:
+        """The number of jobs that the blocks are grouped into."""
+        return min(self.blocks, math.ceil(self.samples / SAMPLES_PER_JOB))
 
 
 class BoxTask(StrictModel):
@@ -162,6 +172,7 @@ class Study(StrictModel):
     kind: Literal["study"]
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)]
     robots: Annotated[dict[Name, RobotEntry], Field(min_length=1)]
+    sweeps: Annotated[dict[Name, Sweep], Field(max_length=100)] = {}
     validation: ValidationSettings
     workspace: WorkspaceSettings
     capability: CapabilitySettings = CapabilitySettings()
@@ -175,25 +186,74 @@ class Study(StrictModel):
         """The file that the study was read from."""
         return self._file
 
+    @model_validator(mode="after")
+    def _variants_have_names_of_their_own(self):
+        taken = set(self.robots)
+        for name, sweep in self.sweeps.items():
+            if sweep.robot not in self.robots:
+                problem = f"sweeps.{name}.robot: the study has no robot '{sweep.robot}'"
+                raise ValueError(f"{problem} | Known: {', '.join(self.robots)}")
+            for variant in sweep.variants(name):
+                if variant.name in taken:
+                    problem = f"sweeps.{name}: '{variant.name}' is the name of another robot already"
+                    raise ValueError(f"{problem} | Give the sweep another name")
+                if not re.match(NAME_PATTERN, variant.name):
+                    problem = f"sweeps.{name}: '{variant.name}' is too long for a robot's name"
+                    raise ValueError(f"{problem} | Give the sweep a shorter name")
+                taken.add(variant.name)
+        return self
+
+    @property
+    def variants(self) -> dict[str, Variant]:
+        """The robots that the sweeps make, by name."""
+        return {variant.name: variant for name, sweep in self.sweeps.items() for variant in sweep.variants(name)}
+
+    @property
+    def names(self) -> list[str]:
+        """All robots of the study, variants after those that are written in it."""
+        return [*self.robots, *self.variants]
+
+    def stages(self, name: str) -> tuple[str, ...]:
+        """The stages that a robot goes through."""
+        variant = self.variants.get(name)
+        return STAGES if variant is None else tuple(self.sweeps[variant.sweep].stages)
+
+    def pages(self, name: str) -> tuple[str, ...]:
+        """The pages of a robot: its stages', and the teach panel of one that is no variant."""
+        return self.stages(name) if name in self.variants else (*STAGES, "teach")
+
     def entry(self, name: str) -> RobotEntry:
-        """The study's entry for a robot; :class:`InputError` if it has none."""
-        if name not in self.robots:
+        """The study's entry for a robot, for a variant that of its base; :class:`InputError` if it has none."""
+        base = self._base(name)
+        if base not in self.robots:
             raise InputError(None, f"robots.{name}", "the study has no such robot", f"Known: {', '.join(self.robots)}")
-        return self.robots[name]
+        return self.robots[base]
+
+    def _base(self, name: str) -> str:
+        variant = self.variants.get(name)
+        return variant.base if variant else name
 
     def robot_file(self, name: str) -> Path:
-        """The robot's file; :class:`InputError` naming the entry if there is none."""
+        """The file of a robot, or of a variant's base; :class:`InputError` naming the entry if there is none."""
+        base = self._base(name)
         try:
-            return robot_path(self.entry(name).file or name)
+            return robot_path(self.entry(name).file or base)
         except InputError as error:
-            raise InputError(error.file, error.field or f"robots.{name}", error.problem, error.remedy) from None
+            raise InputError(error.file, error.field or f"robots.{base}", error.problem, error.remedy) from None
+
+    def table(self, name: str) -> RobotFile:
+        """What the robot's file holds, with a variant's title and varied entry."""
+        content = read_robot(self.robot_file(name))
+        variant = self.variants.get(name)
+        return variant.table(content) if variant else content
 
     def robot(self, name: str) -> Robot:
         """The robot with the study's base and tool."""
-        entry = self.entry(name)
-        robot = load_robot(self.robot_file(name))
-        changes = {key: placement_transform(getattr(entry, key)) for key in ("base", "tool") if getattr(entry, key)}
-        return robot.replace(name=name, **changes)
+        entry, content = self.entry(name), self.table(name)
+        base, tool = entry.base or content.base, entry.tool or content.tool
+        if variant := self.variants.get(name):
+            tool = variant.tool(tool)
+        return robot_of(content).replace(name=name, base=placement_transform(base), tool=placement_transform(tool))
 
     def inputs(self, name: str, stage: str) -> list[Path]:
         """The files that a stage reads for a robot."""
@@ -201,7 +261,7 @@ class Study(StrictModel):
         files = [self.robot_file(name)]
         kinds = {"validation": "*.csv", "workspace": "envelope.csv"}
         if stage in kinds:
-            for reference in load_robot(files[0]).references:
+            for reference in read_robot(files[0]).references:
                 files += sorted((REFERENCES / reference).glob(kinds[stage]))
         if stage == "inverse":
             files.append(Path(entry.targets))
@@ -216,6 +276,8 @@ class Study(StrictModel):
     def settings(self, name: str, stage: str) -> dict[str, Any]:
         """The resolved part of the study that a stage's numbers depend on; plain data."""
         entry = self.entry(name).model_dump(exclude={"targets", "paths", "file", "scene"}, exclude_none=True)
+        if variant := self.variants.get(name):
+            entry["varied"] = {variant.vary: variant.value}
         own = getattr(self, stage, None)
         settings = own.model_dump() if own else {}
         if "scene" in settings:

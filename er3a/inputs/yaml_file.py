@@ -18,7 +18,7 @@ Model = TypeVar("Model", bound=BaseModel)
 MAX_BYTES = 1_000_000
 MAX_YAML_BYTES = 250_000  # of which the worst takes seconds to read
 
-_FIELD = re.compile(r"([A-Za-z_]\w*(?:\.\w+|\[\d+\])*): ")
+_FIELD = re.compile(r"([A-Za-z_]\w*(?:\.[\w-]+|\[\d+\])*): ")
 _REMEDIES = {
     "float_type": "Write a number, without quotes or unit",
     "int_type": "Write a whole number, without point, quotes or unit",

@@ -24,11 +24,15 @@ def load_robot(name_or_path: str | Path) -> Robot:
     InputError
         naming file, field and remedy
     """
-    path = robot_path(name_or_path)
+    return robot_of(read_robot(robot_path(name_or_path)))
+
+
+def read_robot(path: Path) -> RobotFile:
+    """What a robot file holds, checked; :class:`InputError` as :func:`load_robot`."""
     content = load(RobotFile, path)
     if content.name != path.stem:
         raise InputError(path, "name", f"'{content.name}' is not the file's name", f"Write {path.stem}")
-    return robot_of(content)
+    return content
 
 
 def robot_path(name_or_path: str | Path) -> Path:

@@ -43,6 +43,7 @@ def write_teach_page(study: Study, name: str, output: Path) -> None:
         _HERE / "teach.html.j2",
         output,
         robot=robot,
+        robot_pages=study.pages(name),
         joint_names=JOINT_NAMES,
         joint_colours=JOINTS,
         degrees=float(np.degrees(1.0)),

@@ -1,4 +1,7 @@
-"""The pages over all robots: the index (robots x stages, verdicts and key figures) and the comparison of two."""
+"""The pages over all robots: the index (robots x stages, verdicts and key figures) and the comparison of two.
+
+Variants of a sweep stand in the section of their sweep only.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ from er3a.results import read_summary, result_records
 from er3a.study import STAGES, Study
 from er3a.viewing import page
 from er3a.viewing.compare import write_compare
+from er3a.viewing.sweep_section import sweep_sections
 
 SHOWN_FIGURES = 3
 QUESTIONS = {
@@ -21,7 +25,10 @@ QUESTIONS = {
 
 
 def write_index(study: Study, results: Path, folder: Path) -> None:
-    """Render ``index.html`` and ``compare.html`` into a folder, from the results of all robots and stages."""
+    """Render ``index.html`` and ``compare.html`` into a folder, from the results of all robots and stages.
+
+    The comparison offers the robots that are written in the study, not the variants that sweeps make of them.
+    """
     robots = [
         {"robot": study.robot(name), "summaries": [read_summary(results / name / stage) for stage in STAGES]}
         for name in study.robots
@@ -33,9 +40,10 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         stages=STAGES,
         questions=QUESTIONS,
         shown_figures=SHOWN_FIGURES,
+        sweeps=sweep_sections(study, results),
         command=page.run_command(study, "index.html"),
         provenance={
-            "inputs": result_records(results, study.robots),
+            "inputs": result_records(results, study.names),
             "seed": study.seed,
             "code": code_digest(__name__),
         },

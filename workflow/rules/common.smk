@@ -1,4 +1,3 @@
-import math
 import os
 import shlex
 import sys
@@ -24,7 +23,7 @@ try:
 except Er3aError as error:
     raise WorkflowError(str(error)) from None
 
-ROBOTS = list(STUDY.robots)
+ROBOTS = STUDY.names
 
 # Pages and recordings depend on the words of their language, results don't.
 LANGUAGE = STUDY.report.language
@@ -103,6 +102,11 @@ def code_of(stage, verb):
 def results_of(stage):
     """Paths of a stage's results, the robot as wildcard."""
     return [f"results/{{robot}}/{stage}/summary.json", *tables(stage)]
+
+
+def of_all(path):
+    """A path with the wildcards robot and stage, for all stages of all robots."""
+    return [path.format(robot=robot, stage=stage) for robot in ROBOTS for stage in STUDY.stages(robot)]
 
 
 def viewed(wildcards):

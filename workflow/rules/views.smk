@@ -6,6 +6,8 @@ rule record:
         "reports/{robot}/{stage}.rrd",
     log:
         "logs/{robot}/{stage}.record.log",
+    benchmark:
+        "logs/{robot}/{stage}.record.tsv"
     conda:
         "../envs/er3a.yaml"
     params:
@@ -30,6 +32,8 @@ rule report:
         ),
     log:
         "logs/{robot}/{stage}.report.log",
+    benchmark:
+        "logs/{robot}/{stage}.report.tsv"
     conda:
         "../envs/er3a.yaml"
     params:
@@ -54,6 +58,8 @@ rule teach:
         ),
     log:
         "logs/{robot}/teach.log",
+    benchmark:
+        "logs/{robot}/teach.tsv"
     conda:
         "../envs/er3a.yaml"
     params:
@@ -68,9 +74,9 @@ rule teach:
 
 rule index:
     input:
-        expand("results/{robot}/{stage}/summary.json", robot=ROBOTS, stage=STAGES),
-        expand("results/{robot}/workspace/border.parquet", robot=ROBOTS),
-        expand("reports/{robot}/{page}.html", robot=ROBOTS, page=[*STAGES, "teach"]),
+        of_all("results/{robot}/{stage}/summary.json"),
+        expand("results/{robot}/workspace/border.parquet", robot=STUDY.robots),
+        [f"reports/{robot}/{page}.html" for robot in ROBOTS for page in STUDY.pages(robot)],
         CATALOGUE,
     output:
         report(
@@ -87,6 +93,8 @@ rule index:
         ),
     log:
         "logs/index.log",
+    benchmark:
+        "logs/index.tsv"
     conda:
         "../envs/er3a.yaml"
     params:

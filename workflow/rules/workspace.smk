@@ -1,10 +1,6 @@
-# Below this a job costs more to start than to do.
-SAMPLES_PER_JOB = 200_000_000
-
-
 # The seeded blocks are fixed by the study; scattering only groups them into jobs (--set-scatter blocks=N).
 scattergather:
-    blocks=min(STUDY.workspace.blocks, math.ceil(STUDY.workspace.samples / SAMPLES_PER_JOB)),
+    blocks=STUDY.workspace.parts,
 
 
 rule sample_workspace:

@@ -55,6 +55,7 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
         summary,
         command=run_command(study, f"{name}/inverse.html"),
         robot=robot,
+        robot_pages=study.pages(name),
         overview=[_overview_row(target) for target in summary["targets"]],
         sections=sections,
         trips=trips,

@@ -73,6 +73,7 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
         summary,
         command=run_command(study, f"{name}/trajectory.html"),
         robot=robot,
+        robot_pages=study.pages(name),
         paths=sections,
         clearance=clearance_section(summary, read_table(folder / "clearance.parquet")),
         near=summary["near"],

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from er3a.robots.load import load_robot
+from er3a.robots.load import robot_of
 from er3a.robots.robot import Robot
 from er3a.study import Study
 
 
 def model_of(study: Study, name: str) -> Robot:
     """The robot as its file has it, without tool: references speak of its flange and of the maker's base."""
-    return load_robot(study.robot_file(name)).without_tool().replace(name=name)
+    return robot_of(study.table(name)).without_tool().replace(name=name)

@@ -52,6 +52,7 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
         summary,
         command=run_command(study, f"{name}/validation.html"),
         robot=robot,
+        robot_pages=study.pages(name),
         sets=[_set_story(finding, checks, poses) for finding in summary["sets"]],
         culprits=culprit_stories(summary, read_table(folder / "residuals.parquet")),
         corrections=correction_stories(summary, read_table(folder / "corrections.parquet")),

@@ -47,6 +47,7 @@ def report(study: Study, name: str, folder: Path, output: Path) -> None:
         summary,
         command=run_command(study, f"{name}/workspace.html"),
         robot=robot,
+        robot_pages=study.pages(name),
         section=Picture(
             sections(robot, summary, tables),
             tr("Side sections about axis 1: density of the samples, and proven cells with the exact border"),
