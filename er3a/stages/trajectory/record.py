@@ -65,6 +65,7 @@ def record(study: Study, name: str, folder: Path, output: Path) -> None:
             )
             for curve, title in CURVES.items()
         ),
+        row_shares=[4, 3, 3, 3],
         name="Curves",
     )
     words = rrb.Vertical(
