@@ -64,21 +64,23 @@ def _shoot(port: int, viewer: subprocess.Popen[bytes], shot: Path) -> None:
     Er3aError
         if that takes longer than PATIENCE_S
     """
-    client, before = None, b""
+    client, bare, before = None, False, b""
     deadline = time.monotonic() + PATIENCE_S
     while time.monotonic() < deadline:
         if viewer.poll() is not None:
             raise EOFError
         try:
-            if client is None:
-                client = ViewerClient(f"rerun+http://{LOOPBACK}:{port}/proxy")
-                client.run_command("ui.toggle_blueprint_panel")
+            client = client or ViewerClient(f"rerun+http://{LOOPBACK}:{port}/proxy")
             state = client.get_state()
+            ready = state.active_recording and not state.loading
+            if ready and not bare:
+                client.run_command("ui.toggle_blueprint_panel")  # its tree unfolds or not, as loading goes
+                bare = True
             client.save_screenshot(str(shot))
         except (ConnectionError, RuntimeError):
             time.sleep(0.05)
             continue
-        if state.active_recording and not state.loading and shot.read_bytes() == before:
+        if ready and shot.read_bytes() == before:
             return
         before = shot.read_bytes()
     raise Er3aError(f"the viewer drew no steady picture in {PATIENCE_S} s")

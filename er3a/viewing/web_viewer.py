@@ -7,6 +7,7 @@ with the recordings, under a policy with which a browser connects to no other ad
 
 from __future__ import annotations
 
+import re
 import time
 import urllib.request
 from collections.abc import Sequence
@@ -81,4 +82,6 @@ def _viewer_files() -> dict[str, tuple[str, bytes]]:
 
 def _fetched(url: str) -> tuple[str, bytes]:
     with urllib.request.urlopen(url, timeout=PATIENCE_S) as answer:
-        return answer.headers["Content-Type"], answer.read()
+        kind, content = answer.headers["Content-Type"], answer.read()
+    # No policy keeps a browser from connecting ahead of a font that it may not load then.
+    return kind, re.sub(rb"<link\b[^>]*https://[^>]*>", b"", content) if kind.startswith("text/html") else content

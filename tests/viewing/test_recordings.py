@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import colorsys
 import ctypes.util
-import io
 import os
 import re
 import subprocess
@@ -12,17 +10,15 @@ import sys
 from functools import cache
 from pathlib import Path
 
-import numpy as np
 import pytest
-from PIL import Image
 from rerun.chunk import RrdReader
 from typer.testing import CliRunner
 
 from er3a.cli import app
 from er3a.seals import check_seal, seal
 from er3a.study import STAGES
-from er3a.viewing.palette import JOINTS, rgb
 from tests.conftest import ROBOTS, ROOT
+from tests.viewing.pictures import joints_seen
 
 RERUN = Path(sys.executable).with_name("rerun")
 RECORDINGS = [f"{robot}/{stage}.rrd" for robot in ROBOTS for stage in STAGES]
@@ -102,19 +98,6 @@ def test_the_preview_shows_the_arm_and_the_page_shows_the_preview(small_study, r
     assert len(preview.read_bytes()) < 150_000
     assert joints_seen(preview.read_bytes()) >= 4
     assert 'src="data:image/webp;base64,' in preview.with_suffix(".html").read_text(encoding="utf-8")
-
-
-def joints_seen(picture: bytes) -> int:
-    """How many of the six joints' colours (by hue, shaded as they are) fill a spot of the picture."""
-    pixels = Image.open(io.BytesIO(picture)).convert("HSV")
-    hue, saturation, value = (np.asarray(band, dtype=float) for band in pixels.split())
-    strong = (saturation > 100) & (value > 60)
-    seen = 0
-    for colour in JOINTS:
-        wanted = colorsys.rgb_to_hsv(*(part / 255 for part in rgb(colour)))[0] * 255
-        apart = np.abs((hue - wanted + 127.5) % 255 - 127.5)
-        seen += int((strong & (apart < 4)).sum() > 40)
-    return seen
 
 
 @pytest.fixture
