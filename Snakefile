@@ -31,8 +31,9 @@ rule all:
 
 
 onerror:
-    print("\nWhat failed, in short:", *errors_told(), sep="\n")
+    print("\nWhat failed, in short:", *told("error: "), sep="\n")
 
 
 onsuccess:
+    print(*told("note: "), sep="\n")
     print("\nOpen reports/index.html in a browser; `make view` opens the recordings.")

@@ -92,9 +92,27 @@ def record(
     results: Results = DEFAULT_RESULTS,
     reports: Reports = DEFAULT_REPORTS,
 ):
-    """Write a stage's Rerun recording from its results."""
+    """Write a stage's Rerun recording from its results, in English: the viewer has no other letters."""
+    from er3a.seals import seal
+
     loaded, folder = _folder(study, results, robot, stage)
-    _sealed(_verb("record", stage), loaded, robot, folder, reports / robot / f"{stage}.rrd")
+    recording = reports / robot / f"{stage}.rrd"
+    _verb("record", stage)(loaded, robot, folder, recording)
+    seal(recording)
+
+
+@app.command()
+def preview(stage: StageName, robot: RobotName, reports: Reports = DEFAULT_REPORTS):
+    """Draw a stage's recording as a picture for its page; an empty file where nothing can draw it."""
+    from er3a.seals import check_seal, seal
+    from er3a.viewing.preview import draw_preview
+
+    recording = reports / robot / f"{stage}.rrd"
+    check_seal(recording)
+    picture = recording.with_suffix(".webp")
+    if problem := draw_preview(recording, picture):
+        print(f"note: previews of recordings were skipped: {problem}", file=sys.stderr)
+    seal(picture)
 
 
 @app.command()
@@ -106,8 +124,13 @@ def report(
     reports: Reports = DEFAULT_REPORTS,
 ):
     """Write a stage's page from its results."""
+    from er3a.seals import seal
+
     loaded, folder = _folder(study, results, robot, stage)
-    _sealed(_verb("report", stage), loaded, robot, folder, reports / robot / f"{stage}.html")
+    page = reports / robot / f"{stage}.html"
+    language.use(loaded.report.language)
+    _verb("report", stage)(loaded, robot, folder, page)
+    seal(page)
 
 
 @app.command()
@@ -197,15 +220,19 @@ def view(
     robot: Annotated[str | None, typer.Argument(help="one robot; all if absent")] = None,
     reports: Reports = DEFAULT_REPORTS,
 ):
-    """Open the recordings in the Rerun viewer."""
+    """Open the recordings in the Rerun viewer; where there is no desktop, serve them to a browser."""
     from er3a.seals import check_seal
-    from er3a.viewing.viewer import viewer_command, without_statistics
+    from er3a.viewing.viewer import has_display, viewer_command, without_statistics
+    from er3a.viewing.web_viewer import serve
 
     recordings = sorted(reports.glob(f"{robot or '*'}/*.rrd"))
     if not recordings:
         raise Er3aError(f"no recordings below {reports / (robot or '')}; `make run` writes them")
     for recording in recordings:
         check_seal(recording)
+    if not has_display():
+        serve(recordings)
+        return
     with without_statistics() as environment:
         done = subprocess.run(viewer_command(recordings), env=environment, check=False)
     raise typer.Exit(done.returncode)
@@ -296,15 +323,6 @@ def _complain(error: Er3aError | str) -> None:
 
 def _complain_of_memory() -> None:
     _complain(f"out of memory in `er3a {' '.join(sys.argv[1:])}`; give it more, lower the study's budgets or --cores")
-
-
-def _sealed(verb, study: Study, robot: str, folder: Path, output: Path) -> None:
-    """Have a verb write a view in the study's language, and keep its checksum."""
-    from er3a.seals import seal
-
-    language.use(study.report.language)
-    verb(study, robot, folder, output)
-    seal(output)
 
 
 def _study_to_show(file: Path) -> Study:

@@ -1,4 +1,4 @@
-"""Checksums of pages and recordings, in a hidden file beside each, and the search for files that are not as written."""
+"""Checksums of views, in a hidden file beside each, and the search for files that are not as they were written."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ OVERALL = ("index.html", "compare.html")
 
 
 def seal(path: Path) -> None:
-    """Write the checksum of a finished page or recording beside it."""
+    """Write the checksum of a finished view beside it."""
     checksum = sha256(path)
     write_atomically(_seal_of(path), lambda file: file.write_text(checksum, encoding="ascii"))
 
 
 def check_seal(path: Path) -> None:
-    """Raise :class:`ResultError` if a page or recording is not the one that was sealed."""
+    """Raise :class:`ResultError` if a view is not the one that was sealed."""
     try:
         sealed = _seal_of(path).read_bytes()
     except OSError:
@@ -31,15 +31,15 @@ def check_seal(path: Path) -> None:
 def unsound(study: Study, results: Path, reports: Path) -> Iterator[tuple[Path, ResultError]]:
     """Files that are there and not as they were written, or of another format version, each with what is wrong.
 
-    These are results, blocks that a run which was cut off has sampled, pages and recordings. Of a stage's results it is
-    the summary that is named, without which the stage counts as not done.
+    These are results, blocks that a run which was cut off has sampled, pages, recordings and previews. Of a stage's
+    results it is the summary that is named, without which the stage counts as not done.
     """
     checks: list[tuple[Path, Callable[[Path], object]]] = [(reports / page, check_seal) for page in OVERALL]
     for robot in study.names:
         checks += [(reports / robot / f"{page}.html", check_seal) for page in study.pages(robot)]
         for stage in study.stages(robot):
             checks.append((results / robot / stage / "summary.json", lambda path: check_results(path.parent)))
-            checks.append((reports / robot / f"{stage}.rrd", check_seal))
+            checks += [(reports / robot / f"{stage}.{kind}", check_seal) for kind in ("rrd", "webp")]
         checks += [(part, read_checked) for part in sorted((results / robot).glob("*/parts/*.npz"))]
     for path, check in checks:
         if path.is_file():

@@ -6,7 +6,6 @@ import fcntl
 import os
 import re
 import shutil
-import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -20,7 +19,7 @@ import pytest
 from benchmarks.small_study import fresh
 from er3a.robots.load import load_robot
 from er3a.robots.robot import Robot
-from er3a.viewing.viewer import viewer_command, without_statistics
+from er3a.viewing.viewer import without_statistics
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 
@@ -31,19 +30,6 @@ def _no_usage_statistics() -> Iterator[None]:
     with without_statistics() as environment, pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CONFIG_HOME", environment["XDG_CONFIG_HOME"])
         yield
-
-
-@contextmanager
-def viewer_on(recording: Path, *words: str) -> Iterator[subprocess.Popen[bytes]]:
-    """The real viewer on a recording, ended with all its processes (the command `rerun` starts the program proper)."""
-    command = viewer_command([recording], "--headless", *words)
-    quiet = subprocess.DEVNULL
-    viewer = subprocess.Popen(command, stdout=quiet, stderr=quiet, start_new_session=True)
-    try:
-        yield viewer
-    finally:
-        os.killpg(viewer.pid, signal.SIGKILL)
-        viewer.wait()
 
 
 @pytest.fixture(params=ROBOTS)

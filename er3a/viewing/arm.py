@@ -26,17 +26,19 @@ def size_of(robot: Robot) -> float:
 
 
 def arm_view(
-    robot: Robot, name: str, contents: list[str] | str = "/**", reach: float | None = None
+    robot: Robot, name: str, contents: list[str], reach: float | None = None, centre: np.ndarray | None = None
 ) -> rrb.Spatial3DView:
     """A 3-D view that opens with the whole arm in sight.
 
     Parameters
     ----------
-    contents : entity path expressions, all entities unless told otherwise
+    contents : entity path expressions
     reach : radius (m) of what must be in sight, the arm's own size unless told otherwise
+    centre : (3,), m, of what must be in sight, somewhat above the base unless told otherwise
     """
     radius = reach or size_of(robot)
-    centre = robot.base[:3, 3] + robot.base[:3, 2] * 0.25 * radius
+    if centre is None:
+        centre = robot.base[:3, 3] + robot.base[:3, 2] * 0.25 * radius
     eye = rrb.EyeControls3D(
         kind="Orbital",
         position=centre + np.array([0.5, -1.15, 0.45]) * radius,

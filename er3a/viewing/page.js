@@ -119,7 +119,7 @@ for (const figure of document.querySelectorAll("figure")) {
   tools.className = "tools";
   const save = document.createElement("a");
   save.href = image.src;
-  save.download = `${nameFor(figure)}.svg`;
+  save.download = `${nameFor(figure)}.${image.src.match(/^data:image\/(\w+)/)?.[1] ?? "svg"}`;
   save.textContent = WORDS.svg;
   tools.append(toolButton(WORDS.enlarge, () => enlarge(image)), save);
   image.after(tools);

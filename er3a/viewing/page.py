@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import os
 import platform
 import shlex
@@ -109,6 +110,7 @@ def render(
         summary=summary,
         command=command,
         provenance=summary["provenance"] if summary else provenance,
+        preview=_preview(output.with_suffix(".webp")),
         versions=_versions(),
         commit=_commit(),
         **context,
@@ -125,6 +127,12 @@ def sentence(finding: str) -> str:
 def run_command(study: Study, page: str) -> str:
     """The command that makes a page of a study again, results included; ``page`` is its path below the reports."""
     return shlex.join(["make", "run", f"STUDY={os.path.relpath(study.file)}", f"ARGS=reports/{page}"])
+
+
+def _preview(picture: Path) -> str | None:
+    """The preview of a recording as a data address; None where there is none or none could be drawn."""
+    content = picture.read_bytes() if picture.is_file() else b""
+    return "data:image/webp;base64," + base64.b64encode(content).decode("ascii") if content else None
 
 
 def status_word(status: str) -> str:

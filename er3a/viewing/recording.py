@@ -14,42 +14,54 @@ import rerun.blueprint as rrb
 from er3a.results import write_atomically
 from er3a.viewing.palette import rgb
 
-APPLICATION = "er3a"
 TIMELINE = "t"
+ARM = "/arm/**"
 
 
 @contextmanager
-def recording(output: Path, robot: str, stage: str, *views: rrb.View | rrb.Container) -> Iterator[rr.RecordingStream]:
+def recording(output: Path, robot: str, stage: str, layout: rrb.View | rrb.Container) -> Iterator[rr.RecordingStream]:
     """Open a recording for logging; ``output`` appears when the block ends without an error.
+
+    Viewers keep one blueprint for each application id, so every stage of every robot is an application of its own:
+    opened together, each keeps its own layout and camera.
 
     Parameters
     ----------
-    robot, stage : name the recording, ``er3a/<robot>/<stage>``
-    views : side by side in the blueprint
+    robot, stage : name the recording: application ``<stage> <robot>``, recording ``<robot>``
+    layout : what the blueprint shows
     """
     rr.set_strict_mode(True)
     blueprint = rrb.Blueprint(
-        rrb.Horizontal(*views, column_shares=[2] + [1] * (len(views) - 1)) if len(views) > 1 else views[0],
-        rrb.TimePanel(timeline=TIMELINE, state="collapsed"),
+        layout,
+        rrb.TimePanel(timeline=TIMELINE, state="collapsed", play_state="paused"),
         rrb.SelectionPanel(state="hidden"),
-        rrb.BlueprintPanel(state="collapsed"),
+        rrb.BlueprintPanel(state="expanded"),
         auto_views=False,
     )
 
     # No chunk is cut by the clock: recordings of equal data then compare equal on a busy machine too.
     never = rr.ChunkBatcherConfig.NEVER()
-    stream = rr.RecordingStream(
-        APPLICATION, recording_id=f"{robot}-{stage}", send_properties=False, batcher_config=never
-    )
+    stream = rr.RecordingStream(f"{stage} {robot}", recording_id=robot, send_properties=False, batcher_config=never)
     with stream:
         # Rerun's own file writer waits for ever when the disk is full; bytes can be written like any other file.
         collected = stream.binary_stream()
-        stream.send_blueprint(blueprint, make_active=False, make_default=True)
+        # The viewer in a browser shows a blueprint only if it is active, not if it is merely the default.
+        stream.send_blueprint(blueprint, make_active=True, make_default=True)
         stream.set_log_time_enabled(False)
         stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         yield stream
         content = collected.read(flush=True)
     write_atomically(output, lambda file: file.write_bytes(content))
+
+
+def log_note(stream: rr.RecordingStream, stage: str, markdown: str) -> None:
+    """Log the text that says what to look at, ``/<stage>/note``."""
+    stream.log(f"{stage}/note", rr.TextDocument(markdown, media_type=rr.MediaType.MARKDOWN), static=True)
+
+
+def note_view(stage: str) -> rrb.View:
+    """The view of a stage's note."""
+    return rrb.TextDocumentView(origin=f"/{stage}/note", name="What to look at")
 
 
 def escaped(text: str) -> str:

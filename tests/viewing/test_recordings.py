@@ -1,30 +1,85 @@
-"""Every recording is sound, and is drawn by the real viewer where its drawing software is present."""
+"""Every recording is sound, holds what its documentation lists, and is drawn by the real viewer where that can draw."""
 
 from __future__ import annotations
 
-import colorsys
 import ctypes.util
 import os
-import socket
+import re
 import subprocess
 import sys
-import time
+from functools import cache
 from pathlib import Path
 
-import numpy as np
 import pytest
-from PIL import Image
-from rerun.experimental import ViewerClient
+from rerun.chunk import RrdReader
+from typer.testing import CliRunner
 
-from er3a.viewing.palette import JOINTS, rgb
-from tests.conftest import viewer_on
+from er3a.cli import app
+from er3a.seals import check_seal, seal
+from er3a.study import STAGES
+from tests.conftest import ROBOTS, ROOT
+from tests.viewing.pictures import joints_seen
 
 RERUN = Path(sys.executable).with_name("rerun")
-RECORDINGS = [
-    f"{robot}/{stage}.rrd"
-    for robot in ("er3a_c60", "er3a_c60_article", "er3_600")
-    for stage in ("validation", "workspace", "inverse", "trajectory")
-]
+RECORDINGS = [f"{robot}/{stage}.rrd" for robot in ROBOTS for stage in STAGES]
+ROW = re.compile(r"^\| `(/[^`]*)` \| [^|]+ \| [^|]* \| (\w+) \|$", flags=re.MULTILINE)
+
+
+@cache
+def documented() -> dict[str, str]:
+    """The documentation's paths, each with its stage or ``all``."""
+    return dict(ROW.findall((ROOT / "docs/recordings.md").read_text(encoding="utf-8")))
+
+
+def logged(path: Path) -> set[str]:
+    return {column.entity_path for column in RrdReader(path).stream().collect().schema().component_columns()}
+
+
+def rows_for(entity: str, stage: str) -> list[str]:
+    """Which rows of the table speak of an entity in a stage's recording."""
+    names = {row: re.sub("<[a-z]+>", "[^/]+", row) for row, of in documented().items() if of in ("all", stage)}
+    return [row for row, pattern in names.items() if re.fullmatch(pattern, entity)]
+
+
+@pytest.mark.parametrize("recording", RECORDINGS)
+def test_recording_is_sound(small_study, recording):
+    path = small_study.folder / "reports" / recording
+    assert subprocess.run([RERUN, "rrd", "verify", path], capture_output=True, check=False).returncode == 0
+    assert "BlueprintActivationCommand" in subprocess.run(
+        [RERUN, "rrd", "print", path], capture_output=True, text=True, check=True
+    ).stdout  # fmt: skip
+
+
+@pytest.mark.parametrize("recording", RECORDINGS)
+def test_each_entity_is_in_the_documentation_once(small_study, recording):
+    stage = Path(recording).stem
+    entities = logged(small_study.folder / "reports" / recording)
+    assert {f"/{stage}/note", "/arm/link_6/axis", "/arm/tool"} <= entities
+    assert {entity: len(rows_for(entity, stage)) for entity in entities} == dict.fromkeys(entities, 1)
+
+
+def test_each_documented_entity_is_logged(small_study):
+    found = {
+        row
+        for recording in RECORDINGS
+        for entity in logged(small_study.folder / "reports" / recording)
+        for row in rows_for(entity, Path(recording).stem)
+    }
+    assert set(documented()) - found == set()
+
+
+@pytest.mark.parametrize("stage", ["inverse", "trajectory"])
+def test_the_study_s_scene_is_drawn(small_study, stage):
+    entities = logged(small_study.folder / f"reports/er3a_c60/{stage}.rrd")
+    scene = {"table", "post", "lamp", "floor"}
+    assert {f"/{stage}/scene/{solid}" for solid in scene} <= entities
+
+
+def test_recordings_of_a_robot_merge_without_being_mixed(small_study, tmp_path):
+    parts = [small_study.folder / f"reports/er3_600/{stage}.rrd" for stage in STAGES]
+    subprocess.run([RERUN, "rrd", "merge", *parts, "-o", tmp_path / "all.rrd"], check=True, capture_output=True)
+    kept = RrdReader(tmp_path / "all.rrd").recordings()
+    assert sorted(recording.application_id for recording in kept) == sorted(f"{stage} er3_600" for stage in STAGES)
 
 
 @pytest.fixture(scope="session")
@@ -37,46 +92,30 @@ def vulkan() -> None:
 
 
 @pytest.mark.parametrize("recording", RECORDINGS)
-def test_recording_is_sound_and_holds_an_arm(small_study, recording):
-    path = small_study.folder / "reports" / recording
-    assert subprocess.run([RERUN, "rrd", "verify", path], capture_output=True, check=False).returncode == 0
-    shown = subprocess.run([RERUN, "rrd", "print", path], capture_output=True, text=True, check=True).stdout
-    assert "/link_1" in shown
-    assert "TextDocument" in shown
-    assert "blueprint" in shown.lower()
+def test_the_preview_shows_the_arm_and_the_page_shows_the_preview(small_study, recording, vulkan):
+    preview = (small_study.folder / "reports" / recording).with_suffix(".webp")
+    check_seal(preview)
+    assert len(preview.read_bytes()) < 150_000
+    assert joints_seen(preview.read_bytes()) >= 4
+    assert 'src="data:image/webp;base64,' in preview.with_suffix(".html").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("recording", RECORDINGS)
-def test_recording_is_drawn(small_study, recording, vulkan, tmp_path):
-    path, picture = small_study.folder / "reports" / recording, tmp_path / "drawn.png"
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    with viewer_on(path, "--port", str(port), "--window-size", "1200x800") as viewer:
-        deadline = time.monotonic() + 90
-        while joints_drawn(port, picture) < 4:  # it takes a while to load
-            assert time.monotonic() < deadline, "the picture shows no arm: fewer than four joint colours"
-            assert viewer.poll() is None, "the viewer ended early"
-            time.sleep(0.5)
+@pytest.fixture
+def copied(small_study, tmp_path):
+    """Reports with one recording."""
+    (tmp_path / "er3_600").mkdir()
+    path = tmp_path / "er3_600/inverse.rrd"
+    path.write_bytes((small_study.folder / "reports/er3_600/inverse.rrd").read_bytes())
+    seal(path)
+    return tmp_path
 
 
-def joints_drawn(port: int, picture: Path) -> int:
-    """Have the viewer draw itself; how many joints its picture shows, 0 while it does not answer."""
-    try:
-        ViewerClient(f"rerun+http://127.0.0.1:{port}/proxy").save_screenshot(str(picture))
-    except (ConnectionError, RuntimeError):
-        return 0
-    return joints_seen(picture)
-
-
-def joints_seen(picture: Path) -> int:
-    """How many of the six joints' colours (by hue, shaded as they are) fill a spot of the picture."""
-    pixels = Image.open(picture).convert("HSV").resize((1200, 800), Image.Resampling.NEAREST)
-    hue, saturation, value = (np.asarray(band, dtype=float) for band in pixels.split())
-    strong = (saturation > 100) & (value > 60)
-    seen = 0
-    for colour in JOINTS:
-        wanted = colorsys.rgb_to_hsv(*(part / 255 for part in rgb(colour)))[0] * 255
-        apart = np.abs((hue - wanted + 127.5) % 255 - 127.5)
-        seen += int((strong & (apart < 4)).sum() > 40)
-    return seen
+def test_without_a_driver_the_preview_is_empty_and_one_line_says_why(copied, monkeypatch):
+    for name in ("VK_DRIVER_FILES", "VK_ICD_FILENAMES"):
+        monkeypatch.setenv(name, "/nowhere")
+    monkeypatch.setenv("LIBGL_DRIVERS_PATH", "/nowhere")
+    done = CliRunner().invoke(app, ["preview", "inverse", "er3_600", "--reports", str(copied)])
+    assert done.exit_code == 0
+    assert re.fullmatch(r"note: previews of recordings were skipped: the Rerun viewer .+\n", done.stderr)
+    assert (copied / "er3_600/inverse.webp").read_bytes() == b""
+    check_seal(copied / "er3_600/inverse.webp")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import socket
 import subprocess
 import sys
 import time
@@ -17,8 +16,7 @@ import pytest
 from er3a.cli import app
 from er3a.errors import ResultError
 from er3a.seals import check_seal, seal
-from er3a.viewing.viewer import without_statistics
-from tests.conftest import viewer_on
+from er3a.viewing.viewer import free_port, viewer_running, without_statistics
 
 RERUN = Path(sys.executable).with_name("rerun")
 RECORDING = """
@@ -81,10 +79,8 @@ def listened_to(process: psutil.Process) -> list:
 
 
 def test_it_listens_on_the_loopback_address_alone(recording):
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    with viewer_on(recording, "--port", str(port)) as viewer:
+    port = free_port()
+    with viewer_running([recording], "--headless", "--port", str(port)) as viewer:
         deadline = time.monotonic() + 60
         listening: list = []
         while port not in [address.port for address in listening]:
@@ -104,6 +100,7 @@ def test_a_recording_cut_in_half_is_one_line_and_is_not_opened(recording, monkey
     path = recording.rename(folder / "inverse.rrd")
     seal(path)
     check_seal(path)
+    monkeypatch.setenv("DISPLAY", ":0")
     started = []
     monkeypatch.setattr(subprocess, "run", lambda command, **_: started.append(command))
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])

@@ -25,7 +25,7 @@ except Er3aError as error:
 
 ROBOTS = STUDY.names
 
-# Pages and recordings depend on the words of their language, results don't.
+# Pages depend on the words of their language, results and recordings don't.
 LANGUAGE = STUDY.report.language
 CATALOGUE = [] if LANGUAGE == "en" else os.path.relpath(catalogue_file(LANGUAGE))
 
@@ -71,11 +71,11 @@ shell.prefix(
 )
 
 
-def errors_told():
-    """The lines with which jobs of this run ended that could not do their work, each once."""
+def told(start):
+    """The lines with this start that jobs of this run have told, each once."""
     logs = [path for path in Path("logs").rglob("*.log") if path.stat().st_mtime >= STARTED - 1]
     lines = [line for path in sorted(logs) for line in path.read_text(errors="replace").splitlines()]
-    return list(dict.fromkeys(line for line in lines if line.startswith("error: ")))
+    return list(dict.fromkeys(line for line in lines if line.startswith(start)))
 
 
 def tables(stage):

@@ -1,7 +1,6 @@
 rule record:
     input:
         viewed,
-        CATALOGUE,
     output:
         "reports/{robot}/{stage}.rrd",
     log:
@@ -11,7 +10,6 @@ rule record:
     conda:
         "../envs/er3a.yaml"
     params:
-        language=LANGUAGE,
         code=lambda wildcards: code_of(wildcards.stage, "record"),
     message:
         "{wildcards.robot}: record {wildcards.stage}"
@@ -19,10 +17,28 @@ rule record:
         "er3a record {wildcards.stage} {wildcards.robot} 2> {log}"
 
 
+rule preview:
+    input:
+        "reports/{robot}/{stage}.rrd",
+    output:
+        "reports/{robot}/{stage}.webp",
+    log:
+        "logs/{robot}/{stage}.preview.log",
+    conda:
+        "../envs/er3a.yaml"
+    params:
+        code=code_digest("er3a.viewing.preview"),
+    message:
+        "{wildcards.robot}: preview {wildcards.stage}"
+    shell:
+        "er3a preview {wildcards.stage} {wildcards.robot} 2> {log}"
+
+
 rule report:
     input:
         viewed,
         CATALOGUE,
+        preview="reports/{robot}/{stage}.webp",
     output:
         report(
             "reports/{robot}/{stage}.html",

@@ -17,21 +17,25 @@ from er3a.stages.inverse.shape_colours import colour_of, shape_of
 from er3a.study import Study
 from er3a.viewing.arm import arm_view, capsules, log_arm, send_motion, size_of
 from er3a.viewing.palette import HIGHLIGHT, MUTED, rgb
-from er3a.viewing.recording import TIMELINE, escaped, recording
+from er3a.viewing.recording import ARM, TIMELINE, escaped, log_note, note_view, recording
+from er3a.viewing.scene import log_scene
 from er3a.viewing.skeleton import skeleton
 
+STAGE = "inverse"
+AXES = ((255, 80, 80), (80, 200, 80), (110, 130, 255))
 NOTE = """# Ways to reach each target
 
-Drag the time line: **one second for each target**.
+**Look first** at how differently the arm can stand for one and the same tool pose. Each target has one second: drag the
+time, or press play.
 
-- **Solid arm**: the solution taken; where none is, the arm where it comes from.
-- **Translucent arms**: the other branches within the limits, coloured as on the page.
-- **Thin grey arms**: branches that leave a joint limit or collide.
-- **Pink ball with axes**: the target's frame.
+- solid arm: the solution taken; where none is, the arm where it comes from
+- translucent arms: the other branches within the limits, coloured as on the page
+- thin grey lines: branches that leave a joint limit or collide
+- magenta ball with axes: the target's frame
+- grey solids: the scene
 
-Look first at how differently the arm can stand for one and the same tool pose. Each branch, the one taken too, is an
-entity `/targets/<name>/branch_<number>` and can be switched off in the tree on the left. A flip and a no-flip branch
-lie on one another.
+Each branch, the one taken too, is an entity `/inverse/targets/<name>/branch_<number>` that can be switched off in the
+tree on the left. A flip and a no-flip branch lie on one another.
 """
 
 
@@ -40,13 +44,14 @@ def record(study: Study, name: str, folder: Path, output: Path) -> None:
     robot = study.robot(name)
     summary = read_summary(folder)
     solutions = read_table(folder / "solutions.parquet")
-    note = rrb.Vertical(
-        rrb.TextDocumentView(origin="/about_target", name="This target"),
-        rrb.TextDocumentView(origin="/note", name="What to look at"),
+    words = rrb.Vertical(
+        note_view(STAGE), rrb.TextDocumentView(origin=f"/{STAGE}/now", name="This target"), name="Words"
     )
-    view = arm_view(robot, "Solutions", ["+ /arm/**", "+ /targets/**"], reach=_sight(robot, summary["targets"]))
-    with recording(output, name, "inverse", view, note) as stream:
-        stream.log("note", rr.TextDocument(NOTE, media_type=rr.MediaType.MARKDOWN), static=True)
+    view = arm_view(robot, "Solutions", [ARM, f"/{STAGE}/**"], reach=_sight(robot, summary["targets"]))
+    layout = rrb.Horizontal(view, words, column_shares=[2, 1], name="Solutions")
+    with recording(output, name, STAGE, layout) as stream:
+        log_note(stream, STAGE, NOTE)
+        log_scene(stream, study, name, STAGE)
         targets = summary["targets"]
         stands = np.radians([target["chosen_deg"] or target["q_ref_deg"] for target in targets])
         log_arm(stream, robot, stands[0])
@@ -54,7 +59,7 @@ def record(study: Study, name: str, folder: Path, output: Path) -> None:
         for second, target in enumerate(targets):
             stream.set_time(TIMELINE, duration=float(second))
             if second:
-                stream.log(f"targets/{targets[second - 1]['name']}", rr.Clear(recursive=True))
+                stream.log(f"{STAGE}/targets/{targets[second - 1]['name']}", rr.Clear(recursive=True))
             rows = solutions[(solutions["target"] == target["name"]) & solutions["first_of_branch"].astype(bool)]
             _log_target(stream, robot, target, rows)
 
@@ -67,14 +72,15 @@ def _sight(robot: Robot, targets: list[dict[str, Any]]) -> float:
 
 
 def _log_target(stream: rr.RecordingStream, robot: Robot, target: dict[str, Any], branches: pd.DataFrame) -> None:
-    root, size = f"targets/{target['name']}", size_of(robot)
+    root, size = f"{STAGE}/targets/{target['name']}", size_of(robot)
     position = np.array(target["xyz_mm"]) / 1000
     w, x, y, z = target["quaternion_wxyz"]
     frame = rr.Transform3D(translation=position, quaternion=[x, y, z, w])
-    stream.log(f"{root}/frame", frame, rr.TransformAxes3D(0.12 * size))
+    axes = rr.Arrows3D(vectors=0.12 * size * np.eye(3), colors=AXES, radii=0.003 * size)
+    stream.log(f"{root}/frame", frame, axes)
     ball = rr.Points3D([position], radii=0.012 * size, colors=rgb(HIGHLIGHT), labels=target["name"], show_labels=True)
     stream.log(f"{root}/point", ball)
-    stream.log("about_target", rr.TextDocument(_about(target, branches), media_type=rr.MediaType.MARKDOWN))
+    stream.log(f"{STAGE}/now", rr.TextDocument(_about(target, branches), media_type=rr.MediaType.MARKDOWN))
     for _, branch in branches.iterrows():
         points = skeleton(robot, np.radians(branch[JOINT_COLUMNS].astype(float).to_numpy()))
         entity = f"{root}/branch_{branch['branch']}"

@@ -17,9 +17,11 @@ from er3a.robots.robot import Robot
 from er3a.study import Study
 from er3a.viewing.arm import log_arm, send_motion, size_of
 from er3a.viewing.palette import HIGHLIGHT, JOINT_NAMES, JOINTS, MODEL, MUTED, REFERENCE, rgb
-from er3a.viewing.recording import escaped, recording, send_series
+from er3a.viewing.recording import ARM, TIMELINE, escaped, log_note, note_view, recording, send_series
+from er3a.viewing.scene import log_scene
 from er3a.viewing.skeleton import skeleton
 
+STAGE = "trajectory"
 PAUSE = 1.0  # s between two paths
 FRAMES_PER_SECOND = 50
 TRAIL_POINTS = 60
@@ -28,6 +30,15 @@ GHOST_ALPHA = 110
 GHOST_WIDTH = 0.006  # of the arm's size
 EYE_DIRECTION = np.array([0.6, -0.7, 0.35])
 CONDITION_SCALE = LogNorm(3, 300)
+CURVES = {
+    "angle": "Joint angle (deg)",
+    "velocity": "Joint velocity (deg/s)",
+    "condition": "Log10 of the condition number",
+    "smallest": "Smallest singular value",
+}
+SHOWN_S = rr.TimeRange(
+    start=rr.TimeRangeBoundary.cursor_relative(seconds=-4), end=rr.TimeRangeBoundary.cursor_relative(seconds=12)
+)
 LEVELS = {
     "safe": rr.TextLogLevel.INFO,
     "near-singular": rr.TextLogLevel.WARN,
@@ -44,21 +55,37 @@ def record(study: Study, name: str, folder: Path, output: Path) -> None:
     robot = study.robot(name)
     summary, checks = read_summary(folder), read_table(folder / "checks.parquet")
     repairs = read_table(folder / "repairs.parquet").assign(reachable=True)
-    no_legend = rrb.PlotLegend(visible=False)
     series = rrb.Vertical(
-        rrb.TimeSeriesView(origin="/curves/angle", name="joint angle (deg)"),
-        rrb.TimeSeriesView(origin="/curves/velocity", name="joint velocity (deg/s)", plot_legend=no_legend),
-        rrb.TimeSeriesView(origin="/curves/condition", name="log10 of the condition number", plot_legend=no_legend),
-        rrb.TimeSeriesView(origin="/curves/smallest", name="smallest singular value", plot_legend=no_legend),
+        *(
+            rrb.TimeSeriesView(
+                origin=f"/{STAGE}/curves/{curve}",
+                name=title,
+                axis_x=rrb.TimeAxis(view_range=SHOWN_S),
+                plot_legend=rrb.PlotLegend(visible=curve == "angle"),
+            )
+            for curve, title in CURVES.items()
+        ),
+        row_shares=[4, 3, 3, 3],
+        name="Curves",
     )
     words = rrb.Vertical(
-        rrb.TextDocumentView(origin="/note", name="What to look at"),
-        rrb.TextDocumentView(origin="/now", name="This path"),
-        rrb.TextLogView(origin="/events", name="Events"),
-        row_shares=[2, 1, 2],
+        note_view(STAGE),
+        rrb.TextDocumentView(origin=f"/{STAGE}/now", name="This path"),
+        rrb.TextLogView(
+            origin=f"/{STAGE}/events",
+            name="Events",
+            columns=rrb.TextLogColumns(
+                timeline_columns=rrb.encodings.TimelineColumn(TIMELINE, visible=False),
+                text_log_columns=["loglevel", "body"],
+            ),
+        ),
+        row_shares=[5, 2, 4],
+        name="Words",
     )
-    with recording(output, name, "trajectory", _view(robot, checks), series, words) as stream:
-        stream.log("note", rr.TextDocument(_note(robot, summary), media_type=rr.MediaType.MARKDOWN), static=True)
+    layout = rrb.Horizontal(_view(robot, checks), series, words, column_shares=[2, 1, 1], name="Paths")
+    with recording(output, name, STAGE, layout) as stream:
+        log_note(stream, STAGE, _note(robot, summary))
+        log_scene(stream, study, name, STAGE)
         first = checks.loc[checks["reachable"], [f"q{j + 1}_deg" for j in range(6)]].to_numpy()
         log_arm(stream, robot, np.radians(first[0]) if len(first) else np.zeros(6))
         for path, start, repaired in _timetable(summary):
@@ -67,11 +94,11 @@ def record(study: Study, name: str, folder: Path, output: Path) -> None:
             if not repaired:
                 _announce(stream, robot, path, rows, start)
             else:
-                stream.set_time("t", duration=start)
+                stream.set_time(TIMELINE, duration=start)
                 sentence = f"## {path['name']}, repaired\n{path['repair_text']}."
-                stream.log("now", rr.TextDocument(sentence, media_type=rr.MediaType.MARKDOWN))
+                stream.log(f"{STAGE}/now", rr.TextDocument(sentence, media_type=rr.MediaType.MARKDOWN))
                 text = f"{path['name']}, repaired: {path['repair_text']}"
-                stream.log("events", rr.TextLog(text, level=rr.TextLogLevel.INFO))
+                stream.log(f"{STAGE}/events", rr.TextLog(text, level=rr.TextLogLevel.INFO))
             _run(stream, robot, _frames(rows), start, MODEL if repaired else HIGHLIGHT)
 
 
@@ -98,7 +125,7 @@ def _view(robot: Robot, checks: pd.DataFrame) -> rrb.Spatial3DView:
     eye = rrb.EyeControls3D(
         kind="Orbital", position=centre + distance * EYE_DIRECTION, look_target=centre, eye_up=[0, 0, 1]
     )
-    return rrb.Spatial3DView(origin="/", contents="/**", name="arm", eye_controls=eye)
+    return rrb.Spatial3DView(origin="/", contents=[ARM, f"/{STAGE}/**"], name="Arm and path", eye_controls=eye)
 
 
 def _frames(rows: pd.DataFrame) -> pd.DataFrame:
@@ -111,13 +138,13 @@ def _frames(rows: pd.DataFrame) -> pd.DataFrame:
 
 def _announce(stream: rr.RecordingStream, robot: Robot, path: dict[str, Any], rows: pd.DataFrame, start: float) -> None:
     """What is known of a path: its line, its singular poses with ghosts of the arm, its verdict and events."""
-    stream.set_time("t", duration=start)
+    stream.set_time(TIMELINE, duration=start)
     sentence = f"## {path['name']}\n**{path['verdict']}**: {path['text']}.\n\n{escaped(path['title'])}."
-    stream.log("now", rr.TextDocument(sentence, media_type=rr.MediaType.MARKDOWN))
-    stream.log("events", rr.TextLog(f"{path['name']}: {path['verdict']}", level=LEVELS[path["verdict"]]))
+    stream.log(f"{STAGE}/now", rr.TextDocument(sentence, media_type=rr.MediaType.MARKDOWN))
+    stream.log(f"{STAGE}/events", rr.TextLog(f"{path['name']}: {path['verdict']}", level=LEVELS[path["verdict"]]))
     shown = _frames(rows)
     points = shown[["x_mm", "y_mm", "z_mm"]].to_numpy() / 1000
-    stream.log("target", _target(path, points, shown["condition_number"].to_numpy()))
+    stream.log(f"{STAGE}/path", _line(path, points, shown["condition_number"].to_numpy()))
     _ghosts(stream, robot, path, rows)
     _events(stream, path, start)
 
@@ -134,7 +161,7 @@ def _run(stream: rr.RecordingStream, robot: Robot, rows: pd.DataFrame, start: fl
 
     def send(entity: str, values: np.ndarray, names: list[str], colours: list[str]) -> None:
         gap = np.full((1, values.shape[1]), np.nan)
-        send_series(stream, f"curves/{entity}", broken, np.concatenate([values, gap]), names, colours)
+        send_series(stream, f"{STAGE}/curves/{entity}", broken, np.concatenate([values, gap]), names, colours)
 
     send("angle", _columns(rows, "deg"), list(JOINT_NAMES), list(JOINTS))
     send("velocity", _columns(rows, "deg_s"), list(JOINT_NAMES), list(JOINTS))
@@ -147,7 +174,7 @@ def _columns(rows: pd.DataFrame, unit: str) -> np.ndarray:
     return rows[[f"q{j + 1}_{unit}" for j in range(6)]].to_numpy()
 
 
-def _target(path: dict[str, Any], points: np.ndarray, condition: np.ndarray) -> rr.LineStrips3D:
+def _line(path: dict[str, Any], points: np.ndarray, condition: np.ndarray) -> rr.LineStrips3D:
     """The whole path in segments: coloured by the condition number, grey where it can't be reached."""
     colours = (colormaps["viridis_r"](CONDITION_SCALE(np.nan_to_num(condition, nan=3.0, posinf=1e12))) * 255).astype(
         int
@@ -166,30 +193,30 @@ def _ghosts(stream: rr.RecordingStream, robot: Robot, path: dict[str, Any], rows
     ]
     points = rows[["x_mm", "y_mm", "z_mm"]].to_numpy()[at].reshape(-1, 3) / 1000
     colours = [rgb(HIGHLIGHT)] * len(at)
-    stream.log("marks", rr.Points3D(points, radii=0.012, colors=colours, labels=labels))
+    stream.log(f"{STAGE}/marks", rr.Points3D(points, radii=0.012, colors=colours, labels=labels))
     q = np.radians(_columns(rows, "deg")[at]).reshape(-1, 6)
     strips = [skeleton(robot, joints) for joints in q if np.isfinite(joints).all()]
     ghost = [(*rgb(HIGHLIGHT), GHOST_ALPHA)] * len(strips)
-    stream.log("ghosts", rr.LineStrips3D(strips, colors=ghost, radii=GHOST_WIDTH * size_of(robot)))
+    stream.log(f"{STAGE}/ghosts", rr.LineStrips3D(strips, colors=ghost, radii=GHOST_WIDTH * size_of(robot)))
 
 
 def _trail(stream: rr.RecordingStream, times: np.ndarray, points: np.ndarray, reached: np.ndarray, colour: str) -> None:
     """The way the tool has come so far, in TRAIL_POINTS steps; empty at the start."""
-    stream.set_time("t", duration=float(times[0]))
-    stream.log("trail", rr.LineStrips3D([]))
+    stream.set_time(TIMELINE, duration=float(times[0]))
+    stream.log(f"{STAGE}/trail", rr.LineStrips3D([]))
     for i in np.unique(np.linspace(1, len(times) - 1, TRAIL_POINTS).astype(int)):
         so_far = points[: i + 1][reached[: i + 1]]
         if len(so_far) > 1:
-            stream.set_time("t", duration=float(times[i]))
-            stream.log("trail", rr.LineStrips3D([so_far], colors=[rgb(colour)], radii=0.007))
+            stream.set_time(TIMELINE, duration=float(times[i]))
+            stream.log(f"{STAGE}/trail", rr.LineStrips3D([so_far], colors=[rgb(colour)], radii=0.007))
 
 
 def _events(stream: rr.RecordingStream, path: dict[str, Any], start: float) -> None:
     for event in path["singularities"]:
-        stream.set_time("t", duration=start + event["t_s"])
+        stream.set_time(TIMELINE, duration=start + event["t_s"])
         how = "meets" if event["crossing"] else "passes near"
         text = f"{how} the {event['type']} singularity"
-        stream.log("events", rr.TextLog(text, level=rr.TextLogLevel.WARN))
+        stream.log(f"{STAGE}/events", rr.TextLog(text, level=rr.TextLogLevel.WARN))
     for key, word in (
         ("unreachable", "not reachable"),
         ("out_of_limits", "limit"),
@@ -197,8 +224,8 @@ def _events(stream: rr.RecordingStream, path: dict[str, Any], start: float) -> N
         ("collisions", "collision"),
     ):
         for part in path[key]:
-            stream.set_time("t", duration=start + part["t0_s"])
-            stream.log("events", rr.TextLog(f"{word}: {part['cause']}", level=rr.TextLogLevel.ERROR))
+            stream.set_time(TIMELINE, duration=start + part["t0_s"])
+            stream.log(f"{STAGE}/events", rr.TextLog(f"{word}: {part['cause']}", level=rr.TextLogLevel.ERROR))
 
 
 def _note(robot: Robot, summary: dict[str, Any]) -> str:
@@ -211,15 +238,16 @@ def _note(robot: Robot, summary: dict[str, Any]) -> str:
             f"# {escaped(robot.title)}: paths",
             summary["verdict"]["text"],
             "",
-            "Press play: the arm runs along one path after another. The line that it follows is dark where the arm is "
-            "badly conditioned and grey where it can't go; its trail grows behind the tool. Where the path is singular "
-            "stands a ghost of the arm. A path that can be repaired runs a second time, repaired, with a blue trail.",
+            "**Look first** at the velocity curves where an event is logged: a spike is the price of passing near a "
+            "singular pose. Press play: the arm runs along one path after another.",
+            "",
+            "- line: the path, dark where the arm is badly conditioned, grey where it can't go",
+            "- trail behind the tool: magenta as programmed, blue on a second run, repaired",
+            "- magenta lines: the arm at the path's singular poses",
+            "- grey solids: the scene",
             "",
             "| from | path | verdict |",
             "|---|---|---|",
             *rows,
-            "",
-            "Look first at the velocity curves where an event is logged: a spike is the price of passing near a "
-            "singular pose.",
         ]
     )

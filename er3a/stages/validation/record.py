@@ -16,9 +16,10 @@ from er3a.stages.validation.model import model_of
 from er3a.study import Study
 from er3a.viewing.arm import log_arm, send_motion, size_of
 from er3a.viewing.palette import HIGHLIGHT, MODEL, REFERENCE, rgb
-from er3a.viewing.recording import TIMELINE, escaped, recording, send_series
+from er3a.viewing.recording import ARM, TIMELINE, escaped, log_note, note_view, recording, send_series
 from er3a.viewing.skeleton import skeleton
 
+STAGE = "validation"
 HOLD_S, MOVE_S, STEPS = 2.0, 1.0, 30
 STATION_S = HOLD_S + MOVE_S
 LEAST_ARROW_MM = 0.1
@@ -29,13 +30,12 @@ NOTE = """# Key poses of {title}
 
 {text}
 
-The arm stops at each pose that a reference names ({hold:g} s each): **press play**, or drag the time.
+**Look first** at the curve below, the largest deviation at each pose: go to the pose where it is highest. The arm stops
+{hold:g} s at each pose that a reference names; press play, or drag the time.
 
 - blue ball: the model's flange or wrist centre
-- orange ball (magenta for claims): where the reference has it; **the arrow is the deviation** (from 0.1 mm on)
+- orange ball (magenta for claims): where the reference has it; the arrow is the deviation (from 0.1 mm on)
 - orange lines at the start: joint axes that references state, in the zero pose
-
-The panel on the right names the pose and its source; the curve is the deviation in mm.
 """
 
 
@@ -47,33 +47,32 @@ def record(study: Study, name: str, folder: Path, output: Path) -> None:
     stations = _stations(poses)
     starts = STATION_S * np.arange(len(stations))
     mended, fault = mended_robot(robot, summary["culprits"])
-    views = (
-        _view(robot, poses, axes),
-        rrb.Vertical(
-            rrb.TextDocumentView(origin="/note", name="what to look at"),
-            rrb.TextDocumentView(origin="/pose", name="this pose"),
-            rrb.TimeSeriesView(origin="/deviation", name="deviation (mm)"),
-            row_shares=[4, 3, 3],
-        ),
+    words = rrb.Vertical(
+        note_view(STAGE),
+        rrb.TextDocumentView(origin=f"/{STAGE}/now", name="This pose"),
+        rrb.TimeSeriesView(origin=f"/{STAGE}/curves/deviation", name="Largest deviation (mm)"),
+        row_shares=[4, 3, 3],
+        name="Words and curve",
     )
-    with recording(output, name, "validation", *views) as stream:
+    layout = rrb.Horizontal(_view(robot, poses, axes), words, column_shares=[2, 1], name="Key poses")
+    with recording(output, name, STAGE, layout) as stream:
         note = NOTE.format(title=escaped(robot.title), text=summary["verdict"]["text"], hold=HOLD_S)
-        note += f"\nThe see-through arm has the most likely fault {fault}.\n" if mended is not None else ""
-        stream.log("note", rr.TextDocument(note, media_type=rr.MediaType.MARKDOWN), static=True)
+        note += f"- see-through arm: the same table, {fault}\n" if mended is not None else ""
+        log_note(stream, STAGE, note)
         _log_axes(stream, axes, size_of(robot), end=starts[1] - MOVE_S if len(starts) > 1 else None)
         log_arm(stream, robot, np.zeros(6))
         times, q = _motion(stations, starts)
         send_motion(stream, robot, times, q)
         if mended is not None:
-            log_arm(stream, mended, np.zeros(6), entity="mended", ghost=True)
-            send_motion(stream, mended, times, q, entity="mended")
+            log_arm(stream, mended, np.zeros(6), entity=f"{STAGE}/mended", ghost=True)
+            send_motion(stream, mended, times, q, entity=f"{STAGE}/mended")
         for start, rows in zip(starts, stations):
             _log_station(stream, float(start), rows, 0.012 * size_of(robot))
         worst = np.array([rows["deviation_mm"].max() for rows in stations])
         at = (starts[:, None] + [0, HOLD_S, HOLD_S + 0.01]).ravel()
         curve = np.repeat(worst, 3)
         curve[2::3] = np.nan
-        send_series(stream, "deviation", at, curve[:, None], ["largest deviation"], [REFERENCE])
+        send_series(stream, f"{STAGE}/curves/deviation", at, curve[:, None], ["largest deviation"], [REFERENCE])
 
 
 def _stations(poses: pd.DataFrame) -> list[pd.DataFrame]:
@@ -103,12 +102,12 @@ def _log_station(stream: rr.RecordingStream, start: float, rows: pd.DataFrame, r
     for row in rows.dropna(subset=["deviation_mm"]).itertuples():
         point = row.point.replace("_", " ")
         lines.append(f"- {point}: off by **{row.deviation_mm:.2f} mm**, {escaped(row.source)} ({row.grade})")
-    stream.log("pose", rr.TextDocument("\n".join(lines), media_type=rr.MediaType.MARKDOWN))
+    stream.log(f"{STAGE}/now", rr.TextDocument("\n".join(lines), media_type=rr.MediaType.MARKDOWN))
     stated = rows.dropna(subset=XYZ)
     points, model = stated[XYZ].to_numpy() / 1000, stated[MODEL_XYZ].to_numpy() / 1000
     colours = np.array([rgb(REFERENCE if grade in WEIGHTY_GRADES else HIGHLIGHT) for grade in stated["grade"]])
-    stream.log("reference/points", rr.Points3D(points, radii=radius, colors=colours))
-    stream.log("model/points", rr.Points3D(model, radii=radius * 1.15, colors=rgb(MODEL)))
+    stream.log(f"{STAGE}/reference/points", rr.Points3D(points, radii=radius, colors=colours))
+    stream.log(f"{STAGE}/model", rr.Points3D(model, radii=radius * 1.15, colors=rgb(MODEL)))
     seen = stated["deviation_mm"].to_numpy() >= LEAST_ARROW_MM
     arrows = rr.Arrows3D(
         origins=model[seen],
@@ -118,10 +117,10 @@ def _log_station(stream: rr.RecordingStream, start: float, rows: pd.DataFrame, r
         labels=[f"{deviation:.1f} mm" for deviation in stated["deviation_mm"][seen]],
         show_labels=True,
     )
-    stream.log("reference/deviation", arrows)
+    stream.log(f"{STAGE}/deviation", arrows)
     stream.set_time(TIMELINE, duration=start + HOLD_S)
-    for entity in ("reference/points", "reference/deviation", "model/points"):
-        stream.log(entity, rr.Clear(recursive=False))
+    for entity in ("reference/points", "model", "deviation"):
+        stream.log(f"{STAGE}/{entity}", rr.Clear(recursive=False))
 
 
 def _log_axes(stream: rr.RecordingStream, axes: pd.DataFrame, size: float, end: float | None) -> None:
@@ -139,10 +138,10 @@ def _log_axes(stream: rr.RecordingStream, axes: pd.DataFrame, size: float, end: 
         show_labels=False,
     )
     stream.set_time(TIMELINE, duration=0.0)
-    stream.log("reference/axes", lines)
+    stream.log(f"{STAGE}/reference/axes", lines)
     if end is not None:
         stream.set_time(TIMELINE, duration=end)
-        stream.log("reference/axes", rr.Clear(recursive=False))
+        stream.log(f"{STAGE}/reference/axes", rr.Clear(recursive=False))
 
 
 def _view(robot: Robot, poses: pd.DataFrame, axes: pd.DataFrame) -> rrb.Spatial3DView:
@@ -157,4 +156,4 @@ def _view(robot: Robot, poses: pd.DataFrame, axes: pd.DataFrame) -> rrb.Spatial3
         look_target=centre,
         eye_up=[0, 0, 1],
     )
-    return rrb.Spatial3DView(origin="/", contents="/**", name="key poses", eye_controls=eye)
+    return rrb.Spatial3DView(origin="/", contents=[ARM, f"/{STAGE}/**"], name="Key poses", eye_controls=eye)

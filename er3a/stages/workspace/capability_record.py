@@ -13,7 +13,6 @@ from er3a.results import read_table
 from er3a.stages.workspace.cell_lookup import CellLookup
 from er3a.viewing.palette import HIGHLIGHT, MUTED, rgb
 
-VIEW = ["/arm/**", "/capability/far/**", "/places/**"]
 _CLASSES = (0.0, 0.25, 0.5, 0.75, 1.0)
 _NAMES = ("below_25_percent", "25_to_50_percent", "50_to_75_percent", "75_percent_and_more", "all")
 
@@ -30,10 +29,10 @@ def log_capability(stream: rr.RecordingStream, folder: Path, summary: dict[str, 
             centers=[place["centre_m"]],
             sizes=[place["size_m"]],
             colors=[rgb(HIGHLIGHT if place["status"] == "proven" else MUTED)],
-            labels=[f"{number}: {place['status']}"],
+            labels=[str(number)],
             radii=rr.Radius.ui_points(1.5),
         )
-        stream.log(f"places/{number}", box, static=True)
+        stream.log(f"workspace/places/{number}", box, static=True)
 
 
 def _log_voxels(stream: rr.RecordingStream, summary: dict[str, Any], lookup: CellLookup, share: np.ndarray) -> None:
@@ -49,7 +48,7 @@ def _log_voxels(stream: rr.RecordingStream, summary: dict[str, Any], lookup: Cel
     far = (local @ np.array(frame["axes"]))[:, 1] >= 0
     level = np.digitize(value, _CLASSES[1:])
     placed = rr.Transform3D(translation=frame["origin_m"], mat3x3=np.array(frame["axes"]).T)
-    stream.log("capability", placed, static=True)
+    stream.log("workspace/capability", placed, static=True)
     for half, side in (("far", far), ("near", ~far)):
         for number, name in enumerate(_NAMES):
             chosen = side & (level == number)
@@ -60,4 +59,4 @@ def _log_voxels(stream: rr.RecordingStream, summary: dict[str, Any], lookup: Cel
                     colors=colours[chosen],
                     fill_mode="solid",
                 )
-                stream.log(f"capability/{half}/{name}", voxels, static=True)
+                stream.log(f"workspace/capability/{half}/{name}", voxels, static=True)

@@ -1,0 +1,99 @@
+"""The server that shows recordings in a browser."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import urllib.error
+import urllib.request
+from urllib.parse import parse_qs, urlsplit
+
+import psutil
+import pytest
+
+from er3a.cli import app
+from er3a.seals import seal
+from er3a.viewing import web_viewer
+
+
+@pytest.fixture(scope="module")
+def reports(tmp_path_factory):
+    """Reports with two recordings; what is in them does not matter here."""
+    folder = tmp_path_factory.mktemp("reports")
+    for stage in ("inverse", "workspace"):
+        path = folder / f"er3_600/{stage}.rrd"
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(f"recording of {stage}".encode())
+        seal(path)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def root(reports):
+    """The address of a server of these recordings."""
+    recordings = sorted(reports.glob("*/*.rrd"))
+    with web_viewer.server(recordings) as listening:
+        threading.Thread(target=listening.serve_forever, daemon=True).start()
+        yield web_viewer.address(listening, recordings)
+        listening.shutdown()
+
+
+def fetched(address: str, path: str):
+    return urllib.request.urlopen(f"http://{urlsplit(address).netloc}{path}", timeout=60)
+
+
+def test_each_recording_is_in_the_address_and_is_served_as_it_is(root):
+    shown = parse_qs(urlsplit(root).query)["url"]
+    content = [urllib.request.urlopen(url, timeout=60).read() for url in shown]
+    assert content == [b"recording of inverse", b"recording of workspace"]
+
+
+@pytest.mark.parametrize("path", ["/", "/re_viewer.js", "/re_viewer_bg.wasm", "/er3_600/inverse.rrd"])
+def test_a_browser_may_connect_to_nothing_else(root, path):
+    with fetched(root, path) as answer:
+        assert answer.headers["Content-Security-Policy"].startswith("default-src 'self'")
+        assert "http" not in answer.headers["Content-Security-Policy"]
+
+
+def test_the_page_names_no_font_elsewhere(root):
+    with fetched(root, "/") as answer:
+        page = answer.read().decode()
+    assert "re_viewer.js" in page
+    assert [link for link in re.findall("<link[^>]*>", page) if "://" in link] == []
+
+
+@pytest.mark.parametrize("path", ["/er3_600/", "/../../etc/passwd", "/er3_600/.inverse.rrd.sha256"])
+def test_nothing_else_is_served(root, path):
+    with pytest.raises(urllib.error.HTTPError, match="404"):
+        fetched(root, path)
+
+
+def test_without_a_desktop_view_serves_on_the_loopback_address_until_it_is_interrupted(reports):
+    quiet = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    command = [sys.executable, "-m", "er3a", "view", "er3_600", "--reports", str(reports)]
+    with subprocess.Popen(command, env=quiet, stdout=subprocess.PIPE, text=True) as viewing:
+        told = [viewing.stdout.readline() for _ in range(3)]
+        assert "Ctrl+C" in told[0]
+        with urllib.request.urlopen(told[1].strip(), timeout=60) as answer:
+            assert answer.status == 200
+        process = psutil.Process(viewing.pid)
+        listening = [one.laddr for one in process.net_connections() if one.status == psutil.CONN_LISTEN]
+        assert [(one.ip, one.port) for one in listening] == [("127.0.0.1", urlsplit(told[1].strip()).port)]
+        assert process.children(recursive=True) == []
+        viewing.send_signal(signal.SIGINT)
+        assert viewing.wait(timeout=60) == 0
+
+
+def test_with_a_desktop_view_opens_a_window(reports, monkeypatch):
+    from typer.testing import CliRunner
+
+    started = []
+    monkeypatch.setenv("DISPLAY", ":0")
+    ended = subprocess.CompletedProcess([], 0)
+    monkeypatch.setattr(subprocess, "run", lambda command, **_: started.append(command) or ended)
+    assert CliRunner().invoke(app, ["view", "--reports", str(reports)]).exit_code == 0
+    assert [part for part in started[0] if part.endswith(".rrd")] == sorted(map(str, reports.glob("*/*.rrd")))
