@@ -189,10 +189,7 @@ def _fault_text(robot: Robot, fault: int, gap: float) -> str:
     if fault == ORIENTATION:
         return said("the wrist can't tilt that far; {angle:.3g} deg are missing", angle=np.degrees(gap))
     if fault == OFF_AXIS:
-        return said(
-            "the wrist centre would be {gap} too near to axis 1 for the arm's sideways offset",
-            gap=_mm(gap),
-        )
+        return said("the wrist centre would be {gap} too near to axis 1 for the arm's sideways offset", gap=_mm(gap))
     if fault == TOO_FAR:
         return said(
             "the wrist centre would be {gap} too far from axis 2, which the stretched arm reaches to {reach}",
