@@ -60,7 +60,7 @@ def catalogue_texts() -> set[str]:
 def wide_letters() -> Iterator[list[str]]:
     """Views written in here are in wide letters; the list collects the texts of their figures."""
     shown: list[str] = []
-    save, to_html = Figure.savefig, go.Figure.to_html
+    save, to_json = Figure.savefig, go.Figure.to_json
 
     def saved(figure, *arguments, **named):
         shown.extend(text.get_text() for text in figure.findobj(matplotlib.text.Text) if text.get_visible())
@@ -68,13 +68,13 @@ def wide_letters() -> Iterator[list[str]]:
 
     def drawn(figure, *arguments, **named):
         shown.extend(_texts_of_figure(figure.to_dict()))
-        return to_html(figure, *arguments, **named)
+        return to_json(figure, *arguments, **named)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(language, "_catalogue", Wide(catalogue_texts()))
         patch.setattr(language, "_language", "zh")
         patch.setattr(Figure, "savefig", saved)
-        patch.setattr(go.Figure, "to_html", drawn)
+        patch.setattr(go.Figure, "to_json", drawn)
         yield shown
 
 
