@@ -58,7 +58,7 @@ def parameters(robot: Robot) -> dict[tuple[str, str, str], float | str | None]:
     """Values of a robot's table by (group, name, unit); None where unknown."""
     columns = (
         (N_("D-H table"), "a", "mm", robot.a * 1000),
-        (N_("D-H table"), "alpha", "deg", np.degrees(robot.alpha)),
+        (N_("D-H table"), "α", "deg", np.degrees(robot.alpha)),
         (N_("D-H table"), "d", "mm", robot.d * 1000),
         (N_("zero"), tr("offset"), "deg", np.degrees(robot.offset)),
         (N_("zero"), tr("direction"), "", robot.direction),

@@ -10,7 +10,8 @@ async function unpackPlotly() {
 
 {
   const place = document.getElementById("turning");
-  const near = new IntersectionObserver((entries) => entries.some((entry) => entry.isIntersecting) && draw(), { rootMargin: "50%" });
+  const look = (entries) => entries.some((entry) => entry.isIntersecting) && draw();
+  const near = new IntersectionObserver(look, { rootMargin: "25%" });
   let plotly = null;
 
   const draw = () => {
@@ -27,7 +28,8 @@ async function unpackPlotly() {
       if (marker) marker.size *= scale;
       if (line) line.width *= scale;
     }
-    Plotly.newPlot(place, data, layout, { displaylogo: false, responsive: true }).then(() => performance.mark("turning"));
+    const config = { displaylogo: false, responsive: true, plotGlPixelRatio: Math.max(1, devicePixelRatio) };
+    Plotly.newPlot(place, data, layout, config).then(() => performance.mark("turning"));
   };
 
   unpackPlotly().then((text) => {
