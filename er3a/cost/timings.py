@@ -101,7 +101,7 @@ def trial(study: Study, robot: str, whole: bool) -> Trial:
         def carry_out(verb: str, stage: str, *words: str) -> None:
             options = places.get(verb, [*places["compute"], *places["teach"]])
             command = ["er3a", verb, *words, *options, "--study", folder / "study.yaml"]
-            timings[verb, stage] = _timed([str(word) for word in command])
+            timings[verb, stage] = timed([str(word) for word in command])
 
         def carry_out_stage(stage: str) -> None:
             carry_out("compute", stage, stage, robot, *([part] if stage == "workspace" else []))
@@ -125,8 +125,8 @@ def written_bytes(folders: list[Path]) -> int:
     return sum(path.stat().st_size for folder in folders for path in folder.rglob("*") if path.is_file())
 
 
-def _timed(command: list[str]) -> Timing:
-    """Run a command of er3a to its end; :class:`Er3aError` with its own words if it fails."""
+def timed(command: list[str]) -> Timing:
+    """Run a module of Python with some arguments to its end; :class:`Er3aError` with its last words if it fails."""
     environment = os.environ | _ONE_THREAD | {"PYTHONHASHSEED": "0"}
     quiet = subprocess.DEVNULL
     start = time.perf_counter()
