@@ -37,7 +37,7 @@ def study_of(samples: int) -> Study:
 
 def calibration_of(study: Study) -> Calibration:
     """What `er3a plan` measures in the working folder."""
-    return calibrate(study, Path(STUDY), Path("results"), Path("reports"), Path("logs"))
+    return calibrate(study, Path("results"), Path("reports"), Path("logs"))
 
 
 def run_from_nothing(samples: int) -> tuple[float, float]:

@@ -164,6 +164,8 @@ def plan(
     logs: Annotated[Path, typer.Option(help="folder of a run's timings")] = Path("logs"),
 ):
     """Say what the study will take: samples/s, wall time, memory and disk, from a short calibration on this machine."""
+    from rich.console import Console
+
     from er3a.cost.plan import calibrate
     from er3a.cost.tables import print_plan
 
@@ -171,7 +173,9 @@ def plan(
     if not all(number.strip().isdigit() and int(number) > 0 for number in numbers):
         raise Er3aError(f"--cores is '{cores}'; expected numbers such as 1,2,8,64")
     loaded = load_study(study)
-    print_plan(loaded, calibrate(loaded, study, results, reports, logs), sorted({int(number) for number in numbers}))
+    with Console(stderr=True).status("Measuring on this machine ..."):
+        measured = calibrate(loaded, results, reports, logs)
+    print_plan(loaded, measured, sorted({int(number) for number in numbers}))
 
 
 @app.command()

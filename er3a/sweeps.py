@@ -18,43 +18,50 @@ StageName = Literal["validation", "workspace", "inverse", "trajectory"]
 MOST_VALUES = 1000
 DECIMALS = 9
 Value = Annotated[float, Field(ge=-1e6, le=1e6)]
-_TOOL = "tool"
 
 
 class Entry(NamedTuple):
-    """Where an entry stands in a robot's file (group and column, or key and index of the tool), and its unit."""
+    """An entry that can be varied: of a joint, or of the tool (``joint`` None); where it stands, its name and unit.
 
+    ``group`` and ``column`` are those of a joint's row in a robot's file, or the key and index of a tool's placement.
+    """
+
+    joint: int | None
     group: str
     column: str | int
     label: str
     unit: str
 
 
-_JOINT_ENTRIES = {
-    "a_mm": Entry("dh", "a_mm", "a", "mm"),
-    "alpha_deg": Entry("dh", "alpha_deg", "alpha", "deg"),
-    "d_mm": Entry("dh", "d_mm", "d", "mm"),
-    "offset_deg": Entry("zero", "offset_deg", N_("offset"), "deg"),
-    "lower_deg": Entry("limits", "lower_deg", N_("lower limit"), "deg"),
-    "upper_deg": Entry("limits", "upper_deg", N_("upper limit"), "deg"),
-    "speed_deg_s": Entry("speeds", "speed_deg_s", N_("greatest speed"), "deg/s"),
+_OF_A_JOINT = {
+    "a_mm": ("dh", "a", "mm"),
+    "alpha_deg": ("dh", "alpha", "deg"),
+    "d_mm": ("dh", "d", "mm"),
+    "offset_deg": ("zero", N_("offset"), "deg"),
+    "lower_deg": ("limits", N_("lower limit"), "deg"),
+    "upper_deg": ("limits", N_("upper limit"), "deg"),
+    "speed_deg_s": ("speeds", N_("greatest speed"), "deg/s"),
 }
-_TURNS = {"roll": N_("roll"), "pitch": N_("pitch"), "yaw": N_("yaw")}
-_TOOL_ENTRIES = {
-    **{f"{axis}_mm": Entry("xyz_mm", i, axis, "mm") for i, axis in enumerate("xyz")},
-    **{f"{turn}_deg": Entry("rpy_deg", i, word, "deg") for i, (turn, word) in enumerate(_TURNS.items())},
+_OF_THE_TOOL = {
+    "x_mm": ("xyz_mm", 0, "x", "mm"),
+    "y_mm": ("xyz_mm", 1, "y", "mm"),
+    "z_mm": ("xyz_mm", 2, "z", "mm"),
+    "roll_deg": ("rpy_deg", 0, N_("roll"), "deg"),
+    "pitch_deg": ("rpy_deg", 1, N_("pitch"), "deg"),
+    "yaw_deg": ("rpy_deg", 2, N_("yaw"), "deg"),
 }
+ENTRIES = {
+    f"joints.{joint}.{column}": Entry(joint, group, column, label, unit)
+    for joint in range(1, 7)
+    for column, (group, label, unit) in _OF_A_JOINT.items()
+} | {f"tool.{key}": Entry(None, *where) for key, where in _OF_THE_TOOL.items()}
 
 
 def _known_entry(path: str) -> str:
-    first, _, rest = path.partition(".")
-    joint, _, key = rest.partition(".")
-    if (first == "joints" and joint in tuple("123456") and key in _JOINT_ENTRIES) or (
-        first == _TOOL and rest in _TOOL_ENTRIES
-    ):
-        return path
-    remedy = f"Write joints.1 to joints.6 with one of {', '.join(_JOINT_ENTRIES)}; or tool with one of "
-    raise ValueError(f"'{path}' is no entry that can be varied | {remedy}{', '.join(_TOOL_ENTRIES)}")
+    if path not in ENTRIES:
+        remedy = f"Write joints.1 to joints.6 with one of {', '.join(_OF_A_JOINT)}; or tool with one of "
+        raise ValueError(f"'{path}' is no entry that can be varied | {remedy}{', '.join(_OF_THE_TOOL)}")
+    return path
 
 
 @dataclass(frozen=True)
@@ -74,25 +81,28 @@ class Variant:
     value: float
 
     @property
+    def entry(self) -> Entry:
+        """The entry that is varied."""
+        return ENTRIES[self.vary]
+
+    @property
     def title(self) -> str:
         """What is varied, and the value, in the language in use."""
-        return f"{entry_label(self.vary)} = {self.value:.9g} {entry_unit(self.vary)}"
+        return f"{entry_label(self.entry)} = {self.value:.9g} {self.entry.unit}"
 
     def table(self, content: RobotFile) -> RobotFile:
         """A robot's file with the variant's title and the varied joint entry (a varied tool is no part of it).
 
         Capsules that the file gives for its own link lengths don't fit others: a varied D-H entry leaves the default.
         """
-        data = content.model_dump(exclude_none=True) | {"title": f"{content.title[:1000]}, {self.title}"}
-        if self.vary.startswith(_TOOL):
-            return RobotFile.model_validate(data)
-        joint, _ = _joint_and_key(self.vary)
-        entry = _entry_of(self.vary)
+        entry, title = self.entry, f"{content.title[:1000]}, {self.title}"
+        if entry.joint is None:
+            return content.model_copy(update={"title": title})
+        data = content.model_dump(exclude_none=True) | {"title": title}
         if entry.group not in data:
-            problem = f"the robot's file gives no {entry.group}"
-            raise self._refusal(problem, f"Add the group {entry.group} to it")
+            raise self._refusal(f"the robot's file gives no {entry.group}", f"Add the group {entry.group} to it")
         group: dict[str, Any] = data[entry.group]
-        group["rows"][joint - 1][entry.column] = self.value
+        group["rows"][entry.joint - 1][entry.column] = self.value
         group |= {"source": f"{group['source'][:1000]}; {self.vary} as varied by the study", "grade": "inferred"}
         if entry.group == "dh":
             data.pop("envelopes", None)
@@ -103,24 +113,24 @@ class Variant:
 
     def tool(self, tool: Placement | None) -> Placement | None:
         """The tool with the varied entry; a varied joint leaves it as it is."""
-        if not self.vary.startswith(_TOOL):
+        entry = self.entry
+        if entry.joint is not None:
             return tool
-        entry = _entry_of(self.vary)
         placement = (tool or Placement()).model_dump(include={"xyz_mm", "rpy_deg"})
         placement[entry.group][entry.column] = self.value
         try:
-            check_placement(_TOOL, Placement(**placement))
+            check_placement("tool", Placement(**placement))
         except ValueError as error:
             raise self._refusal(*str(error).split(" | ")) from None
         return Placement(**placement)
 
     def replaced(self, content: RobotFile, tool: Placement | None) -> float | None:
         """The value that the base robot itself has, given its file and its tool; None if it has none."""
-        entry = _entry_of(self.vary)
-        if self.vary.startswith(_TOOL):
+        entry = self.entry
+        if entry.joint is None:
             return getattr(tool or Placement(), entry.group)[entry.column]
         group = getattr(content, entry.group)
-        return getattr(group.rows[_joint_and_key(self.vary)[0] - 1], entry.column) if group else None
+        return getattr(group.rows[entry.joint - 1], entry.column) if group else None
 
     def _refusal(self, problem: str, remedy: str) -> InputError:
         return InputError(None, f"sweeps.{self.sweep}", f"{self.vary} = {self.value:.9g}: {problem}", remedy)
@@ -171,23 +181,7 @@ class Sweep(StrictModel):
             yield Variant(f"{self.robot}-{name}-{number:02d}", self.robot, name, self.vary, value)
 
 
-def entry_label(vary: str) -> str:
-    """An entry's path in words, in the language in use."""
-    label = tr(_entry_of(vary).label)
-    return tr("tool {axis}", axis=label) if vary.startswith(_TOOL) else f"J{_joint_and_key(vary)[0]} {label}"
-
-
-def entry_unit(vary: str) -> str:
-    """The unit of an entry."""
-    return _entry_of(vary).unit
-
-
-def _entry_of(vary: str) -> Entry:
-    if vary.startswith(_TOOL):
-        return _TOOL_ENTRIES[vary.partition(".")[2]]
-    return _JOINT_ENTRIES[_joint_and_key(vary)[1]]
-
-
-def _joint_and_key(vary: str) -> tuple[int, str]:
-    _, joint, key = vary.split(".")
-    return int(joint), key
+def entry_label(entry: Entry) -> str:
+    """An entry in words, in the language in use."""
+    label = tr(entry.label)
+    return tr("tool {axis}", axis=label) if entry.joint is None else f"J{entry.joint} {label}"

@@ -15,7 +15,7 @@ class Job:
 
     Attributes
     ----------
-    verb : sample, compute, record, report, teach or index
+    verb : sample, compute, record, preview, report, teach or index
     stage, robot : empty where the verb has none
     samples : how many are drawn
     needs : numbers of the jobs that must be done before
@@ -51,8 +51,9 @@ def jobs_of(study: Study) -> list[Job]:
                     add("sample", stage, robot, total * (n + 1) // count - total * n // count) for n in range(count)
                 )
             done = add("compute", stage, robot, needs=parts)
-            add("record", stage, robot, needs=(done,))
-            pages.append(add("report", stage, robot, needs=(done,)))
+            recorded = add("record", stage, robot, needs=(done,))
+            shown = add("preview", stage, robot, needs=(recorded,)) if robot in study.robots else done
+            pages.append(add("report", stage, robot, needs=(shown,)))
         if "teach" in study.pages(robot):
             pages.append(add("teach", "", robot))
     add("index", "", "", needs=tuple(pages))

@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean
 
 from er3a.cost.jobs import Job, jobs_of, wall_time
 from er3a.cost.speed import Speed, sampling_speed
-from er3a.cost.timings import FEW_SAMPLES, Key, Timing, Trial, logged, trial, written_bytes
-from er3a.errors import Er3aError
+from er3a.cost.timings import FEW_SAMPLES, Key, Timing, Trial, logged, timed, trial, written_bytes
 from er3a.study import Study
-
-WORKFLOW_MB = 250.0
-"""What Snakemake itself takes beside the jobs."""
 
 
 @dataclass(frozen=True)
@@ -28,14 +21,14 @@ class Calibration:
     speeds : of sampling, by robot of the study (variants sample as their base does)
     timings : of the jobs that a run has timed; trial : of one robot's jobs, timed now
     result_bytes : size of results and views, by robot
-    start_s : time of the workflow before its first job
+    workflow : what Snakemake takes before the first job, and its memory
     """
 
     speeds: dict[str, Speed]
     timings: dict[Key, Timing]
     trial: Trial
     result_bytes: dict[str, int]
-    start_s: float
+    workflow: Timing
 
 
 @dataclass(frozen=True)
@@ -49,12 +42,12 @@ class Cost:
     memory_mb: float
 
 
-def calibrate(study: Study, study_file: Path, results: Path, reports: Path, logs: Path) -> Calibration:
+def calibrate(study: Study, results: Path, reports: Path, logs: Path) -> Calibration:
     """Measure what :func:`cost` needs: seconds, or as long as one robot's stages take if no run has timed them."""
     jobs = jobs_of(study)
     timings = logged(study, jobs, results, logs)
-    timed, kinds = {key[:2] for key in timings}, {job.key[:2] for job in jobs if job.verb != "sample"}
-    first, whole = next(iter(study.robots)), timed != kinds
+    known, kinds = {key[:2] for key in timings}, {job.key[:2] for job in jobs if job.verb != "sample"}
+    first, whole = next(iter(study.robots)), known != kinds
     tried = trial(study, first, whole)
     done = [name for name in study.robots if ("report", "workspace", name) in timings]
     sizes = {name: written_bytes([results / name, reports / name]) for name in done}
@@ -63,28 +56,23 @@ def calibrate(study: Study, study_file: Path, results: Path, reports: Path, logs
         timings=timings,
         trial=tried,
         result_bytes={first: tried.result_bytes} if whole else sizes,
-        start_s=_workflow_start(study_file),
+        workflow=_workflow(study.file),
     )
 
 
-def _workflow_start(study_file: Path) -> float:
-    words = ["-m", "snakemake", "--configfile", str(study_file), "--dry-run", "--forceall", "--quiet", "all"]
-    start = time.perf_counter()
-    done = subprocess.run([sys.executable, *words], capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise Er3aError("the workflow can't be planned here; run this in the folder of the project")
-    return time.perf_counter() - start
+def _workflow(study_file: Path) -> Timing:
+    return timed(["snakemake", "--configfile", str(study_file), "--dry-run", "--forceall", "--quiet", "all"])
 
 
 def cost(study: Study, calibration: Calibration, cores: int) -> Cost:
     """Wall time and memory of a study on some cores like this machine's."""
     jobs, estimates = jobs_of(study), estimates_of(study, calibration)
     least, expected, greatest = (
-        calibration.start_s + wall_time(jobs, lambda job, end=end: estimates[job].seconds[end], cores)
+        calibration.workflow.seconds + wall_time(jobs, lambda job, end=end: estimates[job].seconds[end], cores)
         for end in range(3)
     )
     largest = sorted((estimates[job].memory_mb for job in jobs), reverse=True)[:cores]
-    return Cost(cores, least, expected, greatest, WORKFLOW_MB + sum(largest))
+    return Cost(cores, least, expected, greatest, calibration.workflow.memory_mb + sum(largest))
 
 
 def disk_bytes(study: Study, calibration: Calibration) -> tuple[int, int]:

@@ -89,24 +89,24 @@ def trial(study: Study, robot: str, whole: bool) -> Trial:
         alone = {"workspace": settings, "robots": {robot: study.robots[robot]}, "sweeps": {}}
         small = study.model_copy(update=alone)
         content = small.model_dump(mode="json", by_alias=True, exclude_none=True)
-        (folder / "study.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
-        part = folder / "1-of-1.npz"
+        file, part = folder / "study.yaml", folder / "1-of-1.npz"
+        file.write_text(yaml.safe_dump(content), encoding="utf-8")
         timings: dict[tuple[str, str], Timing] = {}
         places = {
-            "sample": ["--part", "1-of-1", "--output", part],
-            "compute": ["--results", folder / "results"],
-            "teach": ["--reports", folder / "reports"],
+            "sample": ["--study", file, "--part", "1-of-1", "--output", part],
+            "compute": ["--study", file, "--results", folder / "results"],
+            "preview": ["--reports", folder / "reports"],
+            "teach": ["--study", file, "--reports", folder / "reports"],
         }
 
         def carry_out(verb: str, stage: str, *words: str) -> None:
-            options = places.get(verb, [*places["compute"], *places["teach"]])
-            command = ["er3a", verb, *words, *options, "--study", folder / "study.yaml"]
-            timings[verb, stage] = _timed([str(word) for word in command])
+            options = places.get(verb, [*places["compute"], *places["preview"]])
+            timings[verb, stage] = timed([str(word) for word in ("er3a", verb, *words, *options)])
 
         def carry_out_stage(stage: str) -> None:
             carry_out("compute", stage, stage, robot, *([part] if stage == "workspace" else []))
-            carry_out("record", stage, stage, robot)
-            carry_out("report", stage, stage, robot)
+            for view in ("record", "preview", "report"):
+                carry_out(view, stage, stage, robot)
 
         carry_out("sample", "workspace", robot)
         if whole:
@@ -125,8 +125,8 @@ def written_bytes(folders: list[Path]) -> int:
     return sum(path.stat().st_size for folder in folders for path in folder.rglob("*") if path.is_file())
 
 
-def _timed(command: list[str]) -> Timing:
-    """Run a command of er3a to its end; :class:`Er3aError` with its own words if it fails."""
+def timed(command: list[str]) -> Timing:
+    """Run a module of Python with some arguments to its end; :class:`Er3aError` with its last words if it fails."""
     environment = os.environ | _ONE_THREAD | {"PYTHONHASHSEED": "0"}
     quiet = subprocess.DEVNULL
     start = time.perf_counter()

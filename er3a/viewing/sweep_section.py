@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from er3a.language import N_, tr
 from er3a.results import read_summary
 from er3a.study import Study
-from er3a.sweeps import entry_label, entry_unit
+from er3a.sweeps import ENTRIES, entry_label
 from er3a.viewing.figures import new_figure
 from er3a.viewing.numbers import number
 from er3a.viewing.page import PAGES, Picture, status_word
@@ -55,7 +55,7 @@ def _section(study: Study, name: str, results: Path) -> dict[str, Any]:
     ]
     content, entry = study.table(sweep.robot), study.entry(sweep.robot)
     own = variants[0].replaced(content, entry.tool or content.tool)
-    what, unit = entry_label(sweep.vary), entry_unit(sweep.vary)
+    what, unit = entry_label(ENTRIES[sweep.vary]), ENTRIES[sweep.vary].unit
     ends = {"low": _plain(min(sweep.resolved)), "high": _plain(max(sweep.resolved))}
     title = tr("{robot}: {what} from {low} to {high} {unit}", robot=content.title, what=what, unit=unit, **ends)
     columns, rows = _table(points, what, unit, sweep.stages)

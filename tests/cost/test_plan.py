@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from er3a.cli import app
 from er3a.cost.jobs import Job, jobs_of, wall_time
-from er3a.cost.plan import WORKFLOW_MB, Calibration, cost, disk_bytes, estimates_of
+from er3a.cost.plan import Calibration, cost, disk_bytes, estimates_of
 from er3a.cost.speed import Speed
 from er3a.cost.tables import duration, size
 from er3a.cost.timings import FEW_SAMPLES, Timing, Trial, logged
@@ -43,7 +43,7 @@ def calibration(study):
     timings = dict.fromkeys(kinds, Timing(1.0, 100.0)) | {("sample", "workspace"): Timing(2.0, 50.0)}
     trial = Trial(timings, part_bytes=1000, gather_s=0.0, result_bytes=5000)
     speeds = dict.fromkeys(ROBOTS, Speed(MILLION, 0.9 * MILLION, 1.1 * MILLION))
-    return Calibration(speeds, {}, trial, {"er3a_c60": 5000}, start_s=3.0)
+    return Calibration(speeds, {}, trial, {"er3a_c60": 5000}, Timing(3.0, 250.0))
 
 
 def test_jobs_on_one_core_take_the_sum_and_on_many_the_longest_chain():
@@ -93,8 +93,8 @@ def test_wall_time_has_the_start_and_its_range_the_wander_of_the_speed(study, ca
     assert found.expected_s == pytest.approx(3 + jobs + 3 * 1.0)
     assert found.greatest_s - 3 == pytest.approx(1.1 * (found.expected_s - 3))
     assert found.least_s - 3 == pytest.approx(0.9 * (found.expected_s - 3))
-    assert found.memory_mb == WORKFLOW_MB + 100
-    assert cost(study, calibration, 4).memory_mb == WORKFLOW_MB + 400
+    assert found.memory_mb == 250 + 100
+    assert cost(study, calibration, 4).memory_mb == 250 + 400
     assert cost(study, calibration, 4).expected_s < found.expected_s / 3
 
 

@@ -112,3 +112,8 @@ def of_all(path):
 def viewed(wildcards):
     """Input function: the results that a stage's views show."""
     return [path.format(robot=wildcards.robot) for path in results_of(wildcards.stage)]
+
+
+def preview(wildcards):
+    """Input function: the picture of a stage's recording. Variants, of which there may be hundreds, have none."""
+    return [] if wildcards.robot in STUDY.variants else f"reports/{wildcards.robot}/{wildcards.stage}.webp"

@@ -24,6 +24,8 @@ rule preview:
         "reports/{robot}/{stage}.webp",
     log:
         "logs/{robot}/{stage}.preview.log",
+    benchmark:
+        "logs/{robot}/{stage}.preview.tsv"
     conda:
         "../envs/er3a.yaml"
     params:
@@ -38,7 +40,7 @@ rule report:
     input:
         viewed,
         CATALOGUE,
-        preview="reports/{robot}/{stage}.webp",
+        preview=preview,
     output:
         report(
             "reports/{robot}/{stage}.html",
