@@ -35,5 +35,4 @@ onerror:
 
 
 onsuccess:
-    print(*told("note: "), sep="\n")
-    print("\nOpen reports/index.html in a browser; `make view` opens the recordings.")
+    print(*told("note: "), "\nOpen reports/index.html in a browser; `make view` opens the recordings.", sep="\n")

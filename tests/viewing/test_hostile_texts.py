@@ -78,11 +78,12 @@ def _with_hostile(value):
 @pytest.mark.parametrize("stage", STAGES)
 def test_a_page_shows_hostile_texts_and_does_not_act_on_them(hostile, small_study, stage, tmp_path):
     study, folder = hostile
-    page = tmp_path / "page.html"
+    page, finished = tmp_path / f"{stage}.html", small_study.folder / f"reports/{ROBOT}/{stage}.html"
+    shutil.copy(finished.with_suffix(".webp"), tmp_path)
     import_module(f"er3a.stages.{stage}.report").report(study, ROBOT, folder / "results" / ROBOT / stage, page)
     html = page.read_text(encoding="utf-8")
     found = Tags(html)
-    usual = Tags((small_study.folder / f"reports/{ROBOT}/{stage}.html").read_text(encoding="utf-8"))
+    usual = Tags(finished.read_text(encoding="utf-8"))
     assert found.counts == usual.counts
     assert found.handlers == usual.handlers
     assert all(address.startswith("data:") for address in found.loaded)

@@ -19,6 +19,7 @@ from er3a.viewing.arm import arm_view, log_arm
 from er3a.viewing.numbers import fixed
 from er3a.viewing.palette import HIGHLIGHT, MUTED, REFERENCE, rgb
 from er3a.viewing.recording import ARM, escaped, log_note, note_view, recording
+from er3a.viewing.skeleton import skeleton
 
 STAGE = "workspace"
 _XYZ = ["x_m", "y_m", "z_m"]
@@ -29,7 +30,7 @@ def record(study: Study, name: str, folder: Path, output: Path) -> None:
     """Write the workspace recording of a robot from its results in ``folder``."""
     robot, summary = study.robot(name), read_summary(folder)
     cloud = read_table(folder / "cloud.parquet")
-    points = cloud[_XYZ].to_numpy()
+    points = np.vstack([cloud[_XYZ], skeleton(robot, np.zeros(6))])
     centre, reach = (points.min(axis=0) + points.max(axis=0)) / 2, np.ptp(points, axis=0).max() / 2
 
     def view(title: str, *entities: str) -> rrb.Spatial3DView:
