@@ -2,6 +2,8 @@
 "use strict";
 
 const ON_A4 = { width: 680, height: 460 };
+// All buttons that work offline: one of Plotly's own would send the figure to a server.
+const BUTTONS = [["toImage", "zoom3d", "pan3d", "orbitRotation", "tableRotation", "resetCameraDefault3d"]];
 
 async function unpackPlotly() {
   const packed = await fetch(`data:application/gzip;base64,${document.getElementById("plotly").textContent}`);
@@ -28,7 +30,15 @@ async function unpackPlotly() {
       if (marker) marker.size *= scale;
       if (line) line.width *= scale;
     }
-    const config = { displaylogo: false, responsive: true, plotGlPixelRatio: Math.max(1, devicePixelRatio) };
+    const dictionary = JSON.parse(document.getElementById("turning-words").textContent);
+    const config = {
+      displaylogo: false,
+      responsive: true,
+      plotGlPixelRatio: Math.max(1, devicePixelRatio),
+      modeBarButtons: BUTTONS,
+      locale: "page",
+      locales: { page: { dictionary } },
+    };
     Plotly.newPlot(place, data, layout, config).then(() => performance.mark("turning"));
   };
 

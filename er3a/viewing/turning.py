@@ -4,12 +4,25 @@ from __future__ import annotations
 
 import base64
 import gzip
+import json
 from functools import cache
 from pathlib import Path
 
 import plotly.graph_objects as go
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
+
+from er3a.language import N_, tr
+
+# As Plotly names its buttons.
+WORDS = (
+    N_("Download plot as a PNG"),
+    N_("Zoom"),
+    N_("Pan"),
+    N_("Orbital rotation"),
+    N_("Turntable rotation"),
+    N_("Reset camera to default"),
+)
 
 
 def turning_html(figure: go.Figure) -> Markup:
@@ -20,6 +33,7 @@ def turning_html(figure: go.Figure) -> Markup:
         '<div id="turning"></div>'
         f'<script type="text/plain" id="plotly">{_packed_plotly()}</script>'
         f'<script type="application/json" id="turning-figure">{shown}</script>'
+        f'<script type="application/json" id="turning-words">{json.dumps({word: tr(word) for word in WORDS})}</script>'
         f"<script>{script}</script>"
     )
 

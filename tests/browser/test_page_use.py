@@ -8,6 +8,7 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.expected_conditions import staleness_of
 from selenium.webdriver.support.wait import WebDriverWait
 
+from er3a.viewing.turning import WORDS
 from tests.browser.pages import PAGES, STAGE_PAGES
 
 
@@ -99,3 +100,13 @@ def shown_number(text: str) -> float | None:
         return float(plain.replace("·10", "e"))
     except ValueError:
         return None
+
+
+@pytest.mark.parametrize("page", ["er3_600/workspace.html", "er3_600/trajectory.html"])
+def test_the_3d_figure_offers_nothing_that_needs_the_network(browser, small_study, page):
+    browser.get((small_study.folder / "reports" / page).as_uri())
+    figure = browser.find_element(By.ID, "turning")
+    browser.execute_script("arguments[0].scrollIntoView()", figure)
+    WebDriverWait(browser, PAUSE).until(lambda _: figure.find_elements(By.CSS_SELECTOR, ".modebar-btn"))
+    buttons = figure.find_elements(By.CSS_SELECTOR, ".modebar-btn")
+    assert {button.get_attribute("data-title") for button in buttons} == set(WORDS)
