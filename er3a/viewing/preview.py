@@ -18,6 +18,7 @@ from er3a.viewing.viewer import LOOPBACK, free_port, viewer_running
 
 WINDOW = (1400, 900)  # pixels
 TITLE_BAR = 36
+TIME_BAR = 34  # left out: it fills as loading goes
 QUALITY = 75
 PATIENCE_S = 60
 DRIVER = "a software driver is enough, on Debian `apt install mesa-vulkan-drivers`"
@@ -49,8 +50,9 @@ def _picture(recording: Path) -> bytes:
             except EOFError:
                 raise Er3aError(_why(messages.read_text(errors="replace"))) from None
         image = Image.open(shot).convert("RGB")
+        views = image.crop((0, TITLE_BAR, image.width, image.height - TIME_BAR))
         encoded = io.BytesIO()
-        image.crop((0, TITLE_BAR, *image.size)).save(encoded, "WEBP", quality=QUALITY, method=6)
+        views.save(encoded, "WEBP", quality=QUALITY, method=6)
         return encoded.getvalue()
 
 

@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 from er3a.cli import app
 from er3a.seals import check_seal, seal
 from er3a.study import STAGES
+from er3a.viewing.preview import draw_preview
 from tests.conftest import ROBOTS, ROOT
 from tests.viewing.pictures import joints_seen
 
@@ -98,6 +99,13 @@ def test_the_preview_shows_the_arm_and_the_page_shows_the_preview(small_study, r
     assert len(preview.read_bytes()) < 150_000
     assert joints_seen(preview.read_bytes()) >= 4
     assert 'src="data:image/webp;base64,' in preview.with_suffix(".html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_a_preview_drawn_again_is_the_same_to_the_byte(small_study, stage, vulkan, tmp_path):
+    recording = small_study.folder / f"reports/er3a_c60/{stage}.rrd"
+    assert draw_preview(recording, tmp_path / "again.webp") is None
+    assert (tmp_path / "again.webp").read_bytes() == recording.with_suffix(".webp").read_bytes()
 
 
 @pytest.fixture
