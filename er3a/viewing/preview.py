@@ -21,7 +21,6 @@ TITLE_BAR = 36
 TIME_BAR = 34  # left out: it fills as loading goes
 QUALITY = 75
 PATIENCE_S = 60
-DRIVER = "a software driver is enough, on Debian `apt install mesa-vulkan-drivers`"
 
 
 def draw_preview(recording: Path, output: Path) -> str | None:
@@ -91,4 +90,4 @@ def _shoot(port: int, viewer: subprocess.Popen[bytes], shot: Path) -> None:
 def _why(messages: str) -> str:
     panic = re.search(r"panicked at '(.+?)'\n", messages, flags=re.DOTALL)
     said = panic[1] if panic else (messages.strip().splitlines() or ["without a word"])[-1]
-    return f"the Rerun viewer ended: {said}"
+    return f"the Rerun viewer ended: {said} (docs/recordings.md tells what it needs)"
