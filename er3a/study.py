@@ -179,11 +179,11 @@ class Study(StrictModel):
     inverse: InverseSettings = InverseSettings()
     trajectory: TrajectorySettings
     report: ReportSettings = ReportSettings()
-    _file: Path = PrivateAttr()
+    _file: Path | None = PrivateAttr(default=None)
 
     @property
-    def file(self) -> Path:
-        """The file that the study was read from."""
+    def file(self) -> Path | None:
+        """The file that the study was read from; None if it was made in Python."""
         return self._file
 
     @model_validator(mode="after")

@@ -75,7 +75,7 @@ def render(
     output: Path,
     summary: dict[str, Any] | None = None,
     *,
-    command: str,
+    command: str | None,
     provenance: dict[str, Any] | None = None,
     **context: Any,
 ) -> None:
@@ -85,7 +85,7 @@ def render(
     ----------
     template : a Jinja file that extends ``base.html.j2``
     summary : the stage's summary; its verdict, figures and provenance frame the page
-    command : the command that makes the page again
+    command : the command that makes the page again, if there is one
     provenance : of pages without a summary, in the shape that a summary has
     context : what the template needs besides
     """
@@ -124,8 +124,15 @@ def sentence(finding: str) -> str:
     return text[:1].upper() + text[1:] if language.current() == "en" else text
 
 
-def run_command(study: Study, page: str) -> str:
-    """The command that makes a page of a study again, results included; ``page`` is its path below the reports."""
+def run_command(study: Study, page: str) -> str | None:
+    """The command that makes a page of a study again, results included; None for a study that no file holds.
+
+    Parameters
+    ----------
+    page : its path below the reports
+    """
+    if study.file is None:
+        return None
     return shlex.join(["make", "run", f"STUDY={os.path.relpath(study.file)}", f"ARGS=reports/{page}"])
 
 

@@ -431,5 +431,5 @@ def test_page_and_recording_show_every_target(folders, tmp_path):
     shown = subprocess.run(
         [rerun, "rrd", "print", tmp_path / "inverse.rrd"], capture_output=True, text=True, check=True
     )
-    for entity in ("/arm/link_1", "/targets/article_target/branch_7", "/targets/many_ways/frame", "/about_target"):
+    for entity in ("/arm/link_1", "/inverse/targets/article_target/branch_7", "/inverse/targets/many_ways/frame"):
         assert entity in shown.stdout
