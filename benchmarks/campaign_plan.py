@@ -52,7 +52,7 @@ def run_from_nothing(samples: int) -> tuple[float, float]:
             peak = max(peak, sum(each.memory_info().rss for each in [process, *process.children(recursive=True)]))
         time.sleep(0.2)
     if process.returncode:
-        raise SystemExit(f"the study with {samples:.0e} samples does not run")
+        raise SystemExit(f"the study with {samples:,} samples does not run")
     return time.perf_counter() - start, peak / 1e6
 
 
@@ -86,7 +86,7 @@ def _page(
         f"while {os.getloadavg()[2]:.1f} processes wanted the {os.cpu_count()} processors.",
         "",
         f"*Trial*: no run was there to learn from, the calibration took {took:.0f} s. *Run*: the timings of the run "
-        f"with {SAMPLES[0]:.0e} samples were there. One core samples {speed.mean / 1e6:.0f} million a second "
+        f"with {_power(SAMPLES[0])} samples were there. One core samples {speed.mean / 1e6:.0f} million a second "
         f"({speed.least / 1e6:.0f} to {speed.greatest / 1e6:.0f}).",
         "",
         "| samples | predicted by trial | off by | predicted by run | off by | measured | memory, at most | measured |",
@@ -98,7 +98,7 @@ def _page(
         off = [f"{found.expected_s / seconds - 1:+.0%}" for found in (first, second)]
         after = (duration(second.expected_s), off[1]) if samples != SAMPLES[0] else ("", "")
         cells = (
-            f"{samples:.0e}",
+            _power(samples),
             duration(first.expected_s),
             off[0],
             *after,
@@ -119,5 +119,9 @@ def _page(
     for samples in SAMPLES:
         found = [cost(study_of(samples), by_run, cores) for cores in MORE_CORES]
         ranges = (f"{duration(each.least_s)} to {duration(each.greatest_s)}" for each in found)
-        lines.append(f"| {samples:.0e} | {' | '.join(ranges)} |")
+        lines.append(f"| {_power(samples)} | {' | '.join(ranges)} |")
     return "\n".join(lines) + "\n"
+
+
+def _power(samples: int) -> str:
+    return f"10^{len(str(samples)) - 1}"

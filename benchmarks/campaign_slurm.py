@@ -86,7 +86,7 @@ def table(block: int = BLOCK) -> str:
     inside = sum(end - begin for begin, end in spans)
     held = CORES * (max(end for _, end in spans) - min(begin for begin, _ in spans))
     lines = [
-        f"{BLOCKS} blocks of {block:.0e} samples, one Slurm job each, on {CORES} cores. While this was measured, "
+        f"{BLOCKS} blocks of {block:,} samples, one Slurm job each, on {CORES} cores. While this was measured, "
         f"{os.getloadavg()[1]:.1f} processes wanted the {os.cpu_count()} processors.",
         "",
         "| | core time (s) | beyond the work |",

@@ -30,8 +30,8 @@ class Speed:
 def sampling_speed(study: Study, robot: str) -> Speed:
     """Speed of a robot's sampling at the study's settings, measured in as many processes as there are cores.
 
-    It is the slope between a small and a larger number of samples: what a job takes before its first sample counts
-    with the job.
+    It is the slope from few samples, timed at their best, to many: what a job takes before its first sample counts with
+    the job.
     """
     cores = os.cpu_count() or 1
     with ProcessPoolExecutor(cores, mp_context=multiprocessing.get_context("spawn")) as pool:
@@ -49,4 +49,5 @@ def _speeds(study: Study, name: str) -> list[float]:
         return time.perf_counter() - start
 
     seconds(1 << 16)
-    return [(MANY_SAMPLES - FEW_SAMPLES) / (seconds(MANY_SAMPLES) - seconds(FEW_SAMPLES)) for _ in range(ROUNDS)]
+    begin = min(seconds(FEW_SAMPLES) for _ in range(ROUNDS))
+    return [(MANY_SAMPLES - FEW_SAMPLES) / (seconds(MANY_SAMPLES) - begin) for _ in range(ROUNDS)]
