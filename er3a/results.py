@@ -138,7 +138,7 @@ def write_summary(
         **stage_keys,
         "provenance": {
             "inputs": input_records(study.inputs(robot, stage)),
-            "config": study.settings(robot, stage),
+            "config": study.computed_from(robot, stage),
             "seed": study.seed,
             "code": code_digest(f"er3a.stages.{stage}.compute"),
         },

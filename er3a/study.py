@@ -273,8 +273,13 @@ class Study(StrictModel):
                 files.append(scene)
         return files
 
+    def computed_from(self, name: str, stage: str) -> dict[str, Any]:
+        """The resolved parts of the study that a stage's results depend on; plain data."""
+        more = self.settings(name, "capability") if stage == "workspace" else {}
+        return more | self.settings(name, stage)
+
     def settings(self, name: str, stage: str) -> dict[str, Any]:
-        """The resolved part of the study that a stage's numbers depend on; plain data."""
+        """The resolved part of the study that a stage's numbers depend on, or one that is no stage's; plain data."""
         entry = self.entry(name).model_dump(exclude={"targets", "paths", "file", "scene"}, exclude_none=True)
         if variant := self.variants.get(name):
             entry["varied"] = {variant.vary: variant.value}

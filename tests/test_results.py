@@ -81,7 +81,7 @@ def test_shape_of_a_summary(tmp_path, study):
                 ("data/manual_refs/er3_600/envelope.csv", {"official": 9}),
             )
         ],
-        "config": study.settings("er3_600", "workspace"),
+        "config": study.settings("er3_600", "capability") | study.settings("er3_600", "workspace"),
         "seed": study.seed,
         "code": code_digest("er3a.stages.workspace.compute"),
     }
