@@ -189,12 +189,18 @@ def differing_file(path: Path) -> list[str]:
     return _differing(loaders[kind](path), node, "")
 
 
+def _given(model: BaseModel) -> dict[str, object]:
+    """The values of a model that were written, by the keys that people write."""
+    fields = type(model).model_fields
+    return {fields[name].alias or name: getattr(model, name) for name in model.model_fields_set}
+
+
 def _differing(value: object, node: yaml.Node, where: str) -> list[str]:
     if isinstance(value, BaseModel | dict):
         if not isinstance(node, yaml.MappingNode):
             return [f"{where}: a group from {node.value!r:.80}"]
         names = [key.value for key, _ in node.value]
-        members = value if isinstance(value, dict) else {name: getattr(value, name) for name in value.model_fields_set}
+        members = value if isinstance(value, dict) else _given(value)
         if sorted(names) != sorted(members):
             return [f"{where}: keys {sorted(names)} read as {sorted(members)}"]
         return [

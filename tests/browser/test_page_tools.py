@@ -8,6 +8,8 @@ import io
 import pytest
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.expected_conditions import staleness_of
+from selenium.webdriver.support.wait import WebDriverWait
 
 from er3a.viewing.figures import new_figure
 from er3a.viewing.page import Picture, render
@@ -70,7 +72,7 @@ def test_figure_is_enlarged_and_closed_by_keyboard(page):
         > page.find_element(By.CSS_SELECTOR, "figure img").size["height"]
     )
     page.switch_to.active_element.send_keys(Keys.ESCAPE)
-    assert page.find_elements(By.CSS_SELECTOR, "dialog") == []
+    WebDriverWait(page, 5).until(staleness_of(dialog))
 
 
 def test_figure_is_offered_for_download(page):
