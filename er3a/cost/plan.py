@@ -5,11 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean
+from tempfile import TemporaryDirectory
 
 from er3a.cost.jobs import Job, jobs_of, wall_time
 from er3a.cost.speed import Speed, sampling_speed
 from er3a.cost.timings import FEW_SAMPLES, Key, Timing, Trial, logged, timed, trial, written_bytes
 from er3a.study import Study
+
+IDLE_JOBS = 12
+_IDLE_WORKFLOW = f"""
+rule all:
+    input: expand("{{n}}", n=range({IDLE_JOBS}))
+rule idle:
+    output: "{{n}}"
+    shell: "touch {{output}}"
+"""
 
 
 @dataclass(frozen=True)
@@ -22,6 +32,7 @@ class Calibration:
     timings : of the jobs that a run has timed; trial : of one robot's jobs, timed now
     result_bytes : size of results and views, by robot
     workflow : what Snakemake takes before the first job, and its memory
+    handling_s : what Snakemake adds to each job
     """
 
     speeds: dict[str, Speed]
@@ -29,6 +40,7 @@ class Calibration:
     trial: Trial
     result_bytes: dict[str, int]
     workflow: Timing
+    handling_s: float
 
 
 @dataclass(frozen=True)
@@ -57,6 +69,7 @@ def calibrate(study: Study, results: Path, reports: Path, logs: Path) -> Calibra
         trial=tried,
         result_bytes={first: tried.result_bytes} if whole else sizes,
         workflow=_workflow(study.file),
+        handling_s=_handling(),
     )
 
 
@@ -64,11 +77,21 @@ def _workflow(study_file: Path) -> Timing:
     return timed(["snakemake", "--configfile", str(study_file), "--dry-run", "--forceall", "--quiet", "all"])
 
 
+def _handling() -> float:
+    """Time (s) that Snakemake takes for a job that does nothing."""
+    with TemporaryDirectory() as folder:
+        (Path(folder) / "Snakefile").write_text(_IDLE_WORKFLOW, encoding="utf-8")
+        words = ["snakemake", "--directory", folder, "--snakefile", f"{folder}/Snakefile", "--quiet", "all"]
+        planned = timed([*words, "--dry-run"]).seconds
+        return (timed([*words, "--cores", "1", "--scheduler", "greedy"]).seconds - planned) / IDLE_JOBS
+
+
 def cost(study: Study, calibration: Calibration, cores: int) -> Cost:
     """Wall time and memory of a study on some cores like this machine's."""
     jobs, estimates = jobs_of(study), estimates_of(study, calibration)
     least, expected, greatest = (
-        calibration.workflow.seconds + wall_time(jobs, lambda job, end=end: estimates[job].seconds[end], cores)
+        calibration.workflow.seconds
+        + wall_time(jobs, lambda job, end=end: estimates[job].seconds[end] + calibration.handling_s, cores)
         for end in range(3)
     )
     largest = sorted((estimates[job].memory_mb for job in jobs), reverse=True)[:cores]

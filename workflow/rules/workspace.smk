@@ -12,6 +12,7 @@ rule sample_workspace:
         "logs/{robot}/workspace.sample.{scatteritem}.log",
     benchmark:
         "logs/{robot}/workspace.sample.{scatteritem}.tsv"
+    priority: 2  # what takes longest starts first
     conda:
         "../envs/er3a.yaml"
     params:
@@ -34,6 +35,7 @@ rule compute_workspace:
         "logs/{robot}/workspace.compute.log",
     benchmark:
         "logs/{robot}/workspace.compute.tsv"
+    priority: 1
     conda:
         "../envs/er3a.yaml"
     params:
