@@ -17,11 +17,9 @@ from er3a.collision.clearance import clearance
 from er3a.collision.scene import load_scene
 from er3a.errors import InputError, ResultError
 from er3a.kinematics.forward import forward
-from er3a.kinematics.inverse import Solutions, inverse
-from er3a.kinematics.selection import limit_margin, nearest
+from er3a.kinematics.inverse import inverse
 from er3a.results import read_summary, read_table
 from er3a.robots.load import ROBOTS, load_robot
-from er3a.stages.inverse.advice import neighbours, solvable
 from er3a.stages.inverse.compute import compute
 from er3a.stages.inverse.record import record
 from er3a.stages.inverse.report import report
@@ -220,78 +218,6 @@ def test_results_are_the_same_bytes_in_another_process(tmp_path, monkeypatch):
     for file in ("summary.json", "solutions.parquet"):
         there = tmp_path / "there" / "er3a_c60" / "inverse" / file
         assert there.read_bytes() == (tmp_path / "here" / file).read_bytes()
-
-
-def solutions_of(q, within, branch) -> Solutions:
-    q = np.array(q, dtype=float)
-    reason = tuple("" if ok else "J1 beyond" for ok in within)
-    label = tuple(f"branch {number}" for number in branch)
-    return Solutions(q, np.array(within), np.array(branch), np.zeros((len(q), 6), int), reason, (), label=label)
-
-
-def test_nearest_breaks_ties_by_all_joints_then_branch():
-    robot = load_robot("er3_600")
-    rows = [[1, 0.5, 0, 0, 0, 0], [1, 0, 0, 0, 0, 0], [-1, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0]]
-    choice = nearest(robot, solutions_of(rows, [True, True, True, False], [0, 5, 4, 1]), np.zeros(6))
-    assert choice.order.tolist() == [2, 1, 0]
-    assert "just as near" in choice.reason
-    choice = nearest(robot, solutions_of(rows[:2], [True, True], [0, 1]), np.zeros(6))
-    assert choice.chosen == 1
-    assert "taken together" in choice.reason
-
-
-def test_nearest_of_none_and_of_one():
-    robot = load_robot("er3_600")
-    choice = nearest(robot, solutions_of([[9, 0, 0, 0, 0, 0]], [False], [3]), np.zeros(6))
-    assert choice.chosen is None
-    assert "the only solution leaves them" in choice.reason
-    choice = nearest(robot, solutions_of([[1, 0, 0, 0, 0, 0]], [True], [3]), np.zeros(6))
-    assert (choice.chosen, choice.runner_up) == (0, None)
-    assert choice.reason == "greatest joint move 57.3 deg (J1); the only solution within the limits"
-
-
-def test_nearest_counts_turns_from_the_reference(robot):
-    q_ref = np.radians([0, 0, 0, 0, 0, 300])
-    T = forward(robot, np.radians([10, 20, 10, 30, 40, -50]))
-    solutions = inverse(robot, T, q_ref)
-    chosen = solutions.q[nearest(robot, solutions, q_ref).chosen]
-    assert np.degrees(chosen[5]) == pytest.approx(310)
-
-
-def test_limit_margin_is_negative_outside():
-    robot = load_robot("er3_600")
-    np.testing.assert_allclose(np.degrees(limit_margin(robot, np.zeros((2, 6)))), [65, 65])
-    assert np.degrees(limit_margin(robot, np.radians([0, 95, 0, 0, 0, 0]))) == pytest.approx(-10)
-
-
-def test_neighbours_find_the_way_back_into_reach(random):
-    robot = load_robot("er3_600")
-    outward = forward(robot, np.radians([0, -80, 80, 0, 0, 0]))  # arm nearly stretched out forwards
-    T = outward.copy()
-    T[0, 3] += 0.1
-    near = neighbours(robot, T, random)
-    assert not solvable(robot, T[None])[0]
-    assert 0.05 < near.least_shift <= 0.1 + 2e-3
-    moved = T.copy()
-    moved[:3, 3] = near.shifted_to
-    assert solvable(robot, moved[None])[0]
-
-
-def test_neighbours_find_the_way_from_far_off(random):
-    robot = load_robot("er3_600")
-    T = forward(robot, np.zeros(6))
-    T[1, 3] = 90.0
-    assert neighbours(robot, T, random).least_shift == pytest.approx(90, abs=0.7)
-
-
-def test_neighbours_find_an_orientation(random):
-    robot = load_robot("er3_600")
-    T = forward(robot, np.radians([0, -20, 20, 0, 0, 0]))
-    T[:3, :3] = Rotation.from_euler("y", -140, degrees=True).as_matrix() @ T[:3, :3]
-    near = neighbours(robot, T, random)
-    assert not solvable(robot, T[None])[0]
-    assert 0 < near.least_turn < np.pi / 2
-    assert 0 < near.orientation_share < 1
 
 
 def test_all_targets_solved_is_a_pass_and_none_a_fail(tmp_path):

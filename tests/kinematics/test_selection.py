@@ -1,0 +1,53 @@
+"""Which of several solutions is nearest, and how far it stays from the limits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from er3a.kinematics.forward import forward
+from er3a.kinematics.inverse import Solutions, inverse
+from er3a.kinematics.selection import limit_margin, nearest
+from er3a.robots.load import load_robot
+
+
+def solutions_of(q, within, branch) -> Solutions:
+    q = np.array(q, dtype=float)
+    reason = tuple("" if ok else "J1 beyond" for ok in within)
+    label = tuple(f"branch {number}" for number in branch)
+    return Solutions(q, np.array(within), np.array(branch), np.zeros((len(q), 6), int), reason, (), label=label)
+
+
+def test_nearest_breaks_ties_by_all_joints_then_branch():
+    robot = load_robot("er3_600")
+    rows = [[1, 0.5, 0, 0, 0, 0], [1, 0, 0, 0, 0, 0], [-1, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0]]
+    choice = nearest(robot, solutions_of(rows, [True, True, True, False], [0, 5, 4, 1]), np.zeros(6))
+    assert choice.order.tolist() == [2, 1, 0]
+    assert "just as near" in choice.reason
+    choice = nearest(robot, solutions_of(rows[:2], [True, True], [0, 1]), np.zeros(6))
+    assert choice.chosen == 1
+    assert "taken together" in choice.reason
+
+
+def test_nearest_of_none_and_of_one():
+    robot = load_robot("er3_600")
+    choice = nearest(robot, solutions_of([[9, 0, 0, 0, 0, 0]], [False], [3]), np.zeros(6))
+    assert choice.chosen is None
+    assert "the only solution leaves them" in choice.reason
+    choice = nearest(robot, solutions_of([[1, 0, 0, 0, 0, 0]], [True], [3]), np.zeros(6))
+    assert (choice.chosen, choice.runner_up) == (0, None)
+    assert choice.reason == "greatest joint move 57.3 deg (J1); the only solution within the limits"
+
+
+def test_nearest_counts_turns_from_the_reference(robot):
+    q_ref = np.radians([0, 0, 0, 0, 0, 300])
+    T = forward(robot, np.radians([10, 20, 10, 30, 40, -50]))
+    solutions = inverse(robot, T, q_ref)
+    chosen = solutions.q[nearest(robot, solutions, q_ref).chosen]
+    assert np.degrees(chosen[5]) == pytest.approx(310)
+
+
+def test_limit_margin_is_negative_outside():
+    robot = load_robot("er3_600")
+    np.testing.assert_allclose(np.degrees(limit_margin(robot, np.zeros((2, 6)))), [65, 65])
+    assert np.degrees(limit_margin(robot, np.radians([0, 95, 0, 0, 0, 0]))) == pytest.approx(-10)
