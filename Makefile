@@ -45,12 +45,12 @@ format: $(VENV)/dev.stamp  ## format Python and Snakemake code
 schema: $(VENV)/run.stamp  ## write the JSON schemas again from the pydantic models
 	$(BIN)/er3a schema
 
-words: $(VENV)/dev.stamp  ## collect the texts to be translated into er3a/locale/
-	$(BIN)/pybabel -q extract -F er3a/locale/babel.cfg -k said -k tr -k N_ --add-location=file --sort-by-file \
-		--omit-header --no-wrap -o er3a/locale/er3a.pot .
-	$(BIN)/pybabel -q update -D er3a -i er3a/locale/er3a.pot -d er3a/locale -l zh --no-fuzzy-matching --no-wrap \
+words: $(VENV)/dev.stamp  ## collect the texts to be translated into er3a/pipeline/messages/locale/
+	$(BIN)/pybabel -q extract -F er3a/pipeline/messages/locale/babel.cfg -k said -k tr -k N_ --add-location=file --sort-by-file \
+		--omit-header --no-wrap -o er3a/pipeline/messages/locale/er3a.pot .
+	$(BIN)/pybabel -q update -D er3a -i er3a/pipeline/messages/locale/er3a.pot -d er3a/pipeline/messages/locale -l zh --no-fuzzy-matching --no-wrap \
 		--ignore-obsolete --ignore-pot-creation-date
-	rm er3a/locale/er3a.pot
+	rm er3a/pipeline/messages/locale/er3a.pot
 
 campaigns: $(VENV)/dev.stamp  ## full-size evidence: writes the tables in docs/evidence/ again
 	$(BIN)/python benchmarks/campaigns.py $(ARGS)

@@ -7,7 +7,7 @@ import numpy as np
 from er3a import forward, load_robot
 from er3a.collision.along import clearance_along
 from er3a.collision.bodies import Bodies
-from er3a.collision.scene import SceneFile
+from er3a.files.scene_file import SceneFile
 from er3a.planning.moves import JointMove
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")

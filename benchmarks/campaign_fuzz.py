@@ -26,19 +26,19 @@ from mutants import mutant
 from pydantic import BaseModel
 from scipy.spatial.transform import Rotation
 
-from er3a.check import check_file
-from er3a.collision.scene import load_scene
 from er3a.errors import InputError
-from er3a.identification.measurements import load_measurements
-from er3a.inputs.yaml_file import load
+from er3a.files.measurements import load_measurements
+from er3a.files.path_file import load_paths
+from er3a.files.path_table import PathTable, read_path_table
+from er3a.files.reference_sets import check_reference_file
+from er3a.files.robot_file import RobotFile
+from er3a.files.robot_library import load_robot
+from er3a.files.scene_file import load_scene
+from er3a.files.target_file import load_targets
+from er3a.files.yaml_file import load
 from er3a.kinematics.forward import forward
-from er3a.planning.path_file import load_paths
-from er3a.planning.path_table import PathTable, read_path_table
-from er3a.references.load import check_reference_file
-from er3a.robots.load import load_robot
-from er3a.robots.schema import RobotFile
-from er3a.study import load_study
-from er3a.targets import load_targets
+from er3a.pipeline.check import check_file
+from er3a.pipeline.study import load_study
 
 ROOT = Path(__file__).resolve().parents[1]
 SEED, MUTANTS = 20261120, 6000

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio
 
 from er3a import forward, jacobian, load_robot
-from er3a.kinematics.transforms import rotation_angle
+from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.wrist_partitioned import solve_slots
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")

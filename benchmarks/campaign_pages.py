@@ -8,7 +8,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from er3a.study import STAGES, load_study
+from er3a.pipeline.study import STAGES, load_study
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from tests.browser import chromium

@@ -13,13 +13,13 @@ import numpy as np
 import roboticstoolbox as rtb
 
 from er3a import load_robot
+from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
-from er3a.kinematics.transforms import transform
+from er3a.planning.avoidance.singular_segment import clear, trouble_of
+from er3a.planning.avoidance.strategies import WAYS, best, compare
 from er3a.planning.follow import follow
 from er3a.planning.moves import line
-from er3a.planning.repairs.compare import WAYS, best, compare
-from er3a.planning.repairs.trouble import clear, trouble_of
 from er3a.planning.singular_events import singular_events
 from er3a.planning.timing import joint_limits
 

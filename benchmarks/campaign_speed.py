@@ -25,9 +25,9 @@ from campaign_kinematics import pinocchio_model
 from eaik.IK_DH import DhRobot
 
 from er3a import forward, inverse_batch, jacobian, load_robot, solve
+from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.batch import BatchSolutions
 from er3a.kinematics.chain import constant_links
-from er3a.kinematics.transforms import rotation_angle
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 POSES, FORWARD_POSES, NUMERICAL_POSES, PEER_POSES, SEED, ROUNDS = 100_000, 1_000_000, 10_000, 5_000, 20261120, 7

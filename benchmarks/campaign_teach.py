@@ -13,9 +13,9 @@ import psutil
 
 from er3a import forward, inverse, load_robot
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
-from er3a.kinematics.turns import principal
-from er3a.study import load_study
-from er3a.teach.page import panel_data, write_teach_page
+from er3a.pipeline.study import load_study
+from er3a.pipeline.teach.panel import panel_data, write_teach_page
+from er3a.robots.joint_limits import principal
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from tests.browser import chromium

@@ -14,11 +14,11 @@ import numpy as np
 import roboticstoolbox as rtb
 
 from er3a import forward, load_robot
-from er3a.kinematics.jit import kernel
-from er3a.stages.workspace.grid import make_grid
-from er3a.stages.workspace.random_joints import Draw
-from er3a.stages.workspace.tally import tally_blocks
-from er3a.workspace.arcs import TURN
+from er3a.numerics.jit import kernel
+from er3a.sampling.grid import make_grid
+from er3a.sampling.random_joints import Draw
+from er3a.sampling.tally import tally_blocks
+from er3a.workspace.azimuths import TURN
 from er3a.workspace.general import prove_general
 from er3a.workspace.general_arm import general_arm
 from er3a.workspace.lookup import SectionMap

@@ -6,7 +6,7 @@ The names below are imported on first use, so that one part of the package does 
 from importlib import import_module
 
 _PUBLIC = {
-    "load_robot": "er3a.robots.load",
+    "load_robot": "er3a.files.robot_library",
     "Robot": "er3a.robots.robot",
     "forward": "er3a.kinematics.forward",
     "jacobian": "er3a.kinematics.forward",
@@ -15,16 +15,16 @@ _PUBLIC = {
     "solve": "er3a.kinematics.numerical",
     "select": "er3a.selection.select",
     "select_sequence": "er3a.selection.sequence",
-    "load_scene": "er3a.collision.scene",
-    "load_targets": "er3a.targets",
+    "load_scene": "er3a.files.scene_file",
+    "load_targets": "er3a.files.target_file",
     "diagnose": "er3a.diagnosis.diagnose",
-    "identify": "er3a.identification.identify",
-    "load_measurements": "er3a.identification.measurements",
-    "load_references": "er3a.references.load",
+    "identify": "er3a.calibration.calibrate",
+    "load_measurements": "er3a.files.measurements",
+    "load_references": "er3a.files.reference_sets",
     "to_modified": "er3a.robots.conventions",
     "to_standard": "er3a.robots.conventions",
-    "import_urdf": "er3a.robots.urdf",
-    "export_urdf": "er3a.robots.urdf",
+    "import_urdf": "er3a.formats.urdf",
+    "export_urdf": "er3a.formats.urdf",
     "Er3aError": "er3a.errors",
 }
 

@@ -1,5 +1,5 @@
 """`python -m er3a`."""
 
-from er3a.cli import main
+from er3a.pipeline.cli import main
 
 main()

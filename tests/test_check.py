@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from er3a.check import SCHEMAS, check_file, check_study
 from er3a.errors import InputError
+from er3a.pipeline.check import SCHEMAS, check_file, check_study
 
 ROOT = Path(__file__).resolve().parents[1]
 INPUTS = sorted(

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from er3a.cli import main
+from er3a.pipeline.cli import main
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -64,7 +64,7 @@ def test_a_machine_at_its_limits_is_one_line_and_exit_code_2(monkeypatch, capsys
     def fail(**_):
         raise fault
 
-    monkeypatch.setattr("er3a.cli.app", fail)
+    monkeypatch.setattr("er3a.pipeline.cli.app", fail)
     with pytest.raises(SystemExit) as caught:
         main()
     error = capsys.readouterr().err

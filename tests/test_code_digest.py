@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import er3a
-from er3a.code_digest import code_digest
+from er3a.pipeline.code_digest import code_digest
 
 PACKAGE = Path(er3a.__file__).parent
 
@@ -45,22 +45,26 @@ class Copy:
         return done.stdout.strip()
 
     def digests(self, *modules: str) -> list[str]:
-        code = f"from er3a.code_digest import code_digest\nfor name in {modules}: print(code_digest('er3a.' + name))"
+        head = "from er3a.pipeline.code_digest import code_digest\n"
+        code = head + f"for name in {modules}: print(code_digest('er3a.' + name))"
         return self.run(code).split()
 
 
 def package_with_a_stage(folder: Path) -> Copy:
     """A copy with a stage of its own: compute uses the forward kinematics, the report the page."""
     copy = Copy(folder)
-    copy.write("stages/made/compute.py", "from er3a.kinematics.forward import forward\n")
-    copy.write("stages/made/report.py", "from er3a.viewing.page import Picture\nimport er3a.stages.made.parts\n")
-    copy.write("stages/made/parts.py", "from er3a.kinematics import chain\n")
-    copy.write("stages/made/report.html.j2", "a template")
-    copy.write("stages/made/script.js", "a script")
+    copy.write("pipeline/stages/made/compute.py", "from er3a.kinematics.forward import forward\n")
+    copy.write(
+        "pipeline/stages/made/report.py",
+        "from er3a.pipeline.viewing.page import Picture\nimport er3a.pipeline.stages.made.parts\n",
+    )
+    copy.write("pipeline/stages/made/parts.py", "from er3a.kinematics import chain\n")
+    copy.write("pipeline/stages/made/report.html.j2", "a template")
+    copy.write("pipeline/stages/made/script.js", "a script")
     return copy
 
 
-MADE = ("stages.made.compute", "stages.made.report")
+MADE = ("pipeline.stages.made.compute", "pipeline.stages.made.report")
 
 
 @pytest.fixture
@@ -77,20 +81,20 @@ def before(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
 @pytest.mark.parametrize(
     ("path", "changes_compute", "changes_report"),
     [
-        ("stages/made/compute.py", True, False),
+        ("pipeline/stages/made/compute.py", True, False),
         ("kinematics/forward.py", True, False),
-        ("kinematics/jit.py", True, True),
+        ("numerics/jit.py", True, True),
         ("robots/robot.py", True, True),
         ("kinematics/chain.py", True, True),
-        ("stages/made/parts.py", False, True),
-        ("stages/made/report.html.j2", False, True),
-        ("viewing/base.html.j2", False, True),
-        ("viewing/style.css", False, True),
-        ("stages/made/script.js", False, True),
+        ("pipeline/stages/made/parts.py", False, True),
+        ("pipeline/stages/made/report.html.j2", False, True),
+        ("pipeline/viewing/base.html.j2", False, True),
+        ("pipeline/viewing/style.css", False, True),
+        ("pipeline/stages/made/script.js", False, True),
         ("kinematics/inverse.py", False, False),
-        ("stages/workspace/report.html.j2", False, False),
-        ("stages/workspace/compute.py", False, False),
-        ("cli.py", False, False),
+        ("pipeline/stages/workspace/report.html.j2", False, False),
+        ("pipeline/stages/workspace/compute.py", False, False),
+        ("pipeline/cli.py", False, False),
         ("kinematics/__init__.py", False, False),
     ],
 )
@@ -102,34 +106,34 @@ def test_digest_changes_with_what_is_used(package, before, path, changes_compute
 
 
 def test_digest_is_that_of_the_content_not_of_the_place(package):
-    assert package.digests("kinematics.forward", "study") == [
+    assert package.digests("kinematics.forward", "pipeline.study") == [
         code_digest("er3a.kinematics.forward"),
-        code_digest("er3a.study"),
+        code_digest("er3a.pipeline.study"),
     ]
 
 
 def test_a_new_template_changes_the_report_only(package, before):
-    package.write("stages/made/extra.html.j2", "more")
+    package.write("pipeline/stages/made/extra.html.j2", "more")
     after = package.digests(*MADE)
     assert before[0] == after[0]
     assert before[1] != after[1]
 
 
 def test_moving_code_to_another_module_changes_the_digest(package, before):
-    package.write("stages/made/parts.py", "from er3a.stages.made import more\n")
-    package.write("stages/made/more.py", "from er3a.kinematics import chain\n")
+    package.write("pipeline/stages/made/parts.py", "from er3a.pipeline.stages.made import more\n")
+    package.write("pipeline/stages/made/more.py", "from er3a.kinematics import chain\n")
     assert package.digests(*MADE)[1] != before[1]
 
 
 def test_circular_imports_end(package):
-    package.write("stages/made/more.py", "from er3a.stages.made import compute\n")
-    package.write("stages/made/compute.py", "from er3a.stages.made import more\n")
-    assert len(package.digests("stages.made.compute")[0]) == 64
+    package.write("pipeline/stages/made/more.py", "from er3a.pipeline.stages.made import compute\n")
+    package.write("pipeline/stages/made/compute.py", "from er3a.pipeline.stages.made import more\n")
+    assert len(package.digests("pipeline.stages.made.compute")[0]) == 64
 
 
 def test_unknown_module_is_refused():
-    with pytest.raises(ModuleNotFoundError, match=r"er3a has no module 'er3a\.stages\.typo\.compute'"):
-        code_digest("er3a.stages.typo.compute")
+    with pytest.raises(ModuleNotFoundError, match=r"er3a has no module 'er3a\.pipeline\.stages\.typo\.compute'"):
+        code_digest("er3a.pipeline.stages.typo.compute")
 
 
 @pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.py")), ids=lambda path: str(path.relative_to(PACKAGE)))
@@ -149,23 +153,24 @@ def test_every_import_is_one_that_the_digest_follows(path):
                 assert file.is_file(), f"line {node.lineno}: {name} is no module"
 
 
-def test_cache_folder_changes_with_a_kernel_s_source(package):
-    folders = package.run(
-        "from er3a.kinematics import jit\n"
-        "import numba\n"
-        "print(numba.config.CACHE_DIR)\n"
-        "for name in ('study.py', 'kinematics/forward.py'):\n"
-        "    with open('er3a/' + name, 'a') as file: file.write('# changed')\n"
-        "    print(jit._cache_folder())\n"
-    ).split()
-    assert Path(folders[0]).is_relative_to(package.folder / "cache" / "er3a")
-    assert folders[1] == folders[0]
-    assert folders[2] != folders[0]
+def test_a_kernel_s_folder_changes_with_what_it_may_call_and_with_nothing_else(package):
+    folders = "from er3a.numerics import jit; from pathlib import Path; "
+    folders += "print(*(jit._kernels_digest(Path(f'er3a/kinematics/{name}.py').resolve()) for name in names))"
+    names = "names = ('forward', 'closed_form'); "
+    first = package.run(names + folders).split()
+    package.append("pipeline/study.py")
+    assert package.run(names + folders).split() == first
+    package.append("kinematics/forward.py")
+    changed = package.run(names + folders).split()
+    assert changed[0] != first[0]
+    assert changed[1] == first[1]
+    package.append("geometry/vectors.py")
+    assert package.run(names + folders).split()[1] != changed[1]
 
 
 def test_an_edited_kernel_reaches_the_kernels_that_call_it(package):
     """numba alone would go on with the old machine code of the caller."""
-    head = "from er3a.kinematics.jit import kernel\n"
+    head = "from er3a.numerics.jit import kernel\n"
     inner = "@kernel\ndef inner(x):\n    return x + {}\n"
     package.write("kinematics/inner.py", head + inner.format(1))
     outer = "from er3a.kinematics.inner import inner\n@kernel\ndef outer(x):\n    return 10 * inner(x)\n"
@@ -177,5 +182,11 @@ def test_an_edited_kernel_reaches_the_kernels_that_call_it(package):
 
 
 def test_a_cache_folder_of_one_s_own_is_kept(package):
-    code = "import os; os.environ['NUMBA_CACHE_DIR'] = '/nowhere'; from er3a.kinematics import jit; import numba; "
-    assert package.run(code + "print(numba.config.CACHE_DIR)") == "/nowhere"
+    code = "import os; os.environ['NUMBA_CACHE_DIR'] = 'mine'; from er3a.geometry.vectors import dot; "
+    package.run(code + "import numpy as np; dot(np.ones(3), np.ones(3))")
+    assert list((package.folder / "mine" / "er3a").glob("vectors-*/*.nbi"))
+
+
+def test_importing_changes_no_setting_of_numba(package):
+    code = "import numba; before = vars(numba.config).copy(); import er3a.kinematics.forward; "
+    assert package.run(code + "print(vars(numba.config) == before)") == "True"

@@ -13,8 +13,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from er3a.errors import WriteError
-from er3a.results import write_table
-from er3a.viewing.recording import recording
+from er3a.pipeline.results import write_table
+from er3a.pipeline.viewing.recording import recording
 
 NOISE = np.random.default_rng(1).random((20_000, 3))
 

@@ -8,9 +8,9 @@ import pytest
 from campaign_fuzz import MEASUREMENTS, PATH_TABLE, SCENE, TARGET_TABLE, TARGETS, judge, run, seeds, unclear
 from mutants import mutant
 
-from er3a.check import check_file, check_study
 from er3a.errors import InputError
-from er3a.robots.load import ROBOTS
+from er3a.files.robot_library import ROBOTS
+from er3a.pipeline.check import check_file, check_study
 
 ROBOT = (ROBOTS / "er3_600.yaml").read_text(encoding="utf-8")
 REACH = (ROBOTS.parent / "manual_refs/er3a_c60/reach.csv").read_text(encoding="utf-8")

@@ -6,8 +6,8 @@ import gettext
 
 import pytest
 
-from er3a import language
-from er3a.language import joined, keeps_sentences, know, note_written, said, sentences, tr
+from er3a.pipeline.messages import language
+from er3a.pipeline.messages.language import joined, keeps_sentences, know, note_written, said, sentences, tr
 
 GERMAN = {
     "the {joint} is {angle:.1f} deg off": "{angle} deg daneben: {joint}",

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import er3a
-from er3a.open3d_loader import load_open3d
+from er3a.geometry.open3d_loader import load_open3d
 
 
 def test_open3d_has_the_geometry_we_use():

@@ -14,9 +14,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from er3a.code_digest import code_digest
 from er3a.errors import ResultError, WriteError
-from er3a.results import (
+from er3a.files.robot_library import ROBOTS
+from er3a.pipeline.code_digest import code_digest
+from er3a.pipeline.results import (
     CHECKSUMS,
     FORMAT_VERSION,
     Figure,
@@ -30,8 +31,7 @@ from er3a.results import (
     write_summary,
     write_table,
 )
-from er3a.robots.load import ROBOTS
-from er3a.study import load_study
+from er3a.pipeline.study import load_study
 
 ROOT = Path(__file__).resolve().parents[1]
 VERDICT = Verdict("fail", "workspace.void_enclosed", "Ein Hohlraum – 空洞.", {"volume_m3": 0.25, "cells": 12})
@@ -83,7 +83,7 @@ def test_shape_of_a_summary(tmp_path, study):
         ],
         "config": study.settings("er3_600", "capability") | study.settings("er3_600", "workspace"),
         "seed": study.seed,
-        "code": code_digest("er3a.stages.workspace.compute"),
+        "code": code_digest("er3a.pipeline.stages.workspace.compute"),
     }
 
 
@@ -127,7 +127,7 @@ def test_a_failing_write_leaves_the_old_file_and_no_temporary(tmp_path):
 
 def test_what_a_killed_process_left_is_found(tmp_path):
     killed = (
-        "import os, sys; from pathlib import Path; from er3a.results import write_atomically\n"
+        "import os, sys; from pathlib import Path; from er3a.pipeline.results import write_atomically\n"
         "for name in ('t.parquet', 'SHA256SUMS', '.page.html.sha256'):\n"
         "    if os.fork() == 0: write_atomically(Path(sys.argv[1]) / 'x' / name, lambda f: (f.touch(), os._exit(9)))\n"
         "    os.wait()"

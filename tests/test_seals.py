@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from er3a.errors import ResultError
-from er3a.results import Figure, Verdict, write_checked, write_summary
-from er3a.seals import check_seal, seal, unsound
-from er3a.study import load_study
+from er3a.pipeline.checksums import check_seal, seal, unsound
+from er3a.pipeline.results import Figure, Verdict, write_checked, write_summary
+from er3a.pipeline.study import load_study
 
 ROOT = Path(__file__).resolve().parents[1]
 FILES = ("results/er3_600/inverse/summary.json", "results/er3_600/workspace/parts/1-of-1.npz", "reports/index.html",

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 import yaml
 
-from er3a.check import check_study
 from er3a.collision.envelopes import default_envelopes, envelopes_of
 from er3a.errors import InputError
+from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.kinematics.forward import forward
-from er3a.robots.load import ROBOTS, load_robot
-from er3a.stages.validation.model import model_of
-from er3a.study import STAGES, Study, load_study
+from er3a.pipeline.check import check_study
+from er3a.pipeline.stages.validation.subject import model_of
+from er3a.pipeline.study import STAGES, Study, load_study
 
 ROOT = Path(__file__).resolve().parents[1]
 A3 = {"robot": "er3a_c60", "vary": "joints.3.a_mm", "from": 40, "to": 100, "steps": 4}

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import InputError
+from er3a.files.robot_library import load_robot
+from er3a.files.target_file import MOST_TARGETS, Target, load_targets
 from er3a.kinematics.forward import forward
-from er3a.robots.load import load_robot
-from er3a.targets import MOST_TARGETS, Target, load_targets
 
 ROBOT = load_robot("er3_600")
 DATA = Path(__file__).parents[1] / "data" / "targets"

@@ -29,7 +29,7 @@ from scipy.optimize import brentq
 
 from er3a.collision.bodies import Bodies
 from er3a.collision.envelopes import link_frames
-from er3a.language import N_
+from er3a.pipeline.messages.language import N_
 
 SHORTEST = 1e-9  # share of the duration; motion that is wide over less is a jump
 LOCATED = 1e-10  # share of the duration

@@ -15,10 +15,10 @@ from functools import lru_cache
 import numpy as np
 
 from er3a.collision.envelopes import BASE, capsule_poses, envelopes_of
-from er3a.collision.scene import SceneFile
 from er3a.errors import Er3aError
-from er3a.kinematics.transforms import transform
-from er3a.language import N_, said
+from er3a.files.scene_file import SceneFile
+from er3a.geometry.transforms import transform
+from er3a.pipeline.messages.language import N_, said
 from er3a.robots.robot import Envelope, Robot
 
 try:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.collision.bodies import Bodies
-from er3a.collision.scene import SceneFile
-from er3a.language import N_
+from er3a.files.scene_file import SceneFile
+from er3a.pipeline.messages.language import N_
 from er3a.robots.robot import Robot
 
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from er3a.diagnosis.next_measurement import what_decides
 from er3a.diagnosis.ranking import MEETS, Ranking, rank
+from er3a.files.reference_sets import load_references
 from er3a.kinematics.table_batch import robot_of
-from er3a.language import said
-from er3a.references.load import load_references
+from er3a.pipeline.messages.language import said
 from er3a.references.reference import Reference, ReferenceSet, expected_of, lengths_of, vectors_of
 from er3a.robots.robot import Robot
 

@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from er3a.kinematics.table_batch import COLUMNS, Tables
-from er3a.language import N_, said
+from er3a.pipeline.messages.language import N_, said
 
 JOINTS = range(6)
 RADIANS_PER_DEGREE = np.pi / 180

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.kinematics.table_batch import Tables, frames_of
-from er3a.language import N_, said
+from er3a.pipeline.messages.language import N_, said
 from er3a.robots.robot import Robot
 
 STEP_DEG = 45.0

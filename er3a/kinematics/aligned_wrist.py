@@ -12,9 +12,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from er3a.geometry.vectors import signed_angle
 from er3a.kinematics.closed_form import BOUNDARY_M
 from er3a.kinematics.forward import forward, frames, jacobian
-from er3a.kinematics.vectors import signed_angle
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from er3a.robots.robot import Robot
 

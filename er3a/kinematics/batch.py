@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.errors import PoseError, ShapeError
+from er3a.geometry.transforms import as_floats, check_poses
 from er3a.kinematics.block_inverse import BLOCK, count_turns, solve_blocks
 from er3a.kinematics.closed_form import REACHED, SLOTS
 from er3a.kinematics.forward import checked_joints
-from er3a.kinematics.threads import share_out
-from er3a.kinematics.transforms import as_floats, check_poses
-from er3a.kinematics.turns import nearest_turns, within
 from er3a.kinematics.wrist_partitioned import constants_for_blocks, solve_slots
+from er3a.numerics.threads import share_out
+from er3a.robots.joint_limits import nearest_turns, within
 from er3a.robots.robot import Robot
 
 SMALLEST_SHARE = 8 * BLOCK

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from er3a.kinematics.vectors import Vector
+from er3a.geometry.vectors import Vector
 
 EDGE = 2e-9  # m or rad from where two branches meet or end
 

@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from er3a.geometry.transforms import FARTHEST_M, ORTHONORMAL_TOLERANCE
 from er3a.kinematics.block_constants import EDGE
-from er3a.kinematics.fast_math import arctan2
-from er3a.kinematics.jit import kernel
-from er3a.kinematics.transforms import FARTHEST_M, ORTHONORMAL_TOLERANCE
-from er3a.kinematics.turns import LIMIT_TOLERANCE, TURN
+from er3a.numerics.fast_math import arctan2
+from er3a.numerics.jit import kernel
+from er3a.robots.joint_limits import LIMIT_TOLERANCE, TURN
 
 BLOCK = 64
 NEAR = 1e-6  # m or rad from where a joint becomes free

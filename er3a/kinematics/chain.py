@@ -20,7 +20,7 @@ from functools import lru_cache
 import numpy as np
 
 from er3a.errors import Er3aError
-from er3a.kinematics.transforms import rot_x, rot_y, translation
+from er3a.geometry.transforms import rot_x, rot_y, translation
 from er3a.robots.robot import Robot
 
 JOINTS = 6

@@ -35,8 +35,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from er3a.kinematics.jit import kernel
-from er3a.kinematics.vectors import (
+from er3a.geometry.vectors import (
     Vector,
     add,
     cross,
@@ -47,6 +46,7 @@ from er3a.kinematics.vectors import (
     subtract,
     unsigned_angle,
 )
+from er3a.numerics.jit import kernel
 
 SLOTS = 8
 BOUNDARY_M = 1e-9

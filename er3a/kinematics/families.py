@@ -24,8 +24,8 @@ from er3a.kinematics.aligned_wrist import (
 )
 from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.forward import frames, jacobian
-from er3a.kinematics.turns import LIMIT_TOLERANCE, TURN, nearest_turns, principal, within
 from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.robots.joint_limits import LIMIT_TOLERANCE, TURN, nearest_turns, principal, within
 from er3a.robots.robot import Robot
 
 GRID = np.radians(2.0)

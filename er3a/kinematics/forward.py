@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.errors import ShapeError
+from er3a.geometry.transforms import as_floats
 from er3a.kinematics.chain import JOINTS, constant_links
-from er3a.kinematics.fast_math import LARGEST_ANGLE, cos_sin
-from er3a.kinematics.jit import kernel
-from er3a.kinematics.transforms import as_floats
+from er3a.numerics.fast_math import LARGEST_ANGLE, cos_sin
+from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 
 BLOCK = 64

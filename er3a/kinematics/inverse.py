@@ -8,16 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.errors import Er3aError, NotWristPartitionedError, PoseError, ShapeError
-from er3a.kinematics.branch import branch_labels
+from er3a.geometry.transforms import check_poses
 from er3a.kinematics.closed_form import FREE, OFF_AXIS, ORIENTATION, REACHED, TOO_FAR
+from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.families import Family, families
 from er3a.kinematics.forward import checked_joints
 from er3a.kinematics.numerical import all_found
 from er3a.kinematics.singularity import determinant_factors
-from er3a.kinematics.transforms import check_poses
-from er3a.kinematics.turns import TURN, limit_reason, nearest_turns, principal, turn_bounds, within
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
-from er3a.language import N_, said
+from er3a.pipeline.messages.language import N_, said
+from er3a.robots.joint_limits import TURN, limit_reason, nearest_turns, principal, turn_bounds, within
 from er3a.robots.robot import Robot
 
 SAME_JOINTS = 1e-9

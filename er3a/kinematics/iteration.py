@@ -21,9 +21,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.kinematics.cholesky import LANES, solve_by_cholesky
-from er3a.kinematics.fast_math import arctan2, cos_sin
-from er3a.kinematics.jit import kernel
+from er3a.numerics.cholesky import LANES, solve_by_cholesky
+from er3a.numerics.fast_math import arctan2, cos_sin
+from er3a.numerics.jit import kernel
 
 DAMPING = 0.1
 MOST_ITERATIONS = 40

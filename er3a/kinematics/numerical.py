@@ -8,13 +8,13 @@ from numbers import Integral
 import numpy as np
 
 from er3a.errors import Er3aError, PoseError, ShapeError
+from er3a.geometry.transforms import as_floats, check_poses
 from er3a.kinematics.chain import JOINTS, arm_length, constant_links
 from er3a.kinematics.forward import checked_joints, jacobian
 from er3a.kinematics.iteration import solve_numerically
-from er3a.kinematics.threads import share_out
-from er3a.kinematics.transforms import as_floats, check_poses
-from er3a.kinematics.turns import limit_reason, nearest_turns, principal, within
-from er3a.language import said
+from er3a.numerics.threads import share_out
+from er3a.pipeline.messages.language import said
+from er3a.robots.joint_limits import limit_reason, nearest_turns, principal, within
 from er3a.robots.robot import Robot
 
 SOLVED, UNREACHABLE, SINGULAR, LIMIT_BOUND, BAD_GUESS = "solved", "unreachable", "singular", "limit-bound", "bad guess"

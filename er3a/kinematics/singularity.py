@@ -17,12 +17,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.errors import NotWristPartitionedError
+from er3a.geometry.vectors import cross, dot, subtract
 from er3a.kinematics.chain import JOINTS, arm_length, constant_links
 from er3a.kinematics.forward import checked_joints, jacobian, rows_of, step_row, turn_row
-from er3a.kinematics.jit import kernel
-from er3a.kinematics.vectors import cross, dot, subtract
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
-from er3a.language import N_
+from er3a.numerics.jit import kernel
+from er3a.pipeline.messages.language import N_
 from er3a.robots.robot import Robot
 
 TYPES = (N_("wrist"), N_("elbow"), N_("shoulder"))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from er3a.kinematics.forward import rows_of, step_row, turn_row, write_rows
-from er3a.kinematics.jit import kernel
+from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 
 

@@ -12,11 +12,11 @@ from functools import lru_cache
 import numpy as np
 
 from er3a.errors import NotWristPartitionedError
+from er3a.geometry.vectors import Vector, signed_angle, unsigned_angle
 from er3a.kinematics.block_constants import BlockConstants, block_constants
 from er3a.kinematics.chain import axes_at_zero_theta
 from er3a.kinematics.closed_form import APART, BOUNDARY_M, BOUNDARY_RAD, SLOTS, ArmConstants, solve
-from er3a.kinematics.vectors import Vector, signed_angle, unsigned_angle
-from er3a.language import N_, said
+from er3a.pipeline.messages.language import N_, said
 from er3a.robots.robot import Robot
 
 PARALLEL = 1e-9

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.errors import PoseError
-from er3a.kinematics.transforms import check_poses
+from er3a.geometry.transforms import check_poses
 from er3a.planning.moves import rotation_between, turning_poses
 from er3a.planning.profiles import Rates, one_go
 

@@ -10,12 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from er3a.errors import InputError, PathError, PoseError
-from er3a.kinematics.branch import branch_labels
-from er3a.kinematics.forward import forward
-from er3a.kinematics.transforms import transform
-from er3a.planning.arcs import arc
-from er3a.planning.moves import JointMove, Line, ToolPath, line, rotation_between
-from er3a.planning.path_file import (
+from er3a.files.path_file import (
     ArcPath,
     ArcTo,
     JointPath,
@@ -27,7 +22,12 @@ from er3a.planning.path_file import (
     SequencePath,
     TablePath,
 )
-from er3a.planning.path_table import PathTable, read_path_table
+from er3a.files.path_table import PathTable, read_path_table
+from er3a.geometry.transforms import transform
+from er3a.kinematics.configuration import branch_labels
+from er3a.kinematics.forward import forward
+from er3a.planning.arcs import arc
+from er3a.planning.moves import JointMove, Line, ToolPath, line, rotation_between
 from er3a.planning.sequences import (
     TURN_LENGTH,
     JointSequence,

@@ -1,11 +1,11 @@
 """Joint angles along a line of the tool: the sequence of closed-form branches that is best as a whole.
 
-On the grid of :mod:`er3a.planning.branches`, dynamic programming [1]_ finds for each branch at the start the best way
-to continue to the end. Best means, in this order: fewest jumps (a joint would have to move far in no time), least time
-outside the limits, least joint travel. Whole turns cost no states of their own: along a continuous sequence they are
-fixed by the first angle, so each joint's turn is chosen once per stretch, by least time outside the limits, then
-nearest to the joints before. Among the branches at the start, the best whole sequence wins; given start joints admit
-only the branches that they lie on (several, if the start is singular).
+On the grid of :mod:`er3a.planning.branch_tracking`, dynamic programming [1]_ finds for each branch at the start the
+best way to continue to the end. Best means, in this order: fewest jumps (a joint would have to move far in no time),
+least time outside the limits, least joint travel. Whole turns cost no states of their own: along a continuous sequence
+they are fixed by the first angle, so each joint's turn is chosen once per stretch, by least time outside the limits,
+then nearest to the joints before. Among the branches at the start, the best whole sequence wins; given start joints
+admit only the branches that they lie on (several, if the start is singular).
 
 An unreachable pose interrupts the sequence; the stretch behind it is solved on its own.
 
@@ -22,11 +22,11 @@ import numpy as np
 
 from er3a.errors import PoseError
 from er3a.kinematics.closed_form import SLOTS
-from er3a.kinematics.jit import kernel
-from er3a.kinematics.turns import LIMIT_TOLERANCE, TURN, nearest_turns, within
-from er3a.planning.branches import WIDE_STEP, Branches, branches_along, turned_difference
+from er3a.numerics.jit import kernel
+from er3a.planning.branch_tracking import WIDE_STEP, Branches, branches_along, turned_difference
 from er3a.planning.followed import Followed, Jump
 from er3a.planning.moves import ToolPath
+from er3a.robots.joint_limits import LIMIT_TOLERANCE, TURN, nearest_turns, within
 from er3a.robots.robot import Robot
 
 JUMP_COST = 1e7

@@ -14,7 +14,7 @@ import numpy as np
 from er3a.kinematics.forward import jacobian
 from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots
-from er3a.planning.branches import FREE_SHOULDER, FREE_WRIST, align_wrist, onto_axis_1, turned_difference
+from er3a.planning.branch_tracking import FREE_SHOULDER, FREE_WRIST, align_wrist, onto_axis_1, turned_difference
 from er3a.planning.moves import ToolPath
 from er3a.robots.robot import Robot
 

@@ -9,11 +9,11 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from er3a.kinematics.inverse import inverse
-from er3a.kinematics.turns import LIMIT_TOLERANCE
 from er3a.kinematics.wrist_partitioned import solve_slots
-from er3a.language import N_, joined, said
+from er3a.pipeline.messages.language import N_, joined, said
 from er3a.planning.followed import Followed
 from er3a.planning.singular_events import Joints, runs
+from er3a.robots.joint_limits import LIMIT_TOLERANCE
 from er3a.robots.robot import Robot
 
 _ABOVE = N_("J{joint} goes to {reached:.1f} deg; its upper limit is {bound:g} deg")

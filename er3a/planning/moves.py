@@ -21,7 +21,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import PoseError
-from er3a.kinematics.transforms import check_poses
+from er3a.geometry.transforms import check_poses
 from er3a.planning.profiles import Rates, one_go, quintic
 
 HALF_TURN_TOLERANCE = 1e-9

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from er3a.errors import Er3aError
-from er3a.language import N_
+from er3a.pipeline.messages.language import N_
 from er3a.robots.robot import Robot
 
 LONGEST_STEP = 0.02  # share of the whole way between two nodes

@@ -7,9 +7,9 @@ from itertools import combinations
 
 import numpy as np
 
-from er3a.language import N_
+from er3a.files.reference_rows import AxisRow, PositionRow, Row
+from er3a.pipeline.messages.language import N_
 from er3a.references.quantities import Quantity
-from er3a.references.rows import AxisRow, PositionRow, Row
 from er3a.robots.robot import WEIGHTY_GRADES, Grade
 
 GROUPS = (

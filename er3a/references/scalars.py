@@ -4,7 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from er3a.language import N_, said
+from er3a.files.reference_rows import (
+    ENVELOPE_CORNERS,
+    AxisRow,
+    DirectionRow,
+    EnvelopeRow,
+    LimitRow,
+    PositionRow,
+    ReachRow,
+    Row,
+    SpeedRow,
+)
+from er3a.pipeline.messages.language import N_, said
 from er3a.references.quantities import (
     ZERO_POSE,
     AxisAngle,
@@ -19,17 +30,6 @@ from er3a.references.quantities import (
     Speed,
 )
 from er3a.references.reference import Reference
-from er3a.references.rows import (
-    ENVELOPE_CORNERS,
-    AxisRow,
-    DirectionRow,
-    EnvelopeRow,
-    LimitRow,
-    PositionRow,
-    ReachRow,
-    Row,
-    SpeedRow,
-)
 
 POINT_WORDS = {"flange": N_("flange"), "wrist_centre": N_("wrist centre")}
 SEGMENT_NAMES = {"upper_arm": N_("upper arm from the vertical"), "forearm": N_("forearm from the vertical")}

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.kinematics.transforms import rot_x, rot_y, translation
+from er3a.geometry.transforms import rot_x, rot_y, translation
 from er3a.robots.robot import Robot
 
 

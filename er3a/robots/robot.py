@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.errors import ShapeError
-from er3a.language import N_
+from er3a.pipeline.messages.language import N_
 
 Grade = Literal["official", "cad", "export", "claim", "inferred"]
 GRADES: dict[str, str] = {

@@ -14,11 +14,11 @@ import numpy as np
 
 from er3a.collision.bodies import can_measure
 from er3a.collision.clearance import clearance
-from er3a.collision.scene import SceneFile
 from er3a.errors import Er3aError
-from er3a.kinematics.selection import limit_margin
+from er3a.files.scene_file import SceneFile
+from er3a.kinematics.admissible import limit_margin
 from er3a.kinematics.singularity import characteristic_length, conditioning
-from er3a.language import N_
+from er3a.pipeline.messages.language import N_
 from er3a.robots.robot import Robot
 
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.collision.clearance import clearance
-from er3a.collision.scene import SceneFile
 from er3a.errors import ShapeError
+from er3a.files.scene_file import SceneFile
+from er3a.kinematics.admissible import limit_margin, nearest
 from er3a.kinematics.inverse import Solutions, checked_reference
-from er3a.kinematics.selection import limit_margin, nearest
-from er3a.language import said
+from er3a.pipeline.messages.language import said
 from er3a.robots.robot import Robot
 from er3a.selection.rules import RULES, checked_weights
 

@@ -17,8 +17,8 @@ from itertools import pairwise
 import numpy as np
 
 from er3a.collision.clearance import clearance
-from er3a.collision.scene import SceneFile
 from er3a.errors import Er3aError
+from er3a.files.scene_file import SceneFile
 from er3a.kinematics.inverse import Solutions, checked_reference
 from er3a.robots.robot import Robot
 from er3a.selection.rules import joint_weights

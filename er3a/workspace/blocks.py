@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from er3a.workspace.arcs import TURN
+from er3a.workspace.azimuths import TURN
 from er3a.workspace.cavities import Cavity
 from er3a.workspace.proof import ring_volumes
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.kinematics.jit import kernel
+from er3a.numerics.jit import kernel
 from er3a.workspace.empty import STACK, is_empty
 from er3a.workspace.section_arm import SectionArm
 

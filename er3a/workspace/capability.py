@@ -21,16 +21,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.geometry.sphere import fibonacci_sphere
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.block_constants import BlockConstants
-from er3a.kinematics.jit import kernel
-from er3a.kinematics.turns import LIMIT_TOLERANCE
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
+from er3a.numerics.jit import kernel
+from er3a.robots.joint_limits import LIMIT_TOLERANCE
 from er3a.robots.robot import Robot
 from er3a.workspace.directions import Roll, left_to_roll, poses, tool_rotations
 from er3a.workspace.interval_inverse import FREE, SLOTS
 from er3a.workspace.section_arm import section_frame
-from er3a.workspace.sphere import fibonacci_sphere
 
 SECTORS = 64
 """Sectors of azimuth with a limited joint 1, the first about azimuth 0; one bit each in a proof's masks."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.kinematics.forward import forward
-from er3a.language import N_, joined, said
+from er3a.pipeline.messages.language import N_, joined, said
 from er3a.robots.robot import Robot
 from er3a.workspace.cavities import Cavity
 from er3a.workspace.proof import judge, ring_volumes

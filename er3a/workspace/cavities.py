@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from er3a.workspace.arcs import TURN
+from er3a.workspace.azimuths import TURN
 from er3a.workspace.lookup import SectionMap
 from er3a.workspace.proof import MOST_LEVEL, ring_volumes
 

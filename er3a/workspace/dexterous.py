@@ -11,15 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.kinematics.jit import kernel
+from er3a.geometry.sphere import fibonacci_sphere
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
+from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 from er3a.workspace.capability import SECTORS, sector_count
 from er3a.workspace.directions import Roll, left_to_roll, point_tool, tool_rotations
 from er3a.workspace.interval_inverse import GOOD, NEVER, SLOTS, branches, theta_ranges
 from er3a.workspace.proof import ring_volumes
 from er3a.workspace.section_arm import section_frame
-from er3a.workspace.sphere import fibonacci_sphere
 
 _MOST_LEVEL = 6
 _STACK = 256

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.kinematics.jit import kernel
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
+from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 
 _ON_AXIS = 1e-12

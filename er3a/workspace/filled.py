@@ -17,8 +17,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.kinematics.jit import kernel
-from er3a.kinematics.vectors import dot
+from er3a.geometry.vectors import dot
+from er3a.numerics.jit import kernel
 from er3a.workspace.section_arm import ROUND_OFF, wrist_and_forearm
 
 _SAFE = 64 * ROUND_OFF

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.workspace.arcs import MOST_ARCS, TURN, remove
+from er3a.workspace.azimuths import MOST_ARCS, TURN, remove
 from er3a.workspace.general_arm import GeneralArm
 from er3a.workspace.general_inner import fill_from_samples
 from er3a.workspace.general_outer import mark_reachable

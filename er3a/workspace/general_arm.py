@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from er3a.kinematics.chain import JOINTS, constant_links
-from er3a.kinematics.jit import kernel
+from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 from er3a.workspace.section_arm import FULL_TURN
 

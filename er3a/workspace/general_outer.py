@@ -18,8 +18,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.kinematics.jit import kernel
-from er3a.workspace.arcs import TURN
+from er3a.numerics.jit import kernel
+from er3a.workspace.azimuths import TURN
 from er3a.workspace.general_arm import place
 from er3a.workspace.section_arm import ROUND_OFF
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.kinematics.block_inverse import in_frame_1
-from er3a.kinematics.jit import kernel
+from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 
 SLOTS = 8

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from er3a.workspace.arcs import TURN
+from er3a.workspace.azimuths import TURN
 from er3a.workspace.proof import Proof
 
 OUTSIDE = -1

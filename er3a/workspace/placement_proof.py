@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.kinematics.jit import kernel
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
+from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 from er3a.workspace.directions import Roll, across, left_to_roll, point_tool
 from er3a.workspace.interval_inverse import GOOD, NEVER, SLOTS, branches, holds, misses, theta_ranges

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.workspace.arcs import MOST_ARCS, TURN
+from er3a.workspace.azimuths import MOST_ARCS, TURN
+from er3a.workspace.cell_decision import judge_cells
 from er3a.workspace.filled import fill_stances
-from er3a.workspace.judge import judge_cells
 from er3a.workspace.section_arm import SectionArm
 
 _STANCES = 96

@@ -23,9 +23,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from er3a.kinematics.jit import kernel
-from er3a.kinematics.vectors import Vector, add, cross, dot, scaled, subtract
+from er3a.geometry.vectors import Vector, add, cross, dot, scaled, subtract
 from er3a.kinematics.wrist_partitioned import WristPartitionedArm, wrist_partitioned_arm
+from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 
 ROUND_OFF = 1e-12

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.kinematics.jit import kernel
-from er3a.kinematics.vectors import cross, dot, subtract
+from er3a.geometry.vectors import cross, dot, subtract
+from er3a.numerics.jit import kernel
 from er3a.workspace.section_arm import ROUND_OFF, along_change, turned, wrist_and_forearm
 
 DIRECTIONS = 4

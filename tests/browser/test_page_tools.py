@@ -11,8 +11,8 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.expected_conditions import staleness_of
 from selenium.webdriver.support.wait import WebDriverWait
 
-from er3a.viewing.figures import new_figure
-from er3a.viewing.page import Picture, render
+from er3a.pipeline.viewing.figures import new_figure
+from er3a.pipeline.viewing.page import Picture, render
 
 TEMPLATE = """{% extends "base.html.j2" %}
 {% block title %}Test{% endblock %}

@@ -8,7 +8,7 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.expected_conditions import staleness_of
 from selenium.webdriver.support.wait import WebDriverWait
 
-from er3a.viewing.turning import WORDS
+from er3a.pipeline.viewing.figure_3d import WORDS
 from tests.browser.pages import PAGES, STAGE_PAGES
 
 

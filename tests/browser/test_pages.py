@@ -7,7 +7,7 @@ from axe_core_python.selenium import Axe
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select
 
-from er3a.robots.load import load_robot
+from er3a.files.robot_library import load_robot
 from tests.browser import chromium
 from tests.browser.pages import OVER_ALL, PAGES
 

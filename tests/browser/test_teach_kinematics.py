@@ -10,16 +10,16 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from er3a.files.robot_library import load_robot
 from er3a.kinematics.closed_form import REACHED
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
-from er3a.kinematics.turns import principal
 from er3a.kinematics.wrist_partitioned import solve_slots
-from er3a.robots.load import load_robot
+from er3a.pipeline.study import load_study
+from er3a.pipeline.teach.panel import panel_data, write_teach_page
+from er3a.robots.joint_limits import principal
 from er3a.robots.robot import Robot
-from er3a.study import load_study
-from er3a.teach.page import panel_data, write_teach_page
 from tests.kinematics.arms import arms, joints_at_random, make_arm, margin, pose_errors
 
 POSES, AGREE = 1000, 1e-9

@@ -15,12 +15,12 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.wait import WebDriverWait
 
-from er3a import language
+from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
-from er3a.robots.load import load_robot
-from er3a.study import load_study
-from er3a.teach import page as teach_page
-from er3a.teach.words import WORDS
+from er3a.pipeline.messages import language
+from er3a.pipeline.study import load_study
+from er3a.pipeline.teach import page as teach_page
+from er3a.pipeline.teach.words import WORDS
 from tests.kinematics.arms import make_arm, pose_errors
 
 LARGEST_PAGE = 8_000_000
@@ -229,7 +229,7 @@ def test_the_warning_names_what_is_near(panel, degrees, state, told):
 
 def test_an_arm_outside_the_class_says_why_it_has_no_solutions(browser, folder, monkeypatch):
     skew = make_arm(alpha=np.radians([-90, 5, -90, 90, -90, 0]))
-    monkeypatch.setattr("er3a.study.Study.robot", lambda study, name: skew)
+    monkeypatch.setattr("er3a.pipeline.study.Study.robot", lambda study, name: skew)
     panel = Panel(browser, folder / "skew.html").open("#q=10,20,30,40,50,60")
     assert "axes 2 and 3 are not parallel" in panel.text(".solutions")
     assert panel.text("#warning") == WORDS["clear"]
@@ -286,7 +286,7 @@ def test_the_chinese_panel_warns_in_chinese_alone(browser, folder, chinese, degr
 
 def test_the_chinese_panel_says_why_an_arm_has_no_solutions(browser, folder, chinese, monkeypatch):
     offset_wrist = make_arm(d=[0.3, 0, 0, 0.35, 0.02, 0.08])
-    monkeypatch.setattr("er3a.study.Study.robot", lambda study, name: offset_wrist)
+    monkeypatch.setattr("er3a.pipeline.study.Study.robot", lambda study, name: offset_wrist)
     panel = Panel(browser, folder / "chinese_offset_wrist.html").open("#q=10,20,30,40,50,60")
     assert "因为轴 4、5、6 不交于一点，相差 10 mm" in panel.text(".solutions")
     assert english(panel.texts()) == set()

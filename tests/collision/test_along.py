@@ -8,12 +8,12 @@ import pytest
 from er3a.collision.along import clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.clearance import clearance
-from er3a.collision.scene import SceneFile
+from er3a.files.robot_library import load_robot
+from er3a.files.scene_file import SceneFile
+from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
-from er3a.kinematics.transforms import transform
 from er3a.planning.follow import follow
 from er3a.planning.moves import JointMove, line
-from er3a.robots.load import load_robot
 
 DEPTH = 1e-3
 ENDS = np.array([0.0, 1.0])

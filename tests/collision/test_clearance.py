@@ -9,12 +9,12 @@ import yaml
 from er3a.collision.bodies import self_pairs
 from er3a.collision.clearance import clearance
 from er3a.collision.envelopes import capsule_poses, default_envelopes, envelopes_of
-from er3a.collision.scene import SceneFile, load_scene
 from er3a.errors import InputError
+from er3a.files.robot_library import ROBOTS, load_robot
+from er3a.files.robot_writer import write_robot
+from er3a.files.scene_file import SceneFile, load_scene
 from er3a.kinematics.forward import forward
-from er3a.robots.load import ROBOTS, load_robot
 from er3a.robots.robot import Envelope
-from er3a.robots.write import write_robot
 from tests.kinematics.arms import joints_at_random, placement
 
 

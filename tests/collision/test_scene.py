@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import yaml
 
-from er3a.collision.scene import load_scene
 from er3a.errors import InputError
+from er3a.files.scene_file import load_scene
 
 SHIPPED = Path(__file__).parents[2] / "data" / "scenes" / "table_and_post.yaml"
 BOX = {"name": "table", "size_mm": [500, 800, 40], "xyz_mm": [500, 0, 80]}

@@ -8,16 +8,16 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from er3a.cli import app
-from er3a.cost.jobs import Job, jobs_of, wall_time
-from er3a.cost.plan import Calibration, cost, disk_bytes, estimates_of
-from er3a.cost.speed import Speed
-from er3a.cost.tables import duration, size
-from er3a.cost.timings import FEW_SAMPLES, Timing, Trial, logged
 from er3a.errors import Er3aError
-from er3a.results import Figure, Verdict, write_summary
-from er3a.study import SAMPLES_PER_JOB, load_study
-from er3a.sweeps import Sweep
+from er3a.pipeline.cli import app
+from er3a.pipeline.estimate.estimate import Calibration, cost, disk_bytes, estimates_of
+from er3a.pipeline.estimate.jobs import Job, jobs_of, wall_time
+from er3a.pipeline.estimate.speed import Speed
+from er3a.pipeline.estimate.terminal import duration, size
+from er3a.pipeline.estimate.timings import FEW_SAMPLES, Timing, Trial, logged
+from er3a.pipeline.results import Figure, Verdict, write_summary
+from er3a.pipeline.study import SAMPLES_PER_JOB, load_study
+from er3a.pipeline.sweeps import Sweep
 
 ROOT = Path(__file__).resolve().parents[2]
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")

@@ -12,10 +12,10 @@ import er3a
 from er3a.diagnosis.mutations import Mutation, mutations_of, noisy, try_mutation
 from er3a.diagnosis.ranking import rank, usable
 from er3a.errors import InputError
-from er3a.references.load import load_references
+from er3a.files.reference_sets import load_references
+from er3a.files.robot_library import load_robot
 from er3a.references.reference import expected_of
 from er3a.robots.conventions import to_modified
-from er3a.robots.load import load_robot
 
 TRUSTED = ("er3a_c60", "er3_600")
 

@@ -10,14 +10,14 @@ from scipy.optimize import least_squares
 from typer.testing import CliRunner
 
 import er3a
-from er3a.cli import app
+from er3a.calibration.parameters import Parameter, jacobian, parallel_pairs, parameters_of
+from er3a.calibration.simulate import covered, measured
 from er3a.errors import IdentificationError, InputError
-from er3a.identification.measurements import COLUMNS, load_measurements, scalars_of_measurements
-from er3a.identification.parameters import Parameter, jacobian, parallel_pairs, parameters_of
-from er3a.identification.simulate import covered, measured
+from er3a.files.measurements import COLUMNS, load_measurements, scalars_of_measurements
+from er3a.files.robot_library import load_robot
 from er3a.kinematics.table_batch import tables_of
+from er3a.pipeline.cli import app
 from er3a.robots.conventions import to_modified
-from er3a.robots.load import load_robot
 
 HEADER = ",".join(COLUMNS) + "\n"
 TRUSTED = ("er3a_c60", "er3_600")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from er3a.errors import InputError
-from er3a.inputs.csv_file import Column, read_csv
+from er3a.files.csv_file import Column, read_csv
 
 COLUMNS = {
     "name": Column(str),

@@ -9,7 +9,7 @@ import pytest
 from pydantic import Field, model_validator
 
 from er3a.errors import InputError
-from er3a.inputs.yaml_file import MAX_YAML_BYTES, StrictModel, load, parse, read_yaml
+from er3a.files.yaml_file import MAX_YAML_BYTES, StrictModel, load, parse, read_yaml
 
 
 class Part(StrictModel):

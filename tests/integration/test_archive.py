@@ -13,8 +13,8 @@ import yaml
 from rocrate_validator import models, services
 from rocrate_validator.utils.http import HttpRequester
 
-from er3a.archive import archive
 from er3a.errors import ResultError
+from er3a.pipeline.archive import archive
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 

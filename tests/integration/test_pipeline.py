@@ -20,9 +20,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from er3a.cli import app
 from er3a.errors import ResultError
-from er3a.results import FORMAT_VERSION, check_results, read_summary, write_checksums
+from er3a.pipeline.cli import app
+from er3a.pipeline.results import FORMAT_VERSION, check_results, read_summary, write_checksums
 from tests.conftest import ALL_THERE, ROBOTS
 
 STAGES = ("validation", "workspace", "inverse", "trajectory")
@@ -113,13 +113,13 @@ def test_a_second_run_does_nothing(small_study):
 
 
 def test_editing_a_template_renders_reports_only(small_study):
-    template = small_study.folder / "er3a/stages/inverse/report.html.j2"
+    template = small_study.folder / "er3a/pipeline/stages/inverse/report.html.j2"
     with edited(template, "{% block content %}", "{% block content %}<!-- -->"):
         assert small_study.planned() == {f"{robot}: report inverse" for robot in ROBOTS} | {"write the index"}
 
 
 def test_editing_the_base_template_renders_all_pages_and_no_number(small_study):
-    with edited(small_study.folder / "er3a/viewing/base.html.j2", "<main>", "<main >"):
+    with edited(small_study.folder / "er3a/pipeline/viewing/base.html.j2", "<main>", "<main >"):
         expected = {f"{robot}: report {stage}" for robot in ROBOTS for stage in STAGES} | PANELS
         assert small_study.planned() == expected | {"write the index"}
 
@@ -132,17 +132,19 @@ def test_another_language_renders_pages_and_computes_nothing(small_study):
 
 
 def test_an_edit_of_the_chinese_catalogue_leaves_english_pages(small_study):
-    with edited(small_study.folder / "er3a/locale/zh/LC_MESSAGES/er3a.po", "所有机器人", "全部机器人"):
+    with edited(
+        small_study.folder / "er3a/pipeline/messages/locale/zh/LC_MESSAGES/er3a.po", "所有机器人", "全部机器人"
+    ):
         assert small_study.planned() == set()
 
 
 def test_editing_a_script_writes_the_teach_panels_only(small_study):
-    with edited(small_study.folder / "er3a/teach/kinematics.js", "/**", "/** Edited."):
+    with edited(small_study.folder / "er3a/pipeline/teach/kinematics.js", "/**", "/** Edited."):
         assert small_study.planned() == PANELS | {"write the index"}
 
 
 def test_editing_a_kinematics_module_reruns_what_uses_it(small_study):
-    with edited(small_study.folder / "er3a/kinematics/selection.py", '"""', '"""Edited. '):
+    with edited(small_study.folder / "er3a/kinematics/admissible.py", '"""', '"""Edited. '):
         expected = {f"{robot}: compute inverse" for robot in ROBOTS}
         for robot in ROBOTS:
             expected |= views(robot, "inverse")

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from er3a.cost.jobs import jobs_of
-from er3a.results import read_summary
-from er3a.study import load_study
-from er3a.viewing.index import write_index
+from er3a.pipeline.estimate.jobs import jobs_of
+from er3a.pipeline.results import read_summary
+from er3a.pipeline.study import load_study
+from er3a.pipeline.viewing.index import write_index
 from tests.conftest import ROBOTS
 from tests.viewing.untranslated import PageTexts, plain_words, texts_from_files, wide_letters
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.kinematics.branch import branch_of
+from er3a.kinematics.configuration import branch_of
 from er3a.kinematics.families import Family
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import determinant_factors

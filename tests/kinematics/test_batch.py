@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 import er3a
 from er3a.errors import Er3aError, NotWristPartitionedError, PoseError, ShapeError
 from er3a.kinematics.batch import inverse_batch
-from er3a.kinematics.branch import branch_of
+from er3a.kinematics.configuration import branch_of
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
-from er3a.kinematics.turns import nearest_turns, within
 from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.robots.joint_limits import nearest_turns, within
 from tests.kinematics.arms import DEG, arms, joints_at_random, joints_within, make_arm, margin, pose_errors
 from tests.kinematics.singular_poses import CLASSES, joints_near, turned
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from er3a.kinematics.fast_math import LARGEST_ANGLE, arctan2, cos_sin
 from er3a.kinematics.forward import forward
-from er3a.kinematics.jit import kernel
+from er3a.numerics.fast_math import LARGEST_ANGLE, arctan2, cos_sin
+from er3a.numerics.jit import kernel
 from tests.kinematics.arms import frame_by_hand
 
 

@@ -10,12 +10,12 @@ from scipy.spatial.transform import Rotation
 
 import er3a
 from er3a.errors import Er3aError, ShapeError
+from er3a.files.robot_library import load_robot
+from er3a.geometry.transforms import transform
 from er3a.kinematics.chain import axes_at_zero_theta
 from er3a.kinematics.forward import forward, frames, jacobian
 from er3a.kinematics.table_batch import frames_of, join, tables_of
-from er3a.kinematics.transforms import transform
 from er3a.robots.conventions import to_modified, to_standard
-from er3a.robots.load import load_robot
 from tests.kinematics.arms import (
     PinocchioArm,
     arms,

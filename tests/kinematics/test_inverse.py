@@ -13,8 +13,8 @@ from er3a.kinematics.closed_form import REACHED
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import determinant_factors
-from er3a.kinematics.turns import limit_reason, nearest_turns
 from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.robots.joint_limits import limit_reason, nearest_turns
 from tests.kinematics.arms import DEG, arms, joints_at_random, joints_within, make_arm, margin, placement, pose_errors
 
 TURN = 2 * np.pi

@@ -11,7 +11,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 CALL = """
 import numpy as np
-from er3a.kinematics.vectors import dot
+from er3a.geometry.vectors import dot
 
 assert dot(np.ones(3), np.ones(3)) == 3.0
 print(sum(dot.stats.cache_hits.values()), sum(dot.stats.cache_misses.values()))
@@ -28,6 +28,6 @@ def test_a_copy_with_equal_kernels_compiles_nothing_and_one_with_others_does(tmp
         shutil.copytree(ROOT / "er3a", tmp_path / name / "er3a", ignore=shutil.ignore_patterns("__pycache__"))
     assert hits_and_misses(tmp_path / "one") == "0 1\n"
     assert hits_and_misses(tmp_path / "other") == "1 0\n"
-    edited = tmp_path / "other/er3a/kinematics/forward.py"
+    edited = tmp_path / "other/er3a/geometry/vectors.py"
     edited.write_text(edited.read_text() + "\n# edited\n")
     assert hits_and_misses(tmp_path / "other") == "0 1\n"

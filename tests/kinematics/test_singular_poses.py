@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from er3a.kinematics.aligned_wrist import bend_of_wrist
-from er3a.kinematics.branch import branch_of
+from er3a.kinematics.configuration import branch_of
 from er3a.kinematics.families import Family, _nearest_wrists
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse

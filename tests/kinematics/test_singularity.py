@@ -8,9 +8,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from er3a.errors import NotWristPartitionedError
+from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import jacobian
 from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
-from er3a.robots.load import load_robot
 from tests.kinematics.arms import arms, joints_at_random, joints_within, make_arm, number
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import qmc
 
-from er3a.kinematics.spread import spread
+from er3a.numerics.quasi_random import spread
 
 
 def test_points_fill_the_box_more_evenly_than_random_ones(random):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import PoseError, ShapeError
-from er3a.kinematics.transforms import check_poses, rot_x, rot_z, rotation_angle, rpy_of, transform, translation
+from er3a.geometry.transforms import check_poses, rot_x, rot_z, rotation_angle, rpy_of, transform, translation
 from tests.kinematics.arms import number
 
 angles = number(-np.pi, np.pi)

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import NotWristPartitionedError
-from er3a.kinematics.branch import branch_labels
 from er3a.kinematics.closed_form import OFF_AXIS, ORIENTATION, TOO_FAR, TOO_NEAR
+from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward, frames
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm

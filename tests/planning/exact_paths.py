@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from er3a.errors import PoseError
-from er3a.kinematics.branch import branch_labels
+from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
 from er3a.planning.follow import follow
 from er3a.planning.moves import line

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
-from er3a.planning.branches import WIDE_STEP, branches_along, turned_difference
+from er3a.planning.branch_tracking import WIDE_STEP, branches_along, turned_difference
 from er3a.planning.follow import _turned, follow
 from er3a.planning.moves import line
-from er3a.robots.load import load_robot
 
 GRID = np.linspace(0, 1, 121)
 

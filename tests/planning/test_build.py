@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from er3a.errors import InputError
+from er3a.files.path_file import load_paths
+from er3a.files.robot_library import load_robot
+from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
-from er3a.kinematics.transforms import transform
 from er3a.planning.build import build
-from er3a.planning.path_file import load_paths
-from er3a.robots.load import load_robot
 
 HEAD = {"name": "path", "title": "A path", "samples": 20}
 DOWN = [180, 0, 0]

@@ -7,17 +7,17 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import PoseError
+from er3a.files.robot_library import load_robot
+from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.singularity import determinant_factors
-from er3a.kinematics.transforms import transform
-from er3a.kinematics.turns import nearest_turns, within
 from er3a.planning.arcs import arc
 from er3a.planning.follow import follow
 from er3a.planning.intervals import out_of_limits, too_fast, unreachable
 from er3a.planning.moves import JointMove, line
 from er3a.planning.sequences import segment_path
 from er3a.planning.singular_events import singular_events
-from er3a.robots.load import load_robot
+from er3a.robots.joint_limits import nearest_turns, within
 
 NEAR = {"wrist": np.radians(5), "elbow": np.radians(5), "shoulder": 0.03}
 GRID = np.linspace(0, 1, 301)

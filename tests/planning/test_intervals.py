@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from er3a.kinematics.transforms import transform
+from er3a.files.robot_library import load_robot
+from er3a.geometry.transforms import transform
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.planning.arcs import arc
 from er3a.planning.follow import follow
 from er3a.planning.intervals import out_of_limits, too_fast, unreachable
 from er3a.planning.moves import JointMove
-from er3a.robots.load import load_robot
 
 GRID = np.linspace(0, 1, 21)
 

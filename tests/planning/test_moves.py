@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
 from er3a.errors import PoseError
+from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
-from er3a.kinematics.transforms import transform
 from er3a.planning.moves import JointMove, line
 
 
@@ -68,7 +68,7 @@ def test_twist_is_the_derivative_of_the_pose(random):
 
 
 def test_half_turn_of_the_article_goes_counter_clockwise_unless_told_otherwise():
-    from er3a.robots.load import load_robot
+    from er3a.files.robot_library import load_robot
 
     start = forward(load_robot("er3a_c60_article"), np.zeros(6))
     end = transform([0.6, 0.3, 0.5], [0, np.pi, 0])

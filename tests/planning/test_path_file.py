@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from er3a.errors import InputError
-from er3a.planning.path_file import load_paths
+from er3a.files.path_file import load_paths
 
 JOINT = {
     "name": "move",

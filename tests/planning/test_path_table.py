@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import InputError
-from er3a.kinematics.transforms import transform
-from er3a.planning.path_table import read_path_table
+from er3a.files.path_table import read_path_table
+from er3a.geometry.transforms import transform
 
 RPY = "x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg"
 POSES = [[300, -50, 250, 175, 5, 10], [320, 0, 250, 180, 10, 20], [300, 50, 260, 175, 0, 40]]

@@ -6,21 +6,21 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from er3a.files.robot_library import load_robot
+from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.singularity import characteristic_length, determinant_factors
-from er3a.kinematics.transforms import transform
-from er3a.kinematics.turns import within
 from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.planning.avoidance import damped as damped_module
+from er3a.planning.avoidance import via
+from er3a.planning.avoidance.deviation import deviation
+from er3a.planning.avoidance.singular_segment import margin, trouble_of
+from er3a.planning.avoidance.strategies import WAYS, best, compare
 from er3a.planning.follow import follow
 from er3a.planning.moves import line
-from er3a.planning.repairs import damped as damped_module
-from er3a.planning.repairs import via
-from er3a.planning.repairs.compare import WAYS, best, compare
-from er3a.planning.repairs.deviation import deviation
-from er3a.planning.repairs.trouble import margin, trouble_of
 from er3a.planning.singular_events import singular_events
 from er3a.planning.timing import joint_limits
-from er3a.robots.load import load_robot
+from er3a.robots.joint_limits import within
 
 NEAR = {"wrist": np.radians(5), "elbow": np.radians(5), "shoulder": 0.03}
 FORWARD, UP = [0, np.pi / 2, 0], [0, 0, 0]

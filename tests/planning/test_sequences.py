@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
 from er3a.errors import PathError, PoseError
-from er3a.kinematics.transforms import transform
+from er3a.geometry.transforms import transform
 from er3a.planning.arcs import arc
 from er3a.planning.moves import line
 from er3a.planning.rotation_curves import spin

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from er3a.files.robot_library import load_robot
 from er3a.planning.moves import JointMove
 from er3a.planning.timing import JointLimits, fastest, joined, joint_limits, nodes_along, standing, straight
-from er3a.robots.load import load_robot
 
 LIMITS = JointLimits(np.array([1.0, 2.0, 3.0, 1.5, 2.5, 4.0]), np.array([4.0, 3.0, 8.0, 5.0, 6.0, 9.0]))
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from er3a.errors import InputError
-from er3a.references.load import MANUAL_REFS, check_reference_file, load_references
-from er3a.references.rows import COLUMNS
+from er3a.files.reference_rows import COLUMNS
+from er3a.files.reference_sets import MANUAL_REFS, check_reference_file, load_references
 from er3a.references.scalars import scalars_of
 from er3a.robots.robot import GRADES
 

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from er3a.files.reference_sets import load_references
+from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward, frames
-from er3a.references.extremes import search
-from er3a.references.load import load_references
 from er3a.references.predict import predict, read, state_of
 from er3a.references.quantities import (
     ZERO_POSE,
@@ -24,8 +24,8 @@ from er3a.references.quantities import (
     Speed,
     measure_of,
 )
+from er3a.references.reach import search
 from er3a.references.reference import Reference, conflicts, expected_of
-from er3a.robots.load import load_robot
 from er3a.robots.robot import Robot
 
 # Joint origins (m, rad) of the URDF in hanliumaozhi/efort_description: xyz, then fixed-axis roll, pitch, yaw.

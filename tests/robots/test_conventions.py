@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.robots.conventions import to_modified, to_standard
-from er3a.robots.load import load_robot
 from er3a.robots.robot import Robot
 
 

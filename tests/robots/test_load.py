@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from er3a.errors import InputError, ShapeError
-from er3a.robots.load import ROBOTS, load_robot
+from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.robots.robot import GRADES
 from tests.kinematics.arms import make_arm, placement
 

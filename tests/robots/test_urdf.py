@@ -10,12 +10,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import InputError
+from er3a.files.robot_library import load_robot
+from er3a.files.robot_writer import write_robot
+from er3a.formats.from_axes import table_from_axes
+from er3a.formats.urdf import export_urdf, import_urdf
 from er3a.kinematics.forward import forward, frames
-from er3a.robots.from_axes import table_from_axes
-from er3a.robots.load import load_robot
 from er3a.robots.robot import Robot
-from er3a.robots.urdf import export_urdf, import_urdf
-from er3a.robots.write import write_robot
 
 # The real arm as its published URDF has it: joint origins to 0.1 mm, right angles rounded to five digits.
 REAL_ARM = [

@@ -14,17 +14,17 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 from er3a.collision.clearance import clearance
-from er3a.collision.scene import load_scene
 from er3a.errors import InputError, ResultError
+from er3a.files.robot_library import ROBOTS, load_robot
+from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
-from er3a.results import read_summary, read_table
-from er3a.robots.load import ROBOTS, load_robot
-from er3a.stages.inverse.compute import compute
-from er3a.stages.inverse.record import record
-from er3a.stages.inverse.report import report
-from er3a.stages.inverse.round_trips import round_trips
-from er3a.study import Study, load_study
+from er3a.pipeline.results import read_summary, read_table
+from er3a.pipeline.stages.inverse.compute import compute
+from er3a.pipeline.stages.inverse.record import record
+from er3a.pipeline.stages.inverse.report import report
+from er3a.pipeline.stages.inverse.round_trips import round_trips
+from er3a.pipeline.study import Study, load_study
 
 ROOT = Path(__file__).parents[2]
 NAMES = ("er3a_c60", "er3a_c60_article", "er3_600")
@@ -194,7 +194,7 @@ def test_round_trips_lose_nothing(computed):
 
 
 def test_round_trips_tell_when_the_solver_fails(monkeypatch):
-    from er3a.stages.inverse import round_trips as module
+    from er3a.pipeline.stages.inverse import round_trips as module
 
     solve = module.inverse_batch
 

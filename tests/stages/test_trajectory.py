@@ -10,15 +10,15 @@ import pytest
 import yaml
 
 from er3a.errors import InputError
+from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import characteristic_length, conditioning
-from er3a.kinematics.transforms import transform
-from er3a.planning.repairs.compare import WAYS
-from er3a.results import read_summary, read_table
-from er3a.stages.trajectory.compute import compute
-from er3a.stages.trajectory.record import record
-from er3a.stages.trajectory.report import report
-from er3a.study import Study, load_study
+from er3a.pipeline.results import read_summary, read_table
+from er3a.pipeline.stages.trajectory.compute import compute
+from er3a.pipeline.stages.trajectory.record import record
+from er3a.pipeline.stages.trajectory.report import report
+from er3a.pipeline.study import Study, load_study
+from er3a.planning.avoidance.strategies import WAYS
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 JOINTS = [f"q{j + 1}_deg" for j in range(6)]

@@ -12,21 +12,21 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 import er3a
+from er3a.files.reference_sets import load_references
+from er3a.files.robot_file import Placement
+from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.kinematics.forward import frames
-from er3a.references.load import load_references
+from er3a.pipeline.results import read_table
+from er3a.pipeline.stages.validation.checks import checks_of_set
+from er3a.pipeline.stages.validation.compute import compute
+from er3a.pipeline.stages.validation.record import record
+from er3a.pipeline.stages.validation.report import report
+from er3a.pipeline.stages.validation.self_checks import round_trips, table_checks
+from er3a.pipeline.study import RobotEntry, Study, load_study
+from er3a.references.circle_points import circle_points, fit_circle
 from er3a.references.predict import predict
 from er3a.references.quantities import Limit
 from er3a.references.reference import Reference, ReferenceSet
-from er3a.results import read_table
-from er3a.robots.load import ROBOTS, load_robot
-from er3a.robots.schema import Placement
-from er3a.stages.validation.checks import checks_of_set
-from er3a.stages.validation.circle_points import circle_points, fit_circle
-from er3a.stages.validation.compute import compute
-from er3a.stages.validation.record import record
-from er3a.stages.validation.report import report
-from er3a.stages.validation.self_checks import round_trips, table_checks
-from er3a.study import RobotEntry, Study, load_study
 from tests.robots.test_conventions import random_arm
 
 NAMES = ("er3a_c60", "er3a_c60_article", "er3_600")

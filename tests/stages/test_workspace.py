@@ -11,15 +11,15 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import InputError, ResultError
+from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
-from er3a.results import read_summary, read_table
-from er3a.robots.load import ROBOTS, load_robot
-from er3a.stages.workspace.compute import compute
-from er3a.stages.workspace.record import record
-from er3a.stages.workspace.report import report
-from er3a.stages.workspace.sample import sample
-from er3a.study import load_study
+from er3a.pipeline.results import read_summary, read_table
+from er3a.pipeline.stages.workspace.compute import compute
+from er3a.pipeline.stages.workspace.record import record
+from er3a.pipeline.stages.workspace.report import report
+from er3a.pipeline.stages.workspace.sample import sample
+from er3a.pipeline.study import load_study
 from tests.stages.workspace_arms import locked_file, make_study, skew_file, tally_of
 
 # --- the stage ---

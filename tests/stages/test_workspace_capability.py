@@ -9,14 +9,14 @@ import pytest
 import yaml
 
 from er3a.errors import InputError
-from er3a.inputs.yaml_file import load
-from er3a.robots.load import load_robot
+from er3a.files.robot_library import load_robot
+from er3a.files.yaml_file import load
+from er3a.pipeline.stages.workspace.capability_numbers import CanDo, can_do
+from er3a.pipeline.stages.workspace.capability_texts import capability_context
+from er3a.pipeline.stages.workspace.cell_lookup import CellLookup
+from er3a.pipeline.study import CapabilitySettings, Study
+from er3a.pipeline.viewing.page import Picture
 from er3a.robots.robot import Robot
-from er3a.stages.workspace.capability_numbers import CanDo, can_do
-from er3a.stages.workspace.capability_texts import capability_context
-from er3a.stages.workspace.cell_lookup import CellLookup
-from er3a.study import CapabilitySettings, Study
-from er3a.viewing.page import Picture
 
 ROOT = Path(__file__).resolve().parents[2]
 

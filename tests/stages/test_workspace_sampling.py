@@ -10,18 +10,18 @@ from scipy import stats
 from scipy.stats import qmc
 
 from er3a.errors import InputError, NotWristPartitionedError
+from er3a.files.robot_library import load_robot
+from er3a.geometry.sphere import fibonacci_sphere
+from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
-from er3a.kinematics.transforms import transform
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
-from er3a.robots.load import load_robot
-from er3a.stages.workspace import grid as grid_module
-from er3a.stages.workspace.grid import make_grid, tool_bound
-from er3a.stages.workspace.point_chain import at_wrist_centre, point_chain
-from er3a.stages.workspace.progress import shown_progress
-from er3a.stages.workspace.random_joints import Draw, philox4x32
-from er3a.stages.workspace.sobol import direction_numbers
-from er3a.stages.workspace.tally import tally_blocks
-from er3a.workspace.sphere import fibonacci_sphere
+from er3a.pipeline.progress import shown_progress
+from er3a.pipeline.stages.workspace import grid as grid_module
+from er3a.sampling.grid import make_grid, tool_bound
+from er3a.sampling.point_chain import at_wrist_centre, point_chain
+from er3a.sampling.random_joints import Draw, philox4x32
+from er3a.sampling.sobol import direction_numbers
+from er3a.sampling.tally import tally_blocks
 from tests.stages.workspace_arms import SEED, extreme_points, tally_of
 
 # --- random numbers ---
@@ -127,7 +127,7 @@ def test_the_wrist_centre_can_be_sampled(robot):
 
 
 def test_progress_is_shown_as_lines_in_a_log(robot, capsys, monkeypatch):
-    monkeypatch.setattr("er3a.stages.workspace.progress.EVERY_S", 0.0)
+    monkeypatch.setattr("er3a.pipeline.progress.EVERY_S", 0.0)
     draw = Draw(SEED, 30_000, 3)
     with shown_progress(30_000, "robot: samples") as advance:
         tally_blocks(robot, make_grid(robot, 8), draw, range(3), 0, advance)

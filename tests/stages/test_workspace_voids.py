@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
-from er3a.robots.load import load_robot
+from er3a.pipeline.stages.workspace.verdict import judge
 from er3a.robots.robot import Robot
-from er3a.stages.workspace.grid import make_grid
-from er3a.stages.workspace.hull import cells_inside, convex_hull
-from er3a.stages.workspace.random_joints import Draw
-from er3a.stages.workspace.reach import reach_figures
-from er3a.stages.workspace.verdict import judge
-from er3a.stages.workspace.voids import find_voids, shape_of, unseen_cells
+from er3a.sampling.grid import make_grid
+from er3a.sampling.random_joints import Draw
+from er3a.sampling.reach_search import reach_figures
 from er3a.workspace.cavities import cavities
+from er3a.workspace.hull import cells_inside, convex_hull
 from er3a.workspace.lookup import SectionMap
 from er3a.workspace.proof import prove
+from er3a.workspace.sampled_voids import find_voids, shape_of, unseen_cells
 from er3a.workspace.section_arm import section_arm
 from tests.stages.workspace_arms import SEED, extreme_points, tally_of, two_link_arm
 

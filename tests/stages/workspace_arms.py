@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import yaml
 
+from er3a.files.robot_library import ROBOTS
 from er3a.kinematics.forward import forward
-from er3a.robots.load import ROBOTS
+from er3a.pipeline.study import Study
 from er3a.robots.robot import Robot
-from er3a.stages.workspace.extremes import Extremes
-from er3a.stages.workspace.grid import make_grid
-from er3a.stages.workspace.random_joints import Draw
-from er3a.stages.workspace.tally import tally_blocks
-from er3a.study import Study
+from er3a.sampling.extreme_samples import Extremes
+from er3a.sampling.grid import make_grid
+from er3a.sampling.random_joints import Draw
+from er3a.sampling.tally import tally_blocks
 
 SEED = 20261120
 

@@ -8,7 +8,7 @@ import io
 import numpy as np
 from PIL import Image
 
-from er3a.viewing.palette import JOINTS, rgb
+from er3a.pipeline.viewing.palette import JOINTS, rgb
 
 
 def joints_seen(picture: bytes) -> int:

@@ -8,11 +8,11 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from er3a.cli import app
 from er3a.errors import ResultError
-from er3a.results import Figure, Verdict, write_checksums, write_summary, write_table
-from er3a.study import load_study
-from er3a.viewing.diff import changes, write_diff
+from er3a.pipeline.cli import app
+from er3a.pipeline.results import Figure, Verdict, write_checksums, write_summary, write_table
+from er3a.pipeline.study import load_study
+from er3a.pipeline.viewing.diff import changes, write_diff
 
 
 @pytest.fixture

@@ -13,10 +13,10 @@ import pytest
 import yaml
 
 from er3a.errors import InputError
-from er3a.results import write_checksums, write_table
-from er3a.study import STAGES, load_study
-from er3a.viewing.index import write_index
-from er3a.viewing.recording import escaped
+from er3a.pipeline.results import write_checksums, write_table
+from er3a.pipeline.study import STAGES, load_study
+from er3a.pipeline.viewing.index import write_index
+from er3a.pipeline.viewing.recording import escaped
 
 ROBOT = "er3_600"
 HOSTILE = """ <script>alert("x")</script><img src=http://x/y onerror=alert(1)> $x^$ {{ 7*7 }} </style> ' " &amp;"""
@@ -80,7 +80,7 @@ def test_a_page_shows_hostile_texts_and_does_not_act_on_them(hostile, small_stud
     study, folder = hostile
     page, finished = tmp_path / f"{stage}.html", small_study.folder / f"reports/{ROBOT}/{stage}.html"
     shutil.copy(finished.with_suffix(".webp"), tmp_path)
-    import_module(f"er3a.stages.{stage}.report").report(study, ROBOT, folder / "results" / ROBOT / stage, page)
+    import_module(f"er3a.pipeline.stages.{stage}.report").report(study, ROBOT, folder / "results" / ROBOT / stage, page)
     html = page.read_text(encoding="utf-8")
     found = Tags(html)
     usual = Tags(finished.read_text(encoding="utf-8"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from er3a.viewing.numbers import fixed, number
+from er3a.pipeline.viewing.numbers import fixed, number
 
 
 @pytest.mark.parametrize(

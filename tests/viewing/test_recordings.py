@@ -14,10 +14,10 @@ import pytest
 from rerun.chunk import RrdReader
 from typer.testing import CliRunner
 
-from er3a.cli import app
-from er3a.seals import check_seal, seal
-from er3a.study import STAGES
-from er3a.viewing.preview import draw_preview
+from er3a.pipeline.checksums import check_seal, seal
+from er3a.pipeline.cli import app
+from er3a.pipeline.study import STAGES
+from er3a.pipeline.viewing.preview import draw_preview
 from tests.conftest import ROBOTS, ROOT
 from tests.viewing.pictures import joints_seen
 

@@ -12,16 +12,16 @@ from babel.messages.extract import extract_from_dir
 from babel.messages.frontend import parse_mapping_cfg
 from babel.messages.pofile import read_po
 
-from er3a import language
-from er3a.study import STAGES, load_study
-from er3a.teach.page import write_teach_page
-from er3a.viewing.index import write_index
+from er3a.pipeline.messages import language
+from er3a.pipeline.study import STAGES, load_study
+from er3a.pipeline.teach.panel import write_teach_page
+from er3a.pipeline.viewing.index import write_index
 from tests.conftest import ROBOTS, ROOT
 from tests.viewing.untranslated import PageTexts, plain_words, texts_from_files, wide_letters
 
 KEYWORDS = {"said": None, "tr": None, "N_": None, "_": None, "gettext": None, "ngettext": (1, 2)}
 CHINESE = re.compile("[\u4e00-\u9fff]")
-UPDATE = "`make words` collects texts; translate the new ones in er3a/locale/zh"
+UPDATE = "`make words` collects texts; translate the new ones in er3a/pipeline/messages/locale/zh"
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +31,7 @@ def catalogue():
 
 
 def test_the_chinese_catalogue_has_the_texts_of_the_code_and_no_others(catalogue):
-    with (ROOT / "er3a/locale/babel.cfg").open() as file:
+    with (ROOT / "er3a/pipeline/messages/locale/babel.cfg").open() as file:
         methods, options = parse_mapping_cfg(file)
     found = extract_from_dir(str(ROOT), methods, options, keywords=KEYWORDS, strip_comment_tags=False)
     in_code = {_forms(message) for _, _, message, _, _ in found if message}
@@ -61,7 +61,7 @@ def own_texts(small_study):
 def test_each_word_of_a_stage_s_page_can_be_translated(stage, name, small_study, own_texts, tmp_path, monkeypatch):
     monkeypatch.chdir(small_study.folder)
     study, page = load_study("config/small.yaml"), tmp_path / "page.html"
-    report = import_module(f"er3a.stages.{stage}.report").report
+    report = import_module(f"er3a.pipeline.stages.{stage}.report").report
     with wide_letters() as shown:
         report(study, name, Path("results") / name / stage, page)
     assert plain_words([*PageTexts(page.read_text(encoding="utf-8")).texts, *shown], own_texts) == []

@@ -13,10 +13,10 @@ from pathlib import Path
 import psutil
 import pytest
 
-from er3a.cli import app
 from er3a.errors import ResultError
-from er3a.seals import check_seal, seal
-from er3a.viewing.viewer import free_port, viewer_running, without_statistics
+from er3a.pipeline.checksums import check_seal, seal
+from er3a.pipeline.cli import app
+from er3a.pipeline.viewing.viewer import free_port, viewer_running, without_statistics
 
 RERUN = Path(sys.executable).with_name("rerun")
 RECORDING = """

@@ -15,9 +15,9 @@ from urllib.parse import parse_qs, urlsplit
 import psutil
 import pytest
 
-from er3a.cli import app
-from er3a.seals import seal
-from er3a.viewing import web_viewer
+from er3a.pipeline.checksums import seal
+from er3a.pipeline.cli import app
+from er3a.pipeline.viewing import web_viewer
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,7 @@ import yaml
 from babel.messages.pofile import read_po
 from matplotlib.figure import Figure
 
-from er3a import language
+from er3a.pipeline.messages import language
 
 KEPT = re.compile(r"(\{[^}]*\}|%\(\w+\)s|<[^>]*>|&\w+;)")
 WIDE = {ord(letter): ord(letter) + 0xFEE0 for letter in "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"}

@@ -8,18 +8,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from er3a.files.robot_library import load_robot
+from er3a.geometry.sphere import fibonacci_sphere
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
-from er3a.robots.load import load_robot
 from er3a.robots.robot import Robot
 from er3a.workspace.capability import manipulability, map_capability
 from er3a.workspace.dexterous import dexterous_core
 from er3a.workspace.directions import cone_directions, poses, roll_of, tool_rotations
 from er3a.workspace.interval_inverse import GOOD, NEVER, branches, theta_ranges
 from er3a.workspace.section_arm import section_arm, section_frame
-from er3a.workspace.sphere import fibonacci_sphere
 from tests.kinematics.arms import arms, joints_within, placement
 from tests.workspace.shell_arm import NARROW, TOOL_ASIDE, shell_arm
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from er3a.files.robot_library import load_robot
+from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward, jacobian
-from er3a.kinematics.transforms import transform
-from er3a.robots.load import load_robot
 from er3a.robots.robot import Robot
 from er3a.workspace.general import prove_general
 from er3a.workspace.general_arm import general_arm, place

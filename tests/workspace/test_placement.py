@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from er3a.files.robot_library import load_robot
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import jacobian
 from er3a.kinematics.inverse import inverse
-from er3a.robots.load import load_robot
 from er3a.robots.robot import Robot
 from er3a.workspace.directions import cone_directions, from_polar, poses, roll_of, tool_rotations
 from er3a.workspace.placement import MIXED, NO, Places, Task, fitting_places, lattice_spacing, narrowed, survey

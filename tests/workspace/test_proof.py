@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from er3a.files.robot_library import load_robot
+from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
-from er3a.kinematics.transforms import transform
 from er3a.kinematics.wrist_partitioned import solve_slots
-from er3a.robots.load import load_robot
 from er3a.robots.robot import Robot
-from er3a.workspace.arcs import MOST_ARCS, measure, meets, remove
+from er3a.workspace.azimuths import MOST_ARCS, measure, meets, remove
 from er3a.workspace.boundary import border
 from er3a.workspace.causes import describe, relaxations
 from er3a.workspace.cavities import cavities

@@ -3,10 +3,10 @@ import shlex
 import sys
 import time
 
-from er3a.code_digest import code_digest
+from er3a.pipeline.code_digest import code_digest
 from er3a.errors import Er3aError
-from er3a.language import catalogue_file
-from er3a.study import STAGES, load_study
+from er3a.pipeline.messages.language import catalogue_file
+from er3a.pipeline.study import STAGES, load_study
 
 DEFAULT_STUDY = "config/config.yaml"
 STARTED = time.time()
@@ -96,7 +96,7 @@ def settings(stage):
 
 def code_of(stage, verb):
     """Digest of the modules that a verb of a stage uses: Snakemake doesn't see edits of an imported package."""
-    return code_digest(f"er3a.stages.{stage}.{verb}")
+    return code_digest(f"er3a.pipeline.stages.{stage}.{verb}")
 
 
 def results_of(stage):

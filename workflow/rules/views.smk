@@ -29,7 +29,7 @@ rule preview:
     conda:
         "../envs/er3a.yaml"
     params:
-        code=code_digest("er3a.viewing.preview"),
+        code=code_digest("er3a.pipeline.viewing.preview"),
     message:
         "{wildcards.robot}: preview {wildcards.stage}"
     shell:
@@ -83,7 +83,7 @@ rule teach:
     params:
         language=LANGUAGE,
         settings=settings("trajectory"),
-        code=code_digest("er3a.teach.page"),
+        code=code_digest("er3a.pipeline.teach.panel"),
     message:
         "{wildcards.robot}: write the teach panel"
     shell:
@@ -117,7 +117,7 @@ rule index:
         "../envs/er3a.yaml"
     params:
         language=LANGUAGE,
-        code=code_digest("er3a.viewing.index"),
+        code=code_digest("er3a.pipeline.viewing.index"),
     message:
         "write the index"
     shell:

@@ -13,10 +13,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-from er3a.check import check_study
 from er3a.errors import Er3aError
-from er3a.results import half_written
-from er3a.seals import unsound
+from er3a.pipeline.check import check_study
+from er3a.pipeline.checksums import unsound
+from er3a.pipeline.results import half_written
 
 
 def main() -> int:

@@ -1,0 +1,57 @@
+"""Simulated measurements of an arm that differs from its table, to see whether the intervals tell the truth."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from er3a.calibration.calibrate import identify
+from er3a.calibration.parameters import Parameter, moved
+from er3a.files.measurements import Measurement
+from er3a.kinematics.forward import forward
+from er3a.kinematics.table_batch import robot_of, tables_of
+from er3a.references.quantities import MM
+from er3a.robots.robot import Robot
+
+LENGTH_ERROR_M = 5e-4
+ANGLE_ERROR_RAD = 2e-3
+
+
+def measured(arm: Robot, q: np.ndarray, deviation_mm: float, random: np.random.Generator) -> tuple[Measurement, ...]:
+    """Flange positions of an arm at joint angles (P, 6) in rad, with Gaussian noise."""
+    position = forward(arm.without_tool(), q)[:, :3, 3] * MM
+    position = position + random.normal(0.0, deviation_mm, position.shape)
+    return tuple(
+        Measurement(row, tuple(map(float, angles)), "flange", tuple(map(float, xyz)), deviation_mm)
+        for row, (angles, xyz) in enumerate(zip(np.degrees(q), position), 1)
+    )
+
+
+def covered(
+    robot: Robot, runs: int, poses: int, deviation_mm: float, random: np.random.Generator
+) -> tuple[tuple[str, ...], np.ndarray]:
+    """Identify arms with random errors in the identifiable entries, each measured at random poses.
+
+    Returns
+    -------
+    names : of the k identifiable entries
+    inside : (runs, k) bool, whether the 95 % interval holds the true correction
+    """
+    kept = _identifiable(robot, poses, random)
+    size = np.array([LENGTH_ERROR_M if parameter.unit == "mm" else ANGLE_ERROR_RAD for parameter in kept])
+    inside = np.zeros((runs, len(kept)), dtype=bool)
+    for run in range(runs):
+        truth = random.normal(0.0, size)
+        arm = robot_of(moved(tables_of(robot), kept, truth[None]), 0, robot)
+        q = random.uniform(robot.lower, robot.upper, (poses, 6))
+        found = identify(robot, measured(arm, q, deviation_mm, random))
+        by_name = {estimate.name: estimate for estimate in found.estimates}
+        for k, parameter in enumerate(kept):
+            estimate = by_name[parameter.name]
+            inside[run, k] = abs(estimate.correction - truth[k] * parameter.in_unit) <= estimate.half_width
+    return tuple(parameter.name for parameter in kept), inside
+
+
+def _identifiable(robot: Robot, poses: int, random: np.random.Generator) -> list[Parameter]:
+    q = random.uniform(robot.lower, robot.upper, (poses, 6))
+    found = identify(robot, measured(robot, q, 1.0, random))
+    return [Parameter(estimate.name[:-1], int(estimate.name[-1])) for estimate in found.estimates]

@@ -1,0 +1,144 @@
+"""Tidy CSV tables: known columns, no NaN, one error naming row and column."""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import io
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from er3a.errors import InputError
+from er3a.files.yaml_file import read_text, vanished
+
+LARGEST_DIGITS = 9
+LARGEST = 10.0**LARGEST_DIGITS
+
+
+class Written(float):
+    """A number that knows with how many decimals it was written."""
+
+    decimals: int
+
+    def __new__(cls, text: str) -> Written:
+        number = super().__new__(cls, text)
+        mantissa, _, exponent = text.lower().partition("e")
+        number.decimals = max(len(mantissa.partition(".")[2]) - int(exponent or 0), -LARGEST_DIGITS)
+        return number
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a CSV table.
+
+    Attributes
+    ----------
+    type : float, Written, int or str
+    optional : an empty field is read as None
+    choices : the allowed values, for columns of words
+    """
+
+    type: type = float
+    optional: bool = False
+    choices: tuple[str, ...] = ()
+
+
+def read_csv(path: str | Path, columns: Mapping[str, Column]) -> list[dict[str, Any]]:
+    """Read a CSV file with exactly these columns (any order); rows as dicts with a ``row`` key (file line).
+
+    Raises
+    ------
+    InputError
+        for a missing or unknown column, a wrong unit in a column name, an empty or non-finite number, a ragged row
+    """
+    path = Path(path)
+    lines = _lines(path)
+    if not lines:
+        raise InputError(path, None, "the file is empty", f"Write a header: {','.join(columns)}")
+    header = [name.strip() for name in lines[0][1]]
+    _check_header(path, header, columns)
+    rows = []
+    for number, line in lines[1:]:
+        if len(line) != len(header):
+            problem = f"{len(line)} fields where the header has {len(header)}"
+            raise InputError(path, f"row {number}", problem, "Mend the commas; quote texts that hold one")
+        row = {name: _value(path, number, name, text.strip(), columns[name]) for name, text in zip(header, line)}
+        rows.append({"row": number, **row})
+    return rows
+
+
+def read_header(path: str | Path) -> list[str]:
+    """The column names of a CSV file, [] if it is empty; :class:`InputError` if it is not CSV."""
+    lines = _lines(Path(path))
+    return [name.strip() for name in lines[0][1]] if lines else []
+
+
+def read_column(path: str | Path, column: str) -> list[str]:
+    """The texts in a column of a CSV file that has been checked, [] if it has no such column."""
+    (_, header), *rows = _lines(Path(path))
+    names = [name.strip() for name in header]
+    return [line[names.index(column)].strip() for _, line in rows] if column in names else []
+
+
+def _lines(path: Path) -> list[tuple[int, list[str]]]:
+    """Lines of a CSV file that aren't blank, with their numbers."""
+    reader = csv.reader(io.StringIO(read_text(path)), strict=True)
+    try:
+        return [(reader.line_num, line) for line in reader if any(field.strip() for field in line)]
+    except csv.Error as error:
+        raise InputError(path, f"line {reader.line_num}", f"not valid CSV ({error})", "Mend this line") from None
+
+
+def _check_header(path: Path, header: list[str], columns: Mapping[str, Column]) -> None:
+    for name in filter(None, header):
+        if header.count(name) > 1:
+            raise InputError(path, f"column {name}", "stands in the header twice", "Keep one of the two")
+    missing = [name for name in columns if name not in header]
+    for name in header:
+        if name in columns:
+            continue
+        stem = name.rsplit("_", 1)[0]
+        same_stem = [other for other in missing if other.rsplit("_", 1)[0] == stem or other.startswith(name + "_")]
+        if same_stem:
+            problem, remedy = "not a unit this column can have", f"Convert the values and name it '{same_stem[0]}'"
+            raise InputError(path, f"column {name}", problem, remedy)
+        if not name:
+            raise InputError(path, f"column {header.index(name) + 1}", "has no name", "Name it, or remove a comma")
+        close = difflib.get_close_matches(name, missing, n=1)
+        remedy = f"Did you mean '{close[0]}'?" if close else f"Known columns: {', '.join(columns)}"
+        raise InputError(path, f"column {name}", "unknown column", remedy)
+    if missing:
+        raise InputError(path, f"column {missing[0]}", "missing", f"The header must hold: {', '.join(columns)}")
+
+
+def _value(path: Path, row: int, name: str, text: str, column: Column) -> Any:
+    where = f"row {row}, column {name}"
+    if not text:
+        if column.optional:
+            return None
+        raise InputError(path, where, "empty", "Fill in a value" + _allowed(column))
+    if column.type is str:
+        if column.choices and text not in column.choices:
+            raise InputError(path, where, f"'{text}' is not known", "Write" + _allowed(column))
+        return text
+    number = "a whole number" if column.type is int else "a number"
+    plain = text.isascii() and "_" not in text  # Python would read 1_000 as 1000, and the digits of any script
+    try:
+        value = column.type(text) if plain else None
+    except ValueError:
+        value = None
+    if value is None:
+        raise InputError(path, where, f"'{text}' is not {number}", f"Write {number} without a unit")
+    if not math.isfinite(value):
+        raise InputError(path, where, f"'{text}' is not a finite number", "Write a number, or remove the row")
+    if abs(value) > LARGEST or vanished(text, value):
+        problem = f"'{text}' is too {'large' if value else 'small'} for any length or angle"
+        raise InputError(path, where, problem, "Check its exponent")
+    return value
+
+
+def _allowed(column: Column) -> str:
+    return f" one of: {', '.join(column.choices)}" if column.choices else ""

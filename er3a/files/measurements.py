@@ -1,0 +1,148 @@
+"""Measured positions: CSV tables of joint angles and where a point was seen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from er3a.errors import InputError
+from er3a.files.csv_file import Column, read_csv
+from er3a.references.quantities import MM, CarriedCoordinate, PointCoordinate, Pose, SectionCoordinate
+from er3a.references.reference import Reference, ReferenceSet
+from er3a.robots.robot import Robot
+
+_NUMBER = Column(float)
+COLUMNS = {
+    **{f"q{joint}_deg": _NUMBER for joint in range(1, 7)},
+    "point": Column(str, choices=("flange", "tool")),
+    **{f"{c}_mm": Column(float, optional=True) for c in "xyz"},
+    "standard_deviation_mm": _NUMBER,
+}
+LEAST_SPAN_MM = 10.0
+WIDEST_IN_RADIANS = 2.01 * np.pi
+POSES_TO_JUDGE_UNITS = 3
+LIMIT_SLACK_DEG = 0.01
+APART_DEVIATIONS = 8.0
+HALF_WIDTH_TO_DEVIATION = 1 / np.sqrt(3)
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """Where a point was seen.
+
+    Attributes
+    ----------
+    row : line of the file
+    pose : joint angles, deg
+    point : flange (frame 6 of the table) or tool (the origin of the robot's tool frame)
+    xyz_mm : base frame; None for coordinates that weren't measured
+    deviation_mm : standard deviation of each coordinate
+    """
+
+    row: int
+    pose: Pose
+    point: str
+    xyz_mm: tuple[float | None, float | None, float | None]
+    deviation_mm: float
+
+
+def load_measurements(path: str | Path) -> tuple[Measurement, ...]:
+    """Read measured positions.
+
+    Raises
+    ------
+    InputError
+        naming file, row and column: a wrong unit, a number missing or not finite, a deviation that is not positive,
+        values that can only be metres or radians, or rows that contradict each other
+    """
+    path = Path(path)
+    table = read_csv(path, COLUMNS)
+    if not table:
+        raise InputError(path, None, "the table has a header but no rows", "Add a row for each measured position")
+    rows = []
+    for fields in table:
+        xyz = tuple(fields[f"{c}_mm"] for c in "xyz")
+        if xyz == (None, None, None):
+            raise InputError(path, f"row {fields['row']}, column x_mm", "no coordinate is given", "Give one at least")
+        if fields["standard_deviation_mm"] <= 0:
+            problem = f"{fields['standard_deviation_mm']:g} is not positive"
+            where = f"row {fields['row']}, column standard_deviation_mm"
+            raise InputError(path, where, problem, "Write the measuring device's standard deviation")
+        pose = tuple(fields[f"q{joint}_deg"] for joint in range(1, 7))
+        rows.append(Measurement(fields["row"], pose, fields["point"], xyz, fields["standard_deviation_mm"]))
+    _check_units(path, rows)
+    _check_contradictions(path, rows)
+    return tuple(rows)
+
+
+def check_poses(measurements: Sequence[Measurement], robot: Robot, path: str | Path | None = None) -> None:
+    """Refuse poses outside the joint limits: :class:`InputError` naming row and joint."""
+    lower, upper = np.degrees(robot.lower), np.degrees(robot.upper)
+    for measurement in measurements:
+        for joint, angle in enumerate(measurement.pose):
+            if not lower[joint] - LIMIT_SLACK_DEG <= angle <= upper[joint] + LIMIT_SLACK_DEG:
+                limits = f"{lower[joint]:g} .. {upper[joint]:g}"
+                problem = f"{angle:g} deg is outside the limits {limits} of joint {joint + 1}"
+                remedy = "Check the angle, its sign and its unit, or the robot's limits"
+                raise InputError(path, f"row {measurement.row}, column q{joint + 1}_deg", problem, remedy)
+
+
+def scalars_of_measurements(
+    measurements: Sequence[Measurement], robot: Robot
+) -> tuple[tuple[Reference, ...], np.ndarray]:
+    """Each coordinate as a reference, and their standard deviations (n,) in mm."""
+    tool = tuple(float(value) for value in robot.tool[:3, 3] * MM)
+    references, deviation = [], []
+    for measurement in measurements:
+        offset = tool if measurement.point == "tool" else (0.0, 0.0, 0.0)
+        for coordinate, value in zip("xyz", measurement.xyz_mm):
+            if value is not None:
+                quantity = CarriedCoordinate(measurement.pose, offset, coordinate)
+                name = f"row {measurement.row}: {measurement.point} {coordinate}"
+                references.append(
+                    Reference(name, "key poses", quantity, value, measurement.deviation_mm, "measured", "inferred")
+                )
+                deviation.append(measurement.deviation_mm)
+    return tuple(references), np.array(deviation)
+
+
+def scalars_of_set(references: ReferenceSet) -> tuple[tuple[Reference, ...], np.ndarray]:
+    """A reference set's coordinates at single poses, official, CAD and export ones if there are any, and their standard
+    deviations (n,) in mm: half-width over root 3, as for a value that may lie anywhere within (GUM 4.3.7)."""
+    stated = [r for r in references.checkable if isinstance(r.quantity, PointCoordinate | SectionCoordinate)]
+    weighty = [r for r in stated if r.weighty] or stated
+    return tuple(weighty), HALF_WIDTH_TO_DEVIATION * np.array([r.uncertainty for r in weighty])
+
+
+def _check_units(path: Path, rows: list[Measurement]) -> None:
+    for row in rows:
+        span = max(abs(value) for value in row.xyz_mm if value is not None)
+        if None not in row.xyz_mm and span < LEAST_SPAN_MM:
+            problem = f"the point is {span:g} mm from the base's origin at most, which can only be metres"
+            raise InputError(path, f"row {row.row}, columns x_mm, y_mm, z_mm", problem, "Multiply by 1000")
+    widest = max(abs(angle) for row in rows for angle in row.pose)
+    if len({row.pose for row in rows}) >= POSES_TO_JUDGE_UNITS and 0 < widest <= WIDEST_IN_RADIANS:
+        problem = f"the widest angle is {widest:g} deg, which can only be radians"
+        raise InputError(path, "columns q1_deg to q6_deg", problem, "Convert to degrees")
+
+
+def _check_contradictions(path: Path, rows: list[Measurement]) -> None:
+    by_pose: dict[tuple, list[Measurement]] = {}
+    for row in rows:
+        by_pose.setdefault((row.pose, row.point), []).append(row)
+    for same in (rows for rows in by_pose.values() if len(rows) > 1):
+        xyz = np.array([row.xyz_mm for row in same], dtype=float)  # None becomes NaN, which is never far from anything
+        deviation = np.array([row.deviation_mm for row in same])
+        for n, row in enumerate(same):
+            apart = np.abs(xyz[:n] - xyz[n])
+            far = np.argwhere(apart > APART_DEVIATIONS * np.hypot(deviation[:n], deviation[n])[:, None])
+            if len(far):
+                k, c = far[0]
+                problem = (
+                    f"contradicts row {same[k].row}: same joints, {apart[k, c]:.3g} mm apart in {'xyz'[c]}, "
+                    f"far beyond the stated standard deviations"
+                )
+                raise InputError(path, f"row {row.row}", problem, "Remove the wrong one, or state its deviation")

@@ -1,0 +1,225 @@
+"""What a path file may hold (YAML, mm, degrees and seconds): data/paths/<robot>.yaml."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from er3a.errors import InputError
+from er3a.files.robot_file import Name, Text
+from er3a.files.units import JointsDeg, PositionMm, RpyDeg, Triple
+from er3a.files.yaml_file import StrictModel, load
+
+TRAPEZOID_RAMP = 1 / 3  # of a motion's time, on the way up and on the way down
+
+Duration = Annotated[float, Field(gt=0, le=3600)]
+Samples = Annotated[int, Field(ge=2, le=100_000)]
+Rates = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=6, max_length=6)]
+Blend = Annotated[float, Field(ge=0, le=10_000)]
+
+
+class PoseEntry(StrictModel):
+    """A pose of the tool in the base frame; R = Rz(yaw) Ry(pitch) Rx(roll)."""
+
+    xyz_mm: PositionMm
+    rpy_deg: RpyDeg
+
+
+class NamedPath(StrictModel):
+    """What every path has."""
+
+    name: Name
+    title: Text
+    samples: Samples
+
+
+class Profiled(NamedPath):
+    """A path that runs from rest to rest, or from halt to halt.
+
+    ``profile`` is the position's law of time; ``ramp_share`` is the share of the time of each ramp of a trapezoid
+    (1/3 if left out).
+    """
+
+    duration_s: Duration
+    profile: Literal["quintic", "trapezoid"] = "quintic"
+    ramp_share: Annotated[float, Field(gt=0, le=0.5)] | None = None
+
+    @model_validator(mode="after")
+    def _ramp_of_a_trapezoid(self):
+        if self.ramp_share is not None and self.profile != "trapezoid":
+            raise ValueError("ramp_share: a quintic has no ramps | Remove it, or write profile: trapezoid")
+        return self
+
+    @property
+    def ramp(self) -> float | None:
+        """The trapezoid's share of time per ramp; None for the quintic."""
+        return (self.ramp_share or TRAPEZOID_RAMP) if self.profile == "trapezoid" else None
+
+
+class JointPath(NamedPath):
+    """A joint move: quintic in time, all joints together; at rest at the ends unless their rates are given.
+
+    It starts at ``start_deg``, or where the arm stands ``after`` an earlier path of the file.
+    """
+
+    kind: Literal["joint"]
+    start_deg: JointsDeg | None = None
+    after: Name | None = None
+    end_deg: JointsDeg
+    start_velocity_deg_s: Rates | None = None
+    end_velocity_deg_s: Rates | None = None
+    start_acceleration_deg_s2: Rates | None = None
+    end_acceleration_deg_s2: Rates | None = None
+    duration_s: Duration
+
+    @model_validator(mode="after")
+    def _one_start(self):
+        if (self.start_deg is None) == (self.after is None):
+            raise ValueError(
+                "give either start_deg (six joint angles) or after (an earlier path) | Keep one of the two"
+            )
+        return self
+
+
+class JointSequencePath(Profiled):
+    """Joint moves through points, all joints together; each corner rounded over ``blend_deg`` on either side.
+
+    ``blend_deg`` counts in the joint that turns most; with 0 the arm stops at each corner.
+    """
+
+    kind: Literal["joint_sequence"]
+    points_deg: Annotated[list[JointsDeg], Field(min_length=2)]
+    blend_deg: Blend = 0.0
+
+
+class ToolStart(Profiled):
+    """Where a path of the tool starts: at joint angles, at a pose, or where the arm stands ``after`` an earlier path.
+
+    ``start_branch`` (only with a start pose) fixes the branch to begin on, in the words of the inverse's solutions.
+    """
+
+    start_deg: JointsDeg | None = None
+    start: PoseEntry | None = None
+    after: Name | None = None
+    start_branch: Text | None = None
+
+    @model_validator(mode="after")
+    def _one_start(self):
+        if [self.start, self.start_deg, self.after].count(None) != 2:
+            ways = "start_deg (six joint angles) or start (a pose) or after (an earlier path)"
+            raise ValueError(f"give either {ways} | Keep one of them")
+        if self.start_branch is not None and self.start is None:
+            what = "after" if self.after else "start_deg"
+            raise ValueError(f"start_branch: {what} already fixes the branch | Remove start_branch")
+        return self
+
+
+class LineTo(StrictModel):
+    """A straight line to a pose; ``half_turn_axis`` chooses the sense of a rotation by exactly 180 deg."""
+
+    end: PoseEntry
+    half_turn_axis: Triple | None = None
+
+
+class ArcTo(LineTo):
+    """A circular arc through a point to a pose."""
+
+    via_mm: PositionMm
+
+
+class LinePath(ToolStart, LineTo):
+    """A straight line of the tool."""
+
+    kind: Literal["line"]
+
+
+class ArcPath(ToolStart, ArcTo):
+    """A circular arc of the tool."""
+
+    kind: Literal["arc"]
+
+
+class LineSegment(LineTo):
+    """A line of a sequence; ``blend_mm`` rounds the corner at its end over that length on either side."""
+
+    kind: Literal["line"]
+    blend_mm: Blend = 0.0
+
+
+class ArcSegment(ArcTo):
+    """An arc of a sequence; ``blend_mm`` rounds the corner at its end over that length on either side."""
+
+    kind: Literal["arc"]
+    blend_mm: Blend = 0.0
+
+
+class SequencePath(ToolStart):
+    """Lines and arcs one after another; the tool stops at each corner that is not rounded."""
+
+    kind: Literal["sequence"]
+    segments: Annotated[
+        list[Annotated[LineSegment | ArcSegment, Field(discriminator="kind")]], Field(min_length=1, max_length=1000)
+    ]
+
+    @model_validator(mode="after")
+    def _no_corner_at_the_end(self):
+        if self.segments[-1].blend_mm:
+            last = len(self.segments) - 1
+            raise ValueError(f"segments[{last}].blend_mm: the last segment has no corner at its end | Remove it")
+        return self
+
+
+class TablePath(NamedPath):
+    """A path through the rows of a CSV table (:mod:`er3a.files.path_table`).
+
+    ``duration_s`` is for tables without times. Corners are rounded over ``blend_mm`` (``blend_deg`` for joint angles)
+    on either side, less where half of a side is shorter; left out, over half of the shorter side.
+    """
+
+    kind: Literal["table"]
+    file: Text
+    duration_s: Duration | None = None
+    blend_mm: Blend | None = None
+    blend_deg: Blend | None = None
+    start_branch: Text | None = None
+    half_turn_axis: Triple | None = None
+
+
+PathEntry = JointPath | JointSequencePath | LinePath | ArcPath | SequencePath | TablePath
+
+
+class PathFile(StrictModel):
+    """A list of named paths."""
+
+    kind: Literal["paths"]
+    paths: Annotated[list[Annotated[PathEntry, Field(discriminator="kind")]], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _names_differ(self):
+        names = [entry.name for entry in self.paths]
+        for i, name in enumerate(names):
+            if name in names[:i]:
+                raise ValueError(f"paths[{i}].name: '{name}' names an earlier path too | Give each path its own name")
+            after = getattr(self.paths[i], "after", None)
+            if after and after not in names[:i]:
+                raise ValueError(f"paths[{i}].after: no earlier path is named '{after}' | Name one that stands above")
+        return self
+
+
+def load_paths(path: str | Path) -> PathFile:
+    """Read and check a path file.
+
+    Raises
+    ------
+    InputError
+        naming file, field and remedy
+    """
+    try:
+        return load(PathFile, path)
+    except InputError as error:
+        kinds = "joint_sequence|joint|line|arc|sequence|table"
+        field = error.field and re.sub(rf"((?:paths|segments)\[\d+\])\.(?:{kinds})\b", r"\1", error.field)
+        raise InputError(error.file, field, error.problem, error.remedy) from None

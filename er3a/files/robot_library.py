@@ -1,0 +1,89 @@
+"""Robot files to :class:`Robot`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from er3a.errors import InputError
+from er3a.files.robot_file import Envelopes, Placement, RobotFile
+from er3a.files.yaml_file import load
+from er3a.geometry.transforms import transform
+from er3a.robots.robot import Envelope, Robot, Source
+
+DATA = Path(__file__).resolve().parents[2] / "data"
+ROBOTS = DATA / "robots"
+
+
+def load_robot(name_or_path: str | Path) -> Robot:
+    """Load a robot by the name of a file in data/robots, or by a path that ends in .yaml.
+
+    Raises
+    ------
+    InputError
+        naming file, field and remedy
+    """
+    return robot_of(read_robot(robot_path(name_or_path)))
+
+
+def read_robot(path: Path) -> RobotFile:
+    """What a robot file holds, checked; :class:`InputError` as :func:`load_robot`."""
+    content = load(RobotFile, path)
+    if content.name != path.stem:
+        raise InputError(path, "name", f"'{content.name}' is not the file's name", f"Write {path.stem}")
+    return content
+
+
+def robot_path(name_or_path: str | Path) -> Path:
+    """The file that a robot's name, or a path ending in .yaml, stands for."""
+    text = str(name_or_path)
+    if text.endswith((".yaml", ".yml")):
+        return Path(text)
+    path = ROBOTS / f"{text}.yaml"
+    if "/" in text or "\0" in text or not path.is_file():
+        known = ", ".join(sorted(file.stem for file in ROBOTS.glob("*.yaml")))
+        raise InputError(None, None, f"there is no robot '{text}'", f"Known: {known}; or give a path ending in .yaml")
+    return path
+
+
+def robot_of(content: RobotFile) -> Robot:
+    """The model behind a checked file: metres and radians."""
+    groups = ("dh", "zero", "limits", "speeds", "base", "tool", "envelopes")
+    present = {group: getattr(content, group) for group in groups if getattr(content, group) is not None}
+    speeds = [row.speed_deg_s for row in content.speeds.rows] if content.speeds else [np.nan] * 6
+    return Robot(
+        name=content.name,
+        title=content.title,
+        convention=content.dh.convention,
+        a=np.array([row.a_mm for row in content.dh.rows]) / 1000,
+        alpha=np.radians([row.alpha_deg for row in content.dh.rows]),
+        d=np.array([row.d_mm for row in content.dh.rows]) / 1000,
+        beta=np.radians([row.beta_deg or 0.0 for row in content.dh.rows]),
+        direction=np.array([row.direction for row in content.zero.rows], dtype=float),
+        offset=np.radians([row.offset_deg for row in content.zero.rows]),
+        lower=np.radians([row.lower_deg for row in content.limits.rows]),
+        upper=np.radians([row.upper_deg for row in content.limits.rows]),
+        speed=np.radians(speeds),
+        base=placement_transform(content.base),
+        tool=placement_transform(content.tool),
+        zero_pose=content.zero_pose,
+        references=tuple(content.references),
+        envelopes=_envelopes(content.envelopes),
+        sources={group: Source(value.source, value.grade) for group, value in present.items()},
+    )
+
+
+def _envelopes(group: Envelopes | None) -> tuple[Envelope, ...]:
+    def metres(values: list[float]) -> tuple[float, float, float]:
+        return tuple(value / 1000 for value in values)
+
+    capsules = group.capsules if group else []
+    return tuple(Envelope(c.link, metres(c.from_mm), metres(c.to_mm), c.radius_mm / 1000) for c in capsules)
+
+
+def placement_transform(placement: Placement | None) -> np.ndarray:
+    """The (4, 4) transform of a placement in mm and degrees; the identity for None."""
+    if placement is None:
+        return np.eye(4)
+    return transform(np.array(placement.xyz_mm) / 1000, np.radians(placement.rpy_deg))

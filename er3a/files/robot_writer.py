@@ -1,0 +1,87 @@
+"""A :class:`Robot` as a robot file (YAML, mm and degrees)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from er3a.files.robot_file import SHORTEST_PLAIN_LENGTH_MM, RobotFile
+from er3a.geometry.transforms import rpy_of
+from er3a.pipeline.results import write_atomically
+from er3a.robots.robot import Robot, Source
+
+_UNKNOWN = Source("not stated", "inferred")
+
+
+def robot_file(robot: Robot) -> RobotFile:
+    """The file model of a robot; mm and degrees to 1e-11, so that rounding noise does not reach the file.
+
+    Raises
+    ------
+    pydantic.ValidationError
+        if the robot's values make no acceptable file
+    """
+
+    def sourced(group: str) -> dict:
+        source = robot.sources.get(group, _UNKNOWN)
+        return {"source": source.source, "grade": source.grade}
+
+    def rows(**columns: np.ndarray) -> list[dict]:
+        return [{"joint": k + 1, **{key: _tidy(values[k]) for key, values in columns.items()}} for k in range(6)]
+
+    a_mm, d_mm = robot.a * 1000, robot.d * 1000
+    lengths = np.abs(np.concatenate([a_mm, d_mm]))
+    zero_rows = rows(offset_deg=np.degrees(robot.offset))
+    for row, direction in zip(zero_rows, robot.direction):
+        row["direction"] = int(direction)
+    dh_rows = rows(a_mm=a_mm, alpha_deg=np.degrees(robot.alpha), d_mm=d_mm)
+    for row, beta in zip(dh_rows, robot.beta):
+        row["beta_deg"] = _tidy(np.degrees(beta)) or None
+    content = {
+        "kind": "robot",
+        "name": robot.name,
+        "title": robot.title,
+        "zero_pose": robot.zero_pose or "not stated",
+        "references": list(robot.references),
+        "dh": sourced("dh")
+        | {
+            "convention": robot.convention,
+            "calibrated": bool(((lengths > 0) & (lengths < SHORTEST_PLAIN_LENGTH_MM)).any() or robot.beta.any()),
+            "rows": dh_rows,
+        },
+        "zero": sourced("zero") | {"rows": zero_rows},
+        "limits": sourced("limits")
+        | {"rows": rows(lower_deg=np.degrees(robot.lower), upper_deg=np.degrees(robot.upper))},
+    }
+    if np.isfinite(robot.speed).all():
+        content["speeds"] = sourced("speeds") | {"rows": rows(speed_deg_s=np.degrees(robot.speed))}
+    if robot.envelopes:
+        capsules = [
+            {
+                "link": envelope.link,
+                "from_mm": [_tidy(value * 1000) for value in envelope.start],
+                "to_mm": [_tidy(value * 1000) for value in envelope.end],
+                "radius_mm": _tidy(envelope.radius * 1000),
+            }
+            for envelope in robot.envelopes
+        ]
+        content["envelopes"] = sourced("envelopes") | {"capsules": capsules}
+    for key in ("base", "tool"):
+        T = getattr(robot, key)
+        if not np.array_equal(T, np.eye(4)):
+            placement = {"xyz_mm": map(_tidy, T[:3, 3] * 1000), "rpy_deg": map(_tidy, np.degrees(rpy_of(T)))}
+            content[key] = sourced(key) | {name: list(values) for name, values in placement.items()}
+    return RobotFile.model_validate(content)
+
+
+def write_robot(robot: Robot, path: Path) -> None:
+    """Write a robot file that :func:`er3a.load_robot` reads back to the same numbers, to 1e-12 m and rad."""
+    content = robot_file(robot).model_dump(exclude_none=True)
+    text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=110, default_flow_style=None)
+    write_atomically(path, lambda file: file.write_text(text, encoding="utf-8"))
+
+
+def _tidy(value: float) -> float:
+    return round(float(value), 11) + 0.0

@@ -1,0 +1,194 @@
+"""Target files (YAML or CSV): the poses that the inverse-kinematics study asks for."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, field_validator, model_validator
+from scipy.spatial.transform import Rotation
+
+from er3a.errors import InputError
+from er3a.files.robot_file import Name
+from er3a.files.target_table import FORMS, POSITION, REFERENCE, read_target_table
+from er3a.files.units import JointsDeg, PositionMm, Six, Triple, as_degrees
+from er3a.files.yaml_file import StrictModel, load, parse
+from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, transform
+from er3a.kinematics.forward import forward
+from er3a.robots.robot import Robot
+
+MOST_TARGETS = 50
+UNIT_LENGTH_TOLERANCE = 1e-6
+EULER_KEY = re.compile(r"euler\w*|[xyz]{3}(_(deg|rad))?", re.IGNORECASE)
+ORIENTATION_FORMS = ("rpy_deg", "zyz_deg", "quaternion_wxyz", "matrix")
+
+Angles = Annotated[Triple, as_degrees("give the orientation as a quaternion or a matrix")]
+Line = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\r\n]*$")]
+
+
+class Target(StrictModel):
+    """One pose of the tool, in the frame that the robot's base is placed in.
+
+    Either ``xyz_mm`` and one orientation form, or ``q_deg`` (the pose at these joint angles).
+
+    Attributes
+    ----------
+    rpy_deg : R = Rz(yaw) Ry(pitch) Rx(roll)
+    zyz_deg : R = Rz(a) Ry(b) Rz(c)
+    quaternion_wxyz : of unit length to 1e-6
+    matrix : rotation matrix by rows, orthonormal to 1e-6; the nearest exact rotation is used
+    q_ref_deg : the joint angles that the arm comes from
+    """
+
+    name: Name
+    note: Line | None = None
+    xyz_mm: PositionMm | None = None
+    rpy_deg: Angles | None = None
+    zyz_deg: Angles | None = None
+    quaternion_wxyz: Annotated[list[float], Field(min_length=4, max_length=4)] | None = None
+    matrix: Annotated[list[Triple], Field(min_length=3, max_length=3)] | None = None
+    q_deg: Annotated[Six, as_degrees("give the pose by xyz_mm and an orientation")] | None = None
+    q_ref_deg: JointsDeg = [0.0] * 6
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_euler_order(cls, content: Any) -> Any:
+        for key in content if isinstance(content, dict) else ():
+            if key != "zyz_deg" and EULER_KEY.fullmatch(str(key)):
+                raise ValueError(
+                    f"{key}: this order of Euler angles is not known | Write rpy_deg (roll, pitch, yaw: R = Rz Ry Rx, "
+                    "the order ZYX), zyz_deg, quaternion_wxyz or matrix"
+                )
+        return content
+
+    @field_validator("quaternion_wxyz")
+    @classmethod
+    def _unit_length(cls, values):
+        length = 1.0 if values is None else math.hypot(*values)
+        if abs(length - 1) > UNIT_LENGTH_TOLERANCE:
+            raise ValueError(f"the quaternion's length is {length:.9g}, not 1 | Divide w, x, y and z by it")
+        return values
+
+    @field_validator("matrix")
+    @classmethod
+    def _rotation(cls, rows):
+        if rows is None:
+            return rows
+        R = np.array(rows)
+        with np.errstate(over="ignore", invalid="ignore"):
+            worst = np.abs(R @ R.T - np.eye(3)).max()
+        if not worst <= ORTHONORMAL_TOLERANCE:
+            raise ValueError(
+                f"the matrix is no rotation: R R^T differs from 1 by {worst:.3g} | "
+                f"Its rows must be orthonormal to {ORTHONORMAL_TOLERANCE:g}; write more digits"
+            )
+        if np.linalg.det(R) < 0:
+            raise ValueError("the matrix mirrors (its determinant is -1) | Turn the sign of one axis")
+        return rows
+
+    @model_validator(mode="after")
+    def _one_pose(self):
+        forms = [key for key in ORIENTATION_FORMS if getattr(self, key) is not None]
+        if self.q_deg is not None:
+            if self.xyz_mm is not None or forms:
+                extra = "xyz_mm" if self.xyz_mm is not None else forms[0]
+                raise ValueError(f"q_deg and {extra} both give a pose | Keep one of the two")
+            return self
+        if self.xyz_mm is None:
+            raise ValueError("the position is missing | Add xyz_mm and an orientation, or q_deg alone")
+        if not forms:
+            raise ValueError(f"the orientation is missing | Add one of {', '.join(ORIENTATION_FORMS)}")
+        if len(forms) > 1:
+            raise ValueError(f"the orientation stands here twice, as {' and '.join(forms)} | Keep one")
+        return self
+
+    def pose(self, robot: Robot) -> np.ndarray:
+        """T_base_tool (4, 4), m, read-only; the robot is needed for a target given by joint angles."""
+        if self.q_deg is not None:
+            T = forward(robot, np.radians(self.q_deg))
+        elif self.rpy_deg is not None:
+            T = transform(np.array(self.xyz_mm) / 1000, np.radians(self.rpy_deg))
+        else:
+            T = np.eye(4)
+            T[:3, 3] = np.array(self.xyz_mm) / 1000
+            T[:3, :3] = self._rotation_matrix()
+        T.setflags(write=False)
+        return T
+
+    def reference(self) -> np.ndarray:
+        """``q_ref_deg`` in rad, (6,)."""
+        return np.radians(self.q_ref_deg)
+
+    def _rotation_matrix(self) -> np.ndarray:
+        if self.zyz_deg is not None:
+            first, second, third = (transform(np.zeros(3), turn)[:3, :3] for turn in _zyz_turns(self.zyz_deg))
+            return first @ second @ third
+        if self.quaternion_wxyz is not None:
+            return Rotation.from_quat(self.quaternion_wxyz, scalar_first=True).as_matrix()
+        u, _, vt = np.linalg.svd(np.array(self.matrix))
+        return u @ vt
+
+
+class TargetFile(StrictModel):
+    """data/targets/ROBOT.yaml."""
+
+    kind: Literal["targets"]
+    targets: list[Target]
+
+    @field_validator("targets")
+    @classmethod
+    def _some_but_not_many(cls, targets):
+        if not targets:
+            raise ValueError("the list is empty | Add a target, or take the robot out of the study")
+        if len(targets) > MOST_TARGETS:
+            raise ValueError(f"{len(targets)} targets don't fit on a page | Split the file; {MOST_TARGETS} at most")
+        return targets
+
+    @model_validator(mode="after")
+    def _own_names(self):
+        names = [target.name for target in self.targets]
+        for i, name in enumerate(names):
+            if name in names[:i]:
+                raise ValueError(
+                    f"targets[{i}].name: '{name}' is also that of targets[{names.index(name)}] | Rename it"
+                )
+        return self
+
+
+def load_targets(path: str | Path) -> tuple[Target, ...]:
+    """The targets of a YAML or CSV file, in its order.
+
+    Raises
+    ------
+    InputError
+        naming file, field (or row and column) and remedy
+    """
+    if str(path).endswith(".csv"):
+        return _targets_of_table(Path(path))
+    return tuple(load(TargetFile, path).targets)
+
+
+def _targets_of_table(path: Path) -> tuple[Target, ...]:
+    rows = read_target_table(path)
+    lines = [row.pop("row") for row in rows]
+    try:
+        return tuple(parse(TargetFile, {"kind": "targets", "targets": rows}, path).targets)
+    except InputError as error:
+        where = re.match(r"targets\[(\d+)\]\.?(\w*)", error.field or "")
+        if where is None:
+            raise InputError(path, "rows", error.problem, error.remedy) from None
+        column = f", column {', '.join(_columns_of(where[2]))}" if where[2] else ""
+        problem = re.sub(r"targets\[(\d+)\]", lambda other: f"row {lines[int(other[1])]}", error.problem)
+        raise InputError(path, f"row {lines[int(where[1])]}{column}", problem, error.remedy) from None
+
+
+def _columns_of(field: str) -> tuple[str, ...]:
+    return {"xyz_mm": POSITION, "q_ref_deg": REFERENCE, **FORMS}.get(field, (field,))
+
+
+def _zyz_turns(zyz_deg: list[float]) -> np.ndarray:
+    a, b, c = np.radians(zyz_deg)
+    return np.array([[0, 0, a], [0, b, 0], [0, 0, c]])

@@ -1,0 +1,1 @@
+"""Robots in other people's formats: URDF, and tables from joint axes."""

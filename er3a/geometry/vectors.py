@@ -1,0 +1,73 @@
+"""Vectors in space as tuples of three floats, for kernels: numba keeps them in registers, where arrays are allocated.
+
+References
+----------
+.. [1] R. M. Murray, Z. Li, S. S. Sastry, *A Mathematical Introduction to Robotic Manipulation*, 1994, equation 2.14.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from er3a.numerics.jit import kernel
+
+Vector = tuple[float, float, float]
+
+
+@kernel
+def dot(a, b):
+    """Scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def cross(a, b):
+    """Vector product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@kernel
+def add(a, b):
+    """Sum."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@kernel
+def subtract(a, b):
+    """Difference."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@kernel
+def scaled(a, factor):
+    """Product with a number."""
+    return a[0] * factor, a[1] * factor, a[2] * factor
+
+
+@kernel
+def rotated(v, axis, c, s):
+    """v turned about a unit axis by the angle with cosine c and sine s: Rodrigues' formula [1]_."""
+    u = cross(axis, v)
+    along = dot(axis, v) * (1.0 - c)
+    return (
+        v[0] * c + u[0] * s + axis[0] * along,
+        v[1] * c + u[1] * s + axis[1] * along,
+        v[2] * c + u[2] * s + axis[2] * along,
+    )
+
+
+@kernel
+def signed_angle(start, end, axis):
+    """Angle (rad) that turns ``start`` to ``end`` about the unit axis, both projected across it.
+
+    Projecting first, by vector products, keeps all digits where both vectors nearly lie on the axis (wrist aligned).
+    """
+    start, end = cross(axis, start), cross(axis, end)
+    return np.arctan2(dot(axis, cross(start, end)), dot(start, end))
+
+
+@kernel
+def unsigned_angle(a, b):
+    """Angle (rad) between two vectors, 0 to pi."""
+    c = cross(a, b)
+    return np.arctan2(np.sqrt(dot(c, c)), dot(a, b))

@@ -1,0 +1,1 @@
+"""From a study file to results, recordings and pages: everything that is no library."""

@@ -1,0 +1,85 @@
+"""Checking an input file without computing anything from it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import BaseModel
+
+from er3a.errors import InputError
+from er3a.files.measurements import load_measurements
+from er3a.files.path_file import PathFile, TablePath, load_paths
+from er3a.files.path_table import read_path_table
+from er3a.files.reference_rows import COLUMNS
+from er3a.files.reference_sets import check_reference_file, load_references
+from er3a.files.robot_file import RobotFile
+from er3a.files.robot_library import load_robot
+from er3a.files.scene_file import SceneFile, load_scene
+from er3a.files.target_file import TargetFile, load_targets
+from er3a.files.yaml_file import read_text, read_yaml
+from er3a.pipeline.study import Study, load_study
+
+SCHEMAS: dict[str, type[BaseModel]] = {
+    "study": Study,
+    "robot": RobotFile,
+    "targets": TargetFile,
+    "paths": PathFile,
+    "scene": SceneFile,
+}
+
+_CHECKS = {
+    "study": load_study,
+    "robot": load_robot,
+    "targets": load_targets,
+    "paths": load_paths,
+    "scene": load_scene,
+}
+_WORDS = {"robot": "a robot", "study": "a study", "targets": "targets", "paths": "paths", "scene": "a scene"}
+
+
+def check_file(path: Path) -> str:
+    """Check a file and return in words what it is; :class:`er3a.errors.InputError` if something is wrong with it."""
+    if path.suffix == ".csv" and path.parent.name == "targets":
+        load_targets(path)
+        return _WORDS["targets"]
+    if path.suffix == ".csv" and path.parent.name == "paths":
+        read_path_table(path)
+        return "a path"
+    if path.suffix == ".csv":
+        return _check_table(path)
+    if path.suffix not in (".yaml", ".yml"):
+        raise InputError(path, None, f"'{path.suffix}' files are none of er3a's inputs", "Give a .yaml or .csv file")
+    kind = read_yaml(path).get("kind")
+    if not isinstance(kind, str) or kind not in _CHECKS:
+        problem = "missing" if kind is None else f"'{kind}' is not known"
+        raise InputError(path, "kind", problem, f"Write one of: {', '.join(_CHECKS)}")
+    _CHECKS[kind](path)
+    return _WORDS[kind]
+
+
+def _check_table(path: Path) -> str:
+    if path.stem not in COLUMNS and "q1_deg" in read_text(path).partition("\n")[0]:
+        load_measurements(path)
+        return "measured positions"
+    check_reference_file(path)
+    return f"references about {path.stem}"
+
+
+def check_study(path: Path) -> Study:
+    """Check a study file and every file that it leads to, before a run starts."""
+    study = load_study(path)
+    for name in study.names:
+        try:
+            robot, entry = study.robot(name), study.entry(name)
+        except InputError as error:
+            raise InputError(error.file or path, error.field, error.problem, error.remedy) from None
+        for reference in robot.references:
+            load_references(reference)
+        load_targets(entry.targets)
+        for planned in load_paths(entry.paths).paths:
+            if isinstance(planned, TablePath):
+                read_path_table(planned.file)
+        for stage in ("inverse", "trajectory"):
+            if scene := study.scene(name, stage):
+                load_scene(scene)
+    return study

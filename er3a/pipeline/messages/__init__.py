@@ -1,0 +1,1 @@
+"""Every sentence that er3a says, in the reader's language."""

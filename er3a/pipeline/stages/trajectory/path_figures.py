@@ -1,0 +1,232 @@
+"""The figure of a path: curves and measures over one time, the joints' effort before and after, and the path in space.
+
+Layout is fixed, so that matplotlib draws each figure once.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
+
+from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.stages.trajectory.oblique import draw_path
+from er3a.pipeline.viewing.figures import svg_data_uri
+from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINT_NAMES, MODEL, MUTED, REFERENCE, VERDICTS
+from er3a.pipeline.viewing.palette import JOINTS as COLOURS
+from er3a.robots.robot import Robot
+
+WIDTHS = (3.2, 2.8, 2.4, 2.0, 1.6, 1.2)  # so that curves that coincide all show
+NEAR_LIMIT_DEG = 20.0
+EVENT_STYLES = {True: "-", False: ":"}
+TYPE_COLOURS = {"wrist": COLOURS[4], "elbow": COLOURS[2], "shoulder": COLOURS[3]}
+SHADES = {
+    "out_of_limits": (VERDICTS["caution"], 0.16, N_("outside a joint limit")),
+    "too_fast": (VERDICTS["fail"], 0.14, N_("joint too fast")),
+    "unreachable": (INK, 0.14, N_("not reachable")),
+}
+LEFT, BOTTOM, TOP = 0.055, 0.07, 0.925
+COLUMNS, GAP = (0.275, 0.275, 0.265), 0.06
+FONT = 9.0
+
+
+class PathFigure:
+    """Joint curves on the left, measures in the middle, the path in space and the joints' effort on the right.
+
+    One figure serves all paths of a page: making axes and their ticks takes longer than drawing the curves.
+    """
+
+    def __init__(self):
+        self.figure = Figure(figsize=(13.2, 7.0), layout="none")
+        self.joints = [self._axes(0, row) for row in range(3)]
+        self.measures = [self._axes(1, row) for row in range(3)]
+        self.effort = self._axes(2, 2)
+        left = LEFT + sum(COLUMNS[:2]) + 2 * GAP - 0.02
+        self.space = self.figure.add_axes((left, 0.40, COLUMNS[2] + 0.02, TOP - 0.41))
+        for column in (self.joints, self.measures):
+            for ax in column:
+                ax.yaxis.set_label_coords(-0.15, 0.5)
+            for ax in column[:-1]:
+                ax.tick_params(labelbottom=False)
+            column[-1].set_xlabel(tr("time (s)"), fontsize=FONT)
+
+    def draw(
+        self, robot: Robot, record: dict[str, Any], rows: pd.DataFrame, ways: pd.DataFrame, near: dict[str, float]
+    ) -> str:
+        """The figure of a path as the data address of an image."""
+        for ax in self.figure.axes:
+            _clear(ax)
+        t = rows["t_s"].to_numpy()
+        _joint_curves(self.joints, robot, record, rows)
+        _distances(self.measures[0], rows, near)
+        _condition(self.measures[1], rows)
+        _small_measures(self.measures[2], rows)
+        for ax in (*self.joints, *self.measures):
+            _mark(ax, record)
+            ax.set_xlim(t[0], t[-1])
+        _effort(self.effort, record, rows, ways)
+        draw_path(self.space, robot, record, rows, ways[ways["way"] == record["repair"]])
+        handles = _legend(record)
+        legend = self.figure.legend(
+            handles=handles, loc="upper center", bbox_to_anchor=(0.5, 1.0), ncols=9, fontsize=FONT
+        )
+        self.figure.set_layout_engine("none")  # saving the figure before has set the default one
+        image = svg_data_uri(self.figure)
+        legend.remove()
+        return image
+
+    def _axes(self, column: int, row: int) -> Axes:
+        height = (TOP - BOTTOM) / 3
+        x = LEFT + sum(COLUMNS[:column]) + column * GAP
+        ax = self.figure.add_axes((x, BOTTOM + (2 - row) * height, COLUMNS[column], height - 0.03))
+        ax.tick_params(labelsize=FONT, length=2)
+        ax.xaxis.set_major_locator(MaxNLocator(5))
+        ax.yaxis.set_major_locator(MaxNLocator(4))
+        return ax
+
+
+def _clear(ax: Axes) -> None:
+    """Take a path's curves out of axes, and leave their ticks."""
+    for artist in (*ax.lines, *ax.collections, *ax.patches, *ax.texts):
+        artist.remove()
+    if ax.get_legend() is not None:
+        ax.get_legend().remove()
+    ax.relim()
+    ax.margins(0.05)
+    ax.autoscale(True)
+
+
+def _joint_curves(axes: list[Axes], robot: Robot, record: dict[str, Any], rows: pd.DataFrame) -> None:
+    t = rows["t_s"].to_numpy()
+    labels = (
+        ("deg", N_("joint angle (deg)")),
+        ("deg_s", N_("velocity (deg/s)")),
+        ("deg_s2", N_("acceleration (deg/s²)")),
+    )
+    for ax, (unit, label) in zip(axes, labels):
+        values = rows[[f"q{j + 1}_{unit}" for j in range(6)]].to_numpy()
+        for j in range(6):
+            ax.plot(t, values[:, j], color=COLOURS[j], linewidth=WIDTHS[j])
+        ax.set_ylabel(tr(label), fontsize=FONT)
+        if unit == "deg":
+            _limits(ax, robot, values)
+        elif not record["joint_speed_bounded"]:
+            _cut(ax, values)
+
+
+def _distances(ax: Axes, rows: pd.DataFrame, near: dict[str, float]) -> None:
+    """Distance from each singular set, in parts of the distance below which a pass counts as near."""
+    t = rows["t_s"].to_numpy()
+    columns = (("wrist", "wrist_deg"), ("elbow", "elbow_deg"), ("shoulder", "shoulder_mm"))
+    for kind, column in columns:
+        share = np.abs(rows[column].to_numpy()) / near[column]
+        ax.plot(t, np.maximum(share, 1e-4), color=TYPE_COLOURS[kind], label=tr(kind))
+    ax.axhline(1.0, color=INK, linewidth=1, linestyle="--")
+    _logarithmic(ax, 0.01, 100.0)
+    ax.set_ylabel(tr("distance / threshold"), fontsize=FONT)
+    _key(ax, "lower left")
+
+
+def _condition(ax: Axes, rows: pd.DataFrame) -> None:
+    values = rows["condition_number"].replace(np.inf, np.nan)
+    ax.plot(rows["t_s"], values, color=MODEL)
+    _logarithmic(ax, 1.0, min(1e6, 2 * values.fillna(0.0).clip(lower=50.0).max()))
+    ax.set_ylabel(tr("condition number"), fontsize=FONT)
+
+
+def _logarithmic(ax: Axes, low: float, high: float) -> None:
+    """A logarithmic axis with plain numbers at powers of ten: matplotlib's own ticks take longer than all curves."""
+    ax.set_yscale("log")
+    ax.set_ylim(low, high)
+    decades = np.arange(np.ceil(np.log10(low) - 1e-9), np.floor(np.log10(high) + 1e-9) + 1)
+    ticks = 10.0 ** (decades if len(decades) < 6 else decades[::2])
+    ax.yaxis.set_minor_locator(NullLocator())
+    ax.yaxis.set_major_locator(FixedLocator(ticks))
+    ax.yaxis.set_major_formatter(lambda value, _: f"{value:.10g}" if value < 1e5 else f"1e{round(np.log10(value))}")
+
+
+def _small_measures(ax: Axes, rows: pd.DataFrame) -> None:
+    ax.plot(rows["t_s"], rows["smallest_singular_value"], color=REFERENCE, label=tr("smallest singular value"))
+    ax.plot(rows["t_s"], rows["manipulability"], color=MODEL, label=tr("manipulability"))
+    most = rows[["smallest_singular_value", "manipulability"]].max().max()
+    ax.set_ylim(0, 1.35 * most if most > 0 else 1)
+    ax.set_ylabel(tr("measure"), fontsize=FONT)
+    _key(ax, "upper left")
+
+
+def _effort(ax: Axes, record: dict[str, Any], rows: pd.DataFrame, ways: pd.DataFrame) -> None:
+    """Share of the joints' speed limits over the share of the time: as programmed, repaired, at its fastest."""
+    programmed = rows["speed_share"].to_numpy()
+    ax.plot(rows["t_s"] / rows["t_s"].iloc[-1], programmed, color=HIGHLIGHT, label=tr("as programmed"))
+    shown = [programmed]
+    for way, colour, label in ((record["repair"], MODEL, tr("repaired")), ("fastest", MUTED, tr("at its fastest"))):
+        part = ways[ways["way"] == way]
+        if len(part):
+            ax.plot(part["t_s"] / part["t_s"].iloc[-1], part["speed_share"], color=colour, label=label, linewidth=1.3)
+            shown.append(part["speed_share"].to_numpy())
+    ax.axhline(1.0, color=INK, linewidth=1, linestyle="--")
+    size = np.concatenate(shown)
+    most = np.nanmax(size) if np.isfinite(size).any() else 1.0
+    ax.set_ylim(0, 1.35 * max(1.0, most) if record["joint_speed_bounded"] else 3.0)
+    ax.set_xlim(0, 1)
+    ax.set_xlabel(tr("share of each motion's time"), fontsize=FONT)
+    ax.set_ylabel(tr("joint speed / limit"), fontsize=FONT)
+    _key(ax, "upper left")
+
+
+def _key(ax: Axes, corner: str) -> None:
+    ax.legend(loc=corner, ncols=3, fontsize=8, handlelength=1.2, columnspacing=1.0, borderpad=0.1)
+
+
+def _limits(ax: Axes, robot: Robot, degrees: np.ndarray) -> None:
+    """Dashed lines at the limits that a joint comes near to."""
+    if np.isnan(degrees).all():
+        return
+    low, high = np.nanmin(degrees, axis=0), np.nanmax(degrees, axis=0)
+    lower, upper = np.degrees(robot.lower), np.degrees(robot.upper)
+    for j in range(6):
+        for limit, gap, side in ((lower[j], low[j] - lower[j], "top"), (upper[j], upper[j] - high[j], "bottom")):
+            if gap < NEAR_LIMIT_DEG:
+                ax.axhline(limit, color=COLOURS[j], linestyle="--", linewidth=1)
+                text = tr("limit of {joint}", joint=JOINT_NAMES[j])
+                ax.text(0.01, limit, text, transform=ax.get_yaxis_transform(), va=side, fontsize=8, color=COLOURS[j])
+                ax.margins(y=0.18)
+
+
+def _cut(ax: Axes, values: np.ndarray) -> None:
+    """Cut the axis where a curve grows without bound at the edge of reach."""
+    size = np.abs(values[np.isfinite(values)])
+    if size.size:
+        reach = 1.6 * np.percentile(size, 97)
+        ax.set_ylim(-reach, reach)
+        ax.text(0.99, 0.04, tr("cut: grows without bound"), transform=ax.transAxes, ha="right", fontsize=8)
+
+
+def _mark(ax: Axes, record: dict[str, Any]) -> None:
+    for key, (colour, alpha, _) in SHADES.items():
+        for part in record[key]:
+            ax.axvspan(part["t0_s"], part["t1_s"], color=colour, alpha=alpha, linewidth=0)
+    for event in record["singularities"]:
+        ax.axvline(event["t_s"], color=HIGHLIGHT, linestyle=EVENT_STYLES[event["crossing"]], linewidth=1.4)
+        at = (event["t_s"], 1.0)
+        ax.plot(*at, "v", color=HIGHLIGHT, markersize=6, transform=ax.get_xaxis_transform(), clip_on=False, zorder=5)
+
+
+def _legend(record: dict[str, Any]) -> list[Line2D | Patch]:
+    handles: list[Line2D | Patch] = [
+        Line2D([], [], color=COLOURS[j], linewidth=WIDTHS[j], label=JOINT_NAMES[j]) for j in range(6)
+    ]
+    for crossing, label in ((True, tr("singular")), (False, tr("near-singular"))):
+        if any(event["crossing"] == crossing for event in record["singularities"]):
+            style = {"linestyle": EVENT_STYLES[crossing], "marker": "v"}
+            handles.append(Line2D([], [], color=HIGHLIGHT, label=label, **style))
+    for key, (colour, alpha, label) in SHADES.items():
+        if record[key]:
+            handles.append(Patch(color=colour, alpha=2 * alpha, label=tr(label)))
+    return handles

@@ -1,0 +1,106 @@
+"""The teach panel's page: a robot's table, the words and the scripts, put into one file that works offline."""
+
+from __future__ import annotations
+
+import base64
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from er3a.errors import NotWristPartitionedError
+from er3a.kinematics.configuration import branch_labels
+from er3a.kinematics.singularity import characteristic_length
+from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
+from er3a.pipeline.code_digest import code_digest
+from er3a.pipeline.messages.language import keeps_sentences, know, note_written, sentences, tr
+from er3a.pipeline.results import input_records
+from er3a.pipeline.study import Study
+from er3a.pipeline.teach.words import WORDS
+from er3a.pipeline.viewing.page import render, run_command
+from er3a.pipeline.viewing.palette import BODY, INK, JOINT_NAMES, JOINTS, LINK
+from er3a.robots.robot import Robot
+
+_HERE = Path(__file__).parent
+MODULES = tuple(sorted(path.stem for path in _HERE.glob("*.js")))
+TABLE = ("a", "alpha", "d", "beta", "direction", "offset", "lower", "upper", "base", "tool")
+NEAR_LIMIT = np.radians(5.0)
+NEAR_SINGULAR = 1e-2  # smallest singular value below which an arm without named singularities is warned of one
+
+
+def write_teach_page(study: Study, name: str, output: Path) -> None:
+    """Write the teach panel of a robot of the study to ``output``."""
+    robot = study.robot(name)
+    settings = study.trajectory
+    near = {
+        "wrist": np.radians(settings.near_wrist_deg),
+        "elbow": np.radians(settings.near_elbow_deg),
+        "shoulder": settings.near_shoulder_mm / 1000,
+    }
+    panel = panel_data(robot, near)
+    render(
+        _HERE / "teach.html.j2",
+        output,
+        robot=robot,
+        robot_pages=study.pages(name),
+        joint_names=JOINT_NAMES,
+        joint_colours=JOINTS,
+        degrees=float(np.degrees(1.0)),
+        words=panel["words"],
+        panel=panel,
+        modules=json.dumps({"imports": {f"er3a/{module}": _module(module) for module in MODULES}}),
+        command=run_command(study, f"{name}/teach.html"),
+        provenance={
+            "inputs": input_records(study.inputs(name, "teach")),
+            "config": study.settings(name, "trajectory"),
+            "code": code_digest(__name__),
+        },
+    )
+
+
+def panel_data(robot: Robot, near: dict[str, float]) -> dict[str, Any]:
+    """What the scripts take of a robot, as plain data; SI units.
+
+    Parameters
+    ----------
+    near : per type of singularity the distance (rad; m for shoulder) below which the panel warns
+    """
+    reason = _without_closed_form(robot)
+    labels = [] if reason else [tr(label) for label in branch_labels(robot)]
+    return {
+        "name": robot.name,
+        "table": {"convention": robot.convention} | {key: getattr(robot, key).tolist() for key in TABLE},
+        "characteristic_length": characteristic_length(robot),
+        "no_closed_form": reason,
+        "branch_labels": labels,
+        "near": {**near, "limit": NEAR_LIMIT, "value": NEAR_SINGULAR},
+        "joint_names": JOINT_NAMES,
+        "colours": {"joints": JOINTS, "link": LINK, "body": BODY, "mark": INK},
+        "words": _translated(WORDS),
+    }
+
+
+def _translated(words: Any) -> Any:
+    """The words, nested as they are, in the page's language."""
+    if isinstance(words, dict):
+        return {key: _translated(word) for key, word in words.items()}
+    return [_translated(word) for word in words] if isinstance(words, list) else tr(words)
+
+
+@keeps_sentences
+def _without_closed_form(robot: Robot) -> str | None:
+    """Why the closed form doesn't hold for the arm, in the page's language; None if it does."""
+    try:
+        wrist_partitioned_arm(robot)
+    except NotWristPartitionedError as error:
+        note_written(error.property_missing)
+        know(sentences())
+        return tr(error.property_missing)
+    return None
+
+
+def _module(name: str) -> str:
+    """A script as an address of its own, so that the scripts of one file can import each other."""
+    source = (_HERE / f"{name}.js").read_bytes()
+    return "data:text/javascript;base64," + base64.b64encode(source).decode("ascii")

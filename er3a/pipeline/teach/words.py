@@ -1,0 +1,127 @@
+"""All words of the teach panel, in one place. Braces are filled in by the page."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from er3a.pipeline.messages.language import N_
+
+WORDS: dict[str, Any] = {
+    "title": N_("teach panel"),
+    "lead": N_(
+        "Move the joints and watch the tool: its pose, the limits, how near the arm comes to a singularity, and which "
+        "other joint angles reach the same pose."
+    ),
+    "no_script": N_("This page computes in the browser; it needs JavaScript."),
+    "view": N_("The arm"),
+    "picture": N_(
+        "The arm in three dimensions at the joint angles of the sliders, each joint in its own colour. "
+        "Arrow keys turn the view, plus and minus zoom."
+    ),
+    "view_help": N_("Drag to turn the view. With the picture in focus the wheel and the plus and minus keys zoom."),
+    "views": {"overview": N_("Overview"), "side": N_("Side"), "front": N_("Front"), "top": N_("Top")},
+    "zoom_in": N_("Closer"),
+    "zoom_out": N_("Farther"),
+    "joints": N_("Joints"),
+    "joints_help": N_(
+        "Arrow keys move by 1°, with Shift by 0.1°; Page Up and Page Down by 10°; Home and End go to the limits."
+    ),
+    "slider": N_("{joint}, slider"),
+    "typed": N_("{joint} in degrees"),
+    "angle": N_("{degrees} degrees"),
+    "room": N_("{room} from its limit"),
+    "at_limit": N_("at its limit"),
+    "outside": N_("{joint} stays between {lower} and {upper}."),
+    "no_number": N_("{joint} needs a number, in degrees."),
+    "zero": N_("Zero pose"),
+    "copy_joints": N_("Copy joints"),
+    "copy_link": N_("Copy link"),
+    "copied": N_("The joints are copied: {text}"),
+    "link_copied": N_("The link to this pose is copied."),
+    "not_copied": N_("This browser lets no page copy; take it from here: {text}"),
+    "bad_link": N_("The link's joints were not taken: {reason}"),
+    "bad_count": N_("it names {count} numbers where six are needed."),
+    "pose": N_("Tool pose"),
+    "pose_help": N_("Of the tool's frame in the base frame."),
+    "position": N_("Position"),
+    "orientation": N_("Orientation as"),
+    "orientations": {
+        "rpy": N_("Roll, pitch, yaw (ZYX)"),
+        "zyz": N_("Euler angles ZYZ"),
+        "quaternion": N_("Quaternion"),
+        "matrix": N_("Matrix"),
+    },
+    "parts": {
+        "rpy": [N_("roll about X"), N_("pitch about Y"), N_("yaw about Z")],
+        "zyz": [N_("φ about Z"), N_("ϑ about Y"), N_("ψ about Z")],
+        "quaternion": ["w", "x", "y", "z"],
+    },
+    "matrix_caption": N_("Transform from the tool to the base; its last column is the position in mm"),
+    "measures": N_("How near to a singularity?"),
+    "measures_help": N_(
+        "At a singularity the tool loses a direction, and near it slow tool motions need fast joints. The measures are "
+        "of the Jacobian with its linear rows divided by {length} mm, {length_is}; they are 0 at a singularity."
+    ),
+    "length_is": {"wrist": N_("the reach of the wrist centre"), "links": N_("half the length along all links")},
+    "manipulability": N_("Manipulability"),
+    "smallest": N_("Smallest singular value"),
+    "condition": N_("Condition number"),
+    "kinds": {"wrist": N_("Wrist"), "elbow": N_("Elbow"), "shoulder": N_("Shoulder")},
+    "kinds_are": {
+        "wrist": N_("between axes 4 and 6"),
+        "elbow": N_("short of straight or folded"),
+        "shoulder": N_("wrist centre from the plane of axes 1 and 2"),
+    },
+    "states": {"clear": N_("clear"), "near": N_("near"), "at": N_("singular")},
+    "clear": N_("No singularity is near."),
+    "near": {
+        "wrist": N_("Near the wrist singularity: axes 4 and 6 are {distance} short of one line."),
+        "elbow": N_("Near the elbow singularity: the arm is {distance} short of straight or folded."),
+        "shoulder": N_("Near the shoulder singularity: the wrist centre is {distance} from the plane of axes 1 and 2."),
+    },
+    "at": {
+        "wrist": N_("At the wrist singularity: axes 4 and 6 lie in one line, so J4 and J6 turn the tool the same way."),
+        "elbow": N_("At the elbow singularity: the arm is straight or folded and can't move further along itself."),
+        "shoulder": N_(
+            "At the shoulder singularity: the wrist centre is in the plane of axes 1 and 2, where no joint moves it "
+            "along axis 2."
+        ),
+    },
+    "near_unnamed": N_("Near a singularity: the smallest singular value is {value}."),
+    "unnamed": N_("The kinds of singularity of this arm have no names here, because {reason}."),
+    "solutions": N_("All ways to this pose"),
+    "solutions_help": N_(
+        "Choose one and the arm goes there; the tool stays. Point at one to see it as a pale arm. Branches: "
+        "wrist before axis 1 or over the head (back), elbow up or down, wrist flipped or not. "
+        "Numbers are J1 to J6 in degrees."
+    ),
+    "previous": N_("Previous"),
+    "next": N_("Next"),
+    "count": N_("{within} of {total} within the limits"),
+    "current": N_("the arm is here"),
+    "within": N_("within the limits"),
+    "leaves": N_("outside: {reasons}"),
+    "separator": N_("; "),
+    "above": N_("{joint} at {angle} is {excess} above its limit of {limit}"),
+    "below": N_("{joint} at {angle} is {excess} below its limit of {limit}"),
+    "turn": N_("{joint} {turn}"),
+    "other_turns": N_("Further turns:"),
+    "missing": N_("not there: {reason}"),
+    "faults": {
+        "too_far": N_("the wrist centre would be {gap} too far from axis 2"),
+        "too_near": N_("the wrist centre would be {gap} too near to axis 2"),
+        "off_axis": N_("the wrist centre would be {gap} too near to axis 1"),
+        "orientation": N_("the wrist would have to tilt {gap} further than it can"),
+    },
+    "free": {
+        "wrist": N_(
+            "Axes 4 and 6 are in one line: J4 and J6 can be traded, so there are endless many; J4 is kept here."
+        ),
+        "elbow": N_("The wrist centre is on axis 2: J2 is free, so there are endless many; J2 is kept here."),
+        "shoulder": N_("The wrist centre is on axis 1: J1 is free, so there are endless many; J1 is kept here."),
+    },
+    "no_closed_form": N_(
+        "None are shown: the page solves arms with a spherical wrist and parallel axes 2 and 3 in closed form. For "
+        "this arm it can't, because {reason}. The inverse page solves such arms by iteration."
+    ),
+}

@@ -1,0 +1,144 @@
+"""What moved between two results folders: verdicts, key figures, and tables."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from dataclasses import astuple, dataclass
+from pathlib import Path
+from typing import Any
+
+from er3a.errors import ResultError
+from er3a.pipeline.code_digest import code_digest
+from er3a.pipeline.messages import language
+from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.results import CHECKSUMS, read_summary, result_records, sha256
+from er3a.pipeline.viewing import page
+from er3a.pipeline.viewing.numbers import number
+
+COLUMNS = (N_("robot"), N_("stage"), N_("what"), N_("old"), N_("new"), N_("difference"), N_("note"))
+
+
+@dataclass(frozen=True)
+class Change:
+    """One thing that differs.
+
+    Attributes
+    ----------
+    robot, stage, what : where it stands; ``what`` is a key figure's name, ``verdict`` or a file's name
+    old, new : as shown, with unit; a dash where there is none
+    difference : new - old with its unit, or words
+    note : what the change means against the figures' uncertainty, or empty
+    """
+
+    robot: str
+    stage: str
+    what: str
+    old: str
+    new: str
+    difference: str
+    note: str = ""
+
+
+def changes(old: Path, new: Path) -> list[Change]:
+    """All that differs between two results folders, in the order of robots, stages and figures.
+
+    Raises
+    ------
+    ResultError
+        a folder holds no results, or a summary in it is damaged or of another version
+    """
+    stages = {folder: _stages(folder) for folder in (old, new)}
+    found: list[Change] = []
+    for key in sorted(stages[old] | stages[new]):
+        robot, stage = key
+        if key not in stages[old] or key not in stages[new]:
+            there = key in stages[new]
+            found.append(
+                Change(
+                    robot, stage, tr("stage"), *(("–", tr("there")) if there else (tr("there"), "–")), tr("only here")
+                )
+            )
+            continue
+        folders = old / robot / stage, new / robot / stage
+        found += _in_summaries(robot, stage, *(read_summary(folder) for folder in folders))
+        found += _in_tables(robot, stage, *folders)
+    return found
+
+
+def write_diff(old: Path, new: Path, found: list[Change], output: Path) -> None:
+    """Render the changes as a page."""
+    page.render(
+        Path(__file__).with_name("diff.html.j2"),
+        output,
+        command=shlex.join(
+            ["er3a", "diff", str(old), str(new), "--language", language.current(), "--output", str(output)]
+        ),
+        provenance={"inputs": _records(old) + _records(new), "code": code_digest(__name__)},
+        old=old,
+        new=new,
+        columns=COLUMNS,
+        rows=[astuple(change) for change in found],
+    )
+
+
+def _records(folder: Path) -> list[dict[str, Any]]:
+    return result_records(folder, sorted({robot for robot, _ in _stages(folder)}))
+
+
+def _stages(folder: Path) -> set[tuple[str, str]]:
+    found = {path.parent.relative_to(folder).parts for path in folder.glob("*/*/summary.json")}
+    if not found:
+        raise ResultError(folder, "holds no results (no ROBOT/STAGE/summary.json in it)")
+    return found
+
+
+def _in_summaries(robot: str, stage: str, old: dict[str, Any], new: dict[str, Any]) -> list[Change]:
+    found = []
+    verdicts = [summary["verdict"] for summary in (old, new)]
+    statuses = [page.status_word(verdict["status"]) for verdict in verdicts]
+    texts = [tr(text) for text in (verdict["text"] for verdict in verdicts)]
+    if statuses[0] != statuses[1]:
+        found.append(Change(robot, stage, tr("verdict"), *statuses, tr("turned"), texts[1]))
+    elif texts[0] != texts[1]:
+        found.append(Change(robot, stage, tr("verdict's text"), *texts, tr("reworded")))
+    before, after = ({figure["name"]: figure for figure in summary["figures"]} for summary in (old, new))
+    for name in {**before, **after}:
+        a, b = before.get(name), after.get(name)
+        if a != b:
+            found.append(Change(robot, stage, tr(name), _shown(a), _shown(b), *_moved(a, b)))
+    return found
+
+
+def _shown(figure: dict[str, Any] | None) -> str:
+    if figure is None or figure["value"] is None:
+        return "–"
+    interval = "" if figure["uncertainty"] is None else f" ± {number(figure['uncertainty'], 2)}"
+    return f"{number(figure['value'], 6)}{interval} {figure['unit']}".strip()
+
+
+def _moved(a: dict[str, Any] | None, b: dict[str, Any] | None) -> tuple[str, str]:
+    """The difference in words and what it means."""
+    if a is None or b is None:
+        return tr("new") if a is None else tr("gone"), ""
+    if a["unit"] != b["unit"]:
+        return tr("another unit"), tr("not to be compared")
+    if a["value"] is None or b["value"] is None:
+        return "–", ""
+    difference = b["value"] - a["value"]
+    shown = f"{number(difference, 3)} {b['unit']}".strip()
+    if a["uncertainty"] is None or b["uncertainty"] is None:
+        return shown, ""
+    within = abs(difference) <= math.hypot(a["uncertainty"], b["uncertainty"])
+    return shown, tr("within the 95 % interval of the difference") if within else tr("more than the intervals explain")
+
+
+def _in_tables(robot: str, stage: str, old: Path, new: Path) -> list[Change]:
+    found = []
+    names = {path.name for folder in (old, new) for path in folder.iterdir() if path.is_file()}
+    names -= {"summary.json", CHECKSUMS}
+    for name in sorted(names):
+        sums = [sha256(folder / name)[:12] if (folder / name).is_file() else "–" for folder in (old, new)]
+        if sums[0] != sums[1]:
+            found.append(Change(robot, stage, name, *sums, tr("other bytes")))
+    return found

@@ -1,0 +1,81 @@
+"""Matplotlib figures as SVG images for the pages."""
+
+from __future__ import annotations
+
+import base64
+import io
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.font_manager import fontManager
+from matplotlib.text import Text
+
+from er3a.pipeline.messages import language
+from er3a.pipeline.viewing.palette import GRID, INK, JOINTS, MUTED
+
+CHINESE_FONTS = (
+    "Noto Sans CJK SC",
+    "Noto Sans CJK JP",  # as matplotlib names the collection of all of Noto's
+    "Source Han Sans SC",
+    "WenQuanYi Zen Hei",
+    "WenQuanYi Micro Hei",
+    "Microsoft YaHei",
+    "PingFang SC",
+    "SimHei",
+)
+matplotlib.rcParams |= {
+    "axes.edgecolor": MUTED,
+    "axes.grid": True,
+    "axes.labelcolor": INK,
+    "axes.prop_cycle": matplotlib.cycler(color=JOINTS),
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlelocation": "left",
+    "axes.titlesize": 11,
+    "axes.titleweight": "bold",
+    "figure.constrained_layout.use": True,
+    "figure.facecolor": "white",
+    "font.family": ["DejaVu Sans"],
+    "font.size": 10,
+    "grid.color": GRID,
+    "grid.linewidth": 0.7,
+    "legend.frameon": False,
+    "legend.fontsize": 9,
+    "lines.linewidth": 1.6,
+    "svg.hashsalt": "er3a",
+    "xtick.color": INK,
+    "ytick.color": INK,
+}
+
+
+def new_figure(rows: int = 1, columns: int = 1, width: float = 9.0, height: float = 4.5, **subplots):
+    """A figure in the house style and its axes (as ``Figure.subplots`` returns them); sizes in inches."""
+    figure = Figure(figsize=(width, height))
+    return figure, figure.subplots(rows, columns, **subplots)
+
+
+def equal_scale(axes: Axes, x_label: str, y_label: str) -> None:
+    """A drawing to scale: equal units on both axes."""
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel(x_label)
+    axes.set_ylabel(y_label)
+
+
+def _chinese_font() -> list[str]:
+    """The name of a font of this machine that has Chinese signs; none if there is none."""
+    present = {font.name for font in fontManager.ttflist}
+    return [name for name in CHINESE_FONTS if name in present][:1]
+
+
+def svg_data_uri(figure: Figure) -> str:
+    """The figure as a ``data:`` address of an SVG image (dense clouds rasterised at 160 dpi)."""
+    chinese = _chinese_font() if language.current() == "zh" else []
+    for text in figure.findobj(Text):
+        text.set_fontfamily([*matplotlib.rcParams["font.family"], *chinese])
+    # Without a font for it here, Chinese stays text, for which the reader's browser finds one.
+    glyphs = "none" if language.current() == "zh" and not chinese else "path"
+    buffer = io.BytesIO()
+    with matplotlib.rc_context({"svg.fonttype": glyphs}):
+        figure.savefig(buffer, format="svg", dpi=160, metadata={"Date": None})
+    return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")

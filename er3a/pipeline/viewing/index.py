@@ -1,0 +1,51 @@
+"""The pages over all robots: the index (robots x stages, verdicts and key figures) and the comparison of two.
+
+Variants of a sweep stand in the section of their sweep only.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from er3a.pipeline.code_digest import code_digest
+from er3a.pipeline.messages.language import N_
+from er3a.pipeline.results import read_summary, result_records
+from er3a.pipeline.study import STAGES, Study
+from er3a.pipeline.viewing import page
+from er3a.pipeline.viewing.comparison import write_compare
+from er3a.pipeline.viewing.sweep_section import sweep_sections
+
+SHOWN_FIGURES = 3
+QUESTIONS = {
+    "validation": N_("Does the table match the maker's data?"),
+    "workspace": N_("What can it reach, where are the voids?"),
+    "inverse": N_("Which joint solutions reach a pose?"),
+    "trajectory": N_("Do the paths run into singularities?"),
+}
+
+
+def write_index(study: Study, results: Path, folder: Path) -> None:
+    """Render ``index.html`` and ``compare.html`` into a folder, from the results of all robots and stages.
+
+    The comparison offers the robots that are written in the study, not the variants that sweeps make of them.
+    """
+    robots = [
+        {"robot": study.robot(name), "summaries": [read_summary(results / name / stage) for stage in STAGES]}
+        for name in study.robots
+    ]
+    page.render(
+        Path(__file__).with_name("index.html.j2"),
+        folder / "index.html",
+        robots=robots,
+        stages=STAGES,
+        questions=QUESTIONS,
+        shown_figures=SHOWN_FIGURES,
+        sweeps=sweep_sections(study, results),
+        command=page.run_command(study, "index.html"),
+        provenance={
+            "inputs": result_records(results, study.names),
+            "seed": study.seed,
+            "code": code_digest(__name__),
+        },
+    )
+    write_compare(study, results, folder / "compare.html")

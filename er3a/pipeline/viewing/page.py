@@ -1,0 +1,179 @@
+"""HTML pages: one self-contained file each, rendered from a stage's template on the shared base."""
+
+from __future__ import annotations
+
+import base64
+import os
+import platform
+import shlex
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from matplotlib.figure import Figure
+
+from er3a.pipeline.messages import language
+from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.results import write_atomically
+from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.figures import svg_data_uri
+from er3a.pipeline.viewing.numbers import fixed, number
+
+_HERE = Path(__file__).parent
+_ROOT = _HERE.parents[2]
+SHOWN_VERSIONS = ("numpy", "scipy", "numba", "open3d-cpu", "rerun-sdk", "matplotlib")
+VERDICT_WORDS = {
+    "pass": N_("pass"),
+    "caution": N_("caution"),
+    "fail": N_("fail"),
+    "conflict": N_("conflict"),
+    "no_reference": N_("no reference"),
+}
+
+PAGES = {
+    "validation": N_("validation"),
+    "workspace": N_("workspace"),
+    "inverse": N_("inverse"),
+    "trajectory": N_("trajectory"),
+    "teach": N_("teach panel"),
+}
+
+SCRIPT_WORDS = {
+    "sort": N_("sort by this column"),
+    "csv": N_("download as CSV"),
+    "svg": N_("download"),
+    "enlarge": N_("enlarge"),
+    "close": N_("close"),
+}
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure for a page: the image, what it shows (for those who can't see it), and what to conclude from it."""
+
+    figure: Figure
+    alt: str
+    caption: str
+
+    @property
+    def uri(self) -> str:
+        """The image as a data address."""
+        return svg_data_uri(self.figure)
+
+    @property
+    def inches(self) -> float:
+        """The width that the figure's letters are meant for."""
+        return float(self.figure.get_figwidth())
+
+
+def render(
+    template: Path,
+    output: Path,
+    summary: dict[str, Any] | None = None,
+    *,
+    command: str | None,
+    provenance: dict[str, Any] | None = None,
+    **context: Any,
+) -> None:
+    """Render a template to ``output``, whole or not at all.
+
+    Parameters
+    ----------
+    template : a Jinja file that extends ``base.html.j2``
+    summary : the stage's summary; its verdict, figures and provenance frame the page
+    command : the command that makes the page again, if there is one
+    provenance : of pages without a summary, in the shape that a summary has
+    context : what the template needs besides
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader([template.parent, _HERE]),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        extensions=["jinja2.ext.i18n"],
+    )
+    environment.install_gettext_translations(language.translations(), newstyle=False)
+    environment.policies["ext.i18n.trimmed"] = True
+    environment.filters |= {"number": number, "fixed": fixed, "tr": tr, "sentence": sentence}
+    html = environment.get_template(template.name).render(
+        style=(_HERE / "style.css").read_text(encoding="utf-8"),
+        script=(_HERE / "page.js").read_text(encoding="utf-8"),
+        script_words={key: tr(word) for key, word in SCRIPT_WORDS.items()},
+        verdict_words=VERDICT_WORDS,
+        pages=PAGES,
+        language=language.current(),
+        summary=summary,
+        command=command,
+        provenance=summary["provenance"] if summary else provenance,
+        preview=_preview(output.with_suffix(".webp")),
+        versions=_versions(),
+        commit=_commit(),
+        **context,
+    )
+    write_atomically(output, lambda file: file.write_text(html, encoding="utf-8"))
+
+
+def sentence(finding: str) -> str:
+    """A finding as a sentence of its own."""
+    text = tr("{finding}.", finding=finding)
+    return text[:1].upper() + text[1:] if language.current() == "en" else text
+
+
+def run_command(study: Study, page: str) -> str | None:
+    """The command that makes a page of a study again, results included; None for a study that no file holds.
+
+    Parameters
+    ----------
+    page : its path below the reports
+    """
+    if study.file is None:
+        return None
+    return shlex.join(["make", "run", f"STUDY={os.path.relpath(study.file)}", f"ARGS=reports/{page}"])
+
+
+def _preview(picture: Path) -> str | None:
+    """The preview of a recording as a data address; None where there is none or none could be drawn."""
+    content = picture.read_bytes() if picture.is_file() else b""
+    return "data:image/webp;base64," + base64.b64encode(content).decode("ascii") if content else None
+
+
+def status_word(status: str) -> str:
+    """A verdict's status as a page shows it."""
+    return tr(VERDICT_WORDS[status])
+
+
+def rows_of(records: Sequence[dict[str, Any]], *columns: str) -> list[list[Any]]:
+    """The given columns of a list of records, for the ``table`` macro."""
+    return [[record[column] for column in columns] for record in records]
+
+
+def _versions() -> dict[str, str]:
+    found = {"python": platform.python_version(), "er3a": version("er3a")}
+    for name in SHOWN_VERSIONS:
+        try:
+            found[name] = version(name)
+        except ModuleNotFoundError:
+            continue
+    return found
+
+
+def _commit() -> str | None:
+    """Commit of the project's checkout, with ``+ changes`` if it is dirty; None outside a checkout."""
+
+    def git(*words: str) -> str | None:
+        command = ["git", "-C", str(_ROOT), *words]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=False)
+        except (OSError, subprocess.TimeoutExpired):
+            return None
+        return done.stdout.strip() if done.returncode == 0 else None
+
+    if git("rev-parse", "--show-toplevel") != str(_ROOT):
+        return None
+    commit = git("rev-parse", "--short=12", "HEAD")
+    return commit and commit + (" + changes" if git("status", "--porcelain", "--untracked-files=no") else "")

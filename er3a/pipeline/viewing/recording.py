@@ -1,0 +1,93 @@
+"""Rerun recordings: opened arranged, written whole or not at all."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from er3a.pipeline.results import write_atomically
+from er3a.pipeline.viewing.palette import rgb
+
+TIMELINE = "t"
+ARM = "/arm/**"
+
+
+@contextmanager
+def recording(output: Path, robot: str, stage: str, layout: rrb.View | rrb.Container) -> Iterator[rr.RecordingStream]:
+    """Open a recording for logging; ``output`` appears when the block ends without an error.
+
+    Viewers keep one blueprint for each application id, so every stage of every robot is an application of its own:
+    opened together, each keeps its own layout and camera.
+
+    Parameters
+    ----------
+    robot, stage : name the recording: application ``<stage> <robot>``, recording ``<robot>``
+    layout : what the blueprint shows
+    """
+    rr.set_strict_mode(True)
+    blueprint = rrb.Blueprint(
+        layout,
+        rrb.TimePanel(timeline=TIMELINE, state="collapsed", play_state="paused"),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.BlueprintPanel(state="expanded"),
+        auto_views=False,
+    )
+
+    # No chunk is cut by the clock: recordings of equal data then compare equal on a busy machine too.
+    never = rr.ChunkBatcherConfig.NEVER()
+    stream = rr.RecordingStream(f"{stage} {robot}", recording_id=robot, send_properties=False, batcher_config=never)
+    with stream:
+        # Rerun's own file writer waits for ever when the disk is full; bytes can be written like any other file.
+        collected = stream.binary_stream()
+        # The viewer in a browser shows a blueprint only if it is active, not if it is merely the default.
+        stream.send_blueprint(blueprint, make_active=True, make_default=True)
+        stream.set_log_time_enabled(False)
+        stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        yield stream
+        content = collected.read(flush=True)
+    write_atomically(output, lambda file: file.write_bytes(content))
+
+
+def log_note(stream: rr.RecordingStream, stage: str, markdown: str) -> None:
+    """Log the text that says what to look at, ``/<stage>/note``."""
+    stream.log(f"{stage}/note", rr.TextDocument(markdown, media_type=rr.MediaType.MARKDOWN), static=True)
+
+
+def note_view(stage: str) -> rrb.View:
+    """The view of a stage's note."""
+    return rrb.TextDocumentView(origin=f"/{stage}/note", name="What to look at")
+
+
+def escaped(text: str) -> str:
+    """A text from an input file for a Markdown document: shown as it is, on one line, with nothing fetched for it."""
+    return re.sub(r"([\\`*_{}\[\]<>#!|~])", r"\\\1", " ".join(text.split()))
+
+
+def seconds(times: np.ndarray) -> rr.TimeColumn:
+    """A time column (s) for ``send_columns``."""
+    return rr.TimeColumn(TIMELINE, duration=np.asarray(times, dtype=float))
+
+
+def send_series(
+    stream: rr.RecordingStream, entity: str, times: np.ndarray, values: np.ndarray, names: list[str], colours: list[str]
+) -> None:
+    """Log curves as one entity.
+
+    Parameters
+    ----------
+    times : (N,), s
+    values : (N, k); a row with NaN is a gap in all curves (NaN itself would never compare equal between recordings)
+    names, colours : k of each
+    """
+    stream.log(entity, rr.SeriesLines(names=names, colors=[rgb(colour) for colour in colours]), static=True)
+    times, known = np.asarray(times, dtype=float), np.isfinite(values).all(axis=1)
+    stream.send_columns(entity, [seconds(times[known])], rr.Scalars.columns(scalars=np.asarray(values)[known]))
+    gap_starts = times[~known & np.append(True, known[:-1])]
+    cleared = rr.Clear.columns(is_recursive=np.zeros(len(gap_starts), dtype=bool))
+    stream.send_columns(entity, [seconds(gap_starts)], cleared)

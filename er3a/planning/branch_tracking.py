@@ -1,0 +1,191 @@
+"""All closed-form branches along a line, on a grid that is refined until each branch can be told from the others.
+
+Between two grid points a branch is followed by continuity, which is safe only if no joint of it moves far between them.
+An interval where one does (a pass near a pole of the wrist or near axis 1), or where a branch begins or ends, is halved
+until the motion is small or the interval is 1e-10 of the duration.
+
+Where a joint is free (axes 4 and 6 aligned, wrist centre on axis 1) each branch keeps the value that it had before, and
+at the path's beginning the one that it has next: the value that makes the motion continuous.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from er3a.kinematics.closed_form import REACHED, SLOTS
+from er3a.kinematics.forward import frames
+from er3a.kinematics.singularity import determinant_factors
+from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
+from er3a.planning.moves import ToolPath
+from er3a.robots.joint_limits import principal
+from er3a.robots.robot import Robot
+
+WIDE_STEP = np.radians(20.0)
+SHORTEST_INTERVAL = 1e-10
+FREE_WRIST = 1e-10  # rad; below it rounding decides joint 4
+FREE_SHOULDER = 1e-10  # m; below it rounding decides joint 1
+STRAIGHT_ELBOW = 1e-3  # rad; the angle of the elbow grows with the root of the distance from the edge of reach
+
+
+@dataclass(frozen=True, eq=False)
+class Branches:
+    """Closed-form solutions along a line.
+
+    Attributes
+    ----------
+    t : (N,), s, rising; progress : (N,), share of the way
+    q : (N, 8, 6), rad in (-pi, pi], NaN where a branch has no solution
+    gap : (N, 8), by how much a branch misses the pose, m or rad; 0 where it has a solution
+    free_wrist : (N, 8) bool, whether joints 4 and 6 can turn against each other with the tool at rest
+    free_shoulder : (N, 8) bool, whether joint 1 can turn with the wrist centre at rest
+    straight : (N, 8) bool, whether the arm is stretched or folded, so that both elbow branches are one
+    factors : (N, 8, 3), distances from the wrist, elbow and shoulder singularities (rad, rad, m)
+    """
+
+    t: np.ndarray
+    progress: np.ndarray
+    q: np.ndarray
+    gap: np.ndarray
+    free_wrist: np.ndarray
+    free_shoulder: np.ndarray
+    straight: np.ndarray
+    factors: np.ndarray
+
+    @property
+    def meeting(self) -> np.ndarray:
+        """(N, 8) bool, whether a branch meets another one there."""
+        return self.free_wrist | self.free_shoulder | self.straight
+
+    @property
+    def doors(self) -> np.ndarray:
+        """(N, 8), bits of the branch number (:mod:`er3a.kinematics.configuration`) that differ in the branch met there."""
+        return self.free_wrist + 2 * self.straight + 4 * self.free_shoulder
+
+    @property
+    def reached(self) -> np.ndarray:
+        """(N, 8) bool, whether a branch has a solution."""
+        return np.isfinite(self.q[..., 0])
+
+
+def branches_along(robot: Robot, line: ToolPath, t: np.ndarray) -> Branches:
+    """Solve a line at times (N,) in s (rising, both ends included) and at as many more as its branches need."""
+    grid = _solve_at(robot, line, t)
+    grid = _merge(grid, _solve_at(robot, line, _closest_passes(grid)))
+    while True:
+        wide = _unclear(grid) & (np.diff(grid.t) > SHORTEST_INTERVAL * line.duration)
+        if not wide.any():
+            break
+        middle = (grid.t[:-1] + grid.t[1:])[wide] / 2
+        grid = _merge(grid, _solve_at(robot, line, middle))
+    _fill_free_shoulder(robot, line, grid)
+    _fill_free_wrist(robot, grid)
+    return grid
+
+
+def turned_difference(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """b - a with whole turns removed, in (-pi, pi]."""
+    return principal(b - a)
+
+
+def align_wrist(robot: Robot, q: np.ndarray, joint_4: np.ndarray) -> np.ndarray:
+    """Turn joint 4 to given angles (...,) with the tool at rest, for arms q (..., 6) with axes 4 and 6 aligned."""
+    T = frames(robot, q)
+    same = np.sign(np.einsum("...i,...i->...", T[..., 3, :3, 2], T[..., 5, :3, 2]))
+    same = same * robot.direction[3] * robot.direction[5]
+    turned = q.copy()
+    turned[..., 5] += same * (q[..., 3] - joint_4)
+    turned[..., 3] = joint_4
+    return turned
+
+
+def onto_axis_1(robot: Robot, T: np.ndarray) -> np.ndarray:
+    """Poses (N, 4, 4) shifted so that the wrist centre, which is next to axis 1, lies exactly on it."""
+    arm = wrist_partitioned_arm(robot)
+    centre = T[:, :3, 3] + T[:, :3, :3] @ arm.wrist_in_tool
+    from_axis = centre - arm.points[0]
+    moved = T.copy()
+    moved[:, :3, 3] -= from_axis - np.outer(from_axis @ arm.axes[0], arm.axes[0])
+    return moved
+
+
+def _solve_at(robot: Robot, line: ToolPath, t: np.ndarray) -> Branches:
+    progress = line.progress(t)[0]
+    q, fault, gap = solve_slots(robot, line.poses(progress), np.zeros((len(t), 6)))
+    return Branches(t, progress, q, np.where(fault == REACHED, 0.0, gap), *_free(robot, q))
+
+
+def _free(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    factors = determinant_factors(robot, q)
+    wrist, elbow, shoulder = (np.abs(value) for value in (factors.wrist, factors.elbow, factors.shoulder))
+    distances = np.stack([wrist, elbow, shoulder], axis=-1)
+    return wrist < FREE_WRIST, shoulder < FREE_SHOULDER, elbow < STRAIGHT_ELBOW, distances
+
+
+def _merge(a: Branches, b: Branches) -> Branches:
+    t, first = np.unique(np.concatenate([a.t, b.t]), return_index=True)
+    rest = (np.concatenate([getattr(a, key), getattr(b, key)])[first] for key in list(Branches.__annotations__)[1:])
+    return Branches(t, *rest)
+
+
+def _closest_passes(grid: Branches) -> np.ndarray:
+    """Times at which a branch comes nearest to a singularity between grid points, by a parabola through three."""
+    found = [np.empty(0)]
+    for kind in range(3):
+        for slot in range(SLOTS):
+            y = grid.factors[:, slot, kind] ** 2
+            i = 1 + np.flatnonzero((y[1:-1] < y[:-2]) & (y[1:-1] <= y[2:]))
+            found.append(vertex(grid.t, y, i))
+    return np.unique(np.concatenate(found))
+
+
+def vertex(x: np.ndarray, y: np.ndarray, i: np.ndarray) -> np.ndarray:
+    """Lowest points of the parabolas through the points i - 1, i, i + 1, each kept between its outer points."""
+    left, right = x[i] - x[i - 1], x[i + 1] - x[i]
+    rise, fall = (y[i + 1] - y[i]) / right, (y[i] - y[i - 1]) / left
+    curvature = (rise - fall) / (left + right)
+    slope = (fall * right + rise * left) / (left + right)
+    curved = curvature > 0
+    lowest = x[i[curved]] - slope[curved] / (2 * curvature[curved])
+    return np.clip(lowest, x[i[curved] - 1], x[i[curved] + 1])
+
+
+def _unclear(grid: Branches) -> np.ndarray:
+    """(N - 1,) bool: intervals where a branch begins or ends, or moves a joint that is not free by a wide step."""
+    step = np.abs(turned_difference(grid.q[:-1], grid.q[1:]))
+    for free, joints in ((grid.free_wrist, [3, 5]), (grid.free_shoulder, [0, 3, 4, 5])):
+        either = free[:-1] | free[1:]
+        for joint in joints:
+            step[either, joint] = 0.0
+    wide = (step > WIDE_STEP).any(axis=-1)
+    return (wide | (grid.reached[:-1] != grid.reached[1:])).any(axis=-1)
+
+
+def _fill_free_shoulder(robot: Robot, line: ToolPath, grid: Branches) -> None:
+    for side in (slice(0, 4), slice(4, 8)):
+        free = grid.free_shoulder[:, side].any(axis=1)
+        if not free.any():
+            continue
+        kept = _kept(grid.q[:, side.start, 0], free | ~grid.reached[:, side.start])
+        q_ref = np.zeros((int(free.sum()), 6))
+        q_ref[:, 0] = kept[free]
+        q, _, _ = solve_slots(robot, onto_axis_1(robot, line.poses(grid.progress[free])), q_ref)
+        grid.q[free, side] = q[:, side]
+
+
+def _fill_free_wrist(robot: Robot, grid: Branches) -> None:
+    for slot in range(SLOTS):
+        free = grid.free_wrist[:, slot]
+        if free.any():
+            kept = _kept(grid.q[:, slot, 3], free | ~grid.reached[:, slot])
+            grid.q[free, slot] = principal(align_wrist(robot, grid.q[free, slot], kept[free]))
+
+
+def _kept(values: np.ndarray, unknown: np.ndarray) -> np.ndarray:
+    """Values (N,) with the unknown ones replaced by the last known one before, else the next one, else 0."""
+    known = np.flatnonzero(~unknown)
+    if not known.size:
+        return np.zeros(len(values))
+    before = np.searchsorted(known, np.arange(len(values)), side="right") - 1
+    return values[known[np.maximum(before, 0)]]

@@ -1,0 +1,80 @@
+"""Greatest and least values over the joint limits, by optimisation.
+
+Points spread evenly over the box are evaluated in one batch; its best points and an equal number of others start a
+bounded truncated-Newton search each [1]_. Nothing is random: equal inputs give equal numbers.
+
+References
+----------
+.. [1] S. G. Nash, "Newton-type minimization via the Lanczos method", SIAM J. Numer. Anal. 21(4), 1984.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import minimize
+
+from er3a.kinematics.chain import JOINTS
+from er3a.kinematics.forward import frames
+from er3a.numerics.quasi_random import spread
+from er3a.references.quantities import MM, Extreme, measure_of
+from er3a.robots.robot import Robot
+
+SCAN = 4096
+STEP = 1e-6
+
+
+def search(robot: Robot, quantity: Extreme, starts: int) -> tuple[float, np.ndarray]:
+    """Find an extreme.
+
+    The robot's tool does not count. Joint 1 stays at 0: none of the measures changes with it, or the side view is drawn
+    there. A joint without influence on the result is given as 0 (or its limit nearest to 0).
+
+    Parameters
+    ----------
+    starts : number of local searches
+
+    Returns
+    -------
+    value : mm
+    q : (6,), rad, where it is attained
+    """
+    robot = robot.without_tool()
+    lower, upper = robot.lower.copy(), robot.upper.copy()
+    lower[0] = upper[0] = 0.0
+    sign = -1.0 if quantity.extreme == "greatest" else 1.0
+
+    def cost(q: np.ndarray) -> np.ndarray:
+        return sign * measure_of(frames(robot, q), quantity.point, quantity.measure)
+
+    offsets = np.vstack([np.zeros(JOINTS), STEP * np.eye(JOINTS), -STEP * np.eye(JOINTS)])
+
+    def cost_and_slope(q: np.ndarray) -> tuple[float, np.ndarray]:
+        values = cost(q + offsets)
+        return values[0], (values[1 : JOINTS + 1] - values[JOINTS + 1 :]) / (2 * STEP)
+
+    scan = spread(lower, upper, SCAN)
+    best = scan[np.argsort(cost(scan), kind="stable")[: (starts + 1) // 2]]
+    results = [
+        minimize(
+            cost_and_slope,
+            start,
+            jac=True,
+            method="TNC",
+            bounds=list(zip(lower, upper)),
+            options={"ftol": 1e-15, "xtol": 1e-12, "gtol": 1e-12, "maxfun": 100},
+        )
+        for start in (*best, *scan[: starts // 2])
+    ]
+    q = min(results, key=lambda result: result.fun).x
+    q = _without_idle_joints(q, lower, upper, cost)
+    return float(sign * cost(q) * MM), q
+
+
+def _without_idle_joints(q: np.ndarray, lower: np.ndarray, upper: np.ndarray, cost) -> np.ndarray:
+    rest = np.clip(0.0, lower, upper)
+    for joint in range(JOINTS):
+        trial = q.copy()
+        trial[joint] = rest[joint]
+        if cost(trial) <= cost(q) + 1e-12:
+            q = trial
+    return q

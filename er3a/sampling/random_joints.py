@@ -1,0 +1,150 @@
+"""Joint vectors that can be drawn again one by one: Philox4x32-10, a counter-based generator [1]_, or Sobol' points.
+
+*uniform*: the counter is (sample within the block, block), the key is the seed, and the four words of one draw give
+six numbers of 21 bits (steps below 0.0002 deg for a full turn). So the joint vector of sample n of block b depends on
+nothing else: not on what was drawn before it, nor on how blocks are shared out among processes.
+
+*sobol*: the samples of all blocks, numbered through, are points of one Sobol' sequence (:mod:`.sobol`), shifted at
+random.
+
+References
+----------
+.. [1] J. K. Salmon, M. A. Moraes, R. O. Dror, D. E. Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC11, 2011.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from er3a.kinematics.chain import JOINTS
+from er3a.numerics.jit import kernel
+from er3a.robots.robot import Robot
+from er3a.sampling.sobol import fill_sobol, shifted_directions
+
+CHUNK = 512
+"""Samples that are worked on at a time, in rows of an array that stays in the processor's cache."""
+ROUNDS = 10
+_LOW = np.uint64(0xFFFFFFFF)
+_32 = np.uint64(32)
+_M0, _M1 = np.uint64(0xD2511F53), np.uint64(0xCD9E8D57)
+_W0, _W1 = np.uint64(0x9E3779B9), np.uint64(0xBB67AE85)
+_10, _11 = np.uint64(10), np.uint64(11)
+_MASK_10, _MASK_11 = np.uint64(0x3FF), np.uint64(0x7FF)
+_HALF, _STEP = np.float32(0.5), np.float32(2.0**-21)
+
+
+@dataclass(frozen=True)
+class Draw:
+    """How the samples of a run are drawn.
+
+    Attributes
+    ----------
+    seed : of the study, below 2**63
+    samples, blocks : how many in all, and in how many blocks
+    sampling : "uniform" or "sobol"
+    """
+
+    seed: int
+    samples: int
+    blocks: int
+    sampling: str = "uniform"
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """Samples (blocks,) of each block: as even as possible, the first ones one larger."""
+        return self.samples // self.blocks + (np.arange(self.blocks) < self.samples % self.blocks)
+
+    def first(self, blocks: np.ndarray) -> np.ndarray:
+        """Number within the run of the first sample of each block."""
+        return blocks * (self.samples // self.blocks) + np.minimum(blocks, self.samples % self.blocks)
+
+    def directions(self) -> np.ndarray:
+        """Direction numbers and shift of the Sobol' sequence; without rows for uniform samples."""
+        return shifted_directions(self.seed) if self.sampling == "sobol" else np.empty((0, 0), dtype=np.uint64)
+
+    def joints(self, robot: Robot, blocks: np.ndarray, samples: np.ndarray) -> np.ndarray:
+        """Draw the joint vectors of some samples again.
+
+        Parameters
+        ----------
+        blocks, samples : (N,), the block of each sample and its number within it
+
+        Returns
+        -------
+        q : (N, 6), rad, within the joint limits; a joint of zero range stays where it is
+        """
+        blocks, samples = np.asarray(blocks, dtype=np.int64), np.asarray(samples, dtype=np.int64)
+        out, first = np.empty((len(blocks), JOINTS)), self.first(blocks)
+        _again(np.uint64(self.seed), blocks, samples, first, self.directions(), out)
+        return robot.lower + out * (robot.upper - robot.lower)
+
+
+@kernel
+def _round(c0, c1, c2, c3, k0, k1, r):
+    k0, k1 = (k0 + np.uint64(r) * _W0) & _LOW, (k1 + np.uint64(r) * _W1) & _LOW
+    p0, p1 = _M0 * c0, _M1 * c2
+    return (p1 >> _32) ^ c1 ^ k0, p1 & _LOW, (p0 >> _32) ^ c3 ^ k1, p0 & _LOW
+
+
+@kernel
+def philox4x32(c0, c1, c2, c3, k0, k1):
+    """Four random 32-bit words from four counter words and two key words, all held in uint64."""
+    for r in range(ROUNDS):
+        c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0, k1, r)
+    return c0, c1, c2, c3
+
+
+@kernel
+def _unit(bits):
+    """A number in (0, 1) from 21 bits, exact in single precision."""
+    return (np.float32(np.int32(bits)) + _HALF) * _STEP
+
+
+@kernel
+def _fifth(a, b):
+    """The bits that two words have left over."""
+    return ((a & _MASK_11) << _10) | (b & _MASK_10)
+
+
+@kernel
+def fill_uniform(seed, block, first, rows):
+    """Set the six first rows of ``CHUNK`` numbers to those of the samples from ``first`` on, in (0, 1)."""
+    k0, k1 = seed & _LOW, seed >> _32
+    for i in range(CHUNK):
+        sample = first + np.uint64(i)
+        a, b, c, d = sample & _LOW, sample >> _32, block, np.uint64(0)
+        # Written out: a call that stays a call keeps the loop from becoming vector instructions.
+        a, b, c, d = _round(a, b, c, d, k0, k1, 0)
+        a, b, c, d = _round(a, b, c, d, k0, k1, 1)
+        a, b, c, d = _round(a, b, c, d, k0, k1, 2)
+        a, b, c, d = _round(a, b, c, d, k0, k1, 3)
+        a, b, c, d = _round(a, b, c, d, k0, k1, 4)
+        a, b, c, d = _round(a, b, c, d, k0, k1, 5)
+        a, b, c, d = _round(a, b, c, d, k0, k1, 6)
+        a, b, c, d = _round(a, b, c, d, k0, k1, 7)
+        a, b, c, d = _round(a, b, c, d, k0, k1, 8)
+        a, b, c, d = _round(a, b, c, d, k0, k1, 9)
+        rows[i] = _unit(a >> _11)
+        rows[CHUNK + i] = _unit(b >> _11)
+        rows[2 * CHUNK + i] = _unit(c >> _11)
+        rows[3 * CHUNK + i] = _unit(d >> _11)
+        rows[4 * CHUNK + i] = _unit(_fifth(a, b))
+        rows[5 * CHUNK + i] = _unit(_fifth(c, d))
+
+
+@kernel
+def _again(seed, blocks, samples, first, directions, out):
+    rows = np.empty(JOINTS * CHUNK, dtype=np.float32)
+    for n in range(blocks.shape[0]):
+        if directions.shape[0] > 0:
+            fill_sobol(directions, first[n] + samples[n], 1, CHUNK, rows)
+            for k in range(JOINTS):
+                out[n, k] = rows[k * CHUNK]
+            continue
+        sample = np.uint64(samples[n])
+        key = seed & _LOW, seed >> _32
+        a, b, c, d = philox4x32(sample & _LOW, sample >> _32, np.uint64(blocks[n]), np.uint64(0), key[0], key[1])
+        out[n, 0], out[n, 1], out[n, 2], out[n, 3] = _unit(a >> _11), _unit(b >> _11), _unit(c >> _11), _unit(d >> _11)
+        out[n, 4], out[n, 5] = _unit(_fifth(a, b)), _unit(_fifth(c, d))

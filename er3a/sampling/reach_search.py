@@ -1,0 +1,53 @@
+"""How far the tool point gets from axis 1 and along it: the best samples, each taken on to its local optimum."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import minimize
+
+from er3a.kinematics.forward import forward, jacobian
+from er3a.robots.robot import Robot
+from er3a.sampling.grid import Grid
+
+NANOMETRES = 9
+_STARTS = 8
+
+
+def reach_figures(robot: Robot, grid: Grid, q: np.ndarray) -> dict[str, float]:
+    """Extreme distances from axis 1 and heights along it.
+
+    Parameters
+    ----------
+    q : (N, 6), rad, samples to start from
+
+    Returns
+    -------
+    figures : m, to the nanometre; ``furthest_from_axis``, ``nearest_to_axis``, ``highest`` and ``lowest`` (heights
+        above the foot of axis 1)
+    """
+    offset = forward(robot, q)[:, :3, 3] - grid.axis_point
+    height = offset @ grid.axis
+    radius2 = np.einsum("ij,ij->i", offset, offset) - height**2
+    found = {
+        "furthest_from_axis": np.sqrt(max(0.0, -_best(robot, grid, q, -radius2, -1.0, 0.0))),
+        "nearest_to_axis": np.sqrt(max(0.0, _best(robot, grid, q, radius2, 1.0, 0.0))),
+        "highest": -_best(robot, grid, q, -height, 0.0, -1.0),
+        "lowest": _best(robot, grid, q, height, 0.0, 1.0),
+    }
+    return {key: round(float(value), NANOMETRES) for key, value in found.items()}
+
+
+def _best(robot: Robot, grid: Grid, q: np.ndarray, values: np.ndarray, of_radius: float, of_height: float) -> float:
+    """Least ``of_radius * radius^2 + of_height * height`` found from the samples with the least ``values``."""
+
+    def goal(x):
+        offset = forward(robot, x)[:3, 3] - grid.axis_point
+        height = offset @ grid.axis
+        across = offset - height * grid.axis
+        gradient = 2 * of_radius * across + of_height * grid.axis
+        return of_radius * (across @ across) + of_height * height, gradient @ jacobian(robot, x)[:3]
+
+    bounds = list(zip(robot.lower, robot.upper))
+    starts = q[np.argsort(values, kind="stable")[:_STARTS]]
+    tight = {"ftol": 1e-15, "gtol": 1e-12, "maxiter": 500}
+    return float(min(minimize(goal, x, jac=True, method="L-BFGS-B", bounds=bounds, options=tight).fun for x in starts))
