@@ -53,7 +53,7 @@ words: $(VENV)/dev.stamp  ## collect the texts to be translated into er3a/pipeli
 	rm er3a/pipeline/messages/locale/er3a.pot
 
 campaigns: $(VENV)/dev.stamp  ## full-size evidence: writes the tables in docs/evidence/ again
-	$(BIN)/python benchmarks/campaigns.py $(ARGS)
+	$(BIN)/python -m benchmarks.campaigns $(ARGS)
 
 lock: $(VENV)/uv.stamp  ## resolve the locked requirements again
 	$(BIN)/uv pip compile pyproject.toml --extra dev --extra peers $(LOCK_FLAGS) -o requirements/dev.txt

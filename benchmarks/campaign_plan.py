@@ -12,12 +12,12 @@ from pathlib import Path
 
 import psutil
 import yaml
-from small_study import STUDY, environment, fresh, run_command
 
 from er3a.pipeline.estimate.estimate import Calibration, calibrate, cost, disk_bytes
 from er3a.pipeline.estimate.terminal import duration, size
 from er3a.pipeline.estimate.timings import written_bytes
 from er3a.pipeline.study import Study, load_study
+from testing.small_study import STUDY, environment, fresh, run_command
 
 ROBOT, BLOCKS = "er3a_c60", 32
 SAMPLES = tuple(10**exponent for exponent in range(6, 11))
