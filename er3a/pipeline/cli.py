@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from importlib import import_module
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +12,7 @@ import typer
 
 from er3a.errors import Er3aError
 from er3a.pipeline.messages import language
+from er3a.pipeline.stages import run
 from er3a.pipeline.study import STAGES, Study, load_study
 
 app = typer.Typer(
@@ -81,7 +81,7 @@ def compute(
         raise Er3aError(f"the stage {stage} takes no sampled parts")
     extra = {"parts": parts} if parts else {}
     loaded, folder = _folder(study, results, robot, stage)
-    _verb("compute", stage)(loaded, robot, folder, **extra)
+    run.compute(stage, loaded, robot, folder, **extra)
 
 
 @app.command()
@@ -97,7 +97,7 @@ def record(
 
     loaded, folder = _folder(study, results, robot, stage)
     recording = reports / robot / f"{stage}.rrd"
-    _verb("record", stage)(loaded, robot, folder, recording)
+    run.show("record", stage, loaded, robot, folder, recording)
     seal(recording)
 
 
@@ -129,7 +129,7 @@ def report(
     loaded, folder = _folder(study, results, robot, stage)
     page = reports / robot / f"{stage}.html"
     language.use(loaded.report.language)
-    _verb("report", stage)(loaded, robot, folder, page)
+    run.show("report", stage, loaded, robot, folder, page)
     seal(page)
 
 
@@ -337,12 +337,8 @@ def _study_to_show(file: Path) -> Study:
 
 
 def _folder(study_file: Path, results: Path, robot: str, stage: str) -> tuple[Study, Path]:
+    if stage not in STAGES:
+        raise Er3aError(f"there is no stage '{stage}'; known: {', '.join(STAGES)}")
     study = load_study(study_file)
     study.entry(robot)
     return study, results / robot / stage
-
-
-def _verb(verb: str, stage: str):
-    if stage not in STAGES:
-        raise Er3aError(f"there is no stage '{stage}'; known: {', '.join(STAGES)}")
-    return getattr(import_module(f"er3a.pipeline.stages.{stage}.{verb}"), verb)

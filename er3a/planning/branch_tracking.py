@@ -60,7 +60,7 @@ class Branches:
 
     @property
     def doors(self) -> np.ndarray:
-        """(N, 8), bits of the branch number (:mod:`er3a.kinematics.configuration`) that differ in the branch met there."""
+        """(N, 8), bits of the branch number (:mod:`er3a.kinematics.configuration`) that differ in a branch met."""
         return self.free_wrist + 2 * self.straight + 4 * self.free_shoulder
 
     @property

@@ -164,6 +164,18 @@ def tr(text: str, /, **parts: Any) -> str:
     return _catalogue.gettext(text) if text else text
 
 
+def translated(context: str, text: str) -> str:
+    """A text in the language in use, looked up with its context, and without it where the catalogue has none."""
+    found = _catalogue.pgettext(context, text)
+    return found if found != text else _catalogue.gettext(text)
+
+
+def translated_count(context: str, one: str, many: str, count: int) -> str:
+    """The form of a text that fits a number."""
+    found = _catalogue.npgettext(context, one, many, count)
+    return found if found not in (one, many) else _catalogue.ngettext(one, many, count)
+
+
 def _compose(template: str, parts: dict[str, str]) -> str:
     shown = {name: part if name.startswith("own_") else tr(part) for name, part in parts.items()}
     return _AsIs().format(_catalogue.gettext(template), **shown)

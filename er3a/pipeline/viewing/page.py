@@ -18,7 +18,9 @@ from matplotlib.figure import Figure
 
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.say import say, word
 from er3a.pipeline.results import write_atomically
+from er3a.pipeline.stage_results import Stored
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import svg_data_uri
 from er3a.pipeline.viewing.numbers import fixed, number
@@ -70,11 +72,66 @@ class Picture:
         return float(self.figure.get_figwidth())
 
 
+@dataclass(frozen=True)
+class ShownFigure:
+    """A key figure in the page's language; ``unit`` holds what it is part of, if it is a count."""
+
+    label: str
+    value: float | int | None
+    unit: str
+    uncertainty: float | None
+
+
+@dataclass(frozen=True)
+class Head:
+    """What frames a stage's page: its verdict as a sentence, key figures, and where the numbers come from."""
+
+    robot: str
+    stage: str
+    status: str
+    text: str
+    figures: tuple[ShownFigure, ...]
+    provenance: Any
+
+
+def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
+    """The head of a stage's page.
+
+    Parameters
+    ----------
+    figure_words : names of key figures by code, marked with ``N_``
+    """
+    verdict, stage = stored.results.summary.verdict, stored.stage
+    shown = tuple(
+        ShownFigure(
+            word(f"{stage}.figure", figure_words, figure.name),
+            figure.value,
+            tr("of {total}", total=figure.of) if figure.of is not None else figure.unit,
+            figure.uncertainty,
+        )
+        for figure in stored.results.summary.figures
+    )
+    return Head(stored.robot, stage, verdict.status, say(verdict.finding), shown, stored.provenance)
+
+
+def _old_head(summary: dict[str, Any]) -> Head:
+    """The head from a summary that is still plain data."""
+    shown = tuple(
+        ShownFigure(tr(item["name"]), item["value"], tr(item["unit"]), item["uncertainty"])
+        for item in summary["figures"]
+    )
+    verdict = summary["verdict"]
+    return Head(
+        summary["robot"], summary["stage"], verdict["status"], tr(verdict["text"]), shown, summary["provenance"]
+    )
+
+
 def render(
     template: Path,
     output: Path,
-    summary: dict[str, Any] | None = None,
+    summary: Any = None,
     *,
+    head: Head | None = None,
     command: str | None,
     provenance: dict[str, Any] | None = None,
     **context: Any,
@@ -84,11 +141,13 @@ def render(
     Parameters
     ----------
     template : a Jinja file that extends ``base.html.j2``
-    summary : the stage's summary; its verdict, figures and provenance frame the page
+    summary : the stage's summary, for the template
+    head : what frames a stage's page
     command : the command that makes the page again, if there is one
     provenance : of pages without a summary, in the shape that a summary has
     context : what the template needs besides
     """
+    head = _old_head(summary) if isinstance(summary, dict) else head
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader([template.parent, _HERE]),
         autoescape=True,
@@ -108,8 +167,9 @@ def render(
         pages=PAGES,
         language=language.current(),
         summary=summary,
+        head=head,
         command=command,
-        provenance=summary["provenance"] if summary else provenance,
+        provenance=head.provenance if head else provenance,
         preview=_preview(output.with_suffix(".webp")),
         versions=_versions(),
         commit=_commit(),

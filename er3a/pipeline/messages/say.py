@@ -1,0 +1,51 @@
+"""From findings to sentences in the language in use.
+
+Each module of this room makes sentences for the findings of one area::
+
+    @say.register
+    def _(found: OutOfReach) -> str:
+        return sentence(found.code, "joint {joint} is {gap:.1f} mm short", joint=found.joint, gap=found.gap_mm)
+
+Views and the command line import the modules whose findings they show. The code of a finding is the context of its
+text in the catalogues.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import singledispatch
+from typing import Any
+
+from er3a.findings import Finding
+from er3a.pipeline.messages import language
+
+
+@singledispatch
+def say(finding: Any) -> str:
+    """A finding as a text in the language in use."""
+    raise TypeError(f"no sentence is known for {type(finding).__name__}; import the room of messages that has it")
+
+
+def sentence(code: str, template: str, /, **parts: Any) -> str:
+    """A text in the language in use, its fields filled in as ``str.format`` does; ``code`` tells equal texts apart."""
+    return language.translated(code, template).format(**parts)
+
+
+def counted(code: str, one: str, many: str, count: int, /, **parts: Any) -> str:
+    """A text whose form depends on a number, which is the field ``{count}`` in it."""
+    return language.translated_count(code, one, many, count).format(count=count, **parts)
+
+
+def word(code: str, words: dict[str, str], key: str) -> str:
+    """The word for a code out of a table of words marked with ``N_``; a key without one stays as it is."""
+    return language.translated(code, words[key]) if key in words else key
+
+
+def listed(findings: Iterable[Finding]) -> list[str]:
+    """Each finding's text."""
+    return [say(finding) for finding in findings]
+
+
+def joined(texts: Iterable[str], separator: str = "; ") -> str:
+    """Texts as one: apart by ``"; "``, ``", "`` or ``" "`` (whole sentences); empty ones are left out."""
+    return language.translated("joined", separator).join(text for text in texts if text)

@@ -1,0 +1,192 @@
+"""Tables of results: typed columns with unit and meaning, kept as Parquet.
+
+A table is a frozen dataclass of equally long arrays::
+
+    @dataclass(frozen=True, eq=False)
+    class Samples(Table):
+        path: Texts = column("name of the path", dtype=object)
+        t_s: Reals = column("time since the path's start", "s")
+        q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
+        point_mm: Reals = vector("{}_mm", "tool point in the base frame", "mm")
+
+``q_deg`` is (rows, n) and written as ``q1_deg ... qn_deg``, ``point_mm`` (rows, 3) as ``x_mm, y_mm, z_mm``. Unit and
+meaning go into the file.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+Reals = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+Texts = NDArray[np.object_]
+
+_ARROW_TEXT = pa.string()
+
+
+@dataclass(frozen=True)
+class Column:
+    """What a column, or a group of columns with one array, holds.
+
+    Attributes
+    ----------
+    pattern : name in the file; with ``{}`` for a group: what stands there is in ``parts``, or counts from 1
+    """
+
+    pattern: str
+    meaning: str
+    unit: str
+    dtype: np.dtype
+    parts: tuple[str, ...] | None = None
+
+    @property
+    def is_group(self) -> bool:
+        """Whether the array has two dimensions and each column of it a name of its own."""
+        return "{}" in self.pattern
+
+    def names(self, width: int) -> list[str]:
+        """Names in the file, of a group with so many columns."""
+        if not self.is_group:
+            return [self.pattern]
+        return [self.pattern.format(part) for part in self.parts or range(1, width + 1)]
+
+    def found_in(self, names: Iterable[str]) -> list[str]:
+        """Those names of a file that belong to this column, in order."""
+        present = set(names)
+        if not self.is_group or self.parts:
+            return [name for name in self.names(0) if name in present]
+        pattern = re.compile(re.escape(self.pattern).replace(r"\{\}", r"(\d+)"))
+        numbered = {int(match[1]): name for name in present if (match := pattern.fullmatch(name))}
+        return [numbered[number] for number in sorted(numbered)]
+
+
+def column(meaning: str, unit: str = "", *, name: str = "", dtype: Any = np.float64) -> Any:
+    """A column (rows,); ``name`` in the file is the attribute's where it is left out."""
+    return _declared(name, meaning, unit, dtype, None)
+
+
+def per_joint(pattern: str, meaning: str, unit: str = "", *, dtype: Any = np.float64) -> Any:
+    """One column for each joint, (rows, n): ``"q{}_deg"`` is written as ``q1_deg ... qn_deg``."""
+    return _declared(pattern, meaning, unit, dtype, None)
+
+
+def vector(pattern: str, meaning: str, unit: str = "", *, parts: Iterable[str] = "xyz", dtype: Any = np.float64) -> Any:
+    """Columns that belong together, (rows, len(parts)): ``"{}_mm"`` is written as ``x_mm, y_mm, z_mm``."""
+    return _declared(pattern, meaning, unit, dtype, tuple(parts))
+
+
+def _declared(pattern: str, meaning: str, unit: str, dtype: Any, parts: tuple[str, ...] | None) -> Any:
+    return field(metadata={"column": Column(pattern, meaning, unit, np.dtype(dtype), parts)})
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Base of all tables; see the module."""
+
+    joints: ClassVar[int] = 6
+    """Columns of a group that counts joints, in a table without rows."""
+
+    def __post_init__(self) -> None:
+        lengths = {}
+        for name, spec in self.columns().items():
+            array = np.asarray(getattr(self, name), dtype=spec.dtype)
+            if array.ndim != (2 if spec.is_group else 1):
+                raise ValueError(f"{type(self).__name__}.{name} has shape {array.shape}")
+            object.__setattr__(self, name, array)
+            lengths[name] = len(array)
+        if len(set(lengths.values())) > 1:
+            raise ValueError(f"{type(self).__name__}: columns of different lengths: {lengths}")
+
+    @classmethod
+    def columns(cls) -> dict[str, Column]:
+        """The columns by attribute."""
+        found = {}
+        for attribute in fields(cls):
+            spec: Column = attribute.metadata["column"]
+            name = spec.pattern or attribute.name
+            found[attribute.name] = Column(name, spec.meaning, spec.unit, spec.dtype, spec.parts)
+        return found
+
+    @classmethod
+    def empty(cls) -> Self:
+        """A table without rows."""
+        shapes = {
+            name: (0, len(spec.parts or range(cls.joints))) if spec.is_group else (0,)
+            for name, spec in cls.columns().items()
+        }
+        return cls(**{name: np.empty(shape, cls.columns()[name].dtype) for name, shape in shapes.items()})
+
+    @classmethod
+    def stacked(cls, tables: Iterable[Self]) -> Self:
+        """The rows of several tables, one after another."""
+        parts = list(tables)
+        if not parts:
+            return cls.empty()
+        return cls(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in cls.columns()})
+
+    @classmethod
+    def of_rows(cls, rows: Iterable[tuple[Any, ...]]) -> Self:
+        """A table from rows in the order of the attributes."""
+        listed = list(rows)
+        if not listed:
+            return cls.empty()
+        return cls(**{name: _array(values, spec) for (name, spec), values in zip(cls.columns().items(), zip(*listed))})
+
+    def __len__(self) -> int:
+        return len(getattr(self, fields(self)[0].name))
+
+    def take(self, rows: NDArray[Any]) -> Self:
+        """The chosen rows: a mask (rows,) or row numbers."""
+        return type(self)(**{name: getattr(self, name)[rows] for name in self.columns()})
+
+    def frame(self) -> pd.DataFrame:
+        """The table for pandas, with the names of the file."""
+        return pd.DataFrame({name: values for name, values, _ in self._flat()})
+
+    def _flat(self) -> Iterator[tuple[str, NDArray[Any], Column]]:
+        for name, spec in self.columns().items():
+            array = getattr(self, name)
+            parts = array.T if spec.is_group else [array]
+            for part_name, part in zip(spec.names(len(parts)), parts):
+                yield part_name, part, spec
+
+    def write(self, file: Path) -> None:
+        """Write a Parquet file; equal tables give equal bytes."""
+        schema, arrays = [], []
+        for name, values, spec in self._flat():
+            kind = _ARROW_TEXT if spec.dtype == object else pa.from_numpy_dtype(spec.dtype)
+            schema.append(pa.field(name, kind, metadata={"unit": spec.unit, "meaning": spec.meaning}))
+            arrays.append(pa.array(np.ascontiguousarray(values), kind))
+        pq.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(schema)), file, compression="zstd")
+
+    @classmethod
+    def read(cls, content: bytes) -> Self:
+        """Read what :meth:`write` wrote; ``KeyError`` naming a column that is missing."""
+        stored = pq.read_table(pa.BufferReader(content))
+        arrays = {}
+        for name, spec in cls.columns().items():
+            names = spec.found_in(stored.column_names)
+            if not names or (spec.parts and len(names) != len(spec.parts)):
+                raise KeyError(spec.pattern)
+            parts = [stored[part].to_numpy() for part in names]
+            arrays[name] = np.stack(parts, axis=1).astype(spec.dtype) if spec.is_group else parts[0]
+        return cls(**arrays)
+
+
+def _array(values: tuple[Any, ...], spec: Column) -> NDArray[Any]:
+    if spec.dtype != object or spec.is_group:
+        return np.array(values, spec.dtype)
+    array = np.empty(len(values), object)
+    array[:] = values
+    return array
