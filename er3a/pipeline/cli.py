@@ -125,11 +125,13 @@ def report(
 ):
     """Write a stage's page from its results."""
     from er3a.pipeline.checksums import seal
+    from er3a.pipeline.viewing.figures import house_style
 
     loaded, folder = _folder(study, results, robot, stage)
     page = reports / robot / f"{stage}.html"
     language.use(loaded.report.language)
-    run.show("report", stage, loaded, robot, folder, page)
+    with house_style():
+        run.show("report", stage, loaded, robot, folder, page)
     seal(page)
 
 
@@ -148,9 +150,11 @@ def teach(robot: RobotName, study: StudyFile = DEFAULT_STUDY, reports: Reports =
 def index(study: StudyFile = DEFAULT_STUDY, results: Results = DEFAULT_RESULTS, reports: Reports = DEFAULT_REPORTS):
     """Write the pages over all robots and stages: the index and the comparison of two robots."""
     from er3a.pipeline.checksums import OVERALL, seal
+    from er3a.pipeline.viewing.figures import house_style
     from er3a.pipeline.viewing.index import write_index
 
-    write_index(_study_to_show(study), results, reports)
+    with house_style():
+        write_index(_study_to_show(study), results, reports)
     for page in OVERALL:
         seal(reports / page)
 
