@@ -178,7 +178,7 @@ def read_stage(folder: Path, stage: Stage) -> Stored[Any]:
     record = _record(folder)
     if record["verdict"]["status"] == "not_computed":
         verdict = record["verdict"]
-        absent = NotComputed(verdict["text"])
+        absent = NotComputed(verdict["params"].get("reason", verdict["text"]))
         origin = _adapter(Provenance).validate_python(record["provenance"])
         return Stored(record["robot"], stage.name, origin, AbsentResults(Summary(Verdict("not_computed", absent), ())))
     return read_results(folder, stage.module("model").RESULTS)

@@ -101,7 +101,8 @@ class StudyBase(StrictModel):
 
     def pages(self, name: str) -> tuple[str, ...]:
         """The pages of a robot: its stages', and the teach panel of one that is no variant."""
-        return self.stages(name) if name in self.variants else (*STAGES, "teach")
+        pages = tuple(stage for stage in self.stages(name) if "report" in REGISTRY[stage].views)
+        return pages if name in self.variants else (*pages, "teach")
 
     def entry(self, name: str) -> RobotEntry:
         """The study's entry for a robot, for a variant that of its base; :class:`InputError` if it has none."""

@@ -6,7 +6,7 @@ scattergather:
     blocks=STUDY.workspace.parts,
 
 
-for stage in REGISTRY.values():
+for stage in STAGES.values():
     if stage.sampled:
 
         rule:
@@ -25,7 +25,7 @@ for stage in REGISTRY.values():
                 "../envs/er3a.yaml"
             params:
                 settings=settings(stage.name),
-                code=code_of(stage.name, "sample"),
+                code=code_digest(f"{stage.package}.sample"),
             message:
                 f"{{wildcards.robot}}: sample the {stage.name}, part {{wildcards.scatteritem}}"
             shell:
@@ -36,7 +36,9 @@ for stage in REGISTRY.values():
             f"compute_{stage.name}"
         input:
             files=inputs(stage.name),
-            parts=gather.blocks(f"results/{{{{robot}}}}/{stage.name}/parts/{{scatteritem}}.npz") if stage.sampled else [],
+            parts=(
+                gather.blocks(f"results/{{{{robot}}}}/{stage.name}/parts/{{scatteritem}}.npz") if stage.sampled else []
+            ),
         output:
             results_of(stage.name),
         log:
@@ -49,7 +51,7 @@ for stage in REGISTRY.values():
         params:
             stage=stage.name,
             settings=computed_from(stage.name),
-            code=[code_of(stage.name, "compute"), code_digest(stage.verdict_messages)],
+            code=code_of(stage.name, "compute"),
         message:
             f"{{wildcards.robot}}: compute {stage.name}"
         shell:

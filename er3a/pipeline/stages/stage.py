@@ -69,6 +69,11 @@ class Stage:
         return list(table_types(self.module("model").RESULTS))
 
     @property
+    def messages(self) -> str:
+        """The module with the names of the stage's key figures and the sentences of its page."""
+        return f"er3a.pipeline.messages.{self.name}"
+
+    @property
     def verdict_messages(self) -> str:
         """The module that makes a sentence of the stage's verdict."""
         return f"er3a.pipeline.messages.{self.name}_verdict"
