@@ -161,7 +161,7 @@ def index(study: StudyFile = DEFAULT_STUDY, results: Results = DEFAULT_RESULTS, 
 
 
 @app.command()
-def plan(
+def estimate(
     cores: Annotated[str, typer.Option(help="numbers of cores, of one machine or of nodes together")] = "1,2,8,64",
     study: StudyFile = DEFAULT_STUDY,
     results: Results = DEFAULT_RESULTS,
@@ -171,16 +171,16 @@ def plan(
     """Say what the study will take: samples/s, wall time, memory and disk, from a short calibration on this machine."""
     from rich.console import Console
 
-    from er3a.pipeline.estimate.estimate import calibrate
-    from er3a.pipeline.estimate.terminal import print_plan
+    from er3a.pipeline.estimate.cost import measured_here
+    from er3a.pipeline.estimate.terminal import print_estimate
 
     numbers = cores.split(",")
     if not all(number.strip().isdigit() and int(number) > 0 for number in numbers):
         raise Er3aError(f"--cores is '{cores}'; expected numbers such as 1,2,8,64")
     loaded = load_study(study)
     with Console(stderr=True).status("Measuring on this machine ..."):
-        measured = calibrate(loaded, results, reports, logs)
-    print_plan(loaded, measured, sorted({int(number) for number in numbers}))
+        measured = measured_here(loaded, results, reports, logs)
+    print_estimate(loaded, measured, sorted({int(number) for number in numbers}))
 
 
 @app.command()

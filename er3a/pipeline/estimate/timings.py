@@ -143,5 +143,5 @@ def timed(command: list[str]) -> Timing:
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode:
         last = (said.strip().splitlines() or ["it said nothing"])[-1].removeprefix("error: ")
-        raise Er3aError(f"`{' '.join(command[:4])}`, timed for the plan, failed: {last}")
+        raise Er3aError(f"`{' '.join(command[:4])}`, timed for the estimate, failed: {last}")
     return Timing(seconds, usage.ru_maxrss / 1024)
