@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from er3a.calibration.findings import CalibrationConclusion, Held, LevelName, MorePositions, NotCalibrated
-from er3a.diagnosis.findings import Conclusion, Faults, NextMeasurement
+from er3a.calibration.outcomes import CalibrationConclusion, Held, LevelName, MorePositions, NotCalibrated
+from er3a.diagnosis.conclusions import Conclusion, NextMeasurement
+from er3a.diagnosis.fault_kinds import Faults
 from er3a.pipeline.tables import Reals, Table, Texts, column
 from er3a.references.quantities import Unit
 
