@@ -19,7 +19,7 @@ import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, get_type_hints
 
 import numpy as np
 import pandas as pd
@@ -190,3 +190,9 @@ def _array(values: tuple[Any, ...], spec: Column) -> NDArray[Any]:
     array = np.empty(len(values), object)
     array[:] = values
     return array
+
+
+def table_types(results: type) -> dict[str, type[Table]]:
+    """The tables of a stage's results, by attribute, which is the name of their file."""
+    hints = get_type_hints(results)
+    return {name: hint for name, hint in hints.items() if isinstance(hint, type) and issubclass(hint, Table)}
