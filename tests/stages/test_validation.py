@@ -30,8 +30,7 @@ from er3a.references.reference import Reference, ReferenceSet
 from tests.robots.test_conventions import random_arm
 
 NAMES = ("er3a_c60", "er3a_c60_article", "er3_600")
-TABLES = {f"{name}.parquet" for name in ("checks", "axes", "key_poses", "section", "residuals", "corrections")}
-WRITTEN = TABLES | {"summary.json", "SHA256SUMS"}
+WRITTEN = {f"{name}.parquet" for name in table_types(RESULTS)} | {"summary.json", "SHA256SUMS"}
 
 
 @pytest.fixture(scope="module")
@@ -40,16 +39,21 @@ def study() -> Study:
 
 
 @pytest.fixture(scope="module")
-def results(study, tmp_path_factory) -> dict[str, Path]:
+def folders(study, tmp_path_factory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("results")
     for name in NAMES:
-        compute(study, name, folder / name)
+        run.compute("validation", study, name, folder / name)
     return {name: folder / name for name in NAMES}
 
 
 @pytest.fixture(scope="module")
-def summaries(results) -> dict[str, dict]:
-    return {name: json.loads((folder / "summary.json").read_text()) for name, folder in results.items()}
+def stored(folders) -> dict[str, Stored[ValidationResults]]:
+    return {name: read_results(folder, RESULTS) for name, folder in folders.items()}
+
+
+@pytest.fixture(scope="module")
+def summaries(stored) -> dict[str, ValidationSummary]:
+    return {name: each.results.summary for name, each in stored.items()}
 
 
 def edited_robot(study: Study, folder: Path, edit) -> Study:
@@ -63,13 +67,21 @@ def edited_robot(study: Study, folder: Path, edit) -> Study:
     return study.model_copy(update={"robots": {**study.robots, "edited": entry}})
 
 
-def summary_of(study: Study, folder: Path) -> dict:
-    compute(study, "edited", folder)
-    return json.loads((folder / "summary.json").read_text())
+def computed(study: Study, folder: Path) -> Stored[ValidationResults]:
+    run.compute("validation", study, "edited", folder)
+    return read_results(folder, RESULTS)
 
 
-def with_status(summary: dict, status: str) -> list[str]:
-    return [check["name"] for check in summary["checks"] if check["status"] == status]
+def with_status(results: ValidationResults, status: str) -> set:
+    return {check.subject for check in results.summary.checks if check.status == status}
+
+
+def page_of(study: Study, stored: Stored[ValidationResults], folder: Path) -> str:
+    """The page's text, after both views were written."""
+    report(study, stored, folder / "page.html")
+    record(study, stored, folder / "out.rrd")
+    assert (folder / "out.rrd").stat().st_size > 10_000
+    return " ".join((folder / "page.html").read_text(encoding="utf-8").split())
 
 
 def test_verdicts_on_the_three_robots(summaries):

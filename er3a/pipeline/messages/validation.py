@@ -27,6 +27,21 @@ FIGURES = {
     "flange_reach": N_("Flange reaches from axis 1"),
     "round_trip_joint_error": N_("Round trips: worst joint error"),
 }
+GRADES = {
+    "official": N_("the manufacturer's own document"),
+    "cad": N_("measured on a CAD model that carries the model's name"),
+    "export": N_("a URDF exported from CAD"),
+    "claim": N_("an article's text"),
+    "inferred": N_("reasoned, not stated"),
+}
+GRADE_NAMES = {
+    "official": N_("official"),
+    "cad": N_("cad"),
+    "export": N_("export"),
+    "claim": N_("claim"),
+    "inferred": N_("inferred"),
+}
+CONVENTIONS = {"standard": N_("standard"), "modified": N_("modified")}
 GROUPS = GROUP_WORDS | {"table_sanity": N_("table sanity"), "round_trips": N_("round trips")}
 
 
