@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from er3a.files.reference_sets import load_references
+from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.pipeline.stages.validation.checks import checks_of_set, nothing_to_compare
 from er3a.pipeline.stages.validation.corrections import calibrate_from_sets
 from er3a.pipeline.stages.validation.diagnoses import diagnose_sets
@@ -16,7 +17,7 @@ from er3a.pipeline.stages.validation.model import (
     ValidationResults,
     ValidationSummary,
 )
-from er3a.pipeline.stages.validation.self_checks import property_missing, round_trip_checks, table_checks
+from er3a.pipeline.stages.validation.self_checks import round_trip_checks, table_checks
 from er3a.pipeline.stages.validation.subject import model_of
 from er3a.pipeline.stages.validation.verdict import SHOWN_DECIMALS, key_figures, set_summaries, verdict_of
 from er3a.pipeline.study import Study
@@ -64,7 +65,7 @@ def compute(study: Study, name: str) -> ValidationResults:
     checks += trip_checks
 
     axes, poses = axes_table(circles, sets), key_poses_table(robot, sets, extremes)
-    hypotheses, diagnoses, residuals = diagnose_sets(robot, sets)
+    diagnoses, residuals = diagnose_sets(robot, sets)
     calibrations, corrections = calibrate_from_sets(robot, sets)
     found = {each.reference_set: each for each in diagnoses}
     summaries = set_summaries(sets, checks, poses, found)
@@ -75,11 +76,10 @@ def compute(study: Study, name: str) -> ValidationResults:
         checks=tuple(checks),
         conflicts=tuple(conflicts),
         sets=summaries,
-        hypotheses=hypotheses,
         diagnoses=diagnoses,
         calibrations=calibrations,
         circle_points=_rounded(circles),
-        table=TableFacts(robot.convention, property_missing(robot)),
+        table=TableFacts(robot.convention, closed_form_missing(robot)),
         round_trips=trips,
         section_origin_mm=_section_origin_mm(robot),
     )

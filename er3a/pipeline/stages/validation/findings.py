@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from er3a.kinematics.wrist_partitioned import PropertyMissing
-from er3a.pipeline.stages.validation.diagnoses import Diagnosed
+from er3a.diagnosis.findings import MainFault, MostLikelyFault
+from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.references.subjects import DrawingCorner, DrawingExtent, Reach, ReferenceSubject, Subject
 from er3a.robots.robot import Grade
 
@@ -96,7 +96,7 @@ class NumbersMissing:
 class NoClosedForm:
     """The arm has no closed-form inverse."""
 
-    missing: PropertyMissing
+    missing: ClosedFormMissing
     code: Literal["no_closed_form"] = "no_closed_form"
 
 
@@ -117,10 +117,13 @@ Note = (
     | SetHasNoData
     | InNoSet
     | NumbersMissing
-    | PropertyMissing
+    | ClosedFormMissing
     | NoClosedForm
     | NearSingularLeftOut
 )
+
+
+LikelyFault = MostLikelyFault | MainFault
 
 
 @dataclass(frozen=True)
@@ -141,7 +144,7 @@ class Claims:
     reference_set: str
     claims: int
     failed: int
-    diagnosis: Diagnosed | None
+    diagnosis: LikelyFault | None
     code: Literal["claims"] = "claims"
 
 
@@ -206,7 +209,7 @@ class _Missed(_Judged):
     expected: float
     unit: str
     grades: tuple[Grade, ...]
-    diagnosis: Diagnosed | None
+    diagnosis: LikelyFault | None
 
 
 @dataclass(frozen=True)

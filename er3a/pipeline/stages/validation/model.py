@@ -8,7 +8,9 @@ from typing import Literal, Self
 
 import numpy as np
 
+from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.pipeline.stage_results import Results, Summary, Verdict
+from er3a.pipeline.stages.validation.diagnosis_model import Corrections, Residuals, SetCalibration, SetDiagnosis
 from er3a.pipeline.stages.validation.findings import CheckSubject, KeyPose, ModelGroup, Note, Validated
 from er3a.pipeline.tables import (
     Findings,
@@ -131,7 +133,7 @@ class TableFacts:
     """The table's D-H convention, and why the arm has no closed-form inverse, if so."""
 
     convention: str
-    no_closed_form: PropertyMissing | None
+    no_closed_form: ClosedFormMissing | None
 
 
 @dataclass(frozen=True)
@@ -173,6 +175,8 @@ class ValidationSummary(Summary):
     checks: tuple[Check, ...]
     conflicts: tuple[Conflict, ...]
     sets: tuple[SetSummary, ...]
+    diagnoses: tuple[SetDiagnosis, ...]
+    calibrations: tuple[SetCalibration, ...]
     circle_points: Circles
     table: TableFacts
     round_trips: RoundTripErrors | None
@@ -262,6 +266,8 @@ class ValidationResults(Results[ValidationSummary]):
     axes: Axes
     key_poses: KeyPoses
     section: Section
+    residuals: Residuals
+    corrections: Corrections
 
 
 RESULTS = ValidationResults

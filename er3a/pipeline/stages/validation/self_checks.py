@@ -7,15 +7,15 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.errors import NotWristPartitionedError
 from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import determinant_factors
-from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
+from er3a.kinematics.wrist_partitioned import closed_form_missing, solve_slots
 from er3a.pipeline.stages.validation.checks import against_itself, nothing_to_compare
 from er3a.pipeline.stages.validation.findings import (
     NearSingularLeftOut,
     NoClosedForm,
+    Note,
     NumbersMissing,
     SelfCheck,
     SelfChecked,
@@ -67,19 +67,10 @@ def table_checks(robot: Robot) -> list[Check]:
         "limit_unit": int(0 < np.degrees(np.nanmax(limits)) < WIDEST_IN_RADIANS),
     }
     checks = [against_itself(name, "table_sanity", float(count), 0.5) for name, count in faults.items()]
-    missing = NumbersMissing() if checks[0].status == "fail" else property_missing(robot)
+    missing = NumbersMissing() if checks[0].status == "fail" else closed_form_missing(robot)
     if missing:
         return [*checks, nothing_to_compare(SelfCheck("closed_form"), "table_sanity", "", missing)]
     return [*checks, against_itself("closed_form", "table_sanity", 0.0, 0.5)]
-
-
-def property_missing(robot: Robot) -> PropertyMissing | None:
-    """Why the arm has no closed-form inverse; None if it has one."""
-    try:
-        wrist_partitioned_arm(robot)
-    except NotWristPartitionedError as error:
-        return error.property_missing
-    return None
 
 
 def round_trips(robot: Robot, poses: int, seed: int) -> RoundTrips:
@@ -98,7 +89,7 @@ def round_trips(robot: Robot, poses: int, seed: int) -> RoundTrips:
 
 def round_trip_checks(robot: Robot, poses: int, seed: int) -> tuple[list[Check], RoundTripErrors | None]:
     """Round trips as checks, and their errors; None if the arm has no closed form."""
-    missing = property_missing(robot)
+    missing = closed_form_missing(robot)
     if missing:
         note = NoClosedForm(missing)
         return [nothing_to_compare(SelfCheck("joints_to_pose_to_joints"), GROUP, "deg", note)], None

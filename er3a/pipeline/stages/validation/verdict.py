@@ -8,14 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from er3a.diagnosis.findings import MainFault, MostLikelyFault, NoFaultStandsOut, NoFewFaultsExplain
 from er3a.pipeline.stage_results import Figure, Verdict
-from er3a.pipeline.stages.validation.diagnoses import Diagnosed, SetDiagnosis
+from er3a.pipeline.stages.validation.diagnosis_model import SetDiagnosis
 from er3a.pipeline.stages.validation.findings import (
     AnotherArm,
     Claims,
     Confirmed,
     Contradicted,
     Contradiction,
+    LikelyFault,
     ModelUnsound,
     NothingToCompare,
     Validated,
@@ -51,7 +53,7 @@ def set_summaries(
                 name=references.name,
                 grades=tuple(sorted({reference.grade for reference in references.references})),
                 authoritative=authoritative,
-                another_arm=most_fail and diagnoses[references.name].status == "unexplained",
+                another_arm=most_fail and isinstance(diagnoses[references.name].conclusion, NoFaultStandsOut | NoFewFaultsExplain),
                 claims=_counts(check for check in own if check.grade and not check.is_authoritative),
                 zero_pose_flange_off_mm=_zero_pose_error(poses, references.name),
             )
@@ -69,7 +71,11 @@ def verdict_of(
     judged = [check for check in checks if check.is_authoritative and check.status != "no_reference"]
     documented = [check for check in judged if not check.is_of_model]
     failed = [check for check in documented if check.status == "fail"]
-    named = {name: diagnosis.finding for name, diagnosis in diagnoses.items() if diagnosis.faults}
+    named = {
+        name: diagnosis.conclusion
+        for name, diagnosis in diagnoses.items()
+        if isinstance(diagnosis.conclusion, MostLikelyFault | MainFault)
+    }
     common = {
         "checks": len(documented),
         "failed": len(failed),
@@ -135,7 +141,7 @@ def _missed(
     failed: list[Check],
     documented: list[Check],
     sets: tuple[SetSummary, ...],
-    named: Mapping[str, Diagnosed],
+    named: Mapping[str, LikelyFault],
 ) -> Contradicted | AnotherArm:
     quoted = most_telling(failed)
     other = any(each.another_arm for each in sets if each.name == quoted.reference_set)
@@ -163,7 +169,7 @@ def _zero_pose_error(poses: KeyPoses, set_name: str) -> float | None:
     return float(poses.deviation_mm[own].max()) if own.any() else None
 
 
-def _claims(sets: tuple[SetSummary, ...], named: Mapping[str, Diagnosed]) -> tuple[Claims, ...]:
+def _claims(sets: tuple[SetSummary, ...], named: Mapping[str, LikelyFault]) -> tuple[Claims, ...]:
     return tuple(
         Claims(each.name, each.claims.total, each.claims.failed, named.get(each.name))
         for each in sets
