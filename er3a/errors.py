@@ -8,6 +8,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from er3a.findings import Finding
+
 
 class Er3aError(Exception):
     """Root of all errors that a user can cause and mend."""
@@ -62,8 +64,12 @@ class NotWristPartitionedError(Er3aError):
         super().__init__(f"{robot}: no closed-form inverse, because {property_missing}")
 
 
-class IdentificationError(Er3aError):
-    """Measurements determine too little of a table, or no corrections make the table fit them."""
+class CalibrationError(Er3aError):
+    """Measurements determine too little of a table, or no corrections make the table fit them; see ``finding``."""
+
+    def __init__(self, finding: Finding, problem: str):
+        self.finding = finding
+        super().__init__(problem)
 
 
 class ResultError(Er3aError):
@@ -81,7 +87,8 @@ class WriteError(Er3aError):
     def __init__(self, file: str | Path, error: OSError):
         self.file = str(file)
         told = os.strerror(error.errno) if error.errno else str(error)
-        super().__init__(f"{_line(str(file))}: can't be written ({told}). Make room or mend the rights, then run again")
+        remedy = "Free disk space or fix the permissions, then run again"
+        super().__init__(f"{_line(str(file))}: can't be written ({told}). {remedy}")
 
 
 def _line(text: str, most: int | None = None) -> str:

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.diagnosis.findings import (
+from er3a.diagnosis.conclusions import (
     Conclusion,
-    Faults,
     MainFault,
     MostLikelyFault,
     NextMeasurement,
@@ -18,6 +17,7 @@ from er3a.diagnosis.findings import (
     NothingToExplain,
     NothingToRestOn,
 )
+from er3a.diagnosis.fault_kinds import Faults
 from er3a.diagnosis.next_measurement import what_decides
 from er3a.diagnosis.ranking import MEETS, UNITS, Ranking, rank, usable
 from er3a.kinematics.table_batch import robot_of

@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.diagnosis.findings import (
+from er3a.diagnosis.fault_kinds import (
     Entries,
     Fault,
     LimitFault,

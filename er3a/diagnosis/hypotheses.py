@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from er3a.diagnosis.fault_kinds import Faults
 from er3a.diagnosis.faults import Repair, Slope, repairs_of, slopes
-from er3a.diagnosis.findings import Faults
 from er3a.kinematics.table_batch import Tables, join
 from er3a.references.quantities import Reals
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from er3a.diagnosis.fault_kinds import Fault, WrongLength, WrongScale
 from er3a.diagnosis.faults import LengthColumn, repairs_of
-from er3a.diagnosis.findings import Fault, WrongLength, WrongScale
 from er3a.diagnosis.ranking import rank, usable
 from er3a.kinematics.table_batch import COLUMNS, Tables, robot_of, tables_of
 from er3a.references.predict import predict_tables

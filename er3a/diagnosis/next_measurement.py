@@ -6,7 +6,7 @@ from typing import cast
 
 import numpy as np
 
-from er3a.diagnosis.findings import (
+from er3a.diagnosis.conclusions import (
     FlangePositionDecides,
     LimitDecides,
     NextMeasurement,

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.diagnosis.findings import Fault, rounded
+from er3a.diagnosis.fault_kinds import Fault, rounded
 from er3a.diagnosis.hypotheses import Pool, evaluate
 from er3a.kinematics.table_batch import Tables, tables_of
 from er3a.references.predict import predict_tables

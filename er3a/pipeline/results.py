@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import re
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -15,16 +13,23 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from er3a.errors import ResultError, WriteError
+from er3a.errors import ResultError
 from er3a.files.grades import grades_in
 from er3a.pipeline.code_digest import code_digest
+from er3a.pipeline.kept_files import (  # noqa: F401
+    half_written,
+    read_bytes,
+    read_checked,
+    sha256,
+    shown_path,
+    write_atomically,
+    write_checked,
+)
 from er3a.pipeline.messages import language
 from er3a.pipeline.study import STAGES, Study
 
 FORMAT_VERSION = 3
 CHECKSUMS = "SHA256SUMS"
-_DIGEST_BYTES = hashlib.sha256().digest_size
-_TEMPORARY = re.compile(r"\..+\.[0-9]+(\.\w+)?")  # as `write_atomically` names them
 
 Status = Literal["pass", "caution", "fail", "no_reference"]
 
@@ -56,47 +61,6 @@ class Figure:
     uncertainty: float | None = None
 
 
-def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
-    """Call ``write`` with a temporary path beside ``path``, then move the finished file, kept on disk, into place.
-
-    Raises
-    ------
-    WriteError
-        naming ``path``, if the system refuses; the file that was there before stays
-    """
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            write(temporary)
-            with temporary.open("rb") as written:
-                os.fsync(written.fileno())
-            os.replace(temporary, path)
-        finally:
-            temporary.unlink(missing_ok=True)
-    except OSError as error:
-        raise WriteError(path, error) from None
-
-
-def write_checked(path: Path, content: bytes) -> None:
-    """Write bytes behind their checksum."""
-    write_atomically(path, lambda file: file.write_bytes(hashlib.sha256(content).digest() + content))
-
-
-def read_checked(path: Path) -> bytes:
-    """Read what :func:`write_checked` wrote, or raise :class:`ResultError` if it is missing or damaged."""
-    content = _content(path)
-    checksum, content = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
-    if hashlib.sha256(content).digest() != checksum:
-        raise ResultError(path, "damaged (its checksum does not agree)")
-    return content
-
-
-def half_written(folder: Path) -> list[Path]:
-    """The temporary files that killed processes left below a folder."""
-    return [path for path in sorted(folder.rglob(".*")) if _TEMPORARY.fullmatch(path.name)]
-
-
 def write_table(path: Path, table: pd.DataFrame) -> None:
     """Write a Parquet file (units stand in the column names)."""
     for column in table.select_dtypes(["object", "string"]):
@@ -107,7 +71,7 @@ def write_table(path: Path, table: pd.DataFrame) -> None:
 
 def read_table(path: Path) -> pd.DataFrame:
     """Read a Parquet file of ours, or raise :class:`ResultError`; its checksum is compared if there is one."""
-    content = _content(path)
+    content = read_bytes(path)
     if (path.parent / CHECKSUMS).is_file():
         _compare(path, content, checksums(path.parent))
     try:
@@ -160,7 +124,7 @@ def write_checksums(folder: Path) -> None:
 def read_summary(folder: Path) -> dict[str, Any]:
     """Read a stage's ``summary.json``, or raise :class:`ResultError` if missing, damaged or of another version."""
     path = folder / "summary.json"
-    content = _content(path)
+    content = read_bytes(path)
     try:
         summary = json.loads(content)
     except ValueError as error:
@@ -187,26 +151,17 @@ def check_results(folder: Path) -> None:
     read_summary(folder)
     sums = checksums(folder)
     for name in sums:
-        _compare(folder / name, _content(folder / name), sums)
+        _compare(folder / name, read_bytes(folder / name), sums)
 
 
 def checksums(folder: Path) -> dict[str, str]:
     """The checksums that a stage wrote, by file name; :class:`ResultError` if they can't be read."""
     path = folder / CHECKSUMS
     try:
-        lines = _content(path).decode("ascii").removesuffix("\n").split("\n")
+        lines = read_bytes(path).decode("ascii").removesuffix("\n").split("\n")
         return {name: checksum for checksum, name in (line.split("  ") for line in lines)}
     except ValueError:
         raise ResultError(path, "damaged (no list of checksums)") from None
-
-
-def _content(path: Path) -> bytes:
-    try:
-        return Path(path).read_bytes()
-    except FileNotFoundError:
-        raise ResultError(path, "missing") from None
-    except OSError as error:
-        raise ResultError(path, f"can't be read ({error.strerror})") from None
 
 
 def _compare(path: Path, content: bytes, sums: dict[str, str]) -> None:
@@ -216,22 +171,10 @@ def _compare(path: Path, content: bytes, sums: dict[str, str]) -> None:
 
 def input_records(files: Iterable[Path]) -> list[dict[str, Any]]:
     """What provenance says of input files: path from the project's root, checksum, and the grades in them."""
-    return [{"path": _shown_path(file), "sha256": sha256(file), "grades": grades_in(file)} for file in files]
+    return [{"path": shown_path(file), "sha256": sha256(file), "grades": grades_in(file)} for file in files]
 
 
 def result_records(results: Path, robots: Iterable[str]) -> list[dict[str, Any]]:
     """What provenance says of the results of robots: their lists of checksums, and the checksum of each."""
     files = [results / robot / stage / CHECKSUMS for robot in robots for stage in STAGES]
     return [{"path": file.as_posix(), "sha256": sha256(file), "grades": {}} for file in files if file.is_file()]
-
-
-def sha256(path: Path) -> str:
-    """Checksum of a file, in hex."""
-    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
-
-
-def _shown_path(path: Path) -> str:
-    """Path from the project's root, so that the summary names no machine."""
-    root = Path(__file__).resolve().parents[2]
-    resolved = Path(path).resolve()
-    return resolved.relative_to(root).as_posix() if resolved.is_relative_to(root) else resolved.name

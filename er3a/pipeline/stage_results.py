@@ -17,32 +17,29 @@ status; in the file it is ``{status, code, params, text}``, the text in English 
 
 from __future__ import annotations
 
+import hashlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, Generic, Literal, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, Generic, Literal, TypeVar, get_args, get_origin
 
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from er3a.errors import ResultError
+from er3a.files.grades import grades_in
 from er3a.findings import Finding
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.results import (
-    _compare,
-    _content,
-    checksums,
-    input_records,
-    write_atomically,
-    write_checksums,
-)
-from er3a.pipeline.study import Study
-from er3a.pipeline.tables import Table
+from er3a.pipeline.kept_files import read_bytes, sha256, shown_path, write_atomically
+from er3a.pipeline.stages.stage import Stage
+from er3a.pipeline.study import STAGES, Study
+from er3a.pipeline.tables import table_types
 
 FORMAT_VERSION = 4
 SUMMARY = "summary.json"
+CHECKSUMS = "SHA256SUMS"
 
 Status = Literal["pass", "caution", "fail", "no_reference", "not_computed"]
 FindingT = TypeVar("FindingT", bound=Finding)
@@ -95,7 +92,7 @@ class Results(Generic[SummaryT]):
 
 @dataclass(frozen=True)
 class Input:
-    """An input file of a stage: path from the project's root, checksum, and the grades that stand in it."""
+    """An input file: path from the project's root, checksum, and the grades that stand in it."""
 
     path: str
     sha256: str
@@ -104,12 +101,12 @@ class Input:
 
 @dataclass(frozen=True)
 class Provenance:
-    """What a stage's numbers rest on."""
+    """What numbers rest on; pages over several stages have no settings of their own."""
 
     inputs: tuple[Input, ...]
-    config: dict[str, Any]
-    seed: int
     code: str
+    config: dict[str, Any] | None = None
+    seed: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,62 +118,98 @@ class Stored(Generic[ResultsT]):
     provenance: Provenance
     results: ResultsT
 
+    @property
+    def status(self) -> Status:
+        """The verdict's status."""
+        return self.results.summary.verdict.status
+
+
+@dataclass(frozen=True)
+class NotComputed:
+    """A stage could not be computed for a robot."""
+
+    reason: str
+    code: Literal["stage.not_computed"] = "stage.not_computed"
+
+
+@dataclass(frozen=True, eq=False)
+class AbsentResults(Results[Summary]):
+    """In place of the results of a stage that was not computed; its verdict is a finding that tells why."""
+
 
 def write_results(
-    folder: Path, study: Study, robot: str, stage: str, results: Results[Any], sentence: Callable[[Finding], str]
+    folder: Path, study: Study, robot: str, stage: Stage, results: Results[Any], sentence: Callable[[Finding], str]
 ) -> None:
-    """Write a stage's tables, summary and checksums into a folder.
+    """Write a stage's tables, summary and checksums into a folder; tables without rows if it was not computed.
 
     Parameters
     ----------
     sentence : the verdict's text in English
     """
-    for name in table_types(type(results)):
-        write_atomically(folder / f"{name}.parquet", getattr(results, name).write)
+    kind = AbsentResults if isinstance(results, AbsentResults) else type(results)
+    for name, table in table_types(stage.module("model").RESULTS).items():
+        rows = table.empty() if kind is AbsentResults else getattr(results, name)
+        write_atomically(folder / f"{name}.parquet", rows.write)
     summary = results.summary
     own = {part.name: plain(getattr(summary, part.name)) for part in fields(summary)}
     own["verdict"] = _verdict_record(summary.verdict, sentence(summary.verdict.finding))
-    origin = {
-        "inputs": input_records(study.inputs(robot, stage)),
-        "config": study.computed_from(robot, stage),
-        "seed": study.seed,
-        "code": code_digest(f"er3a.pipeline.stages.{stage}.compute"),
-    }
-    content = {"format_version": FORMAT_VERSION, "robot": robot, "stage": stage, **own, "provenance": origin}
-    text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    _parsed(folder / SUMMARY, json.loads(text), type(results))  # what is written can be read
+    origin = Provenance(
+        inputs=input_records(study.inputs(robot, stage.name)),
+        config=study.computed_from(robot, stage.name),
+        seed=study.seed,
+        code=code_digest(f"{stage.package}.compute", stage.verdict_messages),
+    )
+    content = {"format_version": FORMAT_VERSION, "robot": robot, "stage": stage.name, **own}
+    text = json.dumps(content | {"provenance": plain(origin)}, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    if kind is not AbsentResults:
+        _parsed(folder / SUMMARY, json.loads(text), kind)  # what is written can be read
     write_atomically(folder / SUMMARY, lambda file: file.write_text(text, encoding="utf-8"))
     write_checksums(folder)
 
 
-def read_results(folder: Path, kind: type[ResultsT]) -> Stored[ResultsT]:
-    """Read a stage's results.
+def read_stage(folder: Path, stage: Stage) -> Stored[Any]:
+    """Read a stage's results, or :class:`AbsentResults` if it was not computed.
 
     Raises
     ------
     ResultError
         naming the file that is missing, damaged or of another format version
     """
-    sums = checksums(folder)
-    path = folder / SUMMARY
-    content = _content(path)
-    stored = read_record(path, content)
-    _compare(path, content, sums)
+    record = _record(folder)
+    if record["verdict"]["status"] == "not_computed":
+        verdict = record["verdict"]
+        absent = NotComputed(verdict["params"].get("reason", verdict["text"]))
+        origin = _adapter(Provenance).validate_python(record["provenance"])
+        return Stored(record["robot"], stage.name, origin, AbsentResults(Summary(Verdict("not_computed", absent), ())))
+    return read_results(folder, stage.module("model").RESULTS)
+
+
+def read_results(folder: Path, kind: type[ResultsT]) -> Stored[ResultsT]:
+    """Read the results of a stage that was computed.
+
+    Raises
+    ------
+    ResultError
+        naming the file that is missing, damaged or of another format version
+    """
+    record, sums = _record(folder), checksums(folder)
+    summary, provenance = _parsed(folder / SUMMARY, record, kind)
     tables = {}
     for name, table in table_types(kind).items():
         file = folder / f"{name}.parquet"
-        content = _content(file)
+        content = read_bytes(file)
         _compare(file, content, sums)
         try:
             tables[name] = table.read(content)
         except (OSError, ValueError, KeyError) as error:
             raise ResultError(file, f"damaged ({' '.join(str(error).split())})") from None
-    summary, provenance = _parsed(path, stored, kind)
-    return Stored(stored["robot"], stored["stage"], provenance, kind(summary=summary, **tables))
+    return Stored(record["robot"], record["stage"], provenance, kind(summary=summary, **tables))
 
 
-def read_record(path: Path, content: bytes) -> dict[str, Any]:
-    """A summary file's content of the present format, as plain data."""
+def _record(folder: Path) -> dict[str, Any]:
+    """A summary file as plain data, whole and of the present format."""
+    path = folder / SUMMARY
+    content = read_bytes(path)
     try:
         stored = json.loads(content)
     except ValueError as error:
@@ -184,13 +217,63 @@ def read_record(path: Path, content: bytes) -> dict[str, Any]:
     version = stored.get("format_version") if isinstance(stored, dict) else None
     if version != FORMAT_VERSION:
         raise ResultError(path, f"format version {version}, this er3a reads {FORMAT_VERSION}")
+    for key in ("robot", "stage", "verdict", "figures", "provenance"):
+        if key not in stored:
+            raise ResultError(path, f"damaged (no '{key}' in it)")
+    _compare(path, content, checksums(folder))
     return stored
 
 
-def table_types(kind: type[Results[Any]]) -> dict[str, type[Table]]:
-    """The tables of a stage's results, by the name of their file."""
-    hints = get_type_hints(kind)
-    return {name: hint for name, hint in hints.items() if isinstance(hint, type) and issubclass(hint, Table)}
+def read_provenance(folder: Path) -> Provenance:
+    """What a stage's results rest on, whatever they are."""
+    return _adapter(Provenance).validate_python(_record(folder)["provenance"])
+
+
+def check_results(folder: Path) -> None:
+    """Check that a stage's results are whole, unchanged and of this version.
+
+    Raises
+    ------
+    ResultError
+        naming the first file that is not
+    """
+    _record(folder)
+    sums = checksums(folder)
+    for name in sums:
+        _compare(folder / name, read_bytes(folder / name), sums)
+
+
+def write_checksums(folder: Path) -> None:
+    """Write the checksums of a stage's files, in the form that ``sha256sum --check`` reads."""
+    files = sorted(path for path in folder.iterdir() if path.is_file() and path.name[0] != ".")
+    sums = "".join(f"{sha256(path)}  {path.name}\n" for path in files if path.name != CHECKSUMS)
+    write_atomically(folder / CHECKSUMS, lambda file: file.write_text(sums, encoding="utf-8"))
+
+
+def checksums(folder: Path) -> dict[str, str]:
+    """The checksums that a stage wrote, by file name; :class:`ResultError` if they can't be read."""
+    path = folder / CHECKSUMS
+    try:
+        lines = read_bytes(path).decode("ascii").removesuffix("\n").split("\n")
+        return {name: checksum for checksum, name in (line.split("  ") for line in lines)}
+    except ValueError:
+        raise ResultError(path, "damaged (no list of checksums)") from None
+
+
+def _compare(path: Path, content: bytes, sums: dict[str, str]) -> None:
+    if sums.get(path.name) != hashlib.sha256(content).hexdigest():
+        raise ResultError(path, f"damaged (not the bytes that {CHECKSUMS} beside it tells of)")
+
+
+def input_records(files: Iterable[Path]) -> tuple[Input, ...]:
+    """What provenance says of input files."""
+    return tuple(Input(shown_path(file), sha256(file), grades_in(file)) for file in files)
+
+
+def result_records(results: Path, robots: Iterable[str]) -> tuple[Input, ...]:
+    """What provenance says of the results of robots: their lists of checksums, and the checksum of each."""
+    files = [results / robot / stage / CHECKSUMS for robot in robots for stage in STAGES]
+    return tuple(Input(file.as_posix(), sha256(file), {}) for file in files if file.is_file())
 
 
 def summary_type(kind: type[Results[Any]]) -> type[Summary]:
