@@ -11,18 +11,20 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from er3a.calibration.outcomes import Misfit, MorePositions, NoCorrectionFound
+from er3a.diagnosis.conclusions import MostLikelyFault, NoFewFaultsExplain, NothingToExplain
+from er3a.diagnosis.fault_kinds import WrongOffset
+from er3a.kinematics.round_trips import slot_round_trips
 from scipy.spatial.transform import Rotation
 
 import er3a
-from er3a.calibration.findings import Misfit, MorePositions, NoCorrectionFound
-from er3a.diagnosis.findings import MostLikelyFault, NoFewFaultsExplain, NothingToExplain, WrongOffset
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_file import Placement
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.kinematics.forward import frames
 from er3a.kinematics.wrist_partitioned import NoWristCentre
 from er3a.pipeline.messages.say import say
-from er3a.pipeline.stage_results import Stored, read_results, table_types
+from er3a.pipeline.results import Stored, read_results, table_types
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.validation.checks import checks_of_set
 from er3a.pipeline.stages.validation.compute import compute
@@ -246,7 +248,9 @@ def test_an_arm_without_closed_form_is_still_checked(study, tmp_path):
 def test_a_table_with_crossed_limits_fails_its_internal_checks(summaries):
     summary = summaries["er3_600"]
     name = SelfCheck("crossed_limits")
-    checks = [replace(check, status="fail", measured=2.0) if check.subject == name else check for check in summary.checks]
+    checks = [
+        replace(check, status="fail", measured=2.0) if check.subject == name else check for check in summary.checks
+    ]
     verdict = verdict_of(checks, [], summary.sets, {})
     assert verdict.status == "fail"
     assert (verdict.finding.check, verdict.finding.measured) == (name, 2.0)
@@ -295,7 +299,7 @@ def test_table_checks_see_faults_that_a_file_could_not_hold():
 
 
 def test_round_trips_find_the_joints_again(robot):
-    result = round_trips(robot, 3000, 7)
+    result = slot_round_trips(robot, 3000, 7)
     assert result.poses == 3000
     assert 0 < result.near_singular < 300
     assert result.unsolved == 0

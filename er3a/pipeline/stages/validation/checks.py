@@ -34,7 +34,12 @@ ROUNDING = 1e-9
 
 
 def against_itself(
-    quantity: SelfChecked, group: ModelGroup, measured: float, tolerance: float, unit: str = "", note: Note | None = None
+    quantity: SelfChecked,
+    group: ModelGroup,
+    measured: float,
+    tolerance: float,
+    unit: str = "",
+    note: Note | None = None,
 ) -> Check:
     """A check that needs no document: ``measured`` should be 0."""
     status: CheckStatus = "pass" if abs(measured) <= tolerance else "fail"
@@ -62,9 +67,7 @@ def checks_of_set(references: ReferenceSet, values: NDArray[np.float64]) -> tupl
     return checks + _gaps(references), _conflicts(references.name, stated, values, met, pairs)
 
 
-def _status(
-    i: int, stated: tuple[Reference, ...], met: list[bool], pairs: list[tuple[int, int]]
-) -> CheckStatus:
+def _status(i: int, stated: tuple[Reference, ...], met: list[bool], pairs: list[tuple[int, int]]) -> CheckStatus:
     if met[i]:
         return "pass"
     rivals = [b if a == i else a for a, b in pairs if i in (a, b)]
@@ -121,7 +124,11 @@ def _gaps(references: ReferenceSet) -> list[Check]:
 
 
 def _conflicts(
-    set_name: str, stated: tuple[Reference, ...], values: NDArray[np.float64], met: list[bool], pairs: list[tuple[int, int]]
+    set_name: str,
+    stated: tuple[Reference, ...],
+    values: NDArray[np.float64],
+    met: list[bool],
+    pairs: list[tuple[int, int]],
 ) -> list[Conflict]:
     members: dict[Quantity, set[int]] = {}
     for pair in pairs:

@@ -7,6 +7,7 @@ from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.pipeline.stages.validation.checks import checks_of_set, nothing_to_compare
 from er3a.pipeline.stages.validation.corrections import calibrate_from_sets
 from er3a.pipeline.stages.validation.diagnoses import diagnose_sets
+from er3a.pipeline.stages.validation.entry import ValidationSettings
 from er3a.pipeline.stages.validation.findings import InNoSet
 from er3a.pipeline.stages.validation.geometry_tables import axes_table, key_poses_table, section_table
 from er3a.pipeline.stages.validation.model import (
@@ -44,7 +45,7 @@ ALWAYS_SEARCHED = (
 def compute(study: Study, name: str) -> ValidationResults:
     """Check a robot's model, and say what is most likely wrong with it."""
     robot = model_of(study, name)
-    settings = study.validation
+    settings = study.section(ValidationSettings)
     sets = [load_references(reference) for reference in robot.references]
 
     stated = [quantity for references in sets for quantity in quantities_of(references.checkable)]

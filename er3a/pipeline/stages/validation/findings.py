@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from er3a.diagnosis.findings import MainFault, MostLikelyFault
+from er3a.diagnosis.conclusions import MainFault, MostLikelyFault
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.references.subjects import DrawingCorner, DrawingExtent, Reach, ReferenceSubject, Subject
 from er3a.robots.robot import Grade

@@ -9,7 +9,7 @@ from typing import Literal, Self
 import numpy as np
 
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
-from er3a.pipeline.stage_results import Results, Summary, Verdict
+from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.validation.diagnosis_model import Corrections, Residuals, SetCalibration, SetDiagnosis
 from er3a.pipeline.stages.validation.findings import CheckSubject, KeyPose, ModelGroup, Note, Validated
 from er3a.pipeline.tables import (

@@ -10,7 +10,7 @@ import rerun.blueprint as rrb
 
 from er3a.pipeline.messages import validation_verdict as _sentences  # noqa: F401
 from er3a.pipeline.messages.say import say
-from er3a.pipeline.stage_results import Stored
+from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation.corrected import corrected_robot
 from er3a.pipeline.stages.validation.findings import NamedPose
 from er3a.pipeline.stages.validation.model import Axes, KeyPoses, ValidationResults

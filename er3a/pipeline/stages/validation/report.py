@@ -11,8 +11,8 @@ import numpy as np
 
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import counted, joined, say, sentence, word
-from er3a.pipeline.messages.validation import CONVENTIONS, FIGURES, GRADES, GRADE_NAMES, GROUPS
-from er3a.pipeline.stage_results import Stored
+from er3a.pipeline.messages.validation import CONVENTIONS, FIGURES, GRADE_NAMES, GRADES, GROUPS
+from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation.axis_figures import axis_deviation, side_view, workspace_drawing
 from er3a.pipeline.stages.validation.corrected import corrected_robot
 from er3a.pipeline.stages.validation.diagnosis_figures import correction_stories, diagnosis_stories
@@ -29,7 +29,7 @@ from er3a.pipeline.stages.validation.model import (
 from er3a.pipeline.stages.validation.subject import model_of
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import Picture, fixed, head_of, number, render, run_command
-from er3a.references.subjects import DrawingCorner, SegmentInclination
+from er3a.references.subjects import SegmentInclination
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Robot
 
 SHOWN_FAILURES = 12

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from er3a.diagnosis.findings import MainFault, MostLikelyFault, NoFaultStandsOut, NoFewFaultsExplain
-from er3a.pipeline.stage_results import Figure, Verdict
+from er3a.diagnosis.conclusions import MainFault, MostLikelyFault, NoFaultStandsOut, NoFewFaultsExplain
+from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.validation.diagnosis_model import SetDiagnosis
 from er3a.pipeline.stages.validation.findings import (
     AnotherArm,
@@ -53,7 +53,8 @@ def set_summaries(
                 name=references.name,
                 grades=tuple(sorted({reference.grade for reference in references.references})),
                 authoritative=authoritative,
-                another_arm=most_fail and isinstance(diagnoses[references.name].conclusion, NoFaultStandsOut | NoFewFaultsExplain),
+                another_arm=most_fail
+                and isinstance(diagnoses[references.name].conclusion, NoFaultStandsOut | NoFewFaultsExplain),
                 claims=_counts(check for check in own if check.grade and not check.is_authoritative),
                 zero_pose_flange_off_mm=_zero_pose_error(poses, references.name),
             )
@@ -85,7 +86,9 @@ def verdict_of(
     }
     for check in judged:
         if check.is_of_model and check.status == "fail":
-            return Verdict("fail", ModelUnsound(**common, check=check.subject, measured=check.measured, unit=check.unit))
+            return Verdict(
+                "fail", ModelUnsound(**common, check=check.subject, measured=check.measured, unit=check.unit)
+            )
     if failed:
         return Verdict("fail", _missed(common, failed, documented, sets, named))
     if not documented:
