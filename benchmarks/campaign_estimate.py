@@ -83,7 +83,7 @@ def _page(
         "# What a study takes, predicted and measured",
         "",
         f"`er3a estimate` on the small study with {ROBOT} alone, {CORES} cores. Written by "
-        f"`make campaigns ARGS=estimate`, while {os.getloadavg()[2]:.1f} processes wanted the {os.cpu_count()} processors.",
+        f"`make campaigns ARGS=estimate`, with a load of {os.getloadavg()[2]:.1f} on {os.cpu_count()} processors.",
         "",
         f"*Trial*: no run was there to learn from, the calibration took {took:.0f} s. *Run*: the timings of the run "
         f"with {_power(SAMPLES[0])} samples were there. One core samples {speed.mean / 1e6:.0f} million a second "

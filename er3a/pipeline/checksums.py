@@ -7,7 +7,7 @@ from pathlib import Path
 
 from er3a.errors import ResultError
 from er3a.pipeline.kept_files import read_checked, sha256, write_atomically
-from er3a.pipeline.stage_results import check_results
+from er3a.pipeline.results import check_results
 from er3a.pipeline.study import Study
 
 OVERALL = ("index.html", "compare.html")

@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from er3a.pipeline.stage_results import CHECKSUMS, FORMAT_VERSION, Provenance, summary_type
+from er3a.pipeline.results import CHECKSUMS, FORMAT_VERSION, Provenance, summary_type
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.tables import Column, Table, table_types

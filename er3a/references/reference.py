@@ -12,7 +12,7 @@ import numpy as np
 
 from er3a.references.quantities import Quantity, Reals, Unit
 from er3a.references.subjects import Subject
-from er3a.robots.robot import WEIGHTY_GRADES, Grade
+from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Reference:
     @property
     def authoritative(self) -> bool:
         """Whether a verdict may rest on it."""
-        return self.grade in WEIGHTY_GRADES
+        return self.grade in AUTHORITATIVE_GRADES
 
 
 Scalar = tuple[Subject, str, Quantity, float | None, float]

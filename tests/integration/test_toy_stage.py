@@ -59,7 +59,8 @@ def compute(study, name):
     if name == "er3a_c60_article":
         raise ZeroDivisionError("no such arm")
     a = study.robot(name).a * study.section(ToySettings).factor
-    return ToyResults(ToySummary(Verdict("pass", Long(float(a.sum()))), (Figure("sum", float(a.sum()), "m"),)), Lengths(a))
+    whole = float(a.sum())
+    return ToyResults(ToySummary(Verdict("pass", Long(whole)), (Figure("sum", whole, "m"),)), Lengths(a))
 ''',
     "pipeline/stages/toy/report.py": '''"""The page."""
 from pathlib import Path
@@ -73,7 +74,10 @@ def report(study, stored, output):
            robot_pages=study.pages(stored.robot))
 ''',
     "pipeline/stages/toy/report.html.j2": '{% extends "base.html.j2" %}\n',
-    "pipeline/messages/toy.py": '"""Words."""\nimport er3a.pipeline.messages.toy_verdict\nFIGURES = {"sum": "All lengths"}\n',
+    "pipeline/messages/toy.py": '''"""Words."""
+import er3a.pipeline.messages.toy_verdict
+FIGURES = {"sum": "All lengths"}
+''',
     "pipeline/messages/toy_verdict.py": '''"""The verdict."""
 from er3a.pipeline.messages.say import say, sentence
 from er3a.pipeline.stages.toy.model import Long

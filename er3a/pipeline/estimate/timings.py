@@ -16,7 +16,7 @@ import yaml
 
 from er3a.errors import Er3aError, ResultError
 from er3a.pipeline.estimate.jobs import Job
-from er3a.pipeline.stage_results import read_provenance
+from er3a.pipeline.results import read_provenance
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.workspace.parts import gather
 from er3a.pipeline.study import Study

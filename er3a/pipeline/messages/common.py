@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from er3a.pipeline.messages.say import say, sentence
-from er3a.pipeline.stage_results import NotComputed
+from er3a.pipeline.results import NotComputed
 
 __all__ = ["say"]
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from er3a.errors import Er3aError, InputError, ResultError, WriteError
 from er3a.pipeline.messages.common import say
-from er3a.pipeline.stage_results import (
+from er3a.pipeline.results import (
     AbsentResults,
     NotComputed,
     Results,

@@ -15,7 +15,7 @@ from er3a.kinematics.singularity import characteristic_length
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.language import keeps_sentences, know, note_written, sentences, tr
-from er3a.pipeline.stage_results import Provenance, input_records
+from er3a.pipeline.results import Provenance, input_records
 from er3a.pipeline.study import Study
 from er3a.pipeline.teach.words import WORDS
 from er3a.pipeline.viewing.page import render, run_command

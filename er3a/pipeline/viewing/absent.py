@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from er3a.pipeline.messages.common import say
-from er3a.pipeline.stage_results import AbsentResults, Stored
+from er3a.pipeline.results import AbsentResults, Stored
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import head_of, render, run_command
 from er3a.pipeline.viewing.recording import escaped, log_note, note_view, recording

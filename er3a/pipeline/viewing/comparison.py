@@ -9,7 +9,7 @@ import pandas as pd
 
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.stage_results import AbsentResults, Input, Provenance, input_records, read_stage, result_records
+from er3a.pipeline.results import AbsentResults, Input, Provenance, input_records, read_stage, result_records
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing import page

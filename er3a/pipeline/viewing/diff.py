@@ -12,7 +12,7 @@ from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.kept_files import sha256
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.stage_results import CHECKSUMS, Input, Provenance, result_records
+from er3a.pipeline.results import CHECKSUMS, Input, Provenance, result_records
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.heads import stage_head

@@ -6,7 +6,7 @@ from importlib import import_module
 from pathlib import Path
 
 from er3a.pipeline.messages import common  # noqa: F401 (says why a stage was not computed)
-from er3a.pipeline.stage_results import read_stage
+from er3a.pipeline.results import read_stage
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.viewing.page import Head, head_of
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.stage_results import Provenance, result_records
+from er3a.pipeline.results import Provenance, result_records
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing import page

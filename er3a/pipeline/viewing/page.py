@@ -19,7 +19,7 @@ from er3a.pipeline.kept_files import write_atomically
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import say, word
-from er3a.pipeline.stage_results import Provenance, Stored
+from er3a.pipeline.results import Provenance, Stored
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import svg_data_uri

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.stage_results import Stored, read_stage
+from er3a.pipeline.results import Stored, read_stage
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
 from er3a.pipeline.sweeps import ENTRIES, entry_label
