@@ -11,13 +11,13 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from er3a.calibration.outcomes import Misfit, MorePositions, NoCorrectionFound
-from er3a.diagnosis.conclusions import MostLikelyFault, NoFewFaultsExplain, NothingToExplain
-from er3a.diagnosis.fault_kinds import WrongOffset
 from er3a.kinematics.round_trips import slot_round_trips
 from scipy.spatial.transform import Rotation
 
 import er3a
+from er3a.calibration.outcomes import Misfit, MorePositions, NoCorrectionFound
+from er3a.diagnosis.conclusions import MostLikelyFault, NoFewFaultsExplain, NothingToExplain
+from er3a.diagnosis.fault_kinds import WrongOffset
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_file import Placement
 from er3a.files.robot_library import ROBOTS, load_robot
