@@ -8,8 +8,6 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from er3a.findings import Finding
-
 
 class Er3aError(Exception):
     """Root of all errors that a user can cause and mend."""
@@ -62,14 +60,6 @@ class NotWristPartitionedError(Er3aError):
     def __init__(self, robot: str, property_missing: str):
         self.robot, self.property_missing = robot, property_missing
         super().__init__(f"{robot}: no closed-form inverse, because {property_missing}")
-
-
-class CalibrationError(Er3aError):
-    """Measurements determine too little of a table, or no corrections make the table fit them; see ``finding``."""
-
-    def __init__(self, finding: Finding, problem: str):
-        self.finding = finding
-        super().__init__(problem)
 
 
 class ResultError(Er3aError):
