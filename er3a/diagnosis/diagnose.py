@@ -73,6 +73,11 @@ class Diagnosis:
     ranking: Ranking | None
     hypotheses: tuple[Hypothesis, ...]
 
+    @property
+    def names_fault(self) -> bool:
+        """Whether the best hypothesis explains all or most of the disagreement."""
+        return isinstance(self.conclusion, MostLikelyFault | MainFault)
+
 
 def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> list[Hypothesis]:
     """Hypotheses about what is wrong with a table, best first.

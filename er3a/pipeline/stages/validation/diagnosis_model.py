@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from er3a.calibration.calibrate import Close
 from er3a.calibration.outcomes import CalibrationConclusion, Held, LevelName, MorePositions, NotCalibrated
 from er3a.diagnosis.conclusions import Conclusion, NextMeasurement
 from er3a.diagnosis.fault_kinds import Faults
-from er3a.pipeline.tables import Reals, Table, Texts, column
+from er3a.pipeline.tables import Findings, Reals, Table, Texts, column, findings
 from er3a.references.quantities import Unit
+from er3a.references.subjects import ReferenceSubject
 
 Six = tuple[float, ...]
 
@@ -69,20 +71,11 @@ class Residuals(Table):
     reference_set: Texts = column("name of the reference set", dtype=object)
     source: Texts = column("source of the reference", dtype=object)
     group: Texts = column("group of the reference", dtype=object)
-    subject: Texts = column("what the reference is about; coordinates of one point together", dtype=object)
+    subject: Findings = findings("what the reference is about; coordinates of one point together", ReferenceSubject)
     unit: Texts = column("unit of the three numbers", dtype=object)
     before: Reals = column("difference between model and reference")
     after: Reals = column("the same with the best hypothesis corrected")
     uncertainty: Reals = column("half-width of the interval that the source leaves open")
-
-
-@dataclass(frozen=True)
-class CorrelatedPair:
-    """Two estimated entries whose errors are correlated by more than 0.9."""
-
-    first: str
-    second: str
-    correlation: float
 
 
 @dataclass(frozen=True)
@@ -95,7 +88,7 @@ class Calibrated:
     coordinates: int
     poses: int
     held: tuple[Held, ...]
-    close: tuple[CorrelatedPair, ...]
+    close: tuple[Close, ...]
     singular_values: tuple[float, ...]
     rms_before_mm: float
     rms_after_mm: float
