@@ -34,7 +34,7 @@ _VALID, _WITHIN, _PAIR_ROWS = 12, 13, 15  # two slots of a wrist: six angles eac
 def solve_blocks(arm, direction, offset, lower, upper, T, q_ref, q, valid, within, rigid, marked):
     """Solve poses ``T`` (N, 4, 4).
 
-    Fills ``q`` (N, 8, 6), the manufacturer's angles by the turns within the limits that are nearest to ``q_ref`` (N or 1, 6),
+    Fills ``q`` (N, 8, 6), by the turns within the limits that are nearest to ``q_ref`` (N or 1, 6), rad,
     NaN where a slot has no solution, and per slot ``valid`` and ``within`` the limits (N, 8). ``rigid`` (N,) tells
     which poses are rigid transforms, ``marked`` (N,) which are left to the careful solver.
     """
@@ -93,7 +93,7 @@ def _check(w):
 
 @kernel
 def _manufacturers_angles(direction, offset, lower, upper, reference, pair):
-    """Angles theta into the manufacturer's, by the nearest turn within the limits (``joint_limits.nearest_equivalent``)."""
+    """Angles theta into the manufacturer's, by the nearest turn within the limits (``nearest_equivalent``)."""
     for i in range(BLOCK):
         pair[_WITHIN * BLOCK + i] = pair[_VALID * BLOCK + i]
         pair[(_WITHIN + 1) * BLOCK + i] = pair[_VALID * BLOCK + i]
