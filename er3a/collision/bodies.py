@@ -11,13 +11,13 @@ References
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
 from er3a.collision.envelopes import BASE, capsule_poses, envelopes_of
+from er3a.collision.scene import Box, Cylinder, Plane, Scene, Solid, Sphere
 from er3a.errors import Er3aError
-from er3a.files.scene_file import SceneFile
-from er3a.geometry.transforms import transform
 from er3a.pipeline.messages.language import N_, said
 from er3a.robots.robot import Envelope, Robot
 
@@ -48,18 +48,18 @@ class Bodies:
         if the Coal library is missing, or the scene is none
     """
 
-    def __init__(self, robot: Robot, scene: SceneFile | None):
+    def __init__(self, robot: Robot, scene: Scene | None):
         if coal is None:
             problem = "clearance needs the Coal library, which has no wheels for this platform; leave the scene out"
             raise Er3aError(problem)
-        if not isinstance(scene, SceneFile | None):
+        if not isinstance(scene, Scene | None):
             raise Er3aError(f"the scene is a {type(scene).__name__}; expected what er3a.load_scene returns")
         self.robot = robot
         self.capsules = envelopes_of(robot)
         self._shapes = [
             coal.Capsule(c.radius, float(np.linalg.norm(np.subtract(c.end, c.start)))) for c in self.capsules
         ]
-        self._solids = _solids(scene) if scene else []
+        self._solids = [(solid.name, *_shape(solid)) for solid in scene.solids] if scene else []
         links = [_link_name(capsule) for capsule in self.capsules]
         own = self_pairs(robot)
         moving = [i for i, capsule in enumerate(self.capsules) if capsule.link != BASE]
@@ -109,25 +109,18 @@ def self_pairs(robot: Robot) -> tuple[tuple[int, int], ...]:
     return tuple(pairs)
 
 
-def _solids(scene: SceneFile) -> list[tuple[str, object, object]]:
-    """Name, shape and place of each of the scene's solids."""
-    found = []
-    for box in scene.boxes:
-        found.append((box.name, coal.Box(*(np.array(box.size_mm) / 1000)), _place(box.xyz_mm, box.rpy_deg)))
-    for cylinder in scene.cylinders:
-        shape = coal.Cylinder(cylinder.radius_mm / 1000, cylinder.length_mm / 1000)
-        found.append((cylinder.name, shape, _place(cylinder.xyz_mm, cylinder.rpy_deg)))
-    for sphere in scene.spheres:
-        found.append((sphere.name, coal.Sphere(sphere.radius_mm / 1000), _place(sphere.xyz_mm, [0.0] * 3)))
-    for plane in scene.planes:
-        offset = plane.offset_mm / 1000 / np.linalg.norm(plane.normal)
-        found.append((plane.name, coal.Halfspace(plane.unit_normal(), offset), coal.Transform3s.Identity()))
-    return found
-
-
-def _place(xyz_mm: list[float], rpy_deg: list[float]):
-    T = transform(np.array(xyz_mm) / 1000, np.radians(rpy_deg))
-    return coal.Transform3s(T[:3, :3], T[:3, 3])
+def _shape(solid: Solid) -> tuple[Any, Any]:
+    """Shape and place of a solid."""
+    match solid:
+        case Plane():
+            return coal.Halfspace(solid.normal, solid.offset), coal.Transform3s.Identity()
+        case Box():
+            shape = coal.Box(*solid.size)
+        case Cylinder():
+            shape = coal.Cylinder(solid.radius, solid.length)
+        case Sphere():
+            shape = coal.Sphere(solid.radius)
+    return shape, coal.Transform3s(solid.T[:3, :3], solid.T[:3, 3])
 
 
 def _placed(ends: np.ndarray) -> list:

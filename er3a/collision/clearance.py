@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.collision.bodies import Bodies
-from er3a.files.scene_file import SceneFile
+from er3a.collision.scene import Scene
 from er3a.pipeline.messages.language import N_
 from er3a.robots.robot import Robot
 
@@ -26,7 +26,7 @@ class Clearance:
     pair: tuple[str, ...]
 
 
-def clearance(robot: Robot, q: np.ndarray, scene: SceneFile | None) -> Clearance:
+def clearance(robot: Robot, q: np.ndarray, scene: Scene | None) -> Clearance:
     """Least distance of each arm (N, 6) in rad from the scene's solids and from itself.
 
     Raises

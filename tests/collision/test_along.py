@@ -8,6 +8,7 @@ import pytest
 from er3a.collision.along import clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.clearance import clearance
+from er3a.collision.scene import Scene
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import SceneFile
 from er3a.geometry.transforms import transform
@@ -19,8 +20,8 @@ DEPTH = 1e-3
 ENDS = np.array([0.0, 1.0])
 
 
-def scene_of(**shapes) -> SceneFile:
-    return SceneFile.model_validate({"kind": "scene", "title": "made"} | shapes)
+def scene_of(**shapes) -> Scene:
+    return SceneFile.model_validate({"kind": "scene", "title": "made"} | shapes).scene()
 
 
 def swing(robot):

@@ -9,6 +9,7 @@ import yaml
 from er3a.collision.bodies import self_pairs
 from er3a.collision.clearance import clearance
 from er3a.collision.envelopes import capsule_poses, default_envelopes, envelopes_of
+from er3a.collision.scene import Scene
 from er3a.errors import InputError
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.files.robot_writer import write_robot
@@ -18,8 +19,8 @@ from er3a.robots.robot import Envelope
 from tests.kinematics.arms import joints_at_random, placement
 
 
-def scene_of(**shapes) -> SceneFile:
-    return SceneFile.model_validate({"kind": "scene", "title": "made"} | shapes)
+def scene_of(**shapes) -> Scene:
+    return SceneFile.model_validate({"kind": "scene", "title": "made"} | shapes).scene()
 
 
 def segment_distances(ends: np.ndarray, points) -> float:

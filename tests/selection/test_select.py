@@ -68,7 +68,7 @@ def test_mix_stretches_each_rule_over_its_range(arm, solutions):
 
 
 def test_colliding_solutions_are_refused_with_their_pair(arm, solutions):
-    scene = SceneFile.model_validate(WALL)
+    scene = SceneFile.model_validate(WALL).scene()
     ranking = select(arm, solutions, "nearest", np.zeros(6), scene)
     clear = clearance(arm, solutions.q, scene)
     touching = solutions.within_limits & (clear.distance < 0)
@@ -80,7 +80,7 @@ def test_colliding_solutions_are_refused_with_their_pair(arm, solutions):
 
 def test_nothing_left_says_why(arm, solutions):
     everywhere = WALL | {"planes": [{"name": "rock", "normal": [0, 0, 1], "offset_mm": 5000}]}
-    ranking = select(arm, solutions, "time", np.zeros(6), SceneFile.model_validate(everywhere))
+    ranking = select(arm, solutions, "time", np.zeros(6), SceneFile.model_validate(everywhere).scene())
     assert ranking.chosen is None
     assert "solutions within the limits collide: link" in ranking.chosen_reason
     far = forward(arm, POSE)
