@@ -34,7 +34,7 @@ def judged(robot, random) -> tuple[int, int, int, float, float, int]:
     for _ in range(MOTIONS):
         move, scene = past_an_obstacle(robot, random)
         bodies = Bodies(robot, scene)
-        every = np.arange(len(bodies.names))
+        every = np.arange(len(bodies.pairs))
         dense = np.array([bodies.distances(ends, every).min() for ends in bodies.ends(move.joints(times)[0])])
         found = clearance_along(bodies, lambda t, move=move: move.joints(t)[0], ENDS, ENDS, DEPTH)
         inside = np.zeros(DENSE, bool)

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.clearance import clearance
 from er3a.collision.scene import Scene
 from er3a.errors import ShapeError
 from er3a.kinematics.admissible import limit_margin, nearest
 from er3a.kinematics.inverse import Solutions, checked_reference
 from er3a.pipeline.messages.language import said
+from er3a.pipeline.messages.say import say
 from er3a.robots.robot import Robot
 from er3a.selection.rules import RULES, checked_weights
 
@@ -87,7 +89,7 @@ def refusals(robot: Robot, solutions: Solutions, scene: Scene | None) -> list[st
         clear = clearance(robot, solutions.q[inside], scene)
         for row, distance, pair in zip(inside, clear.distance, clear.pair):
             if distance < COLLIDES:
-                refused[row] = said("{pair} overlap by {depth:.0f} mm", pair=pair, depth=-distance * 1000)
+                refused[row] = said("{pair} overlap by {depth:.0f} mm", pair=say(pair), depth=-distance * 1000)
     return refused
 
 

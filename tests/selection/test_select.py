@@ -14,6 +14,7 @@ from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import SceneFile
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.inverse import inverse
+from er3a.pipeline.messages.say import say
 from er3a.selection.rules import RULES, available_rules, joint_weights
 from er3a.selection.select import select
 from er3a.selection.sequence import select_sequence
@@ -75,7 +76,7 @@ def test_colliding_solutions_are_refused_with_their_pair(arm, solutions):
     assert touching.any()
     for row in np.flatnonzero(touching):
         assert row not in ranking.order
-        assert ranking.reason[row].startswith(f"{clear.pair[row]} overlap by ")
+        assert ranking.reason[row].startswith(f"{say(clear.pair[row])} overlap by ")
 
 
 def test_nothing_left_says_why(arm, solutions):
