@@ -12,7 +12,7 @@ from er3a.calibration.measured import Observations
 from er3a.calibration.outcomes import CalibrationError, LevelName, MorePositions, NoPositions
 from er3a.calibration.parameters import LEVELS, SCALE, Parameter, Subspace, jacobian, parameters_of, subspace
 from er3a.kinematics.table_batch import tables_of
-from er3a.numerics.quasi_random import spread
+from er3a.numerics.quasi_random import quasi_random_points
 from er3a.references.quantities import COORDINATES, ZERO_POSE, CarriedCoordinate, PointCoordinate, Pose, Quantity
 from er3a.robots.robot import Robot
 
@@ -76,7 +76,7 @@ def _rich(robot: Robot, quantities: Sequence[Quantity]) -> tuple[Quantity, ...]:
 
 def _spread(robot: Robot) -> list[Pose]:
     low, high = np.degrees(robot.lower), np.degrees(robot.upper)
-    rows = np.round(spread(low, high, RICH_POSES) / 5) * 5 + 0.0
+    rows = np.round(quasi_random_points(low, high, RICH_POSES) / 5) * 5 + 0.0
     return [cast(Pose, tuple(row)) for row in rows.tolist()]
 
 

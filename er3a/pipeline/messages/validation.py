@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from er3a.pipeline.messages import validation_verdict as _verdict  # noqa: F401
+import er3a.pipeline.messages.kinematics
+import er3a.pipeline.messages.validation_verdict  # noqa: F401
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.references import GROUP_WORDS, MISSING_WORDS
 from er3a.pipeline.messages.say import say, sentence, word
 from er3a.pipeline.stages.validation.findings import (
     InNoSet,
+    NamedPose,
     NearSingularLeftOut,
     NoClosedForm,
     NotInRobotFile,
@@ -43,6 +45,11 @@ GRADE_NAMES = {
 }
 CONVENTIONS = {"standard": N_("standard"), "modified": N_("modified")}
 GROUPS = GROUP_WORDS | {"table_sanity": N_("table sanity"), "round_trips": N_("round trips")}
+
+
+@say.register
+def _(found: NamedPose) -> str:
+    return found.name
 
 
 @say.register

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from er3a.pipeline.messages import diagnosis as _diagnosis  # noqa: F401
+import er3a.pipeline.messages.diagnosis  # noqa: F401
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.references import quoted
 from er3a.pipeline.messages.say import counted, joined, say, sentence, word

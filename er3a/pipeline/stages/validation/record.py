@@ -8,7 +8,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from er3a.pipeline.messages import validation_verdict as _sentences  # noqa: F401
+import er3a.pipeline.messages.validation  # noqa: F401
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation.corrected import corrected_robot

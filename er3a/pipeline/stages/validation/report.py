@@ -236,11 +236,11 @@ def _side_picture(robot: Robot, drawn: Axes, summary: ValidationSummary) -> Pict
         farthest = drawn.distance_mm.max()
         template = (
             N_(
-                "The model's axes stand up to {farthest} mm from the stated ones: the two arms differ in size and "
+                "The model's axes are up to {farthest} mm from the stated ones: the two arms differ in size and "
                 "shape, not in a detail."
             )
             if any(found.another_arm for found in summary.sets)
-            else N_("The model's axes stand up to {farthest} mm from the stated ones.")
+            else N_("The model's axes are up to {farthest} mm from the stated ones.")
         )
         caption = tr(template, farthest=fixed(farthest, 0 if farthest >= 10 else 2))
         if corrected is not None:
