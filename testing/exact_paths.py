@@ -99,7 +99,7 @@ def worst_location(robot, random, lines: int) -> dict[str, tuple[int, float]]:
         q = random.uniform(robot.lower, robot.upper)
         way = line(*forward(robot, np.stack([q, q + random.uniform(-0.4, 0.4, 6)])), 1.0)
         for slot in (0, 2):
-            if not labels[slot].startswith("front"):
+            if not labels[slot].startswith("front_"):
                 slot += 4
             try:
                 followed = follow(robot, way, grid, start_slot=slot)
@@ -107,7 +107,7 @@ def worst_location(robot, random, lines: int) -> dict[str, tuple[int, float]]:
                 continue
             if np.isnan(followed.q).any() or len(set(followed.slot)) > 1:
                 continue
-            up = "elbow up" in labels[slot]
+            up = "elbow_up" in labels[slot]
             for event in singular_events(robot, followed.t, followed.q, followed.joints, NEAR):
                 if 0.01 < event.t < 0.99:
                     at = float(way.progress(np.array(event.t))[0])
