@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,10 +13,14 @@ from er3a.collision.bodies import Bodies
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.pipeline.messages.language import N_, joined, said
+from er3a.pipeline.messages.planning import STRATEGIES
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.stages.trajectory.judgement import Judgement, stretch_text
 from er3a.pipeline.stages.trajectory.motion import Motion
-from er3a.planning.avoidance.singular_segment import Trouble, trouble_of
-from er3a.planning.avoidance.strategies import Price, best, compare
+from er3a.planning.avoidance import StrategyName
+from er3a.planning.avoidance.singular_segment import SingularSegment, singular_segment
+from er3a.planning.avoidance.strategies import Cost, StrategyResult, best, compare
+from er3a.planning.near_singular import NearSingular
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
 from er3a.robots.robot import Robot
 
@@ -27,15 +30,7 @@ _PER_JOINT = [f"q{j + 1}_{unit}" for unit in ("deg", "deg_s", "deg_s2") for j in
 _MEASURES = ["deviation_mm", "deviation_deg", "speed_share", "condition_number", "smallest_singular_value"]
 NUMBERS = ("t_s", *_PER_JOINT, "x_mm", "y_mm", "z_mm", *_MEASURES)
 CLEARANCE_TIMES = 41
-SENTENCES = {
-    "slow": N_("Keep the path and slow down"),
-    "branch": N_("Change to another solution of the arm first"),
-    "via_shift": N_("Bend the path through a shifted via point"),
-    "via_tilt": N_("Bend the path through a tilted via point"),
-    "damped": N_("Let damped least squares leave the path"),
-    "detour": N_("Cross the region by a joint move"),
-    "stop": N_("Stop before the region with an alarm"),
-}
+SENTENCES = STRATEGIES
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,47 +53,53 @@ def ways_around(
     robot: Robot,
     motion: Motion,
     found: Judgement,
-    near: Mapping[str, float],
+    near: NearSingular,
     limits: JointLimits,
-    chosen: str | None,
+    chosen: StrategyName | None,
     surroundings: Surroundings | None = None,
 ) -> Ways:
     """Compare the ways around where a path is not safe; find its fastest time law where it can be run as it is.
 
     A way on which the arm meets its surroundings or itself is not usable; without ``surroundings`` that is unknown.
     """
-    prices: list[Price] = []
+    prices: list[StrategyResult] = []
     if motion.followed is None:
         quickest, prices = _joint_move(motion, found, limits)
     else:
-        trouble = trouble_of(motion.followed, near, limits, found.events, motion.built.q_start is not None)
+        trouble = singular_segment(motion.followed, near, limits, found.events, motion.built.q_start is not None)
         quickest = _quickest(trouble)
         if found.word != "safe":
             prices = compare(trouble, chosen)
-    clearances = {}
+    clearances, meeting = {}, {}
     if surroundings:
-        for i, price in enumerate(prices):
-            if price.motion:
-                prices[i], clearances[price.name] = _measured(price, surroundings)
-    taken = best(prices, meets=any(event.crossing for event in found.events) and motion.followed is not None)
+        for price in prices:
+            if price.cost:
+                meeting[price.name], clearances[price.name] = _measured(price, surroundings)
+    taken = best(
+        [price for price in prices if not meeting.get(price.name)],
+        meets=any(event.crossing for event in found.events) and motion.followed is not None,
+    )
     known = found.velocity[np.isfinite(found.velocity[:, 0])] if found.speed_bounded else found.velocity[:0]
     record = {
         "max_joint_speed_ratio": float(np.abs(known / limits.speed).max()) if len(known) else None,
         "max_joint_acceleration_ratio": _pull(found, limits),
         "fastest_s": quickest and quickest.duration,
-        "repairs": [_record(price) | {"clearance_mm": clearances.get(price.name)} for price in prices],
+        "repairs": [
+            _record(price, meeting.get(price.name, "")) | {"clearance_mm": clearances.get(price.name)}
+            for price in prices
+        ],
         "repair": taken and taken.name,
-        "repair_text": _text(motion, found, prices, taken),
+        "repair_text": _text(motion, found, prices, taken, meeting),
     }
-    rows = [_rows(robot, motion, price.name, price.motion, price, limits) for price in prices if price.motion]
+    rows = [_rows(robot, motion, price.name, price.cost.motion, price.cost, limits) for price in prices if price.cost]
     if quickest:
         rows.append(_rows(robot, motion, FASTEST, quickest, None, limits))
     return Ways(record, rows)
 
 
-def _measured(price: Price, surroundings: Surroundings) -> tuple[Price, float | None]:
-    """The way, no longer usable if it meets something, and its least clearance in mm (None if nothing can meet)."""
-    t, q = price.motion.t, price.motion.q
+def _measured(price: StrategyResult, surroundings: Surroundings) -> tuple[str, float | None]:
+    """What the way meets, if anything, and its least clearance in mm (None if nothing can meet)."""
+    t, q = price.cost.motion.t, price.cost.motion.q
 
     def joints(at: np.ndarray) -> np.ndarray:
         return np.stack([np.interp(at, t, q[:, j]) for j in range(6)], axis=-1)
@@ -106,13 +107,10 @@ def _measured(price: Price, surroundings: Surroundings) -> tuple[Price, float | 
     grid = np.linspace(0.0, t[-1], CLEARANCE_TIMES)
     along = clearance_along(surroundings.bodies, joints, grid, grid, surroundings.depth)
     if along.least < 0:
-        return price, None
+        return "", None
     least = float(along.distance[along.least] * 1000)
-    if along.contacts:
-        meets = said("{pair} overlap by {depth:.1f} mm", pair=along.pair[along.least], depth=-least)
-        reason = joined([price.reason, meets])
-        price = replace(price, usable=False, reason=reason)
-    return price, least
+    meets = said("{pair} overlap by {depth:.1f} mm", pair=along.pair[along.least], depth=-least)
+    return meets if along.contacts else "", least
 
 
 def limits_record(robot: Robot, limits: JointLimits, full_speed_after: float) -> dict[str, Any]:
@@ -142,7 +140,7 @@ def _pull(found: Judgement, limits: JointLimits) -> float | None:
     return float(np.abs(known / limits.acceleration).max()) if found.speed_bounded and len(known) else None
 
 
-def _joint_move(motion: Motion, found: Judgement, limits: JointLimits) -> tuple[Timed | None, list[Price]]:
+def _joint_move(motion: Motion, found: Judgement, limits: JointLimits) -> tuple[Timed | None, list[StrategyResult]]:
     """Fastest time law; slowing down is the only repair that a joint move can need."""
     t, q = nodes_along(motion.joints, motion.t, motion.q, limits)
     try:
@@ -152,12 +150,12 @@ def _joint_move(motion: Motion, found: Judgement, limits: JointLimits) -> tuple[
         slower = fastest(q, limits, t)
     except TimingError:
         return None, []
-    speed, acceleration = slower.share(limits)
+    speed, acceleration = slower.ratios(limits)
     nothing = np.zeros(len(slower.t))
-    return quickest, [Price("slow", slower, True, "", 1.0, nothing, nothing, speed, acceleration)]
+    return quickest, [StrategyResult("slow", Cost(slower, 1.0, nothing, nothing, speed, acceleration, False))]
 
 
-def _quickest(trouble: Trouble) -> Timed | None:
+def _quickest(trouble: SingularSegment) -> Timed | None:
     if np.isnan(trouble.q[:, 0]).any() or trouble.followed.jumps:
         return None
     try:
@@ -166,46 +164,60 @@ def _quickest(trouble: Trouble) -> Timed | None:
         return None
 
 
-def _record(price: Price) -> dict[str, Any]:
-    record: dict[str, Any] = {"way": price.name, "usable": price.usable, "reason": price.reason}
+def _reason(price: StrategyResult, meets: str) -> str:
+    return joined([*(say(reason) for reason in price.reasons), meets])
+
+
+def _record(price: StrategyResult, meets: str) -> dict[str, Any]:
+    reason = _reason(price, meets)
+    record: dict[str, Any] = {"way": price.name, "usable": not reason, "reason": reason}
     keys = ("done_share", "max_deviation_mm", "max_deviation_deg", "duration_s", "keeps_clear", "max_joint_speed_deg_s")
     keys += ("max_joint_speed_ratio", "max_joint_acceleration_deg_s2", "max_joint_acceleration_ratio")
-    if price.motion is None:
+    cost = price.cost
+    if cost is None:
         return record | dict.fromkeys(keys)
     values = (
-        price.done,
-        float(price.distance.max() * 1000),
-        float(np.degrees(price.angle.max())),
-        price.motion.duration,
-        price.clear,
-        [float(value) for value in np.degrees(np.abs(price.motion.velocity).max(axis=0))],
-        price.speed,
-        [float(value) for value in np.degrees(np.abs(price.motion.acceleration).max(axis=0))],
-        price.acceleration,
+        cost.done,
+        float(cost.distance.max() * 1000),
+        float(np.degrees(cost.angle.max())),
+        cost.motion.duration,
+        cost.keeps_clear,
+        [float(value) for value in np.degrees(np.abs(cost.motion.velocity).max(axis=0))],
+        cost.speed_ratio,
+        [float(value) for value in np.degrees(np.abs(cost.motion.acceleration).max(axis=0))],
+        cost.acceleration_ratio,
     )
     return record | dict(zip(keys, values))
 
 
-def _text(motion: Motion, found: Judgement, prices: list[Price], taken: Price | None) -> str | None:
+def _text(
+    motion: Motion,
+    found: Judgement,
+    prices: list[StrategyResult],
+    taken: StrategyResult | None,
+    meeting: dict[str, str],
+) -> str | None:
     """One sentence: what to do about the path; None where nothing is to be done."""
     if not prices:
         return None
     if taken is not None:
-        cost = {"tool": _leaves(taken), "time": _time(taken.motion.duration - motion.built.duration)}
+        cost = {"tool": _leaves(taken), "time": _time(taken.cost.motion.duration - motion.built.duration)}
         return said("{way}: {tool}, and {time}", way=SENTENCES[taken.name], **cost)
     if found.beyond:
+        reasons = [""]
         why = said("it is out of reach {when}", when=joined((stretch_text(part) for part in found.beyond), ", "))
     else:
-        causes = [part.cause for part in found.limits] or [price.reason for price in prices if price.reason]
+        reasons = [_reason(price, meeting.get(price.name, "")) for price in prices]
+        causes = [say(part.cause) for part in found.limits] or [reason for reason in reasons if reason]
         why = joined(dict.fromkeys(causes))
     if len(prices) == 1:
-        only = {"way": SENTENCES[prices[0].name], "reason": prices[0].reason}
+        only = {"way": SENTENCES[prices[0].name], "reason": reasons[0]}
         return said("{way}, as the study asks for, does not repair it: {reason}", **only)
     return said("No way around completes this path: {why}", why=why)
 
 
-def _leaves(way: Price) -> str:
-    far, turned = way.distance.max() * 1000, np.degrees(way.angle.max())
+def _leaves(way: StrategyResult) -> str:
+    far, turned = way.cost.distance.max() * 1000, np.degrees(way.cost.angle.max())
     if far < 0.005 and turned < 0.005:
         return N_("the tool stays on the path")
     if turned < 0.005:
@@ -224,7 +236,7 @@ def _time(longer: float) -> str:
 
 
 def _rows(
-    robot: Robot, motion: Motion, name: str, timed: Timed, price: Price | None, limits: JointLimits
+    robot: Robot, motion: Motion, name: str, timed: Timed, price: Cost | None, limits: JointLimits
 ) -> pd.DataFrame:
     """At most ROWS rows of a way: its motion, its tool and its deviation."""
     kept = np.unique(np.linspace(0, len(timed.t) - 1, min(ROWS, len(timed.t))).round().astype(int))

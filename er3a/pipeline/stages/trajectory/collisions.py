@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,11 +11,25 @@ import pandas as pd
 from er3a.collision.along import ClearanceAlong, Contact, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.pipeline.messages.language import joined, said
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.stages.trajectory.judgement import WORDS, fault_text, interval_records
 from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning.intervals import Interval
 
 MOST_PAIRS = 3
+
+
+@dataclass(frozen=True)
+class Worded:
+    """Until contacts are findings."""
+
+    text: str
+    code: str = "worded"
+
+
+@say.register
+def _(found: Worded) -> str:
+    return found.text
 
 
 def measured(bodies: Bodies, motion: Motion, overlap_mm: float) -> ClearanceAlong:
@@ -29,7 +44,7 @@ def with_collisions(record: dict[str, Any], motion: Motion, along: ClearanceAlon
     """
     if along is None or along.least < 0:
         return record | {"collisions": [], "clearance": None}
-    stretches = [Interval(contact.start, contact.end, _cause(contact)) for contact in along.contacts]
+    stretches = [Interval(contact.start, contact.end, Worded(_cause(contact))) for contact in along.contacts]
     clearance = {
         "least_mm": float(along.distance[along.least] * 1000),
         "t_s": float(along.t[along.least]),

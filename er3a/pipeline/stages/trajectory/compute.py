@@ -16,7 +16,7 @@ import pandas as pd
 from er3a.collision.bodies import Bodies, can_measure
 from er3a.files.path_file import load_paths
 from er3a.files.scene_file import load_scene
-from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
+from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
 from er3a.pipeline.messages.language import N_, joined, keeps_sentences, said
 from er3a.pipeline.results import Figure, Verdict, write_summary, write_table
 from er3a.pipeline.stages.trajectory.avoidance_results import (
@@ -30,6 +30,7 @@ from er3a.pipeline.stages.trajectory.collisions import clearance_table, measured
 from er3a.pipeline.stages.trajectory.judgement import WORDS, Judgement, judge, path_record
 from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
 from er3a.pipeline.study import Study
+from er3a.planning.near_singular import NearSingular
 from er3a.planning.timing import JointLimits, joint_limits
 from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
@@ -40,11 +41,11 @@ def compute(study: Study, name: str, folder: Path) -> None:
     """Compute the trajectory stage of a robot into ``folder``."""
     robot, settings = study.robot(name), study.trajectory
     file = Path(study.entry(name).paths)
-    near = {
-        "wrist": np.radians(settings.near_wrist_deg),
-        "elbow": np.radians(settings.near_elbow_deg),
-        "shoulder": settings.near_shoulder_mm / 1000,
-    }
+    near = NearSingular(
+        float(np.radians(settings.near_wrist_deg)),
+        float(np.radians(settings.near_elbow_deg)),
+        settings.near_shoulder_mm / 1000,
+    )
     length = characteristic_length(robot)
     limits = joint_limits(robot, np.radians(settings.assumed_speed_deg_s), settings.full_speed_after_s)
     chosen = None if settings.repair == "compare" else settings.repair
@@ -88,7 +89,7 @@ def compute(study: Study, name: str, folder: Path) -> None:
 
 
 def _table(
-    robot: Robot, motion: Motion, found: Judgement, near: dict[str, float], length: float, limits: JointLimits
+    robot: Robot, motion: Motion, found: Judgement, near: NearSingular, length: float, limits: JointLimits
 ) -> pd.DataFrame:
     """One row per check point; joint columns are NaN where the path can't be reached."""
     reached = np.isfinite(found.q[:, 0])
@@ -116,7 +117,7 @@ def _table(
         "shoulder_mm": factors.shoulder * 1000,
         "reachable": reached,
         "within_limits": within(robot, found.q) & reached,
-        "near_singular": np.any([np.abs(getattr(factors, kind)) < near[kind] for kind in TYPES], axis=0),
+        "near_singular": near.contains(factors),
     }
     return pd.DataFrame(columns)
 

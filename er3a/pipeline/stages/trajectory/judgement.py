@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from er3a.kinematics.configuration import branch_labels
+from er3a.pipeline.messages import planning  # noqa: F401
 from er3a.pipeline.messages.language import N_, joined, said
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning.intervals import Interval, out_of_limits, too_fast, unreachable
+from er3a.planning.near_singular import NearSingular
 from er3a.planning.singular_events import SingularEvent, singular_events
 from er3a.robots.robot import Robot
 
@@ -52,7 +54,7 @@ class Judgement:
     velocity_check: float
 
 
-def judge(robot: Robot, motion: Motion, near: Mapping[str, float]) -> Judgement:
+def judge(robot: Robot, motion: Motion, near: NearSingular) -> Judgement:
     """Check a motion at its check points, at its closest passes, and at what lies between by root finding.
 
     Parameters
@@ -200,7 +202,7 @@ def stretch_text(part: Interval) -> str:
 
 def fault_text(part: Interval) -> str:
     """When a stretch starts and ends, and what is wrong on it."""
-    return said("{when}: {cause}", when=stretch_text(part), cause=part.cause)
+    return said("{when}: {cause}", when=stretch_text(part), cause=say(part.cause))
 
 
 def _velocity_check(motion: Motion) -> float:
@@ -248,7 +250,9 @@ def interval_records(motion: Motion, intervals: list[Interval]) -> list[dict[str
     records = []
     for interval in intervals:
         s0, s1 = (float(value) for value in motion.way(np.array([interval.start, interval.end])))
-        records.append({"t0_s": interval.start, "t1_s": interval.end, "s0_m": s0, "s1_m": s1, "cause": interval.cause})
+        records.append(
+            {"t0_s": interval.start, "t1_s": interval.end, "s0_m": s0, "s1_m": s1, "cause": say(interval.cause)}
+        )
     return records
 
 

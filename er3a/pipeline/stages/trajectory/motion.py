@@ -14,6 +14,7 @@ from er3a.errors import InputError, PoseError
 from er3a.files.path_file import PathEntry
 from er3a.kinematics.forward import forward, jacobian
 from er3a.planning.build import Built, build
+from er3a.planning.commands import Source
 from er3a.planning.follow import follow
 from er3a.planning.followed import Followed
 from er3a.robots.robot import Robot
@@ -60,7 +61,7 @@ def motion_of(
     InputError
         for what :func:`er3a.planning.build.build` refuses, and a start branch that has no solution at the start
     """
-    built = build(robot, entry, field, file, ends)
+    built = build(robot, entry.command(Source(file, field)), ends)
     samples = np.linspace(0.0, built.duration, entry.samples)
     checks = np.linspace(0.0, built.duration, (entry.samples - 1) * (checks_per_sample + 1) + 1)
     checks[:: checks_per_sample + 1] = samples
