@@ -22,6 +22,7 @@ import numpy as np
 
 from er3a.errors import PoseError
 from er3a.kinematics.closed_form import SLOTS
+from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
 from er3a.planning.branch_tracking import WIDE_STEP, Branches, branches_along, turned_difference
 from er3a.planning.followed import Followed, Jump
@@ -39,14 +40,14 @@ SWITCH_STEP = 1e-4
 class _Sequence:
     """One way through a stretch: angles (n, 6) in rad, slots (n,), jumps behind points (n - 1,), and its cost."""
 
-    q: np.ndarray
-    slot: np.ndarray
-    jumps: np.ndarray
+    q: Reals
+    slot: Reals
+    jumps: Reals
     cost: tuple[float, float, float]
 
 
 def follow(
-    robot: Robot, line: ToolPath, t: np.ndarray, q_start: np.ndarray | None = None, start_slot: int | None = None
+    robot: Robot, line: ToolPath, t: Reals, q_start: Reals | None = None, start_slot: int | None = None
 ) -> Followed:
     """Follow a line.
 
@@ -80,12 +81,12 @@ def follow(
     return Followed(robot, line, grid.t, grid.progress, q, slot, turn, tuple(jumps))
 
 
-def _stretches(reached: np.ndarray) -> list[tuple[int, int]]:
+def _stretches(reached: Reals) -> list[tuple[int, int]]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], reached, [False]]).astype(int)))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
-def _admitted(grid: Branches, starts: np.ndarray, q_start: np.ndarray | None, start_slot: int | None) -> np.ndarray:
+def _admitted(grid: Branches, starts: Reals, q_start: Reals | None, start_slot: int | None) -> Reals:
     if start_slot is not None:
         if start_slot not in starts:
             raise PoseError(f"the start pose has no solution on branch {start_slot}")
@@ -99,7 +100,7 @@ def _admitted(grid: Branches, starts: np.ndarray, q_start: np.ndarray | None, st
     return starts[worst <= max(SAME_JOINTS, worst.min())]
 
 
-def _best(robot: Robot, grid: Branches, part: slice, starts: np.ndarray, before: np.ndarray | None) -> _Sequence:
+def _best(robot: Robot, grid: Branches, part: slice, starts: Reals, before: Reals | None) -> _Sequence:
     q, t = grid.q[part], grid.t[part]
     share = np.gradient(t) / grid.t[-1] if len(t) > 1 else np.zeros(1)
     fits = within(robot, nearest_turns(robot, q, np.zeros(6)))
@@ -113,9 +114,7 @@ def _best(robot: Robot, grid: Branches, part: slice, starts: np.ndarray, before:
     return min(sequences, key=lambda sequence: sequence.cost)
 
 
-def _turned(
-    robot: Robot, q: np.ndarray, slot: np.ndarray, jumps: np.ndarray, share: np.ndarray, before: np.ndarray | None
-) -> _Sequence:
+def _turned(robot: Robot, q: Reals, slot: Reals, jumps: Reals, share: Reals, before: Reals | None) -> _Sequence:
     """Make angles continuous and choose each joint's whole turns."""
     steps = turned_difference(q[:-1], q[1:])
     unwound = q[0] + np.concatenate([np.zeros((1, 6)), np.cumsum(steps, axis=0)])
@@ -138,7 +137,7 @@ def _turned(
     return _Sequence(unwound, slot, jumps, (float(jumps.sum()), outside, travel))
 
 
-def _jump(t: np.ndarray, q: np.ndarray, i: int) -> Jump:
+def _jump(t: Reals, q: Reals, i: int) -> Jump:
     step = q[i + 1] - q[i]
     joint = int(np.argmax(np.abs(step)))
     return Jump(float(t[i + 1]), joint + 1, float(step[joint]))

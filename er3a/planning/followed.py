@@ -14,6 +14,7 @@ import numpy as np
 from er3a.kinematics.forward import jacobian
 from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.numerics.arrays import Reals
 from er3a.planning.branch_tracking import FREE_SHOULDER, FREE_WRIST, align_wrist, onto_axis_1, turned_difference
 from er3a.planning.moves import ToolPath
 from er3a.robots.robot import Robot
@@ -53,23 +54,23 @@ class Followed:
 
     robot: Robot
     line: ToolPath
-    t: np.ndarray
-    progress: np.ndarray
-    q: np.ndarray
-    slot: np.ndarray
-    start_turn: np.ndarray
+    t: Reals
+    progress: Reals
+    q: Reals
+    slot: Reals
+    start_turn: Reals
     jumps: tuple[Jump, ...]
 
-    def joints(self, t: np.ndarray) -> np.ndarray:
+    def joints(self, t: Reals) -> Reals:
         """Joint angles (..., 6) in rad at times (...,) in s; NaN where unreachable."""
         return self.joints_at(self.line.progress(t)[0])
 
-    def joints_at(self, progress: np.ndarray) -> np.ndarray:
+    def joints_at(self, progress: Reals) -> Reals:
         """Joint angles (..., 6) in rad at shares of the way (...,); NaN where unreachable."""
         progress = np.asarray(progress, float)
         return self._solve(progress.reshape(-1)).reshape(*progress.shape, 6)
 
-    def _solve(self, progress: np.ndarray) -> np.ndarray:
+    def _solve(self, progress: Reals) -> Reals:
         robot = self.robot
         right = np.clip(np.searchsorted(self.progress, progress, side="right"), 1, len(self.progress) - 1)
         left = right - 1
@@ -96,7 +97,7 @@ class Followed:
         return q
 
     @staticmethod
-    def _nearest(q: np.ndarray, q_ref: np.ndarray, slot_a: np.ndarray, slot_b: np.ndarray) -> np.ndarray:
+    def _nearest(q: Reals, q_ref: Reals, slot_a: Reals, slot_b: Reals) -> Reals:
         """Of the branches (n, 8, 6) in use on either side, the nearer to q_ref (n, 6), by the nearest turns."""
         rows = np.arange(len(q))
         both = np.stack([q[rows, slot_a], q[rows, slot_b]], axis=1)
@@ -106,7 +107,7 @@ class Followed:
         best = np.argmin(np.where(np.isnan(distance), np.inf, distance), axis=1)
         return q_ref + step[rows, best]
 
-    def derivatives(self, progress: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def derivatives(self, progress: Reals) -> tuple[Reals, Reals, Reals]:
         """Joint angles and their first and second derivative by progress, at shares of the way (n,) [1]_.
 
         With the tool's twist per unit of progress, J q' = twist and J q'' = twist' - J' q'. Where the Jacobian is
@@ -125,7 +126,7 @@ class Followed:
                 dq[rows], ddq[rows] = self._beside(progress[rows], aside)
         return q, dq, ddq
 
-    def rates(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def rates(self, t: Reals) -> tuple[Reals, Reals, Reals]:
         """Joint angles (rad), velocities (rad/s) and accelerations (rad/s^2) at times (n,) in s; each (n, 6)."""
         progress, speed, acceleration = (part[:, None] for part in self.line.progress(np.asarray(t, float)))
         q, dq, ddq = self.derivatives(progress[:, 0])
@@ -136,7 +137,7 @@ class Followed:
         """Size of the line in rad, for comparing derivatives."""
         return self.line.length / characteristic_length(self.robot) + self.line.turned
 
-    def _beside(self, progress: np.ndarray, aside: float) -> tuple[np.ndarray, np.ndarray]:
+    def _beside(self, progress: Reals, aside: float) -> tuple[Reals, Reals]:
         """Derivatives on both sides of points of the way, averaged where they agree; NaN elsewhere."""
         before = np.where(progress < aside, progress + aside, progress - aside)
         after = np.where(progress > 1 - aside, progress - aside, progress + aside)
@@ -148,7 +149,7 @@ class Followed:
             merged.append(np.where(agree[:, None], (a + b) / 2, np.nan))
         return merged[0], merged[1]
 
-    def _through_jacobian(self, q: np.ndarray, progress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _through_jacobian(self, q: Reals, progress: Reals) -> tuple[Reals, Reals]:
         length = characteristic_length(self.robot)
         dq, ddq = np.full_like(q, np.nan), np.full_like(q, np.nan)
         rows = np.flatnonzero(np.isfinite(q[:, 0]))

@@ -7,18 +7,16 @@ from dataclasses import dataclass
 from typing import Generic, Literal, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 from er3a.findings import Finding
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.numerics.arrays import Reals
 from er3a.planning.followed import Followed
 from er3a.planning.singular_events import Joints, runs
 from er3a.robots.joint_limits import LIMIT_TOLERANCE
 from er3a.robots.robot import Robot
-
-Reals = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

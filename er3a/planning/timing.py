@@ -19,13 +19,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from er3a.errors import Er3aError
+from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
-
-Reals = NDArray[np.float64]
 
 LONGEST_STEP = 0.02  # share of the whole way between two nodes
 SHARPEST_BEND = 0.15  # rad, between two steps in joint space measured in full speeds

@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 from er3a.kinematics.forward import frames
 from er3a.kinematics.singularity import characteristic_length, determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
+from er3a.numerics.arrays import Reals
 from er3a.planning.avoidance.findings import (
     BeginsInRegion,
     BentPathSingular,
@@ -31,7 +32,6 @@ from er3a.planning.avoidance.findings import (
 from er3a.planning.avoidance.singular_segment import (
     AT_REST,
     Avoidance,
-    Reals,
     SingularSegment,
     coarse,
     singular_segment,
