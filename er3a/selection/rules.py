@@ -14,8 +14,8 @@ import numpy as np
 
 from er3a.collision.bodies import can_measure
 from er3a.collision.clearance import clearance
+from er3a.collision.scene import Scene
 from er3a.errors import Er3aError
-from er3a.files.scene_file import SceneFile
 from er3a.kinematics.admissible import limit_margin
 from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.pipeline.messages.language import N_
@@ -37,7 +37,7 @@ class Rule:
     title: str
     unit: str
     best: str
-    measure: Callable[[Robot, np.ndarray, np.ndarray, SceneFile | None], np.ndarray]
+    measure: Callable[[Robot, np.ndarray, np.ndarray, Scene | None], np.ndarray]
 
     def cost(self, measured: np.ndarray) -> np.ndarray:
         """The measure, or its negative, so that less is better."""
@@ -54,29 +54,29 @@ def joint_weights(robot: Robot) -> np.ndarray:
     return np.maximum(outward / outward.max(), 0.1)
 
 
-def _greatest_move(robot: Robot, q: np.ndarray, q_ref: np.ndarray, scene: SceneFile | None) -> np.ndarray:
+def _greatest_move(robot: Robot, q: np.ndarray, q_ref: np.ndarray, scene: Scene | None) -> np.ndarray:
     return np.degrees(np.abs(q - q_ref).max(axis=1, initial=0.0))
 
 
-def _weighted_move(robot: Robot, q: np.ndarray, q_ref: np.ndarray, scene: SceneFile | None) -> np.ndarray:
+def _weighted_move(robot: Robot, q: np.ndarray, q_ref: np.ndarray, scene: Scene | None) -> np.ndarray:
     return np.degrees(np.linalg.norm(joint_weights(robot) * (q - q_ref), axis=1))
 
 
-def _time(robot: Robot, q: np.ndarray, q_ref: np.ndarray, scene: SceneFile | None) -> np.ndarray:
+def _time(robot: Robot, q: np.ndarray, q_ref: np.ndarray, scene: Scene | None) -> np.ndarray:
     if not np.isfinite(robot.speed).all():
         raise Er3aError(f"{robot.name}: the rule 'time' needs joint speeds, and the robot's file gives none")
     return (np.abs(q - q_ref) / robot.speed).max(axis=1, initial=0.0)
 
 
-def _manipulability(robot: Robot, q: np.ndarray, q_ref: np.ndarray, scene: SceneFile | None) -> np.ndarray:
+def _manipulability(robot: Robot, q: np.ndarray, q_ref: np.ndarray, scene: Scene | None) -> np.ndarray:
     return conditioning(robot, q, characteristic_length(robot)).manipulability
 
 
-def _limit_distance(robot: Robot, q: np.ndarray, q_ref: np.ndarray, scene: SceneFile | None) -> np.ndarray:
+def _limit_distance(robot: Robot, q: np.ndarray, q_ref: np.ndarray, scene: Scene | None) -> np.ndarray:
     return np.degrees(limit_margin(robot, q))
 
 
-def _clearance(robot: Robot, q: np.ndarray, q_ref: np.ndarray, scene: SceneFile | None) -> np.ndarray:
+def _clearance(robot: Robot, q: np.ndarray, q_ref: np.ndarray, scene: Scene | None) -> np.ndarray:
     return clearance(robot, q, scene).distance * 1000
 
 

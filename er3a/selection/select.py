@@ -7,12 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.clearance import clearance
+from er3a.collision.scene import Scene
 from er3a.errors import ShapeError
-from er3a.files.scene_file import SceneFile
 from er3a.kinematics.admissible import limit_margin, nearest
 from er3a.kinematics.inverse import Solutions, checked_reference
 from er3a.pipeline.messages.language import said
+from er3a.pipeline.messages.say import say
 from er3a.robots.robot import Robot
 from er3a.selection.rules import RULES, checked_weights
 
@@ -49,7 +51,7 @@ def select(
     solutions: Solutions,
     rule: str | Mapping[str, float],
     q_ref: np.ndarray,
-    scene: SceneFile | None = None,
+    scene: Scene | None = None,
 ) -> Ranking:
     """Rank the solutions of one pose.
 
@@ -79,7 +81,7 @@ def select(
     return Ranking(order, measured, cost, reason, _chosen_reason(robot, solutions, order, refused, words, q_ref))
 
 
-def refusals(robot: Robot, solutions: Solutions, scene: SceneFile | None) -> list[str]:
+def refusals(robot: Robot, solutions: Solutions, scene: Scene | None) -> list[str]:
     """Why each row is refused: limits that it leaves or, with a scene, what overlaps; empty texts for the others."""
     refused = list(solutions.reason)
     inside = np.flatnonzero(solutions.within_limits)
@@ -87,7 +89,7 @@ def refusals(robot: Robot, solutions: Solutions, scene: SceneFile | None) -> lis
         clear = clearance(robot, solutions.q[inside], scene)
         for row, distance, pair in zip(inside, clear.distance, clear.pair):
             if distance < COLLIDES:
-                refused[row] = said("{pair} overlap by {depth:.0f} mm", pair=pair, depth=-distance * 1000)
+                refused[row] = said("{pair} overlap by {depth:.0f} mm", pair=say(pair), depth=-distance * 1000)
     return refused
 
 

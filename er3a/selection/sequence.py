@@ -17,8 +17,8 @@ from itertools import pairwise
 import numpy as np
 
 from er3a.collision.clearance import clearance
+from er3a.collision.scene import Scene
 from er3a.errors import Er3aError
-from er3a.files.scene_file import SceneFile
 from er3a.kinematics.inverse import Solutions, checked_reference
 from er3a.robots.robot import Robot
 from er3a.selection.rules import joint_weights
@@ -49,7 +49,7 @@ def select_sequence(
     poses: Sequence[Solutions],
     q_ref: np.ndarray,
     rule: str = "nearest",
-    scene: SceneFile | None = None,
+    scene: Scene | None = None,
 ) -> SequenceChoice:
     """Choose one solution of each pose so that all moves together cost least.
 
@@ -96,7 +96,7 @@ def select_sequence(
     )
 
 
-def _usable(robot: Robot, solutions: Solutions, scene: SceneFile | None, number: int) -> np.ndarray:
+def _usable(robot: Robot, solutions: Solutions, scene: Scene | None, number: int) -> np.ndarray:
     rows = np.flatnonzero(solutions.within_limits)
     if scene is not None and rows.size:
         rows = rows[clearance(robot, solutions.q[rows], scene).distance >= 0]

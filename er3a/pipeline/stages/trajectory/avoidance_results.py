@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.along import clearance_along
 from er3a.collision.bodies import Bodies
+from er3a.collision.pairs import PairOverlaps
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.pipeline.messages.language import N_, joined, said
@@ -109,8 +111,8 @@ def _measured(price: StrategyResult, surroundings: Surroundings) -> tuple[str, f
     if along.least < 0:
         return "", None
     least = float(along.distance[along.least] * 1000)
-    meets = said("{pair} overlap by {depth:.1f} mm", pair=along.pair[along.least], depth=-least)
-    return meets if along.contacts else "", least
+    meets = say(PairOverlaps(along.pair[along.least], -least)) if along.contacts else ""
+    return meets, least
 
 
 def limits_record(robot: Robot, limits: JointLimits, full_speed_after: float) -> dict[str, Any]:
