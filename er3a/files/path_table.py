@@ -20,7 +20,7 @@ from er3a.files.csv_file import Column, read_csv, read_header
 from er3a.files.target_table import FORMS, POSITION
 from er3a.files.units import check_degrees, check_millimetres
 from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, transform
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Flags, Integers, Reals
 
 JOINT_COLUMNS = tuple(f"q{joint}_deg" for joint in range(1, 7))
 UNIT_LENGTH_TOLERANCE = 1e-6
@@ -43,11 +43,11 @@ class PathTable:
     """
 
     file: Path
-    rows: Reals
+    rows: Integers
     times: Reals | None
     poses: Reals | None
     joints: Reals | None
-    repeated: Reals
+    repeated: Flags
 
 
 def read_path_table(path: str | Path) -> PathTable:
@@ -98,7 +98,7 @@ def read_path_table(path: str | Path) -> PathTable:
     return PathTable(path, lines, times, poses, joints, repeated)
 
 
-def _times(path: Path, lines: Reals, rows: list[dict[str, Any]]) -> Reals:
+def _times(path: Path, lines: Integers, rows: list[dict[str, Any]]) -> Reals:
     times = np.array([row["t_s"] for row in rows])
     if times[0] != 0:
         raise InputError(path, f"row {lines[0]}, column t_s", f"the path starts at {times[0]:g} s", "Start at 0")
@@ -110,7 +110,7 @@ def _times(path: Path, lines: Reals, rows: list[dict[str, Any]]) -> Reals:
     return times
 
 
-def _poses(path: Path, lines: Reals, rows: list[dict[str, Any]], form: str) -> Reals:
+def _poses(path: Path, lines: Integers, rows: list[dict[str, Any]], form: str) -> Reals:
     position = _block(path, rows, POSITION)
     T = transform(position / 1000, np.zeros_like(position))
     names = FORMS[form]

@@ -10,7 +10,7 @@ at the path's beginning the one that it has next: the value that makes the motio
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from er3a.kinematics.closed_form import REACHED, SLOTS
 from er3a.kinematics.forward import frames
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.planning.moves import ToolPath
 from er3a.robots.robot import Robot
 
@@ -49,25 +49,22 @@ class Branches:
     progress: Reals
     q: Reals
     gap: Reals
-    free_wrist: Reals
-    free_shoulder: Reals
-    straight: Reals
+    free_wrist: Flags
+    free_shoulder: Flags
+    straight: Flags
     factors: Reals
 
     @property
-    def meeting(self) -> Reals:
-        """(N, 8) bool, whether a branch meets another one there."""
-        return self.free_wrist | self.free_shoulder | self.straight
-
-    @property
-    def doors(self) -> Reals:
+    def meeting(self) -> Integers:
         """(N, 8), bits of the branch number (:mod:`er3a.kinematics.configuration`) that differ in a branch met."""
-        return self.free_wrist + 2 * self.straight + 4 * self.free_shoulder
+        bits: Integers = self.free_wrist + 2 * self.straight + 4 * self.free_shoulder
+        return bits
 
     @property
-    def reached(self) -> Reals:
+    def reached(self) -> Flags:
         """(N, 8) bool, whether a branch has a solution."""
-        return np.isfinite(self.q[..., 0])
+        reached: Flags = np.isfinite(self.q[..., 0])
+        return reached
 
 
 def branches_along(robot: Robot, line: ToolPath, t: Reals) -> Branches:
@@ -117,7 +114,7 @@ def _solve_at(robot: Robot, line: ToolPath, t: Reals) -> Branches:
     return Branches(t, progress, q, np.where(fault == REACHED, 0.0, gap), *_free(robot, q))
 
 
-def _free(robot: Robot, q: Reals) -> tuple[Reals, Reals, Reals, Reals]:
+def _free(robot: Robot, q: Reals) -> tuple[Flags, Flags, Flags, Reals]:
     factors = determinant_factors(robot, q)
     wrist, elbow, shoulder = (np.abs(value) for value in (factors.wrist, factors.elbow, factors.shoulder))
     distances = np.stack([wrist, elbow, shoulder], axis=-1)
@@ -126,7 +123,8 @@ def _free(robot: Robot, q: Reals) -> tuple[Reals, Reals, Reals, Reals]:
 
 def _merge(a: Branches, b: Branches) -> Branches:
     t, first = np.unique(np.concatenate([a.t, b.t]), return_index=True)
-    rest = (np.concatenate([getattr(a, key), getattr(b, key)])[first] for key in list(Branches.__annotations__)[1:])
+    names = [part.name for part in fields(Branches)][1:]
+    rest = (np.concatenate([getattr(a, name), getattr(b, name)])[first] for name in names)
     return Branches(t, *rest)
 
 
@@ -141,7 +139,7 @@ def _closest_passes(grid: Branches) -> Reals:
     return np.unique(np.concatenate(found))
 
 
-def vertex(x: Reals, y: Reals, i: Reals) -> Reals:
+def vertex(x: Reals, y: Reals, i: Integers) -> Reals:
     """Lowest points of the parabolas through the points i - 1, i, i + 1, each kept between its outer points."""
     left, right = x[i] - x[i - 1], x[i + 1] - x[i]
     rise, fall = (y[i + 1] - y[i]) / right, (y[i] - y[i - 1]) / left
@@ -152,7 +150,7 @@ def vertex(x: Reals, y: Reals, i: Reals) -> Reals:
     return np.clip(lowest, x[i[curved] - 1], x[i[curved] + 1])
 
 
-def _unclear(grid: Branches) -> Reals:
+def _unclear(grid: Branches) -> Flags:
     """(N - 1,) bool: intervals where a branch begins or ends, or moves a joint that is not free by a wide step."""
     step = np.abs(turned_difference(grid.q[:-1], grid.q[1:]))
     for free, joints in ((grid.free_wrist, [3, 5]), (grid.free_shoulder, [0, 3, 4, 5])):
@@ -160,7 +158,8 @@ def _unclear(grid: Branches) -> Reals:
         for joint in joints:
             step[either, joint] = 0.0
     wide = (step > WIDE_STEP).any(axis=-1)
-    return (wide | (grid.reached[:-1] != grid.reached[1:])).any(axis=-1)
+    unclear: Flags = (wide | (grid.reached[:-1] != grid.reached[1:])).any(axis=-1)
+    return unclear
 
 
 def _fill_free_shoulder(robot: Robot, line: ToolPath, grid: Branches) -> None:
@@ -183,7 +182,7 @@ def _fill_free_wrist(robot: Robot, grid: Branches) -> None:
             grid.q[free, slot] = wrap_to_pi(align_wrist(robot, grid.q[free, slot], kept[free]))
 
 
-def _kept(values: Reals, unknown: Reals) -> Reals:
+def _kept(values: Reals, unknown: Flags) -> Reals:
     """Values (N,) with the unknown ones replaced by the last known one before, else the next one, else 0."""
     known = np.flatnonzero(~unknown)
     if not known.size:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Integers, Reals
 
 POWERS = 6
 GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(12)
@@ -30,7 +30,7 @@ class Curve:
     edges: Reals
     coefficients: Reals
 
-    def piece(self, s: Reals) -> tuple[Reals, Reals]:
+    def piece(self, s: Reals) -> tuple[Integers, Reals]:
         """Number of the piece, and the share of it, at parameters (...,)."""
         s = np.asarray(s, float)
         i = np.clip(np.searchsorted(self.edges, s, side="right") - 1, 0, len(self.coefficients) - 1)

@@ -14,7 +14,7 @@ import numpy as np
 from er3a.kinematics.forward import jacobian
 from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Integers, Reals
 from er3a.planning.branch_tracking import FREE_SHOULDER, FREE_WRIST, align_wrist, onto_axis_1, turned_difference
 from er3a.planning.moves import ToolPath
 from er3a.robots.robot import Robot
@@ -46,7 +46,7 @@ class Followed:
     Attributes
     ----------
     t : (N,), s, rising; progress : (N,), share of the way (0..1)
-    q : (N, 6), rad, maker's angles, continuous but for ``jumps``; NaN where no branch reaches the pose
+    q : (N, 6), rad, manufacturer's angles, continuous but for ``jumps``; NaN where no branch reaches the pose
     slot : (N,) int, closed-form branch; -1 where none
     start_turn : (6,), rad, turn at rest from the given start joints to the beginning; not 0 only at a singular start
     jumps : changes of branch that no continuous motion makes
@@ -57,7 +57,7 @@ class Followed:
     t: Reals
     progress: Reals
     q: Reals
-    slot: Reals
+    slot: Integers
     start_turn: Reals
     jumps: tuple[Jump, ...]
 
@@ -97,7 +97,7 @@ class Followed:
         return q
 
     @staticmethod
-    def _nearest(q: Reals, q_ref: Reals, slot_a: Reals, slot_b: Reals) -> Reals:
+    def _nearest(q: Reals, q_ref: Reals, slot_a: Integers, slot_b: Integers) -> Reals:
         """Of the branches (n, 8, 6) in use on either side, the nearer to q_ref (n, 6), by the nearest turns."""
         rows = np.arange(len(q))
         both = np.stack([q[rows, slot_a], q[rows, slot_b]], axis=1)
@@ -105,7 +105,8 @@ class Followed:
         step = turned_difference(q_ref[:, None], both)
         distance = np.abs(step).max(axis=-1)
         best = np.argmin(np.where(np.isnan(distance), np.inf, distance), axis=1)
-        return q_ref + step[rows, best]
+        nearest: Reals = q_ref + step[rows, best]
+        return nearest
 
     def derivatives(self, progress: Reals) -> tuple[Reals, Reals, Reals]:
         """Joint angles and their first and second derivative by progress, at shares of the way (n,) [1]_.

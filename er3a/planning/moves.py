@@ -38,7 +38,8 @@ class ToolPath(Protocol):
     turned : by how much the tool turns in all, rad
     """
 
-    duration: float
+    @property
+    def duration(self) -> float: ...
 
     @property
     def length(self) -> float: ...
@@ -68,7 +69,7 @@ class JointMove:
 
     Attributes
     ----------
-    start, end : (6,), rad, maker's angles
+    start, end : (6,), rad, manufacturer's angles
     duration : s
     start_velocity, end_velocity : (6,), rad/s, or 0
     start_acceleration, end_acceleration : (6,), rad/s^2, or 0

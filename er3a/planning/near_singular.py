@@ -33,7 +33,7 @@ class NearSingular:
 
     def contains(self, factors: DeterminantFactors) -> Flags:
         """Whether poses (...,) are near-singular; False where the factors are NaN."""
-        near: Flags = (self.ratios(factors) < 1.0).any(axis=0)
+        near: Flags = np.any(self.ratios(factors) < 1.0, axis=0)
         return near
 
     def margin(self, robot: Robot, q: Reals) -> Reals:

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import PathError
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.planning.arcs import Arc
 from er3a.planning.curves import GAUSS_POINTS, GAUSS_WEIGHTS, POWERS, Curve, joining, straight
 from er3a.planning.moves import Line
@@ -101,7 +101,9 @@ class SegmentPath:
         """Length of the tool point's way (...,) between shares (...,) of the way, both on one piece."""
         half = (end - start) / 2
         at = start[..., None] + half[..., None] * (1 + GAUSS_POINTS)
-        return (np.linalg.norm(self._values(at)[1][..., :3], axis=-1) * GAUSS_WEIGHTS).sum(axis=-1) * half
+        speeds: Reals = np.linalg.norm(self._values(at)[1][..., :3], axis=-1)
+        lengths: Reals = (speeds * GAUSS_WEIGHTS).sum(axis=-1) * half
+        return lengths
 
     def _values(self, progress: Reals) -> tuple[Reals, Reals, Reals]:
         """Position and rotation vector (..., 6) with derivatives by progress."""
@@ -156,7 +158,18 @@ class Times:
     """
 
     times: Reals
-    corner: Reals
+    corner: Integers
+
+
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """A piece of a :class:`SegmentPath`, which explains the names."""
+
+    span: float
+    coefficients: Reals
+    origin: Reals
+    arc: Arc | None = None
+    arc_shares: tuple[float, float] = (0.0, 1.0)
 
 
 def segment_path(
@@ -184,37 +197,35 @@ def segment_path(
         for last, first, a, b in zip(lasts, firsts[1:], sizes, sizes[1:])
     ]
     starts, ends = np.append(0.0, blends) / sizes, 1 - np.append(blends, 0.0) / sizes
-    spans, coefficients, origins, arcs, shares = [], [], [], [], []
-
-    def add(span, piece, origin, arc=None, share=(0.0, 1.0)):
-        spans.append(span), coefficients.append(piece), origins.append(origin), arcs.append(arc), shares.append(share)
-
+    pieces: list[_Piece] = []
     for k, part in enumerate(segments):
         origin, u = part.T_start[:3, :3], np.array([starts[k], ends[k]])
         if u[1] - u[0] > RUNS_ON:
-            points = np.hstack([part.points(u), u[:, None] * part.rotation])
-            add((u[1] - u[0]) * sizes[k], straight(*points), origin, part if isinstance(part, Arc) else None, u)
+            ends_of_part = np.hstack([part.points(u), u[:, None] * part.rotation])
+            arc = part if isinstance(part, Arc) else None
+            pieces.append(_Piece((u[1] - u[0]) * sizes[k], straight(*ends_of_part), origin, arc, (u[0], u[1])))
         if k + 1 < len(segments) and blends[k] > 0:
             onward = segments[k + 1]
             before = _beside(part, ends[k], sizes[k], -1 + ends[k])
             after = _beside(onward, starts[k + 1], sizes[k + 1], starts[k + 1])
-            add(2 * blends[k], joining(before, after, 2 * blends[k]), onward.T_start[:3, :3])
+            span = 2 * blends[k]
+            pieces.append(_Piece(span, joining(before, after, span), onward.T_start[:3, :3]))
     corners, law, duration = _timed(sizes, np.asarray(blends) == 0, np.array(runs_on, bool), timing, ramp)
     path = SegmentPath(
         duration=duration,
         law=law,
-        curve=_curve(spans, coefficients),
-        origins=np.array(origins),
-        arcs=tuple(arcs),
-        arc_shares=np.array(shares),
+        curve=_curve([piece.span for piece in pieces], [piece.coefficients for piece in pieces]),
+        origins=np.array([piece.origin for piece in pieces]),
+        arcs=tuple(piece.arc for piece in pieces),
+        arc_shares=np.array([piece.arc_shares for piece in pieces]),
         corners=corners[1:-1],
         deviation=np.zeros(len(segments) - 1),
         turned=float(sum(part.turned for part in segments)),
         turns=tuple((k + 1, axis) for k, part in enumerate(segments) for _, axis in part.half_turns()),
     )
-    points = [part.T_start[:3, 3] for part in segments[1:]]
+    points = np.reshape([part.T_start[:3, 3] for part in segments[1:]], (-1, 1, 3))
     near = _passes(corners, np.asarray(blends) / sizes.sum())
-    away = path._values(near)[0][..., :3] - np.reshape(points, (-1, 1, 3))
+    away = path._values(near)[0][..., :3] - points
     return replace(path, deviation=np.linalg.norm(away, axis=-1).min(axis=-1))
 
 
@@ -235,7 +246,8 @@ def joint_sequence(points: Reals, blends: Reals, timing: float | Times, ramp: fl
         a, b = points[k] + cut[k] * rates[k], points[k + 1] - cut[k + 1] * rates[k]
         rest = sizes[k] - cut[k] - cut[k + 1]
         if rest > RUNS_ON * sizes[k]:
-            spans.append(rest), coefficients.append(straight(a, b))
+            spans.append(rest)
+            coefficients.append(straight(a, b))
         if cut[k + 1] > 0:
             onward = points[k + 1] + cut[k + 1] * rates[k + 1]
             span = 2 * cut[k + 1]
@@ -274,7 +286,7 @@ def _curve(spans: list[float], coefficients: list[Reals]) -> Curve:
 
 
 def _timed(
-    sizes: Reals, sharp: Reals, runs_on: Reals, timing: float | Times, ramp: float | None
+    sizes: Reals, sharp: Flags, runs_on: Flags, timing: float | Times, ramp: float | None
 ) -> tuple[Reals, TimeLaw, float]:
     """Shares of the way of all corners with start and end, the law of time, and the duration."""
     corners = np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum()

@@ -135,7 +135,7 @@ def _root(factor: Factor, start: float, end: float, duration: float) -> float:
     low, high = float(factor(start)), float(factor(end))
     if not low * high < 0:
         return start if abs(low) < abs(high) else end
-    return brentq(factor, start, end, xtol=1e-14 * duration, rtol=4 * np.finfo(float).eps)
+    return float(brentq(factor, start, end, xtol=1e-14 * duration, rtol=4 * np.finfo(float).eps))
 
 
 def _minima(times: Reals, f: Reals, factor: Factor, near: float, duration: float) -> list[tuple[float, float]]:

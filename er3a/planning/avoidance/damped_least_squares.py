@@ -60,9 +60,13 @@ def _run(segment: SingularSegment, t: Reals, T: Reals, damping: float) -> Timed:
     q[0] = segment.q[0]
     length = characteristic_length(robot)
     _damped_steps(robot.direction, robot.offset, constant_links(robot), T, t[1] - t[0], length, damping, q)
-    velocity = np.gradient(q, t, axis=0)
+    velocity = _slope(q, t)
     velocity[0] = velocity[-1] = 0.0
-    return Timed(t, q, velocity, np.gradient(velocity, t, axis=0))
+    return Timed(t, q, velocity, _slope(velocity, t))
+
+
+def _slope(values: Reals, t: Reals) -> Reals:
+    return np.asarray(np.gradient(values, t, axis=0))
 
 
 @kernel

@@ -70,7 +70,8 @@ class SingularSegment:
     @cached_property
     def first_joints(self) -> Reals:
         """Joints (6,) at which the arm waits before the path begins; the path's own unless its start is singular."""
-        return self.q[0] - self.followed.start_turn
+        first: Reals = self.q[0] - self.followed.start_turn
+        return first
 
     def begin(self) -> list[Timed]:
         """The turn at rest that a singular start may ask for; no part where none is needed."""
@@ -93,7 +94,8 @@ Strategy = Callable[[SingularSegment], Avoidance | NotPossible]
 
 def coarse(t: Reals) -> Reals:
     """About POINTS of the times (N,), with both ends."""
-    return t[np.unique(np.linspace(0, len(t) - 1, min(POINTS, len(t))).round().astype(int))]
+    kept: Reals = t[np.unique(np.linspace(0, len(t) - 1, min(POINTS, len(t))).round().astype(int))]
+    return kept
 
 
 def singular_segment(
