@@ -196,7 +196,7 @@ def _blends(sizes: Reals, wanted: float | None) -> Reals:
 def _slot(robot: Robot, name: str | None, source: Source) -> int | None:
     if name is None:
         return None
-    labels = branch_labels(robot)
+    labels: tuple[str, ...] = branch_labels(robot)
     if name not in labels:
         raise source.error("start_branch", f"this robot has no branch '{name}'", f"Known: {'; '.join(labels)}")
     return labels.index(name)

@@ -32,7 +32,7 @@ class Start:
 
     Attributes
     ----------
-    branch : name of the branch to begin on; only with a pose
+    branch : code of the branch to begin on (:mod:`er3a.kinematics.configuration`); only with a pose
     """
 
     joints: Reals | None = None
