@@ -15,6 +15,7 @@ from er3a.files.robot_library import DATA, placement_transform, read_robot, robo
 from er3a.files.units import FARTHEST_MM, Triple, check_millimetres
 from er3a.files.yaml_file import StrictModel, load, read_yaml
 from er3a.pipeline.sweeps import StageName, Sweep, Variant
+from er3a.planning.avoidance import StrategyName
 from er3a.robots.robot import Robot
 
 STAGES: tuple[str, ...] = get_args(StageName)
@@ -123,9 +124,6 @@ class CapabilitySettings(StrictModel):
     placement: BoxTask = BoxTask()
 
 
-WayName = Literal["slow", "branch", "via_shift", "via_tilt", "damped", "detour", "stop"]
-
-
 class TrajectorySettings(StrictModel):
     """Where a path counts as near-singular, and how many points are checked between two samples.
 
@@ -138,7 +136,7 @@ class TrajectorySettings(StrictModel):
     near_wrist_deg: Annotated[float, Field(gt=0, le=90)]
     near_elbow_deg: Annotated[float, Field(gt=0, le=90)]
     near_shoulder_mm: Annotated[float, Field(gt=0, le=10_000)]
-    repair: Literal["compare"] | WayName = "compare"
+    repair: Literal["compare"] | StrategyName = "compare"
     assumed_speed_deg_s: Annotated[
         list[Annotated[float, Field(gt=0, le=10_000)]], Field(min_length=6, max_length=6)
     ] = [180, 180, 180, 360, 360, 360]

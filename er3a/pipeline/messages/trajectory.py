@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import er3a.pipeline.messages.collision
-import er3a.pipeline.messages.planning  # noqa: F401
+import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.pipeline.messages.language import N_
+from er3a.pipeline.messages.planning import SINGULARITIES
+from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
 from er3a.pipeline.messages.say import joined, listed, say, sentence, word
 from er3a.pipeline.messages.trajectory_verdict import verdict_word
 from er3a.pipeline.stages.trajectory.model import (
@@ -41,7 +42,6 @@ KINDS = {
     "sequence": N_("lines and arcs in sequence"),
     "table": N_("path from a table"),
 }
-TYPES = {"wrist": N_("wrist"), "elbow": N_("elbow"), "shoulder": N_("shoulder")}
 STRATEGIES = {
     "slow": N_("slow down on the path"),
     "branch": N_("another solution of the arm first"),
@@ -50,15 +50,6 @@ STRATEGIES = {
     "damped": N_("damped least squares"),
     "detour": N_("joint move across the region"),
     "stop": N_("stop before it, with an alarm"),
-}
-ADVICE = {
-    "slow": N_("Keep the path and slow down"),
-    "branch": N_("Change to another solution of the arm first"),
-    "via_shift": N_("Bend the path through a shifted via point"),
-    "via_tilt": N_("Bend the path through a tilted via point"),
-    "damped": N_("Let damped least squares leave the path"),
-    "detour": N_("Cross the region by a joint move"),
-    "stop": N_("Stop before the region with an alarm"),
 }
 MOST_PAIRS = 3
 NO_DEVIATION = 0.005  # mm or deg
@@ -72,7 +63,7 @@ def kind_word(kind: PathKind) -> str:
 
 def type_word(kind: SingularityType) -> str:
     """A type of singularity."""
-    return word("singularity", TYPES, kind)
+    return word("singularity", SINGULARITIES, kind)
 
 
 def strategy_word(name: StrategyName) -> str:
@@ -87,8 +78,8 @@ def path_text(path: PathSummary) -> str:
         return _apart_from_collisions(path)
     if path.verdict != "collides":
         return joined([_apart_from_collisions(path), *collisions])
-    graver = path.too_fast or path.jumps or (path.singularities and not path.in_joint_space)
-    return joined([*collisions, _apart_from_collisions(path) if graver else ""])
+    other = path.too_fast or path.jumps or (path.singularities and not path.in_joint_space)
+    return joined([*collisions, _apart_from_collisions(path) if other else ""])
 
 
 def _apart_from_collisions(path: PathSummary) -> str:
@@ -115,20 +106,14 @@ def _speeds(bounded: bool) -> str:
     return sentence("path.speeds", "no finite joint speed follows the path there")
 
 
-def distance_text(event: Singularity) -> str:
-    """The distance of a pass with its unit."""
-    if event.distance_mm is not None:
-        return f"{event.distance_mm:.3g} mm"
-    return f"{event.distance_deg:.3g} deg"
-
-
 @say.register
 def _(event: Singularity) -> str:
     when = f"{event.t_s:.4g}" if event.t_s == event.until_s else f"{event.t_s:.4g} – {event.until_s:.4g}"
     kind = type_word(event.type)
     if event.crossing:
         return sentence("singularity.met", "{type} at t = {when} s", type=kind, when=when)
-    passed = {"type": kind, "when": when, "distance": distance_text(event)}
+    distance = f"{event.distance_deg:.3g} deg" if event.distance_mm is None else f"{event.distance_mm:.3g} mm"
+    passed = {"type": kind, "when": when, "distance": distance}
     return sentence("singularity.passed", "{type} at t = {when} s, at {distance}", **passed)
 
 

@@ -28,7 +28,13 @@ def _(found: PathCounts) -> str:
         "near-singular": found.near_singular,
     }
     faults = [
-        sentence("trajectory.fault", "{count} {word} ({names})", count=len(names), word=verdict_word(verdict), names=", ".join(names))
+        sentence(
+            "trajectory.fault",
+            "{count} {word} ({names})",
+            count=len(names),
+            word=verdict_word(verdict),
+            names=", ".join(names),
+        )
         for verdict, names in unsafe.items()
         if names
     ]

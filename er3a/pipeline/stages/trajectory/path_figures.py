@@ -236,8 +236,6 @@ def _legend(path: PathSummary) -> list[Line2D | Patch]:
     ]
     for crossing, label in ((True, tr("singular")), (False, tr("near-singular"))):
         if any(event.crossing == crossing for event in path.singularities):
-            handles.append(
-                Line2D([], [], color=HIGHLIGHT, label=label, linestyle=EVENT_STYLES[crossing], marker="v")
-            )
+            handles.append(Line2D([], [], color=HIGHLIGHT, label=label, linestyle=EVENT_STYLES[crossing], marker="v"))
     handles += [Patch(color=colour, alpha=2 * alpha, label=label) for _, colour, alpha, label in _shades(path)]
     return handles
