@@ -10,9 +10,10 @@ from er3a.collision.bodies import Bodies, can_measure
 from er3a.files.path_file import load_paths
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
-from er3a.pipeline.stage_results import Figure, Verdict
+from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.trajectory.avoidance_results import AvoidanceTask, speed_ratio
 from er3a.pipeline.stages.trajectory.collisions import Surroundings, clearance_rows, measured
+from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.stages.trajectory.judgement import Judgement, judge
 from er3a.pipeline.stages.trajectory.model import (
     AllSafe,
@@ -42,7 +43,7 @@ from er3a.robots.robot import Robot
 
 def compute(study: Study, name: str) -> TrajectoryResults:
     """Compute the trajectory stage of a robot."""
-    robot, settings = study.robot(name), study.trajectory
+    robot, settings = study.robot(name), study.section(TrajectorySettings)
     file = Path(study.entry(name).paths)
     thresholds = NearThresholds(settings.near_wrist_deg, settings.near_elbow_deg, settings.near_shoulder_mm)
     near = NearSingular(

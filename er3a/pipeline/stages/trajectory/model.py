@@ -10,7 +10,7 @@ from typing import Generic, Literal, TypeVar, get_args
 
 from er3a.collision.pairs import Pair, PairOverlaps
 from er3a.findings import Finding
-from er3a.pipeline.stage_results import Results, Summary, Verdict
+from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.tables import Flags, Reals, Table, Texts, column, per_joint, vector
 from er3a.planning.avoidance import StrategyName
 from er3a.planning.avoidance.strategies import NotUsable

@@ -19,7 +19,7 @@ from er3a.pipeline.messages.trajectory import (
     type_word,
     verdict_word,
 )
-from er3a.pipeline.stage_results import Stored
+from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.trajectory.clearance_figures import clearance_section
 from er3a.pipeline.stages.trajectory.model import (
     AvoidanceRows,
