@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from er3a.errors import InputError
@@ -17,6 +16,7 @@ from er3a.files.robot_file import Name, Text
 from er3a.files.units import JointsDeg, PositionMm, RpyDeg, Triple
 from er3a.files.yaml_file import StrictModel, load
 from er3a.geometry.transforms import transform
+from er3a.numerics.arrays import Reals
 from er3a.planning.commands import (
     Command,
     JointMoveCommand,
@@ -45,7 +45,7 @@ class PoseEntry(StrictModel):
     xyz_mm: PositionMm
     rpy_deg: RpyDeg
 
-    def pose(self) -> NDArray[np.float64]:
+    def pose(self) -> Reals:
         """T_base_tool (4, 4), m."""
         return transform(np.array(self.xyz_mm) / 1000, np.radians(self.rpy_deg))
 
@@ -331,13 +331,13 @@ def load_paths(path: str | Path) -> PathFile:
         raise InputError(error.file, field, error.problem, error.remedy) from None
 
 
-def _radians(degrees: list[float] | None) -> NDArray[np.float64] | None:
+def _radians(degrees: list[float] | None) -> Reals | None:
     return None if degrees is None else np.radians(degrees)
 
 
-def _axis(axis: list[float] | None) -> NDArray[np.float64] | None:
+def _axis(axis: list[float] | None) -> Reals | None:
     return None if axis is None else np.array(axis)
 
 
-def _rates(degrees: list[float] | None) -> NDArray[np.float64] | float:
+def _rates(degrees: list[float] | None) -> Reals | float:
     return 0.0 if degrees is None else np.radians(degrees)

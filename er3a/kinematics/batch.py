@@ -12,8 +12,8 @@ from er3a.kinematics.block_inverse import BLOCK, count_turns, solve_blocks
 from er3a.kinematics.closed_form import REACHED, SLOTS
 from er3a.kinematics.forward import checked_joints
 from er3a.kinematics.wrist_partitioned import constants_for_blocks, solve_slots
-from er3a.numerics.threads import share_out
-from er3a.robots.joint_limits import nearest_turns, within
+from er3a.numerics.threads import parallel_for
+from er3a.robots.joint_limits import nearest_equivalent, within
 from er3a.robots.robot import Robot
 
 SMALLEST_SHARE = 8 * BLOCK
@@ -25,7 +25,7 @@ class BatchSolutions:
 
     Attributes
     ----------
-    q : (N, 8, 6), rad, maker's angles; NaN in empty slots. Slot ``4 * shoulder + 2 * elbow + wrist``; of the turns
+    q : (N, 8, 6), rad, manufacturer's angles; NaN in empty slots. Slot ``4 * shoulder + 2 * elbow + wrist``; of the turns
         within the limits the nearest to the reference, else the nearest to the limits
     valid : (N, 8) bool, whether the slot has a solution
     within_limits : (N, 8) bool, whether it is within the limits by any turn
@@ -76,14 +76,14 @@ def inverse_batch(
         rows = (q[part], valid[part], inside[part], rigid[part], marked[part])
         solve_blocks(arm, robot.direction, robot.offset, robot.lower, robot.upper, T[part], own, *rows)
 
-    share_out(count, threads, SMALLEST_SHARE, solve)
+    parallel_for(count, threads, SMALLEST_SHARE, solve)
     if not rigid.all():
         check_poses(T)
     left = np.flatnonzero(marked)
     if left.size:
         own = np.broadcast_to(reference, (count, 6))[left]
-        found, fault, _ = solve_slots(robot, T[left], own, apart=True, twins=True)
-        q[left] = nearest_turns(robot, found, own[:, None])
+        found, fault, _ = solve_slots(robot, T[left], own, keep_folds=True, keep_free=True)
+        q[left] = nearest_equivalent(robot, found, own[:, None])
         valid[left] = fault == REACHED
         inside[left] = within(robot, q[left])
     return BatchSolutions(q, valid, inside, _turns(robot, q) if turns else None)

@@ -79,7 +79,7 @@ def link_parts(robot: Robot) -> np.ndarray:
 
 @lru_cache(maxsize=256)
 def axes_at_zero_theta(robot: Robot) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Joint axes with all model angles theta at 0 (not the maker's zero pose), in the base frame.
+    """Joint axes with all model angles theta at 0 (not the manufacturer's zero pose), in the base frame.
 
     Returns
     -------

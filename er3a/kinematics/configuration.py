@@ -54,7 +54,7 @@ def branch_of(robot: Robot, q: np.ndarray) -> np.ndarray:
 def branch_labels(robot: Robot) -> tuple[str, ...]:
     """The eight slots in words.
 
-    *front*: the wrist centre is on the side of axis 1 where it stands in the maker's zero pose (if it stands on axis 1
+    *front*: the wrist centre is on the side of axis 1 where it stands in the manufacturer's zero pose (if it stands on axis 1
     there, the side of the cross product of axes 1 and 2); *back*: reached over the head. *up*: with the arm stretched
     out level on that side, the elbow is above the line from shoulder to wrist. *flip*: the wrist root with the
     negative angle.

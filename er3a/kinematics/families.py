@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from er3a.geometry.angles import TURN, wrap_to_pi
 from er3a.kinematics.aligned_wrist import (
     SOLVES_M,
     SOLVES_RAD,
@@ -25,7 +26,7 @@ from er3a.kinematics.aligned_wrist import (
 from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.forward import frames, jacobian
 from er3a.kinematics.wrist_partitioned import solve_slots
-from er3a.robots.joint_limits import LIMIT_TOLERANCE, TURN, nearest_turns, principal, within
+from er3a.robots.joint_limits import LIMIT_TOLERANCE, nearest_equivalent, within
 from er3a.robots.robot import Robot
 
 GRID = np.radians(2.0)
@@ -69,7 +70,7 @@ class Family:
             return self.q0 + t[..., None] * self.direction
         joint = FREE_JOINT[self.kind]
         q = _on_curve(self.robot, self.T, joint, self.q0[joint] + t.reshape(-1), self.q0, self.branches[0])
-        q = nearest_turns(self.robot, _nearest_wrists(self.robot, q, self.q0), self.q0)
+        q = nearest_equivalent(self.robot, _nearest_wrists(self.robot, q, self.q0), self.q0)
         q[:, joint] = self.q0[joint] + t.reshape(-1)
         return q.reshape(*t.shape, 6)
 
@@ -110,7 +111,7 @@ def _wrist_families(
 ) -> list[Family]:
     """One family for each sum (or difference) of joints 4 and 6 that the limits admit."""
     q, direction = wrist_line(robot, q)
-    rest = nearest_turns(robot, q, q_ref)
+    rest = nearest_equivalent(robot, q, q_ref)
     rest[[3, 5]] = q[[3, 5]] + TURN * np.round((q_ref - q) / TURN)[[3, 5]]
     families = []
     fits = within(robot, np.where(direction != 0, np.clip(rest, robot.lower, robot.upper), rest))
@@ -141,7 +142,7 @@ def _on_curve(robot: Robot, T: np.ndarray, joint: int, values: np.ndarray, q_ref
     """Solutions (n, 6) of one slot with the free joint at given angles (n,)."""
     reference = np.tile(q_ref, (len(values), 1))
     reference[:, joint] = values
-    return solve_slots(robot, np.broadcast_to(T, (len(values), 4, 4)), reference, apart=True)[0][:, slot]
+    return solve_slots(robot, np.broadcast_to(T, (len(values), 4, 4)), reference, keep_folds=True)[0][:, slot]
 
 
 def _curve_family(robot: Robot, T: np.ndarray, kind: str, q_ref: np.ndarray, branches: tuple[int, ...]) -> Family:
@@ -150,7 +151,8 @@ def _curve_family(robot: Robot, T: np.ndarray, kind: str, q_ref: np.ndarray, bra
     grid = np.unique(np.append(np.minimum(grid, robot.upper[joint]), np.clip(q_ref, robot.lower, robot.upper)[joint]))
 
     def members(values: np.ndarray) -> np.ndarray:
-        q = nearest_turns(robot, _nearest_wrists(robot, _on_curve(robot, T, joint, values, q_ref, slot), q_ref), q_ref)
+        q = _nearest_wrists(robot, _on_curve(robot, T, joint, values, q_ref, slot), q_ref)
+        q = nearest_equivalent(robot, q, q_ref)
         q[:, joint] = values
         return q
 
@@ -178,7 +180,7 @@ def _nearest_wrists(robot: Robot, q: np.ndarray, q_ref: np.ndarray) -> np.ndarra
         axis_4, axis_6 = frames(robot, on_line)[[3, 5], :3, 2]
         if np.linalg.norm(np.cross(axis_4, axis_6)) > SOLVES_RAD:  # an oblique wrist is never in line
             continue
-        on_line = q_ref + principal(on_line - q_ref)
+        on_line = q_ref + wrap_to_pi(on_line - q_ref)
         q[row] = on_line + _nearest_on_line(on_line, direction, q_ref) * direction
     return q
 

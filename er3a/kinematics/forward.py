@@ -25,7 +25,7 @@ def forward(robot: Robot, q: np.ndarray, frame: int | None = None, out: np.ndarr
 
     Parameters
     ----------
-    q : (..., 6), rad, the maker's joint angles; NaN in a row gives NaN in its pose
+    q : (..., 6), rad, the manufacturer's joint angles; NaN in a row gives NaN in its pose
     frame : None for the tool point (``T_base_tool``); 0..6 for the frame after that joint in the table's own
         convention, base included, tool not
     out : (..., 4, 4) writeable float64 C-contiguous array to fill and return
@@ -55,7 +55,7 @@ def frames(robot: Robot, q: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    q : (..., 6), rad, maker's angles
+    q : (..., 6), rad, manufacturer's angles
 
     Returns
     -------
@@ -69,7 +69,7 @@ def frames(robot: Robot, q: np.ndarray) -> np.ndarray:
 
 
 def jacobian(robot: Robot, q: np.ndarray) -> np.ndarray:
-    """Geometric Jacobian at the tool point, in the base frame, with respect to the maker's angles [1]_.
+    """Geometric Jacobian at the tool point, in the base frame, with respect to the manufacturer's angles [1]_.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ def _fill_start(rows, link):
 
 @kernel
 def _keep_axis(rows, sign, column):
-    """A point on the joint's axis, and the axis in the sense of the maker's angle."""
+    """A point on the joint's axis, and the axis in the sense of the manufacturer's angle."""
     for r in range(3):
         for i in range(BLOCK):
             column[r * BLOCK + i] = rows[(4 * r + 3) * BLOCK + i]

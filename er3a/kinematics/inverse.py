@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.errors import Er3aError, NotWristPartitionedError, PoseError, ShapeError
+from er3a.geometry.angles import TURN, wrap_to_pi
 from er3a.geometry.transforms import check_poses
 from er3a.kinematics.closed_form import FREE, OFF_AXIS, ORIENTATION, REACHED, TOO_FAR
 from er3a.kinematics.configuration import branch_labels
@@ -17,7 +18,7 @@ from er3a.kinematics.numerical import all_found
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from er3a.pipeline.messages.language import N_, said
-from er3a.robots.joint_limits import TURN, limit_reason, nearest_turns, principal, turn_bounds, within
+from er3a.robots.joint_limits import limit_reason, nearest_equivalent, turn_bounds, within
 from er3a.robots.robot import Robot
 
 SAME_JOINTS = 1e-9
@@ -34,7 +35,7 @@ class Solutions:
 
     Attributes
     ----------
-    q : (n, 6), rad, maker's angles; each branch once per turn that the limits allow, or once if it leaves them
+    q : (n, 6), rad, manufacturer's angles; each branch once per turn that the limits allow, or once if it leaves them
     within_limits : (n,) bool
     branch : (n,) int, slot ``4 * shoulder + 2 * elbow + wrist``; for arms without a closed form, the number of the arm
         found
@@ -82,13 +83,13 @@ def inverse(robot: Robot, T: np.ndarray, q_ref: np.ndarray | None = None) -> Sol
         wrist_partitioned_arm(robot)
     except NotWristPartitionedError as error:
         return _by_iteration(robot, T, q_ref, error.property_missing)
-    q, fault, gap = (batch[0] for batch in solve_slots(robot, T[None], q_ref[None], apart=True, twins=True))
+    q, fault, gap = (batch[0] for batch in solve_slots(robot, T[None], q_ref[None], keep_folds=True, keep_free=True))
     continua = families(robot, T, q, q_ref)
     q = _free_joints_near(robot, T, q, q_ref, continua)
 
     slots: list[int] = []
     for slot in np.flatnonzero(fault == REACHED):
-        if not any(np.abs(principal(q[slot] - q[other])).max() < SAME_JOINTS for other in slots):
+        if not any(np.abs(wrap_to_pi(q[slot] - q[other])).max() < SAME_JOINTS for other in slots):
             slots.append(slot)
     rows = [_rows_of_branch(robot, q[slot], q_ref) for slot in slots]
     for family in continua:
@@ -108,7 +109,7 @@ def _judged(robot: Robot, branches: list[int], rows: list[np.ndarray], labels: S
         q=q,
         within_limits=inside,
         branch=branch,
-        turn=np.round((q - principal(q)) / TURN).astype(int),
+        turn=np.round((q - wrap_to_pi(q)) / TURN).astype(int),
         reason=tuple("" if ok else limit_reason(robot, row) for row, ok in zip(q, inside)),
         label=tuple(labels[number] for number in branch),
         **rest,
@@ -154,16 +155,16 @@ def _free_joints_near(
         for slot in family.branches:
             if exact[family.kind][slot]:
                 reference[slot], moved[slot] = family.q0, True
-    again = solve_slots(robot, np.broadcast_to(T, (len(q), 4, 4)), reference, apart=True, twins=True)[0]
+    again = solve_slots(robot, np.broadcast_to(T, (len(q), 4, 4)), reference, keep_folds=True, keep_free=True)[0]
     again = again[np.arange(len(q)), np.arange(len(q))]
-    away, away_again = (np.abs(principal(rows - q_ref)).max(axis=1) for rows in (q, again))
+    away, away_again = (np.abs(wrap_to_pi(rows - q_ref)).max(axis=1) for rows in (q, again))
     return np.where((moved & (away_again < away))[:, None], again, q)
 
 
 def _rows_of_branch(robot: Robot, q: np.ndarray, q_ref: np.ndarray) -> np.ndarray:
     low, high = turn_bounds(robot, q)
     if (low > high).any():
-        return nearest_turns(robot, q, q_ref)[None]
+        return nearest_equivalent(robot, q, q_ref)[None]
     if np.prod(high - low + 1) > MOST_ROWS:
         raise Er3aError(f"{robot.name}: the limits allow more than {MOST_ROWS} turns of one pose; narrow them")
     choices = [q[j] + TURN * np.arange(low[j], high[j] + 1) for j in range(6)]

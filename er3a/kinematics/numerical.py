@@ -8,13 +8,14 @@ from numbers import Integral
 import numpy as np
 
 from er3a.errors import Er3aError, PoseError, ShapeError
+from er3a.geometry.angles import wrap_to_pi
 from er3a.geometry.transforms import as_floats, check_poses
 from er3a.kinematics.chain import JOINTS, arm_length, constant_links
 from er3a.kinematics.forward import checked_joints, jacobian
 from er3a.kinematics.iteration import solve_numerically
-from er3a.numerics.threads import share_out
+from er3a.numerics.threads import parallel_for
 from er3a.pipeline.messages.language import said
-from er3a.robots.joint_limits import limit_reason, nearest_turns, principal, within
+from er3a.robots.joint_limits import limit_reason, nearest_equivalent, within
 from er3a.robots.robot import Robot
 
 SOLVED, UNREACHABLE, SINGULAR, LIMIT_BOUND, BAD_GUESS = "solved", "unreachable", "singular", "limit-bound", "bad guess"
@@ -32,7 +33,7 @@ class NumericalSolutions:
 
     Attributes
     ----------
-    q : (..., 6), rad, maker's angles
+    q : (..., 6), rad, manufacturer's angles
     solved : (...,) bool, whether both errors are within the tolerances
     position_error : (...,), m; rotation_error : (...,), rad, of the degrees of freedom asked for
     starts : (...,) int, starts used; 0 where none succeeded
@@ -117,9 +118,9 @@ def all_found(robot: Robot, T: np.ndarray, starts: int, seed: int = 0) -> tuple[
     random = np.random.default_rng([seed, 2])
     begin = random.uniform(-np.pi, np.pi, (starts, 6))
     q, _, used = search.run(np.tile(T, (starts, 1, 1)), begin, False, 0, 1)
-    distinct = [principal(first.q)]
+    distinct = [wrap_to_pi(first.q)]
     for row in q[used > 0]:
-        if min(np.abs(principal(row - other)).max() for other in distinct) > SAME_ARM:
+        if min(np.abs(wrap_to_pi(row - other)).max() for other in distinct) > SAME_ARM:
             distinct.append(row)
     return np.array(distinct), first
 
@@ -146,8 +147,8 @@ class _Search:
             constants = (self.mask, self.tolerances, arm_length(robot), restarts, np.uint64(self.seed), rows.start)
             solve_numerically(arm, limits, T[rows], q0[rows], *constants, *own)
 
-        share_out(count, threads, SMALLEST_SHARE, part)
-        return (q if respect else principal(q)), error, starts
+        parallel_for(count, threads, SMALLEST_SHARE, part)
+        return (q if respect else wrap_to_pi(q)), error, starts
 
     def explain(self, T: np.ndarray, q: np.ndarray, error: np.ndarray, respect: bool, restarts: int) -> tuple[str, str]:
         """Why one pose was not solved: its nearest arm and a search without what may have hindered it."""
@@ -165,7 +166,7 @@ class _Search:
         if respect:
             free, _, starts = self.run(T[None], q[None], False, DIAGNOSIS_RESTARTS, 1)
             if starts[0]:
-                turned = nearest_turns(self.robot, free[0], q)
+                turned = nearest_equivalent(self.robot, free[0], q)
                 if within(self.robot, turned):
                     return BAD_GUESS, said(
                         "bad guess: {miss}; without limits an arm within them was found, start there", miss=miss

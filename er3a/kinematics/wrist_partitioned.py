@@ -15,7 +15,7 @@ from er3a.errors import NotWristPartitionedError
 from er3a.geometry.vectors import Vector, signed_angle, unsigned_angle
 from er3a.kinematics.block_constants import BlockConstants, block_constants
 from er3a.kinematics.chain import axes_at_zero_theta
-from er3a.kinematics.closed_form import APART, BOUNDARY_M, BOUNDARY_RAD, SLOTS, ArmConstants, solve
+from er3a.kinematics.closed_form import BOUNDARY_M, BOUNDARY_RAD, FOLD_OFFSET, SLOTS, ArmConstants, solve
 from er3a.pipeline.messages.language import N_, said
 from er3a.robots.robot import Robot
 
@@ -140,9 +140,9 @@ def _constants(robot: Robot) -> ArmConstants:
         wrist_angle=float(signed_angle(w[3], w[5], w[4])),
         angle_45=angle_45,
         angle_56=angle_56,
-        folded_apart=APART * min(1.0, least / arm.forearm_length) if least > BOUNDARY_M else 0.0,
-        least_tilt_apart=APART if oblique[0] else 0.0,
-        most_tilt_apart=APART if oblique[1] else 0.0,
+        folded_offset=FOLD_OFFSET * min(1.0, least / arm.forearm_length) if least > BOUNDARY_M else 0.0,
+        least_tilt_offset=FOLD_OFFSET if oblique[0] else 0.0,
+        most_tilt_offset=FOLD_OFFSET if oblique[1] else 0.0,
     )
 
 
@@ -163,7 +163,7 @@ def constants_for_blocks(robot: Robot) -> BlockConstants:
 
 
 def solve_slots(
-    robot: Robot, T: np.ndarray, q_ref: np.ndarray, apart: bool = False, twins: bool = False
+    robot: Robot, T: np.ndarray, q_ref: np.ndarray, keep_folds: bool = False, keep_free: bool = False
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """All branches for a batch of poses.
 
@@ -171,12 +171,12 @@ def solve_slots(
     ----------
     T : (N, 4, 4), T_base_tool, valid rigid transforms
     q_ref : (N, 6), rad; supplies the joint that is free where a continuum solves the pose
-    apart, twins : keep branches that meet at a fold, or where a joint is free, as two different rows (see
+    keep_folds, keep_free : keep branches that meet at a fold, or where a joint is free, as two different rows (see
         :mod:`closed_form`); else both are one
 
     Returns
     -------
-    q : (N, 8, 6), rad, maker's angles within half a turn of 0 (-pi..pi]; NaN where the slot has no solution
+    q : (N, 8, 6), rad, manufacturer's angles within half a turn of 0 (-pi..pi]; NaN where the slot has no solution
     fault : (N, 8), int8: REACHED, TOO_FAR, TOO_NEAR, OFF_AXIS or ORIENTATION
     gap : (N, 8): by how much, in m (rad for ORIENTATION)
     """
@@ -185,5 +185,5 @@ def solve_slots(
     fault = np.zeros((count, SLOTS), dtype=np.int8)
     gap = np.zeros((count, SLOTS))
     T, q_ref = np.ascontiguousarray(T), np.ascontiguousarray(q_ref)
-    solve(_constants(robot), robot.direction, robot.offset, T, q_ref, apart, twins, q, fault, gap)
+    solve(_constants(robot), robot.direction, robot.offset, T, q_ref, keep_folds, keep_free, q, fault, gap)
     return q, fault, gap

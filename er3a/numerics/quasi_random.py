@@ -14,7 +14,7 @@ import numpy as np
 ROUNDS = 64
 
 
-def spread(lower: np.ndarray, upper: np.ndarray, count: int) -> np.ndarray:
+def quasi_random_points(lower: np.ndarray, upper: np.ndarray, count: int) -> np.ndarray:
     """Points (count, d) in the box between ``lower`` and ``upper`` (d,)."""
     d = len(lower)
     g = 1.5

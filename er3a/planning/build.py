@@ -8,11 +8,11 @@ from itertools import pairwise
 from typing import assert_never
 
 import numpy as np
-from numpy.typing import NDArray
 
 from er3a.errors import PathError, PoseError
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
+from er3a.numerics.arrays import Reals
 from er3a.planning.arcs import arc
 from er3a.planning.commands import (
     Command,
@@ -31,8 +31,6 @@ from er3a.planning.sequences import TURN_LENGTH, JointSequence, Segment, joint_s
 from er3a.robots.robot import Robot
 
 GEOMETRY = 1.0  # s; a segment's own duration is of no account in a sequence
-
-Reals = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,13 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from er3a.errors import InputError
+from er3a.numerics.arrays import Reals
 from er3a.planning.sequences import Times
-
-Reals = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,18 +7,16 @@ from dataclasses import dataclass
 from typing import Generic, Literal, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 from er3a.findings import Finding
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.numerics.arrays import Reals
 from er3a.planning.followed import Followed
 from er3a.planning.singular_events import Joints, runs
 from er3a.robots.joint_limits import LIMIT_TOLERANCE
 from er3a.robots.robot import Robot
-
-Reals = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -171,8 +169,8 @@ def _peaks_between(t: Reals, values: Reals, function: Callable[[float], float]) 
 def _root(function: Callable[[float], float], t: Reals, values: Reals, a: int, b: int) -> float:
     """Where the function changes sign between grid points a and b; the bad one's time beside an unknown value."""
     if not (np.isfinite(values[a]) and np.isfinite(values[b])):
-        return t[a] if values[a] > 0 else t[b]
+        return float(t[a] if values[a] > 0 else t[b])
     low, high = function(t[a]), function(t[b])
     if not low * high < 0:
-        return t[a] if abs(values[a]) < abs(values[b]) else t[b]
-    return brentq(function, t[a], t[b], xtol=1e-12 * (t[-1] - t[0]))
+        return float(t[a] if abs(values[a]) < abs(values[b]) else t[b])
+    return float(brentq(function, t[a], t[b], xtol=1e-12 * (t[-1] - t[0])))

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from er3a.kinematics.singularity import DeterminantFactors, determinant_factors
+from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
 
 SingularityType = Literal["wrist", "elbow", "shoulder"]
@@ -27,16 +27,16 @@ class NearSingular:
         """The threshold of one type, rad or m."""
         return {"wrist": self.wrist_rad, "elbow": self.elbow_rad, "shoulder": self.shoulder_m}[kind]
 
-    def ratios(self, factors: DeterminantFactors) -> NDArray[np.float64]:
+    def ratios(self, factors: DeterminantFactors) -> Reals:
         """Distances from the three singular sets over their thresholds, (3, ...) in the order of TYPES."""
         return np.stack([np.abs(factor_of(factors, kind)) / self.of(kind) for kind in TYPES])
 
-    def contains(self, factors: DeterminantFactors) -> NDArray[np.bool_]:
+    def contains(self, factors: DeterminantFactors) -> Flags:
         """Whether poses (...,) are near-singular; False where the factors are NaN."""
-        near: NDArray[np.bool_] = (self.ratios(factors) < 1.0).any(axis=0)
+        near: Flags = np.any(self.ratios(factors) < 1.0, axis=0)
         return near
 
-    def margin(self, robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    def margin(self, robot: Robot, q: Reals) -> Reals:
         """Least of the ratios (N,) at joint angles (N, 6) in rad; -1 where they are NaN, for unreachable poses."""
         ratios = self.ratios(determinant_factors(robot, q))
         return np.where(np.isnan(ratios[0]), -1.0, ratios.min(axis=0))

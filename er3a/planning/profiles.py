@@ -15,18 +15,20 @@ from typing import Protocol
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-Rates = tuple[np.ndarray, np.ndarray, np.ndarray]
+from er3a.numerics.arrays import Reals
+
+Rates = tuple[Reals, Reals, Reals]
 
 
 def quintic(
-    t: np.ndarray,
+    t: Reals,
     duration: float,
-    start: np.ndarray,
-    end: np.ndarray,
-    start_velocity: np.ndarray | float = 0.0,
-    end_velocity: np.ndarray | float = 0.0,
-    start_acceleration: np.ndarray | float = 0.0,
-    end_acceleration: np.ndarray | float = 0.0,
+    start: Reals,
+    end: Reals,
+    start_velocity: Reals | float = 0.0,
+    end_velocity: Reals | float = 0.0,
+    start_acceleration: Reals | float = 0.0,
+    end_acceleration: Reals | float = 0.0,
 ) -> Rates:
     """Polynomial of fifth degree that meets position, velocity and acceleration at both ends [1]_.
 
@@ -55,7 +57,7 @@ def quintic(
     return x, dx / duration, ddx / duration**2
 
 
-def trapezoid(t: np.ndarray, duration: float, ramp: float) -> Rates:
+def trapezoid(t: Reals, duration: float, ramp: float) -> Rates:
     """Progress from 0 to 1 at a velocity that rises, stays and falls, each ramp taking its share of the time [2]_.
 
     Parameters
@@ -80,7 +82,7 @@ def trapezoid(t: np.ndarray, duration: float, ramp: float) -> Rates:
 class TimeLaw(Protocol):
     """Share of the way done (0..1) at times (...,) in s, with its first and second derivative by time."""
 
-    def __call__(self, t: np.ndarray) -> Rates: ...
+    def __call__(self, t: Reals) -> Rates: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,11 +95,11 @@ class FromRestToRest:
     ramp : share of the time of each ramp of a trapezoid
     """
 
-    times: np.ndarray
-    progress: np.ndarray
+    times: Reals
+    progress: Reals
     ramp: float | None = None
 
-    def __call__(self, t: np.ndarray) -> Rates:
+    def __call__(self, t: Reals) -> Rates:
         """See :class:`TimeLaw`."""
         t = np.asarray(t, float)
         i = np.clip(np.searchsorted(self.times, t, side="right"), 1, len(self.times) - 1)
@@ -123,14 +125,14 @@ class Timetable:
     halts : (k,) bool, where the motion has to stop besides
     """
 
-    def __init__(self, times: np.ndarray, progress: np.ndarray, halts: np.ndarray):
+    def __init__(self, times: Reals, progress: Reals, halts: Reals):
         self.times, self.progress = np.asarray(times, float), np.asarray(progress, float)
         slopes = PchipInterpolator(self.times, self.progress).derivative()(self.times)
         slopes[np.asarray(halts, bool)] = 0.0
         slopes[[0, -1]] = 0.0
         self._slopes = slopes
 
-    def __call__(self, t: np.ndarray) -> Rates:
+    def __call__(self, t: Reals) -> Rates:
         """See :class:`TimeLaw`."""
         t = np.clip(np.asarray(t, float), self.times[0], self.times[-1])
         i = np.clip(np.searchsorted(self.times, t, side="right"), 1, len(self.times) - 1)

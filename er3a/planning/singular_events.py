@@ -16,11 +16,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.signal import find_peaks
 
 from er3a.kinematics.singularity import determinant_factors
+from er3a.numerics.arrays import Flags, Reals
 from er3a.planning.near_singular import TYPES, NearSingular, SingularityType, factor_of
 from er3a.robots.robot import Robot
 
@@ -30,8 +30,6 @@ FLAT = 1e-9  # relative, by which rounding may raise the distance at its minimum
 SLOPE_STEP = 5e-5  # share of the duration
 SAME_EVENT = 1e-8  # share of the duration
 LONG_STAY = 0.01  # share of the duration
-
-Reals = NDArray[np.float64]
 Joints = Callable[[Reals], Reals]
 Factor = Callable[[Any], Any]
 
@@ -75,7 +73,7 @@ def singular_events(robot: Robot, t: Reals, q: Reals, joints: Joints, near: Near
     return sorted(events, key=lambda event: (event.t, TYPES.index(event.type)))
 
 
-def runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def runs(flags: Flags) -> list[tuple[int, int]]:
     """Index ranges (first, behind the last) of the stretches of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
@@ -137,7 +135,7 @@ def _root(factor: Factor, start: float, end: float, duration: float) -> float:
     low, high = float(factor(start)), float(factor(end))
     if not low * high < 0:
         return start if abs(low) < abs(high) else end
-    return brentq(factor, start, end, xtol=1e-14 * duration, rtol=4 * np.finfo(float).eps)
+    return float(brentq(factor, start, end, xtol=1e-14 * duration, rtol=4 * np.finfo(float).eps))
 
 
 def _minima(times: Reals, f: Reals, factor: Factor, near: float, duration: float) -> list[tuple[float, float]]:

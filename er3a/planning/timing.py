@@ -16,16 +16,14 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from er3a.errors import Er3aError
+from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
-
-Reals = NDArray[np.float64]
 
 LONGEST_STEP = 0.02  # share of the whole way between two nodes
 SHARPEST_BEND = 0.15  # rad, between two steps in joint space measured in full speeds
@@ -206,21 +204,23 @@ def _toppra(way: Reals, spline: CubicSpline, limits: JointLimits, cap: Reals | N
     except ModuleNotFoundError:
         raise TimingError(ToppraMissing()) from None
 
-    class Way(AbstractGeometricPath):
+    class Way(AbstractGeometricPath):  # type: ignore[misc]
         dof, waypoints = 6, None
         path_interval = np.array([way[0], way[-1]])
 
-        def __call__(self, at, order=0):
+        def __call__(self, at: Reals, order: int = 0) -> Any:
             return spline(at, order)
 
-    class Programme(LinearConstraint):
+    most = np.empty(0) if cap is None else cap**2
+
+    class Programme(LinearConstraint):  # type: ignore[misc]
         """The programme's speed along the way as an upper bound."""
 
-        def get_dof(self):
+        def get_dof(self) -> int:
             return 6
 
-        def compute_constraint_params(self, path, gridpoints):
-            return None, None, None, None, None, None, np.stack([np.zeros_like(cap), cap**2], axis=1)
+        def compute_constraint_params(self, path: Any, gridpoints: Any) -> tuple[Reals | None, ...]:
+            return None, None, None, None, None, None, np.stack([np.zeros_like(most), most], axis=1)
 
     both = (
         np.stack([-limits.speed, limits.speed], axis=1),

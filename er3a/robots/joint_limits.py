@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from er3a.geometry.angles import TURN
 from er3a.pipeline.messages.language import N_, joined, said
 from er3a.robots.robot import Robot
 
 LIMIT_TOLERANCE = 1e-9
-TURN = 2 * np.pi
 ABOVE = N_("J{joint} at {at:.1f} deg is {by:.3g} deg above its limit of {bound:g} deg")
 BELOW = N_("J{joint} at {at:.1f} deg is {by:.3g} deg below its limit of {bound:g} deg")
 
@@ -18,12 +18,7 @@ def within(robot: Robot, q: np.ndarray) -> np.ndarray:
     return (np.maximum(q - robot.upper, robot.lower - q) <= LIMIT_TOLERANCE).all(axis=-1)
 
 
-def principal(q: np.ndarray) -> np.ndarray:
-    """The same angles in (-pi, pi]."""
-    return q - TURN * np.ceil((q - np.pi) / TURN)
-
-
-def nearest_turns(robot: Robot, q: np.ndarray, q_ref: np.ndarray) -> np.ndarray:
+def nearest_equivalent(robot: Robot, q: np.ndarray, q_ref: np.ndarray) -> np.ndarray:
     """The same arm poses (..., 6) by the turns nearest to q_ref within the limits, else by those nearest to them."""
     near = q + TURN * np.round((q_ref - q) / TURN)
     low, high = turn_bounds(robot, near)

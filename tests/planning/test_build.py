@@ -14,6 +14,7 @@ from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.planning.build import build
+from er3a.planning.commands import Source
 
 HEAD = {"name": "path", "title": "A path", "samples": 20}
 DOWN = [180, 0, 0]
@@ -34,7 +35,8 @@ def built(folder: Path, entry: dict, table: str | None = None, ends=None):
     file = folder / "paths.yaml"
     before = [JOINTS | {"name": name} for name in ends or {}]
     file.write_text(json.dumps({"kind": "paths", "paths": [*before, entry]}))
-    return build(load_robot("er3a_c60"), load_paths(file).paths[-1], f"paths[{len(before)}]", file, ends or {})
+    command = load_paths(file).paths[-1].command(Source(file, f"paths[{len(before)}]"))
+    return build(load_robot("er3a_c60"), command, ends or {})
 
 
 def test_line_and_arc_start_and_end_where_they_say(tmp_path):

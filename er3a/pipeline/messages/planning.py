@@ -69,6 +69,11 @@ def _(found: findings.NothingToAvoid) -> str:
 
 
 @say.register
+def _(found: findings.NoSingularRegion) -> str:
+    return sentence(found.code, "there is no singular region on this path")
+
+
+@say.register
 def _(found: findings.BeginsOutOfReach) -> str:
     return sentence(found.code, "the path begins out of reach")
 

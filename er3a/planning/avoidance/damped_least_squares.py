@@ -19,9 +19,10 @@ import numpy as np
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import rows_of, step_row, turn_row
 from er3a.kinematics.singularity import characteristic_length
+from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
 from er3a.planning.avoidance.findings import BeginsOutOfReach, NoDampingSuffices, NotPossible
-from er3a.planning.avoidance.singular_segment import Avoidance, Reals, SingularSegment
+from er3a.planning.avoidance.singular_segment import Avoidance, SingularSegment
 from er3a.planning.timing import Timed, joined
 
 STEPS = 1000
@@ -59,9 +60,13 @@ def _run(segment: SingularSegment, t: Reals, T: Reals, damping: float) -> Timed:
     q[0] = segment.q[0]
     length = characteristic_length(robot)
     _damped_steps(robot.direction, robot.offset, constant_links(robot), T, t[1] - t[0], length, damping, q)
-    velocity = np.gradient(q, t, axis=0)
+    velocity = _slope(q, t)
     velocity[0] = velocity[-1] = 0.0
-    return Timed(t, q, velocity, np.gradient(velocity, t, axis=0))
+    return Timed(t, q, velocity, _slope(velocity, t))
+
+
+def _slope(values: Reals, t: Reals) -> Reals:
+    return np.asarray(np.gradient(values, t, axis=0))
 
 
 @kernel

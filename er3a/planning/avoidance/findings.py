@@ -10,9 +10,16 @@ from er3a.planning.timing import NoTimeLaw
 
 @dataclass(frozen=True)
 class NothingToAvoid:
-    """The path keeps its distance everywhere."""
+    """The path can be reached, within the limits and away from singular poses, everywhere."""
 
     code: Literal["nothing_to_avoid"] = "nothing_to_avoid"
+
+
+@dataclass(frozen=True)
+class NoSingularRegion:
+    """The path has no singular region to stop at, bend or go around."""
+
+    code: Literal["no_singular_region"] = "no_singular_region"
 
 
 @dataclass(frozen=True)
@@ -98,6 +105,7 @@ class NoDampingSuffices:
 
 NotPossible = (
     NothingToAvoid
+    | NoSingularRegion
     | BeginsOutOfReach
     | EndsOutOfReach
     | PartlyOutOfReach

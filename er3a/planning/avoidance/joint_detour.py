@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.planning.avoidance.findings import BeginsOutOfReach, EndsOutOfReach, NothingToAvoid, NotPossible
+from er3a.planning.avoidance.findings import BeginsOutOfReach, EndsOutOfReach, NoSingularRegion, NotPossible
 from er3a.planning.avoidance.singular_segment import Avoidance, SingularSegment
 from er3a.planning.timing import Timed, joined, straight
 
@@ -15,7 +15,7 @@ def detour(segment: SingularSegment) -> Avoidance | NotPossible:
     Where the path begins or ends inside a region, its first or last joints take the place of the good pose.
     """
     if not segment.regions:
-        return NothingToAvoid()
+        return NoSingularRegion()
     count, at = len(segment.t), 0
     parts: list[Timed] = []
     for first, last in segment.regions:

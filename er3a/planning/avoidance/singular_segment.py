@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from er3a.numerics.arrays import Flags, Reals
 from er3a.planning.avoidance.findings import NotPossible
 from er3a.planning.followed import Followed
 from er3a.planning.near_singular import NearSingular
@@ -18,8 +18,6 @@ from er3a.robots.robot import Robot
 
 AT_REST = 1e-6  # rad
 POINTS = 501
-
-Reals = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,9 +54,9 @@ class SingularSegment:
         return self.followed.robot
 
     @cached_property
-    def good(self) -> NDArray[np.bool_]:
+    def good(self) -> Flags:
         """(N,) bool, whether the path can be reached and keeps its distance, away from places where a branch ends."""
-        good: NDArray[np.bool_] = self.near.margin(self.robot, self.q) >= 1.0
+        good: Flags = self.near.margin(self.robot, self.q) >= 1.0
         for jump in self.followed.jumps:
             after = np.searchsorted(self.t, jump.t)
             good[max(after - 1, 0) : after + 1] = False
@@ -72,7 +70,8 @@ class SingularSegment:
     @cached_property
     def first_joints(self) -> Reals:
         """Joints (6,) at which the arm waits before the path begins; the path's own unless its start is singular."""
-        return self.q[0] - self.followed.start_turn
+        first: Reals = self.q[0] - self.followed.start_turn
+        return first
 
     def begin(self) -> list[Timed]:
         """The turn at rest that a singular start may ask for; no part where none is needed."""
@@ -95,7 +94,8 @@ Strategy = Callable[[SingularSegment], Avoidance | NotPossible]
 
 def coarse(t: Reals) -> Reals:
     """About POINTS of the times (N,), with both ends."""
-    return t[np.unique(np.linspace(0, len(t) - 1, min(POINTS, len(t))).round().astype(int))]
+    kept: Reals = t[np.unique(np.linspace(0, len(t) - 1, min(POINTS, len(t))).round().astype(int))]
+    return kept
 
 
 def singular_segment(

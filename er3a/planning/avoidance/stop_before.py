@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from er3a.planning.avoidance.findings import BeginsInRegion, NothingToAvoid, NotPossible
+from er3a.planning.avoidance.findings import BeginsInRegion, NoSingularRegion, NotPossible
 from er3a.planning.avoidance.singular_segment import Avoidance, SingularSegment
 from er3a.planning.timing import joined
 
@@ -10,7 +10,7 @@ from er3a.planning.timing import joined
 def stop(segment: SingularSegment) -> Avoidance | NotPossible:
     """Follow the path exactly, and come to rest at the last pose that keeps its distance."""
     if not segment.regions:
-        return NothingToAvoid()
+        return NoSingularRegion()
     last = segment.regions[0][0] - 1
     if last < 1:
         return BeginsInRegion()

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.kinematics.forward import forward
+from er3a.numerics.arrays import Reals
 from er3a.planning.avoidance import StrategyName
 from er3a.planning.avoidance.damped_least_squares import damped
 from er3a.planning.avoidance.deviation import deviation
@@ -20,7 +21,7 @@ from er3a.planning.avoidance.findings import (
 )
 from er3a.planning.avoidance.joint_detour import detour
 from er3a.planning.avoidance.other_branch import branch
-from er3a.planning.avoidance.singular_segment import Avoidance, Reals, SingularSegment, Strategy
+from er3a.planning.avoidance.singular_segment import Avoidance, SingularSegment, Strategy
 from er3a.planning.avoidance.slow_down import slow
 from er3a.planning.avoidance.stop_before import stop
 from er3a.planning.avoidance.via_point import shifted_via, tilted_via

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import product
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -19,19 +19,19 @@ from scipy.spatial.transform import Rotation
 from er3a.kinematics.forward import frames
 from er3a.kinematics.singularity import characteristic_length, determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
+from er3a.numerics.arrays import Reals
 from er3a.planning.avoidance.findings import (
     BeginsInRegion,
     BentPathSingular,
     EndsInRegion,
     NoShiftKeepsDistance,
-    NothingToAvoid,
+    NoSingularRegion,
     NoTiltKeepsDistance,
     NotPossible,
 )
 from er3a.planning.avoidance.singular_segment import (
     AT_REST,
     Avoidance,
-    Reals,
     SingularSegment,
     coarse,
     singular_segment,
@@ -125,7 +125,7 @@ def tilted_via(segment: SingularSegment) -> Avoidance | NotPossible:
 
 def _via(segment: SingularSegment, kind: Kind) -> Avoidance | NotPossible:
     if not segment.regions:
-        return NothingToAvoid()
+        return NoSingularRegion()
     if segment.regions[0][0] == 0:
         return BeginsInRegion()
     if segment.regions[-1][1] == len(segment.t):
@@ -152,7 +152,8 @@ def _followed(segment: SingularSegment, path: BentPath) -> Iterator[SingularSegm
     t = coarse(segment.t)
     starts: tuple[dict[str, Any], ...] = ({"q_start": segment.q[0]}, {"start_slot": int(segment.followed.slot[0])})
     for start in starts:
-        yield singular_segment(follow(segment.robot, path, t, **start), segment.near, segment.limits)
+        followed = follow(segment.robot, cast(ToolPath, path), t, **start)  # only its joints are asked for
+        yield singular_segment(followed, segment.near, segment.limits)
 
 
 def _carried_out(segment: SingularSegment, other: SingularSegment) -> Timed:
@@ -218,7 +219,8 @@ def _beside(segment: SingularSegment, T: Reals, slot: int, singular: Singularity
     arm = wrist_partitioned_arm(robot)
     if singular == "shoulder":
         centre = T[:, :3, 3] + T[:, :3, :3] @ arm.wrist_in_tool - arm.points[0]
-        return centre @ _plane_across(arm.axes[0]).T
+        across: Reals = centre @ _plane_across(arm.axes[0]).T
+        return across
     q, _, gap = solve_slots(robot, T, np.zeros((len(T), 6)))
     if singular == "elbow":
         reached = np.isfinite(q[:, slot, 0])
@@ -227,7 +229,8 @@ def _beside(segment: SingularSegment, T: Reals, slot: int, singular: Singularity
     axes = frames(robot, q[:, slot])[..., :3, 2]
     axis_4, axis_6 = axes[:, 3], axes[:, 5]
     same = np.sign(np.einsum("ni,ni->n", axis_4, axis_6))[:, None]
-    return (axis_6 - same * axis_4) @ _plane_across(axis_6[-1]).T
+    apart: Reals = (axis_6 - same * axis_4) @ _plane_across(axis_6[-1]).T
+    return apart
 
 
 def _plane_across(axis: Reals) -> Reals:

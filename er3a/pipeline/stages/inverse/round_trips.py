@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.geometry.angles import wrap_to_pi
 from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.forward import forward
-from er3a.robots.joint_limits import principal
 from er3a.robots.robot import Robot
 
 SAME_JOINTS_RAD = 1e-6
@@ -47,7 +47,7 @@ def round_trips(robot: Robot, random: np.random.Generator, poses: int) -> RoundT
     q, valid = solved.q, solved.valid
     back = forward(robot, q[valid])
     asked = np.repeat(T, valid.sum(axis=1), axis=0)
-    apart = np.abs(principal(q - own[:, None])).max(axis=2)
+    apart = np.abs(wrap_to_pi(q - own[:, None])).max(axis=2)
     apart = np.where(valid, apart, np.inf).min(axis=1)
     return RoundTrips(
         poses=poses,

@@ -7,13 +7,13 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from er3a.errors import NotWristPartitionedError
+from er3a.geometry.angles import wrap_to_pi
 from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from er3a.pipeline.messages.language import N_, said
 from er3a.pipeline.stages.validation.checks import Check, against_itself, nothing_to_compare
-from er3a.robots.joint_limits import principal
 from er3a.robots.robot import Robot
 
 NEAR_WRIST_DEG = NEAR_ELBOW_DEG = 0.5
@@ -123,7 +123,7 @@ def _block(robot: Robot, random: np.random.Generator, count: int) -> tuple[float
     T = forward(robot, q)
     found = solve_slots(robot, T, np.zeros_like(q))[0]
     solved = np.isfinite(found).all(axis=2)
-    gap = np.abs(principal(found - q[:, None])).max(axis=2)
+    gap = np.abs(wrap_to_pi(found - q[:, None])).max(axis=2)
     nearest = np.where(solved, gap, np.inf).min(axis=1)
 
     factors = determinant_factors(robot, q)
