@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 class TrajectorySettings(StrictModel):
     """Where a path counts as near-singular, and how many points are checked between two samples.
 
-    ``repair`` chooses the way around singular regions, or compares all of them. Joints of unknown speed are taken to do
+    ``repair`` chooses the avoidance strategy, or compares all of them. Joints of unknown speed are taken to do
     ``assumed_speed_deg_s``; all joints to reach full speed in ``full_speed_after_s``.
     ``scene`` holds the obstacles; no overlap with them deeper than ``overlap_mm`` goes unnoticed between points.
     """
