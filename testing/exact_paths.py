@@ -109,7 +109,7 @@ def worst_location(robot, random, lines: int) -> dict[str, tuple[int, float]]:
                 continue
             if np.isnan(followed.q).any() or len(set(followed.slot)) > 1:
                 continue
-            up = "elbow up" in labels[slot]
+            up = "elbow_up" in labels[slot]
             for event in singular_events(robot, followed.t, followed.q, followed.joints, NEAR):
                 if 0.01 < event.t < 0.99:
                     at = float(way.progress(np.array(event.t))[0])
