@@ -29,7 +29,7 @@ from er3a.planning.commands import (
     ToolSequenceCommand,
     ToolTableCommand,
 )
-from er3a.planning.sequences import Times
+from er3a.planning.profiles import Times
 
 TRAPEZOID_RAMP = 1 / 3  # of a motion's time, on the way up and on the way down
 
@@ -111,10 +111,8 @@ class JointPath(NamedPath):
             Start(joints=_radians(self.start_deg), after=self.after),
             np.radians(self.end_deg),
             self.duration_s,
-            start_velocity=_rates(self.start_velocity_deg_s),
-            end_velocity=_rates(self.end_velocity_deg_s),
-            start_acceleration=_rates(self.start_acceleration_deg_s2),
-            end_acceleration=_rates(self.end_acceleration_deg_s2),
+            (_rates(self.start_velocity_deg_s), _rates(self.end_velocity_deg_s)),
+            (_rates(self.start_acceleration_deg_s2), _rates(self.end_acceleration_deg_s2)),
             source=source,
         )
 
