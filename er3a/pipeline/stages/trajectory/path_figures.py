@@ -48,7 +48,7 @@ class PathFigure:
     """
 
     def __init__(self) -> None:
-        self.figure = Figure(figsize=(13.2, 7.0), layout="none")
+        self.figure = Figure(figsize=(13.2, 7.0), layout="none")  # type: ignore[arg-type]  # the stubs lack it
         self.joints = [self._axes(0, row) for row in range(3)]
         self.measures = [self._axes(1, row) for row in range(3)]
         self.effort = self._axes(2, 2)
@@ -170,7 +170,7 @@ def _effort(ax: Axes, path: PathSummary, rows: Checks, motions: AvoidanceRows) -
     for name, colour, label in ((path.strategy, MODEL, tr("repaired")), (FASTEST, MUTED, tr("at its fastest"))):
         part = motions.take(motions.strategy == name)
         if len(part):
-            ax.plot(part.t_s / part.t_s[-1], part.speed_ratio, color=colour, label=label, linewidth=1.3)
+            ax.plot(part.t_s / (part.t_s[-1] or np.nan), part.speed_ratio, color=colour, label=label, linewidth=1.3)
             shown.append(part.speed_ratio)
     ax.axhline(1.0, color=INK, linewidth=1, linestyle="--")
     size = np.concatenate(shown)
