@@ -13,9 +13,10 @@ import numpy as np
 from er3a.errors import PoseError
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
+from er3a.kinematics.singularity import TYPES
 from er3a.planning.follow import follow
 from er3a.planning.moves import line
-from er3a.planning.near_singular import TYPES, NearSingular
+from er3a.planning.near_singular import NearSingular
 from er3a.planning.singular_events import singular_events
 
 REAL = np.longdouble
@@ -108,7 +109,7 @@ def worst_location(robot, random, lines: int) -> dict[str, tuple[int, float]]:
                 continue
             if np.isnan(followed.q).any() or len(set(followed.slot)) > 1:
                 continue
-            up = "elbow up" in labels[slot]
+            up = "elbow_up" in labels[slot]
             for event in singular_events(robot, followed.t, followed.q, followed.joints, NEAR):
                 if 0.01 < event.t < 0.99:
                     at = float(way.progress(np.array(event.t))[0])

@@ -29,7 +29,7 @@ from er3a.planning.commands import (
     ToolSequenceCommand,
     ToolTableCommand,
 )
-from er3a.planning.sequences import Times
+from er3a.planning.profiles import Times
 
 TRAPEZOID_RAMP = 1 / 3  # of a motion's time, on the way up and on the way down
 
@@ -111,10 +111,8 @@ class JointPath(NamedPath):
             Start(joints=_radians(self.start_deg), after=self.after),
             np.radians(self.end_deg),
             self.duration_s,
-            start_velocity=_rates(self.start_velocity_deg_s),
-            end_velocity=_rates(self.end_velocity_deg_s),
-            start_acceleration=_rates(self.start_acceleration_deg_s2),
-            end_acceleration=_rates(self.end_acceleration_deg_s2),
+            (_rates(self.start_velocity_deg_s), _rates(self.end_velocity_deg_s)),
+            (_rates(self.start_acceleration_deg_s2), _rates(self.end_acceleration_deg_s2)),
             source=source,
         )
 
@@ -159,7 +157,7 @@ class ToolStart(Profiled):
     def start_command(self) -> Start:
         """The start in SI units."""
         pose = self.start.pose() if self.start else None
-        return Start(_radians(self.start_deg), pose, self.after, self.start_branch)
+        return Start(_radians(self.start_deg), pose, self.after, _branch(self.start_branch))
 
 
 class LineTo(StrictModel):
@@ -288,7 +286,7 @@ class TablePath(NamedPath):
             timing,
             blend=None if self.blend_mm is None else self.blend_mm * 1e-3,
             repeated_rows=repeated,
-            branch=self.start_branch,
+            branch=_branch(self.start_branch),
             half_turn_axis=_axis(self.half_turn_axis),
             source=source,
         )
@@ -337,6 +335,11 @@ def _radians(degrees: list[float] | None) -> Reals | None:
 
 def _axis(axis: list[float] | None) -> Reals | None:
     return None if axis is None else np.array(axis)
+
+
+def _branch(words: str | None) -> str | None:
+    """The code of a branch: "front, elbow up, flip" is front_elbow_up_flip."""
+    return words and re.sub(r"[ ,]+", "_", words)
 
 
 def _rates(degrees: list[float] | None) -> Reals | float:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from er3a.numerics.arrays import Reals
 
 TURN = 2 * np.pi
 
 
-def wrap_to_pi(angle: NDArray[np.float64]) -> NDArray[np.float64]:
+def wrap_to_pi(angle: Reals) -> Reals:
     """The same angles (rad, any shape) in (-pi, pi]."""
     return angle - TURN * np.ceil((angle - np.pi) / TURN)

@@ -26,6 +26,7 @@ from er3a.kinematics.aligned_wrist import (
 from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.forward import frames, jacobian
 from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.numerics.arrays import Reals
 from er3a.robots.joint_limits import LIMIT_TOLERANCE, nearest_equivalent, within
 from er3a.robots.robot import Robot
 
@@ -55,15 +56,15 @@ class Family:
     """
 
     kind: str
-    q0: np.ndarray
-    direction: np.ndarray
-    range: np.ndarray
+    q0: Reals
+    direction: Reals
+    range: Reals
     within_limits: bool
     branches: tuple[int, ...]
     robot: Robot
-    T: np.ndarray
+    T: Reals
 
-    def members(self, t: np.ndarray) -> np.ndarray:
+    def members(self, t: Reals) -> Reals:
         """Joint angles (..., 6) in rad at parameters (...,)."""
         t = np.asarray(t, float)
         if self.kind == "wrist":
@@ -75,7 +76,7 @@ class Family:
         return q.reshape(*t.shape, 6)
 
 
-def families(robot: Robot, T: np.ndarray, q: np.ndarray, q_ref: np.ndarray) -> tuple[Family, ...]:
+def families(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[Family, ...]:
     """All continua that solve a pose to 1e-9 m and rad, nearest to the reference first within each kind.
 
     Parameters
@@ -106,9 +107,7 @@ def _add(found: list[Family], new: list[Family]) -> None:
             found.append(family)
 
 
-def _wrist_families(
-    robot: Robot, T: np.ndarray, q: np.ndarray, q_ref: np.ndarray, branches: tuple[int, ...]
-) -> list[Family]:
+def _wrist_families(robot: Robot, T: Reals, q: Reals, q_ref: Reals, branches: tuple[int, ...]) -> list[Family]:
     """One family for each sum (or difference) of joints 4 and 6 that the limits admit."""
     q, direction = wrist_line(robot, q)
     rest = nearest_equivalent(robot, q, q_ref)
@@ -134,29 +133,29 @@ def _wrist_families(
     return sorted(families, key=lambda family: float(np.linalg.norm(family.q0 - q_ref)))
 
 
-def _nearest_on_line(q: np.ndarray, direction: np.ndarray, q_ref: np.ndarray) -> float:
+def _nearest_on_line(q: Reals, direction: Reals, q_ref: Reals) -> float:
     return float((q_ref - q) @ direction / (direction @ direction))
 
 
-def _on_curve(robot: Robot, T: np.ndarray, joint: int, values: np.ndarray, q_ref: np.ndarray, slot: int) -> np.ndarray:
+def _on_curve(robot: Robot, T: Reals, joint: int, values: Reals, q_ref: Reals, slot: int) -> Reals:
     """Solutions (n, 6) of one slot with the free joint at given angles (n,)."""
     reference = np.tile(q_ref, (len(values), 1))
     reference[:, joint] = values
     return solve_slots(robot, np.broadcast_to(T, (len(values), 4, 4)), reference, keep_folds=True)[0][:, slot]
 
 
-def _curve_family(robot: Robot, T: np.ndarray, kind: str, q_ref: np.ndarray, branches: tuple[int, ...]) -> Family:
+def _curve_family(robot: Robot, T: Reals, kind: str, q_ref: Reals, branches: tuple[int, ...]) -> Family:
     joint, slot = FREE_JOINT[kind], branches[0]
     grid = np.arange(robot.lower[joint], robot.upper[joint] + GRID, GRID)
     grid = np.unique(np.append(np.minimum(grid, robot.upper[joint]), np.clip(q_ref, robot.lower, robot.upper)[joint]))
 
-    def members(values: np.ndarray) -> np.ndarray:
+    def members(values: Reals) -> Reals:
         q = _nearest_wrists(robot, _on_curve(robot, T, joint, values, q_ref, slot), q_ref)
         q = nearest_equivalent(robot, q, q_ref)
         q[:, joint] = values
         return q
 
-    def costs(q: np.ndarray) -> np.ndarray:
+    def costs(q: Reals) -> Reals:
         return np.where(within(robot, q) | ~any_inside, np.sum((q - q_ref) ** 2, axis=1), np.inf)
 
     q = members(grid)
@@ -173,7 +172,7 @@ def _curve_family(robot: Robot, T: np.ndarray, kind: str, q_ref: np.ndarray, bra
     return replace(family, range=span)
 
 
-def _nearest_wrists(robot: Robot, q: np.ndarray, q_ref: np.ndarray) -> np.ndarray:
+def _nearest_wrists(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
     """Rows (n, 6) with an aligned wrist moved along their line to the member nearest to the reference."""
     for row in np.flatnonzero(np.abs(bend_of_wrist(robot, q)) < SOLVES_RAD):
         on_line, direction = wrist_line(robot, q[row])
@@ -185,7 +184,7 @@ def _nearest_wrists(robot: Robot, q: np.ndarray, q_ref: np.ndarray) -> np.ndarra
     return q
 
 
-def _tangent(robot: Robot, q: np.ndarray, joint: int) -> np.ndarray:
+def _tangent(robot: Robot, q: Reals, joint: int) -> Reals:
     """Joint rates that leave the tool at rest while the free joint turns at rate 1: the wrist undoes its rotation."""
     spin = jacobian(robot, q)[3:]
     direction = np.zeros(6)
@@ -195,7 +194,7 @@ def _tangent(robot: Robot, q: np.ndarray, joint: int) -> np.ndarray:
     return direction
 
 
-def _range(family: Family, grid: np.ndarray) -> np.ndarray:
+def _range(family: Family, grid: Reals) -> Reals:
     """Ends of the connected part within the limits around q0, by the grid and bisection."""
     joint = FREE_JOINT[family.kind]
     steps = grid - family.q0[joint]

@@ -12,6 +12,7 @@ import numpy as np
 from er3a.errors import ShapeError
 from er3a.geometry.transforms import as_floats
 from er3a.kinematics.chain import JOINTS, constant_links
+from er3a.numerics.arrays import Reals
 from er3a.numerics.fast_math import LARGEST_ANGLE, cos_sin
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
@@ -20,7 +21,7 @@ BLOCK = 64
 _COS, _SIN = 12, 13  # rows of scratch memory behind the 3 x 4 entries of a block of poses
 
 
-def forward(robot: Robot, q: np.ndarray, frame: int | None = None, out: np.ndarray | None = None) -> np.ndarray:
+def forward(robot: Robot, q: Reals, frame: int | None = None, out: Reals | None = None) -> Reals:
     """Pose of the tool point, or of a frame of the table, for joint angles.
 
     Parameters
@@ -50,7 +51,7 @@ def forward(robot: Robot, q: np.ndarray, frame: int | None = None, out: np.ndarr
     return out
 
 
-def frames(robot: Robot, q: np.ndarray) -> np.ndarray:
+def frames(robot: Robot, q: Reals) -> Reals:
     """Frames that move with each joint, and the tool frame.
 
     Parameters
@@ -68,7 +69,7 @@ def frames(robot: Robot, q: np.ndarray) -> np.ndarray:
     return out
 
 
-def jacobian(robot: Robot, q: np.ndarray) -> np.ndarray:
+def jacobian(robot: Robot, q: Reals) -> Reals:
     """Geometric Jacobian at the tool point, in the base frame, with respect to the manufacturer's angles [1]_.
 
     Parameters
@@ -85,7 +86,7 @@ def jacobian(robot: Robot, q: np.ndarray) -> np.ndarray:
     return out
 
 
-def checked_joints(q: np.ndarray, argument: str = "q") -> np.ndarray:
+def checked_joints(q: Reals, argument: str = "q") -> Reals:
     """Return q as contiguous float array (..., 6), or raise :class:`ShapeError` or :class:`PoseError`."""
     q = np.ascontiguousarray(as_floats(q, argument))
     if q.ndim == 0 or q.shape[-1] != JOINTS:

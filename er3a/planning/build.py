@@ -93,16 +93,7 @@ def _joint_move(command: JointMoveCommand, ends: Mapping[str, Reals]) -> Built:
     start = _start_joints(command.start, command.source, ends)
     if start is None:
         raise command.source.error("start", "a joint move starts at joint angles", "Give them, or an earlier path")
-    move = JointMove(
-        start,
-        command.end,
-        command.duration,
-        start_velocity=command.start_velocity,
-        end_velocity=command.end_velocity,
-        start_acceleration=command.start_acceleration,
-        end_acceleration=command.end_acceleration,
-    )
-    return Built(joints=move)
+    return Built(joints=JointMove(start, command.end, command.duration, command.velocities, command.accelerations))
 
 
 def _joint_sequence(command: JointSequenceCommand) -> Built:
@@ -196,7 +187,7 @@ def _blends(sizes: Reals, wanted: float | None) -> Reals:
 def _slot(robot: Robot, name: str | None, source: Source) -> int | None:
     if name is None:
         return None
-    labels = branch_labels(robot)
+    labels: tuple[str, ...] = branch_labels(robot)
     if name not in labels:
         raise source.error("start_branch", f"this robot has no branch '{name}'", f"Known: {'; '.join(labels)}")
     return labels.index(name)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.numerics.arrays import Reals
-from er3a.planning.sequences import Times
+from er3a.planning.profiles import Ends, Times
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Start:
 
     Attributes
     ----------
-    branch : name of the branch to begin on; only with a pose
+    branch : code of the branch to begin on (:mod:`er3a.kinematics.configuration`); only with a pose
     """
 
     joints: Reals | None = None
@@ -52,16 +52,14 @@ class JointMoveCommand(_Command):
 
     Attributes
     ----------
-    start_velocity, end_velocity : (6,), rad/s, or 0; start_acceleration, end_acceleration : (6,), rad/s^2, or 0
+    velocities, accelerations : at start and end, (6,) in rad/s and rad/s^2, or 0
     """
 
     start: Start
     end: Reals
     duration: float
-    start_velocity: Reals | float = 0.0
-    end_velocity: Reals | float = 0.0
-    start_acceleration: Reals | float = 0.0
-    end_acceleration: Reals | float = 0.0
+    velocities: Ends = (0.0, 0.0)
+    accelerations: Ends = (0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)

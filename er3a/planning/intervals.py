@@ -11,6 +11,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from er3a.findings import Finding
 from er3a.kinematics.inverse import inverse
+from er3a.kinematics.solutions import Unsolved
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.numerics.arrays import Reals
 from er3a.planning.followed import Followed
@@ -53,7 +54,7 @@ class TooFast:
 class OutOfReach:
     """No branch reaches the pose; per side of the arm, why."""
 
-    reasons: tuple[str, ...]
+    reasons: tuple[Unsolved, ...]
     code: Literal["out_of_reach"] = "out_of_reach"
 
 
@@ -108,17 +109,6 @@ def too_fast(robot: Robot, t: Reals, velocity: Reals, speed: Callable[[Reals], R
             needed, able = np.degrees([robot.speed[j] + most, robot.speed[j]]).tolist()
             found.append(Interval(start, end, TooFast(j + 1, needed, able)))
     return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
-
-
-def beyond_limits(robot: Robot, q: Reals) -> list[AboveLimit | BelowLimit]:
-    """Which limits joint angles (6,) in rad leave."""
-    found: list[AboveLimit | BelowLimit] = []
-    for j, reached in enumerate(np.degrees(q).tolist()):
-        if q[j] - robot.upper[j] > LIMIT_TOLERANCE:
-            found.append(AboveLimit(j + 1, reached, float(np.degrees(robot.upper[j]))))
-        if robot.lower[j] - q[j] > LIMIT_TOLERANCE:
-            found.append(BelowLimit(j + 1, reached, float(np.degrees(robot.lower[j]))))
-    return found
 
 
 def unreachable(followed: Followed) -> list[Interval[OutOfReach]]:

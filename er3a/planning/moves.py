@@ -23,7 +23,7 @@ from scipy.spatial.transform import Rotation
 from er3a.errors import PoseError
 from er3a.geometry.transforms import check_poses
 from er3a.numerics.arrays import Reals
-from er3a.planning.profiles import Rates, one_go, quintic
+from er3a.planning.profiles import Ends, Rates, one_go, quintic
 
 HALF_TURN_TOLERANCE = 1e-9
 
@@ -71,23 +71,18 @@ class JointMove:
     ----------
     start, end : (6,), rad, manufacturer's angles
     duration : s
-    start_velocity, end_velocity : (6,), rad/s, or 0
-    start_acceleration, end_acceleration : (6,), rad/s^2, or 0
+    velocities, accelerations : at start and end, (6,) in rad/s and rad/s^2, or 0
     """
 
     start: Reals
     end: Reals
     duration: float
-    start_velocity: Reals | float = 0.0
-    end_velocity: Reals | float = 0.0
-    start_acceleration: Reals | float = 0.0
-    end_acceleration: Reals | float = 0.0
+    velocities: Ends = (0.0, 0.0)
+    accelerations: Ends = (0.0, 0.0)
 
     def joints(self, t: Reals) -> tuple[Reals, Reals, Reals]:
         """Angles (rad), velocities (rad/s) and accelerations (rad/s^2) at times (...,) in s; each (..., 6)."""
-        velocities = self.start_velocity, self.end_velocity
-        accelerations = self.start_acceleration, self.end_acceleration
-        return quintic(t, self.duration, self.start, self.end, *velocities, *accelerations)
+        return quintic(t, self.duration, self.start, self.end, self.velocities, self.accelerations)
 
 
 @dataclass(frozen=True, eq=False)

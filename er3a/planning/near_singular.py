@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
-from er3a.kinematics.singularity import DeterminantFactors, determinant_factors
+from er3a.kinematics.singularity import TYPES, DeterminantFactors, SingularityType, determinant_factors
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
-
-SingularityType = Literal["wrist", "elbow", "shoulder"]
-TYPES: tuple[SingularityType, ...] = ("wrist", "elbow", "shoulder")
 
 
 @dataclass(frozen=True)

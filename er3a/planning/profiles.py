@@ -15,9 +15,24 @@ from typing import Protocol
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Integers, Reals
 
 Rates = tuple[Reals, Reals, Reals]
+Ends = tuple[Reals | float, Reals | float]
+
+
+@dataclass(frozen=True, eq=False)
+class Times:
+    """When a sequence is at its corners; start and end count as corners.
+
+    Attributes
+    ----------
+    times : (m,), s, rising from 0
+    corner : (m,) int, not falling, from 0 to the last; one that stands twice is a halt there
+    """
+
+    times: Reals
+    corner: Integers
 
 
 def quintic(
@@ -25,10 +40,8 @@ def quintic(
     duration: float,
     start: Reals,
     end: Reals,
-    start_velocity: Reals | float = 0.0,
-    end_velocity: Reals | float = 0.0,
-    start_acceleration: Reals | float = 0.0,
-    end_acceleration: Reals | float = 0.0,
+    velocities: Ends = (0.0, 0.0),
+    accelerations: Ends = (0.0, 0.0),
 ) -> Rates:
     """Polynomial of fifth degree that meets position, velocity and acceleration at both ends [1]_.
 
@@ -36,7 +49,8 @@ def quintic(
     ----------
     t : (...,), s, from 0 to ``duration``
     duration : s, greater than 0
-    start, end : (...,) or (k,), in any unit u; the boundary derivatives in u/s and u/s^2, of the same shape
+    start, end : (...,) or (k,), in any unit u
+    velocities, accelerations : at start and end, in u/s and u/s^2, each of the same shape, or 0
 
     Returns
     -------
@@ -44,8 +58,8 @@ def quintic(
     """
     start, end = np.asarray(start, float), np.asarray(end, float)
     tau = np.asarray(t, float).reshape(np.shape(t) + (1,) * start.ndim) / duration
-    v0, v1 = np.asarray(start_velocity) * duration, np.asarray(end_velocity) * duration
-    a0, a1 = np.asarray(start_acceleration) * duration**2, np.asarray(end_acceleration) * duration**2
+    v0, v1 = (np.asarray(velocity) * duration for velocity in velocities)
+    a0, a1 = (np.asarray(acceleration) * duration**2 for acceleration in accelerations)
     # What the cubic, quartic and quintic terms have to add to the parabola of the start values.
     position, velocity, acceleration = end - start - v0 - a0 / 2, v1 - v0 - a0, a1 - a0
     c3 = 10 * position - 4 * velocity + acceleration / 2

@@ -15,11 +15,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import PathError
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.arrays import Flags, Reals
 from er3a.planning.arcs import Arc
 from er3a.planning.curves import GAUSS_POINTS, GAUSS_WEIGHTS, POWERS, Curve, joining, straight
 from er3a.planning.moves import Line
-from er3a.planning.profiles import FromRestToRest, Rates, TimeLaw, Timetable
+from er3a.planning.profiles import FromRestToRest, Rates, TimeLaw, Times, Timetable
 from er3a.planning.rotation_curves import spin
 
 TURN_LENGTH = 0.1  # m per rad
@@ -145,20 +145,6 @@ class JointSequence:
         q, dq, ddq = self.curve(progress)
         speed, acceleration = speed[..., None], acceleration[..., None]
         return q, dq * speed, ddq * speed**2 + dq * acceleration
-
-
-@dataclass(frozen=True, eq=False)
-class Times:
-    """When a sequence is at its corners; start and end count as corners.
-
-    Attributes
-    ----------
-    times : (m,), s, rising from 0
-    corner : (m,) int, not falling, from 0 to the last; one that stands twice is a halt there
-    """
-
-    times: Reals
-    corner: Integers
 
 
 @dataclass(frozen=True, eq=False)

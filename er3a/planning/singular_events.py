@@ -19,9 +19,9 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.signal import find_peaks
 
-from er3a.kinematics.singularity import determinant_factors
+from er3a.kinematics.singularity import TYPES, SingularityType, determinant_factors
 from er3a.numerics.arrays import Flags, Reals
-from er3a.planning.near_singular import TYPES, NearSingular, SingularityType, factor_of
+from er3a.planning.near_singular import NearSingular, factor_of
 from er3a.robots.robot import Robot
 
 ON_SET = 1e-9  # rad or m: this near counts as on the singular set

@@ -10,13 +10,13 @@ from er3a.errors import PoseError
 from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward, jacobian
-from er3a.kinematics.singularity import determinant_factors
-from er3a.pipeline.messages.say import say
+from er3a.kinematics.singularity import TYPES, determinant_factors
+from er3a.kinematics.solutions import WristTooFar
 from er3a.planning.arcs import arc
 from er3a.planning.follow import follow
 from er3a.planning.intervals import BelowLimit, out_of_limits, too_fast, unreachable
 from er3a.planning.moves import JointMove, line
-from er3a.planning.near_singular import TYPES, NearSingular, factor_of
+from er3a.planning.near_singular import NearSingular, factor_of
 from er3a.planning.sequences import segment_path
 from er3a.planning.singular_events import singular_events
 from er3a.robots.joint_limits import nearest_equivalent, within
@@ -164,7 +164,7 @@ def test_unreachable_stretch_ends_where_the_stretched_arm_ends(robot):
     followed = follow(robot, way, GRID)
     (interval,) = unreachable(followed)
     assert interval.end == 1.0
-    assert "too far from axis 2" in say(interval.cause)
+    assert any(isinstance(reason.why, WristTooFar) for reason in interval.cause.reasons)
     inside, outside = way.progress(np.array([interval.start - 1e-6, interval.start + 1e-6]))[0]
     assert np.isfinite(followed.joints_at(np.array([inside]))).all()
     assert np.isnan(follow(robot, line(way.poses(outside), way.poses(1.0), 1.0), GRID).q).all()

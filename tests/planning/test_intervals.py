@@ -7,8 +7,8 @@ import pytest
 
 from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import transform
+from er3a.kinematics.solutions import WristTooFar
 from er3a.kinematics.wrist_partitioned import solve_slots
-from er3a.pipeline.messages.say import say
 from er3a.planning.arcs import arc
 from er3a.planning.follow import follow
 from er3a.planning.intervals import AboveLimit, TooFast, out_of_limits, too_fast, unreachable
@@ -71,4 +71,4 @@ def test_short_stretch_out_of_reach_between_check_points_is_found():
     assert y[0] == pytest.approx(-y[1], abs=1e-9)
     reach = inside - 0.0785  # the wrist centre's greatest distance from axis 1 at this height
     assert y[1] == pytest.approx(np.sqrt(2 * 2e-5 / (1 / path.radius - 1 / reach)), rel=1e-3)
-    assert "mm too far" in say(interval.cause)
+    assert any(isinstance(reason.why, WristTooFar) for reason in interval.cause.reasons)

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
+from er3a.pipeline.messages.kinematics import SINGULARITIES  # noqa: F401
 from er3a.pipeline.messages.language import N_
-from er3a.pipeline.messages.say import joined, say, sentence
+from er3a.pipeline.messages.say import joined, listed, say, sentence
 from er3a.planning.avoidance import StrategyName, findings
 from er3a.planning.intervals import AboveLimit, BelowLimit, OutOfReach, TooFast
-from er3a.planning.near_singular import SingularityType
 from er3a.planning.timing import MustStandStill, NoTimeLawFound, ToppraMissing
 
-SINGULARITIES: dict[SingularityType, str] = {
-    "wrist": N_("wrist"),
-    "elbow": N_("elbow"),
-    "shoulder": N_("shoulder"),
-}
 STRATEGIES: dict[StrategyName, str] = {
     "slow": N_("Keep the path and slow down"),
     "branch": N_("Change to another solution of the arm first"),
@@ -45,7 +40,7 @@ def _(found: TooFast) -> str:
 
 @say.register
 def _(found: OutOfReach) -> str:
-    return joined(found.reasons)
+    return joined(listed(found.reasons))
 
 
 @say.register

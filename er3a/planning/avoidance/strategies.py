@@ -25,9 +25,8 @@ from er3a.planning.avoidance.singular_segment import Avoidance, SingularSegment,
 from er3a.planning.avoidance.slow_down import slow
 from er3a.planning.avoidance.stop_before import stop
 from er3a.planning.avoidance.via_point import shifted_via, tilted_via
-from er3a.planning.intervals import AboveLimit, BelowLimit, beyond_limits
 from er3a.planning.timing import Timed, TimingError
-from er3a.robots.joint_limits import within
+from er3a.robots.joint_limits import LimitsExceeded, limits_exceeded
 
 STRATEGIES: dict[StrategyName, Strategy] = {
     "slow": slow,
@@ -42,7 +41,7 @@ ARRIVED = 1e-3, np.radians(0.1)  # m and rad from the path's end
 ON_PATH = 1e-6, np.radians(1e-4)
 OVER = 1e-6  # relative, by which rounding may exceed a limit
 
-NotUsable = NotPossible | PathNotFinished | EndsOffPath | AboveLimit | BelowLimit | SpeedExceeded | AccelerationExceeded
+NotUsable = NotPossible | PathNotFinished | EndsOffPath | LimitsExceeded | SpeedExceeded | AccelerationExceeded
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,9 +124,9 @@ def _tried(segment: SingularSegment, name: StrategyName) -> StrategyResult:
         reasons.append(PathNotFinished(found.done))
     elif left > ARRIVED[0] or twisted > ARRIVED[1]:
         reasons.append(EndsOffPath(left * 1000, float(np.degrees(twisted))))
-    if not within(robot, motion.q).all():
-        worst = np.argmax(np.maximum(motion.q - robot.upper, robot.lower - motion.q).max(axis=1))
-        reasons += beyond_limits(robot, motion.q[worst])
+    worst = np.argmax(np.maximum(motion.q - robot.upper, robot.lower - motion.q).max(axis=1))
+    if exceeded := limits_exceeded(robot, motion.q[worst]):
+        reasons.append(exceeded)
     if speed > 1 + OVER:
         reasons.append(SpeedExceeded(speed))
     if acceleration > 1 + OVER:

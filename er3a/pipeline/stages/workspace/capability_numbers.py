@@ -10,6 +10,7 @@ import pandas as pd
 
 from er3a.errors import NotWristPartitionedError
 from er3a.kinematics.configuration import branch_labels
+from er3a.pipeline.messages.kinematics import BRANCHES, say
 from er3a.pipeline.messages.language import N_, said
 from er3a.pipeline.study import CapabilitySettings
 from er3a.robots.robot import Robot
@@ -45,7 +46,7 @@ def can_do(robot: Robot, settings: CapabilitySettings, cell: float) -> CanDo:
     try:
         arm, roll = section_arm(robot), roll_of(robot, settings.rolls)
     except NotWristPartitionedError as error:
-        reason = said("it needs the closed-form inverse, and {lacks}", lacks=error.property_missing)
+        reason = said("it needs the closed-form inverse, and {lacks}", lacks=say(error.property_missing))
         empty = {"capability": pd.DataFrame(columns=_CELLS, dtype=float)}
         empty["places"] = pd.DataFrame(columns=_PLACES, dtype=float)
         none = {"computed": False, "reason": reason}
@@ -153,7 +154,7 @@ def _placement(robot: Robot, settings: CapabilitySettings, roll: Roll, cell: flo
 
 
 def _listed(robot: Robot, task: Task, places: Places, chosen: Chosen, agile: float) -> list[dict[str, Any]]:
-    labels = branch_labels(robot)
+    labels = [BRANCHES[label] for label in branch_labels(robot)]
     return [
         {
             "centre_m": places.centre[row].tolist(),

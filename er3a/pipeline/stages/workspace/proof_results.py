@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from er3a.errors import NotWristPartitionedError
+from er3a.pipeline.messages.kinematics import say
 from er3a.pipeline.messages.language import N_, said
 from er3a.robots.robot import Robot
 from er3a.workspace.blocks import Blocks, blocks_of, mesh, pockets
@@ -70,7 +71,7 @@ def prove_robot(robot: Robot, most_cells: int, points: int, seed: int) -> Proven
     try:
         arm = section_arm(robot)
     except NotWristPartitionedError as error:
-        return _prove_general(robot, most_cells, points, seed, error.property_missing)
+        return _prove_general(robot, most_cells, points, seed, say(error.property_missing))
     section = SectionMap(prove(arm, TARGET, int((1 - VOID_SHARE) * most_cells)))
     section = _about_voids(arm, section, int(VOID_SHARE * most_cells))
     estimate = estimate_volume(arm, section, arm.reach, arm.heights, points, seed)
