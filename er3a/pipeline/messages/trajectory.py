@@ -34,7 +34,7 @@ FIGURES = {
     "velocity_check": N_("Velocity check, greatest error"),
     "characteristic_length": N_("Characteristic length of the Jacobian"),
 }
-KINDS = {
+KINDS: dict[PathKind, str] = {
     "joint": N_("joint move"),
     "joint_sequence": N_("joint moves in sequence"),
     "line": N_("straight line"),
@@ -42,7 +42,7 @@ KINDS = {
     "sequence": N_("lines and arcs in sequence"),
     "table": N_("path from a table"),
 }
-STRATEGIES = {
+STRATEGIES: dict[StrategyName, str] = {
     "slow": N_("slow down on the path"),
     "branch": N_("another solution of the arm first"),
     "via_shift": N_("via point, tool point shifted"),
@@ -73,7 +73,7 @@ def strategy_word(name: StrategyName) -> str:
 
 def path_text(path: PathSummary) -> str:
     """Where a path is singular or has faults, or that it has none."""
-    collisions = listed(path.collisions)
+    collisions = [say(part) for part in path.collisions]
     if not collisions:
         return _apart_from_collisions(path)
     if path.verdict != "collides":
@@ -86,17 +86,17 @@ def _apart_from_collisions(path: PathSummary) -> str:
     if path.unreachable:
         return joined(map(_when, path.unreachable))
     if faults := path.out_of_limits or path.too_fast:
-        return joined([*listed(faults), *listed(path.singularities)])
-    met = listed(event for event in path.singularities if event.crossing)
+        return joined([*map(say, faults), *map(say, path.singularities)])
+    met = [say(event) for event in path.singularities if event.crossing]
     if path.in_joint_space:
         if not met:
             return sentence("path.no_fault", "no fault")
         harmless = "passes singular poses ({places}), which a joint move does without harm"
         return sentence("path.harmless", harmless, places=joined(met))
     if met or path.jumps:
-        return joined([*met, *listed(path.jumps), _speeds(path.joint_speed_bounded)])
+        return joined([*met, *map(say, path.jumps), _speeds(path.joint_speed_bounded)])
     if path.singularities:
-        return joined(listed(path.singularities))
+        return joined(map(say, path.singularities))
     return sentence("path.safe", "no singular pose near, within limits and reach")
 
 

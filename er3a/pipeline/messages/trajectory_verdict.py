@@ -6,7 +6,7 @@ from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.say import counted, joined, say, sentence, word
 from er3a.pipeline.stages.trajectory.model import PathCounts, PathVerdict
 
-VERDICTS = {
+VERDICTS: dict[PathVerdict, str] = {
     "unreachable": N_("unreachable"),
     "leaves limits": N_("leaves limits"),
     "collides": N_("collides"),

@@ -76,8 +76,12 @@ class AvoidanceTask:
         meets = motion.followed is not None and any(event.crossing for event in found.events)
         chosen = best(free, meets)
         tried = tuple(_tried(result, *met.get(result.name, (None, None))) for result in results)
-        tables = list(self._tables(motion, results, quickest))
-        return Avoided(tried, chosen and chosen.name, quickest and quickest.duration, AvoidanceRows.stacked(tables))
+        return Avoided(
+            tried=tried,
+            chosen=chosen.name if chosen else None,
+            fastest_s=quickest.duration if quickest else None,
+            rows=AvoidanceRows.stacked(self._tables(motion, results, quickest)),
+        )
 
     def _joint_move(self, motion: Motion, found: Judgement) -> tuple[Timed | None, list[StrategyResult]]:
         """Fastest time law; slowing down is the only strategy that a joint move can need."""
@@ -158,8 +162,12 @@ def _quickest(segment: SingularSegment) -> Timed | None:
 
 def _tried(result: StrategyResult, meets: PairOverlaps | None, clearance_mm: float | None) -> TriedStrategy:
     reasons = (*result.reasons, meets) if meets else result.reasons
-    cost = result.cost
-    motion = cost and StrategyMotion(
+    motion = _motion(result.cost, clearance_mm) if result.cost else None
+    return TriedStrategy(result.name, motion is not None and not reasons, reasons, motion)
+
+
+def _motion(cost: Cost, clearance_mm: float | None) -> StrategyMotion:
+    return StrategyMotion(
         done_ratio=cost.done,
         max_deviation_mm=float(cost.distance.max() * 1000),
         max_deviation_deg=float(np.degrees(cost.angle.max())),
@@ -171,7 +179,6 @@ def _tried(result: StrategyResult, meets: PairOverlaps | None, clearance_mm: flo
         max_joint_acceleration_ratio=cost.acceleration_ratio,
         clearance_mm=clearance_mm,
     )
-    return TriedStrategy(result.name, motion is not None and not reasons, reasons, motion)
 
 
 def _greatest_deg(values: Reals) -> tuple[float, ...]:

@@ -10,7 +10,7 @@ from er3a.collision.bodies import Bodies, can_measure
 from er3a.files.path_file import load_paths
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
-from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.results import Figure, Status, Verdict
 from er3a.pipeline.stages.trajectory.avoidance_results import AvoidanceTask, speed_ratio
 from er3a.pipeline.stages.trajectory.collisions import Surroundings, clearance_rows, measured
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
@@ -129,21 +129,20 @@ def _verdict(paths: list[PathSummary]) -> Verdict[AllSafe | SomeUnsafe | NoneSaf
     def named(verdict: PathVerdict) -> tuple[str, ...]:
         return tuple(path.name for path in paths if path.verdict == verdict)
 
-    counts = {
-        "paths": len(paths),
-        "safe": len(named("safe")),
-        "unreachable": named("unreachable"),
-        "leaves_limits": named("leaves limits"),
-        "collides": named("collides"),
-        "too_fast": named("too fast"),
-        "singular": named("singular"),
-        "near_singular": named("near-singular"),
-    }
-    if not counts["safe"]:
-        return Verdict("fail", NoneSafe(**counts))
-    if counts["safe"] < len(paths):
-        return Verdict("caution", SomeUnsafe(**counts))
-    return Verdict("pass", AllSafe(**counts))
+    safe = len(named("safe"))
+    finding = AllSafe if safe == len(paths) else SomeUnsafe if safe else NoneSafe
+    status: Status = "pass" if safe == len(paths) else "caution" if safe else "fail"
+    counts = finding(
+        paths=len(paths),
+        safe=safe,
+        unreachable=named("unreachable"),
+        leaves_limits=named("leaves limits"),
+        collides=named("collides"),
+        too_fast=named("too fast"),
+        singular=named("singular"),
+        near_singular=named("near-singular"),
+    )
+    return Verdict(status, counts)
 
 
 def _figures(paths: list[PathSummary], length: float, measured: bool, assumed: bool) -> tuple[Figure, ...]:

@@ -60,20 +60,21 @@ def _floor(ax: Axes, points: Reals) -> None:
     high = np.ceil(np.maximum(points.max(axis=0), 200) / 200) * 200
     lines = [[(x, low[1], 0), (x, high[1], 0)] for x in np.arange(low[0], high[0] + 1, 200)]
     lines += [[(low[0], y, 0), (high[0], y, 0)] for y in np.arange(low[1], high[1] + 1, 200)]
-    ax.add_collection(LineCollection(project(np.array(lines, float)), colors=GRID, linewidths=0.7, zorder=0))
+    ax.add_collection(LineCollection(list(project(np.array(lines, float))), colors=GRID, linewidths=0.7, zorder=0))
     corner = np.array([low[0], low[1], 0.0])
     for k, name in enumerate("xyz"):
         tip = corner + 200.0 * np.eye(3)[k]
         ax.plot(*project(np.stack([corner, tip])).T, color=BODY, linewidth=1.6, zorder=1)
         label = name if k else tr("x (squares: 200 mm)")
-        ax.text(*project(corner + 235.0 * np.eye(3)[k]), label, fontsize=8, color=MUTED, ha="center", va="center")
+        x, y = project(corner + 235.0 * np.eye(3)[k])
+        ax.text(x, y, label, fontsize=8, color=MUTED, ha="center", va="center")
 
 
 def _coloured(ax: Axes, points: Reals, condition: Reals) -> None:
     segments = np.stack([points[:-1], points[1:]], axis=1)
     known = ~np.isnan(condition[:-1])
-    ax.add_collection(LineCollection(segments[~known], colors=MUTED, linewidths=2, linestyles=":", zorder=3))
-    lines = LineCollection(segments[known], cmap=COLOURS, norm=CONDITION_SCALE, linewidths=4, zorder=4)
+    ax.add_collection(LineCollection(list(segments[~known]), colors=MUTED, linewidths=2, linestyles=":", zorder=3))
+    lines = LineCollection(list(segments[known]), cmap=COLOURS, norm=CONDITION_SCALE, linewidths=4, zorder=4)
     lines.set_array(np.minimum(condition[:-1][known], 1e12))
     lines.set_rasterized(True)
     ax.add_collection(lines)

@@ -5,7 +5,7 @@ Layout is fixed, so that matplotlib draws each figure once.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -34,7 +34,7 @@ from er3a.robots.robot import Robot
 
 WIDTHS = (3.2, 2.8, 2.4, 2.0, 1.6, 1.2)  # so that curves that coincide all show
 NEAR_LIMIT_DEG = 20.0
-EVENT_STYLES = {True: "-", False: ":"}
+EVENT_STYLES: dict[bool, Literal["-", ":"]] = {True: "-", False: ":"}
 TYPE_COLOURS = {"wrist": COLOURS[4], "elbow": COLOURS[2], "shoulder": COLOURS[3]}
 LEFT, BOTTOM, TOP = 0.055, 0.07, 0.925
 COLUMNS, GAP = (0.275, 0.275, 0.265), 0.06
@@ -48,7 +48,7 @@ class PathFigure:
     """
 
     def __init__(self) -> None:
-        self.figure = Figure(figsize=(13.2, 7.0), layout="none")
+        self.figure = Figure(figsize=(13.2, 7.0), layout="none")  # type: ignore[arg-type]  # the stubs lack it
         self.joints = [self._axes(0, row) for row in range(3)]
         self.measures = [self._axes(1, row) for row in range(3)]
         self.effort = self._axes(2, 2)
@@ -97,8 +97,8 @@ def _clear(ax: Axes) -> None:
     """Take a path's curves out of axes, and leave their ticks."""
     for artist in (*ax.lines, *ax.collections, *ax.patches, *ax.texts):
         artist.remove()
-    if ax.get_legend() is not None:
-        ax.get_legend().remove()
+    if legend := ax.get_legend():
+        legend.remove()
     ax.relim()
     ax.margins(0.05)
     ax.autoscale(True)
@@ -150,7 +150,7 @@ def _logarithmic(ax: Axes, low: float, high: float) -> None:
     decades = np.arange(np.ceil(np.log10(low) - 1e-9), np.floor(np.log10(high) + 1e-9) + 1)
     ticks = 10.0 ** (decades if len(decades) < 6 else decades[::2])
     ax.yaxis.set_minor_locator(NullLocator())
-    ax.yaxis.set_major_locator(FixedLocator(ticks))
+    ax.yaxis.set_major_locator(FixedLocator(ticks.tolist()))
     ax.yaxis.set_major_formatter(lambda value, _: f"{value:.10g}" if value < 1e5 else f"1e{round(np.log10(value))}")
 
 
@@ -170,7 +170,7 @@ def _effort(ax: Axes, path: PathSummary, rows: Checks, motions: AvoidanceRows) -
     for name, colour, label in ((path.strategy, MODEL, tr("repaired")), (FASTEST, MUTED, tr("at its fastest"))):
         part = motions.take(motions.strategy == name)
         if len(part):
-            ax.plot(part.t_s / part.t_s[-1], part.speed_ratio, color=colour, label=label, linewidth=1.3)
+            ax.plot(part.t_s / (part.t_s[-1] or np.nan), part.speed_ratio, color=colour, label=label, linewidth=1.3)
             shown.append(part.speed_ratio)
     ax.axhline(1.0, color=INK, linewidth=1, linestyle="--")
     size = np.concatenate(shown)
@@ -182,7 +182,7 @@ def _effort(ax: Axes, path: PathSummary, rows: Checks, motions: AvoidanceRows) -
     _key(ax, "upper left")
 
 
-def _key(ax: Axes, corner: str) -> None:
+def _key(ax: Axes, corner: Literal["upper left", "lower left"]) -> None:
     ax.legend(loc=corner, ncols=3, fontsize=8, handlelength=1.2, columnspacing=1.0, borderpad=0.1)
 
 
@@ -212,7 +212,7 @@ def _cut(ax: Axes, values: Reals) -> None:
 
 def _shades(path: PathSummary) -> list[tuple[tuple[Stretch[Any], ...], str, float, str]]:
     """Stretches that are wrong, with the colour, opacity and name of their shade."""
-    shades = [
+    shades: list[tuple[tuple[Stretch[Any], ...], str, float, str]] = [
         (path.out_of_limits, VERDICTS["caution"], 0.16, tr("outside a joint limit")),
         (path.too_fast, VERDICTS["fail"], 0.14, tr("joint too fast")),
         (path.unreachable, INK, 0.14, tr("not reachable")),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TypeVar
+from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -32,7 +32,6 @@ from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot
 
 Rows = Checks | AvoidanceRows
-RowsT = TypeVar("RowsT", Checks, AvoidanceRows)
 
 STAGE = "trajectory"
 PAUSE = 1.0  # s between two paths
@@ -52,7 +51,7 @@ CURVES = {
 SHOWN_S = rr.TimeRange(
     start=rr.TimeRangeBoundary.cursor_relative(seconds=-4), end=rr.TimeRangeBoundary.cursor_relative(seconds=12)
 )
-LEVELS: dict[PathVerdict, str] = {
+LEVELS: dict[PathVerdict, rr.TextLogLevel] = {
     "safe": rr.TextLogLevel.INFO,
     "near-singular": rr.TextLogLevel.WARN,
     "singular": rr.TextLogLevel.WARN,
@@ -79,7 +78,7 @@ def record(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
             else:
                 rows = checks.take(checks.path == path.name)
                 _announce(stream, robot, path, rows, start)
-            _run(stream, robot, _frames(rows), start, MODEL if repaired else HIGHLIGHT)
+            _run(stream, robot, rows.take(_frames(rows)), start, MODEL if repaired else HIGHLIGHT)
 
 
 def _layout(robot: Robot, checks: Checks) -> rrb.Horizontal:
@@ -130,18 +129,19 @@ def _view(robot: Robot, checks: Checks) -> rrb.Spatial3DView:
     reached = checks.q_deg[checks.reachable][::SKELETON_EVERY]
     points = np.concatenate([checks.xyz_mm / 1000, *(skeleton(robot, np.radians(q)) for q in reached)])
     centre = (points.min(axis=0) + points.max(axis=0)) / 2
-    distance = 0.85 * max(np.linalg.norm(np.ptp(points, axis=0)), 2 * size_of(robot))
+    distance = 0.85 * max(float(np.linalg.norm(np.ptp(points, axis=0))), 2 * size_of(robot))
     eye = rrb.EyeControls3D(
         kind="Orbital", position=centre + distance * EYE_DIRECTION, look_target=centre, eye_up=[0, 0, 1]
     )
     return rrb.Spatial3DView(origin="/", contents=[ARM, f"/{STAGE}/**"], name="Arm and path", eye_controls=eye)
 
 
-def _frames(rows: RowsT) -> RowsT:
-    """Rows at no more than FRAMES_PER_SECOND, ends and closest passes kept."""
+def _frames(rows: Rows) -> Flags:
+    """Which rows to show: no more than FRAMES_PER_SECOND, ends and closest passes kept."""
     kept = np.concatenate([[True], np.diff(np.floor(rows.t_s * FRAMES_PER_SECOND)) > 0])
     kept[-1] = True
-    return rows.take(kept | (rows.condition_number > 1e6))
+    shown: Flags = kept | (rows.condition_number > 1e6)
+    return shown
 
 
 def _announce(stream: rr.RecordingStream, robot: Robot, path: PathSummary, rows: Checks, start: float) -> None:
@@ -151,7 +151,7 @@ def _announce(stream: rr.RecordingStream, robot: Robot, path: PathSummary, rows:
     sentence = f"## {path.name}\n**{verdict}**: {path_text(path)}.\n\n{escaped(path.title)}."
     stream.log(f"{STAGE}/now", rr.TextDocument(sentence, media_type=rr.MediaType.MARKDOWN))
     stream.log(f"{STAGE}/events", rr.TextLog(f"{path.name}: {verdict}", level=LEVELS[path.verdict]))
-    shown = _frames(rows)
+    shown = rows.take(_frames(rows))
     stream.log(f"{STAGE}/path", _line(shown.xyz_mm / 1000, shown.condition_number))
     _ghosts(stream, robot, path, rows)
     _events(stream, path, start)
@@ -191,7 +191,7 @@ def _line(points: Reals, condition: Reals) -> rr.LineStrips3D:
         int
     )
     colours[np.isnan(condition), :3] = rgb(MUTED)
-    strips = np.stack([points[:-1], points[1:]], axis=1)
+    strips: Any = np.stack([points[:-1], points[1:]], axis=1)
     return rr.LineStrips3D(strips, colors=colours[:-1], radii=0.004)
 
 

@@ -132,11 +132,11 @@ def _figure(
 
 def _drawn(path: PathSummary, rows: Checks) -> Checks:
     """The rows that a curve needs: evenly spread ones, those at singular poses, and the greatest speeds."""
-    kept = [np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round()]
-    kept.append(np.array([np.argmin(np.abs(rows.t_s - event.t_s)) for event in path.singularities]))
+    even = np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round()
+    events = [int(np.argmin(np.abs(rows.t_s - event.t_s))) for event in path.singularities]
     speed = np.nan_to_num(rows.speed_ratio)
-    kept.append(np.flatnonzero(speed > 0.5 * speed.max())[:: max(1, len(rows) // DRAWN // 2)])
-    return rows.take(np.unique(np.concatenate(kept).astype(int)))
+    fast = np.flatnonzero(speed > 0.5 * speed.max())[:: max(1, len(rows) // DRAWN // 2)]
+    return rows.take(np.unique(np.concatenate([even, events, fast]).astype(int)))
 
 
 def _faults(path: PathSummary) -> list[list[str]]:
@@ -164,7 +164,7 @@ def _strategies(path: PathSummary) -> list[list[str]]:
     """Rows of the comparison: the programme, each strategy, and the exact path at its fastest."""
     if not path.avoidance:
         return []
-    clearance = _clearance(path.clearance and path.clearance.least_mm)
+    clearance = _clearance(path.clearance.least_mm if path.clearance else None)
     ratios = _ratio(path.max_joint_speed_ratio), _ratio(path.max_joint_acceleration_ratio)
     programmed = ["0", "0", *ratios, clearance, fixed(path.duration_s, 2), tr("the path to be repaired")]
     rows = [[tr("as programmed"), *programmed]]
