@@ -6,10 +6,14 @@ import os
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from er3a.errors import InputError
 from er3a.kinematics.chain import JOINTS, constant_links
+from er3a.kinematics.forward import forward
 from er3a.robots.robot import Robot
+
+Reals = NDArray[np.float64]
 
 BYTES_PER_CELL = 64
 """Peak over sampling and gathering: counts, first blocks, masks, labels and their copies."""
@@ -28,12 +32,12 @@ class Grid:
     section_origin : (2,), m, lowest (rho, z); section_cell : m; section_shape : cells along rho (from the axis) and z
     """
 
-    origin: np.ndarray
+    origin: Reals
     cell: float
     shape: tuple[int, int, int]
-    axis_point: np.ndarray
-    axis: np.ndarray
-    section_origin: np.ndarray
+    axis_point: Reals
+    axis: Reals
+    section_origin: Reals
     section_cell: float
     section_shape: tuple[int, int]
 
@@ -42,7 +46,7 @@ class Grid:
         """Volume of a cell, m^3."""
         return self.cell**3
 
-    def centres(self, indices: np.ndarray) -> np.ndarray:
+    def centres(self, indices: ArrayLike) -> Reals:
         """Centres (N, 3) in m of the cells with indices (N, 3)."""
         return self.origin + (np.asarray(indices) + 0.5) * self.cell
 
@@ -57,8 +61,8 @@ class Bound:
     radius : m, of the ball
     """
 
-    axis_point: np.ndarray
-    axis: np.ndarray
+    axis_point: Reals
+    axis: Reals
     height: float
     offset: float
     radius: float
@@ -120,18 +124,24 @@ def make_grid(robot: Robot, cells_across: int) -> Grid:
     )
 
 
+def shoulder_of(robot: Robot, grid: Grid) -> Reals:
+    """The point of axis 1 at the height of joint 2: (3,), m."""
+    joint_2 = forward(robot, np.zeros(JOINTS), frame=1)[:3, 3]
+    return grid.axis_point + ((joint_2 - grid.axis_point) @ grid.axis) * grid.axis
+
+
 def memory_budget() -> int:
     """Bytes that a grid may take: half of the machine's memory."""
     return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2
 
 
-def _shape(half: np.ndarray, cells_across: int) -> np.ndarray:
+def _shape(half: Reals, cells_across: int) -> NDArray[np.int64]:
     """Cells along each side of a box with the given half sides."""
     cells = np.ceil(cells_across * half / half.max() * (1 - _MARGIN / 10))
     return np.minimum(cells, cells_across).astype(np.int64)
 
 
-def _check_memory(half: np.ndarray, cells_across: int) -> None:
+def _check_memory(half: Reals, cells_across: int) -> None:
     budget = memory_budget()
     needed = int(_shape(half, cells_across).prod()) * BYTES_PER_CELL
     if needed <= budget:

@@ -2,7 +2,7 @@
 
 *uniform*: the counter is (sample within the block, block), the key is the seed, and the four words of one draw give
 six numbers of 21 bits (steps below 0.0002 deg for a full turn). So the joint vector of sample n of block b depends on
-nothing else: not on what was drawn before it, nor on how blocks are shared out among processes.
+nothing else: not on what was drawn before it, nor on which process draws which block.
 
 *sobol*: the samples of all blocks, numbered through, are points of one Sobol' sequence (:mod:`.sobol`), shifted at
 random.
@@ -15,13 +15,20 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from er3a.kinematics.chain import JOINTS
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 from er3a.sampling.sobol import fill_sobol, shifted_directions
+
+Sampling = Literal["uniform", "sobol"]
+Integers = NDArray[np.int64]
+Reals = NDArray[np.float64]
+Singles = NDArray[np.float32]
 
 CHUNK = 512
 """Samples that are worked on at a time, in rows of an array that stays in the processor's cache."""
@@ -43,28 +50,33 @@ class Draw:
     ----------
     seed : of the study, below 2**63
     samples, blocks : how many in all, and in how many blocks
-    sampling : "uniform" or "sobol"
     """
 
     seed: int
     samples: int
     blocks: int
-    sampling: str = "uniform"
+    sampling: Sampling = "uniform"
 
     @property
-    def sizes(self) -> np.ndarray:
+    def sizes(self) -> Integers:
         """Samples (blocks,) of each block: as even as possible, the first ones one larger."""
         return self.samples // self.blocks + (np.arange(self.blocks) < self.samples % self.blocks)
 
-    def first(self, blocks: np.ndarray) -> np.ndarray:
+    def first(self, blocks: Integers) -> Integers:
         """Number within the run of the first sample of each block."""
         return blocks * (self.samples // self.blocks) + np.minimum(blocks, self.samples % self.blocks)
 
-    def directions(self) -> np.ndarray:
+    def directions(self) -> NDArray[np.uint64]:
         """Direction numbers and shift of the Sobol' sequence; without rows for uniform samples."""
         return shifted_directions(self.seed) if self.sampling == "sobol" else np.empty((0, 0), dtype=np.uint64)
 
-    def joints(self, robot: Robot, blocks: np.ndarray, samples: np.ndarray) -> np.ndarray:
+    def opening_joints(self, robot: Robot, count: int) -> Reals:
+        """Draw the first samples of each block again: (n, 6), rad, about as many of each, ``count`` at most."""
+        wanted = Draw(self.seed, min(count, self.samples), self.blocks).sizes
+        blocks = np.repeat(np.arange(self.blocks), wanted)
+        return self.joints(robot, blocks, np.concatenate([np.arange(size) for size in wanted]))
+
+    def joints(self, robot: Robot, blocks: ArrayLike, samples: ArrayLike) -> Reals:
         """Draw the joint vectors of some samples again.
 
         Parameters

@@ -49,7 +49,7 @@ def border(arm: SectionArm, side_view: bool = False) -> list[BorderArc]:
     """Arcs of the border of the section; none if the arm is no mirror image of itself.
 
     A limited joint 1 is left out of account: what counts is whether any azimuth reaches the ring, or, in a side view,
-    whether the arm reaches the point of its own plane without joint 1, as makers draw it.
+    whether the arm reaches the point of its own plane without joint 1, as manufacturers draw it.
     """
     if not arm.mirrored or arm.inner_low > arm.inner_high:
         return []

@@ -88,7 +88,7 @@ def cavities(section: SectionMap) -> tuple[list[Cavity], Cavity]:
     graph = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(cell), len(cell)))
     _, label = connected_components(graph, directed=False)
     outside = np.unique(label[section.outermost[cell]])
-    share = _empty_share(arcs, proof.empty[cell])
+    share = _empty_ratio(arcs, proof.empty[cell])
     is_open = np.isin(label, outside)
     cells = proof.cells[cell]
     everything = Cavity(False, cells, arcs, share)
@@ -126,7 +126,7 @@ def _across_zero(cell: np.ndarray, arcs: np.ndarray) -> np.ndarray:
     return np.array(pairs, dtype=np.int64).reshape(-1, 2).T
 
 
-def _empty_share(arcs: np.ndarray, empty: np.ndarray) -> np.ndarray:
+def _empty_ratio(arcs: np.ndarray, empty: np.ndarray) -> np.ndarray:
     low = np.maximum(arcs[:, None, 0], empty[..., 0])
     high = np.minimum(arcs[:, None, 1], empty[..., 1])
     return np.nansum(np.maximum(0, high - low), axis=1) / (arcs[:, 1] - arcs[:, 0])

@@ -1,4 +1,4 @@
-"""The proof for any arm of six revolute joints: coarser than the one for spherical wrists, and as right.
+"""The proof for any arm of six revolute joints: coarser than the one for spherical wrists, and equally rigorous.
 
 Random joint vectors fill cells from inside (:mod:`.general_inner`), boxes of joints bound them from outside
 (:mod:`.general_outer`).

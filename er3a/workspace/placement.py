@@ -4,13 +4,13 @@ A lattice of points is asked for all directions of a cone, branch by branch. A b
 are good, which sliding minima tell for all places at once. The lattice only proposes; :mod:`placement_proof` decides.
 
 Criterion: places where one branch serves the whole box come first, then those with the largest least manipulability
-over the box and the cone, which keeps away from singularities; equals by the room to the joint limits. Distance from
-limits is a demand of its own: the task narrows them.
+over the box and the cone, which keeps away from singularities; equals by the distance from the joint limits. That
+distance is a demand of its own too: the task narrows the limits.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from scipy import ndimage
@@ -65,14 +65,14 @@ class Field:
     origin : (3,), m; spacing : (3,), m; shape of the arrays : (nx, ny, nz)
     least : (nx, ny, nz, 8), m^3, least manipulability over the directions by branch, NO where it misses one
     least_any : (nx, ny, nz), the same by the best branch for each direction
-    room : (nx, ny, nz, 8), rad, least distance of joints with less than a full turn from their limits, by branch
+    limit_margin : (nx, ny, nz, 8), rad, least distance of joints with less than a full turn from their limits, by branch
     """
 
     origin: np.ndarray
     spacing: np.ndarray
     least: np.ndarray
     least_any: np.ndarray
-    room: np.ndarray
+    limit_margin: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +83,7 @@ class Places:
     ----------
     centre : (n, 3), m; turned : (n,), whether the box stands turned by 90 deg about z
     slot : (n,), the branch that serves it all, or MIXED
-    least : (n,), m^3, the criterion; room : (n,), rad (NaN with MIXED)
+    least : (n,), m^3, the criterion; limit_margin : (n,), rad (NaN with MIXED)
     proven : (n,), whether all bricks of the lattice in it are proven, by any mix of branches
     """
 
@@ -91,8 +91,12 @@ class Places:
     turned: np.ndarray
     slot: np.ndarray
     least: np.ndarray
-    room: np.ndarray
+    limit_margin: np.ndarray
     proven: np.ndarray
+
+    def rows(self, chosen: np.ndarray) -> Places:
+        """Some of the places."""
+        return Places(*(getattr(self, part.name)[chosen] for part in fields(self)))
 
 
 def lattice_spacing(box: np.ndarray, coarsest: float) -> np.ndarray:
@@ -131,10 +135,12 @@ def survey(robot: Robot, task: Task, roll: Roll, coarsest: float) -> Field:
         & (np.linalg.norm(points - middle, axis=1) <= arm.reach)
     )
     least, least_any = np.full((len(points), SLOTS), NO), np.full(len(points), NO)
-    room = np.zeros((len(points), SLOTS))
+    limit_margin = np.zeros((len(points), SLOTS))
     rotations = tool_rotations(cone_directions(task.axis, task.half_angle), roll)
-    least[asked], least_any[asked], room[asked] = serve(robot, points[asked], rotations, roll)
-    return Field(start, spacing, least.reshape(*shape, SLOTS), least_any.reshape(shape), room.reshape(*shape, SLOTS))
+    least[asked], least_any[asked], limit_margin[asked] = serve(robot, points[asked], rotations, roll)
+    return Field(
+        start, spacing, least.reshape(*shape, SLOTS), least_any.reshape(shape), limit_margin.reshape(*shape, SLOTS)
+    )
 
 
 def serve(robot: Robot, points: np.ndarray, rotations: np.ndarray, roll: Roll):
@@ -146,12 +152,12 @@ def serve(robot: Robot, points: np.ndarray, rotations: np.ndarray, roll: Roll):
 
     Returns
     -------
-    least, least_any, room : (n, 8), (n,), (n, 8), as in :class:`Field`
+    least, least_any, limit_margin : (n, 8), (n,), (n, 8), as in :class:`Field`
     """
     asked, arm = left_to_roll(robot, roll), constants_for_blocks(robot)
     limited = np.flatnonzero(asked.upper - asked.lower < FREE)
     least, least_any = np.full((len(points), SLOTS), np.inf), np.full(len(points), np.inf)
-    room = np.full((len(points), SLOTS), np.inf)
+    limit_margin = np.full((len(points), SLOTS), np.inf)
     alive = np.arange(len(points))
     for direction in rotations:
         if not alive.size:
@@ -167,9 +173,9 @@ def serve(robot: Robot, points: np.ndarray, rotations: np.ndarray, roll: Roll):
             free = np.take_along_axis(free.reshape(len(part), -1, SLOTS), rolled, axis=1)[:, 0]
             least[part] = np.minimum(least[part], value)
             least_any[part] = np.minimum(least_any[part], value.max(axis=1))
-            room[part] = np.fmin(room[part], free)
+            limit_margin[part] = np.fmin(limit_margin[part], free)
         alive = np.flatnonzero(least_any > NO)
-    return least, least_any, np.where(least > NO, room, 0.0)
+    return least, least_any, np.where(least > NO, limit_margin, 0.0)
 
 
 def fitting_places(field: Field, bricks: np.ndarray, box: np.ndarray) -> Places:
@@ -182,10 +188,10 @@ def fitting_places(field: Field, bricks: np.ndarray, box: np.ndarray) -> Places:
     found = [_places(field, bricks, box, False)]
     if abs(box[0] - box[1]) > 1e-9:
         found.append(_places(field, bricks, box[[1, 0, 2]], True))
-    places = Places(*(np.concatenate([getattr(part, key) for part in found]) for key in Places.__annotations__))
-    merit = (-np.round(np.nan_to_num(places.room), 6), -np.round(places.least, 9), places.slot == MIXED)
+    places = Places(*(np.concatenate([getattr(part, column.name) for part in found]) for column in fields(Places)))
+    merit = (-np.round(np.nan_to_num(places.limit_margin), 6), -np.round(places.least, 9), places.slot == MIXED)
     order = np.lexsort((*np.round(places.centre.T, 6), -np.round(places.centre[:, 0], 6), *merit))
-    return Places(*(getattr(places, key)[order] for key in Places.__annotations__))
+    return places.rows(order)
 
 
 def _places(field: Field, bricks: np.ndarray, box: np.ndarray, turned: bool) -> Places:
@@ -194,10 +200,10 @@ def _places(field: Field, bricks: np.ndarray, box: np.ndarray, turned: bool) -> 
     where = np.nonzero(any_branch > NO)
     used = np.flatnonzero((field.least > NO).any(axis=(0, 1, 2)))
     by_slot = np.full((len(where[0]), SLOTS), NO)
-    room = np.zeros((len(where[0]), SLOTS))
+    limit_margin = np.zeros((len(where[0]), SLOTS))
     for slot in used:
         by_slot[:, slot] = _sliding_least(field.least[..., slot], points)[where]
-        room[:, slot] = _sliding_least(field.room[..., slot], points)[where]
+        limit_margin[:, slot] = _sliding_least(field.limit_margin[..., slot], points)[where]
     slot = np.round(by_slot, 9).argmax(axis=1)
     rows = np.arange(len(slot))
     one = by_slot[rows, slot] > NO
@@ -206,7 +212,7 @@ def _places(field: Field, bricks: np.ndarray, box: np.ndarray, turned: bool) -> 
         turned=np.full(len(slot), turned),
         slot=np.where(one, slot, MIXED),
         least=np.where(one, by_slot[rows, slot], any_branch[where]),
-        room=np.where(one, room[rows, slot], np.nan),
+        limit_margin=np.where(one, limit_margin[rows, slot], np.nan),
         proven=_sliding_least(bricks.astype(float), points - 1)[where] > 0,
     )
 

@@ -6,7 +6,7 @@ piece (:mod:`interval_inverse`), or the middle of a piece turns out to be out of
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 from er3a.workspace.directions import Roll, across, left_to_roll, point_tool
 from er3a.workspace.interval_inverse import GOOD, NEVER, SLOTS, branches, holds, misses, theta_ranges
-from er3a.workspace.placement import MIXED, NO, Field, Places, Task
+from er3a.workspace.placement import MIXED, NO, Field, Places, Task, fitting_places, narrowed, survey
 
 PROVEN, REFUTED, UNDECIDED = "proven", "refuted", "undecided"
 _ANSWERS = (UNDECIDED, PROVEN, REFUTED)
@@ -42,6 +42,43 @@ class Chosen:
     branch_proven: list[bool]
     refuted: int
     poses: int
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """Where a box can stand: the lattice, the places on it, and the best of them."""
+
+    field: Field
+    places: Places
+    chosen: Chosen
+
+    @property
+    def best_turns(self) -> Places:
+        """The better of both turns at each centre."""
+        key = np.round((self.places.centre - self.field.origin) / self.field.spacing * 2).astype(np.int64)
+        _, first = np.unique(key, axis=0, return_index=True)
+        return self.places.rows(np.sort(first))
+
+
+def find_places(robot: Robot, task: Task, roll: Roll, coarsest: float, count: int, most_poses: int) -> Placement:
+    """Survey where the box can stand and put the best places to the proof.
+
+    Parameters
+    ----------
+    robot : with its own limits; coarsest : m, about the lattice's spacing
+    count : how many places to choose; most_poses : how many neighbourhoods of poses their proofs may look at
+
+    Raises
+    ------
+    NotWristPartitionedError
+    """
+    robot = narrowed(robot, task.margin)
+    field = survey(robot, task, roll, coarsest)
+    places = fitting_places(field, proven_bricks(robot, task, field, roll), task.box)
+    chosen = choose_places(robot, task, places, roll, count, most_poses)
+    proven = places.proven.copy()
+    proven[[row for row, is_proven in zip(chosen.row, chosen.proven) if is_proven]] = True
+    return Placement(field, replace(places, proven=proven), chosen)
 
 
 def choose_places(robot: Robot, task: Task, places: Places, roll: Roll, count: int, most_poses: int) -> Chosen:

@@ -52,12 +52,12 @@ class Proof:
         return ring_volumes(self.cells)
 
     @property
-    def unfilled_share(self) -> np.ndarray:
+    def unfilled_ratio(self) -> np.ndarray:
         """Share of each ring that is not proven filled, (n,)."""
         return np.nansum(self.unfilled[..., 1] - self.unfilled[..., 0], axis=1) / TURN
 
     @property
-    def empty_share(self) -> np.ndarray:
+    def empty_ratio(self) -> np.ndarray:
         """Share of each ring that is proven empty, (n,)."""
         return np.nansum(self.empty[..., 1] - self.empty[..., 0], axis=1) / TURN
 
@@ -65,7 +65,7 @@ class Proof:
     def bounds(self) -> tuple[float, float]:
         """Bounds of the reached volume, m^3."""
         volumes = self.volumes
-        return float(volumes @ (1 - self.unfilled_share)), float(volumes @ (1 - self.empty_share))
+        return float(volumes @ (1 - self.unfilled_ratio)), float(volumes @ (1 - self.empty_ratio))
 
     @property
     def width(self) -> float:
@@ -96,7 +96,7 @@ def prove(arm: SectionArm, target: float, most_cells: int, across: int = 32, thr
     while len(cells):
         judged = _judge(arm, cells, stances, level, parents, threads)
         looked, boxes = looked + len(cells), boxes + judged.boxes
-        volumes, reached = judged.volumes, 1 - np.stack([judged.unfilled_share, judged.empty_share])
+        volumes, reached = judged.volumes, 1 - np.stack([judged.unfilled_ratio, judged.empty_ratio])
         undecided = volumes * (reached[1] - reached[0])
         split = undecided > _OPEN * volumes
         lower, upper = settled + reached @ volumes

@@ -106,7 +106,7 @@ def stratified_volume(arm: SectionArm, section: SectionMap, points: int, seed: i
     Each point stands for its whole ring (the symmetry about axis 1): what counts is how much of it is reached.
     """
     proof = section.proof
-    volume = proof.volumes * (proof.unfilled_share - proof.empty_share)
+    volume = proof.volumes * (proof.unfilled_ratio - proof.empty_ratio)
     share = np.cumsum(volume) / volume.sum()
     random = np.random.Generator(np.random.Philox(key=seed))
     unit = random.random((points, 2))
@@ -117,7 +117,7 @@ def stratified_volume(arm: SectionArm, section: SectionMap, points: int, seed: i
     half = POINT / 2
     rho = np.maximum(rho, 2 * half)
     looked = judge(arm, np.stack([rho - half, rho + half, z - half, z + half], axis=1))
-    open_before = (proof.unfilled_share - proof.empty_share)[cell]
-    lost = looked.unfilled_share / 2 + looked.empty_share / 2
-    reached = np.clip(1 - proof.empty_share[cell] - lost, 0, None) - (1 - proof.unfilled_share[cell])
+    open_before = (proof.unfilled_ratio - proof.empty_ratio)[cell]
+    lost = looked.unfilled_ratio / 2 + looked.empty_ratio / 2
+    reached = np.clip(1 - proof.empty_ratio[cell] - lost, 0, None) - (1 - proof.unfilled_ratio[cell])
     return proof.bounds[0] + float(volume.sum() * np.clip(reached / open_before, 0, 1).mean())
