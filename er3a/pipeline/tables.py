@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -42,6 +42,7 @@ class Column:
     Attributes
     ----------
     pattern : name in the file; with ``{}`` for a group: what stands there is in ``parts``, or counts from 1
+    lists : whether each row holds a list of real numbers
     """
 
     pattern: str
@@ -49,6 +50,14 @@ class Column:
     unit: str
     dtype: np.dtype
     parts: tuple[str, ...] | None = None
+    lists: bool = False
+
+    @property
+    def arrow_type(self) -> pa.DataType:
+        """How a column is kept in the file."""
+        if self.lists:
+            return pa.list_(pa.float64())
+        return _ARROW_TEXT if self.dtype == object else pa.from_numpy_dtype(self.dtype)
 
     @property
     def is_group(self) -> bool:
@@ -86,6 +95,11 @@ def vector(pattern: str, meaning: str, unit: str = "", *, parts: Iterable[str] =
     return _declared(pattern, meaning, unit, dtype, tuple(parts))
 
 
+def lists(meaning: str, unit: str = "") -> Any:
+    """A column (rows,) with a list of real numbers in each row."""
+    return field(metadata={"column": Column("", meaning, unit, np.dtype(object), lists=True)})
+
+
 def _declared(pattern: str, meaning: str, unit: str, dtype: Any, parts: tuple[str, ...] | None) -> Any:
     return field(metadata={"column": Column(pattern, meaning, unit, np.dtype(dtype), parts)})
 
@@ -115,7 +129,7 @@ class Table:
         for attribute in fields(cls):
             spec: Column = attribute.metadata["column"]
             name = spec.pattern or attribute.name
-            found[attribute.name] = Column(name, spec.meaning, spec.unit, spec.dtype, spec.parts)
+            found[attribute.name] = replace(spec, pattern=name)
         return found
 
     @classmethod
@@ -165,9 +179,8 @@ class Table:
         """Write a Parquet file; equal tables give equal bytes."""
         schema, arrays = [], []
         for name, values, spec in self._flat():
-            kind = _ARROW_TEXT if spec.dtype == object else pa.from_numpy_dtype(spec.dtype)
-            schema.append(pa.field(name, kind, metadata={"unit": spec.unit, "meaning": spec.meaning}))
-            arrays.append(pa.array(np.ascontiguousarray(values), kind))
+            schema.append(pa.field(name, spec.arrow_type, metadata={"unit": spec.unit, "meaning": spec.meaning}))
+            arrays.append(pa.array(np.ascontiguousarray(values), spec.arrow_type))
         pq.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(schema)), file, compression="zstd")
 
     @classmethod
