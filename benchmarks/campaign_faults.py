@@ -13,7 +13,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from small_study import contents, environment, finished, run, run_command
+from testing.small_study import contents, environment, finished, run, run_command
 
 ROBOT = "er3_600"
 BLOCKS = f"results/{ROBOT}/workspace/parts/1-of-1.npz"

@@ -11,9 +11,8 @@ import tempfile
 from pathlib import Path
 from random import Random
 
-from small_study import contents, environment, finished, fresh, run_command
-
 from er3a.pipeline.viewing.viewer import without_statistics
+from testing.small_study import contents, environment, finished, fresh, run_command
 
 KILLS, SEED = 50, 20261120
 LONGEST_S = 40.0  # a kill comes at a moment drawn evenly from this long after each start

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import os
 import statistics
-import sys
 import tempfile
 from pathlib import Path
 
 from er3a.pipeline.study import STAGES, load_study
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from tests.browser import chromium
+from testing import chromium
 
 REPORTS = Path("reports").resolve()
 SCREENS = {"laptop": (1280, 900), "4K": (3840, 2160)}

@@ -5,13 +5,12 @@ The same generators and judgements as the tests', at full size.
 
 from __future__ import annotations
 
-import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import roboticstoolbox as rtb
 
+from benchmarks.campaign_speed import elementary, pinned
 from er3a import load_robot
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
@@ -22,12 +21,8 @@ from er3a.planning.follow import follow
 from er3a.planning.moves import line
 from er3a.planning.singular_events import singular_events
 from er3a.planning.timing import joint_limits
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from campaign_speed import elementary, pinned
-
-from tests.planning.exact_paths import worst_location
-from tests.planning.random_paths import KINDS, NEAR, Found
+from testing.exact_paths import worst_location
+from testing.random_paths import KINDS, NEAR, Found
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 PATHS, LINES, TROUBLED, SEED = 120, 200, 30, 20261120

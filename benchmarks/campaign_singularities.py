@@ -5,17 +5,13 @@ The same generator and judgement as the tests', at full size.
 
 from __future__ import annotations
 
-import sys
 from concurrent.futures import ProcessPoolExecutor
-from pathlib import Path
 
 import numpy as np
 
 from er3a import forward, inverse, load_robot
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from tests.kinematics.arms import pose_errors
-from tests.kinematics.singular_poses import CLASSES, admissible_slots, family_holds, joints_near, tolerance, turned
+from testing.arms import pose_errors
+from testing.singular_poses import CLASSES, admissible_slots, family_holds, joints_near, tolerance, turned
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 POSES, SEED = 10_000, 20261120

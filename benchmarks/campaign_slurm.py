@@ -12,7 +12,8 @@ from pathlib import Path
 
 import psutil
 import yaml
-from small_study import ROOT, STUDY, environment, fresh, run_command
+
+from testing.small_study import ROOT, STUDY, environment, fresh, run_command
 
 ROBOT, CORES, BLOCKS = "er3a_c60", 2, 4
 BLOCK = 10_000_000_000

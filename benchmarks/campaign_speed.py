@@ -21,9 +21,9 @@ from pathlib import Path
 import numpy as np
 import pinocchio
 import roboticstoolbox as rtb
-from campaign_kinematics import pinocchio_model
 from eaik.IK_DH import DhRobot
 
+from benchmarks.campaign_kinematics import pinocchio_model
 from er3a import forward, inverse_batch, jacobian, load_robot, solve
 from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.batch import BatchSolutions

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import statistics
-import sys
 import tempfile
 from pathlib import Path
 
@@ -16,11 +15,9 @@ from er3a.kinematics.singularity import TYPES, characteristic_length, conditioni
 from er3a.pipeline.study import load_study
 from er3a.pipeline.teach.panel import panel_data, write_teach_page
 from er3a.robots.joint_limits import principal
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from tests.browser import chromium
-from tests.browser.test_teach_kinematics import NEAR, SOLVE
-from tests.kinematics.arms import joints_at_random, pose_errors
+from testing import chromium
+from testing.arms import joints_at_random, pose_errors
+from testing.teach_kinematics import NEAR, SOLVE
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 SCREENS = {"phone": (375, 800), "laptop": (1280, 900), "4K": (3840, 2160)}

@@ -25,7 +25,7 @@ CAMPAIGNS = (
     "capability",
     "teach",
     "pages",
-    "plan",
+    "estimate",
     *PARTS,
 )
 
@@ -46,7 +46,7 @@ def main(names: list[str]) -> int:
         return 2
     for name in names or CAMPAIGNS:
         print(f"{name} ...", flush=True)
-        text = import_module(f"campaign_{name}").table()
+        text = import_module(f"benchmarks.campaign_{name}").table()
         if name in PARTS:
             write_part(name, text)
         else:

@@ -81,7 +81,8 @@ class WriteError(Er3aError):
     def __init__(self, file: str | Path, error: OSError):
         self.file = str(file)
         told = os.strerror(error.errno) if error.errno else str(error)
-        super().__init__(f"{_line(str(file))}: can't be written ({told}). Make room or mend the rights, then run again")
+        remedy = "Free disk space or fix the permissions, then run again"
+        super().__init__(f"{_line(str(file))}: can't be written ({told}). {remedy}")
 
 
 def _line(text: str, most: int | None = None) -> str:

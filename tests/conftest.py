@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.small_study import fresh
 from er3a.files.robot_library import load_robot
 from er3a.pipeline.viewing.viewer import without_statistics
 from er3a.robots.robot import Robot
+from testing.small_study import fresh
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 from random import Random
 
 import pytest
-from campaign_fuzz import MEASUREMENTS, PATH_TABLE, SCENE, TARGET_TABLE, TARGETS, judge, run, seeds, unclear
-from mutants import mutant
 
 from er3a.errors import InputError
 from er3a.files.robot_library import ROBOTS
 from er3a.pipeline.check import check_file, check_study
+from testing.file_judge import judge, run, unclear
+from testing.input_files import MEASUREMENTS, PATH_TABLE, SCENE, TARGET_TABLE, TARGETS, seeds
+from testing.mutants import mutant
 
 ROBOT = (ROBOTS / "er3_600.yaml").read_text(encoding="utf-8")
 REACH = (ROBOTS.parent / "manual_refs/er3a_c60/reach.csv").read_text(encoding="utf-8")

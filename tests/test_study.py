@@ -13,7 +13,7 @@ from er3a.errors import InputError
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.kinematics.forward import forward
 from er3a.pipeline.study import STAGES, Study, load_study
-from tests.kinematics.arms import placement
+from testing.arms import placement
 
 ROOT = Path(__file__).resolve().parents[1]
 

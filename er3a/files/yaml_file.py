@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import re
-import stat
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -12,10 +11,10 @@ import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from er3a.errors import InputError
+from er3a.formats.text_file import read_text
 
 Model = TypeVar("Model", bound=BaseModel)
 
-MAX_BYTES = 1_000_000
 MAX_YAML_BYTES = 250_000  # of which the worst takes seconds to read
 
 _FIELD = re.compile(r"([A-Za-z_]\w*(?:\.[\w-]+|\[\d+\])*): ")
@@ -116,26 +115,6 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
         kind = "nothing" if data is None else f"a {type(data).__name__}"
         raise InputError(path, None, f"the top level is {kind}", "Write `key: value` lines there")
     return data
-
-
-def read_text(path: Path, most: int = MAX_BYTES) -> str:
-    """Read a UTF-8 text file of at most so many bytes, or raise :class:`InputError`."""
-    try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):
-            raise InputError(path, None, "not a file", "Check the path")
-        raw = path.read_bytes() if status.st_size <= most else None
-    except FileNotFoundError:
-        raise InputError(path, None, "there is no such file", "Check the path") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(path, None, f"can't be read ({reason})", "Check the path and its permissions") from None
-    if raw is None:
-        raise InputError(path, None, f"larger than {most} bytes", "Input tables are small text files")
-    try:
-        return raw.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError(path, f"byte {error.start}", "not UTF-8 text", "Save the file as UTF-8") from None
 
 
 def parse(model: type[Model], data: dict[str, Any], path: str | Path | None) -> Model:

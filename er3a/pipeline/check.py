@@ -16,7 +16,8 @@ from er3a.files.robot_file import RobotFile
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import SceneFile, load_scene
 from er3a.files.target_file import TargetFile, load_targets
-from er3a.files.yaml_file import read_text, read_yaml
+from er3a.files.yaml_file import read_yaml
+from er3a.formats.text_file import read_text
 from er3a.pipeline.study import Study, load_study
 
 SCHEMAS: dict[str, type[BaseModel]] = {

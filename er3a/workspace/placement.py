@@ -65,7 +65,7 @@ class Field:
     origin : (3,), m; spacing : (3,), m; shape of the arrays : (nx, ny, nz)
     least : (nx, ny, nz, 8), m^3, least manipulability over the directions by branch, NO where it misses one
     least_any : (nx, ny, nz), the same by the best branch for each direction
-    limit_margin : (nx, ny, nz, 8), rad, least distance of joints with less than a full turn from their limits, by branch
+    limit_margin : (nx, ny, nz, 8), rad, least distance from the limits of joints with less than a full turn, by branch
     """
 
     origin: np.ndarray

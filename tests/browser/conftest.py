@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from tests.browser import chromium
+from testing import chromium
 
 
 @pytest.fixture(scope="session")

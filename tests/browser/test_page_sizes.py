@@ -8,7 +8,7 @@ import re
 import pytest
 from selenium.webdriver.common.by import By
 
-from tests.browser import chromium
+from testing import chromium
 from tests.browser.pages import PAGES
 
 

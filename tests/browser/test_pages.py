@@ -8,7 +8,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select
 
 from er3a.files.robot_library import load_robot
-from tests.browser import chromium
+from testing import chromium
 from tests.browser.pages import OVER_ALL, PAGES
 
 

@@ -20,29 +20,11 @@ from er3a.pipeline.study import load_study
 from er3a.pipeline.teach.panel import panel_data, write_teach_page
 from er3a.robots.joint_limits import principal
 from er3a.robots.robot import Robot
-from tests.kinematics.arms import arms, joints_at_random, make_arm, margin, pose_errors
+from testing.arms import arms, joints_at_random, make_arm, margin, pose_errors
+from testing.teach_kinematics import NEAR, SOLVE
 
 POSES, AGREE = 1000, 1e-9
 STUDY = load_study("config/small.yaml")
-NEAR = {"wrist": 0.1, "elbow": 0.1, "shoulder": 0.03}
-
-SOLVE = """
-const [panel, joints, done] = arguments;
-Promise.all([import("er3a/kinematics"), import("er3a/inverse")]).then(([kinematics, inverse]) => {
-  const { table, characteristic_length: length } = panel;
-  const links = kinematics.constantLinks(table);
-  const arm = panel.no_closed_form ? null : inverse.closedForm(table, links);
-  done(joints.map((q) => {
-    const T = kinematics.frames(table, links, q);
-    return {
-      T: T[6],
-      measures: kinematics.conditioning(table, T, length),
-      factors: arm && kinematics.determinantFactors(T, arm.wristInTool),
-      solved: arm && inverse.inverse(table, arm, T[6], q),
-    };
-  }));
-}).catch((error) => done(String(error.stack)));
-"""
 
 REPRESENT = """
 const [poses, done] = arguments;

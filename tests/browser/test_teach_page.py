@@ -19,9 +19,9 @@ from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.pipeline.messages import language
 from er3a.pipeline.study import load_study
-from er3a.pipeline.teach import page as teach_page
+from er3a.pipeline.teach import panel as teach_page
 from er3a.pipeline.teach.words import WORDS
-from tests.kinematics.arms import make_arm, pose_errors
+from testing.arms import make_arm, pose_errors
 
 LARGEST_PAGE = 8_000_000
 SELECT_ALL = Keys.CONTROL + "a" + Keys.NULL

@@ -9,7 +9,7 @@ import pytest
 from selenium.common.exceptions import TimeoutException
 
 from er3a.pipeline.viewing.web_viewer import address, server
-from tests.browser import chromium
+from testing import chromium
 from tests.viewing.pictures import joints_seen
 
 DRAWS_BY_ITSELF = ("use-angle=swiftshader", "enable-unsafe-swiftshader", "window-size=1000,650")

@@ -15,7 +15,7 @@ from er3a.files.robot_writer import write_robot
 from er3a.files.scene_file import SceneFile, load_scene
 from er3a.kinematics.forward import forward
 from er3a.robots.robot import Envelope
-from tests.kinematics.arms import joints_at_random, placement
+from testing.arms import joints_at_random, placement
 
 
 def scene_of(**shapes) -> SceneFile:

@@ -15,8 +15,8 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.robots.joint_limits import nearest_turns, within
-from tests.kinematics.arms import DEG, arms, joints_at_random, joints_within, make_arm, margin, pose_errors
-from tests.kinematics.singular_poses import CLASSES, joints_near, turned
+from testing.arms import DEG, arms, joints_at_random, joints_within, make_arm, margin, pose_errors
+from testing.singular_poses import CLASSES, joints_near, turned
 
 
 def assert_solves(robot, T, solved):

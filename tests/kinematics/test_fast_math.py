@@ -8,7 +8,7 @@ import pytest
 from er3a.kinematics.forward import forward
 from er3a.numerics.fast_math import LARGEST_ANGLE, arctan2, cos_sin
 from er3a.numerics.jit import kernel
-from tests.kinematics.arms import frame_by_hand
+from testing.arms import frame_by_hand
 
 
 @kernel

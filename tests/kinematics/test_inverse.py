@@ -15,7 +15,7 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.robots.joint_limits import limit_reason, nearest_turns
-from tests.kinematics.arms import DEG, arms, joints_at_random, joints_within, make_arm, margin, placement, pose_errors
+from testing.arms import DEG, arms, joints_at_random, joints_within, make_arm, margin, placement, pose_errors
 
 TURN = 2 * np.pi
 

@@ -15,8 +15,8 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.iteration import _E, _Q, _ROWS, _TARGET, LANES, _evaluate, uniform
 from er3a.kinematics.numerical import BAD_GUESS, LIMIT_BOUND, SINGULAR, SOLVED, UNREACHABLE, solve
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
-from tests.kinematics.arms import DEG, arms, joints_at_random, joints_within, make_arm, placement, pose_errors
-from tests.kinematics.singular_poses import CLASSES, joints_near
+from testing.arms import DEG, arms, joints_at_random, joints_within, make_arm, placement, pose_errors
+from testing.singular_poses import CLASSES, joints_near
 
 UR5 = {
     "a": [0, -0.425, -0.39225, 0, 0, 0],

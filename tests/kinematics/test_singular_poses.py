@@ -11,8 +11,8 @@ from er3a.kinematics.families import Family, _nearest_wrists
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import determinant_factors
-from tests.kinematics.arms import DEG, joints_at_random, make_arm, margin, pose_errors
-from tests.kinematics.singular_poses import (
+from testing.arms import DEG, joints_at_random, make_arm, margin, pose_errors
+from testing.singular_poses import (
     CLASSES,
     admissible_slots,
     family_holds,

@@ -11,7 +11,7 @@ from er3a.errors import NotWristPartitionedError
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import jacobian
 from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
-from tests.kinematics.arms import arms, joints_at_random, joints_within, make_arm, number
+from testing.arms import arms, joints_at_random, joints_within, make_arm, number
 
 
 def product_of_factors(robot, q):

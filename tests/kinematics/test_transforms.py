@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from er3a.errors import PoseError, ShapeError
 from er3a.geometry.transforms import check_poses, rot_x, rot_z, rotation_angle, rpy_of, transform, translation
-from tests.kinematics.arms import number
+from testing.arms import number
 
 angles = number(-np.pi, np.pi)
 

@@ -16,7 +16,7 @@ from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward, frames
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
-from tests.kinematics.arms import DEG, joints_at_random, make_arm, number, placement, pose_errors
+from testing.arms import DEG, joints_at_random, make_arm, number, placement, pose_errors
 
 SIDEWAYS = {"a": [0, 0.4318, 0.0203, 0, 0, 0], "d": [0.66, 0, 0.15, 0.4318, 0, 0.05]}
 

@@ -11,8 +11,8 @@ from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.singularity import characteristic_length, determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots
-from er3a.planning.avoidance import damped as damped_module
-from er3a.planning.avoidance import via
+from er3a.planning.avoidance import damped_least_squares as damped_module
+from er3a.planning.avoidance import via_point as via
 from er3a.planning.avoidance.deviation import deviation
 from er3a.planning.avoidance.singular_segment import margin, trouble_of
 from er3a.planning.avoidance.strategies import WAYS, best, compare

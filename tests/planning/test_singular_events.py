@@ -8,8 +8,8 @@ import pytest
 from er3a.kinematics.singularity import determinant_factors
 from er3a.planning.moves import JointMove
 from er3a.planning.singular_events import singular_events
-from tests.planning.exact_paths import REAL, quintic_time, worst_location
-from tests.planning.random_paths import KINDS, NEAR, Found
+from testing.exact_paths import REAL, quintic_time, worst_location
+from testing.random_paths import KINDS, NEAR, Found
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -15,7 +15,7 @@ import yaml
 from er3a.errors import InputError, ShapeError
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.robots.robot import GRADES
-from tests.kinematics.arms import make_arm, placement
+from testing.arms import make_arm, placement
 
 GROUPS = ("dh", "zero", "limits", "speeds")
 Change = Callable[[dict[str, Any]], Any]

@@ -17,7 +17,7 @@ from er3a.kinematics.inverse import inverse
 from er3a.selection.rules import RULES, available_rules, joint_weights
 from er3a.selection.select import select
 from er3a.selection.sequence import select_sequence
-from tests.kinematics.arms import DEG, joints_at_random
+from testing.arms import DEG, joints_at_random
 
 POSE = np.array([10, 20, 10, 30, 40, -50]) * DEG
 WALL = {"kind": "scene", "title": "wall", "planes": [{"name": "wall", "normal": [0, -1, 0], "offset_mm": -10}]}

@@ -16,7 +16,7 @@ from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
 from er3a.pipeline.progress import shown_progress
-from er3a.pipeline.stages.workspace import grid as grid_module
+from er3a.sampling import grid as grid_module
 from er3a.sampling.grid import make_grid, tool_bound
 from er3a.sampling.point_chain import at_wrist_centre, point_chain
 from er3a.sampling.random_joints import Draw, philox4x32

@@ -10,14 +10,23 @@ import sys
 import threading
 import urllib.error
 import urllib.request
+from contextlib import contextmanager
 from urllib.parse import parse_qs, urlsplit
 
 import psutil
 import pytest
 
-from er3a.pipeline.checksums import seal
+from er3a.pipeline.checksums import write_checksum
 from er3a.pipeline.cli import app
 from er3a.pipeline.viewing import web_viewer
+
+# A shell without a terminal starts what runs in the background with SIGINT ignored, and so do all its children.
+AS_FROM_A_TERMINAL = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from er3a.pipeline.cli import main
+main()
+"""
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +37,7 @@ def reports(tmp_path_factory):
         path = folder / f"er3_600/{stage}.rrd"
         path.parent.mkdir(exist_ok=True)
         path.write_bytes(f"recording of {stage}".encode())
-        seal(path)
+        write_checksum(path)
     return folder
 
 
@@ -55,6 +64,7 @@ def test_each_recording_is_in_the_address_and_is_served_as_it_is(root):
 @pytest.mark.parametrize("path", ["/", "/re_viewer.js", "/re_viewer_bg.wasm", "/er3_600/inverse.rrd"])
 def test_a_browser_may_connect_to_nothing_else(root, path):
     with fetched(root, path) as answer:
+        answer.read()
         assert answer.headers["Content-Security-Policy"].startswith("default-src 'self'")
         assert "http" not in answer.headers["Content-Security-Policy"]
 
@@ -72,19 +82,30 @@ def test_nothing_else_is_served(root, path):
         fetched(root, path)
 
 
-def test_without_a_desktop_view_serves_on_the_loopback_address_until_it_is_interrupted(reports):
+@contextmanager
+def viewing_in_a_browser(reports):
+    """`er3a view` without a desktop, as started from a terminal; killed if it is still there at the end."""
     quiet = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    command = [sys.executable, "-m", "er3a", "view", "er3_600", "--reports", str(reports)]
+    command = [sys.executable, "-c", AS_FROM_A_TERMINAL, "view", "er3_600", "--reports", str(reports)]
     with subprocess.Popen(command, env=quiet, stdout=subprocess.PIPE, text=True) as viewing:
+        try:
+            yield viewing
+        finally:
+            viewing.kill()
+
+
+@pytest.mark.parametrize("request_to_end", [signal.SIGINT, signal.SIGTERM])
+def test_without_a_desktop_view_serves_on_the_loopback_address_until_it_is_told_to_end(reports, request_to_end):
+    with viewing_in_a_browser(reports) as viewing:
         told = [viewing.stdout.readline() for _ in range(3)]
         assert "Ctrl+C" in told[0]
         with urllib.request.urlopen(told[1].strip(), timeout=60) as answer:
-            assert answer.status == 200
+            assert answer.read().startswith(b"<!")
         process = psutil.Process(viewing.pid)
         listening = [one.laddr for one in process.net_connections() if one.status == psutil.CONN_LISTEN]
         assert [(one.ip, one.port) for one in listening] == [("127.0.0.1", urlsplit(told[1].strip()).port)]
         assert process.children(recursive=True) == []
-        viewing.send_signal(signal.SIGINT)
+        viewing.send_signal(request_to_end)
         assert viewing.wait(timeout=60) == 0
 
 

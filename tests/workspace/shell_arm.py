@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.robots.robot import Robot
-from tests.kinematics.arms import DEG, make_arm, placement
+from testing.arms import DEG, make_arm, placement
 
 NARROW = [-100, -90, -70, -150, -100, -120], [100, 80, 120, 160, 90, 170]
 TOOL_ASIDE = placement([0.05, 0.02, 0.1], np.array([20, 25, 30]) * DEG)

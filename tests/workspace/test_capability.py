@@ -20,7 +20,7 @@ from er3a.workspace.dexterous import dexterous_core
 from er3a.workspace.directions import cone_directions, poses, roll_of, tool_rotations
 from er3a.workspace.interval_inverse import GOOD, NEVER, branches, theta_ranges
 from er3a.workspace.section_arm import section_arm, section_frame
-from tests.kinematics.arms import arms, joints_within, placement
+from testing.arms import arms, joints_within, placement
 from tests.workspace.shell_arm import NARROW, TOOL_ASIDE, shell_arm
 
 TURN = 2 * np.pi

@@ -15,7 +15,7 @@ from er3a.robots.robot import Robot
 from er3a.workspace.directions import cone_directions, from_polar, poses, roll_of, tool_rotations
 from er3a.workspace.placement import MIXED, NO, Places, Task, fitting_places, lattice_spacing, narrowed, survey
 from er3a.workspace.placement_proof import PROVEN, REFUTED, choose_places, prove_place, proven_bricks
-from tests.kinematics.arms import placement
+from testing.arms import placement
 from tests.workspace.shell_arm import NARROW, TOOL_ASIDE, shell_arm
 
 DOWN = np.array([0.0, 0.0, -1.0])

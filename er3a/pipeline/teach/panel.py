@@ -15,7 +15,7 @@ from er3a.kinematics.singularity import characteristic_length
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.language import keeps_sentences, know, note_written, sentences, tr
-from er3a.pipeline.results import input_records
+from er3a.pipeline.results import Provenance, input_records
 from er3a.pipeline.study import Study
 from er3a.pipeline.teach.words import WORDS
 from er3a.pipeline.viewing.page import render, run_command
@@ -51,11 +51,11 @@ def write_teach_page(study: Study, name: str, output: Path) -> None:
         panel=panel,
         modules=json.dumps({"imports": {f"er3a/{module}": _module(module) for module in MODULES}}),
         command=run_command(study, f"{name}/teach.html"),
-        provenance={
-            "inputs": input_records(study.inputs(name, "teach")),
-            "config": study.settings(name, "trajectory"),
-            "code": code_digest(__name__),
-        },
+        provenance=Provenance(
+            inputs=input_records(study.inputs(name, "teach")),
+            code=code_digest(__name__),
+            config=study.settings(name, "trajectory"),
+        ),
     )
 
 

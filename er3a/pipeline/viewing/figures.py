@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+from contextlib import AbstractContextManager
 
 import matplotlib
 from matplotlib.axes import Axes
@@ -14,6 +15,7 @@ from matplotlib.text import Text
 from er3a.pipeline.messages import language
 from er3a.pipeline.viewing.palette import GRID, INK, JOINTS, MUTED
 
+FONTS = ["DejaVu Sans"]
 CHINESE_FONTS = (
     "Noto Sans CJK SC",
     "Noto Sans CJK JP",  # as matplotlib names the collection of all of Noto's
@@ -24,7 +26,7 @@ CHINESE_FONTS = (
     "PingFang SC",
     "SimHei",
 )
-matplotlib.rcParams |= {
+STYLE = {
     "axes.edgecolor": MUTED,
     "axes.grid": True,
     "axes.labelcolor": INK,
@@ -36,7 +38,7 @@ matplotlib.rcParams |= {
     "axes.titleweight": "bold",
     "figure.constrained_layout.use": True,
     "figure.facecolor": "white",
-    "font.family": ["DejaVu Sans"],
+    "font.family": FONTS,
     "font.size": 10,
     "grid.color": GRID,
     "grid.linewidth": 0.7,
@@ -49,8 +51,13 @@ matplotlib.rcParams |= {
 }
 
 
+def house_style() -> AbstractContextManager[None]:
+    """The look of all figures of the pages, for what is drawn within it."""
+    return matplotlib.rc_context(STYLE)
+
+
 def new_figure(rows: int = 1, columns: int = 1, width: float = 9.0, height: float = 4.5, **subplots):
-    """A figure in the house style and its axes (as ``Figure.subplots`` returns them); sizes in inches."""
+    """A figure and its axes (as ``Figure.subplots`` returns them); sizes in inches."""
     figure = Figure(figsize=(width, height))
     return figure, figure.subplots(rows, columns, **subplots)
 
@@ -72,10 +79,10 @@ def svg_data_uri(figure: Figure) -> str:
     """The figure as a ``data:`` address of an SVG image (dense clouds rasterised at 160 dpi)."""
     chinese = _chinese_font() if language.current() == "zh" else []
     for text in figure.findobj(Text):
-        text.set_fontfamily([*matplotlib.rcParams["font.family"], *chinese])
+        text.set_fontfamily([*FONTS, *chinese])
     # Without a font for it here, Chinese stays text, for which the reader's browser finds one.
     glyphs = "none" if language.current() == "zh" and not chinese else "path"
     buffer = io.BytesIO()
-    with matplotlib.rc_context({"svg.fonttype": glyphs}):
+    with matplotlib.rc_context(STYLE | {"svg.fonttype": glyphs}):
         figure.savefig(buffer, format="svg", dpi=160, metadata={"Date": None})
     return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")

@@ -8,6 +8,7 @@ with the recordings, under a policy with which a browser connects to no other ad
 from __future__ import annotations
 
 import re
+import signal
 import time
 import urllib.request
 from collections.abc import Sequence
@@ -24,7 +25,8 @@ PATIENCE_S = 30
 
 
 def serve(recordings: Sequence[Path]) -> None:
-    """Serve recordings to a browser on this machine, until Ctrl+C."""
+    """Serve recordings to a browser on this machine, until Ctrl+C or a request to end (SIGTERM)."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     with server(recordings) as listening:
         port = listening.server_port
         print("There is no desktop here. Ctrl+C stops what is served to a browser on this machine at")

@@ -10,6 +10,7 @@ import numpy as np
 from er3a.errors import NotWristPartitionedError
 from er3a.kinematics.configuration import branch_labels
 from er3a.pipeline.stages.workspace import table_rows
+from er3a.pipeline.stages.workspace.entry import BoxTask, CapabilitySettings
 from er3a.pipeline.stages.workspace.model import (
     CapabilitySummary,
     NeedsClosedForm,
@@ -21,7 +22,6 @@ from er3a.pipeline.stages.workspace.model import (
     triple,
 )
 from er3a.pipeline.stages.workspace.tables import BoxPlaces, CapabilityCells
-from er3a.pipeline.study import BoxTask, CapabilitySettings
 from er3a.robots.robot import Robot
 from er3a.workspace.capability import map_capability, overall, rings
 from er3a.workspace.dexterous import dexterous_core

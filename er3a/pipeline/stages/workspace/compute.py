@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from er3a.kinematics.forward import forward
-from er3a.pipeline.stage_results import Figure
+from er3a.pipeline.results import Figure
 from er3a.pipeline.stages.workspace import table_rows
 from er3a.pipeline.stages.workspace.capability import ToolCapability, tool_capability
 from er3a.pipeline.stages.workspace.envelope_marks import drawing_table

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from er3a.pipeline.stage_results import Results, Summary, Verdict
+from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.workspace.findings import WorkspaceFinding
 from er3a.pipeline.stages.workspace.tables import (
     Border,

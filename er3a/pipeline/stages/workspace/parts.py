@@ -13,7 +13,7 @@ import numpy as np
 from er3a.errors import ResultError
 from er3a.kinematics.chain import constant_links
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.results import read_checked, write_checked
+from er3a.pipeline.kept_files import read_checked, write_checked
 from er3a.pipeline.study import Study
 from er3a.robots.robot import Robot
 from er3a.sampling.extreme_samples import Extremes

@@ -11,7 +11,7 @@ from matplotlib import colormaps
 
 from er3a.pipeline.messages.say import say, word
 from er3a.pipeline.messages.workspace import VOID_STATUS
-from er3a.pipeline.stage_results import Stored
+from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.workspace.capability_record import log_capability
 from er3a.pipeline.stages.workspace.model import WorkspaceResults, WorkspaceSummary
 from er3a.pipeline.stages.workspace.tables import Cloud

@@ -9,7 +9,7 @@ import numpy as np
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import counted, joined, say, word
 from er3a.pipeline.messages.workspace import FIGURES, VOID_KINDS, VOID_STATUS
-from er3a.pipeline.stage_results import Stored
+from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.workspace.capability_texts import capability_context
 from er3a.pipeline.stages.workspace.cloud_figure import turning_figure
 from er3a.pipeline.stages.workspace.findings import VoidUnexpected

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from er3a.pipeline.stage_results import Verdict
+from er3a.pipeline.results import Verdict
 from er3a.pipeline.stages.workspace.findings import (
     Flat,
     NoVoid,

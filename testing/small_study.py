@@ -1,4 +1,4 @@
-"""Copies of the project in which campaigns run the small study, and do what they like to it."""
+"""Copies of the project in which tests and campaigns run the small study, and do what they like to it."""
 
 from __future__ import annotations
 

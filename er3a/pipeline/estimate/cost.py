@@ -8,7 +8,7 @@ from statistics import mean
 from tempfile import TemporaryDirectory
 
 from er3a.pipeline.estimate.jobs import Job, jobs_of, wall_time
-from er3a.pipeline.estimate.speed import Speed, sampling_speed
+from er3a.pipeline.estimate.speed import SamplingSpeed, sampling_speed
 from er3a.pipeline.estimate.timings import FEW_SAMPLES, Key, Timing, Trial, logged, timed, trial, written_bytes
 from er3a.pipeline.study import Study
 
@@ -35,7 +35,7 @@ class Calibration:
     handling_s : what Snakemake adds to each job
     """
 
-    speeds: dict[str, Speed]
+    speeds: dict[str, SamplingSpeed]
     timings: dict[Key, Timing]
     trial: Trial
     result_bytes: dict[str, int]
@@ -54,7 +54,7 @@ class Cost:
     memory_mb: float
 
 
-def calibrate(study: Study, results: Path, reports: Path, logs: Path) -> Calibration:
+def measured_here(study: Study, results: Path, reports: Path, logs: Path) -> Calibration:
     """Measure what :func:`cost` needs: seconds, or as long as one robot's stages take if no run has timed them."""
     jobs = jobs_of(study)
     timings = logged(study, jobs, results, logs)
@@ -106,21 +106,21 @@ def disk_bytes(study: Study, calibration: Calibration) -> tuple[int, int]:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class JobEstimate:
     """Of a job: time (s; least, expected, greatest) and memory (MB)."""
 
     seconds: tuple[float, float, float]
     memory_mb: float
 
 
-def estimates_of(study: Study, calibration: Calibration) -> dict[Job, Estimate]:
+def estimates_of(study: Study, calibration: Calibration) -> dict[Job, JobEstimate]:
     """What each job of a study takes."""
     speeds = calibration.speeds.values()
     wander = max((speed.greatest - speed.least) / (2 * speed.mean) for speed in speeds)
     return {job: _estimate(job, study, calibration, wander) for job in jobs_of(study)}
 
 
-def _estimate(job: Job, study: Study, calibration: Calibration, wander: float) -> Estimate:
+def _estimate(job: Job, study: Study, calibration: Calibration, wander: float) -> JobEstimate:
     """A job's own timing or its base's, else what others of its kind took; uncertain by what repeated timings differ
     and, if it is taken from others, by what those differ."""
     written = _written(job.robot, study)
@@ -143,9 +143,9 @@ def _estimate(job: Job, study: Study, calibration: Calibration, wander: float) -
     return _uncertain(timing, wander)
 
 
-def _uncertain(timing: Timing, spread: float) -> Estimate:
+def _uncertain(timing: Timing, spread: float) -> JobEstimate:
     low = timing.seconds * max(0.0, 1 - spread)
-    return Estimate((low, timing.seconds, timing.seconds * (1 + spread)), timing.memory_mb)
+    return JobEstimate((low, timing.seconds, timing.seconds * (1 + spread)), timing.memory_mb)
 
 
 def _written(robot: str, study: Study) -> str:

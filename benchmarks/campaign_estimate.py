@@ -1,4 +1,4 @@
-"""What `er3a plan` predicts against what runs then take: one robot, small budgets, ever more samples."""
+"""What `er3a estimate` predicts against what runs then take: one robot, small budgets, ever more samples."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from pathlib import Path
 
 import psutil
 import yaml
-from small_study import STUDY, environment, fresh, run_command
 
-from er3a.pipeline.estimate.estimate import Calibration, calibrate, cost, disk_bytes
+from er3a.pipeline.estimate.cost import Calibration, cost, disk_bytes, measured_here
 from er3a.pipeline.estimate.terminal import duration, size
 from er3a.pipeline.estimate.timings import written_bytes
 from er3a.pipeline.study import Study, load_study
+from testing.small_study import STUDY, environment, fresh, run_command
 
 ROBOT, BLOCKS = "er3a_c60", 32
 SAMPLES = tuple(10**exponent for exponent in range(6, 11))
@@ -36,8 +36,8 @@ def study_of(samples: int) -> Study:
 
 
 def calibration_of(study: Study) -> Calibration:
-    """What `er3a plan` measures in the working folder."""
-    return calibrate(study, Path("results"), Path("reports"), Path("logs"))
+    """What `er3a estimate` measures in the working folder."""
+    return measured_here(study, Path("results"), Path("reports"), Path("logs"))
 
 
 def run_from_nothing(samples: int) -> tuple[float, float]:
@@ -82,8 +82,8 @@ def _page(
     lines = [
         "# What a study takes, predicted and measured",
         "",
-        f"`er3a plan` on the small study with {ROBOT} alone, {CORES} cores. Written by `make campaigns ARGS=plan`, "
-        f"while {os.getloadavg()[2]:.1f} processes wanted the {os.cpu_count()} processors.",
+        f"`er3a estimate` on the small study with {ROBOT} alone, {CORES} cores. Written by "
+        f"`make campaigns ARGS=estimate`, with a load of {os.getloadavg()[2]:.1f} on {os.cpu_count()} processors.",
         "",
         f"*Trial*: no run was there to learn from, the calibration took {took:.0f} s. *Run*: the timings of the run "
         f"with {_power(SAMPLES[0])} samples were there. One core samples {speed.mean / 1e6:.0f} million a second "

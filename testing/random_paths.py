@@ -1,4 +1,4 @@
-"""Random joint moves and straight lines, and what a finer sampling finds on them: for the tests and the campaign."""
+"""Random joint moves and straight lines, and what a finer sampling finds on them."""
 
 from __future__ import annotations
 

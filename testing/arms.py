@@ -1,4 +1,4 @@
-"""Arms for the tests of the kinematics, and computations of theirs that share no code with er3a."""
+"""Arms drawn at random or made to measure, and computations of theirs that share no code with er3a."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from er3a.errors import ResultError
-from er3a.pipeline.checksums import check_seal, seal, unsound
+from er3a.pipeline.checksums import check_checksum, corrupted, write_checksum
 from er3a.pipeline.results import Figure, Verdict, write_checked, write_summary
 from er3a.pipeline.study import load_study
 
@@ -27,12 +27,12 @@ def run(tmp_path, monkeypatch):
     for name in FILES[2:]:
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("whole")
-        seal(tmp_path / name)
+        write_checksum(tmp_path / name)
     return study, tmp_path / "results", tmp_path / "reports"
 
 
 def test_nothing_is_found_where_all_is_whole(run):
-    assert list(unsound(*run)) == []
+    assert list(corrupted(*run)) == []
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -42,7 +42,7 @@ def test_nothing_is_found_where_all_is_whole(run):
 def test_a_damaged_file_is_found_and_no_other(run, tmp_path, name, damage):
     path = tmp_path / name
     path.write_bytes(damage(path.read_bytes()))
-    ((found, fault),) = unsound(*run)
+    ((found, fault),) = corrupted(*run)
     assert found == path
     assert fault.file == str(path)
     assert fault.problem.startswith("damaged")
@@ -51,5 +51,5 @@ def test_a_damaged_file_is_found_and_no_other(run, tmp_path, name, damage):
 def test_a_view_without_a_checksum_is_found(run, tmp_path):
     (tmp_path / "reports/er3_600/.inverse.rrd.sha256").unlink()
     with pytest.raises(ResultError, match=r"inverse\.rrd: no checksum of it was kept"):
-        check_seal(tmp_path / FILES[3])
-    assert [path.name for path, _ in unsound(*run)] == ["inverse.rrd"]
+        check_checksum(tmp_path / FILES[3])
+    assert [path.name for path, _ in corrupted(*run)] == ["inverse.rrd"]

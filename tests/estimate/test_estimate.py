@@ -10,9 +10,9 @@ from typer.testing import CliRunner
 
 from er3a.errors import Er3aError
 from er3a.pipeline.cli import app
-from er3a.pipeline.estimate.estimate import Calibration, cost, disk_bytes, estimates_of
+from er3a.pipeline.estimate.cost import Calibration, cost, disk_bytes, estimates_of
 from er3a.pipeline.estimate.jobs import Job, jobs_of, wall_time
-from er3a.pipeline.estimate.speed import Speed
+from er3a.pipeline.estimate.speed import SamplingSpeed
 from er3a.pipeline.estimate.terminal import duration, size
 from er3a.pipeline.estimate.timings import FEW_SAMPLES, Timing, Trial, logged
 from er3a.pipeline.results import Figure, Verdict, write_summary
@@ -43,7 +43,7 @@ def calibration(study):
     kinds = {job.key[:2] for job in jobs_of(study)}
     timings = dict.fromkeys(kinds, Timing(1.0, 100.0)) | {("sample", "workspace"): Timing(2.0, 50.0)}
     trial = Trial(timings, part_bytes=1000, gather_s=0.0, result_bytes=5000)
-    speeds = dict.fromkeys(ROBOTS, Speed(MILLION, 0.9 * MILLION, 1.1 * MILLION))
+    speeds = dict.fromkeys(ROBOTS, SamplingSpeed(MILLION, 0.9 * MILLION, 1.1 * MILLION))
     return Calibration(speeds, {}, trial, {"er3a_c60": 5000}, Timing(3.0, 250.0), HANDLING)
 
 
@@ -146,7 +146,7 @@ def test_timings_of_a_run_count_where_its_settings_do(study, tmp_path, monkeypat
 @pytest.mark.parametrize("cores", ["", "0", "two", "1,,2", "-1"])
 def test_cores_that_are_no_numbers_are_refused(cores, monkeypatch):
     monkeypatch.chdir(ROOT)
-    told = CliRunner().invoke(app, ["plan", "--study", "config/small.yaml", "--cores", cores])
+    told = CliRunner().invoke(app, ["estimate", "--study", "config/small.yaml", "--cores", cores])
     assert isinstance(told.exception, Er3aError)
     assert "expected numbers such as 1,2,8,64" in str(told.exception)
 
