@@ -8,6 +8,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from er3a.findings import Finding
+
 
 class Er3aError(Exception):
     """Root of all errors that a user can cause and mend."""
@@ -57,9 +59,12 @@ class PathError(Er3aError, ValueError):
 class NotWristPartitionedError(Er3aError):
     """The closed-form inverse does not apply to this arm; ``property_missing`` says which property it lacks."""
 
-    def __init__(self, robot: str, property_missing: str):
+    def __init__(self, robot: str, property_missing: Finding):
         self.robot, self.property_missing = robot, property_missing
-        super().__init__(f"{robot}: no closed-form inverse, because {property_missing}")
+        super().__init__(
+            f"{robot}: no closed-form inverse ({property_missing.code.replace('_', ' ')}); it needs parallel axes 2 "
+            "and 3, and axes 4, 5 and 6 through one point"
+        )
 
 
 class IdentificationError(Er3aError):

@@ -14,12 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.geometry.angles import wrap_to_pi
 from er3a.kinematics.closed_form import REACHED, SLOTS
 from er3a.kinematics.forward import frames
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from er3a.planning.moves import ToolPath
-from er3a.robots.joint_limits import principal
 from er3a.robots.robot import Robot
 
 WIDE_STEP = np.radians(20.0)
@@ -86,7 +86,7 @@ def branches_along(robot: Robot, line: ToolPath, t: np.ndarray) -> Branches:
 
 def turned_difference(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """b - a with whole turns removed, in (-pi, pi]."""
-    return principal(b - a)
+    return wrap_to_pi(b - a)
 
 
 def align_wrist(robot: Robot, q: np.ndarray, joint_4: np.ndarray) -> np.ndarray:
@@ -179,7 +179,7 @@ def _fill_free_wrist(robot: Robot, grid: Branches) -> None:
         free = grid.free_wrist[:, slot]
         if free.any():
             kept = _kept(grid.q[:, slot, 3], free | ~grid.reached[:, slot])
-            grid.q[free, slot] = principal(align_wrist(robot, grid.q[free, slot], kept[free]))
+            grid.q[free, slot] = wrap_to_pi(align_wrist(robot, grid.q[free, slot], kept[free]))
 
 
 def _kept(values: np.ndarray, unknown: np.ndarray) -> np.ndarray:

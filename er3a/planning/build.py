@@ -26,6 +26,7 @@ from er3a.files.path_table import PathTable, read_path_table
 from er3a.geometry.transforms import transform
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
+from er3a.pipeline.messages.kinematics import BRANCHES
 from er3a.planning.arcs import arc
 from er3a.planning.moves import JointMove, Line, ToolPath, line, rotation_between
 from er3a.planning.sequences import (
@@ -202,7 +203,7 @@ def _blends(sizes: np.ndarray, wanted: float | None, unit: float) -> np.ndarray:
 def _slot(robot: Robot, name: str | None, field: str, file: Path) -> int | None:
     if name is None:
         return None
-    labels = branch_labels(robot)
+    labels = [BRANCHES[label] for label in branch_labels(robot)]
     if name not in labels:
         problem = f"this robot has no branch '{name}'"
         raise InputError(file, f"{field}.start_branch", problem, f"Known: {'; '.join(labels)}")

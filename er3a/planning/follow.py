@@ -21,12 +21,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.errors import PoseError
+from er3a.geometry.angles import TURN
 from er3a.kinematics.closed_form import SLOTS
 from er3a.numerics.jit import kernel
 from er3a.planning.branch_tracking import WIDE_STEP, Branches, branches_along, turned_difference
 from er3a.planning.followed import Followed, Jump
 from er3a.planning.moves import ToolPath
-from er3a.robots.joint_limits import LIMIT_TOLERANCE, TURN, nearest_turns, within
+from er3a.robots.joint_limits import LIMIT_TOLERANCE, nearest_equivalent, within
 from er3a.robots.robot import Robot
 
 JUMP_COST = 1e7
@@ -102,7 +103,7 @@ def _admitted(grid: Branches, starts: np.ndarray, q_start: np.ndarray | None, st
 def _best(robot: Robot, grid: Branches, part: slice, starts: np.ndarray, before: np.ndarray | None) -> _Sequence:
     q, t = grid.q[part], grid.t[part]
     share = np.gradient(t) / grid.t[-1] if len(t) > 1 else np.zeros(1)
-    fits = within(robot, nearest_turns(robot, q, np.zeros(6)))
+    fits = within(robot, nearest_equivalent(robot, q, np.zeros(6)))
     price = np.where(fits, 0.0, OUTSIDE_COST * share[:, None])
     onward, leaps = _costs_to_go(q, price, grid.doors[part])
     sequences = []

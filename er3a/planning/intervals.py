@@ -10,6 +10,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.pipeline.messages.kinematics import say
 from er3a.pipeline.messages.language import N_, joined, said
 from er3a.planning.followed import Followed
 from er3a.planning.singular_events import Joints, runs
@@ -81,7 +82,7 @@ def unreachable(followed: Followed) -> list[Interval]:
         poses = followed.line.poses(followed.progress[first:last])
         gap = solve_slots(robot, poses, np.zeros((len(poses), 6)))[2]
         worst = int(np.argmax(gap.min(axis=1)))
-        cause = joined(inverse(robot, poses[worst]).unsolved)
+        cause = joined(map(say, inverse(robot, poses[worst]).unsolved))
         found.append(Interval(float(followed.t[first]), float(followed.t[last - 1]), cause))
     return found
 

@@ -15,7 +15,7 @@ from scipy.optimize import minimize
 
 from er3a.kinematics.chain import JOINTS
 from er3a.kinematics.forward import frames
-from er3a.numerics.quasi_random import spread
+from er3a.numerics.quasi_random import quasi_random_points
 from er3a.references.quantities import MM, Extreme, measure_of
 from er3a.robots.robot import Robot
 
@@ -52,7 +52,7 @@ def search(robot: Robot, quantity: Extreme, starts: int) -> tuple[float, np.ndar
         values = cost(q + offsets)
         return values[0], (values[1 : JOINTS + 1] - values[JOINTS + 1 :]) / (2 * STEP)
 
-    scan = spread(lower, upper, SCAN)
+    scan = quasi_random_points(lower, upper, SCAN)
     best = scan[np.argsort(cost(scan), kind="stable")[: (starts + 1) // 2]]
     results = [
         minimize(

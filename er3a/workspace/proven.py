@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.errors import NotWristPartitionedError
+from er3a.kinematics.wrist_partitioned import ClosedFormMissing, closed_form_missing
 from er3a.robots.robot import Robot
 from er3a.workspace.cavities import cavities, rim
 from er3a.workspace.general import prove_general
@@ -39,7 +39,7 @@ class SphericalWrist:
 class GeneralMethod:
     """The cells were decided by the coarser method for any arm, because of what this one lacks."""
 
-    lacks: str
+    lacks: ClosedFormMissing
     code: Literal["general_method"] = "general_method"
 
 
@@ -93,10 +93,9 @@ class Proven:
 
 def prove_robot(robot: Robot, most_cells: int, points: int, seed: int) -> Proven:
     """Run the proof and the estimate that rests on it; bounds by lengths alone where the arm's build gives no more."""
-    try:
-        arm = section_arm(robot)
-    except NotWristPartitionedError as error:
-        return _prove_general(robot, most_cells, points, seed, error.property_missing)
+    if lacks := closed_form_missing(robot):
+        return _prove_general(robot, most_cells, points, seed, lacks)
+    arm = section_arm(robot)
     section = SectionMap(prove(arm, TARGET, int((1 - VOID_RATIO) * most_cells)))
     section = _about_voids(arm, section, int(VOID_RATIO * most_cells))
     estimate = estimate_volume(arm, section, arm.reach, arm.heights, points, seed)
@@ -104,7 +103,7 @@ def prove_robot(robot: Robot, most_cells: int, points: int, seed: int) -> Proven
     return Proven(arm, section.proof, section, *section_frame(robot), witness, estimate, SphericalWrist())
 
 
-def _prove_general(robot: Robot, most_cells: int, points: int, seed: int, lacks: str) -> Proven:
+def _prove_general(robot: Robot, most_cells: int, points: int, seed: int, lacks: ClosedFormMissing) -> Proven:
     arm, R, origin = general_arm(robot)
     budgets = (GENERAL_SAMPLES * most_cells, GENERAL_BOXES * most_cells)
     proof, theta = prove_general(arm, GENERAL_CELLS * most_cells, seed, *budgets)

@@ -8,10 +8,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.errors import NotWristPartitionedError
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward
-from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
+from er3a.kinematics.wrist_partitioned import closed_form_missing, wrist_partitioned_arm
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import Grid, make_grid
 from er3a.sampling.point_chain import at_wrist_centre, plane_direction
@@ -72,10 +71,9 @@ def side_views(robot: Robot, tally: Tally, grid: Grid, draw: Draw) -> list[SideV
     """Side views of the tool point and, with fewer samples, of the wrist centre, if there is one."""
     front = _front(robot, plane_direction(robot))
     found = [_side_view("tool_point", grid, tally, front)]
-    try:
-        bare = at_wrist_centre(robot)
-    except NotWristPartitionedError:
+    if closed_form_missing(robot):
         return found
+    bare = at_wrist_centre(robot)
     wrist_grid = make_grid(bare, max(grid.shape))
     fewer = Draw(draw.seed, min(draw.samples, WRIST_SAMPLES), 1, draw.sampling)
     return [*found, _side_view("wrist_centre", wrist_grid, tally_blocks(bare, wrist_grid, fewer, [0], 0), front)]
@@ -90,10 +88,9 @@ def _side_view(point: Literal["tool_point", "wrist_centre"], grid: Grid, tally: 
 
 def border_lines(robot: Robot) -> list[BorderLine]:
     """Exact borders of tool point, flange and wrist centre; none without a spherical wrist."""
-    try:
-        front, elbow = _front(robot, section_frame(robot)[0][0]), wrist_partitioned_arm(robot).elbow_sign
-    except NotWristPartitionedError:
+    if closed_form_missing(robot):
         return []
+    front, elbow = _front(robot, section_frame(robot)[0][0]), wrist_partitioned_arm(robot).elbow_sign
     arms: dict[BorderPoint, SectionArm] = {
         "tool_point": section_arm(robot),
         "wrist_centre": section_arm(robot, wrist_centre=True),
@@ -121,10 +118,9 @@ def _joints_2_3(robot: Robot, theta: Reals) -> Reals:
 
 def corner_side(robot: Robot, q2: float, q3: float) -> float:
     """-1 if the wrist centre lies behind axis 1 with joints 2 and 3 (rad) at these values, else +1."""
-    try:
-        bare = at_wrist_centre(robot)
-    except NotWristPartitionedError:
+    if closed_form_missing(robot):
         return 1.0
+    bare = at_wrist_centre(robot)
     away = forward(bare, np.array([0, q2, q3, 0, 0, 0]))[:3, 3] - constant_links(bare)[0, :3, 3]
     return 1.0 if away @ robot.base[:3, 0] >= 0 else -1.0
 

@@ -17,7 +17,7 @@ from er3a.planning.intervals import out_of_limits, too_fast, unreachable
 from er3a.planning.moves import JointMove, line
 from er3a.planning.sequences import segment_path
 from er3a.planning.singular_events import singular_events
-from er3a.robots.joint_limits import nearest_turns, within
+from er3a.robots.joint_limits import nearest_equivalent, within
 
 NEAR = {"wrist": np.radians(5), "elbow": np.radians(5), "shoulder": 0.03}
 GRID = np.linspace(0, 1, 301)
@@ -197,7 +197,7 @@ def test_branch_is_chosen_for_the_whole_path_not_for_its_first_point():
     followed = follow(robot, way, GRID)
     assert within(robot, followed.q).all()
     others = [follow(robot, way, GRID, start_slot=slot) for slot in range(4) if slot != followed.slot[0]]
-    at_start = [within(robot, nearest_turns(robot, other.q[0], np.zeros(6))) for other in others]
+    at_start = [within(robot, nearest_equivalent(robot, other.q[0], np.zeros(6))) for other in others]
     assert any(ok and not within(robot, other.q).all() for ok, other in zip(at_start, others))
 
 

@@ -26,4 +26,4 @@ POINTS = {"tool_point": N_("tool point"), "wrist_centre": N_("wrist centre"), "f
 
 @say.register
 def _(found: NeedsClosedForm) -> str:
-    return sentence(found.code, "it needs the closed-form inverse, and {lacks}", lacks=found.lacks)
+    return sentence(found.code, "it needs the closed-form inverse, and {lacks}", lacks=say(found.lacks))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from er3a.pipeline.messages import kinematics as _kinematics  # noqa: F401 (says what an arm lacks)
 from er3a.pipeline.messages.say import joined, say, sentence
 from er3a.workspace.causes import Disappears, Geometry, OnlySampled, Relaxed, SeveralLimits, VoidCause
 from er3a.workspace.proven import GeneralMethod, SphericalWrist
@@ -65,4 +66,4 @@ def _(found: SphericalWrist) -> str:
 
 @say.register
 def _(found: GeneralMethod) -> str:
-    return sentence(found.code, "general method, because {lacks}", lacks=found.lacks)
+    return sentence(found.code, "general method, because {lacks}", lacks=say(found.lacks))

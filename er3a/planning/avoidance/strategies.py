@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.kinematics.forward import forward
+from er3a.pipeline.messages.kinematics import say
 from er3a.pipeline.messages.language import joined, said
 from er3a.planning.avoidance.damped_least_squares import damped
 from er3a.planning.avoidance.deviation import deviation
@@ -18,7 +19,7 @@ from er3a.planning.avoidance.slow_down import slow
 from er3a.planning.avoidance.stop_before import stop
 from er3a.planning.avoidance.via_point import shifted_via, tilted_via
 from er3a.planning.timing import Timed, TimingError
-from er3a.robots.joint_limits import limit_reason, within
+from er3a.robots.joint_limits import limits_exceeded, within
 
 WAYS: dict[str, Callable[[Trouble], WayAround]] = {
     "slow": slow,
@@ -110,7 +111,7 @@ def _priced(trouble: Trouble, name: str, way: Callable[[Trouble], WayAround]) ->
         faults.append(said("it ends {mm:.3g} mm and {deg:.3g} deg from the path's end", **far))
     outside = ~within(robot, motion.q)
     if outside.any():
-        faults.append(limit_reason(robot, motion.q[_worst(trouble, motion.q)]))
+        faults.append(say(limits_exceeded(robot, motion.q[_worst(trouble, motion.q)])))
     if speed > 1 + OVER:
         faults.append(said("a joint needs {share:.2f} times its greatest speed", share=speed))
     if acceleration > 1 + OVER:

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from er3a.files.scene_file import SceneFile, load_scene
+from er3a.collision.scene import Scene
+from er3a.files.scene_file import load_scene
 from er3a.files.target_file import load_targets
 from er3a.kinematics.admissible import NEAREST_RULE
 from er3a.kinematics.inverse import CLOSED_FORM
@@ -78,7 +79,7 @@ def compute(study: Study, name: str, folder: Path) -> None:
 
 
 def _verdict(
-    entries: list[dict[str, Any]], solutions: pd.DataFrame, trips: RoundTrips | None, scene: SceneFile | None
+    entries: list[dict[str, Any]], solutions: pd.DataFrame, trips: RoundTrips | None, scene: Scene | None
 ) -> Verdict:
     position, orientation = _worst_residuals(solutions, trips)
     lost = trips.poses - trips.own_found if trips else 0

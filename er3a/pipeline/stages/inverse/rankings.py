@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from er3a.files.scene_file import SceneFile
+from er3a.collision.scene import Scene
 from er3a.kinematics.inverse import Solutions
 from er3a.pipeline.messages.language import N_
 from er3a.robots.robot import Robot
@@ -34,7 +34,7 @@ def rankings(
     first: np.ndarray,
     collides: np.ndarray,
     q_ref: np.ndarray,
-    scene: SceneFile | None,
+    scene: Scene | None,
     mix: dict[str, float],
 ) -> pd.DataFrame:
     """Place and measure of each branch's best row within the limits, by each rule.
@@ -92,7 +92,7 @@ def sequence(
     poses: list[Solutions],
     q_ref: np.ndarray,
     reached: list[bool],
-    scene: SceneFile | None,
+    scene: Scene | None,
 ) -> dict[str, Any] | None:
     """Visiting all targets that are reached, in order: the best rows as a whole, against the greedy ones."""
     usable = np.flatnonzero(reached)

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
-from er3a.files.scene_file import SceneFile
+from er3a.collision.scene import Scene
 from er3a.files.target_file import Target
 from er3a.geometry.transforms import rotation_angle, rpy_of
 from er3a.kinematics.admissible import Choice, limit_margin, nearest
@@ -30,7 +30,7 @@ LITTLE_MARGIN_DEG = 2.0
 
 
 def solve_target(
-    robot: Robot, target: Target, random: np.random.Generator, scene: SceneFile | None = None
+    robot: Robot, target: Target, random: np.random.Generator, scene: Scene | None = None
 ) -> tuple[dict[str, Any], pd.DataFrame, Solutions]:
     """Solve, choose, explain; solutions that collide with the scene or with themselves are not chosen.
 

@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.along import clearance_along
 from er3a.collision.bodies import Bodies
+from er3a.collision.pairs import PairOverlaps
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.pipeline.messages.language import N_, joined, said
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.stages.trajectory.judgement import Judgement, stretch_text
 from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning.avoidance.singular_segment import Trouble, trouble_of
@@ -109,7 +112,7 @@ def _measured(price: Price, surroundings: Surroundings) -> tuple[Price, float | 
         return price, None
     least = float(along.distance[along.least] * 1000)
     if along.contacts:
-        meets = said("{pair} overlap by {depth:.1f} mm", pair=along.pair[along.least], depth=-least)
+        meets = say(PairOverlaps(along.pair[along.least], -least))
         reason = joined([price.reason, meets])
         price = replace(price, usable=False, reason=reason)
     return price, least

@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.along import ClearanceAlong, Contact, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.pipeline.messages.language import joined, said
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.stages.trajectory.judgement import WORDS, fault_text, interval_records
 from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning.intervals import Interval
@@ -33,7 +35,7 @@ def with_collisions(record: dict[str, Any], motion: Motion, along: ClearanceAlon
     clearance = {
         "least_mm": float(along.distance[along.least] * 1000),
         "t_s": float(along.t[along.least]),
-        "between": along.pair[along.least],
+        "between": say(along.pair[along.least]),
         "poses_measured": along.measured,
     }
     record = record | {"collisions": interval_records(motion, stretches), "clearance": clearance}
@@ -54,12 +56,17 @@ def clearance_table(name: str, along: ClearanceAlong | None) -> pd.DataFrame:
     if along is None:
         return pd.DataFrame({"path": [], "t_s": np.empty(0), "clearance_mm": np.empty(0), "between": []})
     return pd.DataFrame(
-        {"path": name, "t_s": along.t, "clearance_mm": along.distance * 1000, "between": list(along.pair)}
+        {
+            "path": name,
+            "t_s": along.t,
+            "clearance_mm": along.distance * 1000,
+            "between": [pair.label if pair else "" for pair in along.pair],
+        }
     )
 
 
 def _cause(contact: Contact) -> str:
-    pairs = joined(contact.pairs[:MOST_PAIRS], ", ")
+    pairs = joined(map(say, contact.pairs[:MOST_PAIRS]), ", ")
     if len(contact.pairs) > MOST_PAIRS:
         pairs = said("{pairs} and more", pairs=pairs)
     worst = {"pairs": pairs, "depth": contact.depth * 1000, "t": contact.at}

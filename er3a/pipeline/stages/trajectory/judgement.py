@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from er3a.kinematics.configuration import branch_labels
+from er3a.pipeline.messages.kinematics import BRANCHES
 from er3a.pipeline.messages.language import N_, joined, said
 from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning.intervals import Interval, out_of_limits, too_fast, unreachable
@@ -91,7 +92,7 @@ def path_record(robot: Robot, motion: Motion, found: Judgement) -> dict[str, Any
     speeds = np.abs(found.velocity)
     ratio = speeds / robot.speed
     known = speeds[np.isfinite(speeds[:, 0])] if found.speed_bounded else speeds[:0]
-    labels = branch_labels(robot)
+    labels = [BRANCHES[label] for label in branch_labels(robot)]
     slots = [] if followed is None else [int(slot) for slot in dict.fromkeys(followed.slot) if slot >= 0]
     return {
         "name": entry.name,

@@ -2,49 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 
 import numpy as np
 
-from er3a.errors import NotWristPartitionedError
-from er3a.geometry.transforms import rotation_angle
-from er3a.kinematics.forward import forward
-from er3a.kinematics.singularity import determinant_factors
-from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
+from er3a.kinematics.round_trips import NEAR_ELBOW_DEG, NEAR_SHOULDER_MM, NEAR_WRIST_DEG, slot_round_trips
+from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.pipeline.messages.kinematics import say
 from er3a.pipeline.messages.language import N_, said
 from er3a.pipeline.stages.validation.checks import Check, against_itself, nothing_to_compare
-from er3a.robots.joint_limits import principal
 from er3a.robots.robot import Robot
 
-NEAR_WRIST_DEG = NEAR_ELBOW_DEG = 0.5
-NEAR_SHOULDER_MM = 1.0
 JOINT_TOLERANCE_DEG = 1e-6
 POSITION_TOLERANCE_MM = 1e-6
 ORIENTATION_TOLERANCE_DEG = 1e-6
-BLOCK = 20_000
 SHORTEST, LONGEST = 0.01, 20.0  # m
 WIDEST_IN_RADIANS = 2.01 * np.pi
 GROUP = "round trips"
-
-
-@dataclass(frozen=True)
-class RoundTrips:
-    """Worst errors of random poses taken back to joints.
-
-    Attributes
-    ----------
-    poses : how many; near_singular : how many of them nearer to a singularity than the margins
-    joint_error_deg : worst angle between the joints and the nearest solution, over the other poses
-    position_error_mm, orientation_error_deg : worst over all solutions of all poses
-    unsolved : poses without any solution
-    """
-
-    poses: int
-    near_singular: int
-    joint_error_deg: float
-    position_error_mm: float
-    orientation_error_deg: float
-    unsolved: int
 
 
 def table_checks(robot: Robot) -> list[Check]:
@@ -70,25 +44,8 @@ def table_checks(robot: Robot) -> list[Check]:
 
 def closed_form(robot: Robot) -> str:
     """Why the arm has no closed-form inverse; empty if it has one."""
-    try:
-        wrist_partitioned_arm(robot)
-    except NotWristPartitionedError as error:
-        return error.property_missing
-    return ""
-
-
-def round_trips(robot: Robot, poses: int, seed: int) -> RoundTrips:
-    """Draw joints uniformly within the limits, take them to a pose, solve it, and compare.
-
-    Parameters
-    ----------
-    robot : an arm with a closed-form inverse
-    """
-    random = np.random.default_rng(seed)
-    blocks = [_block(robot, random, min(BLOCK, poses - done)) for done in range(0, poses, BLOCK)]
-    table = np.array(blocks)
-    worst = table.max(axis=0)
-    return RoundTrips(poses, int(table[:, 0].sum()), *map(float, worst[1:4]), int(table[:, 4].sum()))
+    missing = closed_form_missing(robot)
+    return say(missing) if missing else ""
 
 
 def round_trip_checks(robot: Robot, poses: int, seed: int) -> tuple[list[Check], dict | None]:
@@ -97,7 +54,7 @@ def round_trip_checks(robot: Robot, poses: int, seed: int) -> tuple[list[Check],
     if missing:
         note = said("no closed-form inverse, because {missing}", missing=missing)
         return [nothing_to_compare(N_("joints to pose to joints"), GROUP, "deg", note)], None
-    result = round_trips(robot, poses, seed)
+    result = slot_round_trips(robot, poses, seed)
     note = said(
         "{judged} of {poses} random poses; the others lie within {wrist:g} deg (wrist, elbow) or {shoulder:g} mm "
         "(shoulder) of a singularity, where joints follow from a pose less exactly",
@@ -116,30 +73,3 @@ def round_trip_checks(robot: Robot, poses: int, seed: int) -> tuple[list[Check],
     ]
     margins = {"wrist_deg": NEAR_WRIST_DEG, "elbow_deg": NEAR_ELBOW_DEG, "shoulder_mm": NEAR_SHOULDER_MM}
     return checks, asdict(result) | {"margins": margins}
-
-
-def _block(robot: Robot, random: np.random.Generator, count: int) -> tuple[float, ...]:
-    q = robot.lower + random.random((count, 6)) * (robot.upper - robot.lower)
-    T = forward(robot, q)
-    found = solve_slots(robot, T, np.zeros_like(q))[0]
-    solved = np.isfinite(found).all(axis=2)
-    gap = np.abs(principal(found - q[:, None])).max(axis=2)
-    nearest = np.where(solved, gap, np.inf).min(axis=1)
-
-    factors = determinant_factors(robot, q)
-    near = np.abs(factors.wrist) < np.radians(NEAR_WRIST_DEG)
-    near |= np.abs(factors.elbow) < np.radians(NEAR_ELBOW_DEG)
-    near |= np.abs(factors.shoulder) * 1000 < NEAR_SHOULDER_MM
-    judged = nearest[~near & solved.any(axis=1)]
-
-    rows, slots = np.nonzero(solved)
-    back = forward(robot, found[rows, slots])
-    position = np.linalg.norm(back[:, :3, 3] - T[rows, :3, 3], axis=1)
-    orientation = rotation_angle(back[:, :3, :3], T[rows, :3, :3])
-    return (
-        float(near.sum()),
-        float(np.degrees(judged.max(initial=0.0))),
-        float(position.max(initial=0.0) * 1000),
-        float(np.degrees(orientation.max(initial=0.0))),
-        float((~solved.any(axis=1)).sum()),
-    )

@@ -7,8 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.errors import NotWristPartitionedError
 from er3a.kinematics.configuration import branch_labels
+from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.pipeline.stages.workspace import table_rows
 from er3a.pipeline.stages.workspace.entry import BoxTask, CapabilitySettings
 from er3a.pipeline.stages.workspace.model import (
@@ -51,11 +51,9 @@ def tool_capability(robot: Robot, settings: CapabilitySettings, cell: float) -> 
     ----------
     cell : m, edge of the workspace's cells; taken coarser where more than ``MOST_ACROSS`` would span the reach
     """
-    try:
-        arm, roll = section_arm(robot), roll_of(robot, settings.rolls)
-    except NotWristPartitionedError as error:
-        missing = NeedsClosedForm(error.property_missing)
-        return ToolCapability(missing, None, CapabilityCells.empty(), BoxPlaces.empty())
+    if lacks := closed_form_missing(robot):
+        return ToolCapability(NeedsClosedForm(lacks), None, CapabilityCells.empty(), BoxPlaces.empty())
+    arm, roll = section_arm(robot), roll_of(robot, settings.rolls)
     cell = max(cell, 2 * (arm.upper_length + arm.forearm_length + arm.d) / MOST_ACROSS)
     cells = rings(arm.reach, arm.heights, cell)
     middles = np.stack([cells[:, :2].mean(axis=1), cells[:, 2:].mean(axis=1)], axis=1)

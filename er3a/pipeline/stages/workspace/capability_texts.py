@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import say, word
 from er3a.pipeline.messages.workspace import STATUS
@@ -143,9 +144,9 @@ def _place_row(row: int, place: PlaceSummary) -> list[str]:
     if place.branch is None:
         branch = tr("changes within the box")
     elif place.status == place.branch_status:
-        branch = tr(place.branch)
+        branch = branch_word(place.branch)
     else:
-        branch = tr("{branch} (by samples)", branch=place.branch)
+        branch = tr("{branch} (by samples)", branch=branch_word(place.branch))
     return [
         str(row),
         ", ".join(fixed(1000 * value, 0) for value in place.centre_m),

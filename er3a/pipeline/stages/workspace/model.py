@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
+from er3a.kinematics.configuration import BranchLabel
+from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.workspace.findings import WorkspaceFinding
 from er3a.pipeline.stages.workspace.tables import (
@@ -165,7 +167,7 @@ class CapabilitySummary:
 class NeedsClosedForm:
     """Capability and placement were not computed: they need the closed-form inverse."""
 
-    lacks: str
+    lacks: ClosedFormMissing
     code: Literal["workspace.needs_closed_form"] = "workspace.needs_closed_form"
 
 
@@ -196,7 +198,7 @@ class PlaceSummary:
     size_m: Triple
     turned: bool
     status: Literal["proven", "sampled"]
-    branch: str | None
+    branch: BranchLabel | None
     branch_status: Literal["proven", "sampled"]
     manipulability_m3: float
     manipulability_ratio: float

@@ -1,4 +1,4 @@
-"""What would help a target that has no solution within the limits: a search over neighbouring poses."""
+"""Poses near one that has no solution within the limits: by how little must the tool turn or shift to have one?"""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from er3a.geometry.sphere import fibonacci_sphere
 from er3a.kinematics.batch import inverse_batch
+from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
 
 DIRECTIONS = 400
@@ -26,40 +28,41 @@ class Neighbours:
 
     Attributes
     ----------
-    orientation_share : share of 4000 random tool orientations at the target's position that have a solution
+    orientation_ratio : part of 4000 random tool orientations at the target's position that have a solution
     least_turn : rad, least rotation of the tool found that has one, position kept; None if none has
     least_shift : m, least shift of the tool found that has one, orientation kept; None if none has
     shifted_to : (3,), m, where that shift ends; None if none has
     """
 
-    orientation_share: float
+    orientation_ratio: float
     least_turn: float | None
     least_shift: float | None
-    shifted_to: np.ndarray | None
+    shifted_to: Reals | None
 
 
-def solvable(robot: Robot, T: np.ndarray) -> np.ndarray:
+def solvable(robot: Robot, T: Reals) -> Flags:
     """Whether poses (N, 4, 4) have a solution within the limits, (N,)."""
-    return inverse_batch(robot, T).within_limits.any(axis=1)
+    found: Flags = inverse_batch(robot, T).within_limits.any(axis=1)
+    return found
 
 
-def neighbours(robot: Robot, T: np.ndarray, random: np.random.Generator) -> Neighbours:
+def neighbours(robot: Robot, T: Reals, random: np.random.Generator) -> Neighbours:
     """Search around a pose (4, 4) of the tool."""
     turned = np.tile(T, (RANDOM_ORIENTATIONS, 1, 1))
     turned[:, :3, :3] = Rotation.random(RANDOM_ORIENTATIONS, rng=random).as_matrix()
     shifted_to = _nearest_position(robot, T)
     return Neighbours(
-        orientation_share=float(solvable(robot, turned).mean()),
+        orientation_ratio=float(solvable(robot, turned).mean()),
         least_turn=_least_turn(robot, T),
         least_shift=None if shifted_to is None else float(np.linalg.norm(shifted_to - T[:3, 3])),
         shifted_to=shifted_to,
     )
 
 
-def _least_turn(robot: Robot, T: np.ndarray) -> float | None:
-    axes, angles = _even_directions(DIRECTIONS), np.linspace(0, np.pi, TURN_STEPS + 1)[1:]
+def _least_turn(robot: Robot, T: Reals) -> float | None:
+    axes, angles = fibonacci_sphere(DIRECTIONS, turned_back=True), np.linspace(0, np.pi, TURN_STEPS + 1)[1:]
 
-    def turned_ok(about: np.ndarray, by: np.ndarray) -> np.ndarray:
+    def turned_ok(about: Reals, by: Reals) -> Flags:
         poses = np.tile(T, (len(about), 1, 1))
         poses[:, :3, :3] = Rotation.from_rotvec(about * by[:, None]).as_matrix() @ T[:3, :3]
         return solvable(robot, poses)
@@ -78,7 +81,7 @@ def _least_turn(robot: Robot, T: np.ndarray) -> float | None:
     return float(high.min())
 
 
-def _nearest_position(robot: Robot, T: np.ndarray) -> np.ndarray | None:
+def _nearest_position(robot: Robot, T: Reals) -> Reals | None:
     """Position (3,) nearest to that of T which has a solution with its orientation, on a grid refined step by step."""
     half = np.abs(robot.a).sum() + np.abs(robot.d).sum() + np.linalg.norm(robot.tool[:3, 3])
     centre, count = robot.base[:3, 3], COARSE_GRID
@@ -93,11 +96,3 @@ def _nearest_position(robot: Robot, T: np.ndarray) -> np.ndarray | None:
         centre = points[np.linalg.norm(points - T[:3, 3], axis=1).argmin()]
         half, count = ticks[1] - ticks[0], FINE_GRID
     return centre
-
-
-def _even_directions(count: int) -> np.ndarray:
-    """Unit vectors (count, 3) on a Fibonacci lattice."""
-    z = 1 - (2 * np.arange(count) + 1) / count
-    around = np.arange(count) * np.pi * (3 - np.sqrt(5))
-    radius = np.sqrt(1 - z**2)
-    return np.stack([radius * np.cos(around), radius * np.sin(around), z], axis=1)
