@@ -14,7 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.geometry.vectors import Vector
+from er3a.numerics.arrays import Integers, Reals, Singles
 from er3a.numerics.jit import kernel
+
+NearLists = tuple[Reals, Integers, Integers, Reals]
 
 _PATCHES = 16
 _SAFETY = 1 - 1e-5
@@ -78,7 +82,7 @@ def cube_map() -> np.ndarray:
 
 
 @kernel
-def _patch(x, y, z):
+def _patch(x: float, y: float, z: float) -> int:
     ax, ay, az = abs(x), abs(y), abs(z)
     if ax >= ay and ax >= az:
         face, m, u, v = (0 if x >= 0 else 1), ax, y, z
@@ -94,7 +98,7 @@ def _patch(x, y, z):
 
 
 @kernel
-def _set_thresholds(directions, seen, patches, widen, threshold):
+def _set_thresholds(directions: Reals, seen: Reals, patches: Reals, widen: float, threshold: Reals) -> None:
     """Squared distance per patch, grown by the angle ``widen`` (rad), below which nothing improves any direction."""
     cos_widen, sin_widen = np.cos(widen), np.sin(widen)
     count = patches.shape[1]
@@ -114,7 +118,7 @@ def _set_thresholds(directions, seen, patches, widen, threshold):
 
 
 @kernel
-def _set_lists(directions, seen, patches, least, lists):
+def _set_lists(directions: Reals, seen: Reals, patches: Reals, least: Reals, lists: NearLists) -> None:
     """List for each patch the directions that may be improved there, by the distance from which on they are.
 
     Parameters
@@ -149,7 +153,15 @@ def _set_lists(directions, seen, patches, least, lists):
 
 
 @kernel
-def refresh(directions, support, inner, patches, lists, grid, idle):
+def refresh(
+    directions: Reals,
+    support: Reals,
+    inner: Reals,
+    patches: Reals,
+    lists: NearLists,
+    grid: tuple[Reals, float, tuple[int, int, int]],
+    idle: Singles,
+) -> None:
     """Set the lists of the patches, and where samples of each cell are idle, from the support so far.
 
     Parameters
@@ -191,7 +203,17 @@ def near_lists(patches: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.nda
 
 
 @kernel
-def take_point(point, block, sample, directions, inner, lists, support, blocks, samples):
+def take_point(
+    point: Vector,
+    block: int,
+    sample: int,
+    directions: Reals,
+    inner: Reals,
+    lists: NearLists,
+    support: Reals,
+    blocks: Integers,
+    samples: Integers,
+) -> None:
     """Take one point (x, y, z) into the extremes; samples of a block come in their order."""
     complete, count, near, limits = lists
     x, y, z = point[0] - inner[0], point[1] - inner[1], point[2] - inner[2]

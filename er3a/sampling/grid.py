@@ -6,14 +6,13 @@ import os
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from er3a.errors import InputError
 from er3a.kinematics.chain import JOINTS, constant_links
 from er3a.kinematics.forward import forward
+from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import Robot
-
-Reals = NDArray[np.float64]
 
 BYTES_PER_CELL = 64
 """Peak over sampling and gathering: counts, first blocks, masks, labels and their copies."""
@@ -135,7 +134,7 @@ def memory_budget() -> int:
     return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2
 
 
-def _shape(half: Reals, cells_across: int) -> NDArray[np.int64]:
+def _shape(half: Reals, cells_across: int) -> Integers:
     """Cells along each side of a box with the given half sides."""
     cells = np.ceil(cells_across * half / half.max() * (1 - _MARGIN / 10))
     return np.minimum(cells, cells_across).astype(np.int64)

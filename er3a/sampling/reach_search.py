@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from er3a.kinematics.forward import forward, jacobian
+from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import Grid
 
@@ -26,7 +26,7 @@ class Reach:
     lowest: float
 
 
-def search_reach(robot: Robot, grid: Grid, q: NDArray[np.float64]) -> Reach:
+def search_reach(robot: Robot, grid: Grid, q: Reals) -> Reach:
     """Extremes of the tool point.
 
     Parameters
@@ -45,13 +45,11 @@ def search_reach(robot: Robot, grid: Grid, q: NDArray[np.float64]) -> Reach:
     return Reach(*(round(float(value), NANOMETRES) for value in found))
 
 
-def _best(
-    robot: Robot, grid: Grid, q: NDArray[np.float64], values: NDArray[np.float64], factors: tuple[float, float]
-) -> float:
+def _best(robot: Robot, grid: Grid, q: Reals, values: Reals, factors: tuple[float, float]) -> float:
     """Least ``of_radius * radius^2 + of_height * height`` found from the samples with the least ``values``."""
     of_radius, of_height = factors
 
-    def goal(x: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    def goal(x: Reals) -> tuple[float, Reals]:
         offset = forward(robot, x)[:3, 3] - grid.axis_point
         height = offset @ grid.axis
         across = offset - height * grid.axis

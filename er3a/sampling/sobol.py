@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from er3a.numerics.arrays import Singles, Words
 from er3a.numerics.jit import kernel
 
 BITS = 40
@@ -47,7 +48,7 @@ def shifted_directions(seed: int) -> np.ndarray:
 
 
 @kernel
-def fill_sobol(directions, first, count, chunk, rows):
+def fill_sobol(directions: Words, first: int, count: int, chunk: int, rows: Singles) -> None:
     """Set the six first rows (each ``chunk`` long) to the points numbered from ``first`` on, in (0, 1)."""
     for k in range(directions.shape[0]):
         # Neighbours in number differ by the directions of the trailing ones (Gray code): one step, one exclusive or.

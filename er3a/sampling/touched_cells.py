@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.sampling.grid import Grid
 from er3a.sampling.random_joints import Draw
 from er3a.sampling.tally import UNTOUCHED, Tally
@@ -26,10 +26,10 @@ class SectionCells:
     samples : (n,), how many fell into it; void : (n,), whether it is cut off
     """
 
-    rho: NDArray[np.float64]
-    z: NDArray[np.float64]
-    samples: NDArray[np.int64]
-    void: NDArray[np.bool_]
+    rho: Reals
+    z: Reals
+    samples: Integers
+    void: Flags
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +42,8 @@ class Growth:
     """
 
     cell: float
-    samples: NDArray[np.int64]
-    volume: NDArray[np.float64]
+    samples: Integers
+    volume: Reals
 
 
 def section_cells(tally: Tally, grid: Grid) -> SectionCells:

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import kernel
 from er3a.workspace.empty import STACK, is_empty
 from er3a.workspace.section_arm import SectionArm
@@ -145,7 +146,7 @@ def _on_border(arm: SectionArm, points: np.ndarray, side_view: bool) -> np.ndarr
 
 
 @kernel
-def _unreachable(arm, rings, angles, out):
+def _unreachable(arm: SectionArm, rings: Reals, angles: Reals, out: Flags) -> None:
     stack = np.empty((STACK, 6))
     for n in range(rings.shape[0]):
         rho, z = rings[n, 0], rings[n, 1]

@@ -20,12 +20,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from er3a.geometry.sphere import fibonacci_sphere
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.block_constants import BlockConstants
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
+from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.joint_limits import LIMIT_TOLERANCE
 from er3a.robots.robot import Robot
@@ -33,8 +33,6 @@ from er3a.workspace.directions import Roll, left_to_roll, poses, tool_rotations
 from er3a.workspace.interval_inverse import FREE, SLOTS
 from er3a.workspace.proof import ring_volumes
 from er3a.workspace.section_arm import section_frame
-
-Reals = NDArray[np.float64]
 
 SECTORS = 64
 """Sectors of azimuth with a limited joint 1, the first about azimuth 0; one bit each in a proof's masks."""
@@ -154,7 +152,16 @@ def manipulability(arm: BlockConstants, theta: Reals) -> Reals:
 
 
 @kernel
-def _tally(theta_1, within, values, range_1, reachability, solutions, most, best):
+def _tally(
+    theta_1: Reals,
+    within: Flags,
+    values: Reals,
+    range_1: Reals,
+    reachability: Reals,
+    solutions: Reals,
+    most: Reals,
+    best: Reals,
+) -> None:
     """Sum up cells: ``theta_1``, ``within``, ``values`` are (cells, directions, rolls, slots), the rest is filled."""
     sectors = reachability.shape[1]
     width = _TURN / sectors

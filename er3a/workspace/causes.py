@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er3a.kinematics.forward import forward
+from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 from er3a.workspace.cavities import Cavity
 from er3a.workspace.proof import judge, ring_volumes
 from er3a.workspace.section_arm import FULL_TURN, section_arm
 
-Reals = NDArray[np.float64]
 InSection = Callable[[Reals], tuple[Reals, Reals, Reals]]
 
 PROBES, SAMPLES = 300, 400_000

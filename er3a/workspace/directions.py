@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
+from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 
@@ -115,7 +116,7 @@ def poses(points: np.ndarray, rotations: np.ndarray) -> np.ndarray:
 
 
 @kernel
-def point_tool(T, frame, polar, around, c_roll, s_roll):
+def point_tool(T: Reals, frame: Reals, polar: float, around: float, c_roll: float, s_roll: float) -> None:
     """Turn a pose (4, 4): its z axis at angles (rad) from and around z of a frame (columns x, y, z), rolled."""
     cp, sp, ca, sa = np.cos(polar), np.sin(polar), np.cos(around), np.sin(around)
     for i in range(3):

@@ -10,7 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from er3a.geometry.vectors import Vector
 from er3a.kinematics.chain import JOINTS, constant_links
+from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 from er3a.workspace.section_arm import FULL_TURN
@@ -86,7 +88,7 @@ def _levers(links: np.ndarray, tip: np.ndarray, last: int) -> tuple[np.ndarray, 
 
 
 @kernel
-def place(arm, theta, radii, columns, frame):
+def place(arm: GeneralArm, theta: Reals, radii: Reals, columns: Reals, frame: Reals) -> Vector:
     """The tool point for one joint vector, with levers and derivatives.
 
     Parameters

@@ -9,8 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from er3a.kinematics.block_constants import BlockConstants
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
+from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 from er3a.workspace.directions import Roll, across, left_to_roll, point_tool
@@ -177,14 +180,40 @@ def _constants(robot: Robot, task: Task, roll: Roll):
 
 
 @kernel
-def _prove_all(arm, ranges, frame, half_angle, angles, reach, scale, centres, half, slot, most_poses, good):
+def _prove_all(
+    arm: BlockConstants,
+    ranges: Reals,
+    frame: Reals,
+    half_angle: float,
+    angles: Reals,
+    reach: float,
+    scale: float,
+    centres: Reals,
+    half: Reals,
+    slot: int,
+    most_poses: int,
+    good: Flags,
+) -> None:
     for n in range(centres.shape[0]):
         numbers = (centres[n], half, slot, most_poses, 0.0)
         good[n] = _prove(arm, ranges, frame, half_angle, angles, reach, scale, *numbers)[0] == 1
 
 
 @kernel
-def _prove(arm, ranges, frame, half_angle, angles, reach, scale, centre, half, slot, most_poses, smallest):
+def _prove(
+    arm: BlockConstants,
+    ranges: Reals,
+    frame: Reals,
+    half_angle: float,
+    angles: Reals,
+    reach: float,
+    scale: float,
+    centre: Reals,
+    half: Reals,
+    slot: int,
+    most_poses: int,
+    smallest: float,
+) -> tuple[int, int]:
     T, state, theta_1 = np.eye(4), np.empty(SLOTS, dtype=np.int8), np.empty((SLOTS, 2))
     stack, size = np.empty((_STACK, 10)), np.empty(5)
     for k in range(3):
@@ -237,7 +266,7 @@ def _prove(arm, ranges, frame, half_angle, angles, reach, scale, centre, half, s
 
 
 @kernel
-def _some(ranges, state, theta_1, slot):
+def _some(ranges: Reals, state: NDArray[np.int8], theta_1: Reals, slot: int) -> bool:
     """Whether some branch, or the one asked for, is good with joint 1 too."""
     for k in range(SLOTS):
         if (slot == MIXED or k == slot) and state[k] == GOOD and holds(ranges, 0, theta_1[k, 0], theta_1[k, 1]):
@@ -246,7 +275,7 @@ def _some(ranges, state, theta_1, slot):
 
 
 @kernel
-def _none(ranges, state, theta_1, slot):
+def _none(ranges: Reals, state: NDArray[np.int8], theta_1: Reals, slot: int) -> bool:
     """Whether no branch, or not the one asked for, is possible."""
     for k in range(SLOTS):
         if (slot == MIXED or k == slot) and state[k] != NEVER and not misses(ranges, 0, theta_1[k, 0], theta_1[k, 1]):

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing, closed_form_missing
+from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
 from er3a.workspace.cavities import cavities, rim
 from er3a.workspace.general import prove_general
@@ -19,7 +19,6 @@ from er3a.workspace.section_arm import SectionArm, section_arm, section_frame
 from er3a.workspace.volume import VolumeEstimate, estimate_volume
 from er3a.workspace.witness import lies_in_cell, reach_points, witness_joints
 
-Reals = NDArray[np.float64]
 CellState = Literal["filled", "touched", "empty", "undecided", "partly_filled"]
 
 TARGET = 0.002
@@ -115,7 +114,7 @@ def _prove_general(robot: Robot, most_cells: int, points: int, seed: int, lacks:
     q[:, :count] = turned + 2 * np.pi * np.round((middle - turned) / (2 * np.pi))
     q = np.where(lies_in_cell(robot, q, proof, R, origin)[:, None], q, np.nan)
 
-    def search(local: Reals) -> NDArray[np.bool_]:
+    def search(local: Reals) -> Flags:
         cells = section.cell_of(np.hypot(local[:, 0], local[:, 1]), local[:, 2])
         starts = np.where(np.isfinite(q[cells]), q[cells], (robot.lower + robot.upper) / 2)
         return np.isfinite(reach_points(robot, local @ R + origin, starts)[:, 0])

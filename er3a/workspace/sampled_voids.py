@@ -26,10 +26,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.sampling.grid import Grid
 
-Integers = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 VoidKind = Literal["enclosed", "open"]
 
 LEAST_CELLS = 8
@@ -54,11 +53,11 @@ class SampledVoid:
     status: Literal["sampled", "undersampled"]
     cells: NDArray[np.intp]
 
-    def centroid(self, grid: Grid) -> NDArray[np.float64]:
+    def centroid(self, grid: Grid) -> Reals:
         """Centroid (3,), m."""
         return grid.centres(self.cells).mean(axis=0)
 
-    def extent(self, grid: Grid) -> NDArray[np.float64]:
+    def extent(self, grid: Grid) -> Reals:
         """Extent along x, y, z, (3,), m."""
         return (np.ptp(self.cells, axis=0) + 1) * grid.cell
 
@@ -80,7 +79,7 @@ def find_voids(counts: Integers, inside: Flags) -> list[SampledVoid]:
     return sorted(found, key=lambda void: (-len(void.cells), tuple(void.cells[0])))
 
 
-def void_numbers(voids: list[SampledVoid], counts: Integers, inside: Flags) -> NDArray[np.int64]:
+def void_numbers(voids: list[SampledVoid], counts: Integers, inside: Flags) -> Integers:
     """Number of the void that each untouched cell in the hull belongs to, from 1, UNLISTED for none; 0 elsewhere."""
     number = np.where(inside & (counts == 0), UNLISTED, 0)
     for n, void in enumerate(voids, start=1):

@@ -201,7 +201,7 @@ def _both_ways(arm, tool, range_5) -> tuple[float, float]:
 
 
 @kernel
-def turned(v, axis, c, s):
+def turned(v: Vector, axis: Vector, c: float, s: float) -> Vector:
     """v across the unit axis, turned about it by the angle with cosine c and sine s; a part along the axis stays."""
     along = v[0] * axis[0] + v[1] * axis[1] + v[2] * axis[2]
     flat = subtract(v, scaled(axis, along))
@@ -210,7 +210,7 @@ def turned(v, axis, c, s):
 
 
 @kernel
-def wrist_and_forearm(arm, theta_2, tau):
+def wrist_and_forearm(arm: SectionArm, theta_2: float, tau: float) -> tuple[Vector, Vector]:
     """Wrist centre W (m) and forearm direction f at joint 1 = 0."""
     c, s = np.cos(theta_2 + tau), np.sin(theta_2 + tau)
     upper = turned(arm.upper, arm.axis_2, np.cos(theta_2), np.sin(theta_2))
@@ -219,7 +219,9 @@ def wrist_and_forearm(arm, theta_2, tau):
 
 
 @kernel
-def along_change(arm, x, x_1, theta_2, f, e1, e2, e3):
+def along_change(
+    arm: SectionArm, x: Vector, x_1: Vector, theta_2: float, f: Vector, e1: float, e2: float, e3: float
+) -> float:
     """Bound on how much ``(x - W) . f`` changes over a box about (phi, theta_2, tau).
 
     ``(x - W) . f = y . f - U . f + const`` with y = x - C, and ``U . f`` depends on tau alone.

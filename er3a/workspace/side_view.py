@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward
 from er3a.kinematics.wrist_partitioned import closed_form_missing, wrist_partitioned_arm
+from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import Grid, make_grid
 from er3a.sampling.point_chain import at_wrist_centre, plane_direction
@@ -19,7 +19,6 @@ from er3a.sampling.tally import Tally, tally_blocks
 from er3a.workspace.boundary import border
 from er3a.workspace.section_arm import SectionArm, section_arm, section_frame
 
-Reals = NDArray[np.float64]
 BorderPoint = Literal["tool_point", "wrist_centre", "flange"]
 Sweeping = Literal["joint_2", "joint_3", "wrist"]
 
@@ -42,7 +41,7 @@ class SideView:
     x: Reals
     z: Reals
     cell: float
-    samples: NDArray[np.int64]
+    samples: Integers
 
 
 @dataclass(frozen=True, eq=False)

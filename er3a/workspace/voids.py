@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import Grid
 from er3a.workspace.blocks import Blocks, blocks_of, mesh, pockets
@@ -16,9 +16,6 @@ from er3a.workspace.cavities import Cavity, cavities
 from er3a.workspace.hull import Hull, depth_inside
 from er3a.workspace.proven import Proven
 from er3a.workspace.sampled_voids import SampledVoid, VoidKind
-
-Reals = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 POCKET_BLOCKS, TURNS = 64, 180
 MESH_BLOCKS, MESH_TURNS = 24, 72
@@ -49,7 +46,7 @@ class Void:
     relaxed: tuple[Relaxed | Unlimited, ...]
     holds_shoulder: bool
     vertices: Reals
-    triangles: NDArray[np.int64]
+    triangles: Integers
 
 
 def proven_voids(robot: Robot, proven: Proven, hull: Hull, shoulder: Reals) -> list[Void]:
