@@ -36,9 +36,9 @@ class Extremes:
     block, sample : (D,), int64, which sample it is, -1 where there is none
     """
 
-    support: np.ndarray
-    block: np.ndarray
-    sample: np.ndarray
+    support: Reals
+    block: Integers
+    sample: Integers
 
     @classmethod
     def empty(cls, count: int) -> Extremes:
@@ -50,14 +50,13 @@ class Extremes:
         earlier = (other.block < self.block) | ((other.block == self.block) & (other.sample < self.sample))
         take = (other.support > self.support) | ((other.support == self.support) & earlier & (other.block != NONE))
         return Extremes(
-            *(np.where(take, b, a) for a, b in zip(self._arrays(), other._arrays())),
+            np.where(take, other.support, self.support),
+            np.where(take, other.block, self.block),
+            np.where(take, other.sample, self.sample),
         )
 
-    def _arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return self.support, self.block, self.sample
 
-
-def cube_map() -> np.ndarray:
+def cube_map() -> Reals:
     """Centres (unit vectors) and angular radii (rad) of the patches that :func:`_patch` numbers, as rows (4, P)."""
     edge = np.linspace(-1, 1, _PATCHES + 1)
     middle = (edge[1:] + edge[:-1]) / 2
@@ -65,10 +64,11 @@ def cube_map() -> np.ndarray:
     for face in range(6):
         major, sign = face // 2, 1 - 2 * (face % 2)
 
-        def unit(u, v, major=major, sign=sign):
+        def unit(u: Reals, v: Reals, major: int = major, sign: int = sign) -> Reals:
             out = np.empty((*np.broadcast(u, v).shape, 3))
             out[..., major], out[..., (major + 1) % 3], out[..., (major + 2) % 3] = sign, u, v
-            return out / np.linalg.norm(out, axis=-1, keepdims=True)
+            direction: Reals = out / np.linalg.norm(out, axis=-1, keepdims=True)
+            return direction
 
         centre = unit(middle[:, None], middle[None, :])
         corners = unit(edge[:, None], edge[None, :])
@@ -194,7 +194,7 @@ def refresh(
                 idle[(i * ny + j) * nz + k] = np.inf if inside else wider[_patch(x, y, z)]
 
 
-def near_lists(patches: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def near_lists(patches: int) -> NearLists:
     """Per patch: squared distance (m^2) up to which its list is complete, length of the list, directions, and the
     squared distances from which on each may be improved. Before the first refresh no list is complete.
     """

@@ -114,7 +114,7 @@ def make_grid(robot: Robot, cells_across: int) -> Grid:
     return Grid(
         origin=centre - shape * cell / 2,
         cell=cell,
-        shape=tuple(int(n) for n in shape),
+        shape=(int(shape[0]), int(shape[1]), int(shape[2])),
         axis_point=bound.axis_point,
         axis=bound.axis,
         section_origin=np.array([0.0, bound.height - section[1] / 2]),
@@ -137,7 +137,8 @@ def memory_budget() -> int:
 def _shape(half: Reals, cells_across: int) -> Integers:
     """Cells along each side of a box with the given half sides."""
     cells = np.ceil(cells_across * half / half.max() * (1 - _MARGIN / 10))
-    return np.minimum(cells, cells_across).astype(np.int64)
+    shape: Integers = np.minimum(cells, cells_across).astype(np.int64)
+    return shape
 
 
 def _check_memory(half: Reals, cells_across: int) -> None:

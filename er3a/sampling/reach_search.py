@@ -54,7 +54,7 @@ def _best(robot: Robot, grid: Grid, q: Reals, values: Reals, factors: tuple[floa
         height = offset @ grid.axis
         across = offset - height * grid.axis
         gradient = 2 * of_radius * across + of_height * grid.axis
-        return of_radius * (across @ across) + of_height * height, gradient @ jacobian(robot, x)[:3]
+        return float(of_radius * (across @ across) + of_height * height), gradient @ jacobian(robot, x)[:3]
 
     bounds = list(zip(robot.lower, robot.upper))
     starts = q[np.argsort(values, kind="stable")[:_STARTS]]

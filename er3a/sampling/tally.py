@@ -30,7 +30,7 @@ from er3a.sampling.random_joints import CHUNK, Draw, fill_uniform
 from er3a.sampling.sobol import fill_sobol
 
 Tallies = NDArray[np.uint32]
-_Block = tuple[np.uint64, np.int64, np.int64, Words]
+_Block = tuple[np.uint64, int, int, Words]
 _Voxels = tuple[Reals, float, tuple[int, int, int], Tallies]
 _Section = tuple[np.float32, np.float32, np.int32, np.int32, Tallies]
 _Watch = tuple[tuple[Reals, Reals, Integers, Integers], tuple[Reals, Reals, NearLists, Singles], Integers]
@@ -56,10 +56,10 @@ class Tally:
     extremes : furthest samples in the hull directions
     """
 
-    blocks: np.ndarray
-    counts: np.ndarray
-    first_block: np.ndarray
-    side: np.ndarray
+    blocks: Integers
+    counts: Integers
+    first_block: NDArray[np.int32]
+    side: Integers
     extremes: Extremes
 
     def merge(self, other: Tally) -> Tally:
@@ -73,10 +73,11 @@ class Tally:
         )
 
     @property
-    def section(self) -> np.ndarray:
+    def section(self) -> Integers:
         """The side view folded along axis 1: (n_rho, n_z)."""
         half = len(self.side) // 2
-        return self.side[half:] + self.side[:half][::-1]
+        folded: Integers = self.side[half:] + self.side[:half][::-1]
+        return folded
 
 
 def tally_blocks(

@@ -70,6 +70,7 @@ def touched_growth(draw: Draw, tally: Tally, grid: Grid) -> list[Growth]:
         nx, ny, nz = (size // factor for size in first.shape)
         first = first.reshape(nx, factor, ny, factor, nz, factor).min(axis=(1, 3, 5))
         cells = np.cumsum(np.bincount(first[first != UNTOUCHED], minlength=len(drawn)))
-        cell = grid.cell * factor
-        found.append(Growth(cell, drawn, cells * cell**3))
+        cell: float = grid.cell * factor
+        volume: Reals = np.asarray(cells * cell**3, np.float64)
+        found.append(Growth(cell, drawn, volume))
     return found

@@ -179,7 +179,8 @@ def _open_angle(robot: Robot, cavity: Cavity, chosen: NDArray[np.intp]) -> Reals
     looked = judge(section_arm(robot), probes)
     low, high = cavity.arcs[chosen].T
     a, b = np.maximum(looked.unfilled[..., 0], low[:, None]), np.minimum(looked.unfilled[..., 1], high[:, None])
-    return np.nansum(np.maximum(0, b - a), axis=1)
+    open_angle: Reals = np.nansum(np.maximum(0, b - a), axis=1)
+    return open_angle
 
 
 def _ratio_filled(robot: Robot, cavity: Cavity, chosen: NDArray[np.intp], before: Reals) -> float:

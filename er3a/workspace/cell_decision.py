@@ -88,7 +88,8 @@ def _row(stances: Reals, i: int) -> Stance:
 @kernel
 def _angle(stance: Stance, side: float, rho: float, X: float) -> float:
     """phi at which the stance reaches a point of the section."""
-    return stance[2] + side * np.arccos(min(1.0, max(-1.0, X / max(rho, 1e-12))))
+    phi: float = stance[2] + side * np.arccos(min(1.0, max(-1.0, X / max(rho, 1e-12))))
+    return phi
 
 
 @kernel

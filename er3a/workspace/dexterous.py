@@ -51,7 +51,7 @@ class Core:
     poses: int
 
 
-def dexterous_core(robot: Robot, cells: np.ndarray, directions: int, roll: Roll, most_poses: int) -> Core:
+def dexterous_core(robot: Robot, cells: Reals, directions: int, roll: Roll, most_poses: int) -> Core:
     """Bound the core.
 
     Parameters
@@ -89,7 +89,7 @@ def dexterous_core(robot: Robot, cells: np.ndarray, directions: int, roll: Roll,
     return Core(lower, upper, lower + float(shares @ np.bitwise_count(likely)), looked, used)
 
 
-def _split(cells: np.ndarray) -> np.ndarray:
+def _split(cells: Reals) -> Reals:
     a, b, c, d = cells.T
     m, n = (a + b) / 2, (c + d) / 2
     return np.concatenate([np.stack(part, axis=1) for part in ((a, m, c, n), (m, b, c, n), (a, m, n, d), (m, b, n, d))])

@@ -66,7 +66,7 @@ def left_to_roll(robot: Robot, roll: Roll) -> Robot:
     return robot.replace(lower=lower, upper=upper)
 
 
-def cone_directions(axis: np.ndarray, half_angle: float) -> np.ndarray:
+def cone_directions(axis: Reals, half_angle: float) -> Reals:
     """Unit vectors (n, 3) of a cone: rings at most 10 deg apart, the outermost (on the cone's edge) first.
 
     Each ring is its own image under quarter turns.
@@ -83,14 +83,14 @@ def cone_directions(axis: np.ndarray, half_angle: float) -> np.ndarray:
     return from_polar(axis, polar, around)
 
 
-def from_polar(axis: np.ndarray, polar: np.ndarray, around: np.ndarray) -> np.ndarray:
+def from_polar(axis: Reals, polar: Reals, around: Reals) -> Reals:
     """Unit vectors (n, 3) at angles (n,) in rad from an axis and around it."""
     x, y = across(axis[None])
     flat = np.cos(around)[:, None] * x + np.sin(around)[:, None] * y
     return np.sin(polar)[:, None] * flat + np.cos(polar)[:, None] * axis
 
 
-def across(directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def across(directions: Reals) -> tuple[Reals, Reals]:
     """Unit vectors x, y (n, 3) that make a right-handed frame with each direction (n, 3) as z."""
     helper = np.eye(3)[np.argmin(np.abs(directions), axis=1)]
     x = np.cross(helper, directions)
@@ -98,7 +98,7 @@ def across(directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return x, np.cross(directions, x)
 
 
-def tool_rotations(directions: np.ndarray, roll: Roll) -> np.ndarray:
+def tool_rotations(directions: Reals, roll: Roll) -> Reals:
     """Orientations (n, rolls, 3, 3) of the tool frame with z along each direction (n, 3)."""
     x, y = across(directions)
     c, s = np.cos(roll.angles)[:, None], np.sin(roll.angles)[:, None]
@@ -107,7 +107,7 @@ def tool_rotations(directions: np.ndarray, roll: Roll) -> np.ndarray:
     return np.stack([rolled_x, rolled_y, z], axis=-1)
 
 
-def poses(points: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+def poses(points: Reals, rotations: Reals) -> Reals:
     """Poses (..., 4, 4) from points (..., 3) in m and rotations (..., 3, 3), broadcast against each other."""
     shape = np.broadcast_shapes(points.shape[:-1], rotations.shape[:-2])
     T = np.zeros((*shape, 4, 4))

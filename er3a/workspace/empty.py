@@ -39,10 +39,12 @@ def zone_distance(arm: SectionArm, along: float, across: float, length: float) -
     """Distance (m) to the outer zone of a point at ``length`` from W, ``along`` f and ``across`` it."""
     if along > length * arm.outer_high:
         sine = np.sqrt(max(0.0, 1.0 - arm.outer_high * arm.outer_high))
-        return np.hypot(along - arm.d * arm.outer_high, across - arm.d * sine)
+        above: float = np.hypot(along - arm.d * arm.outer_high, across - arm.d * sine)
+        return above
     if along < length * arm.outer_low:
         sine = np.sqrt(max(0.0, 1.0 - arm.outer_low * arm.outer_low))
-        return np.hypot(along - arm.d * arm.outer_low, across - arm.d * sine)
+        below: float = np.hypot(along - arm.d * arm.outer_low, across - arm.d * sine)
+        return below
     return abs(length - arm.d)
 
 

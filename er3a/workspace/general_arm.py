@@ -33,11 +33,11 @@ class GeneralArm(NamedTuple):
     full_turn : whether joint 1 covers a full turn
     """
 
-    links: np.ndarray
-    tip: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-    levers: np.ndarray
+    links: Reals
+    tip: Reals
+    lower: Reals
+    upper: Reals
+    levers: Reals
     heights: tuple[float, float]
     full_turn: bool
 
@@ -47,7 +47,7 @@ class GeneralArm(NamedTuple):
         return float(self.levers[0])
 
 
-def general_arm(robot: Robot) -> tuple[GeneralArm, np.ndarray, np.ndarray]:
+def general_arm(robot: Robot) -> tuple[GeneralArm, Reals, Reals]:
     """The chain of a robot, and the frame about axis 1: x, y, z in the base frame as rows (3, 3), and origin (3,)."""
     links = constant_links(robot)
     last, tip = JOINTS - 1, links[JOINTS, :3, 3]
@@ -71,7 +71,7 @@ def general_arm(robot: Robot) -> tuple[GeneralArm, np.ndarray, np.ndarray]:
     return arm, links[0, :3, :3].T, links[0, :3, 3]
 
 
-def _levers(links: np.ndarray, tip: np.ndarray, last: int) -> tuple[np.ndarray, tuple[float, float]]:
+def _levers(links: Reals, tip: Reals, last: int) -> tuple[Reals, tuple[float, float]]:
     """Bounds of the distance from each axis and of the height along axis 1, from the tip inwards.
 
     Turned about z, a point fills at most a disc of radius ``lever`` at heights between ``low`` and ``high``.

@@ -31,7 +31,7 @@ FREE = 2 * np.pi - 1e-12
 _TURN = 2 * np.pi
 
 
-def theta_ranges(robot: Robot) -> np.ndarray:
+def theta_ranges(robot: Robot) -> Reals:
     """Ranges (6, 2) in rad of the table's angles theta; a full turn or more is ``-inf`` to ``inf``."""
     ends = robot.direction[:, None] * np.stack([robot.lower, robot.upper], axis=1) + robot.offset[:, None]
     ends.sort(axis=1)
@@ -42,20 +42,22 @@ def theta_ranges(robot: Robot) -> np.ndarray:
 @kernel
 def holds(ranges: Reals, joint: int, low: float, high: float) -> bool:
     """Whether all angles from ``low`` to ``high`` are within the joint's range, by one same turn."""
-    least, most = ranges[joint, 0], ranges[joint, 1]
+    least: float = ranges[joint, 0]
+    most: float = ranges[joint, 1]
     if most == np.inf:
         return True
-    shift = np.ceil((least - low) / _TURN) * _TURN
+    shift: float = np.ceil((least - low) / _TURN) * _TURN
     return low + shift >= least and high + shift <= most
 
 
 @kernel
 def misses(ranges: Reals, joint: int, low: float, high: float) -> bool:
     """Whether no angle from ``low`` to ``high`` is within the joint's range, by any turn."""
-    least, most = ranges[joint, 0], ranges[joint, 1]
+    least: float = ranges[joint, 0]
+    most: float = ranges[joint, 1]
     if most == np.inf or high - low >= _TURN:
         return False
-    shift = np.ceil((least - low) / _TURN) * _TURN
+    shift: float = np.ceil((least - low) / _TURN) * _TURN
     return low + shift > most and high + shift - _TURN < least
 
 
@@ -71,7 +73,8 @@ def _to_frame_1(arm: BlockConstants, T: Reals, v: Vector) -> Vector:
 def _opposite(a: float, b: float, opposite: float) -> float:
     """Angle of a triangle between the sides a and b; 0 or pi where there is no triangle."""
     s = 0.5 * (a + b + opposite)
-    return 2.0 * np.arctan2(np.sqrt(max((s - a) * (s - b), 0.0)), np.sqrt(max(s * (s - opposite), 0.0)))
+    angle: float = 2.0 * np.arctan2(np.sqrt(max((s - a) * (s - b), 0.0)), np.sqrt(max(s * (s - opposite), 0.0)))
+    return angle
 
 
 @kernel
@@ -97,7 +100,8 @@ def _tilt_to_phi_5(arm: BlockConstants, tilt: float) -> float:
     b, c = np.arctan2(arm.sin_45, arm.cos_45), np.arctan2(arm.sin_56, arm.cos_56)
     upper = np.sin(0.5 * (tilt - b + c)) * np.sin(0.5 * (tilt + b - c))
     lower = np.sin(0.5 * (b + c - tilt)) * np.sin(0.5 * (b + c + tilt))
-    return 2.0 * np.arctan2(np.sqrt(max(upper, 0.0)), np.sqrt(max(lower, 0.0)))
+    angle: float = 2.0 * np.arctan2(np.sqrt(max(upper, 0.0)), np.sqrt(max(lower, 0.0)))
+    return angle
 
 
 @kernel

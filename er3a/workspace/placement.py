@@ -11,12 +11,15 @@ distance is a demand of its own too: the task narrows the limits.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot
 from er3a.workspace.capability import manipulability
 from er3a.workspace.directions import Roll, cone_directions, left_to_roll, poses, tool_rotations
@@ -41,8 +44,8 @@ class Task:
     margin : rad, how far joints with less than a full turn keep within their limits
     """
 
-    box: np.ndarray
-    axis: np.ndarray
+    box: Reals
+    axis: Reals
     half_angle: float
     lowest: float
     clear: float
@@ -68,11 +71,11 @@ class Field:
     limit_margin : (nx, ny, nz, 8), rad, least distance from the limits of joints with less than a full turn, by branch
     """
 
-    origin: np.ndarray
-    spacing: np.ndarray
-    least: np.ndarray
-    least_any: np.ndarray
-    limit_margin: np.ndarray
+    origin: Reals
+    spacing: Reals
+    least: Reals
+    least_any: Reals
+    limit_margin: Reals
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,19 +90,19 @@ class Places:
     proven : (n,), whether all bricks of the lattice in it are proven, by any mix of branches
     """
 
-    centre: np.ndarray
-    turned: np.ndarray
-    slot: np.ndarray
-    least: np.ndarray
-    limit_margin: np.ndarray
-    proven: np.ndarray
+    centre: Reals
+    turned: Flags
+    slot: Integers
+    least: Reals
+    limit_margin: Reals
+    proven: Flags
 
-    def rows(self, chosen: np.ndarray) -> Places:
+    def rows(self, chosen: NDArray[Any]) -> Places:
         """Some of the places."""
         return Places(*(getattr(self, part.name)[chosen] for part in fields(self)))
 
 
-def lattice_spacing(box: np.ndarray, coarsest: float) -> np.ndarray:
+def lattice_spacing(box: Reals, coarsest: float) -> Reals:
     """Spacing (3,) in m that divides the box's height and its shorter side evenly, about as fine as asked."""
     sides = np.array([min(box[:2]), min(box[:2]), box[2]])
     return np.maximum(sides / np.maximum(1, np.round(sides / coarsest)), coarsest / 2)
@@ -126,7 +129,7 @@ def survey(robot: Robot, task: Task, roll: Roll, coarsest: float) -> Field:
     # Heights count from the lowest place, so that the lowest box lies on lattice points.
     start[2] += (task.lowest - start[2]) % spacing[2]
     shape = tuple(2 * count + 1)
-    points = start + np.stack(np.indices(shape), axis=-1).reshape(-1, 3) * spacing
+    points = start + np.moveaxis(np.indices(shape), 0, -1).reshape(-1, 3) * spacing
     local = (points - origin) @ R.T
     near = np.hypot(local[:, 0], local[:, 1])
     asked = np.flatnonzero(
@@ -143,7 +146,7 @@ def survey(robot: Robot, task: Task, roll: Roll, coarsest: float) -> Field:
     )
 
 
-def serve(robot: Robot, points: np.ndarray, rotations: np.ndarray, roll: Roll):
+def serve(robot: Robot, points: Reals, rotations: Reals, roll: Roll) -> tuple[Reals, Reals, Reals]:
     """How each branch serves points over all directions.
 
     Parameters
@@ -178,7 +181,7 @@ def serve(robot: Robot, points: np.ndarray, rotations: np.ndarray, roll: Roll):
     return least, least_any, np.where(least > NO, limit_margin, 0.0)
 
 
-def fitting_places(field: Field, bricks: np.ndarray, box: np.ndarray) -> Places:
+def fitting_places(field: Field, bricks: Flags, box: Reals) -> Places:
     """All boxes on the lattice whose points are good; the box is taken up to one spacing larger.
 
     Parameters
@@ -194,7 +197,7 @@ def fitting_places(field: Field, bricks: np.ndarray, box: np.ndarray) -> Places:
     return places.rows(order)
 
 
-def _places(field: Field, bricks: np.ndarray, box: np.ndarray, turned: bool) -> Places:
+def _places(field: Field, bricks: Flags, box: Reals, turned: bool) -> Places:
     points = np.maximum(1, np.ceil(box / field.spacing - 1e-6)).astype(int) + 1
     any_branch = _sliding_least(field.least_any, points)
     where = np.nonzero(any_branch > NO)
@@ -217,7 +220,7 @@ def _places(field: Field, bricks: np.ndarray, box: np.ndarray, turned: bool) -> 
     )
 
 
-def _sliding_least(values: np.ndarray, points: np.ndarray) -> np.ndarray:
+def _sliding_least(values: Reals, points: Integers) -> Reals:
     """Least value over ``points`` (3,) lattice points from each one on; NO where the box leaves the lattice."""
     for axis, size in enumerate(points):
         values = ndimage.minimum_filter1d(values, int(size), axis, mode="constant", cval=NO, origin=-(int(size) // 2))

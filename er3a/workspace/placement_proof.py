@@ -7,6 +7,7 @@ piece (:mod:`interval_inverse`), or the middle of a piece turns out to be out of
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +21,11 @@ from er3a.workspace.directions import Roll, across, left_to_roll, point_tool
 from er3a.workspace.interval_inverse import GOOD, NEVER, SLOTS, branches, holds, misses, theta_ranges
 from er3a.workspace.placement import MIXED, NO, Field, Places, Task, fitting_places, narrowed, survey
 
-PROVEN, REFUTED, UNDECIDED = "proven", "refuted", "undecided"
-_ANSWERS = (UNDECIDED, PROVEN, REFUTED)
+Answer = Literal["proven", "refuted", "undecided"]
+PROVEN: Answer = "proven"
+REFUTED: Answer = "refuted"
+_ANSWERS: tuple[Answer, ...] = ("undecided", PROVEN, REFUTED)
+Constants = tuple[BlockConstants, Reals, Reals, float, Reals, float, float]
 _STACK = 512
 _MOST_TRIES = 200
 _POSES_PER_BRICK = 512
@@ -93,18 +97,26 @@ def choose_places(robot: Robot, task: Task, places: Places, roll: Roll, count: i
     ------
     NotWristPartitionedError
     """
-    rows, slots, proven, branch_proven, refuted, used = [], [], [], [], 0, 0
+    rows: list[int] = []
+    slots: list[int] = []
+    proven: list[bool] = []
+    branch_proven: list[bool] = []
+    refuted = used = 0
     sizes = np.where(places.turned[:, None], task.box[[1, 0, 2]], task.box)
     free = np.ones(len(places.slot), dtype=bool)
+
+    def proved(row: int, slot: int, most: int) -> tuple[Answer, int]:
+        return prove_place(robot, task, places.centre[row], bool(places.turned[row]), slot, roll, most_poses=most)
+
     while len(rows) < count and refuted < _MOST_TRIES and free.any():
         row = int(np.argmax(free))
-        share = (most_poses - used) // (count - len(rows))
+        budget = (most_poses - used) // (count - len(rows))
         slot = int(places.slot[row])
-        answer, spent = prove_place(robot, task, places.centre[row], places.turned[row], slot, roll, share)
+        answer, spent = proved(row, slot, budget)
         used += spent
         if answer == REFUTED and slot != MIXED:
             slot = MIXED
-            answer, spent = prove_place(robot, task, places.centre[row], places.turned[row], slot, roll, share)
+            answer, spent = proved(row, slot, budget)
             used += spent
         if answer == REFUTED:
             free[row], refuted = False, refuted + 1
@@ -119,8 +131,8 @@ def choose_places(robot: Robot, task: Task, places: Places, roll: Roll, count: i
 
 
 def prove_place(
-    robot: Robot, task: Task, centre: np.ndarray, turned: bool, slot: int, roll: Roll, most_poses: int
-) -> tuple[str, int]:
+    robot: Robot, task: Task, centre: Reals, turned: bool, slot: int, roll: Roll, *, most_poses: int
+) -> tuple[Answer, int]:
     """Decide one place.
 
     Parameters
@@ -131,7 +143,7 @@ def prove_place(
 
     Returns
     -------
-    answer : PROVEN; REFUTED (a point and direction that no branch reaches, with any of the rolls); or UNDECIDED
+    answer : refuted means that there is a point and direction that no branch reaches, with any of the rolls
     used : how many neighbourhoods were looked at
 
     Raises
@@ -139,18 +151,18 @@ def prove_place(
     NotWristPartitionedError
     """
     half = (task.box[[1, 0, 2]] if turned else task.box) / 2
-    constants, centre = _constants(robot, task, roll), np.asarray(centre, float)
+    constants, middle = _constants(robot, task, roll), np.asarray(centre, float)
     answer = used = 0
     # Coarse pieces first, everywhere: what refutes a place is found before effort goes into its rims.
     for smallest in _SMALLEST:
-        answer, spent = _prove(*constants, centre, half, slot, most_poses - used, smallest)
+        answer, spent = _prove(*constants, middle, half, slot, most_poses - used, smallest)
         used += int(spent)
         if answer or used >= most_poses:
             break
     return _ANSWERS[answer], used
 
 
-def proven_bricks(robot: Robot, task: Task, field: Field, roll: Roll) -> np.ndarray:
+def proven_bricks(robot: Robot, task: Task, field: Field, roll: Roll) -> Flags:
     """Which bricks between eight lattice points are served at every point, by any mix of branches: (nx-1, ny-1, nz-1).
 
     Raises
@@ -169,7 +181,7 @@ def proven_bricks(robot: Robot, task: Task, field: Field, roll: Roll) -> np.ndar
     return proven
 
 
-def _constants(robot: Robot, task: Task, roll: Roll):
+def _constants(robot: Robot, task: Task, roll: Roll) -> Constants:
     """What the kernels take of an arm and a task."""
     asked = left_to_roll(robot, roll)
     arm, ranges = constants_for_blocks(asked), theta_ranges(asked)

@@ -55,11 +55,13 @@ class SampledVoid:
 
     def centroid(self, grid: Grid) -> Reals:
         """Centroid (3,), m."""
-        return grid.centres(self.cells).mean(axis=0)
+        centroid: Reals = grid.centres(self.cells).mean(axis=0)
+        return centroid
 
     def extent(self, grid: Grid) -> Reals:
         """Extent along x, y, z, (3,), m."""
-        return (np.ptp(self.cells, axis=0) + 1) * grid.cell
+        extent: Reals = (np.ptp(self.cells, axis=0) + 1) * grid.cell
+        return extent
 
 
 def find_voids(counts: Integers, inside: Flags) -> list[SampledVoid]:
@@ -92,7 +94,8 @@ def _enclosed(untouched: Flags) -> Integers:
     labels, count = ndimage.label(np.pad(untouched, 1, constant_values=True))
     renumber = np.arange(count + 1)
     renumber[labels[0, 0, 0]] = 0
-    return renumber[labels[1:-1, 1:-1, 1:-1]]
+    found: Integers = renumber[labels[1:-1, 1:-1, 1:-1]]
+    return found
 
 
 def _pockets(untouched: Flags, candidates: Flags) -> Integers:

@@ -16,14 +16,14 @@ from er3a.sampling.grid import Grid, make_grid
 from er3a.sampling.point_chain import at_wrist_centre, plane_direction
 from er3a.sampling.random_joints import Draw
 from er3a.sampling.tally import Tally, tally_blocks
-from er3a.workspace.boundary import border
+from er3a.workspace.boundary import Swept, border
 from er3a.workspace.section_arm import SectionArm, section_arm, section_frame
 
 BorderPoint = Literal["tool_point", "wrist_centre", "flange"]
 Sweeping = Literal["joint_2", "joint_3", "wrist"]
 
 WRIST_SAMPLES = 4_000_000
-_SWEEPING: dict[str, Sweeping] = {"theta_2": "joint_2", "tau": "joint_3", "gamma": "wrist"}
+_SWEEPING: dict[Swept, Sweeping] = {"theta_2": "joint_2", "tau": "joint_3", "gamma": "wrist"}
 _VIEWS: tuple[Literal["section"], Literal["side"]] = ("section", "side")
 
 
@@ -80,7 +80,7 @@ def side_views(robot: Robot, tally: Tally, grid: Grid, draw: Draw) -> list[SideV
 
 def _side_view(point: Literal["tool_point", "wrist_centre"], grid: Grid, tally: Tally, front: float) -> SideView:
     index = np.argwhere(tally.side > 0)
-    x = front * (index[:, 0] - grid.section_shape[0] + 0.5) * grid.section_cell
+    x = np.asarray(front * (index[:, 0] - grid.section_shape[0] + 0.5) * grid.section_cell, np.float64)
     z = grid.section_origin[1] + (index[:, 1] + 0.5) * grid.section_cell
     return SideView(point, x, z, grid.section_cell, tally.side[tally.side > 0])
 

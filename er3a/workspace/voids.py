@@ -74,10 +74,21 @@ def sampled_only(voids: list[SampledVoid], grid: Grid, shoulder: Reals, proven: 
         if any((np.abs(centroid - other.centroid) <= other.extent / 2).all() for other in proven):
             continue
         near = np.all(np.abs(void.cells - cell_of_shoulder) <= 1, axis=1)
-        volume = len(void.cells) * grid.cell_volume
-        nothing = np.empty((0, 3)), np.empty((0, 3), np.int64)
-        rest = (centroid, void.extent(grid), OnlySampled(), (), bool(np.any(near)), *nothing)
-        found.append(Void(void.kind, "undersampled", 0.0, volume, *rest))
+        found.append(
+            Void(
+                kind=void.kind,
+                status="undersampled",
+                lower=0.0,
+                upper=len(void.cells) * grid.cell_volume,
+                centroid=centroid,
+                extent=void.extent(grid),
+                cause=OnlySampled(),
+                relaxed=(),
+                holds_shoulder=bool(np.any(near)),
+                vertices=np.empty((0, 3)),
+                triangles=np.empty((0, 3), np.int64),
+            )
+        )
     return found
 
 
@@ -94,17 +105,17 @@ def _void(
     near &= (cavity.cells[:, [1, 3]] >= [rho - size, local[2] - size]).all(axis=1)
     vertices, triangles = mesh(*surface)
     return Void(
-        kind,
-        "proven_empty",
-        cavity.lower,
-        cavity.upper,
-        proven.in_base(cavity.centroid()) + 0.0,
-        extent,
-        cause_of(single, unlimited),
-        (*single, unlimited),
-        bool(near.any()),
-        proven.in_base(vertices),
-        triangles,
+        kind=kind,
+        status="proven_empty",
+        lower=cavity.lower,
+        upper=cavity.upper,
+        centroid=proven.in_base(cavity.centroid()) + 0.0,
+        extent=extent,
+        cause=cause_of(single, unlimited),
+        relaxed=(*single, unlimited),
+        holds_shoulder=bool(near.any()),
+        vertices=proven.in_base(vertices),
+        triangles=triangles,
     )
 
 

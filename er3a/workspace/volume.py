@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.workspace.lookup import EMPTY, FILLED, SectionMap
 from er3a.workspace.proof import judge
 from er3a.workspace.section_arm import SectionArm
@@ -37,7 +38,7 @@ class VolumeEstimate:
 
 
 def estimate_volume(
-    search: SectionArm | Callable[[np.ndarray], np.ndarray],
+    search: SectionArm | Callable[[Reals], Flags],
     section: SectionMap,
     reach: float,
     heights: tuple[float, float],
@@ -77,7 +78,7 @@ def estimate_volume(
     )
 
 
-def _decide(arm: SectionArm, rho: np.ndarray, azimuth: np.ndarray, z: np.ndarray, status: np.ndarray) -> None:
+def _decide(arm: SectionArm, rho: Reals, azimuth: Reals, z: Reals, status: Integers) -> None:
     """Judge open points as cells of next to no size."""
     for n in range(2):
         left = np.flatnonzero((status != FILLED) & (status != EMPTY))

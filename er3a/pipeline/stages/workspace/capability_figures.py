@@ -14,7 +14,7 @@ from matplotlib.patches import Patch, Rectangle
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.stages.workspace.cell_lookup import CellLookup
 from er3a.pipeline.stages.workspace.model import CapabilitySummary, PlacementSummary, PlaceSummary, SectionFrame
-from er3a.pipeline.stages.workspace.tables import BoxPlaces, CapabilityCells
+from er3a.pipeline.stages.workspace.tables import BoxPlaces, CapabilityCells, Singles
 from er3a.pipeline.tables import Flags, Integers, Reals
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed
@@ -104,7 +104,7 @@ def placement_views(
     return figure
 
 
-def _looked_up(values: Reals, row: Integers) -> np.ma.MaskedArray:
+def _looked_up(values: Reals | Singles, row: Integers) -> np.ma.MaskedArray:
     return np.ma.masked_array(values[np.maximum(row, 0)], row < 0)
 
 
@@ -121,7 +121,7 @@ def _draw_arm(axes: Axes, robot: Robot, frame: SectionFrame) -> None:
     axes.plot(local[:, 0], local[:, 2], color=INK, linewidth=2.0, marker="o", markersize=3, solid_capstyle="round")
 
 
-def _raster(points: Reals, steps: list[float], percent: Reals, proven: Flags) -> tuple[list[Reals], Reals, Flags]:
+def _raster(points: Reals, steps: list[float], percent: Singles, proven: Flags) -> tuple[list[Reals], Reals, Flags]:
     """Edges of the raster's columns and rows (m), the greatest value in each of its cells (proven ones first; -1: none
     there), and whether one is proven."""
     low = points.min(axis=0)
@@ -135,11 +135,11 @@ def _raster(points: Reals, steps: list[float], percent: Reals, proven: Flags) ->
 
 def _draw_boxes(axes: Axes, listed: Sequence[PlaceSummary], shown: list[int]) -> None:
     """Outlines with their numbers; boxes that fall on each other share a label."""
-    labels: dict[tuple[float, ...], list[str]] = {}
+    labels: dict[tuple[float, float], list[str]] = {}
     for number, place in enumerate(listed, start=1):
         centre, size = (1000 * np.array(part)[shown] for part in (place.centre_m, place.size_m))
         low = centre - size / 2
-        axes.add_patch(Rectangle(low, *size, fill=False, edgecolor=HIGHLIGHT, linewidth=1.6))
+        axes.add_patch(Rectangle((low[0], low[1]), *size, fill=False, edgecolor=HIGHLIGHT, linewidth=1.6))
         labels.setdefault((low[0].round(3), (low[1] + size[1]).round(3)), []).append(str(number))
     shade = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1}
     for corner, numbers in labels.items():

@@ -102,7 +102,7 @@ def gather(paths: list[Path], study: Study, robot: Robot) -> Tally:
         total = tally if total is None else total.merge(tally)
     held = total.blocks if total else np.array([])
     missing = np.setdiff1d(np.arange(study.workspace.blocks), held)
-    if missing.size:
+    if missing.size or total is None:
         where = paths[-1] if paths else "part files"
         raise ResultError(where, f"with this file and the others, block {int(missing[0])} is still missing")
     return total

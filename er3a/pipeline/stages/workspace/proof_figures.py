@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import ListedColormap
@@ -53,7 +54,9 @@ def sections(robot: Robot, results: WorkspaceResults) -> Figure:
     draw_labels(right, drawing, drawing.rho_m)
     left.set_title(tr("Samples, all azimuths folded in"))
     right.set_title(tr("Proof"))
-    handles = [Line2D([], [], color=INK, marker="o", markersize=4, linewidth=2.4, label=tr("arm, all joints 0"))]
+    handles: list[Artist] = [
+        Line2D([], [], color=INK, marker="o", markersize=4, linewidth=2.4, label=tr("arm, all joints 0"))
+    ]
     handles += [
         Line2D([], [], color=colour, label=tr("exact border, {point}", point=word("workspace.point", POINTS, point)))
         for point, colour in BORDERS.items()
@@ -86,7 +89,7 @@ def _draw_proof(axes: Axes, proof: ProofCells) -> None:
         a, b, c, d = corners[kinds == kind].T
         boxes = np.stack([np.stack([a, c], 1), np.stack([b, c], 1), np.stack([b, d], 1), np.stack([a, d], 1)], axis=1)
         axes.add_collection(
-            PolyCollection(boxes, facecolors=colour, edgecolors=colour, linewidths=0.2, rasterized=True)
+            PolyCollection(list(boxes), facecolors=colour, edgecolors=colour, linewidths=0.2, rasterized=True)
         )
     axes.set_ylim(corners[:, 2].min(), corners[:, 3].max())
 

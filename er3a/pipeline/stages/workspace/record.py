@@ -73,7 +73,7 @@ def _log_cloud(stream: rr.RecordingStream, cloud: Cloud, middle: float, reach: f
 def _log_hull(stream: rr.RecordingStream, results: WorkspaceResults) -> None:
     vertices, triangles = results.hull_vertices.point_m, results.hull_triangles.corners
     edges = np.unique(np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
-    wires = rr.LineStrips3D(vertices[edges], colors=[(*rgb(MUTED), 90)], radii=rr.Radius.ui_points(0.4))
+    wires = rr.LineStrips3D(list(vertices[edges]), colors=[(*rgb(MUTED), 90)], radii=rr.Radius.ui_points(0.4))
     stream.log(f"{STAGE}/hull", wires, static=True)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -49,14 +50,13 @@ def report(study: Study, stored: Stored[WorkspaceResults], output: Path) -> None
         voids_more=max(0, len(summary.voids) - LISTED),
         unexpected=isinstance(summary.verdict.finding, VoidUnexpected),
         wide=100 * summary.proof.width,
-        **_pictures(robot, results),
-        **capability_context(robot, results),
+        **_context(robot, results),
     )
 
 
-def _pictures(robot: Robot, results: WorkspaceResults) -> dict[str, Picture]:
+def _context(robot: Robot, results: WorkspaceResults) -> dict[str, Any]:
     summary = results.summary
-    return {
+    return capability_context(robot, results) | {
         "section": Picture(
             sections(robot, results),
             tr("Side sections about axis 1: density of the samples, and proven cells with the exact border"),

@@ -38,7 +38,12 @@ def cells(tally: Tally, void_number: NDArray[np.int64]) -> Cells:
     """Touched cells, and untouched ones in the hull with the number of their void."""
     shown = (tally.counts > 0) | (void_number != 0)
     first = tally.first_block[shown]
-    return Cells(np.argwhere(shown), tally.counts[shown], np.where(first == UNTOUCHED, -1, first), void_number[shown])
+    return Cells(
+        index=np.argwhere(shown).astype(np.int16),
+        samples=tally.counts[shown],
+        first_block=np.where(first == UNTOUCHED, -1, first),
+        void=void_number[shown].astype(np.int32),
+    )
 
 
 def section(found: touched_cells.SectionCells) -> SectionCells:
@@ -78,7 +83,7 @@ def proof(proven: Proven) -> ProofCells:
         rho_m=found.cells[:, :2],
         z_m=found.cells[:, 2:],
         volume_m3=found.volumes,
-        level=found.level,
+        level=found.level.astype(np.int16),
         status=_texts(proven.cell_states()),
         filled_ratio=1 - found.unfilled_ratio,
         empty_ratio=found.empty_ratio,
@@ -92,11 +97,15 @@ def border(lines: Sequence[BorderLine]) -> Border:
     """The points of border lines, one line after another."""
     return Border.stacked(
         Border(
-            *line.points.T,
-            *np.degrees(line.q).T,
-            np.degrees(line.tilt),
-            np.full(len(line.tilt), line.number),
-            *(_repeated(text, len(line.tilt)) for text in (line.point, line.sweeps, line.view)),
+            rho_m=line.points[:, 0],
+            z_m=line.points[:, 1],
+            q2_deg=np.degrees(line.q[:, 0]),
+            q3_deg=np.degrees(line.q[:, 1]),
+            tilt_deg=np.degrees(line.tilt),
+            arc=np.full(len(line.tilt), line.number),
+            point=_repeated(line.point, len(line.tilt)),
+            sweeps=_repeated(line.sweeps, len(line.tilt)),
+            view=_repeated(line.view, len(line.tilt)),
         )
         for line in lines
     )
@@ -115,19 +124,26 @@ def capability(middles: Reals, found: Capability) -> CapabilityCells:
     """Reached cells and sectors; ``middles`` (n, 2), m, are those of all cells."""
     cell, sector = np.nonzero(found.reachability)
     return CapabilityCells(
-        *middles[cell].T,
-        360.0 * sector / found.reachability.shape[1],
-        found.reachability[cell, sector],
-        found.solutions[cell, sector],
-        found.most_solutions[cell, sector],
-        found.manipulability[cell, sector],
+        rho_m=middles[cell, 0],
+        z_m=middles[cell, 1],
+        azimuth_deg=360.0 * sector / found.reachability.shape[1],
+        reachability=found.reachability[cell, sector].astype(np.float32),
+        solutions=found.solutions[cell, sector].astype(np.float32),
+        most_solutions=found.most_solutions[cell, sector].astype(np.int8),
+        manipulability_m3=found.manipulability[cell, sector].astype(np.float32),
     )
 
 
 def places(found: Places) -> BoxPlaces:
     """Positions of the box."""
-    limit_margin = np.degrees(found.limit_margin)
-    return BoxPlaces(found.centre, found.turned, found.slot, found.least, limit_margin, found.proven)
+    return BoxPlaces(
+        centre_m=found.centre,
+        turned=found.turned,
+        slot=found.slot.astype(np.int8),
+        manipulability_m3=found.least.astype(np.float32),
+        limit_margin_deg=np.degrees(found.limit_margin).astype(np.float32),
+        proven=found.proven,
+    )
 
 
 def _repeated(text: str, count: int) -> Texts:
