@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from er3a.pipeline.messages.kinematics import SINGULARITIES  # noqa: F401
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.say import joined, listed, say, sentence
 from er3a.planning.avoidance import StrategyName, findings

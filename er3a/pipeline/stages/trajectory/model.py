@@ -10,6 +10,7 @@ from typing import Generic, Literal, TypeVar, get_args
 
 from er3a.collision.pairs import Pair, PairOverlaps
 from er3a.findings import Finding
+from er3a.kinematics.configuration import BranchLabel
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.tables import Flags, Reals, Table, Texts, column, per_joint, vector
 from er3a.planning.avoidance import StrategyName
@@ -216,7 +217,7 @@ class PathSummary:
     duration_s: float
     samples: int
     length_m: float
-    branches: tuple[str, ...]
+    branches: tuple[BranchLabel, ...]
     half_turns: tuple[HalfTurn, ...]
     corner_deviation_mm: float | None
     corner_deviation_deg: float | None
