@@ -8,8 +8,6 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from er3a.findings import Finding
-
 
 class Er3aError(Exception):
     """Root of all errors that a user can cause and mend."""
@@ -65,10 +63,6 @@ class NotWristPartitionedError(Er3aError):
             f"{robot}: no closed-form inverse ({property_missing.code.replace('_', ' ')}); it needs parallel axes 2 "
             "and 3, and axes 4, 5 and 6 through one point"
         )
-
-
-class IdentificationError(Er3aError):
-    """Measurements determine too little of a table, or no corrections make the table fit them."""
 
 
 class ResultError(Er3aError):

@@ -101,7 +101,7 @@ def worst_location(robot, random, lines: int) -> dict[str, tuple[int, float]]:
         q = random.uniform(robot.lower, robot.upper)
         way = line(*forward(robot, np.stack([q, q + random.uniform(-0.4, 0.4, 6)])), 1.0)
         for slot in (0, 2):
-            if not labels[slot].startswith("front"):
+            if not labels[slot].startswith("front_"):
                 slot += 4
             try:
                 followed = follow(robot, way, grid, start_slot=slot)

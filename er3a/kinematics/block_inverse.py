@@ -14,6 +14,7 @@ import numpy as np
 
 from er3a.geometry.angles import TURN
 from er3a.geometry.transforms import FARTHEST_M, ORTHONORMAL_TOLERANCE
+from er3a.geometry.vectors import Vector
 from er3a.kinematics.block_constants import EDGE
 from er3a.numerics.fast_math import arctan2
 from er3a.numerics.jit import kernel
@@ -129,7 +130,7 @@ def count_turns(q, lower, upper, turns):
 
 
 @kernel
-def in_frame_1(rows, x, y, z):
+def in_frame_1(rows: tuple[Vector, Vector, Vector], x: float, y: float, z: float) -> Vector:
     """A vector turned by a rotation given as three rows."""
     a, b, c = rows
     return (

@@ -13,7 +13,7 @@ import numpy as np
 from er3a.errors import ResultError
 from er3a.kinematics.chain import constant_links
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.results import read_checked, write_checked
+from er3a.pipeline.kept_files import read_checked, write_checked
 from er3a.pipeline.study import Study
 from er3a.robots.robot import Robot
 from er3a.sampling.extreme_samples import Extremes
@@ -102,7 +102,7 @@ def gather(paths: list[Path], study: Study, robot: Robot) -> Tally:
         total = tally if total is None else total.merge(tally)
     held = total.blocks if total else np.array([])
     missing = np.setdiff1d(np.arange(study.workspace.blocks), held)
-    if missing.size:
+    if missing.size or total is None:
         where = paths[-1] if paths else "part files"
         raise ResultError(where, f"with this file and the others, block {int(missing[0])} is still missing")
     return total
