@@ -11,7 +11,6 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from er3a.kinematics.round_trips import slot_round_trips
 from scipy.spatial.transform import Rotation
 
 import er3a
@@ -22,6 +21,7 @@ from er3a.files.reference_sets import load_references
 from er3a.files.robot_file import Placement
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.kinematics.forward import frames
+from er3a.kinematics.round_trips import slot_round_trips
 from er3a.kinematics.wrist_partitioned import NoWristCentre
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import Stored, read_results, table_types

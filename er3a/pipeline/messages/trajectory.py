@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import er3a.pipeline.messages.collision  # noqa: F401
+from er3a.kinematics.singularity import SingularityType
 from er3a.pipeline.messages.kinematics import SINGULARITIES
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
@@ -18,7 +19,6 @@ from er3a.pipeline.stages.trajectory.model import (
     TriedStrategy,
 )
 from er3a.planning.avoidance import StrategyName
-from er3a.planning.near_singular import SingularityType
 
 __all__ = ["FIGURES", "advice", "kind_word", "path_text", "strategy_word", "type_word", "verdict_word"]
 

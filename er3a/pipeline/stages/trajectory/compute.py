@@ -49,11 +49,13 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     near = NearSingular(
         float(np.radians(thresholds.wrist_deg)), float(np.radians(thresholds.elbow_deg)), thresholds.shoulder_mm / 1000
     )
-    limits = joint_limits(robot, np.radians(settings.assumed_speed_deg_s), settings.full_speed_after_s)
+    limits = joint_limits(robot, np.radians(settings.assumed_speed_deg_s), settings.acceleration_time_s)
     scene_file = study.scene(name, "trajectory")
     scene = load_scene(scene_file) if scene_file else None
-    surroundings = Surroundings(Bodies(robot, scene), settings.overlap_mm / 1000) if can_measure() else None
-    only = None if settings.repair == "compare" else settings.repair
+    surroundings = (
+        Surroundings(Bodies(robot, scene), settings.penetration_tolerance_mm / 1000) if can_measure() else None
+    )
+    only = None if settings.avoidance == "compare" else settings.avoidance
     avoidance = AvoidanceTask(robot, near, limits, only, surroundings)
     tables: list[Checks] = []
     clearances: list[Clearances] = []
@@ -80,11 +82,11 @@ def compute(study: Study, name: str) -> TrajectoryResults:
         characteristic_length_m=length,
         near=thresholds,
         joint_limits=LimitsUsed(
-            _degrees(limits.speed), assumed, _degrees(limits.acceleration), settings.full_speed_after_s
+            _degrees(limits.speed), assumed, _degrees(limits.acceleration), settings.acceleration_time_s
         ),
         scene=scene.title if scene else None,
         clearance_measured=surroundings is not None,
-        penetration_tolerance_mm=settings.overlap_mm,
+        penetration_tolerance_mm=settings.penetration_tolerance_mm,
         paths=tuple(paths),
     )
     return TrajectoryResults(

@@ -11,12 +11,12 @@ from typing import Generic, Literal, TypeVar, get_args
 from er3a.collision.pairs import Pair, PairOverlaps
 from er3a.findings import Finding
 from er3a.kinematics.configuration import BranchLabel
+from er3a.kinematics.singularity import SingularityType
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.tables import Flags, Reals, Table, Texts, column, per_joint, vector
 from er3a.planning.avoidance import StrategyName
 from er3a.planning.avoidance.strategies import NotUsable
 from er3a.planning.intervals import AboveLimit, BelowLimit, PathOutOfReach, TooFast
-from er3a.planning.near_singular import SingularityType
 
 PathKind = Literal["joint", "joint_sequence", "line", "arc", "sequence", "table"]
 PathVerdict = Literal["unreachable", "leaves limits", "collides", "too fast", "singular", "near-singular", "safe"]
