@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.trajectory import (
@@ -70,6 +71,7 @@ class Section:
     kind: str
     text: str
     advice: str | None
+    branches: list[str]
     speed: str
     events: list[list[str]]
     faults: list[list[str]]
@@ -109,6 +111,7 @@ def _section(path: PathSummary, rows: Checks, figure: Drawing) -> Section:
         kind=kind_word(path.kind),
         text=path_text(path),
         advice=advice(path),
+        branches=[branch_word(label) for label in path.branches],
         speed=_speed(path),
         events=[_event_row(event) for event in path.singularities],
         faults=_faults(path),
