@@ -8,6 +8,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from er3a.findings import Finding
+
 
 class Er3aError(Exception):
     """Root of all errors that a user can cause and mend."""
