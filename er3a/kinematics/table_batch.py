@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from er3a.kinematics.forward import rows_of, step_row, turn_row, write_rows
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 
@@ -23,7 +23,7 @@ class Tables:
     a, d : (H, 6), m; alpha, beta, offset, lower, upper : (H, 6), rad; direction : (H, 6), +1 or -1
     """
 
-    modified: Reals
+    modified: Flags
     a: Reals
     alpha: Reals
     beta: Reals
