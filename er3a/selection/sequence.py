@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 
@@ -25,7 +26,8 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import Robot
 from er3a.selection.rules import joint_weights
 
-MOVES = ("nearest", "weighted", "time")
+MoveRule = Literal["nearest", "weighted", "time"]
+MOVES: tuple[MoveRule, ...] = ("nearest", "weighted", "time")
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +52,7 @@ def select_sequence(
     robot: Robot,
     poses: Sequence[Solutions],
     q_ref: Reals,
-    rule: str = "nearest",
+    rule: MoveRule = "nearest",
     scene: Scene | None = None,
 ) -> SequenceChoice:
     """Choose one solution of each pose so that all moves together cost least.

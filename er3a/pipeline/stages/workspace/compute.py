@@ -12,6 +12,7 @@ from er3a.kinematics.forward import forward
 from er3a.pipeline.results import Figure
 from er3a.pipeline.stages.workspace import table_rows
 from er3a.pipeline.stages.workspace.capability import ToolCapability, tool_capability
+from er3a.pipeline.stages.workspace.entry import CapabilitySettings, WorkspaceSettings
 from er3a.pipeline.stages.workspace.envelope_marks import drawing_table
 from er3a.pipeline.stages.workspace.model import (
     AxisSummary,
@@ -83,11 +84,12 @@ def compute(study: Study, name: str, parts: Sequence[Path] | None = None) -> Wor
     grid, draw, tally, hull = samples.grid, samples.draw, samples.tally, samples.hull
     in_cloud = find_voids(tally.counts, samples.inside)
     shoulder = shoulder_of(robot, grid)
-    proven = prove_robot(robot, study.workspace.proof_cells, study.workspace.volume_points, study.seed)
+    settings = study.section(WorkspaceSettings)
+    proven = prove_robot(robot, settings.proof_cells, settings.volume_points, study.seed)
     voids = proven_voids(robot, proven, hull, shoulder)
     if proven.arm is None:
         voids += sampled_only(in_cloud, grid, shoulder, voids)
-    tool = tool_capability(robot, study.capability, grid.cell)
+    tool = tool_capability(robot, study.section(CapabilitySettings), grid.cell)
     vertices, triangles = table_rows.void_surfaces(voids)
     return WorkspaceResults(
         summary=_summary(study, robot, samples, proven, voids, tool),
@@ -109,7 +111,7 @@ def compute(study: Study, name: str, parts: Sequence[Path] | None = None) -> Wor
 
 
 def _samples(study: Study, robot: Robot, parts: Sequence[Path] | None) -> _Samples:
-    settings = study.workspace
+    settings = study.section(WorkspaceSettings)
     grid, draw = make_grid(robot, settings.cells_across), draw_of(study)
     if parts is None:
         tally = sampled(study, robot, grid, range(settings.blocks))
@@ -124,7 +126,7 @@ def _samples(study: Study, robot: Robot, parts: Sequence[Path] | None) -> _Sampl
 def _summary(
     study: Study, robot: Robot, samples: _Samples, proven: Proven, voids: Sequence[Void], tool: ToolCapability
 ) -> WorkspaceSummary:
-    settings, grid, tally, hull = study.workspace, samples.grid, samples.tally, samples.hull
+    settings, grid, tally, hull = study.section(WorkspaceSettings), samples.grid, samples.tally, samples.hull
     touched, unseen = tally.counts > 0, unseen_cells(tally.counts)
     counts = CellCounts(int(touched.sum()), int(samples.inside.sum()), int((touched & samples.inside).sum()), unseen)
     lower, upper = proven.proof.bounds
