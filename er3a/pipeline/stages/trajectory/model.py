@@ -16,7 +16,7 @@ from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.tables import Flags, Reals, Table, Texts, column, per_joint, vector
 from er3a.planning.avoidance import StrategyName
 from er3a.planning.avoidance.strategies import NotUsable
-from er3a.planning.intervals import AboveLimit, BelowLimit, OutOfReach, TooFast
+from er3a.planning.intervals import AboveLimit, BelowLimit, PathOutOfReach, TooFast
 
 PathKind = Literal["joint", "joint_sequence", "line", "arc", "sequence", "table"]
 PathVerdict = Literal["unreachable", "leaves limits", "collides", "too fast", "singular", "near-singular", "safe"]
@@ -224,7 +224,7 @@ class PathSummary:
     repeated_rows: tuple[int, ...]
     start_turn_deg: tuple[float, ...] | None
     singularities: tuple[Singularity, ...]
-    unreachable: tuple[Stretch[OutOfReach], ...]
+    unreachable: tuple[Stretch[PathOutOfReach], ...]
     out_of_limits: tuple[Stretch[AboveLimit | BelowLimit], ...]
     too_fast: tuple[Stretch[TooFast], ...]
     jumps: tuple[Jump, ...]
