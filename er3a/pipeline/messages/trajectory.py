@@ -8,7 +8,6 @@ from er3a.pipeline.messages.kinematics import SINGULARITIES
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
 from er3a.pipeline.messages.say import joined, listed, say, sentence, word
-from er3a.pipeline.messages.trajectory_verdict import verdict_word
 from er3a.pipeline.stages.trajectory.model import (
     BodiesOverlap,
     Jump,
@@ -19,8 +18,6 @@ from er3a.pipeline.stages.trajectory.model import (
     TriedStrategy,
 )
 from er3a.planning.avoidance import StrategyName
-
-__all__ = ["FIGURES", "advice", "kind_word", "path_text", "strategy_word", "type_word", "verdict_word"]
 
 FIGURES = {
     "paths": N_("Paths planned"),

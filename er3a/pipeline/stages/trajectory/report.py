@@ -18,8 +18,8 @@ from er3a.pipeline.messages.trajectory import (
     reasons,
     strategy_word,
     type_word,
-    verdict_word,
 )
+from er3a.pipeline.messages.trajectory_verdict import verdict_word
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.trajectory.clearance_figures import clearance_section
 from er3a.pipeline.stages.trajectory.model import (
