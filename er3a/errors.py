@@ -67,14 +67,6 @@ class NotWristPartitionedError(Er3aError):
         )
 
 
-class CalibrationError(Er3aError):
-    """Measurements determine too little of a table, or no corrections make the table fit them; see ``finding``."""
-
-    def __init__(self, finding: Finding, problem: str):
-        self.finding = finding
-        super().__init__(problem)
-
-
 class ResultError(Er3aError):
     """A results file is missing, damaged or of another format version; a rerun of its stage mends it."""
 

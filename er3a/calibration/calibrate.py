@@ -21,6 +21,7 @@ from er3a.calibration.identifiable import Level, choose_level
 from er3a.calibration.measured import Measurement, Observations, observed
 from er3a.calibration.outcomes import (
     CalibrationConclusion,
+    CalibrationError,
     CorrectionsFound,
     Held,
     LevelName,
@@ -30,10 +31,9 @@ from er3a.calibration.outcomes import (
     NoCorrectionFound,
 )
 from er3a.calibration.parameters import Parameter, jacobian, moved
-from er3a.errors import CalibrationError
 from er3a.kinematics.table_batch import Tables, robot_of, tables_of
+from er3a.numerics.arrays import Reals
 from er3a.references.predict import predict_tables
-from er3a.references.quantities import Reals
 from er3a.references.reference import ReferenceSet
 from er3a.robots.robot import Robot
 

@@ -9,9 +9,8 @@ from typing import cast
 import numpy as np
 
 from er3a.calibration.measured import Observations
-from er3a.calibration.outcomes import LevelName, MorePositions, NoPositions
+from er3a.calibration.outcomes import CalibrationError, LevelName, MorePositions, NoPositions
 from er3a.calibration.parameters import LEVELS, SCALE, Parameter, Subspace, jacobian, parameters_of, subspace
-from er3a.errors import CalibrationError
 from er3a.kinematics.table_batch import tables_of
 from er3a.numerics.quasi_random import quasi_random_points
 from er3a.references.quantities import COORDINATES, ZERO_POSE, CarriedCoordinate, PointCoordinate, Pose, Quantity

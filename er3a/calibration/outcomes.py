@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from er3a.errors import Er3aError
 from er3a.references.quantities import Pose
 
 LevelName = Literal["lengths", "lengths_and_offsets", "all_entries"]
@@ -73,6 +74,14 @@ class NoCorrectionFits:
 
 
 NotCalibrated = NoPositions | MorePositions | NoCorrectionFits
+
+
+class CalibrationError(Er3aError):
+    """Measurements determine too little of a table, or no corrections make the table fit them; see ``finding``."""
+
+    def __init__(self, finding: NotCalibrated, problem: str):
+        self.finding = finding
+        super().__init__(problem)
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ from er3a.kinematics.aligned_wrist import (
 )
 from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.forward import frames, jacobian
+from er3a.kinematics.singularity import SingularityType
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.numerics.arrays import Reals
 from er3a.robots.joint_limits import LIMIT_TOLERANCE, nearest_equivalent, within
@@ -33,7 +34,8 @@ from er3a.robots.robot import Robot
 GRID = np.radians(2.0)
 SPLIT, ROUNDS = 16, 10  # an interval is cut into so many parts, so often
 SAME_FAMILY = 1e-8
-FREE_JOINT = {"shoulder": 0, "elbow": 1}
+CURVES: tuple[tuple[SingularityType, int, int], ...] = (("shoulder", 4, 0), ("elbow", 2, 1))  # slots apart, joint
+FREE_JOINT: dict[SingularityType, int] = {"shoulder": 0, "elbow": 1}
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +57,7 @@ class Family:
     branches : slots that the family belongs to
     """
 
-    kind: str
+    kind: SingularityType
     q0: Reals
     direction: Reals
     range: Reals
@@ -87,7 +89,7 @@ def families(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[Family, ..
     for pair, on_line in aligned_arms(robot, T, q):
         _add(found, _wrist_families(robot, T, on_line, q_ref, pair))
     solved, slots = np.isfinite(q[:, 0]), np.arange(SLOTS)
-    for kind, step, joint in (("shoulder", 4, 0), ("elbow", 2, 1)):
+    for kind, step, joint in CURVES:
         for slot in slots[(slots // step % 2 == 0) & solved]:
             moved = wrist_centre_on_axis(robot, T, q[slot], joint)
             if np.linalg.norm(moved[:3, 3] - T[:3, 3]) < SOLVES_M and (joint == 0 or arm_folds_fully(robot)):
@@ -144,7 +146,7 @@ def _on_curve(robot: Robot, T: Reals, joint: int, values: Reals, q_ref: Reals, s
     return solve_slots(robot, np.broadcast_to(T, (len(values), 4, 4)), reference, keep_folds=True)[0][:, slot]
 
 
-def _curve_family(robot: Robot, T: Reals, kind: str, q_ref: Reals, branches: tuple[int, ...]) -> Family:
+def _curve_family(robot: Robot, T: Reals, kind: SingularityType, q_ref: Reals, branches: tuple[int, ...]) -> Family:
     joint, slot = FREE_JOINT[kind], branches[0]
     grid = np.arange(robot.lower[joint], robot.upper[joint] + GRID, GRID)
     grid = np.unique(np.append(np.minimum(grid, robot.upper[joint]), np.clip(q_ref, robot.lower, robot.upper)[joint]))

@@ -270,9 +270,9 @@ def export_urdf(
     output: Annotated[Path, typer.Option(help="the URDF to write")],
 ):
     """Write a robot as URDF."""
+    from er3a.files.kept_files import write_atomically
     from er3a.files.robot_library import load_robot
     from er3a.formats.urdf import export_urdf as urdf_text
-    from er3a.pipeline.kept_files import write_atomically
 
     text = urdf_text(load_robot(robot))
     write_atomically(output, lambda path: path.write_text(text, encoding="utf-8"))

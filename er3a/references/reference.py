@@ -10,7 +10,8 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from er3a.references.quantities import Quantity, Reals, Unit
+from er3a.numerics.arrays import Reals
+from er3a.references.quantities import Quantity, Unit
 from er3a.references.subjects import ReferenceSubject
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 
@@ -25,7 +26,8 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import Robot
 from er3a.selection.rules import joint_weights
 
-MOVES = ("nearest", "weighted", "time")
+MoveRule = Literal["nearest", "weighted", "time"]
+MOVES: tuple[MoveRule, ...] = ("nearest", "weighted", "time")
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +52,7 @@ def select_sequence(
     robot: Robot,
     poses: Sequence[Solutions],
     q_ref: Reals,
-    rule: str = "nearest",
+    rule: MoveRule = "nearest",
     scene: Scene | None = None,
 ) -> SequenceChoice:
     """Choose one solution of each pose so that all moves together cost least.
@@ -111,9 +113,12 @@ def _move_costs(robot: Robot, before: Reals, after: Reals, rule: str) -> Reals:
     """Cost (n, m) of each move from joint angles (n, 6) to (m, 6)."""
     moves = np.abs(before[:, None] - after[None])
     if rule == "nearest":
-        return np.degrees(moves.max(axis=2))
+        farthest: Reals = moves.max(axis=2)
+        return np.degrees(farthest)
     if rule == "weighted":
-        return np.degrees(np.linalg.norm(joint_weights(robot) * moves, axis=2))
+        distance: Reals = np.linalg.norm(joint_weights(robot) * moves, axis=2)
+        return np.degrees(distance)
     if not np.isfinite(robot.speed).all():
         raise Er3aError(f"{robot.name}: the rule 'time' needs joint speeds, and the robot's file gives none")
-    return (moves / robot.speed).max(axis=2)
+    longest: Reals = (moves / robot.speed).max(axis=2)
+    return longest

@@ -168,8 +168,9 @@ def _(found: LimitBound) -> str:
 
 @say.register
 def _(found: SingularEnd) -> str:
-    text = "singular: the iteration creeps towards a singular arm, where it ends: {miss}"
-    return sentence(found.code, text, miss=say(found.miss))
+    return sentence(
+        found.code, "singular: the iteration creeps towards a singular arm, where it ends: {miss}", miss=say(found.miss)
+    )
 
 
 @say.register

@@ -12,12 +12,14 @@ text in the catalogues.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import singledispatch
-from typing import Any
+from typing import Any, TypeVar
 
 from er3a.findings import Finding
 from er3a.pipeline.messages import language
+
+KeyT = TypeVar("KeyT", bound=str)
 
 
 @singledispatch
@@ -28,15 +30,16 @@ def say(finding: Any) -> str:
 
 def sentence(code: str, template: str, /, **parts: Any) -> str:
     """A text in the language in use, its fields filled in as ``str.format`` does; ``code`` tells equal texts apart."""
-    return language.translated(code, template).format(**parts)
+    return language.filled(language.translated(code, template), template, parts)
 
 
 def counted(code: str, one: str, many: str, count: int, /, **parts: Any) -> str:
     """A text whose form depends on a number, which is the field ``{count}`` in it."""
-    return language.translated_count(code, one, many, count).format(count=count, **parts)
+    found = language.translated_count(code, one, many, count)
+    return language.filled(found, one if count == 1 else many, {"count": count} | parts)
 
 
-def word(code: str, words: dict[str, str], key: str) -> str:
+def word(code: str, words: Mapping[KeyT, str], key: KeyT) -> str:
     """The word for a code out of a table of words marked with ``N_``; a key without one stays as it is."""
     return language.translated(code, words[key]) if key in words else key
 

@@ -45,8 +45,9 @@ RULE_TITLES = {
 
 @say.register
 def _(found: GreatestMove) -> str:
-    text = "greatest joint move {angle:.1f} deg (J{joint})"
-    return sentence(found.code, text, angle=found.angle_deg, joint=found.joint)
+    return sentence(
+        found.code, "greatest joint move {angle:.1f} deg (J{joint})", angle=found.angle_deg, joint=found.joint
+    )
 
 
 @say.register
@@ -56,8 +57,13 @@ def _(found: OnlyAdmissible) -> str:
 
 @say.register
 def _(found: MovesLess) -> str:
-    text = "{move}, {angle:.3g} deg less than {other}"
-    return sentence(found.code, text, move=say(found.move), angle=found.less_deg, other=_next_best(found))
+    return sentence(
+        found.code,
+        "{move}, {angle:.3g} deg less than {other}",
+        move=say(found.move),
+        angle=found.less_deg,
+        other=_next_best(found),
+    )
 
 
 @say.register
@@ -123,8 +129,7 @@ def _of_side(found: Unsolved) -> str:
 def _(found: AllOutsideLimits) -> str:
     label, reason = branch_word(found.label, found.branch), say(found.exceeded)
     if found.count == 1:
-        text = "the only solution leaves them: {branch}: {reason}"
-        return sentence(found.code, text, branch=label, reason=reason)
+        return sentence(found.code, "the only solution leaves them: {branch}: {reason}", branch=label, reason=reason)
     return sentence(
         found.code,
         "all {count} solutions leave the limits; the least so is {branch}: {reason}",
@@ -136,8 +141,12 @@ def _(found: AllOutsideLimits) -> str:
 
 @say.register
 def _(found: AllCollide) -> str:
-    text = "all {count} solutions within the limits collide: {reason}"
-    return sentence(found.code, text, count=found.count, reason=say(found.overlap))
+    return sentence(
+        found.code,
+        "all {count} solutions within the limits collide: {reason}",
+        count=found.count,
+        reason=say(found.overlap),
+    )
 
 
 @say.register

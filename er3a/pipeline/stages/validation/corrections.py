@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from er3a.calibration.calibrate import Calibration, calibrate
-from er3a.errors import CalibrationError
+from er3a.calibration.outcomes import CalibrationError
 from er3a.pipeline.stages.validation.diagnosis_model import Calibrated, Corrections, SetCalibration
 from er3a.references.reference import ReferenceSet
 from er3a.robots.robot import Robot

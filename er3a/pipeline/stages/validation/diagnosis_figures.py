@@ -109,8 +109,10 @@ def _calibration_story(calibration: SetCalibration, corrections: Corrections) ->
         more=typographic(say(found.more)) if found and found.more else "",
         picture=Picture(corrections_figure(own), alt, text) if len(own) else None,
         rows=[
-            [row.entry, fixed(row.nominal, 3), fixed(row.correction, 4), fixed(row.half_width, 4), row.unit]
-            for row in own.frame().itertuples(index=False)
+            [entry, fixed(nominal, 3), fixed(correction, 4), fixed(half_width, 4), unit]
+            for entry, nominal, correction, half_width, unit in zip(
+                own.entry, own.nominal, own.correction, own.half_width, own.unit
+            )
         ],
     )
 
@@ -172,7 +174,11 @@ def _residual_picture(rows: Residuals, diagnosis: SetDiagnosis) -> Picture | Non
 def _hypothesis_row(hypothesis: RankedHypothesis) -> list[str]:
     words = both(hypothesis.faults)
     if alike := hypothesis.indistinguishable_from:
-        template = "{faults} (or {more} more that these references can't tell from it)"
-        words = sentence("alike", template, faults=words, more=len(alike))
+        words = sentence(
+            "alike",
+            "{faults} (or {more} more that these references can't tell from it)",
+            faults=words,
+            more=len(alike),
+        )
     numbers = [fixed(value, 1) for value in (hypothesis.residual_before, hypothesis.residual_after)]
     return [typographic(words), *numbers, hypothesis.unit]
