@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from er3a.pipeline.stages.validation.check_model import Check, Conflict, ModelCheck, ReferenceCheck, Statement, Unjudged
 from er3a.pipeline.stages.validation.findings import (
     ModelGroup,
     NearSingularLeftOut,
@@ -17,14 +18,6 @@ from er3a.pipeline.stages.validation.findings import (
     SetHasNoData,
     SourceGivesNone,
     WholeGroup,
-)
-from er3a.pipeline.stages.validation.model import (
-    Check,
-    Conflict,
-    ModelCheck,
-    ReferenceCheck,
-    Statement,
-    Unjudged,
 )
 from er3a.pipeline.tables import Reals
 from er3a.references.quantities import Limit, Quantity, Speed
