@@ -25,21 +25,20 @@ from testing.small_study import STUDY, fresh
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 ROBOT = "er3_600"  # the one that the fast tests study
-LONGEST_STUDY_S = 900
+LONGEST_S = 900
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests of a study may take as long as a study; those that ask for a robot which the fast ones lack are long."""
-    others = [name for name in ROBOTS if name != ROBOT]
+    """Tests of the small study that ask for a robot which the fast set's lacks are long; time limits of long ones."""
+    others = {name for name in ROBOTS if name != ROBOT}
     for item in items:
-        if "shared_folder" not in getattr(item, "fixturenames", ()):
-            continue
-        item.add_marker(pytest.mark.timeout(LONGEST_STUDY_S))
-        parameters = getattr(item, "callspec", None)
-        named = [str(value).partition("/")[0] for value in parameters.params.values()] if parameters else []
-        if set(named) & set(others):
+        of_a_study = "shared_folder" in getattr(item, "fixturenames", ())
+        values = item.callspec.params.values() if of_a_study and hasattr(item, "callspec") else ()
+        if others & {str(value).partition("/")[0] for value in values}:
             item.add_marker(pytest.mark.long)
+        if of_a_study or item.get_closest_marker("long"):
+            item.add_marker(pytest.mark.timeout(LONGEST_S))
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -46,6 +46,7 @@ def test_archive_holds_pages_recordings_results_and_inputs(pack, small_study):
 
 
 @pytest.mark.long
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # the validator's, of the libraries that it uses
 def test_a_validator_accepts_it(pack, tmp_path, monkeypatch):
     crate = tmp_path / "crate"
     shutil.unpack_archive(pack("er3_600"), crate)

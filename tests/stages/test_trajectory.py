@@ -225,6 +225,7 @@ def test_articles_moves_are_those_of_robotics_toolbox(study, folders):
     np.testing.assert_allclose(line[["x_mm", "y_mm", "z_mm"]] / 1000, ctraj.t, atol=1e-9)
 
 
+@pytest.mark.long
 def test_equal_inputs_give_equal_bytes(study, folders, tmp_path):
     compute(study, "er3a_c60_article", tmp_path)
     for file in sorted(folders["er3a_c60_article"].iterdir()):
