@@ -12,10 +12,7 @@ report: "workflow/report/study.rst"
 
 
 include: "workflow/rules/common.smk"
-include: "workflow/rules/validation.smk"
-include: "workflow/rules/workspace.smk"
-include: "workflow/rules/inverse.smk"
-include: "workflow/rules/trajectory.smk"
+include: "workflow/rules/stages.smk"
 include: "workflow/rules/views.smk"
 
 
@@ -23,7 +20,7 @@ rule all:
     default_target: True
     input:
         "reports/index.html",
-        of_all("reports/{robot}/{stage}.rrd"),
+        of_all("reports/{robot}/{stage}.rrd", "record"),
         # Named too, so that a result that was deleted is made again although its views are still there.
         [expand(results_of(stage), robot=robot) for robot in ROBOTS for stage in STUDY.stages(robot)],
     message:

@@ -7,7 +7,8 @@ import numpy as np
 from er3a import forward, load_robot
 from er3a.collision.along import clearance_along
 from er3a.collision.bodies import Bodies
-from er3a.files.scene_file import SceneFile
+from er3a.collision.scene import Cylinder, Scene, Sphere
+from er3a.geometry.transforms import transform
 from er3a.planning.moves import JointMove
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
@@ -15,16 +16,16 @@ MOTIONS, DENSE, SEED, DEPTH = 400, 501, 20261120, 1e-3
 ENDS = np.array([0.0, 1.0])
 
 
-def past_an_obstacle(robot, random) -> tuple[JointMove, SceneFile]:
+def past_an_obstacle(robot, random) -> tuple[JointMove, Scene]:
     """A move of up to 60 deg per joint, and a bead or a wire within 120 mm, along each axis, of the tool's way."""
     a = random.uniform(robot.lower, robot.upper) * 0.7
     move = JointMove(a, a + random.uniform(-1.05, 1.05, 6), 1.0)
     at = forward(robot, move.joints(np.array(random.uniform(0.2, 0.8)))[0])[:3, 3] + random.uniform(-0.12, 0.12, 3)
-    solid = {"name": "obstacle", "xyz_mm": (1000 * at).tolist(), "radius_mm": float(random.uniform(0.2, 5))}
+    radius = float(random.uniform(0.2, 5)) / 1000
     if random.uniform() < 0.5:
-        return move, SceneFile(kind="scene", title="bead", spheres=[solid | {"radius_mm": solid["radius_mm"] + 1}])
-    turns = random.integers(-90, 90, 3).astype(float).tolist()
-    return move, SceneFile(kind="scene", title="wire", cylinders=[solid | {"length_mm": 300.0, "rpy_deg": turns}])
+        return move, Scene("bead", spheres=(Sphere("obstacle", transform(at, np.zeros(3)), radius + 1e-3),))
+    T = transform(at, np.radians(random.integers(-90, 90, 3)))
+    return move, Scene("wire", cylinders=(Cylinder("obstacle", T, radius, 0.3),))
 
 
 def judged(robot, random) -> tuple[int, int, int, float, float, int]:
@@ -33,7 +34,7 @@ def judged(robot, random) -> tuple[int, int, int, float, float, int]:
     for _ in range(MOTIONS):
         move, scene = past_an_obstacle(robot, random)
         bodies = Bodies(robot, scene)
-        every = np.arange(len(bodies.names))
+        every = np.arange(len(bodies.pairs))
         dense = np.array([bodies.distances(ends, every).min() for ends in bodies.ends(move.joints(times)[0])])
         found = clearance_along(bodies, lambda t, move=move: move.joints(t)[0], ENDS, ENDS, DEPTH)
         inside = np.zeros(DENSE, bool)

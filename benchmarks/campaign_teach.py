@@ -11,10 +11,10 @@ import numpy as np
 import psutil
 
 from er3a import forward, inverse, load_robot
+from er3a.geometry.angles import wrap_to_pi
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
 from er3a.pipeline.study import load_study
 from er3a.pipeline.teach.panel import panel_data, write_teach_page
-from er3a.robots.joint_limits import principal
 from testing import chromium
 from testing.arms import joints_at_random, pose_errors
 from testing.teach_kinematics import NEAR, SOLVE
@@ -88,7 +88,7 @@ def agreement(browser, name: str) -> tuple[int, list[float]]:
             if sorted(row["slot"] for row in one["solved"]["rows"]) != sorted(solutions.branch):
                 joints = np.inf
                 continue
-            between = np.abs(principal(there[:, None] - here)).max(axis=-1)
+            between = np.abs(wrap_to_pi(there[:, None] - here)).max(axis=-1)
             joints = max(joints, between.min(axis=0).max(), between.min(axis=1).max())
             rows += len(here)
         worst = np.maximum(worst, [*apart, joints])

@@ -25,7 +25,7 @@ CAMPAIGNS = (
     "capability",
     "teach",
     "pages",
-    "plan",
+    "estimate",
     *PARTS,
 )
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from er3a.findings import Finding
+
 
 class Er3aError(Exception):
     """Root of all errors that a user can cause and mend."""
@@ -57,13 +59,12 @@ class PathError(Er3aError, ValueError):
 class NotWristPartitionedError(Er3aError):
     """The closed-form inverse does not apply to this arm; ``property_missing`` says which property it lacks."""
 
-    def __init__(self, robot: str, property_missing: str):
+    def __init__(self, robot: str, property_missing: Finding):
         self.robot, self.property_missing = robot, property_missing
-        super().__init__(f"{robot}: no closed-form inverse, because {property_missing}")
-
-
-class IdentificationError(Er3aError):
-    """Measurements determine too little of a table, or no corrections make the table fit them."""
+        super().__init__(
+            f"{robot}: no closed-form inverse ({property_missing.code.replace('_', ' ')}); it needs parallel axes 2 "
+            "and 3, and axes 4, 5 and 6 through one point"
+        )
 
 
 class ResultError(Er3aError):
@@ -81,7 +82,8 @@ class WriteError(Er3aError):
     def __init__(self, file: str | Path, error: OSError):
         self.file = str(file)
         told = os.strerror(error.errno) if error.errno else str(error)
-        super().__init__(f"{_line(str(file))}: can't be written ({told}). Make room or mend the rights, then run again")
+        remedy = "Free disk space or fix the permissions, then run again"
+        super().__init__(f"{_line(str(file))}: can't be written ({told}). {remedy}")
 
 
 def _line(text: str, most: int | None = None) -> str:

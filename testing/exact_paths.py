@@ -13,12 +13,14 @@ import numpy as np
 from er3a.errors import PoseError
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
+from er3a.kinematics.singularity import TYPES
 from er3a.planning.follow import follow
 from er3a.planning.moves import line
+from er3a.planning.near_singular import NearSingular
 from er3a.planning.singular_events import singular_events
 
 REAL = np.longdouble
-NEAR = {"wrist": np.radians(30), "elbow": np.radians(30), "shoulder": 0.2}
+NEAR = NearSingular(float(np.radians(30)), float(np.radians(30)), 0.2)
 
 
 def line_distances(robot, way, progress, elbow_up: bool) -> dict[str, np.ndarray]:
@@ -93,13 +95,13 @@ def worst_location(robot, random, lines: int) -> dict[str, tuple[int, float]]:
 
     Passes within 30 deg or 200 mm count, on the branches that reach to the front, away from the ends of the lines.
     """
-    found = {kind: (0, 0.0) for kind in NEAR}
+    found = {kind: (0, 0.0) for kind in TYPES}
     grid, labels = np.linspace(0, 1, 201), branch_labels(robot)
     for _ in range(lines):
         q = random.uniform(robot.lower, robot.upper)
         way = line(*forward(robot, np.stack([q, q + random.uniform(-0.4, 0.4, 6)])), 1.0)
         for slot in (0, 2):
-            if not labels[slot].startswith("front"):
+            if not labels[slot].startswith("front_"):
                 slot += 4
             try:
                 followed = follow(robot, way, grid, start_slot=slot)
@@ -107,7 +109,7 @@ def worst_location(robot, random, lines: int) -> dict[str, tuple[int, float]]:
                 continue
             if np.isnan(followed.q).any() or len(set(followed.slot)) > 1:
                 continue
-            up = "elbow up" in labels[slot]
+            up = "elbow_up" in labels[slot]
             for event in singular_events(robot, followed.t, followed.q, followed.joints, NEAR):
                 if 0.01 < event.t < 0.99:
                     at = float(way.progress(np.array(event.t))[0])

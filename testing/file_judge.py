@@ -31,7 +31,7 @@ from er3a.files.reference_sets import check_reference_file
 from er3a.files.robot_file import RobotFile
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
-from er3a.files.target_file import load_targets
+from er3a.files.target_file import read_targets
 from er3a.files.yaml_file import load
 from er3a.kinematics.forward import forward
 from er3a.pipeline.check import check_file
@@ -104,7 +104,7 @@ def differing_file(path: Path) -> list[str]:
         robot, content = load_robot(path), load(RobotFile, path)
         return [*_differing(content, node, ""), *_differing_poses(robot, written)]
     if kind == "targets":
-        targets, nodes = load_targets(path), written["targets"].value
+        targets, nodes = read_targets(path), written["targets"].value
         found = [] if len(targets) == len(nodes) else [f"{len(targets)} targets of {len(nodes)}"]
         return found + [word for target, each in zip(targets, nodes) for word in _differing(target, each, each.tag)]
     loaders = {"study": load_study, "paths": load_paths, "scene": load_scene}
@@ -199,7 +199,7 @@ def differing_table(path: Path) -> list[str]:
     if path.parent.name == "paths":
         return _differing_points(read_path_table(path), table)
     if path.parent.name == "targets":
-        rows: list = list(load_targets(path))
+        rows: list = list(read_targets(path))
     else:
         rows = list(
             load_measurements(path) if "q1_deg" in table and "grade" not in table else check_reference_file(path)

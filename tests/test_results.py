@@ -8,7 +8,10 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -17,26 +20,89 @@ import pytest
 from er3a.errors import ResultError, WriteError
 from er3a.files.robot_library import ROBOTS
 from er3a.pipeline.code_digest import code_digest
+from er3a.files.kept_files import half_written, sha256, write_atomically
 from er3a.pipeline.results import (
     CHECKSUMS,
     FORMAT_VERSION,
+    AbsentResults,
     Figure,
+    NotComputed,
+    Results,
+    Summary,
     Verdict,
     check_results,
-    half_written,
-    read_summary,
-    read_table,
-    sha256,
-    write_atomically,
-    write_summary,
-    write_table,
+    read_results,
+    read_stage,
+    write_results,
 )
+from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import load_study
+from er3a.pipeline.tables import Integers, Reals, Table, Texts, column, per_joint, vector
 
 ROOT = Path(__file__).resolve().parents[1]
-VERDICT = Verdict("fail", "workspace.void_enclosed", "Ein Hohlraum – 空洞.", {"volume_m3": 0.25, "cells": 12})
-FIGURES = (Figure("hull volume", 1.25, "m³", 0.01), Figure("reach", None, "mm"))
-TABLE = pd.DataFrame({"x_m": [0.1, np.nan, -0.0], "count": [1, 2, 3], "name": ["a", "b", None]})
+
+
+@dataclass(frozen=True)
+class Hollow:
+    """A finding of the stage below."""
+
+    volume_m3: float
+    code: Literal["made.hollow"] = "made.hollow"
+
+
+@dataclass(frozen=True)
+class Solid:
+    """Another, which holds one."""
+
+    apart_from: Hollow | None
+    code: Literal["made.solid"] = "made.solid"
+
+
+@dataclass(frozen=True)
+class MadeSummary(Summary):
+    """With a key of its own."""
+
+    verdict: Verdict[Hollow | Solid]
+    reach_m: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Rows(Table):
+    """One column of each kind."""
+
+    x_m: Reals = column("how far", "m")
+    count: Integers = column("how many", dtype=np.int32)
+    label: Texts = column("what", dtype=object)
+    q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
+    point_mm: Reals = vector("{}_mm", "where", "mm")
+
+
+@dataclass(frozen=True, eq=False)
+class MadeResults(Results[MadeSummary]):
+    """A summary and a table."""
+
+    rows: Rows
+
+
+@dataclass(frozen=True)
+class MadeStage(Stage):
+    """A stage with the model above, which takes all else from the workspace stage."""
+
+    def module(self, name):
+        return SimpleNamespace(RESULTS=MadeResults)
+
+
+STAGE = MadeStage(**vars(STAGES["workspace"]))
+ROWS = Rows(
+    x_m=[0.1, np.nan, -0.0],
+    count=[1, 2, 3],
+    label=["a", "空洞", None],
+    q_deg=np.arange(18.0).reshape(3, 6),
+    point_mm=np.arange(9.0).reshape(3, 3),
+)
+FIGURES = (Figure("hull_volume", 1.25, "m³", 0.01), Figure("reach", None, "mm"), Figure("solved", 2, "", of=3))
+SUMMARY = MadeSummary(Verdict("fail", Hollow(0.25)), FIGURES, (0.5, 1.0))
 
 
 @pytest.fixture
@@ -45,8 +111,8 @@ def study(monkeypatch):
     return load_study("config/small.yaml")
 
 
-def write(folder, study, **more):
-    write_summary(folder, study, "er3_600", "workspace", VERDICT, FIGURES, **more)
+def write(folder, study, summary=SUMMARY, rows=ROWS):
+    write_results(folder, study, "er3_600", STAGE, MadeResults(summary, rows), lambda found: f"空洞: {found.code}.")
     return folder / "summary.json"
 
 
@@ -55,17 +121,17 @@ def leftovers(folder):
 
 
 def test_shape_of_a_summary(tmp_path, study):
-    write(tmp_path, study, voids=[{"volume_m3": 0.25}])
-    summary = read_summary(tmp_path)
+    summary = json.loads(write(tmp_path, study).read_text())
     shared = ["format_version", "robot", "stage", "verdict", "figures"]
-    assert list(summary) == [*shared, "voids", "provenance", "sentences"]
+    assert list(summary) == [*shared, "reach_m", "provenance"]
+    assert summary["format_version"] == FORMAT_VERSION
     assert summary["verdict"] == {
         "status": "fail",
-        "code": "workspace.void_enclosed",
-        "text": "Ein Hohlraum – 空洞.",
-        "params": {"volume_m3": 0.25, "cells": 12},
+        "code": "made.hollow",
+        "params": {"volume_m3": 0.25},
+        "text": "空洞: made.hollow.",
     }
-    assert summary["figures"][1] == {"name": "reach", "value": None, "unit": "mm", "uncertainty": None}
+    assert summary["figures"][1] == {"name": "reach", "value": None, "unit": "mm", "uncertainty": None, "of": None}
     assert summary["provenance"] == {
         "inputs": [
             {
@@ -81,34 +147,71 @@ def test_shape_of_a_summary(tmp_path, study):
                 ("data/manual_refs/er3_600/envelope.csv", {"official": 9}),
             )
         ],
+        "code": code_digest(f"{STAGE.package}.compute", STAGE.verdict_messages),
         "config": study.settings("er3_600", "capability") | study.settings("er3_600", "workspace"),
         "seed": study.seed,
-        "code": code_digest("er3a.pipeline.stages.workspace.compute"),
     }
 
 
+def test_results_come_back_as_written(tmp_path, study):
+    write(tmp_path, study, replace(SUMMARY, verdict=Verdict("pass", Solid(Hollow(1.5)))))
+    stored = read_results(tmp_path, MadeResults)
+    assert (stored.robot, stored.stage, stored.status) == ("er3_600", "workspace", "pass")
+    assert stored.results.summary.verdict.finding == Solid(Hollow(1.5))
+    assert stored.results.summary.figures == FIGURES
+    pd.testing.assert_frame_equal(stored.results.rows.frame(), ROWS.frame())
+    assert np.signbit(stored.results.rows.x_m[2])
+    assert stored.results.rows.q_deg.shape == (3, 6)
+    names = ["x_m", "count", "label", *(f"q{joint}_deg" for joint in range(1, 7)), "x_mm", "y_mm", "z_mm"]
+    assert list(pd.read_parquet(tmp_path / "rows.parquet")) == names
+
+
+def test_a_stage_that_was_not_computed_has_a_reason_and_empty_tables(tmp_path, study):
+    absent = AbsentResults(Summary(Verdict("not_computed", NotComputed("no wrist")), ()))
+    write_results(tmp_path, study, "er3_600", STAGE, absent, lambda found: f"Not computed: {found.reason}")
+    stored = read_stage(tmp_path, STAGE)
+    assert isinstance(stored.results, AbsentResults)
+    assert stored.results.summary.verdict == Verdict("not_computed", NotComputed("no wrist"))
+    assert pd.read_parquet(tmp_path / "rows.parquet").empty
+    check_results(tmp_path)
+
+
+def test_a_column_of_another_length_or_shape_is_refused():
+    with pytest.raises(ValueError, match="different lengths"):
+        Rows(x_m=[1.0], count=[1, 2], label=["a"], q_deg=np.zeros((1, 6)), point_mm=np.zeros((1, 3)))
+    with pytest.raises(ValueError, match="q_deg has shape"):
+        Rows(x_m=[1.0], count=[1], label=["a"], q_deg=[0.0], point_mm=np.zeros((1, 3)))
+
+
 def test_equal_inputs_give_equal_bytes(tmp_path, study):
-    first = write(tmp_path / "a", study, voids=[1, 2]).read_bytes()
-    assert write(tmp_path / "b", study, voids=[1, 2]).read_bytes() == first
+    first = write(tmp_path / "a", study).read_bytes()
+    assert write(tmp_path / "b", study).read_bytes() == first
     assert str(ROOT).encode() not in first
     assert first.decode().endswith("}\n")
     assert "空洞".encode() in first
-    for folder in ("a", "b"):
-        write_table(tmp_path / folder / "t.parquet", TABLE)
-    assert (tmp_path / "a/t.parquet").read_bytes() == (tmp_path / "b/t.parquet").read_bytes()
+    assert (tmp_path / "a/rows.parquet").read_bytes() == (tmp_path / "b/rows.parquet").read_bytes()
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-@pytest.mark.parametrize("where", ["stage key", "figure", "params"])
+@pytest.mark.parametrize("where", ["own key", "figure", "params"])
 def test_a_number_that_is_none_is_refused_and_the_old_file_stays(tmp_path, study, bad, where):
     path = write(tmp_path, study)
     before = path.read_bytes()
-    verdict = Verdict("pass", "workspace.ok", "Fine.", {"x": bad if where == "params" else 1})
-    figures = [Figure("x", bad if where == "figure" else 1, "m")]
+    summary = {
+        "own key": replace(SUMMARY, reach_m=(bad,)),
+        "figure": replace(SUMMARY, figures=(Figure("x", bad, "m"),)),
+        "params": replace(SUMMARY, verdict=Verdict("fail", Hollow(bad))),
+    }[where]
     with pytest.raises(ValueError, match="not JSON compliant"):
-        write_summary(tmp_path, study, "er3_600", "workspace", verdict, figures, x=bad if where == "stage key" else 1)
+        write(tmp_path, study, summary)
     assert path.read_bytes() == before
-    assert leftovers(tmp_path) == [CHECKSUMS, "summary.json"]
+    assert leftovers(tmp_path) == [CHECKSUMS, "rows.parquet", "summary.json"]
+
+
+def test_what_the_model_does_not_allow_is_not_written(tmp_path, study):
+    with pytest.raises(ResultError, match="reach_m"):
+        write(tmp_path, study, replace(SUMMARY, reach_m=("far",)))
+    assert not (tmp_path / "summary.json").exists()
 
 
 def test_a_failing_write_leaves_the_old_file_and_no_temporary(tmp_path):
@@ -119,7 +222,7 @@ def test_a_failing_write_leaves_the_old_file_and_no_temporary(tmp_path):
         file.write_text("half")
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    with pytest.raises(WriteError, match=r"file\.txt: can't be written .No space left on device.\. Make room"):
+    with pytest.raises(WriteError, match=r"file\.txt: can't be written .No space left on device.\. Free disk"):
         write_atomically(path, fail)
     assert path.read_text() == "old"
     assert leftovers(path.parent) == ["file.txt"]
@@ -127,7 +230,7 @@ def test_a_failing_write_leaves_the_old_file_and_no_temporary(tmp_path):
 
 def test_what_a_killed_process_left_is_found(tmp_path):
     killed = (
-        "import os, sys; from pathlib import Path; from er3a.pipeline.results import write_atomically\n"
+        "import os, sys; from pathlib import Path; from er3a.files.kept_files import write_atomically\n"
         "for name in ('t.parquet', 'SHA256SUMS', '.page.html.sha256'):\n"
         "    if os.fork() == 0: write_atomically(Path(sys.argv[1]) / 'x' / name, lambda f: (f.touch(), os._exit(9)))\n"
         "    os.wait()"
@@ -148,46 +251,23 @@ def test_while_writing_the_file_is_not_there_yet(tmp_path):
     assert path.read_text() == "x"
 
 
-def test_tables_come_back_as_written(tmp_path):
-    path = tmp_path / "robot=x" / "t.parquet"
-    write_table(path, TABLE)
-    table = read_table(path)
-    assert list(table) == ["x_m", "count", "name"]
-    pd.testing.assert_frame_equal(table, TABLE, check_dtype=False)
-    assert np.signbit(table["x_m"][2])
-
-
-def test_a_column_may_hold_lists(tmp_path):
-    path = tmp_path / "t.parquet"
-    write_table(path, pd.DataFrame({"arcs_deg": [[0.0, 90.0], []]}))
-    assert [arcs.tolist() for arcs in read_table(path)["arcs_deg"]] == [[0.0, 90.0], []]
-
-
 @pytest.mark.parametrize("keep", [0, 4, 100, -10, -1])
-def test_a_truncated_table_is_told(tmp_path, keep):
-    path = tmp_path / "t.parquet"
-    write_table(path, TABLE)
+@pytest.mark.parametrize("name", ["rows.parquet", "summary.json", CHECKSUMS])
+def test_a_file_cut_short_is_told(tmp_path, study, name, keep):
+    write(tmp_path, study)
+    path = tmp_path / name
     path.write_bytes(path.read_bytes()[:keep])
-    with pytest.raises(ResultError, match=r"t\.parquet: damaged .*run `make run`") as caught:
-        read_table(path)
+    with pytest.raises(ResultError, match=r"(damaged|missing).*run `make run`") as caught:
+        read_results(tmp_path, MadeResults)
     assert "\n" not in str(caught.value)
 
 
-def test_a_table_with_a_damaged_page_is_told(tmp_path):
-    path = tmp_path / "t.parquet"
-    write_table(path, pd.DataFrame({"x": np.random.default_rng(1).random(1000)}))
-    content = bytearray(path.read_bytes())
-    content[20:2000] = bytes(1980)
-    path.write_bytes(bytes(content))
-    with pytest.raises(ResultError, match="damaged"):
-        read_table(path)
-
-
-def test_missing_files_are_told(tmp_path):
-    with pytest.raises(ResultError, match=r"t\.parquet: missing\. Delete the file and run `make run`"):
-        read_table(tmp_path / "t.parquet")
-    with pytest.raises(ResultError, match=r"summary\.json: missing"):
-        read_summary(tmp_path)
+@pytest.mark.parametrize("name", ["rows.parquet", "summary.json", CHECKSUMS])
+def test_missing_files_are_told(tmp_path, study, name):
+    write(tmp_path, study)
+    (tmp_path / name).unlink()
+    with pytest.raises(ResultError, match=rf"{name}: missing\. Delete the file and run `make run`"):
+        read_results(tmp_path, MadeResults)
 
 
 @pytest.mark.parametrize(
@@ -196,63 +276,43 @@ def test_missing_files_are_told(tmp_path):
         (b"", "damaged"),
         (b"{", "damaged"),
         (b"\xff\xfe", "damaged"),
-        (b"[]", "format version None, this er3a reads 3"),
-        (b'{"format_version": 1}', "format version 1, this er3a reads 3"),
-        (b'{"format_version": 3, "robot": "x", "stage": "y"}', "damaged .no 'verdict' in it"),
+        (b"[]", f"format version None, this er3a reads {FORMAT_VERSION}"),
+        (b'{"format_version": 3}', f"format version 3, this er3a reads {FORMAT_VERSION}"),
+        (b'{"format_version": 4, "robot": "x", "stage": "y"}', "damaged .no 'verdict' in it"),
     ],
 )
 def test_a_damaged_summary_is_told(tmp_path, content, problem):
     (tmp_path / "summary.json").write_bytes(content)
     with pytest.raises(ResultError, match=problem) as caught:
-        read_summary(tmp_path)
+        check_results(tmp_path)
     assert "\n" not in str(caught.value)
 
 
-def test_a_summary_cut_short_is_told(tmp_path, study):
-    path = write(tmp_path, study)
-    path.write_bytes(path.read_bytes()[:-20])
-    with pytest.raises(ResultError, match="damaged"):
-        read_summary(tmp_path)
-
-
-@pytest.mark.parametrize("name", ["summary.json", "t.parquet", CHECKSUMS])
+@pytest.mark.parametrize("name", ["summary.json", "rows.parquet", CHECKSUMS])
 @pytest.mark.parametrize("at", [0, 0.3, 0.7, 0.999])
 def test_one_flipped_bit_anywhere_is_told(tmp_path, study, name, at):
-    write_table(tmp_path / "t.parquet", TABLE)
     write(tmp_path, study)
     check_results(tmp_path)
     content = bytearray((tmp_path / name).read_bytes())
     content[int(at * len(content))] ^= 1
     (tmp_path / name).write_bytes(bytes(content))
-    with pytest.raises(ResultError, match=r": (damaged|missing)"):
-        check_results(tmp_path)
-    with pytest.raises(ResultError, match=r": (damaged|missing)"):
-        read_summary(tmp_path), read_table(tmp_path / "t.parquet")
+    for read in (check_results, lambda folder: read_results(folder, MadeResults)):
+        with pytest.raises(ResultError, match=r": (damaged|missing)"):
+            read(tmp_path)
 
 
 def test_a_table_of_another_run_is_told(tmp_path, study):
-    write_table(tmp_path / "t.parquet", TABLE)
     write(tmp_path, study)
-    write_table(tmp_path / "t.parquet", TABLE.iloc[:1])
-    with pytest.raises(ResultError, match=r"t\.parquet: damaged .not the bytes that SHA256SUMS"):
-        read_table(tmp_path / "t.parquet")
-
-
-def test_results_without_checksums_are_not_read(tmp_path, study):
-    write(tmp_path, study).with_name(CHECKSUMS).unlink()
-    with pytest.raises(ResultError, match=r"SHA256SUMS: missing"):
-        read_summary(tmp_path)
+    ROWS.take(np.array([0])).write(tmp_path / "rows.parquet")
+    with pytest.raises(ResultError, match=r"rows\.parquet: damaged .not the bytes that SHA256SUMS"):
+        read_results(tmp_path, MadeResults)
 
 
 @pytest.mark.parametrize("folder", ["file/stage", "file"])
-def test_a_folder_that_cannot_be_made_is_told(tmp_path, folder):
+def test_a_folder_that_cannot_be_made_is_told(tmp_path, study, folder):
     (tmp_path / "file").write_text("in the way")
-    with pytest.raises(WriteError, match=r"t\.parquet: can't be written"):
-        write_table(tmp_path / folder / "t.parquet", TABLE)
-
-
-def test_format_version_is_what_is_written(tmp_path, study):
-    assert json.loads(write(tmp_path, study).read_text())["format_version"] == FORMAT_VERSION
+    with pytest.raises(WriteError, match=r"rows\.parquet: can't be written"):
+        write(tmp_path / folder, study)
 
 
 def test_checksum(tmp_path):

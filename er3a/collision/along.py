@@ -29,13 +29,14 @@ from scipy.optimize import brentq
 
 from er3a.collision.bodies import Bodies
 from er3a.collision.envelopes import link_frames
-from er3a.pipeline.messages.language import N_
+from er3a.collision.pairs import Pair
+from er3a.numerics.arrays import Flags, Integers, Reals
 
 SHORTEST = 1e-9  # share of the duration; motion that is wide over less is a jump
 LOCATED = 1e-10  # share of the duration
 CHUNK = 20_000  # points whose ends are held in memory at a time
 
-Joints = Callable[[np.ndarray], np.ndarray]
+Joints = Callable[[Reals], Reals]
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class Contact:
 
     start: float
     end: float
-    pairs: tuple[str, ...]
+    pairs: tuple[Pair, ...]
     depth: float
     at: float
 
@@ -63,14 +64,14 @@ class ClearanceAlong:
     Attributes
     ----------
     t : (K,), s, rising; distance : (K,), m, negative by the depth of overlap, NaN where the motion is unknown
-    pair : K texts, what is nearest to what
+    pair : K, what is nearest to what; None where that is unknown or nothing can meet
     contacts : stretches of overlap, in order of time
     measured : number of arm poses at which distances were measured
     """
 
-    t: np.ndarray
-    distance: np.ndarray
-    pair: tuple[str, ...]
+    t: Reals
+    distance: Reals
+    pair: tuple[Pair | None, ...]
     contacts: tuple[Contact, ...]
     measured: int
 
@@ -83,17 +84,17 @@ class ClearanceAlong:
 class _Motion:
     """Distances along a motion, remembered per time."""
 
-    def __init__(self, bodies: Bodies, joints: Joints):
+    def __init__(self, bodies: Bodies, joints: Joints) -> None:
         self.bodies, self.joints = bodies, joints
-        self.known: dict[float, np.ndarray] = {}
+        self.known: dict[float, Reals] = {}
         own = np.flatnonzero(bodies.second >= 0)
         solid = np.flatnonzero(bodies.second < 0)
         moving, track = np.unique(bodies.first[solid], return_inverse=True)
         self._own, self._moving = own, moving
-        self.track = np.empty(len(bodies.names), dtype=int)  # of a pair: which tracked capsule's way counts
+        self.track = np.empty(len(bodies.pairs), dtype=int)  # of a pair: which tracked capsule's way counts
         self.track[own], self.track[solid] = np.arange(len(own)), len(own) + track
 
-    def tracked(self, q: np.ndarray) -> np.ndarray:
+    def tracked(self, q: Reals) -> Reals:
         """End points (..., tracks, 2, 3): of links in other links' frames, then of capsules in space."""
         bodies, ends = self.bodies, self.bodies.ends(q)
         links = [bodies.capsules[i].link for i in bodies.first[self._own]]
@@ -101,16 +102,16 @@ class _Motion:
         from_link = ends[..., bodies.second[self._own], :, :] - T[..., None, :3, 3]
         return np.concatenate([from_link @ T[..., :3, :3], ends[..., self._moving, :, :]], axis=-3)
 
-    def measure(self, t: float, q: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    def measure(self, t: float, q: Reals, pairs: Integers) -> Reals:
         """Distances (P,) at a time, those of ``pairs`` known, the others perhaps NaN."""
-        found = self.known.setdefault(t, np.full(len(self.bodies.names), np.nan))
+        found = self.known.setdefault(t, np.full(len(self.bodies.pairs), np.nan))
         missing = pairs[np.isnan(found[pairs])]
         if missing.size:
             found[missing] = self.bodies.distances(self.bodies.ends(q), missing)
         return found
 
 
-def clearance_along(bodies: Bodies, joints: Joints, t: np.ndarray, shown: np.ndarray, depth: float) -> ClearanceAlong:
+def clearance_along(bodies: Bodies, joints: Joints, t: Reals, shown: Reals, depth: float) -> ClearanceAlong:
     """Measure clearance along a motion.
 
     Parameters
@@ -121,17 +122,17 @@ def clearance_along(bodies: Bodies, joints: Joints, t: np.ndarray, shown: np.nda
     depth : m; see the module's text
     """
     motion = _Motion(bodies, joints)
-    every = np.arange(len(bodies.names))
+    every = np.arange(len(bodies.pairs))
     if not every.size:
-        return ClearanceAlong(shown, np.full(len(shown), np.nan), (N_("nothing near"),) * len(shown), (), 0)
+        return ClearanceAlong(shown, np.full(len(shown), np.nan), (None,) * len(shown), (), 0)
     times, q, way = _fine(motion, t, 2 * depth)
     reached = np.isfinite(q[:, 0])
     for i in np.flatnonzero(np.isin(times, shown) & reached):
         motion.measure(times[i], q[i], every)
     contacts: list[Contact] = []
     for first, last in _runs(reached):
-        for i in (first, last - 1):
-            motion.measure(times[i], q[i], every)
+        for end in (first, last - 1):
+            motion.measure(times[end], q[end], every)
         part = slice(first, last)
         _refine(motion, times[part], q[part], way[part], 2 * depth)
         contacts += _contacts(motion, times[part], q[part], (t[-1] - t[0]) * LOCATED)
@@ -141,11 +142,11 @@ def clearance_along(bodies: Bodies, joints: Joints, t: np.ndarray, shown: np.nda
     rows = np.array([motion.known.get(time, unknown) for time in at])
     blind = np.isnan(rows).any(axis=1)
     distance = np.where(blind, np.nan, rows.min(axis=1))
-    pair = tuple("" if b else bodies.names[int(np.argmin(row))] for b, row in zip(blind, rows))
+    pair = tuple(None if b else bodies.pairs[int(np.argmin(row))] for b, row in zip(blind, rows))
     return ClearanceAlong(at, distance, pair, tuple(contacts), len(motion.known))
 
 
-def _fine(motion: _Motion, t: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _fine(motion: _Motion, t: Reals, step: float) -> tuple[Reals, Reals, Reals]:
     """Times so near to one another that no tracked end moves by more than ``step``, joints, and the way so far.
 
     The way is (N, tracks), that of the end that moves more, summed up; infinite steps where it is unknown.
@@ -166,17 +167,18 @@ def _fine(motion: _Motion, t: np.ndarray, step: float) -> tuple[np.ndarray, np.n
     return times, q, np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
 
 
-def _steps(motion: _Motion, q: np.ndarray, q_middle: np.ndarray) -> np.ndarray:
+def _steps(motion: _Motion, q: Reals, q_middle: Reals) -> Reals:
     """How far the tracked ends move at most between neighbours (n + 1, 6), by way of the middles; (n, tracks)."""
     here, half = motion.tracked(q), motion.tracked(q_middle)
     chords = np.linalg.norm(half - here[:-1], axis=-1) + np.linalg.norm(here[1:] - half, axis=-1)
     bulge = np.linalg.norm(here[:-1] - 2 * half + here[1:], axis=-1)
-    return (chords + bulge).max(axis=-1)
+    moved: Reals = (chords + bulge).max(axis=-1)
+    return moved
 
 
-def _refine(motion: _Motion, times: np.ndarray, q: np.ndarray, way: np.ndarray, step: float) -> None:
+def _refine(motion: _Motion, times: Reals, q: Reals, way: Reals, step: float) -> None:
     """Measure between known points until every interval is free as a whole, or overlaps so, or is short."""
-    every = np.arange(len(motion.bodies.names))
+    every = np.arange(len(motion.bodies.pairs))
     known = [i for i, time in enumerate(times) if time in motion.known]
     best = min(float(motion.known[times[i]].min()) for i in known)
     waiting = [(a, b, every) for a, b in pairwise(known)]
@@ -199,9 +201,9 @@ def _refine(motion: _Motion, times: np.ndarray, q: np.ndarray, way: np.ndarray, 
         waiting += [(a, middle, pairs), (middle, b, pairs)]
 
 
-def _contacts(motion: _Motion, times: np.ndarray, q: np.ndarray, near: float) -> list[Contact]:
+def _contacts(motion: _Motion, times: Reals, q: Reals, near: float) -> list[Contact]:
     """Stretches of overlap between known points, their ends located where the least distance is 0."""
-    every = np.arange(len(motion.bodies.names))
+    every = np.arange(len(motion.bodies.pairs))
     known = [i for i, time in enumerate(times) if time in motion.known]
     overlap = np.array([bool(np.nanmin(motion.known[times[i]]) <= 0) for i in known])
 
@@ -215,13 +217,13 @@ def _contacts(motion: _Motion, times: np.ndarray, q: np.ndarray, near: float) ->
         rows = np.array([motion.measure(times[i], q[i], every) for i in known[a:b]])
         deepest = rows.min(axis=0)
         order = np.argsort(deepest, kind="stable")
-        names = dict.fromkeys(motion.bodies.names[k] for k in order if deepest[k] <= 0)
+        pairs = dict.fromkeys(motion.bodies.pairs[k] for k in order if deepest[k] <= 0)
         at = times[known[a + int(np.argmin(rows.min(axis=1)))]]
-        found.append(Contact(float(start), float(end), tuple(names), -float(deepest.min()), float(at)))
+        found.append(Contact(float(start), float(end), tuple(pairs), -float(deepest.min()), float(at)))
     return found
 
 
-def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
+def _runs(flags: Flags) -> list[tuple[int, int]]:
     """Index ranges (first, behind the last) of the stretches of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

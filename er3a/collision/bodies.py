@@ -11,15 +11,16 @@ References
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
-from er3a.collision.envelopes import BASE, capsule_poses, envelopes_of
+from er3a.collision.envelopes import capsule_poses, envelopes_of
+from er3a.collision.pairs import BASE, LinkAndSolid, LinkPair, Pair
+from er3a.collision.scene import Box, Cylinder, Plane, Scene, Solid, Sphere
 from er3a.errors import Er3aError
-from er3a.files.scene_file import SceneFile
-from er3a.geometry.transforms import transform
-from er3a.pipeline.messages.language import N_, said
-from er3a.robots.robot import Envelope, Robot
+from er3a.numerics.arrays import Integers, Reals
+from er3a.robots.robot import Robot
 
 try:
     import coal
@@ -40,7 +41,7 @@ class Bodies:
     capsules : of the arm
     first : (P,) int, number of the pair's capsule; of two links the one nearer to the base
     second : (P,) int, number of the other link's capsule, -1 for a solid
-    names : P texts, what meets what
+    pairs : P, what meets what
 
     Raises
     ------
@@ -48,44 +49,41 @@ class Bodies:
         if the Coal library is missing, or the scene is none
     """
 
-    def __init__(self, robot: Robot, scene: SceneFile | None):
+    def __init__(self, robot: Robot, scene: Scene | None) -> None:
         if coal is None:
             problem = "clearance needs the Coal library, which has no wheels for this platform; leave the scene out"
             raise Er3aError(problem)
-        if not isinstance(scene, SceneFile | None):
+        if not isinstance(scene, Scene | None):
             raise Er3aError(f"the scene is a {type(scene).__name__}; expected what er3a.load_scene returns")
         self.robot = robot
         self.capsules = envelopes_of(robot)
         self._shapes = [
             coal.Capsule(c.radius, float(np.linalg.norm(np.subtract(c.end, c.start)))) for c in self.capsules
         ]
-        self._solids = _solids(scene) if scene else []
-        links = [_link_name(capsule) for capsule in self.capsules]
+        solids = scene.solids if scene else ()
+        self._solids = [_shape(solid) for solid in solids]
+        links = [capsule.link for capsule in self.capsules]
         own = self_pairs(robot)
-        moving = [i for i, capsule in enumerate(self.capsules) if capsule.link != BASE]
-        self.first = np.array([i for i, _ in own] + [i for _ in self._solids for i in moving], dtype=int)
-        self.second = np.array([j for _, j in own] + [-1 for _ in self._solids for _ in moving], dtype=int)
-        self.names = tuple(
-            [said("{first} and {second}", first=links[i], second=links[j]) for i, j in own]
-            + [
-                said("{link} and {own_name}", link=links[i], own_name=name)
-                for name, _, _ in self._solids
-                for i in moving
-            ]
+        moving = [i for i, link in enumerate(links) if link != BASE]
+        self.first = np.array([i for i, _ in own] + [i for _ in solids for i in moving], dtype=int)
+        self.second = np.array([j for _, j in own] + [-1 for _ in solids for _ in moving], dtype=int)
+        self.pairs: tuple[Pair, ...] = (
+            *(LinkPair(links[i], links[j]) for i, j in own),
+            *(LinkAndSolid(links[i], solid.name) for solid in solids for i in moving),
         )
-        self._solid_of = [-1] * len(own) + [k for k in range(len(self._solids)) for _ in moving]
+        self._solid_of = [-1] * len(own) + [k for k in range(len(solids)) for _ in moving]
 
-    def ends(self, q: np.ndarray) -> np.ndarray:
+    def ends(self, q: Reals) -> Reals:
         """End points (..., capsules, 2, 3) in m of the capsules' lines at joint angles (..., 6) in rad."""
         return capsule_poses(self.robot, self.capsules, q)
 
-    def distances(self, ends: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    def distances(self, ends: Reals, pairs: Integers) -> Reals:
         """Distances (len(pairs),) in m of some pairs, negative by the depth of overlap, for end points (n, 2, 3)."""
         placed = _placed(ends)
         found = np.empty(len(pairs))
         for row, pair in enumerate(pairs):
             i, j, solid = self.first[pair], self.second[pair], self._solid_of[pair]
-            other, where = (self._shapes[j], placed[j]) if solid < 0 else self._solids[solid][1:]
+            other, where = (self._shapes[j], placed[j]) if solid < 0 else self._solids[solid]
             found[row] = coal.distance(
                 self._shapes[i], placed[i], other, where, coal.DistanceRequest(), coal.DistanceResult()
             )
@@ -109,28 +107,21 @@ def self_pairs(robot: Robot) -> tuple[tuple[int, int], ...]:
     return tuple(pairs)
 
 
-def _solids(scene: SceneFile) -> list[tuple[str, object, object]]:
-    """Name, shape and place of each of the scene's solids."""
-    found = []
-    for box in scene.boxes:
-        found.append((box.name, coal.Box(*(np.array(box.size_mm) / 1000)), _place(box.xyz_mm, box.rpy_deg)))
-    for cylinder in scene.cylinders:
-        shape = coal.Cylinder(cylinder.radius_mm / 1000, cylinder.length_mm / 1000)
-        found.append((cylinder.name, shape, _place(cylinder.xyz_mm, cylinder.rpy_deg)))
-    for sphere in scene.spheres:
-        found.append((sphere.name, coal.Sphere(sphere.radius_mm / 1000), _place(sphere.xyz_mm, [0.0] * 3)))
-    for plane in scene.planes:
-        offset = plane.offset_mm / 1000 / np.linalg.norm(plane.normal)
-        found.append((plane.name, coal.Halfspace(plane.unit_normal(), offset), coal.Transform3s.Identity()))
-    return found
+def _shape(solid: Solid) -> tuple[Any, Any]:
+    """Shape and place of a solid."""
+    match solid:
+        case Plane():
+            return coal.Halfspace(solid.normal, solid.offset), coal.Transform3s.Identity()
+        case Box():
+            shape = coal.Box(*solid.size)
+        case Cylinder():
+            shape = coal.Cylinder(solid.radius, solid.length)
+        case Sphere():
+            shape = coal.Sphere(solid.radius)
+    return shape, coal.Transform3s(solid.T[:3, :3], solid.T[:3, 3])
 
 
-def _place(xyz_mm: list[float], rpy_deg: list[float]):
-    T = transform(np.array(xyz_mm) / 1000, np.radians(rpy_deg))
-    return coal.Transform3s(T[:3, :3], T[:3, 3])
-
-
-def _placed(ends: np.ndarray) -> list:
+def _placed(ends: Reals) -> list[Any]:
     """Where capsules (n, 2, 3) (along their own z, about their middle) lie."""
     along = ends[:, 1] - ends[:, 0]
     length = np.linalg.norm(along, axis=1, keepdims=True)
@@ -140,7 +131,3 @@ def _placed(ends: np.ndarray) -> list:
     x /= np.linalg.norm(x, axis=1, keepdims=True)
     R = np.stack([x, np.cross(z, x), z], axis=-1)
     return [coal.Transform3s(rotation, middle) for rotation, middle in zip(R, ends.mean(axis=1))]
-
-
-def _link_name(capsule: Envelope) -> str:
-    return N_("base") if capsule.link == BASE else said("link {number}", number=capsule.link)

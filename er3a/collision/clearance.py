@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.collision.bodies import Bodies
-from er3a.files.scene_file import SceneFile
-from er3a.pipeline.messages.language import N_
+from er3a.collision.pairs import Pair
+from er3a.collision.scene import Scene
+from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 
 
@@ -19,14 +20,14 @@ class Clearance:
     Attributes
     ----------
     distance : (N,), m; negative where something overlaps, by the depth
-    pair : N texts, what is nearest to what
+    pair : N, what is nearest to what; None where nothing can meet
     """
 
-    distance: np.ndarray
-    pair: tuple[str, ...]
+    distance: Reals
+    pair: tuple[Pair | None, ...]
 
 
-def clearance(robot: Robot, q: np.ndarray, scene: SceneFile | None) -> Clearance:
+def clearance(robot: Robot, q: Reals, scene: Scene | None) -> Clearance:
     """Least distance of each arm (N, 6) in rad from the scene's solids and from itself.
 
     Raises
@@ -35,11 +36,12 @@ def clearance(robot: Robot, q: np.ndarray, scene: SceneFile | None) -> Clearance
         if the Coal library is missing, or the scene is none
     """
     bodies = Bodies(robot, scene)
-    pairs = np.arange(len(bodies.names))
-    distances, names = [], []
+    every = np.arange(len(bodies.pairs))
+    distances: list[float] = []
+    pairs: list[Pair | None] = []
     for ends in bodies.ends(np.asarray(q, float).reshape(-1, 6)):
-        found = bodies.distances(ends, pairs)
+        found = bodies.distances(ends, every)
         least = int(np.argmin(found)) if found.size else -1
         distances.append(found[least] if found.size else np.inf)
-        names.append(bodies.names[least] if found.size else N_("nothing near"))
-    return Clearance(np.array(distances), tuple(names))
+        pairs.append(bodies.pairs[least] if found.size else None)
+    return Clearance(np.array(distances), tuple(pairs))

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from er3a.errors import InputError
-from er3a.files.yaml_file import read_text, vanished
+from er3a.files.yaml_file import vanished
+from er3a.formats.text_file import read_text
 
 LARGEST_DIGITS = 9
 LARGEST = 10.0**LARGEST_DIGITS

@@ -14,6 +14,7 @@ from er3a.robots.robot import Envelope, Robot, Source
 
 DATA = Path(__file__).resolve().parents[2] / "data"
 ROBOTS = DATA / "robots"
+REFERENCES = DATA / "manual_refs"
 
 
 def load_robot(name_or_path: str | Path) -> Robot:

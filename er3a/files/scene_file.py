@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
+from er3a.collision import scene as library
 from er3a.files.robot_file import Name, Text
 from er3a.files.units import FARTHEST_MM, PositionMm, RpyDeg, Triple
 from er3a.files.yaml_file import StrictModel, load
+from er3a.geometry.transforms import transform
 
 SMALLEST_OBSTACLE_MM = 2.0
 SHAPES = ("boxes", "cylinders", "spheres", "planes")
@@ -26,6 +28,10 @@ class Obstacle(StrictModel):
     xyz_mm: PositionMm
     rpy_deg: RpyDeg = [0.0, 0.0, 0.0]
 
+    def place(self) -> np.ndarray:
+        """T_world_solid (4, 4)."""
+        return transform(np.array(self.xyz_mm) / 1000, np.radians(self.rpy_deg))
+
 
 class Box(Obstacle):
     """``size_mm``: edges along x, y and z."""
@@ -34,9 +40,13 @@ class Box(Obstacle):
 
     @field_validator("size_mm")
     @classmethod
-    def _large_enough(cls, values):
+    def _large_enough(cls, values: list[float]) -> list[float]:
         _check_size(max(values))
         return values
+
+    def solid(self) -> library.Box:
+        """In the units of the library."""
+        return library.Box(self.name, self.place(), np.array(self.size_mm) / 1000)
 
 
 class Cylinder(Obstacle):
@@ -46,9 +56,13 @@ class Cylinder(Obstacle):
     length_mm: Length
 
     @model_validator(mode="after")
-    def _large_enough(self):
+    def _large_enough(self) -> Self:
         _check_size(max(2 * self.radius_mm, self.length_mm))
         return self
+
+    def solid(self) -> library.Cylinder:
+        """In the units of the library."""
+        return library.Cylinder(self.name, self.place(), self.radius_mm / 1000, self.length_mm / 1000)
 
 
 class Sphere(StrictModel):
@@ -58,9 +72,13 @@ class Sphere(StrictModel):
 
     @field_validator("radius_mm")
     @classmethod
-    def _large_enough(cls, value):
+    def _large_enough(cls, value: float) -> float:
         _check_size(2 * value)
         return value
+
+    def solid(self) -> library.Sphere:
+        """In the units of the library."""
+        return library.Sphere(self.name, transform(np.array(self.xyz_mm) / 1000, np.zeros(3)), self.radius_mm / 1000)
 
 
 class Plane(StrictModel):
@@ -72,14 +90,15 @@ class Plane(StrictModel):
 
     @field_validator("normal")
     @classmethod
-    def _has_direction(cls, values):
+    def _has_direction(cls, values: list[float]) -> list[float]:
         if not 1e-6 <= math.hypot(*values) <= 1e6:
             raise ValueError("the normal has no direction | Write a vector of about unit length out of the solid")
         return values
 
-    def unit_normal(self) -> np.ndarray:
-        """The normal at unit length, (3,)."""
-        return np.array(self.normal) / np.linalg.norm(self.normal)
+    def solid(self) -> library.Plane:
+        """In the units of the library."""
+        length = np.linalg.norm(self.normal)
+        return library.Plane(self.name, np.array(self.normal) / length, float(self.offset_mm / 1000 / length))
 
 
 class SceneFile(StrictModel):
@@ -92,8 +111,18 @@ class SceneFile(StrictModel):
     spheres: list[Sphere] = []
     planes: list[Plane] = []
 
+    def scene(self) -> library.Scene:
+        """In the units of the library."""
+        return library.Scene(
+            self.title,
+            tuple(box.solid() for box in self.boxes),
+            tuple(cylinder.solid() for cylinder in self.cylinders),
+            tuple(sphere.solid() for sphere in self.spheres),
+            tuple(plane.solid() for plane in self.planes),
+        )
+
     @model_validator(mode="after")
-    def _obstacles_with_own_names(self):
+    def _obstacles_with_own_names(self) -> Self:
         seen: dict[str, str] = {}
         for shape in SHAPES:
             for i, obstacle in enumerate(getattr(self, shape)):
@@ -106,7 +135,7 @@ class SceneFile(StrictModel):
         return self
 
 
-def load_scene(path: str | Path) -> SceneFile:
+def load_scene(path: str | Path) -> library.Scene:
     """Read and check a scene file.
 
     Raises
@@ -114,7 +143,7 @@ def load_scene(path: str | Path) -> SceneFile:
     InputError
         naming file, field and remedy
     """
-    return load(SceneFile, path)
+    return load(SceneFile, path).scene()
 
 
 def _check_size(longest: float) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 from scipy.spatial.transform import Rotation
 
@@ -18,6 +19,7 @@ from er3a.files.units import JointsDeg, PositionMm, Six, Triple, as_degrees
 from er3a.files.yaml_file import StrictModel, load, parse
 from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, transform
 from er3a.kinematics.forward import forward
+from er3a.kinematics.targets import Target
 from er3a.robots.robot import Robot
 
 MOST_TARGETS = 50
@@ -29,7 +31,7 @@ Angles = Annotated[Triple, as_degrees("give the orientation as a quaternion or a
 Line = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\r\n]*$")]
 
 
-class Target(StrictModel):
+class TargetEntry(StrictModel):
     """One pose of the tool, in the frame that the robot's base is placed in.
 
     Either ``xyz_mm`` and one orientation form, or ``q_deg`` (the pose at these joint angles).
@@ -105,8 +107,12 @@ class Target(StrictModel):
             raise ValueError(f"the orientation stands here twice, as {' and '.join(forms)} | Keep one")
         return self
 
-    def pose(self, robot: Robot) -> np.ndarray:
-        """T_base_tool (4, 4), m, read-only; the robot is needed for a target given by joint angles."""
+    def target(self, robot: Robot) -> Target:
+        """The target for a robot, which is needed where the pose is given by joint angles."""
+        return Target(self.name, self._pose(robot), self.note, tuple(self.q_ref_deg))
+
+    def _pose(self, robot: Robot) -> NDArray[np.float64]:
+        """T_base_tool (4, 4), m, read-only."""
         if self.q_deg is not None:
             T = forward(robot, np.radians(self.q_deg))
         elif self.rpy_deg is not None:
@@ -118,11 +124,7 @@ class Target(StrictModel):
         T.setflags(write=False)
         return T
 
-    def reference(self) -> np.ndarray:
-        """``q_ref_deg`` in rad, (6,)."""
-        return np.radians(self.q_ref_deg)
-
-    def _rotation_matrix(self) -> np.ndarray:
+    def _rotation_matrix(self) -> NDArray[np.float64]:
         if self.zyz_deg is not None:
             first, second, third = (transform(np.zeros(3), turn)[:3, :3] for turn in _zyz_turns(self.zyz_deg))
             return first @ second @ third
@@ -136,7 +138,7 @@ class TargetFile(StrictModel):
     """data/targets/ROBOT.yaml."""
 
     kind: Literal["targets"]
-    targets: list[Target]
+    targets: list[TargetEntry]
 
     @field_validator("targets")
     @classmethod
@@ -158,8 +160,19 @@ class TargetFile(StrictModel):
         return self
 
 
-def load_targets(path: str | Path) -> tuple[Target, ...]:
-    """The targets of a YAML or CSV file, in its order.
+def load_targets(path: str | Path, robot: Robot) -> tuple[Target, ...]:
+    """The targets of a YAML or CSV file, in its order; the robot places those that are given by joint angles.
+
+    Raises
+    ------
+    InputError
+        naming file, field (or row and column) and remedy
+    """
+    return tuple(entry.target(robot) for entry in read_targets(path))
+
+
+def read_targets(path: str | Path) -> tuple[TargetEntry, ...]:
+    """A target file as it is written.
 
     Raises
     ------
@@ -171,7 +184,7 @@ def load_targets(path: str | Path) -> tuple[Target, ...]:
     return tuple(load(TargetFile, path).targets)
 
 
-def _targets_of_table(path: Path) -> tuple[Target, ...]:
+def _targets_of_table(path: Path) -> tuple[TargetEntry, ...]:
     rows = read_target_table(path)
     lines = [row.pop("row") for row in rows]
     try:
@@ -189,6 +202,6 @@ def _columns_of(field: str) -> tuple[str, ...]:
     return {"xyz_mm": POSITION, "q_ref_deg": REFERENCE, **FORMS}.get(field, (field,))
 
 
-def _zyz_turns(zyz_deg: list[float]) -> np.ndarray:
+def _zyz_turns(zyz_deg: list[float]) -> NDArray[np.float64]:
     a, b, c = np.radians(zyz_deg)
     return np.array([[0, 0, a], [0, b, 0], [0, 0, c]])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import re
-import stat
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -12,11 +11,18 @@ import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from er3a.errors import InputError
+from er3a.formats.text_file import read_text
 
 Model = TypeVar("Model", bound=BaseModel)
 
-MAX_BYTES = 1_000_000
 MAX_YAML_BYTES = 250_000  # of which the worst takes seconds to read
+
+RENAMED = {
+    "full_speed_after_s": "acceleration_time_s",
+    "overlap_mm": "penetration_tolerance_mm",
+    "repair": "avoidance",
+}
+"""Keys of files by the names that they had, and the names that they have."""
 
 _FIELD = re.compile(r"([A-Za-z_]\w*(?:\.[\w-]+|\[\d+\])*): ")
 _REMEDIES = {
@@ -118,26 +124,6 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
     return data
 
 
-def read_text(path: Path, most: int = MAX_BYTES) -> str:
-    """Read a UTF-8 text file of at most so many bytes, or raise :class:`InputError`."""
-    try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):
-            raise InputError(path, None, "not a file", "Check the path")
-        raw = path.read_bytes() if status.st_size <= most else None
-    except FileNotFoundError:
-        raise InputError(path, None, "there is no such file", "Check the path") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(path, None, f"can't be read ({reason})", "Check the path and its permissions") from None
-    if raw is None:
-        raise InputError(path, None, f"larger than {most} bytes", "Input tables are small text files")
-    try:
-        return raw.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError(path, f"byte {error.start}", "not UTF-8 text", "Save the file as UTF-8") from None
-
-
 def parse(model: type[Model], data: dict[str, Any], path: str | Path | None) -> Model:
     """Validate ``data`` as ``model``; the first fault found is raised as :class:`InputError`."""
     try:
@@ -174,6 +160,8 @@ def _explain(fault: dict[str, Any], model: type[BaseModel]) -> tuple[str, str]:
     if kind == "extra_forbidden":
         if any(word in str(key) for word in ("coupl", "parallelogram", "mimic")):
             return "coupled joints are not supported", "er3a needs six independent joints; remove the key"
+        if str(key) in RENAMED:
+            return f"the key {str(key)!r} has another name now", f"Write '{RENAMED[str(key)]}'"
         known = _known_keys(model)
         close = difflib.get_close_matches(str(key), known, n=1)
         hint = f"Did you mean '{close[0]}'?" if close else "Remove it, or check its place in the file"

@@ -15,8 +15,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import InputError
-from er3a.files.yaml_file import read_text
 from er3a.formats.from_axes import table_from_axes
+from er3a.formats.text_file import read_text
 from er3a.geometry.transforms import rot_z, rpy_of, transform
 from er3a.kinematics.chain import JOINTS, constant_links
 from er3a.kinematics.forward import forward

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.errors import PoseError, ShapeError
+from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
 
 ORTHONORMAL_TOLERANCE = 1e-6
@@ -18,38 +19,38 @@ BOTTOM_ROW_TOLERANCE = 1e-12
 FARTHEST_M = 100.0  # from the origin: farther off, a position was meant in mm
 
 
-def cos_sin(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def cos_sin(angle: Reals) -> tuple[Reals, Reals]:
     """Cosine and sine, exactly 0 where the angle is a right angle to rounding (``cos(pi/2)`` is 6e-17 otherwise)."""
     c, s = np.cos(angle), np.sin(angle)
     return np.where(np.abs(c) < 1e-15, 0.0, c), np.where(np.abs(s) < 1e-15, 0.0, s)
 
 
-def rot_x(angle: float) -> np.ndarray:
+def rot_x(angle: float) -> Reals:
     """Rotation about x by ``angle`` (rad) as a transform, shape (4, 4)."""
     c, s = cos_sin(angle)
     return np.array([[1, 0, 0, 0], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1]], dtype=float)
 
 
-def rot_y(angle: float) -> np.ndarray:
+def rot_y(angle: float) -> Reals:
     """Rotation about y by ``angle`` (rad) as a transform, shape (4, 4)."""
     c, s = cos_sin(angle)
     return np.array([[c, 0, s, 0], [0, 1, 0, 0], [-s, 0, c, 0], [0, 0, 0, 1]], dtype=float)
 
 
-def rot_z(angle: float) -> np.ndarray:
+def rot_z(angle: float) -> Reals:
     """Rotation about z by ``angle`` (rad) as a transform, shape (4, 4)."""
     c, s = cos_sin(angle)
     return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], dtype=float)
 
 
-def translation(x: float, y: float, z: float) -> np.ndarray:
+def translation(x: float, y: float, z: float) -> Reals:
     """Translation (m) as a transform, shape (4, 4)."""
     T = np.eye(4)
     T[:3, 3] = x, y, z
     return T
 
 
-def transform(xyz: np.ndarray, rpy: np.ndarray) -> np.ndarray:
+def transform(xyz: Reals, rpy: Reals) -> Reals:
     """Transforms from positions (..., 3) in m and roll-pitch-yaw (..., 3) in rad: R = Rz(yaw) Ry(pitch) Rx(roll) [2]_.
 
     Returns
@@ -67,7 +68,7 @@ def transform(xyz: np.ndarray, rpy: np.ndarray) -> np.ndarray:
     return T
 
 
-def rpy_of(T: np.ndarray) -> np.ndarray:
+def rpy_of(T: Reals) -> Reals:
     """Roll-pitch-yaw ZYX (..., 3) in rad of transforms (..., 4, 4); at pitch +-90 deg the roll is set to 0."""
     R = np.asarray(T, float)[..., :3, :3]
     pitch = np.arctan2(-R[..., 2, 0], np.hypot(R[..., 0, 0], R[..., 1, 0]))
@@ -77,7 +78,7 @@ def rpy_of(T: np.ndarray) -> np.ndarray:
     return np.stack([roll, pitch, yaw], axis=-1)
 
 
-def rotation_angle(R_a: np.ndarray, R_b: np.ndarray) -> np.ndarray:
+def rotation_angle(R_a: Reals, R_b: Reals) -> Reals:
     """Angle (...,) in rad, 0 to pi, of the rotation from R_a to R_b, each (..., 3, 3).
 
     From sine and cosine both, so that neither small turns nor half turns lose digits.
@@ -87,7 +88,7 @@ def rotation_angle(R_a: np.ndarray, R_b: np.ndarray) -> np.ndarray:
     return np.arctan2(np.linalg.norm(skew, axis=-1), np.trace(R, axis1=-2, axis2=-1) - 1.0)
 
 
-def as_floats(values: np.ndarray, argument: str) -> np.ndarray:
+def as_floats(values: Reals, argument: str) -> Reals:
     """Values as a float array; :class:`PoseError` if some are no real numbers, or rows differ in length."""
     try:
         array = np.asarray(values)
@@ -98,7 +99,7 @@ def as_floats(values: np.ndarray, argument: str) -> np.ndarray:
         raise PoseError(f"{argument} holds something that is no real number, or rows that differ in length") from None
 
 
-def check_poses(T: np.ndarray, argument: str = "T") -> np.ndarray:
+def check_poses(T: Reals, argument: str = "T") -> Reals:
     """Return T as float array (..., 4, 4), or raise if any matrix is no rigid transform, or farther off than 100 m.
 
     Raises
@@ -118,7 +119,7 @@ def check_poses(T: np.ndarray, argument: str = "T") -> np.ndarray:
     return T
 
 
-def _fault_of(T: np.ndarray) -> str:
+def _fault_of(T: Reals) -> str:
     """What keeps a matrix (4, 4) from being a rigid transform; empty if nothing does."""
     if not np.isfinite(T).all():
         row, column = np.argwhere(~np.isfinite(T))[0]

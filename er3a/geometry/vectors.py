@@ -15,37 +15,37 @@ Vector = tuple[float, float, float]
 
 
 @kernel
-def dot(a, b):
+def dot(a: Vector, b: Vector) -> float:
     """Scalar product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @kernel
-def cross(a, b):
+def cross(a: Vector, b: Vector) -> Vector:
     """Vector product."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @kernel
-def add(a, b):
+def add(a: Vector, b: Vector) -> Vector:
     """Sum."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 @kernel
-def subtract(a, b):
+def subtract(a: Vector, b: Vector) -> Vector:
     """Difference."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @kernel
-def scaled(a, factor):
+def scaled(a: Vector, factor: float) -> Vector:
     """Product with a number."""
     return a[0] * factor, a[1] * factor, a[2] * factor
 
 
 @kernel
-def rotated(v, axis, c, s):
+def rotated(v: Vector, axis: Vector, c: float, s: float) -> Vector:
     """v turned about a unit axis by the angle with cosine c and sine s: Rodrigues' formula [1]_."""
     u = cross(axis, v)
     along = dot(axis, v) * (1.0 - c)
@@ -57,7 +57,7 @@ def rotated(v, axis, c, s):
 
 
 @kernel
-def signed_angle(start, end, axis):
+def signed_angle(start: Vector, end: Vector, axis: Vector) -> float:
     """Angle (rad) that turns ``start`` to ``end`` about the unit axis, both projected across it.
 
     Projecting first, by vector products, keeps all digits where both vectors nearly lie on the axis (wrist aligned).
@@ -67,7 +67,7 @@ def signed_angle(start, end, axis):
 
 
 @kernel
-def unsigned_angle(a, b):
+def unsigned_angle(a: Vector, b: Vector) -> float:
     """Angle (rad) between two vectors, 0 to pi."""
     c = cross(a, b)
     return np.arctan2(np.sqrt(dot(c, c)), dot(a, b))

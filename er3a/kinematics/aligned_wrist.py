@@ -16,6 +16,7 @@ from er3a.geometry.vectors import signed_angle
 from er3a.kinematics.closed_form import BOUNDARY_M
 from er3a.kinematics.forward import forward, frames, jacobian
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
+from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 
 SOLVES_M = SOLVES_RAD = 0.9e-9  # a family is given where it solves the pose to 1e-9, rounding included
@@ -25,7 +26,7 @@ MOVING = [0, 1, 2, 5]
 MOST_STEPS, ROUNDING, SETTLED, INDEPENDENT = 8, 1e-14, 0.01, 1e-9
 
 
-def aligned_arms(robot: Robot, T: np.ndarray, q: np.ndarray) -> Iterator[tuple[tuple[int, int], np.ndarray]]:
+def aligned_arms(robot: Robot, T: Reals, q: Reals) -> Iterator[tuple[tuple[int, int], Reals]]:
     """Arms that solve a pose to 1e-9 m and rad with an aligned wrist.
 
     Parameters
@@ -49,7 +50,7 @@ def aligned_arms(robot: Robot, T: np.ndarray, q: np.ndarray) -> Iterator[tuple[t
                 yield (first, first + 1), arm
 
 
-def bend_of_wrist(robot: Robot, q: np.ndarray) -> np.ndarray:
+def bend_of_wrist(robot: Robot, q: Reals) -> Reals:
     """By how much (rad, signed) joint 5 of arms (..., 6) is away from where axes 4 and 6 are in line."""
     arm = wrist_partitioned_arm(robot)
     w = [tuple(axis) for axis in arm.axes.tolist()]
@@ -57,7 +58,7 @@ def bend_of_wrist(robot: Robot, q: np.ndarray) -> np.ndarray:
     return bend - np.pi * np.round(bend / np.pi)
 
 
-def wrist_line(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def wrist_line(robot: Robot, q: Reals) -> tuple[Reals, Reals]:
     """Joint angles with axes 4 and 6 put exactly in line, and the direction of the line of solutions."""
     q = q.copy()
     q[4] -= robot.direction[4] * bend_of_wrist(robot, q)
@@ -66,7 +67,7 @@ def wrist_line(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return q, np.array([0, 0, 0, 1.0, 0, -same])
 
 
-def wrist_centre_on_axis(robot: Robot, T: np.ndarray, q: np.ndarray, joint: int) -> np.ndarray:
+def wrist_centre_on_axis(robot: Robot, T: Reals, q: Reals, joint: int) -> Reals:
     """The pose shifted so that the wrist centre lies on the axis of joint 1 or 2 of the arm at q."""
     arm = wrist_partitioned_arm(robot)
     axis = frames(robot, q)[joint]
@@ -82,7 +83,7 @@ def arm_folds_fully(robot: Robot) -> bool:
     return abs(arm.upper_arm_length - arm.forearm_length) < BOUNDARY_M
 
 
-def _turned_about(robot: Robot, T: np.ndarray, q: np.ndarray, joint: int, slot: int) -> list[np.ndarray]:
+def _turned_about(robot: Robot, T: Reals, q: Reals, joint: int, slot: int) -> list[Reals]:
     """With the wrist centre on the axis of joint 1 or 2: arms with axes 4 and 6 at the same angle about it."""
     moved = wrist_centre_on_axis(robot, T, q, joint)
     if np.linalg.norm(moved[:3, 3] - T[:3, 3]) >= SOLVES_M:
@@ -99,7 +100,7 @@ def _turned_about(robot: Robot, T: np.ndarray, q: np.ndarray, joint: int, slot: 
     return list(solve_slots(robot, np.broadcast_to(moved, (2, 4, 4)), reference)[0][:, slot])
 
 
-def _in_line(robot: Robot, T: np.ndarray, q: np.ndarray) -> np.ndarray | None:
+def _in_line(robot: Robot, T: Reals, q: Reals) -> Reals | None:
     """The arm with its wrist put in line and joints 1, 2, 3 and 6 moved to make up for it; None if it misses the pose.
 
     At a fold these joints move the tool in second order only, and the least squares find the way.

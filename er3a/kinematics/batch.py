@@ -2,46 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
+from numpy.typing import NDArray
 
 from er3a.errors import PoseError, ShapeError
 from er3a.geometry.transforms import as_floats, check_poses
 from er3a.kinematics.block_inverse import BLOCK, count_turns, solve_blocks
 from er3a.kinematics.closed_form import REACHED, SLOTS
 from er3a.kinematics.forward import checked_joints
+from er3a.kinematics.solutions import Solutions
 from er3a.kinematics.wrist_partitioned import constants_for_blocks, solve_slots
-from er3a.numerics.threads import share_out
-from er3a.robots.joint_limits import nearest_turns, within
+from er3a.numerics.arrays import Reals
+from er3a.numerics.threads import parallel_for
+from er3a.robots.joint_limits import nearest_equivalent, within
 from er3a.robots.robot import Robot
 
-SMALLEST_SHARE = 8 * BLOCK
-
-
-@dataclass(frozen=True, eq=False)
-class BatchSolutions:
-    """Joint solutions of N poses, one slot for each branch.
-
-    Attributes
-    ----------
-    q : (N, 8, 6), rad, maker's angles; NaN in empty slots. Slot ``4 * shoulder + 2 * elbow + wrist``; of the turns
-        within the limits the nearest to the reference, else the nearest to the limits
-    valid : (N, 8) bool, whether the slot has a solution
-    within_limits : (N, 8) bool, whether it is within the limits by any turn
-    turns : (N, 8, 6, 2) int8, least and greatest number of whole turns that can be added to each joint within its
-        limits (least above greatest: none); None unless asked for
-    """
-
-    q: np.ndarray
-    valid: np.ndarray
-    within_limits: np.ndarray
-    turns: np.ndarray | None = None
+SMALLEST_PART = 8 * BLOCK
 
 
 def inverse_batch(
-    robot: Robot, T: np.ndarray, q_ref: np.ndarray | None = None, turns: bool = False, threads: int = 1
-) -> BatchSolutions:
+    robot: Robot,
+    T: Reals,
+    q_ref: Reals | None = None,
+    turns: bool = False,
+    threads: int = 1,
+) -> Solutions:
     """All closed-form solutions of a wrist-partitioned arm for many poses of the tool.
 
     At a singularity both branches that meet keep their slots: a free joint has its value of ``q_ref`` in one and half a
@@ -76,20 +61,21 @@ def inverse_batch(
         rows = (q[part], valid[part], inside[part], rigid[part], marked[part])
         solve_blocks(arm, robot.direction, robot.offset, robot.lower, robot.upper, T[part], own, *rows)
 
-    share_out(count, threads, SMALLEST_SHARE, solve)
+    parallel_for(count, threads, SMALLEST_PART, solve)
     if not rigid.all():
         check_poses(T)
     left = np.flatnonzero(marked)
     if left.size:
         own = np.broadcast_to(reference, (count, 6))[left]
-        found, fault, _ = solve_slots(robot, T[left], own, apart=True, twins=True)
-        q[left] = nearest_turns(robot, found, own[:, None])
+        found, fault, _ = solve_slots(robot, T[left], own, keep_folds=True, keep_free=True)
+        q[left] = nearest_equivalent(robot, found, own[:, None])
         valid[left] = fault == REACHED
         inside[left] = within(robot, q[left])
-    return BatchSolutions(q, valid, inside, _turns(robot, q) if turns else None)
+    branch = np.broadcast_to(np.arange(SLOTS), valid.shape)
+    return Solutions(robot, q, valid, inside, branch, turn_range=_turn_range(robot, q) if turns else None)
 
 
-def _checked_reference(q_ref: np.ndarray | None, count: int) -> np.ndarray:
+def _checked_reference(q_ref: Reals | None, count: int) -> Reals:
     """Reference joints (1 or N, 6)."""
     reference = checked_joints(np.zeros(6) if q_ref is None else q_ref, "q_ref")
     if reference.shape not in ((6,), (count, 6)):
@@ -101,7 +87,7 @@ def _checked_reference(q_ref: np.ndarray | None, count: int) -> np.ndarray:
     return reference
 
 
-def _turns(robot: Robot, q: np.ndarray) -> np.ndarray:
+def _turn_range(robot: Robot, q: Reals) -> NDArray[np.int8]:
     turns = np.empty((*q.shape, 2), dtype=np.int8)
     count_turns(q.reshape(-1, 6), robot.lower, robot.upper, turns.reshape(-1, 6, 2))
     return turns

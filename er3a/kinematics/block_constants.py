@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from er3a.geometry.vectors import Vector
+from er3a.numerics.arrays import Reals
 
 EDGE = 2e-9  # m or rad from where two branches meet or end
 
@@ -56,11 +57,11 @@ class BlockConstants(NamedTuple):
 
 
 def block_constants(
-    axes: np.ndarray,
-    points: np.ndarray,
-    wrist: np.ndarray,
-    tool_rotation: np.ndarray,
-    wrist_in_tool: np.ndarray,
+    axes: Reals,
+    points: Reals,
+    wrist: Reals,
+    tool_rotation: Reals,
+    wrist_in_tool: Reals,
     elbow_sign: float,
 ) -> BlockConstants:
     """Constants of an arm given as its axis lines with all theta at 0 (see ``WristPartitionedArm``), base frame."""
@@ -121,7 +122,7 @@ def block_constants(
     )
 
 
-def _floats(values: np.ndarray) -> tuple[float, ...]:
+def _floats(values: Reals) -> tuple[float, ...]:
     return tuple(_clean(value) for value in values)
 
 
@@ -130,11 +131,11 @@ def _clean(value: float) -> float:
     return 0.0 if abs(value) < 1e-15 else float(value)
 
 
-def _rx(angle: float) -> np.ndarray:
+def _rx(angle: float) -> Reals:
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
 
 
-def _rz(angle: float) -> np.ndarray:
+def _rz(angle: float) -> Reals:
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])

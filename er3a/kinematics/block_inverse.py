@@ -12,11 +12,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from er3a.geometry.angles import TURN
 from er3a.geometry.transforms import FARTHEST_M, ORTHONORMAL_TOLERANCE
+from er3a.geometry.vectors import Vector
 from er3a.kinematics.block_constants import EDGE
 from er3a.numerics.fast_math import arctan2
 from er3a.numerics.jit import kernel
-from er3a.robots.joint_limits import LIMIT_TOLERANCE, TURN
+from er3a.robots.joint_limits import LIMIT_TOLERANCE
 
 BLOCK = 64
 NEAR = 1e-6  # m or rad from where a joint becomes free
@@ -33,7 +35,7 @@ _VALID, _WITHIN, _PAIR_ROWS = 12, 13, 15  # two slots of a wrist: six angles eac
 def solve_blocks(arm, direction, offset, lower, upper, T, q_ref, q, valid, within, rigid, marked):
     """Solve poses ``T`` (N, 4, 4).
 
-    Fills ``q`` (N, 8, 6), the maker's angles by the turns within the limits that are nearest to ``q_ref`` (N or 1, 6),
+    Fills ``q`` (N, 8, 6), by the turns within the limits that are nearest to ``q_ref`` (N or 1, 6), rad,
     NaN where a slot has no solution, and per slot ``valid`` and ``within`` the limits (N, 8). ``rigid`` (N,) tells
     which poses are rigid transforms, ``marked`` (N,) which are left to the careful solver.
     """
@@ -60,7 +62,7 @@ def solve_blocks(arm, direction, offset, lower, upper, T, q_ref, q, valid, withi
             if pair % 2 == 0:
                 _elbow(arm, pose, side)
             _wrist(arm, pose, side, 1.0 - 2.0 * (pair % 2), pairs[pair])
-            _as_the_maker_counts(direction, offset, lower, upper, reference, pairs[pair])
+            _manufacturers_angles(direction, offset, lower, upper, reference, pairs[pair])
             for i in range(size):
                 for row in range(6):
                     q[start + i, 2 * pair, row] = pairs[pair, row * BLOCK + i]
@@ -91,8 +93,8 @@ def _check(w):
 
 
 @kernel
-def _as_the_maker_counts(direction, offset, lower, upper, reference, pair):
-    """Angles theta into maker's angles by the nearest turn within the limits; see ``turns.nearest_turns``."""
+def _manufacturers_angles(direction, offset, lower, upper, reference, pair):
+    """Angles theta into the manufacturer's, by the nearest turn within the limits (``nearest_equivalent``)."""
     for i in range(BLOCK):
         pair[_WITHIN * BLOCK + i] = pair[_VALID * BLOCK + i]
         pair[(_WITHIN + 1) * BLOCK + i] = pair[_VALID * BLOCK + i]
@@ -128,7 +130,7 @@ def count_turns(q, lower, upper, turns):
 
 
 @kernel
-def in_frame_1(rows, x, y, z):
+def in_frame_1(rows: tuple[Vector, Vector, Vector], x: float, y: float, z: float) -> Vector:
     """A vector turned by a rotation given as three rows."""
     a, b, c = rows
     return (

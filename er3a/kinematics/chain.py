@@ -15,20 +15,20 @@ References
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from er3a.errors import Er3aError
 from er3a.geometry.transforms import rot_x, rot_y, translation
+from er3a.numerics.arrays import Reals
+from er3a.robots.derived import derived
 from er3a.robots.robot import Robot
 
 JOINTS = 6
 ALONG_Z, TO_NEXT_AXIS = 0, 1
 
 
-@lru_cache(maxsize=256)
-def constant_links(robot: Robot, frame: int | None = None) -> np.ndarray:
+@derived
+def constant_links(robot: Robot, frame: int | None = None) -> Reals:
     """Constant transforms between the joint rotations, base included.
 
     Parameters
@@ -58,7 +58,7 @@ def constant_links(robot: Robot, frame: int | None = None) -> np.ndarray:
     return links
 
 
-def link_parts(robot: Robot) -> np.ndarray:
+def link_parts(robot: Robot) -> Reals:
     """Each link's constant transform in two steps: along its joint's axis, then across to the next axis.
 
     Returns
@@ -77,9 +77,9 @@ def link_parts(robot: Robot) -> np.ndarray:
     return parts
 
 
-@lru_cache(maxsize=256)
-def axes_at_zero_theta(robot: Robot) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Joint axes with all model angles theta at 0 (not the maker's zero pose), in the base frame.
+@derived
+def axes_at_zero_theta(robot: Robot) -> tuple[Reals, Reals, Reals]:
+    """Joint axes with all model angles theta at 0 (not the manufacturer's zero pose), in the base frame.
 
     Returns
     -------
@@ -99,6 +99,7 @@ def axes_at_zero_theta(robot: Robot) -> tuple[np.ndarray, np.ndarray, np.ndarray
     return directions, points, T
 
 
+@derived
 def arm_length(robot: Robot) -> float:
     """Half the distance along all links (m), which makes position and rotation errors comparable."""
     points = axes_at_zero_theta(robot)[1]

@@ -14,13 +14,13 @@ Triangle angles come from half-angle tangents, which keep full accuracy where a 
 
 Slot order: ``4 * shoulder + 2 * elbow + wrist``, 0 the root with the positive angle in each of the three steps.
 
-Where two branches meet they are one solution to rounding. They can be kept two rows that solve the pose:
+Where two branches meet they are one solution to rounding. Both can be kept, as duplicates that solve the pose:
 
-- ``apart``: at a fold (arm stretched or folded, wrist tilted as far as it goes, sideways offset at its limit), which
-  counts as met within ``AT_FOLD``, both are the folded arm but for ``APART`` in their angles; this moves the tool by
-  less than 1e-17 m;
-- ``twins``: where a joint is free, the second branch has it half a turn further, where it comes from when the pose is
-  left.
+- ``keep_folds``: at a fold (arm stretched or folded, wrist tilted as far as it goes, sideways offset at its limit),
+  which counts as met within ``AT_FOLD``, both are the folded arm but for ``FOLD_OFFSET`` in their angles; this moves
+  the tool by less than 1e-17 m;
+- ``keep_free``: where a joint is free, the second branch has it half a turn further, where it comes from when the pose
+  is left.
 
 References
 ----------
@@ -52,7 +52,7 @@ SLOTS = 8
 BOUNDARY_M = 1e-9
 BOUNDARY_RAD = 1e-9
 FREE = 1e-13
-APART = 0.9e-9  # rad; twice this tells rows apart, once this leaves no limit
+FOLD_OFFSET = 0.9e-9  # rad; twice this tells rows apart, once this leaves no limit
 AT_FOLD = 1e-15  # m or rad
 
 REACHED, TOO_FAR, TOO_NEAR, OFF_AXIS, ORIENTATION = 0, 1, 2, 3, 4
@@ -63,8 +63,8 @@ class ArmConstants(NamedTuple):
 
     ``beside_6`` is a vector across axis 6; ``_in_tool`` marks components in the tool frame. ``reach`` and ``least`` are
     the stretched and the folded arm's length, ``elbow_angle`` turns the upper arm to the forearm, ``wrist_angle`` axis
-    4 to axis 6 about axis 5, ``angle_45`` and ``angle_56`` lie between neighbouring axes. ``*_apart`` is how far
-    roots that meet at that fold are kept from it, 0 where it is no fold.
+    4 to axis 6 about axis 5, ``angle_45`` and ``angle_56`` lie between neighbouring axes. ``*_offset`` is how
+    far roots that meet at that fold are kept from it, 0 where it is no fold.
     """
 
     axis_1: Vector
@@ -90,9 +90,9 @@ class ArmConstants(NamedTuple):
     wrist_angle: float
     angle_45: float
     angle_56: float
-    folded_apart: float
-    least_tilt_apart: float
-    most_tilt_apart: float
+    folded_offset: float
+    least_tilt_offset: float
+    most_tilt_offset: float
 
 
 @kernel
@@ -112,17 +112,17 @@ def _to_base(T, v):
 
 
 @kernel
-def _off_folds(angle, to_low, to_high, apart_low, apart_high):
+def _off_folds(angle, to_low, to_high, low_offset, high_offset):
     """An angle in 0..pi, put beside that end whose distance from the fold (m or rad) is nothing but rounding."""
-    if to_low < AT_FOLD and apart_low > 0.0:
-        return apart_low
-    if to_high < AT_FOLD and apart_high > 0.0:
-        return np.pi - apart_high
+    if to_low < AT_FOLD and low_offset > 0.0:
+        return low_offset
+    if to_high < AT_FOLD and high_offset > 0.0:
+        return np.pi - high_offset
     return angle
 
 
 @kernel
-def solve(arm, direction, offset, T, q_ref, apart, twins, q, fault, gap):
+def solve(arm, direction, offset, T, q_ref, keep_folds, keep_free, q, fault, gap):
     """Fill ``q`` (N, 8, 6), ``fault`` and ``gap`` (N, 8) for poses ``T`` (N, 4, 4); see ``solve_slots``."""
     for n in range(T.shape[0]):
         tool_point = (T[n, 0, 3], T[n, 1, 3], T[n, 2, 3])
@@ -138,12 +138,12 @@ def solve(arm, direction, offset, T, q_ref, apart, twins, q, fault, gap):
             gap[n, :] = missing / arm.sin_12
             continue
         phi, delta = np.arctan2(B, A), np.arctan2(np.sqrt(max((H - C) * (H + C), 0.0)), C)
-        if apart:
-            delta = _off_folds(delta, H - C, H + C, APART, APART)
+        if keep_folds:
+            delta = _off_folds(delta, H - C, H + C, FOLD_OFFSET, FOLD_OFFSET)
         for shoulder in range(2):
             theta_1 = phi + (delta if shoulder == 0 else -delta)
             if H < FREE:
-                theta_1 = direction[0] * q_ref[n, 0] + offset[0] + (np.pi if twins and shoulder == 1 else 0.0)
+                theta_1 = direction[0] * q_ref[n, 0] + offset[0] + (np.pi if keep_free and shoulder == 1 else 0.0)
             c, s = np.cos(theta_1), -np.sin(theta_1)
             x = subtract(add(rotated(v, arm.axis_1, c, s), arm.point_1), arm.point_2)
             x = subtract(x, scaled(arm.axis_2, dot(arm.axis_2, x)))
@@ -159,14 +159,14 @@ def solve(arm, direction, offset, T, q_ref, apart, twins, q, fault, gap):
             bend = 2.0 * np.arctan2(
                 np.sqrt(max(-far, 0.0) * (arm.reach + D)), np.sqrt(max(-near, 0.0) * (D + arm.least))
             )
-            if apart:
-                bend = _off_folds(bend, -far, -near, APART, arm.folded_apart)
+            if keep_folds:
+                bend = _off_folds(bend, -far, -near, FOLD_OFFSET, arm.folded_offset)
             for elbow in range(2):
                 turn = (bend if elbow == 0 else -bend) - arm.elbow_angle
                 y = add(arm.upper_arm, rotated(arm.forearm, arm.axis_2, np.cos(turn), np.sin(turn)))
                 theta_2 = signed_angle(y, x, arm.axis_2)
                 if D < FREE:
-                    theta_2 = direction[1] * q_ref[n, 1] + offset[1] + (np.pi if twins and elbow == 1 else 0.0)
+                    theta_2 = direction[1] * q_ref[n, 1] + offset[1] + (np.pi if keep_free and elbow == 1 else 0.0)
                 # Axes 2 and 3 are parallel, so one rotation undoes both joints.
                 c, s = np.cos(theta_2 + turn), -np.sin(theta_2 + turn)
                 slot = 4 * shoulder + 2 * elbow
@@ -180,8 +180,8 @@ def solve(arm, direction, offset, T, q_ref, apart, twins, q, fault, gap):
                     rotated(axis_6_1, arm.axis_2, c, s),
                     rotated(beside_6_1, arm.axis_2, c, s),
                     free_theta_4,
-                    apart,
-                    twins,
+                    keep_folds,
+                    keep_free,
                     q[n, slot : slot + 2],
                 )
                 for wrist in range(slot, slot + 2):
@@ -193,7 +193,7 @@ def solve(arm, direction, offset, T, q_ref, apart, twins, q, fault, gap):
 
 
 @kernel
-def _solve_wrist(arm, axis_6, beside_6, free_theta_4, apart, twins, theta):
+def _solve_wrist(arm, axis_6, beside_6, free_theta_4, keep_folds, keep_free, theta):
     """Set the last three columns of ``theta`` (2, 6) from where axis 6 and the vector beside it must turn to.
 
     Returns by how much (rad) the wrist would have to tilt further than it can; beyond the boundary ``theta`` is NaN.
@@ -207,9 +207,9 @@ def _solve_wrist(arm, axis_6, beside_6, free_theta_4, apart, twins, theta):
     upper_part = np.sin((gamma + b - c) / 2) * np.sin((gamma - b + c) / 2)
     lower_part = np.sin((b + c + gamma) / 2) * np.sin((b + c - gamma) / 2)
     bend = 2.0 * np.arctan2(np.sqrt(max(upper_part, 0.0)), np.sqrt(max(lower_part, 0.0)))
-    if apart:
+    if keep_folds:
         low, high = gamma - np.abs(b - c), min(b + c, 2 * np.pi - b - c) - gamma
-        bend = _off_folds(bend, low, high, arm.least_tilt_apart, arm.most_tilt_apart)
+        bend = _off_folds(bend, low, high, arm.least_tilt_offset, arm.most_tilt_offset)
     aligned = gamma < FREE or np.pi - gamma < FREE
     for k in range(2):
         theta_5 = (bend if k == 0 else -bend) - arm.wrist_angle
@@ -217,7 +217,7 @@ def _solve_wrist(arm, axis_6, beside_6, free_theta_4, apart, twins, theta):
         tilted = rotated(arm.axis_6, arm.axis_5, c_5, s_5)
         theta_4 = signed_angle(tilted, axis_6, arm.axis_4)
         if aligned:
-            theta_4 = free_theta_4 + (np.pi if twins and k == 1 else 0.0)
+            theta_4 = free_theta_4 + (np.pi if keep_free and k == 1 else 0.0)
         rest = rotated(beside_6, arm.axis_4, np.cos(theta_4), -np.sin(theta_4))
         rest = rotated(rest, arm.axis_5, c_5, -s_5)
         theta[k, 3], theta[k, 4], theta[k, 5] = theta_4, theta_5, signed_angle(arm.beside_6, rest, arm.axis_6)

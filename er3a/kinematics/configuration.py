@@ -10,7 +10,7 @@ that a branch can only change where the arm passes a singularity of that part:
 
 from __future__ import annotations
 
-from functools import lru_cache
+from typing import Literal
 
 import numpy as np
 
@@ -18,22 +18,38 @@ from er3a.geometry.vectors import signed_angle
 from er3a.kinematics.closed_form import BOUNDARY_M, SLOTS
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
-from er3a.pipeline.messages.language import N_
+from er3a.numerics.arrays import Integers, Reals
+from er3a.robots.derived import derived
 from er3a.robots.robot import Robot
 
-LABELS = (  # by shoulder, elbow and wrist
-    (
-        (N_("front, elbow up, no flip"), N_("front, elbow up, flip")),
-        (N_("front, elbow down, no flip"), N_("front, elbow down, flip")),
+Side = Literal["front", "back"]
+BranchLabel = Literal[
+    "front_elbow_up_no_flip",
+    "front_elbow_up_flip",
+    "front_elbow_down_no_flip",
+    "front_elbow_down_flip",
+    "back_elbow_up_no_flip",
+    "back_elbow_up_flip",
+    "back_elbow_down_no_flip",
+    "back_elbow_down_flip",
+]
+LABELS: dict[Side, tuple[BranchLabel, ...]] = {  # by side, then elbow up or down and wrist
+    "front": (
+        "front_elbow_up_no_flip",
+        "front_elbow_up_flip",
+        "front_elbow_down_no_flip",
+        "front_elbow_down_flip",
     ),
-    (
-        (N_("back, elbow up, no flip"), N_("back, elbow up, flip")),
-        (N_("back, elbow down, no flip"), N_("back, elbow down, flip")),
+    "back": (
+        "back_elbow_up_no_flip",
+        "back_elbow_up_flip",
+        "back_elbow_down_no_flip",
+        "back_elbow_down_flip",
     ),
-)
+}
 
 
-def branch_of(robot: Robot, q: np.ndarray) -> np.ndarray:
+def branch_of(robot: Robot, q: Reals) -> Integers:
     """Slot (...,) that joint angles (..., 6) in rad belong to; on a singularity, where two meet, the lower number.
 
     Raises
@@ -50,25 +66,38 @@ def branch_of(robot: Robot, q: np.ndarray) -> np.ndarray:
     return 4 * shoulder + 2 * (np.sin(elbow) < 0) + (np.sin(wrist) < 0)
 
 
-@lru_cache(maxsize=256)
-def branch_labels(robot: Robot) -> tuple[str, ...]:
-    """The eight slots in words.
+@derived
+def branch_labels(robot: Robot) -> tuple[BranchLabel, ...]:
+    """The codes of the eight slots.
 
-    *front*: the wrist centre is on the side of axis 1 where it stands in the maker's zero pose (if it stands on axis 1
+    *front*: the wrist centre is on the side of axis 1 where it is in the manufacturer's zero pose (if it is on axis 1
     there, the side of the cross product of axes 1 and 2); *back*: reached over the head. *up*: with the arm stretched
     out level on that side, the elbow is above the line from shoulder to wrist. *flip*: the wrist root with the
     negative angle.
+
+    Raises
+    ------
+    NotWristPartitionedError
     """
     arm = wrist_partitioned_arm(robot)
     w1, w2 = arm.axes[0], arm.axes[1]
-    forward_root = -1.0  # slot 0 has theta_1 = phi + delta: the wrist lies against w1 x w2
-    at_zero = determinant_factors(robot, np.zeros(6)).shoulder
-    zero_side = 1.0 if abs(at_zero) < BOUNDARY_M else np.sign(at_zero)
     labels = []
     for slot in range(SLOTS):
-        side = forward_root * (1.0 if slot < 4 else -1.0)
-        outward = side * np.cross(w1, w2)
+        outward = _outward(slot) * np.cross(w1, w2)
         bend = 1.0 if slot % 4 < 2 else -1.0
         down = bend * (np.cross(w2, outward) @ w1) >= 0
-        labels.append(LABELS[int(side != zero_side)][int(down)][slot % 2])
+        labels.append(LABELS[side_of(robot, slot)][2 * int(down) + slot % 2])
     return tuple(labels)
+
+
+@derived
+def side_of(robot: Robot, slot: int) -> Side:
+    """Whether a slot's wrist is in front of axis 1 or reached over the head (see :func:`branch_labels`)."""
+    at_zero = determinant_factors(robot, np.zeros(6)).shoulder
+    zero_side = 1.0 if abs(at_zero) < BOUNDARY_M else np.sign(at_zero)
+    return "front" if _outward(slot) == zero_side else "back"
+
+
+def _outward(slot: int) -> float:
+    """On which side of axis 1 the wrist is, along w1 x w2: slot 0 has theta_1 = phi + delta and lies against it."""
+    return -1.0 if slot < 4 else 1.0

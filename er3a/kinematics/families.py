@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from er3a.geometry.angles import TURN, wrap_to_pi
 from er3a.kinematics.aligned_wrist import (
     SOLVES_M,
     SOLVES_RAD,
@@ -24,14 +25,17 @@ from er3a.kinematics.aligned_wrist import (
 )
 from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.forward import frames, jacobian
+from er3a.kinematics.singularity import SingularityType
 from er3a.kinematics.wrist_partitioned import solve_slots
-from er3a.robots.joint_limits import LIMIT_TOLERANCE, TURN, nearest_turns, principal, within
+from er3a.numerics.arrays import Reals
+from er3a.robots.joint_limits import LIMIT_TOLERANCE, nearest_equivalent, within
 from er3a.robots.robot import Robot
 
 GRID = np.radians(2.0)
 SPLIT, ROUNDS = 16, 10  # an interval is cut into so many parts, so often
 SAME_FAMILY = 1e-8
-FREE_JOINT = {"shoulder": 0, "elbow": 1}
+CURVES: tuple[tuple[SingularityType, int, int], ...] = (("shoulder", 4, 0), ("elbow", 2, 1))  # slots apart, joint
+FREE_JOINT: dict[SingularityType, int] = {"shoulder": 0, "elbow": 1}
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,28 +57,28 @@ class Family:
     branches : slots that the family belongs to
     """
 
-    kind: str
-    q0: np.ndarray
-    direction: np.ndarray
-    range: np.ndarray
+    kind: SingularityType
+    q0: Reals
+    direction: Reals
+    range: Reals
     within_limits: bool
     branches: tuple[int, ...]
     robot: Robot
-    T: np.ndarray
+    T: Reals
 
-    def members(self, t: np.ndarray) -> np.ndarray:
+    def members(self, t: Reals) -> Reals:
         """Joint angles (..., 6) in rad at parameters (...,)."""
         t = np.asarray(t, float)
         if self.kind == "wrist":
             return self.q0 + t[..., None] * self.direction
         joint = FREE_JOINT[self.kind]
         q = _on_curve(self.robot, self.T, joint, self.q0[joint] + t.reshape(-1), self.q0, self.branches[0])
-        q = nearest_turns(self.robot, _nearest_wrists(self.robot, q, self.q0), self.q0)
+        q = nearest_equivalent(self.robot, _nearest_wrists(self.robot, q, self.q0), self.q0)
         q[:, joint] = self.q0[joint] + t.reshape(-1)
         return q.reshape(*t.shape, 6)
 
 
-def families(robot: Robot, T: np.ndarray, q: np.ndarray, q_ref: np.ndarray) -> tuple[Family, ...]:
+def families(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[Family, ...]:
     """All continua that solve a pose to 1e-9 m and rad, nearest to the reference first within each kind.
 
     Parameters
@@ -85,7 +89,7 @@ def families(robot: Robot, T: np.ndarray, q: np.ndarray, q_ref: np.ndarray) -> t
     for pair, on_line in aligned_arms(robot, T, q):
         _add(found, _wrist_families(robot, T, on_line, q_ref, pair))
     solved, slots = np.isfinite(q[:, 0]), np.arange(SLOTS)
-    for kind, step, joint in (("shoulder", 4, 0), ("elbow", 2, 1)):
+    for kind, step, joint in CURVES:
         for slot in slots[(slots // step % 2 == 0) & solved]:
             moved = wrist_centre_on_axis(robot, T, q[slot], joint)
             if np.linalg.norm(moved[:3, 3] - T[:3, 3]) < SOLVES_M and (joint == 0 or arm_folds_fully(robot)):
@@ -105,12 +109,10 @@ def _add(found: list[Family], new: list[Family]) -> None:
             found.append(family)
 
 
-def _wrist_families(
-    robot: Robot, T: np.ndarray, q: np.ndarray, q_ref: np.ndarray, branches: tuple[int, ...]
-) -> list[Family]:
+def _wrist_families(robot: Robot, T: Reals, q: Reals, q_ref: Reals, branches: tuple[int, ...]) -> list[Family]:
     """One family for each sum (or difference) of joints 4 and 6 that the limits admit."""
     q, direction = wrist_line(robot, q)
-    rest = nearest_turns(robot, q, q_ref)
+    rest = nearest_equivalent(robot, q, q_ref)
     rest[[3, 5]] = q[[3, 5]] + TURN * np.round((q_ref - q) / TURN)[[3, 5]]
     families = []
     fits = within(robot, np.where(direction != 0, np.clip(rest, robot.lower, robot.upper), rest))
@@ -133,28 +135,29 @@ def _wrist_families(
     return sorted(families, key=lambda family: float(np.linalg.norm(family.q0 - q_ref)))
 
 
-def _nearest_on_line(q: np.ndarray, direction: np.ndarray, q_ref: np.ndarray) -> float:
+def _nearest_on_line(q: Reals, direction: Reals, q_ref: Reals) -> float:
     return float((q_ref - q) @ direction / (direction @ direction))
 
 
-def _on_curve(robot: Robot, T: np.ndarray, joint: int, values: np.ndarray, q_ref: np.ndarray, slot: int) -> np.ndarray:
+def _on_curve(robot: Robot, T: Reals, joint: int, values: Reals, q_ref: Reals, slot: int) -> Reals:
     """Solutions (n, 6) of one slot with the free joint at given angles (n,)."""
     reference = np.tile(q_ref, (len(values), 1))
     reference[:, joint] = values
-    return solve_slots(robot, np.broadcast_to(T, (len(values), 4, 4)), reference, apart=True)[0][:, slot]
+    return solve_slots(robot, np.broadcast_to(T, (len(values), 4, 4)), reference, keep_folds=True)[0][:, slot]
 
 
-def _curve_family(robot: Robot, T: np.ndarray, kind: str, q_ref: np.ndarray, branches: tuple[int, ...]) -> Family:
+def _curve_family(robot: Robot, T: Reals, kind: SingularityType, q_ref: Reals, branches: tuple[int, ...]) -> Family:
     joint, slot = FREE_JOINT[kind], branches[0]
     grid = np.arange(robot.lower[joint], robot.upper[joint] + GRID, GRID)
     grid = np.unique(np.append(np.minimum(grid, robot.upper[joint]), np.clip(q_ref, robot.lower, robot.upper)[joint]))
 
-    def members(values: np.ndarray) -> np.ndarray:
-        q = nearest_turns(robot, _nearest_wrists(robot, _on_curve(robot, T, joint, values, q_ref, slot), q_ref), q_ref)
+    def members(values: Reals) -> Reals:
+        q = _nearest_wrists(robot, _on_curve(robot, T, joint, values, q_ref, slot), q_ref)
+        q = nearest_equivalent(robot, q, q_ref)
         q[:, joint] = values
         return q
 
-    def costs(q: np.ndarray) -> np.ndarray:
+    def costs(q: Reals) -> Reals:
         return np.where(within(robot, q) | ~any_inside, np.sum((q - q_ref) ** 2, axis=1), np.inf)
 
     q = members(grid)
@@ -171,19 +174,19 @@ def _curve_family(robot: Robot, T: np.ndarray, kind: str, q_ref: np.ndarray, bra
     return replace(family, range=span)
 
 
-def _nearest_wrists(robot: Robot, q: np.ndarray, q_ref: np.ndarray) -> np.ndarray:
+def _nearest_wrists(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
     """Rows (n, 6) with an aligned wrist moved along their line to the member nearest to the reference."""
     for row in np.flatnonzero(np.abs(bend_of_wrist(robot, q)) < SOLVES_RAD):
         on_line, direction = wrist_line(robot, q[row])
         axis_4, axis_6 = frames(robot, on_line)[[3, 5], :3, 2]
         if np.linalg.norm(np.cross(axis_4, axis_6)) > SOLVES_RAD:  # an oblique wrist is never in line
             continue
-        on_line = q_ref + principal(on_line - q_ref)
+        on_line = q_ref + wrap_to_pi(on_line - q_ref)
         q[row] = on_line + _nearest_on_line(on_line, direction, q_ref) * direction
     return q
 
 
-def _tangent(robot: Robot, q: np.ndarray, joint: int) -> np.ndarray:
+def _tangent(robot: Robot, q: Reals, joint: int) -> Reals:
     """Joint rates that leave the tool at rest while the free joint turns at rate 1: the wrist undoes its rotation."""
     spin = jacobian(robot, q)[3:]
     direction = np.zeros(6)
@@ -193,7 +196,7 @@ def _tangent(robot: Robot, q: np.ndarray, joint: int) -> np.ndarray:
     return direction
 
 
-def _range(family: Family, grid: np.ndarray) -> np.ndarray:
+def _range(family: Family, grid: Reals) -> Reals:
     """Ends of the connected part within the limits around q0, by the grid and bisection."""
     joint = FREE_JOINT[family.kind]
     steps = grid - family.q0[joint]

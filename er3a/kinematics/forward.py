@@ -12,6 +12,7 @@ import numpy as np
 from er3a.errors import ShapeError
 from er3a.geometry.transforms import as_floats
 from er3a.kinematics.chain import JOINTS, constant_links
+from er3a.numerics.arrays import Reals
 from er3a.numerics.fast_math import LARGEST_ANGLE, cos_sin
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
@@ -20,12 +21,12 @@ BLOCK = 64
 _COS, _SIN = 12, 13  # rows of scratch memory behind the 3 x 4 entries of a block of poses
 
 
-def forward(robot: Robot, q: np.ndarray, frame: int | None = None, out: np.ndarray | None = None) -> np.ndarray:
+def forward(robot: Robot, q: Reals, frame: int | None = None, out: Reals | None = None) -> Reals:
     """Pose of the tool point, or of a frame of the table, for joint angles.
 
     Parameters
     ----------
-    q : (..., 6), rad, the maker's joint angles; NaN in a row gives NaN in its pose
+    q : (..., 6), rad, the manufacturer's joint angles; NaN in a row gives NaN in its pose
     frame : None for the tool point (``T_base_tool``); 0..6 for the frame after that joint in the table's own
         convention, base included, tool not
     out : (..., 4, 4) writeable float64 C-contiguous array to fill and return
@@ -50,12 +51,12 @@ def forward(robot: Robot, q: np.ndarray, frame: int | None = None, out: np.ndarr
     return out
 
 
-def frames(robot: Robot, q: np.ndarray) -> np.ndarray:
+def frames(robot: Robot, q: Reals) -> Reals:
     """Frames that move with each joint, and the tool frame.
 
     Parameters
     ----------
-    q : (..., 6), rad, maker's angles
+    q : (..., 6), rad, manufacturer's angles
 
     Returns
     -------
@@ -68,8 +69,8 @@ def frames(robot: Robot, q: np.ndarray) -> np.ndarray:
     return out
 
 
-def jacobian(robot: Robot, q: np.ndarray) -> np.ndarray:
-    """Geometric Jacobian at the tool point, in the base frame, with respect to the maker's angles [1]_.
+def jacobian(robot: Robot, q: Reals) -> Reals:
+    """Geometric Jacobian at the tool point, in the base frame, with respect to the manufacturer's angles [1]_.
 
     Parameters
     ----------
@@ -85,7 +86,7 @@ def jacobian(robot: Robot, q: np.ndarray) -> np.ndarray:
     return out
 
 
-def checked_joints(q: np.ndarray, argument: str = "q") -> np.ndarray:
+def checked_joints(q: Reals, argument: str = "q") -> Reals:
     """Return q as contiguous float array (..., 6), or raise :class:`ShapeError` or :class:`PoseError`."""
     q = np.ascontiguousarray(as_floats(q, argument))
     if q.ndim == 0 or q.shape[-1] != JOINTS:
@@ -219,7 +220,7 @@ def _fill_start(rows, link):
 
 @kernel
 def _keep_axis(rows, sign, column):
-    """A point on the joint's axis, and the axis in the sense of the maker's angle."""
+    """A point on the joint's axis, and the axis in the sense of the manufacturer's angle."""
     for r in range(3):
         for i in range(BLOCK):
             column[r * BLOCK + i] = rows[(4 * r + 3) * BLOCK + i]

@@ -8,59 +8,47 @@ from numbers import Integral
 import numpy as np
 
 from er3a.errors import Er3aError, PoseError, ShapeError
+from er3a.geometry.angles import wrap_to_pi
 from er3a.geometry.transforms import as_floats, check_poses
 from er3a.kinematics.chain import JOINTS, arm_length, constant_links
 from er3a.kinematics.forward import checked_joints, jacobian
 from er3a.kinematics.iteration import solve_numerically
-from er3a.numerics.threads import share_out
-from er3a.pipeline.messages.language import said
-from er3a.robots.joint_limits import limit_reason, nearest_turns, principal, within
+from er3a.kinematics.solutions import (
+    BadGuess,
+    Iteration,
+    LimitBound,
+    NearestMiss,
+    NotFound,
+    PoseUnsolved,
+    SingularEnd,
+    Solutions,
+    Unreachable,
+)
+from er3a.numerics.arrays import Integers, Reals
+from er3a.numerics.threads import parallel_for
+from er3a.robots.joint_limits import limits_exceeded, nearest_equivalent, within
 from er3a.robots.robot import Robot
 
-SOLVED, UNREACHABLE, SINGULAR, LIMIT_BOUND, BAD_GUESS = "solved", "unreachable", "singular", "limit-bound", "bad guess"
 RESTARTS = 500
 DIAGNOSIS_RESTARTS = 100
 NEARLY = 1e-6  # m (in parts of the arm's length) or rad: so near, only a singularity keeps the iteration from its end
 RANK = 1e-3  # smallest singular value below which the end of an iteration counts as singular
 SAME_ARM = 1e-6
-SMALLEST_SHARE = 64
-
-
-@dataclass(frozen=True, eq=False)
-class NumericalSolutions:
-    """One arm for each pose, or the nearest that was found; leading dimensions are those of the poses.
-
-    Attributes
-    ----------
-    q : (..., 6), rad, maker's angles
-    solved : (...,) bool, whether both errors are within the tolerances
-    position_error : (...,), m; rotation_error : (...,), rad, of the degrees of freedom asked for
-    starts : (...,) int, starts used; 0 where none succeeded
-    outcome : (...,) texts: solved, unreachable, singular, limit-bound or bad guess
-    reason : (...,) texts, empty where solved
-    """
-
-    q: np.ndarray
-    solved: np.ndarray
-    position_error: np.ndarray
-    rotation_error: np.ndarray
-    starts: np.ndarray
-    outcome: np.ndarray
-    reason: np.ndarray
+SMALLEST_PART = 64
 
 
 def solve(
     robot: Robot,
-    T: np.ndarray,
-    q0: np.ndarray | None = None,
-    mask: np.ndarray | None = None,
+    T: Reals,
+    q0: Reals | None = None,
+    mask: Reals | None = None,
     respect_limits: bool = True,
     restarts: int = RESTARTS,
     position_tolerance: float = 1e-10,
     rotation_tolerance: float = 1e-10,
     seed: int = 0,
     threads: int = 1,
-) -> NumericalSolutions:
+) -> Solutions:
     """Solve poses by iteration from a start guess, then from random ones.
 
     Parameters
@@ -97,15 +85,26 @@ def solve(
     poses = T.reshape(-1, 4, 4)
     starts_at = np.broadcast_to(q0, (*shape, 6)).reshape(-1, 6)
     q, error, starts = search.run(poses, starts_at, respect_limits, restarts, threads)
-    outcome = np.full(len(poses), SOLVED, dtype=object)
-    reason = np.full(len(poses), "", dtype=object)
-    for n in np.flatnonzero(starts == 0):
-        outcome[n], reason[n] = search.explain(poses[n], q[n], error[n], respect_limits, restarts)
-    fields = (q.reshape(*shape, 6), starts > 0, error[:, 0], error[:, 1], starts, outcome, reason)
-    return NumericalSolutions(fields[0], *(field.reshape(shape) for field in fields[1:]))
+    unsolved = tuple(
+        PoseUnsolved(int(n), search.explain(poses[n], q[n], error[n], respect_limits, restarts))
+        for n in np.flatnonzero(starts == 0)
+    )
+    q = q.reshape(*shape, 6)
+    return Solutions(
+        robot,
+        q,
+        solved=(starts > 0).reshape(shape),
+        within_limits=(starts > 0).reshape(shape) & within(robot, q),
+        branch=np.full(shape, -1),
+        method=Iteration(1 + restarts),
+        unsolved=unsolved,
+        position_error=error[:, 0].reshape(shape),
+        rotation_error=error[:, 1].reshape(shape),
+        starts=starts.reshape(shape),
+    )
 
 
-def all_found(robot: Robot, T: np.ndarray, starts: int, seed: int = 0) -> tuple[np.ndarray, NumericalSolutions]:
+def all_found(robot: Robot, T: Reals, starts: int, seed: int = 0) -> tuple[Reals, Solutions]:
     """Different arms (n, 6), rad in (-pi, pi], found from that many random starts for one pose, and the first search.
 
     There may be more: a search from random starts can't prove that it has found all.
@@ -117,9 +116,9 @@ def all_found(robot: Robot, T: np.ndarray, starts: int, seed: int = 0) -> tuple[
     random = np.random.default_rng([seed, 2])
     begin = random.uniform(-np.pi, np.pi, (starts, 6))
     q, _, used = search.run(np.tile(T, (starts, 1, 1)), begin, False, 0, 1)
-    distinct = [principal(first.q)]
+    distinct = [wrap_to_pi(first.q)]
     for row in q[used > 0]:
-        if min(np.abs(principal(row - other)).max() for other in distinct) > SAME_ARM:
+        if min(np.abs(wrap_to_pi(row - other)).max() for other in distinct) > SAME_ARM:
             distinct.append(row)
     return np.array(distinct), first
 
@@ -127,13 +126,11 @@ def all_found(robot: Robot, T: np.ndarray, starts: int, seed: int = 0) -> tuple[
 @dataclass(frozen=True, eq=False)
 class _Search:
     robot: Robot
-    mask: np.ndarray
-    tolerances: np.ndarray
+    mask: Reals
+    tolerances: Reals
     seed: int
 
-    def run(
-        self, T: np.ndarray, q0: np.ndarray, respect: bool, restarts: int, threads: int
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def run(self, T: Reals, q0: Reals, respect: bool, restarts: int, threads: int) -> tuple[Reals, Reals, Integers]:
         """Arms (N, 6), errors (N, 2) in m and rad, and starts (N,) for poses (N, 4, 4)."""
         robot, count = self.robot, len(T)
         q, error, starts = np.empty((count, 6)), np.empty((count, 2)), np.empty(count, dtype=np.int64)
@@ -146,47 +143,31 @@ class _Search:
             constants = (self.mask, self.tolerances, arm_length(robot), restarts, np.uint64(self.seed), rows.start)
             solve_numerically(arm, limits, T[rows], q0[rows], *constants, *own)
 
-        share_out(count, threads, SMALLEST_SHARE, part)
-        return (q if respect else principal(q)), error, starts
+        parallel_for(count, threads, SMALLEST_PART, part)
+        return (q if respect else wrap_to_pi(q)), error, starts
 
-    def explain(self, T: np.ndarray, q: np.ndarray, error: np.ndarray, respect: bool, restarts: int) -> tuple[str, str]:
+    def explain(self, T: Reals, q: Reals, error: Reals, respect: bool, restarts: int) -> NotFound:
         """Why one pose was not solved: its nearest arm and a search without what may have hindered it."""
-        miss = said(
-            "the nearest arm found misses by {position:.3g} mm and {rotation:.3g} deg",
-            position=error[0] * 1000,
-            rotation=np.degrees(error[1]),
-        )
+        miss = NearestMiss(float(error[0] * 1000), float(np.degrees(error[1])))
         if restarts < DIAGNOSIS_RESTARTS:
             _, _, starts = self.run(T[None], q[None], respect, DIAGNOSIS_RESTARTS, 1)
             if starts[0]:
-                return BAD_GUESS, said(
-                    "bad guess: from the start given {miss}; other starts solve it, so allow restarts", miss=miss
-                )
+                return BadGuess(miss, "other_starts")
         if respect:
             free, _, starts = self.run(T[None], q[None], False, DIAGNOSIS_RESTARTS, 1)
             if starts[0]:
-                turned = nearest_turns(self.robot, free[0], q)
-                if within(self.robot, turned):
-                    return BAD_GUESS, said(
-                        "bad guess: {miss}; without limits an arm within them was found, start there", miss=miss
-                    )
-                return LIMIT_BOUND, said(
-                    "limit-bound: {miss}; an arm that leaves the limits solves it: {beyond}",
-                    miss=miss,
-                    beyond=limit_reason(self.robot, turned),
-                )
+                exceeded = limits_exceeded(self.robot, nearest_equivalent(self.robot, free[0], q))
+                return LimitBound(miss, exceeded) if exceeded else BadGuess(miss, "without_limits")
         length = arm_length(self.robot)
         J = jacobian(self.robot, q)
         J[:3] /= length
         singular = np.linalg.svd(J[self.mask > 0], compute_uv=False)[-1] < RANK
         if singular and max(error[0] / length, error[1]) < NEARLY:
-            return SINGULAR, said(
-                "singular: the iteration creeps towards a singular arm, where it ends: {miss}", miss=miss
-            )
-        return UNREACHABLE, said("unreachable: {miss}, whatever the start", miss=miss)
+            return SingularEnd(miss)
+        return Unreachable(miss)
 
 
-def _checked_mask(mask: np.ndarray | None) -> np.ndarray:
+def _checked_mask(mask: Reals | None) -> Reals:
     values = np.ones(JOINTS) if mask is None else as_floats(mask, "mask")
     if values.shape != (6,):
         raise ShapeError("mask", values.shape, "(6,)")

@@ -13,19 +13,21 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
-from er3a.errors import NotWristPartitionedError
 from er3a.geometry.vectors import cross, dot, subtract
 from er3a.kinematics.chain import JOINTS, arm_length, constant_links
 from er3a.kinematics.forward import checked_joints, jacobian, rows_of, step_row, turn_row
-from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
+from er3a.kinematics.wrist_partitioned import closed_form_missing, wrist_partitioned_arm
+from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
-from er3a.pipeline.messages.language import N_
+from er3a.robots.derived import derived
 from er3a.robots.robot import Robot
 
-TYPES = (N_("wrist"), N_("elbow"), N_("shoulder"))
+SingularityType = Literal["wrist", "elbow", "shoulder"]
+TYPES: tuple[SingularityType, ...] = ("wrist", "elbow", "shoulder")
 ROUNDING = 6 * np.finfo(float).eps
 
 
@@ -40,9 +42,9 @@ class Conditioning:
     smallest_singular_value : (...,)
     """
 
-    manipulability: np.ndarray
-    condition_number: np.ndarray
-    smallest_singular_value: np.ndarray
+    manipulability: Reals
+    condition_number: Reals
+    smallest_singular_value: Reals
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,23 +58,21 @@ class DeterminantFactors:
     shoulder : (...,), m, distance of the wrist centre from the plane of axis 1 and the direction of axis 2
     """
 
-    wrist: np.ndarray
-    elbow: np.ndarray
-    shoulder: np.ndarray
+    wrist: Reals
+    elbow: Reals
+    shoulder: Reals
 
 
+@derived
 def characteristic_length(robot: Robot) -> float:
     """Length (m) that makes linear and angular rows comparable: the wrist centre's reach from axis 2.
 
     For arms without a wrist centre it is half the length along all links.
     """
-    try:
-        return wrist_partitioned_arm(robot).wrist_reach
-    except NotWristPartitionedError:
-        return arm_length(robot)
+    return arm_length(robot) if closed_form_missing(robot) else wrist_partitioned_arm(robot).wrist_reach
 
 
-def conditioning(robot: Robot, q: np.ndarray, length: float) -> Conditioning:
+def conditioning(robot: Robot, q: Reals, length: float) -> Conditioning:
     """Manipulability, condition number and smallest singular value at joint angles (..., 6) in rad.
 
     Parameters
@@ -88,7 +88,7 @@ def conditioning(robot: Robot, q: np.ndarray, length: float) -> Conditioning:
     return Conditioning(values.prod(axis=-1), condition, smallest)
 
 
-def determinant_factors(robot: Robot, q: np.ndarray) -> DeterminantFactors:
+def determinant_factors(robot: Robot, q: Reals) -> DeterminantFactors:
     """Signed distances from the wrist, elbow and shoulder singularities at joint angles (..., 6) in rad.
 
     Raises

@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from er3a.kinematics.forward import rows_of, step_row, turn_row, write_rows
+from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 
@@ -22,15 +23,15 @@ class Tables:
     a, d : (H, 6), m; alpha, beta, offset, lower, upper : (H, 6), rad; direction : (H, 6), +1 or -1
     """
 
-    modified: np.ndarray
-    a: np.ndarray
-    alpha: np.ndarray
-    beta: np.ndarray
-    d: np.ndarray
-    direction: np.ndarray
-    offset: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
+    modified: Reals
+    a: Reals
+    alpha: Reals
+    beta: Reals
+    d: Reals
+    direction: Reals
+    offset: Reals
+    lower: Reals
+    upper: Reals
 
     def __len__(self) -> int:
         return len(self.modified)
@@ -38,7 +39,7 @@ class Tables:
     def __getitem__(self, rows) -> Tables:
         return Tables(*(getattr(self, field.name)[rows] for field in fields(self)))
 
-    def with_column(self, name: str, joints, values: np.ndarray) -> Tables:
+    def with_column(self, name: str, joints, values: Reals) -> Tables:
         """A copy with the given joints' entries (H, len(joints)) of one column replaced."""
         column = getattr(self, name).copy()
         column[:, joints] = values
@@ -64,7 +65,7 @@ def join(batches: Sequence[Tables]) -> Tables:
     return Tables(*(np.concatenate([getattr(batch, field.name) for batch in batches]) for field in fields(Tables)))
 
 
-def frames_of(tables: Tables, base: np.ndarray, q: np.ndarray) -> np.ndarray:
+def frames_of(tables: Tables, base: Reals, q: Reals) -> Reals:
     """Frames (H, P, 7, 4, 4) of each table at joint angles (P, 6) in rad, as :func:`er3a.kinematics.forward.frames` has
     them for one robot without tool; entry 6 is the flange."""
     out = np.empty((len(tables), len(q), 7, 4, 4))

@@ -7,19 +7,55 @@ base and tool need no cases of their own.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from er3a.errors import NotWristPartitionedError
 from er3a.geometry.vectors import Vector, signed_angle, unsigned_angle
 from er3a.kinematics.block_constants import BlockConstants, block_constants
 from er3a.kinematics.chain import axes_at_zero_theta
-from er3a.kinematics.closed_form import APART, BOUNDARY_M, BOUNDARY_RAD, SLOTS, ArmConstants, solve
-from er3a.pipeline.messages.language import N_, said
+from er3a.kinematics.closed_form import BOUNDARY_M, BOUNDARY_RAD, FOLD_OFFSET, SLOTS, ArmConstants, solve
+from er3a.numerics.arrays import Reals
+from er3a.robots.derived import derived
 from er3a.robots.robot import Robot
 
 PARALLEL = 1e-9
+
+
+@dataclass(frozen=True)
+class ElbowAxesNotParallel:
+    """Axes 2 and 3 are not parallel."""
+
+    code: Literal["elbow_axes_not_parallel"] = "elbow_axes_not_parallel"
+
+
+@dataclass(frozen=True)
+class NeighboursParallel:
+    """Two neighbouring axes are parallel that must not be."""
+
+    first: int
+    second: int
+    code: Literal["neighbouring_axes_parallel"] = "neighbouring_axes_parallel"
+
+
+@dataclass(frozen=True)
+class NoWristCentre:
+    """Axes 4, 5 and 6 miss a common point."""
+
+    miss_mm: float
+    code: Literal["no_common_point_of_axes_4_5_6"] = "no_common_point_of_axes_4_5_6"
+
+
+@dataclass(frozen=True)
+class NoArmLength:
+    """The upper arm or the forearm has no length."""
+
+    code: Literal["upper_arm_or_forearm_without_length"] = "upper_arm_or_forearm_without_length"
+
+
+ClosedFormMissing = ElbowAxesNotParallel | NeighboursParallel | NoWristCentre | NoArmLength
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,14 +71,14 @@ class WristPartitionedArm:
     shoulder_offset : constant component along axis 2 of the wrist centre, seen from the point on axis 1
     """
 
-    axes: np.ndarray
-    points: np.ndarray
-    wrist: np.ndarray
-    tool_rotation: np.ndarray
-    wrist_in_tool: np.ndarray
+    axes: Reals
+    points: Reals
+    wrist: Reals
+    tool_rotation: Reals
+    wrist_in_tool: Reals
     elbow_sign: float
-    upper_arm: np.ndarray
-    forearm: np.ndarray
+    upper_arm: Reals
+    forearm: Reals
     shoulder_offset: float
 
     @property
@@ -61,30 +97,41 @@ class WristPartitionedArm:
         return self.upper_arm_length + self.forearm_length
 
 
-@lru_cache(maxsize=256)
 def wrist_partitioned_arm(robot: Robot) -> WristPartitionedArm:
-    """Recognise the arm from its table.
+    """The arm as recognised from its table.
 
     Raises
     ------
     NotWristPartitionedError
         naming the property that the arm lacks
     """
+    found = _recognised(robot)
+    if isinstance(found, WristPartitionedArm):
+        return found
+    raise NotWristPartitionedError(robot.name, found)
+
+
+def closed_form_missing(robot: Robot) -> ClosedFormMissing | None:
+    """Which property the arm lacks for the closed form; None if it has them all."""
+    found = _recognised(robot)
+    return None if isinstance(found, WristPartitionedArm) else found
+
+
+@derived
+def _recognised(robot: Robot) -> WristPartitionedArm | ClosedFormMissing:
     axes, points, T_base_tool = axes_at_zero_theta(robot)
     if np.linalg.norm(np.cross(axes[1], axes[2])) > PARALLEL:
-        raise NotWristPartitionedError(robot.name, N_("axes 2 and 3 are not parallel"))
+        return ElbowAxesNotParallel()
     for i, j in ((0, 1), (3, 4), (4, 5)):
         if np.linalg.norm(np.cross(axes[i], axes[j])) < PARALLEL:
-            problem = said("axes {first} and {second} are parallel", first=i + 1, second=j + 1)
-            raise NotWristPartitionedError(robot.name, problem)
+            return NeighboursParallel(i + 1, j + 1)
     wrist, miss = _meeting_point(axes[3:], points[3:])
     if miss > BOUNDARY_M:
-        problem = said("axes 4, 5 and 6 miss a common point by {miss:.6g} mm", miss=miss * 1000)
-        raise NotWristPartitionedError(robot.name, problem)
+        return NoWristCentre(miss * 1000)
     across = np.eye(3) - np.outer(axes[1], axes[1])
     upper_arm, forearm = across @ (points[2] - points[1]), across @ (wrist - points[2])
     if min(np.linalg.norm(upper_arm), np.linalg.norm(forearm)) < BOUNDARY_M:
-        raise NotWristPartitionedError(robot.name, N_("the upper arm or the forearm has no length"))
+        return NoArmLength()
     return WristPartitionedArm(
         axes=axes,
         points=points,
@@ -98,7 +145,7 @@ def wrist_partitioned_arm(robot: Robot) -> WristPartitionedArm:
     )
 
 
-def _meeting_point(axes: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, float]:
+def _meeting_point(axes: Reals, points: Reals) -> tuple[Reals, float]:
     """Point nearest to all lines by least squares, and its greatest distance from a line (m)."""
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
     meeting = np.linalg.lstsq(across.reshape(-1, 3), (across @ points[:, :, None]).reshape(-1), rcond=None)[0]
@@ -106,7 +153,7 @@ def _meeting_point(axes: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, fl
     return meeting, float(miss)
 
 
-@lru_cache(maxsize=256)
+@derived
 def _constants(robot: Robot) -> ArmConstants:
     arm = wrist_partitioned_arm(robot)
     w = [_vector(axis) for axis in arm.axes]
@@ -140,17 +187,18 @@ def _constants(robot: Robot) -> ArmConstants:
         wrist_angle=float(signed_angle(w[3], w[5], w[4])),
         angle_45=angle_45,
         angle_56=angle_56,
-        folded_apart=APART * min(1.0, least / arm.forearm_length) if least > BOUNDARY_M else 0.0,
-        least_tilt_apart=APART if oblique[0] else 0.0,
-        most_tilt_apart=APART if oblique[1] else 0.0,
+        folded_offset=FOLD_OFFSET * min(1.0, least / arm.forearm_length) if least > BOUNDARY_M else 0.0,
+        least_tilt_offset=FOLD_OFFSET if oblique[0] else 0.0,
+        most_tilt_offset=FOLD_OFFSET if oblique[1] else 0.0,
     )
 
 
-def _vector(array: np.ndarray) -> Vector:
-    return tuple(array.tolist())
+def _vector(array: Reals) -> Vector:
+    x, y, z = array.tolist()
+    return x, y, z
 
 
-@lru_cache(maxsize=256)
+@derived
 def constants_for_blocks(robot: Robot) -> BlockConstants:
     """The arm as the kernel for many poses takes it.
 
@@ -163,20 +211,20 @@ def constants_for_blocks(robot: Robot) -> BlockConstants:
 
 
 def solve_slots(
-    robot: Robot, T: np.ndarray, q_ref: np.ndarray, apart: bool = False, twins: bool = False
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    robot: Robot, T: Reals, q_ref: Reals, keep_folds: bool = False, keep_free: bool = False
+) -> tuple[Reals, NDArray[np.int8], Reals]:
     """All branches for a batch of poses.
 
     Parameters
     ----------
     T : (N, 4, 4), T_base_tool, valid rigid transforms
     q_ref : (N, 6), rad; supplies the joint that is free where a continuum solves the pose
-    apart, twins : keep branches that meet at a fold, or where a joint is free, as two different rows (see
+    keep_folds, keep_free : keep branches that meet at a fold, or where a joint is free, as two different rows (see
         :mod:`closed_form`); else both are one
 
     Returns
     -------
-    q : (N, 8, 6), rad, maker's angles within half a turn of 0 (-pi..pi]; NaN where the slot has no solution
+    q : (N, 8, 6), rad, manufacturer's angles within half a turn of 0 (-pi..pi]; NaN where the slot has no solution
     fault : (N, 8), int8: REACHED, TOO_FAR, TOO_NEAR, OFF_AXIS or ORIENTATION
     gap : (N, 8): by how much, in m (rad for ORIENTATION)
     """
@@ -185,5 +233,5 @@ def solve_slots(
     fault = np.zeros((count, SLOTS), dtype=np.int8)
     gap = np.zeros((count, SLOTS))
     T, q_ref = np.ascontiguousarray(T), np.ascontiguousarray(q_ref)
-    solve(_constants(robot), robot.direction, robot.offset, T, q_ref, apart, twins, q, fault, gap)
+    solve(_constants(robot), robot.direction, robot.offset, T, q_ref, keep_folds, keep_free, q, fault, gap)
     return q, fault, gap

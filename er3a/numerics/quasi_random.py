@@ -11,10 +11,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from er3a.numerics.arrays import Reals
+
 ROUNDS = 64
 
 
-def spread(lower: np.ndarray, upper: np.ndarray, count: int) -> np.ndarray:
+def quasi_random_points(lower: Reals, upper: Reals, count: int) -> Reals:
     """Points (count, d) in the box between ``lower`` and ``upper`` (d,)."""
     d = len(lower)
     g = 1.5

@@ -13,7 +13,7 @@ from er3a.errors import Er3aError
 PARTS_PER_THREAD = 8
 
 
-def share_out(count: int, threads: int, smallest: int, work: Callable[[slice], None]) -> None:
+def parallel_for(count: int, threads: int, smallest: int, work: Callable[[slice], None]) -> None:
     """Call ``work`` on parts of ``count`` rows, each at least ``smallest``, in so many threads, the caller's included.
 
     Threads take the next part as they are ready, so that one on a busy processor holds up nothing.

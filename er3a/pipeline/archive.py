@@ -14,7 +14,9 @@ from rocrate.model.person import Person
 from rocrate.rocrate import ROCrate
 
 from er3a.errors import ResultError
-from er3a.pipeline.results import read_summary, write_atomically
+from er3a.files.kept_files import write_atomically
+from er3a.pipeline.results import check_results
+from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import load_study
 
 _ROOT = Path(__file__).resolve().parents[2]
@@ -48,10 +50,11 @@ def archive(study_file: Path, results: Path, reports: Path, output: Path) -> int
     files = {Path("config") / study_file.name: study_file}
     for name in study.names:
         for stage in study.stages(name):
-            read_summary(results / name / stage)
+            check_results(results / name / stage)
             files |= {Path("results") / name / stage / file.name: file for file in (results / name / stage).iterdir()}
             files |= {_place(file): file for file in study.inputs(name, stage)}
-            files[Path("reports") / name / f"{stage}.rrd"] = _there(reports / name / f"{stage}.rrd")
+            if "record" in STAGES[stage].views:
+                files[Path("reports") / name / f"{stage}.rrd"] = _there(reports / name / f"{stage}.rrd")
         for page in study.pages(name):
             files[Path("reports") / name / f"{page}.html"] = _there(reports / name / f"{page}.html")
     files |= {Path("reports") / name: _there(reports / name) for name in ("index.html", "compare.html")}

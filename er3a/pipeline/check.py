@@ -10,13 +10,14 @@ from er3a.errors import InputError
 from er3a.files.measurements import load_measurements
 from er3a.files.path_file import PathFile, TablePath, load_paths
 from er3a.files.path_table import read_path_table
-from er3a.files.reference_rows import COLUMNS
+from er3a.files.reference_rows import FORMATS
 from er3a.files.reference_sets import check_reference_file, load_references
 from er3a.files.robot_file import RobotFile
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import SceneFile, load_scene
-from er3a.files.target_file import TargetFile, load_targets
-from er3a.files.yaml_file import read_text, read_yaml
+from er3a.files.target_file import TargetFile, read_targets
+from er3a.files.yaml_file import read_yaml
+from er3a.formats.text_file import read_text
 from er3a.pipeline.study import Study, load_study
 
 SCHEMAS: dict[str, type[BaseModel]] = {
@@ -30,7 +31,7 @@ SCHEMAS: dict[str, type[BaseModel]] = {
 _CHECKS = {
     "study": load_study,
     "robot": load_robot,
-    "targets": load_targets,
+    "targets": read_targets,
     "paths": load_paths,
     "scene": load_scene,
 }
@@ -40,7 +41,7 @@ _WORDS = {"robot": "a robot", "study": "a study", "targets": "targets", "paths":
 def check_file(path: Path) -> str:
     """Check a file and return in words what it is; :class:`er3a.errors.InputError` if something is wrong with it."""
     if path.suffix == ".csv" and path.parent.name == "targets":
-        load_targets(path)
+        read_targets(path)
         return _WORDS["targets"]
     if path.suffix == ".csv" and path.parent.name == "paths":
         read_path_table(path)
@@ -58,7 +59,7 @@ def check_file(path: Path) -> str:
 
 
 def _check_table(path: Path) -> str:
-    if path.stem not in COLUMNS and "q1_deg" in read_text(path).partition("\n")[0]:
+    if path.stem not in FORMATS and "q1_deg" in read_text(path).partition("\n")[0]:
         load_measurements(path)
         return "measured positions"
     check_reference_file(path)
@@ -75,7 +76,7 @@ def check_study(path: Path) -> Study:
             raise InputError(error.file or path, error.field, error.problem, error.remedy) from None
         for reference in robot.references:
             load_references(reference)
-        load_targets(entry.targets)
+        read_targets(entry.targets)
         for planned in load_paths(entry.paths).paths:
             if isinstance(planned, TablePath):
                 read_path_table(planned.file)

@@ -13,7 +13,8 @@ import typer
 from er3a.errors import Er3aError
 from er3a.pipeline.messages import language
 from er3a.pipeline.stages import run
-from er3a.pipeline.study import STAGES, Study, load_study
+from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.study import Study, load_study
 
 app = typer.Typer(
     name="er3a",
@@ -77,11 +78,11 @@ def compute(
     results: Results = DEFAULT_RESULTS,
 ):
     """Compute a stage's numbers: tables and summary.json."""
-    if parts and stage != "workspace":
-        raise Er3aError(f"the stage {stage} takes no sampled parts")
-    extra = {"parts": parts} if parts else {}
     loaded, folder = _folder(study, results, robot, stage)
-    run.compute(stage, loaded, robot, folder, **extra)
+    if parts and not STAGES[stage].sampled:
+        raise Er3aError(f"the stage {stage} takes no sampled parts")
+    if absent := run.compute(stage, loaded, robot, folder, parts):
+        print(f"note: {robot}, {stage}: {absent}", file=sys.stderr)
 
 
 @app.command()
@@ -93,26 +94,26 @@ def record(
     reports: Reports = DEFAULT_REPORTS,
 ):
     """Write a stage's Rerun recording from its results, in English: the viewer has no other letters."""
-    from er3a.pipeline.checksums import seal
+    from er3a.pipeline.checksums import write_checksum
 
     loaded, folder = _folder(study, results, robot, stage)
     recording = reports / robot / f"{stage}.rrd"
     run.show("record", stage, loaded, robot, folder, recording)
-    seal(recording)
+    write_checksum(recording)
 
 
 @app.command()
 def preview(stage: StageName, robot: RobotName, reports: Reports = DEFAULT_REPORTS):
     """Draw a stage's recording as a picture for its page; an empty file where nothing can draw it."""
-    from er3a.pipeline.checksums import check_seal, seal
+    from er3a.pipeline.checksums import check_checksum, write_checksum
     from er3a.pipeline.viewing.preview import draw_preview
 
     recording = reports / robot / f"{stage}.rrd"
-    check_seal(recording)
+    check_checksum(recording)
     picture = recording.with_suffix(".webp")
     if problem := draw_preview(recording, picture):
         print(f"note: previews of recordings were skipped: {problem}", file=sys.stderr)
-    seal(picture)
+    write_checksum(picture)
 
 
 @app.command()
@@ -124,7 +125,7 @@ def report(
     reports: Reports = DEFAULT_REPORTS,
 ):
     """Write a stage's page from its results."""
-    from er3a.pipeline.checksums import seal
+    from er3a.pipeline.checksums import write_checksum
     from er3a.pipeline.viewing.figures import house_style
 
     loaded, folder = _folder(study, results, robot, stage)
@@ -132,35 +133,35 @@ def report(
     language.use(loaded.report.language)
     with house_style():
         run.show("report", stage, loaded, robot, folder, page)
-    seal(page)
+    write_checksum(page)
 
 
 @app.command()
 def teach(robot: RobotName, study: StudyFile = DEFAULT_STUDY, reports: Reports = DEFAULT_REPORTS):
     """Write a robot's teach panel: sliders, the arm in 3-D, its pose and all ways to it, in one page."""
-    from er3a.pipeline.checksums import seal
+    from er3a.pipeline.checksums import write_checksum
     from er3a.pipeline.teach.panel import write_teach_page
 
     page = reports / robot / "teach.html"
     write_teach_page(_study_to_show(study), robot, page)
-    seal(page)
+    write_checksum(page)
 
 
 @app.command()
 def index(study: StudyFile = DEFAULT_STUDY, results: Results = DEFAULT_RESULTS, reports: Reports = DEFAULT_REPORTS):
     """Write the pages over all robots and stages: the index and the comparison of two robots."""
-    from er3a.pipeline.checksums import OVERALL, seal
+    from er3a.pipeline.checksums import OVERALL, write_checksum
     from er3a.pipeline.viewing.figures import house_style
     from er3a.pipeline.viewing.index import write_index
 
     with house_style():
         write_index(_study_to_show(study), results, reports)
     for page in OVERALL:
-        seal(reports / page)
+        write_checksum(reports / page)
 
 
 @app.command()
-def plan(
+def estimate(
     cores: Annotated[str, typer.Option(help="numbers of cores, of one machine or of nodes together")] = "1,2,8,64",
     study: StudyFile = DEFAULT_STUDY,
     results: Results = DEFAULT_RESULTS,
@@ -170,16 +171,16 @@ def plan(
     """Say what the study will take: samples/s, wall time, memory and disk, from a short calibration on this machine."""
     from rich.console import Console
 
-    from er3a.pipeline.estimate.estimate import calibrate
-    from er3a.pipeline.estimate.terminal import print_plan
+    from er3a.pipeline.estimate.cost import measured_here
+    from er3a.pipeline.estimate.terminal import print_estimate
 
     numbers = cores.split(",")
     if not all(number.strip().isdigit() and int(number) > 0 for number in numbers):
         raise Er3aError(f"--cores is '{cores}'; expected numbers such as 1,2,8,64")
     loaded = load_study(study)
     with Console(stderr=True).status("Measuring on this machine ..."):
-        measured = calibrate(loaded, results, reports, logs)
-    print_plan(loaded, measured, sorted({int(number) for number in numbers}))
+        measured = measured_here(loaded, results, reports, logs)
+    print_estimate(loaded, measured, sorted({int(number) for number in numbers}))
 
 
 @app.command()
@@ -229,7 +230,7 @@ def view(
     reports: Reports = DEFAULT_REPORTS,
 ):
     """Open the recordings in the Rerun viewer; where there is no desktop, serve them to a browser."""
-    from er3a.pipeline.checksums import check_seal
+    from er3a.pipeline.checksums import check_checksum
     from er3a.pipeline.viewing.viewer import has_display, viewer_command, without_statistics
     from er3a.pipeline.viewing.web_viewer import serve
 
@@ -237,7 +238,7 @@ def view(
     if not recordings:
         raise Er3aError(f"no recordings below {reports / (robot or '')}; `make run` writes them")
     for recording in recordings:
-        check_seal(recording)
+        check_checksum(recording)
     if not has_display():
         serve(recordings)
         return
@@ -269,9 +270,9 @@ def export_urdf(
     output: Annotated[Path, typer.Option(help="the URDF to write")],
 ):
     """Write a robot as URDF."""
+    from er3a.files.kept_files import write_atomically
     from er3a.files.robot_library import load_robot
     from er3a.formats.urdf import export_urdf as urdf_text
-    from er3a.pipeline.results import write_atomically
 
     text = urdf_text(load_robot(robot))
     write_atomically(output, lambda path: path.write_text(text, encoding="utf-8"))
@@ -285,27 +286,34 @@ def identify(
     output: Annotated[Path, typer.Option(help="the robot file to write")],
 ):
     """Estimate corrections to a robot's table from measured positions, and write the corrected robot file."""
-    from er3a.calibration.calibrate import identify as identify_robot
-    from er3a.calibration.calibrate import in_words
+    from er3a.files.by_name import calibrate
     from er3a.files.reference_sets import load_references
     from er3a.files.robot_library import load_robot
     from er3a.files.robot_writer import write_robot
+    from er3a.pipeline.messages.calibration import lines_of
 
     source = Path(measurements) if measurements.endswith(".csv") else load_references(measurements)
-    found = identify_robot(load_robot(robot), source)
-    print(in_words(found))
+    found = calibrate(load_robot(robot), source)
+    print(lines_of(found))
     write_robot(found.robot.replace(name=output.stem, title=f"{found.robot.title}, identified"), output)
     print(f"{output}: written")
 
 
 @app.command()
-def schema(folder: Annotated[Path, typer.Option(help="where to write them")] = Path("config")):
-    """Write the JSON schemas of the input files, for editors."""
+def schema(
+    folder: Annotated[Path, typer.Option(help="where the schemas of input files go")] = Path("config"),
+    docs: Annotated[Path, typer.Option(help="where the documents about results go")] = Path("docs/results"),
+):
+    """Write the JSON schemas of input files and of results, and the dictionary of all tables."""
     from er3a.pipeline.check import SCHEMAS
+    from er3a.pipeline.dictionary import data_dictionary, summary_schema
 
-    for kind, model in SCHEMAS.items():
-        text = json.dumps(model.model_json_schema(), indent=2) + "\n"
-        (folder / f"{kind}.schema.json").write_text(text, encoding="utf-8")
+    schemas = {folder / f"{kind}.schema.json": model.model_json_schema() for kind, model in SCHEMAS.items()}
+    schemas |= {docs / f"{name}.schema.json": summary_schema(stage) for name, stage in STAGES.items()}
+    for file, content in schemas.items():
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    (docs / "dictionary.md").write_text(data_dictionary(), encoding="utf-8")
 
 
 def main() -> None:

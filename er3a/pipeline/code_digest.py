@@ -16,12 +16,14 @@ VIEWS = ("report.py", "page.py", "panel.py", "index.py")
 
 
 @cache
-def code_digest(module: str) -> str:
-    """SHA-256 over the sources of ``module``, of all modules of er3a it imports (transitively), and of templates
+def code_digest(*modules: str) -> str:
+    """SHA-256 over the sources of modules, of all modules of er3a that they import (transitively), and of templates
     (``*.j2``, ``*.css``, ``*.js``) that stand beside those that are part of a view."""
-    reached = _reached(module)
-    if not reached:
-        raise ModuleNotFoundError(f"er3a has no module '{module}'")
+    reached: set[Path] = set()
+    for module in modules:
+        if _file(module) is None:
+            raise ModuleNotFoundError(f"er3a has no module '{module}'")
+        reached |= _reached(module)
     digest = hashlib.sha256()
     for path in sorted(reached):
         digest.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")

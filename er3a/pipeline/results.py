@@ -1,179 +1,232 @@
-"""Result files: written whole or not at all, with equal bytes for equal inputs."""
+"""What a stage computes, as one typed model, and how it is kept: ``summary.json``, Parquet tables, checksums.
+
+A stage's ``model.py`` declares a summary and its results::
+
+    @dataclass(frozen=True)
+    class ReachSummary(Summary):
+        verdict: Verdict[Reached | NotReached]
+        farthest_mm: float
+
+    @dataclass(frozen=True)
+    class ReachResults(Results[ReachSummary]):
+        points: Points  # a Table, written as points.parquet
+
+``compute`` returns the results, views take what :func:`read_results` reads. The summary's verdict is a finding with a
+status; in the file it is ``{status, code, params, text}``, the text in English for whoever reads the file alone.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
-import os
-import re
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Generic, Literal, TypeVar, get_args, get_origin
 
-import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
+import numpy as np
+from pydantic import TypeAdapter, ValidationError
 
-from er3a.errors import ResultError, WriteError
+from er3a.errors import ResultError
 from er3a.files.grades import grades_in
+from er3a.files.kept_files import read_bytes, sha256, shown_path, write_atomically
+from er3a.findings import Finding
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.messages import language
+from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import STAGES, Study
+from er3a.pipeline.tables import table_types
 
-FORMAT_VERSION = 3
+FORMAT_VERSION = 4
+SUMMARY = "summary.json"
 CHECKSUMS = "SHA256SUMS"
-_DIGEST_BYTES = hashlib.sha256().digest_size
-_TEMPORARY = re.compile(r"\..+\.[0-9]+(\.\w+)?")  # as `write_atomically` names them
 
-Status = Literal["pass", "caution", "fail", "no_reference"]
+Status = Literal["pass", "caution", "fail", "no_reference", "not_computed"]
+FindingT = TypeVar("FindingT", bound=Finding)
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """A stage's answer in one sentence.
-
-    Attributes
-    ----------
-    status : pass, caution (usable, with something to know), fail, or no_reference (nothing to check against)
-    code : stable identifier of the sentence; params : the values in it
-    text : the sentence in English
-    """
+class Verdict(Generic[FindingT]):
+    """A stage's answer: pass, caution (usable, with something to know), fail, or no_reference, and what it found."""
 
     status: Status
-    code: str
-    text: str
-    params: dict[str, Any] = field(default_factory=dict)
+    finding: FindingT
 
 
 @dataclass(frozen=True)
 class Figure:
-    """A key figure; ``uncertainty`` is the half-width of its 95 % interval in the same unit, None where it has none."""
+    """A key figure.
+
+    Attributes
+    ----------
+    name : code of what it is; value : None where it can't be had
+    uncertainty : half-width of its 95 % interval in the same unit, None where it has none
+    of : the whole that a count is part of
+    """
 
     name: str
     value: float | int | None
     unit: str
     uncertainty: float | None = None
+    of: int | None = None
 
 
-def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
-    """Call ``write`` with a temporary path beside ``path``, then move the finished file, kept on disk, into place.
+@dataclass(frozen=True)
+class Summary:
+    """What all summaries begin with; a stage's own says what its verdict can be."""
 
-    Raises
-    ------
-    WriteError
-        naming ``path``, if the system refuses; the file that was there before stays
-    """
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            write(temporary)
-            with temporary.open("rb") as written:
-                os.fsync(written.fileno())
-            os.replace(temporary, path)
-        finally:
-            temporary.unlink(missing_ok=True)
-    except OSError as error:
-        raise WriteError(path, error) from None
+    verdict: Verdict[Any]
+    figures: tuple[Figure, ...]
 
 
-def write_checked(path: Path, content: bytes) -> None:
-    """Write bytes behind their checksum."""
-    write_atomically(path, lambda file: file.write_bytes(hashlib.sha256(content).digest() + content))
+SummaryT = TypeVar("SummaryT", bound=Summary)
+ResultsT = TypeVar("ResultsT", bound="Results[Any]")
 
 
-def read_checked(path: Path) -> bytes:
-    """Read what :func:`write_checked` wrote, or raise :class:`ResultError` if it is missing or damaged."""
-    content = _content(path)
-    checksum, content = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
-    if hashlib.sha256(content).digest() != checksum:
-        raise ResultError(path, "damaged (its checksum does not agree)")
-    return content
+@dataclass(frozen=True, eq=False)
+class Results(Generic[SummaryT]):
+    """A stage's results: its summary, and the tables that a subclass adds."""
+
+    summary: SummaryT
 
 
-def half_written(folder: Path) -> list[Path]:
-    """The temporary files that killed processes left below a folder."""
-    return [path for path in sorted(folder.rglob(".*")) if _TEMPORARY.fullmatch(path.name)]
+@dataclass(frozen=True)
+class Input:
+    """An input file: path from the project's root, checksum, and the grades that stand in it."""
+
+    path: str
+    sha256: str
+    grades: dict[str, list[str] | int]
 
 
-def write_table(path: Path, table: pd.DataFrame) -> None:
-    """Write a Parquet file (units stand in the column names)."""
-    for column in table.select_dtypes(["object", "string"]):
-        language.note_written(table[column].tolist())
-    arrow = pa.Table.from_pandas(table, preserve_index=False).replace_schema_metadata(None)
-    write_atomically(path, lambda file: pq.write_table(arrow, file, compression="zstd"))
+@dataclass(frozen=True)
+class Provenance:
+    """What numbers rest on; pages over several stages have no settings of their own."""
+
+    inputs: tuple[Input, ...]
+    code: str
+    config: dict[str, Any] | None = None
+    seed: int | None = None
 
 
-def read_table(path: Path) -> pd.DataFrame:
-    """Read a Parquet file of ours, or raise :class:`ResultError`; its checksum is compared if there is one."""
-    content = _content(path)
-    if (path.parent / CHECKSUMS).is_file():
-        _compare(path, content, checksums(path.parent))
-    try:
-        return pq.read_table(pa.BufferReader(content)).to_pandas()
-    except (OSError, pa.ArrowException) as error:
-        raise ResultError(path, f"damaged ({' '.join(str(error).split())})") from None
+@dataclass(frozen=True, eq=False)
+class Stored(Generic[ResultsT]):
+    """Results as they were read, and where they come from."""
+
+    robot: str
+    stage: str
+    provenance: Provenance
+    results: ResultsT
+
+    @property
+    def status(self) -> Status:
+        """The verdict's status."""
+        return self.results.summary.verdict.status
 
 
-def write_summary(
-    folder: Path,
-    study: Study,
-    robot: str,
-    stage: str,
-    verdict: Verdict,
-    figures: Iterable[Figure],
-    **stage_keys: Any,
+@dataclass(frozen=True)
+class NotComputed:
+    """A stage could not be computed for a robot."""
+
+    reason: str
+    code: Literal["stage.not_computed"] = "stage.not_computed"
+
+
+@dataclass(frozen=True, eq=False)
+class AbsentResults(Results[Summary]):
+    """In place of the results of a stage that was not computed; its verdict is a finding that tells why."""
+
+
+def write_results(
+    folder: Path, study: Study, robot: str, stage: Stage, results: Results[Any], sentence: Callable[[Finding], str]
 ) -> None:
-    """Write ``summary.json``: the shape shared by all stages, then the stage's own keys (plain data).
+    """Write a stage's tables, summary and checksums into a folder; tables without rows if it was not computed.
 
-    It comes last: with it the checksums of all files in the folder are written.
+    Parameters
+    ----------
+    sentence : the verdict's text in English
     """
-    summary = {
-        "format_version": FORMAT_VERSION,
-        "robot": robot,
-        "stage": stage,
-        "verdict": asdict(verdict),
-        "figures": [asdict(figure) for figure in figures],
-        **stage_keys,
-        "provenance": {
-            "inputs": input_records(study.inputs(robot, stage)),
-            "config": study.computed_from(robot, stage),
-            "seed": study.seed,
-            "code": code_digest(f"er3a.pipeline.stages.{stage}.compute"),
-        },
-    }
-    language.note_written(summary)
-    summary["sentences"] = language.sentences()
-    text = json.dumps(summary, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    write_atomically(folder / "summary.json", lambda file: file.write_text(text, encoding="utf-8"))
+    kind = AbsentResults if isinstance(results, AbsentResults) else type(results)
+    for name, table in table_types(stage.module("model").RESULTS).items():
+        rows = table.empty() if kind is AbsentResults else getattr(results, name)
+        write_atomically(folder / f"{name}.parquet", rows.write)
+    summary = results.summary
+    own = {part.name: plain(getattr(summary, part.name)) for part in fields(summary)}
+    own["verdict"] = _verdict_record(summary.verdict, sentence(summary.verdict.finding))
+    origin = Provenance(
+        inputs=input_records(study.inputs(robot, stage.name)),
+        config=study.computed_from(robot, stage.name),
+        seed=study.seed,
+        code=code_digest(f"{stage.package}.compute", stage.verdict_messages),
+    )
+    content = {"format_version": FORMAT_VERSION, "robot": robot, "stage": stage.name, **own}
+    text = json.dumps(content | {"provenance": plain(origin)}, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    if kind is not AbsentResults:
+        _parsed(folder / SUMMARY, json.loads(text), kind)  # what is written can be read
+    write_atomically(folder / SUMMARY, lambda file: file.write_text(text, encoding="utf-8"))
     write_checksums(folder)
 
 
-def write_checksums(folder: Path) -> None:
-    """Write the checksums of a stage's files, in the form that ``sha256sum --check`` reads."""
-    files = sorted(path for path in folder.iterdir() if path.is_file() and path.name[0] != ".")
-    sums = "".join(f"{sha256(path)}  {path.name}\n" for path in files if path.name != CHECKSUMS)
-    write_atomically(folder / CHECKSUMS, lambda file: file.write_text(sums, encoding="utf-8"))
+def read_stage(folder: Path, stage: Stage) -> Stored[Any]:
+    """Read a stage's results, or :class:`AbsentResults` if it was not computed.
+
+    Raises
+    ------
+    ResultError
+        naming the file that is missing, damaged or of another format version
+    """
+    record = _record(folder)
+    if record["verdict"]["status"] == "not_computed":
+        verdict = record["verdict"]
+        absent = NotComputed(verdict["params"].get("reason", verdict["text"]))
+        origin = _adapter(Provenance).validate_python(record["provenance"])
+        return Stored(record["robot"], stage.name, origin, AbsentResults(Summary(Verdict("not_computed", absent), ())))
+    return read_results(folder, stage.module("model").RESULTS)
 
 
-def read_summary(folder: Path) -> dict[str, Any]:
-    """Read a stage's ``summary.json``, or raise :class:`ResultError` if missing, damaged or of another version."""
-    path = folder / "summary.json"
-    content = _content(path)
+def read_results(folder: Path, kind: type[ResultsT]) -> Stored[ResultsT]:
+    """Read the results of a stage that was computed.
+
+    Raises
+    ------
+    ResultError
+        naming the file that is missing, damaged or of another format version
+    """
+    record, sums = _record(folder), checksums(folder)
+    summary, provenance = _parsed(folder / SUMMARY, record, kind)
+    tables = {}
+    for name, table in table_types(kind).items():
+        file = folder / f"{name}.parquet"
+        content = read_bytes(file)
+        _compare(file, content, sums)
+        try:
+            tables[name] = table.read(content)
+        except (OSError, ValueError, KeyError) as error:
+            raise ResultError(file, f"damaged ({' '.join(str(error).split())})") from None
+    return Stored(record["robot"], record["stage"], provenance, kind(summary=summary, **tables))
+
+
+def _record(folder: Path) -> dict[str, Any]:
+    """A summary file as plain data, whole and of the present format."""
+    path = folder / SUMMARY
+    content = read_bytes(path)
     try:
-        summary = json.loads(content)
+        stored = json.loads(content)
     except ValueError as error:
         raise ResultError(path, f"damaged ({error})") from None
-    version = summary.get("format_version") if isinstance(summary, dict) else None
+    version = stored.get("format_version") if isinstance(stored, dict) else None
     if version != FORMAT_VERSION:
         raise ResultError(path, f"format version {version}, this er3a reads {FORMAT_VERSION}")
-    for key in ("robot", "stage", "verdict", "figures", "provenance", "sentences"):
-        if key not in summary:
+    for key in ("robot", "stage", "verdict", "figures", "provenance"):
+        if key not in stored:
             raise ResultError(path, f"damaged (no '{key}' in it)")
     _compare(path, content, checksums(folder))
-    language.know(summary["sentences"])
-    return summary
+    return stored
+
+
+def read_provenance(folder: Path) -> Provenance:
+    """What a stage's results rest on, whatever they are."""
+    return _adapter(Provenance).validate_python(_record(folder)["provenance"])
 
 
 def check_results(folder: Path) -> None:
@@ -184,29 +237,27 @@ def check_results(folder: Path) -> None:
     ResultError
         naming the first file that is not
     """
-    read_summary(folder)
+    _record(folder)
     sums = checksums(folder)
     for name in sums:
-        _compare(folder / name, _content(folder / name), sums)
+        _compare(folder / name, read_bytes(folder / name), sums)
+
+
+def write_checksums(folder: Path) -> None:
+    """Write the checksums of a stage's files, in the form that ``sha256sum --check`` reads."""
+    files = sorted(path for path in folder.iterdir() if path.is_file() and path.name[0] != ".")
+    sums = "".join(f"{sha256(path)}  {path.name}\n" for path in files if path.name != CHECKSUMS)
+    write_atomically(folder / CHECKSUMS, lambda file: file.write_text(sums, encoding="utf-8"))
 
 
 def checksums(folder: Path) -> dict[str, str]:
     """The checksums that a stage wrote, by file name; :class:`ResultError` if they can't be read."""
     path = folder / CHECKSUMS
     try:
-        lines = _content(path).decode("ascii").removesuffix("\n").split("\n")
+        lines = read_bytes(path).decode("ascii").removesuffix("\n").split("\n")
         return {name: checksum for checksum, name in (line.split("  ") for line in lines)}
     except ValueError:
         raise ResultError(path, "damaged (no list of checksums)") from None
-
-
-def _content(path: Path) -> bytes:
-    try:
-        return Path(path).read_bytes()
-    except FileNotFoundError:
-        raise ResultError(path, "missing") from None
-    except OSError as error:
-        raise ResultError(path, f"can't be read ({error.strerror})") from None
 
 
 def _compare(path: Path, content: bytes, sums: dict[str, str]) -> None:
@@ -214,24 +265,59 @@ def _compare(path: Path, content: bytes, sums: dict[str, str]) -> None:
         raise ResultError(path, f"damaged (not the bytes that {CHECKSUMS} beside it tells of)")
 
 
-def input_records(files: Iterable[Path]) -> list[dict[str, Any]]:
-    """What provenance says of input files: path from the project's root, checksum, and the grades in them."""
-    return [{"path": _shown_path(file), "sha256": sha256(file), "grades": grades_in(file)} for file in files]
+def input_records(files: Iterable[Path]) -> tuple[Input, ...]:
+    """What provenance says of input files."""
+    return tuple(Input(shown_path(file), sha256(file), grades_in(file)) for file in files)
 
 
-def result_records(results: Path, robots: Iterable[str]) -> list[dict[str, Any]]:
+def result_records(results: Path, robots: Iterable[str]) -> tuple[Input, ...]:
     """What provenance says of the results of robots: their lists of checksums, and the checksum of each."""
     files = [results / robot / stage / CHECKSUMS for robot in robots for stage in STAGES]
-    return [{"path": file.as_posix(), "sha256": sha256(file), "grades": {}} for file in files if file.is_file()]
+    return tuple(Input(file.as_posix(), sha256(file), {}) for file in files if file.is_file())
 
 
-def sha256(path: Path) -> str:
-    """Checksum of a file, in hex."""
-    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+def summary_type(kind: type[Results[Any]]) -> type[Summary]:
+    """The summary of a stage's results."""
+    for base in kind.__orig_bases__:  # type: ignore[attr-defined]
+        if get_origin(base) is Results:
+            return get_args(base)[0]
+    raise TypeError(f"{kind.__name__} does not say what its summary is")
 
 
-def _shown_path(path: Path) -> str:
-    """Path from the project's root, so that the summary names no machine."""
-    root = Path(__file__).resolve().parents[2]
-    resolved = Path(path).resolve()
-    return resolved.relative_to(root).as_posix() if resolved.is_relative_to(root) else resolved.name
+def plain(value: Any) -> Any:
+    """Dataclasses, arrays and numpy's numbers as JSON has them."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return {part.name: plain(getattr(value, part.name)) for part in fields(value)}
+    if isinstance(value, dict):
+        return {key: plain(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(part) for part in value]
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _verdict_record(verdict: Verdict[Any], text: str) -> dict[str, Any]:
+    params = plain(verdict.finding)
+    return {"status": verdict.status, "code": params.pop("code"), "params": params, "text": text}
+
+
+def _parsed(path: Path, stored: dict[str, Any], kind: type[Results[Any]]) -> tuple[Any, Provenance]:
+    own = {key: value for key, value in stored.items() if key not in ("format_version", "robot", "stage", "provenance")}
+    verdict = own.get("verdict")
+    try:
+        if isinstance(verdict, dict):
+            own["verdict"] = {"status": verdict["status"], "finding": verdict["params"] | {"code": verdict["code"]}}
+        summary = _adapter(summary_type(kind)).validate_python(own)
+        return summary, _adapter(Provenance).validate_python(stored.get("provenance"))
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise ResultError(path, f"damaged ({where}: {first['msg']})") from None
+    except KeyError as error:
+        raise ResultError(path, f"damaged (verdict without {error})") from None
+
+
+@cache
+def _adapter(kind: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(kind)

@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-import math
 import re
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
-from pydantic import Field, PrivateAttr, field_validator, model_validator
+from pydantic import Field, PrivateAttr, create_model, model_validator
 
 from er3a.errors import InputError
 from er3a.files.robot_file import NAME_PATTERN, Name, Placement, RobotFile, Text, check_placement
-from er3a.files.robot_library import DATA, placement_transform, read_robot, robot_of, robot_path
-from er3a.files.units import FARTHEST_MM, Triple, check_millimetres
-from er3a.files.yaml_file import StrictModel, load, read_yaml
-from er3a.pipeline.sweeps import StageName, Sweep, Variant
+from er3a.files.robot_library import placement_transform, read_robot, robot_of, robot_path
+from er3a.files.yaml_file import StrictModel, load
+from er3a.pipeline.stages.registry import STAGES as REGISTRY
+from er3a.pipeline.sweeps import Sweep, Variant
 from er3a.robots.robot import Robot
 
-STAGES: tuple[str, ...] = get_args(StageName)
-REFERENCES = DATA / "manual_refs"
-SAMPLES_PER_JOB = 1_000_000_000
-"""About ten seconds, of which starting is a tenth."""
-
-
-RuleName = Literal["nearest", "weighted", "time", "manipulability", "limits", "clearance"]
+STAGES = tuple(REGISTRY)
+SettingsT = TypeVar("SettingsT", bound=StrictModel)
 
 
 class RobotEntry(StrictModel):
@@ -43,141 +37,19 @@ class RobotEntry(StrictModel):
         return self
 
 
-class ValidationSettings(StrictModel):
-    """``round_trips``: random joint vectors taken to a pose and back. ``reach_starts``: starts of each reach search."""
-
-    round_trips: Annotated[int, Field(ge=1, le=10_000_000)]
-    reach_starts: Annotated[int, Field(ge=1, le=10_000)]
-
-
-class WorkspaceSettings(StrictModel):
-    """Monte Carlo budget and grid.
-
-    ``samples`` are drawn in ``blocks`` seeded blocks, uniform in the joints or (``sampling: sobol``) more evenly than
-    chance as points of a Sobol' sequence; ``cells_across`` cells span the bounding box's longest side,
-    the hull is taken over the extreme samples in ``hull_directions`` directions, the recording shows ``cloud_points``.
-    The proof looks at ``proof_cells`` cells of the section; ``volume_points`` uniform points estimate the volume.
-    """
-
-    samples: Annotated[int, Field(ge=1, le=100_000_000_000)]
-    blocks: Annotated[int, Field(ge=1, le=100_000)]
-    cells_across: Annotated[int, Field(ge=8, le=1024)]
-    hull_directions: Annotated[int, Field(ge=1000, le=100_000)]
-    cloud_points: Annotated[int, Field(ge=1, le=300_000)]
-    proof_cells: Annotated[int, Field(ge=1, le=10_000_000)] = 8000
-    volume_points: Annotated[int, Field(ge=100, le=10_000_000)] = 100_000
-    sampling: Literal["uniform", "sobol"] = "uniform"
-
-    @model_validator(mode="after")
-    def _a_sample_per_block(self):
-        if self.samples < self.blocks:
-            raise ValueError(f"{self.samples} samples can't fill {self.blocks} blocks | Lower workspace.blocks")
-        return self
-
-    @property
-    def parts(self) -> int:
-        """The number of jobs that the blocks are grouped into."""
-        return min(self.blocks, math.ceil(self.samples / SAMPLES_PER_JOB))
-
-
-class BoxTask(StrictModel):
-    """A box that the tool must serve, in the frame that the robot's base is placed in.
-
-    ``box_mm`` are its edges along x, y and z (it may stand turned by 90 deg about z), ``lowest_mm`` the least height of
-    its underside, ``clear_of_axis_mm`` the least distance of its points from axis 1. At every point the tool must reach
-    all directions within ``cone_deg`` of ``tool_direction`` (z of the tool frame), ``limit_margin_deg`` within limits.
-    """
-
-    box_mm: Annotated[list[Annotated[float, Field(gt=0)]], Field(min_length=3, max_length=3)] = [200, 150, 50]
-    tool_direction: Triple = [0, 0, -1]
-    cone_deg: Annotated[float, Field(ge=0, le=180)] = 30
-    limit_margin_deg: Annotated[float, Field(ge=0, le=45)] = 2
-    lowest_mm: Annotated[float, Field(ge=-FARTHEST_MM, le=FARTHEST_MM)] = 0
-    clear_of_axis_mm: Annotated[float, Field(ge=0, le=FARTHEST_MM)] = 150
-
-    @field_validator("box_mm")
-    @classmethod
-    def _no_metres(cls, values):
-        check_millimetres(values)
-        return values
-
-    @field_validator("tool_direction")
-    @classmethod
-    def _has_length(cls, values):
-        if max(map(abs, values)) < 1e-6:
-            raise ValueError("the vector has no direction | Write for example [0, 0, -1]: the tool points down")
-        return values
-
-
-class CapabilitySettings(StrictModel):
-    """What the tool can do in each cell of the workspace.
-
-    ``directions`` are spread over the sphere, with ``rolls`` about each where the roll matters (a tool beside axis 6,
-    which takes as many times longer). The proofs of the dexterous core and of the listed places may look at
-    ``proof_poses`` neighbourhoods of poses each.
-    """
-
-    directions: Annotated[int, Field(ge=12, le=10_000)] = 300
-    rolls: Annotated[int, Field(ge=1, le=360)] = 8
-    proof_poses: Annotated[int, Field(ge=1, le=1_000_000_000)] = 100_000
-    placement: BoxTask = BoxTask()
-
-
-WayName = Literal["slow", "branch", "via_shift", "via_tilt", "damped", "detour", "stop"]
-
-
-class TrajectorySettings(StrictModel):
-    """Where a path counts as near-singular, and how many points are checked between two samples.
-
-    ``repair`` chooses the way around singular regions, or compares all of them. Joints of unknown speed are taken to do
-    ``assumed_speed_deg_s``; all joints to reach full speed in ``full_speed_after_s``.
-    ``scene`` holds the obstacles; no overlap with them deeper than ``overlap_mm`` goes unnoticed between points.
-    """
-
-    checks_per_sample: Annotated[int, Field(ge=1, le=1000)]
-    near_wrist_deg: Annotated[float, Field(gt=0, le=90)]
-    near_elbow_deg: Annotated[float, Field(gt=0, le=90)]
-    near_shoulder_mm: Annotated[float, Field(gt=0, le=10_000)]
-    repair: Literal["compare"] | WayName = "compare"
-    assumed_speed_deg_s: Annotated[
-        list[Annotated[float, Field(gt=0, le=10_000)]], Field(min_length=6, max_length=6)
-    ] = [180, 180, 180, 360, 360, 360]
-    full_speed_after_s: Annotated[float, Field(gt=0, le=10)] = 0.25
-    scene: Text | None = None
-    overlap_mm: Annotated[float, Field(ge=0.05, le=100)] = 1.0
-
-
-class InverseSettings(StrictModel):
-    """``round_trips``: random poses solved back. ``map_cells``: cells across the maps of the number of solutions.
-
-    ``scene`` holds the obstacles that clearance is measured from and that solutions may not touch; ``mix`` weighs
-    rules against each other as one more rule (names: er3a/selection/rules.py).
-    """
-
-    round_trips: Annotated[int, Field(ge=1, le=10_000_000)] = 2000
-    map_cells: Annotated[int, Field(ge=8, le=512)] = 80
-    scene: Text | None = None
-    mix: Annotated[dict[RuleName, Annotated[float, Field(ge=0, le=1000)]], Field(min_length=1)] = {"nearest": 1}
-
-
 class ReportSettings(StrictModel):
     """How pages and recordings are written; no number depends on it."""
 
     language: Literal["en", "zh"] = "en"
 
 
-class Study(StrictModel):
-    """config/config.yaml."""
+class StudyBase(StrictModel):
+    """A study file; the stages' own keys are added by the registry."""
 
     kind: Literal["study"]
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)]
     robots: Annotated[dict[Name, RobotEntry], Field(min_length=1)]
     sweeps: Annotated[dict[Name, Sweep], Field(max_length=100)] = {}
-    validation: ValidationSettings
-    workspace: WorkspaceSettings
-    capability: CapabilitySettings = CapabilitySettings()
-    inverse: InverseSettings = InverseSettings()
-    trajectory: TrajectorySettings
     report: ReportSettings = ReportSettings()
     _file: Path | None = PrivateAttr(default=None)
 
@@ -203,6 +75,15 @@ class Study(StrictModel):
                 taken.add(variant.name)
         return self
 
+    @model_validator(mode="after")
+    def _sweeps_go_through_stages_that_there_are(self):
+        for name, sweep in self.sweeps.items():
+            for stage in sweep.stages:
+                if stage not in REGISTRY:
+                    problem = f"sweeps.{name}.stages: there is no stage '{stage}'"
+                    raise ValueError(f"{problem} | Known: {', '.join(REGISTRY)}")
+        return self
+
     @property
     def variants(self) -> dict[str, Variant]:
         """The robots that the sweeps make, by name."""
@@ -220,7 +101,8 @@ class Study(StrictModel):
 
     def pages(self, name: str) -> tuple[str, ...]:
         """The pages of a robot: its stages', and the teach panel of one that is no variant."""
-        return self.stages(name) if name in self.variants else (*STAGES, "teach")
+        pages = tuple(stage for stage in self.stages(name) if "report" in REGISTRY[stage].views)
+        return pages if name in self.variants else (*pages, "teach")
 
     def entry(self, name: str) -> RobotEntry:
         """The study's entry for a robot, for a variant that of its base; :class:`InputError` if it has none."""
@@ -255,40 +137,46 @@ class Study(StrictModel):
             tool = variant.tool(tool)
         return robot_of(content).replace(name=name, base=placement_transform(base), tool=placement_transform(tool))
 
+    def references(self, name: str) -> list[str]:
+        """The reference sets that a robot's file names."""
+        return read_robot(self.robot_file(name)).references
+
     def inputs(self, name: str, stage: str) -> list[Path]:
-        """The files that a stage reads for a robot."""
-        entry = self.entry(name)
-        files = [self.robot_file(name)]
-        kinds = {"validation": "*.csv", "workspace": "envelope.csv"}
-        if stage in kinds:
-            for reference in read_robot(files[0]).references:
-                files += sorted((REFERENCES / reference).glob(kinds[stage]))
-        if stage == "inverse":
-            files.append(Path(entry.targets))
-            if scene := self.scene(name, stage):
-                files.append(scene)
-        if stage == "trajectory":
-            files += [Path(entry.paths), *_tables_of(entry.paths)]
-            if scene := self.scene(name, stage):
-                files.append(scene)
-        return files
+        """The files that a stage, or the teach panel, reads for a robot."""
+        more = REGISTRY[stage].inputs(self, name) if stage in REGISTRY else []
+        return [self.robot_file(name), *more]
+
+    def section(self, kind: type[SettingsT]) -> SettingsT:
+        """The resolved settings of one kind, such as ``InverseSettings``."""
+        for stage in REGISTRY.values():
+            for key, model in stage.settings.items():
+                if model is kind:
+                    return getattr(self, key)
+        raise KeyError(kind.__name__)
 
     def computed_from(self, name: str, stage: str) -> dict[str, Any]:
         """The resolved parts of the study that a stage's results depend on; plain data."""
-        more = self.settings(name, "capability") if stage == "workspace" else {}
-        return more | self.settings(name, stage)
+        found: dict[str, Any] = {}
+        for key in REGISTRY[stage].settings:
+            found |= self.settings(name, key)
+        return found
 
-    def settings(self, name: str, stage: str) -> dict[str, Any]:
-        """The resolved part of the study that a stage's numbers depend on, or one that is no stage's; plain data."""
+    def settings(self, name: str, key: str) -> dict[str, Any]:
+        """What of the study concerns one of its keys, for a robot; of a key without settings seed and robot alone."""
         entry = self.entry(name).model_dump(exclude={"targets", "paths", "file", "scene"}, exclude_none=True)
         if variant := self.variants.get(name):
             entry["varied"] = {variant.vary: variant.value}
-        own = getattr(self, stage, None)
+        own = getattr(self, key, None)
         settings = own.model_dump() if own else {}
         if "scene" in settings:
-            scene = self.scene(name, stage)
+            scene = self.scene(name, key)
             settings["scene"] = str(scene) if scene else None
-        return {"seed": self.seed, "robot": entry, stage: settings}
+        return {"seed": self.seed, "robot": entry, key: settings}
+
+    def scenes(self, name: str, stage: str) -> list[Path]:
+        """The file of :meth:`scene` as a list, empty in open space."""
+        scene = self.scene(name, stage)
+        return [scene] if scene else []
 
     def scene(self, name: str, stage: str) -> Path | None:
         """The file of the solids that a robot may not touch in a stage; None for open space."""
@@ -296,11 +184,20 @@ class Study(StrictModel):
         return Path(scene) if scene else None
 
 
-def _tables_of(path_file: str) -> list[Path]:
-    """The CSV tables that a path file names; the file is checked elsewhere."""
-    paths = read_yaml(path_file).get("paths")
-    named = [path.get("file") for path in paths if isinstance(path, dict)] if isinstance(paths, list) else []
-    return [Path(file) for file in named if isinstance(file, str)]
+def _sections() -> dict[str, Any]:
+    """The stages' keys of a study file; those that need no entry have a default."""
+    found = {}
+    for stage in REGISTRY.values():
+        for key, model in stage.settings.items():
+            required = any(part.is_required() for part in model.model_fields.values())
+            found[key] = (model, ...) if required else (model, model())
+    return found
+
+
+if TYPE_CHECKING:
+    Study = StudyBase
+else:
+    Study = create_model("Study", __base__=StudyBase, __doc__=StudyBase.__doc__, **_sections())
 
 
 def load_study(path: str | Path) -> Study:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
@@ -14,7 +14,6 @@ from er3a.files.robot_file import Name, Placement, RobotFile, Text, check_placem
 from er3a.files.yaml_file import StrictModel, parse
 from er3a.pipeline.messages.language import N_, tr
 
-StageName = Literal["validation", "workspace", "inverse", "trajectory"]
 MOST_VALUES = 1000
 DECIMALS = 9
 Value = Annotated[float, Field(ge=-1e6, le=1e6)]
@@ -156,7 +155,7 @@ class Sweep(StrictModel):
     to: Value | None = None
     steps: Annotated[int, Field(ge=2, le=MOST_VALUES)] | None = None
     values: Annotated[list[Value], Field(min_length=1, max_length=MOST_VALUES), AfterValidator(_distinct)] | None = None
-    stages: Annotated[list[StageName], Field(min_length=1), AfterValidator(_distinct)] = ["validation", "workspace"]
+    stages: Annotated[list[Text], Field(min_length=1), AfterValidator(_distinct)] = ["validation", "workspace"]
 
     @model_validator(mode="after")
     def _values_or_a_range(self):

@@ -10,27 +10,33 @@ A table is a frozen dataclass of equally long arrays::
         point_mm: Reals = vector("{}_mm", "tool point in the base frame", "mm")
 
 ``q_deg`` is (rows, n) and written as ``q1_deg ... qn_deg``, ``point_mm`` (rows, 3) as ``x_mm, y_mm, z_mm``. Unit and
-meaning go into the file.
+meaning go into the file. A column of findings is written as JSON texts, with each finding's code and parameters.
 """
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
+from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, get_type_hints
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
+
+from er3a.findings import Finding
 
 Reals = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 Texts = NDArray[np.object_]
+Findings = NDArray[np.object_]
 
 _ARROW_TEXT = pa.string()
 
@@ -42,6 +48,8 @@ class Column:
     Attributes
     ----------
     pattern : name in the file; with ``{}`` for a group: what stands there is in ``parts``, or counts from 1
+    kind : of a column of findings, which ones they can be
+    lists : whether each row holds a list of real numbers
     """
 
     pattern: str
@@ -49,6 +57,15 @@ class Column:
     unit: str
     dtype: np.dtype
     parts: tuple[str, ...] | None = None
+    kind: Any = None
+    lists: bool = False
+
+    @property
+    def arrow_type(self) -> pa.DataType:
+        """How a column is kept in the file."""
+        if self.lists:
+            return pa.list_(pa.float64())
+        return _ARROW_TEXT if self.dtype == object else pa.from_numpy_dtype(self.dtype)
 
     @property
     def is_group(self) -> bool:
@@ -76,6 +93,11 @@ def column(meaning: str, unit: str = "", *, name: str = "", dtype: Any = np.floa
     return _declared(name, meaning, unit, dtype, None)
 
 
+def findings(meaning: str, kind: Any) -> Any:
+    """A column (rows,) of findings, or None; ``kind`` says which ones they can be."""
+    return field(metadata={"column": Column("", meaning, "", np.dtype(object), None, kind)})
+
+
 def per_joint(pattern: str, meaning: str, unit: str = "", *, dtype: Any = np.float64) -> Any:
     """One column for each joint, (rows, n): ``"q{}_deg"`` is written as ``q1_deg ... qn_deg``."""
     return _declared(pattern, meaning, unit, dtype, None)
@@ -84,6 +106,11 @@ def per_joint(pattern: str, meaning: str, unit: str = "", *, dtype: Any = np.flo
 def vector(pattern: str, meaning: str, unit: str = "", *, parts: Iterable[str] = "xyz", dtype: Any = np.float64) -> Any:
     """Columns that belong together, (rows, len(parts)): ``"{}_mm"`` is written as ``x_mm, y_mm, z_mm``."""
     return _declared(pattern, meaning, unit, dtype, tuple(parts))
+
+
+def lists(meaning: str, unit: str = "") -> Any:
+    """A column (rows,) with a list of real numbers in each row."""
+    return field(metadata={"column": Column("", meaning, unit, np.dtype(object), lists=True)})
 
 
 def _declared(pattern: str, meaning: str, unit: str, dtype: Any, parts: tuple[str, ...] | None) -> Any:
@@ -115,7 +142,7 @@ class Table:
         for attribute in fields(cls):
             spec: Column = attribute.metadata["column"]
             name = spec.pattern or attribute.name
-            found[attribute.name] = Column(name, spec.meaning, spec.unit, spec.dtype, spec.parts)
+            found[attribute.name] = replace(spec, pattern=name)
         return found
 
     @classmethod
@@ -151,7 +178,7 @@ class Table:
         return type(self)(**{name: getattr(self, name)[rows] for name in self.columns()})
 
     def frame(self) -> pd.DataFrame:
-        """The table for pandas, with the names of the file."""
+        """The table for pandas, with the names and the values of the file."""
         return pd.DataFrame({name: values for name, values, _ in self._flat()})
 
     def _flat(self) -> Iterator[tuple[str, NDArray[Any], Column]]:
@@ -159,15 +186,14 @@ class Table:
             array = getattr(self, name)
             parts = array.T if spec.is_group else [array]
             for part_name, part in zip(spec.names(len(parts)), parts):
-                yield part_name, part, spec
+                yield part_name, np.array([_coded(each) for each in part], object) if spec.kind else part, spec
 
     def write(self, file: Path) -> None:
         """Write a Parquet file; equal tables give equal bytes."""
         schema, arrays = [], []
         for name, values, spec in self._flat():
-            kind = _ARROW_TEXT if spec.dtype == object else pa.from_numpy_dtype(spec.dtype)
-            schema.append(pa.field(name, kind, metadata={"unit": spec.unit, "meaning": spec.meaning}))
-            arrays.append(pa.array(np.ascontiguousarray(values), kind))
+            schema.append(pa.field(name, spec.arrow_type, metadata={"unit": spec.unit, "meaning": spec.meaning}))
+            arrays.append(pa.array(np.ascontiguousarray(values), spec.arrow_type))
         pq.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(schema)), file, compression="zstd")
 
     @classmethod
@@ -181,6 +207,8 @@ class Table:
                 raise KeyError(spec.pattern)
             parts = [stored[part].to_numpy() for part in names]
             arrays[name] = np.stack(parts, axis=1).astype(spec.dtype) if spec.is_group else parts[0]
+            if spec.kind:
+                arrays[name] = _array(tuple(_decoded(spec.kind, text) for text in parts[0]), spec)
         return cls(**arrays)
 
 
@@ -190,3 +218,24 @@ def _array(values: tuple[Any, ...], spec: Column) -> NDArray[Any]:
     array = np.empty(len(values), object)
     array[:] = values
     return array
+
+
+def _coded(finding: Finding | None) -> str | None:
+    """A finding as text: its code first, then its parameters."""
+    return None if finding is None else json.dumps({"code": finding.code} | asdict(finding), ensure_ascii=False)
+
+
+@cache
+def _decoded(kind: Any, text: str | None) -> Any:
+    return None if text is None else _adapter(kind).validate_json(text)
+
+
+@cache
+def _adapter(kind: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(kind)
+
+
+def table_types(results: type) -> dict[str, type[Table]]:
+    """The tables of a stage's results, by attribute, which is the name of their file."""
+    hints = get_type_hints(results)
+    return {name: hint for name, hint in hints.items() if isinstance(hint, type) and issubclass(hint, Table)}

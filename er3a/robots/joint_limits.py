@@ -2,28 +2,51 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Literal
+
 import numpy as np
 
-from er3a.pipeline.messages.language import N_, joined, said
+from er3a.geometry.angles import TURN
+from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
 
 LIMIT_TOLERANCE = 1e-9
-TURN = 2 * np.pi
-ABOVE = N_("J{joint} at {at:.1f} deg is {by:.3g} deg above its limit of {bound:g} deg")
-BELOW = N_("J{joint} at {at:.1f} deg is {by:.3g} deg below its limit of {bound:g} deg")
 
 
-def within(robot: Robot, q: np.ndarray) -> np.ndarray:
+@dataclass(frozen=True)
+class LimitExceeded:
+    """A joint stands above its upper or below its lower limit, by the excess."""
+
+    joint: int
+    side: Literal["above", "below"]
+    angle_deg: float
+    excess_deg: float
+    limit_deg: float
+    code: Literal["limit_exceeded"] = "limit_exceeded"
+
+
+@dataclass(frozen=True)
+class LimitsExceeded:
+    """One or more joints stand outside their limits."""
+
+    joints: tuple[LimitExceeded, ...]
+    code: Literal["limits_exceeded"] = "limits_exceeded"
+
+
+def within(robot: Robot, q: Reals) -> Flags:
     """Whether joint angles (..., 6) in rad lie within the limits, to 1e-9 rad; shape (...,)."""
-    return (np.maximum(q - robot.upper, robot.lower - q) <= LIMIT_TOLERANCE).all(axis=-1)
+    fits: Flags = (np.maximum(q - robot.upper, robot.lower - q) <= LIMIT_TOLERANCE).all(axis=-1)
+    return fits
 
 
-def principal(q: np.ndarray) -> np.ndarray:
-    """The same angles in (-pi, pi]."""
-    return q - TURN * np.ceil((q - np.pi) / TURN)
+def limit_margin(robot: Robot, q: Reals) -> Reals:
+    """Least distance (...,) in rad of any joint of (..., 6) from its limits; negative outside them."""
+    margin: Reals = np.minimum(q - robot.lower, robot.upper - q).min(axis=-1)
+    return margin
 
 
-def nearest_turns(robot: Robot, q: np.ndarray, q_ref: np.ndarray) -> np.ndarray:
+def nearest_equivalent(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
     """The same arm poses (..., 6) by the turns nearest to q_ref within the limits, else by those nearest to them."""
     near = q + TURN * np.round((q_ref - q) / TURN)
     low, high = turn_bounds(robot, near)
@@ -33,22 +56,22 @@ def nearest_turns(robot: Robot, q: np.ndarray, q_ref: np.ndarray) -> np.ndarray:
     return np.where(low <= high, inside, outside)
 
 
-def turn_bounds(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def turn_bounds(robot: Robot, q: Reals) -> tuple[Reals, Reals]:
     """Least and greatest number of turns to add so that each angle lies within its limits (least > greatest: none)."""
     low = np.ceil((robot.lower - LIMIT_TOLERANCE - q) / TURN)
     high = np.floor((robot.upper + LIMIT_TOLERANCE - q) / TURN)
     return low, high
 
 
-def limit_reason(robot: Robot, q: np.ndarray) -> str:
-    """Which limits the angles (6,) leave, and by how many degrees; empty if none."""
-    parts = []
+def limits_exceeded(robot: Robot, q: Reals) -> LimitsExceeded | None:
+    """Which limits the angles (6,) in rad leave; None if none."""
+    found: list[LimitExceeded] = []
     for j, angle in enumerate(q):
-        for excess, text, limit in (
-            (angle - robot.upper[j], ABOVE, robot.upper[j]),
-            (robot.lower[j] - angle, BELOW, robot.lower[j]),
-        ):
+        sides: tuple[tuple[Literal["above", "below"], float, float], ...] = (
+            ("above", angle - robot.upper[j], robot.upper[j]),
+            ("below", robot.lower[j] - angle, robot.lower[j]),
+        )
+        for side, excess, limit in sides:
             if excess > LIMIT_TOLERANCE:
-                at, by, bound = np.degrees([angle, excess, limit])
-                parts.append(said(text, joint=j + 1, at=at, by=by, bound=bound))
-    return joined(parts, "; ")
+                found.append(LimitExceeded(j + 1, side, *np.degrees([angle, excess, limit]).tolist()))
+    return LimitsExceeded(tuple(found)) if found else None

@@ -5,22 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from er3a.errors import ShapeError
-from er3a.pipeline.messages.language import N_
+from er3a.numerics.arrays import Reals
 
 Grade = Literal["official", "cad", "export", "claim", "inferred"]
-GRADES: dict[str, str] = {
-    N_("official"): N_("the maker's own document"),
-    N_("cad"): N_("measured on a CAD model that carries the model's name"),
-    N_("export"): N_("a URDF exported from CAD"),
-    N_("claim"): N_("an article's text"),
-    N_("inferred"): N_("reasoned, not stated"),
-}
-WEIGHTY_GRADES = ("official", "cad", "export")
+GRADES: tuple[Grade, ...] = get_args(Grade)
+AUTHORITATIVE_GRADES: tuple[Grade, ...] = ("official", "cad", "export")
 
 
 @dataclass(frozen=True)
@@ -67,29 +61,31 @@ class Robot:
     zero_pose : what the arm looks like at q = 0, in words
     references : names of the reference sets (folders of data/manual_refs) that it is checked against
     envelopes : capsules around the links; empty where the file gives none
+    derived : what :func:`er3a.robots.derived.derived` keeps of this robot
     sources : per group of values ("dh", "zero", "limits", "speeds", "base", "tool", "envelopes") its source and grade
     """
 
     name: str
     title: str
     convention: Literal["standard", "modified"]
-    a: np.ndarray
-    alpha: np.ndarray
-    d: np.ndarray
-    direction: np.ndarray
-    offset: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-    speed: np.ndarray = field(default_factory=lambda: np.full(6, np.nan))
-    beta: np.ndarray = field(default_factory=lambda: np.zeros(6))
-    base: np.ndarray = field(default_factory=lambda: np.eye(4))
-    tool: np.ndarray = field(default_factory=lambda: np.eye(4))
+    a: Reals
+    alpha: Reals
+    d: Reals
+    direction: Reals
+    offset: Reals
+    lower: Reals
+    upper: Reals
+    speed: Reals = field(default_factory=lambda: np.full(6, np.nan))
+    beta: Reals = field(default_factory=lambda: np.zeros(6))
+    base: Reals = field(default_factory=lambda: np.eye(4))
+    tool: Reals = field(default_factory=lambda: np.eye(4))
     zero_pose: str = ""
     references: tuple[str, ...] = ()
     envelopes: tuple[Envelope, ...] = ()
     sources: Mapping[str, Source] = field(default_factory=dict)
+    derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for key in ("a", "alpha", "d", "beta", "direction", "offset", "lower", "upper", "speed", "base", "tool"):
             array = np.array(getattr(self, key), dtype=float)
             expected = (4, 4) if key in ("base", "tool") else (6,)
@@ -103,6 +99,6 @@ class Robot:
         """The robot with its flange as tool: references speak of the flange, which is frame 6 of the table."""
         return self.replace(tool=np.eye(4))
 
-    def replace(self, **changes) -> Robot:
+    def replace(self, **changes: Any) -> Robot:
         """A copy with other values for some attributes."""
         return replace(self, **changes)

@@ -9,17 +9,20 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from numbers import Real
+from typing import Literal
 
 import numpy as np
 
 from er3a.collision.bodies import can_measure
 from er3a.collision.clearance import clearance
+from er3a.collision.scene import Scene
 from er3a.errors import Er3aError
-from er3a.files.scene_file import SceneFile
-from er3a.kinematics.admissible import limit_margin
 from er3a.kinematics.singularity import characteristic_length, conditioning
-from er3a.pipeline.messages.language import N_
+from er3a.numerics.arrays import Flags, Reals
+from er3a.robots.joint_limits import limit_margin
 from er3a.robots.robot import Robot
+
+RuleName = Literal["nearest", "weighted", "time", "manipulability", "limits", "clearance"]
 
 
 @dataclass(frozen=True)
@@ -28,23 +31,21 @@ class Rule:
 
     Attributes
     ----------
-    title : in words
     unit : of the measure
     best : "least" or "greatest" measure
     measure : (robot, q (n, 6), q_ref (6,), scene) -> (n,)
     """
 
-    title: str
     unit: str
-    best: str
-    measure: Callable[[Robot, np.ndarray, np.ndarray, SceneFile | None], np.ndarray]
+    best: Literal["least", "greatest"]
+    measure: Callable[[Robot, Reals, Reals, Scene | None], Reals]
 
-    def cost(self, measured: np.ndarray) -> np.ndarray:
+    def cost(self, measured: Reals) -> Reals:
         """The measure, or its negative, so that less is better."""
         return measured if self.best == "least" else -measured
 
 
-def joint_weights(robot: Robot) -> np.ndarray:
+def joint_weights(robot: Robot) -> Reals:
     """Weights (6,) of joint moves: the greatest lever (m) at which each joint swings the tool, the longest being 1.
 
     A joint near the base moves more of the arm; a joint with no lever still counts a tenth.
@@ -54,51 +55,62 @@ def joint_weights(robot: Robot) -> np.ndarray:
     return np.maximum(outward / outward.max(), 0.1)
 
 
-def _greatest_move(robot: Robot, q: np.ndarray, q_ref: np.ndarray, scene: SceneFile | None) -> np.ndarray:
+def _greatest_move(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
     return np.degrees(np.abs(q - q_ref).max(axis=1, initial=0.0))
 
 
-def _weighted_move(robot: Robot, q: np.ndarray, q_ref: np.ndarray, scene: SceneFile | None) -> np.ndarray:
+def _weighted_move(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
     return np.degrees(np.linalg.norm(joint_weights(robot) * (q - q_ref), axis=1))
 
 
-def _time(robot: Robot, q: np.ndarray, q_ref: np.ndarray, scene: SceneFile | None) -> np.ndarray:
+def _time(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
     if not np.isfinite(robot.speed).all():
         raise Er3aError(f"{robot.name}: the rule 'time' needs joint speeds, and the robot's file gives none")
     return (np.abs(q - q_ref) / robot.speed).max(axis=1, initial=0.0)
 
 
-def _manipulability(robot: Robot, q: np.ndarray, q_ref: np.ndarray, scene: SceneFile | None) -> np.ndarray:
+def _manipulability(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
     return conditioning(robot, q, characteristic_length(robot)).manipulability
 
 
-def _limit_distance(robot: Robot, q: np.ndarray, q_ref: np.ndarray, scene: SceneFile | None) -> np.ndarray:
+def _limit_distance(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
     return np.degrees(limit_margin(robot, q))
 
 
-def _clearance(robot: Robot, q: np.ndarray, q_ref: np.ndarray, scene: SceneFile | None) -> np.ndarray:
+def _clearance(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
     return clearance(robot, q, scene).distance * 1000
 
 
-RULES: dict[str, Rule] = {
-    N_("nearest"): Rule(N_("least greatest joint move"), "deg", "least", _greatest_move),
-    N_("weighted"): Rule(
-        N_("least joint moves, weighted by how far each joint swings the tool"), "deg", "least", _weighted_move
-    ),
-    N_("time"): Rule(N_("least time at the joint speeds"), "s", "least", _time),
-    N_("manipulability"): Rule(N_("farthest from singularities (manipulability)"), "1", "greatest", _manipulability),
-    N_("limits"): Rule(N_("farthest from the joint limits"), "deg", "greatest", _limit_distance),
-    N_("clearance"): Rule(N_("farthest from obstacles and from itself"), "mm", "greatest", _clearance),
+RULES: dict[RuleName, Rule] = {
+    "nearest": Rule("deg", "least", _greatest_move),
+    "weighted": Rule("deg", "least", _weighted_move),
+    "time": Rule("s", "least", _time),
+    "manipulability": Rule("1", "greatest", _manipulability),
+    "limits": Rule("deg", "greatest", _limit_distance),
+    "clearance": Rule("mm", "greatest", _clearance),
 }
 
 
-def available_rules(robot: Robot) -> tuple[str, ...]:
+def available_rules(robot: Robot) -> tuple[RuleName, ...]:
     """Names of the rules whose data the robot has, and whose library this machine."""
     known = {"time": bool(np.isfinite(robot.speed).all()), "clearance": can_measure()}
     return tuple(name for name in RULES if known.get(name, True))
 
 
-def checked_weights(rule: str | Mapping[str, float]) -> dict[str, float]:
+def mixed_cost(
+    weights: Mapping[RuleName, float],
+    costs: Mapping[RuleName, Reals],
+    allowed: Flags,
+) -> Reals:
+    """The weighted sum (n,) of costs (n,) per rule, each stretched to 0..1 over the allowed rows."""
+    total = np.zeros(len(allowed))
+    for name, weight in weights.items():
+        least, most = (costs[name][allowed].min(), costs[name][allowed].max()) if allowed.any() else (0.0, 1.0)
+        total += weight * (costs[name] - least) / (most - least if most > least else 1.0)
+    return total
+
+
+def checked_weights(rule: str | Mapping[str, float]) -> dict[RuleName, float]:
     """A rule, or a mix of rules, as weights.
 
     Raises
@@ -108,12 +120,15 @@ def checked_weights(rule: str | Mapping[str, float]) -> dict[str, float]:
     """
     if not isinstance(rule, str | Mapping):
         raise Er3aError(f"the rule is {rule!r}; expected a name ({', '.join(RULES)}) or weights of several")
-    weights = {rule: 1.0} if isinstance(rule, str) else dict(rule)
-    if not weights:
+    given = {rule: 1.0} if isinstance(rule, str) else dict(rule)
+    if not given:
         raise Er3aError(f"the mix of rules is empty; give weights to some of: {', '.join(RULES)}")
-    for name, weight in weights.items():
-        if name not in RULES:
+    known: dict[str, RuleName] = {name: name for name in RULES}
+    weights = {}
+    for name, weight in given.items():
+        if name not in known:
             raise Er3aError(f"there is no rule '{name}'; known: {', '.join(RULES)}")
+        weights[known[name]] = weight
         if not (isinstance(weight, Real) and np.isfinite(weight) and weight >= 0):
             raise Er3aError(f"the weight of rule '{name}' is {weight!r}; expected a number of at least 0")
     if not sum(weights.values()) > 0:

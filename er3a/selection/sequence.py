@@ -13,17 +13,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 
 from er3a.collision.clearance import clearance
+from er3a.collision.scene import Scene
 from er3a.errors import Er3aError
-from er3a.files.scene_file import SceneFile
-from er3a.kinematics.inverse import Solutions, checked_reference
+from er3a.kinematics.inverse import checked_reference
+from er3a.kinematics.solutions import Solutions
+from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import Robot
 from er3a.selection.rules import joint_weights
 
-MOVES = ("nearest", "weighted", "time")
+MoveRule = Literal["nearest", "weighted", "time"]
+MOVES: tuple[MoveRule, ...] = ("nearest", "weighted", "time")
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,19 +41,19 @@ class SequenceChoice:
     greedy_rows : (N,) int, what taking the cheapest next move each time would take; greedy_cost : what that costs
     """
 
-    rows: np.ndarray
-    q: np.ndarray
+    rows: Integers
+    q: Reals
     cost: float
-    greedy_rows: np.ndarray
+    greedy_rows: Integers
     greedy_cost: float
 
 
 def select_sequence(
     robot: Robot,
     poses: Sequence[Solutions],
-    q_ref: np.ndarray,
-    rule: str = "nearest",
-    scene: SceneFile | None = None,
+    q_ref: Reals,
+    rule: MoveRule = "nearest",
+    scene: Scene | None = None,
 ) -> SequenceChoice:
     """Choose one solution of each pose so that all moves together cost least.
 
@@ -96,7 +100,7 @@ def select_sequence(
     )
 
 
-def _usable(robot: Robot, solutions: Solutions, scene: SceneFile | None, number: int) -> np.ndarray:
+def _usable(robot: Robot, solutions: Solutions, scene: Scene | None, number: int) -> Integers:
     rows = np.flatnonzero(solutions.within_limits)
     if scene is not None and rows.size:
         rows = rows[clearance(robot, solutions.q[rows], scene).distance >= 0]
@@ -105,7 +109,7 @@ def _usable(robot: Robot, solutions: Solutions, scene: SceneFile | None, number:
     return rows
 
 
-def _move_costs(robot: Robot, before: np.ndarray, after: np.ndarray, rule: str) -> np.ndarray:
+def _move_costs(robot: Robot, before: Reals, after: Reals, rule: str) -> Reals:
     """Cost (n, m) of each move from joint angles (n, 6) to (m, 6)."""
     moves = np.abs(before[:, None] - after[None])
     if rule == "nearest":

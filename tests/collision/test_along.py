@@ -8,6 +8,8 @@ import pytest
 from er3a.collision.along import clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.clearance import clearance
+from er3a.collision.pairs import LinkAndSolid, LinkPair
+from er3a.collision.scene import Scene
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import SceneFile
 from er3a.geometry.transforms import transform
@@ -19,8 +21,8 @@ DEPTH = 1e-3
 ENDS = np.array([0.0, 1.0])
 
 
-def scene_of(**shapes) -> SceneFile:
-    return SceneFile.model_validate({"kind": "scene", "title": "made"} | shapes)
+def scene_of(**shapes) -> Scene:
+    return SceneFile.model_validate({"kind": "scene", "title": "made"} | shapes).scene()
 
 
 def swing(robot):
@@ -49,7 +51,7 @@ def test_thin_obstacle_between_two_points_is_found(robot, obstacle):
     found = along(robot, scene, move)
     assert (clearance(robot, move.joints(ENDS)[0], scene).distance > 0.05).all()
     (contact,) = found.contacts
-    assert any(pair.endswith(solid["name"]) for pair in contact.pairs)
+    assert LinkAndSolid(6, solid["name"]) in contact.pairs
     assert 0 < contact.start < 0.5 < contact.end < 1
     edges = clearance(robot, move.joints(np.array([contact.start, contact.end]))[0], scene)
     np.testing.assert_allclose(edges.distance, 0, atol=1e-6)
@@ -102,7 +104,7 @@ def test_arm_that_folds_into_itself_is_found():
     followed = follow(robot, path, t)
     found = clearance_along(Bodies(robot, None), followed.joints, followed.t, t, DEPTH)
     (contact,) = found.contacts
-    assert all("link" in pair for pair in contact.pairs)
+    assert all(isinstance(pair, LinkPair) for pair in contact.pairs)
     edge = clearance(robot, followed.joints(np.array([contact.start])), None).distance
     np.testing.assert_allclose(edge, 0, atol=1e-6)
 

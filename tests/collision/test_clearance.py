@@ -9,6 +9,8 @@ import yaml
 from er3a.collision.bodies import self_pairs
 from er3a.collision.clearance import clearance
 from er3a.collision.envelopes import capsule_poses, default_envelopes, envelopes_of
+from er3a.collision.pairs import LinkAndSolid, LinkPair
+from er3a.collision.scene import Scene
 from er3a.errors import InputError
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.files.robot_writer import write_robot
@@ -18,8 +20,8 @@ from er3a.robots.robot import Envelope
 from testing.arms import joints_at_random, placement
 
 
-def scene_of(**shapes) -> SceneFile:
-    return SceneFile.model_validate({"kind": "scene", "title": "made"} | shapes)
+def scene_of(**shapes) -> Scene:
+    return SceneFile.model_validate({"kind": "scene", "title": "made"} | shapes).scene()
 
 
 def segment_distances(ends: np.ndarray, points) -> float:
@@ -60,7 +62,7 @@ def test_distances_from_solids_are_those_of_geometry(robot, random):
             least = min(
                 segment_distances(line[None], exact[kind]) - capsule.radius for line, capsule in zip(ends, capsules)
             )
-            if pair.endswith(solid["name"]):
+            if isinstance(pair, LinkAndSolid):
                 assert distance == pytest.approx(least, abs=1e-4)
             else:
                 assert distance <= least + 1e-4
@@ -70,7 +72,7 @@ def test_overlap_is_negative_and_named(robot):
     wall = scene_of(planes=[{"name": "ceiling", "normal": [0, 0, -1], "offset_mm": 0}])
     clear = clearance(robot, np.zeros((1, 6)), wall)
     assert clear.distance[0] < 0
-    assert clear.pair[0].endswith("and ceiling")
+    assert clear.pair[0].solid == "ceiling"
 
 
 def test_base_of_the_arm_turns_the_obstacles_away(random):
@@ -87,7 +89,7 @@ def test_arm_that_reaches_into_its_base_collides_with_itself(random):
     q = joints_at_random(arm, random, 400)
     clear = clearance(arm, q, None)
     assert (clear.distance < 0).any()
-    assert "base and link 6" in clear.pair
+    assert LinkPair(0, 6) in clear.pair
     links = [(envelopes_of(arm)[i].link, envelopes_of(arm)[j].link) for i, j in self_pairs(arm)]
     assert all(abs(i - j) > 2 for i, j in links)
 

@@ -10,6 +10,7 @@ import yaml
 
 from er3a.errors import InputError
 from er3a.files.scene_file import load_scene
+from er3a.geometry.transforms import translation
 
 SHIPPED = Path(__file__).parents[2] / "data" / "scenes" / "table_and_post.yaml"
 BOX = {"name": "table", "size_mm": [500, 800, 40], "xyz_mm": [500, 0, 80]}
@@ -32,12 +33,13 @@ def test_shipped_scene_holds_one_of_each():
         "lamp",
         "floor",
     ]
-    assert scene.boxes[0].rpy_deg == [0, 0, 0]
+    np.testing.assert_array_equal(scene.boxes[0].T, translation(0.5, 0, 0.08))
 
 
 def test_normal_comes_at_unit_length(tmp_path):
     scene = load_scene(write(tmp_path, planes=[PLANE]))
-    np.testing.assert_array_equal(scene.planes[0].unit_normal(), [0, 0, 1])
+    np.testing.assert_array_equal(scene.planes[0].normal, [0, 0, 1])
+    assert scene.planes[0].offset == -0.0025
 
 
 BAD = {

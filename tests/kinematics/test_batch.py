@@ -14,7 +14,7 @@ from er3a.kinematics.configuration import branch_of
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import solve_slots
-from er3a.robots.joint_limits import nearest_turns, within
+from er3a.robots.joint_limits import nearest_equivalent, within
 from testing.arms import DEG, arms, joints_at_random, joints_within, make_arm, margin, pose_errors
 from testing.singular_poses import CLASSES, joints_near, turned
 
@@ -33,7 +33,7 @@ def test_the_careful_solver_agrees(robot, random):
     assert_solves(robot, T, solved)
     slots, _, _ = solve_slots(robot, T, q_ref)
     regular = margin(robot, slots).min(axis=1, initial=1, where=np.isfinite(slots[..., 0])) > 1e-3
-    slots = nearest_turns(robot, slots, q_ref[:, None])
+    slots = nearest_equivalent(robot, slots, q_ref[:, None])
     assert regular.sum() > 4000
     np.testing.assert_allclose(solved.q[regular], slots[regular], rtol=0, atol=1e-9)
 

@@ -14,7 +14,7 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots
-from er3a.robots.joint_limits import limit_reason, nearest_turns
+from er3a.robots.joint_limits import limit_reason, nearest_equivalent
 from testing.arms import DEG, arms, joints_at_random, joints_within, make_arm, margin, placement, pose_errors
 
 TURN = 2 * np.pi
@@ -128,21 +128,21 @@ def test_rows_outside_use_the_turn_nearest_to_the_range():
     lower, upper = [-10, -100, -100, 200, -100, -100], [10, 100, 100, 210, 100, 100]
     arm = make_arm(lower=np.array(lower) * DEG, upper=np.array(upper) * DEG)
     q = np.array([170.0, 20, 20, -178, 30, 0]) * DEG
-    near = nearest_turns(arm, q, np.zeros(6)) / DEG
+    near = nearest_equivalent(arm, q, np.zeros(6)) / DEG
     np.testing.assert_allclose(near, [170, 20, 20, 182, 30, 0], atol=1e-9)
     assert limit_reason(arm, near * DEG) == (
         "J1 at 170.0 deg is 160 deg above its limit of 10 deg; J4 at 182.0 deg is 18 deg below its limit of 200 deg"
     )
-    below = nearest_turns(arm, np.array([0, 0, 0, 215 - 360, 0, 0]) * DEG, np.zeros(6)) / DEG
+    below = nearest_equivalent(arm, np.array([0, 0, 0, 215 - 360, 0, 0]) * DEG, np.zeros(6)) / DEG
     assert below[3] == pytest.approx(215)
 
 
 @settings(max_examples=100, deadline=None)
 @given(data=st.data(), robot=arms())
-def test_nearest_turns_are_the_best_of_all_turns(data, robot):
+def test_nearest_equivalents_are_the_best_of_all_turns(data, robot):
     q, q_ref = data.draw(joints_within(robot)), data.draw(joints_within(robot))
     q = q + TURN * np.array(data.draw(st.lists(st.integers(-3, 3), min_size=6, max_size=6)))
-    near = nearest_turns(robot, q, q_ref)
+    near = nearest_equivalent(robot, q, q_ref)
     for j in range(6):
         all_turns = q[j] + TURN * np.arange(-8, 9)
         inside = all_turns[(all_turns >= robot.lower[j] - 1e-9) & (all_turns <= robot.upper[j] + 1e-9)]

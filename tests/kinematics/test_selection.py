@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from er3a.kinematics.admissible import limit_margin, nearest
 
 from er3a.files.robot_library import load_robot
-from er3a.kinematics.admissible import limit_margin, nearest
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import Solutions, inverse
 

@@ -14,6 +14,7 @@ from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import SceneFile
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.inverse import inverse
+from er3a.pipeline.messages.say import say
 from er3a.selection.rules import RULES, available_rules, joint_weights
 from er3a.selection.select import select
 from er3a.selection.sequence import select_sequence
@@ -68,19 +69,19 @@ def test_mix_stretches_each_rule_over_its_range(arm, solutions):
 
 
 def test_colliding_solutions_are_refused_with_their_pair(arm, solutions):
-    scene = SceneFile.model_validate(WALL)
+    scene = SceneFile.model_validate(WALL).scene()
     ranking = select(arm, solutions, "nearest", np.zeros(6), scene)
     clear = clearance(arm, solutions.q, scene)
     touching = solutions.within_limits & (clear.distance < 0)
     assert touching.any()
     for row in np.flatnonzero(touching):
         assert row not in ranking.order
-        assert ranking.reason[row].startswith(f"{clear.pair[row]} overlap by ")
+        assert ranking.reason[row].startswith(f"{say(clear.pair[row])} overlap by ")
 
 
 def test_nothing_left_says_why(arm, solutions):
     everywhere = WALL | {"planes": [{"name": "rock", "normal": [0, 0, 1], "offset_mm": 5000}]}
-    ranking = select(arm, solutions, "time", np.zeros(6), SceneFile.model_validate(everywhere))
+    ranking = select(arm, solutions, "time", np.zeros(6), SceneFile.model_validate(everywhere).scene())
     assert ranking.chosen is None
     assert "solutions within the limits collide: link" in ranking.chosen_reason
     far = forward(arm, POSE)

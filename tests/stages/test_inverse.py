@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from er3a.pipeline.stages.inverse.round_trips import round_trips
 from scipy.spatial.transform import Rotation
 
 from er3a.collision.clearance import clearance
@@ -23,7 +24,6 @@ from er3a.pipeline.results import read_summary, read_table
 from er3a.pipeline.stages.inverse.compute import compute
 from er3a.pipeline.stages.inverse.record import record
 from er3a.pipeline.stages.inverse.report import report
-from er3a.pipeline.stages.inverse.round_trips import round_trips
 from er3a.pipeline.study import Study, load_study
 
 ROOT = Path(__file__).parents[2]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from er3a.pipeline.stages.inverse.advice import neighbours, solvable
 from scipy.spatial.transform import Rotation
 
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
-from er3a.pipeline.stages.inverse.advice import neighbours, solvable
 
 
 def test_neighbours_find_the_way_back_into_reach(random):

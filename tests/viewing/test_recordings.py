@@ -14,7 +14,7 @@ import pytest
 from rerun.chunk import RrdReader
 from typer.testing import CliRunner
 
-from er3a.pipeline.checksums import check_seal, seal
+from er3a.pipeline.checksums import check_checksum, write_checksum
 from er3a.pipeline.cli import app
 from er3a.pipeline.study import STAGES
 from er3a.pipeline.viewing.preview import draw_preview
@@ -96,7 +96,7 @@ def vulkan() -> None:
 @pytest.mark.parametrize("recording", RECORDINGS)
 def test_the_preview_shows_the_arm_and_the_page_shows_the_preview(small_study, recording, vulkan):
     preview = (small_study.folder / "reports" / recording).with_suffix(".webp")
-    check_seal(preview)
+    check_checksum(preview)
     assert len(preview.read_bytes()) < 150_000
     assert joints_seen(preview.read_bytes()) >= 4
     assert 'src="data:image/webp;base64,' in preview.with_suffix(".html").read_text(encoding="utf-8")
@@ -115,7 +115,7 @@ def copied(small_study, tmp_path):
     (tmp_path / "er3_600").mkdir()
     path = tmp_path / "er3_600/inverse.rrd"
     path.write_bytes((small_study.folder / "reports/er3_600/inverse.rrd").read_bytes())
-    seal(path)
+    write_checksum(path)
     return tmp_path
 
 
@@ -127,4 +127,4 @@ def test_without_a_driver_the_preview_is_empty_and_one_line_says_why(copied, mon
     assert done.exit_code == 0
     assert re.fullmatch(r"note: previews of recordings were skipped: the Rerun viewer .+\n", done.stderr)
     assert (copied / "er3_600/inverse.webp").read_bytes() == b""
-    check_seal(copied / "er3_600/inverse.webp")
+    check_checksum(copied / "er3_600/inverse.webp")

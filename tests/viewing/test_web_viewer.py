@@ -15,7 +15,7 @@ from urllib.parse import parse_qs, urlsplit
 import psutil
 import pytest
 
-from er3a.pipeline.checksums import seal
+from er3a.pipeline.checksums import write_checksum
 from er3a.pipeline.cli import app
 from er3a.pipeline.viewing import web_viewer
 from testing.processes import started
@@ -37,7 +37,7 @@ def reports(tmp_path_factory):
         path = folder / f"er3_600/{stage}.rrd"
         path.parent.mkdir(exist_ok=True)
         path.write_bytes(f"recording of {stage}".encode())
-        seal(path)
+        write_checksum(path)
     return folder
 
 

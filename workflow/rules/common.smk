@@ -6,7 +6,8 @@ import time
 from er3a.pipeline.code_digest import code_digest
 from er3a.errors import Er3aError
 from er3a.pipeline.messages.language import catalogue_file
-from er3a.pipeline.study import STAGES, load_study
+from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.study import load_study
 
 DEFAULT_STUDY = "config/config.yaml"
 STARTED = time.time()
@@ -28,29 +29,6 @@ ROBOTS = STUDY.names
 # Pages depend on the words of their language, results and recordings don't.
 LANGUAGE = STUDY.report.language
 CATALOGUE = [] if LANGUAGE == "en" else os.path.relpath(catalogue_file(LANGUAGE))
-
-# The tables that each stage writes beside its summary.json.
-TABLES = {
-    "validation": ["checks", "axes", "key_poses", "section", "residuals", "corrections"],
-    "workspace": [
-        "cells",
-        "section",
-        "side_view",
-        "curve",
-        "cloud",
-        "hull_vertices",
-        "hull_triangles",
-        "proof",
-        "border",
-        "drawing",
-        "void_vertices",
-        "void_triangles",
-        "capability",
-        "places",
-    ],
-    "inverse": ["solutions", "rankings", "map"],
-    "trajectory": ["checks", "clearance", "repairs", "samples"],
-}
 
 
 wildcard_constraints:
@@ -81,7 +59,7 @@ def told(start):
 def tables(stage):
     """Paths of a stage's tables and their checksums, the robot as wildcard."""
     folder = f"results/{{robot}}/{stage}"
-    return [*(f"{folder}/{table}.parquet" for table in TABLES[stage]), f"{folder}/SHA256SUMS"]
+    return [*(f"{folder}/{table}.parquet" for table in STAGES[stage].tables), f"{folder}/SHA256SUMS"]
 
 
 def inputs(stage):
@@ -89,14 +67,19 @@ def inputs(stage):
     return lambda wildcards: [os.path.relpath(path) for path in STUDY.inputs(wildcards.robot, stage)]
 
 
-def settings(stage):
-    """Params function: the part of the study that a stage's numbers depend on, so that only its change reruns them."""
-    return lambda wildcards: STUDY.settings(wildcards.robot, stage)
+def settings(key):
+    """Params function: what of one key of the study concerns a robot, so that only its change makes jobs run again."""
+    return lambda wildcards: STUDY.settings(wildcards.robot, key)
+
+
+def computed_from(stage):
+    """Params function: the parts of the study that a stage's numbers depend on."""
+    return lambda wildcards: STUDY.computed_from(wildcards.robot, stage)
 
 
 def code_of(stage, verb):
     """Digest of the modules that a verb of a stage uses: Snakemake doesn't see edits of an imported package."""
-    return code_digest(f"er3a.pipeline.stages.{stage}.{verb}")
+    return code_digest(f"{STAGES[stage].package}.{verb}", STAGES[stage].verdict_messages)
 
 
 def results_of(stage):
@@ -104,9 +87,14 @@ def results_of(stage):
     return [f"results/{{robot}}/{stage}/summary.json", *tables(stage)]
 
 
-def of_all(path):
-    """A path with the wildcards robot and stage, for all stages of all robots."""
-    return [path.format(robot=robot, stage=stage) for robot in ROBOTS for stage in STUDY.stages(robot)]
+def of_all(path, view=None):
+    """A path with the wildcards robot and stage, for all stages of all robots, or those that have a view."""
+    return [
+        path.format(robot=robot, stage=stage)
+        for robot in ROBOTS
+        for stage in STUDY.stages(robot)
+        if view is None or view in STAGES[stage].views
+    ]
 
 
 def viewed(wildcards):
@@ -115,5 +103,8 @@ def viewed(wildcards):
 
 
 def preview(wildcards):
-    """Input function: the picture of a stage's recording. Variants, of which there may be hundreds, have none."""
-    return [] if wildcards.robot in STUDY.variants else f"reports/{wildcards.robot}/{wildcards.stage}.webp"
+    """Input function: the picture of a stage's recording. Variants, of which there may be hundreds, have
+    none."""
+    if wildcards.robot in STUDY.variants or "record" not in STAGES[wildcards.stage].views:
+        return []
+    return f"reports/{wildcards.robot}/{wildcards.stage}.webp"

@@ -15,8 +15,8 @@ from pathlib import Path
 
 from er3a.errors import Er3aError
 from er3a.pipeline.check import check_study
-from er3a.pipeline.checksums import unsound
-from er3a.pipeline.results import half_written
+from er3a.pipeline.checksums import corrupted
+from er3a.files.kept_files import half_written
 
 
 def main() -> int:
@@ -42,7 +42,7 @@ def main() -> int:
         results, reports = Path("results"), Path("reports")
         for path in (*half_written(results), *half_written(reports)):
             path.unlink()
-        for path, fault in unsound(study, results, reports):
+        for path, fault in corrupted(study, results, reports):
             print(f"{fault.file}: {fault.problem}; it is made again")
             path.unlink()
     except Er3aError as error:

@@ -6,6 +6,8 @@ import heapq
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.stages.workspace.entry import WorkspaceSettings
 from er3a.pipeline.study import Study
 
 
@@ -45,15 +47,18 @@ def jobs_of(study: Study) -> list[Job]:
     for robot in study.names:
         for stage in study.stages(robot):
             parts: tuple[int, ...] = ()
-            if stage == "workspace":
-                count, total = study.workspace.parts, study.workspace.samples
+            if STAGES[stage].sampled:
+                count, total = study.section(WorkspaceSettings).parts, study.section(WorkspaceSettings).samples
                 parts = tuple(
                     add("sample", stage, robot, total * (n + 1) // count - total * n // count) for n in range(count)
                 )
             done = add("compute", stage, robot, needs=parts)
-            recorded = add("record", stage, robot, needs=(done,))
-            shown = add("preview", stage, robot, needs=(recorded,)) if robot in study.robots else done
-            pages.append(add("report", stage, robot, needs=(shown,)))
+            shown, views = done, STAGES[stage].views
+            if "record" in views:
+                recorded = add("record", stage, robot, needs=(done,))
+                shown = add("preview", stage, robot, needs=(recorded,)) if robot in study.robots else done
+            if "report" in views:
+                pages.append(add("report", stage, robot, needs=(shown,)))
         if "teach" in study.pages(robot):
             pages.append(add("teach", "", robot))
     add("index", "", "", needs=tuple(pages))

@@ -9,6 +9,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 
 from er3a.pipeline.estimate.timings import FEW_SAMPLES
+from er3a.pipeline.stages.workspace.entry import WorkspaceSettings
 from er3a.pipeline.study import Study
 from er3a.sampling.grid import make_grid
 from er3a.sampling.random_joints import Draw
@@ -19,7 +20,7 @@ ROUNDS = 4
 
 
 @dataclass(frozen=True)
-class Speed:
+class SamplingSpeed:
     """Samples per second and core: mean, least and greatest of those measured."""
 
     mean: float
@@ -27,7 +28,7 @@ class Speed:
     greatest: float
 
 
-def sampling_speed(study: Study, robot: str) -> Speed:
+def sampling_speed(study: Study, robot: str) -> SamplingSpeed:
     """Speed of a robot's sampling at the study's settings, measured in as many processes as there are cores.
 
     It is the slope from few samples, timed at their best, to many: what a job takes before its first sample counts with
@@ -36,11 +37,11 @@ def sampling_speed(study: Study, robot: str) -> Speed:
     cores = os.cpu_count() or 1
     with ProcessPoolExecutor(cores, mp_context=multiprocessing.get_context("spawn")) as pool:
         found = [speed for speeds in pool.map(_speeds, [study] * cores, [robot] * cores) for speed in speeds]
-    return Speed(sum(found) / len(found), min(found), max(found))
+    return SamplingSpeed(sum(found) / len(found), min(found), max(found))
 
 
 def _speeds(study: Study, name: str) -> list[float]:
-    robot, settings = study.robot(name), study.workspace
+    robot, settings = study.robot(name), study.section(WorkspaceSettings)
     grid = make_grid(robot, settings.cells_across)
 
     def seconds(samples: int) -> float:

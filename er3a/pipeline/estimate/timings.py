@@ -16,7 +16,9 @@ import yaml
 
 from er3a.errors import Er3aError, ResultError
 from er3a.pipeline.estimate.jobs import Job
-from er3a.pipeline.results import read_summary
+from er3a.pipeline.results import read_provenance
+from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.stages.workspace.entry import WorkspaceSettings
 from er3a.pipeline.stages.workspace.parts import gather
 from er3a.pipeline.study import Study
 
@@ -54,7 +56,7 @@ def logged(study: Study, jobs: list[Job], results: Path, logs: Path) -> dict[Key
 
 def _same_settings(study: Study, job: Job, results: Path) -> bool:
     try:
-        config = read_summary(results / job.robot / job.stage)["provenance"]["config"]
+        config = read_provenance(results / job.robot / job.stage).config or {}
     except ResultError:
         return False
     now = study.settings(job.robot, job.stage)
@@ -85,7 +87,7 @@ def trial(study: Study, robot: str, whole: bool) -> Trial:
     """Sample a robot's workspace; ``whole``: also carry out its stages at the study's budgets, on all cores here."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
-        settings = study.workspace.model_copy(update={"samples": FEW_SAMPLES, "blocks": 1})
+        settings = study.section(WorkspaceSettings).model_copy(update={"samples": FEW_SAMPLES, "blocks": 1})
         alone = {"workspace": settings, "robots": {robot: study.robots[robot]}, "sweeps": {}}
         small = study.model_copy(update=alone)
         content = small.model_dump(mode="json", by_alias=True, exclude_none=True)
@@ -104,9 +106,11 @@ def trial(study: Study, robot: str, whole: bool) -> Trial:
             timings[verb, stage] = timed([str(word) for word in ("er3a", verb, *words, *options)])
 
         def carry_out_stage(stage: str) -> None:
-            carry_out("compute", stage, stage, robot, *([part] if stage == "workspace" else []))
-            for view in ("record", "preview", "report"):
+            carry_out("compute", stage, stage, robot, *([part] if STAGES[stage].sampled else []))
+            for view in STAGES[stage].views:
                 carry_out(view, stage, stage, robot)
+                if view == "record":
+                    carry_out("preview", stage, stage, robot)
 
         carry_out("sample", "workspace", robot)
         if whole:
@@ -140,5 +144,5 @@ def timed(command: list[str]) -> Timing:
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode:
         last = (said.strip().splitlines() or ["it said nothing"])[-1].removeprefix("error: ")
-        raise Er3aError(f"`{' '.join(command[:4])}`, timed for the plan, failed: {last}")
+        raise Er3aError(f"`{' '.join(command[:4])}`, timed for the estimate, failed: {last}")
     return Timing(seconds, usage.ru_maxrss / 1024)

@@ -2,35 +2,67 @@
 
 from __future__ import annotations
 
+import sys
+import traceback
 from importlib import import_module
-from inspect import signature
 from pathlib import Path
 from typing import Any
 
-from er3a.pipeline.messages.say import say
-from er3a.pipeline.stage_results import read_results, write_results
+from er3a.errors import Er3aError, InputError, ResultError, WriteError
+from er3a.pipeline.messages.common import say
+from er3a.pipeline.results import (
+    AbsentResults,
+    NotComputed,
+    Results,
+    Summary,
+    Verdict,
+    read_stage,
+    write_results,
+)
+from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.absent import record_absent, report_absent
+
+FOR_A_PERSON = (InputError, ResultError, WriteError, MemoryError, OSError, ImportError)
+"""What a person mends and runs again; anything else belongs to the stage and the robot, and others go on."""
 
 
-def compute(stage: str, study: Study, robot: str, folder: Path, **extra: Any) -> None:
-    """Compute a stage of a robot and write its results into ``folder``."""
-    verb = _module(stage, "compute").compute
-    if "folder" in signature(verb).parameters:
-        verb(study, robot, folder, **extra)
-        return
-    results = verb(study, robot, **extra)
-    import_module(f"er3a.pipeline.messages.{stage}_verdict")
+def compute(name: str, study: Study, robot: str, folder: Path, parts: list[Path] | None = None) -> str | None:
+    """Compute a stage of a robot and write its results into ``folder``.
+
+    Returns
+    -------
+    absent : why the stage was not computed, in words; None if it was
+    """
+    stage = STAGES[name]
+    import_module(stage.verdict_messages)
+    results = _computed(stage, study, robot, {"parts": parts} if stage.sampled else {})
     write_results(folder, study, robot, stage, results, say)
+    return say(results.summary.verdict.finding) if isinstance(results, AbsentResults) else None
 
 
-def show(verb: str, stage: str, study: Study, robot: str, folder: Path, output: Path) -> None:
+def _computed(stage: Stage, study: Study, robot: str, extra: dict[str, Any]) -> Results[Any]:
+    try:
+        if finding := stage.applies(study.robot(robot)):
+            return AbsentResults(Summary(Verdict("not_computed", finding), ()))
+        return stage.module("compute").compute(study, robot, **extra)
+    except FOR_A_PERSON:
+        raise
+    except Er3aError as error:
+        reason = str(error)
+    except Exception as error:
+        traceback.print_exc(file=sys.stderr)
+        reason = f"{type(error).__name__}: {error}"
+    return AbsentResults(Summary(Verdict("not_computed", NotComputed(reason)), ()))
+
+
+def show(verb: str, name: str, study: Study, robot: str, folder: Path, output: Path) -> None:
     """Write a view of a stage's results: ``record`` or ``report``."""
-    view = getattr(_module(stage, verb), verb)
-    if "folder" in signature(view).parameters:
-        view(study, robot, folder, output)
-        return
-    view(study, read_results(folder, _module(stage, "model").RESULTS), output)
-
-
-def _module(stage: str, name: str) -> Any:
-    return import_module(f"er3a.pipeline.stages.{stage}.{name}")
+    stage = STAGES[name]
+    import_module(stage.verdict_messages)
+    stored = read_stage(folder, stage)
+    if isinstance(stored.results, AbsentResults):
+        {"record": record_absent, "report": report_absent}[verb](study, stored, output)
+    else:
+        getattr(stage.module(verb), verb)(study, stored, output)

@@ -9,13 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from er3a.errors import NotWristPartitionedError
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.singularity import characteristic_length
-from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
+from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.messages.language import keeps_sentences, know, note_written, sentences, tr
-from er3a.pipeline.results import input_records
+from er3a.pipeline.messages.kinematics import branch_word
+from er3a.pipeline.messages.language import tr
+from er3a.pipeline.messages.say import say
+from er3a.pipeline.results import Provenance, input_records
+from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.study import Study
 from er3a.pipeline.teach.words import WORDS
 from er3a.pipeline.viewing.page import render, run_command
@@ -32,7 +34,7 @@ NEAR_SINGULAR = 1e-2  # smallest singular value below which an arm without named
 def write_teach_page(study: Study, name: str, output: Path) -> None:
     """Write the teach panel of a robot of the study to ``output``."""
     robot = study.robot(name)
-    settings = study.trajectory
+    settings = study.section(TrajectorySettings)
     near = {
         "wrist": np.radians(settings.near_wrist_deg),
         "elbow": np.radians(settings.near_elbow_deg),
@@ -51,11 +53,11 @@ def write_teach_page(study: Study, name: str, output: Path) -> None:
         panel=panel,
         modules=json.dumps({"imports": {f"er3a/{module}": _module(module) for module in MODULES}}),
         command=run_command(study, f"{name}/teach.html"),
-        provenance={
-            "inputs": input_records(study.inputs(name, "teach")),
-            "config": study.settings(name, "trajectory"),
-            "code": code_digest(__name__),
-        },
+        provenance=Provenance(
+            inputs=input_records(study.inputs(name, "teach")),
+            code=code_digest(__name__),
+            config=study.settings(name, "trajectory"),
+        ),
     )
 
 
@@ -66,13 +68,13 @@ def panel_data(robot: Robot, near: dict[str, float]) -> dict[str, Any]:
     ----------
     near : per type of singularity the distance (rad; m for shoulder) below which the panel warns
     """
-    reason = _without_closed_form(robot)
-    labels = [] if reason else [tr(label) for label in branch_labels(robot)]
+    missing = closed_form_missing(robot)
+    labels = [] if missing else [branch_word(label) for label in branch_labels(robot)]
     return {
         "name": robot.name,
         "table": {"convention": robot.convention} | {key: getattr(robot, key).tolist() for key in TABLE},
         "characteristic_length": characteristic_length(robot),
-        "no_closed_form": reason,
+        "no_closed_form": say(missing) if missing else None,
         "branch_labels": labels,
         "near": {**near, "limit": NEAR_LIMIT, "value": NEAR_SINGULAR},
         "joint_names": JOINT_NAMES,
@@ -86,18 +88,6 @@ def _translated(words: Any) -> Any:
     if isinstance(words, dict):
         return {key: _translated(word) for key, word in words.items()}
     return [_translated(word) for word in words] if isinstance(words, list) else tr(words)
-
-
-@keeps_sentences
-def _without_closed_form(robot: Robot) -> str | None:
-    """Why the closed form doesn't hold for the arm, in the page's language; None if it does."""
-    try:
-        wrist_partitioned_arm(robot)
-    except NotWristPartitionedError as error:
-        note_written(error.property_missing)
-        know(sentences())
-        return tr(error.property_missing)
-    return None
 
 
 def _module(name: str) -> str:

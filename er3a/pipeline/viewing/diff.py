@@ -6,15 +6,18 @@ import math
 import shlex
 from dataclasses import astuple, dataclass
 from pathlib import Path
-from typing import Any
 
 from er3a.errors import ResultError
+from er3a.files.kept_files import sha256
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.results import CHECKSUMS, read_summary, result_records, sha256
+from er3a.pipeline.results import CHECKSUMS, Input, Provenance, result_records
+from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.viewing import page
+from er3a.pipeline.viewing.heads import stage_head
 from er3a.pipeline.viewing.numbers import number
+from er3a.pipeline.viewing.page import Head, ShownFigure
 
 COLUMNS = (N_("robot"), N_("stage"), N_("what"), N_("old"), N_("new"), N_("difference"), N_("note"))
 
@@ -61,7 +64,8 @@ def changes(old: Path, new: Path) -> list[Change]:
             )
             continue
         folders = old / robot / stage, new / robot / stage
-        found += _in_summaries(robot, stage, *(read_summary(folder) for folder in folders))
+        if stage in STAGES:
+            found += _in_heads(robot, stage, *(stage_head(folder, STAGES[stage]) for folder in folders))
         found += _in_tables(robot, stage, *folders)
     return found
 
@@ -74,7 +78,7 @@ def write_diff(old: Path, new: Path, found: list[Change], output: Path) -> None:
         command=shlex.join(
             ["er3a", "diff", str(old), str(new), "--language", language.current(), "--output", str(output)]
         ),
-        provenance={"inputs": _records(old) + _records(new), "code": code_digest(__name__)},
+        provenance=Provenance(_records(old) + _records(new), code_digest(__name__)),
         old=old,
         new=new,
         columns=COLUMNS,
@@ -82,7 +86,7 @@ def write_diff(old: Path, new: Path, found: list[Change], output: Path) -> None:
     )
 
 
-def _records(folder: Path) -> list[dict[str, Any]]:
+def _records(folder: Path) -> tuple[Input, ...]:
     return result_records(folder, sorted({robot for robot, _ in _stages(folder)}))
 
 
@@ -93,43 +97,42 @@ def _stages(folder: Path) -> set[tuple[str, str]]:
     return found
 
 
-def _in_summaries(robot: str, stage: str, old: dict[str, Any], new: dict[str, Any]) -> list[Change]:
+def _in_heads(robot: str, stage: str, old: Head, new: Head) -> list[Change]:
     found = []
-    verdicts = [summary["verdict"] for summary in (old, new)]
-    statuses = [page.status_word(verdict["status"]) for verdict in verdicts]
-    texts = [tr(text) for text in (verdict["text"] for verdict in verdicts)]
+    statuses = [page.status_word(head.status) for head in (old, new)]
     if statuses[0] != statuses[1]:
-        found.append(Change(robot, stage, tr("verdict"), *statuses, tr("turned"), texts[1]))
-    elif texts[0] != texts[1]:
-        found.append(Change(robot, stage, tr("verdict's text"), *texts, tr("reworded")))
-    before, after = ({figure["name"]: figure for figure in summary["figures"]} for summary in (old, new))
+        found.append(Change(robot, stage, tr("verdict"), *statuses, tr("turned"), new.text))
+    elif old.text != new.text:
+        found.append(Change(robot, stage, tr("verdict's text"), old.text, new.text, tr("reworded")))
+    before, after = ({figure.name: figure for figure in head.figures} for head in (old, new))
     for name in {**before, **after}:
         a, b = before.get(name), after.get(name)
         if a != b:
-            found.append(Change(robot, stage, tr(name), _shown(a), _shown(b), *_moved(a, b)))
+            label = (b or a).label
+            found.append(Change(robot, stage, label, _shown(a), _shown(b), *_moved(a, b)))
     return found
 
 
-def _shown(figure: dict[str, Any] | None) -> str:
-    if figure is None or figure["value"] is None:
+def _shown(figure: ShownFigure | None) -> str:
+    if figure is None or figure.value is None:
         return "–"
-    interval = "" if figure["uncertainty"] is None else f" ± {number(figure['uncertainty'], 2)}"
-    return f"{number(figure['value'], 6)}{interval} {figure['unit']}".strip()
+    interval = "" if figure.uncertainty is None else f" ± {number(figure.uncertainty, 2)}"
+    return f"{number(figure.value, 6)}{interval} {figure.unit}".strip()
 
 
-def _moved(a: dict[str, Any] | None, b: dict[str, Any] | None) -> tuple[str, str]:
+def _moved(a: ShownFigure | None, b: ShownFigure | None) -> tuple[str, str]:
     """The difference in words and what it means."""
     if a is None or b is None:
         return tr("new") if a is None else tr("gone"), ""
-    if a["unit"] != b["unit"]:
+    if a.unit != b.unit:
         return tr("another unit"), tr("not to be compared")
-    if a["value"] is None or b["value"] is None:
+    if a.value is None or b.value is None:
         return "–", ""
-    difference = b["value"] - a["value"]
-    shown = f"{number(difference, 3)} {b['unit']}".strip()
-    if a["uncertainty"] is None or b["uncertainty"] is None:
+    difference = b.value - a.value
+    shown = f"{number(difference, 3)} {b.unit}".strip()
+    if a.uncertainty is None or b.uncertainty is None:
         return shown, ""
-    within = abs(difference) <= math.hypot(a["uncertainty"], b["uncertainty"])
+    within = abs(difference) <= math.hypot(a.uncertainty, b.uncertainty)
     return shown, tr("within the 95 % interval of the difference") if within else tr("more than the intervals explain")
 
 

@@ -8,20 +8,15 @@ from __future__ import annotations
 from pathlib import Path
 
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.messages.language import N_
-from er3a.pipeline.results import read_summary, result_records
-from er3a.pipeline.study import STAGES, Study
+from er3a.pipeline.results import Provenance, result_records
+from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.study import Study
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.comparison import write_compare
+from er3a.pipeline.viewing.heads import stage_head
 from er3a.pipeline.viewing.sweep_section import sweep_sections
 
 SHOWN_FIGURES = 3
-QUESTIONS = {
-    "validation": N_("Does the table match the maker's data?"),
-    "workspace": N_("What can it reach, where are the voids?"),
-    "inverse": N_("Which joint solutions reach a pose?"),
-    "trajectory": N_("Do the paths run into singularities?"),
-}
 
 
 def write_index(study: Study, results: Path, folder: Path) -> None:
@@ -30,7 +25,10 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
     The comparison offers the robots that are written in the study, not the variants that sweeps make of them.
     """
     robots = [
-        {"robot": study.robot(name), "summaries": [read_summary(results / name / stage) for stage in STAGES]}
+        {
+            "robot": study.robot(name),
+            "heads": [stage_head(results / name / stage.name, stage) for stage in STAGES.values()],
+        }
         for name in study.robots
     ]
     page.render(
@@ -38,14 +36,13 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         folder / "index.html",
         robots=robots,
         stages=STAGES,
-        questions=QUESTIONS,
         shown_figures=SHOWN_FIGURES,
         sweeps=sweep_sections(study, results),
         command=page.run_command(study, "index.html"),
-        provenance={
-            "inputs": result_records(results, study.names),
-            "seed": study.seed,
-            "code": code_digest(__name__),
-        },
+        provenance=Provenance(
+            inputs=result_records(results, study.names),
+            code=code_digest(__name__, *(stage.messages for stage in STAGES.values())),
+            seed=study.seed,
+        ),
     )
     write_compare(study, results, folder / "compare.html")

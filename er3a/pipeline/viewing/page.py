@@ -7,7 +7,6 @@ import os
 import platform
 import shlex
 import subprocess
-from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -16,11 +15,12 @@ from typing import Any
 import jinja2
 from matplotlib.figure import Figure
 
+from er3a.files.kept_files import write_atomically
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import say, word
-from er3a.pipeline.results import write_atomically
-from er3a.pipeline.stage_results import Stored
+from er3a.pipeline.results import Provenance, Stored
+from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import svg_data_uri
 from er3a.pipeline.viewing.numbers import fixed, number
@@ -34,15 +34,10 @@ VERDICT_WORDS = {
     "fail": N_("fail"),
     "conflict": N_("conflict"),
     "no_reference": N_("no reference"),
+    "not_computed": N_("not computed"),
 }
 
-PAGES = {
-    "validation": N_("validation"),
-    "workspace": N_("workspace"),
-    "inverse": N_("inverse"),
-    "trajectory": N_("trajectory"),
-    "teach": N_("teach panel"),
-}
+PAGES = {stage.name: stage.title for stage in STAGES.values()} | {"teach": N_("teach panel")}
 
 SCRIPT_WORDS = {
     "sort": N_("sort by this column"),
@@ -74,12 +69,14 @@ class Picture:
 
 @dataclass(frozen=True)
 class ShownFigure:
-    """A key figure in the page's language; ``unit`` holds what it is part of, if it is a count."""
+    """A key figure in the page's language; the unit of ``part`` of a whole is the whole, in words."""
 
+    name: str
     label: str
     value: float | int | None
     unit: str
     uncertainty: float | None
+    part: bool
 
 
 @dataclass(frozen=True)
@@ -91,7 +88,7 @@ class Head:
     status: str
     text: str
     figures: tuple[ShownFigure, ...]
-    provenance: Any
+    provenance: Provenance
 
 
 def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
@@ -104,26 +101,16 @@ def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
     verdict, stage = stored.results.summary.verdict, stored.stage
     shown = tuple(
         ShownFigure(
+            figure.name,
             word(f"{stage}.figure", figure_words, figure.name),
             figure.value,
             tr("of {total}", total=figure.of) if figure.of is not None else figure.unit,
             figure.uncertainty,
+            figure.of is not None,
         )
         for figure in stored.results.summary.figures
     )
     return Head(stored.robot, stage, verdict.status, say(verdict.finding), shown, stored.provenance)
-
-
-def _old_head(summary: dict[str, Any]) -> Head:
-    """The head from a summary that is still plain data."""
-    shown = tuple(
-        ShownFigure(tr(item["name"]), item["value"], tr(item["unit"]), item["uncertainty"])
-        for item in summary["figures"]
-    )
-    verdict = summary["verdict"]
-    return Head(
-        summary["robot"], summary["stage"], verdict["status"], tr(verdict["text"]), shown, summary["provenance"]
-    )
 
 
 def render(
@@ -133,7 +120,7 @@ def render(
     *,
     head: Head | None = None,
     command: str | None,
-    provenance: dict[str, Any] | None = None,
+    provenance: Provenance | None = None,
     **context: Any,
 ) -> None:
     """Render a template to ``output``, whole or not at all.
@@ -144,10 +131,9 @@ def render(
     summary : the stage's summary, for the template
     head : what frames a stage's page
     command : the command that makes the page again, if there is one
-    provenance : of pages without a summary, in the shape that a summary has
+    provenance : of pages that show no stage
     context : what the template needs besides
     """
-    head = _old_head(summary) if isinstance(summary, dict) else head
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader([template.parent, _HERE]),
         autoescape=True,
@@ -158,7 +144,7 @@ def render(
     )
     environment.install_gettext_translations(language.translations(), newstyle=False)
     environment.policies["ext.i18n.trimmed"] = True
-    environment.filters |= {"number": number, "fixed": fixed, "tr": tr, "sentence": sentence}
+    environment.filters |= {"number": number, "fixed": fixed, "tr": tr, "sentence": whole_sentence}
     html = environment.get_template(template.name).render(
         style=(_HERE / "style.css").read_text(encoding="utf-8"),
         script=(_HERE / "page.js").read_text(encoding="utf-8"),
@@ -178,8 +164,8 @@ def render(
     write_atomically(output, lambda file: file.write_text(html, encoding="utf-8"))
 
 
-def sentence(finding: str) -> str:
-    """A finding as a sentence of its own."""
+def whole_sentence(finding: str) -> str:
+    """A finding's text as a sentence of its own."""
     text = tr("{finding}.", finding=finding)
     return text[:1].upper() + text[1:] if language.current() == "en" else text
 
@@ -205,11 +191,6 @@ def _preview(picture: Path) -> str | None:
 def status_word(status: str) -> str:
     """A verdict's status as a page shows it."""
     return tr(VERDICT_WORDS[status])
-
-
-def rows_of(records: Sequence[dict[str, Any]], *columns: str) -> list[list[Any]]:
-    """The given columns of a list of records, for the ``table`` macro."""
-    return [[record[column] for column in columns] for record in records]
 
 
 def _versions() -> dict[str, str]:

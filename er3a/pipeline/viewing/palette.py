@@ -21,6 +21,7 @@ VERDICTS = {
     "fail": "#b42318",
     "conflict": "#6941c6",
     "no_reference": "#52606d",
+    "not_computed": "#52606d",
 }
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import rerun as rr
 
-from er3a.files.scene_file import Plane, SceneFile, load_scene
-from er3a.geometry.transforms import transform
+from er3a.collision.scene import Plane, Scene
+from er3a.files.scene_file import load_scene
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import size_of
 from er3a.pipeline.viewing.palette import MUTED, rgb
@@ -28,35 +30,26 @@ def log_scene(stream: rr.RecordingStream, study: Study, name: str, stage: str) -
 
 
 def _solids(
-    scene: SceneFile, base: np.ndarray, plane_size: float
-) -> Iterator[tuple[str, np.ndarray, rr.Boxes3D | rr.Cylinders3D | rr.Ellipsoids3D]]:
+    scene: Scene, base: Reals, plane_size: float
+) -> Iterator[tuple[str, Reals, rr.Boxes3D | rr.Cylinders3D | rr.Ellipsoids3D]]:
     """Name, place (4, 4) and shape of each solid; planes are squares of ``plane_size`` (m) nearest to the base (3,)."""
-    style = {"colors": [(*rgb(MUTED), 120)], "fill_mode": "transparentfillmajorwireframe"}
+    style: dict[str, Any] = {"colors": [(*rgb(MUTED), 120)], "fill_mode": "transparentfillmajorwireframe"}
     for box in scene.boxes:
-        shape = rr.Boxes3D(sizes=[np.array(box.size_mm) / 1000], **style)
-        yield box.name, _place(box.xyz_mm, box.rpy_deg), shape
+        yield box.name, box.T, rr.Boxes3D(sizes=[box.size], **style)
     for cylinder in scene.cylinders:
-        length, radius = cylinder.length_mm / 1000, cylinder.radius_mm / 1000
-        shape = rr.Cylinders3D(lengths=[length], radii=[radius], **style)
-        yield cylinder.name, _place(cylinder.xyz_mm, cylinder.rpy_deg), shape
+        yield cylinder.name, cylinder.T, rr.Cylinders3D(lengths=[cylinder.length], radii=[cylinder.radius], **style)
     for sphere in scene.spheres:
-        shape = rr.Ellipsoids3D(radii=[sphere.radius_mm / 1000], **style)
-        yield sphere.name, _place(sphere.xyz_mm, [0, 0, 0]), shape
+        yield sphere.name, sphere.T, rr.Ellipsoids3D(radii=[sphere.radius], **style)
     for plane in scene.planes:
-        shape = rr.Boxes3D(sizes=[[plane_size, plane_size, _PLANE_THICKNESS]], **style)
-        yield plane.name, _below(plane, base), shape
+        slab = rr.Boxes3D(sizes=[[plane_size, plane_size, _PLANE_THICKNESS]], **style)
+        yield plane.name, _below(plane, base), slab
 
 
-def _place(xyz_mm: list[float], rpy_deg: list[float]) -> np.ndarray:
-    return transform(np.array(xyz_mm) / 1000, np.radians(rpy_deg))
-
-
-def _below(plane: Plane, base: np.ndarray) -> np.ndarray:
+def _below(plane: Plane, base: Reals) -> Reals:
     """Where a slab lies whose upper side is in the plane, its middle next to the base."""
-    normal = plane.unit_normal()
-    offset = plane.offset_mm / 1000 / np.linalg.norm(plane.normal)
+    normal = plane.normal
     x = np.linalg.svd(normal[None])[2][1]
     T = np.eye(4)
     T[:3, :3] = np.stack([x, np.cross(normal, x), normal], axis=1)
-    T[:3, 3] = base - (normal @ base - offset + _PLANE_THICKNESS / 2) * normal
+    T[:3, 3] = base - (normal @ base - plane.offset + _PLANE_THICKNESS / 2) * normal
     return T

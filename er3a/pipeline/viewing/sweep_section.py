@@ -11,7 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.results import read_summary
+from er3a.pipeline.results import Stored, read_stage
+from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceSummary
 from er3a.pipeline.study import Study
 from er3a.pipeline.sweeps import ENTRIES, entry_label
 from er3a.pipeline.viewing.figures import new_figure
@@ -19,26 +21,31 @@ from er3a.pipeline.viewing.numbers import number
 from er3a.pipeline.viewing.page import PAGES, Picture, status_word
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, VERDICTS
 
-MARKERS = {"pass": "o", "caution": "^", "fail": "X", "conflict": "D", "no_reference": "s"}
+MARKERS = {"pass": "o", "caution": "^", "fail": "X", "conflict": "D", "no_reference": "s", "not_computed": "x"}
 SHORT_TABLE = 12
 
 
 @dataclass(frozen=True)
 class Point:
-    """A variant in a sweep: its value and its stages' summaries, by stage."""
+    """A variant in a sweep: its value and its stages' results, by stage."""
 
     name: str
     value: float
-    summaries: dict[str, dict[str, Any]]
+    stages: dict[str, Stored[Any]]
 
     @property
-    def enclosed(self) -> list[dict[str, Any]]:
+    def workspace(self) -> WorkspaceSummary:
+        """What the workspace stage found."""
+        return self.stages["workspace"].results.summary
+
+    @property
+    def enclosed(self) -> list[VoidSummary]:
         """The enclosed voids that the workspace stage lists."""
-        return [void for void in self.summaries["workspace"]["voids"] if void["kind"] == "enclosed"]
+        return self.workspace.enclosed_voids
 
     def litres(self, bound: str) -> float:
         """The ``lower`` or ``upper`` bound of the enclosed voids' volume together, L."""
-        return 1000 * sum(void["volume_m3"][bound] for void in self.enclosed)
+        return 1000 * sum(getattr(void.volume_m3, bound) for void in self.enclosed)
 
 
 def sweep_sections(study: Study, results: Path) -> list[dict[str, Any]]:
@@ -50,7 +57,7 @@ def _section(study: Study, name: str, results: Path) -> dict[str, Any]:
     sweep = study.sweeps[name]
     variants = [variant for variant in study.variants.values() if variant.sweep == name]
     points = [
-        Point(v.name, v.value, {stage: read_summary(results / v.name / stage) for stage in sweep.stages})
+        Point(v.name, v.value, {stage: read_stage(results / v.name / stage, STAGES[stage]) for stage in sweep.stages})
         for v in variants
     ]
     content, entry = study.table(sweep.robot), study.entry(sweep.robot)
@@ -74,6 +81,11 @@ def _section(study: Study, name: str, results: Path) -> dict[str, Any]:
     }
 
 
+def _computed(points: list[Point]) -> list[Point]:
+    """The variants whose workspace was computed."""
+    return [point for point in points if point.stages["workspace"].status != "not_computed"]
+
+
 def _figure(points: list[Point], label: str, own: float | None, stages: list[str]) -> Figure:
     drawers = {_draw_volume: 2.4, _draw_litres: 1.5, _draw_numbers: 1.3} if "workspace" in stages else {}
     heights = [*drawers.values(), 0.35 + 0.25 * len(stages)]
@@ -81,7 +93,7 @@ def _figure(points: list[Point], label: str, own: float | None, stages: list[str
         len(heights), 1, height=1.0 + sum(heights), sharex=True, squeeze=False, height_ratios=heights
     )
     for drawer, panel in zip(drawers, axes[:, 0]):
-        drawer(panel, points)
+        drawer(panel, _computed(points))
     _draw_verdicts(axes[-1, 0], points, stages)
     for panel in axes[:, 0]:
         if own is not None:
@@ -91,12 +103,12 @@ def _figure(points: list[Point], label: str, own: float | None, stages: list[str
 
 
 def _draw_volume(axes: Axes, points: list[Point]) -> None:
-    volumes = [point.summaries["workspace"]["volume_m3"] for point in _in_order(points)]
+    volumes = [point.workspace.volume_m3 for point in _in_order(points)]
     x = [point.value for point in _in_order(points)]
-    low, high = ([volume[bound] for volume in volumes] for bound in ("lower", "upper"))
+    low, high = ([getattr(volume, bound) for volume in volumes] for bound in ("lower", "upper"))
     axes.fill_between(x, low, high, color=MODEL, alpha=0.25, linewidth=0, label=tr("proven bounds"))
     axes.vlines(x, low, high, color=MODEL, linewidth=1)
-    axes.plot(x, [volume["estimate"] for volume in volumes], ".-", color=MODEL, linewidth=0.8, label=tr("estimate"))
+    axes.plot(x, [volume.estimate for volume in volumes], ".-", color=MODEL, linewidth=0.8, label=tr("estimate"))
     axes.set_ylabel(tr("reached volume (m³)"))
     axes.legend(loc="best")
 
@@ -113,7 +125,7 @@ def _draw_litres(axes: Axes, points: list[Point]) -> None:
 def _draw_numbers(axes: Axes, points: list[Point]) -> None:
     x = [point.value for point in points]
     numbers = [len(point.enclosed) for point in points]
-    pockets = [len(point.summaries["workspace"]["voids"]) - count for point, count in zip(points, numbers)]
+    pockets = [len(point.workspace.voids) - count for point, count in zip(points, numbers)]
     axes.plot(x, pockets, "o", color=MUTED, markerfacecolor="none", label=tr("open pockets"))
     axes.plot(x, numbers, ".", color=HIGHLIGHT, label=tr("enclosed"))
     axes.yaxis.get_major_locator().set_params(integer=True)
@@ -127,7 +139,7 @@ def _draw_verdicts(axes: Axes, points: list[Point], stages: list[str]) -> None:
     seen = set()
     for point in points:
         for row, stage in enumerate(rows):
-            status = point.summaries[stage]["verdict"]["status"]
+            status = point.stages[stage].status
             label = None if status in seen else status_word(status)
             seen.add(status)
             axes.plot(point.value, row, MARKERS[status], color=VERDICTS[status], linestyle="none", label=label)
@@ -139,15 +151,15 @@ def _draw_verdicts(axes: Axes, points: list[Point], stages: list[str]) -> None:
 
 def _caption(points: list[Point], own: float | None, unit: str, workspace: bool) -> str:
     said = []
-    if workspace:
-        ordered = _in_order(points)
+    if workspace and _computed(points):
+        ordered = _in_order(_computed(points))
         text = N_(
             "Proven reached volume: {low_1} to {high_1} m³ at {value_1}, {low_2} to {high_2} m³ at {value_2} {unit}."
         )
         parts = {"unit": unit}
         for end, point in enumerate((ordered[0], ordered[-1]), start=1):
-            volume = point.summaries["workspace"]["volume_m3"]
-            parts |= {f"low_{end}": number(volume["lower"]), f"high_{end}": number(volume["upper"])}
+            volume = point.workspace.volume_m3
+            parts |= {f"low_{end}": number(volume.lower), f"high_{end}": number(volume.upper)}
             parts[f"value_{end}"] = _plain(point.value)
         said.append(tr(text, **parts))
     if own is not None:
@@ -182,19 +194,21 @@ def _table(points: list[Point], what: str, unit: str, stages: list[str]) -> tupl
 
 
 def _workspace_cells(point: Point) -> list[str]:
-    summary = point.summaries["workspace"]
+    if not _computed([point]):
+        return ["–"] * 6
+    summary = point.workspace
     return [
-        number(summary["volume_m3"]["lower"]),
-        number(summary["volume_m3"]["upper"]),
+        number(summary.volume_m3.lower),
+        number(summary.volume_m3.upper),
         str(len(point.enclosed)),
         number(point.litres("lower"), 3),
-        str(len(summary["voids"]) - len(point.enclosed)),
-        number(1000 * summary["reach_m"]["furthest_from_axis"]),
+        str(len(summary.voids) - len(point.enclosed)),
+        number(1000 * summary.reach_m.furthest_from_axis),
     ]
 
 
 def _verdict(point: Point, stage: str) -> Markup:
-    status = point.summaries[stage]["verdict"]["status"]
+    status = point.stages[stage].status
     return Markup('<a href="{}/{}.html"><span class="badge {}">{}</span></a>').format(
         point.name, stage, status, status_word(status)
     )

@@ -2,114 +2,75 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any
+from collections.abc import Iterator, Mapping
 
 import numpy as np
-import pandas as pd
 
-from er3a.files.scene_file import SceneFile
-from er3a.kinematics.inverse import Solutions
-from er3a.pipeline.messages.language import N_
+from er3a.collision.scene import Scene
+from er3a.kinematics.targets import Target
+from er3a.numerics.arrays import Flags, Reals
+from er3a.pipeline.stages.inverse.model import RankingRows, Sequence, Stop
+from er3a.pipeline.stages.inverse.solve_target import SolvedTarget, collides
 from er3a.robots.robot import Robot
-from er3a.selection.rules import RULES, available_rules
-from er3a.selection.sequence import select_sequence
+from er3a.selection.rules import RULES, RuleName, available_rules, mixed_cost
+from er3a.selection.sequence import MoveRule, select_sequence
 
-MIX = N_("mix")
-RANKING_COLUMNS = [
-    "target",
-    "branch",
-    "label",
-    "rule",  # a name in selection/rules.py, or "mix"
-    "measure",  # in the rule's unit; for the mix its cost, 0 the best
-    "unit",
-    "place",  # 1 is the best; 0 for rows that collide
-]
+MIX = "mix"
+SAME_COST = 1e-9
 
 
 def rankings(
-    robot: Robot,
-    name: str,
-    solutions: Solutions,
-    first: np.ndarray,
-    collides: np.ndarray,
-    q_ref: np.ndarray,
-    scene: SceneFile | None,
-    mix: dict[str, float],
-) -> pd.DataFrame:
-    """Place and measure of each branch's best row within the limits, by each rule.
-
-    Parameters
-    ----------
-    first, collides : (n,) bool, per row of the solutions
-    """
-    rows = np.flatnonzero(first & solutions.within_limits)
-    few = replace(
-        solutions,
-        q=solutions.q[rows],
-        within_limits=solutions.within_limits[rows],
-        branch=solutions.branch[rows],
-        turn=solutions.turn[rows],
-        reason=tuple(solutions.reason[row] for row in rows),
-        label=tuple(solutions.label[row] for row in rows),
+    robot: Robot, target: Target, solved: SolvedTarget, scene: Scene | None, mix: Mapping[RuleName, float]
+) -> RankingRows:
+    """Place and measure of each branch's best row within the limits, by each rule."""
+    rows = np.flatnonzero(solved.rows.first_of_branch & solved.rows.within_limits)
+    few = solved.solutions.take(rows)
+    free = ~collides(solved.rows)[rows]
+    names = np.full(len(rows), target.name, dtype=object)
+    return RankingRows.stacked(
+        RankingRows(names, few.branch, few.label, np.full(len(rows), rule, dtype=object), measure, _places(cost, free))
+        for rule, measure, cost in _measured(robot, few.q, target.q_ref, scene, mix, free)
     )
-    rules = available_rules(robot)
-    measured = {rule: RULES[rule].measure(robot, few.q, q_ref, scene) for rule in rules}
-    costs = {rule: (RULES[rule].cost(measured[rule]), measured[rule], RULES[rule].unit) for rule in rules}
-    free = ~collides[rows]
-    usable = {rule: weight for rule, weight in mix.items() if rule in rules}
+
+
+def _measured(
+    robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None, mix: Mapping[RuleName, float], free: Flags
+) -> Iterator[tuple[str, Reals, Reals]]:
+    """Name, measure and cost (n,) of each rule, and of the mix of those that the robot has data for."""
+    costs = {}
+    for rule in available_rules(robot):
+        measure = RULES[rule].measure(robot, q, q_ref, scene)
+        costs[rule] = RULES[rule].cost(measure)
+        yield rule, measure, costs[rule]
+    usable = {rule: weight for rule, weight in mix.items() if rule in costs}
     if usable and free.any():
-        cost = _mixed(usable, costs, free)
-        costs[MIX] = (cost, cost, "1")
-    table = [
-        [
-            name,
-            few.branch[row],
-            few.label[row],
-            rule,
-            float(values[row]),
-            unit,
-            int((cost[free] < cost[row] - 1e-9).sum()) + 1 if free[row] else 0,
-        ]
-        for rule, (cost, values, unit) in costs.items()
-        for row in range(len(rows))
-    ]
-    return pd.DataFrame(table, columns=RANKING_COLUMNS)
+        cost = mixed_cost(usable, costs, free)
+        yield MIX, cost, cost
 
 
-def _mixed(weights: dict[str, float], costs: dict[str, tuple], free: np.ndarray) -> np.ndarray:
-    """Costs stretched to 0..1 over the rows that don't collide, weighted and added."""
-    total = 0.0
-    for rule, weight in weights.items():
-        cost = costs[rule][0]
-        total = total + weight * (cost - cost[free].min()) / (np.ptp(cost[free]) or 1.0)
-    return total
+def _places(cost: Reals, free: Flags) -> list[int]:
+    return [int((cost[free] < own - SAME_COST).sum()) + 1 if is_free else 0 for own, is_free in zip(cost, free)]
 
 
 def sequence(
-    robot: Robot,
-    names: list[str],
-    poses: list[Solutions],
-    q_ref: np.ndarray,
-    reached: list[bool],
-    scene: SceneFile | None,
-) -> dict[str, Any] | None:
+    robot: Robot, targets: tuple[Target, ...], solved: list[SolvedTarget], scene: Scene | None
+) -> Sequence | None:
     """Visiting all targets that are reached, in order: the best rows as a whole, against the greedy ones."""
-    usable = np.flatnonzero(reached)
-    if len(usable) < 2:
+    reached = [one for one in solved if one.result.chosen_deg is not None]
+    if len(reached) < 2:
         return None
-    rule = "time" if "time" in available_rules(robot) else "nearest"
-    chosen = [poses[k] for k in usable]
-    found = select_sequence(robot, chosen, q_ref, rule, scene)
-    return {
-        "rule": rule,
-        "unit": RULES[rule].unit,
-        "title": RULES[rule].title,
-        "cost": found.cost,
-        "greedy_cost": found.greedy_cost,
-        "targets": [names[k] for k in usable],
-        "labels": [solutions.label[row] for solutions, row in zip(chosen, found.rows)],
-        "q_deg": np.degrees(found.q).tolist(),
-        "greedy_labels": [solutions.label[row] for solutions, row in zip(chosen, found.greedy_rows)],
-        "differs": bool((found.rows != found.greedy_rows).any()),
-    }
+    rule: MoveRule = "time" if "time" in available_rules(robot) else "nearest"
+    found = select_sequence(robot, [one.solutions for one in reached], targets[0].q_ref, rule, scene)
+    stops = tuple(
+        Stop(
+            target=one.result.name,
+            branch=int(one.solutions.branch[row]),
+            label=one.solutions.label[row],
+            q_deg=tuple(np.degrees(q).tolist()),
+            greedy_branch=int(one.solutions.branch[greedy]),
+            greedy_label=one.solutions.label[greedy],
+        )
+        for one, row, q, greedy in zip(reached, found.rows, found.q, found.greedy_rows)
+    )
+    differs = bool((found.rows != found.greedy_rows).any())
+    return Sequence(rule, found.cost, found.greedy_cost, stops, differs)

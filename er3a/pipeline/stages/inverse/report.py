@@ -2,89 +2,134 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import pandas as pd
+import numpy as np
 
-from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.results import read_summary, read_table
-from er3a.pipeline.stages.inverse.columns import JOINT_COLUMNS
-from er3a.pipeline.stages.inverse.solution_figures import histogram, overlay, ways
+from er3a.kinematics.solutions import Iteration
+from er3a.pipeline.messages.inverse import FIGURES, FREE_AT, NEAREST_RULE, limits_in_short
+from er3a.pipeline.messages.kinematics import branch_word, singularity_word
+from er3a.pipeline.messages.language import tr
+from er3a.pipeline.messages.say import joined, listed, say, word
+from er3a.pipeline.messages.selection import RULE_NAMES, RULE_TITLES
+from er3a.pipeline.results import Stored
+from er3a.pipeline.stages.inverse.model import (
+    SINGULAR_PARTS,
+    InverseResults,
+    InverseSummary,
+    RankingRows,
+    SelfMotion,
+    SolutionRows,
+    TargetResult,
+)
+from er3a.pipeline.stages.inverse.model import Sequence as Visits
+from er3a.pipeline.stages.inverse.solution_figures import histogram, overlay, solutions_per_position
 from er3a.pipeline.stages.inverse.symptoms import symptoms
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.page import fixed, number, render, run_command
+from er3a.pipeline.viewing.page import Picture, fixed, head_of, number, render, run_command
+from er3a.robots.joint_limits import LimitsExceeded
+from er3a.robots.robot import Robot
+from er3a.selection.rules import RULES
 
 NO_BREAK_SPACE = "\u00a0"
-FREE_AT = {
-    "wrist": N_("axes 4 and 6 in line"),
-    "shoulder": N_("wrist centre on axis 1"),
-    "elbow": N_("arm folded onto itself"),
-}
 
 
-def report(study: Study, name: str, folder: Path, output: Path) -> None:
-    """Render the page of a robot of the study from its results."""
-    robot = study.robot(name)
-    summary = read_summary(folder)
-    solutions = read_table(folder / "solutions.parquet")
-    ranked, ways_table = read_table(folder / "rankings.parquet"), read_table(folder / "map.parquet")
-    sections = []
-    for target in summary["targets"]:
-        rows = solutions[solutions["target"] == target["name"]]
-        branches = rows[rows["first_of_branch"].astype(bool)].sort_values("branch")
-        sections.append(
-            {
-                "target": target,
-                "picture": overlay(robot, target, branches),
-                "position": _listed(target["xyz_mm"]),
-                "orientation": _listed(target["rpy_deg"]),
-                "reference": _listed(target["q_ref_deg"]),
-                "rows": _branch_rows(rows, branches),
-                "rules": _rule_rows(ranked[ranked["target"] == target["name"]]),
-                "rule_columns": [tr("Branch"), *(_rule_title(rule, summary) for rule in _rules_of(ranked))],
-                "families": [_family_words(family) for family in target["families"]],
-                "residual_mm": rows["position_residual_mm"].max() if len(rows) else None,
-                "residual_deg": rows["orientation_residual_deg"].max() if len(rows) else None,
-            }
-        )
-    trips = summary["round_trips"]
+@dataclass(frozen=True)
+class Section:
+    """What the page says about a target, in words; the worst residuals are None where nothing solves it."""
+
+    target: TargetResult
+    picture: Picture
+    position: str
+    orientation: str
+    reference: str
+    reason: str
+    advice: list[str]
+    method: str
+    families: list[str]
+    unsolved: str
+    rows: list[list[str]]
+    rules: list[list[str]]
+    residual_mm: float | None
+    residual_deg: float | None
+
+
+def report(study: Study, stored: Stored[InverseResults], output: Path) -> None:
+    """Write the page from the stage's results."""
+    name, results, summary = stored.robot, stored.results, stored.results.summary
+    robot, trips = study.robot(name), summary.round_trips
+    rules = list(dict.fromkeys(results.rankings.rule))
     render(
         Path(__file__).with_name("report.html.j2"),
         output,
         summary,
+        head=head_of(stored, FIGURES),
         command=run_command(study, f"{name}/inverse.html"),
         robot=robot,
         robot_pages=study.pages(name),
-        overview=[_overview_row(target) for target in summary["targets"]],
-        sections=sections,
+        nearest_rule=tr(NEAREST_RULE),
+        overview=[_overview_row(target) for target in summary.targets],
+        sections=[_section(robot, target, results) for target in summary.targets],
+        rule_columns=[tr("Branch"), *map(_rule_heading, rules)],
         trips=trips,
         histogram=histogram(trips) if trips else None,
-        ways=ways(ways_table) if len(ways_table) else None,
+        map=solutions_per_position(results.map) if len(results.map) else None,
         symptoms=symptoms(summary),
-        mix=tr(", ").join(f"{tr(rule)} {weight:g}" for rule, weight in summary["mix"].items()),
-        stops=_stops(summary["sequence"]),
+        rules=[(_rule(rule), word("rule.title", RULE_TITLES, rule)) for rule in RULES],
+        mix=tr(", ").join(f"{_rule(rule)} {weight:g}" for rule, weight in summary.mix.items()),
+        stops=_stops(summary.sequence),
+        **_costs(summary),
     )
 
 
-def _rules_of(ranked: pd.DataFrame) -> list[str]:
-    return list(dict.fromkeys(ranked["rule"]))
+def _section(robot: Robot, target: TargetResult, results: InverseResults) -> Section:
+    rows = results.solutions.take(results.solutions.target == target.name)
+    branches = best_of_branches(rows)
+    return Section(
+        target=target,
+        picture=overlay(robot, target, branches),
+        position=_listed(target.xyz_mm),
+        orientation=_listed(target.rpy_deg),
+        reference=_listed(target.q_ref_deg),
+        reason=say(target.reason),
+        advice=listed(target.advice),
+        method=say(target.method) if isinstance(target.method, Iteration) else "",
+        families=[_self_motion(family) for family in target.families],
+        unsolved=joined(listed(target.unsolved)),
+        rows=_branch_rows(rows, branches),
+        rules=_rule_rows(results.rankings.take(results.rankings.target == target.name)),
+        residual_mm=rows.position_residual_mm.max() if len(rows) else None,
+        residual_deg=rows.orientation_residual_deg.max() if len(rows) else None,
+    )
 
 
-def _rule_title(rule: str, summary: dict[str, Any]) -> str:
-    unit = summary["rules"][rule]["unit"] if rule in summary["rules"] else "1"
-    return f"{tr(rule)}{'' if unit == '1' else f' ({unit})'}>"
+def best_of_branches(rows: SolutionRows) -> SolutionRows:
+    """The best row of each branch of a target, by number of the branch."""
+    best = rows.take(rows.first_of_branch)
+    return best.take(np.argsort(best.branch, kind="stable"))
 
 
-def _rule_rows(ranked: pd.DataFrame) -> list[list[str]]:
+def _rule(rule: str) -> str:
+    return word("rule", RULE_NAMES, rule)
+
+
+def _rule_heading(rule: str) -> str:
+    unit = {name: own.unit for name, own in RULES.items()}.get(rule, "1")
+    return f"{_rule(rule)}{'' if unit == '1' else f' ({unit})'}>"
+
+
+def _rule_rows(ranked: RankingRows) -> list[list[str]]:
     """One row for each branch: the measure of each rule, with its place."""
     rows, collides = [], tr("collides")
-    for _, group in ranked.groupby("branch", sort=True):
+    for branch in np.unique(ranked.branch):
+        own = ranked.take(ranked.branch == branch)
         cells = [
-            f"{number(_no_noise(row['measure']), 3)}{NO_BREAK_SPACE}({row['place'] or collides})"
-            for _, row in group.iterrows()
+            f"{number(_no_noise(measure), 3)}{NO_BREAK_SPACE}({place or collides})"
+            for measure, place in zip(own.measure, own.place)
         ]
-        rows.append([_on_one_line(group["label"].iloc[0]), *cells])
+        rows.append([_on_one_line(own.label[0], int(branch)), *cells])
     return rows
 
 
@@ -93,19 +138,19 @@ def _no_noise(measure: float) -> float:
     return 0.0 if abs(measure) < 1e-9 else float(measure)
 
 
-def _family_words(family: dict[str, Any]) -> str:
+def _self_motion(family: SelfMotion) -> str:
     moving = [
         f"J{j + 1} {'+' if rate > 0 else ''}{fixed(rate, 2)}"
-        for j, rate in enumerate(family["direction"])
+        for j, rate in enumerate(family.direction)
         if abs(rate) > 1e-9
     ]
-    low, high = family["range_deg"]
+    low, high = family.range_deg
     parts = {
-        "where": FREE_AT[family["kind"]],
-        "joints": _listed(family["q0_deg"]),
+        "where": word("self_motion", FREE_AT, family.kind),
+        "joints": _listed(family.q0_deg),
         "rates": ", ".join(moving),
     }
-    if not family["within_limits"]:
+    if not family.within_limits:
         return tr(
             "{where}: from ({joints}) deg, nearest to the reference, joints turn with the tool at rest in the ratio "
             "{rates}, but every member leaves the limits",
@@ -120,70 +165,81 @@ def _family_words(family: dict[str, Any]) -> str:
     )
 
 
-def _stops(sequence: dict[str, Any] | None) -> list[list[str]]:
-    if sequence is None:
-        return []
-    return [
-        [target, _short(label), _short(greedy), _listed(q)]
-        for target, label, greedy, q in zip(
-            sequence["targets"], sequence["labels"], sequence["greedy_labels"], sequence["q_deg"]
-        )
-    ]
+def _costs(summary: InverseSummary) -> dict[str, str]:
+    """Unit and title of the rule that moves in the sequence are ranked by."""
+    if summary.sequence is None:
+        return {}
+    rule = summary.sequence.rule
+    return {"unit": RULES[rule].unit, "rule_title": word("rule.title", RULE_TITLES, rule)}
 
 
-def _overview_row(target: dict[str, Any]) -> list[str]:
-    joints = target["chosen_deg"]
-    return [
-        target["name"],
-        _listed(target["xyz_mm"]),
-        tr("{within} of {all}", within=target["within_limits"], all=target["solutions"]),
-        tr("none") if joints is None else _listed(joints),
-        target["reason"] if target["solutions"] else target["short_reason"],
-    ]
-
-
-def _branch_rows(rows: pd.DataFrame, branches: pd.DataFrame) -> list[list[str]]:
-    turns = rows[rows["within_limits"].astype(bool)].groupby("branch").size()
-    ranks = branches.loc[branches["rank"] > 0, "rank"]
+def _stops(sequence: Visits | None) -> list[list[str]]:
     return [
         [
-            _on_one_line(branch["label"]),
-            *(fixed(branch[column], 1) for column in JOINT_COLUMNS),
-            fixed(branch["limit_margin_deg"], 1),
-            fixed(branch["manipulability"], 3),
-            fixed(branch["greatest_move_deg"], 1),
-            _outcome(branch, place=int((ranks <= branch["rank"]).sum()), turns=int(turns.get(branch["branch"], 0))),
+            stop.target,
+            _short(stop.label, stop.branch),
+            _short(stop.greedy_label, stop.greedy_branch),
+            _listed(stop.q_deg),
         ]
-        for _, branch in branches.iterrows()
+        for stop in (sequence.stops if sequence else ())
     ]
 
 
-def _outcome(branch: pd.Series, place: int, turns: int) -> str:
-    if not branch["within_limits"]:
-        return branch["beyond"]
-    if branch["collision"]:
-        return branch["collision"]
-    taken = tr("chosen") if branch["rank"] == 1 else tr("place {place}", place=place)
+def _overview_row(target: TargetResult) -> list[str]:
+    unreached = target.obstacle if not target.solutions else None
+    return [
+        target.name,
+        _listed(target.xyz_mm),
+        tr("{within} of {all}", within=target.within_limits, all=target.solutions),
+        tr("none") if target.chosen_deg is None else _listed(target.chosen_deg),
+        say(unreached or target.reason),
+    ]
+
+
+def _branch_rows(rows: SolutionRows, branches: SolutionRows) -> list[list[str]]:
+    inside = rows.branch[rows.within_limits]
+    ranks = branches.rank[branches.rank > 0]
+    cells = []
+    for k in range(len(branches)):
+        place, turns = int((ranks <= branches.rank[k]).sum()), int((inside == branches.branch[k]).sum())
+        cells.append(
+            [
+                _on_one_line(branches.label[k], int(branches.branch[k])),
+                *(fixed(angle, 1) for angle in branches.q_deg[k]),
+                fixed(branches.limit_margin_deg[k], 1),
+                fixed(branches.manipulability[k], 3),
+                fixed(branches.greatest_move_deg[k], 1),
+                _outcome(branches, k, place, turns),
+            ]
+        )
+    return cells
+
+
+def _outcome(branches: SolutionRows, k: int, place: int, turns: int) -> str:
+    refusal = branches.refusal[k]
+    if refusal is not None:
+        return limits_in_short(refusal) if isinstance(refusal, LimitsExceeded) else say(refusal)
+    taken = tr("chosen") if branches.rank[k] == 1 else tr("place {place}", place=place)
     if turns > 1:
         taken = tr("{taken}, {turns} turns", taken=taken, turns=turns)
-    if not branch["singular"]:
+    kinds = [kind for kind, on in zip(SINGULAR_PARTS, branches.singular[k]) if on]
+    if not kinds:
         return taken
-    if branch["singular"] == "rank":
+    if kinds == ["rank"]:
         return tr("{taken}; rank singularity", taken=taken)
-    kinds = tr(", ").join(tr(kind) for kind in branch["singular"].split())
-    return tr("{taken}; {kinds} singularity", taken=taken, kinds=kinds)
+    return tr("{taken}; {kinds} singularity", taken=taken, kinds=tr(", ").join(map(singularity_word, kinds)))
 
 
-def _short(label: str) -> str:
+def _short(label: str, branch: int) -> str:
     """A branch in words that need little room."""
-    return tr(label).replace("elbow ", "")
+    return branch_word(label, branch).replace("elbow ", "")
 
 
-def _on_one_line(label: str) -> str:
-    return _short(label).replace(" ", NO_BREAK_SPACE)
+def _on_one_line(label: str, branch: int) -> str:
+    return _short(label, branch).replace(" ", NO_BREAK_SPACE)
 
 
-def _listed(values: list[float]) -> str:
+def _listed(values: Iterable[float]) -> str:
     """Numbers with one decimal where they need it, kept on one line."""
     texts = (fixed(value, 1).removesuffix(".0") for value in values)
     return f",{NO_BREAK_SPACE}".join(texts)

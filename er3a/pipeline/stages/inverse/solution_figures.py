@@ -6,13 +6,15 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 
-from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.stages.inverse.columns import JOINT_COLUMNS
+from er3a.pipeline.messages.inverse import ORIENTATION_TITLES, ORIENTATIONS, SHAPES
+from er3a.pipeline.messages.kinematics import branch_word
+from er3a.pipeline.messages.language import tr
+from er3a.pipeline.messages.say import word
+from er3a.pipeline.stages.inverse.model import MapRows, RoundTrips, SolutionRows, TargetResult
 from er3a.pipeline.stages.inverse.shape_colours import colour_of, shape_of
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.page import Picture
@@ -20,21 +22,15 @@ from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, JOINT_NAMES, MOD
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot
 
-SHAPES = (N_("front, elbow up"), N_("front, elbow down"), N_("back, elbow up"), N_("back, elbow down"))
-ORIENTATION_TITLES = {
-    "tool straight down": N_("Tool straight down"),
-    "tool level, outward": N_("Tool level, outward"),
-}
 TITLE = {"loc": "left", "fontsize": 11, "fontweight": "bold"}
 
 
-def overlay(robot: Robot, target: dict[str, Any], branches: pd.DataFrame) -> Picture:
+def overlay(robot: Robot, target: TargetResult, branches: SolutionRows) -> Picture:
     """All arm shapes that solve a target, from the side and from above, with the joint angles of each branch.
 
     Parameters
     ----------
-    target : the summary's entry
-    branches : one row per branch (the rows of the results with ``first_of_branch``)
+    branches : the best row of each branch
     """
     panels = 3 if len(branches) else 2
     ratios = [1, 1, 1.25][:panels]
@@ -43,15 +39,16 @@ def overlay(robot: Robot, target: dict[str, Any], branches: pd.DataFrame) -> Pic
     if panels == 3:
         handles += _draw_joints(axes[2], robot, target, branches)
     figure.legend(handles=handles, loc="outside lower center", ncols=5 if panels == 3 else 2, frameon=False, fontsize=9)
-    name = target["name"]
-    alt = tr("{count} branches for target {own_name}, drawn over one another", count=len(branches), own_name=name)
+    alt = tr(
+        "{count} branches for target {own_name}, drawn over one another", count=len(branches), own_name=target.name
+    )
     return Picture(figure, alt, _conclude(target))
 
 
-def histogram(trips: dict[str, Any]) -> Picture:
+def histogram(trips: RoundTrips) -> Picture:
     """Share of random poses by the number of their solutions within the limits."""
-    counts = np.array(trips["counts_within_limits"])
-    share = 100 * counts / trips["poses"]
+    counts = np.array(trips.counts_within_limits)
+    share = 100 * counts / trips.poses
     figure, axes = new_figure(width=7, height=3.2)
     bars = axes.bar(np.arange(len(counts)), share, color=MODEL, width=0.7)
     axes.bar_label(bars, labels=[f"{value:.0f} %" if value else "" for value in share], padding=2)
@@ -75,21 +72,21 @@ def histogram(trips: dict[str, Any]) -> Picture:
     )
 
 
-def ways(table: pd.DataFrame) -> Picture:
+def solutions_per_position(table: MapRows) -> Picture:
     """Maps of the number of branches within the limits, one for each orientation of the tool."""
-    orientations = list(dict.fromkeys(table["orientation"]))
+    orientations = list(dict.fromkeys(table.orientation))
     figure, axes = new_figure(1, len(orientations), width=10.5, height=4.8, squeeze=False)
     colours = ListedColormap(["#ffffff", *matplotlib.colormaps["viridis_r"](np.linspace(0.08, 0.95, 8))])
     shares = []
-    for panel, words in zip(axes[0], orientations):
-        rows = table[table["orientation"] == words]
-        x, z = np.unique(rows["x_mm"]), np.unique(rows["z_mm"])
-        counts = rows["within_limits"].to_numpy().reshape(len(x), len(z)).T
-        reached = rows["solutions"].to_numpy().reshape(len(x), len(z)).T > 0
+    for panel, orientation in zip(axes[0], orientations):
+        rows = table.take(table.orientation == orientation)
+        x, z = np.unique(rows.x_mm), np.unique(rows.z_mm)
+        counts = rows.within_limits.reshape(len(x), len(z)).T
+        reached = rows.solutions.reshape(len(x), len(z)).T > 0
         image = panel.pcolormesh(x, z, counts, cmap=colours, vmin=-0.5, vmax=8.5, rasterized=True)
         panel.contour(x, z, reached, levels=[0.5], colors=INK, linewidths=1.0)
         panel.plot([0], [0], marker="P", markersize=9, color=HIGHLIGHT, markeredgecolor="white", linestyle="none")
-        panel.set_title(tr(ORIENTATION_TITLES[words]), **TITLE)
+        panel.set_title(word("orientation.title", ORIENTATION_TITLES, orientation), **TITLE)
         panel.set_aspect("equal")
         panel.set_xlabel("x (mm)")
         panel.set_ylabel("z (mm)")
@@ -100,7 +97,9 @@ def ways(table: pd.DataFrame) -> Picture:
             panel.set_ylim(min(z[heights[0]] - edge, -edge), z[heights[-1]] + edge)
         panel.grid(visible=False)
         share = 100 * (counts > 0).sum() / max(reached.sum(), 1)
-        shares.append(tr("{orientation}: {share:.0f} %", orientation=words, share=share))
+        shares.append(
+            tr("{orientation}: {share:.0f} %", orientation=word("orientation", ORIENTATIONS, orientation), share=share)
+        )
     listed = tr("; ").join(shares)
     bar = figure.colorbar(image, ax=axes[0].tolist(), ticks=range(9), shrink=0.85)
     bar.set_label(tr("branches within the limits"))
@@ -115,10 +114,10 @@ def ways(table: pd.DataFrame) -> Picture:
     )
 
 
-def _conclude(target: dict[str, Any]) -> str:
-    if target["chosen_deg"] is not None:
-        counts = {"within": target["within_limits"], "all": target["solutions"], "collide": target["collide"]}
-        if not target["collide"]:
+def _conclude(target: TargetResult) -> str:
+    if target.chosen_deg is not None:
+        counts = {"within": target.within_limits, "all": target.solutions, "collide": target.collide}
+        if not target.collide:
             return tr(
                 "The bold arm is the one taken; {within} of {all} branches stay within the limits. A no-flip and a "
                 "flip branch look the same from here: they differ in J4, J5 and J6.",
@@ -129,20 +128,20 @@ def _conclude(target: dict[str, Any]) -> str:
             "collide. A no-flip and a flip branch look the same from here: they differ in J4, J5 and J6.",
             **counts,
         )
-    if target["collide"]:
+    if target.collide:
         return tr("Every arm that reaches the target (dashed) has a joint beyond its limit or runs into something.")
-    if target["solutions"]:
+    if target.solutions:
         return tr("Every arm that reaches the target (dashed) has a joint beyond its limit: a cross on the right.")
     return tr("The arm, drawn where it comes from, can't stretch to the target.")
 
 
-def _draw_arms(side: Axes, top: Axes, robot: Robot, target: dict[str, Any], branches: pd.DataFrame) -> list[Line2D]:
+def _draw_arms(side: Axes, top: Axes, robot: Robot, target: TargetResult, branches: SolutionRows) -> list[Line2D]:
     from_world = np.linalg.inv(robot.base)
 
     def in_base(points_m: np.ndarray) -> np.ndarray:
         return (np.asarray(points_m) @ from_world[:3, :3].T + from_world[:3, 3]) * 1000
 
-    goal = in_base(np.array(target["xyz_mm"]) / 1000)
+    goal = in_base(np.array(target.xyz_mm) / 1000)
     level = goal[:2] / np.hypot(*goal[:2]) if np.hypot(*goal[:2]) > 1 else np.array([1.0, 0.0])
 
     def draw(points: np.ndarray, **style) -> None:
@@ -150,35 +149,34 @@ def _draw_arms(side: Axes, top: Axes, robot: Robot, target: dict[str, Any], bran
         top.plot(points[:, 0], points[:, 1], solid_joinstyle="round", marker="o", **style)
 
     handles = []
-    shape = [shape_of(branch, label) for branch, label in zip(branches["branch"], branches["label"])]
-    shapes = branches.groupby(np.array(shape), sort=True) if len(branches) else ()
-    for shape, rows in shapes:
-        allowed, chosen = bool((rows["rank"] > 0).any()), bool((rows["rank"] == 1).any())
-        style = {"color": colour_of(shape), "linewidth": 2, "markersize": 4, "zorder": 4}
+    shapes = np.array([shape_of(int(branch), label) for branch, label in zip(branches.branch, branches.label)])
+    for shape in np.unique(shapes):
+        rows = branches.take(shapes == shape)
+        allowed, chosen = bool((rows.rank > 0).any()), bool((rows.rank == 1).any())
+        style: dict[str, Any] = {"color": colour_of(int(shape)), "linewidth": 2, "markersize": 4, "zorder": 4}
         if chosen:
             style |= {"linewidth": 5, "markersize": 7, "zorder": 6}
         if not allowed:
             style = {"color": MUTED, "linewidth": 1.3, "linestyle": "--", "markersize": 3, "zorder": 3}
-        draw(in_base(skeleton(robot, np.radians(rows[JOINT_COLUMNS].to_numpy(float)[0]))), **style)
+        draw(in_base(skeleton(robot, np.radians(rows.q_deg[0]))), **style)
         if allowed:
-            found = rows["label"].iloc[0]
-            label = next((shape for shape in SHAPES if found.startswith(shape)), found)
-            label = tr("{shape} (chosen)", shape=label) if chosen else tr(label)
+            label = _shape_word(rows.label[0], int(rows.branch[0]))
+            label = tr("{shape} (chosen)", shape=label) if chosen else label
             handles.append(Line2D([], [], label=label, **style))
     if not len(branches):
         style = {"color": MUTED, "linewidth": 3, "markersize": 5}
-        draw(in_base(skeleton(robot, np.radians(target["q_ref_deg"]))), **style)
+        draw(in_base(skeleton(robot, np.radians(target.q_ref_deg))), **style)
         handles.append(Line2D([], [], label=tr("arm at the reference"), **style))
-    elif not (branches["rank"] > 0).all():
+    elif not (branches.rank > 0).all():
         style = {"color": MUTED, "linewidth": 1.3, "linestyle": "--", "marker": "o", "markersize": 3}
-        words = tr("outside the limits or colliding") if target["collide"] else tr("outside the limits")
+        words = tr("outside the limits or colliding") if target.collide else tr("outside the limits")
         handles.append(Line2D([], [], label=words, **style))
     cross = {"marker": "P", "markersize": 11, "color": HIGHLIGHT, "markeredgecolor": "white", "linestyle": "none"}
     handles.append(_mark(side, top, goal, level, tr("target"), **cross))
-    near = target["neighbours"]
-    if near and near["shifted_to_mm"]:
+    near = target.neighbours
+    if near and near.shifted_to_mm:
         ring = {"marker": "o", "markersize": 9, "color": "none", "markeredgecolor": HIGHLIGHT, "linestyle": "none"}
-        point = in_base(np.array(near["shifted_to_mm"]) / 1000)
+        point = in_base(np.array(near.shifted_to_mm) / 1000)
         handles.append(_mark(side, top, point, level, tr("nearest position with a solution"), **ring))
     side.set_title(tr("Side, in the target's direction"), **TITLE)
     top.set_title(tr("From above"), **TITLE)
@@ -193,26 +191,26 @@ def _mark(side: Axes, top: Axes, point: np.ndarray, level: np.ndarray, label: st
     return Line2D([], [], label=label, **style)
 
 
-def _draw_joints(axes: Axes, robot: Robot, target: dict[str, Any], branches: pd.DataFrame) -> list[Line2D]:
+def _draw_joints(axes: Axes, robot: Robot, target: TargetResult, branches: SolutionRows) -> list[Line2D]:
     lower, upper = np.degrees(robot.lower), np.degrees(robot.upper)
-    angles = branches[JOINT_COLUMNS].to_numpy(float)
+    angles = branches.q_deg
     for joint in range(6):
         axes.barh(joint, upper[joint] - lower[joint], 0.86, left=lower[joint], color=GRID, zorder=1)
-        reference = target["q_ref_deg"][joint]
+        reference = target.q_ref_deg[joint]
         axes.plot([reference, reference], [joint - 0.43, joint + 0.43], color=INK, linewidth=0.9, zorder=2)
-        for place, (_, row) in enumerate(branches.iterrows()):
+        for place, rank in enumerate(branches.rank):
             y = joint + 0.8 * ((place + 0.5) / max(len(branches), 1) - 0.5)
             x = angles[place, joint]
             outside = not lower[joint] - 1e-6 <= x <= upper[joint] + 1e-6
-            colour = colour_of(shape_of(row["branch"], row["label"])) if row["rank"] else MUTED
+            colour = colour_of(shape_of(int(branches.branch[place]), branches.label[place])) if rank else MUTED
             style = {"marker": "o", "markersize": 4.5, "color": colour}
-            if row["rank"] == 1:
+            if rank == 1:
                 style |= {"marker": "D", "markersize": 8}
             elif outside:
                 style = {"marker": "x", "markersize": 5.5, "color": HIGHLIGHT, "markeredgewidth": 1.6}
-            elif not row["rank"]:
+            elif not rank:
                 style |= {"markerfacecolor": "none"}
-            axes.plot([x], [y], linestyle="none", zorder=5 if row["rank"] == 1 else 4, **style)
+            axes.plot([x], [y], linestyle="none", zorder=5 if rank == 1 else 4, **style)
     axes.set_yticks(range(6), JOINT_NAMES)
     axes.invert_yaxis()
     axes.grid(visible=False, axis="y")
@@ -222,7 +220,12 @@ def _draw_joints(axes: Axes, robot: Robot, target: dict[str, Any], branches: pd.
     axes.set_xlabel(tr("joint angle (deg); grey: allowed range, line: reference"))
     axes.set_title(tr("Joint angles, one mark a branch"), **TITLE)
     handles = []
-    if not branches["within_limits"].all():
+    if not branches.within_limits.all():
         style = {"marker": "x", "color": HIGHLIGHT, "markeredgewidth": 1.6, "linestyle": "none"}
         handles.append(Line2D([], [], label=tr("joint beyond its limit"), **style))
     return handles
+
+
+def _shape_word(label: str, branch: int) -> str:
+    """An arm shape: a branch whatever its wrist."""
+    return word("shape", SHAPES, label) if label in SHAPES else branch_word(label, branch)

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+from er3a.kinematics.solutions import Iteration
 from er3a.pipeline.messages.language import tr
+from er3a.pipeline.stages.inverse.model import InverseSummary, Sequence
+from er3a.selection.rules import RULES
 
 
-def symptoms(summary: dict[str, Any]) -> list[list[str]]:
+def symptoms(summary: InverseSummary) -> list[list[str]]:
     """Rows of symptom, usual cause, what was tried here and what helps, from the summary's targets alone."""
-    targets = summary["targets"]
-    unreachable = [target["name"] for target in targets if not target["solutions"]]
-    limited = [target["name"] for target in targets if target["solutions"] and not target["within_limits"]]
-    free = [target["name"] for target in targets if target["families"]]
-    iterated = [target["name"] for target in targets if target["method"] != "closed form"]
+    targets = summary.targets
+    unreachable = [target.name for target in targets if not target.solutions]
+    limited = [target.name for target in targets if target.solutions and not target.within_limits]
+    free = [target.name for target in targets if target.families]
+    iterated = [target.name for target in targets if isinstance(target.method, Iteration)]
     return [
         [
             tr("No solution anywhere"),
@@ -53,7 +54,7 @@ def symptoms(summary: dict[str, Any]) -> list[list[str]]:
         [
             tr("Sudden wrist flip between two targets"),
             tr("The solver takes the nearest branch target by target"),
-            _greed(summary["sequence"]),
+            _greed(summary.sequence),
             tr("Choose the branches of a sequence as a whole"),
         ],
     ]
@@ -63,13 +64,12 @@ def _names(names: list[str]) -> str:
     return ", ".join(names) if names else tr("no target")
 
 
-def _greed(sequence: dict[str, Any] | None) -> str:
+def _greed(sequence: Sequence | None) -> str:
     if sequence is None:
         return tr("Fewer than two targets can be reached, so there is no sequence")
-    cost, greedy_cost, unit = sequence["cost"], sequence["greedy_cost"], sequence["unit"]
     return tr(
         "All targets in order: {cost:.3g} {unit} as a whole, greedily {more:.3g} {unit} more",
-        cost=cost,
-        more=greedy_cost - cost,
-        unit=unit,
+        cost=sequence.cost,
+        more=sequence.greedy_cost - sequence.cost,
+        unit=RULES[sequence.rule].unit,
     )

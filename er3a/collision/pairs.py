@@ -1,0 +1,53 @@
+"""Pairs of bodies that can meet, by number and name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+BASE = 0  # number of the link that stands still
+
+
+@dataclass(frozen=True)
+class LinkPair:
+    """Two links: 0 for the base, 1..6 for the link that joint 1..6 turns."""
+
+    first: int
+    second: int
+    code: Literal["link_pair"] = "link_pair"
+
+    @property
+    def label(self) -> str:
+        """For columns of text."""
+        return f"{link_label(self.first)}/{link_label(self.second)}"
+
+
+@dataclass(frozen=True)
+class LinkAndSolid:
+    """A link and a solid of the scene, by its name."""
+
+    link: int
+    solid: str
+    code: Literal["link_and_solid"] = "link_and_solid"
+
+    @property
+    def label(self) -> str:
+        """For columns of text."""
+        return f"{link_label(self.link)}/{self.solid}"
+
+
+Pair = LinkPair | LinkAndSolid
+
+
+@dataclass(frozen=True)
+class PairOverlaps:
+    """Two bodies overlap, by a depth."""
+
+    pair: Pair
+    depth_mm: float
+    code: Literal["pair_overlaps"] = "pair_overlaps"
+
+
+def link_label(number: int) -> str:
+    """A link's name in columns of text."""
+    return "base" if number == BASE else f"link_{number}"

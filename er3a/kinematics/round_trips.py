@@ -1,0 +1,131 @@
+"""Random joint angles to poses and back: does the inverse find the joints that made the pose?
+
+``batch_round_trips`` asks the solver of many poses for all solutions, ``slot_round_trips`` the closed form itself, and
+leaves out of the joint errors what is near a singularity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from er3a.geometry.angles import wrap_to_pi
+from er3a.geometry.transforms import rotation_angle
+from er3a.kinematics.batch import inverse_batch
+from er3a.kinematics.closed_form import SLOTS
+from er3a.kinematics.forward import forward
+from er3a.kinematics.singularity import determinant_factors
+from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.numerics.arrays import Integers
+from er3a.robots.robot import Robot
+
+SAME_JOINTS_RAD = 1e-6
+NEAR_WRIST_DEG = NEAR_ELBOW_DEG = 0.5
+NEAR_SHOULDER_MM = 1.0
+BLOCK = 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class BatchRoundTrips:
+    """All solutions of random poses, put back through forward kinematics.
+
+    Attributes
+    ----------
+    poses : number of random joint vectors
+    solutions : number of solutions, all poses together
+    worst_position : m; worst_orientation : rad, of any solution put back through forward kinematics
+    own_found : number of poses whose own joint angles are among the solutions (to 1e-6 rad, turns apart)
+    worst_own : rad, greatest joint difference between any pose's own angles and the nearest solution
+    counts_within_limits : (9,) int, number of poses with 0 .. 8 solutions within the limits
+    """
+
+    poses: int
+    solutions: int
+    worst_position: float
+    worst_orientation: float
+    own_found: int
+    worst_own: float
+    counts_within_limits: Integers
+
+
+@dataclass(frozen=True)
+class SlotRoundTrips:
+    """Worst errors of random poses taken back to joints.
+
+    Attributes
+    ----------
+    poses : how many; near_singular : how many of them nearer to a singularity than the margins
+    joint_error_deg : worst angle between the joints and the nearest solution, over the other poses
+    position_error_mm, orientation_error_deg : worst over all solutions of all poses
+    unsolved : poses without any solution
+    """
+
+    poses: int
+    near_singular: int
+    joint_error_deg: float
+    position_error_mm: float
+    orientation_error_deg: float
+    unsolved: int
+
+
+def batch_round_trips(robot: Robot, random: np.random.Generator, poses: int) -> BatchRoundTrips:
+    """Send that many joint vectors, uniform within the limits, to poses and back."""
+    own = random.uniform(robot.lower, robot.upper, size=(poses, 6))
+    T = forward(robot, own)
+    solved = inverse_batch(robot, T)
+    q, valid = solved.q, solved.solved
+    back = forward(robot, q[valid])
+    asked = np.repeat(T, valid.sum(axis=1), axis=0)
+    difference = np.abs(wrap_to_pi(q - own[:, None])).max(axis=2)
+    difference = np.where(valid, difference, np.inf).min(axis=1)
+    return BatchRoundTrips(
+        poses=poses,
+        solutions=int(valid.sum()),
+        worst_position=float(np.linalg.norm(back[:, :3, 3] - asked[:, :3, 3], axis=1).max(initial=0.0)),
+        worst_orientation=float(rotation_angle(back[:, :3, :3], asked[:, :3, :3]).max(initial=0.0)),
+        own_found=int((difference < SAME_JOINTS_RAD).sum()),
+        worst_own=float(difference.max()),
+        counts_within_limits=np.bincount(solved.within_limits.sum(axis=1), minlength=SLOTS + 1),
+    )
+
+
+def slot_round_trips(robot: Robot, poses: int, seed: int) -> SlotRoundTrips:
+    """Draw joints uniformly within the limits, take them to a pose, solve it, and compare.
+
+    Parameters
+    ----------
+    robot : an arm with a closed-form inverse
+    """
+    random = np.random.default_rng(seed)
+    blocks = [_block(robot, random, min(BLOCK, poses - done)) for done in range(0, poses, BLOCK)]
+    table = np.array(blocks)
+    worst = table.max(axis=0)
+    return SlotRoundTrips(poses, int(table[:, 0].sum()), *map(float, worst[1:4]), int(table[:, 4].sum()))
+
+
+def _block(robot: Robot, random: np.random.Generator, count: int) -> tuple[float, ...]:
+    q = robot.lower + random.random((count, 6)) * (robot.upper - robot.lower)
+    T = forward(robot, q)
+    found = solve_slots(robot, T, np.zeros_like(q))[0]
+    solved = np.isfinite(found).all(axis=2)
+    gap = np.abs(wrap_to_pi(found - q[:, None])).max(axis=2)
+    nearest = np.where(solved, gap, np.inf).min(axis=1)
+
+    factors = determinant_factors(robot, q)
+    near = np.abs(factors.wrist) < np.radians(NEAR_WRIST_DEG)
+    near |= np.abs(factors.elbow) < np.radians(NEAR_ELBOW_DEG)
+    near |= np.abs(factors.shoulder) * 1000 < NEAR_SHOULDER_MM
+    judged = nearest[~near & solved.any(axis=1)]
+
+    rows, slots = np.nonzero(solved)
+    back = forward(robot, found[rows, slots])
+    position = np.linalg.norm(back[:, :3, 3] - T[rows, :3, 3], axis=1)
+    orientation = rotation_angle(back[:, :3, :3], T[rows, :3, :3])
+    return (
+        float(near.sum()),
+        float(np.degrees(judged.max(initial=0.0))),
+        float(position.max(initial=0.0) * 1000),
+        float(np.degrees(orientation.max(initial=0.0))),
+        float((~solved.any(axis=1)).sum()),
+    )

@@ -1,0 +1,212 @@
+"""What the inverse gives: joint solutions with their verdict, and why there are none where there are none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from er3a.geometry.angles import TURN, wrap_to_pi
+from er3a.kinematics.configuration import BranchLabel, branch_labels
+from er3a.kinematics.families import Family
+from er3a.kinematics.wrist_partitioned import ClosedFormMissing
+from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.robots.joint_limits import LimitsExceeded, limits_exceeded
+from er3a.robots.robot import Robot
+
+Label = BranchLabel | Literal["found_arm"]
+
+
+@dataclass(frozen=True)
+class ClosedForm:
+    """All solutions, by the closed form."""
+
+    code: Literal["closed_form"] = "closed_form"
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """Solutions by iteration from random starts, which may miss some; ``lacking`` where the arm has no closed form."""
+
+    starts: int
+    lacking: ClosedFormMissing | None = None
+    code: Literal["iteration"] = "iteration"
+
+
+Method = ClosedForm | Iteration
+
+
+@dataclass(frozen=True)
+class WristTiltsTooLittle:
+    """The wrist would have to tilt further than it can."""
+
+    missing_deg: float
+    code: Literal["wrist_tilts_too_little"] = "wrist_tilts_too_little"
+
+
+@dataclass(frozen=True)
+class WristTooNearAxis1:
+    """The wrist centre would be nearer to axis 1 than the arm's sideways offset lets it come."""
+
+    gap_mm: float
+    code: Literal["wrist_too_near_axis_1"] = "wrist_too_near_axis_1"
+
+
+@dataclass(frozen=True)
+class WristTooFar:
+    """The wrist centre would be farther from axis 2 than the stretched arm reaches."""
+
+    gap_mm: float
+    reach_mm: float
+    code: Literal["wrist_too_far"] = "wrist_too_far"
+
+
+@dataclass(frozen=True)
+class WristTooNear:
+    """The wrist centre would be nearer to axis 2 than the folded arm reaches."""
+
+    gap_mm: float
+    least_mm: float
+    code: Literal["wrist_too_near"] = "wrist_too_near"
+
+
+@dataclass(frozen=True)
+class NearestMiss:
+    """By how much the nearest arm that a search found misses the pose."""
+
+    position_mm: float
+    rotation_deg: float
+    code: Literal["nearest_miss"] = "nearest_miss"
+
+
+@dataclass(frozen=True)
+class BadGuess:
+    """The iteration failed from its start; from others, or without limits, an arm within the limits was found."""
+
+    miss: NearestMiss
+    solved_by: Literal["other_starts", "without_limits"]
+    code: Literal["bad_guess"] = "bad_guess"
+
+
+@dataclass(frozen=True)
+class LimitBound:
+    """Arms were found only outside the limits."""
+
+    miss: NearestMiss
+    exceeded: LimitsExceeded
+    code: Literal["limit_bound"] = "limit_bound"
+
+
+@dataclass(frozen=True)
+class SingularEnd:
+    """The iteration creeps towards a singular arm, where it ends."""
+
+    miss: NearestMiss
+    code: Literal["singular"] = "singular"
+
+
+@dataclass(frozen=True)
+class Unreachable:
+    """No start leads to the pose."""
+
+    miss: NearestMiss
+    code: Literal["unreachable"] = "unreachable"
+
+
+OutOfReach = WristTiltsTooLittle | WristTooNearAxis1 | WristTooFar | WristTooNear
+NotFound = BadGuess | LimitBound | SingularEnd | Unreachable
+
+
+@dataclass(frozen=True)
+class SideUnsolved:
+    """Why no branch exists with the wrist in front of axis 1, or reached over the head (back)."""
+
+    side: Literal["front", "back"]
+    why: OutOfReach
+    code: Literal["side_unsolved"] = "side_unsolved"
+
+
+@dataclass(frozen=True)
+class PoseUnsolved:
+    """Why iteration found no arm for a pose, which is numbered as the poses lie in memory."""
+
+    pose: int
+    why: NotFound
+    code: Literal["pose_unsolved"] = "pose_unsolved"
+
+
+Unsolved = SideUnsolved | PoseUnsolved
+
+
+@dataclass(frozen=True, eq=False)
+class Solutions:
+    """Joint solutions of one pose (``inverse``) or of many (``inverse_batch``, ``solve``).
+
+    What is told of each solution has the leading axes of ``q``: (n,) from ``inverse``; (N, 8) from ``inverse_batch``,
+    one slot for each branch; those of the poses from ``solve``, one arm for each.
+
+    Attributes
+    ----------
+    q : (..., 6), rad, the manufacturer's angles; NaN in empty slots. ``inverse`` gives each branch once per turn that
+        the limits allow, or once if it leaves them; ``inverse_batch`` of the turns within the limits the nearest to the
+        reference, else the nearest to the limits; ``solve`` the nearest arm found where it solves nothing
+    solved : (...,) bool, whether this is a solution
+    within_limits : (...,) bool
+    branch : (...,) int, slot ``4 * shoulder + 2 * elbow + wrist``; of ``inverse`` for arms without a closed form the
+        number of the arm found, of ``solve`` -1
+    method : closed form or iteration
+    unsolved : ``inverse``: per shoulder side without solution, why (both sides: the pose can't be reached);
+        ``solve``: per pose without solution, why
+    families : of ``inverse``: continua of solutions, where a joint can turn with the tool at rest
+    turn_range : (..., 6, 2) int8, least and greatest number of whole turns that can be added to each joint within its
+        limits (least above greatest: none); None unless ``inverse_batch`` was asked for it
+    position_error, rotation_error : (...,), m and rad, of the degrees of freedom that ``solve`` was asked for
+    starts : (...,) int, starts that ``solve`` used; 0 where none succeeded
+    """
+
+    robot: Robot
+    q: Reals
+    solved: Flags
+    within_limits: Flags
+    branch: Integers
+    method: Method = ClosedForm()
+    unsolved: tuple[Unsolved, ...] = ()
+    families: tuple[Family, ...] = ()
+    turn_range: NDArray[np.int8] | None = None
+    position_error: Reals | None = None
+    rotation_error: Reals | None = None
+    starts: Integers | None = None
+
+    @cached_property
+    def turn(self) -> Integers:
+        """(..., 6), full turns added to the angle in (-pi, pi]; 0 in empty slots."""
+        return np.nan_to_num(np.round((self.q - wrap_to_pi(self.q)) / TURN)).astype(int)
+
+    @cached_property
+    def label(self) -> NDArray[np.object_]:
+        """(...,), each branch's code (``configuration.BranchLabel``), or ``found_arm`` without a closed form."""
+        if isinstance(self.method, Iteration):
+            return np.full(self.branch.shape, "found_arm", dtype=object)
+        named: NDArray[np.object_] = np.array(branch_labels(self.robot), dtype=object)[self.branch]
+        return named
+
+    @cached_property
+    def reason(self) -> NDArray[np.object_]:
+        """(...,), which limits each solution leaves (``LimitsExceeded``); None for those within, and in empty slots."""
+        found = np.full(self.q.shape[:-1], None, dtype=object)
+        for at in np.argwhere(self.solved & ~self.within_limits):
+            found[tuple(at)] = limits_exceeded(self.robot, self.q[tuple(at)])
+        return found
+
+    def take(self, rows: NDArray[Any]) -> Solutions:
+        """Some of the solutions of one pose."""
+        return replace(
+            self,
+            q=self.q[rows],
+            solved=self.solved[rows],
+            within_limits=self.within_limits[rows],
+            branch=self.branch[rows],
+        )

@@ -1,0 +1,118 @@
+"""The names of the inverse stage's key figures, and the sentences of its page."""
+
+from __future__ import annotations
+
+from er3a.pipeline.messages.inverse_verdict import say
+from er3a.pipeline.messages.language import N_
+from er3a.pipeline.messages.say import joined, sentence
+from er3a.pipeline.stages.inverse.findings import (
+    AtSingularity,
+    MoveObstacle,
+    NearLimit,
+    ShiftingDoesNotHelp,
+    ShiftTool,
+    TurningDoesNotHelp,
+    TurnTool,
+)
+from er3a.robots.joint_limits import LimitExceeded, LimitsExceeded
+
+FIGURES = {
+    "targets_solved": N_("targets solved"),
+    "solutions_of_random_pose": N_("solutions of a random reachable pose, mean"),
+    "random_poses_solved_back": N_("random poses solved back to their joints"),
+    "worst_position_residual": N_("worst position residual"),
+    "worst_orientation_residual": N_("worst orientation residual"),
+}
+NEAREST_RULE = N_(
+    "Of the solutions within the limits, take the one whose greatest joint move from the reference is least: where all "
+    "joints start and stop together, that joint decides how long the move takes. Between equals (to 1e-9 rad) the "
+    "least root of the summed squares of all joint moves decides, then the lower branch number."
+)
+FREE_AT = {
+    "wrist": N_("axes 4 and 6 in line"),
+    "shoulder": N_("wrist centre on axis 1"),
+    "elbow": N_("arm folded onto itself"),
+}
+AT = {
+    "wrist": N_(
+        "Wrist singularity: axes 4 and 6 lie in one line, so J4 and J6 can be traded against one another; the "
+        "pair nearest to the reference is taken. Leave this pose by a joint move, not along a straight line."
+    ),
+    "elbow": N_("Elbow singularity: the arm is stretched or folded; it can't move further along itself."),
+    "shoulder": N_("Shoulder singularity: the wrist centre is on axis 1, so J1 is free while the wrist follows."),
+}
+SHAPES = {
+    "front_elbow_up_no_flip": N_("front, elbow up"),
+    "front_elbow_up_flip": N_("front, elbow up"),
+    "front_elbow_down_no_flip": N_("front, elbow down"),
+    "front_elbow_down_flip": N_("front, elbow down"),
+    "back_elbow_up_no_flip": N_("back, elbow up"),
+    "back_elbow_up_flip": N_("back, elbow up"),
+    "back_elbow_down_no_flip": N_("back, elbow down"),
+    "back_elbow_down_flip": N_("back, elbow down"),
+}
+ORIENTATIONS = {"tool_down": N_("tool straight down"), "tool_level": N_("tool level, outward")}
+ORIENTATION_TITLES = {"tool_down": N_("Tool straight down"), "tool_level": N_("Tool level, outward")}
+
+
+def limits_in_short(found: LimitsExceeded) -> str:
+    """Which limits are left and by how much, for a cell of a table."""
+    return joined(map(_in_short, found.joints), ", ")
+
+
+def _in_short(found: LimitExceeded) -> str:
+    if found.side == "above":
+        return sentence(found.code, "J{joint} {excess:.1f} above", joint=found.joint, excess=found.excess_deg)
+    return sentence(found.code, "J{joint} {excess:.1f} below", joint=found.joint, excess=found.excess_deg)
+
+
+@say.register
+def _(found: TurnTool) -> str:
+    return sentence(
+        found.code,
+        "Turn the tool: {share:.2g} % of random orientations at this position have a solution within the limits, the "
+        "nearest one found {angle:.1f} deg away.",
+        share=100 * found.orientation_ratio,
+        angle=found.least_turn_deg,
+    )
+
+
+@say.register
+def _(found: TurningDoesNotHelp) -> str:
+    return sentence(found.code, "Turning the tool does not help: no orientation tried at this position has a solution.")
+
+
+@say.register
+def _(found: ShiftTool) -> str:
+    x, y, z = found.to_mm
+    return sentence(
+        found.code,
+        "Move the part or the base: with the tool's orientation kept, a shift of {shift:.0f} mm to ({x:.0f}, {y:.0f}, "
+        "{z:.0f}) mm is enough.",
+        shift=found.shift_mm,
+        x=x,
+        y=y,
+        z=z,
+    )
+
+
+@say.register
+def _(found: ShiftingDoesNotHelp) -> str:
+    return sentence(
+        found.code, "Moving the part alone does not help: no position tried has a solution with this orientation."
+    )
+
+
+@say.register
+def _(found: MoveObstacle) -> str:
+    return sentence(found.code, "Move the part, the obstacle or the base: limits leave this pose reachable.")
+
+
+@say.register
+def _(found: AtSingularity) -> str:
+    return sentence(found.code, AT[found.kind])
+
+
+@say.register
+def _(found: NearLimit) -> str:
+    return sentence(found.code, "Little margin: one joint is {margin:.2g} deg from its limit.", margin=found.margin_deg)

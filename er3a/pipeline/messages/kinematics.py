@@ -1,0 +1,182 @@
+"""Sentences about joint solutions, joint limits and arms without a closed form."""
+
+from __future__ import annotations
+
+from er3a.kinematics.solutions import (
+    BadGuess,
+    Iteration,
+    Label,
+    LimitBound,
+    NearestMiss,
+    PoseUnsolved,
+    SideUnsolved,
+    SingularEnd,
+    Unreachable,
+    WristTiltsTooLittle,
+    WristTooFar,
+    WristTooNear,
+    WristTooNearAxis1,
+)
+from er3a.kinematics.wrist_partitioned import ElbowAxesNotParallel, NeighboursParallel, NoArmLength, NoWristCentre
+from er3a.pipeline.messages.language import N_
+from er3a.pipeline.messages.say import joined, listed, say, sentence, word
+from er3a.robots.joint_limits import LimitExceeded, LimitsExceeded
+
+BRANCHES = {
+    "front_elbow_up_no_flip": N_("front, elbow up, no flip"),
+    "front_elbow_up_flip": N_("front, elbow up, flip"),
+    "front_elbow_down_no_flip": N_("front, elbow down, no flip"),
+    "front_elbow_down_flip": N_("front, elbow down, flip"),
+    "back_elbow_up_no_flip": N_("back, elbow up, no flip"),
+    "back_elbow_up_flip": N_("back, elbow up, flip"),
+    "back_elbow_down_no_flip": N_("back, elbow down, no flip"),
+    "back_elbow_down_flip": N_("back, elbow down, flip"),
+}
+SIDES = {"front": N_("front"), "back": N_("back")}
+SINGULARITIES = {"wrist": N_("wrist"), "elbow": N_("elbow"), "shoulder": N_("shoulder")}
+LIMIT_SIDES = {
+    "above": N_("J{joint} at {at:.1f} deg is {by:.3g} deg above its limit of {bound:g} deg"),
+    "below": N_("J{joint} at {at:.1f} deg is {by:.3g} deg below its limit of {bound:g} deg"),
+}
+GUESSES = {
+    "other_starts": N_("bad guess: from the start given {miss}; other starts solve it, so allow restarts"),
+    "without_limits": N_("bad guess: {miss}; without limits an arm within them was found, start there"),
+}
+
+
+def branch_word(label: Label | str, branch: int = 0) -> str:
+    """A branch by its code, or the number of an arm that iteration found."""
+    if label == "found_arm":
+        return sentence("found_arm", "arm {number}", number=branch + 1)
+    return word("branch", BRANCHES, label)
+
+
+def singularity_word(kind: str) -> str:
+    """The name of a type of singularity."""
+    return word("singularity", SINGULARITIES, kind)
+
+
+@say.register
+def _(found: LimitExceeded) -> str:
+    at, by, bound = found.angle_deg, found.excess_deg, found.limit_deg
+    return sentence(found.code, LIMIT_SIDES[found.side], joint=found.joint, at=at, by=by, bound=bound)
+
+
+@say.register
+def _(found: LimitsExceeded) -> str:
+    return joined(listed(found.joints))
+
+
+@say.register
+def _(found: ElbowAxesNotParallel) -> str:
+    return sentence(found.code, "axes 2 and 3 are not parallel")
+
+
+@say.register
+def _(found: NeighboursParallel) -> str:
+    return sentence(found.code, "axes {first} and {second} are parallel", first=found.first, second=found.second)
+
+
+@say.register
+def _(found: NoWristCentre) -> str:
+    return sentence(found.code, "axes 4, 5 and 6 miss a common point by {miss:.6g} mm", miss=found.miss_mm)
+
+
+@say.register
+def _(found: NoArmLength) -> str:
+    return sentence(found.code, "the upper arm or the forearm has no length")
+
+
+@say.register
+def _(found: Iteration) -> str:
+    return sentence(
+        found.code,
+        "iteration from {starts} random starts, which may miss solutions; no closed form, because {lacking}",
+        starts=found.starts,
+        lacking=say(found.lacking),
+    )
+
+
+@say.register
+def _(found: WristTiltsTooLittle) -> str:
+    return sentence(found.code, "the wrist can't tilt that far; {angle:.3g} deg are missing", angle=found.missing_deg)
+
+
+@say.register
+def _(found: WristTooNearAxis1) -> str:
+    return sentence(
+        found.code,
+        "the wrist centre would be {gap} too near to axis 1 for the arm's sideways offset",
+        gap=_mm(found.gap_mm),
+    )
+
+
+@say.register
+def _(found: WristTooFar) -> str:
+    return sentence(
+        found.code,
+        "the wrist centre would be {gap} too far from axis 2, which the stretched arm reaches to {reach}",
+        gap=_mm(found.gap_mm),
+        reach=_mm(found.reach_mm),
+    )
+
+
+@say.register
+def _(found: WristTooNear) -> str:
+    return sentence(
+        found.code,
+        "the wrist centre would be {gap} too near to axis 2, which the folded arm reaches down to {least}",
+        gap=_mm(found.gap_mm),
+        least=_mm(found.least_mm),
+    )
+
+
+@say.register
+def _(found: SideUnsolved) -> str:
+    return sentence(found.code, "{side}: {fault}", side=word("side", SIDES, found.side), fault=say(found.why))
+
+
+@say.register
+def _(found: PoseUnsolved) -> str:
+    return say(found.why)
+
+
+@say.register
+def _(found: NearestMiss) -> str:
+    return sentence(
+        found.code,
+        "the nearest arm found misses by {position:.3g} mm and {rotation:.3g} deg",
+        position=found.position_mm,
+        rotation=found.rotation_deg,
+    )
+
+
+@say.register
+def _(found: BadGuess) -> str:
+    return sentence(found.code, GUESSES[found.solved_by], miss=say(found.miss))
+
+
+@say.register
+def _(found: LimitBound) -> str:
+    return sentence(
+        found.code,
+        "limit-bound: {miss}; an arm that leaves the limits solves it: {beyond}",
+        miss=say(found.miss),
+        beyond=say(found.exceeded),
+    )
+
+
+@say.register
+def _(found: SingularEnd) -> str:
+    return sentence(
+        found.code, "singular: the iteration creeps towards a singular arm, where it ends: {miss}", miss=say(found.miss)
+    )
+
+
+@say.register
+def _(found: Unreachable) -> str:
+    return sentence(found.code, "unreachable: {miss}, whatever the start", miss=say(found.miss))
+
+
+def _mm(length: float) -> str:
+    return f"{length:.1f} mm" if length >= 0.1 else f"{length:.2g} mm"

@@ -1,0 +1,44 @@
+"""The stage in the registry, and what a study may set of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import Field
+
+from er3a.files.robot_file import Text
+from er3a.files.yaml_file import StrictModel
+from er3a.pipeline.messages.language import N_
+from er3a.pipeline.stages.stage import Stage
+
+if TYPE_CHECKING:
+    from er3a.pipeline.study import Study
+
+RuleName = Literal["nearest", "weighted", "time", "manipulability", "limits", "clearance"]
+
+
+class InverseSettings(StrictModel):
+    """``round_trips``: random poses solved back. ``map_cells``: cells across the maps of the number of solutions.
+
+    ``scene`` holds the obstacles that clearance is measured from and that solutions may not touch; ``mix`` weighs
+    rules against each other as one more rule (names: er3a/selection/rules.py).
+    """
+
+    round_trips: Annotated[int, Field(ge=1, le=10_000_000)] = 2000
+    map_cells: Annotated[int, Field(ge=8, le=512)] = 80
+    scene: Text | None = None
+    mix: Annotated[dict[RuleName, Annotated[float, Field(ge=0, le=1000)]], Field(min_length=1)] = {"nearest": 1}
+
+
+def _inputs(study: Study, robot: str) -> list[Path]:
+    return [Path(study.entry(robot).targets), *study.scenes(robot, STAGE.name)]
+
+
+STAGE = Stage(
+    name="inverse",
+    title=N_("inverse"),
+    question=N_("Which joint solutions reach a pose?"),
+    settings={"inverse": InverseSettings},
+    inputs=_inputs,
+)

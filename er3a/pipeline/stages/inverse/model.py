@@ -1,0 +1,211 @@
+"""What the stage's results hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from er3a.kinematics.solutions import Label, Method, Unsolved
+from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.stages.inverse.findings import (
+    Advice,
+    AllSolved,
+    NoneSolved,
+    NotReproduced,
+    Obstacle,
+    SomeUnsolved,
+)
+from er3a.pipeline.tables import Findings, Flags, Integers, Reals, Table, Texts, column, findings, per_joint, vector
+from er3a.selection.nearest import Refusal, WhyFirst, WhyNone
+from er3a.selection.rules import RuleName
+
+ToolOrientation = Literal["tool_down", "tool_level"]
+SINGULAR_PARTS = ("wrist", "elbow", "shoulder", "rank")
+
+
+@dataclass(frozen=True)
+class Neighbours:
+    """Poses near a target without solution that have one; None where none was found (``kinematics.neighbours``)."""
+
+    orientation_ratio: float
+    least_turn_deg: float | None
+    least_shift_mm: float | None
+    shifted_to_mm: tuple[float, float, float] | None
+
+
+@dataclass(frozen=True)
+class SelfMotion:
+    """A continuum of solutions (``kinematics.families``); ``direction`` in deg per deg of the joint that is free."""
+
+    kind: Literal["wrist", "shoulder", "elbow"]
+    q0_deg: tuple[float, ...]
+    direction: tuple[float, ...]
+    range_deg: tuple[float, float]
+    within_limits: bool
+    branches: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class TargetResult:
+    """One target.
+
+    Attributes
+    ----------
+    solutions, within_limits, collide : branches that reach it, that do so within the limits, that collide there
+    rows_within_limits : solutions within the limits, turns included
+    chosen_deg, chosen_branch : the solution taken; None if there is none
+    reason : why it was taken, or why none was; obstacle : the latter in short, None where one was taken
+    unsolved : why branches, or the pose, have no solution
+    neighbours : only for targets without a solution within the limits
+    """
+
+    name: str
+    note: str | None
+    xyz_mm: tuple[float, float, float]
+    rpy_deg: tuple[float, float, float]
+    quaternion_wxyz: tuple[float, float, float, float]
+    q_ref_deg: tuple[float, ...]
+    solutions: int
+    within_limits: int
+    rows_within_limits: int
+    collide: int
+    chosen_deg: tuple[float, ...] | None
+    chosen_branch: int | None
+    reason: WhyFirst | WhyNone
+    obstacle: Obstacle | None
+    unsolved: tuple[Unsolved, ...]
+    method: Method
+    families: tuple[SelfMotion, ...]
+    neighbours: Neighbours | None
+    advice: tuple[Advice, ...]
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A target in a sequence: its solution when all are chosen as a whole, and the branch taken greedily."""
+
+    target: str
+    branch: int
+    label: Label
+    q_deg: tuple[float, ...]
+    greedy_branch: int
+    greedy_label: Label
+
+
+@dataclass(frozen=True)
+class Sequence:
+    """All targets that can be reached, in order; costs in the rule's unit.
+
+    Attributes
+    ----------
+    differs : whether the greedy solutions (turns included) are others
+    """
+
+    rule: RuleName
+    cost: float
+    greedy_cost: float
+    stops: tuple[Stop, ...]
+    differs: bool
+
+
+@dataclass(frozen=True)
+class RoundTrips:
+    """Random joints to poses and back (``kinematics.round_trips.BatchRoundTrips``).
+
+    Attributes
+    ----------
+    same_joints_deg : up to this difference joints count as found
+    worst_own_deg : None where a pose has no solution at all
+    """
+
+    poses: int
+    solutions: int
+    own_found: int
+    same_joints_deg: float
+    worst_own_deg: float | None
+    worst_position_mm: float
+    worst_orientation_deg: float
+    counts_within_limits: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class InverseSummary(Summary):
+    """What the stage found.
+
+    Attributes
+    ----------
+    mix : weights of rules that make one more rule
+    scene : title of the scene whose solids are not to be touched
+    round_trips : None for arms without a closed form
+    """
+
+    verdict: Verdict[AllSolved | SomeUnsolved | NoneSolved | NotReproduced]
+    mix: dict[RuleName, float]
+    scene: str | None
+    targets: tuple[TargetResult, ...]
+    sequence: Sequence | None
+    round_trips: RoundTrips | None
+
+
+@dataclass(frozen=True, eq=False)
+class SolutionRows(Table):
+    """One row for each solution of each target, turns included."""
+
+    target: Texts = column("name of the target", dtype=object)
+    branch: Integers = column("4 * shoulder + 2 * elbow + wrist; else the number of the arm found", dtype=np.int64)
+    label: Texts = column("code of the branch", dtype=object)
+    q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
+    turn: Integers = per_joint("turn{}", "full turns added to the angle in (-180, 180]", dtype=np.int64)
+    within_limits: Flags = column("whether all joints are within their limits", dtype=bool)
+    refusal: Findings = findings("which limits are left, or what overlaps; none for admissible solutions", Refusal)
+    rank: Integers = column("1 is the chosen one; 0 for refused ones", dtype=np.int64)
+    first_of_branch: Flags = column("whether it is the branch's best", dtype=bool)
+    position_residual_mm: Reals = column("by how much forward kinematics misses the target", "mm")
+    orientation_residual_deg: Reals = column("by how much forward kinematics misses the target", "deg")
+    manipulability: Reals = column("of the Jacobian with lengths divided by the wrist's reach")
+    singular: Flags = vector(
+        "singular_{}",
+        "whether the arm is on this singularity, to 1e-6 rad or m (rank: of an arm without closed form)",
+        parts=SINGULAR_PARTS,
+        dtype=bool,
+    )
+    limit_margin_deg: Reals = column("least distance of a joint from its limits; negative outside", "deg")
+    greatest_move_deg: Reals = column("the farthest that a joint turns from the reference", "deg")
+    distance_deg: Reals = column("root of the summed squares of the joint moves", "deg")
+
+
+@dataclass(frozen=True, eq=False)
+class RankingRows(Table):
+    """Place and measure, by each rule, of each branch's best solution within the limits."""
+
+    target: Texts = column("name of the target", dtype=object)
+    branch: Integers = column("number of the branch", dtype=np.int64)
+    label: Texts = column("code of the branch", dtype=object)
+    rule: Texts = column("name of the rule, or mix", dtype=object)
+    measure: Reals = column("in the rule's unit; for the mix its cost, 0 the best")
+    place: Integers = column("1 is the best; 0 for solutions that collide", dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class MapRows(Table):
+    """Number of solutions of tool poses on a grid in the vertical plane through axis 1 (y = 0 of the base)."""
+
+    orientation: Texts = column("how the tool is held", dtype=object)
+    x_mm: Reals = column("tool position in the base's frame", "mm")
+    z_mm: Reals = column("tool position in the base's frame", "mm")
+    solutions: Integers = column("branches", dtype=np.int64)
+    within_limits: Integers = column("branches within the limits", dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class InverseResults(Results[InverseSummary]):
+    """The stage's results; the map is empty for arms without a closed form."""
+
+    solutions: SolutionRows
+    rankings: RankingRows
+    map: MapRows
+
+
+RESULTS = InverseResults

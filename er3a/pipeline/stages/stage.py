@@ -1,0 +1,79 @@
+"""What the pipeline needs to know of a stage; its folder holds the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from er3a.files.yaml_file import StrictModel
+from er3a.findings import Finding
+from er3a.pipeline.tables import table_types
+from er3a.robots.robot import Robot
+
+if TYPE_CHECKING:
+    from er3a.pipeline.study import Study
+
+
+def applies_to_all(robot: Robot) -> Finding | None:
+    """For stages that can be computed for every robot."""
+    return None
+
+
+def no_files(study: Study, robot: str) -> list[Path]:
+    """For stages that read nothing but the robot's file."""
+    return []
+
+
+@dataclass(frozen=True)
+class Stage:
+    """An entry of the registry.
+
+    ``compute`` stands in the module of that name in the stage's folder, and so do the views it has; ``model`` holds
+    its results.
+
+    Attributes
+    ----------
+    name : of the stage's folder, of its key in the study file, and of its results
+    title, question : marked with ``N_``: the page's title, and what it answers
+    settings : per key of the study file the model of what stands there; the first is the stage's own
+    inputs : the files that a robot's results rest on besides its own file
+    applies : why the stage can't be computed for a robot; None if it can
+    views : ``record`` (a recording, with its preview) and ``report`` (a page), as far as the stage has them
+    sampled : whether ``compute`` gathers parts that jobs of their own have sampled
+    """
+
+    name: str
+    title: str
+    question: str
+    settings: Mapping[str, type[StrictModel]]
+    inputs: Callable[[Study, str], list[Path]] = no_files
+    applies: Callable[[Robot], Finding | None] = applies_to_all
+    views: tuple[str, ...] = ("record", "report")
+    sampled: bool = False
+
+    def module(self, name: str) -> Any:
+        """A module of the stage's folder, imported when it is needed."""
+        return import_module(f"{self.package}.{name}")
+
+    @property
+    def package(self) -> str:
+        """The full name of the stage's folder."""
+        return f"er3a.pipeline.stages.{self.name}"
+
+    @property
+    def tables(self) -> list[str]:
+        """The names of the stage's tables."""
+        return list(table_types(self.module("model").RESULTS))
+
+    @property
+    def messages(self) -> str:
+        """The module with the names of the stage's key figures and the sentences of its page."""
+        return f"er3a.pipeline.messages.{self.name}"
+
+    @property
+    def verdict_messages(self) -> str:
+        """The module that makes a sentence of the stage's verdict."""
+        return f"er3a.pipeline.messages.{self.name}_verdict"

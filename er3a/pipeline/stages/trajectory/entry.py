@@ -1,0 +1,59 @@
+"""The stage in the registry, and what a study may set of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import Field
+
+from er3a.files.robot_file import Text
+from er3a.files.yaml_file import StrictModel, read_yaml
+from er3a.pipeline.messages.language import N_
+from er3a.pipeline.stages.stage import Stage
+from er3a.planning.avoidance import StrategyName
+
+if TYPE_CHECKING:
+    from er3a.pipeline.study import Study
+
+
+class TrajectorySettings(StrictModel):
+    """Where a path counts as near-singular, and how many points are checked between two samples.
+
+    ``avoidance`` chooses the avoidance strategy, or compares all of them. Joints of unknown speed are taken to do
+    ``assumed_speed_deg_s``; all joints to reach full speed in ``acceleration_time_s``.
+    ``scene`` holds the obstacles; no overlap with them deeper than ``penetration_tolerance_mm`` goes unnoticed between points.
+    """
+
+    checks_per_sample: Annotated[int, Field(ge=1, le=1000)]
+    near_wrist_deg: Annotated[float, Field(gt=0, le=90)]
+    near_elbow_deg: Annotated[float, Field(gt=0, le=90)]
+    near_shoulder_mm: Annotated[float, Field(gt=0, le=10_000)]
+    avoidance: Literal["compare"] | StrategyName = "compare"
+    assumed_speed_deg_s: Annotated[
+        list[Annotated[float, Field(gt=0, le=10_000)]], Field(min_length=6, max_length=6)
+    ] = [180, 180, 180, 360, 360, 360]
+    acceleration_time_s: Annotated[float, Field(gt=0, le=10)] = 0.25
+    scene: Text | None = None
+    penetration_tolerance_mm: Annotated[float, Field(ge=0.05, le=100)] = 1.0
+
+
+def _inputs(study: Study, robot: str) -> list[Path]:
+    paths = study.entry(robot).paths
+    return [Path(paths), *_tables_of(paths), *study.scenes(robot, STAGE.name)]
+
+
+def _tables_of(path_file: str) -> list[Path]:
+    """The CSV tables that a path file names; the file is checked elsewhere."""
+    paths = read_yaml(path_file).get("paths")
+    named = [path.get("file") for path in paths if isinstance(path, dict)] if isinstance(paths, list) else []
+    return [Path(file) for file in named if isinstance(file, str)]
+
+
+STAGE = Stage(
+    name="trajectory",
+    title=N_("trajectory"),
+    question=N_("Do the paths run into singularities?"),
+    settings={"trajectory": TrajectorySettings},
+    inputs=_inputs,
+)

@@ -1,0 +1,36 @@
+"""The stage in the registry, and what a study may set of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import Field
+
+from er3a.files.robot_library import REFERENCES
+from er3a.files.yaml_file import StrictModel
+from er3a.pipeline.messages.language import N_
+from er3a.pipeline.stages.stage import Stage
+
+if TYPE_CHECKING:
+    from er3a.pipeline.study import Study
+
+
+class ValidationSettings(StrictModel):
+    """``round_trips``: random joint vectors taken to a pose and back. ``reach_starts``: starts of each reach search."""
+
+    round_trips: Annotated[int, Field(ge=1, le=10_000_000)]
+    reach_starts: Annotated[int, Field(ge=1, le=10_000)]
+
+
+def _inputs(study: Study, robot: str) -> list[Path]:
+    return [file for name in study.references(robot) for file in sorted((REFERENCES / name).glob("*.csv"))]
+
+
+STAGE = Stage(
+    name="validation",
+    title=N_("validation"),
+    question=N_("Does the table match the manufacturer's data?"),
+    settings={"validation": ValidationSettings},
+    inputs=_inputs,
+)

@@ -1,0 +1,108 @@
+"""The stage in the registry, and what a study may set of it."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from er3a.files.robot_library import REFERENCES
+from er3a.files.units import FARTHEST_MM, Triple, check_millimetres
+from er3a.files.yaml_file import StrictModel
+from er3a.pipeline.messages.language import N_
+from er3a.pipeline.stages.stage import Stage
+
+if TYPE_CHECKING:
+    from er3a.pipeline.study import Study
+
+SAMPLES_PER_JOB = 1_000_000_000
+"""About ten seconds, of which starting is a tenth."""
+
+
+class WorkspaceSettings(StrictModel):
+    """Monte Carlo budget and grid.
+
+    ``samples`` are drawn in ``blocks`` seeded blocks, uniform in the joints or (``sampling: sobol``) more evenly than
+    chance as points of a Sobol' sequence; ``cells_across`` cells span the bounding box's longest side,
+    the hull is taken over the extreme samples in ``hull_directions`` directions, the recording shows ``cloud_points``.
+    The proof looks at ``proof_cells`` cells of the section; ``volume_points`` uniform points estimate the volume.
+    """
+
+    samples: Annotated[int, Field(ge=1, le=100_000_000_000)]
+    blocks: Annotated[int, Field(ge=1, le=100_000)]
+    cells_across: Annotated[int, Field(ge=8, le=1024)]
+    hull_directions: Annotated[int, Field(ge=1000, le=100_000)]
+    cloud_points: Annotated[int, Field(ge=1, le=300_000)]
+    proof_cells: Annotated[int, Field(ge=1, le=10_000_000)] = 8000
+    volume_points: Annotated[int, Field(ge=100, le=10_000_000)] = 100_000
+    sampling: Literal["uniform", "sobol"] = "uniform"
+
+    @model_validator(mode="after")
+    def _a_sample_per_block(self):
+        if self.samples < self.blocks:
+            raise ValueError(f"{self.samples} samples can't fill {self.blocks} blocks | Lower workspace.blocks")
+        return self
+
+    @property
+    def parts(self) -> int:
+        """The number of jobs that the blocks are grouped into."""
+        return min(self.blocks, math.ceil(self.samples / SAMPLES_PER_JOB))
+
+
+class BoxTask(StrictModel):
+    """A box that the tool must serve, in the frame that the robot's base is placed in.
+
+    ``box_mm`` are its edges along x, y and z (it may stand turned by 90 deg about z), ``lowest_mm`` the least height of
+    its underside, ``clear_of_axis_mm`` the least distance of its points from axis 1. At every point the tool must reach
+    all directions within ``cone_deg`` of ``tool_direction`` (z of the tool frame), ``limit_margin_deg`` within limits.
+    """
+
+    box_mm: Annotated[list[Annotated[float, Field(gt=0)]], Field(min_length=3, max_length=3)] = [200, 150, 50]
+    tool_direction: Triple = [0, 0, -1]
+    cone_deg: Annotated[float, Field(ge=0, le=180)] = 30
+    limit_margin_deg: Annotated[float, Field(ge=0, le=45)] = 2
+    lowest_mm: Annotated[float, Field(ge=-FARTHEST_MM, le=FARTHEST_MM)] = 0
+    clear_of_axis_mm: Annotated[float, Field(ge=0, le=FARTHEST_MM)] = 150
+
+    @field_validator("box_mm")
+    @classmethod
+    def _no_metres(cls, values):
+        check_millimetres(values)
+        return values
+
+    @field_validator("tool_direction")
+    @classmethod
+    def _has_length(cls, values):
+        if max(map(abs, values)) < 1e-6:
+            raise ValueError("the vector has no direction | Write for example [0, 0, -1]: the tool points down")
+        return values
+
+
+class CapabilitySettings(StrictModel):
+    """What the tool can do in each cell of the workspace.
+
+    ``directions`` are spread over the sphere, with ``rolls`` about each where the roll matters (a tool beside axis 6,
+    which takes as many times longer). The proofs of the dexterous core and of the listed places may look at
+    ``proof_poses`` neighbourhoods of poses each.
+    """
+
+    directions: Annotated[int, Field(ge=12, le=10_000)] = 300
+    rolls: Annotated[int, Field(ge=1, le=360)] = 8
+    proof_poses: Annotated[int, Field(ge=1, le=1_000_000_000)] = 100_000
+    placement: BoxTask = BoxTask()
+
+
+def _inputs(study: Study, robot: str) -> list[Path]:
+    return [file for name in study.references(robot) for file in [REFERENCES / name / "envelope.csv"] if file.is_file()]
+
+
+STAGE = Stage(
+    name="workspace",
+    title=N_("workspace"),
+    question=N_("What can it reach, where are the voids?"),
+    settings={"workspace": WorkspaceSettings, "capability": CapabilitySettings},
+    inputs=_inputs,
+    sampled=True,
+)

@@ -1,0 +1,27 @@
+"""What follows from a robot alone is worked out once and kept with the robot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from typing import Concatenate, ParamSpec, TypeVar
+
+from er3a.robots.robot import Robot
+
+Rest = ParamSpec("Rest")
+Value = TypeVar("Value")
+
+
+def derived(function: Callable[Concatenate[Robot, Rest], Value]) -> Callable[Concatenate[Robot, Rest], Value]:
+    """Keep what a function gives for a robot (and further hashable arguments) as long as the robot is there."""
+
+    @wraps(function)
+    def once(robot: Robot, *rest: Rest.args, **named: Rest.kwargs) -> Value:
+        key = (function, *rest, *named.items())
+        kept = robot.derived
+        if key not in kept:
+            kept[key] = function(robot, *rest, **named)
+        value: Value = kept[key]
+        return value
+
+    return once

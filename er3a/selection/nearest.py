@@ -1,0 +1,239 @@
+"""Which of several joint solutions is nearest to where the arm comes from, and why it is taken, or why none is.
+
+Of the admissible solutions the one is taken whose greatest joint move from the reference is least: where all joints
+start and stop together, that joint decides how long the move takes. Between equals (to 1e-9 rad) the least root of the
+summed squares of all joint moves decides, then the lower branch number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from er3a.collision.pairs import PairOverlaps
+from er3a.kinematics.solutions import Label, Solutions, Unsolved
+from er3a.numerics.arrays import Integers, Reals
+from er3a.robots.joint_limits import LimitsExceeded, limit_margin
+from er3a.robots.robot import Robot
+
+SAME_MOVE = 1e-9
+
+Refusal = LimitsExceeded | PairOverlaps
+
+
+@dataclass(frozen=True)
+class OtherBranch:
+    """The next best solution is on another branch."""
+
+    branch: int
+    label: Label
+    code: Literal["other_branch"] = "other_branch"
+
+
+@dataclass(frozen=True)
+class JointTurned:
+    """A joint of the next best solution stands whole turns further."""
+
+    joint: int
+    turn_deg: int
+    code: Literal["joint_turned"] = "joint_turned"
+
+
+@dataclass(frozen=True)
+class OtherTurns:
+    """The next best solution is on the same branch, with joints turned."""
+
+    joints: tuple[JointTurned, ...]
+    code: Literal["other_turns"] = "other_turns"
+
+
+@dataclass(frozen=True)
+class OtherFreeJoint:
+    """The next best solution is on the same branch, with its free joint at another angle."""
+
+    code: Literal["other_free_joint"] = "other_free_joint"
+
+
+NextBest = OtherBranch | OtherTurns | OtherFreeJoint
+
+
+@dataclass(frozen=True)
+class GreatestMove:
+    """The joint that moves farthest, and how far."""
+
+    joint: int
+    angle_deg: float
+    code: Literal["greatest_move"] = "greatest_move"
+
+
+@dataclass(frozen=True)
+class OnlyAdmissible:
+    """No other solution is within the limits (and free of collisions, where they count)."""
+
+    move: GreatestMove
+    code: Literal["only_admissible"] = "only_admissible"
+
+
+@dataclass(frozen=True)
+class MovesLess:
+    """Its greatest joint move is less than the next best solution's, by ``less_deg``."""
+
+    move: GreatestMove
+    less_deg: float
+    next_best: NextBest
+    code: Literal["moves_less"] = "moves_less"
+
+
+@dataclass(frozen=True)
+class MovesLessTogether:
+    """The greatest joint moves are equal; the root of all moves' squares is less by ``less_deg``."""
+
+    move: GreatestMove
+    less_deg: float
+    next_best: NextBest
+    code: Literal["moves_less_together"] = "moves_less_together"
+
+
+@dataclass(frozen=True)
+class LowerBranchNumber:
+    """The next best solution is just as near."""
+
+    move: GreatestMove
+    next_best: NextBest
+    code: Literal["lower_branch_number"] = "lower_branch_number"
+
+
+@dataclass(frozen=True)
+class NoSolution:
+    """The pose has no solution at all."""
+
+    unsolved: tuple[Unsolved, ...]
+    code: Literal["no_solution"] = "no_solution"
+
+
+@dataclass(frozen=True)
+class AllOutsideLimits:
+    """All solutions leave the limits; told of the one that does so least."""
+
+    count: int
+    branch: int
+    label: Label
+    exceeded: LimitsExceeded
+    code: Literal["all_outside_limits"] = "all_outside_limits"
+
+
+@dataclass(frozen=True)
+class AllCollide:
+    """All solutions within the limits collide; told of the one farthest from its limits."""
+
+    count: int
+    overlap: PairOverlaps
+    code: Literal["all_collide"] = "all_collide"
+
+
+WhyFirst = OnlyAdmissible | MovesLess | MovesLessTogether | LowerBranchNumber
+WhyNone = NoSolution | AllOutsideLimits | AllCollide
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """Admissible solutions, nearest first.
+
+    Attributes
+    ----------
+    order : (k,) int, rows of the solutions to choose from, best first
+    greatest_move : (n,), rad, the farthest that any joint turns from the reference to each solution
+    distance : (n,), rad, root of the summed squares of the joint moves
+    reason : why the first was taken, or why none
+    """
+
+    order: Integers
+    greatest_move: Reals
+    distance: Reals
+    reason: WhyFirst | WhyNone
+
+    @property
+    def chosen(self) -> int | None:
+        """The row taken; None if no solution is admissible."""
+        return int(self.order[0]) if len(self.order) else None
+
+    @property
+    def runner_up(self) -> int | None:
+        """The next best row."""
+        return int(self.order[1]) if len(self.order) > 1 else None
+
+
+def nearest(
+    robot: Robot,
+    solutions: Solutions,
+    q_ref: Reals,
+    refused: Sequence[Refusal | None] | None = None,
+) -> Choice:
+    """Order the admissible solutions of one pose as the module says.
+
+    Parameters
+    ----------
+    q_ref : (6,), rad, the joint angles that the arm comes from
+    refused : why each row is not admissible, None for those that are; left out, the limits alone refuse
+    """
+    moves = np.abs(solutions.q - q_ref)
+    greatest: Reals = moves.max(axis=1, initial=0.0)
+    distance: Reals = np.linalg.norm(moves, axis=1)
+    refused = list(solutions.reason) if refused is None else refused
+    left = [row for row, why in enumerate(refused) if why is None]
+    ordered: list[int] = []
+    while left:
+        best = _first(left, greatest, distance, solutions.branch)
+        ordered.append(best)
+        left.remove(best)
+    why = _why_first(solutions, ordered, moves, distance) if ordered else why_none(robot, solutions, refused)
+    return Choice(np.array(ordered, dtype=int), greatest, distance, why)
+
+
+def _first(rows: list[int], greatest: Reals, distance: Reals, branch: Integers) -> int:
+    for measure in (greatest, distance):
+        least = min(measure[row] for row in rows)
+        rows = [row for row in rows if measure[row] <= least + SAME_MOVE]
+    return min(rows, key=lambda row: (branch[row], row))
+
+
+def _why_first(solutions: Solutions, order: list[int], moves: Reals, distance: Reals) -> WhyFirst:
+    chosen = order[0]
+    joint = int(moves[chosen].argmax())
+    most = moves[chosen, joint]
+    move = GreatestMove(joint + 1, float(np.degrees(most)))
+    if len(order) == 1:
+        return OnlyAdmissible(move)
+    second = order[1]
+    other = _difference(solutions, chosen, second)
+    margin = moves[second].max() - most
+    if margin > SAME_MOVE:
+        return MovesLess(move, float(np.degrees(margin)), other)
+    nearer = distance[second] - distance[chosen]
+    if nearer > SAME_MOVE:
+        return MovesLessTogether(move, float(np.degrees(nearer)), other)
+    return LowerBranchNumber(move, other)
+
+
+def _difference(solutions: Solutions, chosen: int, other: int) -> NextBest:
+    if solutions.branch[other] != solutions.branch[chosen]:
+        return OtherBranch(int(solutions.branch[other]), solutions.label[other])
+    turns = solutions.turn[other] - solutions.turn[chosen]
+    turned = tuple(JointTurned(int(j) + 1, int(360 * turns[j])) for j in np.flatnonzero(turns))
+    return OtherTurns(turned) if turned else OtherFreeJoint()
+
+
+def why_none(robot: Robot, solutions: Solutions, refused: Sequence[Refusal | None]) -> WhyNone:
+    """Why no solution is taken, where each is refused."""
+    if not len(solutions.q):
+        return NoSolution(solutions.unsolved)
+    overlaps = {row: why for row, why in enumerate(refused) if isinstance(why, PairOverlaps)}
+    margin = limit_margin(robot, solutions.q)
+    if overlaps:
+        roomiest = max(overlaps, key=lambda row: margin[row])
+        return AllCollide(len(overlaps), overlaps[roomiest])
+    least = int(margin.argmax())
+    return AllOutsideLimits(len(refused), int(solutions.branch[least]), solutions.label[least], solutions.reason[least])

@@ -1,0 +1,214 @@
+"""Corrections from measured positions: right, honest about their errors, and clear about what they can't tell."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+from typer.testing import CliRunner
+
+import er3a
+from er3a.calibration.measured import observed
+from er3a.calibration.outcomes import CalibrationError, MorePositions, MovesNothing, NoCorrectionFits, NotToldApart
+from er3a.calibration.parameters import jacobian, parallel_pairs, parameters_of
+from er3a.calibration.simulate import covered, measured
+from er3a.errors import InputError
+from er3a.files.measurements import COLUMNS, load_measurements
+from er3a.files.robot_library import load_robot
+from er3a.kinematics.table_batch import tables_of
+from er3a.pipeline.cli import app
+from er3a.robots.conventions import to_modified
+
+HEADER = ",".join(COLUMNS) + "\n"
+TRUSTED = ("er3a_c60", "er3_600")
+
+
+def bent(robot: er3a.Robot, random: np.random.Generator) -> er3a.Robot:
+    """The arm with small errors in every entry, axes 2 and 3 out of parallel both ways."""
+    row = parallel_pairs(robot)[0][0]
+    return robot.replace(
+        a=robot.a + random.normal(0, 5e-4, 6),
+        d=robot.d + random.normal(0, 5e-4, 6),
+        alpha=robot.alpha + random.normal(0, 1e-3, 6),
+        offset=robot.offset + random.normal(0, 2e-3, 6),
+        beta=np.where(np.arange(1, 7) == row, 1.5e-3, 0.0),
+    )
+
+
+def poses_in(robot: er3a.Robot, random: np.random.Generator, count: int) -> np.ndarray:
+    return random.uniform(robot.lower, robot.upper, (count, 6))
+
+
+def exact(truth: er3a.Robot, robot: er3a.Robot, random: np.random.Generator):
+    """Noise-free positions with a stated deviation of 0.05 mm."""
+    rows = measured(truth, poses_in(robot, random, 40), 0.0, random)
+    return tuple(type(row)(row.row, row.pose, row.point, row.xyz_mm, 0.05) for row in rows)
+
+
+@pytest.mark.parametrize("convert", [lambda robot: robot, to_modified])
+@pytest.mark.parametrize("name", TRUSTED)
+def test_exact_positions_give_an_arm_with_the_same_positions_everywhere(name, convert, random):
+    """But for terms of second order: entries that are held because they act alike do so at the nominal table."""
+    robot = convert(load_robot(name))
+    truth = bent(robot, random)
+    found = er3a.calibrate(robot, exact(truth, robot, random))
+    q = poses_in(robot, random, 500)
+    gap = er3a.forward(found.robot, q)[:, :3, 3] - er3a.forward(truth.without_tool(), q)[:, :3, 3]
+    assert found.level == "all_entries"
+    assert np.abs(gap).max() < 1e-5
+    assert found.rms_after_mm < 3e-3 < 0.3 < found.rms_before_mm
+
+
+def test_estimates_are_those_of_an_independent_solver(random):
+    robot = load_robot("er3a_c60")
+    rows = measured(bent(robot, random), poses_in(robot, random, 30), 0.05, random)
+    found = er3a.calibrate(robot, rows)
+    kept = [each.parameter for each in found.estimates]
+    q = np.radians([row.pose for row in rows])
+    seen = np.array([row.xyz_mm for row in rows])
+
+    def weighted(amounts):
+        columns = {key: getattr(robot, key).copy() for key in ("a", "alpha", "beta", "d", "offset")}
+        for parameter, amount in zip(kept, amounts):
+            columns[parameter.column][parameter.joint - 1] += amount
+        return ((er3a.forward(robot.replace(**columns), q)[:, :3, 3] * 1000 - seen) / 0.05).ravel()
+
+    theirs = least_squares(weighted, np.zeros(len(kept)), x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    error = np.sqrt(np.diag(np.linalg.inv(theirs.jac.T @ theirs.jac)))
+    for estimate, parameter, amount, own in zip(found.estimates, kept, theirs.x, error):
+        assert estimate.correction == pytest.approx(amount * parameter.in_unit, abs=1e-3 * estimate.standard_error)
+        assert estimate.standard_error == pytest.approx(own * parameter.in_unit, rel=1e-3)
+    assert found.scatter == pytest.approx(1.0, abs=0.35)
+
+
+def test_what_positions_cannot_tell_apart_is_held(random):
+    robot = load_robot("er3_600")
+    held = er3a.calibrate(robot, measured(robot, poses_in(robot, random, 40), 0.05, random)).held
+    assert NotToldApart(("d3", "d2"), (2, 3)) in held or NotToldApart(("d2", "d3"), (2, 3)) in held
+    assert MovesNothing("offset6") in held
+
+
+def test_held_and_estimated_entries_are_the_rank_of_the_jacobian(random):
+    robot = load_robot("er3a_c60")
+    rows = measured(robot, poses_in(robot, random, 40), 0.05, random)
+    found = er3a.calibrate(robot, rows)
+    seen = observed(rows, robot)
+    parameters = parameters_of(robot, "all_entries")
+    J = jacobian(tables_of(robot), robot, parameters, seen.quantities) / seen.deviation_mm[:, None]
+    assert np.linalg.matrix_rank(J, tol=1e-6 * np.linalg.norm(J, 2)) == len(found.estimates)
+    assert len(found.held) == len(parameters) - len(found.estimates)
+    assert (found.singular_values > 1e-6 * found.singular_values[0]).sum() == len(found.estimates)
+
+
+def test_a_measured_tool_sees_more_than_the_flange(random):
+    tool = np.eye(4)
+    tool[:3, 3] = 0.05, 0.02, 0.1
+    robot = load_robot("er3a_c60").replace(tool=tool)
+    truth = bent(robot, random)
+    q = poses_in(robot, random, 40)
+    rows = [
+        type(row)(row.row, row.pose, "tool", tuple(1000 * T[:3, 3]), 0.05)
+        for row, T in zip(measured(truth, q, 0.0, random), er3a.forward(truth, q))
+    ]
+    found = er3a.calibrate(robot, rows)
+    assert "offset6" in [estimate.name for estimate in found.estimates]
+    q = poses_in(robot, random, 200)
+    np.testing.assert_allclose(er3a.forward(found.robot, q)[:, :3, 3], er3a.forward(truth, q)[:, :3, 3], atol=1e-9)
+
+
+def test_intervals_cover_the_truth_in_95_of_100_runs(random):
+    names, inside = covered(load_robot("er3_600"), 120, 25, 0.05, random)
+    assert len(names) == 20
+    assert 0.93 < inside.mean() < 0.97
+
+
+def test_few_poses_give_fewer_entries_and_say_what_more_is_needed(random):
+    robot = load_robot("er3_600")
+    few = er3a.calibrate(robot, measured(robot, poses_in(robot, random, 5), 0.05, random))
+    assert few.level == "lengths_and_offsets"
+    assert few.more.level == "all_entries"
+    assert few.more.determined + len(few.more.entries) == few.more.determinable
+    assert len(few.more.examples_deg) == 3
+    with pytest.raises(CalibrationError) as caught:
+        er3a.calibrate(robot, measured(robot, poses_in(robot, random, 1), 0.05, random))
+    needed = caught.value.finding
+    assert isinstance(needed, MorePositions)
+    assert (needed.poses, needed.determined, needed.determinable, needed.least) == (1, 3, 5, 1)
+
+
+def test_positions_of_another_arm_are_not_explained_away(random):
+    robot, other = load_robot("er3a_c60_article"), load_robot("er3a_c60")
+    rows = measured(other, random.uniform(-1, 1, (40, 6)), 0.05, random)
+    with pytest.raises(CalibrationError) as caught:
+        er3a.calibrate(robot, rows)
+    assert isinstance(caught.value.finding, NoCorrectionFits)
+
+
+def written(folder: Path, robot: er3a.Robot, random: np.random.Generator) -> Path:
+    rows = measured(robot, poses_in(robot, random, 30), 0.02, random)
+    lines = [",".join(map(repr, row.pose)) + ",flange," + ",".join(map(repr, row.xyz_mm)) + ",0.02" for row in rows]
+    path = folder / "measured.csv"
+    path.write_text(HEADER + "\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def test_the_command_writes_a_robot_file_that_has_the_corrected_kinematics(random, tmp_path):
+    robot = load_robot("er3a_c60")
+    truth = bent(robot, random)
+    path = written(tmp_path, truth, random)
+    done = CliRunner().invoke(app, ["identify", "er3a_c60", str(path), "--output", str(tmp_path / "mine.yaml")])
+    assert done.exit_code == 0, done.output
+    assert "d2 and d3 can't be told apart: joints 2 and 3 are parallel" in done.output
+    mine = load_robot(tmp_path / "mine.yaml")
+    assert mine.beta[1] != 0
+    q = poses_in(robot, random, 200)
+    gap = np.linalg.norm(er3a.forward(mine, q)[:, :3, 3] - er3a.forward(truth, q)[:, :3, 3], axis=1)
+    before = np.linalg.norm(er3a.forward(robot, q)[:, :3, 3] - er3a.forward(truth, q)[:, :3, 3], axis=1)
+    assert gap.max() < 2e-4 < 5e-4 < before.max()
+    np.testing.assert_array_equal(er3a.calibrate(robot, path).robot.a.round(12), mine.a.round(12))
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("0,0,0,0,0,0,flange,374,0,699.5,0", ["row 2", "standard_deviation_mm", "positive"]),
+        ("0,0,0,0,0,0,flange,,,,0.1", ["row 2", "x_mm", "no coordinate"]),
+        ("0,0,0,0,0,0,tip,374,0,699.5,0.1", ["row 2", "point", "tool"]),
+        ("0,0,0,0,0,0,flange,0.374,0,0.6995,0.1", ["row 2", "metres", "1000"]),
+        ("0,0,0,0,0,0,flange,374,0,699.5,0.1\n0,0,0,0,0,0,flange,380,0,699.5,0.1", ["row 3", "contradicts row 2"]),
+        (
+            "0.5,0,0,0,0,0,flange,374,0,699,0.1\n1,0,0,0,0,0,flange,3,0,699,0.1\n2,0,0,0,0,0,flange,3,0,699,0.1",
+            ["radians"],
+        ),
+        ("0,0,0,0,0,flange,374,0,699.5,0.1", ["row 2", "10 fields"]),
+        ("", ["no rows"]),
+    ],
+)
+def test_bad_measurements_are_one_clear_error(tmp_path, line, words):
+    path = tmp_path / "measured.csv"
+    path.write_text(HEADER + line + "\n", encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        load_measurements(path)
+    for word in [*words, str(path)]:
+        assert word in str(caught.value)
+
+
+def test_poses_outside_the_limits_name_row_and_joint(tmp_path):
+    path = tmp_path / "measured.csv"
+    path.write_text(
+        HEADER + "0,0,0,0,0,0,flange,374,0,699.5,0.1\n0,120,0,0,0,0,flange,3,0,699.5,0.1\n", encoding="utf-8"
+    )
+    with pytest.raises(InputError, match="row 3, column q2_deg: 120 deg is outside the limits"):
+        er3a.calibrate(load_robot("er3_600"), path)
+
+
+def test_a_table_of_another_unit_or_seven_joints_is_named(tmp_path):
+    path = tmp_path / "measured.csv"
+    path.write_text(HEADER.replace("x_mm", "x_m") + "0,0,0,0,0,0,flange,0.3,0,0.7,0.1\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"x_m.*unit"):
+        load_measurements(path)
+    path.write_text(HEADER.replace("q6_deg", "q6_deg,q7_deg") + "0,0,0,0,0,0,0,flange,3,0,7,0.1\n", encoding="utf-8")
+    with pytest.raises(InputError, match="q7_deg"):
+        load_measurements(path)

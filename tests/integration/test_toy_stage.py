@@ -1,0 +1,157 @@
+"""A new stage is a folder and a line in the registry: rules, study keys, results, documents and the index follow."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+
+import pytest
+
+FILES = {
+    "pipeline/stages/toy/__init__.py": '"""How long the arm is."""\n',
+    "pipeline/stages/toy/entry.py": '''"""The stage in the registry."""
+from er3a.files.yaml_file import StrictModel
+from er3a.pipeline.stages.stage import Stage
+
+class ToySettings(StrictModel):
+    """``factor``: how many arms in a row."""
+    factor: int = 2
+
+STAGE = Stage(name="toy", title="toy", question="How long?", settings={"toy": ToySettings}, views=("report",))
+''',
+    "pipeline/stages/toy/model.py": '''"""What the stage finds."""
+from dataclasses import dataclass
+from typing import Literal
+from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.tables import Reals, Table, column
+
+@dataclass(frozen=True)
+class Long:
+    """A length."""
+    length_m: float
+    code: Literal["toy.long"] = "toy.long"
+
+@dataclass(frozen=True)
+class ToySummary(Summary):
+    """Nothing more."""
+    verdict: Verdict[Long]
+
+@dataclass(frozen=True, eq=False)
+class Lengths(Table):
+    """Each length."""
+    a_m: Reals = column("length of a link", "m")
+
+@dataclass(frozen=True, eq=False)
+class ToyResults(Results[ToySummary]):
+    """With a table."""
+    lengths: Lengths
+
+RESULTS = ToyResults
+''',
+    "pipeline/stages/toy/compute.py": '''"""Adds lengths."""
+from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.stages.toy.entry import ToySettings
+from er3a.pipeline.stages.toy.model import Lengths, Long, ToyResults, ToySummary
+
+def compute(study, name):
+    if name == "er3a_c60_article":
+        raise ZeroDivisionError("no such arm")
+    a = study.robot(name).a * study.section(ToySettings).factor
+    whole = float(a.sum())
+    return ToyResults(ToySummary(Verdict("pass", Long(whole)), (Figure("sum", whole, "m"),)), Lengths(a))
+''',
+    "pipeline/stages/toy/report.py": '''"""The page."""
+from pathlib import Path
+from er3a.pipeline.messages.toy import FIGURES
+from er3a.pipeline.viewing.page import head_of, render, run_command
+
+def report(study, stored, output):
+    """Write it."""
+    render(Path(__file__).with_name("report.html.j2"), output, head=head_of(stored, FIGURES),
+           command=run_command(study, f"{stored.robot}/toy.html"), robot=study.robot(stored.robot),
+           robot_pages=study.pages(stored.robot))
+''',
+    "pipeline/stages/toy/report.html.j2": '{% extends "base.html.j2" %}\n',
+    "pipeline/messages/toy.py": '''"""Words."""
+import er3a.pipeline.messages.toy_verdict
+FIGURES = {"sum": "All lengths"}
+''',
+    "pipeline/messages/toy_verdict.py": '''"""The verdict."""
+from er3a.pipeline.messages.say import say, sentence
+from er3a.pipeline.stages.toy.model import Long
+
+@say.register
+def _(found: Long) -> str:
+    return sentence(found.code, "The arm is {length:.2f} m long.", length=found.length_m)
+''',
+}
+ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
+
+
+@pytest.fixture(scope="module")
+def with_toy(fresh_project, small_study):
+    """A copy of the project with the small study's results, and a fifth stage computed for every robot."""
+    project = fresh_project("toy")
+    package = project.folder / "er3a"
+    for path, text in FILES.items():
+        (package / path).parent.mkdir(parents=True, exist_ok=True)
+        (package / path).write_text(text, encoding="utf-8")
+    registry = package / "pipeline/stages/registry.py"
+    text = registry.read_text(encoding="utf-8")
+    text = text.replace("\nSTAGES:", "from er3a.pipeline.stages.toy.entry import STAGE as TOY\n\nSTAGES:", 1)
+    registry.write_text(re.sub(r"TRAJECTORY\)\}", "TRAJECTORY, TOY)}", text), encoding="utf-8")
+    study = project.folder / "config/small.yaml"
+    study.write_text(study.read_text(encoding="utf-8") + "\ntoy: {factor: 3}\n", encoding="utf-8")
+    (project.folder / "results").symlink_to(small_study.folder / "results")
+    results = project.folder / "own"
+    for robot in ROBOTS:
+        (results / robot).mkdir(parents=True)
+        for stage in (small_study.folder / "results" / robot).iterdir():
+            (results / robot / stage.name).symlink_to(stage)
+        er3a(project, "compute", "toy", robot, "--results", "own")
+        er3a(project, "report", "toy", robot, "--results", "own")
+    er3a(project, "index", "--results", "own")
+    return project
+
+
+def er3a(project, *words: str) -> str:
+    """Call the copy's command line."""
+    command = [sys.executable, "-m", "er3a", *words]
+    environment = project.environment() | {"ER3A_STUDY": "config/small.yaml"}
+    done = subprocess.run(
+        command, cwd=project.folder, env=environment, capture_output=True, text=True, timeout=300, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stderr
+
+
+def test_its_results_are_written_and_read(with_toy):
+    summary = json.loads((with_toy.folder / "own/er3_600/toy/summary.json").read_text(encoding="utf-8"))
+    assert summary["verdict"] == {
+        "status": "pass",
+        "code": "toy.long",
+        "params": {"length_m": 3 * 0.332},
+        "text": "The arm is 1.00 m long.",
+    }
+    assert summary["provenance"]["config"]["toy"] == {"factor": 3}
+    assert "All lengths" in (with_toy.folder / "reports/er3_600/toy.html").read_text(encoding="utf-8")
+
+
+def test_a_robot_for_which_it_fails_has_a_reason_and_the_index_stands(with_toy):
+    failed = json.loads((with_toy.folder / "own/er3a_c60_article/toy/summary.json").read_text(encoding="utf-8"))
+    assert failed["verdict"]["status"] == "not_computed"
+    reason = "ZeroDivisionError: no such arm"
+    assert failed["verdict"]["params"] == {"reason": reason}
+    assert reason in (with_toy.folder / "reports/er3a_c60_article/toy.html").read_text(encoding="utf-8")
+    index = (with_toy.folder / "reports/index.html").read_text(encoding="utf-8")
+    assert index.count("How long?") >= 1
+    assert reason in index
+    assert "The arm is 1.00 m long." in index
+
+
+def test_the_workflow_has_rules_for_it_and_none_for_the_recording_it_lacks(with_toy):
+    planned = with_toy.planned()
+    assert {f"{robot}: {verb} toy" for robot in ROBOTS for verb in ("compute", "report")} <= planned
+    assert not [job for job in planned if job.endswith(("record toy", "preview toy"))]
