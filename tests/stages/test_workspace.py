@@ -16,11 +16,13 @@ from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import NoWristCentre
-from er3a.pipeline.results import read_stage
+from er3a.pipeline.messages.workspace import say
+from er3a.pipeline.results import read_stage, write_results
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.workspace.compute import compute
 from er3a.pipeline.stages.workspace.findings import VoidUnexpected
+from er3a.pipeline.stages.workspace.model import WorkspaceResults
 from er3a.pipeline.stages.workspace.sample import sample
 from er3a.pipeline.study import load_study
 from tests.stages.workspace_arms import locked_file, make_study, skew_file, tally_of
@@ -63,9 +65,12 @@ def test_results_do_not_depend_on_the_parts(tmp_path):
         assert files_of(tmp_path / str(parts)) == expected
 
 
-def test_tables_agree_with_the_summary():
-    study = make_study()
-    found = compute(study, "er3_600")
+@pytest.fixture(scope="module")
+def found() -> WorkspaceResults:
+    return compute(make_study(), "er3_600")
+
+
+def test_tables_agree_with_the_summary(found):
     summary, curve, hull = found.summary, found.curve, found.hull_vertices
     assert found.cells.samples.sum() == found.section.samples.sum() == summary.samples == 60_001
     for cell in np.unique(curve.cell_mm):
@@ -76,19 +81,18 @@ def test_tables_agree_with_the_summary():
     assert finest.touched_m3[-1] == pytest.approx(summary.touched_m3, rel=1e-12)
     assert len(found.cloud) == 500
     assert (found.cloud.manipulability_m3 >= 0).all()
-    reached = forward(study.robot("er3_600"), np.radians(hull.q_deg))[:, :3, 3]
+    reached = forward(make_study().robot("er3_600"), np.radians(hull.q_deg))[:, :3, 3]
     assert np.abs(reached - hull.point_m).max() < 1e-12
     assert 0 < summary.hull.volume_m3 < 1.26
 
 
-def test_what_is_read_is_what_was_computed(tmp_path):
-    study = make_study()
-    found = compute(study, "er3_600")
-    run.compute("workspace", study, "er3_600", tmp_path)
+def test_what_is_read_is_what_was_computed(found, tmp_path):
+    write_results(tmp_path, make_study(), "er3_600", STAGES["workspace"], found, say)
     read = read_stage(tmp_path, STAGES["workspace"]).results
     assert read.summary == found.summary
     for name in STAGES["workspace"].tables:
-        assert getattr(read, name).frame().equals(getattr(found, name).frame()), name
+        getattr(read, name).write(tmp_path / "again.parquet")
+        assert (tmp_path / "again.parquet").read_bytes() == (tmp_path / f"{name}.parquet").read_bytes(), name
 
 
 @pytest.mark.long
@@ -152,9 +156,8 @@ def test_an_arm_without_a_spherical_wrist_gets_the_general_proof(tmp_path):
     assert np.isfinite(touched.q_deg).all()
 
 
-def test_side_view_holds_the_manufacturers_corners():
+def test_side_view_holds_the_manufacturers_corners(found):
     """The labels of the ER3-600's drawing lie on the exact border of the wrist centre, front and back as drawn."""
-    found = compute(make_study(), "er3_600")
     side = found.border.take((found.border.view == "side") & (found.border.point == "wrist_centre"))
     corners = found.drawing.take(np.isfinite(found.drawing.q2_deg))
     assert len(corners) > 0
