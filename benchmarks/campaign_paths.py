@@ -1,4 +1,4 @@
-"""Paths and their singularities at full size: what is missed, how well it is placed, what the ways around cost, speed.
+"""Paths and their singularities at full size: what is missed, how well it is placed, what avoiding them costs, speed.
 
 The same generators and judgements as the tests', at full size.
 """
@@ -15,8 +15,8 @@ from er3a import load_robot
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
-from er3a.planning.avoidance.singular_segment import clear, trouble_of
-from er3a.planning.avoidance.strategies import WAYS, best, compare
+from er3a.planning.avoidance.singular_segment import singular_segment
+from er3a.planning.avoidance.strategies import STRATEGIES, best, compare
 from er3a.planning.follow import follow
 from er3a.planning.moves import line
 from er3a.planning.singular_events import singular_events
@@ -49,27 +49,27 @@ def place_rows(robot, random) -> list[str]:
     return [f"| {robot.name} | {kind} | {count} | {worst:.1e} |" for kind, (count, worst) in found.items() if count]
 
 
-def repair_rows(robot, random) -> list[str]:
-    """What the ways around cost on random lines that come near a singularity within the limits."""
+def avoidance_rows(robot, random) -> list[str]:
+    """What the strategies of avoidance cost on random lines that come near a singularity within the limits."""
     limits = joint_limits(robot, np.radians([180, 180, 180, 360, 360, 360]), 0.25)
-    t, costs, taken, count = np.linspace(0, 4, 300), {name: [] for name in WAYS}, dict.fromkeys(WAYS, 0), 0
+    t, costs, taken, count = np.linspace(0, 4, 300), {name: [] for name in STRATEGIES}, dict.fromkeys(STRATEGIES, 0), 0
     while count < TROUBLED:
         q = random.uniform(robot.lower, robot.upper) * 0.8
         way = line(*forward(robot, np.stack([q, q + random.uniform(-0.6, 0.6, 6)])), 4.0)
         followed = follow(robot, way, t, q)
         inside = np.isfinite(followed.q).all() and (followed.q < robot.upper).all() and (followed.q > robot.lower).all()
-        if not inside or followed.jumps or not clear(robot, followed.q[[0, -1]], NEAR).all():
+        if not inside or followed.jumps or (NEAR.margin(robot, followed.q[[0, -1]]) < 1).any():
             continue
         events = singular_events(robot, followed.t, followed.q, followed.joints, NEAR)
         if not events:
             continue
         count += 1
-        prices = compare(trouble_of(followed, NEAR, limits, events, fixed_start=True))
-        for price in prices:
-            if price.usable or (price.name == "stop" and price.motion is not None):
-                cells = price.distance.max() * 1000, np.degrees(price.angle.max()), price.motion.duration
-                costs[price.name].append((*cells, max(price.speed, price.acceleration)))
-        if (choice := best(prices, any(event.crossing for event in events))) is not None:
+        results = compare(singular_segment(followed, NEAR, limits, events, fixed_start=True))
+        for result in results:
+            if (cost := result.cost) and (not result.reasons or result.name == "stop"):
+                cells = cost.distance.max() * 1000, np.degrees(cost.angle.max()), cost.motion.duration
+                costs[result.name].append((*cells, max(cost.speed_ratio, cost.acceleration_ratio)))
+        if (choice := best(results, any(event.crossing for event in events))) is not None:
             taken[choice.name] += 1
     rows = []
     for name, cells in costs.items():
@@ -163,17 +163,17 @@ def table() -> str:
             ],
         ),
         (
-            repair_rows,
+            avoidance_rows,
             [
                 "",
-                "## What the ways around cost",
+                "## What the strategies of avoidance cost",
                 "",
                 f"{TROUBLED} random lines per robot within reach and limits that come near a singularity in 4 s, but",
                 "not at their ends; start joints given. Usable: the whole path is done within the limits of angles,",
                 "speeds and accelerations (for `stop`: it stops in time). Deviation as median (greatest); time as",
                 "median; the greatest share of a speed or acceleration limit in use; how often it is the one to take.",
                 "",
-                "| robot | way | usable | off path (mm) | off path (deg) | time (s) | share of a limit | taken |",
+                "| robot | strategy | usable | off path (mm) | off path (deg) | time (s) | share of a limit | taken |",
                 "|---|---|---|---|---|---|---|---|",
             ],
         ),

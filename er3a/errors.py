@@ -67,10 +67,6 @@ class NotWristPartitionedError(Er3aError):
         )
 
 
-class IdentificationError(Er3aError):
-    """Measurements determine too little of a table, or no corrections make the table fit them."""
-
-
 class ResultError(Er3aError):
     """A results file is missing, damaged or of another format version; a rerun of its stage mends it."""
 

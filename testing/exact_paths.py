@@ -13,12 +13,14 @@ import numpy as np
 from er3a.errors import PoseError
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
+from er3a.kinematics.singularity import TYPES
 from er3a.planning.follow import follow
 from er3a.planning.moves import line
+from er3a.planning.near_singular import NearSingular
 from er3a.planning.singular_events import singular_events
 
 REAL = np.longdouble
-NEAR = {"wrist": np.radians(30), "elbow": np.radians(30), "shoulder": 0.2}
+NEAR = NearSingular(float(np.radians(30)), float(np.radians(30)), 0.2)
 
 
 def line_distances(robot, way, progress, elbow_up: bool) -> dict[str, np.ndarray]:
@@ -93,7 +95,7 @@ def worst_location(robot, random, lines: int) -> dict[str, tuple[int, float]]:
 
     Passes within 30 deg or 200 mm count, on the branches that reach to the front, away from the ends of the lines.
     """
-    found = {kind: (0, 0.0) for kind in NEAR}
+    found = {kind: (0, 0.0) for kind in TYPES}
     grid, labels = np.linspace(0, 1, 201), branch_labels(robot)
     for _ in range(lines):
         q = random.uniform(robot.lower, robot.upper)

@@ -11,9 +11,10 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import TYPES, determinant_factors
 from er3a.planning.follow import follow
 from er3a.planning.moves import JointMove, line
+from er3a.planning.near_singular import NearSingular, factor_of
 from er3a.planning.singular_events import SingularEvent, runs, singular_events
 
-NEAR = {"wrist": np.radians(5), "elbow": np.radians(5), "shoulder": 0.03}
+NEAR = NearSingular(float(np.radians(5)), float(np.radians(5)), 0.03)
 COARSE = 101
 FINER = 100
 
@@ -71,7 +72,7 @@ class Found:
         t = np.linspace(0, 1, (COARSE - 1) * FINER + 1)
         factors = determinant_factors(robot, path.joints(t))
         for kind in TYPES:
-            f = getattr(factors, kind)
+            f = factor_of(factors, kind)
             events = [event for event in path.events if event.type == kind]
             for i in np.flatnonzero(f[:-1] * f[1:] < 0):
                 if any(t[i + 1] >= before and t[i] <= behind for before, behind in path.jumps):
@@ -80,7 +81,7 @@ class Found:
                 self.missed_crossings += not any(
                     event.crossing and t[i] - 1e-9 <= event.t <= t[i + 1] + 1e-9 for event in events
                 )
-            for first, last in runs(np.abs(f) < NEAR[kind]):
+            for first, last in runs(np.abs(f) < NEAR.of(kind)):
                 if any(t[last - 1] >= before and t[first] <= behind for before, behind in path.jumps):
                     continue
                 self.passes += 1

@@ -20,7 +20,7 @@ import pytest
 from er3a.errors import ResultError, WriteError
 from er3a.files.robot_library import ROBOTS
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.kept_files import half_written, sha256, write_atomically
+from er3a.files.kept_files import half_written, sha256, write_atomically
 from er3a.pipeline.results import (
     CHECKSUMS,
     FORMAT_VERSION,
@@ -230,7 +230,7 @@ def test_a_failing_write_leaves_the_old_file_and_no_temporary(tmp_path):
 
 def test_what_a_killed_process_left_is_found(tmp_path):
     killed = (
-        "import os, sys; from pathlib import Path; from er3a.pipeline.kept_files import write_atomically\n"
+        "import os, sys; from pathlib import Path; from er3a.files.kept_files import write_atomically\n"
         "for name in ('t.parquet', 'SHA256SUMS', '.page.html.sha256'):\n"
         "    if os.fork() == 0: write_atomically(Path(sys.argv[1]) / 'x' / name, lambda f: (f.touch(), os._exit(9)))\n"
         "    os.wait()"

@@ -4,25 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
-from er3a.calibration.parameters import (
-    LEVELS,
-    SCALE,
-    Parameter,
-    Subspace,
-    jacobian,
-    listed,
-    parameters_of,
-    subspace,
-)
-from er3a.errors import IdentificationError
+from er3a.calibration.measured import Observations
+from er3a.calibration.outcomes import CalibrationError, LevelName, MorePositions, NoPositions
+from er3a.calibration.parameters import LEVELS, SCALE, Parameter, Subspace, jacobian, parameters_of, subspace
 from er3a.kinematics.table_batch import tables_of
-from er3a.numerics.quasi_random import spread
-from er3a.pipeline.messages.language import N_, joined, said
-from er3a.references.quantities import CarriedCoordinate, PointCoordinate
-from er3a.references.reference import Reference
+from er3a.numerics.quasi_random import quasi_random_points
+from er3a.references.quantities import COORDINATES, ZERO_POSE, CarriedCoordinate, PointCoordinate, Pose, Quantity
 from er3a.robots.robot import Robot
 
 RICH_POSES = 64
@@ -36,124 +27,92 @@ class Level:
     Attributes
     ----------
     name : one of ``LEVELS``
-    parameters : its entries; subspace : which of them the references determine
-    deviation : (n,), standard deviation of the references, mm
-    more : what a fuller level would take, in words
+    parameters : its entries; subspace : which of them the observations determine
+    more : what a fuller level would take; None if all entries are estimated
     """
 
-    name: str
+    name: LevelName
     parameters: tuple[Parameter, ...]
     subspace: Subspace
-    deviation: np.ndarray
-    more: str = ""
+    more: MorePositions | None
 
 
-def choose_level(robot: Robot, references: tuple[Reference, ...], deviation: np.ndarray) -> Level:
-    """The fullest level that the references determine as far as positions of these points ever can, with numbers to
+def choose_level(robot: Robot, observations: Observations) -> Level:
+    """The fullest level that the observations determine as far as positions of these points ever can, with numbers to
     spare.
 
     Raises
     ------
-    IdentificationError
-        if even the lengths ask for more; the message says what is needed
+    CalibrationError
+        if even the lengths ask for more
     """
-    if not references:
-        raise IdentificationError(N_("there are no positions of single points to identify anything from"))
-    rich = _rich(robot, references)
-    more = ""
+    if not len(observations):
+        raise CalibrationError(NoPositions(), "there are no positions of single points to calibrate from")
+    rich = _rich(robot, observations.quantities)
+    deviation = np.full(len(rich), np.median(observations.deviation_mm))
+    more: list[MorePositions] = []
     for name in LEVELS[::-1]:
         parameters = parameters_of(robot, name)
-        here = subspace(robot, parameters, references, deviation)
-        best = subspace(robot, parameters, rich, np.full(len(rich), np.median(deviation)))
-        lacking = len(best.kept) - len(here.kept)
-        if not lacking and len(references) > len(here.kept):
-            return Level(name, parameters, here, deviation, more)
-        more = _what_more(robot, name, parameters, here, best, references)
-    raise IdentificationError(more)
+        here = subspace(robot, parameters, observations.quantities, observations.deviation_mm)
+        best = subspace(robot, parameters, rich, deviation)
+        if len(best.kept) == len(here.kept) and len(observations) > len(here.kept):
+            return Level(name, parameters, here, more[-1] if more else None)
+        more.append(_what_more(robot, name, parameters, here, best, observations))
+    problem = f"{len(observations)} coordinates determine too little; positions to be added: {more[-1].least} at least"
+    raise CalibrationError(more[-1], problem)
 
 
-def _rich(robot: Robot, references: Sequence[Reference]) -> tuple[Reference, ...]:
+def _rich(robot: Robot, quantities: Sequence[Quantity]) -> tuple[Quantity, ...]:
     """The same points at poses all over the joint range."""
     points = dict.fromkeys(
-        replace(r.quantity, coordinate=c)
-        if isinstance(r.quantity, CarriedCoordinate | PointCoordinate)
-        else PointCoordinate(r.quantity.seen_at, "wrist_centre", c)
-        for r in references
-        for c in "xyz"
+        replace(quantity, coordinate=c, pose=ZERO_POSE)
+        if isinstance(quantity, CarriedCoordinate | PointCoordinate)
+        else PointCoordinate(ZERO_POSE, "wrist_centre", c)
+        for quantity in quantities
+        for c in COORDINATES
     )
-    kinds = dict.fromkeys(replace(quantity, pose=(0.0,) * 6) for quantity in points)
-    return tuple(
-        Reference("", "key poses", replace(kind, pose=pose), 0.0, 1.0, "", "inferred")
-        for pose in _spread(robot)
-        for kind in kinds
-    )
+    return tuple(replace(point, pose=pose) for pose in _spread(robot) for point in points)
 
 
-def _spread(robot: Robot) -> list[tuple[float, ...]]:
+def _spread(robot: Robot) -> list[Pose]:
     low, high = np.degrees(robot.lower), np.degrees(robot.upper)
-    return [tuple(map(float, row)) for row in np.round(spread(low, high, RICH_POSES) / 5) * 5 + 0.0]
+    rows = np.round(quasi_random_points(low, high, RICH_POSES) / 5) * 5 + 0.0
+    return [cast(Pose, tuple(row)) for row in rows.tolist()]
 
 
 def _what_more(
     robot: Robot,
-    name: str,
+    level: LevelName,
     parameters: tuple[Parameter, ...],
     here: Subspace,
     best: Subspace,
-    references: tuple[Reference, ...],
-) -> str:
-    poses = len({reference.quantity.seen_at for reference in references})
+    observations: Observations,
+) -> MorePositions:
     lacking = len(best.kept) - len(here.kept)
-    undetermined = [parameters[k].name for k in best.kept if k not in here.kept]
-    least = -(-max(lacking, len(best.kept) + 1 - len(references)) // 3)
-    template = (
-        N_(
-            "{coordinates} coordinates at {poses} poses determine {here} of the {best} entries ({level}) that "
-            "positions of these points can determine"
-        )
-        if poses > 1
-        else N_(
-            "{coordinates} coordinates at 1 pose determine {here} of the {best} entries ({level}) that positions of "
-            "these points can determine"
-        )
-    )
-    known = said(
-        template, coordinates=len(references), poses=poses, here=len(here.kept), best=len(best.kept), level=name
-    )
-    needed = (
-        said("it takes at least {least} more positions", least=least)
-        if least > 1
-        else N_("it takes at least 1 more position")
-    )
-    if undetermined:
-        needed = said("{needed} for {entries}", needed=needed, entries=joined(undetermined, ", "))
-    return said(
-        "{known}; {needed}. Spread them over all joints, for example {examples}.",
-        known=known,
-        needed=needed,
-        examples=_examples(robot, parameters, best, references),
+    return MorePositions(
+        coordinates=len(observations),
+        poses=observations.poses,
+        determined=len(here.kept),
+        determinable=len(best.kept),
+        level=level,
+        least=-(-max(lacking, len(best.kept) + 1 - len(observations)) // 3),
+        entries=tuple(parameters[k].name for k in best.kept if k not in here.kept),
+        examples_deg=_examples(robot, [parameters[k] for k in best.kept], observations.quantities),
     )
 
 
-def _examples(
-    robot: Robot, parameters: tuple[Parameter, ...], best: Subspace, references: tuple[Reference, ...]
-) -> str:
+def _examples(robot: Robot, kept: list[Parameter], quantities: Sequence[Quantity]) -> tuple[Pose, ...]:
     """Poses that add most to what is known: greedily the greatest gain in ln det of the information matrix."""
-    kept = [parameters[k] for k in best.kept]
-    spread = _spread(robot)
-    candidates = [
-        Reference("", "key poses", PointCoordinate(pose, "flange", c), 0.0, 1.0, "", "inferred")
-        for pose in spread
-        for c in "xyz"
-    ]
+    poses = _spread(robot)
+    candidates = [PointCoordinate(pose, "flange", c) for pose in poses for c in COORDINATES]
     table = tables_of(robot)
-    blocks = SCALE * jacobian(table, robot, kept, candidates).reshape(len(spread), 3, len(kept))
-    known = SCALE * jacobian(table, robot, kept, references)
+    blocks = SCALE * jacobian(table, robot, kept, candidates).reshape(len(poses), 3, len(kept))
+    known = SCALE * jacobian(table, robot, kept, quantities)
     information = known.T @ known + 1e-9 * np.eye(len(kept))
     chosen = []
     for _ in range(SHOWN_POSES):
         gain = [np.linalg.slogdet(information + block.T @ block)[1] for block in blocks]
         at = int(np.argmax(gain))
         information += blocks[at].T @ blocks[at]
-        chosen.append("(" + ", ".join(f"{angle:g}" for angle in spread[at]) + ") deg")
-    return listed(chosen)
+        chosen.append(poses[at])
+    return tuple(chosen)

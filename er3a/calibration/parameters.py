@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
+from er3a.calibration.outcomes import Held, LevelName, MovesNothing, NotToldApart
 from er3a.kinematics.table_batch import Tables, join, tables_of
-from er3a.pipeline.messages.language import N_, joined, said
 from er3a.references.predict import predict_tables
-from er3a.references.reference import Reference
+from er3a.references.quantities import MM, Quantity, Reals
 from er3a.robots.robot import Robot
 
-LEVELS = (N_("lengths"), N_("lengths and joint offsets"), N_("all entries"))
+LEVELS: tuple[LevelName, ...] = ("lengths", "lengths_and_offsets", "all_entries")
 PARALLEL_RAD = np.radians(1.0)
 STEP = 1e-5
 SCALE = 1e-3  # m and rad alike: 1 mm, and 1 mrad, which moves a flange about as far
@@ -36,17 +37,17 @@ class Parameter:
     @property
     def name(self) -> str:
         """Such as ``d4``."""
-        return said("{column}{joint}", column=self.column, joint=self.joint)
+        return f"{self.column}{self.joint}"
 
     @property
-    def unit(self) -> str:
+    def unit(self) -> Literal["mm", "deg"]:
         """mm or deg."""
         return "mm" if self.column in ("a", "d") else "deg"
 
     @property
     def in_unit(self) -> float:
         """Factor from m or rad to the unit."""
-        return 1000.0 if self.unit == "mm" else 180 / np.pi
+        return MM if self.unit == "mm" else 180 / np.pi
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,20 +57,20 @@ class Subspace:
     Attributes
     ----------
     kept : places of the parameters that are estimated; ``held`` : places of the others, which keep their values
-    words : for each held one, why, in words
+    reasons : for each held one, why
     singular_values : of the scaled Jacobian over all parameters (one standard deviation per mm or mrad), descending
     """
 
     kept: tuple[int, ...]
     held: tuple[int, ...]
-    words: tuple[str, ...]
-    singular_values: np.ndarray
+    reasons: tuple[Held, ...]
+    singular_values: Reals
 
 
-def parameters_of(robot: Robot, level: str) -> tuple[Parameter, ...]:
+def parameters_of(robot: Robot, level: LevelName) -> tuple[Parameter, ...]:
     """The entries of a level, in the order in which they are preferred where some can't be told apart.
 
-    ``lengths`` are those that are not 0. ``all entries`` has Hayati's beta beside alpha wherever neighbouring axes are
+    ``lengths`` are those that are not 0. ``all_entries`` has Hayati's beta beside alpha wherever neighbouring axes are
     parallel: their common normal, on which the other four entries rest, is undefined there.
     """
     joints = range(1, 7)
@@ -96,7 +97,7 @@ def parallel_pairs(robot: Robot) -> list[tuple[int, tuple[int, int]]]:
     return pairs
 
 
-def moved(tables: Tables, parameters: Sequence[Parameter], amounts: np.ndarray) -> Tables:
+def moved(tables: Tables, parameters: Sequence[Parameter], amounts: Reals) -> Tables:
     """One table of the batch for each row of amounts (H, p), in m and rad, added to the entries."""
     for parameter, amount in zip(parameters, amounts.T):
         entry = getattr(tables, parameter.column)[:, [parameter.joint - 1]]
@@ -104,33 +105,32 @@ def moved(tables: Tables, parameters: Sequence[Parameter], amounts: np.ndarray) 
     return tables
 
 
-def jacobian(
-    tables: Tables, robot: Robot, parameters: Sequence[Parameter], references: Sequence[Reference]
-) -> np.ndarray:
-    """Derivative (n, p) of references with respect to entries, in the references' units per m or rad, by central
+def jacobian(tables: Tables, robot: Robot, parameters: Sequence[Parameter], quantities: Sequence[Quantity]) -> Reals:
+    """Derivative (n, p) of quantities with respect to entries, in the quantities' units per m or rad, by central
     differences at a table (a batch of one); exact to about 1e-8."""
     count = len(parameters)
     steps = STEP * np.concatenate([np.eye(count), -np.eye(count)])
-    values = predict_tables(moved(join([tables] * (2 * count)), parameters, steps), robot, references)
-    return (values[:count] - values[count:]).T / (2 * STEP)
+    values = predict_tables(moved(join([tables] * (2 * count)), parameters, steps), robot, quantities)
+    slopes: Reals = (values[:count] - values[count:]).T / (2 * STEP)
+    return slopes
 
 
 def subspace(
-    robot: Robot, parameters: Sequence[Parameter], references: Sequence[Reference], deviation: np.ndarray
+    robot: Robot, parameters: Sequence[Parameter], quantities: Sequence[Quantity], deviation: Reals
 ) -> Subspace:
     """The identifiable part of the parameters: columns of the weighted Jacobian are taken in order of preference, and
     one that lies in the span of those before it (to 0.1 % of its length) is held.
 
     Parameters
     ----------
-    deviation : (n,), standard deviation of the references
+    deviation : (n,), standard deviation of the measured quantities
     """
-    J = SCALE * jacobian(tables_of(robot), robot, parameters, references) / deviation[:, None]
+    J = SCALE * jacobian(tables_of(robot), robot, parameters, quantities) / deviation[:, None]
     norms = np.linalg.norm(J, axis=0)
     kept: list[int] = []
     held: list[int] = []
-    words: list[str] = []
-    basis = np.empty((len(J), 0))
+    reasons: list[Held] = []
+    basis: Reals = np.empty((len(J), 0))
     for k, norm in enumerate(norms):
         rest = J[:, k] - basis @ (basis.T @ J[:, k])
         rest -= basis @ (basis.T @ rest)
@@ -139,32 +139,22 @@ def subspace(
             basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
             continue
         held.append(k)
-        words.append(_why(robot, parameters, k, kept, J, norm <= NO_EFFECT * norms.max()))
-    return Subspace(tuple(kept), tuple(held), tuple(words), np.linalg.svd(J, compute_uv=False))
+        reasons.append(
+            MovesNothing(parameters[k].name)
+            if norm <= NO_EFFECT * norms.max()
+            else _told_apart_from(robot, parameters, k, kept, J)
+        )
+    singular_values = np.asarray(np.linalg.svd(J, compute_uv=False), np.float64)
+    return Subspace(tuple(kept), tuple(held), tuple(reasons), singular_values)
 
 
-def _why(robot: Robot, parameters: Sequence[Parameter], k: int, kept: list[int], J: np.ndarray, no_effect: bool) -> str:
-    name = parameters[k].name
-    if no_effect:
-        return said("{entry} moves none of the measured points", entry=name)
+def _told_apart_from(robot: Robot, parameters: Sequence[Parameter], k: int, kept: list[int], J: Reals) -> NotToldApart:
+    """Which entries act on the measured points as entry ``k`` does."""
     share = np.linalg.lstsq(J[:, kept], J[:, k], rcond=None)[0] * np.linalg.norm(J[:, kept], axis=0)
     partners = [parameters[i] for i, part in zip(kept, share) if abs(part) > DEPENDENT * np.linalg.norm(J[:, k])]
-    entries = listed([name, *(partner.name for partner in partners)])
     between = [
         joints for row, joints in parallel_pairs(robot)
         if parameters[k].column == "d" and {parameters[k].joint, partners[-1].joint} == set(joints)
     ]  # fmt: skip
-    if between and len(partners) == 1:
-        first, second = between[0]
-        return said(
-            "{entries} can't be told apart: joints {first} and {second} are parallel",
-            entries=entries,
-            first=first,
-            second=second,
-        )
-    return said("{entries} can't be told apart", entries=entries)
-
-
-def listed(words: Sequence[str]) -> str:
-    """Two words or more in a row: first, second and last."""
-    return said("{others} and {last}", others=joined(words[:-1], ", "), last=words[-1])
+    entries = (parameters[k].name, *(partner.name for partner in partners))
+    return NotToldApart(entries, between[0] if between and len(partners) == 1 else None)

@@ -2,34 +2,37 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import cast
 
-from er3a.calibration.calibrate import identify
+import numpy as np
+from numpy.typing import NDArray
+
+from er3a.calibration.calibrate import calibrate
+from er3a.calibration.measured import Measurement
 from er3a.calibration.parameters import Parameter, moved
-from er3a.files.measurements import Measurement
 from er3a.kinematics.forward import forward
 from er3a.kinematics.table_batch import robot_of, tables_of
-from er3a.references.quantities import MM
+from er3a.references.quantities import MM, Pose, Reals
 from er3a.robots.robot import Robot
 
 LENGTH_ERROR_M = 5e-4
 ANGLE_ERROR_RAD = 2e-3
 
 
-def measured(arm: Robot, q: np.ndarray, deviation_mm: float, random: np.random.Generator) -> tuple[Measurement, ...]:
+def measured(arm: Robot, q: Reals, deviation_mm: float, random: np.random.Generator) -> tuple[Measurement, ...]:
     """Flange positions of an arm at joint angles (P, 6) in rad, with Gaussian noise."""
     position = forward(arm.without_tool(), q)[:, :3, 3] * MM
     position = position + random.normal(0.0, deviation_mm, position.shape)
     return tuple(
-        Measurement(row, tuple(map(float, angles)), "flange", tuple(map(float, xyz)), deviation_mm)
-        for row, (angles, xyz) in enumerate(zip(np.degrees(q), position), 1)
+        Measurement(row, cast(Pose, tuple(angles)), "flange", (x, y, z), deviation_mm)
+        for row, (angles, (x, y, z)) in enumerate(zip(np.degrees(q).tolist(), position.tolist()), 1)
     )
 
 
 def covered(
     robot: Robot, runs: int, poses: int, deviation_mm: float, random: np.random.Generator
-) -> tuple[tuple[str, ...], np.ndarray]:
-    """Identify arms with random errors in the identifiable entries, each measured at random poses.
+) -> tuple[tuple[str, ...], NDArray[np.bool_]]:
+    """Calibrate arms with random errors in the identifiable entries, each measured at random poses.
 
     Returns
     -------
@@ -43,15 +46,15 @@ def covered(
         truth = random.normal(0.0, size)
         arm = robot_of(moved(tables_of(robot), kept, truth[None]), 0, robot)
         q = random.uniform(robot.lower, robot.upper, (poses, 6))
-        found = identify(robot, measured(arm, q, deviation_mm, random))
-        by_name = {estimate.name: estimate for estimate in found.estimates}
+        found = calibrate(robot, measured(arm, q, deviation_mm, random))
+        by_parameter = {estimate.parameter: estimate for estimate in found.estimates}
         for k, parameter in enumerate(kept):
-            estimate = by_name[parameter.name]
+            estimate = by_parameter[parameter]
             inside[run, k] = abs(estimate.correction - truth[k] * parameter.in_unit) <= estimate.half_width
     return tuple(parameter.name for parameter in kept), inside
 
 
 def _identifiable(robot: Robot, poses: int, random: np.random.Generator) -> list[Parameter]:
     q = random.uniform(robot.lower, robot.upper, (poses, 6))
-    found = identify(robot, measured(robot, q, 1.0, random))
-    return [Parameter(estimate.name[:-1], int(estimate.name[-1])) for estimate in found.estimates]
+    found = calibrate(robot, measured(robot, q, 1.0, random))
+    return [estimate.parameter for estimate in found.estimates]

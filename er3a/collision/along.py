@@ -25,19 +25,18 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from er3a.collision.bodies import Bodies
 from er3a.collision.envelopes import link_frames
 from er3a.collision.pairs import Pair
+from er3a.numerics.arrays import Flags, Integers, Reals
 
 SHORTEST = 1e-9  # share of the duration; motion that is wide over less is a jump
 LOCATED = 1e-10  # share of the duration
 CHUNK = 20_000  # points whose ends are held in memory at a time
 
-Floats = NDArray[np.float64]
-Joints = Callable[[Floats], Floats]
+Joints = Callable[[Reals], Reals]
 
 
 @dataclass(frozen=True)
@@ -70,8 +69,8 @@ class ClearanceAlong:
     measured : number of arm poses at which distances were measured
     """
 
-    t: Floats
-    distance: Floats
+    t: Reals
+    distance: Reals
     pair: tuple[Pair | None, ...]
     contacts: tuple[Contact, ...]
     measured: int
@@ -87,7 +86,7 @@ class _Motion:
 
     def __init__(self, bodies: Bodies, joints: Joints) -> None:
         self.bodies, self.joints = bodies, joints
-        self.known: dict[float, Floats] = {}
+        self.known: dict[float, Reals] = {}
         own = np.flatnonzero(bodies.second >= 0)
         solid = np.flatnonzero(bodies.second < 0)
         moving, track = np.unique(bodies.first[solid], return_inverse=True)
@@ -95,7 +94,7 @@ class _Motion:
         self.track = np.empty(len(bodies.pairs), dtype=int)  # of a pair: which tracked capsule's way counts
         self.track[own], self.track[solid] = np.arange(len(own)), len(own) + track
 
-    def tracked(self, q: Floats) -> Floats:
+    def tracked(self, q: Reals) -> Reals:
         """End points (..., tracks, 2, 3): of links in other links' frames, then of capsules in space."""
         bodies, ends = self.bodies, self.bodies.ends(q)
         links = [bodies.capsules[i].link for i in bodies.first[self._own]]
@@ -103,7 +102,7 @@ class _Motion:
         from_link = ends[..., bodies.second[self._own], :, :] - T[..., None, :3, 3]
         return np.concatenate([from_link @ T[..., :3, :3], ends[..., self._moving, :, :]], axis=-3)
 
-    def measure(self, t: float, q: Floats, pairs: NDArray[np.int_]) -> Floats:
+    def measure(self, t: float, q: Reals, pairs: Integers) -> Reals:
         """Distances (P,) at a time, those of ``pairs`` known, the others perhaps NaN."""
         found = self.known.setdefault(t, np.full(len(self.bodies.pairs), np.nan))
         missing = pairs[np.isnan(found[pairs])]
@@ -112,7 +111,7 @@ class _Motion:
         return found
 
 
-def clearance_along(bodies: Bodies, joints: Joints, t: Floats, shown: Floats, depth: float) -> ClearanceAlong:
+def clearance_along(bodies: Bodies, joints: Joints, t: Reals, shown: Reals, depth: float) -> ClearanceAlong:
     """Measure clearance along a motion.
 
     Parameters
@@ -147,7 +146,7 @@ def clearance_along(bodies: Bodies, joints: Joints, t: Floats, shown: Floats, de
     return ClearanceAlong(at, distance, pair, tuple(contacts), len(motion.known))
 
 
-def _fine(motion: _Motion, t: Floats, step: float) -> tuple[Floats, Floats, Floats]:
+def _fine(motion: _Motion, t: Reals, step: float) -> tuple[Reals, Reals, Reals]:
     """Times so near to one another that no tracked end moves by more than ``step``, joints, and the way so far.
 
     The way is (N, tracks), that of the end that moves more, summed up; infinite steps where it is unknown.
@@ -168,16 +167,16 @@ def _fine(motion: _Motion, t: Floats, step: float) -> tuple[Floats, Floats, Floa
     return times, q, np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
 
 
-def _steps(motion: _Motion, q: Floats, q_middle: Floats) -> Floats:
+def _steps(motion: _Motion, q: Reals, q_middle: Reals) -> Reals:
     """How far the tracked ends move at most between neighbours (n + 1, 6), by way of the middles; (n, tracks)."""
     here, half = motion.tracked(q), motion.tracked(q_middle)
     chords = np.linalg.norm(half - here[:-1], axis=-1) + np.linalg.norm(here[1:] - half, axis=-1)
     bulge = np.linalg.norm(here[:-1] - 2 * half + here[1:], axis=-1)
-    moved: Floats = (chords + bulge).max(axis=-1)
+    moved: Reals = (chords + bulge).max(axis=-1)
     return moved
 
 
-def _refine(motion: _Motion, times: Floats, q: Floats, way: Floats, step: float) -> None:
+def _refine(motion: _Motion, times: Reals, q: Reals, way: Reals, step: float) -> None:
     """Measure between known points until every interval is free as a whole, or overlaps so, or is short."""
     every = np.arange(len(motion.bodies.pairs))
     known = [i for i, time in enumerate(times) if time in motion.known]
@@ -202,7 +201,7 @@ def _refine(motion: _Motion, times: Floats, q: Floats, way: Floats, step: float)
         waiting += [(a, middle, pairs), (middle, b, pairs)]
 
 
-def _contacts(motion: _Motion, times: Floats, q: Floats, near: float) -> list[Contact]:
+def _contacts(motion: _Motion, times: Reals, q: Reals, near: float) -> list[Contact]:
     """Stretches of overlap between known points, their ends located where the least distance is 0."""
     every = np.arange(len(motion.bodies.pairs))
     known = [i for i, time in enumerate(times) if time in motion.known]
@@ -224,7 +223,7 @@ def _contacts(motion: _Motion, times: Floats, q: Floats, near: float) -> list[Co
     return found
 
 
-def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def _runs(flags: Flags) -> list[tuple[int, int]]:
     """Index ranges (first, behind the last) of the stretches of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

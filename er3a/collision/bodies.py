@@ -14,12 +14,12 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from er3a.collision.envelopes import capsule_poses, envelopes_of
 from er3a.collision.pairs import BASE, LinkAndSolid, LinkPair, Pair
 from er3a.collision.scene import Box, Cylinder, Plane, Scene, Solid, Sphere
 from er3a.errors import Er3aError
+from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import Robot
 
 try:
@@ -73,11 +73,11 @@ class Bodies:
         )
         self._solid_of = [-1] * len(own) + [k for k in range(len(solids)) for _ in moving]
 
-    def ends(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    def ends(self, q: Reals) -> Reals:
         """End points (..., capsules, 2, 3) in m of the capsules' lines at joint angles (..., 6) in rad."""
         return capsule_poses(self.robot, self.capsules, q)
 
-    def distances(self, ends: NDArray[np.float64], pairs: NDArray[np.int_]) -> NDArray[np.float64]:
+    def distances(self, ends: Reals, pairs: Integers) -> Reals:
         """Distances (len(pairs),) in m of some pairs, negative by the depth of overlap, for end points (n, 2, 3)."""
         placed = _placed(ends)
         found = np.empty(len(pairs))
@@ -121,7 +121,7 @@ def _shape(solid: Solid) -> tuple[Any, Any]:
     return shape, coal.Transform3s(solid.T[:3, :3], solid.T[:3, 3])
 
 
-def _placed(ends: NDArray[np.float64]) -> list[Any]:
+def _placed(ends: Reals) -> list[Any]:
     """Where capsules (n, 2, 3) (along their own z, about their middle) lie."""
     along = ends[:, 1] - ends[:, 0]
     length = np.linalg.norm(along, axis=1, keepdims=True)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
+from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 
 
@@ -23,11 +23,11 @@ class Clearance:
     pair : N, what is nearest to what; None where nothing can meet
     """
 
-    distance: NDArray[np.float64]
+    distance: Reals
     pair: tuple[Pair | None, ...]
 
 
-def clearance(robot: Robot, q: NDArray[np.float64], scene: Scene | None) -> Clearance:
+def clearance(robot: Robot, q: Reals, scene: Scene | None) -> Clearance:
     """Least distance of each arm (N, 6) in rad from the scene's solids and from itself.
 
     Raises

@@ -8,11 +8,11 @@ which is about how thick small industrial arms are: an estimate. The column belo
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from er3a.collision.pairs import BASE
 from er3a.kinematics.chain import ALONG_Z, JOINTS, TO_NEXT_AXIS, link_parts
 from er3a.kinematics.forward import frames
+from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Envelope, Robot
 
 TOOL_LINK = 6
@@ -42,22 +42,22 @@ def default_envelopes(robot: Robot) -> tuple[Envelope, ...]:
     return tuple(found)
 
 
-def capsule_poses(robot: Robot, capsules: tuple[Envelope, ...], q: NDArray[np.float64]) -> NDArray[np.float64]:
+def capsule_poses(robot: Robot, capsules: tuple[Envelope, ...], q: Reals) -> Reals:
     """End points (..., n, 2, 3) of the capsules' lines in the base's surroundings, m, at joint angles (..., 6)."""
     T = link_frames(robot, q)[..., [c.link for c in capsules], :, :]
     ends = np.array([(c.start, c.end) for c in capsules])
-    placed: NDArray[np.float64] = np.einsum("...nij,nkj->...nki", T[..., :3, :3], ends) + T[..., None, :3, 3]
+    placed: Reals = np.einsum("...nij,nkj->...nki", T[..., :3, :3], ends) + T[..., None, :3, 3]
     return placed
 
 
-def link_frames(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
+def link_frames(robot: Robot, q: Reals) -> Reals:
     """Frames (..., 7, 4, 4) of the base and the six links at joint angles (..., 6)."""
     T = frames(robot, q)
     base = np.broadcast_to(robot.base, (*T.shape[:-3], 1, 4, 4))
     return np.concatenate([base, T[..., :JOINTS, :, :]], axis=-3)
 
 
-def _pieces(link: int, size: float, lines: list[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> list[Envelope]:
+def _pieces(link: int, size: float, lines: list[tuple[Reals, Reals]]) -> list[Envelope]:
     return [
         Envelope(link, tuple(start.tolist()), tuple(end.tolist()), RADIUS_RATIOS[link] * size)
         for start, end in lines

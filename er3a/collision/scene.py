@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
+from er3a.numerics.arrays import Reals
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,8 +17,8 @@ class Box:
     """
 
     name: str
-    T: NDArray[np.float64]
-    size: NDArray[np.float64]
+    T: Reals
+    size: Reals
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +31,7 @@ class Cylinder:
     """
 
     name: str
-    T: NDArray[np.float64]
+    T: Reals
     radius: float
     length: float
 
@@ -47,7 +46,7 @@ class Sphere:
     """
 
     name: str
-    T: NDArray[np.float64]
+    T: Reals
     radius: float
 
 
@@ -61,7 +60,7 @@ class Plane:
     """
 
     name: str
-    normal: NDArray[np.float64]
+    normal: Reals
     offset: float
 
 

@@ -1,92 +1,132 @@
-"""What is most likely wrong with a table, in words."""
+"""What is most likely wrong with a table."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
+from er3a.diagnosis.conclusions import (
+    Conclusion,
+    MainFault,
+    MostLikelyFault,
+    NextMeasurement,
+    NoFaultStandsOut,
+    NoFewFaultsExplain,
+    NothingToExplain,
+    NothingToRestOn,
+)
+from er3a.diagnosis.fault_kinds import Faults
 from er3a.diagnosis.next_measurement import what_decides
-from er3a.diagnosis.ranking import MEETS, Ranking, rank
-from er3a.files.reference_sets import load_references
+from er3a.diagnosis.ranking import MEETS, UNITS, Ranking, rank, usable
 from er3a.kinematics.table_batch import robot_of
-from er3a.pipeline.messages.language import said
+from er3a.references.quantities import Reals, Unit
 from er3a.references.reference import Reference, ReferenceSet, expected_of, lengths_of, vectors_of
 from er3a.robots.robot import Robot
 
-UNITS = ("mm", "deg")
+MOSTLY = 0.05
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Hypothesis:
     """A fault or two that would explain the disagreement.
 
     Attributes
     ----------
-    hypothesis : the faults in words, with the residual before and after
-    faults : each fault in words
-    kinds : the family of each fault
+    faults : one, or two
     residual_before, residual_after : greatest difference over the references of that unit; coordinates of one point are
         taken together, as a distance
     unit : mm, or deg where all lengths agree before and after
     explains : whether all references are met within their uncertainty
-    indistinguishable_from : other hypotheses (their faults in words) that no reference tells from this one
-    to_decide : what would tell them apart, in words; empty if there is nothing to tell apart
+    indistinguishable_from : the faults of other hypotheses that no reference tells from this one
+    to_decide : what would tell them apart; None if there is nothing to tell apart
     score : what it is ranked by; smaller is better
-    repaired : the robot with the faults mended
+    corrected : the robot without the faults
     """
 
-    hypothesis: str
-    faults: tuple[str, ...]
-    kinds: tuple[str, ...]
+    faults: Faults
     residual_before: float
     residual_after: float
-    unit: str
+    unit: Unit
     explains: bool
-    indistinguishable_from: tuple[str, ...]
-    to_decide: str
+    indistinguishable_from: tuple[Faults, ...]
+    to_decide: NextMeasurement | None
     score: float
-    repaired: Robot
+    corrected: Robot
 
 
-def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference] | str | Path) -> list[Hypothesis]:
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """What references say about a table.
+
+    Attributes
+    ----------
+    references : how many it rests on; tried : how many hypotheses were evaluated
+    ranking : None where there is nothing to explain
+    hypotheses : best first
+    """
+
+    conclusion: Conclusion
+    references: int
+    tried: int
+    ranking: Ranking | None
+    hypotheses: tuple[Hypothesis, ...]
+
+    @property
+    def names_fault(self) -> bool:
+        """Whether the best hypothesis explains all or most of the disagreement."""
+        return isinstance(self.conclusion, MostLikelyFault | MainFault)
+
+
+def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> list[Hypothesis]:
     """Hypotheses about what is wrong with a table, best first.
 
     Parameters
     ----------
     robot : the table as given, tool not considered (references speak of the flange)
-    references : a reference set, its name or its folder; official, CAD and export data count, if there are any, else
-        claims do
+    references : official, CAD and export data count, if there are any, else claims do
 
     Returns
     -------
     ranked : at most 10; empty if the references are met, or if no one or two faults explain more than scatter would
-
-    Raises
-    ------
-    InputError
-        if there is no such reference set, or it can't be read
     """
-    ranking = rank(robot, load_references(references) if isinstance(references, str | Path) else references)
-    return described(ranking, robot) if ranking else []
+    return list(diagnosis_of(robot, references).hypotheses)
 
 
-def described(ranking: Ranking, robot: Robot) -> list[Hypothesis]:
-    """A ranking's groups as hypotheses in words."""
-    return [_described(ranking, group, robot) for group in ranking.groups]
+def diagnosis_of(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> Diagnosis:
+    """Hypotheses, and what they amount to."""
+    ranking = rank(robot, references)
+    hypotheses = tuple(_described(ranking, group, robot) for group in ranking.groups) if ranking else ()
+    count, tried = len(usable(references)), len(ranking.pool.faults) if ranking else 0
+    conclusion = _conclusion(count, tried, ranking, hypotheses[0] if hypotheses else None)
+    return Diagnosis(conclusion, count, tried, ranking, hypotheses)
 
 
-def residuals(ranking: Ranking, difference: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[str]]:
+def _conclusion(count: int, tried: int, ranking: Ranking | None, best: Hypothesis | None) -> Conclusion:
+    if not count:
+        return NothingToRestOn()
+    if not ranking:
+        return NothingToExplain(count)
+    if not best:
+        return NoFaultStandsOut()
+    if best.explains:
+        return MostLikelyFault(best.faults, best.residual_before, best.residual_after, best.unit)
+    if best.residual_after < MOSTLY * best.residual_before:
+        return MainFault(best.faults, best.residual_before, best.residual_after, best.unit)
+    return NoFewFaultsExplain(tried, best.residual_before, best.residual_after, best.unit)
+
+
+def residuals(ranking: Ranking, difference: Reals) -> tuple[Reals, Reals, list[Unit]]:
     """Differences (n,) as lengths of vectors: residual and uncertainty (m,) each, and their units.
 
     The uncertainty of a vector is the greatest of its coordinates'.
     """
-    group, units = vectors_of(ranking.references)
+    vectors = vectors_of(ranking.references)
     _, uncertainty = expected_of(ranking.references)
-    bound = np.array([uncertainty[group == i].max() for i in range(len(units))])
-    return lengths_of(difference, group), bound, units
+    bound = np.array([uncertainty[list(places)].max() for places in vectors])
+    units = [ranking.references[places[0]].unit for places in vectors]
+    return lengths_of(difference, vectors), bound, units
 
 
 def _described(ranking: Ranking, group: tuple[int, ...], robot: Robot) -> Hypothesis:
@@ -99,43 +139,20 @@ def _described(ranking: Ranking, group: tuple[int, ...], robot: Robot) -> Hypoth
     of_unit = np.array([each == unit for each in units])
     greatest = [float(lengths[of_unit].max()) for lengths in (before_lengths, after_lengths)]
     return Hypothesis(
-        hypothesis=said(
-            "{faults}; residual falls from {before} {unit} to {after} {unit}",
-            faults=both(pool.faults[best]),
-            before=shown(greatest[0]),
-            after=shown(greatest[1]),
-            unit=unit,
-        ),
         faults=pool.faults[best],
-        kinds=pool.kinds[best],
         residual_before=greatest[0],
         residual_after=greatest[1],
         unit=unit,
         explains=bool((np.abs(after) <= uncertainty * MEETS).all()),
-        indistinguishable_from=tuple(both(pool.faults[i]) for i in group[1:]),
+        indistinguishable_from=tuple(pool.faults[i] for i in group[1:]),
         to_decide=what_decides(pool.tables[list(group)], robot),
         score=float(ranking.score[best]),
-        repaired=robot_of(pool.tables, best, robot),
+        corrected=robot_of(pool.tables, best, robot),
     )
 
 
-def both(faults: Sequence[str]) -> str:
-    """One fault or two as one text."""
-    if len(faults) == 1:
-        return faults[0]
-    return said("{fault} and {second_fault}", fault=faults[0], second_fault=faults[1])
-
-
-def _telling_unit(ranking: Ranking, after: np.ndarray, uncertainty: np.ndarray) -> str:
+def _telling_unit(ranking: Ranking, after: Reals, uncertainty: Reals) -> Unit:
     """mm if any length is missed before or after, else the first unit in which something is."""
-    units = np.array([reference.unit for reference in ranking.references])
     missed = (np.abs(ranking.before) > uncertainty) | (np.abs(after) > uncertainty)
-    for unit in UNITS:
-        if missed[units == unit].any():
-            return unit
-    return str(units[missed][0])
-
-
-def shown(value: float) -> str:
-    """A residual: one decimal below 100, none above."""
-    return f"{value:.1f}" if value < 100 else f"{value:.0f}"
+    found = [reference.unit for reference, off in zip(ranking.references, missed) if off]
+    return next((unit for unit in UNITS if unit in found), found[0])

@@ -7,13 +7,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from er3a.diagnosis.faults import repairs_of
+from er3a.diagnosis.fault_kinds import Fault, WrongLength, WrongScale
+from er3a.diagnosis.faults import LengthColumn, repairs_of
 from er3a.diagnosis.ranking import rank, usable
 from er3a.kinematics.table_batch import COLUMNS, Tables, robot_of, tables_of
 from er3a.references.predict import predict_tables
-from er3a.references.reference import Reference, ReferenceSet, expected_of
+from er3a.references.quantities import MM, Quantity, Reals
+from er3a.references.reference import Reference, ReferenceSet, expected_of, quantities_of
 from er3a.robots.robot import Robot
 
+LENGTH_COLUMNS: tuple[LengthColumn, ...] = ("a", "d")
 SCALES = (0.9, 1.05, 25.4)
 WRONG_BY_M = (0.005, -0.02)
 SAME_LENGTH_M = 2e-3
@@ -24,10 +27,9 @@ STEP = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Mutation:
-    """A right table with one fault: its family, the fault in words, and the faulty table (a batch of one)."""
+    """A right table with one fault: the fault, and the faulty table (a batch of one)."""
 
-    kind: str
-    fault: str
+    fault: Fault
     table: Tables
 
 
@@ -42,8 +44,7 @@ class Outcome:
     set_size : hypotheses in that group; 0 if nothing was reported
     """
 
-    kind: str
-    fault: str
+    fault: Fault
     identifiable: bool
     found: bool
     set_size: int
@@ -53,25 +54,22 @@ def mutations_of(robot: Robot) -> Iterator[Mutation]:
     """Each kind of fault at every place where it changes the table."""
     right = tables_of(robot)
     for repair in repairs_of(right):
-        yield Mutation(repair.kind, repair.fault, repair.apply(right))
-    for column in "ad":
+        yield Mutation(repair.fault, repair.apply(right))
+    for column in LENGTH_COLUMNS:
         for j in range(6):
-            length = getattr(right, column)[0, j]
-            if length:
-                missing = right.with_column(column, [j], np.zeros((1, 1)))
-                yield Mutation("length", f"{column}{j + 1} missing", missing)
-            for by in WRONG_BY_M:
-                wrong = right.with_column(column, [j], np.full((1, 1), length + by))
-                yield Mutation("length", f"{column}{j + 1} wrong by {by * 1000:g} mm", wrong)
+            length = float(getattr(right, column)[0, j])
+            for wrong in ((0.0,) if length else ()) + tuple(length + by for by in WRONG_BY_M):
+                fault = WrongLength(j + 1, column, wrong * MM, length * MM)
+                yield Mutation(fault, right.with_column(column, [j], np.full((1, 1), wrong)))
     for scale in SCALES:
-        yield Mutation("scale", f"lengths times {scale}", replace(right, a=right.a * scale, d=right.d * scale))
+        yield Mutation(WrongScale(1 / scale), replace(right, a=right.a * scale, d=right.d * scale))
 
 
 def noisy(references: Sequence[Reference], noise_mm: float, random: np.random.Generator) -> tuple[Reference, ...]:
     """Lengths with uniform noise up to ``noise_mm``, and with an uncertainty that owns up to it."""
     return tuple(
         replace(r, expected=r.expected + random.uniform(-noise_mm, noise_mm), uncertainty=r.uncertainty + noise_mm)
-        if r.unit == "mm"
+        if r.unit == "mm" and r.expected is not None
         else r
         for r in references
     )
@@ -85,7 +83,6 @@ def try_mutation(
     ranking = rank(robot_of(mutation.table, 0, robot), stated)
     group = ranking.groups[0] if ranking and ranking.groups else ()
     return Outcome(
-        kind=mutation.kind,
         fault=mutation.fault,
         identifiable=identifiable(robot, mutation, stated, noise_mm),
         found=any(_same(ranking.pool.tables[[row]], tables_of(robot)) for row in group) if ranking else False,
@@ -100,12 +97,12 @@ def identifiable(robot: Robot, mutation: Mutation, references: Sequence[Referenc
     differences at the right table) must move some reference by more than its uncertainty and the noise in it. A joint's
     direction and the convention have no derivative: there the change itself counts.
     """
-    right = tables_of(robot)
-    _, uncertainty = expected_of(tuple(references))
+    right, quantities = tables_of(robot), quantities_of(references)
+    _, uncertainty = expected_of(references)
     noise = np.array([noise_mm if reference.unit == "mm" else 0.0 for reference in references])
-    at_right = predict_tables(right, robot, references)[0]
+    at_right = predict_tables(right, robot, quantities)[0]
     if mutation.table.modified[0] != right.modified[0]:
-        moved = predict_tables(mutation.table, robot, references)[0] - at_right
+        moved = predict_tables(mutation.table, robot, quantities)[0] - at_right
         return bool((np.abs(moved) > uncertainty + noise).any())
     moved = np.zeros(len(references))
     for column in COLUMNS:
@@ -113,19 +110,20 @@ def identifiable(robot: Robot, mutation: Mutation, references: Sequence[Referenc
         for j in np.flatnonzero(before != after):
             if column == "direction":
                 turned = right.with_column(column, [j], np.full((1, 1), after[j]))
-                moved += predict_tables(turned, robot, references)[0] - at_right
+                moved += predict_tables(turned, robot, quantities)[0] - at_right
             else:
-                moved += _slope(right, column, int(j), robot, references) * (after[j] - before[j])
+                moved += _slope(right, column, int(j), robot, quantities) * (after[j] - before[j])
     return bool((np.abs(moved) > uncertainty + noise).any())
 
 
-def _slope(right: Tables, column: str, j: int, robot: Robot, references: Sequence[Reference]) -> np.ndarray:
-    """Derivative (n,) of the references with respect to one entry, by central differences."""
+def _slope(right: Tables, column: str, j: int, robot: Robot, quantities: Sequence[Quantity]) -> Reals:
+    """Derivative (n,) of quantities with respect to one entry, by central differences."""
     entry = getattr(right, column)[:, [j]]
     ahead, behind = (
-        predict_tables(right.with_column(column, [j], entry + sign * STEP), robot, references)[0] for sign in (1, -1)
+        predict_tables(right.with_column(column, [j], entry + sign * STEP), robot, quantities)[0] for sign in (1, -1)
     )
-    return (ahead - behind) / (2 * STEP)
+    slope: Reals = (ahead - behind) / (2 * STEP)
+    return slope
 
 
 def _same(table: Tables, right: Tables) -> bool:

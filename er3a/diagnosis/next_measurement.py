@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 
+from er3a.diagnosis.conclusions import (
+    FlangePositionDecides,
+    LimitDecides,
+    NextMeasurement,
+    NothingDecides,
+    OrientationDecides,
+)
 from er3a.kinematics.table_batch import Tables, frames_of
-from er3a.pipeline.messages.language import N_, said
+from er3a.references.quantities import MM, Pose, Reals, Side
 from er3a.robots.robot import Robot
 
 STEP_DEG = 45.0
 APART_MM = 1.0
 APART_RAD = 1e-3
-LIMITS = {
-    "lower": N_("the lower limit of joint {joint} would tell them apart"),
-    "upper": N_("the upper limit of joint {joint} would tell them apart"),
-}
+SIDES: tuple[Side, ...] = ("lower", "upper")
 
 
-def what_decides(tables: Tables, robot: Robot) -> str:
+def what_decides(tables: Tables, robot: Robot) -> NextMeasurement | None:
     """The pose, out of single joints turned and all turned together, at which the flange positions that the tables
     predict are farthest apart; else the limits in which they differ.
 
@@ -27,39 +33,29 @@ def what_decides(tables: Tables, robot: Robot) -> str:
 
     Returns
     -------
-    advice : empty for a single table
+    advice : None for a single table
     """
     if len(tables) < 2:
-        return ""
+        return None
     poses = _candidates(robot)
     flanges = frames_of(tables, robot.base, np.radians(poses))[:, :, 6]
-    points = flanges[..., :3, 3] * 1000
+    points = flanges[..., :3, 3] * MM
     apart = np.linalg.norm(points[:, None] - points[None, :], axis=-1)
     pairs = np.triu_indices(len(tables), 1)
     told = (apart[pairs] > APART_MM).mean(axis=0)
     best = int(np.lexsort((-apart[pairs].max(axis=0), -told))[0])
     if told[best] > 0:
-        pose = ", ".join(f"{angle:g}" for angle in poses[best])
-        template = (
-            N_("the flange's position at joints ({pose}) deg would tell all apart, by up to {most}")
-            if told[best] == 1
-            else N_(
-                "the flange's position at joints ({pose}) deg would tell {share:.0%} of the pairs apart, by up to "
-                "{most}"
-            )
-        )
-        return said(template, pose=pose, share=told[best], most=_length(apart[pairs][:, best].max()))
-    for side, template in LIMITS.items():
-        column = getattr(tables, side)
+        pose = cast(Pose, tuple(poses[best].tolist()))
+        return FlangePositionDecides(pose, float(told[best]), float(apart[pairs][:, best].max()))
+    for side in SIDES:
+        column = tables.lower if side == "lower" else tables.upper
         joints = np.flatnonzero(np.ptp(column, axis=0) > APART_RAD)
         if len(joints):
-            return said(template, joint=joints[0] + 1)
-    if np.ptp(flanges, axis=0).max() < APART_RAD:
-        return N_("nothing can, they are the same arm written in different ways")
-    return N_("no position of the flange does, but its orientation, or a point beside axis 6")
+            return LimitDecides(int(joints[0]) + 1, side)
+    return NothingDecides() if np.ptp(flanges, axis=0).max() < APART_RAD else OrientationDecides()
 
 
-def _candidates(robot: Robot) -> np.ndarray:
+def _candidates(robot: Robot) -> Reals:
     """Poses (P, 6) in deg within the limits: one joint turned either way, pairs, and all."""
     turned = [np.zeros(6)]
     for j in range(6):
@@ -69,7 +65,3 @@ def _candidates(robot: Robot) -> np.ndarray:
     turned.append(STEP_DEG * np.array([1, -1, 1, 1, 1, 1]))
     lower, upper = np.degrees(np.minimum(robot.lower, robot.upper)), np.degrees(np.maximum(robot.lower, robot.upper))
     return np.unique(np.round(np.clip(turned, lower, upper), 3), axis=0)
-
-
-def _length(value: float) -> str:
-    return f"{value:.0f} mm" if value >= 10 else f"{value:.1f} mm"

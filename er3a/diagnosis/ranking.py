@@ -21,17 +21,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from er3a.diagnosis.fault_kinds import Fault, rounded
 from er3a.diagnosis.hypotheses import Pool, evaluate
 from er3a.kinematics.table_batch import Tables, tables_of
 from er3a.references.predict import predict_tables
-from er3a.references.quantities import Extreme, Speed
-from er3a.references.reference import Reference, ReferenceSet, conflicts, expected_of
+from er3a.references.quantities import Extreme, Reals, Speed, Unit
+from er3a.references.reference import Reference, ReferenceSet, conflicts, expected_of, quantities_of
 from er3a.robots.robot import Robot
 
 SHOWN = 10
 MEETS = 1.0 + 1e-6
-UNITS = ("mm", "deg")
+UNITS: tuple[Unit, ...] = ("mm", "deg")
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,10 +51,10 @@ class Ranking:
     """
 
     pool: Pool
-    score: np.ndarray
+    score: Reals
     untouched: float
     groups: tuple[tuple[int, ...], ...]
-    before: np.ndarray
+    before: Reals
     references: tuple[Reference, ...]
 
 
@@ -63,9 +65,10 @@ def rank(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> Rankin
         return None
     given = tables_of(robot)
     expected, uncertainty = expected_of(stated)
+    quantities = quantities_of(stated)
 
-    def difference(tables: Tables) -> np.ndarray:
-        return predict_tables(tables, robot, stated) - expected
+    def difference(tables: Tables) -> Reals:
+        return predict_tables(tables, robot, quantities) - expected
 
     before = difference(given)[0]
     if (np.abs(before) <= uncertainty * MEETS).all():
@@ -79,22 +82,22 @@ def rank(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> Rankin
 
 
 def usable(references: ReferenceSet | Sequence[Reference]) -> tuple[Reference, ...]:
-    """The references that a diagnosis rests on: single poses and limits, weighty ones if there are any.
+    """The references that a diagnosis rests on: single poses and limits, authoritative ones if there are any.
 
     Extremes over the limits are left out, because they take a search for every hypothesis, and so are references that
     contradict each other, which no table could meet.
     """
     every = references.checkable if isinstance(references, ReferenceSet) else references
     stated = [r for r in every if r.expected is not None and not isinstance(r.quantity, Extreme | Speed)]
-    weighty = [r for r in stated if r.weighty]
-    resting = tuple(weighty or stated)
+    authoritative = [r for r in stated if r.authoritative]
+    resting = tuple(authoritative or stated)
     contradicted = {i for pair in conflicts(resting) for i in pair}
     return tuple(reference for i, reference in enumerate(resting) if i not in contradicted)
 
 
-def _misfit(weighted: np.ndarray, units: np.ndarray) -> np.ndarray:
+def _misfit(weighted: Reals, units: NDArray[np.str_]) -> Reals:
     """Sum over the units of n ln(max(chi2 / n, 1)), of differences (..., n) in uncertainties."""
-    total = np.zeros(weighted.shape[:-1])
+    total: Reals = np.zeros(weighted.shape[:-1])
     for unit in UNITS:
         own = weighted[..., units == unit]
         if own.shape[-1]:
@@ -102,26 +105,26 @@ def _misfit(weighted: np.ndarray, units: np.ndarray) -> np.ndarray:
     return total
 
 
-def _groups(pool: Pool, score: np.ndarray, untouched: float, uncertainty: np.ndarray) -> tuple[tuple[int, ...], ...]:
+def _groups(pool: Pool, score: Reals, untouched: float, uncertainty: Reals) -> tuple[tuple[int, ...], ...]:
     groups: list[tuple[int, ...]] = []
     placed: set[int] = set()
-    alone: set[str] = set()
+    alone: set[Fault] = set()
     order = np.argsort(score, kind="stable")
     for best in order[score[order] < untouched]:
-        if best in placed or alone.intersection(pool.faults[best]):
+        if best in placed or alone.intersection(map(rounded, pool.faults[best])):
             continue  # a second fault adds nothing to the first
         group = _alike(pool, score, int(best), uncertainty)
         if any(pool.count[i] < pool.count[best] for i in group):
             continue
         groups.append(group)
         placed.update(group)
-        alone.update(fault for i in group if pool.count[i] == 1 for fault in pool.faults[i])
+        alone.update(rounded(fault) for i in group if pool.count[i] == 1 for fault in pool.faults[i])
         if len(groups) == SHOWN:
             break
     return tuple(groups)
 
 
-def _alike(pool: Pool, score: np.ndarray, best: int, uncertainty: np.ndarray) -> tuple[int, ...]:
+def _alike(pool: Pool, score: Reals, best: int, uncertainty: Reals) -> tuple[int, ...]:
     """``best``, and others with no more faults such that no reference tells any two of them apart, by score."""
     apart = np.abs(pool.difference - pool.difference[best])
     near = np.flatnonzero((apart < uncertainty).all(axis=1) & (pool.count <= pool.count[best]))

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from er3a.calibration.measured import Measurement
 from er3a.errors import InputError
 from er3a.files.csv_file import Column, read_csv
-from er3a.references.quantities import MM, CarriedCoordinate, PointCoordinate, Pose, SectionCoordinate
-from er3a.references.reference import Reference, ReferenceSet
-from er3a.robots.robot import Robot
+from er3a.files.units import LEAST_SPAN_MM, WIDEST_IN_RADIANS
+from er3a.references.quantities import Pose
 
 _NUMBER = Column(float)
 COLUMNS = {
@@ -21,32 +19,8 @@ COLUMNS = {
     **{f"{c}_mm": Column(float, optional=True) for c in "xyz"},
     "standard_deviation_mm": _NUMBER,
 }
-LEAST_SPAN_MM = 10.0
-WIDEST_IN_RADIANS = 2.01 * np.pi
 POSES_TO_JUDGE_UNITS = 3
-LIMIT_SLACK_DEG = 0.01
 APART_DEVIATIONS = 8.0
-HALF_WIDTH_TO_DEVIATION = 1 / np.sqrt(3)
-
-
-@dataclass(frozen=True)
-class Measurement:
-    """Where a point was seen.
-
-    Attributes
-    ----------
-    row : line of the file
-    pose : joint angles, deg
-    point : flange (frame 6 of the table) or tool (the origin of the robot's tool frame)
-    xyz_mm : base frame; None for coordinates that weren't measured
-    deviation_mm : standard deviation of each coordinate
-    """
-
-    row: int
-    pose: Pose
-    point: str
-    xyz_mm: tuple[float | None, float | None, float | None]
-    deviation_mm: float
 
 
 def load_measurements(path: str | Path) -> tuple[Measurement, ...]:
@@ -78,45 +52,6 @@ def load_measurements(path: str | Path) -> tuple[Measurement, ...]:
     return tuple(rows)
 
 
-def check_poses(measurements: Sequence[Measurement], robot: Robot, path: str | Path | None = None) -> None:
-    """Refuse poses outside the joint limits: :class:`InputError` naming row and joint."""
-    lower, upper = np.degrees(robot.lower), np.degrees(robot.upper)
-    for measurement in measurements:
-        for joint, angle in enumerate(measurement.pose):
-            if not lower[joint] - LIMIT_SLACK_DEG <= angle <= upper[joint] + LIMIT_SLACK_DEG:
-                limits = f"{lower[joint]:g} .. {upper[joint]:g}"
-                problem = f"{angle:g} deg is outside the limits {limits} of joint {joint + 1}"
-                remedy = "Check the angle, its sign and its unit, or the robot's limits"
-                raise InputError(path, f"row {measurement.row}, column q{joint + 1}_deg", problem, remedy)
-
-
-def scalars_of_measurements(
-    measurements: Sequence[Measurement], robot: Robot
-) -> tuple[tuple[Reference, ...], np.ndarray]:
-    """Each coordinate as a reference, and their standard deviations (n,) in mm."""
-    tool = tuple(float(value) for value in robot.tool[:3, 3] * MM)
-    references, deviation = [], []
-    for measurement in measurements:
-        offset = tool if measurement.point == "tool" else (0.0, 0.0, 0.0)
-        for coordinate, value in zip("xyz", measurement.xyz_mm):
-            if value is not None:
-                quantity = CarriedCoordinate(measurement.pose, offset, coordinate)
-                name = f"row {measurement.row}: {measurement.point} {coordinate}"
-                references.append(
-                    Reference(name, "key poses", quantity, value, measurement.deviation_mm, "measured", "inferred")
-                )
-                deviation.append(measurement.deviation_mm)
-    return tuple(references), np.array(deviation)
-
-
-def scalars_of_set(references: ReferenceSet) -> tuple[tuple[Reference, ...], np.ndarray]:
-    """A reference set's coordinates at single poses, official, CAD and export ones if there are any, and their standard
-    deviations (n,) in mm: half-width over root 3, as for a value that may lie anywhere within (GUM 4.3.7)."""
-    stated = [r for r in references.checkable if isinstance(r.quantity, PointCoordinate | SectionCoordinate)]
-    weighty = [r for r in stated if r.weighty] or stated
-    return tuple(weighty), HALF_WIDTH_TO_DEVIATION * np.array([r.uncertainty for r in weighty])
-
-
 def _check_units(path: Path, rows: list[Measurement]) -> None:
     for row in rows:
         span = max(abs(value) for value in row.xyz_mm if value is not None)
@@ -130,7 +65,7 @@ def _check_units(path: Path, rows: list[Measurement]) -> None:
 
 
 def _check_contradictions(path: Path, rows: list[Measurement]) -> None:
-    by_pose: dict[tuple, list[Measurement]] = {}
+    by_pose: dict[tuple[Pose, str], list[Measurement]] = {}
     for row in rows:
         by_pose.setdefault((row.pose, row.point), []).append(row)
     for same in (rows for rows in by_pose.values() if len(rows) > 1):

@@ -3,15 +3,33 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from er3a.errors import InputError
+from er3a.files.path_table import read_path_table
 from er3a.files.robot_file import Name, Text
 from er3a.files.units import JointsDeg, PositionMm, RpyDeg, Triple
 from er3a.files.yaml_file import StrictModel, load
+from er3a.geometry.transforms import transform
+from er3a.numerics.arrays import Reals
+from er3a.planning.commands import (
+    Command,
+    JointMoveCommand,
+    JointSequenceCommand,
+    JointTableCommand,
+    SegmentCommand,
+    Source,
+    Start,
+    ToolMoveCommand,
+    ToolSequenceCommand,
+    ToolTableCommand,
+)
+from er3a.planning.profiles import Times
 
 TRAPEZOID_RAMP = 1 / 3  # of a motion's time, on the way up and on the way down
 
@@ -26,6 +44,10 @@ class PoseEntry(StrictModel):
 
     xyz_mm: PositionMm
     rpy_deg: RpyDeg
+
+    def pose(self) -> Reals:
+        """T_base_tool (4, 4), m."""
+        return transform(np.array(self.xyz_mm) / 1000, np.radians(self.rpy_deg))
 
 
 class NamedPath(StrictModel):
@@ -48,7 +70,7 @@ class Profiled(NamedPath):
     ramp_share: Annotated[float, Field(gt=0, le=0.5)] | None = None
 
     @model_validator(mode="after")
-    def _ramp_of_a_trapezoid(self):
+    def _ramp_of_a_trapezoid(self) -> Self:
         if self.ramp_share is not None and self.profile != "trapezoid":
             raise ValueError("ramp_share: a quintic has no ramps | Remove it, or write profile: trapezoid")
         return self
@@ -76,12 +98,23 @@ class JointPath(NamedPath):
     duration_s: Duration
 
     @model_validator(mode="after")
-    def _one_start(self):
+    def _one_start(self) -> Self:
         if (self.start_deg is None) == (self.after is None):
             raise ValueError(
                 "give either start_deg (six joint angles) or after (an earlier path) | Keep one of the two"
             )
         return self
+
+    def command(self, source: Source) -> Command:
+        """The path in SI units."""
+        return JointMoveCommand(
+            Start(joints=_radians(self.start_deg), after=self.after),
+            np.radians(self.end_deg),
+            self.duration_s,
+            (_rates(self.start_velocity_deg_s), _rates(self.end_velocity_deg_s)),
+            (_rates(self.start_acceleration_deg_s2), _rates(self.end_acceleration_deg_s2)),
+            source=source,
+        )
 
 
 class JointSequencePath(Profiled):
@@ -93,6 +126,11 @@ class JointSequencePath(Profiled):
     kind: Literal["joint_sequence"]
     points_deg: Annotated[list[JointsDeg], Field(min_length=2)]
     blend_deg: Blend = 0.0
+
+    def command(self, source: Source) -> Command:
+        """The path in SI units."""
+        points, blend = np.radians(self.points_deg), float(np.radians(self.blend_deg))
+        return JointSequenceCommand(points, blend, self.duration_s, self.ramp, source=source)
 
 
 class ToolStart(Profiled):
@@ -107,7 +145,7 @@ class ToolStart(Profiled):
     start_branch: Text | None = None
 
     @model_validator(mode="after")
-    def _one_start(self):
+    def _one_start(self) -> Self:
         if [self.start, self.start_deg, self.after].count(None) != 2:
             ways = "start_deg (six joint angles) or start (a pose) or after (an earlier path)"
             raise ValueError(f"give either {ways} | Keep one of them")
@@ -116,6 +154,11 @@ class ToolStart(Profiled):
             raise ValueError(f"start_branch: {what} already fixes the branch | Remove start_branch")
         return self
 
+    def start_command(self) -> Start:
+        """The start in SI units."""
+        pose = self.start.pose() if self.start else None
+        return Start(_radians(self.start_deg), pose, self.after, _branch(self.start_branch))
+
 
 class LineTo(StrictModel):
     """A straight line to a pose; ``half_turn_axis`` chooses the sense of a rotation by exactly 180 deg."""
@@ -123,11 +166,19 @@ class LineTo(StrictModel):
     end: PoseEntry
     half_turn_axis: Triple | None = None
 
+    def segment(self) -> SegmentCommand:
+        """The segment in SI units."""
+        return SegmentCommand(self.end.pose(), half_turn_axis=_axis(self.half_turn_axis))
+
 
 class ArcTo(LineTo):
     """A circular arc through a point to a pose."""
 
     via_mm: PositionMm
+
+    def segment(self) -> SegmentCommand:
+        """The segment in SI units."""
+        return replace(super().segment(), via=np.array(self.via_mm) / 1000)
 
 
 class LinePath(ToolStart, LineTo):
@@ -135,11 +186,19 @@ class LinePath(ToolStart, LineTo):
 
     kind: Literal["line"]
 
+    def command(self, source: Source) -> Command:
+        """The path in SI units."""
+        return ToolMoveCommand(self.start_command(), self.segment(), self.duration_s, self.ramp, source=source)
+
 
 class ArcPath(ToolStart, ArcTo):
     """A circular arc of the tool."""
 
     kind: Literal["arc"]
+
+    def command(self, source: Source) -> Command:
+        """The path in SI units."""
+        return ToolMoveCommand(self.start_command(), self.segment(), self.duration_s, self.ramp, source=source)
 
 
 class LineSegment(LineTo):
@@ -165,11 +224,16 @@ class SequencePath(ToolStart):
     ]
 
     @model_validator(mode="after")
-    def _no_corner_at_the_end(self):
+    def _no_corner_at_the_end(self) -> Self:
         if self.segments[-1].blend_mm:
             last = len(self.segments) - 1
             raise ValueError(f"segments[{last}].blend_mm: the last segment has no corner at its end | Remove it")
         return self
+
+    def command(self, source: Source) -> Command:
+        """The path in SI units."""
+        segments = tuple(replace(part.segment(), blend=part.blend_mm / 1000) for part in self.segments)
+        return ToolSequenceCommand(self.start_command(), segments, self.duration_s, self.ramp, source=source)
 
 
 class TablePath(NamedPath):
@@ -187,6 +251,46 @@ class TablePath(NamedPath):
     start_branch: Text | None = None
     half_turn_axis: Triple | None = None
 
+    def command(self, source: Source) -> Command:
+        """The table's points in SI units, without those that repeat the point before.
+
+        Raises
+        ------
+        InputError
+            for a table that can't be read, or does not go with ``duration_s`` and the blends
+        """
+        table = read_path_table(self.file)
+        kept = ~table.repeated
+        timing: float | Times
+        if table.times is None and self.duration_s is not None:
+            timing = self.duration_s
+        elif table.times is not None and self.duration_s is None:
+            timing = Times(table.times, np.cumsum(kept) - 1)
+        elif table.times is None:
+            problem, remedy = "missing, and the table has no column t_s", "Give duration_s, or times in the table"
+            raise source.error("duration_s", problem, remedy)
+        else:
+            raise source.error("duration_s", "the table's t_s gives it too", "Remove one of the two")
+        repeated = tuple(table.rows[table.repeated].tolist())
+        if table.joints is not None:
+            if self.blend_mm is not None:
+                raise source.error("blend_mm", "the table holds joint angles", "Write blend_deg")
+            blend = None if self.blend_deg is None else float(self.blend_deg * np.radians(1.0))
+            return JointTableCommand(table.joints[kept], timing, blend, repeated, source=source)
+        assert table.poses is not None
+        if self.blend_deg is not None:
+            raise source.error("blend_deg", "the table holds poses", "Write blend_mm")
+        return ToolTableCommand(
+            table.poses[kept],
+            tuple(f"row {row} of {table.file}" for row in table.rows[kept]),
+            timing,
+            blend=None if self.blend_mm is None else self.blend_mm * 1e-3,
+            repeated_rows=repeated,
+            branch=_branch(self.start_branch),
+            half_turn_axis=_axis(self.half_turn_axis),
+            source=source,
+        )
+
 
 PathEntry = JointPath | JointSequencePath | LinePath | ArcPath | SequencePath | TablePath
 
@@ -198,7 +302,7 @@ class PathFile(StrictModel):
     paths: Annotated[list[Annotated[PathEntry, Field(discriminator="kind")]], Field(min_length=1)]
 
     @model_validator(mode="after")
-    def _names_differ(self):
+    def _names_differ(self) -> Self:
         names = [entry.name for entry in self.paths]
         for i, name in enumerate(names):
             if name in names[:i]:
@@ -223,3 +327,20 @@ def load_paths(path: str | Path) -> PathFile:
         kinds = "joint_sequence|joint|line|arc|sequence|table"
         field = error.field and re.sub(rf"((?:paths|segments)\[\d+\])\.(?:{kinds})\b", r"\1", error.field)
         raise InputError(error.file, field, error.problem, error.remedy) from None
+
+
+def _radians(degrees: list[float] | None) -> Reals | None:
+    return None if degrees is None else np.radians(degrees)
+
+
+def _axis(axis: list[float] | None) -> Reals | None:
+    return None if axis is None else np.array(axis)
+
+
+def _branch(words: str | None) -> str | None:
+    """The code of a branch: "front, elbow up, flip" is front_elbow_up_flip."""
+    return words and re.sub(r"[ ,]+", "_", words)
+
+
+def _rates(degrees: list[float] | None) -> Reals | float:
+    return 0.0 if degrees is None else np.radians(degrees)

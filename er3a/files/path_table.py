@@ -20,6 +20,7 @@ from er3a.files.csv_file import Column, read_csv, read_header
 from er3a.files.target_table import FORMS, POSITION
 from er3a.files.units import check_degrees, check_millimetres
 from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, transform
+from er3a.numerics.arrays import Flags, Integers, Reals
 
 JOINT_COLUMNS = tuple(f"q{joint}_deg" for joint in range(1, 7))
 UNIT_LENGTH_TOLERANCE = 1e-6
@@ -42,11 +43,11 @@ class PathTable:
     """
 
     file: Path
-    rows: np.ndarray
-    times: np.ndarray | None
-    poses: np.ndarray | None
-    joints: np.ndarray | None
-    repeated: np.ndarray
+    rows: Integers
+    times: Reals | None
+    poses: Reals | None
+    joints: Reals | None
+    repeated: Flags
 
 
 def read_path_table(path: str | Path) -> PathTable:
@@ -97,7 +98,7 @@ def read_path_table(path: str | Path) -> PathTable:
     return PathTable(path, lines, times, poses, joints, repeated)
 
 
-def _times(path: Path, lines: np.ndarray, rows: list[dict[str, Any]]) -> np.ndarray:
+def _times(path: Path, lines: Integers, rows: list[dict[str, Any]]) -> Reals:
     times = np.array([row["t_s"] for row in rows])
     if times[0] != 0:
         raise InputError(path, f"row {lines[0]}, column t_s", f"the path starts at {times[0]:g} s", "Start at 0")
@@ -109,7 +110,7 @@ def _times(path: Path, lines: np.ndarray, rows: list[dict[str, Any]]) -> np.ndar
     return times
 
 
-def _poses(path: Path, lines: np.ndarray, rows: list[dict[str, Any]], form: str) -> np.ndarray:
+def _poses(path: Path, lines: Integers, rows: list[dict[str, Any]], form: str) -> Reals:
     position = _block(path, rows, POSITION)
     T = transform(position / 1000, np.zeros_like(position))
     names = FORMS[form]
@@ -140,7 +141,7 @@ def _poses(path: Path, lines: np.ndarray, rows: list[dict[str, Any]], form: str)
     return T
 
 
-def _block(path: Path, rows: list[dict[str, Any]], names: Sequence[str], otherwise: str | None = None) -> np.ndarray:
+def _block(path: Path, rows: list[dict[str, Any]], names: Sequence[str], otherwise: str | None = None) -> Reals:
     """The values of columns of one kind, their unit judged by the largest row: others may well be small.
 
     Parameters

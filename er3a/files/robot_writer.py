@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import yaml
 
+from er3a.files.kept_files import write_atomically
 from er3a.files.robot_file import SHORTEST_PLAIN_LENGTH_MM, RobotFile
 from er3a.geometry.transforms import rpy_of
-from er3a.pipeline.results import write_atomically
 from er3a.robots.robot import Robot, Source
 
 _UNKNOWN = Source("not stated", "inferred")

@@ -15,6 +15,10 @@ METRES_BELOW_MM = 5.0
 FARTHEST_MM = 100_000.0
 RADIANS_BELOW_DEG = 6.3
 MOST_DEG = 3600.0
+LEAST_SPAN_MM = 10.0
+"""A table whose lengths are all below is in metres."""
+WIDEST_IN_RADIANS = 2.01 * math.pi
+"""A table whose angles (deg) are all below is in radians."""
 WHOLE_DEGREES = "round them to whole degrees"
 
 

@@ -17,6 +17,13 @@ Model = TypeVar("Model", bound=BaseModel)
 
 MAX_YAML_BYTES = 250_000  # of which the worst takes seconds to read
 
+RENAMED = {
+    "full_speed_after_s": "acceleration_time_s",
+    "overlap_mm": "penetration_tolerance_mm",
+    "repair": "avoidance",
+}
+"""Keys of files by the names that they had, and the names that they have."""
+
 _FIELD = re.compile(r"([A-Za-z_]\w*(?:\.[\w-]+|\[\d+\])*): ")
 _REMEDIES = {
     "float_type": "Write a number, without quotes or unit",
@@ -153,6 +160,8 @@ def _explain(fault: dict[str, Any], model: type[BaseModel]) -> tuple[str, str]:
     if kind == "extra_forbidden":
         if any(word in str(key) for word in ("coupl", "parallelogram", "mimic")):
             return "coupled joints are not supported", "er3a needs six independent joints; remove the key"
+        if str(key) in RENAMED:
+            return f"the key {str(key)!r} has another name now", f"Write '{RENAMED[str(key)]}'"
         known = _known_keys(model)
         close = difflib.get_close_matches(str(key), known, n=1)
         hint = f"Did you mean '{close[0]}'?" if close else "Remove it, or check its place in the file"

@@ -14,7 +14,7 @@ from rocrate.model.person import Person
 from rocrate.rocrate import ROCrate
 
 from er3a.errors import ResultError
-from er3a.pipeline.kept_files import write_atomically
+from er3a.files.kept_files import write_atomically
 from er3a.pipeline.results import check_results
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import load_study

@@ -10,7 +10,7 @@ from er3a.errors import InputError
 from er3a.files.measurements import load_measurements
 from er3a.files.path_file import PathFile, TablePath, load_paths
 from er3a.files.path_table import read_path_table
-from er3a.files.reference_rows import COLUMNS
+from er3a.files.reference_rows import FORMATS
 from er3a.files.reference_sets import check_reference_file, load_references
 from er3a.files.robot_file import RobotFile
 from er3a.files.robot_library import load_robot
@@ -59,7 +59,7 @@ def check_file(path: Path) -> str:
 
 
 def _check_table(path: Path) -> str:
-    if path.stem not in COLUMNS and "q1_deg" in read_text(path).partition("\n")[0]:
+    if path.stem not in FORMATS and "q1_deg" in read_text(path).partition("\n")[0]:
         load_measurements(path)
         return "measured positions"
     check_reference_file(path)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from er3a.errors import ResultError
-from er3a.pipeline.kept_files import read_checked, sha256, write_atomically
+from er3a.files.kept_files import read_checked, sha256, write_atomically
 from er3a.pipeline.results import check_results
 from er3a.pipeline.study import Study
 

@@ -270,9 +270,9 @@ def export_urdf(
     output: Annotated[Path, typer.Option(help="the URDF to write")],
 ):
     """Write a robot as URDF."""
+    from er3a.files.kept_files import write_atomically
     from er3a.files.robot_library import load_robot
     from er3a.formats.urdf import export_urdf as urdf_text
-    from er3a.pipeline.kept_files import write_atomically
 
     text = urdf_text(load_robot(robot))
     write_atomically(output, lambda path: path.write_text(text, encoding="utf-8"))
@@ -286,15 +286,15 @@ def identify(
     output: Annotated[Path, typer.Option(help="the robot file to write")],
 ):
     """Estimate corrections to a robot's table from measured positions, and write the corrected robot file."""
-    from er3a.calibration.calibrate import identify as identify_robot
-    from er3a.calibration.calibrate import in_words
+    from er3a.files.by_name import calibrate
     from er3a.files.reference_sets import load_references
     from er3a.files.robot_library import load_robot
     from er3a.files.robot_writer import write_robot
+    from er3a.pipeline.messages.calibration import lines_of
 
     source = Path(measurements) if measurements.endswith(".csv") else load_references(measurements)
-    found = identify_robot(load_robot(robot), source)
-    print(in_words(found))
+    found = calibrate(load_robot(robot), source)
+    print(lines_of(found))
     write_robot(found.robot.replace(name=output.stem, title=f"{found.robot.title}, identified"), output)
     print(f"{output}: written")
 

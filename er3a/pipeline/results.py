@@ -30,9 +30,9 @@ from pydantic import TypeAdapter, ValidationError
 
 from er3a.errors import ResultError
 from er3a.files.grades import grades_in
+from er3a.files.kept_files import read_bytes, sha256, shown_path, write_atomically
 from er3a.findings import Finding
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.kept_files import read_bytes, sha256, shown_path, write_atomically
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import STAGES, Study
 from er3a.pipeline.tables import table_types

@@ -8,6 +8,7 @@ import numpy as np
 
 from er3a.errors import PoseError
 from er3a.geometry.transforms import check_poses
+from er3a.numerics.arrays import Reals
 from er3a.planning.moves import rotation_between, turning_poses
 from er3a.planning.profiles import Rates, one_go
 
@@ -27,11 +28,11 @@ class Arc:
     duration, half_turn, ramp : as of :class:`er3a.planning.moves.Line`
     """
 
-    T_start: np.ndarray
-    centre: np.ndarray
-    normal: np.ndarray
+    T_start: Reals
+    centre: Reals
+    normal: Reals
     angle: float
-    rotation: np.ndarray
+    rotation: Reals
     duration: float
     half_turn: bool = False
     ramp: float | None = None
@@ -51,35 +52,35 @@ class Arc:
         """See :class:`er3a.planning.moves.ToolPath`."""
         return float(np.linalg.norm(self.rotation))
 
-    def progress(self, t: np.ndarray) -> Rates:
+    def progress(self, t: Reals) -> Rates:
         """See :class:`er3a.planning.moves.ToolPath`."""
         return one_go(self.duration, self.ramp)(t)
 
-    def poses(self, progress: np.ndarray) -> np.ndarray:
+    def poses(self, progress: Reals) -> Reals:
         """See :class:`er3a.planning.moves.ToolPath`."""
         progress = np.asarray(progress, float)
         return turning_poses(self.T_start, self.points(progress), self.rotation, progress)
 
-    def points(self, progress: np.ndarray) -> np.ndarray:
+    def points(self, progress: Reals) -> Reals:
         """The tool point (..., 3), m, at shares of the way (...,)."""
         return self.centre + self._spokes(np.asarray(progress, float))
 
-    def twists(self, progress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def twists(self, progress: Reals) -> tuple[Reals, Reals]:
         """See :class:`er3a.planning.moves.ToolPath`."""
         spokes = self._spokes(np.asarray(progress, float))
         turning = np.broadcast_to(self.rotation, spokes.shape)
         first = np.concatenate([self.angle * np.cross(self.normal, spokes), turning], axis=-1)
         return first, np.concatenate([-(self.angle**2) * spokes, np.zeros_like(spokes)], axis=-1)
 
-    def way(self, progress: np.ndarray) -> np.ndarray:
+    def way(self, progress: Reals) -> Reals:
         """See :class:`er3a.planning.moves.ToolPath`."""
         return self.length * np.asarray(progress)
 
-    def half_turns(self) -> tuple[tuple[int, np.ndarray], ...]:
+    def half_turns(self) -> tuple[tuple[int, Reals], ...]:
         """See :class:`er3a.planning.moves.ToolPath`."""
         return ((1, self.rotation / np.pi),) if self.half_turn else ()
 
-    def _spokes(self, progress: np.ndarray) -> np.ndarray:
+    def _spokes(self, progress: Reals) -> Reals:
         """From the centre to the tool point, (..., 3)."""
         spoke = self.T_start[:3, 3] - self.centre
         turn = (self.angle * progress)[..., None]
@@ -87,11 +88,11 @@ class Arc:
 
 
 def arc(
-    T_start: np.ndarray,
-    via: np.ndarray,
-    T_end: np.ndarray,
+    T_start: Reals,
+    via: Reals,
+    T_end: Reals,
     duration: float,
-    half_turn_axis: np.ndarray | None = None,
+    half_turn_axis: Reals | None = None,
     ramp: float | None = None,
 ) -> Arc:
     """The arc from a pose of the tool through a point ``via`` (3,) in m to another pose.

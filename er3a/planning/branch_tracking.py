@@ -10,7 +10,7 @@ at the path's beginning the one that it has next: the value that makes the motio
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from er3a.kinematics.closed_form import REACHED, SLOTS
 from er3a.kinematics.forward import frames
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.planning.moves import ToolPath
 from er3a.robots.robot import Robot
 
@@ -44,32 +45,29 @@ class Branches:
     factors : (N, 8, 3), distances from the wrist, elbow and shoulder singularities (rad, rad, m)
     """
 
-    t: np.ndarray
-    progress: np.ndarray
-    q: np.ndarray
-    gap: np.ndarray
-    free_wrist: np.ndarray
-    free_shoulder: np.ndarray
-    straight: np.ndarray
-    factors: np.ndarray
+    t: Reals
+    progress: Reals
+    q: Reals
+    gap: Reals
+    free_wrist: Flags
+    free_shoulder: Flags
+    straight: Flags
+    factors: Reals
 
     @property
-    def meeting(self) -> np.ndarray:
-        """(N, 8) bool, whether a branch meets another one there."""
-        return self.free_wrist | self.free_shoulder | self.straight
-
-    @property
-    def doors(self) -> np.ndarray:
+    def meeting(self) -> Integers:
         """(N, 8), bits of the branch number (:mod:`er3a.kinematics.configuration`) that differ in a branch met."""
-        return self.free_wrist + 2 * self.straight + 4 * self.free_shoulder
+        bits: Integers = self.free_wrist + 2 * self.straight + 4 * self.free_shoulder
+        return bits
 
     @property
-    def reached(self) -> np.ndarray:
+    def reached(self) -> Flags:
         """(N, 8) bool, whether a branch has a solution."""
-        return np.isfinite(self.q[..., 0])
+        reached: Flags = np.isfinite(self.q[..., 0])
+        return reached
 
 
-def branches_along(robot: Robot, line: ToolPath, t: np.ndarray) -> Branches:
+def branches_along(robot: Robot, line: ToolPath, t: Reals) -> Branches:
     """Solve a line at times (N,) in s (rising, both ends included) and at as many more as its branches need."""
     grid = _solve_at(robot, line, t)
     grid = _merge(grid, _solve_at(robot, line, _closest_passes(grid)))
@@ -84,12 +82,12 @@ def branches_along(robot: Robot, line: ToolPath, t: np.ndarray) -> Branches:
     return grid
 
 
-def turned_difference(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def turned_difference(a: Reals, b: Reals) -> Reals:
     """b - a with whole turns removed, in (-pi, pi]."""
     return wrap_to_pi(b - a)
 
 
-def align_wrist(robot: Robot, q: np.ndarray, joint_4: np.ndarray) -> np.ndarray:
+def align_wrist(robot: Robot, q: Reals, joint_4: Reals) -> Reals:
     """Turn joint 4 to given angles (...,) with the tool at rest, for arms q (..., 6) with axes 4 and 6 aligned."""
     T = frames(robot, q)
     same = np.sign(np.einsum("...i,...i->...", T[..., 3, :3, 2], T[..., 5, :3, 2]))
@@ -100,7 +98,7 @@ def align_wrist(robot: Robot, q: np.ndarray, joint_4: np.ndarray) -> np.ndarray:
     return turned
 
 
-def onto_axis_1(robot: Robot, T: np.ndarray) -> np.ndarray:
+def onto_axis_1(robot: Robot, T: Reals) -> Reals:
     """Poses (N, 4, 4) shifted so that the wrist centre, which is next to axis 1, lies exactly on it."""
     arm = wrist_partitioned_arm(robot)
     centre = T[:, :3, 3] + T[:, :3, :3] @ arm.wrist_in_tool
@@ -110,13 +108,13 @@ def onto_axis_1(robot: Robot, T: np.ndarray) -> np.ndarray:
     return moved
 
 
-def _solve_at(robot: Robot, line: ToolPath, t: np.ndarray) -> Branches:
+def _solve_at(robot: Robot, line: ToolPath, t: Reals) -> Branches:
     progress = line.progress(t)[0]
     q, fault, gap = solve_slots(robot, line.poses(progress), np.zeros((len(t), 6)))
     return Branches(t, progress, q, np.where(fault == REACHED, 0.0, gap), *_free(robot, q))
 
 
-def _free(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _free(robot: Robot, q: Reals) -> tuple[Flags, Flags, Flags, Reals]:
     factors = determinant_factors(robot, q)
     wrist, elbow, shoulder = (np.abs(value) for value in (factors.wrist, factors.elbow, factors.shoulder))
     distances = np.stack([wrist, elbow, shoulder], axis=-1)
@@ -125,11 +123,12 @@ def _free(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarr
 
 def _merge(a: Branches, b: Branches) -> Branches:
     t, first = np.unique(np.concatenate([a.t, b.t]), return_index=True)
-    rest = (np.concatenate([getattr(a, key), getattr(b, key)])[first] for key in list(Branches.__annotations__)[1:])
+    names = [part.name for part in fields(Branches)][1:]
+    rest = (np.concatenate([getattr(a, name), getattr(b, name)])[first] for name in names)
     return Branches(t, *rest)
 
 
-def _closest_passes(grid: Branches) -> np.ndarray:
+def _closest_passes(grid: Branches) -> Reals:
     """Times at which a branch comes nearest to a singularity between grid points, by a parabola through three."""
     found = [np.empty(0)]
     for kind in range(3):
@@ -140,7 +139,7 @@ def _closest_passes(grid: Branches) -> np.ndarray:
     return np.unique(np.concatenate(found))
 
 
-def vertex(x: np.ndarray, y: np.ndarray, i: np.ndarray) -> np.ndarray:
+def vertex(x: Reals, y: Reals, i: Integers) -> Reals:
     """Lowest points of the parabolas through the points i - 1, i, i + 1, each kept between its outer points."""
     left, right = x[i] - x[i - 1], x[i + 1] - x[i]
     rise, fall = (y[i + 1] - y[i]) / right, (y[i] - y[i - 1]) / left
@@ -151,7 +150,7 @@ def vertex(x: np.ndarray, y: np.ndarray, i: np.ndarray) -> np.ndarray:
     return np.clip(lowest, x[i[curved] - 1], x[i[curved] + 1])
 
 
-def _unclear(grid: Branches) -> np.ndarray:
+def _unclear(grid: Branches) -> Flags:
     """(N - 1,) bool: intervals where a branch begins or ends, or moves a joint that is not free by a wide step."""
     step = np.abs(turned_difference(grid.q[:-1], grid.q[1:]))
     for free, joints in ((grid.free_wrist, [3, 5]), (grid.free_shoulder, [0, 3, 4, 5])):
@@ -159,7 +158,8 @@ def _unclear(grid: Branches) -> np.ndarray:
         for joint in joints:
             step[either, joint] = 0.0
     wide = (step > WIDE_STEP).any(axis=-1)
-    return (wide | (grid.reached[:-1] != grid.reached[1:])).any(axis=-1)
+    unclear: Flags = (wide | (grid.reached[:-1] != grid.reached[1:])).any(axis=-1)
+    return unclear
 
 
 def _fill_free_shoulder(robot: Robot, line: ToolPath, grid: Branches) -> None:
@@ -182,7 +182,7 @@ def _fill_free_wrist(robot: Robot, grid: Branches) -> None:
             grid.q[free, slot] = wrap_to_pi(align_wrist(robot, grid.q[free, slot], kept[free]))
 
 
-def _kept(values: np.ndarray, unknown: np.ndarray) -> np.ndarray:
+def _kept(values: Reals, unknown: Flags) -> Reals:
     """Values (N,) with the unknown ones replaced by the last known one before, else the next one, else 0."""
     known = np.flatnonzero(~unknown)
     if not known.size:

@@ -1,42 +1,33 @@
-"""From an entry of a path file to a move of the joints or a path of the tool."""
+"""From a command to a move of the joints or a path of the tool."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
+from typing import assert_never
 
 import numpy as np
 
-from er3a.errors import InputError, PathError, PoseError
-from er3a.files.path_file import (
-    ArcPath,
-    ArcTo,
-    JointPath,
-    JointSequencePath,
-    LinePath,
-    LineTo,
-    PathEntry,
-    PoseEntry,
-    SequencePath,
-    TablePath,
-)
-from er3a.files.path_table import PathTable, read_path_table
-from er3a.geometry.transforms import transform
+from er3a.errors import PathError, PoseError
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
-from er3a.pipeline.messages.kinematics import BRANCHES
+from er3a.numerics.arrays import Reals
 from er3a.planning.arcs import arc
-from er3a.planning.moves import JointMove, Line, ToolPath, line, rotation_between
-from er3a.planning.sequences import (
-    TURN_LENGTH,
-    JointSequence,
-    Segment,
-    Times,
-    joint_sequence,
-    segment_path,
+from er3a.planning.commands import (
+    Command,
+    JointMoveCommand,
+    JointSequenceCommand,
+    JointTableCommand,
+    SegmentCommand,
+    Source,
+    Start,
+    ToolMoveCommand,
+    ToolSequenceCommand,
+    ToolTableCommand,
 )
+from er3a.planning.moves import JointMove, Line, ToolPath, line, rotation_between
+from er3a.planning.sequences import TURN_LENGTH, JointSequence, Segment, joint_sequence, segment_path
 from er3a.robots.robot import Robot
 
 GEOMETRY = 1.0  # s; a segment's own duration is of no account in a sequence
@@ -50,14 +41,14 @@ class Built:
     ----------
     joints : the move, for paths in joint space; else None
     tool : the path of the tool; None for paths in joint space
-    q_start : (6,), rad, joints at the start, where the entry gives them
-    start_slot : closed-form branch (0..7) to begin on, where the entry names one
+    q_start : (6,), rad, joints at the start, where they are given
+    start_slot : closed-form branch (0..7) to begin on, where one is named
     repeated_rows : lines of the table that repeat the point before
     """
 
     joints: JointMove | JointSequence | None = None
     tool: ToolPath | None = None
-    q_start: np.ndarray | None = None
+    q_start: Reals | None = None
     start_slot: int | None = None
     repeated_rows: tuple[int, ...] = ()
 
@@ -65,154 +56,138 @@ class Built:
     def duration(self) -> float:
         """Duration, s."""
         move = self.joints or self.tool
+        assert move is not None
         return move.duration
 
 
-def build(robot: Robot, entry: PathEntry, field: str, file: Path, ends: Mapping[str, np.ndarray]) -> Built:
-    """Make a path of an entry; ``field`` names it in the file.
+def build(robot: Robot, command: Command, ends: Mapping[str, Reals]) -> Built:
+    """Make a path of a command.
 
     Parameters
     ----------
-    ends : joint angles (6,) in rad at the end of each earlier path of the file, NaN where it is not reached
+    ends : joint angles (6,) in rad at the end of each earlier path, NaN where it is not reached
 
     Raises
     ------
     InputError
         for a start branch that this robot has not, a half-turn axis that can't choose, points that fix no circle, a
-        corner that can't be rounded so far, a table that can't be read, an earlier path without end
+        corner that can't be rounded so far, an earlier path without end
     """
-    q_start = _start(entry, field, file, ends)
-    if isinstance(entry, JointPath):
-        rates = (
-            entry.start_velocity_deg_s,
-            entry.end_velocity_deg_s,
-            entry.start_acceleration_deg_s2,
-            entry.end_acceleration_deg_s2,
-        )
-        given = (0.0 if rate is None else np.radians(rate) for rate in rates)
-        return Built(joints=JointMove(q_start, np.radians(entry.end_deg), entry.duration_s, *given))
-    if isinstance(entry, JointSequencePath):
-        points = np.radians(entry.points_deg)
-        blends = np.full(len(points) - 2, np.radians(entry.blend_deg))
-        try:
-            return Built(joints=joint_sequence(points, blends, entry.duration_s, entry.ramp))
-        except PathError as error:
-            where = f"{field}.points_deg[{error.segment}]"
-            raise InputError(file, where, f"its way there {error.problem}", "Mend the point or blend_deg") from None
-    if isinstance(entry, TablePath):
-        return _table(robot, entry, field, file)
-    return _tool(robot, entry, q_start, field, file)
+    match command:
+        case JointMoveCommand():
+            return _joint_move(command, ends)
+        case JointSequenceCommand():
+            return _joint_sequence(command)
+        case ToolMoveCommand() | ToolSequenceCommand():
+            return _tool(robot, command, ends)
+        case JointTableCommand():
+            sizes = np.abs(np.diff(command.points, axis=0)).max(axis=1)
+            joints = joint_sequence(command.points, _blends(sizes, command.blend), command.timing)
+            return Built(joints=joints, repeated_rows=command.repeated_rows)
+        case ToolTableCommand():
+            return _tool_table(robot, command)
+    assert_never(command)
 
 
-def _start(entry: PathEntry, field: str, file: Path, ends: Mapping[str, np.ndarray]) -> np.ndarray | None:
-    """Joint angles (6,) at the start in rad, where the entry gives them or names the path before."""
-    after = getattr(entry, "after", None)
-    if after is not None and np.isnan(ends[after]).any():
-        remedy = "Mend that path, or start from a pose"
-        raise InputError(file, f"{field}.after", f"the path '{after}' does not reach its end", remedy)
-    given = getattr(entry, "start_deg", None)
-    return ends[after] if after else None if given is None else np.radians(given)
+def _joint_move(command: JointMoveCommand, ends: Mapping[str, Reals]) -> Built:
+    start = _start_joints(command.start, command.source, ends)
+    if start is None:
+        raise command.source.error("start", "a joint move starts at joint angles", "Give them, or an earlier path")
+    return Built(joints=JointMove(start, command.end, command.duration, command.velocities, command.accelerations))
 
 
-def _tool(
-    robot: Robot, entry: LinePath | ArcPath | SequencePath, q_start: np.ndarray | None, field: str, file: Path
-) -> Built:
-    T_start = _pose(entry.start) if q_start is None else forward(robot, q_start)
-    slot = _slot(robot, entry.start_branch, field, file)
-    if not isinstance(entry, SequencePath):
-        path: ToolPath = _segment(T_start, entry, entry.duration_s, entry.ramp, field, file)
+def _joint_sequence(command: JointSequenceCommand) -> Built:
+    blends = np.full(len(command.points) - 2, command.blend)
+    try:
+        return Built(joints=joint_sequence(command.points, blends, command.duration, command.ramp))
+    except PathError as error:
+        part = f"points_deg[{error.segment}]"
+        problem = f"its way there {error.problem}"
+        raise command.source.error(part, problem, "Correct the point or blend_deg") from None
+
+
+def _start_joints(start: Start, source: Source, ends: Mapping[str, Reals]) -> Reals | None:
+    """Joint angles (6,) at the start in rad, where they are given or those of the path before."""
+    if start.after is None:
+        return start.joints
+    if np.isnan(ends[start.after]).any():
+        remedy = "Correct that path, or start from a pose"
+        raise source.error("after", f"the path '{start.after}' does not reach its end", remedy)
+    return ends[start.after]
+
+
+def _tool(robot: Robot, command: ToolMoveCommand | ToolSequenceCommand, ends: Mapping[str, Reals]) -> Built:
+    source = command.source
+    q_start = _start_joints(command.start, source, ends)
+    pose = command.start.pose if q_start is None else forward(robot, q_start)
+    if pose is None:
+        raise source.error("start", "a path of the tool starts somewhere", "Give joint angles, a pose or a path before")
+    slot = _slot(robot, command.start.branch, source)
+    if isinstance(command, ToolMoveCommand):
+        path: ToolPath = _segment(pose, command.segment, command.duration, command.ramp, source)
         return Built(tool=path, q_start=q_start, start_slot=slot)
     segments: list[Segment] = []
-    for k, part in enumerate(entry.segments):
-        segments.append(_segment(T_start, part, GEOMETRY, None, f"{field}.segments[{k}]", file))
-        T_start = _pose(part.end)
-    blends = np.array([part.blend_mm for part in entry.segments[:-1]]) / 1000
+    for k, part in enumerate(command.segments):
+        here = Source(source.file, f"{source.field}.segments[{k}]")
+        segments.append(_segment(pose, part, GEOMETRY, None, here))
+        pose = part.end
+    blends = np.array([part.blend for part in command.segments[:-1]])
     try:
-        path = segment_path(segments, blends, entry.duration_s, entry.ramp)
+        path = segment_path(segments, blends, command.duration, command.ramp)
     except PathError as error:
-        where = f"{field}.segments[{error.segment - 1}]"
-        raise InputError(file, where, f"the segment {error.problem}", "Mend its end or blend_mm") from None
+        part_name = f"segments[{error.segment - 1}]"
+        raise source.error(part_name, f"the segment {error.problem}", "Correct its end or blend_mm") from None
     return Built(tool=path, q_start=q_start, start_slot=slot)
 
 
-def _segment(T_start: np.ndarray, part: LineTo, duration: float, ramp: float | None, field: str, file: Path) -> Segment:
-    axis = None if part.half_turn_axis is None else np.array(part.half_turn_axis)
-    T_end = _pose(part.end)
+def _segment(T_start: Reals, part: SegmentCommand, duration: float, ramp: float | None, source: Source) -> Segment:
     try:
-        rotation_between(T_start, T_end, axis)
+        rotation_between(T_start, part.end, part.half_turn_axis)
     except PoseError as error:
-        raise InputError(file, f"{field}.half_turn_axis", str(error), "Remove it, or name the turn's axis") from None
-    if not isinstance(part, ArcTo):
-        return line(T_start, T_end, duration, axis, ramp)
+        raise source.error("half_turn_axis", str(error), "Remove it, or name the turn's axis") from None
+    if part.via is None:
+        return line(T_start, part.end, duration, part.half_turn_axis, ramp)
     try:
-        return arc(T_start, np.array(part.via_mm) / 1000, T_end, duration, axis, ramp)
+        return arc(T_start, part.via, part.end, duration, part.half_turn_axis, ramp)
     except PoseError as error:
-        raise InputError(file, f"{field}.via_mm", str(error), "Give three points that fix a circle") from None
+        raise source.error("via_mm", str(error), "Give three points that fix a circle") from None
 
 
-def _table(robot: Robot, entry: TablePath, field: str, file: Path) -> Built:
-    table = read_path_table(entry.file)
-    if (table.times is None) == (entry.duration_s is None):
-        problem = "missing, and the table has no column t_s" if table.times is None else "the table's t_s gives it too"
-        remedy = "Give duration_s, or times in the table" if table.times is None else "Remove one of the two"
-        raise InputError(file, f"{field}.duration_s", problem, remedy)
-    wrong = "blend_mm" if table.poses is None else "blend_deg"
-    if getattr(entry, wrong) is not None:
-        what = "joint angles" if table.poses is None else "poses"
-        raise InputError(file, f"{field}.{wrong}", f"the table holds {what}", f"Write {_other(wrong)}")
-    kept = np.flatnonzero(~table.repeated)
-    timing: float | Times = (
-        entry.duration_s if table.times is None else Times(table.times, np.cumsum(~table.repeated) - 1)
-    )
-    repeated = tuple(int(row) for row in table.rows[table.repeated])
-    if table.joints is not None:
-        points = table.joints[kept]
-        blends = _blends(np.abs(np.diff(points, axis=0)).max(axis=1), entry.blend_deg, np.radians(1.0))
-        return Built(joints=joint_sequence(points, blends, timing), repeated_rows=repeated)
-    segments = _lines(table, kept, entry, field, file)
+def _tool_table(robot: Robot, command: ToolTableCommand) -> Built:
+    segments = _lines(command)
     sizes = np.array([max(part.length, part.turned * TURN_LENGTH) for part in segments])
-    path = segment_path(segments, _blends(sizes, entry.blend_mm, 1e-3), timing)
-    slot = _slot(robot, entry.start_branch, field, file)
-    return Built(tool=path, start_slot=slot, repeated_rows=repeated)
+    path = segment_path(segments, _blends(sizes, command.blend), command.timing)
+    slot = _slot(robot, command.branch, command.source)
+    return Built(tool=path, start_slot=slot, repeated_rows=command.repeated_rows)
 
 
-def _lines(table: PathTable, kept: np.ndarray, entry: TablePath, field: str, file: Path) -> list[Line]:
+def _lines(command: ToolTableCommand) -> list[Line]:
     """Lines from point to point; the half-turn axis is for those that turn by half a turn."""
-    axis = None if entry.half_turn_axis is None else np.array(entry.half_turn_axis)
-    poses = table.poses[kept]
+    axis, source = command.half_turn_axis, command.source
     segments = []
-    for k, (a, b) in enumerate(pairwise(poses)):
+    for name, (a, b) in zip(command.names[1:], pairwise(command.poses)):
         part = line(a, b, GEOMETRY)
         if part.half_turn and axis is not None:
             try:
                 part = line(a, b, GEOMETRY, axis)
             except PoseError as error:
-                problem = f"on the way to row {table.rows[kept[k + 1]]} of {table.file}, {error}"
-                raise InputError(file, f"{field}.half_turn_axis", problem, "Name the turn's axis") from None
+                problem = f"on the way to {name}, {error}"
+                raise source.error("half_turn_axis", problem, "Name the turn's axis") from None
         segments.append(part)
     if axis is not None and not any(part.half_turn for part in segments):
-        raise InputError(file, f"{field}.half_turn_axis", "nothing in the table turns by 180 deg", "Remove it")
+        raise source.error("half_turn_axis", "nothing in the table turns by 180 deg", "Remove it")
     return segments
 
 
-def _blends(sizes: np.ndarray, wanted: float | None, unit: float) -> np.ndarray:
-    most = np.minimum(sizes[:-1], sizes[1:]) / 2
-    return most if wanted is None else np.minimum(most, wanted * unit)
+def _blends(sizes: Reals, wanted: float | None) -> Reals:
+    most: Reals = np.minimum(sizes[:-1], sizes[1:]) / 2
+    return most if wanted is None else np.minimum(most, wanted)
 
 
-def _slot(robot: Robot, name: str | None, field: str, file: Path) -> int | None:
+def _slot(robot: Robot, name: str | None, source: Source) -> int | None:
     if name is None:
         return None
-    labels = [BRANCHES[label] for label in branch_labels(robot)]
+    labels: tuple[str, ...] = branch_labels(robot)
     if name not in labels:
-        problem = f"this robot has no branch '{name}'"
-        raise InputError(file, f"{field}.start_branch", problem, f"Known: {'; '.join(labels)}")
+        raise source.error("start_branch", f"this robot has no branch '{name}'", f"Known: {'; '.join(labels)}")
     return labels.index(name)
-
-
-def _other(blend: str) -> str:
-    return "blend_deg" if blend == "blend_mm" else "blend_mm"
-
-
-def _pose(entry: PoseEntry) -> np.ndarray:
-    return transform(np.array(entry.xyz_mm) / 1000, np.radians(entry.rpy_deg))

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.numerics.arrays import Integers, Reals
+
 POWERS = 6
 GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(12)
 
@@ -25,16 +27,16 @@ class Curve:
     coefficients : (n, 6, k), of the powers 0 to 5 of each piece's own share
     """
 
-    edges: np.ndarray
-    coefficients: np.ndarray
+    edges: Reals
+    coefficients: Reals
 
-    def piece(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def piece(self, s: Reals) -> tuple[Integers, Reals]:
         """Number of the piece, and the share of it, at parameters (...,)."""
         s = np.asarray(s, float)
         i = np.clip(np.searchsorted(self.edges, s, side="right") - 1, 0, len(self.coefficients) - 1)
         return i, (s - self.edges[i]) / (self.edges[i + 1] - self.edges[i])
 
-    def __call__(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def __call__(self, s: Reals) -> tuple[Reals, Reals, Reals]:
         """Value, first and second derivative by the parameter, each (..., k), at parameters (...,)."""
         i, u = self.piece(s)
         c, u = self.coefficients[i], u[..., None]
@@ -49,16 +51,14 @@ class Curve:
         return x, dx / span, ddx / span**2
 
 
-def straight(start: np.ndarray, end: np.ndarray) -> np.ndarray:
+def straight(start: Reals, end: Reals) -> Reals:
     """Coefficients (6, k) of the straight piece between two points (k,)."""
     found = np.zeros((POWERS, len(start)))
     found[0], found[1] = start, np.subtract(end, start)
     return found
 
 
-def joining(
-    before: tuple[np.ndarray, np.ndarray, np.ndarray], after: tuple[np.ndarray, np.ndarray, np.ndarray], span: float
-) -> np.ndarray:
+def joining(before: tuple[Reals, Reals, Reals], after: tuple[Reals, Reals, Reals], span: float) -> Reals:
     """Coefficients (6, k) of the piece that takes over value and derivatives (k,) ``before`` and ends with ``after``.
 
     Parameters

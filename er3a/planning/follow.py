@@ -23,10 +23,12 @@ import numpy as np
 from er3a.errors import PoseError
 from er3a.geometry.angles import TURN
 from er3a.kinematics.closed_form import SLOTS
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
 from er3a.planning.branch_tracking import WIDE_STEP, Branches, branches_along, turned_difference
 from er3a.planning.followed import Followed, Jump
 from er3a.planning.moves import ToolPath
+from er3a.planning.singular_events import runs
 from er3a.robots.joint_limits import LIMIT_TOLERANCE, nearest_equivalent, within
 from er3a.robots.robot import Robot
 
@@ -40,14 +42,14 @@ SWITCH_STEP = 1e-4
 class _Sequence:
     """One way through a stretch: angles (n, 6) in rad, slots (n,), jumps behind points (n - 1,), and its cost."""
 
-    q: np.ndarray
-    slot: np.ndarray
-    jumps: np.ndarray
+    q: Reals
+    slot: Integers
+    jumps: Flags
     cost: tuple[float, float, float]
 
 
 def follow(
-    robot: Robot, line: ToolPath, t: np.ndarray, q_start: np.ndarray | None = None, start_slot: int | None = None
+    robot: Robot, line: ToolPath, t: Reals, q_start: Reals | None = None, start_slot: int | None = None
 ) -> Followed:
     """Follow a line.
 
@@ -68,25 +70,20 @@ def follow(
     q = np.full((len(grid.t), 6), np.nan)
     slot = np.full(len(grid.t), -1)
     before, jumps = q_start, []
-    for first, last in _stretches(grid.reached.any(axis=1)):
+    for first, last in runs(np.any(grid.reached, axis=1)):
         starts = np.flatnonzero(grid.reached[first])
         if first == 0:
             starts = _admitted(grid, starts, q_start, start_slot)
         best = _best(robot, grid, slice(first, last), starts, before)
         q[first:last], slot[first:last] = best.q, best.slot
-        jumps += [_jump(grid.t, q, first + i) for i in np.flatnonzero(best.jumps)]
+        jumps += [_jump(grid.t, q, first + i) for i in np.flatnonzero(best.jumps).tolist()]
         before = best.q[-1]
     turn = q[0] - q_start if q_start is not None else np.zeros(6)
     turn = np.where(np.abs(turn) < SAME_JOINTS, 0.0, turn)
     return Followed(robot, line, grid.t, grid.progress, q, slot, turn, tuple(jumps))
 
 
-def _stretches(reached: np.ndarray) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], reached, [False]]).astype(int)))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
-
-
-def _admitted(grid: Branches, starts: np.ndarray, q_start: np.ndarray | None, start_slot: int | None) -> np.ndarray:
+def _admitted(grid: Branches, starts: Integers, q_start: Reals | None, start_slot: int | None) -> Integers:
     if start_slot is not None:
         if start_slot not in starts:
             raise PoseError(f"the start pose has no solution on branch {start_slot}")
@@ -97,15 +94,16 @@ def _admitted(grid: Branches, starts: np.ndarray, q_start: np.ndarray | None, st
     distance[np.ix_(grid.free_wrist[0], [3, 5])] = 0.0
     distance[np.ix_(grid.free_shoulder[0], [0, 3, 4, 5])] = 0.0
     worst = distance.max(axis=1)[starts]
-    return starts[worst <= max(SAME_JOINTS, worst.min())]
+    admitted: Integers = starts[worst <= max(SAME_JOINTS, worst.min())]
+    return admitted
 
 
-def _best(robot: Robot, grid: Branches, part: slice, starts: np.ndarray, before: np.ndarray | None) -> _Sequence:
+def _best(robot: Robot, grid: Branches, part: slice, starts: Integers, before: Reals | None) -> _Sequence:
     q, t = grid.q[part], grid.t[part]
     share = np.gradient(t) / grid.t[-1] if len(t) > 1 else np.zeros(1)
     fits = within(robot, nearest_equivalent(robot, q, np.zeros(6)))
     price = np.where(fits, 0.0, OUTSIDE_COST * share[:, None])
-    onward, leaps = _costs_to_go(q, price, grid.doors[part])
+    onward, leaps = _costs_to_go(q, price, grid.meeting[part])
     sequences = []
     for start in starts:
         slot = _walk(onward, start)
@@ -114,9 +112,7 @@ def _best(robot: Robot, grid: Branches, part: slice, starts: np.ndarray, before:
     return min(sequences, key=lambda sequence: sequence.cost)
 
 
-def _turned(
-    robot: Robot, q: np.ndarray, slot: np.ndarray, jumps: np.ndarray, share: np.ndarray, before: np.ndarray | None
-) -> _Sequence:
+def _turned(robot: Robot, q: Reals, slot: Integers, jumps: Flags, share: Reals, before: Reals | None) -> _Sequence:
     """Make angles continuous and choose each joint's whole turns."""
     steps = turned_difference(q[:-1], q[1:])
     unwound = q[0] + np.concatenate([np.zeros((1, 6)), np.cumsum(steps, axis=0)])
@@ -139,14 +135,14 @@ def _turned(
     return _Sequence(unwound, slot, jumps, (float(jumps.sum()), outside, travel))
 
 
-def _jump(t: np.ndarray, q: np.ndarray, i: int) -> Jump:
+def _jump(t: Reals, q: Reals, i: int) -> Jump:
     step = q[i + 1] - q[i]
     joint = int(np.argmax(np.abs(step)))
     return Jump(float(t[i + 1]), joint + 1, float(step[joint]))
 
 
 @kernel
-def _costs_to_go(q, price, doors):
+def _costs_to_go(q: Reals, price: Reals, meeting: Integers) -> tuple[Integers, Flags]:
     """The branch to take next from each point and branch, and whether that is a jump; both (n - 1, 8).
 
     Going from one branch to another is no jump only where they meet, or are the same to SWITCH_STEP. Branches meet in
@@ -174,7 +170,7 @@ def _costs_to_go(q, price, doors):
                     step -= 2 * np.pi * np.round(step / (2 * np.pi))
                     travel += step * step
                     farthest = max(farthest, abs(step))
-                together = (a ^ b) & ~(doors[i, a] | doors[i + 1, b]) == 0
+                together = (a ^ b) & ~(meeting[i, a] | meeting[i + 1, b]) == 0
                 jump = farthest > (WIDE_STEP if together else SWITCH_STEP)
                 total = price[i, a] + np.sqrt(travel) + behind[b] + (JUMP_COST if jump else 0.0)
                 if total < cost[a]:
@@ -185,7 +181,7 @@ def _costs_to_go(q, price, doors):
 
 
 @kernel
-def _walk(onward, start):
+def _walk(onward: Integers, start: int) -> Integers:
     """The sequence of branches from ``start`` to the end."""
     slot = np.empty(onward.shape[0] + 1, dtype=np.int64)
     slot[0] = start

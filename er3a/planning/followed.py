@@ -14,6 +14,7 @@ import numpy as np
 from er3a.kinematics.forward import jacobian
 from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.numerics.arrays import Integers, Reals
 from er3a.planning.branch_tracking import FREE_SHOULDER, FREE_WRIST, align_wrist, onto_axis_1, turned_difference
 from er3a.planning.moves import ToolPath
 from er3a.robots.robot import Robot
@@ -45,7 +46,7 @@ class Followed:
     Attributes
     ----------
     t : (N,), s, rising; progress : (N,), share of the way (0..1)
-    q : (N, 6), rad, maker's angles, continuous but for ``jumps``; NaN where no branch reaches the pose
+    q : (N, 6), rad, manufacturer's angles, continuous but for ``jumps``; NaN where no branch reaches the pose
     slot : (N,) int, closed-form branch; -1 where none
     start_turn : (6,), rad, turn at rest from the given start joints to the beginning; not 0 only at a singular start
     jumps : changes of branch that no continuous motion makes
@@ -53,23 +54,23 @@ class Followed:
 
     robot: Robot
     line: ToolPath
-    t: np.ndarray
-    progress: np.ndarray
-    q: np.ndarray
-    slot: np.ndarray
-    start_turn: np.ndarray
+    t: Reals
+    progress: Reals
+    q: Reals
+    slot: Integers
+    start_turn: Reals
     jumps: tuple[Jump, ...]
 
-    def joints(self, t: np.ndarray) -> np.ndarray:
+    def joints(self, t: Reals) -> Reals:
         """Joint angles (..., 6) in rad at times (...,) in s; NaN where unreachable."""
         return self.joints_at(self.line.progress(t)[0])
 
-    def joints_at(self, progress: np.ndarray) -> np.ndarray:
+    def joints_at(self, progress: Reals) -> Reals:
         """Joint angles (..., 6) in rad at shares of the way (...,); NaN where unreachable."""
         progress = np.asarray(progress, float)
         return self._solve(progress.reshape(-1)).reshape(*progress.shape, 6)
 
-    def _solve(self, progress: np.ndarray) -> np.ndarray:
+    def _solve(self, progress: Reals) -> Reals:
         robot = self.robot
         right = np.clip(np.searchsorted(self.progress, progress, side="right"), 1, len(self.progress) - 1)
         left = right - 1
@@ -96,7 +97,7 @@ class Followed:
         return q
 
     @staticmethod
-    def _nearest(q: np.ndarray, q_ref: np.ndarray, slot_a: np.ndarray, slot_b: np.ndarray) -> np.ndarray:
+    def _nearest(q: Reals, q_ref: Reals, slot_a: Integers, slot_b: Integers) -> Reals:
         """Of the branches (n, 8, 6) in use on either side, the nearer to q_ref (n, 6), by the nearest turns."""
         rows = np.arange(len(q))
         both = np.stack([q[rows, slot_a], q[rows, slot_b]], axis=1)
@@ -104,9 +105,10 @@ class Followed:
         step = turned_difference(q_ref[:, None], both)
         distance = np.abs(step).max(axis=-1)
         best = np.argmin(np.where(np.isnan(distance), np.inf, distance), axis=1)
-        return q_ref + step[rows, best]
+        nearest: Reals = q_ref + step[rows, best]
+        return nearest
 
-    def derivatives(self, progress: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def derivatives(self, progress: Reals) -> tuple[Reals, Reals, Reals]:
         """Joint angles and their first and second derivative by progress, at shares of the way (n,) [1]_.
 
         With the tool's twist per unit of progress, J q' = twist and J q'' = twist' - J' q'. Where the Jacobian is
@@ -125,7 +127,7 @@ class Followed:
                 dq[rows], ddq[rows] = self._beside(progress[rows], aside)
         return q, dq, ddq
 
-    def rates(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def rates(self, t: Reals) -> tuple[Reals, Reals, Reals]:
         """Joint angles (rad), velocities (rad/s) and accelerations (rad/s^2) at times (n,) in s; each (n, 6)."""
         progress, speed, acceleration = (part[:, None] for part in self.line.progress(np.asarray(t, float)))
         q, dq, ddq = self.derivatives(progress[:, 0])
@@ -136,7 +138,7 @@ class Followed:
         """Size of the line in rad, for comparing derivatives."""
         return self.line.length / characteristic_length(self.robot) + self.line.turned
 
-    def _beside(self, progress: np.ndarray, aside: float) -> tuple[np.ndarray, np.ndarray]:
+    def _beside(self, progress: Reals, aside: float) -> tuple[Reals, Reals]:
         """Derivatives on both sides of points of the way, averaged where they agree; NaN elsewhere."""
         before = np.where(progress < aside, progress + aside, progress - aside)
         after = np.where(progress > 1 - aside, progress - aside, progress + aside)
@@ -148,7 +150,7 @@ class Followed:
             merged.append(np.where(agree[:, None], (a + b) / 2, np.nan))
         return merged[0], merged[1]
 
-    def _through_jacobian(self, q: np.ndarray, progress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _through_jacobian(self, q: Reals, progress: Reals) -> tuple[Reals, Reals]:
         length = characteristic_length(self.robot)
         dq, ddq = np.full_like(q, np.nan), np.full_like(q, np.nan)
         rows = np.flatnonzero(np.isfinite(q[:, 0]))

@@ -4,56 +4,94 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Generic, Literal, TypeVar
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
+from er3a.findings import Finding
 from er3a.kinematics.inverse import inverse
+from er3a.kinematics.solutions import Unsolved
 from er3a.kinematics.wrist_partitioned import solve_slots
-from er3a.pipeline.messages.kinematics import say
-from er3a.pipeline.messages.language import N_, joined, said
+from er3a.numerics.arrays import Reals
 from er3a.planning.followed import Followed
 from er3a.planning.singular_events import Joints, runs
 from er3a.robots.joint_limits import LIMIT_TOLERANCE
 from er3a.robots.robot import Robot
 
-_ABOVE = N_("J{joint} goes to {reached:.1f} deg; its upper limit is {bound:g} deg")
-_BELOW = N_("J{joint} goes to {reached:.1f} deg; its lower limit is {bound:g} deg")
+
+@dataclass(frozen=True)
+class AboveLimit:
+    """A joint (from 1) goes beyond its upper limit."""
+
+    joint: int
+    reached_deg: float
+    limit_deg: float
+    code: Literal["above_limit"] = "above_limit"
 
 
 @dataclass(frozen=True)
-class Interval:
-    """A stretch of time (s), and what is wrong in it in words."""
+class BelowLimit:
+    """A joint (from 1) goes beyond its lower limit."""
+
+    joint: int
+    reached_deg: float
+    limit_deg: float
+    code: Literal["below_limit"] = "below_limit"
+
+
+@dataclass(frozen=True)
+class TooFast:
+    """A joint (from 1) would have to turn faster than it can."""
+
+    joint: int
+    needed_deg_s: float
+    limit_deg_s: float
+    code: Literal["too_fast"] = "too_fast"
+
+
+@dataclass(frozen=True)
+class OutOfReach:
+    """No branch reaches the pose; per side of the arm, why."""
+
+    reasons: tuple[Unsolved, ...]
+    code: Literal["out_of_reach"] = "out_of_reach"
+
+
+CauseT = TypeVar("CauseT", bound=Finding)
+
+
+@dataclass(frozen=True)
+class Interval(Generic[CauseT]):
+    """A stretch of time (s), and what is wrong in it."""
 
     start: float
     end: float
-    cause: str
+    cause: CauseT
 
 
-def out_of_limits(robot: Robot, t: np.ndarray, q: np.ndarray, joints: Joints) -> list[Interval]:
+def out_of_limits(robot: Robot, t: Reals, q: Reals, joints: Joints) -> list[Interval[AboveLimit | BelowLimit]]:
     """Where joints leave their limits, one interval per joint and side, its ends located on the motion.
 
     Parameters
     ----------
     t : (N,), s; q : (N, 6), rad, NaN where unreachable; joints : angles (..., 6) at times (...,)
     """
-    found = []
+    found: list[Interval[AboveLimit | BelowLimit]] = []
     for j in range(6):
-        for sign, limit, cause in ((1.0, robot.upper[j], _ABOVE), (-1.0, robot.lower[j], _BELOW)):
+        for sign, limit, finding in ((1.0, robot.upper[j], AboveLimit), (-1.0, robot.lower[j], BelowLimit)):
 
-            def beyond(at, j=j, sign=sign, limit=limit):
-                return sign * (joints(at)[..., j] - limit) - LIMIT_TOLERANCE
+            def beyond(at: float, j: int = j, sign: float = sign, limit: float = limit) -> float:
+                return float(sign * (joints(np.asarray(at))[..., j] - limit) - LIMIT_TOLERANCE)
 
             values = sign * (q[:, j] - limit) - LIMIT_TOLERANCE
             for start, end, most in _where_positive(t, values, beyond):
-                reached, bound = np.degrees([limit + sign * most, limit])
-                found.append(Interval(start, end, said(cause, joint=j + 1, reached=reached, bound=bound)))
-    return sorted(found, key=lambda interval: (interval.start, interval.cause))
+                reached, bound = np.degrees([limit + sign * most, limit]).tolist()
+                found.append(Interval(start, end, finding(j + 1, reached, bound)))
+    return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
 
 
-def too_fast(
-    robot: Robot, t: np.ndarray, velocity: np.ndarray, speed: Callable[[np.ndarray], np.ndarray]
-) -> list[Interval]:
+def too_fast(robot: Robot, t: Reals, velocity: Reals, speed: Callable[[Reals], Reals]) -> list[Interval[TooFast]]:
     """Where joints would have to turn faster than they can; none for joints of unknown speed.
 
     Parameters
@@ -61,35 +99,31 @@ def too_fast(
     t : (N,), s; velocity : (N, 6), rad/s, NaN where unknown; speed : the same at times (n,)
     """
     found = []
-    for j in np.flatnonzero(np.isfinite(robot.speed)):
+    for j in np.flatnonzero(np.isfinite(robot.speed)).tolist():
 
-        def excess(at, j=j):
+        def excess(at: float, j: int = j) -> float:
             return float(np.abs(speed(np.array([at]))[0, j]) - robot.speed[j])
 
         values = np.abs(velocity[:, j]) - robot.speed[j]
         for start, end, most in _where_positive(t, values, excess):
-            needed, able = np.degrees([robot.speed[j] + most, robot.speed[j]])
-            speeds = {"needed": needed, "able": able}
-            cause = said("J{joint} would need {needed:.0f} deg/s; it can do {able:g} deg/s", joint=j + 1, **speeds)
-            found.append(Interval(start, end, cause))
-    return sorted(found, key=lambda interval: (interval.start, interval.cause))
+            needed, able = np.degrees([robot.speed[j] + most, robot.speed[j]]).tolist()
+            found.append(Interval(start, end, TooFast(j + 1, needed, able)))
+    return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
 
 
-def unreachable(followed: Followed) -> list[Interval]:
+def unreachable(followed: Followed) -> list[Interval[OutOfReach]]:
     """Where no branch of the closed form reaches the pose, with the distance that is missing at the worst point."""
     robot, found = followed.robot, []
     for first, last in runs(np.isnan(followed.q[:, 0])):
         poses = followed.line.poses(followed.progress[first:last])
         gap = solve_slots(robot, poses, np.zeros((len(poses), 6)))[2]
         worst = int(np.argmax(gap.min(axis=1)))
-        cause = joined(map(say, inverse(robot, poses[worst]).unsolved))
+        cause = OutOfReach(inverse(robot, poses[worst]).unsolved)
         found.append(Interval(float(followed.t[first]), float(followed.t[last - 1]), cause))
     return found
 
 
-def _where_positive(
-    t: np.ndarray, values: np.ndarray, function: Callable[[float], float]
-) -> list[tuple[float, float, float]]:
+def _where_positive(t: Reals, values: Reals, function: Callable[[float], float]) -> list[tuple[float, float, float]]:
     """Stretches of positive values, those between two grid points too: start, end (roots), and the greatest value."""
     found = []
     for first, last in runs(values > 0):
@@ -99,9 +133,7 @@ def _where_positive(
     return found + _peaks_between(t, values, function)
 
 
-def _peaks_between(
-    t: np.ndarray, values: np.ndarray, function: Callable[[float], float]
-) -> list[tuple[float, float, float]]:
+def _peaks_between(t: Reals, values: Reals, function: Callable[[float], float]) -> list[tuple[float, float, float]]:
     """Stretches of positive values about a peak between grid points that are not positive themselves.
 
     A peak is looked for where the parabola through a highest point and its neighbours rises half way to zero at least.
@@ -124,11 +156,11 @@ def _peaks_between(
     return found
 
 
-def _root(function: Callable[[float], float], t: np.ndarray, values: np.ndarray, a: int, b: int) -> float:
+def _root(function: Callable[[float], float], t: Reals, values: Reals, a: int, b: int) -> float:
     """Where the function changes sign between grid points a and b; the bad one's time beside an unknown value."""
     if not (np.isfinite(values[a]) and np.isfinite(values[b])):
-        return t[a] if values[a] > 0 else t[b]
+        return float(t[a] if values[a] > 0 else t[b])
     low, high = function(t[a]), function(t[b])
     if not low * high < 0:
-        return t[a] if abs(values[a]) < abs(values[b]) else t[b]
-    return brentq(function, t[a], t[b], xtol=1e-12 * (t[-1] - t[0]))
+        return float(t[a] if abs(values[a]) < abs(values[b]) else t[b])
+    return float(brentq(function, t[a], t[b], xtol=1e-12 * (t[-1] - t[0])))

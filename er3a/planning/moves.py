@@ -22,7 +22,8 @@ from scipy.spatial.transform import Rotation
 
 from er3a.errors import PoseError
 from er3a.geometry.transforms import check_poses
-from er3a.planning.profiles import Rates, one_go, quintic
+from er3a.numerics.arrays import Reals
+from er3a.planning.profiles import Ends, Rates, one_go, quintic
 
 HALF_TURN_TOLERANCE = 1e-9
 
@@ -37,7 +38,8 @@ class ToolPath(Protocol):
     turned : by how much the tool turns in all, rad
     """
 
-    duration: float
+    @property
+    def duration(self) -> float: ...
 
     @property
     def length(self) -> float: ...
@@ -45,19 +47,19 @@ class ToolPath(Protocol):
     @property
     def turned(self) -> float: ...
 
-    def progress(self, t: np.ndarray) -> Rates:
+    def progress(self, t: Reals) -> Rates:
         """Share of the way done (0..1, never falling) at times (...,) in s, with first and second derivative."""
 
-    def poses(self, progress: np.ndarray) -> np.ndarray:
+    def poses(self, progress: Reals) -> Reals:
         """T_base_tool (..., 4, 4) at shares of the way (...,)."""
 
-    def twists(self, progress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def twists(self, progress: Reals) -> tuple[Reals, Reals]:
         """Velocity of the tool per unit of progress, and its derivative by progress: (..., 6), m then rad, base."""
 
-    def way(self, progress: np.ndarray) -> np.ndarray:
+    def way(self, progress: Reals) -> Reals:
         """Length of the tool point's way so far, m, at shares of the way (...,)."""
 
-    def half_turns(self) -> tuple[tuple[int, np.ndarray], ...]:
+    def half_turns(self) -> tuple[tuple[int, Reals], ...]:
         """Turns by exactly 180 deg: number of the segment (from 1), and the axis (3,) in the base frame taken."""
 
 
@@ -67,25 +69,20 @@ class JointMove:
 
     Attributes
     ----------
-    start, end : (6,), rad, maker's angles
+    start, end : (6,), rad, manufacturer's angles
     duration : s
-    start_velocity, end_velocity : (6,), rad/s, or 0
-    start_acceleration, end_acceleration : (6,), rad/s^2, or 0
+    velocities, accelerations : at start and end, (6,) in rad/s and rad/s^2, or 0
     """
 
-    start: np.ndarray
-    end: np.ndarray
+    start: Reals
+    end: Reals
     duration: float
-    start_velocity: np.ndarray | float = 0.0
-    end_velocity: np.ndarray | float = 0.0
-    start_acceleration: np.ndarray | float = 0.0
-    end_acceleration: np.ndarray | float = 0.0
+    velocities: Ends = (0.0, 0.0)
+    accelerations: Ends = (0.0, 0.0)
 
-    def joints(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def joints(self, t: Reals) -> tuple[Reals, Reals, Reals]:
         """Angles (rad), velocities (rad/s) and accelerations (rad/s^2) at times (...,) in s; each (..., 6)."""
-        velocities = self.start_velocity, self.end_velocity
-        accelerations = self.start_acceleration, self.end_acceleration
-        return quintic(t, self.duration, self.start, self.end, *velocities, *accelerations)
+        return quintic(t, self.duration, self.start, self.end, self.velocities, self.accelerations)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,9 +99,9 @@ class Line:
     ramp : share of the time of each ramp of a trapezoid; None for the quintic
     """
 
-    T_start: np.ndarray
-    translation: np.ndarray
-    rotation: np.ndarray
+    T_start: Reals
+    translation: Reals
+    rotation: Reals
     duration: float
     half_turn: bool = False
     ramp: float | None = None
@@ -120,42 +117,42 @@ class Line:
         return float(np.linalg.norm(self.rotation))
 
     @property
-    def twist(self) -> np.ndarray:
+    def twist(self) -> Reals:
         """Velocity of the tool per unit of progress, (6,): m, then rad, in the base frame; the same all along."""
         return np.concatenate([self.translation, self.rotation])
 
-    def progress(self, t: np.ndarray) -> Rates:
+    def progress(self, t: Reals) -> Rates:
         """See :class:`ToolPath`."""
         return one_go(self.duration, self.ramp)(t)
 
-    def poses(self, progress: np.ndarray) -> np.ndarray:
+    def poses(self, progress: Reals) -> Reals:
         """See :class:`ToolPath`."""
         progress = np.asarray(progress, float)
         return turning_poses(self.T_start, self.points(progress), self.rotation, progress)
 
-    def points(self, progress: np.ndarray) -> np.ndarray:
+    def points(self, progress: Reals) -> Reals:
         """The tool point (..., 3), m, at shares of the way (...,)."""
         return self.T_start[:3, 3] + np.asarray(progress)[..., None] * self.translation
 
-    def twists(self, progress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def twists(self, progress: Reals) -> tuple[Reals, Reals]:
         """See :class:`ToolPath`."""
         shape = (*np.shape(progress), 6)
         return np.broadcast_to(self.twist, shape), np.zeros(shape)
 
-    def way(self, progress: np.ndarray) -> np.ndarray:
+    def way(self, progress: Reals) -> Reals:
         """See :class:`ToolPath`."""
         return self.length * np.asarray(progress)
 
-    def half_turns(self) -> tuple[tuple[int, np.ndarray], ...]:
+    def half_turns(self) -> tuple[tuple[int, Reals], ...]:
         """See :class:`ToolPath`."""
         return ((1, self.rotation / np.pi),) if self.half_turn else ()
 
 
 def line(
-    T_start: np.ndarray,
-    T_end: np.ndarray,
+    T_start: Reals,
+    T_end: Reals,
     duration: float,
-    half_turn_axis: np.ndarray | None = None,
+    half_turn_axis: Reals | None = None,
     ramp: float | None = None,
 ) -> Line:
     """The straight line between two poses of the tool.
@@ -177,9 +174,7 @@ def line(
     return Line(T_start, T_end[:3, 3] - T_start[:3, 3], rotation, duration, half_turn, ramp)
 
 
-def rotation_between(
-    T_start: np.ndarray, T_end: np.ndarray, half_turn_axis: np.ndarray | None = None
-) -> tuple[np.ndarray, bool]:
+def rotation_between(T_start: Reals, T_end: Reals, half_turn_axis: Reals | None = None) -> tuple[Reals, bool]:
     """Rotation vector (3,) in rad in the base frame, the shorter way round, and whether it is half a turn.
 
     Raises
@@ -197,7 +192,7 @@ def rotation_between(
     return rotation, half_turn
 
 
-def turning_poses(T_start: np.ndarray, points: np.ndarray, rotation: np.ndarray, progress: np.ndarray) -> np.ndarray:
+def turning_poses(T_start: Reals, points: Reals, rotation: Reals, progress: Reals) -> Reals:
     """T_base_tool (..., 4, 4) at points (..., 3), turned from ``T_start`` by shares (...,) of a rotation vector."""
     turns = Rotation.from_rotvec(progress.reshape(-1, 1) * rotation).as_matrix().reshape(*progress.shape, 3, 3)
     T = np.zeros((*progress.shape, 4, 4))
@@ -207,7 +202,7 @@ def turning_poses(T_start: np.ndarray, points: np.ndarray, rotation: np.ndarray,
     return T
 
 
-def _sense(axis: np.ndarray, wanted: np.ndarray | None) -> float:
+def _sense(axis: Reals, wanted: Reals | None) -> float:
     """+1 to turn about ``axis``, -1 to turn about its opposite."""
     if wanted is not None:
         side = float(axis @ wanted)

@@ -15,18 +15,33 @@ from typing import Protocol
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-Rates = tuple[np.ndarray, np.ndarray, np.ndarray]
+from er3a.numerics.arrays import Integers, Reals
+
+Rates = tuple[Reals, Reals, Reals]
+Ends = tuple[Reals | float, Reals | float]
+
+
+@dataclass(frozen=True, eq=False)
+class Times:
+    """When a sequence is at its corners; start and end count as corners.
+
+    Attributes
+    ----------
+    times : (m,), s, rising from 0
+    corner : (m,) int, not falling, from 0 to the last; one that stands twice is a halt there
+    """
+
+    times: Reals
+    corner: Integers
 
 
 def quintic(
-    t: np.ndarray,
+    t: Reals,
     duration: float,
-    start: np.ndarray,
-    end: np.ndarray,
-    start_velocity: np.ndarray | float = 0.0,
-    end_velocity: np.ndarray | float = 0.0,
-    start_acceleration: np.ndarray | float = 0.0,
-    end_acceleration: np.ndarray | float = 0.0,
+    start: Reals,
+    end: Reals,
+    velocities: Ends = (0.0, 0.0),
+    accelerations: Ends = (0.0, 0.0),
 ) -> Rates:
     """Polynomial of fifth degree that meets position, velocity and acceleration at both ends [1]_.
 
@@ -34,7 +49,8 @@ def quintic(
     ----------
     t : (...,), s, from 0 to ``duration``
     duration : s, greater than 0
-    start, end : (...,) or (k,), in any unit u; the boundary derivatives in u/s and u/s^2, of the same shape
+    start, end : (...,) or (k,), in any unit u
+    velocities, accelerations : at start and end, in u/s and u/s^2, each of the same shape, or 0
 
     Returns
     -------
@@ -42,8 +58,8 @@ def quintic(
     """
     start, end = np.asarray(start, float), np.asarray(end, float)
     tau = np.asarray(t, float).reshape(np.shape(t) + (1,) * start.ndim) / duration
-    v0, v1 = np.asarray(start_velocity) * duration, np.asarray(end_velocity) * duration
-    a0, a1 = np.asarray(start_acceleration) * duration**2, np.asarray(end_acceleration) * duration**2
+    v0, v1 = (np.asarray(velocity) * duration for velocity in velocities)
+    a0, a1 = (np.asarray(acceleration) * duration**2 for acceleration in accelerations)
     # What the cubic, quartic and quintic terms have to add to the parabola of the start values.
     position, velocity, acceleration = end - start - v0 - a0 / 2, v1 - v0 - a0, a1 - a0
     c3 = 10 * position - 4 * velocity + acceleration / 2
@@ -55,7 +71,7 @@ def quintic(
     return x, dx / duration, ddx / duration**2
 
 
-def trapezoid(t: np.ndarray, duration: float, ramp: float) -> Rates:
+def trapezoid(t: Reals, duration: float, ramp: float) -> Rates:
     """Progress from 0 to 1 at a velocity that rises, stays and falls, each ramp taking its share of the time [2]_.
 
     Parameters
@@ -80,7 +96,7 @@ def trapezoid(t: np.ndarray, duration: float, ramp: float) -> Rates:
 class TimeLaw(Protocol):
     """Share of the way done (0..1) at times (...,) in s, with its first and second derivative by time."""
 
-    def __call__(self, t: np.ndarray) -> Rates: ...
+    def __call__(self, t: Reals) -> Rates: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,11 +109,11 @@ class FromRestToRest:
     ramp : share of the time of each ramp of a trapezoid
     """
 
-    times: np.ndarray
-    progress: np.ndarray
+    times: Reals
+    progress: Reals
     ramp: float | None = None
 
-    def __call__(self, t: np.ndarray) -> Rates:
+    def __call__(self, t: Reals) -> Rates:
         """See :class:`TimeLaw`."""
         t = np.asarray(t, float)
         i = np.clip(np.searchsorted(self.times, t, side="right"), 1, len(self.times) - 1)
@@ -123,14 +139,14 @@ class Timetable:
     halts : (k,) bool, where the motion has to stop besides
     """
 
-    def __init__(self, times: np.ndarray, progress: np.ndarray, halts: np.ndarray):
+    def __init__(self, times: Reals, progress: Reals, halts: Reals):
         self.times, self.progress = np.asarray(times, float), np.asarray(progress, float)
         slopes = PchipInterpolator(self.times, self.progress).derivative()(self.times)
         slopes[np.asarray(halts, bool)] = 0.0
         slopes[[0, -1]] = 0.0
         self._slopes = slopes
 
-    def __call__(self, t: np.ndarray) -> Rates:
+    def __call__(self, t: Reals) -> Rates:
         """See :class:`TimeLaw`."""
         t = np.clip(np.asarray(t, float), self.times[0], self.times[-1])
         i = np.clip(np.searchsorted(self.times, t, side="right"), 1, len(self.times) - 1)

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from er3a.numerics.arrays import Reals
+
 SMALL = 1e-2  # rad^2; below it the series are exact to rounding
 
 
-def spin(w: np.ndarray, dw: np.ndarray, ddw: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def spin(w: Reals, dw: Reals, ddw: Reals) -> tuple[Reals, Reals]:
     """Angular velocity J(w) w' and its derivative, by the left Jacobian J [1]_.
 
     Parameters
@@ -34,7 +36,7 @@ def spin(w: np.ndarray, dw: np.ndarray, ddw: np.ndarray) -> tuple[np.ndarray, np
     return omega, slope
 
 
-def _coefficients(x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _coefficients(x: Reals) -> tuple[Reals, Reals, Reals, Reals]:
     """(1 - cos) / x and (angle - sin) / (x angle) of the squared angle x, and their derivatives by x."""
     small = x < SMALL
     y = np.where(small, 1.0, x)

@@ -15,10 +15,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import PathError
+from er3a.numerics.arrays import Flags, Reals
 from er3a.planning.arcs import Arc
 from er3a.planning.curves import GAUSS_POINTS, GAUSS_WEIGHTS, POWERS, Curve, joining, straight
 from er3a.planning.moves import Line
-from er3a.planning.profiles import FromRestToRest, Rates, TimeLaw, Timetable
+from er3a.planning.profiles import FromRestToRest, Rates, TimeLaw, Times, Timetable
 from er3a.planning.rotation_curves import spin
 
 TURN_LENGTH = 0.1  # m per rad
@@ -49,24 +50,24 @@ class SegmentPath:
     duration: float
     law: TimeLaw
     curve: Curve
-    origins: np.ndarray
+    origins: Reals
     arcs: tuple[Arc | None, ...]
-    arc_shares: np.ndarray
-    corners: np.ndarray
-    deviation: np.ndarray
+    arc_shares: Reals
+    corners: Reals
+    deviation: Reals
     turned: float
-    turns: tuple[tuple[int, np.ndarray], ...]
+    turns: tuple[tuple[int, Reals], ...]
 
     @property
     def length(self) -> float:
         """Length of the tool point's way, m."""
         return float(self.way(np.array(1.0)))
 
-    def progress(self, t: np.ndarray) -> Rates:
+    def progress(self, t: Reals) -> Rates:
         """See :class:`er3a.planning.moves.ToolPath`."""
         return self.law(t)
 
-    def poses(self, progress: np.ndarray) -> np.ndarray:
+    def poses(self, progress: Reals) -> Reals:
         """See :class:`er3a.planning.moves.ToolPath`."""
         progress = np.asarray(progress, float)
         values = self._values(progress)[0]
@@ -78,13 +79,13 @@ class SegmentPath:
         T[..., 3, 3] = 1.0
         return T
 
-    def twists(self, progress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def twists(self, progress: Reals) -> tuple[Reals, Reals]:
         """See :class:`er3a.planning.moves.ToolPath`."""
         x, dx, ddx = self._values(np.asarray(progress, float))
         omega, slope = spin(x[..., 3:], dx[..., 3:], ddx[..., 3:])
         return np.concatenate([dx[..., :3], omega], axis=-1), np.concatenate([ddx[..., :3], slope], axis=-1)
 
-    def way(self, progress: np.ndarray) -> np.ndarray:
+    def way(self, progress: Reals) -> Reals:
         """See :class:`er3a.planning.moves.ToolPath`; by Gauss quadrature with 12 points per piece."""
         progress = np.asarray(progress, float)
         edges = self.curve.edges
@@ -92,17 +93,19 @@ class SegmentPath:
         i = self.curve.piece(progress)[0]
         return whole[i] + self._lengths(edges[i], progress)
 
-    def half_turns(self) -> tuple[tuple[int, np.ndarray], ...]:
+    def half_turns(self) -> tuple[tuple[int, Reals], ...]:
         """See :class:`er3a.planning.moves.ToolPath`."""
         return self.turns
 
-    def _lengths(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    def _lengths(self, start: Reals, end: Reals) -> Reals:
         """Length of the tool point's way (...,) between shares (...,) of the way, both on one piece."""
         half = (end - start) / 2
         at = start[..., None] + half[..., None] * (1 + GAUSS_POINTS)
-        return (np.linalg.norm(self._values(at)[1][..., :3], axis=-1) * GAUSS_WEIGHTS).sum(axis=-1) * half
+        speeds: Reals = np.linalg.norm(self._values(at)[1][..., :3], axis=-1)
+        lengths: Reals = (speeds * GAUSS_WEIGHTS).sum(axis=-1) * half
+        return lengths
 
-    def _values(self, progress: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _values(self, progress: Reals) -> tuple[Reals, Reals, Reals]:
         """Position and rotation vector (..., 6) with derivatives by progress."""
         x, dx, ddx = self.curve(progress)
         i, u = self.curve.piece(progress)
@@ -133,10 +136,10 @@ class JointSequence:
     duration: float
     law: TimeLaw
     curve: Curve
-    corners: np.ndarray
-    deviation: np.ndarray
+    corners: Reals
+    deviation: Reals
 
-    def joints(self, t: np.ndarray) -> Rates:
+    def joints(self, t: Reals) -> Rates:
         """Angles (rad), velocities (rad/s) and accelerations (rad/s^2) at times (...,) in s; each (..., 6)."""
         progress, speed, acceleration = self.law(t)
         q, dq, ddq = self.curve(progress)
@@ -145,21 +148,18 @@ class JointSequence:
 
 
 @dataclass(frozen=True, eq=False)
-class Times:
-    """When a sequence is at its corners; start and end count as corners.
+class _Piece:
+    """A piece of a :class:`SegmentPath`, which explains the names."""
 
-    Attributes
-    ----------
-    times : (m,), s, rising from 0
-    corner : (m,) int, not falling, from 0 to the last; one that stands twice is a halt there
-    """
-
-    times: np.ndarray
-    corner: np.ndarray
+    span: float
+    coefficients: Reals
+    origin: Reals
+    arc: Arc | None = None
+    arc_shares: tuple[float, float] = (0.0, 1.0)
 
 
 def segment_path(
-    segments: Many[Segment], blends: np.ndarray, timing: float | Times, ramp: float | None = None
+    segments: Many[Segment], blends: Reals, timing: float | Times, ramp: float | None = None
 ) -> SegmentPath:
     """Put segments together.
 
@@ -183,43 +183,39 @@ def segment_path(
         for last, first, a, b in zip(lasts, firsts[1:], sizes, sizes[1:])
     ]
     starts, ends = np.append(0.0, blends) / sizes, 1 - np.append(blends, 0.0) / sizes
-    spans, coefficients, origins, arcs, shares = [], [], [], [], []
-
-    def add(span, piece, origin, arc=None, share=(0.0, 1.0)):
-        spans.append(span), coefficients.append(piece), origins.append(origin), arcs.append(arc), shares.append(share)
-
+    pieces: list[_Piece] = []
     for k, part in enumerate(segments):
         origin, u = part.T_start[:3, :3], np.array([starts[k], ends[k]])
         if u[1] - u[0] > RUNS_ON:
-            points = np.hstack([part.points(u), u[:, None] * part.rotation])
-            add((u[1] - u[0]) * sizes[k], straight(*points), origin, part if isinstance(part, Arc) else None, u)
+            ends_of_part = np.hstack([part.points(u), u[:, None] * part.rotation])
+            arc = part if isinstance(part, Arc) else None
+            pieces.append(_Piece((u[1] - u[0]) * sizes[k], straight(*ends_of_part), origin, arc, (u[0], u[1])))
         if k + 1 < len(segments) and blends[k] > 0:
             onward = segments[k + 1]
             before = _beside(part, ends[k], sizes[k], -1 + ends[k])
             after = _beside(onward, starts[k + 1], sizes[k + 1], starts[k + 1])
-            add(2 * blends[k], joining(before, after, 2 * blends[k]), onward.T_start[:3, :3])
+            span = 2 * blends[k]
+            pieces.append(_Piece(span, joining(before, after, span), onward.T_start[:3, :3]))
     corners, law, duration = _timed(sizes, np.asarray(blends) == 0, np.array(runs_on, bool), timing, ramp)
     path = SegmentPath(
         duration=duration,
         law=law,
-        curve=_curve(spans, coefficients),
-        origins=np.array(origins),
-        arcs=tuple(arcs),
-        arc_shares=np.array(shares),
+        curve=_curve([piece.span for piece in pieces], [piece.coefficients for piece in pieces]),
+        origins=np.array([piece.origin for piece in pieces]),
+        arcs=tuple(piece.arc for piece in pieces),
+        arc_shares=np.array([piece.arc_shares for piece in pieces]),
         corners=corners[1:-1],
         deviation=np.zeros(len(segments) - 1),
         turned=float(sum(part.turned for part in segments)),
         turns=tuple((k + 1, axis) for k, part in enumerate(segments) for _, axis in part.half_turns()),
     )
-    points = [part.T_start[:3, 3] for part in segments[1:]]
+    points = np.reshape([part.T_start[:3, 3] for part in segments[1:]], (-1, 1, 3))
     near = _passes(corners, np.asarray(blends) / sizes.sum())
-    away = path._values(near)[0][..., :3] - np.reshape(points, (-1, 1, 3))
+    away = path._values(near)[0][..., :3] - points
     return replace(path, deviation=np.linalg.norm(away, axis=-1).min(axis=-1))
 
 
-def joint_sequence(
-    points: np.ndarray, blends: np.ndarray, timing: float | Times, ramp: float | None = None
-) -> JointSequence:
+def joint_sequence(points: Reals, blends: Reals, timing: float | Times, ramp: float | None = None) -> JointSequence:
     """The way through joint angles ``points`` (n, 6) in rad; ``blends`` in rad of the joint that turns most.
 
     The rest is as for :func:`segment_path`.
@@ -236,7 +232,8 @@ def joint_sequence(
         a, b = points[k] + cut[k] * rates[k], points[k + 1] - cut[k + 1] * rates[k]
         rest = sizes[k] - cut[k] - cut[k + 1]
         if rest > RUNS_ON * sizes[k]:
-            spans.append(rest), coefficients.append(straight(a, b))
+            spans.append(rest)
+            coefficients.append(straight(a, b))
         if cut[k + 1] > 0:
             onward = points[k + 1] + cut[k + 1] * rates[k + 1]
             span = 2 * cut[k + 1]
@@ -249,7 +246,7 @@ def joint_sequence(
     return JointSequence(duration, law, curve, corners[1:-1], passed)
 
 
-def _check(sizes: np.ndarray, blends: np.ndarray, unit: float, name: str) -> None:
+def _check(sizes: Reals, blends: Reals, unit: float, name: str) -> None:
     for k, size in enumerate(sizes):
         if not size > NO_WAY:
             raise PathError(k + 1, "has no way: it ends where it starts")
@@ -260,14 +257,14 @@ def _check(sizes: np.ndarray, blends: np.ndarray, unit: float, name: str) -> Non
             raise PathError(k + 1, problem + f"{most * unit:.4g} {name}")
 
 
-def _beside(part: Segment, share: float, size: float, turn: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _beside(part: Segment, share: float, size: float, turn: float) -> tuple[Reals, Reals, Reals]:
     """Position and rotation vector (6,) of a segment beside a corner, with derivatives by its way."""
     first, second = part.twists(np.array(share))
     value = np.concatenate([part.points(np.array(share)), turn * part.rotation])
     return value, first / size, second / size**2
 
 
-def _curve(spans: list[float], coefficients: list[np.ndarray]) -> Curve:
+def _curve(spans: list[float], coefficients: list[Reals]) -> Curve:
     edges = np.concatenate([[0.0], np.cumsum(spans)])
     edges /= edges[-1]
     edges[-1] = 1.0
@@ -275,8 +272,8 @@ def _curve(spans: list[float], coefficients: list[np.ndarray]) -> Curve:
 
 
 def _timed(
-    sizes: np.ndarray, sharp: np.ndarray, runs_on: np.ndarray, timing: float | Times, ramp: float | None
-) -> tuple[np.ndarray, TimeLaw, float]:
+    sizes: Reals, sharp: Flags, runs_on: Flags, timing: float | Times, ramp: float | None
+) -> tuple[Reals, TimeLaw, float]:
     """Shares of the way of all corners with start and end, the law of time, and the duration."""
     corners = np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum()
     corners[-1] = 1.0
@@ -287,6 +284,6 @@ def _timed(
     return corners, FromRestToRest(timing * corners[halt], corners[halt], ramp), float(timing)
 
 
-def _passes(corners: np.ndarray, blends: np.ndarray) -> np.ndarray:
+def _passes(corners: Reals, blends: Reals) -> Reals:
     """Shares of the way (c, PASSES) about each corner."""
     return corners[1:-1, None] + blends[:, None] * np.linspace(-1, 1, PASSES)

@@ -11,14 +11,17 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 from scipy.signal import find_peaks
 
-from er3a.kinematics.singularity import TYPES, determinant_factors
+from er3a.kinematics.singularity import TYPES, SingularityType, determinant_factors
+from er3a.numerics.arrays import Flags, Reals
+from er3a.planning.near_singular import NearSingular, factor_of
 from er3a.robots.robot import Robot
 
 ON_SET = 1e-9  # rad or m: this near counts as on the singular set
@@ -27,8 +30,8 @@ FLAT = 1e-9  # relative, by which rounding may raise the distance at its minimum
 SLOPE_STEP = 5e-5  # share of the duration
 SAME_EVENT = 1e-8  # share of the duration
 LONG_STAY = 0.01  # share of the duration
-
-Joints = Callable[[np.ndarray], np.ndarray]
+Joints = Callable[[Reals], Reals]
+Factor = Callable[[Any], Any]
 
 
 @dataclass(frozen=True)
@@ -38,51 +41,49 @@ class SingularEvent:
     Attributes
     ----------
     t, until : s; they differ where the motion stays on the set
-    type : "wrist", "elbow" or "shoulder"
     crossing : whether the motion meets the set; else it passes by at ``distance``
     distance : rad (wrist, elbow) or m (shoulder); 0 for a crossing
     """
 
     t: float
     until: float
-    type: str
+    type: SingularityType
     crossing: bool
     distance: float
 
 
-def singular_events(
-    robot: Robot, t: np.ndarray, q: np.ndarray, joints: Joints, near: Mapping[str, float]
-) -> list[SingularEvent]:
+def singular_events(robot: Robot, t: Reals, q: Reals, joints: Joints, near: NearSingular) -> list[SingularEvent]:
     """All crossings, and the nearest pass of each stretch below its type's threshold, in order of time.
 
     Parameters
     ----------
     t : (N,), s, rising; q : (N, 6), rad, NaN where unreachable
     joints : joint angles (..., 6) at times (...,) within reach
-    near : per type the distance, in rad or m, below which a pass is reported
+    near : distances below which a pass is reported
     """
-    events = []
+    events: list[SingularEvent] = []
     for kind in TYPES:
 
-        def factor(at, kind=kind):
-            return getattr(determinant_factors(robot, joints(at)), kind)
+        def factor(at: Any, kind: SingularityType = kind) -> Any:
+            return factor_of(determinant_factors(robot, joints(at)), kind)
 
-        values = getattr(determinant_factors(robot, q), kind)
-        for first, last in runs(np.isfinite(values)):
-            events += _in_stretch(kind, t, values, first, last, factor, near[kind])
+        values = factor_of(determinant_factors(robot, q), kind)
+        for stretch in runs(np.isfinite(values)):
+            events += _in_stretch(kind, t, values, stretch, factor, near.of(kind))
     return sorted(events, key=lambda event: (event.t, TYPES.index(event.type)))
 
 
-def runs(flags: np.ndarray) -> list[tuple[int, int]]:
+def runs(flags: Flags) -> list[tuple[int, int]]:
     """Index ranges (first, behind the last) of the stretches of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
 def _in_stretch(
-    kind: str, t: np.ndarray, values: np.ndarray, first: int, last: int, factor: Joints, near: float
+    kind: SingularityType, t: Reals, values: Reals, stretch: tuple[int, int], factor: Factor, near: float
 ) -> list[SingularEvent]:
     """Events between two unreachable stretches (or the ends of the motion)."""
+    first, last = stretch
     f, times = values[first:last], t[first:last]
     duration = t[-1] - t[0]
     met = [_on_set(times, f, a, b, factor, duration) for a, b in runs(np.abs(f) <= ON_SET)]
@@ -118,7 +119,7 @@ def _in_stretch(
     return events
 
 
-def _on_set(times: np.ndarray, f: np.ndarray, a: int, b: int, factor: Joints, duration: float) -> tuple[float, float]:
+def _on_set(times: Reals, f: Reals, a: int, b: int, factor: Factor, duration: float) -> tuple[float, float]:
     """When the grid points a to b - 1, which lie on the set to rounding, meet it: a span only if it is a long one."""
     if times[b - 1] - times[a] > LONG_STAY * duration:
         return times[a], times[b - 1]
@@ -129,24 +130,22 @@ def _on_set(times: np.ndarray, f: np.ndarray, a: int, b: int, factor: Joints, du
     return at, at
 
 
-def _root(factor: Joints, start: float, end: float, duration: float) -> float:
+def _root(factor: Factor, start: float, end: float, duration: float) -> float:
     """Where the factor changes sign; the end nearer to 0 if, next to the set, it is evaluated on one side only."""
     low, high = float(factor(start)), float(factor(end))
     if not low * high < 0:
         return start if abs(low) < abs(high) else end
-    return brentq(factor, start, end, xtol=1e-14 * duration, rtol=4 * np.finfo(float).eps)
+    return float(brentq(factor, start, end, xtol=1e-14 * duration, rtol=4 * np.finfo(float).eps))
 
 
-def _minima(
-    times: np.ndarray, f: np.ndarray, factor: Joints, near: float, duration: float
-) -> list[tuple[float, float]]:
+def _minima(times: Reals, f: Reals, factor: Factor, near: float, duration: float) -> list[tuple[float, float]]:
     """Local minima of the distance below the threshold, apart from the changes of sign: time and distance."""
     size = np.abs(f)
     padded = np.concatenate([[np.inf], size, [np.inf]])
     peaks = find_peaks(-padded)[0] - 1
     step, last = SLOPE_STEP * duration, len(f) - 1
 
-    def slope(at):
+    def slope(at: float) -> Any:
         """Of the squared distance, by differences of fourth order."""
         a, b, c, d = factor(at + step * np.array([-2.0, -1.0, 1.0, 2.0])) ** 2
         return 8 * (c - b) - (d - a)

@@ -16,12 +16,13 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from er3a.errors import Er3aError
-from er3a.pipeline.messages.language import N_
+from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 
 LONGEST_STEP = 0.02  # share of the whole way between two nodes
@@ -32,12 +33,44 @@ MOST_ROUNDS = 30
 STRAIGHT_NODES = 81
 
 
+@dataclass(frozen=True)
+class MustStandStill:
+    """The arm would have to stand still on the way."""
+
+    code: Literal["must_stand_still"] = "must_stand_still"
+
+
+@dataclass(frozen=True)
+class NoTimeLawFound:
+    """The time-optimal parametrisation found no time law under the joints' limits."""
+
+    code: Literal["no_time_law_found"] = "no_time_law_found"
+
+
+@dataclass(frozen=True)
+class ToppraMissing:
+    """The library that finds time laws is not installed."""
+
+    code: Literal["toppra_missing"] = "toppra_missing"
+
+
+NoTimeLaw = MustStandStill | NoTimeLawFound | ToppraMissing
+
+
+class TimingError(Er3aError):
+    """No time law under the limits; ``finding`` says why."""
+
+    def __init__(self, finding: NoTimeLaw):
+        self.finding = finding
+        super().__init__(f"no time law ({finding.code})")
+
+
 @dataclass(frozen=True, eq=False)
 class JointLimits:
     """Greatest joint speeds (6,) in rad/s and accelerations (6,) in rad/s^2."""
 
-    speed: np.ndarray
-    acceleration: np.ndarray
+    speed: Reals
+    acceleration: Reals
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,34 +83,32 @@ class Timed:
     q, velocity, acceleration : (N, 6), rad, rad/s, rad/s^2
     """
 
-    t: np.ndarray
-    q: np.ndarray
-    velocity: np.ndarray
-    acceleration: np.ndarray
+    t: Reals
+    q: Reals
+    velocity: Reals
+    acceleration: Reals
 
     @property
     def duration(self) -> float:
         """s"""
         return float(self.t[-1])
 
-    def share(self, limits: JointLimits) -> tuple[float, float]:
-        """Greatest share of a joint's speed limit and of its acceleration limit that the motion needs."""
+    def ratios(self, limits: JointLimits) -> tuple[float, float]:
+        """Greatest ratio of a joint's speed to its limit, and of its acceleration to its limit."""
         speed = np.abs(self.velocity / limits.speed).max()
         return float(speed), float(np.abs(self.acceleration / limits.acceleration).max())
 
 
-def joint_limits(robot: Robot, assumed_speed: np.ndarray, full_speed_after: float) -> JointLimits:
+def joint_limits(robot: Robot, assumed_speed: Reals, acceleration_time: float) -> JointLimits:
     """The robot's joint speeds, with ``assumed_speed`` (6,) in rad/s where they are unknown.
 
-    Tables give no accelerations: each joint is taken to reach its full speed in ``full_speed_after`` seconds.
+    Tables give no accelerations: each joint is taken to reach its full speed in ``acceleration_time`` seconds.
     """
     speed = np.where(np.isfinite(robot.speed), robot.speed, assumed_speed)
-    return JointLimits(speed, speed / full_speed_after)
+    return JointLimits(speed, speed / acceleration_time)
 
 
-def nodes_along(
-    joints: Callable[[np.ndarray], np.ndarray], t: np.ndarray, q: np.ndarray, limits: JointLimits
-) -> tuple[np.ndarray, np.ndarray]:
+def nodes_along(joints: Callable[[Reals], Reals], t: Reals, q: Reals, limits: JointLimits) -> tuple[Reals, Reals]:
     """Times and joints along a motion, on a grid that is refined until its bends in joint space are resolved.
 
     Parameters
@@ -103,7 +134,7 @@ def nodes_along(
     return t, q
 
 
-def fastest(q: np.ndarray, limits: JointLimits, programmed: np.ndarray | None = None) -> Timed:
+def fastest(q: Reals, limits: JointLimits, programmed: Reals | None = None) -> Timed:
     """Run along nodes (N, 6) in rad from rest to rest, as fast as the limits allow.
 
     Parameters
@@ -132,7 +163,7 @@ def fastest(q: np.ndarray, limits: JointLimits, programmed: np.ndarray | None = 
     speed, pull = _toppra(way, spline, limits, cap)
     pace = (speed[:-1] + speed[1:]) / 2
     if (pace <= 0).any():
-        raise TimingError(N_("the arm would have to stand still on the way"))
+        raise TimingError(MustStandStill())
     t = np.concatenate([[0.0], np.cumsum(np.maximum(np.diff(way) / pace, least))])
     slope, bend = spline(way, 1), spline(way, 2)
     pull = np.append(pull, pull[-1])
@@ -140,12 +171,12 @@ def fastest(q: np.ndarray, limits: JointLimits, programmed: np.ndarray | None = 
     return Timed(t, q, velocity, bend * speed[:, None] ** 2 + slope * pull[:, None])
 
 
-def straight(start: np.ndarray, end: np.ndarray, limits: JointLimits) -> Timed:
+def straight(start: Reals, end: Reals, limits: JointLimits) -> Timed:
     """The fastest synchronised joint move between two joint vectors (6,) in rad, from rest to rest."""
     return fastest(np.linspace(start, end, STRAIGHT_NODES), limits)
 
 
-def standing(q: np.ndarray, duration: float) -> Timed:
+def standing(q: Reals, duration: float) -> Timed:
     """Rest at joint angles (6,)."""
     t = np.array([0.0, duration])
     return Timed(t, np.stack([q, q]), np.zeros((2, 6)), np.zeros((2, 6)))
@@ -162,13 +193,7 @@ def joined(parts: list[Timed]) -> Timed:
     return Timed(t[first], q[first], velocity[first], acceleration[first])
 
 
-class TimingError(Er3aError):
-    """No time law under the limits was found."""
-
-
-def _toppra(
-    way: np.ndarray, spline: CubicSpline, limits: JointLimits, cap: np.ndarray | None
-) -> tuple[np.ndarray, np.ndarray]:
+def _toppra(way: Reals, spline: CubicSpline, limits: JointLimits, cap: Reals | None) -> tuple[Reals, Reals]:
     """Speed along the way at its nodes (N,), and acceleration (N - 1,) between them."""
     try:
         with warnings.catch_warnings():  # of escapes in docstrings, when Python compiles the library
@@ -177,23 +202,25 @@ def _toppra(
             from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint, LinearConstraint
             from toppra.interpolator import AbstractGeometricPath
     except ModuleNotFoundError:
-        raise TimingError(N_("the library toppra is not installed; it has wheels for Linux on x86-64 only")) from None
+        raise TimingError(ToppraMissing()) from None
 
-    class Way(AbstractGeometricPath):
+    class Way(AbstractGeometricPath):  # type: ignore[misc]
         dof, waypoints = 6, None
         path_interval = np.array([way[0], way[-1]])
 
-        def __call__(self, at, order=0):
+        def __call__(self, at: Reals, order: int = 0) -> Any:
             return spline(at, order)
 
-    class Programme(LinearConstraint):
+    most = np.empty(0) if cap is None else cap**2
+
+    class Programme(LinearConstraint):  # type: ignore[misc]
         """The programme's speed along the way as an upper bound."""
 
-        def get_dof(self):
+        def get_dof(self) -> int:
             return 6
 
-        def compute_constraint_params(self, path, gridpoints):
-            return None, None, None, None, None, None, np.stack([np.zeros_like(cap), cap**2], axis=1)
+        def compute_constraint_params(self, path: Any, gridpoints: Any) -> tuple[Reals | None, ...]:
+            return None, None, None, None, None, None, np.stack([np.zeros_like(most), most], axis=1)
 
     both = (
         np.stack([-limits.speed, limits.speed], axis=1),
@@ -205,5 +232,5 @@ def _toppra(
     solver = TOPPRA(constraints, Way(), gridpoints=way, solver_wrapper="seidel")
     pull, speed, _ = solver.compute_parameterization(0, 0)
     if speed is None or not np.isfinite(speed).all():
-        raise TimingError(N_("the time-optimal parametrisation found no time law under the joints' limits"))
+        raise TimingError(NoTimeLawFound())
     return speed, pull

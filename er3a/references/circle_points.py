@@ -1,7 +1,7 @@
 """Circle point analysis: turn one joint at a time, and find its axis from the circle that a carried point runs on.
 
 This is how a real arm's axes are measured with a tracker [1]_; here the model runs through the same procedure, so that
-what is compared with the maker's axis lines is what the model does and not what its table says.
+what is compared with the manufacturer's axis lines is what the model does and not what its table says.
 
 References
 ----------
@@ -16,7 +16,7 @@ from itertools import product
 import numpy as np
 
 from er3a.kinematics.forward import forward, frames
-from er3a.references.quantities import MM, AxisLines
+from er3a.references.quantities import MM, AxisLines, Reals
 from er3a.robots.robot import Robot
 
 OFF_EVERY_AXIS_MM = 100.0
@@ -38,9 +38,9 @@ class CirclePoints:
     """
 
     axes: AxisLines
-    radius_mm: np.ndarray
-    roundness_mm: np.ndarray
-    offset_mm: np.ndarray
+    radius_mm: Reals
+    roundness_mm: Reals
+    offset_mm: Reals
 
 
 def circle_points(robot: Robot) -> CirclePoints:
@@ -51,21 +51,22 @@ def circle_points(robot: Robot) -> CirclePoints:
     return CirclePoints(AxisLines(direction, centre), radius, roundness, offset)
 
 
-def carried_point(robot: Robot) -> np.ndarray:
+def carried_point(robot: Robot) -> Reals:
     """A point (3,) in mm in the flange's frame that is at least 100 mm off every axis in the zero pose."""
     T = frames(robot.without_tool(), np.zeros(6))
-    ways = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-    offsets = np.concatenate([ways * length for length in TRIED_OFFSETS_MM])
+    toward = np.array([each for each in product((-1.0, 0.0, 1.0), repeat=3) if any(each)])
+    toward /= np.linalg.norm(toward, axis=1, keepdims=True)
+    offsets = np.concatenate([toward * length for length in TRIED_OFFSETS_MM])
     points = T[6, :3, 3] + (offsets / MM) @ T[6, :3, :3].T
     across = np.cross(T[:6, None, :3, 2], points - T[:6, None, :3, 3])
     least = np.linalg.norm(across, axis=-1).min(axis=0) * MM
     by_length = least.reshape(len(TRIED_OFFSETS_MM), -1)
     length = int(np.argmax(by_length.max(axis=1) >= OFF_EVERY_AXIS_MM))
-    return offsets[length * len(ways) + int(np.argmax(by_length[length]))]
+    chosen: Reals = offsets[length * len(toward) + int(np.argmax(by_length[length]))]
+    return chosen
 
 
-def fit_circle(track: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, float]:
+def fit_circle(track: Reals) -> tuple[Reals, Reals, float, float]:
     """Plane by singular values, then centre and radius in it by linear least squares (Kasa 1976).
 
     Parameters
@@ -94,7 +95,7 @@ def fit_circle(track: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, float]
     return normal, centre, radius, float(np.hypot(height, across - radius).max())
 
 
-def _track(robot: Robot, joint: int, offset_mm: np.ndarray) -> np.ndarray:
+def _track(robot: Robot, joint: int, offset_mm: Reals) -> Reals:
     """The carried point's positions (N, 3) in mm while one joint turns from its lower to its upper limit."""
     lower, upper = sorted((robot.lower[joint], robot.upper[joint]))
     middle, turn = (lower + upper) / 2, np.clip(upper - lower, LEAST_TURN, MOST_TURN)

@@ -8,16 +8,16 @@ import numpy as np
 
 from er3a.kinematics.forward import frames
 from er3a.kinematics.table_batch import Tables, frames_of
-from er3a.references.quantities import ZERO_POSE, AxisLines, Extreme, ModelState, Pose, Quantity
+from er3a.references.quantities import ZERO_POSE, AxisLines, Extreme, ModelState, Pose, Quantity, Reals
 from er3a.references.reach import search
-from er3a.references.reference import Reference
+from er3a.references.reference import Reference, quantities_of
 from er3a.robots.robot import Robot
 
 REACH_STARTS = 32
 CHUNK = 2048
 
 
-def predict(robot: Robot, references: Sequence[Reference], starts: int = REACH_STARTS) -> np.ndarray:
+def predict(robot: Robot, references: Sequence[Reference], starts: int = REACH_STARTS) -> Reals:
     """The model's value for each reference.
 
     Parameters
@@ -29,37 +29,33 @@ def predict(robot: Robot, references: Sequence[Reference], starts: int = REACH_S
     values : (n,), aligned with ``expected``, ``uncertainty`` and ``unit`` of the references; NaN where the robot's file
         says nothing (speeds)
     """
-    return read(references, state_of(robot, references, starts))
+    quantities = quantities_of(references)
+    return read(quantities, state_of(robot, quantities, starts))
 
 
-def read(references: Sequence[Reference], state: ModelState) -> np.ndarray:
-    """Values (..., n) of the references in a state that may hold a batch of models."""
-    if not references:
+def read(quantities: Sequence[Quantity], state: ModelState) -> Reals:
+    """Values (..., n) of quantities in a state that may hold a batch of models."""
+    if not quantities:
         return np.empty((*state.lower.shape[:-1], 0))
-    return np.stack([reference.quantity.value(state) for reference in references], axis=-1)
-
-
-def poses_of(references: Sequence[Reference]) -> tuple[Pose, ...]:
-    """The poses at which the references look at the arm, in deg; the zero pose first."""
-    return tuple(dict.fromkeys([ZERO_POSE, *(reference.quantity.seen_at for reference in references)]))
+    return np.stack([quantity.value(state) for quantity in quantities], axis=-1)
 
 
 def state_of(
     robot: Robot,
-    references: Sequence[Reference],
+    quantities: Sequence[Quantity],
     starts: int = REACH_STARTS,
     extremes: Mapping[Quantity, float] | None = None,
     axes: AxisLines | None = None,
 ) -> ModelState:
     """One model's state, with the extremes searched for unless given. The robot's tool does not count."""
     robot = robot.without_tool()
-    poses = poses_of(references)
+    poses = _poses_of(quantities)
     if extremes is None:
-        wanted = dict.fromkeys(r.quantity for r in references if isinstance(r.quantity, Extreme))
+        wanted = dict.fromkeys(quantity for quantity in quantities if isinstance(quantity, Extreme))
         extremes = {quantity: search(robot, quantity, starts)[0] for quantity in wanted}
     return ModelState(
         frames=frames(robot, np.radians(poses)),
-        index={pose: i for i, pose in enumerate(poses)},
+        index=_places(poses),
         direction=robot.direction,
         lower=robot.lower,
         upper=robot.upper,
@@ -69,8 +65,8 @@ def state_of(
     )
 
 
-def predict_tables(tables: Tables, robot: Robot, references: Sequence[Reference]) -> np.ndarray:
-    """What each of many tables says about references, none of which may be about an extreme over the limits.
+def predict_tables(tables: Tables, robot: Robot, quantities: Sequence[Quantity]) -> Reals:
+    """What each of many tables says about quantities, none of which may be an extreme over the limits.
 
     Parameters
     ----------
@@ -78,20 +74,29 @@ def predict_tables(tables: Tables, robot: Robot, references: Sequence[Reference]
 
     Returns
     -------
-    values : (H, n), in the references' units
+    values : (H, n), in the quantities' units
     """
-    poses = poses_of(references)
-    values = np.empty((len(tables), len(references)))
+    poses = _poses_of(quantities)
+    values = np.empty((len(tables), len(quantities)))
     for start in range(0, len(tables), CHUNK):
         part = tables[start : start + CHUNK]
         state = ModelState(
             frames=frames_of(part, robot.base, np.radians(poses)),
-            index={pose: i for i, pose in enumerate(poses)},
+            index=_places(poses),
             direction=part.direction,
             lower=part.lower,
             upper=part.upper,
             speed=robot.speed,
             extremes={},
         )
-        values[start : start + CHUNK] = read(references, state)
+        values[start : start + CHUNK] = read(quantities, state)
     return values
+
+
+def _poses_of(quantities: Sequence[Quantity]) -> tuple[Pose, ...]:
+    """The poses at which quantities look at the arm, in deg; the zero pose first."""
+    return tuple(dict.fromkeys([ZERO_POSE, *(quantity.seen_at for quantity in quantities)]))
+
+
+def _places(poses: Sequence[Pose]) -> dict[Pose, int]:
+    return {pose: place for place, pose in enumerate(poses)}

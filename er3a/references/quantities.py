@@ -13,15 +13,26 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar, Literal, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
+Reals = NDArray[np.float64]
 Pose = tuple[float, float, float, float, float, float]
 Vector = tuple[float, float, float]
-ZERO_POSE: Pose = (0.0,) * 6
+Unit = Literal["mm", "deg", "deg/s"]
+Coordinate = Literal["x", "y", "z"]
+SectionAxis = Literal["x", "z"]
+Point = Literal["flange", "wrist_centre"]
+Segment = Literal["upper_arm", "forearm"]
+Side = Literal["lower", "upper"]
+Extremity = Literal["greatest", "least"]
+ZERO_POSE: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 MM = 1000.0
-AXES = {"x": 0, "y": 1, "z": 2}
-FRAME_OF_POINT = {"wrist_centre": 4, "flange": 6}
+SECTION_AXES: tuple[SectionAxis, ...] = ("x", "z")
+COORDINATES: tuple[Coordinate, ...] = ("x", "y", "z")
+FRAME_OF_POINT: Mapping[Point, int] = {"wrist_centre": 4, "flange": 6}
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,26 +42,26 @@ class ModelState:
     Attributes
     ----------
     frames : (..., P, 7, 4, 4), as :func:`er3a.kinematics.forward.frames` gives them, at P poses
-    index : place of each pose (maker's angles, deg) among the P
+    index : place of each pose (manufacturer's angles, deg) among the P
     direction, lower, upper, speed : (..., 6), of the robot
     extremes : value (mm) of each :class:`Extreme` that was searched for
     axes : the joints' axis lines in the zero pose, if they were measured on the model; else those of the frames
     """
 
-    frames: np.ndarray
+    frames: Reals
     index: Mapping[Pose, int]
-    direction: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-    speed: np.ndarray
-    extremes: Mapping[Quantity, np.ndarray]
+    direction: Reals
+    lower: Reals
+    upper: Reals
+    speed: Reals
+    extremes: Mapping[Quantity, float]
     axes: AxisLines | None = None
 
-    def at(self, pose: Pose) -> np.ndarray:
+    def at(self, pose: Pose) -> Reals:
         """Frames (..., 7, 4, 4) at a pose."""
         return self.frames[..., self.index[pose], :, :, :]
 
-    def axis(self, joint: int) -> tuple[np.ndarray, np.ndarray]:
+    def axis(self, joint: int) -> tuple[Reals, Reals]:
         """Direction of positive rotation and a point (mm), (..., 3) each, of a joint's axis in the zero pose."""
         if self.axes:
             return self.axes.direction[joint - 1], self.axes.point_mm[joint - 1]
@@ -62,15 +73,15 @@ class ModelState:
 class AxisLines:
     """Six axis lines: ``direction`` (6, 3), unit vectors of positive rotation; ``point_mm`` (6, 3), on each."""
 
-    direction: np.ndarray
-    point_mm: np.ndarray
+    direction: Reals
+    point_mm: Reals
 
 
 @dataclass(frozen=True)
 class Quantity(ABC):
     """One number about an arm."""
 
-    unit = "mm"
+    unit: ClassVar[Unit] = "mm"
 
     @property
     def seen_at(self) -> Pose:
@@ -78,7 +89,7 @@ class Quantity(ABC):
         return ZERO_POSE
 
     @abstractmethod
-    def value(self, state: ModelState) -> np.ndarray:
+    def value(self, state: ModelState) -> Reals:
         """The model's value, shape (...,), in this quantity's unit."""
 
     @property
@@ -98,13 +109,14 @@ class AxisAngle(Quantity):
     joint: int
     toward: Vector = field(compare=False)
     signed: bool = field(compare=False)
-    unit = "deg"
+    unit: ClassVar[Unit] = "deg"
 
-    def value(self, state):
+    def value(self, state: ModelState) -> Reals:
         return angle_between(state.axis(self.joint)[0], np.array(self.toward), self.signed)
 
-    def apart(self, expected, other, other_expected):
-        return float(angle_between(np.array(self.toward), np.array(other.toward), self.signed and other.signed))
+    def apart(self, expected: float, other: Quantity, other_expected: float) -> float:
+        same = cast(AxisAngle, other)
+        return float(angle_between(np.array(self.toward), np.array(same.toward), self.signed and same.signed))
 
 
 @dataclass(frozen=True)
@@ -112,25 +124,27 @@ class AxisCoordinate(Quantity):
     """A coordinate (base frame) of that point of a joint's axis, in the zero pose, which is nearest to ``point_mm``."""
 
     joint: int
-    coordinate: str
+    coordinate: Coordinate
     point_mm: Vector = field(compare=False)
 
-    def value(self, state):
-        return nearest_on_line(*state.axis(self.joint), np.array(self.point_mm))[..., AXES[self.coordinate]]
+    def value(self, state: ModelState) -> Reals:
+        return nearest_on_line(*state.axis(self.joint), np.array(self.point_mm))[
+            ..., COORDINATES.index(self.coordinate)
+        ]
 
     @property
-    def vector(self):
+    def vector(self) -> Hashable:
         return AxisCoordinate, self.joint
 
 
 @dataclass(frozen=True)
 class QuantityAtPose(Quantity):
-    """One number about an arm at a pose (maker's angles, deg)."""
+    """One number about an arm at a pose (manufacturer's angles, deg)."""
 
     pose: Pose
 
     @property
-    def seen_at(self):
+    def seen_at(self) -> Pose:
         return self.pose
 
 
@@ -138,14 +152,14 @@ class QuantityAtPose(Quantity):
 class PointCoordinate(QuantityAtPose):
     """A coordinate (base frame) of the flange or the wrist centre at a pose."""
 
-    point: str
-    coordinate: str
+    point: Point
+    coordinate: Coordinate
 
-    def value(self, state):
-        return point_of(state.at(self.pose), self.point)[..., AXES[self.coordinate]]
+    def value(self, state: ModelState) -> Reals:
+        return point_of(state.at(self.pose), self.point)[..., COORDINATES.index(self.coordinate)]
 
     @property
-    def vector(self):
+    def vector(self) -> Hashable:
         return self.pose, self.point
 
 
@@ -154,15 +168,16 @@ class CarriedCoordinate(QuantityAtPose):
     """A coordinate (base frame) of a point that the flange carries, at a pose; ``offset_mm`` in the flange's frame."""
 
     offset_mm: Vector
-    coordinate: str
+    coordinate: Coordinate
 
-    def value(self, state):
+    def value(self, state: ModelState) -> Reals:
         T = state.at(self.pose)[..., FRAME_OF_POINT["flange"], :3, :]
-        k = AXES[self.coordinate]
-        return T[..., k, 3] * MM + T[..., k, :3] @ np.array(self.offset_mm)
+        k = COORDINATES.index(self.coordinate)
+        carried: Reals = T[..., k, 3] * MM + T[..., k, :3] @ np.array(self.offset_mm)
+        return carried
 
     @property
-    def vector(self):
+    def vector(self) -> Hashable:
         return self.pose, self.offset_mm
 
 
@@ -170,15 +185,15 @@ class CarriedCoordinate(QuantityAtPose):
 class SectionCoordinate(QuantityAtPose):
     """The wrist centre in a side view (joint 1 at 0): x from axis 1, z from axis 2; ``unsigned``: |x|, |z|."""
 
-    coordinate: str
+    coordinate: SectionAxis
     unsigned: bool
 
-    def value(self, state):
+    def value(self, state: ModelState) -> Reals:
         value = section_of(state.at(self.pose))[..., 0 if self.coordinate == "x" else 1]
         return np.abs(value) if self.unsigned else value
 
     @property
-    def vector(self):
+    def vector(self) -> Hashable:
         return SectionCoordinate, self.pose
 
 
@@ -189,10 +204,10 @@ class SegmentAngle(Quantity):
     The upper arm runs from axis 2 to axis 3, the forearm along axis 4 towards the wrist.
     """
 
-    segment: str
-    unit = "deg"
+    segment: Segment
+    unit: ClassVar[Unit] = "deg"
 
-    def value(self, state):
+    def value(self, state: ModelState) -> Reals:
         T = state.at(ZERO_POSE)
         if self.segment == "upper_arm":
             axis, vector = T[..., 1, :3, 2], T[..., 2, :3, 3] - T[..., 1, :3, 3]
@@ -208,11 +223,12 @@ class Limit(Quantity):
     """A joint's ``lower`` or ``upper`` limit."""
 
     joint: int
-    side: str
-    unit = "deg"
+    side: Side
+    unit: ClassVar[Unit] = "deg"
 
-    def value(self, state):
-        return np.degrees(getattr(state, self.side)[..., self.joint - 1])
+    def value(self, state: ModelState) -> Reals:
+        limits = state.lower if self.side == "lower" else state.upper
+        return np.degrees(limits[..., self.joint - 1])
 
 
 @dataclass(frozen=True)
@@ -220,9 +236,9 @@ class Speed(Quantity):
     """A joint's greatest speed; NaN where the robot's file gives none."""
 
     joint: int
-    unit = "deg/s"
+    unit: ClassVar[Unit] = "deg/s"
 
-    def value(self, state):
+    def value(self, state: ModelState) -> Reals:
         return np.degrees(state.speed[..., self.joint - 1])
 
 
@@ -230,65 +246,84 @@ class Speed(Quantity):
 class PoseOutside(QuantityAtPose):
     """How far a pose lies outside the joint limits: greatest excess of a joint, 0 inside."""
 
-    unit = "deg"
+    unit: ClassVar[Unit] = "deg"
 
-    def value(self, state):
+    def value(self, state: ModelState) -> Reals:
         q = np.radians(self.pose)
-        return np.degrees(np.maximum(np.maximum(state.lower - q, q - state.upper).max(axis=-1), 0.0))
+        excess: Reals = np.maximum(np.maximum(state.lower - q, q - state.upper).max(axis=-1), 0.0)
+        return np.degrees(excess)
 
 
 @dataclass(frozen=True)
 class Extreme(Quantity):
-    """Greatest or least value of a measure of a point over all joint angles within the limits.
+    """Greatest or least value of a measure of a point over all joint angles within the limits."""
 
-    ``measure``: ``axis_1`` or ``axis_2``, the point's distance from that axis; ``section_x`` or ``section_z``, its
-    coordinate in the side view (joint 1 at 0, from axis 1 and axis 2).
-    """
+    point: Point
+    extreme: Extremity
 
-    point: str
-    measure: str
-    extreme: str
+    @abstractmethod
+    def measure(self, T: Reals) -> Reals:
+        """The measure (...,) in m of frames (..., 7, 4, 4)."""
 
-    def value(self, state):
-        return state.extremes[self]
+    def value(self, state: ModelState) -> Reals:
+        return np.asarray(state.extremes[self])
 
 
-def measure_of(T: np.ndarray, point: str, measure: str) -> np.ndarray:
-    """An :class:`Extreme`'s measure (...,) in m of frames (..., 7, 4, 4)."""
+@dataclass(frozen=True)
+class AxisDistance(Extreme):
+    """The point's distance from the axis of joint 1 or 2."""
+
+    axis: int
+
+    def measure(self, T: Reals) -> Reals:
+        k = self.axis - 1
+        across = np.cross(T[..., k, :3, 2], T[..., FRAME_OF_POINT[self.point], :3, 3] - T[..., k, :3, 3])
+        return np.sqrt(_dot(across, across))
+
+
+@dataclass(frozen=True)
+class SectionExtent(Extreme):
+    """The point's coordinate in the side view: joint 1 at 0, x from axis 1, z from axis 2."""
+
+    coordinate: SectionAxis
+
+    def measure(self, T: Reals) -> Reals:
+        return section_coordinate(T, self.point, self.coordinate)
+
+
+def section_coordinate(T: Reals, point: Point, coordinate: SectionAxis) -> Reals:
+    """A point's coordinate (...,) in m in the side view, of frames (..., 7, 4, 4)."""
     p = T[..., FRAME_OF_POINT[point], :3, 3]
-    if measure.startswith("section"):
-        return p[..., 0] - T[..., 0, 0, 3] if measure == "section_x" else p[..., 2] - T[..., 1, 2, 3]
-    k = int(measure[-1]) - 1
-    across = np.cross(T[..., k, :3, 2], p - T[..., k, :3, 3])
-    return np.sqrt(_dot(across, across))
+    return p[..., 0] - T[..., 0, 0, 3] if coordinate == "x" else p[..., 2] - T[..., 1, 2, 3]
 
 
-def point_of(T: np.ndarray, point: str) -> np.ndarray:
+def point_of(T: Reals, point: Point) -> Reals:
     """Position (..., 3) in mm of the flange or the wrist centre, of frames (..., 7, 4, 4)."""
     return T[..., FRAME_OF_POINT[point], :3, 3] * MM
 
 
-def section_of(T: np.ndarray) -> np.ndarray:
+def section_of(T: Reals) -> Reals:
     """The wrist centre in the side view (..., 2) in mm: x from axis 1, z from axis 2."""
-    parts = [measure_of(T, "wrist_centre", f"section_{axis}") for axis in "xz"]
+    parts = [section_coordinate(T, "wrist_centre", coordinate) for coordinate in SECTION_AXES]
     return np.stack(parts, axis=-1) * MM
 
 
-def nearest_on_axis(T: np.ndarray, joint: int, point_mm: np.ndarray) -> np.ndarray:
+def nearest_on_axis(T: Reals, joint: int, point_mm: Reals) -> Reals:
     """Point (..., 3) in mm of a joint's axis nearest to a given point, of frames (..., 7, 4, 4)."""
     return nearest_on_line(T[..., joint - 1, :3, 2], T[..., joint - 1, :3, 3] * MM, point_mm)
 
 
-def nearest_on_line(direction: np.ndarray, on_line: np.ndarray, point: np.ndarray) -> np.ndarray:
+def nearest_on_line(direction: Reals, on_line: Reals, point: Reals) -> Reals:
     """Point (..., 3) of lines through ``on_line`` (..., 3) along unit vectors, nearest to a given point."""
     return on_line + direction * _dot(direction, point - on_line)[..., None]
 
 
-def angle_between(a: np.ndarray, b: np.ndarray, signed: bool) -> np.ndarray:
+def angle_between(a: Reals, b: Reals, signed: bool) -> Reals:
     """Angle in deg; of lines (at most 90) if not signed."""
     cross, dot = np.cross(a, b), _dot(a, b)
     return np.degrees(np.arctan2(np.sqrt(_dot(cross, cross)), dot if signed else np.abs(dot)))
 
 
-def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.einsum("...i,...i->...", a, b)
+def _dot(a: Reals, b: Reals) -> Reals:
+    product: Reals = np.einsum("...i,...i->...", a, b)
+    return product

@@ -10,20 +10,22 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.optimize import minimize
 
 from er3a.kinematics.chain import JOINTS
 from er3a.kinematics.forward import frames
 from er3a.numerics.quasi_random import quasi_random_points
-from er3a.references.quantities import MM, Extreme, measure_of
+from er3a.references.quantities import MM, Extreme, Reals
 from er3a.robots.robot import Robot
 
 SCAN = 4096
 STEP = 1e-6
 
 
-def search(robot: Robot, quantity: Extreme, starts: int) -> tuple[float, np.ndarray]:
+def search(robot: Robot, quantity: Extreme, starts: int) -> tuple[float, Reals]:
     """Find an extreme.
 
     The robot's tool does not count. Joint 1 stays at 0: none of the measures changes with it, or the side view is drawn
@@ -43,12 +45,12 @@ def search(robot: Robot, quantity: Extreme, starts: int) -> tuple[float, np.ndar
     lower[0] = upper[0] = 0.0
     sign = -1.0 if quantity.extreme == "greatest" else 1.0
 
-    def cost(q: np.ndarray) -> np.ndarray:
-        return sign * measure_of(frames(robot, q), quantity.point, quantity.measure)
+    def cost(q: Reals) -> Reals:
+        return sign * quantity.measure(frames(robot, q))
 
     offsets = np.vstack([np.zeros(JOINTS), STEP * np.eye(JOINTS), -STEP * np.eye(JOINTS)])
 
-    def cost_and_slope(q: np.ndarray) -> tuple[float, np.ndarray]:
+    def cost_and_slope(q: Reals) -> tuple[float, Reals]:
         values = cost(q + offsets)
         return values[0], (values[1 : JOINTS + 1] - values[JOINTS + 1 :]) / (2 * STEP)
 
@@ -70,7 +72,7 @@ def search(robot: Robot, quantity: Extreme, starts: int) -> tuple[float, np.ndar
     return float(sign * cost(q) * MM), q
 
 
-def _without_idle_joints(q: np.ndarray, lower: np.ndarray, upper: np.ndarray, cost) -> np.ndarray:
+def _without_idle_joints(q: Reals, lower: Reals, upper: Reals, cost: Callable[[Reals], Reals]) -> Reals:
     rest = np.clip(0.0, lower, upper)
     for joint in range(JOINTS):
         trial = q.copy()

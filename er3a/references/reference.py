@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from er3a.files.reference_rows import AxisRow, PositionRow, Row
-from er3a.pipeline.messages.language import N_
-from er3a.references.quantities import Quantity
-from er3a.robots.robot import WEIGHTY_GRADES, Grade
-
-GROUPS = (
-    N_("zero pose"),
-    N_("axes"),
-    N_("key poses"),
-    N_("reach"),
-    N_("envelope"),
-    N_("limits"),
-    N_("speeds"),
-)
+from er3a.references.quantities import Quantity, Reals, Unit
+from er3a.references.subjects import Subject
+from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade
 
 
 @dataclass(frozen=True)
@@ -29,14 +21,14 @@ class Reference:
 
     Attributes
     ----------
-    name : for people
-    group : one of ``GROUPS``
-    quantity : what it is about
+    subject : what it is about, as people name it
+    group : a key of :data:`er3a.references.rows.GROUPS`
+    quantity : what it is about, as a model has it
     expected : in the quantity's unit; None where the source says that it gives no value
     uncertainty : half-width of the interval that the source leaves open, same unit
     """
 
-    name: str
+    subject: Subject
     group: str
     quantity: Quantity
     expected: float | None
@@ -45,14 +37,48 @@ class Reference:
     grade: Grade
 
     @property
-    def unit(self) -> str:
+    def unit(self) -> Unit:
         """mm, deg or deg/s."""
         return self.quantity.unit
 
     @property
-    def weighty(self) -> bool:
+    def authoritative(self) -> bool:
         """Whether a verdict may rest on it."""
-        return self.grade in WEIGHTY_GRADES
+        return self.grade in AUTHORITATIVE_GRADES
+
+
+Scalar = tuple[Subject, str, Quantity, float | None, float]
+"""Subject, group, quantity, expected value and uncertainty of a reference."""
+
+
+@dataclass(frozen=True)
+class Row(ABC):
+    """What every row of a reference table has: its line in the file, its source and grade.
+
+    A kind of reference is a row class: ``kind`` is the name of its tables, ``groups`` those of its references, and
+    ``scalars`` splits a row into them. :data:`er3a.references.rows.KINDS` lists all kinds.
+    """
+
+    kind: ClassVar[str]
+    groups: ClassVar[tuple[str, ...]]
+    line: int
+    source: str
+    grade: Grade
+
+    @abstractmethod
+    def scalars(self) -> Iterator[Scalar]:
+        """What the row states, number by number."""
+
+    def references(self) -> list[Reference]:
+        """The references that the row states."""
+        return [self.reference(scalar) for scalar in self.scalars()]
+
+    def reference(self, scalar: Scalar) -> Reference:
+        """A number with the row's source and grade."""
+        return Reference(*scalar, self.source, self.grade)
+
+
+RowT = TypeVar("RowT", bound=Row)
 
 
 @dataclass(frozen=True)
@@ -63,63 +89,64 @@ class ReferenceSet:
     ----------
     name : the folder's name
     references : the scalars
-    rows : the rows they come from, per kind (file stem)
+    rows : the rows they come from, per kind
     """
 
     name: str
     references: tuple[Reference, ...]
-    rows: dict[str, tuple[Row, ...]] = field(hash=False)
+    rows: Mapping[str, tuple[Row, ...]] = field(hash=False)
 
     @property
     def checkable(self) -> tuple[Reference, ...]:
         """References that state a value."""
         return tuple(reference for reference in self.references if reference.expected is not None)
 
-    @property
-    def axes(self) -> tuple[AxisRow, ...]:
-        """Axis lines, for drawing."""
-        return self.rows.get("axes", ())
-
-    @property
-    def positions(self) -> tuple[PositionRow, ...]:
-        """Key poses, for drawing."""
-        return self.rows.get("positions", ())
+    def of(self, kind: type[RowT]) -> tuple[RowT, ...]:
+        """The rows of a kind."""
+        return tuple(row for row in self.rows.get(kind.kind, ()) if isinstance(row, kind))
 
 
-def expected_of(references: tuple[Reference, ...]) -> tuple[np.ndarray, np.ndarray]:
+def quantities_of(references: Iterable[Reference]) -> tuple[Quantity, ...]:
+    """What references are about."""
+    return tuple(reference.quantity for reference in references)
+
+
+def expected_of(references: Sequence[Reference]) -> tuple[Reals, Reals]:
     """Expected values and uncertainties, (n,) each, of references that state a value."""
-    return np.array([r.expected for r in references]), np.array([r.uncertainty for r in references])
+    expected: list[Any] = [reference.expected for reference in references]
+    return np.array(expected), np.array([reference.uncertainty for reference in references])
 
 
-def vectors_of(references: tuple[Reference, ...]) -> tuple[np.ndarray, list[str]]:
+def vectors_of(references: Sequence[Reference]) -> list[tuple[int, ...]]:
     """Coordinates of one vector from one source belong together: their differences add up to a distance.
 
     Returns
     -------
-    group : (n,), number of the vector that each reference belongs to; numbers count up from 0
-    unit : of each vector
+    vectors : for each the places of its references
     """
-    keys = [(reference.source, reference.quantity.vector) for reference in references]
-    number = {key: i for i, key in enumerate(dict.fromkeys(keys))}
-    unit = dict(zip(keys, (reference.unit for reference in references)))
-    return np.array([number[key] for key in keys]), [unit[key] for key in number]
+    found: dict[Any, list[int]] = {}
+    for place, reference in enumerate(references):
+        found.setdefault((reference.source, reference.quantity.vector), []).append(place)
+    return [tuple(places) for places in found.values()]
 
 
-def lengths_of(values: np.ndarray, group: np.ndarray) -> np.ndarray:
+def lengths_of(values: Reals, vectors: Sequence[tuple[int, ...]]) -> Reals:
     """Length of each vector (..., m) of coordinates (..., n) that :func:`vectors_of` has put together."""
-    return np.sqrt(np.stack([(values[..., group == i] ** 2).sum(axis=-1) for i in range(group.max() + 1)], axis=-1))
+    squares = [(values[..., list(places)] ** 2).sum(axis=-1) for places in vectors]
+    lengths: Reals = np.sqrt(np.stack(squares, axis=-1))
+    return lengths
 
 
-def conflicts(references: tuple[Reference, ...]) -> list[tuple[int, int]]:
+def conflicts(references: Sequence[Reference]) -> list[tuple[int, int]]:
     """Pairs (i, j), i < j, of references about the same quantity that no value can meet both of."""
-    about: dict[Quantity, list[int]] = {}
+    about: dict[Quantity, list[tuple[int, float]]] = {}
     for i, reference in enumerate(references):
         if reference.expected is not None:
-            about.setdefault(reference.quantity, []).append(i)
+            about.setdefault(reference.quantity, []).append((i, reference.expected))
     pairs = []
-    for i, j in (pair for same in about.values() for pair in combinations(same, 2)):
+    for (i, stated), (j, other_stated) in (pair for same in about.values() for pair in combinations(same, 2)):
         first, second = references[i], references[j]
-        apart = first.quantity.apart(first.expected, second.quantity, second.expected)
+        apart = first.quantity.apart(stated, second.quantity, other_stated)
         if apart > first.uncertainty + second.uncertainty:
             pairs.append((i, j))
     return sorted(pairs, key=lambda pair: pair[::-1])

@@ -5,23 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from er3a.errors import ShapeError
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.messages.language import N_
 
 Grade = Literal["official", "cad", "export", "claim", "inferred"]
-GRADES: dict[str, str] = {
-    N_("official"): N_("the maker's own document"),
-    N_("cad"): N_("measured on a CAD model that carries the model's name"),
-    N_("export"): N_("a URDF exported from CAD"),
-    N_("claim"): N_("an article's text"),
-    N_("inferred"): N_("reasoned, not stated"),
-}
-WEIGHTY_GRADES = ("official", "cad", "export")
+GRADES: tuple[Grade, ...] = get_args(Grade)
+AUTHORITATIVE_GRADES: tuple[Grade, ...] = ("official", "cad", "export")
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.geometry.vectors import Vector
+from er3a.numerics.arrays import Integers, Reals, Singles
 from er3a.numerics.jit import kernel
+
+NearLists = tuple[Reals, Integers, Integers, Reals]
 
 _PATCHES = 16
 _SAFETY = 1 - 1e-5
@@ -32,9 +36,9 @@ class Extremes:
     block, sample : (D,), int64, which sample it is, -1 where there is none
     """
 
-    support: np.ndarray
-    block: np.ndarray
-    sample: np.ndarray
+    support: Reals
+    block: Integers
+    sample: Integers
 
     @classmethod
     def empty(cls, count: int) -> Extremes:
@@ -46,14 +50,13 @@ class Extremes:
         earlier = (other.block < self.block) | ((other.block == self.block) & (other.sample < self.sample))
         take = (other.support > self.support) | ((other.support == self.support) & earlier & (other.block != NONE))
         return Extremes(
-            *(np.where(take, b, a) for a, b in zip(self._arrays(), other._arrays())),
+            np.where(take, other.support, self.support),
+            np.where(take, other.block, self.block),
+            np.where(take, other.sample, self.sample),
         )
 
-    def _arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return self.support, self.block, self.sample
 
-
-def cube_map() -> np.ndarray:
+def cube_map() -> Reals:
     """Centres (unit vectors) and angular radii (rad) of the patches that :func:`_patch` numbers, as rows (4, P)."""
     edge = np.linspace(-1, 1, _PATCHES + 1)
     middle = (edge[1:] + edge[:-1]) / 2
@@ -61,10 +64,11 @@ def cube_map() -> np.ndarray:
     for face in range(6):
         major, sign = face // 2, 1 - 2 * (face % 2)
 
-        def unit(u, v, major=major, sign=sign):
+        def unit(u: Reals, v: Reals, major: int = major, sign: int = sign) -> Reals:
             out = np.empty((*np.broadcast(u, v).shape, 3))
             out[..., major], out[..., (major + 1) % 3], out[..., (major + 2) % 3] = sign, u, v
-            return out / np.linalg.norm(out, axis=-1, keepdims=True)
+            direction: Reals = out / np.linalg.norm(out, axis=-1, keepdims=True)
+            return direction
 
         centre = unit(middle[:, None], middle[None, :])
         corners = unit(edge[:, None], edge[None, :])
@@ -78,7 +82,7 @@ def cube_map() -> np.ndarray:
 
 
 @kernel
-def _patch(x, y, z):
+def _patch(x: float, y: float, z: float) -> int:
     ax, ay, az = abs(x), abs(y), abs(z)
     if ax >= ay and ax >= az:
         face, m, u, v = (0 if x >= 0 else 1), ax, y, z
@@ -94,7 +98,7 @@ def _patch(x, y, z):
 
 
 @kernel
-def _set_thresholds(directions, seen, patches, widen, threshold):
+def _set_thresholds(directions: Reals, seen: Reals, patches: Reals, widen: float, threshold: Reals) -> None:
     """Squared distance per patch, grown by the angle ``widen`` (rad), below which nothing improves any direction."""
     cos_widen, sin_widen = np.cos(widen), np.sin(widen)
     count = patches.shape[1]
@@ -114,7 +118,7 @@ def _set_thresholds(directions, seen, patches, widen, threshold):
 
 
 @kernel
-def _set_lists(directions, seen, patches, least, lists):
+def _set_lists(directions: Reals, seen: Reals, patches: Reals, least: Reals, lists: NearLists) -> None:
     """List for each patch the directions that may be improved there, by the distance from which on they are.
 
     Parameters
@@ -149,7 +153,15 @@ def _set_lists(directions, seen, patches, least, lists):
 
 
 @kernel
-def refresh(directions, support, inner, patches, lists, grid, idle):
+def refresh(
+    directions: Reals,
+    support: Reals,
+    inner: Reals,
+    patches: Reals,
+    lists: NearLists,
+    grid: tuple[Reals, float, tuple[int, int, int]],
+    idle: Singles,
+) -> None:
     """Set the lists of the patches, and where samples of each cell are idle, from the support so far.
 
     Parameters
@@ -182,7 +194,7 @@ def refresh(directions, support, inner, patches, lists, grid, idle):
                 idle[(i * ny + j) * nz + k] = np.inf if inside else wider[_patch(x, y, z)]
 
 
-def near_lists(patches: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def near_lists(patches: int) -> NearLists:
     """Per patch: squared distance (m^2) up to which its list is complete, length of the list, directions, and the
     squared distances from which on each may be improved. Before the first refresh no list is complete.
     """
@@ -191,7 +203,17 @@ def near_lists(patches: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.nda
 
 
 @kernel
-def take_point(point, block, sample, directions, inner, lists, support, blocks, samples):
+def take_point(
+    point: Vector,
+    block: int,
+    sample: int,
+    directions: Reals,
+    inner: Reals,
+    lists: NearLists,
+    support: Reals,
+    blocks: Integers,
+    samples: Integers,
+) -> None:
     """Take one point (x, y, z) into the extremes; samples of a block come in their order."""
     complete, count, near, limits = lists
     x, y, z = point[0] - inner[0], point[1] - inner[1], point[2] - inner[2]

@@ -6,9 +6,12 @@ import os
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from er3a.errors import InputError
 from er3a.kinematics.chain import JOINTS, constant_links
+from er3a.kinematics.forward import forward
+from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import Robot
 
 BYTES_PER_CELL = 64
@@ -28,12 +31,12 @@ class Grid:
     section_origin : (2,), m, lowest (rho, z); section_cell : m; section_shape : cells along rho (from the axis) and z
     """
 
-    origin: np.ndarray
+    origin: Reals
     cell: float
     shape: tuple[int, int, int]
-    axis_point: np.ndarray
-    axis: np.ndarray
-    section_origin: np.ndarray
+    axis_point: Reals
+    axis: Reals
+    section_origin: Reals
     section_cell: float
     section_shape: tuple[int, int]
 
@@ -42,7 +45,7 @@ class Grid:
         """Volume of a cell, m^3."""
         return self.cell**3
 
-    def centres(self, indices: np.ndarray) -> np.ndarray:
+    def centres(self, indices: ArrayLike) -> Reals:
         """Centres (N, 3) in m of the cells with indices (N, 3)."""
         return self.origin + (np.asarray(indices) + 0.5) * self.cell
 
@@ -57,8 +60,8 @@ class Bound:
     radius : m, of the ball
     """
 
-    axis_point: np.ndarray
-    axis: np.ndarray
+    axis_point: Reals
+    axis: Reals
     height: float
     offset: float
     radius: float
@@ -111,7 +114,7 @@ def make_grid(robot: Robot, cells_across: int) -> Grid:
     return Grid(
         origin=centre - shape * cell / 2,
         cell=cell,
-        shape=tuple(int(n) for n in shape),
+        shape=(int(shape[0]), int(shape[1]), int(shape[2])),
         axis_point=bound.axis_point,
         axis=bound.axis,
         section_origin=np.array([0.0, bound.height - section[1] / 2]),
@@ -120,18 +123,25 @@ def make_grid(robot: Robot, cells_across: int) -> Grid:
     )
 
 
+def shoulder_of(robot: Robot, grid: Grid) -> Reals:
+    """The point of axis 1 at the height of joint 2: (3,), m."""
+    joint_2 = forward(robot, np.zeros(JOINTS), frame=1)[:3, 3]
+    return grid.axis_point + ((joint_2 - grid.axis_point) @ grid.axis) * grid.axis
+
+
 def memory_budget() -> int:
     """Bytes that a grid may take: half of the machine's memory."""
     return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2
 
 
-def _shape(half: np.ndarray, cells_across: int) -> np.ndarray:
+def _shape(half: Reals, cells_across: int) -> Integers:
     """Cells along each side of a box with the given half sides."""
     cells = np.ceil(cells_across * half / half.max() * (1 - _MARGIN / 10))
-    return np.minimum(cells, cells_across).astype(np.int64)
+    shape: Integers = np.minimum(cells, cells_across).astype(np.int64)
+    return shape
 
 
-def _check_memory(half: np.ndarray, cells_across: int) -> None:
+def _check_memory(half: Reals, cells_across: int) -> None:
     budget = memory_budget()
     needed = int(_shape(half, cells_across).prod()) * BYTES_PER_CELL
     if needed <= budget:

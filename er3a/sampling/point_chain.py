@@ -17,8 +17,10 @@ from typing import NamedTuple
 import numpy as np
 
 from er3a.geometry.transforms import translation
+from er3a.geometry.vectors import Vector
 from er3a.kinematics.chain import JOINTS, constant_links
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
+from er3a.numerics.arrays import Reals, Singles
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 from er3a.sampling.random_joints import CHUNK
@@ -47,11 +49,11 @@ class PointChain(NamedTuple):
     """
 
     last: int
-    point: np.ndarray
-    first: np.ndarray
-    span: np.ndarray
-    links: np.ndarray
-    base: np.ndarray
+    point: Singles
+    first: Singles
+    span: Singles
+    links: Singles
+    base: Reals
 
 
 def point_chain(robot: Robot) -> PointChain:
@@ -75,16 +77,16 @@ def point_chain(robot: Robot) -> PointChain:
     # Near a turn around zero, single precision is finest.
     first, span = first / turn, span / turn
     first -= np.round(first + span / 2)
-    return PointChain(
-        last, *(np.array(part, dtype=np.float32) for part in (point, first, span, steps)), links[0, :3].copy()
-    )
+    single = [np.array(part, dtype=np.float32) for part in (point, first, span, steps)]
+    return PointChain(last, single[0], single[1], single[2], single[3], links[0, :3].copy())
 
 
-def plane_direction(robot: Robot) -> np.ndarray:
+def plane_direction(robot: Robot) -> Reals:
     """Unit vector (3,) in the base frame, at theta_1 = 0, of the x axis of the frame that turns with joint 1."""
     links = constant_links(robot)
     turn = _z_x_z(links[1, :3, :3])[0] if point_chain(robot).last > 0 else 0.0
-    return links[0, :3, :3] @ [np.cos(turn), np.sin(turn), 0.0]
+    direction: Reals = links[0, :3, :3] @ [np.cos(turn), np.sin(turn), 0.0]
+    return direction
 
 
 def at_wrist_centre(robot: Robot) -> Robot:
@@ -99,7 +101,7 @@ def at_wrist_centre(robot: Robot) -> Robot:
     return robot.replace(tool=robot.tool @ translation(*arm.wrist_in_tool))
 
 
-def _z_x_z(R: np.ndarray) -> tuple[float, float, float]:
+def _z_x_z(R: Reals) -> tuple[float, float, float]:
     """Angles with ``R = Rz(a) Rx(b) Rz(c)``; a = 0 where only a + c or a - c is known."""
     sine = np.hypot(R[0, 2], R[1, 2])
     tilt = np.arctan2(sine, R[2, 2])
@@ -109,7 +111,7 @@ def _z_x_z(R: np.ndarray) -> tuple[float, float, float]:
 
 
 @kernel
-def cos_sin_turns(turns):
+def cos_sin_turns(turns: np.float32) -> tuple[np.float32, np.float32]:
     """Cosine and sine of an angle in turns, all in single precision."""
     # The quarter angle lies in [-pi/4, pi/4]; both polynomials (interpolated at Chebyshev nodes) carry a factor
     # sqrt(2).
@@ -123,7 +125,7 @@ def cos_sin_turns(turns):
 
 
 @kernel
-def turn_joint(rows, k, first, span, link):
+def turn_joint(rows: Singles, k: int, first: np.float32, span: np.float32, link: Singles) -> None:
     """Turn a chunk of points by joint k and take the link to the frame before it."""
     cos_x, sin_x, step_x, step_y, step_z = link[0], link[1], link[2], link[3], link[4]
     unit, p = rows[k * CHUNK : (k + 1) * CHUNK], rows[X:]
@@ -137,7 +139,7 @@ def turn_joint(rows, k, first, span, link):
 
 
 @kernel
-def points_about_axis_1(chain, rows):
+def points_about_axis_1(chain: PointChain, rows: Singles) -> None:
     """Set the points of a chunk, from its random numbers, in the frame that turns with joint 1 (z along axis 1)."""
     last, point, first, span, links, _ = chain
     rows[X : X + CHUNK], rows[Y : Y + CHUNK], rows[Z : Z + CHUNK] = point[0], point[1], point[2]
@@ -146,7 +148,7 @@ def points_about_axis_1(chain, rows):
 
 
 @kernel
-def point_in_base(chain, rows, i):
+def point_in_base(chain: PointChain, rows: Singles, i: int) -> Vector:
     """Point i of a chunk that stands in the frame of joint 1, in the base frame."""
     c, s = cos_sin_turns(chain[2][0] + rows[i] * chain[3][0])
     base = chain[5]

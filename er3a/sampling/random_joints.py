@@ -2,7 +2,7 @@
 
 *uniform*: the counter is (sample within the block, block), the key is the seed, and the four words of one draw give
 six numbers of 21 bits (steps below 0.0002 deg for a full turn). So the joint vector of sample n of block b depends on
-nothing else: not on what was drawn before it, nor on how blocks are shared out among processes.
+nothing else: not on what was drawn before it, nor on which process draws which block.
 
 *sobol*: the samples of all blocks, numbered through, are points of one Sobol' sequence (:mod:`.sobol`), shifted at
 random.
@@ -15,13 +15,20 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from er3a.kinematics.chain import JOINTS
+from er3a.numerics.arrays import Integers, Reals, Singles, Words
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 from er3a.sampling.sobol import fill_sobol, shifted_directions
+
+Sampling = Literal["uniform", "sobol"]
+
+Counter = tuple[np.uint64, np.uint64, np.uint64, np.uint64]
 
 CHUNK = 512
 """Samples that are worked on at a time, in rows of an array that stays in the processor's cache."""
@@ -43,28 +50,33 @@ class Draw:
     ----------
     seed : of the study, below 2**63
     samples, blocks : how many in all, and in how many blocks
-    sampling : "uniform" or "sobol"
     """
 
     seed: int
     samples: int
     blocks: int
-    sampling: str = "uniform"
+    sampling: Sampling = "uniform"
 
     @property
-    def sizes(self) -> np.ndarray:
+    def sizes(self) -> Integers:
         """Samples (blocks,) of each block: as even as possible, the first ones one larger."""
         return self.samples // self.blocks + (np.arange(self.blocks) < self.samples % self.blocks)
 
-    def first(self, blocks: np.ndarray) -> np.ndarray:
+    def first(self, blocks: Integers) -> Integers:
         """Number within the run of the first sample of each block."""
         return blocks * (self.samples // self.blocks) + np.minimum(blocks, self.samples % self.blocks)
 
-    def directions(self) -> np.ndarray:
+    def directions(self) -> Words:
         """Direction numbers and shift of the Sobol' sequence; without rows for uniform samples."""
         return shifted_directions(self.seed) if self.sampling == "sobol" else np.empty((0, 0), dtype=np.uint64)
 
-    def joints(self, robot: Robot, blocks: np.ndarray, samples: np.ndarray) -> np.ndarray:
+    def opening_joints(self, robot: Robot, count: int) -> Reals:
+        """Draw the first samples of each block again: (n, 6), rad, about as many of each, ``count`` at most."""
+        wanted = Draw(self.seed, min(count, self.samples), self.blocks).sizes
+        blocks = np.repeat(np.arange(self.blocks), wanted)
+        return self.joints(robot, blocks, np.concatenate([np.arange(size) for size in wanted]))
+
+    def joints(self, robot: Robot, blocks: ArrayLike, samples: ArrayLike) -> Reals:
         """Draw the joint vectors of some samples again.
 
         Parameters
@@ -82,14 +94,14 @@ class Draw:
 
 
 @kernel
-def _round(c0, c1, c2, c3, k0, k1, r):
+def _round(c0: np.uint64, c1: np.uint64, c2: np.uint64, c3: np.uint64, k0: np.uint64, k1: np.uint64, r: int) -> Counter:
     k0, k1 = (k0 + np.uint64(r) * _W0) & _LOW, (k1 + np.uint64(r) * _W1) & _LOW
     p0, p1 = _M0 * c0, _M1 * c2
     return (p1 >> _32) ^ c1 ^ k0, p1 & _LOW, (p0 >> _32) ^ c3 ^ k1, p0 & _LOW
 
 
 @kernel
-def philox4x32(c0, c1, c2, c3, k0, k1):
+def philox4x32(c0: np.uint64, c1: np.uint64, c2: np.uint64, c3: np.uint64, k0: np.uint64, k1: np.uint64) -> Counter:
     """Four random 32-bit words from four counter words and two key words, all held in uint64."""
     for r in range(ROUNDS):
         c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0, k1, r)
@@ -97,19 +109,19 @@ def philox4x32(c0, c1, c2, c3, k0, k1):
 
 
 @kernel
-def _unit(bits):
+def _unit(bits: np.uint64) -> np.float32:
     """A number in (0, 1) from 21 bits, exact in single precision."""
     return (np.float32(np.int32(bits)) + _HALF) * _STEP
 
 
 @kernel
-def _fifth(a, b):
+def _fifth(a: np.uint64, b: np.uint64) -> np.uint64:
     """The bits that two words have left over."""
     return ((a & _MASK_11) << _10) | (b & _MASK_10)
 
 
 @kernel
-def fill_uniform(seed, block, first, rows):
+def fill_uniform(seed: np.uint64, block: np.uint64, first: np.uint64, rows: Singles) -> None:
     """Set the six first rows of ``CHUNK`` numbers to those of the samples from ``first`` on, in (0, 1)."""
     k0, k1 = seed & _LOW, seed >> _32
     for i in range(CHUNK):
@@ -135,7 +147,9 @@ def fill_uniform(seed, block, first, rows):
 
 
 @kernel
-def _again(seed, blocks, samples, first, directions, out):
+def _again(
+    seed: np.uint64, blocks: Integers, samples: Integers, first: Integers, directions: Words, out: Reals
+) -> None:
     rows = np.empty(JOINTS * CHUNK, dtype=np.float32)
     for n in range(blocks.shape[0]):
         if directions.shape[0] > 0:

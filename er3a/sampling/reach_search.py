@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.optimize import minimize
 
 from er3a.kinematics.forward import forward, jacobian
+from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import Grid
 
@@ -13,39 +16,45 @@ NANOMETRES = 9
 _STARTS = 8
 
 
-def reach_figures(robot: Robot, grid: Grid, q: np.ndarray) -> dict[str, float]:
-    """Extreme distances from axis 1 and heights along it.
+@dataclass(frozen=True)
+class Reach:
+    """Extreme distances of the tool point from axis 1 and heights along it, above its foot; m, to the nanometre."""
+
+    furthest_from_axis: float
+    nearest_to_axis: float
+    highest: float
+    lowest: float
+
+
+def search_reach(robot: Robot, grid: Grid, q: Reals) -> Reach:
+    """Extremes of the tool point.
 
     Parameters
     ----------
     q : (N, 6), rad, samples to start from
-
-    Returns
-    -------
-    figures : m, to the nanometre; ``furthest_from_axis``, ``nearest_to_axis``, ``highest`` and ``lowest`` (heights
-        above the foot of axis 1)
     """
     offset = forward(robot, q)[:, :3, 3] - grid.axis_point
     height = offset @ grid.axis
     radius2 = np.einsum("ij,ij->i", offset, offset) - height**2
-    found = {
-        "furthest_from_axis": np.sqrt(max(0.0, -_best(robot, grid, q, -radius2, -1.0, 0.0))),
-        "nearest_to_axis": np.sqrt(max(0.0, _best(robot, grid, q, radius2, 1.0, 0.0))),
-        "highest": -_best(robot, grid, q, -height, 0.0, -1.0),
-        "lowest": _best(robot, grid, q, height, 0.0, 1.0),
-    }
-    return {key: round(float(value), NANOMETRES) for key, value in found.items()}
+    found = (
+        np.sqrt(max(0.0, -_best(robot, grid, q, -radius2, (-1.0, 0.0)))),
+        np.sqrt(max(0.0, _best(robot, grid, q, radius2, (1.0, 0.0)))),
+        -_best(robot, grid, q, -height, (0.0, -1.0)),
+        _best(robot, grid, q, height, (0.0, 1.0)),
+    )
+    return Reach(*(round(float(value), NANOMETRES) for value in found))
 
 
-def _best(robot: Robot, grid: Grid, q: np.ndarray, values: np.ndarray, of_radius: float, of_height: float) -> float:
+def _best(robot: Robot, grid: Grid, q: Reals, values: Reals, factors: tuple[float, float]) -> float:
     """Least ``of_radius * radius^2 + of_height * height`` found from the samples with the least ``values``."""
+    of_radius, of_height = factors
 
-    def goal(x):
+    def goal(x: Reals) -> tuple[float, Reals]:
         offset = forward(robot, x)[:3, 3] - grid.axis_point
         height = offset @ grid.axis
         across = offset - height * grid.axis
         gradient = 2 * of_radius * across + of_height * grid.axis
-        return of_radius * (across @ across) + of_height * height, gradient @ jacobian(robot, x)[:3]
+        return float(of_radius * (across @ across) + of_height * height), gradient @ jacobian(robot, x)[:3]
 
     bounds = list(zip(robot.lower, robot.upper))
     starts = q[np.argsort(values, kind="stable")[:_STARTS]]

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from er3a.numerics.arrays import Singles, Words
 from er3a.numerics.jit import kernel
 
 BITS = 40
@@ -24,7 +25,7 @@ _CUT, _HALF, _STEP = np.uint64(BITS - 21), np.float32(0.5), np.float32(2.0**-21)
 _ONE = np.uint64(1)
 
 
-def direction_numbers() -> np.ndarray:
+def direction_numbers() -> Words:
     """Direction numbers (6, BITS), uint64: that of bit 0 of a point's number first."""
     out = [[1 << (BITS - 1 - bit) for bit in range(BITS)]]
     for degree, coefficients, start in _JOE_KUO:
@@ -39,7 +40,7 @@ def direction_numbers() -> np.ndarray:
     return np.array(out, dtype=np.uint64)
 
 
-def shifted_directions(seed: int) -> np.ndarray:
+def shifted_directions(seed: int) -> Words:
     """Direction numbers and, as last column, the shift of each dimension: (6, BITS + 1)."""
     random = np.random.Generator(np.random.Philox(key=seed))
     shift = random.integers(0, 1 << BITS, size=(6, 1), dtype=np.uint64)
@@ -47,7 +48,7 @@ def shifted_directions(seed: int) -> np.ndarray:
 
 
 @kernel
-def fill_sobol(directions, first, count, chunk, rows):
+def fill_sobol(directions: Words, first: int, count: int, chunk: int, rows: Singles) -> None:
     """Set the six first rows (each ``chunk`` long) to the points numbered from ``first`` on, in (0, 1)."""
     for k in range(directions.shape[0]):
         # Neighbours in number differ by the directions of the trailing ones (Gray code): one step, one exclusive or.

@@ -9,14 +9,17 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from er3a.geometry.sphere import fibonacci_sphere
+from er3a.numerics.arrays import Integers, Reals, Singles, Words
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
-from er3a.sampling.extreme_samples import Extremes, cube_map, near_lists, refresh, take_point
+from er3a.sampling.extreme_samples import Extremes, NearLists, cube_map, near_lists, refresh, take_point
 from er3a.sampling.grid import Grid
 from er3a.sampling.point_chain import (
     ROWS,
+    PointChain,
     X,
     cos_sin_turns,
     point_chain,
@@ -25,6 +28,12 @@ from er3a.sampling.point_chain import (
 )
 from er3a.sampling.random_joints import CHUNK, Draw, fill_uniform
 from er3a.sampling.sobol import fill_sobol
+
+Tallies = NDArray[np.uint32]
+_Block = tuple[np.uint64, int, int, Words]
+_Voxels = tuple[Reals, float, tuple[int, int, int], Tallies]
+_Section = tuple[np.float32, np.float32, np.int32, np.int32, Tallies]
+_Watch = tuple[tuple[Reals, Reals, Integers, Integers], tuple[Reals, Reals, NearLists, Singles], Integers]
 
 UNTOUCHED = np.iinfo(np.int32).max
 PORTION = 1 << 22
@@ -47,10 +56,10 @@ class Tally:
     extremes : furthest samples in the hull directions
     """
 
-    blocks: np.ndarray
-    counts: np.ndarray
-    first_block: np.ndarray
-    side: np.ndarray
+    blocks: Integers
+    counts: Integers
+    first_block: NDArray[np.int32]
+    side: Integers
     extremes: Extremes
 
     def merge(self, other: Tally) -> Tally:
@@ -64,10 +73,11 @@ class Tally:
         )
 
     @property
-    def section(self) -> np.ndarray:
+    def section(self) -> Integers:
         """The side view folded along axis 1: (n_rho, n_z)."""
         half = len(self.side) // 2
-        return self.side[half:] + self.side[:half][::-1]
+        folded: Integers = self.side[half:] + self.side[:half][::-1]
+        return folded
 
 
 def tally_blocks(
@@ -113,7 +123,9 @@ def tally_blocks(
 
 
 @kernel
-def _side_cells(rows, lowest, per_length, n_rho, n_z, cells):
+def _side_cells(
+    rows: Singles, lowest: np.float32, per_length: np.float32, n_rho: np.int32, n_z: np.int32, cells: NDArray[np.int32]
+) -> None:
     p = rows[X:]
     for i in range(CHUNK):
         x, y, z = p[i], p[CHUNK + i], p[2 * CHUNK + i]
@@ -123,7 +135,17 @@ def _side_cells(rows, lowest, per_length, n_rho, n_z, cells):
 
 
 @kernel
-def _voxels(rows, chain, origin, per_length, ny, nz, inner, cells, squared):
+def _voxels(
+    rows: Singles,
+    chain: PointChain,
+    origin: Reals,
+    per_length: np.float32,
+    ny: np.int32,
+    nz: np.int32,
+    inner: Reals,
+    cells: NDArray[np.int32],
+    squared: Singles,
+) -> None:
     """Number of the voxel of each point, and its squared distance (m^2) from the inner point."""
     first, span, base = chain[2][0], chain[3][0], chain[5]
     a, b, c = np.float32(base[0, 0]), np.float32(base[0, 1]), np.float32(base[0, 2])
@@ -144,7 +166,9 @@ def _voxels(rows, chain, origin, per_length, ny, nz, inner, cells, squared):
 
 
 @kernel
-def _sample(draw, start, stop, chain, voxels, section, watch):
+def _sample(
+    draw: _Block, start: int, stop: int, chain: PointChain, voxels: _Voxels, section: _Section, watch: _Watch
+) -> None:
     seed, block, first, sobol = draw
     origin, cell, shape, counts = voxels
     lowest, per_length, n_rho, n_z, side = section
@@ -179,7 +203,9 @@ def _sample(draw, start, stop, chain, voxels, section, watch):
 
 
 @kernel
-def _flush(fresh, block, counts, first_block, fresh_side, side):
+def _flush(
+    fresh: Tallies, block: int, counts: Integers, first_block: NDArray[np.int32], fresh_side: Tallies, side: Integers
+) -> None:
     """Take the fresh counts of a block over into the sums, and begin them again."""
     for n in range(fresh.shape[0]):
         counts[n] += fresh[n]

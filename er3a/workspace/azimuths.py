@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
 
 MOST_ARCS = 12
@@ -15,7 +16,7 @@ TURN = 2 * np.pi
 
 
 @kernel
-def _cut(arcs, count, low, high, more):
+def _cut(arcs: Reals, count: int, low: float, high: float, more: bool) -> int:
     """Take the interval [low, high] within [0, 2 pi] out of the set; see :func:`remove`."""
     n = 0
     while n < count:
@@ -44,7 +45,7 @@ def _cut(arcs, count, low, high, more):
 
 
 @kernel
-def remove(arcs, count, low, high, more):
+def remove(arcs: Reals, count: int, low: float, high: float, more: bool) -> int:
     """Take the arc from ``low`` up to ``high`` (any turn) out of the set; returns the new count.
 
     Where the list has no room for one more piece, ``more`` says whether to take out too much or too little.
@@ -62,7 +63,7 @@ def remove(arcs, count, low, high, more):
 
 
 @kernel
-def meets(arcs, count, low, high):
+def meets(arcs: Reals, count: int, low: float, high: float) -> bool:
     """Whether the arc from ``low`` to ``high`` (any turn) meets the set."""
     if high - low >= TURN:
         return count > 0
@@ -77,7 +78,7 @@ def meets(arcs, count, low, high):
 
 
 @kernel
-def measure(arcs, count):
+def measure(arcs: Reals, count: int) -> float:
     """Sum of the arcs' lengths, rad."""
     total = 0.0
     for n in range(count):

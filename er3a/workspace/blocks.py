@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.workspace.azimuths import TURN
 from er3a.workspace.cavities import Cavity
 from er3a.workspace.proof import ring_volumes
@@ -25,26 +26,27 @@ class Blocks:
     empty, unfilled : (n_rho, n_z, n_azimuth), share of each block's volume that is proven empty, or not proven filled
     """
 
-    rho: np.ndarray
-    z: np.ndarray
-    azimuth: np.ndarray
-    empty: np.ndarray
-    unfilled: np.ndarray
+    rho: Reals
+    z: Reals
+    azimuth: Reals
+    empty: Reals
+    unfilled: Reals
 
     @property
-    def volumes(self) -> np.ndarray:
+    def volumes(self) -> Reals:
         """Volume of each block, m^3, in the shape of the arrays."""
         section = (self.rho[1:] ** 2 - self.rho[:-1] ** 2)[:, None] * np.diff(self.z) / 2
-        return section[:, :, None] * np.diff(self.azimuth)
+        volumes: Reals = section[:, :, None] * np.diff(self.azimuth)
+        return volumes
 
-    def points(self) -> np.ndarray:
+    def points(self) -> Reals:
         """Middles (n_rho, n_z, n_azimuth, 3) in the frame about axis 1, m."""
         rho, z, azimuth = ((edge[1:] + edge[:-1]) / 2 for edge in (self.rho, self.z, self.azimuth))
         rho, z, azimuth = np.meshgrid(rho, z, azimuth, indexing="ij")
         return np.stack([rho * np.cos(azimuth), rho * np.sin(azimuth), z], axis=-1)
 
 
-def blocks_of(pieces: Cavity, size: float, low: np.ndarray, high: np.ndarray, turns: int) -> Blocks:
+def blocks_of(pieces: Cavity, size: float, low: Reals, high: Reals, turns: int) -> Blocks:
     """Sum arcs of cells up into blocks.
 
     Parameters
@@ -76,7 +78,7 @@ def blocks_of(pieces: Cavity, size: float, low: np.ndarray, high: np.ndarray, tu
     return Blocks(rho, z, azimuth, np.minimum(empty, 1), np.minimum(unfilled, 1))
 
 
-def pockets(blocks: Blocks, inside: np.ndarray) -> list[np.ndarray]:
+def pockets(blocks: Blocks, inside: Flags) -> list[Flags]:
     """Connected sets of mostly empty blocks inside the hull, at least three blocks thick, as masks; largest first.
 
     Parameters
@@ -96,14 +98,14 @@ def pockets(blocks: Blocks, inside: np.ndarray) -> list[np.ndarray]:
     return sorted((mask for mask in masks if mask.sum() >= LEAST_BLOCKS), key=lambda mask: -volumes[mask].sum())
 
 
-def _wraps(labels: np.ndarray) -> list[tuple[int, int]]:
+def _wraps(labels: Integers) -> list[tuple[int, int]]:
     """Pairs of labels that touch across azimuth 0, in an order that chains resolve."""
     both = (labels[:, :, 0] > 0) & (labels[:, :, -1] > 0) & (labels[:, :, 0] != labels[:, :, -1])
     pairs = np.sort(np.stack([labels[:, :, 0][both], labels[:, :, -1][both]], axis=1), axis=1)
     return [tuple(pair) for pair in np.unique(pairs, axis=0)[::-1].tolist()]
 
 
-def mesh(blocks: Blocks, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def mesh(blocks: Blocks, mask: Flags) -> tuple[Reals, Integers]:
     """Surface of a set of blocks.
 
     Returns
@@ -132,6 +134,6 @@ def mesh(blocks: Blocks, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.stack([rho * np.cos(azimuth), rho * np.sin(azimuth), z], axis=1), triangles
 
 
-def _padded(mask: np.ndarray, axis: int) -> np.ndarray:
+def _padded(mask: Flags, axis: int) -> Flags:
     width = [(1, 1) if k == axis else (0, 0) for k in range(3)]
     return np.pad(mask, width)

@@ -15,15 +15,23 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
+from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import kernel
 from er3a.workspace.empty import STACK, is_empty
 from er3a.workspace.section_arm import SectionArm
 
+Complexes = NDArray[np.complex128]
+Swept = Literal["theta_2", "tau", "gamma"]
+
 SAMPLES = 121
+_SWEPT: tuple[Swept, ...] = ("theta_2", "tau", "gamma")
 _BESIDE = 4e-3
 _MOST_BOXES = 12_000
 _ANGLE = 1e-9
@@ -37,19 +45,18 @@ class BorderArc:
     ----------
     points : (n, 2), m, radius (in a side view: x, negative behind axis 1) and height
     joints : (n, 3), rad, theta_2, tau and gamma
-    sweeps : "theta_2", "tau" or "gamma"
     """
 
-    points: np.ndarray
-    joints: np.ndarray
-    sweeps: str
+    points: Reals
+    joints: Reals
+    sweeps: Swept
 
 
 def border(arm: SectionArm, side_view: bool = False) -> list[BorderArc]:
     """Arcs of the border of the section; none if the arm is no mirror image of itself.
 
     A limited joint 1 is left out of account: what counts is whether any azimuth reaches the ring, or, in a side view,
-    whether the arm reaches the point of its own plane without joint 1, as makers draw it.
+    whether the arm reaches the point of its own plane without joint 1, as manufacturers draw it.
     """
     if not arm.mirrored or arm.inner_low > arm.inner_high:
         return []
@@ -68,16 +75,17 @@ def border(arm: SectionArm, side_view: bool = False) -> list[BorderArc]:
     return arcs
 
 
-def _points(arm: SectionArm, joints: np.ndarray) -> np.ndarray:
+def _points(arm: SectionArm, joints: Reals) -> Complexes:
     centre, upper, forearm, direction = (
         complex(vector[0], vector[2]) for vector in (arm.centre, arm.upper, arm.forearm, arm.direction)
     )
     theta_2, tau, gamma = joints.T
     wrist = centre + np.exp(-1j * theta_2) * (upper + np.exp(-1j * tau) * forearm)
-    return wrist + arm.d * np.exp(-1j * (theta_2 + tau + gamma)) * direction
+    points: Complexes = wrist + arm.d * np.exp(-1j * (theta_2 + tau + gamma)) * direction
+    return points
 
 
-def _candidates(arm: SectionArm):
+def _candidates(arm: SectionArm) -> Iterator[tuple[Swept, Reals]]:
     """All arcs on which one joint sweeps: pairs of its name and joint values (SAMPLES, 3)."""
     upper, forearm, tool = (complex(v[0], v[2]) for v in (arm.upper, arm.forearm, arm.direction))
     tool = arm.d * tool
@@ -99,10 +107,10 @@ def _candidates(arm: SectionArm):
         }
         return sorted(found)
 
-    def sweep(joint: int, low: float, high: float, values: tuple[float, float, float]):
+    def sweep(joint: int, low: float, high: float, values: tuple[float, float, float]) -> tuple[Swept, Reals]:
         joints = np.tile(np.array(values), (SAMPLES, 1))
         joints[:, joint] = np.linspace(low, high, SAMPLES)
-        return ("theta_2", "tau", "gamma")[joint], joints
+        return _SWEPT[joint], joints
 
     stands = [(tau, gamma) for tau in arm.tau for gamma in tilt_ends]
     for tau in arm.tau:
@@ -129,7 +137,7 @@ def _tilts(arm: SectionArm) -> list[tuple[float, float]]:
     return [(-most, most)] if least < _ANGLE else [(-most, -least), (least, most)]
 
 
-def _on_border(arm: SectionArm, points: np.ndarray, side_view: bool) -> np.ndarray:
+def _on_border(arm: SectionArm, points: Complexes, side_view: bool) -> Flags:
     """Which points have a proven unreachable ring (or point of the plane) close beside them, on either side."""
     along = np.gradient(points)
     length = np.abs(along)
@@ -145,14 +153,14 @@ def _on_border(arm: SectionArm, points: np.ndarray, side_view: bool) -> np.ndarr
 
 
 @kernel
-def _unreachable(arm, rings, angles, out):
+def _unreachable(arm: SectionArm, rings: Reals, angles: Reals, out: Flags) -> None:
     stack = np.empty((STACK, 6))
     for n in range(rings.shape[0]):
         rho, z = rings[n, 0], rings[n, 1]
         out[n], _ = is_empty(arm, (rho, rho, z, z), angles[n, 0], angles[n, 1], _MOST_BOXES, stack)
 
 
-def _runs(kept: np.ndarray) -> list[slice]:
+def _runs(kept: Flags) -> list[slice]:
     """Stretches of at least three points in a row."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], kept.astype(np.int8), [0]])))
     return [slice(a, b) for a, b in zip(edges[::2], edges[1::2]) if b - a >= 3]

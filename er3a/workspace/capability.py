@@ -1,6 +1,6 @@
-"""What a tool can do in each cell: the share of directions it reaches, in how many ways, and how agile it is there.
+"""What a tool can do in each cell: its reachability, the number of solutions, and the manipulability there.
 
-The share is the reachability index of Zacharias, Borst and Hirzinger [1]_: directions spread evenly over the sphere, a
+Reachability is the index of Zacharias, Borst and Hirzinger [1]_: directions spread evenly over the sphere, a
 direction counts if some roll about it has an inverse solution within limits. Here all directions are asked of the
 cell's middle.
 
@@ -25,11 +25,13 @@ from er3a.geometry.sphere import fibonacci_sphere
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.block_constants import BlockConstants
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
+from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.joint_limits import LIMIT_TOLERANCE
 from er3a.robots.robot import Robot
 from er3a.workspace.directions import Roll, left_to_roll, poses, tool_rotations
 from er3a.workspace.interval_inverse import FREE, SLOTS
+from er3a.workspace.proof import ring_volumes
 from er3a.workspace.section_arm import section_frame
 
 SECTORS = 64
@@ -44,16 +46,51 @@ class Capability:
 
     Attributes
     ----------
-    share : of the directions that are reached
-    ways : branches within limits, the mean over reached directions (0 where none is), of the roll that has most
-    most_ways : the most branches that any direction has
+    reachability : ratio of the directions that are reached [1]_
+    solutions : branches within limits, the mean over reached directions (0 where none is), of the roll that has most
+    most_solutions : the most branches that any direction has
     manipulability : m^3, the greatest |det J| [2]_ of any reached pose
     """
 
-    share: np.ndarray
-    ways: np.ndarray
-    most_ways: np.ndarray
-    manipulability: np.ndarray
+    reachability: Reals
+    solutions: Reals
+    most_solutions: Reals
+    manipulability: Reals
+
+
+@dataclass(frozen=True)
+class Overall:
+    """Figures over all reached cells: means by volume, the best of any cell, manipulability in m^3."""
+
+    mean_reachability: float
+    best_reachability: float
+    mean_solutions: float
+    most_solutions: int
+    best_manipulability_m3: float
+
+
+def rings(reach: float, heights: tuple[float, float], cell: float) -> Reals:
+    """Square cells (n, 4) of the section, m, that cover everything within reach: rho_0, rho_1, z_0, z_1."""
+    count = int(np.ceil(reach / cell)), int(np.ceil((heights[1] - heights[0]) / cell))
+    rho, z = np.arange(count[0]) * cell, (heights[0] + heights[1] - count[1] * cell) / 2 + np.arange(count[1]) * cell
+    rho, z = (grid.ravel() for grid in np.meshgrid(rho, z, indexing="ij"))
+    return np.stack([rho, rho + cell, z, z + cell], axis=1)
+
+
+def overall(capability: Capability, cells: Reals) -> Overall:
+    """Figures over all reached cells (n, 4), see :func:`rings`."""
+    volume = np.broadcast_to(ring_volumes(cells)[:, None], capability.reachability.shape)
+    weight = np.where(capability.reachability > 0, volume, 0.0)
+    total = float(weight.sum())
+    if total == 0:
+        return Overall(0.0, 0.0, 0.0, 0, 0.0)
+    return Overall(
+        float((weight * capability.reachability).sum()) / total,
+        float(capability.reachability.max()),
+        float((weight * capability.solutions).sum()) / total,
+        int(capability.most_solutions.max()),
+        float(capability.manipulability.max()),
+    )
 
 
 def sector_count(robot: Robot) -> int:
@@ -61,7 +98,7 @@ def sector_count(robot: Robot) -> int:
     return 1 if robot.upper[0] - robot.lower[0] >= FREE else SECTORS
 
 
-def map_capability(robot: Robot, middles: np.ndarray, directions: int, roll: Roll) -> Capability:
+def map_capability(robot: Robot, middles: Reals, directions: int, roll: Roll) -> Capability:
     """Ask cells for their directions.
 
     Parameters
@@ -100,7 +137,7 @@ def _joint_1_free(robot: Robot) -> Robot:
     return robot.replace(lower=lower, upper=upper)
 
 
-def manipulability(arm: BlockConstants, theta: np.ndarray) -> np.ndarray:
+def manipulability(arm: BlockConstants, theta: Reals) -> Reals:
     """|det J| in m^3 for the table's angles (..., 6): the product of the shoulder's, elbow's and wrist's factors.
 
     The determinant is that of the Jacobian at the wrist centre, where it falls into blocks (Siciliano et al.,
@@ -115,9 +152,18 @@ def manipulability(arm: BlockConstants, theta: np.ndarray) -> np.ndarray:
 
 
 @kernel
-def _tally(theta_1, within, values, range_1, share, ways, most_ways, best):
+def _tally(
+    theta_1: Reals,
+    within: Flags,
+    values: Reals,
+    range_1: Reals,
+    reachability: Reals,
+    solutions: Reals,
+    most: Reals,
+    best: Reals,
+) -> None:
     """Sum up cells: ``theta_1``, ``within``, ``values`` are (cells, directions, rolls, slots), the rest is filled."""
-    sectors = share.shape[1]
+    sectors = reachability.shape[1]
     width = _TURN / sectors
     count, reached = np.zeros(sectors, dtype=np.int64), np.zeros(sectors, dtype=np.int64)
     for cell in range(theta_1.shape[0]):
@@ -143,9 +189,9 @@ def _tally(theta_1, within, values, range_1, share, ways, most_ways, best):
                     reached[sector] = max(reached[sector], count[sector])
             for sector in range(sectors):
                 if reached[sector]:
-                    share[cell, sector] += 1.0
-                    ways[cell, sector] += reached[sector]
-                    most_ways[cell, sector] = max(most_ways[cell, sector], reached[sector])
+                    reachability[cell, sector] += 1.0
+                    solutions[cell, sector] += reached[sector]
+                    most[cell, sector] = max(most[cell, sector], reached[sector])
         for sector in range(sectors):
-            ways[cell, sector] /= max(share[cell, sector], 1.0)
-            share[cell, sector] /= theta_1.shape[1]
+            solutions[cell, sector] /= max(reachability[cell, sector], 1.0)
+            reachability[cell, sector] /= theta_1.shape[1]

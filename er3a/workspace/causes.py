@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from er3a.kinematics.forward import forward
-from er3a.pipeline.messages.language import N_, joined, said
+from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 from er3a.workspace.cavities import Cavity
 from er3a.workspace.proof import judge, ring_volumes
 from er3a.workspace.section_arm import FULL_TURN, section_arm
 
+InSection = Callable[[Reals], tuple[Reals, Reals, Reals]]
+
 PROBES, SAMPLES = 300, 400_000
 STEPS = (15.0, 30.0, 60.0, 90.0, 180.0)
 """By how much a limit is widened, deg, until the void vanishes."""
 _GONE, _SHRUNK = 0.98, 0.10
+
+Side = Literal["lower", "upper"]
+_SIDES: tuple[Side, Side] = ("lower", "upper")
 
 
 @dataclass(frozen=True)
@@ -26,21 +33,70 @@ class Relaxed:
 
     Attributes
     ----------
-    joint : 1 to 6, or 0 for all joints; side : "lower", "upper" or "both"
-    limit_deg : the limit as it is, deg; None for all joints
+    joint : 1 to 6
+    limit_deg : the limit as it is
     by_deg : by how much it is widened: the least of ``STEPS`` that makes the void vanish, or the most there is
-    filled : share of the void that is then reached
+    filled : ratio of the void that is then reached
     """
 
     joint: int
-    side: str
-    limit_deg: float | None
-    by_deg: float | None
+    side: Side
+    limit_deg: float
+    by_deg: float
     filled: float
 
+    @property
+    def extended_deg(self) -> float:
+        """The limit as it would be."""
+        return self.limit_deg + (self.by_deg if self.side == "upper" else -self.by_deg)
 
-def relaxations(robot: Robot, cavity: Cavity, in_section: Callable[[np.ndarray], tuple] | None = None) -> list[Relaxed]:
-    """Judge a void's cells with each limit widened, strongest first; then with all of them.
+
+@dataclass(frozen=True)
+class Unlimited:
+    """All limits taken away; ``filled`` is the ratio of the void that is then reached."""
+
+    filled: float
+    joint: Literal[0] = 0
+    side: Literal["both"] = "both"
+
+
+@dataclass(frozen=True)
+class Disappears:
+    """One limit alone makes the void, or each of two."""
+
+    limits: tuple[Relaxed, ...]
+    code: Literal["void_disappears"] = "void_disappears"
+
+
+@dataclass(frozen=True)
+class SeveralLimits:
+    """Only several limits together make the void; ``most`` is the one that shrinks it most, if one does."""
+
+    most: Relaxed | None
+    code: Literal["void_of_several_limits"] = "void_of_several_limits"
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Part of the void stays without any limit; ``most`` is the limit that shrinks it most, if one does."""
+
+    remaining_ratio: float
+    most: Relaxed | None
+    code: Literal["void_of_geometry"] = "void_of_geometry"
+
+
+@dataclass(frozen=True)
+class OnlySampled:
+    """Only samples tell of the void, so nothing is known of its cause."""
+
+    code: Literal["void_only_sampled"] = "void_only_sampled"
+
+
+VoidCause = Disappears | SeveralLimits | Geometry | OnlySampled
+
+
+def relaxations(robot: Robot, cavity: Cavity, in_section: InSection | None = None) -> tuple[list[Relaxed], Unlimited]:
+    """Judge a void's cells with each limit widened, the strongest first; then without any.
 
     Parameters
     ----------
@@ -52,77 +108,70 @@ def relaxations(robot: Robot, cavity: Cavity, in_section: Callable[[np.ndarray],
         before = _open_angle(robot, cavity, chosen)
         joints = range(1, 6)
 
-        def share_filled(widened: Robot) -> float:
-            return _share_filled(widened, cavity, chosen, before)
+        def ratio_filled(widened: Robot) -> float:
+            return _ratio_filled(widened, cavity, chosen, before)
     else:
         joints = range(1, 7)
 
-        def share_filled(widened: Robot) -> float:
-            return _share_sampled(robot, widened, cavity, chosen, in_section)
+        def ratio_filled(widened: Robot) -> float:
+            return _ratio_sampled(robot, widened, cavity, chosen, in_section)
 
-    found = []
-    for joint in joints:
-        if robot.upper[joint - 1] - robot.lower[joint - 1] >= FULL_TURN:
-            continue
-        for side in ("lower", "upper"):
-            limit = float(getattr(robot, side)[joint - 1])
-            for step in STEPS:
-                share = share_filled(_widened(robot, [joint], side, np.radians(step)))
-                if share >= _GONE:
-                    break
-            found.append(Relaxed(joint, side, float(np.degrees(limit)), step, share))
+    found = [
+        _relaxed(robot, joint, side, ratio_filled)
+        for joint in joints
+        if robot.upper[joint - 1] - robot.lower[joint - 1] < FULL_TURN
+        for side in _SIDES
+    ]
     found.sort(key=lambda relaxed: (relaxed.filled < _GONE, relaxed.by_deg, -relaxed.filled, relaxed.joint))
-    free = share_filled(_widened(robot, [1, 2, 3, 4, 5, 6], "both", 2 * np.pi))
-    return [*found, Relaxed(0, "both", None, None, free)]
+    return found, Unlimited(ratio_filled(_widened(robot, range(1, 7), _SIDES, 2 * np.pi)))
 
 
-def describe(relaxed: list[Relaxed]) -> str:
-    """The cause in one clause."""
-    *single, everything = relaxed
+def _relaxed(robot: Robot, joint: int, side: Side, ratio_filled: Callable[[Robot], float]) -> Relaxed:
+    limit = float((robot.lower if side == "lower" else robot.upper)[joint - 1])
+    for step in STEPS:
+        filled = ratio_filled(_widened(robot, [joint], [side], float(np.radians(step))))
+        if filled >= _GONE:
+            break
+    return Relaxed(joint, side, float(np.degrees(limit)), step, filled)
+
+
+def cause_of(single: list[Relaxed], unlimited: Unlimited) -> VoidCause:
+    """The cause that the relaxations show."""
     gone = [limit for limit in single if limit.filled >= _GONE]
     if gone:
-        nearest = [limit for limit in gone if limit.by_deg == gone[0].by_deg]
-        if len(nearest) == 1:
-            return said("vanishes when {widened}", widened=_exceed(nearest[0]))
-        return said("vanishes when {first} or {second}", first=_exceed(nearest[0]), second=_exceed(nearest[1]))
-    single.sort(key=lambda limit: -limit.filled)
-    part = [limit for limit in single if limit.filled >= _SHRUNK]
-    shrinks = ""
-    if part:
-        shrinks = said("shrinks by {share:.0f} % when {widened}", share=100 * part[0].filled, widened=_exceed(part[0]))
-    if everything.filled >= _GONE:
-        if shrinks:
-            return joined([shrinks, N_("only several limits together make it")])
-        return N_("made by several limits together")
-    left = said("geometry: {share:.0f} % of it stays without any joint limit", share=100 * (1 - everything.filled))
-    return joined([left, shrinks])
+        return Disappears(tuple(limit for limit in gone if limit.by_deg == gone[0].by_deg)[:2])
+    strongest = max(single, key=lambda limit: limit.filled, default=None)
+    most = strongest if strongest is not None and strongest.filled >= _SHRUNK else None
+    if unlimited.filled >= _GONE:
+        return SeveralLimits(most)
+    return Geometry(1 - unlimited.filled, most)
 
 
-def _exceed(limit: Relaxed) -> str:
-    told = {"joint": limit.joint, "limit": f"{limit.limit_deg:+.4g}".replace("-", "−"), "by": limit.by_deg}
-    if limit.side == "upper":
-        return said("joint {joint} may exceed {limit} deg by {by:.3g} deg", **told)
-    return said("joint {joint} may fall below {limit} deg by {by:.3g} deg", **told)
+def joints_behind(cause: VoidCause) -> set[int]:
+    """The joints whose limits a cause names."""
+    if isinstance(cause, Disappears):
+        return {limit.joint for limit in cause.limits}
+    return set() if isinstance(cause, OnlySampled) or cause.most is None else {cause.most.joint}
 
 
-def _widened(robot: Robot, joints: list[int], side: str, by: float) -> Robot:
+def _widened(robot: Robot, joints: Iterable[int], sides: Iterable[Side], by: float) -> Robot:
     lower, upper = robot.lower.copy(), robot.upper.copy()
     for joint in joints:
-        if side in ("upper", "both"):
+        if "upper" in sides:
             upper[joint - 1] += by
-        if side in ("lower", "both"):
+        if "lower" in sides:
             lower[joint - 1] -= by
     return robot.replace(lower=lower, upper=upper)
 
 
-def _probes(cavity: Cavity) -> np.ndarray:
+def _probes(cavity: Cavity) -> NDArray[np.intp]:
     """Numbers of the arcs that hold most of what is proven empty."""
     weight = cavity.volumes * cavity.empty
     chosen = np.argsort(-weight, kind="stable")[:PROBES]
     return chosen[weight[chosen] > 0]
 
 
-def _open_angle(robot: Robot, cavity: Cavity, chosen: np.ndarray) -> np.ndarray:
+def _open_angle(robot: Robot, cavity: Cavity, chosen: NDArray[np.intp]) -> Reals:
     """How much (rad) of each chosen arc an arm leaves open, at the middle of its cell."""
     middle = cavity.cells[chosen].reshape(-1, 2, 2).mean(axis=2)
     half = np.minimum(1e-6, middle[:, 0] / 2)
@@ -130,17 +179,20 @@ def _open_angle(robot: Robot, cavity: Cavity, chosen: np.ndarray) -> np.ndarray:
     looked = judge(section_arm(robot), probes)
     low, high = cavity.arcs[chosen].T
     a, b = np.maximum(looked.unfilled[..., 0], low[:, None]), np.minimum(looked.unfilled[..., 1], high[:, None])
-    return np.nansum(np.maximum(0, b - a), axis=1)
+    open_angle: Reals = np.nansum(np.maximum(0, b - a), axis=1)
+    return open_angle
 
 
-def _share_filled(robot: Robot, cavity: Cavity, chosen: np.ndarray, before: np.ndarray) -> float:
-    """Share of what was open in the chosen arcs, by volume, that another arm fills."""
+def _ratio_filled(robot: Robot, cavity: Cavity, chosen: NDArray[np.intp], before: Reals) -> float:
+    """Ratio of what was open in the chosen arcs, by volume, that another arm fills."""
     section = ring_volumes(cavity.cells[chosen])
     return float(1 - (section @ _open_angle(robot, cavity, chosen)) / (section @ before))
 
 
-def _share_sampled(robot: Robot, widened: Robot, cavity: Cavity, chosen: np.ndarray, in_section: Callable) -> float:
-    """Share by volume of the chosen arcs that samples of a widened arm lie in; fewer samples can only lower it."""
+def _ratio_sampled(
+    robot: Robot, widened: Robot, cavity: Cavity, chosen: NDArray[np.intp], in_section: InSection
+) -> float:
+    """Ratio by volume of the chosen arcs that samples of a widened arm lie in; fewer samples can only lower it."""
     random = np.random.Generator(np.random.Philox(key=len(chosen)))
     q = random.uniform(widened.lower, widened.upper, (SAMPLES, 6))
     # The arm as it is does not come here: at least one joint must be beyond its limit.

@@ -10,9 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.workspace.azimuths import TURN
 from er3a.workspace.lookup import SectionMap
 from er3a.workspace.proof import MOST_LEVEL, ring_volumes
@@ -31,14 +33,15 @@ class Cavity:
     """
 
     enclosed: bool
-    cells: np.ndarray
-    arcs: np.ndarray
-    empty: np.ndarray
+    cells: Reals
+    arcs: Reals
+    empty: Reals
 
     @property
-    def volumes(self) -> np.ndarray:
+    def volumes(self) -> Reals:
         """Volume of each arc's piece of ring, (n,), m^3."""
-        return ring_volumes(self.cells) * (self.arcs[:, 1] - self.arcs[:, 0]) / TURN
+        volumes: Reals = ring_volumes(self.cells) * (self.arcs[:, 1] - self.arcs[:, 0]) / TURN
+        return volumes
 
     @property
     def lower(self) -> float:
@@ -50,11 +53,11 @@ class Cavity:
         """Volume not proven filled, m^3."""
         return float(self.volumes.sum())
 
-    def part(self, chosen: np.ndarray, enclosed: bool) -> Cavity:
+    def part(self, chosen: Flags, enclosed: bool) -> Cavity:
         """Some of its arcs."""
         return Cavity(enclosed, self.cells[chosen], self.arcs[chosen], self.empty[chosen])
 
-    def centroid(self) -> np.ndarray:
+    def centroid(self) -> Reals:
         """Centroid (3,) in the frame about axis 1, m, weighted by what is proven empty."""
         weight = self.volumes * self.empty
         low, high, z = self.arcs[:, 0], self.arcs[:, 1], self.cells[:, 2:].mean(axis=1)
@@ -63,9 +66,10 @@ class Cavity:
         width = high - low
         x = rho * (np.sin(high) - np.sin(low)) / width
         y = rho * (np.cos(low) - np.cos(high)) / width
-        return np.array([x @ weight, y @ weight, z @ weight]) / weight.sum()
+        centroid: Reals = np.array([x @ weight, y @ weight, z @ weight]) / weight.sum()
+        return centroid
 
-    def box(self) -> tuple[np.ndarray, np.ndarray]:
+    def box(self) -> tuple[Reals, Reals]:
         """Lowest and highest corner (3,), m, of what holds something proven empty, in the frame about axis 1."""
         kept = self.empty > 0
         cells, arcs = self.cells[kept], self.arcs[kept]
@@ -88,7 +92,7 @@ def cavities(section: SectionMap) -> tuple[list[Cavity], Cavity]:
     graph = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(cell), len(cell)))
     _, label = connected_components(graph, directed=False)
     outside = np.unique(label[section.outermost[cell]])
-    share = _empty_share(arcs, proof.empty[cell])
+    share = _empty_ratio(arcs, proof.empty[cell])
     is_open = np.isin(label, outside)
     cells = proof.cells[cell]
     everything = Cavity(False, cells, arcs, share)
@@ -97,7 +101,7 @@ def cavities(section: SectionMap) -> tuple[list[Cavity], Cavity]:
     return sorted(enclosed, key=lambda cavity: -cavity.lower), everything.part(is_open, False)
 
 
-def rim(section: SectionMap, enclosed: list[Cavity]) -> np.ndarray:
+def rim(section: SectionMap, enclosed: list[Cavity]) -> Flags:
     """Which cells (n,) of the proof are undecided and belong to enclosed cavities."""
     chosen = np.zeros(len(section.proof.cells), dtype=bool)
     splittable = section.proof.level < MOST_LEVEL
@@ -108,7 +112,7 @@ def rim(section: SectionMap, enclosed: list[Cavity]) -> np.ndarray:
     return chosen & splittable
 
 
-def _overlaps(neighbours: np.ndarray, arcs: np.ndarray, number: np.ndarray) -> np.ndarray:
+def _overlaps(neighbours: NDArray[np.int32], arcs: Reals, number: Integers) -> Integers:
     """Pairs (2, m) of arcs of neighbouring cells whose azimuths overlap."""
     a, b = neighbours.T
     first, second = arcs[a][:, :, None, :], arcs[b][:, None, :, :]
@@ -118,7 +122,7 @@ def _overlaps(neighbours: np.ndarray, arcs: np.ndarray, number: np.ndarray) -> n
     return np.stack([number[a[pair], i], number[b[pair], j]])
 
 
-def _across_zero(cell: np.ndarray, arcs: np.ndarray) -> np.ndarray:
+def _across_zero(cell: Integers, arcs: Reals) -> Integers:
     """Pairs (2, m) of arcs of one cell that end at azimuth 2 pi and begin at 0."""
     ends, begins = np.flatnonzero(arcs[:, 1] >= TURN - 1e-12), np.flatnonzero(arcs[:, 0] <= 1e-12)
     begin_of = dict(zip(cell[begins].tolist(), begins.tolist()))
@@ -126,7 +130,8 @@ def _across_zero(cell: np.ndarray, arcs: np.ndarray) -> np.ndarray:
     return np.array(pairs, dtype=np.int64).reshape(-1, 2).T
 
 
-def _empty_share(arcs: np.ndarray, empty: np.ndarray) -> np.ndarray:
+def _empty_ratio(arcs: Reals, empty: Reals) -> Reals:
     low = np.maximum(arcs[:, None, 0], empty[..., 0])
     high = np.minimum(arcs[:, None, 1], empty[..., 1])
-    return np.nansum(np.maximum(0, high - low), axis=1) / (arcs[:, 1] - arcs[:, 0])
+    ratio: Reals = np.nansum(np.maximum(0, high - low), axis=1) / (arcs[:, 1] - arcs[:, 0])
+    return ratio

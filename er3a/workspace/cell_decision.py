@@ -10,10 +10,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.jit import kernel
 from er3a.workspace.azimuths import MOST_ARCS, TURN, measure, meets, remove
 from er3a.workspace.empty import STACK, is_empty
-from er3a.workspace.filled import climb, reached_angles, slack, turn_aside
+from er3a.workspace.filled import Stance, climb, reached_angles, slack, turn_aside
+from er3a.workspace.section_arm import SectionArm
 from er3a.workspace.sweep import swept_angles
 
 _SECTORS = 12
@@ -21,7 +23,18 @@ _SPLITS = 256
 
 
 @kernel
-def judge_cells(arm, cells, stances, steps, most_boxes, unfilled, unfilled_count, empty, empty_count, witness):
+def judge_cells(
+    arm: SectionArm,
+    cells: Reals,
+    stances: Reals,
+    steps: tuple[float, float],
+    most_boxes: int,
+    unfilled: Reals,
+    unfilled_count: Integers,
+    empty: Reals,
+    empty_count: Integers,
+    witness: Reals,
+) -> int:
     """Decide cells as far as one look goes, beginning from what is known of them.
 
     Parameters
@@ -58,7 +71,7 @@ def judge_cells(arm, cells, stances, steps, most_boxes, unfilled, unfilled_count
 
 
 @kernel
-def _row(stances, i):
+def _row(stances: Reals, i: int) -> Stance:
     return (
         stances[i, 0],
         stances[i, 1],
@@ -73,20 +86,23 @@ def _row(stances, i):
 
 
 @kernel
-def _angle(stance, side, rho, X):
+def _angle(stance: Stance, side: float, rho: float, X: float) -> float:
     """phi at which the stance reaches a point of the section."""
-    return stance[2] + side * np.arccos(min(1.0, max(-1.0, X / max(rho, 1e-12))))
+    phi: float = stance[2] + side * np.arccos(min(1.0, max(-1.0, X / max(rho, 1e-12))))
+    return phi
 
 
 @kernel
-def _cover(arm, stance, side, cell, arcs, count):
+def _cover(
+    arm: SectionArm, stance: Stance, side: float, cell: tuple[float, float, float, float], arcs: Reals, count: int
+) -> int:
     """Take what a stance provably fills out of the arcs."""
     filled, low, high = reached_angles(arm, stance, side, cell[0], cell[1], cell[2], cell[3])
     return _take(arm, low, high, arcs, count) if filled else count
 
 
 @kernel
-def _take(arm, low, high, arcs, count):
+def _take(arm: SectionArm, low: float, high: float, arcs: Reals, count: int) -> int:
     """Take what joint 1 brings the angles from ``low`` to ``high`` to, for all of them, out of the arcs."""
     if arm.full_turn:
         return 0
@@ -97,7 +113,20 @@ def _take(arm, low, high, arcs, count):
 
 
 @kernel
-def _fill(arm, rho_0, rho_1, z_0, z_1, stances, steps, arcs, count, best_of, stance_of, witness):
+def _fill(
+    arm: SectionArm,
+    rho_0: float,
+    rho_1: float,
+    z_0: float,
+    z_1: float,
+    stances: Reals,
+    steps: tuple[float, float],
+    arcs: Reals,
+    count: int,
+    best_of: Reals,
+    stance_of: Integers,
+    witness: Reals,
+) -> int:
     """Take what is proven filled out of the open arcs; returns their new count."""
     rho, z = 0.5 * (rho_0 + rho_1), 0.5 * (z_0 + z_1)
     cell = (rho_0, rho_1, z_0, z_1)
@@ -168,7 +197,16 @@ def _fill(arm, rho_0, rho_1, z_0, z_1, stances, steps, arcs, count, best_of, sta
 
 
 @kernel
-def _exclude(arm, cell, most_boxes, arcs, count, parent, stack, splits):
+def _exclude(
+    arm: SectionArm,
+    cell: tuple[float, float, float, float],
+    most_boxes: int,
+    arcs: Reals,
+    count: int,
+    parent: tuple[Reals, int],
+    stack: Reals,
+    splits: Reals,
+) -> tuple[int, int]:
     """Take what the arm may reach out of the arcs, so that what is left is empty; returns their count and the boxes.
 
     Parameters

@@ -10,9 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from er3a.geometry.sphere import fibonacci_sphere
+from er3a.kinematics.block_constants import BlockConstants
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
+from er3a.numerics.arrays import Reals, Words
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 from er3a.workspace.capability import SECTORS, sector_count
@@ -48,7 +51,7 @@ class Core:
     poses: int
 
 
-def dexterous_core(robot: Robot, cells: np.ndarray, directions: int, roll: Roll, most_poses: int) -> Core:
+def dexterous_core(robot: Robot, cells: Reals, directions: int, roll: Roll, most_poses: int) -> Core:
     """Bound the core.
 
     Parameters
@@ -86,14 +89,14 @@ def dexterous_core(robot: Robot, cells: np.ndarray, directions: int, roll: Roll,
     return Core(lower, upper, lower + float(shares @ np.bitwise_count(likely)), looked, used)
 
 
-def _split(cells: np.ndarray) -> np.ndarray:
+def _split(cells: Reals) -> Reals:
     a, b, c, d = cells.T
     m, n = (a + b) / 2, (c + d) / 2
     return np.concatenate([np.stack(part, axis=1) for part in ((a, m, c, n), (m, b, c, n), (a, m, n, d), (m, b, n, d))])
 
 
 @kernel
-def _arc(first, many):
+def _arc(first: int, many: int) -> np.uint64:
     """Bits of ``many`` sectors in a row, from number ``first`` (any turn)."""
     if many <= 0:
         return _NONE
@@ -107,7 +110,7 @@ def _arc(first, many):
 
 
 @kernel
-def _sectors(ranges, state, theta_1):
+def _sectors(ranges: Reals, state: NDArray[np.int8], theta_1: Reals) -> tuple[np.uint64, np.uint64]:
     """Masks of the sectors where some branch is good, and where none is."""
     good, maybe = _NONE, _NONE
     least, most, width = ranges[0, 0], ranges[0, 1], _TURN / SECTORS
@@ -129,7 +132,20 @@ def _sectors(ranges, state, theta_1):
 
 
 @kernel
-def _judge(arm, ranges, R, origin, cells, against, angles, numbers, most_poses, open_sectors, good, likely):
+def _judge(
+    arm: BlockConstants,
+    ranges: Reals,
+    R: Reals,
+    origin: Reals,
+    cells: Reals,
+    against: Reals,
+    angles: Reals,
+    numbers: tuple[float, float, float, float],
+    most_poses: int,
+    open_sectors: Words,
+    good: Words,
+    likely: Words,
+) -> int:
     """Judge the open sectors of cells; returns how many neighbourhoods of poses were looked at.
 
     ``open_sectors`` keeps those that stay undecided, ``good`` is set to those in the core, ``likely`` to the undecided
@@ -179,7 +195,18 @@ def _judge(arm, ranges, R, origin, cells, against, angles, numbers, most_poses, 
 
 
 @kernel
-def _not_out(arm, ranges, T, against, radius, half_step, beside, rest, state, theta_1):
+def _not_out(
+    arm: BlockConstants,
+    ranges: Reals,
+    T: Reals,
+    against: Reals,
+    radius: float,
+    half_step: float,
+    beside: float,
+    rest: np.uint64,
+    state: NDArray[np.int8],
+    theta_1: Reals,
+) -> tuple[np.uint64, int]:
     """Which of the sectors ``rest`` may reach all directions from somewhere within the radius of the pose's point."""
     used = 0
     for d in range(against.shape[0]):
@@ -200,7 +227,7 @@ def _not_out(arm, ranges, T, against, radius, half_step, beside, rest, state, th
 
 
 @kernel
-def _halve(stack, top, p_0, p_1, a_0, a_1, across):
+def _halve(stack: Reals, top: int, p_0: float, p_1: float, a_0: float, a_1: float, across: bool) -> int:
     """Push both halves of a patch; returns the new height of the stack."""
     middle = 0.5 * (p_0 + p_1) if across else 0.5 * (a_0 + a_1)
     for half in range(2):

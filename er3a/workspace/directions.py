@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
+from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 
@@ -65,7 +66,7 @@ def left_to_roll(robot: Robot, roll: Roll) -> Robot:
     return robot.replace(lower=lower, upper=upper)
 
 
-def cone_directions(axis: np.ndarray, half_angle: float) -> np.ndarray:
+def cone_directions(axis: Reals, half_angle: float) -> Reals:
     """Unit vectors (n, 3) of a cone: rings at most 10 deg apart, the outermost (on the cone's edge) first.
 
     Each ring is its own image under quarter turns.
@@ -82,14 +83,14 @@ def cone_directions(axis: np.ndarray, half_angle: float) -> np.ndarray:
     return from_polar(axis, polar, around)
 
 
-def from_polar(axis: np.ndarray, polar: np.ndarray, around: np.ndarray) -> np.ndarray:
+def from_polar(axis: Reals, polar: Reals, around: Reals) -> Reals:
     """Unit vectors (n, 3) at angles (n,) in rad from an axis and around it."""
     x, y = across(axis[None])
     flat = np.cos(around)[:, None] * x + np.sin(around)[:, None] * y
     return np.sin(polar)[:, None] * flat + np.cos(polar)[:, None] * axis
 
 
-def across(directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def across(directions: Reals) -> tuple[Reals, Reals]:
     """Unit vectors x, y (n, 3) that make a right-handed frame with each direction (n, 3) as z."""
     helper = np.eye(3)[np.argmin(np.abs(directions), axis=1)]
     x = np.cross(helper, directions)
@@ -97,7 +98,7 @@ def across(directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return x, np.cross(directions, x)
 
 
-def tool_rotations(directions: np.ndarray, roll: Roll) -> np.ndarray:
+def tool_rotations(directions: Reals, roll: Roll) -> Reals:
     """Orientations (n, rolls, 3, 3) of the tool frame with z along each direction (n, 3)."""
     x, y = across(directions)
     c, s = np.cos(roll.angles)[:, None], np.sin(roll.angles)[:, None]
@@ -106,7 +107,7 @@ def tool_rotations(directions: np.ndarray, roll: Roll) -> np.ndarray:
     return np.stack([rolled_x, rolled_y, z], axis=-1)
 
 
-def poses(points: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+def poses(points: Reals, rotations: Reals) -> Reals:
     """Poses (..., 4, 4) from points (..., 3) in m and rotations (..., 3, 3), broadcast against each other."""
     shape = np.broadcast_shapes(points.shape[:-1], rotations.shape[:-2])
     T = np.zeros((*shape, 4, 4))
@@ -115,7 +116,7 @@ def poses(points: np.ndarray, rotations: np.ndarray) -> np.ndarray:
 
 
 @kernel
-def point_tool(T, frame, polar, around, c_roll, s_roll):
+def point_tool(T: Reals, frame: Reals, polar: float, around: float, c_roll: float, s_roll: float) -> None:
     """Turn a pose (4, 4): its z axis at angles (rad) from and around z of a frame (columns x, y, z), rolled."""
     cp, sp, ca, sa = np.cos(polar), np.sin(polar), np.cos(around), np.sin(around)
     for i in range(3):

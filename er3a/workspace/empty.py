@@ -25,8 +25,9 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.geometry.vectors import cross, dot, subtract
+from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
-from er3a.workspace.section_arm import ROUND_OFF, along_change, turned, wrist_and_forearm
+from er3a.workspace.section_arm import ROUND_OFF, SectionArm, along_change, turned, wrist_and_forearm
 
 STACK = 512
 _SMALL = 0.1
@@ -34,25 +35,34 @@ _SMALL = 0.1
 
 
 @kernel
-def zone_distance(arm, along, across, length):
+def zone_distance(arm: SectionArm, along: float, across: float, length: float) -> float:
     """Distance (m) to the outer zone of a point at ``length`` from W, ``along`` f and ``across`` it."""
     if along > length * arm.outer_high:
         sine = np.sqrt(max(0.0, 1.0 - arm.outer_high * arm.outer_high))
-        return np.hypot(along - arm.d * arm.outer_high, across - arm.d * sine)
+        above: float = np.hypot(along - arm.d * arm.outer_high, across - arm.d * sine)
+        return above
     if along < length * arm.outer_low:
         sine = np.sqrt(max(0.0, 1.0 - arm.outer_low * arm.outer_low))
-        return np.hypot(along - arm.d * arm.outer_low, across - arm.d * sine)
+        below: float = np.hypot(along - arm.d * arm.outer_low, across - arm.d * sine)
+        return below
     return abs(length - arm.d)
 
 
 @kernel
-def _chord(half_width):
+def _chord(half_width: float) -> float:
     """How far a turn by up to ``half_width`` moves a point at distance 1."""
     return 2.0 * np.sin(0.5 * half_width) if half_width < np.pi else 2.0
 
 
 @kernel
-def is_empty(arm, cell, phi_low, phi_high, most_boxes, stack):
+def is_empty(
+    arm: SectionArm,
+    cell: tuple[float, float, float, float],
+    phi_low: float,
+    phi_high: float,
+    most_boxes: int,
+    stack: Reals,
+) -> tuple[bool, int]:
     """Whether no tool point enters a ring at angles phi_low to phi_high (rad) from the arm's plane.
 
     Parameters

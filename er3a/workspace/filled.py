@@ -18,15 +18,18 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.geometry.vectors import dot
+from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
-from er3a.workspace.section_arm import ROUND_OFF, wrist_and_forearm
+from er3a.workspace.section_arm import ROUND_OFF, SectionArm, wrist_and_forearm
+
+Stance = tuple[float, float, float, float, float, float, float, float, float]
 
 _SAFE = 64 * ROUND_OFF
 REFINEMENTS = 14
 
 
 @kernel
-def placed(arm, theta_2, tau):
+def placed(arm: SectionArm, theta_2: float, tau: float) -> Stance:
     """What the tests need of a stance of joints 2 and 3, as plain numbers."""
     W, f = wrist_and_forearm(arm, theta_2, tau)
     rho_W, rho_f = np.sqrt(W[0] * W[0] + W[1] * W[1]), np.sqrt(f[0] * f[0] + f[1] * f[1])
@@ -36,7 +39,7 @@ def placed(arm, theta_2, tau):
 
 
 @kernel
-def fill_stances(arm, steps_2, steps_3, out):
+def fill_stances(arm: SectionArm, steps_2: int, steps_3: int, out: Reals) -> None:
     """Fill ``out`` (steps_2 * steps_3, 9) with stances on a grid over the limits of joints 2 and 3, ends included."""
     for i in range(steps_2):
         theta_2 = arm.theta_2[0] + (arm.theta_2[1] - arm.theta_2[0]) * i / max(1, steps_2 - 1)
@@ -48,7 +51,7 @@ def fill_stances(arm, steps_2, steps_3, out):
 
 
 @kernel
-def slack(arm, stance, side, rho, z):
+def slack(arm: SectionArm, stance: Stance, side: float, rho: float, z: float) -> tuple[float, float]:
     """How deep (m, roughly) the point (rho, z) lies in what the stance reaches (negative: misses by that), and X."""
     rho_W, W_z, _, f_cos, f_sin, f_z, W_f, _, _ = stance
     dz = z - W_z
@@ -67,7 +70,9 @@ def slack(arm, stance, side, rho, z):
 
 
 @kernel
-def reached_angles(arm, stance, side, rho_0, rho_1, z_0, z_1):
+def reached_angles(
+    arm: SectionArm, stance: Stance, side: float, rho_0: float, rho_1: float, z_0: float, z_1: float
+) -> tuple[bool, float, float]:
     """Angles phi at which the stance reaches the points of a rectangle of the section.
 
     Returns
@@ -128,12 +133,12 @@ def reached_angles(arm, stance, side, rho_0, rho_1, z_0, z_1):
 
 
 @kernel
-def _tilted(k, rho, fixed, z, W_z, f_z):
+def _tilted(k: float, rho: float, fixed: float, z: float, W_z: float, f_z: float) -> float:
     return k * (rho * rho + fixed + (z - W_z) ** 2) + f_z * z
 
 
 @kernel
-def _neighbour(arm, stance, move, step_2, step_3):
+def _neighbour(arm: SectionArm, stance: Stance, move: int, step_2: float, step_3: float) -> Stance:
     """The stance one step of joints 2 and 3 away, within their limits, in one of eight ways."""
     da = (1.0, -1.0, 0.0, 0.0, 1.0, 1.0, -1.0, -1.0)[move] * step_2
     dt = (0.0, 0.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0)[move] * step_3
@@ -143,7 +148,7 @@ def _neighbour(arm, stance, move, step_2, step_3):
 
 
 @kernel
-def climb(arm, stance, side, rho, z, step_2, step_3):
+def climb(arm: SectionArm, stance: Stance, side: float, rho: float, z: float, step_2: float, step_3: float) -> Stance:
     """Move joints 2 and 3 within their limits to where (rho, z) lies deepest; returns the stance."""
     best, _ = slack(arm, stance, side, rho, z)
     for _ in range(REFINEMENTS):
@@ -160,7 +165,15 @@ def climb(arm, stance, side, rho, z, step_2, step_3):
 
 
 @kernel
-def turn_aside(arm, stance, side, cell, step_2, step_3, sense):
+def turn_aside(
+    arm: SectionArm,
+    stance: Stance,
+    side: float,
+    cell: tuple[float, float, float, float],
+    step_2: float,
+    step_3: float,
+    sense: int,
+) -> Stance:
     """Move joints 2 and 3 so that the stance, which fills the cell, does so at angles phi as great as can be.
 
     Parameters

@@ -1,4 +1,4 @@
-"""The proof for any arm of six revolute joints: coarser than the one for spherical wrists, and as right.
+"""The proof for any arm of six revolute joints: coarser than the one for spherical wrists, and equally rigorous.
 
 Random joint vectors fill cells from inside (:mod:`.general_inner`), boxes of joints bound them from outside
 (:mod:`.general_outer`).
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from er3a.numerics.arrays import Flags, Reals
 from er3a.workspace.azimuths import MOST_ARCS, TURN, remove
 from er3a.workspace.general_arm import GeneralArm
 from er3a.workspace.general_inner import fill_from_samples
@@ -23,7 +24,7 @@ _MARGIN = 1e-9
 
 def prove_general(
     arm: GeneralArm, most_cells: int, seed: int, samples: int = SAMPLES, most_boxes: int = MOST_BOXES
-) -> tuple[Proof, np.ndarray]:
+) -> tuple[Proof, Reals]:
     """Decide equal cells of the section about axis 1.
 
     Parameters
@@ -58,7 +59,7 @@ def prove_general(
     return proof, witness.reshape(n, -1)
 
 
-def _outer(arm: GeneralArm, size: float, low: float, most_boxes: int, touched: np.ndarray) -> tuple[np.ndarray, int]:
+def _outer(arm: GeneralArm, size: float, low: float, most_boxes: int, touched: Flags) -> tuple[Flags, int]:
     """Marks of all cells that may be reached, with boxes as fine as the budget allows, and how many were looked at."""
     marked, total = np.ones_like(touched), 0
     for smallest in _SMALLEST:
@@ -71,7 +72,7 @@ def _outer(arm: GeneralArm, size: float, low: float, most_boxes: int, touched: n
     return marked, total
 
 
-def _empty_arcs(arm: GeneralArm, marked: np.ndarray) -> np.ndarray:
+def _empty_arcs(arm: GeneralArm, marked: Flags) -> Reals:
     """Azimuths (n, MOST_ARCS, 2) that no marked sector of the angle phi is brought to by joint 1."""
     empty = np.full((len(marked), MOST_ARCS, 2), np.nan)
     empty[~marked.any(axis=1), 0] = 0.0, TURN

@@ -10,7 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from er3a.geometry.vectors import Vector
 from er3a.kinematics.chain import JOINTS, constant_links
+from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 from er3a.workspace.section_arm import FULL_TURN
@@ -31,11 +33,11 @@ class GeneralArm(NamedTuple):
     full_turn : whether joint 1 covers a full turn
     """
 
-    links: np.ndarray
-    tip: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-    levers: np.ndarray
+    links: Reals
+    tip: Reals
+    lower: Reals
+    upper: Reals
+    levers: Reals
     heights: tuple[float, float]
     full_turn: bool
 
@@ -45,7 +47,7 @@ class GeneralArm(NamedTuple):
         return float(self.levers[0])
 
 
-def general_arm(robot: Robot) -> tuple[GeneralArm, np.ndarray, np.ndarray]:
+def general_arm(robot: Robot) -> tuple[GeneralArm, Reals, Reals]:
     """The chain of a robot, and the frame about axis 1: x, y, z in the base frame as rows (3, 3), and origin (3,)."""
     links = constant_links(robot)
     last, tip = JOINTS - 1, links[JOINTS, :3, 3]
@@ -69,7 +71,7 @@ def general_arm(robot: Robot) -> tuple[GeneralArm, np.ndarray, np.ndarray]:
     return arm, links[0, :3, :3].T, links[0, :3, 3]
 
 
-def _levers(links: np.ndarray, tip: np.ndarray, last: int) -> tuple[np.ndarray, tuple[float, float]]:
+def _levers(links: Reals, tip: Reals, last: int) -> tuple[Reals, tuple[float, float]]:
     """Bounds of the distance from each axis and of the height along axis 1, from the tip inwards.
 
     Turned about z, a point fills at most a disc of radius ``lever`` at heights between ``low`` and ``high``.
@@ -86,7 +88,7 @@ def _levers(links: np.ndarray, tip: np.ndarray, last: int) -> tuple[np.ndarray, 
 
 
 @kernel
-def place(arm, theta, radii, columns, frame):
+def place(arm: GeneralArm, theta: Reals, radii: Reals, columns: Reals, frame: Reals) -> Vector:
     """The tool point for one joint vector, with levers and derivatives.
 
     Parameters

@@ -19,9 +19,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
 from er3a.workspace.azimuths import TURN, meets, remove
-from er3a.workspace.general_arm import place
+from er3a.workspace.general_arm import GeneralArm, place
 from er3a.workspace.section_arm import ROUND_OFF
 
 _SINGULAR = 1e-10
@@ -29,7 +30,9 @@ _ROOM, _SHORT, _ROUNDS = 0.2, 1e-9, 3
 
 
 @kernel
-def _reached_ball(arm, theta, radii, columns, weights, b):
+def _reached_ball(
+    arm: GeneralArm, theta: Reals, radii: Reals, columns: Reals, weights: Reals, b: Reals
+) -> tuple[float, float]:
     """Radius (m) of the ball that is reached about the tool point, and sigma; ``b`` is set to the rows' lengths."""
     n = theta.shape[0]
     for k in range(n):
@@ -75,7 +78,16 @@ def _reached_ball(arm, theta, radii, columns, weights, b):
 
 
 @kernel
-def fill_from_samples(arm, unit, size, low, marked, unfilled, count, witness):
+def fill_from_samples(
+    arm: GeneralArm,
+    unit: Reals,
+    size: float,
+    low: float,
+    marked: Flags,
+    unfilled: Reals,
+    count: Integers,
+    witness: Reals,
+) -> None:
     """Try random joint vectors: mark the cells they lie in, and take what each proves filled out of the open arcs.
 
     Parameters

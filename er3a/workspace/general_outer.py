@@ -18,16 +18,22 @@ from __future__ import annotations
 
 import numpy as np
 
+from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import kernel
 from er3a.workspace.azimuths import TURN
-from er3a.workspace.general_arm import place
+from er3a.workspace.general_arm import GeneralArm, place
 from er3a.workspace.section_arm import ROUND_OFF
+
+Spread = tuple[float, float, float, float, float, float]
+CellRange = tuple[int, int, int, int, int, int]
 
 _STACK = 400
 
 
 @kernel
-def _spread(arm, middle, half, radii, columns, frame, moves, levers):
+def _spread(
+    arm: GeneralArm, middle: Reals, half: Reals, radii: Reals, columns: Reals, frame: Reals, moves: Reals, levers: Reals
+) -> Spread:
     """Range of the tool point over a box of joints 2 to n.
 
     Returns
@@ -67,7 +73,7 @@ def _spread(arm, middle, half, radii, columns, frame, moves, levers):
 
 
 @kernel
-def _range_of(spread, size, low, shape):
+def _range_of(spread: Spread, size: float, low: float, shape: tuple[int, ...]) -> CellRange:
     """First and last cell in each direction; sectors may pass the end."""
     i_0, i_1 = int(spread[0] / size), int(spread[1] / size)
     j_0, j_1 = int(np.floor((spread[2] - low) / size)), int(np.floor((spread[3] - low) / size))
@@ -79,7 +85,7 @@ def _range_of(spread, size, low, shape):
 
 
 @kernel
-def _all_marked(marked, r):
+def _all_marked(marked: Flags, r: CellRange) -> bool:
     sectors = marked.shape[2]
     for i in range(r[0], r[1] + 1):
         for j in range(r[2], r[3] + 1):
@@ -90,7 +96,7 @@ def _all_marked(marked, r):
 
 
 @kernel
-def mark_reachable(arm, size, low, smallest, most_boxes, marked):
+def mark_reachable(arm: GeneralArm, size: float, low: float, smallest: float, most_boxes: int, marked: Flags) -> int:
     """Mark every cell that some joint vector may reach.
 
     Parameters

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.geometry.open3d_loader import load_open3d
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.sampling.grid import Grid
 
 _FLAT = 1e-9
@@ -23,14 +24,14 @@ class Hull:
     volume, area : m^3, m^2; 0 where the points lie in a plane (then there are no triangles)
     """
 
-    vertices: np.ndarray
-    of: np.ndarray
-    triangles: np.ndarray
+    vertices: Reals
+    of: Integers
+    triangles: Integers
     volume: float
     area: float
 
 
-def convex_hull(points: np.ndarray) -> Hull:
+def convex_hull(points: Reals) -> Hull:
     """Hull of points (N, 3) in m."""
     points, of = np.unique(points, axis=0, return_index=True)
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
@@ -47,7 +48,7 @@ def convex_hull(points: np.ndarray) -> Hull:
     return Hull(vertices, of[kept], triangles, float(mesh.get_volume()), float(mesh.get_surface_area()))
 
 
-def _ordered(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+def _ordered(vertices: Reals, triangles: Integers) -> Integers:
     """Triangles facing outwards, each beginning with its lowest vertex, sorted."""
     a, b, c = (vertices[triangles[:, i]] for i in range(3))
     inwards = np.einsum("ij,ij->i", np.cross(b - a, c - a), a - vertices.mean(axis=0)) < 0
@@ -57,7 +58,7 @@ def _ordered(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return triangles[np.lexsort(triangles.T[::-1])]
 
 
-def cells_inside(hull: Hull, grid: Grid) -> np.ndarray:
+def cells_inside(hull: Hull, grid: Grid) -> Flags:
     """Which cells (nx, ny, nz) have their centre in the hull.
 
     Each column of cells is a line along z; the faces' planes cut it down to the interval inside.
@@ -80,7 +81,7 @@ def cells_inside(hull: Hull, grid: Grid) -> np.ndarray:
     return inside
 
 
-def depth_inside(hull: Hull, points: np.ndarray) -> np.ndarray:
+def depth_inside(hull: Hull, points: Reals) -> Reals:
     """Distance (...,) in m of points (..., 3) to the nearest face's plane, negative outside, -inf for a flat hull."""
     flat = points.reshape(-1, 3)
     depth = np.full(len(flat), np.inf if len(hull.triangles) else -np.inf)

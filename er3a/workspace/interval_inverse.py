@@ -14,8 +14,12 @@ References
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from er3a.geometry.vectors import Vector
+from er3a.kinematics.block_constants import BlockConstants
 from er3a.kinematics.block_inverse import in_frame_1
+from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 
@@ -27,7 +31,7 @@ FREE = 2 * np.pi - 1e-12
 _TURN = 2 * np.pi
 
 
-def theta_ranges(robot: Robot) -> np.ndarray:
+def theta_ranges(robot: Robot) -> Reals:
     """Ranges (6, 2) in rad of the table's angles theta; a full turn or more is ``-inf`` to ``inf``."""
     ends = robot.direction[:, None] * np.stack([robot.lower, robot.upper], axis=1) + robot.offset[:, None]
     ends.sort(axis=1)
@@ -36,27 +40,29 @@ def theta_ranges(robot: Robot) -> np.ndarray:
 
 
 @kernel
-def holds(ranges, joint, low, high):
+def holds(ranges: Reals, joint: int, low: float, high: float) -> bool:
     """Whether all angles from ``low`` to ``high`` are within the joint's range, by one same turn."""
-    least, most = ranges[joint, 0], ranges[joint, 1]
+    least: float = ranges[joint, 0]
+    most: float = ranges[joint, 1]
     if most == np.inf:
         return True
-    shift = np.ceil((least - low) / _TURN) * _TURN
+    shift: float = np.ceil((least - low) / _TURN) * _TURN
     return low + shift >= least and high + shift <= most
 
 
 @kernel
-def misses(ranges, joint, low, high):
+def misses(ranges: Reals, joint: int, low: float, high: float) -> bool:
     """Whether no angle from ``low`` to ``high`` is within the joint's range, by any turn."""
-    least, most = ranges[joint, 0], ranges[joint, 1]
+    least: float = ranges[joint, 0]
+    most: float = ranges[joint, 1]
     if most == np.inf or high - low >= _TURN:
         return False
-    shift = np.ceil((least - low) / _TURN) * _TURN
+    shift: float = np.ceil((least - low) / _TURN) * _TURN
     return low + shift > most and high + shift - _TURN < least
 
 
 @kernel
-def _to_frame_1(arm, T, v):
+def _to_frame_1(arm: BlockConstants, T: Reals, v: Vector) -> Vector:
     x = T[0, 0] * v[0] + T[0, 1] * v[1] + T[0, 2] * v[2]
     y = T[1, 0] * v[0] + T[1, 1] * v[1] + T[1, 2] * v[2]
     z = T[2, 0] * v[0] + T[2, 1] * v[1] + T[2, 2] * v[2]
@@ -64,14 +70,15 @@ def _to_frame_1(arm, T, v):
 
 
 @kernel
-def _opposite(a, b, opposite):
+def _opposite(a: float, b: float, opposite: float) -> float:
     """Angle of a triangle between the sides a and b; 0 or pi where there is no triangle."""
     s = 0.5 * (a + b + opposite)
-    return 2.0 * np.arctan2(np.sqrt(max((s - a) * (s - b), 0.0)), np.sqrt(max(s * (s - opposite), 0.0)))
+    angle: float = 2.0 * np.arctan2(np.sqrt(max((s - a) * (s - b), 0.0)), np.sqrt(max(s * (s - opposite), 0.0)))
+    return angle
 
 
 @kernel
-def _angle_range(link, other, low, high):
+def _angle_range(link: float, other: float, low: float, high: float) -> tuple[float, float]:
     """Range of the angle between ``link`` and the line from axis 2 to the wrist centre, whose length is in a range."""
     first, last = _opposite(low, link, other), _opposite(high, link, other)
     least, most = min(first, last), max(first, last)
@@ -82,22 +89,32 @@ def _angle_range(link, other, low, high):
 
 
 @kernel
-def _swing(move, radius):
+def _swing(move: float, radius: float) -> float:
     """By how much a vector of length ``radius`` can turn when its tip moves by ``move``."""
     return np.arcsin(move / radius) if move < radius else np.pi
 
 
 @kernel
-def _tilt_to_phi_5(arm, tilt):
+def _tilt_to_phi_5(arm: BlockConstants, tilt: float) -> float:
     """Angle of joint 5, 0 to pi, for the angle between axes 4 and 6 (spherical triangle)."""
     b, c = np.arctan2(arm.sin_45, arm.cos_45), np.arctan2(arm.sin_56, arm.cos_56)
     upper = np.sin(0.5 * (tilt - b + c)) * np.sin(0.5 * (tilt + b - c))
     lower = np.sin(0.5 * (b + c - tilt)) * np.sin(0.5 * (b + c + tilt))
-    return 2.0 * np.arctan2(np.sqrt(max(upper, 0.0)), np.sqrt(max(lower, 0.0)))
+    angle: float = 2.0 * np.arctan2(np.sqrt(max(upper, 0.0)), np.sqrt(max(lower, 0.0)))
+    return angle
 
 
 @kernel
-def branches(arm, ranges, T, rho, delta, lever, state, theta_1):
+def branches(
+    arm: BlockConstants,
+    ranges: Reals,
+    T: Reals,
+    rho: float,
+    delta: float,
+    lever: float,
+    state: NDArray[np.int8],
+    theta_1: Reals,
+) -> None:
     """Judge the eight branches over a neighbourhood.
 
     Parameters
@@ -239,7 +256,7 @@ def branches(arm, ranges, T, rho, delta, lever, state, theta_1):
 
 
 @kernel
-def _seen(arm, x, y, z, cos_1, sin_1, c, s):
+def _seen(arm: BlockConstants, x: float, y: float, z: float, cos_1: float, sin_1: float, c: float, s: float) -> Vector:
     """A vector of frame 1 as the wrist sees it: turned back by the first three joints, z along axis 4."""
     x, y = x * cos_1 + y * sin_1, y * cos_1 - x * sin_1
     y, z = arm.cos_12 * y - arm.sin_12 * z, arm.sin_12 * y + arm.cos_12 * z
@@ -248,7 +265,19 @@ def _seen(arm, x, y, z, cos_1, sin_1, c, s):
 
 
 @kernel
-def _beside(arm, bx, by, bz, zx, zy, zz, cos_1, sin_1, c, s):
+def _beside(
+    arm: BlockConstants,
+    bx: float,
+    by: float,
+    bz: float,
+    zx: float,
+    zy: float,
+    zz: float,
+    cos_1: float,
+    sin_1: float,
+    c: float,
+    s: float,
+) -> tuple[float, float]:
     """Axis 4 as the tool sees it: its parts along the vector beside axis 6, and along axis 6 times that vector."""
     _, _, along = _seen(arm, bx, by, bz, cos_1, sin_1, c, s)
     wx, wy, wz = zy * bz - zz * by, zz * bx - zx * bz, zx * by - zy * bx

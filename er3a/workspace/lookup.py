@@ -5,7 +5,9 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.workspace.azimuths import TURN
 from er3a.workspace.proof import Proof
 
@@ -34,14 +36,14 @@ class SectionMap:
         for n, ((a, c), (b, d)) in enumerate(zip(low.tolist(), high.tolist())):
             self.owner[a:b, c:d] = n
 
-    def cell_of(self, rho: np.ndarray, z: np.ndarray) -> np.ndarray:
+    def cell_of(self, rho: Reals, z: Reals) -> NDArray[np.int32]:
         """Numbers (n,) of the cells that hold points of the section, ``OUTSIDE`` where none does."""
         index = np.stack([(rho - self.low[0]) // self.size, (z - self.low[1]) // self.size]).astype(np.int64)
         inside = ((index >= 0) & (index < np.array(self.owner.shape)[:, None])).all(axis=0)
         index = np.where(inside, index, 0)
         return np.where(inside, self.owner[index[0], index[1]], OUTSIDE)
 
-    def status(self, rho: np.ndarray, azimuth: np.ndarray, z: np.ndarray) -> np.ndarray:
+    def status(self, rho: Reals, azimuth: Reals, z: Reals) -> Integers:
         """FILLED, EMPTY or UNDECIDED for points (n,) about axis 1 (m, rad, m); outside of all cells is empty."""
         cell, azimuth = self.cell_of(rho, z), np.asarray(azimuth) % TURN
         unfilled = _within(self.proof.unfilled[cell], azimuth)
@@ -49,7 +51,7 @@ class SectionMap:
         return np.where(empty, EMPTY, np.where(unfilled, UNDECIDED, FILLED))
 
     @cached_property
-    def neighbours(self) -> np.ndarray:
+    def neighbours(self) -> NDArray[np.int32]:
         """Pairs (m, 2) of cells that share a stretch of border."""
         pairs = [
             np.stack([self.owner[:-1].ravel(), self.owner[1:].ravel()]),
@@ -60,7 +62,7 @@ class SectionMap:
         return np.unique(found, axis=1).T
 
     @cached_property
-    def outermost(self) -> np.ndarray:
+    def outermost(self) -> Flags:
         """Whether each cell (n,) lies on the outer border of the map (the axis is none)."""
         touches = np.zeros(len(self.proof.cells), dtype=bool)
         for edge in (self.owner[-1], self.owner[:, 0], self.owner[:, -1]):
@@ -68,5 +70,5 @@ class SectionMap:
         return touches
 
 
-def _within(arcs: np.ndarray, azimuth: np.ndarray) -> np.ndarray:
-    return ((arcs[..., 0] <= azimuth[:, None]) & (azimuth[:, None] <= arcs[..., 1])).any(axis=1)
+def _within(arcs: Reals, azimuth: Reals) -> Flags:
+    return np.asarray(((arcs[..., 0] <= azimuth[:, None]) & (azimuth[:, None] <= arcs[..., 1])).any(axis=1))

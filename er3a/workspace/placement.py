@@ -4,19 +4,22 @@ A lattice of points is asked for all directions of a cone, branch by branch. A b
 are good, which sliding minima tell for all places at once. The lattice only proposes; :mod:`placement_proof` decides.
 
 Criterion: places where one branch serves the whole box come first, then those with the largest least manipulability
-over the box and the cone, which keeps away from singularities; equals by the room to the joint limits. Distance from
-limits is a demand of its own: the task narrows them.
+over the box and the cone, which keeps away from singularities; equals by the distance from the joint limits. That
+distance is a demand of its own too: the task narrows the limits.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot
 from er3a.workspace.capability import manipulability
 from er3a.workspace.directions import Roll, cone_directions, left_to_roll, poses, tool_rotations
@@ -41,8 +44,8 @@ class Task:
     margin : rad, how far joints with less than a full turn keep within their limits
     """
 
-    box: np.ndarray
-    axis: np.ndarray
+    box: Reals
+    axis: Reals
     half_angle: float
     lowest: float
     clear: float
@@ -65,14 +68,14 @@ class Field:
     origin : (3,), m; spacing : (3,), m; shape of the arrays : (nx, ny, nz)
     least : (nx, ny, nz, 8), m^3, least manipulability over the directions by branch, NO where it misses one
     least_any : (nx, ny, nz), the same by the best branch for each direction
-    room : (nx, ny, nz, 8), rad, least distance of joints with less than a full turn from their limits, by branch
+    limit_margin : (nx, ny, nz, 8), rad, least distance from the limits of joints with less than a full turn, by branch
     """
 
-    origin: np.ndarray
-    spacing: np.ndarray
-    least: np.ndarray
-    least_any: np.ndarray
-    room: np.ndarray
+    origin: Reals
+    spacing: Reals
+    least: Reals
+    least_any: Reals
+    limit_margin: Reals
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,19 +86,23 @@ class Places:
     ----------
     centre : (n, 3), m; turned : (n,), whether the box stands turned by 90 deg about z
     slot : (n,), the branch that serves it all, or MIXED
-    least : (n,), m^3, the criterion; room : (n,), rad (NaN with MIXED)
+    least : (n,), m^3, the criterion; limit_margin : (n,), rad (NaN with MIXED)
     proven : (n,), whether all bricks of the lattice in it are proven, by any mix of branches
     """
 
-    centre: np.ndarray
-    turned: np.ndarray
-    slot: np.ndarray
-    least: np.ndarray
-    room: np.ndarray
-    proven: np.ndarray
+    centre: Reals
+    turned: Flags
+    slot: Integers
+    least: Reals
+    limit_margin: Reals
+    proven: Flags
+
+    def rows(self, chosen: NDArray[Any]) -> Places:
+        """Some of the places."""
+        return Places(*(getattr(self, part.name)[chosen] for part in fields(self)))
 
 
-def lattice_spacing(box: np.ndarray, coarsest: float) -> np.ndarray:
+def lattice_spacing(box: Reals, coarsest: float) -> Reals:
     """Spacing (3,) in m that divides the box's height and its shorter side evenly, about as fine as asked."""
     sides = np.array([min(box[:2]), min(box[:2]), box[2]])
     return np.maximum(sides / np.maximum(1, np.round(sides / coarsest)), coarsest / 2)
@@ -122,7 +129,7 @@ def survey(robot: Robot, task: Task, roll: Roll, coarsest: float) -> Field:
     # Heights count from the lowest place, so that the lowest box lies on lattice points.
     start[2] += (task.lowest - start[2]) % spacing[2]
     shape = tuple(2 * count + 1)
-    points = start + np.stack(np.indices(shape), axis=-1).reshape(-1, 3) * spacing
+    points = start + np.moveaxis(np.indices(shape), 0, -1).reshape(-1, 3) * spacing
     local = (points - origin) @ R.T
     near = np.hypot(local[:, 0], local[:, 1])
     asked = np.flatnonzero(
@@ -131,13 +138,15 @@ def survey(robot: Robot, task: Task, roll: Roll, coarsest: float) -> Field:
         & (np.linalg.norm(points - middle, axis=1) <= arm.reach)
     )
     least, least_any = np.full((len(points), SLOTS), NO), np.full(len(points), NO)
-    room = np.zeros((len(points), SLOTS))
+    limit_margin = np.zeros((len(points), SLOTS))
     rotations = tool_rotations(cone_directions(task.axis, task.half_angle), roll)
-    least[asked], least_any[asked], room[asked] = serve(robot, points[asked], rotations, roll)
-    return Field(start, spacing, least.reshape(*shape, SLOTS), least_any.reshape(shape), room.reshape(*shape, SLOTS))
+    least[asked], least_any[asked], limit_margin[asked] = serve(robot, points[asked], rotations, roll)
+    return Field(
+        start, spacing, least.reshape(*shape, SLOTS), least_any.reshape(shape), limit_margin.reshape(*shape, SLOTS)
+    )
 
 
-def serve(robot: Robot, points: np.ndarray, rotations: np.ndarray, roll: Roll):
+def serve(robot: Robot, points: Reals, rotations: Reals, roll: Roll) -> tuple[Reals, Reals, Reals]:
     """How each branch serves points over all directions.
 
     Parameters
@@ -146,12 +155,12 @@ def serve(robot: Robot, points: np.ndarray, rotations: np.ndarray, roll: Roll):
 
     Returns
     -------
-    least, least_any, room : (n, 8), (n,), (n, 8), as in :class:`Field`
+    least, least_any, limit_margin : (n, 8), (n,), (n, 8), as in :class:`Field`
     """
     asked, arm = left_to_roll(robot, roll), constants_for_blocks(robot)
     limited = np.flatnonzero(asked.upper - asked.lower < FREE)
     least, least_any = np.full((len(points), SLOTS), np.inf), np.full(len(points), np.inf)
-    room = np.full((len(points), SLOTS), np.inf)
+    limit_margin = np.full((len(points), SLOTS), np.inf)
     alive = np.arange(len(points))
     for direction in rotations:
         if not alive.size:
@@ -167,12 +176,12 @@ def serve(robot: Robot, points: np.ndarray, rotations: np.ndarray, roll: Roll):
             free = np.take_along_axis(free.reshape(len(part), -1, SLOTS), rolled, axis=1)[:, 0]
             least[part] = np.minimum(least[part], value)
             least_any[part] = np.minimum(least_any[part], value.max(axis=1))
-            room[part] = np.fmin(room[part], free)
+            limit_margin[part] = np.fmin(limit_margin[part], free)
         alive = np.flatnonzero(least_any > NO)
-    return least, least_any, np.where(least > NO, room, 0.0)
+    return least, least_any, np.where(least > NO, limit_margin, 0.0)
 
 
-def fitting_places(field: Field, bricks: np.ndarray, box: np.ndarray) -> Places:
+def fitting_places(field: Field, bricks: Flags, box: Reals) -> Places:
     """All boxes on the lattice whose points are good; the box is taken up to one spacing larger.
 
     Parameters
@@ -182,22 +191,22 @@ def fitting_places(field: Field, bricks: np.ndarray, box: np.ndarray) -> Places:
     found = [_places(field, bricks, box, False)]
     if abs(box[0] - box[1]) > 1e-9:
         found.append(_places(field, bricks, box[[1, 0, 2]], True))
-    places = Places(*(np.concatenate([getattr(part, key) for part in found]) for key in Places.__annotations__))
-    merit = (-np.round(np.nan_to_num(places.room), 6), -np.round(places.least, 9), places.slot == MIXED)
+    places = Places(*(np.concatenate([getattr(part, column.name) for part in found]) for column in fields(Places)))
+    merit = (-np.round(np.nan_to_num(places.limit_margin), 6), -np.round(places.least, 9), places.slot == MIXED)
     order = np.lexsort((*np.round(places.centre.T, 6), -np.round(places.centre[:, 0], 6), *merit))
-    return Places(*(getattr(places, key)[order] for key in Places.__annotations__))
+    return places.rows(order)
 
 
-def _places(field: Field, bricks: np.ndarray, box: np.ndarray, turned: bool) -> Places:
+def _places(field: Field, bricks: Flags, box: Reals, turned: bool) -> Places:
     points = np.maximum(1, np.ceil(box / field.spacing - 1e-6)).astype(int) + 1
     any_branch = _sliding_least(field.least_any, points)
     where = np.nonzero(any_branch > NO)
     used = np.flatnonzero((field.least > NO).any(axis=(0, 1, 2)))
     by_slot = np.full((len(where[0]), SLOTS), NO)
-    room = np.zeros((len(where[0]), SLOTS))
+    limit_margin = np.zeros((len(where[0]), SLOTS))
     for slot in used:
         by_slot[:, slot] = _sliding_least(field.least[..., slot], points)[where]
-        room[:, slot] = _sliding_least(field.room[..., slot], points)[where]
+        limit_margin[:, slot] = _sliding_least(field.limit_margin[..., slot], points)[where]
     slot = np.round(by_slot, 9).argmax(axis=1)
     rows = np.arange(len(slot))
     one = by_slot[rows, slot] > NO
@@ -206,12 +215,12 @@ def _places(field: Field, bricks: np.ndarray, box: np.ndarray, turned: bool) -> 
         turned=np.full(len(slot), turned),
         slot=np.where(one, slot, MIXED),
         least=np.where(one, by_slot[rows, slot], any_branch[where]),
-        room=np.where(one, room[rows, slot], np.nan),
+        limit_margin=np.where(one, limit_margin[rows, slot], np.nan),
         proven=_sliding_least(bricks.astype(float), points - 1)[where] > 0,
     )
 
 
-def _sliding_least(values: np.ndarray, points: np.ndarray) -> np.ndarray:
+def _sliding_least(values: Reals, points: Integers) -> Reals:
     """Least value over ``points`` (3,) lattice points from each one on; NO where the box leaves the lattice."""
     for axis, size in enumerate(points):
         values = ndimage.minimum_filter1d(values, int(size), axis, mode="constant", cval=NO, origin=-(int(size) // 2))

@@ -6,19 +6,26 @@ piece (:mod:`interval_inverse`), or the middle of a piece turns out to be out of
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
+from er3a.kinematics.block_constants import BlockConstants
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
+from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 from er3a.workspace.directions import Roll, across, left_to_roll, point_tool
 from er3a.workspace.interval_inverse import GOOD, NEVER, SLOTS, branches, holds, misses, theta_ranges
-from er3a.workspace.placement import MIXED, NO, Field, Places, Task
+from er3a.workspace.placement import MIXED, NO, Field, Places, Task, fitting_places, narrowed, survey
 
-PROVEN, REFUTED, UNDECIDED = "proven", "refuted", "undecided"
-_ANSWERS = (UNDECIDED, PROVEN, REFUTED)
+Answer = Literal["proven", "refuted", "undecided"]
+PROVEN: Answer = "proven"
+REFUTED: Answer = "refuted"
+_ANSWERS: tuple[Answer, ...] = ("undecided", PROVEN, REFUTED)
+Constants = tuple[BlockConstants, Reals, Reals, float, Reals, float, float]
 _STACK = 512
 _MOST_TRIES = 200
 _POSES_PER_BRICK = 512
@@ -44,6 +51,43 @@ class Chosen:
     poses: int
 
 
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """Where a box can stand: the lattice, the places on it, and the best of them."""
+
+    field: Field
+    places: Places
+    chosen: Chosen
+
+    @property
+    def best_turns(self) -> Places:
+        """The better of both turns at each centre."""
+        key = np.round((self.places.centre - self.field.origin) / self.field.spacing * 2).astype(np.int64)
+        _, first = np.unique(key, axis=0, return_index=True)
+        return self.places.rows(np.sort(first))
+
+
+def find_places(robot: Robot, task: Task, roll: Roll, coarsest: float, count: int, most_poses: int) -> Placement:
+    """Survey where the box can stand and put the best places to the proof.
+
+    Parameters
+    ----------
+    robot : with its own limits; coarsest : m, about the lattice's spacing
+    count : how many places to choose; most_poses : how many neighbourhoods of poses their proofs may look at
+
+    Raises
+    ------
+    NotWristPartitionedError
+    """
+    robot = narrowed(robot, task.margin)
+    field = survey(robot, task, roll, coarsest)
+    places = fitting_places(field, proven_bricks(robot, task, field, roll), task.box)
+    chosen = choose_places(robot, task, places, roll, count, most_poses)
+    proven = places.proven.copy()
+    proven[[row for row, is_proven in zip(chosen.row, chosen.proven) if is_proven]] = True
+    return Placement(field, replace(places, proven=proven), chosen)
+
+
 def choose_places(robot: Robot, task: Task, places: Places, roll: Roll, count: int, most_poses: int) -> Chosen:
     """Take up to ``count`` places in their order, none overlapping one before it, each put to the proof.
 
@@ -53,18 +97,26 @@ def choose_places(robot: Robot, task: Task, places: Places, roll: Roll, count: i
     ------
     NotWristPartitionedError
     """
-    rows, slots, proven, branch_proven, refuted, used = [], [], [], [], 0, 0
+    rows: list[int] = []
+    slots: list[int] = []
+    proven: list[bool] = []
+    branch_proven: list[bool] = []
+    refuted = used = 0
     sizes = np.where(places.turned[:, None], task.box[[1, 0, 2]], task.box)
     free = np.ones(len(places.slot), dtype=bool)
+
+    def proved(row: int, slot: int, most: int) -> tuple[Answer, int]:
+        return prove_place(robot, task, places.centre[row], bool(places.turned[row]), slot, roll, most_poses=most)
+
     while len(rows) < count and refuted < _MOST_TRIES and free.any():
         row = int(np.argmax(free))
-        share = (most_poses - used) // (count - len(rows))
+        budget = (most_poses - used) // (count - len(rows))
         slot = int(places.slot[row])
-        answer, spent = prove_place(robot, task, places.centre[row], places.turned[row], slot, roll, share)
+        answer, spent = proved(row, slot, budget)
         used += spent
         if answer == REFUTED and slot != MIXED:
             slot = MIXED
-            answer, spent = prove_place(robot, task, places.centre[row], places.turned[row], slot, roll, share)
+            answer, spent = proved(row, slot, budget)
             used += spent
         if answer == REFUTED:
             free[row], refuted = False, refuted + 1
@@ -79,8 +131,8 @@ def choose_places(robot: Robot, task: Task, places: Places, roll: Roll, count: i
 
 
 def prove_place(
-    robot: Robot, task: Task, centre: np.ndarray, turned: bool, slot: int, roll: Roll, most_poses: int
-) -> tuple[str, int]:
+    robot: Robot, task: Task, centre: Reals, turned: bool, slot: int, roll: Roll, *, most_poses: int
+) -> tuple[Answer, int]:
     """Decide one place.
 
     Parameters
@@ -91,7 +143,7 @@ def prove_place(
 
     Returns
     -------
-    answer : PROVEN; REFUTED (a point and direction that no branch reaches, with any of the rolls); or UNDECIDED
+    answer : refuted means that there is a point and direction that no branch reaches, with any of the rolls
     used : how many neighbourhoods were looked at
 
     Raises
@@ -99,18 +151,18 @@ def prove_place(
     NotWristPartitionedError
     """
     half = (task.box[[1, 0, 2]] if turned else task.box) / 2
-    constants, centre = _constants(robot, task, roll), np.asarray(centre, float)
+    constants, middle = _constants(robot, task, roll), np.asarray(centre, float)
     answer = used = 0
     # Coarse pieces first, everywhere: what refutes a place is found before effort goes into its rims.
     for smallest in _SMALLEST:
-        answer, spent = _prove(*constants, centre, half, slot, most_poses - used, smallest)
+        answer, spent = _prove(*constants, middle, half, slot, most_poses - used, smallest)
         used += int(spent)
         if answer or used >= most_poses:
             break
     return _ANSWERS[answer], used
 
 
-def proven_bricks(robot: Robot, task: Task, field: Field, roll: Roll) -> np.ndarray:
+def proven_bricks(robot: Robot, task: Task, field: Field, roll: Roll) -> Flags:
     """Which bricks between eight lattice points are served at every point, by any mix of branches: (nx-1, ny-1, nz-1).
 
     Raises
@@ -129,7 +181,7 @@ def proven_bricks(robot: Robot, task: Task, field: Field, roll: Roll) -> np.ndar
     return proven
 
 
-def _constants(robot: Robot, task: Task, roll: Roll):
+def _constants(robot: Robot, task: Task, roll: Roll) -> Constants:
     """What the kernels take of an arm and a task."""
     asked = left_to_roll(robot, roll)
     arm, ranges = constants_for_blocks(asked), theta_ranges(asked)
@@ -140,14 +192,40 @@ def _constants(robot: Robot, task: Task, roll: Roll):
 
 
 @kernel
-def _prove_all(arm, ranges, frame, half_angle, angles, reach, scale, centres, half, slot, most_poses, good):
+def _prove_all(
+    arm: BlockConstants,
+    ranges: Reals,
+    frame: Reals,
+    half_angle: float,
+    angles: Reals,
+    reach: float,
+    scale: float,
+    centres: Reals,
+    half: Reals,
+    slot: int,
+    most_poses: int,
+    good: Flags,
+) -> None:
     for n in range(centres.shape[0]):
         numbers = (centres[n], half, slot, most_poses, 0.0)
         good[n] = _prove(arm, ranges, frame, half_angle, angles, reach, scale, *numbers)[0] == 1
 
 
 @kernel
-def _prove(arm, ranges, frame, half_angle, angles, reach, scale, centre, half, slot, most_poses, smallest):
+def _prove(
+    arm: BlockConstants,
+    ranges: Reals,
+    frame: Reals,
+    half_angle: float,
+    angles: Reals,
+    reach: float,
+    scale: float,
+    centre: Reals,
+    half: Reals,
+    slot: int,
+    most_poses: int,
+    smallest: float,
+) -> tuple[int, int]:
     T, state, theta_1 = np.eye(4), np.empty(SLOTS, dtype=np.int8), np.empty((SLOTS, 2))
     stack, size = np.empty((_STACK, 10)), np.empty(5)
     for k in range(3):
@@ -200,7 +278,7 @@ def _prove(arm, ranges, frame, half_angle, angles, reach, scale, centre, half, s
 
 
 @kernel
-def _some(ranges, state, theta_1, slot):
+def _some(ranges: Reals, state: NDArray[np.int8], theta_1: Reals, slot: int) -> bool:
     """Whether some branch, or the one asked for, is good with joint 1 too."""
     for k in range(SLOTS):
         if (slot == MIXED or k == slot) and state[k] == GOOD and holds(ranges, 0, theta_1[k, 0], theta_1[k, 1]):
@@ -209,7 +287,7 @@ def _some(ranges, state, theta_1, slot):
 
 
 @kernel
-def _none(ranges, state, theta_1, slot):
+def _none(ranges: Reals, state: NDArray[np.int8], theta_1: Reals, slot: int) -> bool:
     """Whether no branch, or not the one asked for, is possible."""
     for k in range(SLOTS):
         if (slot == MIXED or k == slot) and state[k] != NEVER and not misses(ranges, 0, theta_1[k, 0], theta_1[k, 1]):

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.workspace.azimuths import MOST_ARCS, TURN
 from er3a.workspace.cell_decision import judge_cells
 from er3a.workspace.filled import fill_stances
@@ -18,7 +21,7 @@ _OPEN = 1e-9
 MOST_LEVEL = 7
 """Cells are not split further than this: a set without volume would never be decided."""
 _SHARE = 64
-_COLUMNS = ("cells", "unfilled", "empty", "level", "witness")
+StanceGrid = tuple[Reals, tuple[float, float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,37 +38,44 @@ class Proof:
     boxes : how many boxes the emptiness proofs looked at
     """
 
-    cells: np.ndarray
-    unfilled: np.ndarray
-    empty: np.ndarray
-    level: np.ndarray
-    witness: np.ndarray
+    cells: Reals
+    unfilled: Reals
+    empty: Reals
+    level: Integers
+    witness: Reals
     boxes: int
 
-    def rows(self, chosen: np.ndarray) -> Proof:
+    def rows(self, chosen: NDArray[Any]) -> Proof:
         """The same with some of the cells."""
-        return Proof(*(getattr(self, key)[chosen] for key in _COLUMNS), self.boxes)
+        return Proof(
+            self.cells[chosen],
+            self.unfilled[chosen],
+            self.empty[chosen],
+            self.level[chosen],
+            self.witness[chosen],
+            self.boxes,
+        )
 
     @property
-    def volumes(self) -> np.ndarray:
+    def volumes(self) -> Reals:
         """Volume of each ring, (n,), m^3."""
         return ring_volumes(self.cells)
 
     @property
-    def unfilled_share(self) -> np.ndarray:
+    def unfilled_ratio(self) -> Reals:
         """Share of each ring that is not proven filled, (n,)."""
-        return np.nansum(self.unfilled[..., 1] - self.unfilled[..., 0], axis=1) / TURN
+        return _arc_ratio(self.unfilled)
 
     @property
-    def empty_share(self) -> np.ndarray:
+    def empty_ratio(self) -> Reals:
         """Share of each ring that is proven empty, (n,)."""
-        return np.nansum(self.empty[..., 1] - self.empty[..., 0], axis=1) / TURN
+        return _arc_ratio(self.empty)
 
     @property
     def bounds(self) -> tuple[float, float]:
         """Bounds of the reached volume, m^3."""
         volumes = self.volumes
-        return float(volumes @ (1 - self.unfilled_share)), float(volumes @ (1 - self.empty_share))
+        return float(volumes @ (1 - self.unfilled_ratio)), float(volumes @ (1 - self.empty_ratio))
 
     @property
     def width(self) -> float:
@@ -74,9 +84,15 @@ class Proof:
         return (upper - lower) / upper if upper > 0 else 0.0
 
 
-def ring_volumes(cells: np.ndarray) -> np.ndarray:
+def _arc_ratio(arcs: Reals) -> Reals:
+    ratio: Reals = np.nansum(arcs[..., 1] - arcs[..., 0], axis=1) / TURN
+    return ratio
+
+
+def ring_volumes(cells: Reals) -> Reals:
     """Volumes (n,) in m^3 of rings with the sections (n, 4)."""
-    return np.pi * (cells[:, 1] ** 2 - cells[:, 0] ** 2) * (cells[:, 3] - cells[:, 2])
+    volumes: Reals = np.pi * (cells[:, 1] ** 2 - cells[:, 0] ** 2) * (cells[:, 3] - cells[:, 2])
+    return volumes
 
 
 def prove(arm: SectionArm, target: float, most_cells: int, across: int = 32, threads: int = 1) -> Proof:
@@ -96,7 +112,7 @@ def prove(arm: SectionArm, target: float, most_cells: int, across: int = 32, thr
     while len(cells):
         judged = _judge(arm, cells, stances, level, parents, threads)
         looked, boxes = looked + len(cells), boxes + judged.boxes
-        volumes, reached = judged.volumes, 1 - np.stack([judged.unfilled_share, judged.empty_share])
+        volumes, reached = judged.volumes, 1 - np.stack([judged.unfilled_ratio, judged.empty_ratio])
         undecided = volumes * (reached[1] - reached[0])
         split = undecided > _OPEN * volumes
         lower, upper = settled + reached @ volumes
@@ -108,37 +124,43 @@ def prove(arm: SectionArm, target: float, most_cells: int, across: int = 32, thr
         settled += (reached * volumes)[:, ~split].sum(axis=1)
         done.append(judged.rows(~split))
         cells, parents, level = _quarters(cells[split]), judged.rows(np.repeat(np.flatnonzero(split), 4)), level + 1
-    columns = (np.concatenate([getattr(part, key) for part in done]) for key in _COLUMNS)
-    return Proof(*columns, boxes)
+    return _joined(done, boxes)
 
 
-def sharpen(arm: SectionArm, proof: Proof, chosen: np.ndarray) -> Proof:
+def sharpen(arm: SectionArm, proof: Proof, chosen: Flags) -> Proof:
     """Split the chosen cells (mask) of a proof into four each, and judge those."""
     parents = proof.rows(np.repeat(np.flatnonzero(chosen), 4))
     finer = _judge(arm, _quarters(proof.cells[chosen]), _stance_grid(arm), 0, parents)
-    level = np.repeat(proof.level[chosen] + 1, 4)
-    columns = [
-        np.concatenate([getattr(proof, key)[~chosen], getattr(finer, key)]) for key in _COLUMNS if key != "level"
-    ]
-    columns.insert(3, np.concatenate([proof.level[~chosen], level]))
-    return Proof(*columns, proof.boxes + finer.boxes)
+    finer = replace(finer, level=np.repeat(proof.level[chosen] + 1, 4))
+    return _joined([proof.rows(~chosen), finer], proof.boxes + finer.boxes)
 
 
-def judge(arm: SectionArm, cells: np.ndarray) -> Proof:
+def _joined(parts: list[Proof], boxes: int) -> Proof:
+    return Proof(
+        np.concatenate([part.cells for part in parts]),
+        np.concatenate([part.unfilled for part in parts]),
+        np.concatenate([part.empty for part in parts]),
+        np.concatenate([part.level for part in parts]),
+        np.concatenate([part.witness for part in parts]),
+        boxes,
+    )
+
+
+def judge(arm: SectionArm, cells: Reals) -> Proof:
     """Judge given cells (n, 4) once, without splitting any."""
     return _judge(arm, np.ascontiguousarray(cells, dtype=float), _stance_grid(arm), 0)
 
 
-def _stance_grid(arm: SectionArm) -> tuple[np.ndarray, tuple[float, float]]:
+def _stance_grid(arm: SectionArm) -> StanceGrid:
     """Stances of joints 2 and 3 over their limits, and the grid's steps (rad)."""
-    spans = (arm.theta_2[1] - arm.theta_2[0], arm.tau[1] - arm.tau[0])
-    counts = [_STANCES if span > 0 else 1 for span in spans]
-    grid = np.empty((counts[0] * counts[1], 9))
-    fill_stances(arm, counts[0], counts[1], grid)
-    return grid, tuple(span / max(1, count - 1) for span, count in zip(spans, counts))
+    span_2, span_3 = arm.theta_2[1] - arm.theta_2[0], arm.tau[1] - arm.tau[0]
+    count_2, count_3 = (_STANCES if span > 0 else 1 for span in (span_2, span_3))
+    grid = np.empty((count_2 * count_3, 9))
+    fill_stances(arm, count_2, count_3, grid)
+    return grid, (span_2 / max(1, count_2 - 1), span_3 / max(1, count_3 - 1))
 
 
-def _first_cells(arm: SectionArm, across: int) -> np.ndarray:
+def _first_cells(arm: SectionArm, across: int) -> Reals:
     """Square cells over the rectangle that the arm can't leave."""
     low, high = arm.heights
     size = (high - low) * (1 + 1e-9) / across
@@ -148,7 +170,7 @@ def _first_cells(arm: SectionArm, across: int) -> np.ndarray:
     return np.stack([i * size, (i + 1) * size, middle + j * size, middle + (j + 1) * size], axis=1)
 
 
-def _quarters(cells: np.ndarray) -> np.ndarray:
+def _quarters(cells: Reals) -> Reals:
     rho, z = cells[:, :2].mean(axis=1), cells[:, 2:].mean(axis=1)
     rows = [
         np.stack([a, b, c, d], axis=1)
@@ -159,7 +181,7 @@ def _quarters(cells: np.ndarray) -> np.ndarray:
 
 
 def _judge(
-    arm: SectionArm, cells: np.ndarray, stances: tuple, level: int, parents: Proof | None = None, threads: int = 1
+    arm: SectionArm, cells: Reals, stances: StanceGrid, level: int, parents: Proof | None = None, threads: int = 1
 ) -> Proof:
     """Judge cells, beginning from what is known of those they were split off."""
     n = len(cells)
@@ -171,8 +193,8 @@ def _judge(
         counts = np.isfinite([unfilled[..., 0], empty[..., 0]]).sum(axis=2)
 
     def work(part: slice) -> int:
-        known = (unfilled[part], counts[0, part], empty[part], counts[1, part])
-        return judge_cells(arm, cells[part], *stances, _MOST_BOXES, *known, witness[part])
+        known = (unfilled[part], counts[0, part], empty[part], counts[1, part], witness[part])
+        return judge_cells(arm, cells[part], stances[0], stances[1], _MOST_BOXES, *known)
 
     # Neighbours cost alike: small shares keep the threads busy to the end.
     parts = [slice(k, k + _SHARE) for k in range(0, n, _SHARE)]

@@ -25,8 +25,11 @@ import numpy as np
 
 from er3a.geometry.vectors import Vector, add, cross, dot, scaled, subtract
 from er3a.kinematics.wrist_partitioned import WristPartitionedArm, wrist_partitioned_arm
+from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
+
+Range = tuple[float, float]
 
 ROUND_OFF = 1e-12
 """Bound (m per metre of reach, and rad) on the rounding of any length or angle computed here."""
@@ -81,7 +84,7 @@ class SectionArm(NamedTuple):
         return self.centre[2] - length, self.centre[2] + length
 
 
-def section_frame(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
+def section_frame(robot: Robot) -> tuple[Reals, Reals]:
     """The frame about axis 1.
 
     Returns
@@ -143,8 +146,8 @@ def _turned(robot: Robot, k: int) -> tuple[float, float]:
     return (low, high) if high - low < FULL_TURN else (low, low + 2 * np.pi)
 
 
-def _vector(array: np.ndarray) -> Vector:
-    return tuple(float(value) for value in array)
+def _vector(array: Reals) -> Vector:
+    return float(array[0]), float(array[1]), float(array[2])
 
 
 def _zone(arm: WristPartitionedArm, limits: list[tuple[float, float]]) -> tuple[float, float, float, float, float]:
@@ -164,32 +167,32 @@ def _zone(arm: WristPartitionedArm, limits: list[tuple[float, float]]) -> tuple[
     return d, outer[0], outer[1], inner[0], inner[1]
 
 
-def _cosines(arm, tool, range_5, range_6) -> tuple[float, float, float]:
+def _cosines(arm: WristPartitionedArm, tool: Reals, range_5: Range, range_6: Range) -> tuple[float, float, float]:
     """Attained extremes of the cosine between axis 4 and the tool point's direction, and by how much they may be off.
 
     For each angle of joint 6 the cosine is ``A + B cos(theta_5) + C sin(theta_5)``, whose extremes on an interval are
-    known; over joint 6 it is Lipschitz with the tool's share across axis 6, so a fine grid bounds it.
+    known; over joint 6 it is Lipschitz with the tool's part across axis 6, so a fine grid bounds it.
     """
     w4, w5, w6 = arm.axes[3], arm.axes[4], arm.axes[5]
     beside = float(np.linalg.norm(np.cross(w6, tool)))
     steps = _TOOL_STEPS if beside > ROUND_OFF else 1
-    theta_6 = np.linspace(*range_6, steps + 1)[:, None]
+    theta_6 = np.linspace(range_6[0], range_6[1], steps + 1)[:, None]
     y = tool * np.cos(theta_6) + np.cross(w6, tool) * np.sin(theta_6) + w6 * (w6 @ tool) * (1 - np.cos(theta_6))
     along = y @ w5
     constant, cosine, sine = along * (w4 @ w5), y @ w4 - along * (w4 @ w5), np.cross(w5, y) @ w4
     size, peak = np.hypot(cosine, sine), np.arctan2(sine, cosine)
 
-    def inside(angle):
-        return (angle - range_5[0]) % (2 * np.pi) <= range_5[1] - range_5[0]
+    def inside(angle: Reals) -> Flags:
+        return np.asarray((angle - range_5[0]) % (2 * np.pi) <= range_5[1] - range_5[0])
 
     ends = np.stack([constant + cosine * np.cos(end) + sine * np.sin(end) for end in range_5])
-    high = np.where(inside(peak), constant + size, ends.max(axis=0)).max()
-    low = np.where(inside(peak + np.pi), constant - size, ends.min(axis=0)).min()
+    high: float = np.where(inside(peak), constant + size, ends.max(axis=0)).max()
+    low: float = np.where(inside(peak + np.pi), constant - size, ends.min(axis=0)).min()
     pad = beside * (range_6[1] - range_6[0]) / steps / 2 + ROUND_OFF
     return float(np.clip(low, -1, 1)), float(np.clip(high, -1, 1)), pad
 
 
-def _both_ways(arm, tool, range_5) -> tuple[float, float]:
+def _both_ways(arm: WristPartitionedArm, tool: Reals, range_5: Range) -> tuple[float, float]:
     """With half a turn of joint 4, the tilts that joint 5 reaches both ways still have every azimuth."""
     aligned = np.arctan2(np.cross(tool, arm.axes[3]) @ arm.axes[4], tool @ arm.axes[3])
     middle = (range_5[0] + range_5[1]) / 2
@@ -201,7 +204,7 @@ def _both_ways(arm, tool, range_5) -> tuple[float, float]:
 
 
 @kernel
-def turned(v, axis, c, s):
+def turned(v: Vector, axis: Vector, c: float, s: float) -> Vector:
     """v across the unit axis, turned about it by the angle with cosine c and sine s; a part along the axis stays."""
     along = v[0] * axis[0] + v[1] * axis[1] + v[2] * axis[2]
     flat = subtract(v, scaled(axis, along))
@@ -210,7 +213,7 @@ def turned(v, axis, c, s):
 
 
 @kernel
-def wrist_and_forearm(arm, theta_2, tau):
+def wrist_and_forearm(arm: SectionArm, theta_2: float, tau: float) -> tuple[Vector, Vector]:
     """Wrist centre W (m) and forearm direction f at joint 1 = 0."""
     c, s = np.cos(theta_2 + tau), np.sin(theta_2 + tau)
     upper = turned(arm.upper, arm.axis_2, np.cos(theta_2), np.sin(theta_2))
@@ -219,7 +222,9 @@ def wrist_and_forearm(arm, theta_2, tau):
 
 
 @kernel
-def along_change(arm, x, x_1, theta_2, f, e1, e2, e3):
+def along_change(
+    arm: SectionArm, x: Vector, x_1: Vector, theta_2: float, f: Vector, e1: float, e2: float, e3: float
+) -> float:
     """Bound on how much ``(x - W) . f`` changes over a box about (phi, theta_2, tau).
 
     ``(x - W) . f = y . f - U . f + const`` with y = x - C, and ``U . f`` depends on tau alone.
@@ -230,10 +235,11 @@ def along_change(arm, x, x_1, theta_2, f, e1, e2, e3):
     f : forearm direction at the middle; e1, e2, e3 : half-widths of the box, rad
     """
     y, f_t = subtract(x, arm.centre), cross(arm.axis_2, f)
-    rho = np.sqrt(dot(x_1, x_1))
+    rho: float = np.sqrt(dot(x_1, x_1))
     away = np.sqrt(dot(y, y)) + rho * e1
     upper = turned(arm.upper, arm.axis_2, np.cos(theta_2), np.sin(theta_2))
     s_2 = dot(y, f_t)
     first = abs(dot(x_1, f)) * e1 + abs(s_2) * e2 + abs(s_2 - dot(upper, f_t)) * e3
     second = rho * e1 * e1 + away * (e2 + e3) ** 2 + arm.upper_length * e3 * e3
-    return first + 0.5 * second + rho * e1 * (e2 + e3)
+    bound: float = first + 0.5 * second + rho * e1 * (e2 + e3)
+    return bound

@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.geometry.vectors import cross, dot, subtract
+from er3a.geometry.vectors import Vector, cross, dot, subtract
 from er3a.numerics.jit import kernel
-from er3a.workspace.section_arm import ROUND_OFF, along_change, turned, wrist_and_forearm
+from er3a.workspace.section_arm import ROUND_OFF, SectionArm, along_change, turned, wrist_and_forearm
 
 DIRECTIONS = 4
 _PIECES = 4
@@ -23,13 +23,15 @@ _LONGEST = 0.4
 
 
 @kernel
-def _direction(k):
+def _direction(k: int) -> Vector:
     """Unit changes of (phi, theta_2, tau): one joint each, and the upper arm alone with the forearm's tilt kept."""
     return ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, -1.0))[k]
 
 
 @kernel
-def _plan(arm, phi, theta_2, tau, way, cell):
+def _plan(
+    arm: SectionArm, phi: float, theta_2: float, tau: float, way: Vector, cell: tuple[float, float, float, float]
+) -> tuple[float, float]:
     """Half-length (rad) of the line that sweeps the cell, and the margin (m) by which it should succeed."""
     rho, z = 0.5 * (cell[0] + cell[1]), 0.5 * (cell[2] + cell[3])
     h_rho, h_z = 0.5 * (cell[1] - cell[0]), 0.5 * (cell[3] - cell[2])
@@ -64,7 +66,15 @@ def _plan(arm, phi, theta_2, tau, way, cell):
 
 
 @kernel
-def _sweeps(arm, phi, theta_2, tau, way, t, cell):
+def _sweeps(
+    arm: SectionArm,
+    phi: float,
+    theta_2: float,
+    tau: float,
+    way: Vector,
+    t: float,
+    cell: tuple[float, float, float, float],
+) -> bool:
     """Whether the line of half-length t provably sweeps the whole cell."""
     for sign in (-1.0, 1.0):
         a, b = theta_2 + sign * t * way[1], tau + sign * t * way[2]
@@ -109,7 +119,14 @@ def _sweeps(arm, phi, theta_2, tau, way, t, cell):
 
 
 @kernel
-def swept_angles(arm, phi, theta_2, tau, cell, steps):
+def swept_angles(
+    arm: SectionArm,
+    phi: float,
+    theta_2: float,
+    tau: float,
+    cell: tuple[float, float, float, float],
+    steps: tuple[float, float],
+) -> tuple[bool, float, float]:
     """Look about a stance for a line that sweeps the cell.
 
     Returns

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.workspace.lookup import EMPTY, FILLED, SectionMap
 from er3a.workspace.proof import judge
 from er3a.workspace.section_arm import SectionArm
@@ -37,7 +38,7 @@ class VolumeEstimate:
 
 
 def estimate_volume(
-    search: SectionArm | Callable[[np.ndarray], np.ndarray],
+    search: SectionArm | Callable[[Reals], Flags],
     section: SectionMap,
     reach: float,
     heights: tuple[float, float],
@@ -77,7 +78,7 @@ def estimate_volume(
     )
 
 
-def _decide(arm: SectionArm, rho: np.ndarray, azimuth: np.ndarray, z: np.ndarray, status: np.ndarray) -> None:
+def _decide(arm: SectionArm, rho: Reals, azimuth: Reals, z: Reals, status: Integers) -> None:
     """Judge open points as cells of next to no size."""
     for n in range(2):
         left = np.flatnonzero((status != FILLED) & (status != EMPTY))
@@ -106,7 +107,7 @@ def stratified_volume(arm: SectionArm, section: SectionMap, points: int, seed: i
     Each point stands for its whole ring (the symmetry about axis 1): what counts is how much of it is reached.
     """
     proof = section.proof
-    volume = proof.volumes * (proof.unfilled_share - proof.empty_share)
+    volume = proof.volumes * (proof.unfilled_ratio - proof.empty_ratio)
     share = np.cumsum(volume) / volume.sum()
     random = np.random.Generator(np.random.Philox(key=seed))
     unit = random.random((points, 2))
@@ -117,7 +118,7 @@ def stratified_volume(arm: SectionArm, section: SectionMap, points: int, seed: i
     half = POINT / 2
     rho = np.maximum(rho, 2 * half)
     looked = judge(arm, np.stack([rho - half, rho + half, z - half, z + half], axis=1))
-    open_before = (proof.unfilled_share - proof.empty_share)[cell]
-    lost = looked.unfilled_share / 2 + looked.empty_share / 2
-    reached = np.clip(1 - proof.empty_share[cell] - lost, 0, None) - (1 - proof.unfilled_share[cell])
+    open_before = (proof.unfilled_ratio - proof.empty_ratio)[cell]
+    lost = looked.unfilled_ratio / 2 + looked.empty_ratio / 2
+    reached = np.clip(1 - proof.empty_ratio[cell] - lost, 0, None) - (1 - proof.unfilled_ratio[cell])
     return proof.bounds[0] + float(volume.sum() * np.clip(reached / open_before, 0, 1).mean())

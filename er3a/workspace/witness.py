@@ -7,6 +7,7 @@ import numpy as np
 from er3a.kinematics.forward import forward
 from er3a.kinematics.numerical import solve
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
+from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
 from er3a.workspace.proof import Proof
 from er3a.workspace.section_arm import SectionArm, section_frame
@@ -15,7 +16,7 @@ POSITION_ONLY = np.array([1, 1, 1, 0, 0, 0])
 _RESTARTS, _TOLERANCE = 10, 1e-9
 
 
-def reach_points(robot: Robot, points: np.ndarray, starts: np.ndarray, restarts: int = _RESTARTS) -> np.ndarray:
+def reach_points(robot: Robot, points: Reals, starts: Reals, restarts: int = _RESTARTS) -> Reals:
     """Joint vectors (n, 6), rad, within the limits, that bring the tool point to ``points`` (n, 3), m; NaN where the
     iteration finds none from ``starts`` (n, 6) and from random starts."""
     T = np.tile(np.eye(4), (len(points), 1, 1))
@@ -24,7 +25,7 @@ def reach_points(robot: Robot, points: np.ndarray, starts: np.ndarray, restarts:
     return np.where(found.solved[:, None], found.q, np.nan)
 
 
-def witness_joints(robot: Robot, arm: SectionArm, proof: Proof) -> np.ndarray:
+def witness_joints(robot: Robot, arm: SectionArm, proof: Proof) -> Reals:
     """Joint vectors (cells, 6), rad, that reach into the cells; NaN where none is known.
 
     The proof's stances give joints 2 and 3 and the angle phi between arm and cell, from which the rest is found by
@@ -50,8 +51,9 @@ def witness_joints(robot: Robot, arm: SectionArm, proof: Proof) -> np.ndarray:
     return np.where(lies_in_cell(robot, q, proof, R, origin)[:, None], q, np.nan)
 
 
-def lies_in_cell(robot: Robot, q: np.ndarray, proof: Proof, R: np.ndarray, origin: np.ndarray) -> np.ndarray:
+def lies_in_cell(robot: Robot, q: Reals, proof: Proof, R: Reals, origin: Reals) -> Flags:
     """Whether each joint vector (cells, 6) brings the tool point into its own cell; False for NaN."""
     x, y, z = R @ (forward(robot, np.nan_to_num(q))[:, :3, 3] - origin).T
     rho, (a, b, c, d) = np.hypot(x, y), proof.cells.T
-    return np.isfinite(q[:, 0]) & (a <= rho) & (rho <= b) & (c <= z) & (z <= d)
+    inside: Flags = np.isfinite(q[:, 0]) & (a <= rho) & (rho <= b) & (c <= z) & (z <= d)
+    return inside

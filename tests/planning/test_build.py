@@ -12,8 +12,10 @@ from er3a.errors import InputError
 from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import transform
+from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
 from er3a.planning.build import build
+from er3a.planning.commands import Source
 
 HEAD = {"name": "path", "title": "A path", "samples": 20}
 DOWN = [180, 0, 0]
@@ -34,7 +36,8 @@ def built(folder: Path, entry: dict, table: str | None = None, ends=None):
     file = folder / "paths.yaml"
     before = [JOINTS | {"name": name} for name in ends or {}]
     file.write_text(json.dumps({"kind": "paths", "paths": [*before, entry]}))
-    return build(load_robot("er3a_c60"), load_paths(file).paths[-1], f"paths[{len(before)}]", file, ends or {})
+    command = load_paths(file).paths[-1].command(Source(file, f"paths[{len(before)}]"))
+    return build(load_robot("er3a_c60"), command, ends or {})
 
 
 def test_line_and_arc_start_and_end_where_they_say(tmp_path):
@@ -54,6 +57,14 @@ def test_joint_start_is_the_pose_there(tmp_path):
     np.testing.assert_allclose(
         found.tool.poses(np.array(0.0)), forward(load_robot("er3a_c60"), np.radians(q)), atol=1e-12
     )
+
+
+def test_start_branch_is_named_in_words_or_by_code(tmp_path):
+    slots = [
+        built(tmp_path, LINE | {"start_branch": name}).start_slot
+        for name in ("back, elbow up, flip", "back_elbow_up_flip")
+    ]
+    assert slots[0] == slots[1] == branch_labels(load_robot("er3a_c60")).index("back_elbow_up_flip")
 
 
 def test_path_goes_on_where_another_ended(tmp_path):

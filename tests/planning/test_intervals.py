@@ -7,10 +7,11 @@ import pytest
 
 from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import transform
+from er3a.kinematics.solutions import WristTooFar
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.planning.arcs import arc
 from er3a.planning.follow import follow
-from er3a.planning.intervals import out_of_limits, too_fast, unreachable
+from er3a.planning.intervals import AboveLimit, TooFast, out_of_limits, too_fast, unreachable
 from er3a.planning.moves import JointMove
 
 GRID = np.linspace(0, 1, 21)
@@ -29,7 +30,7 @@ def test_limit_that_is_left_between_two_check_points_only():
     (interval,) = out_of_limits(robot, GRID, joints(GRID), joints)
     half = np.sqrt(np.radians(0.01) / 4)
     assert (interval.start, interval.end) == pytest.approx((0.525 - half, 0.525 + half), abs=1e-7)
-    assert interval.cause == "J1 goes to 170.0 deg; its upper limit is 170 deg"
+    assert interval.cause == AboveLimit(1, pytest.approx(170.01, abs=0.01), pytest.approx(170))
 
 
 def test_speed_that_is_passed_between_two_check_points_only():
@@ -40,7 +41,7 @@ def test_speed_that_is_passed_between_two_check_points_only():
     assert (np.abs(velocity) < robot.speed).all()
     (interval,) = too_fast(robot, even, velocity, lambda t: move.joints(t)[1])
     np.testing.assert_allclose(move.joints(np.array([interval.start, interval.end]))[1][:, 5], robot.speed[5])
-    assert interval.cause == "J6 would need 840 deg/s; it can do 840 deg/s"
+    assert interval.cause == TooFast(6, pytest.approx(840.2, abs=0.1), pytest.approx(840))
 
 
 def test_motion_that_stays_below_has_no_interval():
@@ -70,4 +71,4 @@ def test_short_stretch_out_of_reach_between_check_points_is_found():
     assert y[0] == pytest.approx(-y[1], abs=1e-9)
     reach = inside - 0.0785  # the wrist centre's greatest distance from axis 1 at this height
     assert y[1] == pytest.approx(np.sqrt(2 * 2e-5 / (1 / path.radius - 1 / reach)), rel=1e-3)
-    assert "mm too far" in interval.cause
+    assert any(isinstance(reason.why, WristTooFar) for reason in interval.cause.reasons)

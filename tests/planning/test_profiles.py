@@ -14,7 +14,7 @@ value = st.floats(-5, 5)
 
 @given(st.floats(0.1, 20), *[value] * 6)
 def test_meets_position_velocity_and_acceleration_at_both_ends(duration, start, end, v0, v1, a0, a1):
-    x, v, a = quintic(np.array([0.0, duration]), duration, start, end, v0, v1, a0, a1)
+    x, v, a = quintic(np.array([0.0, duration]), duration, start, end, (v0, v1), (a0, a1))
     scale = 1e-10 * (1 + duration**2)
     np.testing.assert_allclose(x, [start, end], atol=scale)
     np.testing.assert_allclose(v, [v0, v1], atol=scale / min(duration, 1))
@@ -23,7 +23,7 @@ def test_meets_position_velocity_and_acceleration_at_both_ends(duration, start, 
 
 @given(st.floats(0.5, 20), *[value] * 6)
 def test_derivatives_are_those_of_the_position(duration, start, end, v0, v1, a0, a1):
-    arguments = (duration, start, end, v0, v1, a0, a1)
+    arguments = (duration, start, end, (v0, v1), (a0, a1))
     t, step = np.linspace(0.05, 0.95, 19) * duration, 1e-4 * duration
     _, v, a = quintic(t, *arguments)
     before, after = quintic(t - step, *arguments), quintic(t + step, *arguments)
@@ -45,7 +45,7 @@ def test_agrees_with_robotics_toolbox(boundary, random):
     start, end, v0, v1 = random.uniform(-2, 2, (4, 6))
     ends = {"qd0": v0, "qd1": v1} if boundary else {}
     theirs = rtb.jtraj(start, end, t, **ends)
-    ours = quintic(t, duration, start, end, *((v0, v1) if boundary else ()))
+    ours = quintic(t, duration, start, end, (v0, v1) if boundary else (0.0, 0.0))
     for mine, other in zip(ours, (theirs.q, theirs.qd, theirs.qdd)):
         np.testing.assert_allclose(mine, other, atol=1e-9)
 

@@ -25,7 +25,7 @@ def test_limits_hold_and_one_of_them_is_in_use_everywhere(random):
     angles = np.linspace(0, 2 * np.pi, 400)[:, None]
     q = np.sin(angles * [1, 1, 2, 1, 3, 1] + random.uniform(0, 6, 6)) * random.uniform(0.2, 1, 6)
     motion = fastest(q, LIMITS)
-    speed, acceleration = motion.share(LIMITS)
+    speed, acceleration = motion.ratios(LIMITS)
     assert speed <= 1 + 1e-6
     assert acceleration <= 1 + 1e-6
     by_difference = np.diff(motion.q, axis=0) / np.diff(motion.t)[:, None]
@@ -53,7 +53,7 @@ def test_a_programme_within_the_limits_keeps_its_time(random):
     assert fastest(q, LIMITS).duration < 3.0
     hurried = fastest(q, LIMITS, t / 20)
     assert hurried.duration > 0.3
-    assert max(hurried.share(LIMITS)) <= 1 + 1e-6
+    assert max(hurried.ratios(LIMITS)) <= 1 + 1e-6
 
 
 def test_nodes_resolve_a_sharp_bend():

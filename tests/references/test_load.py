@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from er3a.errors import InputError
-from er3a.files.reference_rows import COLUMNS
+from er3a.files.reference_rows import FORMATS
 from er3a.files.reference_sets import MANUAL_REFS, check_reference_file, load_references
-from er3a.references.scalars import scalars_of
+from er3a.references.subjects import JointLimit, PoseExcess
 from er3a.robots.robot import GRADES
 
 LIMITS = "joint,lower_deg,upper_deg,uncertainty_deg,source,grade\n"
@@ -29,7 +29,7 @@ def written(folder: Path, name: str, text: str) -> Path:
 @pytest.mark.parametrize("name", ["er3a_c60", "er3a_c60_article", "er3_600"])
 def test_every_committed_reference_has_source_grade_and_uncertainty(name):
     references = load_references(name)
-    assert set(references.rows) <= set(COLUMNS)
+    assert set(references.rows) <= set(FORMATS)
     for reference in references.references:
         assert reference.source
         assert reference.grade in GRADES
@@ -42,7 +42,7 @@ def test_folder_and_name_give_the_same_set():
 
 def test_a_limit_that_is_not_given_is_kept_as_not_given():
     blank = [r for r in load_references("er3a_c60").references if r.expected is None]
-    assert [r.name for r in blank] == ["joint 6 lower limit", "joint 6 upper limit"]
+    assert [r.subject for r in blank] == [JointLimit(6, "lower"), JointLimit(6, "upper")]
 
 
 @pytest.mark.parametrize(
@@ -65,7 +65,7 @@ def test_a_limit_that_is_not_given_is_kept_as_not_given():
         (
             "limits.csv",
             LIMITS + "1,-170,170,0.5,m,official\n1,-165,170,0.5,m,official\n",
-            ["row 3", "contradicts row 2", "joint 1 lower"],
+            ["row 3", "contradicts row 2", "joint_limit(1, lower)"],
         ),
         ("limits.csv", LIMITS, ["no rows"]),
         ("speeds.csv", SPEEDS + "1,0,0.5,m,official\n", ["row 2", "speed_deg_s"]),
@@ -122,8 +122,8 @@ def test_unknown_set_and_empty_folder(tmp_path):
 def test_a_pose_that_a_source_shows_counts_as_within_the_limits_once(tmp_path):
     row = "up,{},0,90,0,0,0,0,10,0,699.5,0.1,m,cad\n"
     written(tmp_path, "positions.csv", POSITIONS + row.format("flange") + row.format("wrist_centre"))
-    names = [reference.name for reference in load_references(tmp_path).references]
-    assert names.count("up: outside the limits by") == 1
+    subjects = [reference.subject for reference in load_references(tmp_path).references]
+    assert subjects.count(PoseExcess("up")) == 1
 
 
 @pytest.mark.parametrize(
@@ -139,5 +139,5 @@ def test_a_pose_that_a_source_shows_counts_as_within_the_limits_once(tmp_path):
 )
 def test_without_uncertainty_half_the_last_digit_counts(tmp_path, name, text, uncertainty):
     (row,) = check_reference_file(written(tmp_path, name, text))
-    (reference, *_) = scalars_of(row)
+    (reference, *_) = row.references()
     assert reference.uncertainty == pytest.approx(uncertainty)

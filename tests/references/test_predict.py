@@ -16,16 +16,19 @@ from er3a.references.quantities import (
     ZERO_POSE,
     AxisAngle,
     AxisCoordinate,
+    AxisDistance,
     Extreme,
     Limit,
     ModelState,
     PoseOutside,
+    SectionExtent,
     SegmentAngle,
     Speed,
-    measure_of,
 )
 from er3a.references.reach import search
-from er3a.references.reference import Reference, conflicts, expected_of
+from er3a.references.reference import Reference, conflicts, expected_of, quantities_of
+from er3a.references.rows import PositionRow
+from er3a.references.subjects import AxisDirection, JointLimit
 from er3a.robots.robot import Robot
 
 # Joint origins (m, rad) of the URDF in hanliumaozhi/efort_description: xyz, then fixed-axis roll, pitch, yaw.
@@ -63,7 +66,9 @@ def published_modified_table() -> Robot:
 
 
 def test_committed_positions_follow_from_the_urdf():
-    rows = [row for row in load_references("er3a_c60").positions if row.grade == "export" and row.point == "flange"]
+    rows = [
+        row for row in load_references("er3a_c60").of(PositionRow) if row.grade == "export" and row.point == "flange"
+    ]
     assert len(rows) >= 7
     for row in rows:
         np.testing.assert_allclose(urdf_flange_mm(row.pose), row.xyz_mm, atol=0.006)
@@ -115,8 +120,7 @@ def test_segments_of_the_article_arm_lie_as_the_table_has_them():
 def test_limits_speeds_and_poses_outside():
     robot = load_robot("er3_600")
     pose = (0.0, 90.0, 0.0, 0.0, 0.0, 0.0)
-    reference = Reference("p", "key poses", PoseOutside(pose), 0.0, 0.1, "s", "official")
-    state = state_of(robot, (reference,))
+    state = state_of(robot, (PoseOutside(pose),))
     assert PoseOutside(pose).value(state) == pytest.approx(5)
     assert Limit(3, "upper").value(state) == pytest.approx(185)
     assert Speed(6).value(state) == pytest.approx(840)
@@ -125,7 +129,8 @@ def test_limits_speeds_and_poses_outside():
 def test_a_batch_of_candidates_is_read_at_once():
     """Leading dimensions of the state are candidate tables; the result is each table's prediction."""
     robot = load_robot("er3a_c60")
-    stated = tuple(r for r in load_references("er3a_c60").checkable if not isinstance(r.quantity, Extreme))
+    references = tuple(r for r in load_references("er3a_c60").checkable if not isinstance(r.quantity, Extreme))
+    stated = quantities_of(references)
     candidates = [robot.replace(d=robot.d + shift) for shift in (0.0, 0.001, 0.01)]
     states = [state_of(candidate, stated) for candidate in candidates]
     keys = ("direction", "lower", "upper", "speed")
@@ -138,20 +143,23 @@ def test_a_batch_of_candidates_is_read_at_once():
     values = read(stated, batch)
     assert values.shape == (3, len(stated))
     for row, candidate in zip(values, candidates):
-        np.testing.assert_array_equal(row, predict(candidate, stated))
+        np.testing.assert_array_equal(row, predict(candidate, references))
 
 
 @pytest.mark.parametrize("point", ["wrist_centre", "flange"])
-@pytest.mark.parametrize("measure", ["axis_1", "axis_2", "section_x", "section_z"])
-def test_extremes_are_never_beaten_by_sampling(robot, random, point, measure):
+@pytest.mark.parametrize(
+    ("kind", "where"), [(AxisDistance, 1), (AxisDistance, 2), (SectionExtent, "x"), (SectionExtent, "z")]
+)
+def test_extremes_are_never_beaten_by_sampling(robot, random, point, kind, where):
     q = random.uniform(robot.lower, robot.upper, (50_000, 6))
     q[:, 0] = 0
-    sampled = measure_of(frames(robot, q), point, measure) * 1000
-    greatest, at = search(robot, Extreme(point, measure, "greatest"), 16)
-    least, _ = search(robot, Extreme(point, measure, "least"), 16)
+    extreme = kind(point, "greatest", where)
+    sampled = extreme.measure(frames(robot, q)) * 1000
+    greatest, at = search(robot, extreme, 16)
+    least, _ = search(robot, kind(point, "least", where), 16)
     assert sampled.max() <= greatest + 1e-6
     assert least - 1e-6 <= sampled.min()
-    assert greatest == pytest.approx(float(measure_of(frames(robot, at), point, measure)) * 1000, abs=1e-9)
+    assert greatest == pytest.approx(float(extreme.measure(frames(robot, at))) * 1000, abs=1e-9)
     assert ((at >= robot.lower - 1e-12) & (at <= robot.upper + 1e-12)).all()
 
 
@@ -162,7 +170,7 @@ def test_wrist_reach_is_that_of_the_stretched_arm(name, reach):
     robot = load_robot(name)
     a, d = robot.a * 1000, robot.d * 1000
     assert a[0] + a[1] + np.hypot(a[2], d[3]) == pytest.approx(reach, abs=1e-3)
-    assert search(robot, Extreme("wrist_centre", "axis_1", "greatest"), 32)[0] == pytest.approx(reach, abs=1e-3)
+    assert search(robot, AxisDistance("wrist_centre", "greatest", 1), 32)[0] == pytest.approx(reach, abs=1e-3)
 
 
 def test_reach_respects_limits():
@@ -172,11 +180,11 @@ def test_reach_respects_limits():
     robot = robot.replace(upper=np.where(np.arange(6) == 2, np.radians(20), robot.upper))
     bend = np.radians(np.array([-60, 20]) + 90)
     lengths = np.sqrt(0.65**2 + 0.65161**2 + 2 * 0.65 * 0.65161 * np.cos(bend)) * 1000
-    value = search(robot, Extreme("wrist_centre", "axis_2", "greatest"), 32)[0]
+    value = search(robot, AxisDistance("wrist_centre", "greatest", 2), 32)[0]
     assert value == pytest.approx(lengths.max(), abs=1e-6)
 
 
-def test_the_makers_two_radii_conflict_and_nothing_else():
+def test_the_manufacturers_two_radii_conflict_and_nothing_else():
     stated = load_references("er3_600").checkable
     pairs = conflicts(stated)
     assert [{stated[i].expected, stated[j].expected} for i, j in pairs] == [{592.8, 600.0}]
@@ -187,7 +195,7 @@ def test_the_makers_two_radii_conflict_and_nothing_else():
 @given(st.floats(-1000, 1000), st.floats(-1000, 1000), st.floats(0.01, 50), st.floats(0.01, 50))
 def test_a_conflict_is_what_no_value_can_meet(first, second, u1, u2):
     pair = tuple(
-        Reference("r", "limits", Limit(1, "upper"), expected, uncertainty, source, "official")
+        Reference(JointLimit(1, "upper"), "limits", Limit(1, "upper"), expected, uncertainty, source, "official")
         for expected, uncertainty, source in ((first, u1, "a"), (second, u2, "b"))
     )
     best = (first * u2 + second * u1) / (u1 + u2)
@@ -200,7 +208,7 @@ def test_directions_conflict_by_the_angle_between_them():
     level, tilted = (1.0, 0.0, 0.0), (np.cos(0.02), 0.0, np.sin(0.02))
     for uncertainty, count in ((0.5, 1), (0.6, 0)):
         pair = tuple(
-            Reference("r", "axes", AxisAngle(4, toward, False), 0.0, uncertainty, source, "cad")
+            Reference(AxisDirection(4, False), "axes", AxisAngle(4, toward, False), 0.0, uncertainty, source, "cad")
             for toward, source in ((level, "a"), (tilted, "b"))
         )
         assert len(conflicts(pair)) == count

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from er3a.pipeline.stages.workspace.capability_numbers import CanDo, can_do
 
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.files.yaml_file import load
-from er3a.pipeline.stages.workspace.capability_numbers import CanDo, can_do
 from er3a.pipeline.stages.workspace.capability_texts import capability_context
 from er3a.pipeline.stages.workspace.cell_lookup import CellLookup
 from er3a.pipeline.study import CapabilitySettings, Study

@@ -282,9 +282,9 @@ def test_a_cell_judged_alone_contradicts_nothing(proven):
     robot, section = proven
     chosen = np.arange(0, len(section.proof.cells), 97)
     alone, known = judge(section_arm(robot), section.proof.cells[chosen]), section.proof.rows(chosen)
-    assert (alone.unfilled_share >= known.unfilled_share - 1e-9).all()
-    assert (alone.empty_share <= known.unfilled_share + 1e-9).all()
-    assert (known.empty_share <= alone.unfilled_share + 1e-9).all()
+    assert (alone.unfilled_ratio >= known.unfilled_ratio - 1e-9).all()
+    assert (alone.empty_ratio <= known.unfilled_ratio + 1e-9).all()
+    assert (known.empty_ratio <= alone.unfilled_ratio + 1e-9).all()
 
 
 def test_threads_change_nothing(proven):

@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 from er3a.pipeline.estimate.jobs import Job, jobs_of, wall_time
 from er3a.pipeline.estimate.speed import SamplingSpeed, sampling_speed
 from er3a.pipeline.estimate.timings import FEW_SAMPLES, Key, Timing, Trial, logged, timed, trial, written_bytes
+from er3a.pipeline.stages.workspace.entry import WorkspaceSettings
 from er3a.pipeline.study import Study
 
 IDLE_JOBS = 12
@@ -102,7 +103,7 @@ def disk_bytes(study: Study, calibration: Calibration) -> tuple[int, int]:
     """Size of the study's results and views, and of sampled parts, which go once they are gathered."""
     sizes = calibration.result_bytes
     whole = sum(sizes.get(_written(name, study), mean(sizes.values())) for name in study.names)
-    return round(whole), calibration.trial.part_bytes * study.workspace.parts * len(study.names)
+    return round(whole), calibration.trial.part_bytes * study.section(WorkspaceSettings).parts * len(study.names)
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,8 @@ def _estimate(job: Job, study: Study, calibration: Calibration, wander: float) -
     else:
         timing = calibration.trial.timings[job.key[:2]]
     if job.key[:2] == ("compute", "workspace"):
-        timing = Timing(timing.seconds + study.workspace.parts * calibration.trial.gather_s, timing.memory_mb)
+        gathering = study.section(WorkspaceSettings).parts * calibration.trial.gather_s
+        timing = Timing(timing.seconds + gathering, timing.memory_mb)
     return _uncertain(timing, wander)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.stages.workspace.entry import WorkspaceSettings
 from er3a.pipeline.study import Study
 
 
@@ -47,7 +48,7 @@ def jobs_of(study: Study) -> list[Job]:
         for stage in study.stages(robot):
             parts: tuple[int, ...] = ()
             if STAGES[stage].sampled:
-                count, total = study.workspace.parts, study.workspace.samples
+                count, total = study.section(WorkspaceSettings).parts, study.section(WorkspaceSettings).samples
                 parts = tuple(
                     add("sample", stage, robot, total * (n + 1) // count - total * n // count) for n in range(count)
                 )

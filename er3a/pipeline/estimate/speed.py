@@ -9,6 +9,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 
 from er3a.pipeline.estimate.timings import FEW_SAMPLES
+from er3a.pipeline.stages.workspace.entry import WorkspaceSettings
 from er3a.pipeline.study import Study
 from er3a.sampling.grid import make_grid
 from er3a.sampling.random_joints import Draw
@@ -40,7 +41,7 @@ def sampling_speed(study: Study, robot: str) -> SamplingSpeed:
 
 
 def _speeds(study: Study, name: str) -> list[float]:
-    robot, settings = study.robot(name), study.workspace
+    robot, settings = study.robot(name), study.section(WorkspaceSettings)
     grid = make_grid(robot, settings.cells_across)
 
     def seconds(samples: int) -> float:

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from er3a.pipeline.estimate.cost import Calibration, cost, disk_bytes, estimates_of
 from er3a.pipeline.estimate.jobs import jobs_of
+from er3a.pipeline.stages.workspace.entry import WorkspaceSettings
 from er3a.pipeline.study import Study
 
 
@@ -18,7 +19,7 @@ def print_estimate(study: Study, calibration: Calibration, cores: list[int]) -> 
     """Print speeds, processor time by kind of job, wall time and memory by number of cores, and disk space."""
     console = Console()
     here = os.cpu_count() or 1
-    total = study.workspace.samples * sum("workspace" in study.stages(name) for name in study.names)
+    total = study.section(WorkspaceSettings).samples * sum("workspace" in study.stages(name) for name in study.names)
     console.print(f"{len(study.names)} robots, {total:.3g} samples together. Measured here, all {here} cores busy:")
 
     speeds = Table("robot", box=box.SIMPLE)

@@ -18,6 +18,7 @@ from er3a.errors import Er3aError, ResultError
 from er3a.pipeline.estimate.jobs import Job
 from er3a.pipeline.results import read_provenance
 from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.stages.workspace.entry import WorkspaceSettings
 from er3a.pipeline.stages.workspace.parts import gather
 from er3a.pipeline.study import Study
 
@@ -86,7 +87,7 @@ def trial(study: Study, robot: str, whole: bool) -> Trial:
     """Sample a robot's workspace; ``whole``: also carry out its stages at the study's budgets, on all cores here."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
-        settings = study.workspace.model_copy(update={"samples": FEW_SAMPLES, "blocks": 1})
+        settings = study.section(WorkspaceSettings).model_copy(update={"samples": FEW_SAMPLES, "blocks": 1})
         alone = {"workspace": settings, "robots": {robot: study.robots[robot]}, "sweeps": {}}
         small = study.model_copy(update=alone)
         content = small.model_dump(mode="json", by_alias=True, exclude_none=True)

@@ -12,12 +12,14 @@ text in the catalogues.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import singledispatch
-from typing import Any
+from typing import Any, TypeVar
 
 from er3a.findings import Finding
 from er3a.pipeline.messages import language
+
+KeyT = TypeVar("KeyT", bound=str)
 
 
 @singledispatch
@@ -36,7 +38,7 @@ def counted(code: str, one: str, many: str, count: int, /, **parts: Any) -> str:
     return language.translated_count(code, one, many, count).format(count=count, **parts)
 
 
-def word(code: str, words: dict[str, str], key: str) -> str:
+def word(code: str, words: Mapping[KeyT, str], key: KeyT) -> str:
     """The word for a code out of a table of words marked with ``N_``; a key without one stays as it is."""
     return language.translated(code, words[key]) if key in words else key
 

@@ -17,6 +17,7 @@ from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import Provenance, input_records
+from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.study import Study
 from er3a.pipeline.teach.words import WORDS
 from er3a.pipeline.viewing.page import render, run_command
@@ -33,7 +34,7 @@ NEAR_SINGULAR = 1e-2  # smallest singular value below which an arm without named
 def write_teach_page(study: Study, name: str, output: Path) -> None:
     """Write the teach panel of a robot of the study to ``output``."""
     robot = study.robot(name)
-    settings = study.trajectory
+    settings = study.section(TrajectorySettings)
     near = {
         "wrist": np.radians(settings.near_wrist_deg),
         "elbow": np.radians(settings.near_elbow_deg),

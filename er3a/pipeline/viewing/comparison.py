@@ -17,7 +17,7 @@ from er3a.pipeline.viewing.heads import stage_head
 from er3a.pipeline.viewing.numbers import number
 from er3a.robots.robot import Robot
 
-BORDER_POINT = "tool point"
+BORDER_POINT = "tool_point"
 CONVENTIONS = {"standard": N_("standard"), "modified": N_("modified")}
 
 

@@ -8,8 +8,8 @@ from dataclasses import astuple, dataclass
 from pathlib import Path
 
 from er3a.errors import ResultError
+from er3a.files.kept_files import sha256
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.kept_files import sha256
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.results import CHECKSUMS, Input, Provenance, result_records

@@ -15,7 +15,7 @@ from typing import Any
 import jinja2
 from matplotlib.figure import Figure
 
-from er3a.pipeline.kept_files import write_atomically
+from er3a.files.kept_files import write_atomically
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import say, word

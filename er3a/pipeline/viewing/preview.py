@@ -13,7 +13,7 @@ from PIL import Image
 from rerun.experimental import ViewerClient
 
 from er3a.errors import Er3aError
-from er3a.pipeline.results import write_atomically
+from er3a.files.kept_files import write_atomically
 from er3a.pipeline.viewing.viewer import LOOPBACK, free_port, viewer_running
 
 WINDOW = (1400, 900)  # pixels

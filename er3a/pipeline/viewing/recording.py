@@ -11,7 +11,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from er3a.pipeline.results import write_atomically
+from er3a.files.kept_files import write_atomically
 from er3a.pipeline.viewing.palette import rgb
 
 TIMELINE = "t"

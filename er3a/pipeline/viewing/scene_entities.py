@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 
 from er3a.collision.scene import Plane, Scene
 from er3a.files.scene_file import load_scene
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import size_of
 from er3a.pipeline.viewing.palette import MUTED, rgb
@@ -30,8 +30,8 @@ def log_scene(stream: rr.RecordingStream, study: Study, name: str, stage: str) -
 
 
 def _solids(
-    scene: Scene, base: NDArray[np.float64], plane_size: float
-) -> Iterator[tuple[str, NDArray[np.float64], rr.Boxes3D | rr.Cylinders3D | rr.Ellipsoids3D]]:
+    scene: Scene, base: Reals, plane_size: float
+) -> Iterator[tuple[str, Reals, rr.Boxes3D | rr.Cylinders3D | rr.Ellipsoids3D]]:
     """Name, place (4, 4) and shape of each solid; planes are squares of ``plane_size`` (m) nearest to the base (3,)."""
     style: dict[str, Any] = {"colors": [(*rgb(MUTED), 120)], "fill_mode": "transparentfillmajorwireframe"}
     for box in scene.boxes:
@@ -45,7 +45,7 @@ def _solids(
         yield plane.name, _below(plane, base), slab
 
 
-def _below(plane: Plane, base: NDArray[np.float64]) -> NDArray[np.float64]:
+def _below(plane: Plane, base: Reals) -> Reals:
     """Where a slab lies whose upper side is in the plane, its middle next to the base."""
     normal = plane.normal
     x = np.linalg.svd(normal[None])[2][1]

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.results import Stored, read_stage
 from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceSummary
 from er3a.pipeline.study import Study
 from er3a.pipeline.sweeps import ENTRIES, entry_label
 from er3a.pipeline.viewing.figures import new_figure
@@ -38,9 +39,9 @@ class Point:
         return self.stages["workspace"].results.summary
 
     @property
-    def enclosed(self) -> list[Void]:
+    def enclosed(self) -> list[VoidSummary]:
         """The enclosed voids that the workspace stage lists."""
-        return [void for void in self.workspace.voids if void.kind == "enclosed"]
+        return self.workspace.enclosed_voids
 
     def litres(self, bound: str) -> float:
         """The ``lower`` or ``upper`` bound of the enclosed voids' volume together, L."""

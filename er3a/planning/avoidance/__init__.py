@@ -1,1 +1,5 @@
-"""Ways around the singular regions of a path of the tool: one module per way, each one function of a trouble."""
+"""Singularity avoidance: one module per strategy, each one function of a path with singular segments."""
+
+from typing import Literal
+
+StrategyName = Literal["slow", "branch", "via_shift", "via_tilt", "damped", "detour", "stop"]

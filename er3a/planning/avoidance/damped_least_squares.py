@@ -19,9 +19,10 @@ import numpy as np
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import rows_of, step_row, turn_row
 from er3a.kinematics.singularity import characteristic_length
+from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
-from er3a.pipeline.messages.language import N_
-from er3a.planning.avoidance.singular_segment import Trouble, WayAround
+from er3a.planning.avoidance.findings import BeginsOutOfReach, NoDampingSuffices, NotPossible
+from er3a.planning.avoidance.singular_segment import Avoidance, SingularSegment
 from er3a.planning.timing import Timed, joined
 
 STEPS = 1000
@@ -29,41 +30,49 @@ THRESHOLD = 0.1  # of the smallest singular value, linear rows divided by the ch
 FEEDBACK = 10.0  # 1/s
 DAMPINGS = np.geomspace(2e-3, 0.5, 9)
 
+Row = tuple[float, float, float, float]
 
-def damped(trouble: Trouble) -> WayAround:
+
+def damped(segment: SingularSegment) -> Avoidance | NotPossible:
     """Follow the path on its own time law, with the least damping that keeps the joints within their limits.
 
     Where no damping bounds the accelerations too, it is the least that bounds the speeds.
     """
-    if np.isnan(trouble.q[0, 0]):
-        return WayAround("damped", None, 0.0, N_("the path begins out of reach"))
-    line = trouble.followed.line
+    if np.isnan(segment.q[0, 0]):
+        return BeginsOutOfReach()
+    line = segment.followed.line
     t = np.linspace(0.0, line.duration, STEPS + 1)
     T = line.poses(line.progress(t)[0])
-    runs = [_run(trouble, t, T, damping) for damping in DAMPINGS]
-    shares = np.array([motion.share(trouble.limits) for motion in runs])
-    held = np.flatnonzero((shares <= 1.0).all(axis=1))
+    runs = [_run(segment, t, T, damping) for damping in DAMPINGS]
+    ratios = np.array([motion.ratios(segment.limits) for motion in runs])
+    held = np.flatnonzero((ratios <= 1.0).all(axis=1))
     if not held.size:
-        held = np.flatnonzero(shares[:, 0] <= 1.0)
+        held = np.flatnonzero(ratios[:, 0] <= 1.0)
     if not held.size:
-        return WayAround("damped", None, 0.0, N_("no damping keeps the joint speeds within their limits at this pace"))
+        return NoDampingSuffices()
     best = runs[int(held[0])]
-    return WayAround("damped", joined([*trouble.begin(), best]))
+    return Avoidance(joined([*segment.begin(), best]))
 
 
-def _run(trouble: Trouble, t: np.ndarray, T: np.ndarray, damping: float) -> Timed:
-    robot = trouble.robot
+def _run(segment: SingularSegment, t: Reals, T: Reals, damping: float) -> Timed:
+    robot = segment.robot
     q = np.empty((len(t), 6))
-    q[0] = trouble.q[0]
+    q[0] = segment.q[0]
     length = characteristic_length(robot)
     _damped_steps(robot.direction, robot.offset, constant_links(robot), T, t[1] - t[0], length, damping, q)
-    velocity = np.gradient(q, t, axis=0)
+    velocity = _slope(q, t)
     velocity[0] = velocity[-1] = 0.0
-    return Timed(t, q, velocity, np.gradient(velocity, t, axis=0))
+    return Timed(t, q, velocity, _slope(velocity, t))
+
+
+def _slope(values: Reals, t: Reals) -> Reals:
+    return np.asarray(np.gradient(values, t, axis=0))
 
 
 @kernel
-def _damped_steps(direction, offset, links, T, dt, length, damping, q):
+def _damped_steps(
+    direction: Reals, offset: Reals, links: Reals, T: Reals, dt: float, length: float, damping: float, q: Reals
+) -> None:
     """Fill ``q`` (N, 6) from its first row on: the joints that run after the poses ``T`` (N, 4, 4)."""
     J, wanted = np.empty((6, 6)), np.empty(6)
     for n in range(q.shape[0] - 1):
@@ -86,7 +95,7 @@ def _damped_steps(direction, offset, links, T, dt, length, damping, q):
 
 
 @kernel
-def _pull(tool, now, then, gain, length, wanted):
+def _pull(tool: tuple[Row, Row, Row], now: Reals, then: Reals, gain: float, length: float, wanted: Reals) -> None:
     """The step (6,) asked for: from one target to the next, and ``gain`` times from the tool to the target now."""
     for r in range(3):
         wanted[r] = (then[r, 3] - now[r, 3] + gain * (now[r, 3] - tool[r][3])) / length
@@ -99,7 +108,9 @@ def _pull(tool, now, then, gain, length, wanted):
 
 
 @kernel
-def _scaled_jacobian(q, direction, offset, links, length, J):
+def _scaled_jacobian(
+    q: Reals, direction: Reals, offset: Reals, links: Reals, length: float, J: Reals
+) -> tuple[Row, Row, Row]:
     """Fill ``J`` (6, 6), linear rows divided by ``length``; the tool's frame as three rows."""
     x, y, z = rows_of(links[0])
     points = np.empty((6, 3))

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
+from er3a.numerics.arrays import Reals
 from er3a.planning.moves import ToolPath
 
 POINTS = 2001
 LENGTH = 0.001 / np.radians(1.0)  # m per rad
 
 
-def deviation(line: ToolPath, T: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def deviation(line: ToolPath, T: Reals) -> tuple[Reals, Reals, Reals]:
     """Distance and angle of poses from the path's nearest pose, where 1 mm weighs as much as 1 deg.
 
     Parameters
@@ -36,5 +37,5 @@ def deviation(line: ToolPath, T: np.ndarray) -> tuple[np.ndarray, np.ndarray, np
     return distance, 2 * np.arcsin(np.minimum(chord, 1.0)), refined
 
 
-def _points(T: np.ndarray) -> np.ndarray:
+def _points(T: Reals) -> Reals:
     return np.concatenate([T[:, :3, 3] / LENGTH, T[:, :3, :3].reshape(-1, 9) / np.sqrt(2.0)], axis=1)

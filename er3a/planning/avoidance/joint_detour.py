@@ -4,29 +4,31 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.pipeline.messages.language import N_
-from er3a.planning.avoidance.singular_segment import Trouble, WayAround
-from er3a.planning.timing import joined, straight
+from er3a.planning.avoidance.findings import BeginsOutOfReach, EndsOutOfReach, NoSingularRegion, NotPossible
+from er3a.planning.avoidance.singular_segment import Avoidance, SingularSegment
+from er3a.planning.timing import Timed, joined, straight
 
 
-def detour(trouble: Trouble) -> WayAround:
+def detour(segment: SingularSegment) -> Avoidance | NotPossible:
     """Follow the path up to the last good pose, move the joints to the next good one, and go on, at every region.
 
     Where the path begins or ends inside a region, its first or last joints take the place of the good pose.
     """
-    if not trouble.regions:
-        return WayAround("detour", None, 0.0, N_("there is no singular region to go around"))
-    count, parts, at = len(trouble.t), [], 0
-    for first, last in trouble.regions:
+    if not segment.regions:
+        return NoSingularRegion()
+    count, at = len(segment.t), 0
+    parts: list[Timed] = []
+    for first, last in segment.regions:
         before, after = max(first - 1, 0), min(last, count - 1)
-        for index, reason in ((before, N_("the path begins out of reach")), (after, N_("the path ends out of reach"))):
-            if np.isnan(trouble.q[index, 0]):
-                return WayAround("detour", None, 0.0, reason)
+        if np.isnan(segment.q[before, 0]):
+            return BeginsOutOfReach()
+        if np.isnan(segment.q[after, 0]):
+            return EndsOutOfReach()
         if before > at:
-            parts += [*(trouble.begin() if at == 0 else []), trouble.along(at, before)]
-        leave = trouble.q[before] if before > 0 else trouble.first_joints
-        parts.append(straight(leave, trouble.q[after], trouble.limits))
+            parts += [*(segment.begin() if at == 0 else []), segment.along(at, before)]
+        leave = segment.q[before] if before > 0 else segment.first_joints
+        parts.append(straight(leave, segment.q[after], segment.limits))
         at = after
     if at < count - 1:
-        parts.append(trouble.along(at, count - 1))
-    return WayAround("detour", joined(parts))
+        parts.append(segment.along(at, count - 1))
+    return Avoidance(joined(parts))

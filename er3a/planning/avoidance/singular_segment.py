@@ -1,15 +1,17 @@
-"""Where a followed path is in trouble, and what a way around it yields."""
+"""Where a followed path is singular, nearly so or out of reach, and what a strategy that avoids it yields."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from er3a.kinematics.singularity import TYPES, determinant_factors
+from er3a.numerics.arrays import Flags, Reals
+from er3a.planning.avoidance.findings import NotPossible
 from er3a.planning.followed import Followed
+from er3a.planning.near_singular import NearSingular
 from er3a.planning.singular_events import SingularEvent, runs
 from er3a.planning.timing import JointLimits, Timed, fastest, nodes_along, straight
 from er3a.robots.robot import Robot
@@ -19,37 +21,30 @@ POINTS = 501
 
 
 @dataclass(frozen=True, eq=False)
-class WayAround:
-    """One way around, carried out: ``motion`` is None where it is not possible, and ``reason`` then says why.
+class Avoidance:
+    """A strategy, carried out: its motion, and the share of the path (0..1) that is done."""
 
-    Attributes
-    ----------
-    done : share of the path that is done, 0..1
-    """
-
-    name: str
-    motion: Timed | None
+    motion: Timed
     done: float = 1.0
-    reason: str = ""
 
 
 @dataclass(frozen=True, eq=False)
-class Trouble:
+class SingularSegment:
     """A path that comes nearer to a singular set than ``near``, or leaves the arm's reach.
 
     Attributes
     ----------
     followed : the path as it is followed
     t, q : (N,) s and (N, 6) rad, along the path; q NaN where unreachable
-    near : per type of singularity the distance in rad or m that the path is to keep
+    near : the distances that the path is to keep
     limits : of the joints
     fixed_start : whether the joints at the start are given, or only the tool's pose
     """
 
     followed: Followed
-    t: np.ndarray
-    q: np.ndarray
-    near: Mapping[str, float]
+    t: Reals
+    q: Reals
+    near: NearSingular
     limits: JointLimits
     fixed_start: bool
 
@@ -59,9 +54,9 @@ class Trouble:
         return self.followed.robot
 
     @cached_property
-    def good(self) -> np.ndarray:
+    def good(self) -> Flags:
         """(N,) bool, whether the path can be reached and keeps its distance, away from places where a branch ends."""
-        good = clear(self.robot, self.q, self.near)
+        good: Flags = self.near.margin(self.robot, self.q) >= 1.0
         for jump in self.followed.jumps:
             after = np.searchsorted(self.t, jump.t)
             good[max(after - 1, 0) : after + 1] = False
@@ -73,9 +68,10 @@ class Trouble:
         return runs(~self.good)
 
     @cached_property
-    def first_joints(self) -> np.ndarray:
+    def first_joints(self) -> Reals:
         """Joints (6,) at which the arm waits before the path begins; the path's own unless its start is singular."""
-        return self.q[0] - self.followed.start_turn
+        first: Reals = self.q[0] - self.followed.start_turn
+        return first
 
     def begin(self) -> list[Timed]:
         """The turn at rest that a singular start may ask for; no part where none is needed."""
@@ -93,19 +89,23 @@ class Trouble:
         return fastest(q, self.limits, t if programmed else None)
 
 
-def coarse(t: np.ndarray) -> np.ndarray:
+Strategy = Callable[[SingularSegment], Avoidance | NotPossible]
+
+
+def coarse(t: Reals) -> Reals:
     """About POINTS of the times (N,), with both ends."""
-    return t[np.unique(np.linspace(0, len(t) - 1, min(POINTS, len(t))).round().astype(int))]
+    kept: Reals = t[np.unique(np.linspace(0, len(t) - 1, min(POINTS, len(t))).round().astype(int))]
+    return kept
 
 
-def trouble_of(
+def singular_segment(
     followed: Followed,
-    near: Mapping[str, float],
+    near: NearSingular,
     limits: JointLimits,
     events: list[SingularEvent] | None = None,
     fixed_start: bool = False,
-) -> Trouble:
-    """What is to be repaired on a path, at its own grid points and at its events."""
+) -> SingularSegment:
+    """What is to be avoided on a path, at its own grid points and at its events."""
     inner = [event.t for event in events or [] if 0 < event.t < followed.t[-1]]
     t = np.unique(np.concatenate([followed.t, inner]))
     q = followed.q
@@ -113,16 +113,4 @@ def trouble_of(
         new = ~np.isin(t, followed.t)
         q = np.empty((len(t), 6))
         q[~new], q[new] = followed.q, followed.joints(t[new])
-    return Trouble(followed, t, q, near, limits, fixed_start)
-
-
-def clear(robot: Robot, q: np.ndarray, near: Mapping[str, float]) -> np.ndarray:
-    """Whether arms (N, 6), NaN where unreachable, keep their distance from all singular sets; (N,) bool."""
-    return margin(robot, q, near) >= 1.0
-
-
-def margin(robot: Robot, q: np.ndarray, near: Mapping[str, float]) -> np.ndarray:
-    """Least distance from a singular set, in parts of the distance to keep; (N,), -1 where unreachable."""
-    factors = determinant_factors(robot, q)
-    parts = np.stack([np.abs(getattr(factors, kind)) / near[kind] for kind in TYPES])
-    return np.where(np.isnan(parts[0]), -1.0, parts.min(axis=0))
+    return SingularSegment(followed, t, q, near, limits, fixed_start)

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.pipeline.messages.language import N_, said
-from er3a.planning.avoidance.singular_segment import Trouble, WayAround
+from er3a.planning.avoidance.findings import BranchEnds, NotPossible, PartlyOutOfReach
+from er3a.planning.avoidance.singular_segment import Avoidance, SingularSegment
 from er3a.planning.timing import joined
 
 
-def slow(trouble: Trouble) -> WayAround:
+def slow(segment: SingularSegment) -> Avoidance | NotPossible:
     """Follow the path exactly, as programmed wherever the joints can, slower where they can't."""
-    if np.isnan(trouble.q[:, 0]).any():
-        return WayAround("slow", None, 0.0, N_("a part of the path is out of reach"))
-    if trouble.followed.jumps:
-        jump = trouble.followed.jumps[0]
-        reason = said("at t = {t:.4g} s the branch ends: J{joint} would have to jump", t=jump.t, joint=jump.joint)
-        return WayAround("slow", None, 0.0, reason)
-    return WayAround("slow", joined([*trouble.begin(), trouble.along(0, len(trouble.t) - 1)]))
+    if np.isnan(segment.q[:, 0]).any():
+        return PartlyOutOfReach()
+    if segment.followed.jumps:
+        jump = segment.followed.jumps[0]
+        return BranchEnds(jump.t, jump.joint)
+    return Avoidance(joined([*segment.begin(), segment.along(0, len(segment.t) - 1)]))

@@ -1,27 +1,34 @@
-"""All ways around side by side: what each costs, and which one to take."""
+"""All strategies of singularity avoidance side by side: what each costs, and which one to take."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from er3a.kinematics.forward import forward
-from er3a.pipeline.messages.kinematics import say
-from er3a.pipeline.messages.language import joined, said
+from er3a.numerics.arrays import Reals
+from er3a.planning.avoidance import StrategyName
 from er3a.planning.avoidance.damped_least_squares import damped
 from er3a.planning.avoidance.deviation import deviation
+from er3a.planning.avoidance.findings import (
+    AccelerationExceeded,
+    EndsOffPath,
+    NotPossible,
+    PathNotFinished,
+    SpeedExceeded,
+)
 from er3a.planning.avoidance.joint_detour import detour
 from er3a.planning.avoidance.other_branch import branch
-from er3a.planning.avoidance.singular_segment import Trouble, WayAround, margin
+from er3a.planning.avoidance.singular_segment import Avoidance, SingularSegment, Strategy
 from er3a.planning.avoidance.slow_down import slow
 from er3a.planning.avoidance.stop_before import stop
 from er3a.planning.avoidance.via_point import shifted_via, tilted_via
 from er3a.planning.timing import Timed, TimingError
-from er3a.robots.joint_limits import limits_exceeded, within
+from er3a.robots.joint_limits import LimitsExceeded, limits_exceeded
 
-WAYS: dict[str, Callable[[Trouble], WayAround]] = {
+STRATEGIES: dict[StrategyName, Strategy] = {
     "slow": slow,
     "branch": branch,
     "via_shift": shifted_via,
@@ -34,95 +41,96 @@ ARRIVED = 1e-3, np.radians(0.1)  # m and rad from the path's end
 ON_PATH = 1e-6, np.radians(1e-4)
 OVER = 1e-6  # relative, by which rounding may exceed a limit
 
+NotUsable = NotPossible | PathNotFinished | EndsOffPath | LimitsExceeded | SpeedExceeded | AccelerationExceeded
+
 
 @dataclass(frozen=True, eq=False)
-class Price:
-    """A way around, and what it costs.
+class Cost:
+    """A strategy's motion, and what it costs.
 
     Attributes
     ----------
-    motion : None where the way is not possible
-    usable : whether it does the whole path within the limits of angles, speeds and accelerations
-    reason : why it is not possible or not usable; empty if it is
     done : share of the path that is done
     distance, angle : (N,), m and rad: how far the tool is from the path
-    speed, acceleration : greatest share of a joint's limit that is needed
-    clear : whether the arm keeps its distance from the singular sets wherever the tool is on or beside the path (a
-        joint move may pass them: it takes no harm)
+    speed_ratio, acceleration_ratio : greatest ratio of a joint's speed, or acceleration, to its limit
+    keeps_clear : whether the arm keeps its distance from the singular sets wherever the tool is on or beside the path
+        (a joint move may pass them: joint moves are unaffected by singularities)
     """
 
-    name: str
-    motion: Timed | None
-    usable: bool
-    reason: str
-    done: float = 0.0
-    distance: np.ndarray | None = None
-    angle: np.ndarray | None = None
-    speed: float = np.nan
-    acceleration: float = np.nan
-    clear: bool = False
+    motion: Timed
+    done: float
+    distance: Reals
+    angle: Reals
+    speed_ratio: float
+    acceleration_ratio: float
+    keeps_clear: bool
 
 
-def compare(trouble: Trouble, chosen: str | None = None) -> list[Price]:
-    """Try all ways around, or the chosen one."""
-    return [_priced(trouble, name, way) for name, way in WAYS.items() if chosen in (None, name)]
+@dataclass(frozen=True, eq=False)
+class StrategyResult:
+    """What came of a strategy.
+
+    Attributes
+    ----------
+    cost : None where the strategy is not possible
+    reasons : why it is not possible, or does not do the whole path within the limits of angles, speeds and
+        accelerations; empty if it does
+    """
+
+    name: StrategyName
+    cost: Cost | None
+    reasons: tuple[NotUsable, ...] = ()
 
 
-def best(prices: list[Price], meets: bool) -> Price | None:
-    """Of the usable ways the one that leaves the path least (mm and deg added), then the quickest; else None.
+def compare(segment: SingularSegment, chosen: StrategyName | None = None) -> list[StrategyResult]:
+    """Try all strategies, or the chosen one."""
+    return [_tried(segment, name) for name in STRATEGIES if chosen in (None, name)]
+
+
+def best(results: Iterable[StrategyResult], meets: bool) -> StrategyResult | None:
+    """Of the usable strategies the one that leaves the path least (mm and deg added), then the quickest; else None.
 
     Parameters
     ----------
-    meets : whether the path meets a singular pose; a way that goes through it is then taken only if no other is usable
+    meets : whether the path meets a singular pose; what goes through it is then taken only if nothing else is usable
     """
-    usable = [price for price in prices if price.usable]
 
-    def cost(price: Price) -> tuple[bool, float, float]:
-        far, turned = price.distance.max(), price.angle.max()
+    def price(cost: Cost) -> tuple[bool, float, float]:
+        far, turned = cost.distance.max(), cost.angle.max()
         on_path = far < ON_PATH[0] and turned < ON_PATH[1]
-        return (
-            meets and not price.clear,
-            0.0 if on_path else float(far * 1000 + np.degrees(turned)),
-            price.motion.duration,
-        )
+        away = 0.0 if on_path else float(far * 1000 + np.degrees(turned))
+        return meets and not cost.keeps_clear, away, cost.motion.duration
 
-    return min(usable, key=cost, default=None)
+    usable = [(price(result.cost), i, result) for i, result in enumerate(results) if result.cost and not result.reasons]
+    return min(usable)[2] if usable else None
 
 
-def _priced(trouble: Trouble, name: str, way: Callable[[Trouble], WayAround]) -> Price:
+def _tried(segment: SingularSegment, name: StrategyName) -> StrategyResult:
     try:
-        found = way(trouble)
+        found = STRATEGIES[name](segment)
     except TimingError as error:
-        return Price(name, None, False, str(error))
-    if found.motion is None:
-        return Price(name, None, False, found.reason)
-    robot, motion, line = trouble.robot, found.motion, trouble.followed.line
+        return StrategyResult(name, None, (error.finding,))
+    if not isinstance(found, Avoidance):
+        return StrategyResult(name, None, (found,))
+    robot, motion, line = segment.robot, found.motion, segment.followed.line
     T = forward(robot, motion.q)
     distance, angle, _ = deviation(line, T)
-    speed, acceleration = motion.share(trouble.limits)
-    faults = []
+    speed, acceleration = motion.ratios(segment.limits)
+    reasons: list[NotUsable] = []
     last = line.poses(np.array(1.0))
     left = float(np.linalg.norm(T[-1, :3, 3] - last[:3, 3]))
     twisted = 2 * np.arcsin(min(1.0, float(np.linalg.norm(T[-1, :3, :3] - last[:3, :3])) / np.sqrt(8.0)))
     if name == "stop":
-        faults.append(said("only {share:.0%} of the path is done", share=found.done))
+        reasons.append(PathNotFinished(found.done))
     elif left > ARRIVED[0] or twisted > ARRIVED[1]:
-        far = {"mm": left * 1000, "deg": np.degrees(twisted)}
-        faults.append(said("it ends {mm:.3g} mm and {deg:.3g} deg from the path's end", **far))
-    outside = ~within(robot, motion.q)
-    if outside.any():
-        faults.append(say(limits_exceeded(robot, motion.q[_worst(trouble, motion.q)])))
+        reasons.append(EndsOffPath(left * 1000, float(np.degrees(twisted))))
+    worst = np.argmax(np.maximum(motion.q - robot.upper, robot.lower - motion.q).max(axis=1))
+    if exceeded := limits_exceeded(robot, motion.q[worst]):
+        reasons.append(exceeded)
     if speed > 1 + OVER:
-        faults.append(said("a joint needs {share:.2f} times its greatest speed", share=speed))
+        reasons.append(SpeedExceeded(speed))
     if acceleration > 1 + OVER:
-        faults.append(said("a joint needs {share:.2f} times its greatest acceleration", share=acceleration))
-    keeps = name in ("stop", "detour") or bool(margin(robot, motion.q, trouble.near).min() > 1 - 1e-6)
-    if name == "branch":
-        keeps = True
-    reason = joined(faults)
-    return Price(name, motion, not faults, reason, found.done, distance, angle, speed, acceleration, keeps)
-
-
-def _worst(trouble: Trouble, q: np.ndarray) -> int:
-    beyond = np.maximum(q - trouble.robot.upper, trouble.robot.lower - q).max(axis=1)
-    return int(np.argmax(beyond))
+        reasons.append(AccelerationExceeded(acceleration))
+    keeps = name in ("stop", "detour", "branch") or bool(segment.near.margin(robot, motion.q).min() > 1 - 1e-6)
+    cost = Cost(motion, found.done, distance, angle, speed, acceleration, keeps)
+    return StrategyResult(name, cost, tuple(reasons))

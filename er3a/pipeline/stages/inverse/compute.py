@@ -11,6 +11,7 @@ from er3a.files.target_file import load_targets
 from er3a.kinematics.round_trips import SAME_JOINTS_RAD, BatchRoundTrips, batch_round_trips
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.stages.inverse.entry import InverseSettings
 from er3a.pipeline.stages.inverse.findings import (
     AllSolved,
     NoneSolved,
@@ -42,7 +43,7 @@ def compute(study: Study, name: str) -> InverseResults:
     """Solve the targets of a robot of the study."""
     robot = study.robot(name)
     targets = load_targets(study.entry(name).targets, robot)
-    settings = study.inverse
+    settings = study.section(InverseSettings)
     scene_file = study.scene(name, STAGE)
     scene = load_scene(scene_file) if scene_file else None
     solved = [

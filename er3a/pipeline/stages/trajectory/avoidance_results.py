@@ -1,251 +1,186 @@
-"""The ways around a path's singular regions, and its fastest time law, as records and rows of the results."""
+"""Strategies of singularity avoidance on a path, and its fastest time law: what the results hold of them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 
-import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.along import clearance_along
-from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PairOverlaps
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import characteristic_length, conditioning
-from er3a.pipeline.messages.language import N_, joined, said
-from er3a.pipeline.messages.say import say
-from er3a.pipeline.stages.trajectory.judgement import Judgement, stretch_text
+from er3a.pipeline.stages.trajectory.collisions import Surroundings, least_clearance
+from er3a.pipeline.stages.trajectory.judgement import Judgement
+from er3a.pipeline.stages.trajectory.model import FASTEST, AvoidanceRows, StrategyMotion, TriedStrategy
 from er3a.pipeline.stages.trajectory.motion import Motion
-from er3a.planning.avoidance.singular_segment import Trouble, trouble_of
-from er3a.planning.avoidance.strategies import Price, best, compare
+from er3a.pipeline.tables import Reals
+from er3a.planning.avoidance import StrategyName
+from er3a.planning.avoidance.singular_segment import SingularSegment, singular_segment
+from er3a.planning.avoidance.strategies import Cost, StrategyResult, best, compare
+from er3a.planning.near_singular import NearSingular
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
 from er3a.robots.robot import Robot
 
-ROWS = 250  # of each way in the table
-FASTEST = "fastest"
-_PER_JOINT = [f"q{j + 1}_{unit}" for unit in ("deg", "deg_s", "deg_s2") for j in range(6)]
-_MEASURES = ["deviation_mm", "deviation_deg", "speed_share", "condition_number", "smallest_singular_value"]
-NUMBERS = ("t_s", *_PER_JOINT, "x_mm", "y_mm", "z_mm", *_MEASURES)
+ROWS = 250  # of each motion in the table
 CLEARANCE_TIMES = 41
-SENTENCES = {
-    "slow": N_("Keep the path and slow down"),
-    "branch": N_("Change to another solution of the arm first"),
-    "via_shift": N_("Bend the path through a shifted via point"),
-    "via_tilt": N_("Bend the path through a tilted via point"),
-    "damped": N_("Let damped least squares leave the path"),
-    "detour": N_("Cross the region by a joint move"),
-    "stop": N_("Stop before the region with an alarm"),
-}
 
 
 @dataclass(frozen=True, eq=False)
-class Ways:
-    """What a path's entry in ``summary.json`` gains, and the rows of ``repairs.parquet``."""
+class Avoided:
+    """What was tried on a path, and what to take.
 
-    record: dict[str, Any]
-    rows: list[pd.DataFrame]
+    Attributes
+    ----------
+    fastest_s : duration of the path itself as fast as the joints can; None where no motion follows it
+    """
+
+    tried: tuple[TriedStrategy, ...]
+    chosen: StrategyName | None
+    fastest_s: float | None
+    rows: AvoidanceRows
 
 
 @dataclass(frozen=True)
-class Surroundings:
-    """What motions must not meet: bodies, and the overlap (m) that may go unnoticed."""
+class AvoidanceTask:
+    """What all paths of a robot have in common; without ``surroundings`` clearances stay unknown.
 
-    bodies: Bodies
-    depth: float
-
-
-def ways_around(
-    robot: Robot,
-    motion: Motion,
-    found: Judgement,
-    near: Mapping[str, float],
-    limits: JointLimits,
-    chosen: str | None,
-    surroundings: Surroundings | None = None,
-) -> Ways:
-    """Compare the ways around where a path is not safe; find its fastest time law where it can be run as it is.
-
-    A way on which the arm meets its surroundings or itself is not usable; without ``surroundings`` that is unknown.
+    Attributes
+    ----------
+    only : the strategy that the study asks for; None to compare all
     """
-    prices: list[Price] = []
-    if motion.followed is None:
-        quickest, prices = _joint_move(motion, found, limits)
-    else:
-        trouble = trouble_of(motion.followed, near, limits, found.events, motion.built.q_start is not None)
-        quickest = _quickest(trouble)
-        if found.word != "safe":
-            prices = compare(trouble, chosen)
-    clearances = {}
-    if surroundings:
-        for i, price in enumerate(prices):
-            if price.motion:
-                prices[i], clearances[price.name] = _measured(price, surroundings)
-    taken = best(prices, meets=any(event.crossing for event in found.events) and motion.followed is not None)
-    known = found.velocity[np.isfinite(found.velocity[:, 0])] if found.speed_bounded else found.velocity[:0]
-    record = {
-        "max_joint_speed_ratio": float(np.abs(known / limits.speed).max()) if len(known) else None,
-        "max_joint_acceleration_ratio": _pull(found, limits),
-        "fastest_s": quickest and quickest.duration,
-        "repairs": [_record(price) | {"clearance_mm": clearances.get(price.name)} for price in prices],
-        "repair": taken and taken.name,
-        "repair_text": _text(motion, found, prices, taken),
-    }
-    rows = [_rows(robot, motion, price.name, price.motion, price, limits) for price in prices if price.motion]
-    if quickest:
-        rows.append(_rows(robot, motion, FASTEST, quickest, None, limits))
-    return Ways(record, rows)
+
+    robot: Robot
+    near: NearSingular
+    limits: JointLimits
+    only: StrategyName | None
+    surroundings: Surroundings | None
+
+    def avoid(self, motion: Motion, found: Judgement) -> Avoided:
+        """Compare the strategies where a path is not safe; find its fastest time law where it can be run as it is.
+
+        A strategy on whose motion the arm meets its surroundings or itself is not usable.
+        """
+        results: list[StrategyResult] = []
+        if motion.followed is None:
+            quickest, results = self._joint_move(motion, found)
+        else:
+            fixed_start = motion.built.q_start is not None
+            segment = singular_segment(motion.followed, self.near, self.limits, found.events, fixed_start)
+            quickest = _quickest(segment)
+            if found.verdict != "safe":
+                results = compare(segment, self.only)
+        met = {result.name: self._meets(result.cost) for result in results if result.cost}
+        free = [result for result in results if result.name not in met or met[result.name][0] is None]
+        meets = motion.followed is not None and any(event.crossing for event in found.events)
+        chosen = best(free, meets)
+        tried = tuple(_tried(result, *met.get(result.name, (None, None))) for result in results)
+        return Avoided(
+            tried=tried,
+            chosen=chosen.name if chosen else None,
+            fastest_s=quickest.duration if quickest else None,
+            rows=AvoidanceRows.stacked(self._tables(motion, results, quickest)),
+        )
+
+    def _joint_move(self, motion: Motion, found: Judgement) -> tuple[Timed | None, list[StrategyResult]]:
+        """Fastest time law; slowing down is the only strategy that a joint move can need."""
+        t, q = nodes_along(motion.joints, motion.t, motion.q, self.limits)
+        try:
+            quickest = fastest(q, self.limits)
+            if found.verdict != "too fast":
+                return quickest, []
+            slower = fastest(q, self.limits, t)
+        except TimingError:
+            return None, []
+        speed, acceleration = slower.ratios(self.limits)
+        nothing = np.zeros(len(slower.t))
+        return quickest, [StrategyResult("slow", Cost(slower, 1.0, nothing, nothing, speed, acceleration, False))]
+
+    def _meets(self, cost: Cost) -> tuple[PairOverlaps | None, float | None]:
+        """The deepest overlap on a motion, and its least clearance in mm (None if nothing can meet)."""
+        if self.surroundings is None:
+            return None, None
+        t, q = cost.motion.t, cost.motion.q
+
+        def joints(at: Reals) -> Reals:
+            return np.stack([np.interp(at, t, q[:, j]) for j in range(6)], axis=-1)
+
+        grid = np.linspace(0.0, t[-1], CLEARANCE_TIMES)
+        along = clearance_along(self.surroundings.bodies, joints, grid, grid, self.surroundings.tolerance)
+        least = least_clearance(along)
+        if least is None:
+            return None, None
+        return PairOverlaps(least.between, -least.least_mm) if along.contacts else None, least.least_mm
+
+    def _tables(self, motion: Motion, results: list[StrategyResult], quickest: Timed | None) -> Iterator[AvoidanceRows]:
+        for result in results:
+            if result.cost:
+                deviations = (result.cost.distance, result.cost.angle)
+                yield self._rows(motion.entry.name, result.name, result.cost.motion, deviations)
+        if quickest:
+            yield self._rows(motion.entry.name, FASTEST, quickest, None)
+
+    def _rows(self, path: str, strategy: str, timed: Timed, deviations: tuple[Reals, Reals] | None) -> AvoidanceRows:
+        """At most ROWS rows of a motion, and those of its greatest speed and deviation."""
+        kept = np.unique(np.linspace(0, len(timed.t) - 1, min(ROWS, len(timed.t))).round().astype(int))
+        ratio = speed_ratio(timed.velocity, self.limits)
+        kept = np.union1d(kept, [np.argmax(ratio)] + ([] if deviations is None else [np.argmax(deviations[0])]))
+        q = timed.q[kept]
+        distance, angle = deviations or (np.zeros(len(timed.t)),) * 2
+        measures = conditioning(self.robot, q, characteristic_length(self.robot))
+        return AvoidanceRows(
+            path=np.full(len(kept), path, object),
+            strategy=np.full(len(kept), strategy, object),
+            t_s=timed.t[kept],
+            q_deg=np.degrees(q),
+            q_deg_s=np.degrees(timed.velocity[kept]),
+            q_deg_s2=np.degrees(timed.acceleration[kept]),
+            xyz_mm=forward(self.robot, q)[:, :3, 3] * 1000,
+            deviation_mm=distance[kept] * 1000,
+            deviation_deg=np.degrees(angle[kept]),
+            speed_ratio=ratio[kept],
+            condition_number=measures.condition_number,
+            smallest_singular_value=measures.smallest_singular_value,
+        )
 
 
-def _measured(price: Price, surroundings: Surroundings) -> tuple[Price, float | None]:
-    """The way, no longer usable if it meets something, and its least clearance in mm (None if nothing can meet)."""
-    t, q = price.motion.t, price.motion.q
-
-    def joints(at: np.ndarray) -> np.ndarray:
-        return np.stack([np.interp(at, t, q[:, j]) for j in range(6)], axis=-1)
-
-    grid = np.linspace(0.0, t[-1], CLEARANCE_TIMES)
-    along = clearance_along(surroundings.bodies, joints, grid, grid, surroundings.depth)
-    if along.least < 0:
-        return price, None
-    least = float(along.distance[along.least] * 1000)
-    if along.contacts:
-        meets = say(PairOverlaps(along.pair[along.least], -least))
-        reason = joined([price.reason, meets])
-        price = replace(price, usable=False, reason=reason)
-    return price, least
+def speed_ratio(velocity: Reals, limits: JointLimits) -> Reals:
+    """Greatest ratio of a joint's speed to its limit (N,), of velocities (N, 6) in rad/s; NaN where unknown."""
+    ratio: Reals = np.abs(velocity / limits.speed).max(axis=1)
+    return ratio
 
 
-def limits_record(robot: Robot, limits: JointLimits, full_speed_after: float) -> dict[str, Any]:
-    """The joint limits that motions are timed with, and which of the speeds are assumed."""
-    return {
-        "speed_deg_s": [float(value) for value in np.degrees(limits.speed)],
-        "speed_assumed": [bool(value) for value in ~np.isfinite(robot.speed)],
-        "acceleration_deg_s2": [float(value) for value in np.degrees(limits.acceleration)],
-        "full_speed_after_s": full_speed_after,
-    }
-
-
-def repairs_table(parts: list[pd.DataFrame]) -> pd.DataFrame:
-    """The rows of all ways; an empty table where no path can be driven at all."""
-    if parts:
-        return pd.concat(parts, ignore_index=True)
-    return pd.DataFrame({"path": [], "way": []} | {name: np.empty(0) for name in NUMBERS})
-
-
-def speed_share(velocity: np.ndarray, limits: JointLimits) -> np.ndarray:
-    """Greatest share of a joint's speed limit (N,), of velocities (N, 6) in rad/s; NaN where they are unknown."""
-    return np.abs(velocity / limits.speed).max(axis=1)
-
-
-def _pull(found: Judgement, limits: JointLimits) -> float | None:
-    known = found.acceleration[np.isfinite(found.acceleration[:, 0])]
-    return float(np.abs(known / limits.acceleration).max()) if found.speed_bounded and len(known) else None
-
-
-def _joint_move(motion: Motion, found: Judgement, limits: JointLimits) -> tuple[Timed | None, list[Price]]:
-    """Fastest time law; slowing down is the only repair that a joint move can need."""
-    t, q = nodes_along(motion.joints, motion.t, motion.q, limits)
-    try:
-        quickest = fastest(q, limits)
-        if found.word != "too fast":
-            return quickest, []
-        slower = fastest(q, limits, t)
-    except TimingError:
-        return None, []
-    speed, acceleration = slower.share(limits)
-    nothing = np.zeros(len(slower.t))
-    return quickest, [Price("slow", slower, True, "", 1.0, nothing, nothing, speed, acceleration)]
-
-
-def _quickest(trouble: Trouble) -> Timed | None:
-    if np.isnan(trouble.q[:, 0]).any() or trouble.followed.jumps:
+def _quickest(segment: SingularSegment) -> Timed | None:
+    if np.isnan(segment.q[:, 0]).any() or segment.followed.jumps:
         return None
     try:
-        return trouble.along(0, len(trouble.t) - 1, programmed=False)
+        return segment.along(0, len(segment.t) - 1, programmed=False)
     except TimingError:
         return None
 
 
-def _record(price: Price) -> dict[str, Any]:
-    record: dict[str, Any] = {"way": price.name, "usable": price.usable, "reason": price.reason}
-    keys = ("done_share", "max_deviation_mm", "max_deviation_deg", "duration_s", "keeps_clear", "max_joint_speed_deg_s")
-    keys += ("max_joint_speed_ratio", "max_joint_acceleration_deg_s2", "max_joint_acceleration_ratio")
-    if price.motion is None:
-        return record | dict.fromkeys(keys)
-    values = (
-        price.done,
-        float(price.distance.max() * 1000),
-        float(np.degrees(price.angle.max())),
-        price.motion.duration,
-        price.clear,
-        [float(value) for value in np.degrees(np.abs(price.motion.velocity).max(axis=0))],
-        price.speed,
-        [float(value) for value in np.degrees(np.abs(price.motion.acceleration).max(axis=0))],
-        price.acceleration,
+def _tried(result: StrategyResult, meets: PairOverlaps | None, clearance_mm: float | None) -> TriedStrategy:
+    reasons = (*result.reasons, meets) if meets else result.reasons
+    motion = _motion(result.cost, clearance_mm) if result.cost else None
+    return TriedStrategy(result.name, motion is not None and not reasons, reasons, motion)
+
+
+def _motion(cost: Cost, clearance_mm: float | None) -> StrategyMotion:
+    return StrategyMotion(
+        done_ratio=cost.done,
+        max_deviation_mm=float(cost.distance.max() * 1000),
+        max_deviation_deg=float(np.degrees(cost.angle.max())),
+        duration_s=cost.motion.duration,
+        keeps_clear=cost.keeps_clear,
+        max_joint_speed_deg_s=_greatest_deg(cost.motion.velocity),
+        max_joint_speed_ratio=cost.speed_ratio,
+        max_joint_acceleration_deg_s2=_greatest_deg(cost.motion.acceleration),
+        max_joint_acceleration_ratio=cost.acceleration_ratio,
+        clearance_mm=clearance_mm,
     )
-    return record | dict(zip(keys, values))
 
 
-def _text(motion: Motion, found: Judgement, prices: list[Price], taken: Price | None) -> str | None:
-    """One sentence: what to do about the path; None where nothing is to be done."""
-    if not prices:
-        return None
-    if taken is not None:
-        cost = {"tool": _leaves(taken), "time": _time(taken.motion.duration - motion.built.duration)}
-        return said("{way}: {tool}, and {time}", way=SENTENCES[taken.name], **cost)
-    if found.beyond:
-        why = said("it is out of reach {when}", when=joined((stretch_text(part) for part in found.beyond), ", "))
-    else:
-        causes = [part.cause for part in found.limits] or [price.reason for price in prices if price.reason]
-        why = joined(dict.fromkeys(causes))
-    if len(prices) == 1:
-        only = {"way": SENTENCES[prices[0].name], "reason": prices[0].reason}
-        return said("{way}, as the study asks for, does not repair it: {reason}", **only)
-    return said("No way around completes this path: {why}", why=why)
-
-
-def _leaves(way: Price) -> str:
-    far, turned = way.distance.max() * 1000, np.degrees(way.angle.max())
-    if far < 0.005 and turned < 0.005:
-        return N_("the tool stays on the path")
-    if turned < 0.005:
-        return said("the tool leaves the path by {far:.2g} mm", far=far)
-    if far < 0.005:
-        return said("the tool leaves the path by {turned:.2g} deg", turned=turned)
-    return said("the tool leaves the path by {far:.2g} mm and {turned:.2g} deg", far=far, turned=turned)
-
-
-def _time(longer: float) -> str:
-    if abs(longer) < 0.005:
-        return N_("it takes no more time than programmed")
-    if longer > 0:
-        return said("it takes {longer:.2f} s more than programmed", longer=longer)
-    return said("it takes {shorter:.2f} s less than programmed", shorter=-longer)
-
-
-def _rows(
-    robot: Robot, motion: Motion, name: str, timed: Timed, price: Price | None, limits: JointLimits
-) -> pd.DataFrame:
-    """At most ROWS rows of a way: its motion, its tool and its deviation."""
-    kept = np.unique(np.linspace(0, len(timed.t) - 1, min(ROWS, len(timed.t))).round().astype(int))
-    share = speed_share(timed.velocity, limits)
-    kept = np.union1d(kept, [np.argmax(share)] + ([] if price is None else [np.argmax(price.distance)]))
-    q = timed.q[kept]
-    tool = forward(robot, q)[:, :3, 3] * 1000
-    columns: dict[str, Any] = {"path": motion.entry.name, "way": name, "t_s": timed.t[kept]}
-    for values, unit in ((q, "deg"), (timed.velocity[kept], "deg_s"), (timed.acceleration[kept], "deg_s2")):
-        columns |= {f"q{j + 1}_{unit}": np.degrees(values[:, j]) for j in range(6)}
-    columns |= {f"{axis}_mm": tool[:, k] for k, axis in enumerate("xyz")}
-    none = np.zeros(len(kept))
-    measures = conditioning(robot, q, characteristic_length(robot))
-    columns |= {
-        "deviation_mm": none if price is None else price.distance[kept] * 1000,
-        "deviation_deg": none if price is None else np.degrees(price.angle[kept]),
-        "speed_share": share[kept],
-        "condition_number": measures.condition_number,
-        "smallest_singular_value": measures.smallest_singular_value,
-    }
-    return pd.DataFrame(columns)
+def _greatest_deg(values: Reals) -> tuple[float, ...]:
+    """Of each joint, from (N, 6) in rad."""
+    return tuple(float(value) for value in np.degrees(np.abs(values).max(axis=0)))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 from matplotlib.figure import Figure
 
 from er3a.pipeline.messages.language import tr
+from er3a.pipeline.messages.say import say
+from er3a.pipeline.stages.trajectory.model import LeastClearance, PathSummary, TrajectoryResults
 from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.page import Picture
@@ -17,60 +18,63 @@ from er3a.pipeline.viewing.palette import INK, MODEL, MUTED, VERDICTS
 COLUMNS = 4
 ROW_HEIGHT = 1.5
 
+Measured = tuple[PathSummary, LeastClearance]
 
-def clearance_section(summary: dict[str, Any], rows: pd.DataFrame) -> dict[str, Any] | None:
+
+@dataclass(frozen=True)
+class ClearanceSection:
+    """The picture, None where no path has a pose that can be reached, and the rows of the table."""
+
+    picture: Picture | None
+    rows: list[list[str]]
+
+
+def clearance_section(results: TrajectoryResults) -> ClearanceSection | None:
     """What the section needs; None where no clearance was measured."""
-    if not summary["clearance_measured"]:
+    if not results.summary.clearance_measured:
         return None
-    records = [record for record in summary["paths"] if record["clearance"]]
-    if not records:
-        return {"picture": None, "rows": []}
-    colliding = [record["name"] for record in records if record["collisions"]]
+    paths = [(path, path.clearance) for path in results.summary.paths if path.clearance]
+    if not paths:
+        return ClearanceSection(None, [])
+    colliding = [path.name for path, _ in paths if path.collisions]
     if colliding:
         names = ", ".join(colliding)
         caption = tr("Below zero bodies overlap: {paths} can't be driven as planned.", paths=names)
     else:
         caption = tr("No path comes to zero: none meets its surroundings or the arm itself.")
-    if any(record["unreachable"] for record in records):
+    if any(path.unreachable for path, _ in paths):
         caption += " " + tr("Grey: not reachable.")
-    return {
-        "picture": Picture(
-            _curves(records, rows),
-            tr("Least clearance over time, one panel per path. {conclusion}", conclusion=caption),
-            caption,
-        ),
-        "rows": [_row(record) for record in records],
-    }
+    alt = tr("Least clearance over time, one panel per path. {conclusion}", conclusion=caption)
+    return ClearanceSection(Picture(_curves(paths, results), alt, caption), [_row(*measured) for measured in paths])
 
 
-def _row(record: dict[str, Any]) -> list[Any]:
-    clearance = record["clearance"]
-    least = fixed(clearance["least_mm"], 1)
-    return [record["name"], least, fixed(clearance["t_s"], 3), clearance["between"], clearance["poses_measured"]]
+def _row(path: PathSummary, least: LeastClearance) -> list[str]:
+    return [path.name, fixed(least.least_mm, 1), fixed(least.t_s, 3), say(least.between), str(least.poses_measured)]
 
 
-def _curves(records: list[dict[str, Any]], rows: pd.DataFrame) -> Figure:
-    count = -(-len(records) // COLUMNS)
+def _curves(paths: list[Measured], results: TrajectoryResults) -> Figure:
+    rows = results.clearance
+    count = -(-len(paths) // COLUMNS)
     figure, axes = new_figure(count, COLUMNS, width=11.0, height=ROW_HEIGHT * count + 0.4, sharey=True, squeeze=False)
-    for ax, record in zip(axes.flat, records):
-        part = rows[rows["path"] == record["name"]]
-        t, clearance = part["t_s"].to_numpy(), part["clearance_mm"].to_numpy()
+    for ax, (path, least) in zip(axes.flat, paths):
+        part = rows.take(rows.path == path.name)
+        t, clearance = part.t_s, part.clearance_mm
         ax.plot(t, clearance, color=MODEL)
         ax.fill_between(t, clearance, 0, where=clearance < 0, color=VERDICTS["fail"], alpha=0.5, interpolate=True)
         ax.axhline(0, color=INK, linewidth=0.8)
-        at = record["clearance"]["t_s"], record["clearance"]["least_mm"]
-        ax.plot(*at, "o", color=VERDICTS["fail"] if at[1] <= 0 else INK, markersize=4)
-        for gap in record["unreachable"]:
-            ax.axvspan(gap["t0_s"], gap["t1_s"], color=MUTED, alpha=0.25, linewidth=0)
-        ax.set_title(record["name"], fontsize=9)
-        ax.set_xlim(0, record["duration_s"])
-    for ax in axes.flat[len(records) :]:
+        colour = VERDICTS["fail"] if least.least_mm <= 0 else INK
+        ax.plot(least.t_s, least.least_mm, "o", color=colour, markersize=4)
+        for gap in path.unreachable:
+            ax.axvspan(gap.t0_s, gap.t1_s, color=MUTED, alpha=0.25, linewidth=0)
+        ax.set_title(path.name, fontsize=9)
+        ax.set_xlim(0, path.duration_s)
+    for ax in axes.flat[len(paths) :]:
         ax.set_visible(False)
     for ax in axes[:, 0]:
         ax.set_ylabel(tr("clearance (mm)"), fontsize=8)
-    for k, ax in enumerate(axes.flat[: len(records)]):
-        if k + COLUMNS >= len(records):
+    for k, ax in enumerate(axes.flat[: len(paths)]):
+        if k + COLUMNS >= len(paths):
             ax.set_xlabel(tr("time (s)"), fontsize=8)
-    low, high = np.nanmin(rows["clearance_mm"]), np.nanmax(rows["clearance_mm"])
+    low, high = np.nanmin(rows.clearance_mm), np.nanmax(rows.clearance_mm)
     axes[0, 0].set_ylim(min(low, 0.0) - 0.05 * (high - low), high + 0.05 * (high - low))
     return figure

@@ -1,163 +1,171 @@
-"""Plan and check every path of a robot: where it is singular, leaves the limits, collides, or can't be reached.
-
-Writes ``samples.parquet`` (the paths' own points), ``checks.parquet`` (the same columns, with the points checked
-between them and the closest passes), ``clearance.parquet``, ``repairs.parquet`` (the ways around, and each path at its
-fastest) and ``summary.json``.
-"""
+"""Plan and check every path of a robot: where it is singular, leaves the limits, collides, or can't be reached."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from er3a.collision.bodies import Bodies, can_measure
 from er3a.files.path_file import load_paths
 from er3a.files.scene_file import load_scene
-from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
-from er3a.pipeline.messages.language import N_, joined, keeps_sentences, said
-from er3a.pipeline.results import Figure, Verdict, write_summary, write_table
-from er3a.pipeline.stages.trajectory.avoidance_results import (
-    Surroundings,
-    limits_record,
-    repairs_table,
-    speed_share,
-    ways_around,
+from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
+from er3a.pipeline.results import Figure, Status, Verdict
+from er3a.pipeline.stages.trajectory.avoidance_results import AvoidanceTask, speed_ratio
+from er3a.pipeline.stages.trajectory.collisions import Surroundings, clearance_rows, measured
+from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
+from er3a.pipeline.stages.trajectory.judgement import Judgement, judge
+from er3a.pipeline.stages.trajectory.model import (
+    AllSafe,
+    AvoidanceRows,
+    Checks,
+    Clearances,
+    LimitsUsed,
+    NearThresholds,
+    NoneSafe,
+    PathSummary,
+    PathVerdict,
+    Samples,
+    SomeUnsafe,
+    TrajectoryResults,
+    TrajectorySummary,
 )
-from er3a.pipeline.stages.trajectory.collisions import clearance_table, measured, with_collisions
-from er3a.pipeline.stages.trajectory.judgement import WORDS, Judgement, judge, path_record
 from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
+from er3a.pipeline.stages.trajectory.path_summary import path_summary
 from er3a.pipeline.study import Study
+from er3a.pipeline.tables import Reals
+from er3a.planning.commands import Source
+from er3a.planning.near_singular import NearSingular
 from er3a.planning.timing import JointLimits, joint_limits
 from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
 
 
-@keeps_sentences
-def compute(study: Study, name: str, folder: Path) -> None:
-    """Compute the trajectory stage of a robot into ``folder``."""
-    robot, settings = study.robot(name), study.trajectory
+def compute(study: Study, name: str) -> TrajectoryResults:
+    """Compute the trajectory stage of a robot."""
+    robot, settings = study.robot(name), study.section(TrajectorySettings)
     file = Path(study.entry(name).paths)
-    near = {
-        "wrist": np.radians(settings.near_wrist_deg),
-        "elbow": np.radians(settings.near_elbow_deg),
-        "shoulder": settings.near_shoulder_mm / 1000,
-    }
-    length = characteristic_length(robot)
-    limits = joint_limits(robot, np.radians(settings.assumed_speed_deg_s), settings.full_speed_after_s)
-    chosen = None if settings.repair == "compare" else settings.repair
+    thresholds = NearThresholds(settings.near_wrist_deg, settings.near_elbow_deg, settings.near_shoulder_mm)
+    near = NearSingular(
+        float(np.radians(thresholds.wrist_deg)), float(np.radians(thresholds.elbow_deg)), thresholds.shoulder_mm / 1000
+    )
+    limits = joint_limits(robot, np.radians(settings.assumed_speed_deg_s), settings.acceleration_time_s)
     scene_file = study.scene(name, "trajectory")
     scene = load_scene(scene_file) if scene_file else None
-    bodies = Bodies(robot, scene) if can_measure() else None
-    surroundings = Surroundings(bodies, settings.overlap_mm / 1000) if bodies else None
-    tables, clearances, repairs, records = [], [], [], []
-    ends: dict[str, np.ndarray] = {}
+    surroundings = (
+        Surroundings(Bodies(robot, scene), settings.penetration_tolerance_mm / 1000) if can_measure() else None
+    )
+    only = None if settings.avoidance == "compare" else settings.avoidance
+    avoidance = AvoidanceTask(robot, near, limits, only, surroundings)
+    tables: list[Checks] = []
+    clearances: list[Clearances] = []
+    strategies: list[AvoidanceRows] = []
+    paths: list[PathSummary] = []
+    ends: dict[str, Reals] = {}
     for i, entry in enumerate(load_paths(file).paths):
-        motion = motion_of(robot, entry, settings.checks_per_sample, f"paths[{i}]", file, ends)
+        motion = motion_of(robot, entry, settings.checks_per_sample, Source(file, f"paths[{i}]"), ends)
         ends[entry.name] = motion.q[-1]
         found = judge(robot, motion, near)
-        ways = ways_around(robot, motion, found, near, limits, chosen, surroundings)
-        tables.append(_table(robot, motion, found, near, length, limits))
-        along = measured(bodies, motion, settings.overlap_mm) if bodies else None
-        clearances.append(clearance_table(entry.name, along))
-        repairs += ways.rows
-        records.append(with_collisions(path_record(robot, motion, found), motion, along) | ways.record)
-    checks = pd.concat(tables, ignore_index=True)
-    write_table(folder / "checks.parquet", checks)
-    write_table(folder / "samples.parquet", checks[checks["sample"]].drop(columns="sample"))
-    write_table(folder / "clearance.parquet", pd.concat(clearances, ignore_index=True))
-    write_table(folder / "repairs.parquet", repairs_table(repairs))
-    write_summary(
-        folder,
-        study,
-        name,
-        "trajectory",
-        _verdict(records),
-        _figures(records, length, bodies is not None, bool(np.isnan(robot.speed).any())),
+        avoided = avoidance.avoid(motion, found)
+        along = measured(surroundings, motion) if surroundings else None
+        tables.append(_checks(robot, motion, found, near, limits))
+        clearances.append(clearance_rows(entry.name, along))
+        strategies.append(avoided.rows)
+        paths.append(path_summary(robot, motion, found, along, avoided, limits))
+    checks = Checks.stacked(tables)
+    own = checks.take(checks.sample)
+    length = characteristic_length(robot)
+    assumed = tuple(bool(value) for value in ~np.isfinite(robot.speed))
+    summary = TrajectorySummary(
+        verdict=_verdict(paths),
+        figures=_figures(paths, length, surroundings is not None, any(assumed)),
         characteristic_length_m=length,
-        near={"wrist_deg": settings.near_wrist_deg, "elbow_deg": settings.near_elbow_deg}
-        | {"shoulder_mm": settings.near_shoulder_mm},
-        joint_limits=limits_record(robot, limits, settings.full_speed_after_s),
+        near=thresholds,
+        joint_limits=LimitsUsed(
+            _degrees(limits.speed), assumed, _degrees(limits.acceleration), settings.acceleration_time_s
+        ),
         scene=scene.title if scene else None,
-        clearance_measured=bodies is not None,
-        overlap_mm=settings.overlap_mm,
-        paths=records,
+        clearance_measured=surroundings is not None,
+        penetration_tolerance_mm=settings.penetration_tolerance_mm,
+        paths=tuple(paths),
+    )
+    return TrajectoryResults(
+        summary=summary,
+        samples=Samples(**{name: getattr(own, name) for name in Samples.columns()}),
+        checks=checks,
+        clearance=Clearances.stacked(clearances),
+        avoidance=AvoidanceRows.stacked(strategies),
     )
 
 
-def _table(
-    robot: Robot, motion: Motion, found: Judgement, near: dict[str, float], length: float, limits: JointLimits
-) -> pd.DataFrame:
+def _checks(robot: Robot, motion: Motion, found: Judgement, near: NearSingular, limits: JointLimits) -> Checks:
     """One row per check point; joint columns are NaN where the path can't be reached."""
     reached = np.isfinite(found.q[:, 0])
     measures = np.full((len(found.q), 3), np.nan)
-    part = conditioning(robot, found.q[reached], length)
+    part = conditioning(robot, found.q[reached], characteristic_length(robot))
     measures[reached] = np.stack([part.manipulability, part.condition_number, part.smallest_singular_value], axis=1)
     factors = determinant_factors(robot, found.q)
-    tool = motion.tool(found.times)[:, :3, 3] * 1000
-    columns: dict[str, Any] = {
-        "path": motion.entry.name,
-        "t_s": found.times,
-        "s_m": motion.way(found.times),
-        "sample": np.isin(found.times, motion.samples),
-    }
-    for values, unit in ((found.q, "deg"), (found.velocity, "deg_s"), (found.acceleration, "deg_s2")):
-        columns |= {f"q{j + 1}_{unit}": np.degrees(values[:, j]) for j in range(6)}
-    columns |= {f"{axis}_mm": tool[:, k] for k, axis in enumerate("xyz")}
-    columns |= {
-        "speed_share": speed_share(found.velocity, limits),
-        "manipulability": measures[:, 0],
-        "condition_number": measures[:, 1],
-        "smallest_singular_value": measures[:, 2],
-        "wrist_deg": np.degrees(factors.wrist),
-        "elbow_deg": np.degrees(factors.elbow),
-        "shoulder_mm": factors.shoulder * 1000,
-        "reachable": reached,
-        "within_limits": within(robot, found.q) & reached,
-        "near_singular": np.any([np.abs(getattr(factors, kind)) < near[kind] for kind in TYPES], axis=0),
-    }
-    return pd.DataFrame(columns)
+    return Checks(
+        path=np.full(len(found.times), motion.entry.name, object),
+        t_s=found.times,
+        s_m=motion.way(found.times),
+        q_deg=np.degrees(found.q),
+        q_deg_s=np.degrees(found.velocity),
+        q_deg_s2=np.degrees(found.acceleration),
+        xyz_mm=motion.tool(found.times)[:, :3, 3] * 1000,
+        speed_ratio=speed_ratio(found.velocity, limits),
+        manipulability=measures[:, 0],
+        condition_number=measures[:, 1],
+        smallest_singular_value=measures[:, 2],
+        wrist_deg=np.degrees(factors.wrist),
+        elbow_deg=np.degrees(factors.elbow),
+        shoulder_mm=factors.shoulder * 1000,
+        reachable=reached,
+        within_limits=within(robot, found.q) & reached,
+        near_singular=near.contains(factors),
+        sample=np.isin(found.times, motion.samples),
+    )
 
 
-def _verdict(records: list[dict[str, Any]]) -> Verdict:
-    groups = {word: [record["name"] for record in records if record["verdict"] == word] for word in WORDS}
-    safe = groups.pop("safe")
-    faults = [
-        said("{count} {word} ({names})", count=len(names), word=word, names=", ".join(names))
-        for word, names in groups.items()
-        if names
-    ]
-    text = said("{safe} of {all} paths are safe", safe=len(safe), all=len(records))
-    text = said("{finding}.", finding=joined([text, joined(faults, ", ")]))
-    params = {"paths": len(records), "safe": len(safe)} | {word.replace(" ", "_"): n for word, n in groups.items()}
-    if not safe:
-        return Verdict("fail", "trajectory.none_safe", text, params)
-    if faults:
-        return Verdict("caution", "trajectory.some_unsafe", text, params)
-    return Verdict("pass", "trajectory.safe", text, params)
+def _verdict(paths: list[PathSummary]) -> Verdict[AllSafe | SomeUnsafe | NoneSafe]:
+    def named(verdict: PathVerdict) -> tuple[str, ...]:
+        return tuple(path.name for path in paths if path.verdict == verdict)
+
+    safe = len(named("safe"))
+    finding = AllSafe if safe == len(paths) else SomeUnsafe if safe else NoneSafe
+    status: Status = "pass" if safe == len(paths) else "caution" if safe else "fail"
+    counts = finding(
+        paths=len(paths),
+        safe=safe,
+        unreachable=named("unreachable"),
+        leaves_limits=named("leaves limits"),
+        collides=named("collides"),
+        too_fast=named("too fast"),
+        singular=named("singular"),
+        near_singular=named("near-singular"),
+    )
+    return Verdict(status, counts)
 
 
-def _figures(records: list[dict[str, Any]], length: float, clear: bool, assumed: bool) -> list[Figure]:
-    events = [event for record in records for event in record["singularities"]]
-    bounded = [record for record in records if record["max_joint_speed_deg_s"]]
-    ratios = [record["max_joint_speed_ratio"] for record in bounded if record["max_joint_speed_ratio"] is not None]
-    agreement = max((record["velocity_check_deg_s"] * 1e6 for record in bounded), default=None)
-    fastest = max((max(record["max_joint_speed_deg_s"]) for record in bounded), default=None)
-    share = N_("Share of the joint's assumed speed") if assumed else N_("Share of the joint's greatest speed")
-    return [
-        Figure(N_("Paths planned"), len(records), ""),
-        Figure(N_("Paths safe as they are"), sum(record["verdict"] == "safe" for record in records), ""),
-        Figure(N_("Singular poses met"), sum(event["crossing"] for event in events), ""),
-        Figure(N_("Near passes"), sum(not event["crossing"] for event in events), ""),
-        Figure(N_("Paths that collide"), _colliding(records) if clear else None, ""),
-        Figure(N_("Greatest joint speed needed, where bounded"), fastest, "deg/s"),
-        Figure(share, max(ratios, default=None), ""),
-        Figure(N_("Velocity by Jacobian against differences, within"), agreement, "µdeg/s"),
-        Figure(N_("Characteristic length of the Jacobian"), length * 1000, "mm"),
-    ]
+def _figures(paths: list[PathSummary], length: float, measured: bool, assumed: bool) -> tuple[Figure, ...]:
+    events = [event for path in paths for event in path.singularities]
+    bounded = [path for path in paths if path.max_joint_speed_deg_s]
+    ratios = [path.max_joint_speed_ratio for path in bounded if path.max_joint_speed_ratio is not None]
+    agreement = max((path.velocity_check_deg_s * 1e6 for path in bounded), default=None)
+    fastest = max((max(path.max_joint_speed_deg_s or ()) for path in bounded), default=None)
+    colliding = sum(bool(path.collisions) for path in paths)
+    return (
+        Figure("paths", len(paths), ""),
+        Figure("safe", sum(path.verdict == "safe" for path in paths), ""),
+        Figure("singular_poses", sum(event.crossing for event in events), ""),
+        Figure("near_passes", sum(not event.crossing for event in events), ""),
+        Figure("colliding", colliding if measured else None, ""),
+        Figure("max_joint_speed", fastest, "deg/s"),
+        Figure("assumed_speed_ratio" if assumed else "speed_ratio", max(ratios, default=None), ""),
+        Figure("velocity_check", agreement, "µdeg/s"),
+        Figure("characteristic_length", length * 1000, "mm"),
+    )
 
 
-def _colliding(records: list[dict[str, Any]]) -> int:
-    return sum(bool(record["collisions"]) for record in records)
+def _degrees(values: Reals) -> tuple[float, ...]:
+    return tuple(float(value) for value in np.degrees(values))

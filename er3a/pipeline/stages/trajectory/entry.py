@@ -11,32 +11,31 @@ from er3a.files.robot_file import Text
 from er3a.files.yaml_file import StrictModel, read_yaml
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.stages.stage import Stage
+from er3a.planning.avoidance import StrategyName
 
 if TYPE_CHECKING:
     from er3a.pipeline.study import Study
-
-WayName = Literal["slow", "branch", "via_shift", "via_tilt", "damped", "detour", "stop"]
 
 
 class TrajectorySettings(StrictModel):
     """Where a path counts as near-singular, and how many points are checked between two samples.
 
-    ``repair`` chooses the way around singular regions, or compares all of them. Joints of unknown speed are taken to do
-    ``assumed_speed_deg_s``; all joints to reach full speed in ``full_speed_after_s``.
-    ``scene`` holds the obstacles; no overlap with them deeper than ``overlap_mm`` goes unnoticed between points.
+    ``avoidance`` chooses the avoidance strategy, or compares all of them. Joints of unknown speed are taken to do
+    ``assumed_speed_deg_s``; all joints to reach full speed in ``acceleration_time_s``.
+    ``scene`` holds the obstacles; no overlap with them deeper than ``penetration_tolerance_mm`` goes unnoticed between points.
     """
 
     checks_per_sample: Annotated[int, Field(ge=1, le=1000)]
     near_wrist_deg: Annotated[float, Field(gt=0, le=90)]
     near_elbow_deg: Annotated[float, Field(gt=0, le=90)]
     near_shoulder_mm: Annotated[float, Field(gt=0, le=10_000)]
-    repair: Literal["compare"] | WayName = "compare"
+    avoidance: Literal["compare"] | StrategyName = "compare"
     assumed_speed_deg_s: Annotated[
         list[Annotated[float, Field(gt=0, le=10_000)]], Field(min_length=6, max_length=6)
     ] = [180, 180, 180, 360, 360, 360]
-    full_speed_after_s: Annotated[float, Field(gt=0, le=10)] = 0.25
+    acceleration_time_s: Annotated[float, Field(gt=0, le=10)] = 0.25
     scene: Text | None = None
-    overlap_mm: Annotated[float, Field(ge=0.05, le=100)] = 1.0
+    penetration_tolerance_mm: Annotated[float, Field(ge=0.05, le=100)] = 1.0
 
 
 def _inputs(study: Study, robot: str) -> list[Path]:

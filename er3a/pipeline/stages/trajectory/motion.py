@@ -4,21 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from scipy.integrate import cumulative_simpson
 from scipy.interpolate import CubicHermiteSpline
 
-from er3a.errors import InputError, PoseError
+from er3a.errors import PoseError
 from er3a.files.path_file import PathEntry
 from er3a.kinematics.forward import forward, jacobian
+from er3a.pipeline.tables import Reals
 from er3a.planning.build import Built, build
+from er3a.planning.commands import Source
 from er3a.planning.follow import follow
 from er3a.planning.followed import Followed
+from er3a.planning.moves import JointMove
+from er3a.planning.sequences import JointSequence
 from er3a.robots.robot import Robot
-
-Times = np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,19 +40,19 @@ class Motion:
 
     entry: PathEntry
     built: Built
-    samples: Times
-    checks: Times
-    t: Times
-    q: np.ndarray
-    joints: Callable[[Times], np.ndarray]
-    rates: Callable[[Times], tuple[np.ndarray, np.ndarray, np.ndarray]]
-    tool: Callable[[Times], np.ndarray]
-    way: Callable[[Times], np.ndarray]
+    samples: Reals
+    checks: Reals
+    t: Reals
+    q: Reals
+    joints: Callable[[Reals], Reals]
+    rates: Callable[[Reals], tuple[Reals, Reals, Reals]]
+    tool: Callable[[Reals], Reals]
+    way: Callable[[Reals], Reals]
     followed: Followed | None
 
 
 def motion_of(
-    robot: Robot, entry: PathEntry, checks_per_sample: int, field: str, file: Path, ends: Mapping[str, np.ndarray]
+    robot: Robot, entry: PathEntry, checks_per_sample: int, source: Source, ends: Mapping[str, Reals]
 ) -> Motion:
     """Plan a path, and follow it if it is one of the tool; ``ends`` as for :func:`er3a.planning.build.build`.
 
@@ -60,17 +61,39 @@ def motion_of(
     InputError
         for what :func:`er3a.planning.build.build` refuses, and a start branch that has no solution at the start
     """
-    built = build(robot, entry, field, file, ends)
+    built = build(robot, entry.command(source), ends)
     samples = np.linspace(0.0, built.duration, entry.samples)
     checks = np.linspace(0.0, built.duration, (entry.samples - 1) * (checks_per_sample + 1) + 1)
     checks[:: checks_per_sample + 1] = samples
     if built.joints is not None:
-        return _joint_motion(robot, entry, built, samples, checks)
-    return _tool_motion(robot, entry, built, samples, checks, field, file)
+        return _joint_motion(robot, entry, built, built.joints, samples, checks)
+    path = built.tool
+    if path is None:
+        raise ValueError(f"{entry.name}: neither a move of the joints nor a path of the tool")
+    try:
+        followed = follow(robot, path, checks, built.q_start, built.start_slot)
+    except PoseError:
+        branch = getattr(entry, "start_branch", None)
+        problem = f"'{branch}' has no solution at the start pose"
+        raise source.error("start_branch", problem, "Choose another branch, or leave it out") from None
+    return Motion(
+        entry=entry,
+        built=built,
+        samples=samples,
+        checks=checks,
+        t=followed.t,
+        q=followed.q,
+        joints=followed.joints,
+        rates=followed.rates,
+        tool=lambda t: path.poses(path.progress(t)[0]),
+        way=lambda t: path.way(path.progress(t)[0]),
+        followed=followed,
+    )
 
 
-def _joint_motion(robot: Robot, entry: PathEntry, built: Built, samples: Times, checks: Times) -> Motion:
-    move = built.joints
+def _joint_motion(
+    robot: Robot, entry: PathEntry, built: Built, move: JointMove | JointSequence, samples: Reals, checks: Reals
+) -> Motion:
     q, velocity, _ = move.joints(checks)
     speed = np.linalg.norm(np.einsum("nij,nj->ni", jacobian(robot, q)[:, :3], velocity), axis=1)
     way = CubicHermiteSpline(checks, cumulative_simpson(speed, x=checks, initial=0.0), speed)
@@ -86,28 +109,4 @@ def _joint_motion(robot: Robot, entry: PathEntry, built: Built, samples: Times, 
         tool=lambda t: forward(robot, move.joints(t)[0]),
         way=way,
         followed=None,
-    )
-
-
-def _tool_motion(
-    robot: Robot, entry: PathEntry, built: Built, samples: Times, checks: Times, field: str, file: Path
-) -> Motion:
-    path = built.tool
-    try:
-        followed = follow(robot, path, checks, built.q_start, built.start_slot)
-    except PoseError:
-        problem = f"'{entry.start_branch}' has no solution at the start pose"
-        raise InputError(file, f"{field}.start_branch", problem, "Choose another branch, or leave it out") from None
-    return Motion(
-        entry=entry,
-        built=built,
-        samples=samples,
-        checks=checks,
-        t=followed.t,
-        q=followed.q,
-        joints=followed.joints,
-        rates=followed.rates,
-        tool=lambda t: path.poses(path.progress(t)[0]),
-        way=lambda t: path.way(path.progress(t)[0]),
-        followed=followed,
     )

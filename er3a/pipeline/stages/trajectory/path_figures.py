@@ -5,10 +5,9 @@ Layout is fixed, so that matplotlib draws each figure once.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -16,21 +15,27 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 
 from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.trajectory import type_word
+from er3a.pipeline.stages.trajectory.model import (
+    FASTEST,
+    AvoidanceRows,
+    Checks,
+    NearThresholds,
+    PathSummary,
+    Stretch,
+)
 from er3a.pipeline.stages.trajectory.oblique import draw_path
+from er3a.pipeline.tables import Reals
 from er3a.pipeline.viewing.figures import svg_data_uri
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINT_NAMES, MODEL, MUTED, REFERENCE, VERDICTS
 from er3a.pipeline.viewing.palette import JOINTS as COLOURS
+from er3a.planning.near_singular import SingularityType
 from er3a.robots.robot import Robot
 
 WIDTHS = (3.2, 2.8, 2.4, 2.0, 1.6, 1.2)  # so that curves that coincide all show
 NEAR_LIMIT_DEG = 20.0
-EVENT_STYLES = {True: "-", False: ":"}
+EVENT_STYLES: dict[bool, Literal["-", ":"]] = {True: "-", False: ":"}
 TYPE_COLOURS = {"wrist": COLOURS[4], "elbow": COLOURS[2], "shoulder": COLOURS[3]}
-SHADES = {
-    "out_of_limits": (VERDICTS["caution"], 0.16, N_("outside a joint limit")),
-    "too_fast": (VERDICTS["fail"], 0.14, N_("joint too fast")),
-    "unreachable": (INK, 0.14, N_("not reachable")),
-}
 LEFT, BOTTOM, TOP = 0.055, 0.07, 0.925
 COLUMNS, GAP = (0.275, 0.275, 0.265), 0.06
 FONT = 9.0
@@ -42,8 +47,8 @@ class PathFigure:
     One figure serves all paths of a page: making axes and their ticks takes longer than drawing the curves.
     """
 
-    def __init__(self):
-        self.figure = Figure(figsize=(13.2, 7.0), layout="none")
+    def __init__(self) -> None:
+        self.figure = Figure(figsize=(13.2, 7.0), layout="none")  # type: ignore[arg-type]  # the stubs lack it
         self.joints = [self._axes(0, row) for row in range(3)]
         self.measures = [self._axes(1, row) for row in range(3)]
         self.effort = self._axes(2, 2)
@@ -56,23 +61,20 @@ class PathFigure:
                 ax.tick_params(labelbottom=False)
             column[-1].set_xlabel(tr("time (s)"), fontsize=FONT)
 
-    def draw(
-        self, robot: Robot, record: dict[str, Any], rows: pd.DataFrame, ways: pd.DataFrame, near: dict[str, float]
-    ) -> str:
+    def draw(self, robot: Robot, path: PathSummary, rows: Checks, motions: AvoidanceRows, near: NearThresholds) -> str:
         """The figure of a path as the data address of an image."""
         for ax in self.figure.axes:
             _clear(ax)
-        t = rows["t_s"].to_numpy()
-        _joint_curves(self.joints, robot, record, rows)
+        _joint_curves(self.joints, robot, path, rows)
         _distances(self.measures[0], rows, near)
         _condition(self.measures[1], rows)
         _small_measures(self.measures[2], rows)
         for ax in (*self.joints, *self.measures):
-            _mark(ax, record)
-            ax.set_xlim(t[0], t[-1])
-        _effort(self.effort, record, rows, ways)
-        draw_path(self.space, robot, record, rows, ways[ways["way"] == record["repair"]])
-        handles = _legend(record)
+            _mark(ax, path)
+            ax.set_xlim(rows.t_s[0], rows.t_s[-1])
+        _effort(self.effort, path, rows, motions)
+        draw_path(self.space, robot, path, rows, motions.take(motions.strategy == path.strategy))
+        handles = _legend(path)
         legend = self.figure.legend(
             handles=handles, loc="upper center", bbox_to_anchor=(0.5, 1.0), ncols=9, fontsize=FONT
         )
@@ -95,48 +97,49 @@ def _clear(ax: Axes) -> None:
     """Take a path's curves out of axes, and leave their ticks."""
     for artist in (*ax.lines, *ax.collections, *ax.patches, *ax.texts):
         artist.remove()
-    if ax.get_legend() is not None:
-        ax.get_legend().remove()
+    if legend := ax.get_legend():
+        legend.remove()
     ax.relim()
     ax.margins(0.05)
     ax.autoscale(True)
 
 
-def _joint_curves(axes: list[Axes], robot: Robot, record: dict[str, Any], rows: pd.DataFrame) -> None:
-    t = rows["t_s"].to_numpy()
-    labels = (
-        ("deg", N_("joint angle (deg)")),
-        ("deg_s", N_("velocity (deg/s)")),
-        ("deg_s2", N_("acceleration (deg/s²)")),
+def _joint_curves(axes: list[Axes], robot: Robot, path: PathSummary, rows: Checks) -> None:
+    curves = (
+        (rows.q_deg, N_("joint angle (deg)")),
+        (rows.q_deg_s, N_("velocity (deg/s)")),
+        (rows.q_deg_s2, N_("acceleration (deg/s²)")),
     )
-    for ax, (unit, label) in zip(axes, labels):
-        values = rows[[f"q{j + 1}_{unit}" for j in range(6)]].to_numpy()
+    for ax, (values, label) in zip(axes, curves):
         for j in range(6):
-            ax.plot(t, values[:, j], color=COLOURS[j], linewidth=WIDTHS[j])
+            ax.plot(rows.t_s, values[:, j], color=COLOURS[j], linewidth=WIDTHS[j])
         ax.set_ylabel(tr(label), fontsize=FONT)
-        if unit == "deg":
+        if values is rows.q_deg:
             _limits(ax, robot, values)
-        elif not record["joint_speed_bounded"]:
+        elif not path.joint_speed_bounded:
             _cut(ax, values)
 
 
-def _distances(ax: Axes, rows: pd.DataFrame, near: dict[str, float]) -> None:
+def _distances(ax: Axes, rows: Checks, near: NearThresholds) -> None:
     """Distance from each singular set, in parts of the distance below which a pass counts as near."""
-    t = rows["t_s"].to_numpy()
-    columns = (("wrist", "wrist_deg"), ("elbow", "elbow_deg"), ("shoulder", "shoulder_mm"))
-    for kind, column in columns:
-        share = np.abs(rows[column].to_numpy()) / near[column]
-        ax.plot(t, np.maximum(share, 1e-4), color=TYPE_COLOURS[kind], label=tr(kind))
+    curves: tuple[tuple[SingularityType, Reals, float], ...] = (
+        ("wrist", rows.wrist_deg, near.wrist_deg),
+        ("elbow", rows.elbow_deg, near.elbow_deg),
+        ("shoulder", rows.shoulder_mm, near.shoulder_mm),
+    )
+    for kind, distance, threshold in curves:
+        ratio = np.maximum(np.abs(distance) / threshold, 1e-4)
+        ax.plot(rows.t_s, ratio, color=TYPE_COLOURS[kind], label=type_word(kind))
     ax.axhline(1.0, color=INK, linewidth=1, linestyle="--")
     _logarithmic(ax, 0.01, 100.0)
     ax.set_ylabel(tr("distance / threshold"), fontsize=FONT)
     _key(ax, "lower left")
 
 
-def _condition(ax: Axes, rows: pd.DataFrame) -> None:
-    values = rows["condition_number"].replace(np.inf, np.nan)
-    ax.plot(rows["t_s"], values, color=MODEL)
-    _logarithmic(ax, 1.0, min(1e6, 2 * values.fillna(0.0).clip(lower=50.0).max()))
+def _condition(ax: Axes, rows: Checks) -> None:
+    values = np.where(np.isinf(rows.condition_number), np.nan, rows.condition_number)
+    ax.plot(rows.t_s, values, color=MODEL)
+    _logarithmic(ax, 1.0, min(1e6, 2 * np.nanmax(np.append(values, 50.0))))
     ax.set_ylabel(tr("condition number"), fontsize=FONT)
 
 
@@ -147,48 +150,47 @@ def _logarithmic(ax: Axes, low: float, high: float) -> None:
     decades = np.arange(np.ceil(np.log10(low) - 1e-9), np.floor(np.log10(high) + 1e-9) + 1)
     ticks = 10.0 ** (decades if len(decades) < 6 else decades[::2])
     ax.yaxis.set_minor_locator(NullLocator())
-    ax.yaxis.set_major_locator(FixedLocator(ticks))
+    ax.yaxis.set_major_locator(FixedLocator(ticks.tolist()))
     ax.yaxis.set_major_formatter(lambda value, _: f"{value:.10g}" if value < 1e5 else f"1e{round(np.log10(value))}")
 
 
-def _small_measures(ax: Axes, rows: pd.DataFrame) -> None:
-    ax.plot(rows["t_s"], rows["smallest_singular_value"], color=REFERENCE, label=tr("smallest singular value"))
-    ax.plot(rows["t_s"], rows["manipulability"], color=MODEL, label=tr("manipulability"))
-    most = rows[["smallest_singular_value", "manipulability"]].max().max()
+def _small_measures(ax: Axes, rows: Checks) -> None:
+    ax.plot(rows.t_s, rows.smallest_singular_value, color=REFERENCE, label=tr("smallest singular value"))
+    ax.plot(rows.t_s, rows.manipulability, color=MODEL, label=tr("manipulability"))
+    most = np.nanmax([*rows.smallest_singular_value, *rows.manipulability, 0.0])
     ax.set_ylim(0, 1.35 * most if most > 0 else 1)
     ax.set_ylabel(tr("measure"), fontsize=FONT)
     _key(ax, "upper left")
 
 
-def _effort(ax: Axes, record: dict[str, Any], rows: pd.DataFrame, ways: pd.DataFrame) -> None:
-    """Share of the joints' speed limits over the share of the time: as programmed, repaired, at its fastest."""
-    programmed = rows["speed_share"].to_numpy()
-    ax.plot(rows["t_s"] / rows["t_s"].iloc[-1], programmed, color=HIGHLIGHT, label=tr("as programmed"))
-    shown = [programmed]
-    for way, colour, label in ((record["repair"], MODEL, tr("repaired")), ("fastest", MUTED, tr("at its fastest"))):
-        part = ways[ways["way"] == way]
+def _effort(ax: Axes, path: PathSummary, rows: Checks, motions: AvoidanceRows) -> None:
+    """The joints' greatest ratio of speed to limit over the share of the time: programmed, repaired, at its fastest."""
+    ax.plot(rows.t_s / rows.t_s[-1], rows.speed_ratio, color=HIGHLIGHT, label=tr("as programmed"))
+    shown = [rows.speed_ratio]
+    for name, colour, label in ((path.strategy, MODEL, tr("repaired")), (FASTEST, MUTED, tr("at its fastest"))):
+        part = motions.take(motions.strategy == name)
         if len(part):
-            ax.plot(part["t_s"] / part["t_s"].iloc[-1], part["speed_share"], color=colour, label=label, linewidth=1.3)
-            shown.append(part["speed_share"].to_numpy())
+            ax.plot(part.t_s / (part.t_s[-1] or np.nan), part.speed_ratio, color=colour, label=label, linewidth=1.3)
+            shown.append(part.speed_ratio)
     ax.axhline(1.0, color=INK, linewidth=1, linestyle="--")
     size = np.concatenate(shown)
     most = np.nanmax(size) if np.isfinite(size).any() else 1.0
-    ax.set_ylim(0, 1.35 * max(1.0, most) if record["joint_speed_bounded"] else 3.0)
+    ax.set_ylim(0, 1.35 * max(1.0, most) if path.joint_speed_bounded else 3.0)
     ax.set_xlim(0, 1)
     ax.set_xlabel(tr("share of each motion's time"), fontsize=FONT)
     ax.set_ylabel(tr("joint speed / limit"), fontsize=FONT)
     _key(ax, "upper left")
 
 
-def _key(ax: Axes, corner: str) -> None:
+def _key(ax: Axes, corner: Literal["upper left", "lower left"]) -> None:
     ax.legend(loc=corner, ncols=3, fontsize=8, handlelength=1.2, columnspacing=1.0, borderpad=0.1)
 
 
-def _limits(ax: Axes, robot: Robot, degrees: np.ndarray) -> None:
+def _limits(ax: Axes, robot: Robot, q_deg: Reals) -> None:
     """Dashed lines at the limits that a joint comes near to."""
-    if np.isnan(degrees).all():
+    if np.isnan(q_deg).all():
         return
-    low, high = np.nanmin(degrees, axis=0), np.nanmax(degrees, axis=0)
+    low, high = np.nanmin(q_deg, axis=0), np.nanmax(q_deg, axis=0)
     lower, upper = np.degrees(robot.lower), np.degrees(robot.upper)
     for j in range(6):
         for limit, gap, side in ((lower[j], low[j] - lower[j], "top"), (upper[j], upper[j] - high[j], "bottom")):
@@ -199,7 +201,7 @@ def _limits(ax: Axes, robot: Robot, degrees: np.ndarray) -> None:
                 ax.margins(y=0.18)
 
 
-def _cut(ax: Axes, values: np.ndarray) -> None:
+def _cut(ax: Axes, values: Reals) -> None:
     """Cut the axis where a curve grows without bound at the edge of reach."""
     size = np.abs(values[np.isfinite(values)])
     if size.size:
@@ -208,25 +210,32 @@ def _cut(ax: Axes, values: np.ndarray) -> None:
         ax.text(0.99, 0.04, tr("cut: grows without bound"), transform=ax.transAxes, ha="right", fontsize=8)
 
 
-def _mark(ax: Axes, record: dict[str, Any]) -> None:
-    for key, (colour, alpha, _) in SHADES.items():
-        for part in record[key]:
-            ax.axvspan(part["t0_s"], part["t1_s"], color=colour, alpha=alpha, linewidth=0)
-    for event in record["singularities"]:
-        ax.axvline(event["t_s"], color=HIGHLIGHT, linestyle=EVENT_STYLES[event["crossing"]], linewidth=1.4)
-        at = (event["t_s"], 1.0)
+def _shades(path: PathSummary) -> list[tuple[tuple[Stretch[Any], ...], str, float, str]]:
+    """Stretches that are wrong, with the colour, opacity and name of their shade."""
+    shades: list[tuple[tuple[Stretch[Any], ...], str, float, str]] = [
+        (path.out_of_limits, VERDICTS["caution"], 0.16, tr("outside a joint limit")),
+        (path.too_fast, VERDICTS["fail"], 0.14, tr("joint too fast")),
+        (path.unreachable, INK, 0.14, tr("not reachable")),
+    ]
+    return [shade for shade in shades if shade[0]]
+
+
+def _mark(ax: Axes, path: PathSummary) -> None:
+    for stretches, colour, alpha, _ in _shades(path):
+        for part in stretches:
+            ax.axvspan(part.t0_s, part.t1_s, color=colour, alpha=alpha, linewidth=0)
+    for event in path.singularities:
+        ax.axvline(event.t_s, color=HIGHLIGHT, linestyle=EVENT_STYLES[event.crossing], linewidth=1.4)
+        at = (event.t_s, 1.0)
         ax.plot(*at, "v", color=HIGHLIGHT, markersize=6, transform=ax.get_xaxis_transform(), clip_on=False, zorder=5)
 
 
-def _legend(record: dict[str, Any]) -> list[Line2D | Patch]:
+def _legend(path: PathSummary) -> list[Line2D | Patch]:
     handles: list[Line2D | Patch] = [
         Line2D([], [], color=COLOURS[j], linewidth=WIDTHS[j], label=JOINT_NAMES[j]) for j in range(6)
     ]
     for crossing, label in ((True, tr("singular")), (False, tr("near-singular"))):
-        if any(event["crossing"] == crossing for event in record["singularities"]):
-            style = {"linestyle": EVENT_STYLES[crossing], "marker": "v"}
-            handles.append(Line2D([], [], color=HIGHLIGHT, label=label, **style))
-    for key, (colour, alpha, label) in SHADES.items():
-        if record[key]:
-            handles.append(Patch(color=colour, alpha=2 * alpha, label=tr(label)))
+        if any(event.crossing == crossing for event in path.singularities):
+            handles.append(Line2D([], [], color=HIGHLIGHT, label=label, linestyle=EVENT_STYLES[crossing], marker="v"))
+    handles += [Patch(color=colour, alpha=2 * alpha, label=label) for _, colour, alpha, label in _shades(path)]
     return handles

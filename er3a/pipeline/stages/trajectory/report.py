@@ -4,22 +4,42 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pandas as pd
 
-from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.results import read_summary, read_table
+from er3a.pipeline.messages.language import tr
+from er3a.pipeline.messages.say import say
+from er3a.pipeline.messages.trajectory import (
+    FIGURES,
+    advice,
+    kind_word,
+    path_text,
+    reasons,
+    strategy_word,
+    type_word,
+    verdict_word,
+)
+from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.trajectory.clearance_figures import clearance_section
+from er3a.pipeline.stages.trajectory.model import (
+    AvoidanceRows,
+    Checks,
+    NearThresholds,
+    PathSummary,
+    PathVerdict,
+    Singularity,
+    StrategyMotion,
+    TrajectoryResults,
+    TriedStrategy,
+)
 from er3a.pipeline.stages.trajectory.path_figure_3d import turning_figure
 from er3a.pipeline.stages.trajectory.path_figures import PathFigure
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.page import fixed, number, render, run_command
+from er3a.pipeline.viewing.page import fixed, head_of, number, render, run_command
 from er3a.robots.robot import Robot
 
 DRAWN = 250
-STATUS = {
+STATUS: dict[PathVerdict, str] = {
     "safe": "pass",
     "near-singular": "caution",
     "singular": "caution",
@@ -27,23 +47,6 @@ STATUS = {
     "leaves limits": "fail",
     "collides": "fail",
     "unreachable": "fail",
-}
-WAYS = {
-    "slow": N_("slow down on the path"),
-    "branch": N_("another solution of the arm first"),
-    "via_shift": N_("via point, tool point shifted"),
-    "via_tilt": N_("via point, tool tilted"),
-    "damped": N_("damped least squares"),
-    "detour": N_("joint move across the region"),
-    "stop": N_("stop before it, with an alarm"),
-}
-KINDS = {
-    "joint": N_("joint move"),
-    "joint_sequence": N_("joint moves in sequence"),
-    "line": N_("straight line"),
-    "arc": N_("circular arc"),
-    "sequence": N_("lines and arcs in sequence"),
-    "table": N_("path from a table"),
 }
 
 
@@ -57,119 +60,150 @@ class Drawing:
     inches: float
 
 
-def report(study: Study, name: str, folder: Path, output: Path) -> None:
-    """Write the trajectory page of a robot from the results in ``folder``."""
-    robot = study.robot(name)
-    summary = read_summary(folder)
-    checks, repairs = read_table(folder / "checks.parquet"), read_table(folder / "repairs.parquet")
-    sections, figure = [], PathFigure()
-    for record in summary["paths"]:
-        rows, ways = (table[table["path"] == record["name"]] for table in (checks, repairs))
-        sections.append(_section(robot, record, rows, ways, summary["near"], figure))
-    limits = summary["joint_limits"]
+@dataclass(frozen=True)
+class Section:
+    """A path on the page: the record, and what it says in the page's language."""
+
+    path: PathSummary
+    status: str
+    verdict: str
+    kind: str
+    text: str
+    advice: str | None
+    speed: str
+    events: list[list[str]]
+    faults: list[list[str]]
+    strategies: list[list[str]]
+    figure: Drawing
+
+
+def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> None:
+    """Write the trajectory page of a robot."""
+    robot, results = study.robot(stored.robot), stored.results
+    summary, checks, motions = results.summary, results.checks, results.avoidance
+    figure, sections = PathFigure(), []
+    for path in summary.paths:
+        rows, own = checks.take(checks.path == path.name), motions.take(motions.path == path.name)
+        sections.append(_section(path, rows, _figure(figure, robot, path, rows, own, summary.near)))
+    assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
     render(
         Path(__file__).with_name("report.html.j2"),
         output,
         summary,
-        command=run_command(study, f"{name}/trajectory.html"),
+        head=head_of(stored, FIGURES),
+        command=run_command(study, f"{stored.robot}/trajectory.html"),
         robot=robot,
-        robot_pages=study.pages(name),
-        paths=sections,
-        clearance=clearance_section(summary, read_table(folder / "clearance.parquet")),
-        near=summary["near"],
-        length_mm=summary["characteristic_length_m"] * 1000,
-        limits=limits,
-        assumed=[f"J{j + 1}" for j in range(6) if limits["speed_assumed"][j]],
-        turning=turning_figure(robot, summary, checks, repairs),
+        robot_pages=study.pages(stored.robot),
+        sections=sections,
+        clearance=clearance_section(results),
+        assumed=assumed,
+        turning=turning_figure(robot, results),
     )
 
 
-def _section(
-    robot: Robot,
-    record: dict[str, Any],
-    rows: pd.DataFrame,
-    ways: pd.DataFrame,
-    near: dict[str, float],
-    figure: PathFigure,
-) -> dict[str, Any]:
-    kind, finding = record["kind"], record["text"]
+def _section(path: PathSummary, rows: Checks, figure: Drawing) -> Section:
+    return Section(
+        path=path,
+        status=STATUS[path.verdict],
+        verdict=verdict_word(path.verdict),
+        kind=kind_word(path.kind),
+        text=path_text(path),
+        advice=advice(path),
+        speed=_speed(path),
+        events=[_event_row(event) for event in path.singularities],
+        faults=_faults(path),
+        strategies=_strategies(path),
+        figure=figure,
+    )
+
+
+def _figure(
+    figure: PathFigure, robot: Robot, path: PathSummary, rows: Checks, motions: AvoidanceRows, near: NearThresholds
+) -> Drawing:
     alt = tr(
         "Panels over time for {path}: joint angles, velocities and accelerations; distances from the singular sets, "
         "condition number, manipulability; the path in space; joint speeds against their limits. {finding}.",
-        path=record["name"],
-        finding=finding,
+        path=path.name,
+        finding=path_text(path),
     )
-    return {
-        **record,
-        "status": STATUS[record["verdict"]],
-        "kind_words": tr(KINDS[kind]),
-        "speed": _speed(record),
-        "events": [_event_row(event) for event in record["singularities"]],
-        "faults": [
-            [word, fixed(part["t0_s"], 3), fixed(part["t1_s"], 3), *_way(part), part["cause"]]
-            for word, key in (
-                (N_("not reachable"), "unreachable"),
-                (N_("outside limits"), "out_of_limits"),
-                (N_("too fast"), "too_fast"),
-                (N_("collision"), "collisions"),
-            )
-            for part in record[key]
-        ],
-        "ways": _ways(record),
-        "figure": Drawing(
-            figure.draw(robot, record, _drawn(record, rows), ways, near),
-            alt,
-            _conclusion(record, rows),
-            float(figure.figure.get_figwidth()),
-        ),
-    }
+    uri = figure.draw(robot, path, _drawn(path, rows), motions, near)
+    return Drawing(uri, alt, _conclusion(path, rows), float(figure.figure.get_figwidth()))
 
 
-def _drawn(record: dict[str, Any], rows: pd.DataFrame) -> pd.DataFrame:
+def _drawn(path: PathSummary, rows: Checks) -> Checks:
     """The rows that a curve needs: evenly spread ones, those at singular poses, and the greatest speeds."""
-    kept = [np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round()]
-    kept.append([int(np.argmin(np.abs(rows["t_s"].to_numpy() - event["t_s"]))) for event in record["singularities"]])
-    speed = np.nan_to_num(rows["speed_share"].to_numpy())
-    kept.append(np.flatnonzero(speed > 0.5 * speed.max())[:: max(1, len(rows) // DRAWN // 2)])
-    return rows.iloc[np.unique(np.concatenate(kept).astype(int))]
+    even = np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round()
+    events = [int(np.argmin(np.abs(rows.t_s - event.t_s))) for event in path.singularities]
+    speed = np.nan_to_num(rows.speed_ratio)
+    fast = np.flatnonzero(speed > 0.5 * speed.max())[:: max(1, len(rows) // DRAWN // 2)]
+    return rows.take(np.unique(np.concatenate([even, events, fast]).astype(int)))
 
 
-def _ways(record: dict[str, Any]) -> list[list[str]]:
-    """Rows of the comparison: the programme, each way around, and the exact path at its fastest."""
-    if not record["repairs"]:
+def _faults(path: PathSummary) -> list[list[str]]:
+    kinds = (
+        (tr("not reachable"), path.unreachable),
+        (tr("outside limits"), path.out_of_limits),
+        (tr("too fast"), path.too_fast),
+        (tr("collision"), path.collisions),
+    )
+    return [
+        [
+            word,
+            fixed(part.t0_s, 3),
+            fixed(part.t1_s, 3),
+            fixed(part.s0_m * 1000, 1),
+            fixed(part.s1_m * 1000, 1),
+            say(part.cause),
+        ]
+        for word, stretches in kinds
+        for part in stretches
+    ]
+
+
+def _strategies(path: PathSummary) -> list[list[str]]:
+    """Rows of the comparison: the programme, each strategy, and the exact path at its fastest."""
+    if not path.avoidance:
         return []
-    duration = fixed(record["duration_s"], 2)
-    shares = (record[f"max_joint_{kind}_ratio"] for kind in ("speed", "acceleration"))
-    clearance = record["clearance"] and record["clearance"]["least_mm"]
-    cells = ["0", "0", *(_share(share) for share in shares), _clearance(clearance), duration]
-    rows = [[tr("as programmed"), *cells, tr("the path to be repaired")]]
-    for price in record["repairs"]:
-        way, reason = price["way"], price["reason"]
-        name = tr(WAYS[way]) + (" ←" if way == record["repair"] else "")
-        if price["duration_s"] is None:
-            rows.append([name, *["–"] * 6, tr("not possible: {reason}", reason=reason)])
-            continue
-        remark = tr("not usable: {reason}", reason=reason) if reason else _remark(price)
-        off = (_small(price["max_deviation_mm"]), _small(price["max_deviation_deg"]))
-        shares = (_share(price[f"max_joint_{kind}_ratio"]) for kind in ("speed", "acceleration"))
-        rows.append([name, *off, *shares, _clearance(price["clearance_mm"]), fixed(price["duration_s"], 2), remark])
-    if record["fastest_s"]:
-        cells = ["0", "0", "1.00", "1.00", _clearance(clearance), fixed(record["fastest_s"], 2)]
-        rows.append([tr("the path at its fastest"), *cells, tr("for comparison")])
+    clearance = _clearance(path.clearance.least_mm if path.clearance else None)
+    ratios = _ratio(path.max_joint_speed_ratio), _ratio(path.max_joint_acceleration_ratio)
+    programmed = ["0", "0", *ratios, clearance, fixed(path.duration_s, 2), tr("the path to be repaired")]
+    rows = [[tr("as programmed"), *programmed]]
+    for tried in path.avoidance:
+        name = strategy_word(tried.name) + (" ←" if tried.name == path.strategy else "")
+        if tried.motion is None:
+            rows.append([name, *["–"] * 6, tr("not possible: {reason}", reason=reasons(tried))])
+        else:
+            rows.append([name, *_costs(tried.motion), _remark(tried, tried.motion)])
+    if path.fastest_s:
+        costs = ["0", "0", "1.00", "1.00", clearance, fixed(path.fastest_s, 2)]
+        rows.append([tr("the path at its fastest"), *costs, tr("for comparison")])
     return rows
+
+
+def _costs(motion: StrategyMotion) -> list[str]:
+    return [
+        _small(motion.max_deviation_mm),
+        _small(motion.max_deviation_deg),
+        _ratio(motion.max_joint_speed_ratio),
+        _ratio(motion.max_joint_acceleration_ratio),
+        _clearance(motion.clearance_mm),
+        fixed(motion.duration_s, 2),
+    ]
 
 
 def _clearance(value: float | None) -> str:
     return "–" if value is None else fixed(value, 0)
 
 
-def _remark(price: dict[str, Any]) -> str:
-    if price["way"] == "detour":
-        return tr("a joint move takes no harm from singular poses")
-    return tr("keeps its distance from singular poses") if price["keeps_clear"] else tr("goes through the region")
+def _remark(tried: TriedStrategy, motion: StrategyMotion) -> str:
+    if tried.reasons:
+        return tr("not usable: {reason}", reason=reasons(tried))
+    if tried.name == "detour":
+        return tr("joint moves are unaffected by singularities")
+    return tr("keeps its distance from singular poses") if motion.keeps_clear else tr("goes through the region")
 
 
-def _share(value: float | None) -> str:
+def _ratio(value: float | None) -> str:
     return tr("no bound") if value is None else fixed(value, 2)
 
 
@@ -177,45 +211,37 @@ def _small(value: float) -> str:
     return "0" if value < 5e-4 else number(value, 3)
 
 
-def _conclusion(record: dict[str, Any], rows: pd.DataFrame) -> str:
+def _conclusion(path: PathSummary, rows: Checks) -> str:
     """What the curves show, in one or two sentences."""
-    fastest = record["max_joint_speed_deg_s"]
-    condition = rows["condition_number"]
-    parts = []
-    if fastest:
-        joint = int(np.argmax(fastest))
-        speed = number(fastest[joint], 3)
+    condition, parts = rows.condition_number, []
+    if path.max_joint_speed_deg_s:
+        joint = int(np.argmax(path.max_joint_speed_deg_s))
+        speed = number(path.max_joint_speed_deg_s[joint], 3)
         parts.append(tr("J{joint} is the fastest joint, with {speed} deg/s.", joint=joint + 1, speed=speed))
-    elif rows["reachable"].any():
+    elif rows.reachable.any():
         parts.append(tr("Towards the edge of reach the joint speeds grow without bound: the path must end before it."))
     else:
         parts.append(tr("No point of the path can be reached."))
-    if np.isinf(condition).any() or any(event["crossing"] for event in record["singularities"]):
+    if np.isinf(condition).any() or any(event.crossing for event in path.singularities):
         parts.append(tr("The condition number has no bound at the marked singular poses."))
-    elif condition.notna().any():
-        most = number(float(condition.max()), 3)
+    elif not np.isnan(condition).all():
+        most = number(float(np.nanmax(condition)), 3)
         parts.append(tr("The condition number rises to {most} at most.", most=most))
     return " ".join(parts)
 
 
-def _speed(record: dict[str, Any]) -> str:
-    fastest = record["max_joint_speed_deg_s"]
-    if not fastest:
-        return "–" if not record["joint_speed_bounded"] and record["verdict"] == "unreachable" else tr("unbounded")
-    joint = int(np.argmax(fastest))
-    return f"{number(fastest[joint], 3)} (J{joint + 1})"
+def _speed(path: PathSummary) -> str:
+    if not path.max_joint_speed_deg_s:
+        return "–" if not path.joint_speed_bounded and path.verdict == "unreachable" else tr("unbounded")
+    joint = int(np.argmax(path.max_joint_speed_deg_s))
+    return f"{number(path.max_joint_speed_deg_s[joint], 3)} (J{joint + 1})"
 
 
-def _event_row(event: dict[str, Any]) -> list[str]:
-    when = fixed(event["t_s"], 6)
-    if event["until_s"] > event["t_s"]:
-        when += f" – {fixed(event['until_s'], 6)}"
-    if event["crossing"]:
-        return [event["type"], when, tr("meets it"), "0"]
-    if event["type"] == "shoulder":
-        return [event["type"], when, tr("passes by"), f"{number(event['distance_mm'], 3)} mm"]
-    return [event["type"], when, tr("passes by"), f"{number(event['distance_deg'], 3)} deg"]
-
-
-def _way(part: dict[str, Any]) -> list[str]:
-    return [fixed(part["s0_m"] * 1000, 1), fixed(part["s1_m"] * 1000, 1)]
+def _event_row(event: Singularity) -> list[str]:
+    when = fixed(event.t_s, 6)
+    if event.until_s > event.t_s:
+        when += f" – {fixed(event.until_s, 6)}"
+    if event.crossing:
+        return [type_word(event.type), when, tr("meets it"), "0"]
+    distance, unit = (event.distance_deg, "deg") if event.distance_mm is None else (event.distance_mm, "mm")
+    return [type_word(event.type), when, tr("passes by"), f"{number(distance, 3)} {unit}"]

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
 import numpy as np
-import pandas as pd
-from matplotlib.axes import Axes
+from matplotlib.axes import Axes as PlotAxes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 from er3a.kinematics.forward import frames
 from er3a.pipeline.messages.language import tr
+from er3a.pipeline.stages.validation.model import Axes, KeyPoses, Section
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, LINK, MODEL, MUTED, REFERENCE
 from er3a.pipeline.viewing.skeleton import skeleton
@@ -23,27 +25,28 @@ REGION = "#dcebf5"
 HAIR = 0.9
 
 
-def side_view(robot: Robot, axes_table: pd.DataFrame, mended: Robot | None, mended_label: str) -> Figure:
+def side_view(robot: Robot, stated: Axes, corrected: Robot | None, corrected_label: str) -> Figure:
     """The arm in its zero pose from the side, to scale, with its joint axes over those that the references state."""
     figure, axes = new_figure(width=7, height=7.4)
     corners = skeleton(robot, np.zeros(6)) * 1000
     drawn = [corners]
-    if mended is not None:
-        dashed = skeleton(mended, np.zeros(6)) * 1000
-        axes.plot(dashed[:, 0], dashed[:, 2], "--", color=MUTED, linewidth=2, label=mended_label)
+    if corrected is not None:
+        dashed = skeleton(corrected, np.zeros(6)) * 1000
+        axes.plot(dashed[:, 0], dashed[:, 2], "--", color=MUTED, linewidth=2, label=corrected_label)
         drawn.append(dashed)
-    size = float(np.ptp(np.vstack([*drawn, axes_table[["x_mm", "y_mm", "z_mm"]].to_numpy()]), axis=0).max())
+    size = float(np.ptp(np.vstack([*drawn, stated.point_mm]), axis=0).max())
     style = {"solid_capstyle": "round", "solid_joinstyle": "round", "zorder": 1}
     axes.plot(corners[:, 0], corners[:, 2], color=LINK, linewidth=9, label=tr("model's links"), **style)
     axes.axhline(0, color=MUTED, linewidth=1, zorder=0)
-    for k, (source, rows) in enumerate(axes_table.groupby("source", sort=False)):
+    for k, (source, own) in enumerate(_by_source(stated)):
         marker, points = MARKERS[k % len(MARKERS)]
         colour = REFERENCE_COLOURS[k % len(REFERENCE_COLOURS)]
-        lines = [(row.joint, _vector(row, "direction_{}"), _vector(row, "{}_mm")) for row in rows.itertuples()]
-        _axes_of(axes, lines, size * (0.16 + 0.02 * k), colour, marker, points, _source_label(source), hollow=True)
-        off = rows[rows["distance_mm"] > 0.05 * size]
+        lines = list(zip(own.joint, own.direction, own.point_mm))
+        label = tr("axes: {own_source}", own_source=_short(source))
+        _axes_of(axes, lines, size * (0.16 + 0.02 * k), colour, marker, points, label, hollow=True)
+        off = own.distance_mm > 0.05 * size
         if k == 0:
-            _label(axes, [(row.joint, _vector(row, "{}_mm")) for row in off.itertuples()], colour, (10, -17))
+            _label(axes, zip(own.joint[off], own.point_mm[off]), colour, (10, -17))
     lines = _model_axes(robot)
     _axes_of(axes, lines, size * 0.13, MODEL, "o", 6, tr("model's axes"), hollow=False)
     _label(axes, [(joint, point) for joint, _, point in lines], MODEL, (9, 9))
@@ -53,33 +56,34 @@ def side_view(robot: Robot, axes_table: pd.DataFrame, mended: Robot | None, mend
     return figure
 
 
-def axis_deviation(axes_table: pd.DataFrame) -> Figure:
+def axis_deviation(stated: Axes) -> Figure:
     """Per joint and source: how far the model's axis is off the stated one, in mm and in degrees."""
     figure, panels = new_figure(1, 2, width=9, height=4)
-    sources = list(dict.fromkeys(axes_table["source"]))
+    sources = _by_source(stated)
     width = 0.8 / len(sources)
     for axes, value, bound, label in zip(
         panels,
-        ("distance_mm", "angle_deg"),
-        ("uncertainty_mm", "uncertainty_deg"),
+        (stated.distance_mm, stated.angle_deg),
+        (stated.uncertainty_mm, stated.uncertainty_deg),
         (tr("distance (mm)"), tr("angle (deg)")),
     ):
-        for k, source in enumerate(sources):
-            rows = axes_table[axes_table["source"] == source]
-            at = rows["joint"] + (k - (len(sources) - 1) / 2) * width
-            axes.bar(at, rows[value], width * 0.9, color=REFERENCE_COLOURS[k % len(REFERENCE_COLOURS)])
-            axes.bar(at, rows[bound], width * 0.9, facecolor="none", edgecolor=INK, linewidth=0.8)
+        for k, (source, _) in enumerate(sources):
+            own = stated.source == source
+            at = stated.joint[own] + (k - (len(sources) - 1) / 2) * width
+            axes.bar(at, value[own], width * 0.9, color=REFERENCE_COLOURS[k % len(REFERENCE_COLOURS)])
+            axes.bar(at, bound[own], width * 0.9, facecolor="none", edgecolor=INK, linewidth=0.8)
         axes.set_ylabel(label)
         axes.set_xticks(range(1, 7), [f"J{joint}" for joint in range(1, 7)])
-        axes.set_ylim(0, 1.15 * max(axes_table[value].max(), axes_table[bound].max()))
+        axes.set_ylim(0, 1.15 * max(value.max(), bound.max()))
         axes.grid(axis="x", visible=False)
         axes.set_axisbelow(True)
-        for joint, rows in axes_table.groupby("joint"):
-            worst = rows[value].max()
+        for joint in np.unique(stated.joint):
+            own = stated.joint == joint
+            worst = value[own].max()
             text = f"{worst:.0f}" if worst >= 10 else f"{worst:.2f}"
-            at = (joint, max(worst, rows[bound].max()))
+            at = (joint, max(worst, bound[own].max()))
             axes.annotate(text, at, (0, 2), textcoords="offset points", ha="center", fontsize=8)
-    for k, source in enumerate(sources):
+    for k, (source, _) in enumerate(sources):
         panels[0].bar([0], [0], color=REFERENCE_COLOURS[k % len(REFERENCE_COLOURS)], label=_short(source))
     panels[0].bar([0], [0], facecolor="none", edgecolor=INK, label=tr("uncertainty of the source"))
     panels[0].set_xlim(0.4, 6.6)
@@ -87,39 +91,41 @@ def axis_deviation(axes_table: pd.DataFrame) -> Figure:
     return figure
 
 
-def workspace_drawing(section: pd.DataFrame, labels: pd.DataFrame, origin_mm: list[float]) -> Figure:
-    """The side view of the wrist centre's region from the model, with the drawing's numbered labels."""
+def workspace_drawing(section: Section, labels: KeyPoses, origin_mm: Sequence[float]) -> Figure:
+    """The side view of the wrist centre's region from the model, with the drawing's labels, numbered from 1."""
     figure, axes = new_figure(width=9, height=8)
-    shape = (section["q2_deg"].nunique(), section["q3_deg"].nunique())
-    x, z = (section[key].to_numpy().reshape(shape) for key in ("x_mm", "z_mm"))
+    shape = (len(np.unique(section.q2_deg)), len(np.unique(section.q3_deg)))
+    x, z = section.x_mm.reshape(shape), section.z_mm.reshape(shape)
     axes.pcolormesh(x, z, np.ones(shape), cmap=ListedColormap([REGION]), shading="gouraud", rasterized=True, zorder=1)
-    on_q2, on_q3 = (section[key].to_numpy().reshape(shape) for key in ("on_q2_line", "on_q3_line"))
-    for i in np.flatnonzero(on_q2.all(axis=1)):
+    for i in np.flatnonzero(section.on_q2_line.reshape(shape).all(axis=1)):
         axes.plot(x[i], z[i], color=MODEL, linewidth=1.4, zorder=2)
-    for j in np.flatnonzero(on_q3.all(axis=0)):
+    for j in np.flatnonzero(section.on_q3_line.reshape(shape).all(axis=0)):
         axes.plot(x[:, j], z[:, j], color=MODEL, linewidth=1.4, zorder=2)
     axes.axvline(0, color=GRID, linewidth=1.5, zorder=0)
     axes.axhline(0, color=GRID, linewidth=1.5, zorder=0)
-    spread = max(np.ptp(x), np.ptp(z))
-    for row in labels.itertuples():
-        at = np.array([row.x_mm - origin_mm[0], row.z_mm - origin_mm[1]])
-        outward = at / max(float(np.linalg.norm(at)), 1.0) * 0.07 * spread
+    extent = max(np.ptp(x), np.ptp(z))
+    stated, model = (points[:, [0, 2]] - origin_mm for points in (labels.point_mm, labels.model_point_mm))
+    for number, at in enumerate(stated, 1):
+        outward = at / max(float(np.linalg.norm(at)), 1.0) * 0.07 * extent
         axes.annotate(
-            str(row.number), at, at + outward, ha="center", va="center", fontsize=11, color=INK, zorder=5,
+            str(number), at, at + outward, ha="center", va="center", fontsize=11, color=INK, zorder=5,
             bbox={"boxstyle": "circle,pad=0.25", "facecolor": "white", "edgecolor": REFERENCE},
             arrowprops={"arrowstyle": "-", "color": REFERENCE},
         )  # fmt: skip
         axes.plot(*at, "o", markersize=9, markerfacecolor="none", markeredgecolor=REFERENCE, zorder=4)
-        model = (row.model_x_mm - origin_mm[0], row.model_z_mm - origin_mm[1])
-        axes.plot(*model, ".", color=MODEL, markersize=5, zorder=4)
-    room = 0.12 * spread
-    axes.plot([x.min() - room, x.max() + room], [z.min() - room, z.max() + room], alpha=0)
+        axes.plot(*model[number - 1], ".", color=MODEL, markersize=5, zorder=4)
+    margin = 0.12 * extent
+    axes.plot([x.min() - margin, x.max() + margin], [z.min() - margin, z.max() + margin], alpha=0)
     equal_scale(axes, tr("x from axis 1 (mm)"), tr("z from axis 2 (mm)"))
     return figure
 
 
+def _by_source(stated: Axes) -> list[tuple[str, Axes]]:
+    return [(source, stated.take(stated.source == source)) for source in dict.fromkeys(stated.source)]
+
+
 def _axes_of(
-    axes: Axes, lines: list, half: float, colour: str, marker: str, points: float, label: str, hollow: bool
+    axes: PlotAxes, lines: list, half: float, colour: str, marker: str, points: float, label: str, hollow: bool
 ) -> None:
     """Axes seen end on as markers, the others as dash-dotted lines."""
     face = "none" if hollow else colour
@@ -141,7 +147,7 @@ def _model_axes(robot: Robot) -> list[tuple[int, np.ndarray, np.ndarray]]:
     return [(k + 1, T[k, :3, 2], points[k]) for k in range(6)]
 
 
-def _label(axes: Axes, points: list[tuple[int, np.ndarray]], colour: str, shift: tuple[int, int]) -> None:
+def _label(axes: PlotAxes, points: Iterable[tuple[int, np.ndarray]], colour: str, shift: tuple[int, int]) -> None:
     """Name joints at their points; joints that share a point share a label."""
     groups: list[tuple[np.ndarray, list[int]]] = []
     for joint, point in points:
@@ -156,13 +162,6 @@ def _label(axes: Axes, points: list[tuple[int, np.ndarray]], colour: str, shift:
         axes.annotate(text, point[[0, 2]], shift, textcoords="offset points", color=colour, zorder=6)
 
 
-def _vector(row, pattern: str) -> np.ndarray:
-    return np.array([getattr(row, pattern.format(c)) for c in "xyz"])
-
-
-def _source_label(source: str) -> str:
-    return tr("axes: {own_source}", own_source=_short(source))
-
-
 def _short(source: str) -> str:
+    """A source's title, which is what stands before a colon."""
     return source.split(":")[0]

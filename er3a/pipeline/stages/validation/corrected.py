@@ -1,20 +1,22 @@
-"""The arm with the named fault mended, as the results have it."""
+"""The arm with the most likely fault corrected, as the results have it."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable
+from dataclasses import asdict
 
-from er3a.kinematics.table_batch import COLUMNS
-from er3a.pipeline.messages.language import tr
-from er3a.pipeline.stages.validation.wording import both_faults
+from er3a.diagnosis.conclusions import MainFault, MostLikelyFault
+from er3a.pipeline.messages.diagnosis import both
+from er3a.pipeline.messages.say import sentence
+from er3a.pipeline.stages.validation.diagnosis_model import SetDiagnosis
+from er3a.pipeline.stages.validation.wording import typographic
 from er3a.robots.robot import Robot
 
 
-def mended_robot(robot: Robot, culprits: list[dict[str, Any]]) -> tuple[Robot | None, str]:
-    """The robot with the first named fault mended, and its label; None if no fault is named."""
-    for culprit in culprits:
-        if culprit["repaired"]:
-            columns = {name: culprit["repaired"][name] for name in COLUMNS}
-            label = tr("mended: {faults}", faults=both_faults(culprit["faults"]))
-            return robot.replace(convention=culprit["repaired"]["convention"], **columns), label
+def corrected_robot(robot: Robot, diagnoses: Iterable[SetDiagnosis]) -> tuple[Robot | None, str]:
+    """The robot with the first named fault corrected, and its label; None if no fault is named."""
+    for diagnosis in diagnoses:
+        if diagnosis.corrected and isinstance(diagnosis.conclusion, MostLikelyFault | MainFault):
+            label = sentence("corrected", "corrected: {faults}", faults=typographic(both(diagnosis.conclusion.faults)))
+            return robot.replace(**asdict(diagnosis.corrected)), label
     return None, ""

@@ -1,15 +1,27 @@
-"""What the page shows of diagnosis and identification: tables, and figures with their captions."""
+"""What the page shows of diagnosis and calibration: sentences, rows, and figures with their captions."""
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 from matplotlib.figure import Figure
 
+from er3a.diagnosis.conclusions import MainFault, MostLikelyFault
+from er3a.pipeline.messages.calibration import level
+from er3a.pipeline.messages.diagnosis import both
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.stages.validation.wording import both_faults, in_a_row, typographic
+from er3a.pipeline.messages.say import joined, say, sentence
+from er3a.pipeline.stages.validation.diagnosis_model import (
+    Calibrated,
+    Corrections,
+    RankedHypothesis,
+    Residuals,
+    SetCalibration,
+    SetDiagnosis,
+)
+from er3a.pipeline.stages.validation.model import ValidationSummary
+from er3a.pipeline.stages.validation.wording import typographic
 from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.page import Picture, fixed
 from er3a.pipeline.viewing.palette import INK, MODEL, MUTED, REFERENCE
@@ -19,63 +31,103 @@ SHOWN_RESIDUALS = 12
 LEAST_DRAWN = 1e-3
 
 
-def culprit_stories(summary: dict[str, Any], residuals: pd.DataFrame) -> list[dict[str, Any]]:
+@dataclass(frozen=True)
+class DiagnosisStory:
+    """What the page says about a reference set's diagnosis; ``others``: rows of the next-best hypotheses."""
+
+    reference_set: str
+    text: str
+    alike: list[str]
+    to_decide: str
+    others_title: str
+    others: list[list[str]]
+    hypotheses_tried: int
+    picture: Picture | None
+
+
+@dataclass(frozen=True)
+class CalibrationStory:
+    """What the page says about a reference set's calibration; ``found`` is None where there is none."""
+
+    reference_set: str
+    found: Calibrated | None
+    text: str
+    level: str
+    held: list[str]
+    close: list[str]
+    more: str
+    picture: Picture | None
+    rows: list[list[str]]
+
+
+def diagnosis_stories(summary: ValidationSummary, residuals: Residuals) -> list[DiagnosisStory]:
     """Per reference set: what the diagnosis says, the next-best hypotheses, and the residuals as a figure."""
-    stories = []
-    for culprit in summary["culprits"]:
-        ranked = [row for row in summary["diagnosis"] if row["reference_set"] == culprit["reference_set"]]
-        own = residuals[residuals["reference_set"] == culprit["reference_set"]]
-        named = culprit["status"] in ("named", "mostly")
-        stories.append(
-            culprit
-            | {
-                "text": typographic(culprit["text"]),
-                "alike": [typographic(words) for words in ranked[0]["indistinguishable_from"]] if named else [],
-                "to_decide": typographic(ranked[0]["to_decide"]) if named else "",
-                "others": [_hypothesis_row(row) for row in ranked[1 if named else 0 : SHOWN_HYPOTHESES]],
-                "others_title": tr("Next-best hypotheses")
-                if named
-                else tr("The best hypotheses, none of which will do"),
-                "picture": _residual_picture(own, culprit, ranked),
-            }
-        )
-    return stories
+    return [_diagnosis_story(diagnosis, residuals) for diagnosis in summary.diagnoses]
 
 
-def correction_stories(summary: dict[str, Any], corrections: pd.DataFrame) -> list[dict[str, Any]]:
+def correction_stories(summary: ValidationSummary, corrections: Corrections) -> list[CalibrationStory]:
     """Per reference set: what its positions say about the table's entries, with the figure."""
-    stories = []
-    for found in summary["identification"]:
-        own = corrections[corrections["reference_set"] == found["reference_set"]]
-        story = found | {"text": typographic(found["text"]), "picture": None, "rows": []}
-        story["close"] = [
-            tr("{first} and {second} ({correlation})", first=first, second=second, correlation=fixed(correlation, 2))
-            for first, second, correlation in found.get("close", ())
-        ]
-        if len(own):
-            alt = tr(
-                "Correction of each identified entry of the table with its 95 % interval, lengths and angles apart."
+    return [_calibration_story(calibration, corrections) for calibration in summary.calibrations]
+
+
+def _diagnosis_story(diagnosis: SetDiagnosis, residuals: Residuals) -> DiagnosisStory:
+    named = isinstance(diagnosis.conclusion, MostLikelyFault | MainFault)
+    best = diagnosis.hypotheses[0] if named else None
+    return DiagnosisStory(
+        reference_set=diagnosis.reference_set,
+        text=typographic(say(diagnosis.conclusion)),
+        alike=[typographic(both(faults)) for faults in best.indistinguishable_from] if best else [],
+        to_decide=typographic(say(best.to_decide)) if best and best.to_decide else "",
+        others_title=tr("Next-best hypotheses") if named else tr("The best hypotheses, none of which will do"),
+        others=[_hypothesis_row(each) for each in diagnosis.hypotheses[1 if named else 0 : SHOWN_HYPOTHESES]],
+        hypotheses_tried=diagnosis.hypotheses_tried,
+        picture=_residual_picture(residuals.take(residuals.reference_set == diagnosis.reference_set), diagnosis),
+    )
+
+
+def _calibration_story(calibration: SetCalibration, corrections: Corrections) -> CalibrationStory:
+    found = calibration.result if isinstance(calibration.result, Calibrated) else None
+    text = typographic(say(found.conclusion if found else calibration.result))
+    own = corrections.take(corrections.reference_set == calibration.reference_set)
+    alt = tr("Correction of each estimated entry of the table with its 95 % interval, lengths and angles apart.")
+    return CalibrationStory(
+        reference_set=calibration.reference_set,
+        found=found,
+        text=text,
+        level=level(found.level) if found else "",
+        held=[typographic(say(reason)) for reason in found.held] if found else [],
+        close=[
+            sentence(
+                "close",
+                "{first} and {second} ({correlation})",
+                first=pair.first,
+                second=pair.second,
+                correlation=fixed(pair.correlation, 2),
             )
-            story["picture"] = Picture(corrections_figure(own), alt, story["text"])
-            story["rows"] = [
-                [row.name, fixed(row.nominal, 3), fixed(row.correction, 4), fixed(row.half_width, 4), row.unit]
-                for row in own.itertuples(index=False)
-            ]
-        stories.append(story)
-    return stories
+            for pair in (found.close if found else ())
+        ],
+        more=typographic(say(found.more)) if found and found.more else "",
+        picture=Picture(corrections_figure(own), alt, text) if len(own) else None,
+        rows=[
+            [entry, fixed(nominal, 3), fixed(correction, 4), fixed(half_width, 4), unit]
+            for entry, nominal, correction, half_width, unit in zip(
+                own.entry, own.nominal, own.correction, own.half_width, own.unit
+            )
+        ],
+    )
 
 
-def residual_figure(rows: pd.DataFrame) -> Figure:
+def residual_figure(rows: Residuals) -> Figure:
     """Residuals before and after the best hypothesis, with each reference's uncertainty; worst on top."""
     figure, axes = new_figure(width=9, height=1.5 + 0.32 * len(rows))
     at = np.arange(len(rows))[::-1]
-    before, after = (np.maximum(rows[key].to_numpy(), LEAST_DRAWN) for key in ("before", "after"))
+    before, after = np.maximum(rows.before, LEAST_DRAWN), np.maximum(rows.after, LEAST_DRAWN)
     axes.hlines(at, np.minimum(before, after), np.maximum(before, after), color=MUTED, linewidth=1.2)
     axes.plot(before, at, "o", color=REFERENCE, label=tr("table as it is"))
-    axes.plot(after, at, "D", color=MODEL, markersize=5, label=tr("with the best hypothesis mended"))
-    axes.plot(rows["uncertainty"], at, "|", color=INK, markersize=13, label=tr("uncertainty of the reference"))
+    axes.plot(after, at, "D", color=MODEL, markersize=5, label=tr("with the best hypothesis corrected"))
+    axes.plot(rows.uncertainty, at, "|", color=INK, markersize=13, label=tr("uncertainty of the reference"))
     axes.set_xscale("log")
-    axes.set_yticks(at, [f"{tr(row.name)} ({row.unit})" for row in rows.itertuples(index=False)])
+    axes.set_yticks(at, [f"{say(subject)} ({unit})" for subject, unit in zip(rows.subject, rows.unit)])
     axes.set_ylim(-0.7, len(rows) - 0.3)
     axes.set_xlim(LEAST_DRAWN / 1.5, 2 * max(before.max(), after.max()))
     axes.grid(axis="y", visible=False)
@@ -84,45 +136,45 @@ def residual_figure(rows: pd.DataFrame) -> Figure:
     return figure
 
 
-def corrections_figure(rows: pd.DataFrame) -> Figure:
+def corrections_figure(rows: Corrections) -> Figure:
     """Corrections with their 95 % intervals, lengths and angles in panels of their own."""
-    units = [unit for unit in ("mm", "deg") if (rows["unit"] == unit).any()]
-    counts = [int((rows["unit"] == unit).sum()) for unit in units]
-    figure, panels = new_figure(1, len(units), width=9, height=3.4, width_ratios=counts, squeeze=False)
-    for axes, unit in zip(panels[0], units):
-        own = rows[rows["unit"] == unit]
+    parts = [rows.take(rows.unit == unit) for unit in ("mm", "deg") if (rows.unit == unit).any()]
+    counts = [len(own) for own in parts]
+    figure, panels = new_figure(1, len(parts), width=9, height=3.4, width_ratios=counts, squeeze=False)
+    for axes, own in zip(panels[0], parts):
         at = np.arange(len(own))
         axes.axhline(0, color=MUTED, linewidth=1)
-        axes.errorbar(at, own["correction"], own["half_width"], fmt="o", color=MODEL, capsize=4, elinewidth=1.4)
-        axes.set_xticks(at, [tr(name) for name in own["name"]], rotation=45 if len(own) > 8 else 0)
+        axes.errorbar(at, own.correction, own.half_width, fmt="o", color=MODEL, capsize=4, elinewidth=1.4)
+        axes.set_xticks(at, own.entry, rotation=45 if len(own) > 8 else 0)
         axes.set_xlim(-0.6, len(own) - 0.4)
-        axes.set_ylabel(tr("correction ({unit})", unit=unit))
+        axes.set_ylabel(tr("correction ({unit})", unit=own.unit[0]))
         axes.grid(axis="x", visible=False)
     return figure
 
 
-def _residual_picture(rows: pd.DataFrame, culprit: dict[str, Any], ranked: list[dict]) -> Picture | None:
-    missed = rows[(rows["before"] > rows["uncertainty"]) | (rows["after"] > rows["uncertainty"])]
-    if missed.empty:
+def _residual_picture(rows: Residuals, diagnosis: SetDiagnosis) -> Picture | None:
+    missed = rows.take((rows.before > rows.uncertainty) | (rows.after > rows.uncertainty))
+    if not len(missed):
         return None
-    shown = missed.head(SHOWN_RESIDUALS)
-    still = int((missed["after"] > missed["uncertainty"]).sum())
-    if culprit["status"] == "named":
-        caption = tr("Mending the named fault takes every residual below the uncertainty of its reference.")
-    elif ranked:
+    shown = missed.take(np.arange(len(missed)) < SHOWN_RESIDUALS)
+    still = int((missed.after > missed.uncertainty).sum())
+    if isinstance(diagnosis.conclusion, MostLikelyFault):
+        caption = tr("Correcting the named fault takes every residual below the uncertainty of its reference.")
+    elif diagnosis.hypotheses:
         caption = tr("Even the best hypothesis leaves {still} of {all} references missed.", still=still, all=len(rows))
     else:
         caption = tr("No hypothesis does better than the table as it is.")
     if len(missed) > len(shown):
         more = tr("The {drawn} farthest off of {missed} are drawn.", drawn=len(shown), missed=len(missed))
-        caption = in_a_row(caption, more)
+        caption = joined([caption, more], " ")
     alt = tr("Residual of each missed reference before and after the best hypothesis, on a logarithmic axis.")
     return Picture(residual_figure(shown), alt, caption)
 
 
-def _hypothesis_row(row: dict[str, Any]) -> list[str]:
-    alike = row["indistinguishable_from"]
-    words = both_faults(row["faults"])
-    if alike:
-        words = tr("{faults} (or {more} more that these references can't tell from it)", faults=words, more=len(alike))
-    return [words, fixed(row["residual_before"], 1), fixed(row["residual_after"], 1), row["unit"]]
+def _hypothesis_row(hypothesis: RankedHypothesis) -> list[str]:
+    words = both(hypothesis.faults)
+    if alike := hypothesis.indistinguishable_from:
+        template = "{faults} (or {more} more that these references can't tell from it)"
+        words = sentence("alike", template, faults=words, more=len(alike))
+    numbers = [fixed(value, 1) for value in (hypothesis.residual_before, hypothesis.residual_after)]
+    return [typographic(words), *numbers, hypothesis.unit]

@@ -5,27 +5,28 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import rerun as rr
 import rerun.blueprint as rrb
 
-from er3a.pipeline.results import read_summary, read_table
-from er3a.pipeline.stages.validation.corrected import mended_robot
+import er3a.pipeline.messages.validation  # noqa: F401
+from er3a.pipeline.messages.say import say
+from er3a.pipeline.results import Stored
+from er3a.pipeline.stages.validation.corrected import corrected_robot
+from er3a.pipeline.stages.validation.findings import NamedPose
+from er3a.pipeline.stages.validation.model import Axes, KeyPoses, ValidationResults
 from er3a.pipeline.stages.validation.subject import model_of
 from er3a.pipeline.study import Study
+from er3a.pipeline.tables import Texts
 from er3a.pipeline.viewing.arm import log_arm, send_motion, size_of
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, REFERENCE, rgb
 from er3a.pipeline.viewing.recording import ARM, TIMELINE, escaped, log_note, note_view, recording, send_series
 from er3a.pipeline.viewing.skeleton import skeleton
-from er3a.robots.robot import WEIGHTY_GRADES, Robot
+from er3a.robots.robot import AUTHORITATIVE_GRADES, Robot
 
 STAGE = "validation"
 HOLD_S, MOVE_S, STEPS = 2.0, 1.0, 30
 STATION_S = HOLD_S + MOVE_S
 LEAST_ARROW_MM = 0.1
-XYZ = ["x_mm", "y_mm", "z_mm"]
-MODEL_XYZ = [f"model_{c}" for c in XYZ]
-Q = [f"q{joint}_deg" for joint in range(1, 7)]
 NOTE = """# Key poses of {title}
 
 {text}
@@ -39,14 +40,13 @@ NOTE = """# Key poses of {title}
 """
 
 
-def record(study: Study, name: str, folder: Path, output: Path) -> None:
+def record(study: Study, stored: Stored[ValidationResults], output: Path) -> None:
     """Write the recording from the stage's results."""
-    robot = model_of(study, name)
-    summary = read_summary(folder)
-    axes, poses = read_table(folder / "axes.parquet"), read_table(folder / "key_poses.parquet")
+    name, results = stored.robot, stored.results
+    robot, axes, poses = model_of(study, name), results.axes, results.key_poses
     stations = _stations(poses)
     starts = STATION_S * np.arange(len(stations))
-    mended, fault = mended_robot(robot, summary["culprits"])
+    corrected, fault = corrected_robot(robot, results.summary.diagnoses)
     words = rrb.Vertical(
         note_view(STAGE),
         rrb.TextDocumentView(origin=f"/{STAGE}/now", name="This pose"),
@@ -56,36 +56,37 @@ def record(study: Study, name: str, folder: Path, output: Path) -> None:
     )
     layout = rrb.Horizontal(_view(robot, poses, axes), words, column_shares=[2, 1], name="Key poses")
     with recording(output, name, STAGE, layout) as stream:
-        note = NOTE.format(title=escaped(robot.title), text=summary["verdict"]["text"], hold=HOLD_S)
-        note += f"- see-through arm: the same table, {fault}\n" if mended is not None else ""
+        note = NOTE.format(title=escaped(robot.title), text=say(results.summary.verdict.finding), hold=HOLD_S)
+        note += f"- see-through arm: the same table, {fault}\n" if corrected is not None else ""
         log_note(stream, STAGE, note)
         _log_axes(stream, axes, size_of(robot), end=starts[1] - MOVE_S if len(starts) > 1 else None)
         log_arm(stream, robot, np.zeros(6))
         times, q = _motion(stations, starts)
         send_motion(stream, robot, times, q)
-        if mended is not None:
-            log_arm(stream, mended, np.zeros(6), entity=f"{STAGE}/mended", ghost=True)
-            send_motion(stream, mended, times, q, entity=f"{STAGE}/mended")
+        if corrected is not None:
+            log_arm(stream, corrected, np.zeros(6), entity=f"{STAGE}/corrected", ghost=True)
+            send_motion(stream, corrected, times, q, entity=f"{STAGE}/corrected")
         for start, rows in zip(starts, stations):
             _log_station(stream, float(start), rows, 0.012 * size_of(robot))
-        worst = np.array([rows["deviation_mm"].max() for rows in stations])
+        worst = np.array([np.nanmax(rows.deviation_mm) for rows in stations])
         at = (starts[:, None] + [0, HOLD_S, HOLD_S + 0.01]).ravel()
         curve = np.repeat(worst, 3)
         curve[2::3] = np.nan
         send_series(stream, f"{STAGE}/curves/deviation", at, curve[:, None], ["largest deviation"], [REFERENCE])
 
 
-def _stations(poses: pd.DataFrame) -> list[pd.DataFrame]:
+def _stations(poses: KeyPoses) -> list[KeyPoses]:
     """Rows of equal joint angles together, in the order of the table; the zero pose if there are none."""
-    if poses.empty:
-        return [pd.DataFrame([dict.fromkeys(poses.columns, np.nan) | dict.fromkeys(Q, 0.0) | {"name": "zero pose"}])]
-    keys = poses[Q].round(6).apply(tuple, axis=1)
-    return [rows for _, rows in poses.groupby(keys, sort=False)]
+    if not len(poses):
+        nowhere = (np.nan,) * 3
+        return [KeyPoses.of_rows([("", "", "", "", NamedPose("zero pose"), "", (0.0,) * 6, nowhere, nowhere, np.nan)])]
+    rounded = poses.q_deg.round(6)
+    return [poses.take((rounded == pose).all(axis=1)) for pose in dict.fromkeys(map(tuple, rounded))]
 
 
-def _motion(stations: list[pd.DataFrame], starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _motion(stations: list[KeyPoses], starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Times (N,) and joints (N, 6): hold at each station, then move smoothly to the next."""
-    corners = np.radians([rows.iloc[0][Q].to_numpy(float) for rows in stations])
+    corners = np.radians([rows.q_deg[0] for rows in stations])
     share = np.linspace(0, 1, STEPS + 1)
     smooth = share**2 * (3 - 2 * share)
     times, q = [np.array([0.0])], [corners[:1]]
@@ -95,26 +96,27 @@ def _motion(stations: list[pd.DataFrame], starts: np.ndarray) -> tuple[np.ndarra
     return np.concatenate(times), np.concatenate(q)
 
 
-def _log_station(stream: rr.RecordingStream, start: float, rows: pd.DataFrame, radius: float) -> None:
+def _log_station(stream: rr.RecordingStream, start: float, rows: KeyPoses, radius: float) -> None:
     stream.set_time(TIMELINE, duration=start)
-    angles = ", ".join(f"{angle:g}" for angle in rows.iloc[0][Q].to_numpy(float).round(3))
-    lines = [f"### {' / '.join(map(escaped, dict.fromkeys(rows['name'])))}", f"joints ({angles}) deg", ""]
-    for row in rows.dropna(subset=["deviation_mm"]).itertuples():
-        point = row.point.replace("_", " ")
-        lines.append(f"- {point}: off by **{row.deviation_mm:.2f} mm**, {escaped(row.source)} ({row.grade})")
+    angles = ", ".join(f"{angle:g}" for angle in rows.q_deg[0].round(3))
+    lines = [f"### {' / '.join(escaped(say(pose)) for pose in dict.fromkeys(rows.pose))}", f"joints ({angles}) deg", ""]
+    for point, deviation, source, grade in zip(rows.point, rows.deviation_mm, rows.source, rows.grade):
+        if np.isfinite(deviation):
+            point = point.replace("_", " ")
+            lines.append(f"- {point}: off by **{deviation:.2f} mm**, {escaped(source)} ({grade})")
     stream.log(f"{STAGE}/now", rr.TextDocument("\n".join(lines), media_type=rr.MediaType.MARKDOWN))
-    stated = rows.dropna(subset=XYZ)
-    points, model = stated[XYZ].to_numpy() / 1000, stated[MODEL_XYZ].to_numpy() / 1000
-    colours = np.array([rgb(REFERENCE if grade in WEIGHTY_GRADES else HIGHLIGHT) for grade in stated["grade"]])
+    stated = rows.take(np.isfinite(rows.point_mm).all(axis=1))
+    points, model = stated.point_mm / 1000, stated.model_point_mm / 1000
+    colours = np.array(_colours(stated.grade))
     stream.log(f"{STAGE}/reference/points", rr.Points3D(points, radii=radius, colors=colours))
     stream.log(f"{STAGE}/model", rr.Points3D(model, radii=radius * 1.15, colors=rgb(MODEL)))
-    seen = stated["deviation_mm"].to_numpy() >= LEAST_ARROW_MM
+    seen = stated.deviation_mm >= LEAST_ARROW_MM
     arrows = rr.Arrows3D(
         origins=model[seen],
         vectors=(points - model)[seen],
         radii=radius * 0.35,
         colors=colours[seen],
-        labels=[f"{deviation:.1f} mm" for deviation in stated["deviation_mm"][seen]],
+        labels=[f"{deviation:.1f} mm" for deviation in stated.deviation_mm[seen]],
         show_labels=True,
     )
     stream.log(f"{STAGE}/deviation", arrows)
@@ -123,18 +125,16 @@ def _log_station(stream: rr.RecordingStream, start: float, rows: pd.DataFrame, r
         stream.log(f"{STAGE}/{entity}", rr.Clear(recursive=False))
 
 
-def _log_axes(stream: rr.RecordingStream, axes: pd.DataFrame, size: float, end: float | None) -> None:
+def _log_axes(stream: rr.RecordingStream, axes: Axes, size: float, end: float | None) -> None:
     """The stated joint axes, until the arm leaves its zero pose."""
-    if axes.empty:
+    if not len(axes):
         return
-    direction, point = axes[[f"direction_{c}" for c in "xyz"]].to_numpy(), axes[XYZ].to_numpy() / 1000
-    half = direction * size * 0.16
-    colours = [rgb(REFERENCE if grade in WEIGHTY_GRADES else HIGHLIGHT) for grade in axes["grade"]]
+    point, half = axes.point_mm / 1000, axes.direction * size * 0.16
     lines = rr.LineStrips3D(
         np.stack([point - half, point + half], axis=1),
         radii=size * 0.003,
-        colors=colours,
-        labels=[f"J{joint} stated" for joint in axes["joint"]],
+        colors=_colours(axes.grade),
+        labels=[f"J{joint} stated" for joint in axes.joint],
         show_labels=False,
     )
     stream.set_time(TIMELINE, duration=0.0)
@@ -144,9 +144,14 @@ def _log_axes(stream: rr.RecordingStream, axes: pd.DataFrame, size: float, end: 
         stream.log(f"{STAGE}/reference/axes", rr.Clear(recursive=False))
 
 
-def _view(robot: Robot, poses: pd.DataFrame, axes: pd.DataFrame) -> rrb.Spatial3DView:
+def _colours(grades: Texts) -> list[tuple[int, int, int]]:
+    """The colour of each source: claims have one of their own."""
+    return [rgb(REFERENCE if grade in AUTHORITATIVE_GRADES else HIGHLIGHT) for grade in grades]
+
+
+def _view(robot: Robot, poses: KeyPoses, axes: Axes) -> rrb.Spatial3DView:
     """A 3-D view that opens with all stated and model points in sight."""
-    points = np.vstack([poses[XYZ].to_numpy(), poses[MODEL_XYZ].to_numpy(), axes[XYZ].to_numpy()]) / 1000
+    points = np.vstack([poses.point_mm, poses.model_point_mm, axes.point_mm]) / 1000
     points = np.vstack([points[np.isfinite(points).all(axis=1)], skeleton(robot, np.zeros(6))])
     low, high = points.min(axis=0), points.max(axis=0)
     centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2

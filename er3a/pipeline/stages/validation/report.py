@@ -2,26 +2,38 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.results import read_summary, read_table
+from er3a.pipeline.messages.say import counted, joined, say, sentence, word
+from er3a.pipeline.messages.validation import CONVENTIONS, FIGURES, GRADE_NAMES, GRADES, GROUPS
+from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation.axis_figures import axis_deviation, side_view, workspace_drawing
-from er3a.pipeline.stages.validation.checks import THE_MODEL
-from er3a.pipeline.stages.validation.corrected import mended_robot
-from er3a.pipeline.stages.validation.diagnosis_figures import correction_stories, culprit_stories
+from er3a.pipeline.stages.validation.corrected import corrected_robot
+from er3a.pipeline.stages.validation.diagnosis_figures import correction_stories, diagnosis_stories
+from er3a.pipeline.stages.validation.model import (
+    Axes,
+    Check,
+    Counts,
+    KeyPoses,
+    Section,
+    SetSummary,
+    ValidationResults,
+    ValidationSummary,
+)
 from er3a.pipeline.stages.validation.subject import model_of
-from er3a.pipeline.stages.validation.wording import in_a_row, listed
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.page import Picture, fixed, number, render, run_command
-from er3a.references.scalars import SEGMENT_NAMES
-from er3a.robots.robot import GRADES, WEIGHTY_GRADES, Robot
+from er3a.pipeline.viewing.page import Picture, fixed, head_of, number, render, run_command
+from er3a.references.subjects import SegmentInclination
+from er3a.robots.robot import AUTHORITATIVE_GRADES, Robot
 
 SHOWN_FAILURES = 12
+REVERSED_DEG = 135
 DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "": 0}
 COLUMNS = (
     N_("Check"),
@@ -33,231 +45,262 @@ COLUMNS = (
     N_("Source"),
 )
 SEGMENTS = {
-    SEGMENT_NAMES["upper_arm"]: N_("the upper arm stands {measured}° from the vertical where {expected}° is stated"),
-    SEGMENT_NAMES["forearm"]: N_("the forearm stands {measured}° from the vertical where {expected}° is stated"),
+    "upper_arm": N_("the upper arm stands {measured}° from the vertical where {expected}° is stated"),
+    "forearm": N_("the forearm stands {measured}° from the vertical where {expected}° is stated"),
 }
 
 
-def report(study: Study, name: str, folder: Path, output: Path) -> None:
+@dataclass(frozen=True)
+class SetStory:
+    """What the page says about one reference set; groups, segments and points in words."""
+
+    found: SetSummary
+    counted: Counts
+    is_authoritative: bool
+    telling: list[list[str]]
+    failed_groups: str
+    held_groups: str
+    zero_model: str
+    zero_stated: str
+    segments: str
+    segments_hold: bool
+
+
+@dataclass(frozen=True)
+class GroupRow:
+    """One set and group: counts by status, and the check that comes nearest to failing or fails worst."""
+
+    set: str
+    group: str
+    status: str
+    counts: tuple[int, int, int]
+    worst: str
+    difference: str
+
+
+def report(study: Study, stored: Stored[ValidationResults], output: Path) -> None:
     """Write the page from the stage's results."""
-    robot = model_of(study, name)
-    summary = read_summary(folder)
-    axes, poses = read_table(folder / "axes.parquet"), read_table(folder / "key_poses.parquet")
-    checks = summary["checks"]
-    failed = sorted((check for check in checks if check["status"] == "fail"), key=_tolerances_off, reverse=True)
-    labels = _labels(poses)
+    name, results, summary = stored.robot, stored.results, stored.results.summary
+    robot, checks = model_of(study, name), summary.checks
+    failed = sorted((check for check in checks if check.status == "fail"), key=_tolerances_off, reverse=True)
+    labels = results.key_poses.take(results.key_poses.group == "envelope")
+    drawn = _drawn_axes(results.axes)
+    source = robot.sources.get("dh")
     render(
         Path(__file__).with_name("report.html.j2"),
         output,
         summary,
+        head=head_of(stored, FIGURES),
         command=run_command(study, f"{name}/validation.html"),
         robot=robot,
         robot_pages=study.pages(name),
-        sets=[_set_story(finding, checks, poses) for finding in summary["sets"]],
-        culprits=culprit_stories(summary, read_table(folder / "residuals.parquet")),
-        corrections=correction_stories(summary, read_table(folder / "corrections.parquet")),
-        circles=summary["circle_points"],
+        sets=[_set_story(found, checks, results.key_poses) for found in summary.sets],
+        diagnoses=diagnosis_stories(summary, results.residuals),
+        corrections=correction_stories(summary, results.corrections),
         groups=_groups(checks),
         failed=[_row(check) for check in failed[:SHOWN_FAILURES]],
         more_failed=[_row(check) for check in failed[SHOWN_FAILURES:]],
         passed={
-            title: [_row(check) for check in own if check["status"] == "pass"] for title, own in _by_set(checks).items()
+            title: [_row(check) for check in own if check.status == "pass"] for title, own in _by_set(checks).items()
         },
         columns=[tr(label) for label in COLUMNS],
-        conflicts=summary["conflicts"],
-        blanks=[_blank(check) for check in checks if check["status"] == "no_reference"],
-        side=_side_picture(robot, axes, summary),
-        deviation=_deviation_picture(_drawn_axes(axes)),
-        drawing=_drawing_picture(read_table(folder / "section.parquet"), labels, summary),
+        conflicts=[(say(conflict.subject), conflict) for conflict in summary.conflicts],
+        blanks=[_blank(check) for check in checks if check.status == "no_reference"],
+        side=_side_picture(robot, drawn, summary),
+        deviation=_deviation_picture(drawn) if len(drawn) else None,
+        drawing=_drawing_picture(results.section, labels, summary) if len(labels) else None,
         labels=_label_rows(labels, checks),
-        round_trips=summary["round_trips"],
-        grades=GRADES,
+        table_source=source and (source.source, word("grade", GRADES, source.grade)),
+        convention=word("convention", CONVENTIONS, robot.convention),
+        grade_names={grade: word("grade", GRADE_NAMES, grade) for grade in GRADE_NAMES},
     )
 
 
-def _set_story(finding: dict[str, Any], checks: list[dict], poses: pd.DataFrame) -> dict[str, Any]:
-    """What the page says about one reference set, in numbers."""
-    own = [check for check in checks if check["reference_set"] == finding["name"]]
-    failed_groups = {check["group"] for check in own if check["status"] == "fail"}
-    segments = [check for check in own if check["name"] in SEGMENTS]
-    zero = poses[(poses["reference_set"] == finding["name"]) & (poses["group"] == "zero pose")]
-    zero = zero[zero["point"] == "flange"].head(1)
-    counted = finding["weighty"] if finding["weighty"]["total"] else finding["claims"]
-    return finding | {
-        "weighs": finding["weighty"]["total"] > 0,
-        "counted": counted,
-        "telling": [_row(check) for check in _telling(own)],
-        "failed_groups": listed(sorted(failed_groups)),
-        "held_groups": listed(sorted({check["group"] for check in own if check["status"] == "pass"} - failed_groups)),
-        "zero_model": _point(zero, "model_"),
-        "zero_stated": _point(zero, ""),
-        "segments": listed(_segment(check) for check in segments),
-        "segments_hold": all(check["status"] == "pass" for check in segments),
-    }
+def _set_story(found: SetSummary, checks: Sequence[Check], poses: KeyPoses) -> SetStory:
+    own = [check for check in checks if check.reference_set == found.name]
+    failed = {check.group for check in own if check.status == "fail"}
+    held = {check.group for check in own if check.status == "pass"} - failed
+    segments = [check for check in own if isinstance(check.subject, SegmentInclination)]
+    at_zero = (poses.reference_set == found.name) & (poses.group == "zero_pose") & (poses.point == "flange")
+    zero = poses.take(np.flatnonzero(at_zero)[:1])
+    is_authoritative = found.authoritative.total > 0
+    return SetStory(
+        found=found,
+        counted=found.authoritative if is_authoritative else found.claims,
+        is_authoritative=is_authoritative,
+        telling=[_row(check) for check in _telling(own)],
+        failed_groups=_group_words(failed),
+        held_groups=_group_words(held),
+        zero_model=_point(zero.model_point_mm),
+        zero_stated=_point(zero.point_mm),
+        segments=joined(map(_segment, segments), ", "),
+        segments_hold=all(check.status == "pass" for check in segments),
+    )
 
 
-def _segment(check: dict) -> str:
+def _group_words(groups: Iterable[str]) -> str:
+    return joined((word("group", GROUPS, group) for group in sorted(groups)), ", ")
+
+
+def _segment(check: Check) -> str:
     """How a segment of the arm stands, and how it is stated to."""
-    template = SEGMENTS[check["name"]]
-    return tr(template, measured=fixed(check["measured"], 0), expected=fixed(check["expected"], 0))
+    template = SEGMENTS[check.subject.segment]
+    return tr(template, measured=fixed(check.measured, 0), expected=fixed(check.expected, 0))
 
 
-def _telling(own: list[dict]) -> list[dict]:
+def _telling(own: list[Check]) -> list[Check]:
     """One failed length per group, the farthest off."""
-    worst: dict[str, dict] = {}
+    worst: dict[str, Check] = {}
     for check in own:
-        if check["status"] != "fail" or check["unit"] != "mm":
+        if check.status != "fail" or check.unit != "mm":
             continue
-        group = check["group"]
-        if group not in worst or abs(check["difference"]) > abs(worst[group]["difference"]):
-            worst[group] = check
+        if check.group not in worst or abs(check.difference) > abs(worst[check.group].difference):
+            worst[check.group] = check
     return list(worst.values())
 
 
-def _point(rows: pd.DataFrame, prefix: str) -> str:
-    if rows.empty:
-        return ""
-    return ", ".join(fixed(rows.iloc[0][f"{prefix}{c}_mm"], 1) for c in "xyz")
+def _point(points_mm: np.ndarray) -> str:
+    return ", ".join(fixed(value, 1) for value in points_mm[0]) if len(points_mm) else ""
 
 
-def _by_set(checks: list[dict]) -> dict[str, list[dict]]:
-    found: dict[str, list[dict]] = {}
+def _by_set(checks: Iterable[Check]) -> dict[str, list[Check]]:
+    """Checks by the set that they come from, as the page names it."""
+    found: dict[str, list[Check]] = {}
     for check in checks:
-        found.setdefault(check["reference_set"] or THE_MODEL, []).append(check)
+        found.setdefault(check.reference_set or tr("the model itself"), []).append(check)
     return found
 
 
-def _groups(checks: list[dict]) -> list[list[Any]]:
-    """One row per set and group: counts, and the check that comes nearest to failing or fails worst."""
+def _groups(checks: Sequence[Check]) -> list[GroupRow]:
     rows = []
     for title, own in _by_set(checks).items():
-        for group in dict.fromkeys(check["group"] for check in own):
-            part = [check for check in own if check["group"] == group and check["status"] != "no_reference"]
+        for group in dict.fromkeys(check.group for check in own):
+            part = [check for check in own if check.group == group and check.status != "no_reference"]
             if not part:
                 continue
-            counts = [sum(check["status"] == status for check in part) for status in ("pass", "fail", "conflict")]
+            counted = Counter(check.status for check in part)
+            status = "fail" if counted["fail"] else "conflict" if counted["conflict"] else "pass"
             worst = max(part, key=_tolerances_off)
-            status = "fail" if counts[1] else "conflict" if counts[2] else "pass"
-            difference = f"{_number(worst, 'difference')} {worst['unit']}".strip()
-            rows.append([title, group, status, *counts, worst["name"], difference])
+            rows.append(
+                GroupRow(
+                    set=title,
+                    group=word("group", GROUPS, group),
+                    status=status,
+                    counts=(counted["pass"], counted["fail"], counted["conflict"]),
+                    worst=say(worst.subject),
+                    difference=f"{_value(worst.difference, worst)} {worst.unit}".strip(),
+                )
+            )
     return rows
 
 
-def _tolerances_off(check: dict) -> float:
-    if check["difference"] is None:
-        return -1.0
-    return abs(check["difference"]) / check["tolerance"]
+def _tolerances_off(check: Check) -> float:
+    return -1.0 if check.difference is None else abs(check.difference) / check.tolerance
 
 
-def _row(check: dict) -> list[str]:
-    unit = check["unit"]
-    values = [_number(check, key) for key in ("measured", "expected", "difference")]
-    source, grade = check["source"], check["grade"]
-    source = tr("{own_source} ({grade})", own_source=source, grade=grade) if grade else source
-    return [check["name"], *values, f"{check['tolerance']:g}", unit, source]
+def _row(check: Check) -> list[str]:
+    values = [_value(value, check) for value in (check.measured, check.expected, check.difference)]
+    if check.grade:
+        grade = word("grade", GRADE_NAMES, check.grade)
+        source = sentence("graded", "{own_source} ({grade})", own_source=check.source, grade=grade)
+    else:
+        source = tr("the model itself")
+    return [say(check.subject), *values, f"{check.tolerance:g}", check.unit, source]
 
 
-def _number(check: dict, key: str) -> str:
+def _value(value: float, check: Check) -> str:
     """A value in its unit's decimals; errors of round trips, which are far smaller, with one digit."""
-    value = check[key]
-    if check["group"] == "round trips" and 0 < abs(value) < 1e-3:
+    if check.group == "round_trips" and 0 < abs(value) < 1e-3:
         return number(value, 1)
-    return fixed(value, DECIMALS[check["unit"]])
+    return fixed(value, DECIMALS[check.unit])
 
 
-def _blank(check: dict) -> list[str]:
-    measured = f"{_number(check, 'measured')} {check['unit']}" if check["measured"] is not None else "–"
-    return [check["name"], measured, check["reference_set"] or "–", check["note"]]
+def _blank(check: Check) -> list[str]:
+    measured = f"{_value(check.measured, check)} {check.unit}" if check.measured is not None else "–"
+    return [say(check.subject), measured, check.reference_set or "–", say(check.note)]
 
 
-def _drawn_axes(axes: pd.DataFrame) -> pd.DataFrame:
-    """Axes to draw: those from sources that count, or else the claims."""
-    weighty = axes[axes["grade"].isin(WEIGHTY_GRADES)]
-    return weighty if len(weighty) else axes
+def _drawn_axes(axes: Axes) -> Axes:
+    """Axes to draw: those from authoritative sources, or else the claims."""
+    authoritative = np.isin(axes.grade, AUTHORITATIVE_GRADES)
+    return axes.take(authoritative) if authoritative.any() else axes
 
 
-def _side_picture(robot: Robot, axes: pd.DataFrame, summary: dict) -> Picture:
-    drawn = _drawn_axes(axes)
-    mended, label = mended_robot(robot, summary["culprits"])
-    if drawn.empty:
+def _side_picture(robot: Robot, drawn: Axes, summary: ValidationSummary) -> Picture:
+    corrected, label = corrected_robot(robot, summary.diagnoses)
+    if not len(drawn):
         caption = tr("No reference states any axis: there is nothing to hold the model's against.")
-    elif (drawn["distance_mm"] <= drawn["uncertainty_mm"]).all() and _directions_hold(drawn):
+    elif not drawn.is_off.any():
         caption = tr("Each axis of the model lies on the stated one: the links have the right lengths and offsets.")
     else:
-        farthest = drawn["distance_mm"].max()
+        farthest = drawn.distance_mm.max()
         template = (
             N_(
-                "The model's axes stand up to {farthest} mm from the stated ones: the two arms differ in size and "
+                "The model's axes are up to {farthest} mm from the stated ones: the two arms differ in size and "
                 "shape, not in a detail."
             )
-            if any(finding["another_arm"] for finding in summary["sets"])
-            else N_("The model's axes stand up to {farthest} mm from the stated ones.")
+            if any(found.another_arm for found in summary.sets)
+            else N_("The model's axes are up to {farthest} mm from the stated ones.")
         )
         caption = tr(template, farthest=fixed(farthest, 0 if farthest >= 10 else 2))
-        if mended is not None and drawn["reference_set"].iloc[0] == _repaired_against(summary):
-            mending = tr("The dashed arm has the named fault mended: it meets the stated axes.")
-            caption = in_a_row(caption, mending)
-        elif mended is not None:
-            mending = tr("The dashed arm has the model's own zero pose put right; it still misses the stated axes.")
-            caption = in_a_row(caption, mending)
+        if corrected is not None:
+            corrected_set = next(found.reference_set for found in summary.diagnoses if found.corrected)
+            correction = (
+                tr("The dashed arm has the named fault corrected: it meets the stated axes.")
+                if drawn.reference_set[0] == corrected_set
+                else tr("The dashed arm has the model's own zero pose put right; it still misses the stated axes.")
+            )
+            caption = joined([caption, correction], " ")
     alt = tr("Side view of the zero pose: links and joint axes of the model, and the axes that references state.")
-    return Picture(side_view(robot, drawn, mended, label), alt, caption)
+    return Picture(side_view(robot, drawn, corrected, label), alt, caption)
 
 
-def _repaired_against(summary: dict) -> str:
-    """The reference set whose named fault the dashed arm has mended."""
-    return next(culprit["reference_set"] for culprit in summary["culprits"] if culprit["repaired"])
-
-
-def _directions_hold(axes: pd.DataFrame) -> bool:
-    return bool((axes["angle_deg"] <= axes["uncertainty_deg"]).all())
-
-
-def _deviation_picture(axes: pd.DataFrame) -> Picture | None:
-    if axes.empty:
-        return None
-    off = axes[(axes["distance_mm"] > axes["uncertainty_mm"]) | (axes["angle_deg"] > axes["uncertainty_deg"])]
-    joints = [f"J{joint}" for joint in sorted(set(off["joint"]))]
-    if joints:
-        caption = tr("Off by more than the source leaves open: {joints}.", joints=listed(joints))
-        reversed_joints = [f"J{joint}" for joint in sorted(set(off[off["angle_deg"] > 135]["joint"]))]
-        if reversed_joints:
-            caption = in_a_row(caption, tr("Turning the other way: {joints}.", joints=listed(reversed_joints)))
+def _deviation_picture(axes: Axes) -> Picture:
+    off = axes.take(axes.is_off)
+    if len(off):
+        caption = tr("Outside the source's uncertainty: {joints}.", joints=_joints(off))
+        turned = off.take(off.angle_deg > REVERSED_DEG)
+        if len(turned):
+            caption = joined([caption, tr("Turning the other way: {joints}.", joints=_joints(turned))], " ")
     else:
-        caption = tr("No axis is off by more than its source leaves open (outlined boxes).")
+        caption = tr("No axis is outside its source's uncertainty (outlined boxes).")
     alt = tr("Bars per joint and source: distance and angle between the model's axis and the stated one.")
     return Picture(axis_deviation(axes), alt, caption)
 
 
-def _labels(poses: pd.DataFrame) -> pd.DataFrame:
-    labels = poses[poses["group"] == "envelope"].reset_index(drop=True)
-    return labels.assign(number=np.arange(1, len(labels) + 1))
+def _joints(axes: Axes) -> str:
+    return joined((f"J{joint}" for joint in np.unique(axes.joint)), ", ")
 
 
-def _label_rows(labels: pd.DataFrame, checks: list[dict]) -> list[list[Any]]:
+def _label_rows(labels: KeyPoses, checks: Iterable[Check]) -> list[list[str]]:
     """The drawing's labels with the numbers that they have in the figure."""
+    numbers = {pose: place for place, pose in reversed(list(enumerate(labels.pose, 1)))}
     rows = []
     for check in checks:
-        if check["group"] == "envelope" and check["difference"] is not None:
-            number = next(row.number for row in labels.itertuples() if check["name"].startswith(row.name))
-            values = [fixed(check[key], decimals) for key, decimals in (("expected", 1), ("measured", 2))]
-            rows.append([number, check["name"], *values, fixed(check["difference"], 2), f"{check['tolerance']:g}"])
-    return sorted(rows, key=lambda row: row[0])
+        if check.group == "envelope" and check.difference is not None:
+            values = [fixed(check.expected, 1), fixed(check.measured, 2), fixed(check.difference, 2)]
+            place = numbers[check.subject.whole]
+            rows.append((place, [str(place), say(check.subject), *values, f"{check.tolerance:g}"]))
+    return [row for _, row in sorted(rows, key=lambda row: row[0])]
 
 
-def _drawing_picture(section: pd.DataFrame, labels: pd.DataFrame, summary: dict) -> Picture | None:
-    if labels.empty:
-        return None
-    missed = [c for c in summary["checks"] if c["group"] == "envelope" and c["status"] == "fail"]
-    worst = fixed(labels["deviation_mm"].max(), 2)
+def _drawing_picture(section: Section, labels: KeyPoses, summary: ValidationSummary) -> Picture:
+    missed = [check for check in summary.checks if check.group == "envelope" and check.status == "fail"]
+    worst = fixed(labels.deviation_mm.max(), 2)
     caption = (
         tr(
-            "The maker's labels lie on the region's edge, off by {worst} mm at most: lengths, limits of J2 and J3 and "
-            "the signs of both joints agree with the drawing.",
+            "The manufacturer's labels lie on the region's edge, off by {worst} mm at most: lengths, limits of J2 and "
+            "J3 and the signs of both joints agree with the drawing.",
             worst=worst,
         )
         if not missed
-        else tr("{count} labels are missed, by up to {worst} mm.", count=len(missed), worst=worst)
+        else counted(
+            "labels_missed",
+            "{count} label is missed, by up to {worst} mm.",
+            "{count} labels are missed, by up to {worst} mm.",
+            len(missed),
+            worst=worst,
+        )
     )
     alt = tr("Region that the wrist centre sweeps with joints 2 and 3, and the drawing's labels, numbered.")
-    return Picture(workspace_drawing(section, labels, summary["section_origin_mm"]), alt, caption)
+    return Picture(workspace_drawing(section, labels, summary.section_origin_mm), alt, caption)

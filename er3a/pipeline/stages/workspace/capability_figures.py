@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.stages.workspace.cell_lookup import CellLookup
+from er3a.pipeline.stages.workspace.model import CapabilitySummary, PlacementSummary, PlaceSummary, SectionFrame
+from er3a.pipeline.stages.workspace.tables import BoxPlaces, CapabilityCells, Singles
+from er3a.pipeline.tables import Flags, Integers, Reals
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK
@@ -25,25 +28,25 @@ _HEIGHTS = (0.25, 0.5, 0.75)
 _PLANE = N_("from axis 1, in the arm's zero plane (mm)")
 
 
-def upright_slices(robot: Robot, summary: dict[str, Any], cells: pd.DataFrame):
-    """Three slices through axis 1: share of directions, ways, manipulability."""
-    lookup = CellLookup(summary, cells)
+def upright_slices(robot: Robot, capability: CapabilitySummary, cells: CapabilityCells) -> Figure:
+    """Three slices through axis 1: reachability, IK solutions, manipulability."""
+    lookup = CellLookup(capability, cells)
     x, z = lookup.reach * np.linspace(-1, 1, PIXELS), np.linspace(*lookup.heights, PIXELS)
     grid_x, grid_z = np.meshgrid(x, z, indexing="ij")
     row = lookup.row(np.abs(grid_x), np.where(grid_x < 0, np.pi, 0.0), grid_z)
     panels = (
-        ("share", 100.0, tr("tool directions reached (%)"), (0, 100)),
-        ("ways", 1.0, tr("ways per reached direction"), (0, 8)),
-        ("manipulability_m3", 1e3, tr("best manipulability (10⁻³ m³)"), (0, None)),
+        (cells.reachability, 100.0, tr("tool directions reached (%)"), (0, 100)),
+        (cells.solutions, 1.0, tr("IK solutions per reached direction"), (0, 8)),
+        (cells.manipulability_m3, 1e3, tr("best manipulability (10⁻³ m³)"), (0, None)),
     )
     figure, axes = new_figure(1, 3, width=12.0, height=4.7, sharey=True)
-    for panel, (column, factor, label, limits) in zip(axes, panels):
-        values = _looked_up(cells[column].to_numpy(), row) * factor
+    for panel, (values, factor, label, limits) in zip(axes, panels):
+        shown = _looked_up(values, row) * factor
         mesh = panel.pcolormesh(
-            x * 1000, z * 1000, values.T, cmap=SHADES, vmin=limits[0], vmax=limits[1], rasterized=True
+            x * 1000, z * 1000, shown.T, cmap=SHADES, vmin=limits[0], vmax=limits[1], rasterized=True
         )
         figure.colorbar(mesh, ax=panel, label=label, location="top", shrink=0.9)
-        _draw_arm(panel, robot, summary)
+        _draw_arm(panel, robot, capability.frame)
         up = tr("height along axis 1 (mm)") if panel is axes[0] else ""
         equal_scale(panel, tr(_PLANE) if panel is axes[1] else "", up)
         panel.set_aspect("equal", adjustable="box")
@@ -51,15 +54,15 @@ def upright_slices(robot: Robot, summary: dict[str, Any], cells: pd.DataFrame):
     return figure
 
 
-def level_slices(summary: dict[str, Any], cells: pd.DataFrame):
-    """Share of directions in three slices across axis 1."""
-    lookup = CellLookup(summary, cells)
+def level_slices(capability: CapabilitySummary, cells: CapabilityCells) -> Figure:
+    """Reachability in three slices across axis 1."""
+    lookup = CellLookup(capability, cells)
     line = lookup.reach * np.linspace(-1, 1, PIXELS)
     x, y = np.meshgrid(line, line, indexing="ij")
     figure, axes = new_figure(1, 3, width=12.0, height=4.1, sharey=True)
     for panel, height in zip(axes, _quantiles(cells)):
         row = lookup.row(np.hypot(x, y), np.arctan2(y, x), np.full(x.shape, height))
-        values = _looked_up(cells["share"].to_numpy(), row) * 100
+        values = _looked_up(cells.reachability, row) * 100
         mesh = panel.pcolormesh(line * 1000, line * 1000, values.T, cmap=SHADES, vmin=0, vmax=100, rasterized=True)
         panel.set_title(tr("{height} mm up axis 1", height=fixed(1000 * height, 0)))
         across = tr("across it (mm)") if panel is axes[0] else ""
@@ -70,23 +73,24 @@ def level_slices(summary: dict[str, Any], cells: pd.DataFrame):
     return figure
 
 
-def placement_views(robot: Robot, summary: dict[str, Any], places: pd.DataFrame):
+def placement_views(
+    robot: Robot, capability: CapabilitySummary, placement: PlacementSummary, places: BoxPlaces
+) -> Figure:
     """Where the middle of the box can stand, from above and from the side, with the best places as boxes."""
-    listed = summary["placement"]["places"]
-    best = summary["capability"]["manipulability_m3"]
-    share = 100 * places["manipulability_m3"].to_numpy() / best
+    percent = 100 * places.manipulability_m3 / capability.overall.best_manipulability_m3
     figure, axes = new_figure(1, 2, width=12.0, height=5.6)
-    top, spacing = float(share.max()), summary["placement"]["spacing_m"]
+    top = float(percent.max())
     for panel, (across, up, title) in zip(axes, (("x", "y", tr("From above")), ("x", "z", tr("From the side")))):
-        steps = [spacing["xyz".index(key)] for key in (across, up)]
-        edges, value, proven = _raster(places[[f"{across}_m", f"{up}_m"]].to_numpy(), steps, share, places["proven"])
+        shown = ["xyz".index(across), "xyz".index(up)]
+        steps = [placement.spacing_m[axis] for axis in shown]
+        edges, value, proven = _raster(places.centre_m[:, shown], steps, percent, places.proven)
         extent = [1000 * edge for edge in edges]
         unproven = np.ma.masked_where((value < 0) | proven, value)
         panel.pcolormesh(*extent, unproven.T, cmap=ListedColormap([GRID]), rasterized=True)
         sure = np.ma.masked_where(~proven, value)
         mesh = panel.pcolormesh(*extent, sure.T, cmap=SHADES, vmin=0, vmax=top, rasterized=True)
-        _draw_boxes(panel, listed, ["xyz".index(across), "xyz".index(up)])
-        panel.plot(*_shadow(robot, across, up), color=INK, linewidth=2.2, marker="o", markersize=3)
+        _draw_boxes(panel, placement.places, shown)
+        panel.plot(*skeleton(robot, np.zeros(6)).T[shown] * 1000, color=INK, linewidth=2.2, marker="o", markersize=3)
         equal_scale(panel, f"{across} (mm)", f"{up} (mm)")
         panel.set_title(title)
         panel.grid(False)
@@ -100,46 +104,42 @@ def placement_views(robot: Robot, summary: dict[str, Any], places: pd.DataFrame)
     return figure
 
 
-def _looked_up(values: np.ndarray, row: np.ndarray) -> np.ma.MaskedArray:
+def _looked_up(values: Reals | Singles, row: Integers) -> np.ma.MaskedArray:
     return np.ma.masked_array(values[np.maximum(row, 0)], row < 0)
 
 
-def _quantiles(cells: pd.DataFrame) -> np.ndarray:
+def _quantiles(cells: CapabilityCells) -> Reals:
     """Heights below which 25, 50 and 75 % of the reached volume lie."""
-    volume = cells.groupby("z_m")["rho_m"].sum()
-    return np.interp(_HEIGHTS, volume.cumsum() / volume.sum(), volume.index.to_numpy())
+    heights, row = np.unique(cells.z_m, return_inverse=True)
+    volume = np.bincount(row, weights=cells.rho_m)
+    return np.interp(_HEIGHTS, volume.cumsum() / volume.sum(), heights)
 
 
-def _draw_arm(axes: Axes, robot: Robot, summary: dict[str, Any]) -> None:
-    frame = summary["capability"]["frame"]
-    local = (skeleton(robot, np.zeros(6)) - frame["origin_m"]) @ np.array(frame["axes"]).T * 1000
+def _draw_arm(axes: Axes, robot: Robot, frame: SectionFrame) -> None:
+    local = (skeleton(robot, np.zeros(6)) - frame.origin_m) @ np.array(frame.axes).T * 1000
     axes.plot(local[:, 0], local[:, 2], color="white", linewidth=3.6, solid_capstyle="round")
     axes.plot(local[:, 0], local[:, 2], color=INK, linewidth=2.0, marker="o", markersize=3, solid_capstyle="round")
 
 
-def _shadow(robot: Robot, across: str, up: str) -> np.ndarray:
-    return skeleton(robot, np.zeros(6)).T[["xyz".index(across), "xyz".index(up)]] * 1000
-
-
-def _raster(points: np.ndarray, steps: list[float], share: np.ndarray, proven: np.ndarray):
-    """Edges of the raster's columns and rows (m), the greatest share in each of its cells (proven ones first; -1: none
+def _raster(points: Reals, steps: list[float], percent: Singles, proven: Flags) -> tuple[list[Reals], Reals, Flags]:
+    """Edges of the raster's columns and rows (m), the greatest value in each of its cells (proven ones first; -1: none
     there), and whether one is proven."""
     low = points.min(axis=0)
     index = tuple(np.floor((points - low) / steps + 1e-3).astype(int).T)
     shape = tuple(part.max() + 1 for part in index)
     value, sure = np.full(shape, -1.0), np.zeros(shape, dtype=bool)
     np.logical_or.at(sure, index, proven)
-    np.maximum.at(value, index, np.where(proven | ~sure[index], share, -1.0))
+    np.maximum.at(value, index, np.where(proven | ~sure[index], percent, -1.0))
     return [start + (np.arange(n + 1) - 0.5) * step for start, step, n in zip(low, steps, shape)], value, sure
 
 
-def _draw_boxes(axes: Axes, listed: list[dict[str, Any]], shown: list[int]) -> None:
+def _draw_boxes(axes: Axes, listed: Sequence[PlaceSummary], shown: list[int]) -> None:
     """Outlines with their numbers; boxes that fall on each other share a label."""
-    labels: dict[tuple[float, ...], list[str]] = {}
+    labels: dict[tuple[float, float], list[str]] = {}
     for number, place in enumerate(listed, start=1):
-        centre, size = (1000 * np.array(place[key])[shown] for key in ("centre_m", "size_m"))
+        centre, size = (1000 * np.array(part)[shown] for part in (place.centre_m, place.size_m))
         low = centre - size / 2
-        axes.add_patch(Rectangle(low, *size, fill=False, edgecolor=HIGHLIGHT, linewidth=1.6))
+        axes.add_patch(Rectangle((low[0], low[1]), *size, fill=False, edgecolor=HIGHLIGHT, linewidth=1.6))
         labels.setdefault((low[0].round(3), (low[1] + size[1]).round(3)), []).append(str(number))
     shade = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1}
     for corner, numbers in labels.items():

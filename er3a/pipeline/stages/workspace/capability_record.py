@@ -1,53 +1,52 @@
-"""The recording's part about what the tool can do: voxels by share of directions, and the best places of the box."""
+"""The recording's part about what the tool can do: voxels by reachability, and the best places of the box."""
 
 from __future__ import annotations
-
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import rerun as rr
 from matplotlib import colormaps
 
-from er3a.pipeline.results import read_table
 from er3a.pipeline.stages.workspace.cell_lookup import CellLookup
+from er3a.pipeline.stages.workspace.model import CapabilitySummary, NeedsClosedForm, WorkspaceResults
+from er3a.pipeline.stages.workspace.tables import CapabilityCells
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, rgb
 
 _CLASSES = (0.0, 0.25, 0.5, 0.75, 1.0)
 _NAMES = ("below_25_percent", "25_to_50_percent", "50_to_75_percent", "75_percent_and_more", "all")
 
 
-def log_capability(stream: rr.RecordingStream, folder: Path, summary: dict[str, Any]) -> None:
-    """Log voxels coloured by the share of directions, by halves and classes of it, and the best places."""
-    if not summary["capability"]["computed"]:
+def log_capability(stream: rr.RecordingStream, results: WorkspaceResults) -> None:
+    """Log voxels coloured by reachability, by halves and classes of it, and the best places."""
+    capability, placement = results.summary.capability, results.summary.placement
+    if isinstance(capability, NeedsClosedForm) or placement is None:
         return
-    cells = read_table(folder / "capability.parquet")
-    if len(cells):
-        _log_voxels(stream, summary, CellLookup(summary, cells), cells["share"].to_numpy())
-    for number, place in enumerate(summary["placement"]["places"], start=1):
+    if len(results.capability):
+        _log_voxels(stream, capability, results.capability)
+    for number, place in enumerate(placement.places, start=1):
         box = rr.Boxes3D(
-            centers=[place["centre_m"]],
-            sizes=[place["size_m"]],
-            colors=[rgb(HIGHLIGHT if place["status"] == "proven" else MUTED)],
+            centers=[place.centre_m],
+            sizes=[place.size_m],
+            colors=[rgb(HIGHLIGHT if place.status == "proven" else MUTED)],
             labels=[str(number)],
             radii=rr.Radius.ui_points(1.5),
         )
         stream.log(f"workspace/places/{number}", box, static=True)
 
 
-def _log_voxels(stream: rr.RecordingStream, summary: dict[str, Any], lookup: CellLookup, share: np.ndarray) -> None:
-    frame, cell = summary["capability"]["frame"], lookup.cell
+def _log_voxels(stream: rr.RecordingStream, capability: CapabilitySummary, cells: CapabilityCells) -> None:
+    lookup = CellLookup(capability, cells)
+    axes, cell = np.array(capability.frame.axes), lookup.cell
     count = int(np.ceil(lookup.reach / cell))
     line = (np.arange(-count, count) + 0.5) * cell
     height = np.arange(lookup.heights[0] + cell / 2, lookup.heights[1], cell)
     x, y, z = (part.ravel() for part in np.meshgrid(line, line, height, indexing="ij"))
     row = lookup.row(np.hypot(x, y), np.arctan2(y, x), z)
     reached = row >= 0
-    value, local = share[row[reached]], np.stack([x, y, z], axis=1)[reached]
+    value, local = cells.reachability[row[reached]], np.stack([x, y, z], axis=1)[reached]
     colours = (colormaps["viridis"](value)[:, :3] * 255).astype(np.uint8)
-    far = (local @ np.array(frame["axes"]))[:, 1] >= 0
+    far = (local @ axes)[:, 1] >= 0
     level = np.digitize(value, _CLASSES[1:])
-    placed = rr.Transform3D(translation=frame["origin_m"], mat3x3=np.array(frame["axes"]).T)
+    placed = rr.Transform3D(translation=capability.frame.origin_m, mat3x3=axes.T)
     stream.log("workspace/capability", placed, static=True)
     for half, side in (("far", far), ("near", ~far)):
         for number, name in enumerate(_NAMES):

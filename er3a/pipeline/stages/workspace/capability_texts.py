@@ -4,87 +4,97 @@ from __future__ import annotations
 
 from typing import Any
 
-import pandas as pd
-
+from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
+from er3a.pipeline.messages.say import say, word
+from er3a.pipeline.messages.workspace import STATUS
 from er3a.pipeline.stages.workspace.capability_figures import level_slices, placement_views, upright_slices
+from er3a.pipeline.stages.workspace.model import (
+    CapabilitySummary,
+    NeedsClosedForm,
+    PlacementSummary,
+    PlaceSummary,
+    TaskSummary,
+    WorkspaceResults,
+)
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import Picture
 from er3a.robots.robot import Robot
 
 
-def capability_context(robot: Robot, summary: dict[str, Any], cells: pd.DataFrame, places: pd.DataFrame):
+def capability_context(robot: Robot, results: WorkspaceResults) -> dict[str, Any]:
     """What the template include ``capability.html.j2`` needs."""
-    can, placed = summary["capability"], summary["placement"]
-    if not can["computed"]:
-        return {"can": can, "placed": placed}
+    capability, placement = results.summary.capability, results.summary.placement
+    if isinstance(capability, NeedsClosedForm) or placement is None:
+        return {"missing": say(capability)}
     return {
-        "can": can,
-        "placed": placed,
-        "can_pictures": _pictures(robot, summary, cells) if len(cells) else [],
-        "core_text": _core_text(can),
-        "roll_text": _roll_text(can),
-        "task_text": _task_text(can["settings"]["placement"]),
-        "place_rows": [_place_row(n, place) for n, place in enumerate(placed["places"], start=1)],
+        "missing": "",
+        "directions": capability.directions,
+        "capability_pictures": _pictures(robot, results, capability) if len(results.capability) else [],
+        "core_text": _core_text(capability),
+        "roll_text": _roll_text(capability),
+        "task_text": _task_text(placement.task),
+        "points_serving": placement.points_serving,
+        "place_rows": [_place_row(n, place) for n, place in enumerate(placement.places, start=1)],
         "place_picture": Picture(
-            placement_views(robot, summary, places),
+            placement_views(robot, capability, placement, results.places),
             tr("Where the middle of the box can stand, from above and from the side, with the best places"),
-            _places_caption(placed),
+            _places_caption(placement),
         )
-        if len(places)
+        if len(results.places)
         else None,
     }
 
 
-def _pictures(robot: Robot, summary: dict[str, Any], cells: pd.DataFrame) -> list[Picture]:
-    can = summary["capability"]
+def _pictures(robot: Robot, results: WorkspaceResults, capability: CapabilitySummary) -> list[Picture]:
     return [
         Picture(
-            upright_slices(robot, summary, cells),
-            tr("Slices through axis 1: share of tool directions, ways, manipulability"),
-            _slices_caption(can),
+            upright_slices(robot, capability, results.capability),
+            tr("Slices through axis 1: reachability, IK solutions, manipulability"),
+            _slices_caption(capability),
         ),
         Picture(
-            level_slices(summary, cells),
-            tr("Slices across axis 1: share of tool directions"),
+            level_slices(capability, results.capability),
+            tr("Slices across axis 1: reachability"),
             tr(
                 "Where joint 1 is limited, the sector behind the arm loses directions first: "
                 "put work that needs many tool angles in front."
             )
-            if can["sectors"] > 1
+            if capability.sectors > 1
             else tr("Joint 1 makes a full turn, so what counts is the distance from axis 1 and the height alone."),
         ),
     ]
 
 
-def _slices_caption(can: dict[str, Any]) -> str:
+def _slices_caption(capability: CapabilitySummary) -> str:
+    overall = capability.overall
     return tr(
-        "A reached cell offers {mean} % of all tool directions on average, the best one {best} %, each in {ways} ways "
-        "on average (of {most} at most). Plan work where all three are bright; dark rims are reached only with the arm "
-        "stretched, folded or twisted.",
-        mean=number(100 * can["share"]["mean"], 2),
-        best=number(100 * can["share"]["best"], 3),
-        ways=number(can["ways"]["mean"], 2),
-        most=can["ways"]["most"],
+        "A reached cell offers {mean} % of all tool directions on average, the best one {best} %, each with "
+        "{solutions} IK solutions on average (of {most} at most). Plan work where all three are bright; dark rims are "
+        "reached only with the arm stretched, folded or twisted.",
+        mean=number(100 * overall.mean_reachability, 2),
+        best=number(100 * overall.best_reachability, 3),
+        solutions=number(overall.mean_solutions, 2),
+        most=overall.most_solutions,
     )
 
 
-def _roll_text(can: dict[str, Any]) -> str:
-    if can["roll"]["free"]:
+def _roll_text(capability: CapabilitySummary) -> str:
+    if capability.roll.free:
         return tr(
             "The roll about the tool's own axis is left free: it turns joint 6 alone, so it takes no part in whether a "
-            "direction is reached, nor in the number of ways."
+            "direction is reached, nor in the number of solutions."
         )
     return tr(
         "The tool stands beside the axis of joint 6, so the roll about the tool's own axis moves the wrist: {rolls} "
         "rolls are tried, and a direction counts if one of them is reached.",
-        rolls=can["roll"]["per_direction"],
+        rolls=capability.roll.per_direction,
     )
 
 
-def _core_text(can: dict[str, Any]) -> str:
-    core = {key: 1000 * can["core_m3"][key] for key in ("lower", "upper", "estimate")}
-    if core["upper"] == 0:
+def _core_text(capability: CapabilitySummary) -> str:
+    core = capability.core_m3
+    if core.upper == 0:
         return tr(
             "There is no dexterous core: in every part of the workspace some tool direction is proven unreachable at "
             "all its points. Work that needs the tool from every side needs a turntable."
@@ -93,24 +103,26 @@ def _core_text(can: dict[str, Any]) -> str:
         "The dexterous core, where the tool can take every direction of the sphere, holds at least {lower} L and at "
         "most {upper} L: both are proven, for all points and directions in between too. By the {directions} sampled "
         "directions alone it would be {estimate} L.",
-        directions=can["settings"]["directions"],
-        **{key: number(litres, 2) for key, litres in core.items()},
+        directions=capability.directions,
+        lower=number(1000 * core.lower, 2),
+        upper=number(1000 * core.upper, 2),
+        estimate=number(1000 * core.estimate, 2),
     )
 
 
-def _task_text(task: dict[str, Any]) -> str:
-    box = " × ".join(number(value, 4).rstrip(".") for value in map(_whole, task["box_mm"]))
-    direction = ", ".join(fixed(value, 2).removesuffix(".00") for value in task["tool_direction"])
+def _task_text(task: TaskSummary) -> str:
+    box = " × ".join(number(value, 4).rstrip(".") for value in map(_whole, task.box_mm))
+    direction = ", ".join(fixed(value, 2).removesuffix(".00") for value in task.tool_direction)
     return tr(
         "A box of {box} mm must be served at every point with the tool's axis anywhere within {cone} deg of "
         "({direction}), joints {margin} deg within their limits. It stands level, as given or turned by 90 deg, its "
         "underside at {lowest} mm or higher, and {clear} mm or more from axis 1.",
         box=box,
         direction=direction,
-        cone=fixed(task["cone_deg"], 1).removesuffix(".0"),
-        margin=fixed(task["limit_margin_deg"], 1).removesuffix(".0"),
-        lowest=fixed(task["lowest_mm"], 0),
-        clear=fixed(task["clear_of_axis_mm"], 0),
+        cone=fixed(task.cone_deg, 1).removesuffix(".0"),
+        margin=fixed(task.limit_margin_deg, 1).removesuffix(".0"),
+        lowest=fixed(task.lowest_mm, 0),
+        clear=fixed(task.clear_of_axis_mm, 0),
     )
 
 
@@ -118,29 +130,29 @@ def _whole(value: float) -> float | int:
     return int(value) if value == int(value) else value
 
 
-def _places_caption(placed: dict[str, Any]) -> str:
+def _places_caption(placement: PlacementSummary) -> str:
     return tr(
         "Of {fitting} positions on the lattice that pass by samples, {proven} are proven for every point and "
         "direction. Stand the box's middle on a bright spot; grey ones pass by samples only. The colour shows the best "
         "over what lies in the line of sight.",
-        fitting=number(placed["fitting"]),
-        proven=number(placed["fitting_proven"]),
+        fitting=number(placement.fitting),
+        proven=number(placement.fitting_proven),
     )
 
 
-def _place_row(row: int, place: dict[str, Any]) -> list[str]:
-    if place["branch"] is None:
+def _place_row(row: int, place: PlaceSummary) -> list[str]:
+    if place.branch is None:
         branch = tr("changes within the box")
-    elif place["status"] == place["branch_status"]:
-        branch = place["branch"]
+    elif place.status == place.branch_status:
+        branch = branch_word(place.branch)
     else:
-        branch = tr("{branch} (by samples)", branch=place["branch"])
+        branch = tr("{branch} (by samples)", branch=branch_word(place.branch))
     return [
         str(row),
-        ", ".join(fixed(1000 * value, 0) for value in place["centre_m"]),
-        " × ".join(fixed(1000 * value, 0) for value in place["size_m"]),
-        place["status"],
+        ", ".join(fixed(1000 * value, 0) for value in place.centre_m),
+        " × ".join(fixed(1000 * value, 0) for value in place.size_m),
+        word("workspace.status", STATUS, place.status),
         branch,
-        fixed(100 * place["share_of_best"], 1),
-        fixed(place["room_deg"], 1),
+        fixed(100 * place.manipulability_ratio, 1),
+        fixed(place.limit_margin_deg, 1),
     ]

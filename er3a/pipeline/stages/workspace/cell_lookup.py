@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-import pandas as pd
+from numpy.typing import NDArray
+
+from er3a.pipeline.stages.workspace.model import CapabilitySummary
+from er3a.pipeline.stages.workspace.tables import CapabilityCells
+from er3a.pipeline.tables import Reals
 
 
 class CellLookup:
@@ -16,20 +18,20 @@ class CellLookup:
     reach : m, edge of the outermost cell; heights : m, lowest and highest edge along axis 1
     """
 
-    def __init__(self, summary: dict[str, Any], cells: pd.DataFrame):
-        self.cell, self.sectors = summary["capability"]["cell_m"], summary["capability"]["sectors"]
-        rho, z = cells["rho_m"].to_numpy(), cells["z_m"].to_numpy()
+    def __init__(self, capability: CapabilitySummary, cells: CapabilityCells):
+        self.cell, self.sectors = capability.cell_m, capability.sectors
+        rho, z = cells.rho_m, cells.z_m
         self.reach = float(rho.max() + self.cell / 2)
         self.heights = float(z.min() - self.cell / 2), float(z.max() + self.cell / 2)
-        index = self._index(rho, np.radians(cells["azimuth_deg"].to_numpy()), z)
+        index = self._index(rho, np.radians(cells.azimuth_deg), z)
         self.rows = np.full((index[0].max() + 1, index[1].max() + 1, self.sectors), -1)
         self.rows[index] = np.arange(len(cells))
 
-    def _index(self, rho: np.ndarray, azimuth: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, ...]:
+    def _index(self, rho: Reals, azimuth: Reals, z: Reals) -> tuple[NDArray[np.int64], ...]:
         sector = np.rint(azimuth / (2 * np.pi) * self.sectors).astype(np.int64) % self.sectors
         return (rho // self.cell).astype(np.int64), np.floor((z - self.heights[0]) / self.cell).astype(np.int64), sector
 
-    def row(self, rho: np.ndarray, azimuth: np.ndarray, z: np.ndarray) -> np.ndarray:
+    def row(self, rho: Reals, azimuth: Reals, z: Reals) -> NDArray[np.int64]:
         """Row numbers for points about axis 1 (m, rad, m; any shape), -1 where nothing is reached."""
         index = self._index(rho, azimuth, z)
         inside = np.all([(part >= 0) & (part < size) for part, size in zip(index, self.rows.shape)], axis=0)

@@ -2,32 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-import pandas as pd
 import plotly.graph_objects as go
 from markupsafe import Markup
 
 from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.stages.workspace.model import WorkspaceResults
 from er3a.pipeline.viewing.figure_3d import turning_html
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, REFERENCE
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot
 
 POINTS = 12_000
-_XYZ = ["x_m", "y_m", "z_m"]
 _COLOURS = {"enclosed": HIGHLIGHT, "open": REFERENCE}
 _NAMES = {"enclosed": N_("void {number} (enclosed)"), "open": N_("void {number} (open)")}
 
 
-def turning_figure(
-    robot: Robot, summary: dict[str, Any], cloud: pd.DataFrame, vertices: pd.DataFrame, triangles: pd.DataFrame
-) -> Markup:
+def turning_figure(robot: Robot, results: WorkspaceResults) -> Markup:
     """The figure as HTML with all its script inside."""
     figure = go.Figure()
-    far = cloud[cloud["y_m"] >= summary["axis"]["point_m"][1]][:POINTS]
-    value = far["manipulability_m3"].to_numpy()
+    cloud, vertices, triangles = results.cloud, results.void_vertices, results.void_triangles
+    far = np.flatnonzero(cloud.point_m[:, 1] >= results.summary.axis.point_m[1])[:POINTS]
+    value = cloud.manipulability_m3[far]
     marker = {
         "size": 1.6,
         "symbol": "square",  # two triangles each; a disc has dozens
@@ -35,18 +31,18 @@ def turning_figure(
         "colorscale": "Viridis",
         "cmax": float(np.quantile(value, 0.99)),
     }
-    x, y, z = (np.round(far[key].to_numpy() * 1000, 1) for key in _XYZ)
+    x, y, z = np.round(cloud.point_m[far] * 1000, 1).T
     figure.add_scatter3d(x=x, y=y, z=z, mode="markers", marker=marker, name=tr("cloud, far half"), hoverinfo="skip")
-    for number, void in enumerate(summary["voids"], start=1):
-        corners = np.round(vertices.loc[vertices["void"] == number, _XYZ].to_numpy() * 1000, 1)
-        faces = triangles.loc[triangles["void"] == number, ["a", "b", "c"]].to_numpy()
+    for number, void in enumerate(results.summary.voids, start=1):
+        corners = np.round(vertices.point_m[vertices.void == number] * 1000, 1)
+        faces = triangles.corners[triangles.void == number]
         if not len(faces):
             continue
-        name = _NAMES[void["kind"]]
+        name = _NAMES[void.kind]
         figure.add_mesh3d(
             **dict(zip("xyz", corners.T)),
             **dict(zip("ijk", faces.T)),
-            color=_COLOURS[void["kind"]],
+            color=_COLOURS[void.kind],
             opacity=0.55,
             flatshading=True,
             name=tr(name, number=number),

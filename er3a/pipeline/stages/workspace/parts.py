@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from er3a.errors import ResultError
+from er3a.files.kept_files import read_checked, write_checked
 from er3a.kinematics.chain import constant_links
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.results import read_checked, write_checked
+from er3a.pipeline.stages.workspace.entry import WorkspaceSettings
 from er3a.pipeline.study import Study
 from er3a.robots.robot import Robot
 from er3a.sampling.extreme_samples import Extremes
@@ -25,7 +26,7 @@ FORMAT = "er3a workspace part 3"
 def identity(study: Study, robot: Robot) -> dict[str, Any]:
     """What all part files of one run share: settings, seed, and digests of the robot's numbers and of the code."""
     arrays = (constant_links(robot), robot.direction, robot.offset, robot.lower, robot.upper)
-    settings = study.workspace.model_dump(exclude={"cloud_points"})
+    settings = study.section(WorkspaceSettings).model_dump(exclude={"cloud_points"})
     return {
         "format": FORMAT,
         "robot": robot.name,
@@ -101,8 +102,8 @@ def gather(paths: list[Path], study: Study, robot: Robot) -> Tally:
             raise ResultError(path, f"holds block {int(twice[0])}, which another part file holds too")
         total = tally if total is None else total.merge(tally)
     held = total.blocks if total else np.array([])
-    missing = np.setdiff1d(np.arange(study.workspace.blocks), held)
-    if missing.size:
+    missing = np.setdiff1d(np.arange(study.section(WorkspaceSettings).blocks), held)
+    if missing.size or total is None:
         where = paths[-1] if paths else "part files"
         raise ResultError(where, f"with this file and the others, block {int(missing[0])} is still missing")
     return total

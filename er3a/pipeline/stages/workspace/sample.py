@@ -6,6 +6,7 @@ from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.pipeline.progress import shown_progress
+from er3a.pipeline.stages.workspace.entry import WorkspaceSettings
 from er3a.pipeline.stages.workspace.parts import identity, write_part
 from er3a.pipeline.study import Study
 from er3a.robots.robot import Robot
@@ -29,15 +30,15 @@ def sample(study: Study, name: str, part: int, parts: int, output: Path) -> None
     if not 1 <= part <= parts:
         raise InputError(None, "part", f"there is no part {part} of {parts}", f"Give a number from 1 to {parts}")
     robot = study.robot(name)
-    count = study.workspace.blocks
+    count = study.section(WorkspaceSettings).blocks
     blocks = range((part - 1) * count // parts, part * count // parts)
-    grid = make_grid(robot, study.workspace.cells_across)
+    grid = make_grid(robot, study.section(WorkspaceSettings).cells_across)
     write_part(Path(output), identity(study, robot), sampled(study, robot, grid, blocks))
 
 
 def draw_of(study: Study) -> Draw:
     """How the study draws its samples."""
-    settings = study.workspace
+    settings = study.section(WorkspaceSettings)
     return Draw(study.seed, settings.samples, settings.blocks, settings.sampling)
 
 
@@ -46,4 +47,4 @@ def sampled(study: Study, robot: Robot, grid: Grid, blocks: range) -> Tally:
     draw = draw_of(study)
     total = int(draw.sizes[blocks.start : blocks.stop].sum())
     with shown_progress(total, f"{robot.name}: samples") as advance:
-        return tally_blocks(robot, grid, draw, blocks, study.workspace.hull_directions, advance)
+        return tally_blocks(robot, grid, draw, blocks, study.section(WorkspaceSettings).hull_directions, advance)

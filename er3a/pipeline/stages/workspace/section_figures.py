@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
 from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.language import tr
+from er3a.pipeline.stages.workspace.model import GridSummary, WorkspaceResults
+from er3a.pipeline.stages.workspace.tables import Cells
+from er3a.pipeline.tables import Reals
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.palette import INK, JOINTS, MUTED, REFERENCE
@@ -32,26 +33,24 @@ class CellMap:
     origin, cell : m
     """
 
-    def __init__(self, summary: dict[str, Any], cells: pd.DataFrame):
-        grid = summary["grid"]
-        self.origin, self.cell = np.array(grid["origin_m"]), grid["cell_m"]
-        index = tuple(cells[["ix", "iy", "iz"]].to_numpy(dtype=np.int64).T)
-        self.samples = np.zeros(grid["shape"], dtype=np.int64)
-        self.samples[index] = cells["samples"]
+    def __init__(self, grid: GridSummary, cells: Cells):
+        self.origin, self.cell = np.array(grid.origin_m), grid.cell_m
+        self.samples = np.zeros(grid.shape, dtype=np.int64)
+        self.samples[tuple(cells.index.astype(np.int64).T)] = cells.samples
 
-    def edges(self, axis: int) -> np.ndarray:
+    def edges(self, axis: int) -> Reals:
         """Cell borders along an axis, mm."""
         return (self.origin[axis] + np.arange(self.samples.shape[axis] + 1) * self.cell) * 1000
 
 
-def top_view(robot: Robot, summary: dict[str, Any], cells: pd.DataFrame):
+def top_view(robot: Robot, results: WorkspaceResults) -> Figure:
     """The cloud from above, with the wedge that joint 1 leaves."""
     figure, axes = new_figure(width=8.0, height=6.6)
-    _draw_top(figure, axes, robot, CellMap(summary, cells))
+    _draw_top(figure, axes, robot, CellMap(results.summary.grid, results.cells))
     return figure
 
 
-def _draw_top(figure, axes: Axes, robot: Robot, cells: CellMap) -> None:
+def _draw_top(figure: Figure, axes: Axes, robot: Robot, cells: CellMap) -> None:
     column = cells.samples.sum(axis=2) / cells.cell**2 / 1e6
     mesh = axes.pcolormesh(
         cells.edges(0), cells.edges(1), masked(column).T, cmap=DENSITY, norm=log_norm(column), rasterized=True
@@ -77,17 +76,18 @@ def _draw_top(figure, axes: Axes, robot: Robot, cells: CellMap) -> None:
     axes.grid(False)
 
 
-def convergence(summary: dict[str, Any], curve: pd.DataFrame):
+def convergence(results: WorkspaceResults) -> Figure:
     """Touched volume over the number of samples, by cell size."""
     figure, axes = new_figure(width=9.0, height=4.2)
-    for (cell, rows), colour in zip(curve.groupby("cell_mm"), (JOINTS[0], JOINTS[5], JOINTS[2])):
+    curve, volume = results.curve, results.summary.volume_m3
+    for cell, colour in zip(np.unique(curve.cell_mm), (JOINTS[0], JOINTS[5], JOINTS[2])):
         label = tr("cells of {cell:.0f} mm", cell=cell)
-        axes.plot(rows["samples"] / 1e6, rows["touched_m3"], color=colour, marker=".", label=label)
-    axes.axhline(summary["hull"]["volume_m3"], color=MUTED, linestyle="--", label=tr("convex hull"))
-    volume = summary["volume_m3"]
-    axes.axhspan(volume["lower"], volume["upper"], color=JOINTS[1], alpha=0.35, label=tr("proven bounds"))
-    middle, (low, high) = volume["estimate"], volume["ci95"]
-    last = curve["samples"].max() / 1e6
+        rows = curve.cell_mm == cell
+        axes.plot(curve.samples[rows] / 1e6, curve.touched_m3[rows], color=colour, marker=".", label=label)
+    axes.axhline(results.summary.hull.volume_m3, color=MUTED, linestyle="--", label=tr("convex hull"))
+    axes.axhspan(volume.lower, volume.upper, color=JOINTS[1], alpha=0.35, label=tr("proven bounds"))
+    middle, (low, high) = volume.estimate, volume.ci95
+    last = curve.samples.max() / 1e6
     spread, label = [[middle - low], [high - middle]], tr("estimate, 95 % interval")
     axes.errorbar([last * 1.3], [middle], yerr=spread, color=INK, fmt="o", capsize=4, label=label)
     axes.set_xscale("log")
@@ -101,11 +101,12 @@ def convergence(summary: dict[str, Any], curve: pd.DataFrame):
     return figure
 
 
-def masked(values: np.ndarray) -> np.ma.MaskedArray:
+def masked(values: Reals) -> np.ma.MaskedArray:
+    """The values, zeros left out."""
     return np.ma.masked_equal(values, 0)
 
 
-def log_norm(values: np.ndarray) -> LogNorm:
+def log_norm(values: Reals) -> LogNorm:
     """Colours from the 1 % to the 99.9 % quantile of what is not zero."""
     low, high = np.quantile(values[values > 0], [0.01, 0.999])
     return LogNorm(low, max(high, low * 10), clip=True)

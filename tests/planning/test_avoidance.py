@@ -1,6 +1,8 @@
-"""The ways around singular regions: each does what it says, at the price it states."""
+"""Strategies of singularity avoidance: each does what it says, at the cost it states."""
 
 from __future__ import annotations
+
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -11,18 +13,19 @@ from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.singularity import characteristic_length, determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots
-from er3a.planning.avoidance import damped_least_squares as damped_module
-from er3a.planning.avoidance import via_point as via
+from er3a.pipeline.messages import planning as messages
+from er3a.planning.avoidance import StrategyName, damped_least_squares, findings, via_point
 from er3a.planning.avoidance.deviation import deviation
-from er3a.planning.avoidance.singular_segment import margin, trouble_of
-from er3a.planning.avoidance.strategies import WAYS, best, compare
+from er3a.planning.avoidance.singular_segment import singular_segment
+from er3a.planning.avoidance.strategies import STRATEGIES, best, compare
 from er3a.planning.follow import follow
 from er3a.planning.moves import line
+from er3a.planning.near_singular import NearSingular, factor_of
 from er3a.planning.singular_events import singular_events
 from er3a.planning.timing import joint_limits
 from er3a.robots.joint_limits import within
 
-NEAR = {"wrist": np.radians(5), "elbow": np.radians(5), "shoulder": 0.03}
+NEAR = NearSingular(float(np.radians(5)), float(np.radians(5)), 0.03)
 FORWARD, UP = [0, np.pi / 2, 0], [0, 0, 0]
 LINES = {
     "wrist_near": ([0.4, -0.15, 0.65], [0.4, 0.15, 0.65], FORWARD),
@@ -32,28 +35,28 @@ LINES = {
 }
 
 
-def trouble(name: str, robot=None, duration: float = 4.0):
+def segment_of(name: str, robot=None, duration: float = 4.0):
     robot = robot or load_robot("er3a_c60")
     start, end, rpy = LINES[name]
     way = line(transform(start, rpy), transform(end, rpy), duration)
     followed = follow(robot, way, np.linspace(0, duration, 400))
     events = singular_events(robot, followed.t, followed.q, followed.joints, NEAR)
     limits = joint_limits(robot, np.radians([180, 180, 180, 360, 360, 360]), 0.25)
-    return trouble_of(followed, NEAR, limits, events)
+    return singular_segment(followed, NEAR, limits, events)
 
 
 @pytest.fixture(scope="module")
-def prices():
-    return {name: {price.name: price for price in compare(trouble(name))} for name in LINES}
+def results():
+    return {name: {result.name: result for result in compare(segment_of(name))} for name in LINES}
 
 
 @pytest.mark.parametrize("name", LINES)
-def test_what_is_usable_ends_at_the_end_within_all_limits(prices, name):
-    case = trouble(name)
+def test_what_is_usable_ends_at_the_end_within_all_limits(results, name):
+    case = segment_of(name)
     last = case.followed.line.poses(np.array(1.0))
-    for price in prices[name].values():
-        if not price.usable:
-            assert price.reason
+    for result in results[name].values():
+        price = result.cost
+        if result.reasons:
             continue
         np.testing.assert_allclose(forward(case.robot, price.motion.q[-1]), last, atol=2e-3)
         assert within(case.robot, price.motion.q).all()
@@ -64,35 +67,35 @@ def test_what_is_usable_ends_at_the_end_within_all_limits(prices, name):
 
 
 @pytest.mark.parametrize("name", ["wrist_near", "wrist_met", "shoulder_near"])
-def test_stop_rests_on_the_path_before_the_region(prices, name):
-    case, price = trouble(name), prices[name]["stop"]
+def test_stop_rests_on_the_path_before_the_region(results, name):
+    case, price = segment_of(name), results[name]["stop"].cost
     end = price.motion.q[-1]
-    assert not price.usable
+    assert results[name]["stop"].reasons == (findings.PathNotFinished(price.done),)
     assert 0.2 < price.done < 0.9
-    assert margin(case.robot, price.motion.q, NEAR).min() >= 1
-    assert margin(case.robot, end[None], NEAR)[0] < 1.1
+    assert NEAR.margin(case.robot, price.motion.q).min() >= 1
+    assert NEAR.margin(case.robot, end[None])[0] < 1.1
     np.testing.assert_allclose(forward(case.robot, end), case.followed.line.poses(np.array(price.done)), atol=1e-9)
     assert price.distance.max() < 1e-9
 
 
-def test_slowing_down_stays_on_the_path_and_takes_the_spike(prices):
-    case, price = trouble("wrist_near"), prices["wrist_near"]["slow"]
+def test_slowing_down_stays_on_the_path_and_takes_the_spike(results):
+    case, price = segment_of("wrist_near"), results["wrist_near"]["slow"].cost
     programmed = np.abs(case.followed.rates(case.t)[1] / case.limits.speed).max()
     assert programmed > 1.05
-    assert price.speed <= 1 + 1e-6
+    assert price.speed_ratio <= 1 + 1e-6
     assert price.distance.max() < 1e-9
     assert price.angle.max() < 1e-9
     assert 4.0 < price.motion.duration < 4.5
 
 
 def test_slowing_down_costs_nothing_where_nothing_is_too_fast():
-    motion = WAYS["slow"](trouble("wrist_near", duration=20.0)).motion
+    motion = STRATEGIES["slow"](segment_of("wrist_near", duration=20.0)).motion
     assert motion.duration == pytest.approx(20.0, rel=1e-3)
 
 
 @pytest.mark.parametrize("name", ["wrist_near", "wrist_met", "shoulder_near"])
-def test_detour_leaves_the_path_only_between_good_poses(prices, name):
-    case, price = trouble(name), prices[name]["detour"]
+def test_detour_leaves_the_path_only_between_good_poses(results, name):
+    case, price = segment_of(name), results[name]["detour"].cost
     off = price.distance > 1e-7
     at = deviation(case.followed.line, forward(case.robot, price.motion.q))[2]
     (first, last) = case.regions[0]
@@ -104,11 +107,11 @@ def test_detour_leaves_the_path_only_between_good_poses(prices, name):
 
 @pytest.mark.parametrize("way", ["via_shift", "via_tilt"])
 @pytest.mark.parametrize("name", ["wrist_near", "wrist_met", "shoulder_near"])
-def test_bent_path_keeps_its_distance_and_changes_only_what_it_may(prices, name, way):
-    case, price = trouble(name), prices[name][way]
-    assert price.usable
-    assert price.clear
-    assert margin(case.robot, price.motion.q, NEAR).min() > 1 - 1e-6
+def test_bent_path_keeps_its_distance_and_changes_only_what_it_may(results, name, way):
+    case, price = segment_of(name), results[name][way].cost
+    assert not results[name][way].reasons
+    assert price.keeps_clear
+    assert NEAR.margin(case.robot, price.motion.q).min() > 1 - 1e-6
     if way == "via_tilt":
         assert price.distance.max() < 1e-6
     else:
@@ -117,25 +120,26 @@ def test_bent_path_keeps_its_distance_and_changes_only_what_it_may(prices, name,
 
 @pytest.mark.parametrize("name", ["wrist_near", "shoulder_near"])
 def test_no_random_bend_of_the_same_shape_is_smaller(name, random):
-    case = trouble(name)
+    case = segment_of(name)
     (region,) = case.regions
     slot = int(case.followed.slot[region[0]])
     for kind in ("shift", "tilt"):
-        least = min(via._bends(case, *region, kind), key=lambda bend: bend.amount)
+        least = min(via_point._bends(case, *region, kind), key=lambda bend: bend.amount)
         grid = np.linspace(least.start, least.end, 200)
         for _ in range(60):
             direction = random.normal(size=3)
             direction *= 0.95 * least.amount / np.linalg.norm(direction)
             parts = (direction, np.zeros(3)) if kind == "shift" else (np.zeros(3), direction)
-            other = via.Bend(least.start, least.top, least.end, *parts)
-            T = via.BentPath(case.followed.line, (other,)).poses(grid)
+            other = via_point.Bend(least.start, least.top, least.end, *parts)
+            T = via_point.BentPath(case.followed.line, (other,)).poses(grid)
             q = solve_slots(case.robot, T, np.zeros((len(T), 6)))[0][:, slot]
-            distance = np.abs(getattr(determinant_factors(case.robot, q), name.split("_")[0]))
-            assert distance.min() < NEAR[name.split("_")[0]]
+            kind = name.split("_")[0]
+            distance = np.abs(factor_of(determinant_factors(case.robot, q), kind))
+            assert distance.min() < NEAR.of(kind)
 
 
 def test_bend_is_smooth_and_vanishes_at_its_ends():
-    bend = via.Bend(0.2, 0.5, 0.9, np.ones(3), np.zeros(3))
+    bend = via_point.Bend(0.2, 0.5, 0.9, np.ones(3), np.zeros(3))
     s = np.linspace(0, 1, 100_001)
     size = bend.size(s)
     assert size.max() == 1
@@ -143,29 +147,29 @@ def test_bend_is_smooth_and_vanishes_at_its_ends():
     assert np.abs(np.diff(size, 3)).max() < 1e-10
 
 
-def test_damped_least_squares_are_those_of_the_formula(prices):
+def test_damped_least_squares_are_those_of_the_formula(results):
     """Against the formula in plain numpy, from the tool's velocity and error."""
-    case = trouble("wrist_near")
-    t = np.linspace(0, 4, damped_module.STEPS + 1)
+    case = segment_of("wrist_near")
+    t = np.linspace(0, 4, damped_least_squares.STEPS + 1)
     way, length = case.followed.line, characteristic_length(case.robot)
     T = way.poses(way.progress(t)[0])
-    motion = damped_module._run(case, t, T, 0.1)
+    motion = damped_least_squares._run(case, t, T, 0.1)
     q, dt = case.q[0].copy(), t[1] - t[0]
     scale = np.array([1 / length] * 3 + [1] * 3)
     for n in range(500):
         tool = forward(case.robot, q)
         turn = [Rotation.from_matrix(b[:3, :3] @ a[:3, :3].T).as_rotvec() for a, b in ((T[n], T[n + 1]), (tool, T[n]))]
         step = np.concatenate([T[n + 1][:3, 3] - T[n][:3, 3], turn[0]])
-        step += damped_module.FEEDBACK * dt * np.concatenate([T[n][:3, 3] - tool[:3, 3], turn[1]])
+        step += damped_least_squares.FEEDBACK * dt * np.concatenate([T[n][:3, 3] - tool[:3, 3], turn[1]])
         J = jacobian(case.robot, q) * scale[:, None]
         least = np.linalg.svd(J, compute_uv=False)[-1]
-        squared = 0.1**2 * max(0.0, 1 - (least / damped_module.THRESHOLD) ** 2)
+        squared = 0.1**2 * max(0.0, 1 - (least / damped_least_squares.THRESHOLD) ** 2)
         q = q + J.T @ np.linalg.solve(J @ J.T + squared * np.eye(6), scale * step)
     np.testing.assert_allclose(motion.q[500], q, atol=1e-5)
 
 
-def test_damped_price_is_the_distance_of_the_tool_it_leads_to(prices):
-    case, price = trouble("wrist_near"), prices["wrist_near"]["damped"]
+def test_damped_price_is_the_distance_of_the_tool_it_leads_to(results):
+    case, price = segment_of("wrist_near"), results["wrist_near"]["damped"].cost
     start, end = (case.followed.line.poses(np.array(share))[:3, 3] for share in (0.0, 1.0))
     tool = forward(case.robot, price.motion.q)[:, :3, 3] - start
     along = (end - start) / np.linalg.norm(end - start)
@@ -180,29 +184,29 @@ def test_another_branch_is_clear_from_the_start():
     followed = follow(robot, line(start, end, 4.0), np.linspace(0, 4, 400), start_slot=0)
     followed = (
         followed
-        if margin(robot, followed.q, NEAR).min() < 1
+        if NEAR.margin(robot, followed.q).min() < 1
         else follow(robot, line(start, end, 4.0), np.linspace(0, 4, 400), start_slot=1)
     )
     limits = joint_limits(robot, np.ones(6), 0.25)
-    found = WAYS["branch"](trouble_of(followed, NEAR, limits))
-    assert margin(robot, found.motion.q, NEAR).min() >= 1
-    held = WAYS["branch"](trouble_of(followed, NEAR, limits, fixed_start=True))
+    found = STRATEGIES["branch"](singular_segment(followed, NEAR, limits))
+    assert NEAR.margin(robot, found.motion.q).min() >= 1
+    held = STRATEGIES["branch"](singular_segment(followed, NEAR, limits, fixed_start=True))
     assert held.motion.duration > found.motion.duration
     np.testing.assert_allclose(held.motion.q[0], followed.q[0])
 
 
-def test_what_can_not_be_repaired_is_said_so(prices):
-    found = prices["out_of_reach"]
+def test_what_can_not_be_repaired_is_said_so(results):
+    found = results["out_of_reach"]
     assert best(list(found.values()), meets=True) is None
-    assert "out of reach" in found["slow"].reason
-    assert "out of reach" in found["detour"].reason
-    assert "ends inside the region" in found["via_shift"].reason
-    assert "of the path is done" in found["stop"].reason
+    assert found["slow"].reasons == (findings.PartlyOutOfReach(),)
+    assert found["detour"].reasons == (findings.EndsOutOfReach(),)
+    assert found["via_shift"].reasons == (findings.EndsInRegion(),)
+    assert found["stop"].reasons == (findings.PathNotFinished(found["stop"].cost.done),)
 
 
-def test_best_way_keeps_away_from_a_pose_that_the_path_meets(prices):
-    assert best(list(prices["wrist_near"].values()), meets=False).name == "slow"
-    assert best(list(prices["wrist_met"].values()), meets=True).name == "detour"
+def test_best_way_keeps_away_from_a_pose_that_the_path_meets(results):
+    assert best(list(results["wrist_near"].values()), meets=False).name == "slow"
+    assert best(list(results["wrist_met"].values()), meets=True).name == "detour"
 
 
 def test_start_inside_the_region_is_left_by_a_joint_move():
@@ -213,10 +217,13 @@ def test_start_inside_the_region_is_left_by_a_joint_move():
     end[:3, 3] += [0.0, 0.15, -0.15]
     followed = follow(robot, line(T, end, 3.0), np.linspace(0, 3, 300), q)
     limits = joint_limits(robot, np.radians([180] * 6), 0.25)
-    found = {price.name: price for price in compare(trouble_of(followed, NEAR, limits, fixed_start=True))}
-    np.testing.assert_allclose(found["detour"].motion.q[0], q, atol=1e-9)
-    assert "begins inside" in found["via_shift"].reason
-    assert "begins inside" in found["stop"].reason
+    found = {result.name: result for result in compare(singular_segment(followed, NEAR, limits, fixed_start=True))}
+    np.testing.assert_allclose(found["detour"].cost.motion.q[0], q, atol=1e-9)
+    assert found["via_shift"].reasons == found["stop"].reasons == (findings.BeginsInRegion(),)
+
+
+def test_every_strategy_has_a_name_and_words():
+    assert tuple(STRATEGIES) == get_args(StrategyName) == tuple(messages.STRATEGIES)
 
 
 def test_deviation_is_the_distance_across_and_the_angle(random):

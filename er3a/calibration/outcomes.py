@@ -1,0 +1,113 @@
+"""What a calibration could not estimate, and what it would take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from er3a.errors import Er3aError
+from er3a.references.quantities import Pose
+
+LevelName = Literal["lengths", "lengths_and_offsets", "all_entries"]
+"""Which entries are estimated: lengths that aren't 0, joint offsets besides, or all."""
+
+
+@dataclass(frozen=True)
+class MovesNothing:
+    """An entry moves none of the measured points."""
+
+    entry: str
+    code: Literal["moves_nothing"] = "moves_nothing"
+
+
+@dataclass(frozen=True)
+class NotToldApart:
+    """Entries act alike on the measured points; ``parallel_joints``: because these joints are parallel, if so."""
+
+    entries: tuple[str, ...]
+    parallel_joints: tuple[int, int] | None
+    code: Literal["not_told_apart"] = "not_told_apart"
+
+
+Held = MovesNothing | NotToldApart
+
+
+@dataclass(frozen=True)
+class NoPositions:
+    """There are no positions of single points."""
+
+    code: Literal["no_positions"] = "no_positions"
+
+
+@dataclass(frozen=True)
+class MorePositions:
+    """A level asks for more positions.
+
+    Attributes
+    ----------
+    coordinates, poses : that there are
+    determined, determinable : entries of the level that they determine, and that positions of these points ever can
+    level : the level that is out of reach
+    least : how many more positions it takes
+    entries : those that aren't determined
+    examples_deg : poses that add most
+    """
+
+    coordinates: int
+    poses: int
+    determined: int
+    determinable: int
+    level: LevelName
+    least: int
+    entries: tuple[str, ...]
+    examples_deg: tuple[Pose, ...]
+    code: Literal["more_positions"] = "more_positions"
+
+
+@dataclass(frozen=True)
+class NoCorrectionFits:
+    """The steps do not end: the table has a gross fault or is another arm's."""
+
+    steps: int
+    rest_mm: float
+    code: Literal["no_correction_fits"] = "no_correction_fits"
+
+
+NotCalibrated = NoPositions | MorePositions | NoCorrectionFits
+
+
+class CalibrationError(Er3aError):
+    """Measurements determine too little of a table, or no corrections make the table fit them; see ``finding``."""
+
+    def __init__(self, finding: NotCalibrated, problem: str):
+        self.finding = finding
+        super().__init__(problem)
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """No corrections make the table meet the positions to three times their uncertainty."""
+
+    level: LevelName
+    rms_before_mm: float
+    rms_after_mm: float
+    code: Literal["misfit"] = "misfit"
+
+
+@dataclass(frozen=True)
+class CorrectionsFound:
+    """Entries whose 95 % interval does not hold 0."""
+
+    entries: tuple[str, ...]
+    code: Literal["corrections_found"] = "corrections_found"
+
+
+@dataclass(frozen=True)
+class NoCorrectionFound:
+    """All 95 % intervals hold 0."""
+
+    intervals: int
+    code: Literal["no_correction_found"] = "no_correction_found"
+
+
+CalibrationConclusion = Misfit | CorrectionsFound | NoCorrectionFound

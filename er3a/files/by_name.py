@@ -1,0 +1,60 @@
+"""Diagnosis and calibration with names and paths of the files that they take."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from er3a.calibration import calibrate as calibration
+from er3a.calibration.calibrate import Calibration
+from er3a.calibration.measured import Measurement, check_poses
+from er3a.diagnosis import diagnose as diagnosis
+from er3a.diagnosis.diagnose import Hypothesis
+from er3a.files.measurements import load_measurements
+from er3a.files.reference_sets import load_references
+from er3a.references.reference import Reference, ReferenceSet
+from er3a.robots.robot import Robot, Source
+
+
+def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference] | str | Path) -> list[Hypothesis]:
+    """Hypotheses about what is wrong with a table, best first; see :func:`er3a.diagnosis.diagnose.diagnose`.
+
+    Parameters
+    ----------
+    references : a reference set, its name or its folder
+
+    Raises
+    ------
+    InputError
+        if there is no such reference set, or it can't be read
+    """
+    return diagnosis.diagnose(robot, load_references(references) if isinstance(references, str | Path) else references)
+
+
+def calibrate(robot: Robot, measurements: Sequence[Measurement] | ReferenceSet | str | Path) -> Calibration:
+    """Estimate corrections to a robot's table; see :func:`er3a.calibration.calibrate.calibrate`.
+
+    Parameters
+    ----------
+    measurements : a CSV file of measured positions (:mod:`er3a.files.measurements`), its rows, or a reference set,
+        whose key poses are used then
+
+    Returns
+    -------
+    found : its robot says in its sources where the corrections come from
+
+    Raises
+    ------
+    InputError
+        if the file can't be used, or holds poses outside the joint limits
+    CalibrationError
+        if the positions determine too little, or no corrections make the table fit
+    """
+    if isinstance(measurements, str | Path):
+        path, measurements = measurements, load_measurements(measurements)
+        check_poses(measurements, robot, path)
+    found = calibration.calibrate(robot, measurements)
+    text = f"Calibrated with {found.coordinates} measured coordinates, starting from the table of {robot.name}"
+    source = Source(text, "inferred")
+    return replace(found, robot=found.robot.replace(sources={**robot.sources, "dh": source, "zero": source}))

@@ -1,0 +1,275 @@
+"""Sentences about faults of a table, what a diagnosis concludes, and what to measure next."""
+
+from __future__ import annotations
+
+from er3a.diagnosis.conclusions import (
+    FlangePositionDecides,
+    LimitDecides,
+    MainFault,
+    MostLikelyFault,
+    NoFaultStandsOut,
+    NoFewFaultsExplain,
+    NothingDecides,
+    NothingToExplain,
+    NothingToRestOn,
+    OrientationDecides,
+)
+from er3a.diagnosis.fault_kinds import (
+    Faults,
+    ReversedDirection,
+    ShiftedRows,
+    SwappedEntries,
+    SwappedLimits,
+    SwappedRows,
+    WrongAlphaSign,
+    WrongConvention,
+    WrongLength,
+    WrongLimits,
+    WrongOffset,
+    WrongScale,
+    WrongUnit,
+)
+from er3a.pipeline.messages.language import N_
+from er3a.pipeline.messages.say import counted, say, sentence, word
+
+ENTRIES = {
+    "a": N_("column a"),
+    "d": N_("column d"),
+    "lengths": N_("all lengths"),
+    "alpha": N_("column alpha"),
+    "offset": N_("column offset"),
+    "limits": N_("joint limits"),
+    "angles": N_("all angles"),
+}
+MISREAD = {
+    "metres_as_millimetres": N_("metres read as millimetres (1000 times too small)"),
+    "millimetres_as_metres": N_("millimetres read as metres (1000 times too large)"),
+    "radians_as_degrees": N_("radians read as degrees (57.3 times too small)"),
+    "degrees_as_radians": N_("degrees read as radians (57.3 times too large)"),
+}
+SHIFTS = {
+    "rows down": N_("all rows are shifted down by one joint"),
+    "rows up": N_("all rows are shifted up by one joint"),
+    "a down": N_("column a is shifted down by one joint"),
+    "a up": N_("column a is shifted up by one joint"),
+    "alpha down": N_("column alpha is shifted down by one joint"),
+    "alpha up": N_("column alpha is shifted up by one joint"),
+    "d down": N_("column d is shifted down by one joint"),
+    "d up": N_("column d is shifted up by one joint"),
+}
+CONVENTIONS = {
+    "modified": N_("the table is a standard one, read as modified"),
+    "standard": N_("the table is a modified one, read as standard"),
+}
+LIMIT_FAULTS = {
+    "crossed": N_("limits crossed"),
+    "signs_swapped": N_("limits signed the wrong way round"),
+    "lower_sign": N_("lower limit has the wrong sign"),
+    "upper_sign": N_("upper limit has the wrong sign"),
+}
+LIMITS = {
+    "lower": N_("the lower limit of joint {joint} would tell them apart"),
+    "upper": N_("the upper limit of joint {joint} would tell them apart"),
+}
+
+
+def both(faults: Faults) -> str:
+    """One fault or two as one text."""
+    if len(faults) == 1:
+        return say(faults[0])
+    first, second = map(say, faults)
+    return sentence("faults", "{fault} and {second_fault}", fault=first, second_fault=second)
+
+
+def shown(value: float) -> str:
+    """A residual: one decimal below 100, none above."""
+    return f"{value:.1f}" if value < 100 else f"{value:.0f}"
+
+
+@say.register
+def _(found: WrongUnit) -> str:
+    return _at(word(found.code, ENTRIES, found.entries), word(found.code, MISREAD, found.misread))
+
+
+@say.register
+def _(found: WrongAlphaSign) -> str:
+    fault = sentence(
+        found.code,
+        "alpha has the wrong sign ({given:g} deg given, {fits:g} deg fits)",
+        given=found.given_deg,
+        fits=found.fits_deg,
+    )
+    return _at_joint(found.joint, fault)
+
+
+@say.register
+def _(found: SwappedEntries) -> str:
+    if found.joint is None:
+        return sentence(found.code, "columns a and d are swapped")
+    return _at_joint(found.joint, sentence(found.code, "a and d are swapped"))
+
+
+@say.register
+def _(found: SwappedRows) -> str:
+    return sentence(found.code, "rows {first} and {second} are swapped", first=found.first, second=found.second)
+
+
+@say.register
+def _(found: SwappedLimits) -> str:
+    return sentence(
+        found.code, "limits of joints {first} and {second} are swapped", first=found.first, second=found.second
+    )
+
+
+@say.register
+def _(found: ShiftedRows) -> str:
+    return word(found.code, SHIFTS, f"{found.entries} {found.toward}")
+
+
+@say.register
+def _(found: WrongOffset) -> str:
+    if found.given_deg == 0:
+        fault = sentence(found.code, "offset {fits:g} deg missing", fits=found.fits_deg)
+    else:
+        fault = sentence(
+            found.code, "offset is {given:g} deg, {fits:g} deg fits", given=found.given_deg, fits=found.fits_deg
+        )
+    return _at_joint(found.joint, fault)
+
+
+@say.register
+def _(found: ReversedDirection) -> str:
+    return _at_joint(found.joint, sentence(found.code, "direction reversed"))
+
+
+@say.register
+def _(found: WrongConvention) -> str:
+    return word(found.code, CONVENTIONS, found.read_as)
+
+
+@say.register
+def _(found: WrongLimits) -> str:
+    fault = word(found.code, LIMIT_FAULTS, found.fault)
+    return _at(sentence("place", "every joint"), fault) if found.joint is None else _at_joint(found.joint, fault)
+
+
+@say.register
+def _(found: WrongLength) -> str:
+    if found.given_mm == 0:
+        fault = sentence(found.code, "{entry} missing, {fits:.4g} mm fits", entry=found.column, fits=found.fits_mm)
+    else:
+        fault = sentence(
+            found.code,
+            "{entry} is {given:.6g} mm, {fits:.4g} mm fits",
+            entry=found.column,
+            given=found.given_mm,
+            fits=found.fits_mm,
+        )
+    return _at_joint(found.joint, fault)
+
+
+@say.register
+def _(found: WrongScale) -> str:
+    fault = sentence(found.code, "scale wrong, times {factor:.6g} fits", factor=found.factor)
+    return _at(word("wrong_unit", ENTRIES, "lengths"), fault)
+
+
+@say.register
+def _(found: FlangePositionDecides) -> str:
+    pose = ", ".join(f"{angle:g}" for angle in found.pose_deg)
+    most = f"{found.most_mm:.0f} mm" if found.most_mm >= 10 else f"{found.most_mm:.1f} mm"
+    if found.share == 1:
+        return sentence(
+            found.code,
+            "the flange's position at joints ({pose}) deg would tell all apart, by up to {most}",
+            pose=pose,
+            most=most,
+        )
+    return sentence(
+        found.code,
+        "the flange's position at joints ({pose}) deg would tell {share:.0%} of the pairs apart, by up to {most}",
+        pose=pose,
+        share=found.share,
+        most=most,
+    )
+
+
+@say.register
+def _(found: LimitDecides) -> str:
+    return sentence(found.code, LIMITS[found.side], joint=found.joint)
+
+
+@say.register
+def _(found: NothingDecides) -> str:
+    return sentence(found.code, "nothing can, they are the same arm written in different ways")
+
+
+@say.register
+def _(found: OrientationDecides) -> str:
+    return sentence(found.code, "no position of the flange does, but its orientation, or a point beside axis 6")
+
+
+@say.register
+def _(found: NothingToRestOn) -> str:
+    return sentence(found.code, "There is nothing to base a diagnosis on.")
+
+
+@say.register
+def _(found: NothingToExplain) -> str:
+    return counted(
+        found.code,
+        "Nothing to explain: the one reference about poses, axes and limits is met.",
+        "Nothing to explain: all {count} references about poses, axes and limits are met.",
+        found.references,
+    )
+
+
+@say.register
+def _(found: MostLikelyFault) -> str:
+    return sentence(found.code, "Most likely fault: {hypothesis}.", hypothesis=_residual_falls(found))
+
+
+@say.register
+def _(found: MainFault) -> str:
+    return sentence(
+        found.code,
+        "Most likely fault: {hypothesis}, which is still more than the references leave open.",
+        hypothesis=_residual_falls(found),
+    )
+
+
+@say.register
+def _(found: NoFaultStandsOut) -> str:
+    return sentence(found.code, "The residuals look like noise, so no table entry is indicated.")
+
+
+@say.register
+def _(found: NoFewFaultsExplain) -> str:
+    return sentence(
+        found.code,
+        "No one or two faults explain the data: the best of {tried} hypotheses still leaves {after} {unit} of {before} "
+        "{unit}. This is another arm, or more than two numbers are wrong.",
+        tried=found.tried,
+        after=shown(found.residual_after),
+        before=shown(found.residual_before),
+        unit=found.unit,
+    )
+
+
+def _residual_falls(found: MostLikelyFault | MainFault) -> str:
+    return sentence(
+        "residual_falls",
+        "{faults}; residual falls from {before} {unit} to {after} {unit}",
+        faults=both(found.faults),
+        before=shown(found.residual_before),
+        after=shown(found.residual_after),
+        unit=found.unit,
+    )
+
+
+def _at_joint(joint: int, fault: str) -> str:
+    return _at(sentence("place", "joint {joint}", joint=joint), fault)
+
+
+def _at(place: str, fault: str) -> str:
+    return sentence("fault_at", "{place}: {fault}", place=place, fault=fault)

@@ -1,0 +1,146 @@
+"""Sentences about paths: what is wrong with them, and how singular segments are avoided."""
+
+from __future__ import annotations
+
+from er3a.pipeline.messages.kinematics import SINGULARITIES  # noqa: F401
+from er3a.pipeline.messages.language import N_
+from er3a.pipeline.messages.say import joined, listed, say, sentence
+from er3a.planning.avoidance import StrategyName, findings
+from er3a.planning.intervals import AboveLimit, BelowLimit, OutOfReach, TooFast
+from er3a.planning.timing import MustStandStill, NoTimeLawFound, ToppraMissing
+
+STRATEGIES: dict[StrategyName, str] = {
+    "slow": N_("Keep the path and slow down"),
+    "branch": N_("Change to another solution of the arm first"),
+    "via_shift": N_("Bend the path through a shifted via point"),
+    "via_tilt": N_("Bend the path through a tilted via point"),
+    "damped": N_("Let damped least squares leave the path"),
+    "detour": N_("Cross the region by a joint move"),
+    "stop": N_("Stop before the region with an alarm"),
+}
+
+
+@say.register
+def _(found: AboveLimit) -> str:
+    template = "J{joint} goes to {reached:.1f} deg; its upper limit is {bound:g} deg"
+    return sentence(found.code, template, joint=found.joint, reached=found.reached_deg, bound=found.limit_deg)
+
+
+@say.register
+def _(found: BelowLimit) -> str:
+    template = "J{joint} goes to {reached:.1f} deg; its lower limit is {bound:g} deg"
+    return sentence(found.code, template, joint=found.joint, reached=found.reached_deg, bound=found.limit_deg)
+
+
+@say.register
+def _(found: TooFast) -> str:
+    template = "J{joint} would need {needed:.0f} deg/s; it can do {able:g} deg/s"
+    return sentence(found.code, template, joint=found.joint, needed=found.needed_deg_s, able=found.limit_deg_s)
+
+
+@say.register
+def _(found: OutOfReach) -> str:
+    return joined(listed(found.reasons))
+
+
+@say.register
+def _(found: MustStandStill) -> str:
+    return sentence(found.code, "the arm would have to stand still on the way")
+
+
+@say.register
+def _(found: NoTimeLawFound) -> str:
+    return sentence(found.code, "the time-optimal parametrisation found no time law under the joints' limits")
+
+
+@say.register
+def _(found: ToppraMissing) -> str:
+    return sentence(found.code, "the library toppra is not installed; it has wheels for Linux on x86-64 only")
+
+
+@say.register
+def _(found: findings.NothingToAvoid) -> str:
+    return sentence(found.code, "there is nothing to avoid")
+
+
+@say.register
+def _(found: findings.NoSingularRegion) -> str:
+    return sentence(found.code, "there is no singular region on this path")
+
+
+@say.register
+def _(found: findings.BeginsOutOfReach) -> str:
+    return sentence(found.code, "the path begins out of reach")
+
+
+@say.register
+def _(found: findings.EndsOutOfReach) -> str:
+    return sentence(found.code, "the path ends out of reach")
+
+
+@say.register
+def _(found: findings.PartlyOutOfReach) -> str:
+    return sentence(found.code, "a part of the path is out of reach")
+
+
+@say.register
+def _(found: findings.BeginsInRegion) -> str:
+    return sentence(found.code, "the path begins inside the region")
+
+
+@say.register
+def _(found: findings.EndsInRegion) -> str:
+    return sentence(found.code, "the path ends inside the region")
+
+
+@say.register
+def _(found: findings.BranchEnds) -> str:
+    template = "at t = {t:.4g} s the branch ends: J{joint} would have to jump"
+    return sentence(found.code, template, t=found.t_s, joint=found.joint)
+
+
+@say.register
+def _(found: findings.NoOtherBranch) -> str:
+    return sentence(found.code, "the other branches are singular, beyond a limit or out of reach there too")
+
+
+@say.register
+def _(found: findings.NoShiftKeepsDistance) -> str:
+    template = "no shift of the tool point up to {far:.0f} mm keeps the distance"
+    return sentence(found.code, template, far=found.up_to_mm)
+
+
+@say.register
+def _(found: findings.NoTiltKeepsDistance) -> str:
+    return sentence(found.code, "no tilt of the tool up to {far:.0f} deg keeps the distance", far=found.up_to_deg)
+
+
+@say.register
+def _(found: findings.BentPathSingular) -> str:
+    return sentence(found.code, "the bent path runs into another singular region")
+
+
+@say.register
+def _(found: findings.NoDampingSuffices) -> str:
+    return sentence(found.code, "no damping keeps the joint speeds within their limits at this pace")
+
+
+@say.register
+def _(found: findings.PathNotFinished) -> str:
+    return sentence(found.code, "only {share:.0%} of the path is done", share=found.done)
+
+
+@say.register
+def _(found: findings.EndsOffPath) -> str:
+    template = "it ends {mm:.3g} mm and {deg:.3g} deg from the path's end"
+    return sentence(found.code, template, mm=found.distance_mm, deg=found.angle_deg)
+
+
+@say.register
+def _(found: findings.SpeedExceeded) -> str:
+    return sentence(found.code, "a joint needs {share:.2f} times its greatest speed", share=found.ratio)
+
+
+@say.register
+def _(found: findings.AccelerationExceeded) -> str:
+    return sentence(found.code, "a joint needs {share:.2f} times its greatest acceleration", share=found.ratio)

@@ -1,0 +1,193 @@
+"""What the trajectory page and recording say of paths, beside the verdict."""
+
+from __future__ import annotations
+
+import er3a.pipeline.messages.collision  # noqa: F401
+from er3a.pipeline.messages.language import N_
+from er3a.pipeline.messages.planning import SINGULARITIES
+from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
+from er3a.pipeline.messages.say import joined, listed, say, sentence, word
+from er3a.pipeline.messages.trajectory_verdict import verdict_word
+from er3a.pipeline.stages.trajectory.model import (
+    BodiesOverlap,
+    Jump,
+    PathKind,
+    PathSummary,
+    Singularity,
+    Stretch,
+    TriedStrategy,
+)
+from er3a.planning.avoidance import StrategyName
+from er3a.planning.near_singular import SingularityType
+
+__all__ = ["FIGURES", "advice", "kind_word", "path_text", "strategy_word", "type_word", "verdict_word"]
+
+FIGURES = {
+    "paths": N_("Paths planned"),
+    "safe": N_("Paths safe as they are"),
+    "singular_poses": N_("Singular poses met"),
+    "near_passes": N_("Near passes"),
+    "colliding": N_("Paths that collide"),
+    "max_joint_speed": N_("Greatest joint speed needed, where bounded"),
+    "assumed_speed_ratio": N_("Share of the joint's assumed speed"),
+    "speed_ratio": N_("Share of the joint's greatest speed"),
+    "velocity_check": N_("Velocity check, greatest error"),
+    "characteristic_length": N_("Characteristic length of the Jacobian"),
+}
+KINDS: dict[PathKind, str] = {
+    "joint": N_("joint move"),
+    "joint_sequence": N_("joint moves in sequence"),
+    "line": N_("straight line"),
+    "arc": N_("circular arc"),
+    "sequence": N_("lines and arcs in sequence"),
+    "table": N_("path from a table"),
+}
+STRATEGIES: dict[StrategyName, str] = {
+    "slow": N_("slow down on the path"),
+    "branch": N_("another solution of the arm first"),
+    "via_shift": N_("via point, tool point shifted"),
+    "via_tilt": N_("via point, tool tilted"),
+    "damped": N_("damped least squares"),
+    "detour": N_("joint move across the region"),
+    "stop": N_("stop before it, with an alarm"),
+}
+MOST_PAIRS = 3
+NO_DEVIATION = 0.005  # mm or deg
+NO_TIME = 0.005  # s
+
+
+def kind_word(kind: PathKind) -> str:
+    """What kind of path it is."""
+    return word("trajectory.kind", KINDS, kind)
+
+
+def type_word(kind: SingularityType) -> str:
+    """A type of singularity."""
+    return word("singularity", SINGULARITIES, kind)
+
+
+def strategy_word(name: StrategyName) -> str:
+    """A strategy's name."""
+    return word("trajectory.strategy", STRATEGIES, name)
+
+
+def path_text(path: PathSummary) -> str:
+    """Where a path is singular or has faults, or that it has none."""
+    collisions = [say(part) for part in path.collisions]
+    if not collisions:
+        return _apart_from_collisions(path)
+    if path.verdict != "collides":
+        return joined([_apart_from_collisions(path), *collisions])
+    other = path.too_fast or path.jumps or (path.singularities and not path.in_joint_space)
+    return joined([*collisions, _apart_from_collisions(path) if other else ""])
+
+
+def _apart_from_collisions(path: PathSummary) -> str:
+    if path.unreachable:
+        return joined(map(_when, path.unreachable))
+    if faults := path.out_of_limits or path.too_fast:
+        return joined([*map(say, faults), *map(say, path.singularities)])
+    met = [say(event) for event in path.singularities if event.crossing]
+    if path.in_joint_space:
+        if not met:
+            return sentence("path.no_fault", "no fault")
+        harmless = "passes singular poses ({places}), which a joint move does without harm"
+        return sentence("path.harmless", harmless, places=joined(met))
+    if met or path.jumps:
+        return joined([*met, *map(say, path.jumps), _speeds(path.joint_speed_bounded)])
+    if path.singularities:
+        return joined(map(say, path.singularities))
+    return sentence("path.safe", "no singular pose near, within limits and reach")
+
+
+def _speeds(bounded: bool) -> str:
+    if bounded:
+        return sentence("path.speeds", "joint speeds stay finite")
+    return sentence("path.speeds", "no finite joint speed follows the path there")
+
+
+@say.register
+def _(event: Singularity) -> str:
+    when = f"{event.t_s:.4g}" if event.t_s == event.until_s else f"{event.t_s:.4g} – {event.until_s:.4g}"
+    kind = type_word(event.type)
+    if event.crossing:
+        return sentence("singularity.met", "{type} at t = {when} s", type=kind, when=when)
+    distance = f"{event.distance_deg:.3g} deg" if event.distance_mm is None else f"{event.distance_mm:.3g} mm"
+    passed = {"type": kind, "when": when, "distance": distance}
+    return sentence("singularity.passed", "{type} at t = {when} s, at {distance}", **passed)
+
+
+@say.register
+def _(jump: Jump) -> str:
+    template = "the branch in use ends at t = {t:.4g} s, J{joint} would jump"
+    return sentence("path.jump", template, t=jump.t_s, joint=jump.joint)
+
+
+@say.register
+def _(stretch: Stretch) -> str:  # type: ignore[type-arg]  # singledispatch takes no parametrised class
+    return sentence("path.stretch", "{when}: {cause}", when=_when(stretch), cause=say(stretch.cause))
+
+
+def _when(stretch: Stretch) -> str:  # type: ignore[type-arg]
+    return sentence("path.when", "from t = {start:.4g} to {end:.4g} s", start=stretch.t0_s, end=stretch.t1_s)
+
+
+@say.register
+def _(found: BodiesOverlap) -> str:
+    pairs = joined(listed(found.pairs[:MOST_PAIRS]), ", ")
+    if len(found.pairs) > MOST_PAIRS:
+        pairs = sentence("bodies_overlap.more", "{pairs} and more", pairs=pairs)
+    worst = {"pairs": pairs, "depth": found.depth_mm, "t": found.t_s}
+    return sentence(found.code, "{pairs} overlap, up to {depth:.1f} mm at t = {t:.4g} s", **worst)
+
+
+def advice(path: PathSummary) -> str | None:
+    """What to do about a path; None where nothing is to be done."""
+    if not path.avoidance:
+        return None
+    if path.chosen:
+        return _chosen(path.chosen, path.duration_s)
+    if path.unreachable:
+        when = joined(map(_when, path.unreachable), ", ")
+        why = sentence("advice.out_of_reach", "it is out of reach {when}", when=when)
+    else:
+        causes = [say(part.cause) for part in path.out_of_limits] or [reasons(tried) for tried in path.avoidance]
+        why = joined(dict.fromkeys(causes))
+    if len(path.avoidance) == 1:
+        (only,) = path.avoidance
+        parts = {"way": word("advice", ADVICE, only.name), "reason": reasons(only)}
+        return sentence("advice.only", "{way}, as the study asks for, does not repair it: {reason}", **parts)
+    return sentence("advice.none", "No avoidance strategy completes this path: {why}", why=why)
+
+
+def reasons(tried: TriedStrategy) -> str:
+    """Why a strategy is not possible or not usable; empty where it is."""
+    return joined(listed(tried.reasons))
+
+
+def _chosen(tried: TriedStrategy, programmed_s: float) -> str:
+    motion = tried.motion
+    if motion is None:
+        raise ValueError(f"{tried.name} was chosen and has no motion")
+    tool = _leaves(motion.max_deviation_mm, motion.max_deviation_deg)
+    cost = {"tool": tool, "time": _takes(motion.duration_s - programmed_s)}
+    return sentence("advice.chosen", "{way}: {tool}, and {time}", way=word("advice", ADVICE, tried.name), **cost)
+
+
+def _leaves(far_mm: float, turned_deg: float) -> str:
+    if far_mm < NO_DEVIATION and turned_deg < NO_DEVIATION:
+        return sentence("advice.tool", "the tool stays on the path")
+    if turned_deg < NO_DEVIATION:
+        return sentence("advice.tool", "the tool leaves the path by {far:.2g} mm", far=far_mm)
+    if far_mm < NO_DEVIATION:
+        return sentence("advice.tool", "the tool leaves the path by {turned:.2g} deg", turned=turned_deg)
+    both = "the tool leaves the path by {far:.2g} mm and {turned:.2g} deg"
+    return sentence("advice.tool", both, far=far_mm, turned=turned_deg)
+
+
+def _takes(longer_s: float) -> str:
+    if abs(longer_s) < NO_TIME:
+        return sentence("advice.time", "it takes no more time than programmed")
+    if longer_s > 0:
+        return sentence("advice.time", "it takes {longer:.2f} s more than programmed", longer=longer_s)
+    return sentence("advice.time", "it takes {shorter:.2f} s less than programmed", shorter=-longer_s)

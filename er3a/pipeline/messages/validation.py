@@ -1,0 +1,100 @@
+"""What only the validation page says: names of key figures, and why something is not judged."""
+
+from __future__ import annotations
+
+import er3a.pipeline.messages.kinematics
+import er3a.pipeline.messages.validation_verdict  # noqa: F401
+from er3a.pipeline.messages.language import N_
+from er3a.pipeline.messages.references import GROUP_WORDS, MISSING_WORDS
+from er3a.pipeline.messages.say import say, sentence, word
+from er3a.pipeline.stages.validation.findings import (
+    InNoSet,
+    NamedPose,
+    NearSingularLeftOut,
+    NoClosedForm,
+    NotInRobotFile,
+    NumbersMissing,
+    SetHasNoData,
+    SourceGivesNone,
+    WholeGroup,
+)
+
+FIGURES = {
+    "checks_passed": N_("Checks passed"),
+    "zero_pose_flange_error": N_("Zero pose: flange off by"),
+    "farthest_axis": N_("Joint axes: farthest off"),
+    "most_tilted_axis": N_("Joint axes: most tilted"),
+    "worst_drawing_label": N_("Workspace drawing: worst label off by"),
+    "wrist_centre_reach": N_("Wrist centre reaches from axis 1"),
+    "flange_reach": N_("Flange reaches from axis 1"),
+    "round_trip_joint_error": N_("Round trips: worst joint error"),
+}
+GRADES = {
+    "official": N_("the manufacturer's own document"),
+    "cad": N_("measured on a CAD model that carries the model's name"),
+    "export": N_("a URDF exported from CAD"),
+    "claim": N_("an article's text"),
+    "inferred": N_("reasoned, not stated"),
+}
+GRADE_NAMES = {
+    "official": N_("official"),
+    "cad": N_("cad"),
+    "export": N_("export"),
+    "claim": N_("claim"),
+    "inferred": N_("inferred"),
+}
+CONVENTIONS = {"standard": N_("standard"), "modified": N_("modified")}
+GROUPS = GROUP_WORDS | {"table_sanity": N_("table sanity"), "round_trips": N_("round trips")}
+
+
+@say.register
+def _(found: NamedPose) -> str:
+    return found.name
+
+
+@say.register
+def _(found: WholeGroup) -> str:
+    return word(found.code, MISSING_WORDS, found.group)
+
+
+@say.register
+def _(found: NotInRobotFile) -> str:
+    return sentence(found.code, "the robot's file gives no value")
+
+
+@say.register
+def _(found: SourceGivesNone) -> str:
+    return sentence(found.code, "the source gives none")
+
+
+@say.register
+def _(found: SetHasNoData) -> str:
+    return sentence(found.code, "{own_set} has no data", own_set=found.reference_set)
+
+
+@say.register
+def _(found: InNoSet) -> str:
+    return sentence(found.code, "no reference set gives it")
+
+
+@say.register
+def _(found: NumbersMissing) -> str:
+    return sentence(found.code, "numbers are missing")
+
+
+@say.register
+def _(found: NoClosedForm) -> str:
+    return sentence(found.code, "no closed-form inverse, because {missing}", missing=say(found.missing))
+
+
+@say.register
+def _(found: NearSingularLeftOut) -> str:
+    return sentence(
+        found.code,
+        "{judged} of {poses} random poses; the others lie within {wrist:g} deg (wrist, elbow) or {shoulder:g} mm "
+        "(shoulder) of a singularity, where joints follow from a pose less exactly",
+        judged=found.judged,
+        poses=found.poses,
+        wrist=found.wrist_deg,
+        shoulder=found.shoulder_mm,
+    )

@@ -1,0 +1,89 @@
+"""Sentences of the workspace stage's verdict."""
+
+from __future__ import annotations
+
+from er3a.pipeline.messages.say import joined, say, sentence
+from er3a.pipeline.messages.workspace_proof import is_predicate
+from er3a.pipeline.stages.workspace.findings import (
+    Flat,
+    NoVoid,
+    Undersampled,
+    VoidAtShoulder,
+    VoidUncertain,
+    VoidUnexpected,
+)
+from er3a.workspace.causes import VoidCause
+
+
+@say.register
+def _(found: Flat) -> str:
+    return sentence(
+        found.code, "The tool point moves on a plane, a line or not at all, so there is no volume to speak of."
+    )
+
+
+@say.register
+def _(found: Undersampled) -> str:
+    return sentence(
+        found.code,
+        "Too few samples for cells this small: about {percent:.0f} % of the reachable cells were not touched yet, so "
+        "nothing can be said about voids.",
+        percent=found.unseen_percent,
+    )
+
+
+@say.register
+def _(found: VoidUnexpected) -> str:
+    where = sentence(
+        found.code,
+        "An enclosed void of {litres:.3g} L lies at ({x}, {y}, {z}) mm, away from the shoulder, proven empty.",
+        **_place(found),
+    )
+    return joined([where, _advice(found.cause)], " ")
+
+
+@say.register
+def _(found: VoidUncertain) -> str:
+    return sentence(
+        found.code,
+        "An enclosed void of {litres:.3g} L may lie at ({x}, {y}, {z}) mm, away from the shoulder; there is no proof, "
+        "and the samples can't tell.",
+        **_place(found),
+    )
+
+
+@say.register
+def _(found: VoidAtShoulder) -> str:
+    return sentence(
+        found.code,
+        "An enclosed void of {litres:.3g} L surrounds the arm's own shoulder, where it can't fold to; none elsewhere "
+        "points to a wrong joint range.",
+        **_place(found),
+    )
+
+
+@say.register
+def _(found: NoVoid) -> str:
+    if found.proven:
+        return sentence(found.code, "The workspace holds no enclosed void.")
+    return sentence(found.code, "The samples leave no enclosed void inside the hull; no proof.")
+
+
+def _advice(cause: VoidCause) -> str:
+    """What to check, given a void's cause."""
+    if is_predicate(cause):
+        return sentence(
+            "void_advice",
+            "It {cause}: check the limits, the zero and the direction of joints 2 and 3.",
+            cause=say(cause),
+        )
+    return sentence(
+        "void_advice",
+        "It has this cause: {cause}: check the limits, the zero and the direction of joints 2 and 3.",
+        cause=say(cause),
+    )
+
+
+def _place(found: VoidUnexpected | VoidUncertain | VoidAtShoulder) -> dict[str, float | str]:
+    shown = {"x": found.x_mm, "y": found.y_mm, "z": found.z_mm}
+    return {"litres": found.litres} | {key: str(round(value)).replace("-", "−") for key, value in shown.items()}

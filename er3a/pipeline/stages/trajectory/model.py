@@ -1,0 +1,336 @@
+"""What the trajectory stage computes.
+
+Times count from a path's start, ways along the tool point's path. Angles are the manufacturer's, degrees.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Generic, Literal, TypeVar, get_args
+
+from er3a.collision.pairs import Pair, PairOverlaps
+from er3a.findings import Finding
+from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.tables import Flags, Reals, Table, Texts, column, per_joint, vector
+from er3a.planning.avoidance import StrategyName
+from er3a.planning.avoidance.strategies import NotUsable
+from er3a.planning.intervals import AboveLimit, BelowLimit, OutOfReach, TooFast
+from er3a.planning.near_singular import SingularityType
+
+PathKind = Literal["joint", "joint_sequence", "line", "arc", "sequence", "table"]
+PathVerdict = Literal["unreachable", "leaves limits", "collides", "too fast", "singular", "near-singular", "safe"]
+PATH_VERDICTS: tuple[PathVerdict, ...] = get_args(PathVerdict)
+"""The gravest first."""
+
+FASTEST: Literal["fastest"] = "fastest"
+"""In the table of strategies: the path itself, as fast as the joints can."""
+
+CauseT = TypeVar("CauseT", bound=Finding)
+
+
+@dataclass(frozen=True)
+class PathCounts:
+    """How many paths there are, how many are safe, and the names of the others by their verdict."""
+
+    paths: int
+    safe: int
+    unreachable: tuple[str, ...]
+    leaves_limits: tuple[str, ...]
+    collides: tuple[str, ...]
+    too_fast: tuple[str, ...]
+    singular: tuple[str, ...]
+    near_singular: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class AllSafe(PathCounts):
+    """Every path is safe."""
+
+    code: Literal["trajectory.safe"] = "trajectory.safe"
+
+
+@dataclass(frozen=True)
+class SomeUnsafe(PathCounts):
+    """Some paths are safe."""
+
+    code: Literal["trajectory.some_unsafe"] = "trajectory.some_unsafe"
+
+
+@dataclass(frozen=True)
+class NoneSafe(PathCounts):
+    """No path is safe."""
+
+    code: Literal["trajectory.none_safe"] = "trajectory.none_safe"
+
+
+@dataclass(frozen=True)
+class NearThresholds:
+    """Distance from each singular set below which a pose counts as near-singular."""
+
+    wrist_deg: float
+    elbow_deg: float
+    shoulder_mm: float
+
+
+@dataclass(frozen=True)
+class LimitsUsed:
+    """The joint limits that motions are timed with; all accelerations are assumed.
+
+    Attributes
+    ----------
+    acceleration_time_s : in which each joint is taken to reach its full speed
+    """
+
+    speed_deg_s: tuple[float, ...]
+    speed_assumed: tuple[bool, ...]
+    acceleration_deg_s2: tuple[float, ...]
+    acceleration_time_s: float
+
+
+@dataclass(frozen=True)
+class HalfTurn:
+    """A rotation by exactly 180 deg, and the axis in the base frame of the one of two ways that is taken."""
+
+    segment: int
+    axis: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Singularity:
+    """A pass through a singular set (``crossing``), or by it at a distance.
+
+    Attributes
+    ----------
+    until_s : differs from ``t_s`` where the path stays on the set
+    distance_deg : of wrist and elbow; distance_mm : of the shoulder
+    """
+
+    t_s: float
+    until_s: float
+    type: SingularityType
+    crossing: bool
+    distance_deg: float | None
+    distance_mm: float | None
+
+
+@dataclass(frozen=True)
+class Jump:
+    """Where the branch in use ends, and the joint (from 1) that would have to move farthest to go on."""
+
+    t_s: float
+    joint: int
+    angle_deg: float
+
+
+@dataclass(frozen=True)
+class BodiesOverlap:
+    """What overlaps, the deepest first, and by how much at most."""
+
+    pairs: tuple[Pair, ...]
+    depth_mm: float
+    t_s: float
+    code: Literal["bodies_overlap"] = "bodies_overlap"
+
+
+@dataclass(frozen=True)
+class Stretch(Generic[CauseT]):
+    """A stretch of a path, in time and along its way, on which something is wrong."""
+
+    t0_s: float
+    t1_s: float
+    s0_m: float
+    s1_m: float
+    cause: CauseT
+
+
+@dataclass(frozen=True)
+class LeastClearance:
+    """Where a path comes nearest to its surroundings or the arm to itself; negative by the depth of an overlap."""
+
+    least_mm: float
+    t_s: float
+    between: Pair
+    poses_measured: int
+
+
+@dataclass(frozen=True)
+class StrategyMotion:
+    """A strategy's motion, against the path as programmed.
+
+    Attributes
+    ----------
+    done_ratio : how much of the path is done, 0..1
+    keeps_clear : whether the arm keeps its distance from singular poses wherever the tool is on or beside the path
+    clearance_mm : least; None where none was measured
+    """
+
+    done_ratio: float
+    max_deviation_mm: float
+    max_deviation_deg: float
+    duration_s: float
+    keeps_clear: bool
+    max_joint_speed_deg_s: tuple[float, ...]
+    max_joint_speed_ratio: float
+    max_joint_acceleration_deg_s2: tuple[float, ...]
+    max_joint_acceleration_ratio: float
+    clearance_mm: float | None
+
+
+@dataclass(frozen=True)
+class TriedStrategy:
+    """A strategy of singularity avoidance, tried on a path.
+
+    Attributes
+    ----------
+    reasons : why it is not possible (``motion`` is None then) or not usable
+    """
+
+    name: StrategyName
+    usable: bool
+    reasons: tuple[NotUsable | PairOverlaps, ...]
+    motion: StrategyMotion | None
+
+
+@dataclass(frozen=True)
+class PathSummary:
+    """What is known of a path.
+
+    Attributes
+    ----------
+    in_joint_space : whether it is a move of the joints, which singular poses do no harm
+    branches : of the closed form, in the order in which they serve
+    start_turn_deg : by which the arm turns at rest before it starts; None in joint space
+    max_joint_speed_deg_s, max_joint_speed_ratio, max_joint_acceleration_ratio : None where speeds have no bound
+    velocity_check_deg_s : greatest difference of joint velocities by the Jacobian and by differences of angles
+    clearance : None where none could be measured
+    fastest_s : of the exact path under the joint limits; None where no motion follows it
+    avoidance : the strategies tried; none where the path is safe
+    strategy : the one to take
+    """
+
+    name: str
+    title: str
+    kind: PathKind
+    verdict: PathVerdict
+    in_joint_space: bool
+    duration_s: float
+    samples: int
+    length_m: float
+    branches: tuple[str, ...]
+    half_turns: tuple[HalfTurn, ...]
+    corner_deviation_mm: float | None
+    corner_deviation_deg: float | None
+    repeated_rows: tuple[int, ...]
+    start_turn_deg: tuple[float, ...] | None
+    singularities: tuple[Singularity, ...]
+    unreachable: tuple[Stretch[OutOfReach], ...]
+    out_of_limits: tuple[Stretch[AboveLimit | BelowLimit], ...]
+    too_fast: tuple[Stretch[TooFast], ...]
+    jumps: tuple[Jump, ...]
+    max_joint_speed_deg_s: tuple[float, ...] | None
+    max_joint_speed_ratio: float | None
+    max_joint_acceleration_ratio: float | None
+    joint_speed_bounded: bool
+    velocity_check_deg_s: float
+    collisions: tuple[Stretch[BodiesOverlap], ...]
+    clearance: LeastClearance | None
+    fastest_s: float | None
+    avoidance: tuple[TriedStrategy, ...]
+    strategy: StrategyName | None
+
+    @property
+    def chosen(self) -> TriedStrategy | None:
+        """The strategy to take."""
+        return next((tried for tried in self.avoidance if tried.name == self.strategy), None)
+
+
+@dataclass(frozen=True)
+class TrajectorySummary(Summary):
+    """Head, limits and paths.
+
+    Attributes
+    ----------
+    characteristic_length_m : by which the Jacobian's linear rows are divided
+    scene : title; None where the study names none
+    penetration_tolerance_mm : no overlap deeper than this goes unnoticed between points
+    """
+
+    verdict: Verdict[AllSafe | SomeUnsafe | NoneSafe]
+    characteristic_length_m: float
+    near: NearThresholds
+    joint_limits: LimitsUsed
+    scene: str | None
+    clearance_measured: bool
+    penetration_tolerance_mm: float
+    paths: tuple[PathSummary, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Samples(Table):
+    """The paths' own points; joint columns are NaN where the path can't be reached."""
+
+    path: Texts = column("name of the path", dtype=object)
+    t_s: Reals = column("time since the path's start", "s")
+    s_m: Reals = column("way of the tool point", "m")
+    q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
+    q_deg_s: Reals = per_joint("q{}_deg_s", "joint velocity", "deg/s")
+    q_deg_s2: Reals = per_joint("q{}_deg_s2", "joint acceleration", "deg/s^2")
+    xyz_mm: Reals = vector("{}_mm", "tool point in the base frame", "mm")
+    speed_ratio: Reals = column("greatest ratio of a joint's speed to its limit")
+    manipulability: Reals = column("manipulability of the scaled Jacobian")
+    condition_number: Reals = column("condition number of the scaled Jacobian")
+    smallest_singular_value: Reals = column("smallest singular value of the scaled Jacobian")
+    wrist_deg: Reals = column("signed distance from the aligned wrist", "deg")
+    elbow_deg: Reals = column("signed distance from the straight or folded elbow", "deg")
+    shoulder_mm: Reals = column("signed distance of the wrist centre from the shoulder singularity", "mm")
+    reachable: Flags = column("whether the arm reaches the pose", dtype=bool)
+    within_limits: Flags = column("whether all joints are within their limits", dtype=bool)
+    near_singular: Flags = column("whether the pose is nearer to a singular set than its threshold", dtype=bool)
+
+
+@dataclass(frozen=True, eq=False)
+class Checks(Samples):
+    """The paths' own points, those checked between them, and the closest passes."""
+
+    sample: Flags = column("whether the point is one of the path's own", dtype=bool)
+
+
+@dataclass(frozen=True, eq=False)
+class Clearances(Table):
+    """Times at which the clearance was measured in full; NaN where the path can't be reached."""
+
+    path: Texts = column("name of the path", dtype=object)
+    t_s: Reals = column("time since the path's start", "s")
+    clearance_mm: Reals = column("least distance, negative by the depth of an overlap", "mm")
+    between: Texts = column("the two bodies nearest to each other", dtype=object)
+
+
+@dataclass(frozen=True, eq=False)
+class AvoidanceRows(Table):
+    """Motions of the strategies, and of each path at its fastest (``fastest``)."""
+
+    path: Texts = column("name of the path", dtype=object)
+    strategy: Texts = column("the strategy, or the path at its fastest", dtype=object)
+    t_s: Reals = column("time since the motion's start", "s")
+    q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
+    q_deg_s: Reals = per_joint("q{}_deg_s", "joint velocity", "deg/s")
+    q_deg_s2: Reals = per_joint("q{}_deg_s2", "joint acceleration", "deg/s^2")
+    xyz_mm: Reals = vector("{}_mm", "tool point in the base frame", "mm")
+    deviation_mm: Reals = column("distance of the tool point from the path", "mm")
+    deviation_deg: Reals = column("angle of the tool to the path's", "deg")
+    speed_ratio: Reals = column("greatest ratio of a joint's speed to its limit")
+    condition_number: Reals = column("condition number of the scaled Jacobian")
+    smallest_singular_value: Reals = column("smallest singular value of the scaled Jacobian")
+
+
+@dataclass(frozen=True, eq=False)
+class TrajectoryResults(Results[TrajectorySummary]):
+    """Summary and tables of the stage."""
+
+    samples: Samples
+    checks: Checks
+    clearance: Clearances
+    avoidance: AvoidanceRows
+
+
+RESULTS = TrajectoryResults

@@ -1,0 +1,273 @@
+"""What the stage's results hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal, Self
+
+import numpy as np
+
+from er3a.kinematics.wrist_partitioned import ClosedFormMissing
+from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.stages.validation.diagnosis_model import Corrections, Residuals, SetCalibration, SetDiagnosis
+from er3a.pipeline.stages.validation.findings import CheckSubject, KeyPose, ModelGroup, Note, Validated
+from er3a.pipeline.tables import (
+    Findings,
+    Flags,
+    Integers,
+    Reals,
+    Table,
+    Texts,
+    column,
+    findings,
+    per_joint,
+    vector,
+)
+from er3a.references.subjects import ReferenceSubject
+from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade
+
+CheckStatus = Literal["pass", "fail", "no_reference", "conflict"]
+MODEL_GROUPS: tuple[ModelGroup, ...] = ("table_sanity", "round_trips")
+
+
+@dataclass(frozen=True)
+class Check:
+    """One comparison.
+
+    Attributes
+    ----------
+    status : ``conflict`` is a reference that the model misses while meeting another that contradicts it
+    measured : what the model says; difference : measured - expected; both None where there is nothing to compare
+    source, grade : None for checks of the model against itself
+    """
+
+    subject: CheckSubject
+    group: str
+    reference_set: str | None
+    status: CheckStatus
+    measured: float | None
+    expected: float | None
+    difference: float | None
+    tolerance: float | None
+    unit: str
+    source: str | None
+    grade: Grade | None
+    note: Note | None = None
+
+    @property
+    def is_of_model(self) -> bool:
+        """Whether it holds the model against itself."""
+        return self.group in MODEL_GROUPS
+
+    @property
+    def is_authoritative(self) -> bool:
+        """Whether the verdict rests on it: a trustworthy document, or the model itself."""
+        return self.grade in AUTHORITATIVE_GRADES or self.is_of_model
+
+
+@dataclass(frozen=True)
+class Statement:
+    """What one source says about a number that others contradict it about."""
+
+    expected: float
+    tolerance: float
+    difference: float
+    met: bool
+    source: str
+    grade: Grade
+
+
+@dataclass(frozen=True)
+class Conflict:
+    """References of one set about one number that no model can meet all."""
+
+    reference_set: str
+    subject: ReferenceSubject
+    unit: str
+    measured: float
+    statements: tuple[Statement, ...]
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Checks by their status; ``total`` leaves out those without a reference."""
+
+    total: int
+    passed: int
+    failed: int
+    conflicting: int
+    without_reference: int
+
+
+@dataclass(frozen=True)
+class SetSummary:
+    """What was found against one reference set.
+
+    Attributes
+    ----------
+    authoritative : checks that the verdict rests on; claims : the others
+    another_arm : most of the authoritative ones fail, and no one or two faults explain that
+    zero_pose_flange_off_mm : None where the set does not say where the flange is
+    """
+
+    name: str
+    grades: tuple[Grade, ...]
+    authoritative: Counts
+    another_arm: bool
+    claims: Counts
+    zero_pose_flange_off_mm: float | None
+
+
+@dataclass(frozen=True)
+class Circles:
+    """The point that the flange carries for circle point analysis (in its frame), and its tracks, joint by joint."""
+
+    offset_mm: tuple[float, ...]
+    radius_mm: tuple[float, ...]
+    roundness_mm: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class TableFacts:
+    """The table's D-H convention, and why the arm has no closed-form inverse, if so."""
+
+    convention: str
+    no_closed_form: ClosedFormMissing | None
+
+
+@dataclass(frozen=True)
+class Margins:
+    """How near to a singularity a pose is too near to judge its joints."""
+
+    wrist_deg: float
+    elbow_deg: float
+    shoulder_mm: float
+
+
+@dataclass(frozen=True)
+class RoundTripErrors:
+    """Worst errors of random poses taken back to joints.
+
+    Attributes
+    ----------
+    poses : how many; near_singular : how many of them nearer to a singularity than the margins
+    joint_error_deg : worst angle between the joints and the nearest solution, over the other poses
+    position_error_mm, orientation_error_deg : worst over all solutions of all poses
+    unsolved : poses without any solution
+    """
+
+    poses: int
+    near_singular: int
+    joint_error_deg: float
+    position_error_mm: float
+    orientation_error_deg: float
+    unsolved: int
+    margins: Margins
+
+
+@dataclass(frozen=True)
+class ValidationSummary(Summary):
+    """The stage's summary; ``section_origin_mm``: where the workspace drawing has its origin, x of axis 1 and z of axis
+    2 in the base frame."""
+
+    verdict: Verdict[Validated]
+    checks: tuple[Check, ...]
+    conflicts: tuple[Conflict, ...]
+    sets: tuple[SetSummary, ...]
+    diagnoses: tuple[SetDiagnosis, ...]
+    calibrations: tuple[SetCalibration, ...]
+    circle_points: Circles
+    table: TableFacts
+    round_trips: RoundTripErrors | None
+    section_origin_mm: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Checks(Table):
+    """The summary's checks as a table."""
+
+    subject: Findings = findings("what is compared", CheckSubject)
+    group: Texts = column("group of the check", dtype=object)
+    reference_set: Texts = column("reference set, none for checks of the model against itself", dtype=object)
+    status: Texts = column("pass, fail, conflict or no_reference", dtype=object)
+    measured: Reals = column("the model's value", "see unit")
+    expected: Reals = column("the reference's value", "see unit")
+    difference: Reals = column("measured - expected", "see unit")
+    tolerance: Reals = column("greatest difference that passes", "see unit")
+    unit: Texts = column("unit of the numbers", dtype=object)
+    source: Texts = column("source of the reference", dtype=object)
+    grade: Texts = column("grade of the source", dtype=object)
+    note: Findings = findings("why it is not judged, or how", Note)
+
+    @classmethod
+    def of_records(cls, checks: Iterable[Check]) -> Self:
+        """The table of checks."""
+        return cls.of_rows(tuple(getattr(check, name) for name in cls.columns()) for check in checks)
+
+
+@dataclass(frozen=True, eq=False)
+class Axes(Table):
+    """Each stated axis line in the zero pose beside the model's, in the base frame."""
+
+    reference_set: Texts = column("reference set", dtype=object)
+    source: Texts = column("source of the line", dtype=object)
+    grade: Texts = column("grade of the source", dtype=object)
+    joint: Integers = column("number of the joint, from 1", dtype=np.int64)
+    direction: Reals = vector("direction_{}", "stated direction")
+    point_mm: Reals = vector("{}_mm", "stated point of the axis", "mm")
+    model_direction: Reals = vector("model_direction_{}", "the model's direction of positive rotation")
+    model_point_mm: Reals = vector("model_{}_mm", "point of the model's axis nearest to the stated one", "mm")
+    angle_deg: Reals = column("angle between the directions", "deg")
+    distance_mm: Reals = column("distance of the two points", "mm")
+    uncertainty_deg: Reals = column("the source's uncertainty of the direction", "deg")
+    uncertainty_mm: Reals = column("the source's uncertainty of the line's place", "mm")
+
+    @property
+    def is_off(self) -> Flags:
+        """Which lines the model misses by more than their uncertainty."""
+        return (self.distance_mm > self.uncertainty_mm) | (self.angle_deg > self.uncertainty_deg)
+
+
+@dataclass(frozen=True, eq=False)
+class KeyPoses(Table):
+    """Poses at which references look at the arm, the zero pose first, with the stated point and the model's (base
+    frame)."""
+
+    reference_set: Texts = column("reference set", dtype=object)
+    source: Texts = column("source of the point", dtype=object)
+    grade: Texts = column("grade of the source", dtype=object)
+    group: Texts = column("group of the references", dtype=object)
+    pose: Findings = findings("the pose", KeyPose)
+    point: Texts = column("flange or wrist_centre", dtype=object)
+    q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
+    point_mm: Reals = vector("{}_mm", "stated point, with the model's coordinate where none is stated", "mm")
+    model_point_mm: Reals = vector("model_{}_mm", "the model's point", "mm")
+    deviation_mm: Reals = column("distance of the two points", "mm")
+
+
+@dataclass(frozen=True, eq=False)
+class Section(Table):
+    """The wrist centre in the side view (joint 1 at 0) over a grid of joints 2 and 3 within their limits."""
+
+    q2_deg: Reals = column("joint 2", "deg")
+    q3_deg: Reals = column("joint 3", "deg")
+    x_mm: Reals = column("distance from axis 1 along x", "mm")
+    z_mm: Reals = column("height over axis 2", "mm")
+    on_q2_line: Flags = column("on a line of constant q2 where the region can end", dtype=bool)
+    on_q3_line: Flags = column("on a line of constant q3 where the region can end", dtype=bool)
+
+
+@dataclass(frozen=True, eq=False)
+class ValidationResults(Results[ValidationSummary]):
+    """The stage's results."""
+
+    checks: Checks
+    axes: Axes
+    key_poses: KeyPoses
+    section: Section
+    residuals: Residuals
+    corrections: Corrections
+
+
+RESULTS = ValidationResults

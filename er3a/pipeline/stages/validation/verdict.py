@@ -1,0 +1,191 @@
+"""From checks to what a reader wants to know."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from er3a.diagnosis.conclusions import MainFault, MostLikelyFault, NoFaultStandsOut, NoFewFaultsExplain
+from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.stages.validation.diagnosis_model import SetDiagnosis
+from er3a.pipeline.stages.validation.findings import (
+    AnotherArm,
+    Claims,
+    Confirmed,
+    Contradicted,
+    Contradiction,
+    LikelyFault,
+    ModelUnsound,
+    NothingToCompare,
+    Validated,
+)
+from er3a.pipeline.stages.validation.model import (
+    Axes,
+    Check,
+    Conflict,
+    Counts,
+    KeyPoses,
+    RoundTripErrors,
+    SetSummary,
+)
+from er3a.references.reference import ReferenceSet
+from er3a.references.rows import GROUPS
+from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade
+
+TELLING_SHARE = 0.25
+SHOWN_DECIMALS = 9
+
+
+def set_summaries(
+    sets: list[ReferenceSet], checks: list[Check], poses: KeyPoses, diagnoses: Mapping[str, SetDiagnosis]
+) -> tuple[SetSummary, ...]:
+    """What was found against each reference set; diagnoses by its name."""
+    found = []
+    for references in sets:
+        own = [check for check in checks if check.reference_set == references.name]
+        authoritative = _counts(check for check in own if check.is_authoritative)
+        most_fail = authoritative.failed > authoritative.total / 2
+        found.append(
+            SetSummary(
+                name=references.name,
+                grades=tuple(sorted({reference.grade for reference in references.references})),
+                authoritative=authoritative,
+                another_arm=most_fail
+                and isinstance(diagnoses[references.name].conclusion, NoFaultStandsOut | NoFewFaultsExplain),
+                claims=_counts(check for check in own if check.grade and not check.is_authoritative),
+                zero_pose_flange_off_mm=_zero_pose_error(poses, references.name),
+            )
+        )
+    return tuple(found)
+
+
+def verdict_of(
+    checks: list[Check],
+    conflicts: list[Conflict],
+    sets: tuple[SetSummary, ...],
+    diagnoses: Mapping[str, SetDiagnosis],
+) -> Verdict[Validated]:
+    """The stage's answer."""
+    judged = [check for check in checks if check.is_authoritative and check.status != "no_reference"]
+    documented = [check for check in judged if not check.is_of_model]
+    failed = [check for check in documented if check.status == "fail"]
+    named = {
+        name: diagnosis.conclusion
+        for name, diagnosis in diagnoses.items()
+        if isinstance(diagnosis.conclusion, MostLikelyFault | MainFault)
+    }
+    common = {
+        "checks": len(documented),
+        "failed": len(failed),
+        "conflicts": len(conflicts),
+        "sets": tuple(each.name for each in sets),
+        "claims": _claims(sets, named),
+    }
+    for check in judged:
+        if check.is_of_model and check.status == "fail":
+            return Verdict(
+                "fail", ModelUnsound(**common, check=check.subject, measured=check.measured, unit=check.unit)
+            )
+    if failed:
+        return Verdict("fail", _missed(common, failed, documented, sets, named))
+    if not documented:
+        return Verdict("no_reference", NothingToCompare(**common))
+    passed = sum(check.status == "pass" for check in documented)
+    contradiction = _contradiction(conflicts) if conflicts else None
+    found = Confirmed(**common, passed=passed, grades=_grades(documented), contradiction=contradiction)
+    return Verdict("pass", found)
+
+
+def most_telling(failed: list[Check]) -> Check:
+    """The failed check to quote: of those not far behind the largest difference in mm, the first of the group that
+    tells most."""
+    lengths = [check for check in failed if check.unit == "mm"]
+    least = TELLING_SHARE * max((abs(check.difference) for check in lengths), default=0.0)
+    large = [check for check in lengths if abs(check.difference) >= least]
+    return min(large or failed, key=lambda check: GROUPS[check.group].telling)
+
+
+def key_figures(
+    checks: list[Check],
+    axes: Axes,
+    sets: tuple[SetSummary, ...],
+    reach: Mapping[str, float],
+    trips: RoundTripErrors | None,
+) -> tuple[Figure, ...]:
+    """The stage's key figures; ``reach`` in mm by the figure's name."""
+    counted = _counts(check for check in checks if check.is_authoritative)
+    figures = [Figure("checks_passed", counted.passed, "", of=counted.passed + counted.failed)]
+    errors = [(each.authoritative.total > 0, each.zero_pose_flange_off_mm) for each in sets]
+    errors = [error for error in errors if error[1] is not None]
+    if errors:
+        figures.append(_figure("zero_pose_flange_error", max(errors)[1]))
+    trusted = axes.take(np.isin(axes.grade, AUTHORITATIVE_GRADES))
+    if len(trusted):
+        figures.append(_figure("farthest_axis", float(trusted.distance_mm.max())))
+        figures.append(_figure("most_tilted_axis", float(trusted.angle_deg.max()), "deg"))
+    labels = [abs(check.difference) for check in checks if check.group == "envelope" and check.difference is not None]
+    if labels:
+        figures.append(_figure("worst_drawing_label", max(labels)))
+    figures += [_figure(name, value) for name, value in reach.items()]
+    if trips:
+        figures.append(Figure("round_trip_joint_error", trips.joint_error_deg, "deg"))
+    return tuple(figures)
+
+
+def _figure(name: str, value: float, unit: str = "mm") -> Figure:
+    return Figure(name, round(value, SHOWN_DECIMALS), unit)
+
+
+def _missed(
+    common: dict[str, Any],
+    failed: list[Check],
+    documented: list[Check],
+    sets: tuple[SetSummary, ...],
+    named: Mapping[str, LikelyFault],
+) -> Contradicted | AnotherArm:
+    quoted = most_telling(failed)
+    other = any(each.another_arm for each in sets if each.name == quoted.reference_set)
+    return (AnotherArm if other else Contradicted)(
+        **common,
+        reference_set=quoted.reference_set,
+        check=quoted.subject,
+        measured=quoted.measured,
+        expected=quoted.expected,
+        unit=quoted.unit,
+        grades=_grades(documented),
+        diagnosis=named.get(quoted.reference_set),
+    )
+
+
+def _counts(checks: Iterable[Check]) -> Counts:
+    counted = Counter(check.status for check in checks)
+    numbers = [counted[status] for status in ("pass", "fail", "conflict")]
+    return Counts(sum(numbers), *numbers, counted["no_reference"])
+
+
+def _zero_pose_error(poses: KeyPoses, set_name: str) -> float | None:
+    own = (poses.reference_set == set_name) & (poses.group == "zero_pose") & (poses.point == "flange")
+    own &= np.isfinite(poses.deviation_mm)
+    return float(poses.deviation_mm[own].max()) if own.any() else None
+
+
+def _claims(sets: tuple[SetSummary, ...], named: Mapping[str, LikelyFault]) -> tuple[Claims, ...]:
+    return tuple(
+        Claims(each.name, each.claims.total, each.claims.failed, named.get(each.name))
+        for each in sets
+        if each.claims.total and not each.authoritative.total
+    )
+
+
+def _contradiction(conflicts: list[Conflict]) -> Contradiction:
+    first = conflicts[0]
+    stated = tuple(statement.expected for statement in first.statements)
+    return Contradiction(first.subject, first.unit, stated, len(conflicts) - 1)
+
+
+def _grades(checks: list[Check]) -> tuple[Grade, ...]:
+    present = {check.grade for check in checks}
+    return tuple(grade for grade in AUTHORITATIVE_GRADES if grade in present)

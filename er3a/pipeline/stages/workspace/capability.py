@@ -1,0 +1,135 @@
+"""What the tool can do: capability of the cells, dexterous core and places for the box, as the stage writes them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from er3a.kinematics.configuration import branch_labels
+from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.pipeline.stages.workspace import table_rows
+from er3a.pipeline.stages.workspace.entry import BoxTask, CapabilitySettings
+from er3a.pipeline.stages.workspace.model import (
+    CapabilitySummary,
+    NeedsClosedForm,
+    PlacementSummary,
+    PlaceSummary,
+    RollSummary,
+    SectionFrame,
+    TaskSummary,
+    triple,
+)
+from er3a.pipeline.stages.workspace.tables import BoxPlaces, CapabilityCells
+from er3a.robots.robot import Robot
+from er3a.workspace.capability import map_capability, overall, rings
+from er3a.workspace.dexterous import dexterous_core
+from er3a.workspace.directions import cone_directions, roll_of
+from er3a.workspace.placement import MIXED, NO, Task
+from er3a.workspace.placement_proof import Placement, find_places
+from er3a.workspace.section_arm import section_arm, section_frame
+
+MOST_ACROSS = 64
+LISTED = 5
+
+
+@dataclass(frozen=True, eq=False)
+class ToolCapability:
+    """This part's entries of the summary, and its tables."""
+
+    capability: CapabilitySummary | NeedsClosedForm
+    placement: PlacementSummary | None
+    cells: CapabilityCells
+    places: BoxPlaces
+
+
+def tool_capability(robot: Robot, settings: CapabilitySettings, cell: float) -> ToolCapability:
+    """Work out what the tool can do.
+
+    Parameters
+    ----------
+    cell : m, edge of the workspace's cells; taken coarser where more than ``MOST_ACROSS`` would span the reach
+    """
+    if lacks := closed_form_missing(robot):
+        return ToolCapability(NeedsClosedForm(lacks), None, CapabilityCells.empty(), BoxPlaces.empty())
+    arm, roll = section_arm(robot), roll_of(robot, settings.rolls)
+    cell = max(cell, 2 * (arm.upper_length + arm.forearm_length + arm.d) / MOST_ACROSS)
+    cells = rings(arm.reach, arm.heights, cell)
+    middles = np.stack([cells[:, :2].mean(axis=1), cells[:, 2:].mean(axis=1)], axis=1)
+    found = map_capability(robot, middles, settings.directions, roll)
+    (x, y, z), origin = section_frame(robot)
+    summary = CapabilitySummary(
+        directions=settings.directions,
+        cell_m=cell,
+        frame=SectionFrame((triple(x), triple(y), triple(z)), triple(origin)),
+        sectors=found.reachability.shape[1],
+        roll=RollSummary(roll.free, len(roll.angles)),
+        overall=overall(found, cells),
+        core_m3=dexterous_core(robot, cells, settings.directions, roll, settings.proof_poses),
+    )
+    task = _task(settings.placement)
+    placement = find_places(robot, task, roll, cell, LISTED, settings.proof_poses)
+    return ToolCapability(
+        summary,
+        _placement_summary(robot, settings.placement, task, placement, float(found.manipulability.max())),
+        table_rows.capability(middles, found),
+        table_rows.places(placement.best_turns),
+    )
+
+
+def _task(asked: BoxTask) -> Task:
+    return Task(
+        box=np.array(asked.box_mm) / 1000,
+        axis=np.array(asked.tool_direction) / np.linalg.norm(asked.tool_direction),
+        half_angle=float(np.radians(asked.cone_deg)),
+        lowest=asked.lowest_mm / 1000,
+        clear=asked.clear_of_axis_mm / 1000,
+        margin=float(np.radians(asked.limit_margin_deg)),
+    )
+
+
+def _placement_summary(robot: Robot, asked: BoxTask, task: Task, placement: Placement, best: float) -> PlacementSummary:
+    """The placement as the summary has it; ``best`` is the arm's greatest manipulability, m^3."""
+    places = placement.places
+    return PlacementSummary(
+        task=TaskSummary(
+            triple(asked.box_mm),
+            triple(asked.tool_direction),
+            asked.cone_deg,
+            asked.limit_margin_deg,
+            asked.lowest_mm,
+            asked.clear_of_axis_mm,
+        ),
+        spacing_m=triple(placement.field.spacing),
+        directions=len(cone_directions(task.axis, task.half_angle)),
+        points_serving=int((placement.field.least_any > NO).sum()),
+        fitting=len(places.slot),
+        fitting_with_one_branch=int((places.slot != MIXED).sum()),
+        fitting_proven=int(places.proven.sum()),
+        refuted=placement.chosen.refuted,
+        poses=placement.chosen.poses,
+        places=tuple(_listed(robot, task, placement, best)),
+    )
+
+
+def _listed(robot: Robot, task: Task, placement: Placement, best: float) -> list[PlaceSummary]:
+    labels, places, chosen = branch_labels(robot), placement.places, placement.chosen
+    return [
+        PlaceSummary(
+            centre_m=triple(places.centre[row]),
+            size_m=triple(task.box[[1, 0, 2]] if places.turned[row] else task.box),
+            turned=bool(places.turned[row]),
+            status=_status(proven),
+            branch=None if slot == MIXED else labels[slot],
+            branch_status=_status(branch_proven),
+            manipulability_m3=float(places.least[row]),
+            manipulability_ratio=float(places.least[row]) / best if best > 0 else 0.0,
+            limit_margin_deg=None if slot == MIXED else float(np.degrees(places.limit_margin[row] + task.margin)),
+        )
+        for row, slot, proven, branch_proven in zip(chosen.row, chosen.slot, chosen.proven, chosen.branch_proven)
+    ]
+
+
+def _status(proven: bool) -> Literal["proven", "sampled"]:
+    return "proven" if proven else "sampled"

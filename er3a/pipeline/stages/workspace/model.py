@@ -1,0 +1,272 @@
+"""What the workspace stage writes: its summary and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+from er3a.kinematics.configuration import BranchLabel
+from er3a.kinematics.wrist_partitioned import ClosedFormMissing
+from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.stages.workspace.findings import WorkspaceFinding
+from er3a.pipeline.stages.workspace.tables import (
+    Border,
+    BoxPlaces,
+    CapabilityCells,
+    Cells,
+    Cloud,
+    Curve,
+    Drawing,
+    HullTriangles,
+    HullVertices,
+    ProofCells,
+    SectionCells,
+    SideViewCells,
+    VoidTriangles,
+    VoidVertices,
+)
+from er3a.sampling.random_joints import Sampling
+from er3a.sampling.reach_search import Reach
+from er3a.workspace.capability import Overall
+from er3a.workspace.causes import Relaxed, Unlimited, VoidCause
+from er3a.workspace.dexterous import Core
+from er3a.workspace.proven import ProofMethod
+from er3a.workspace.sampled_voids import VoidKind
+
+Triple = tuple[float, float, float]
+
+
+def triple(values: Iterable[float]) -> Triple:
+    """Three numbers of a vector."""
+    x, y, z = (float(value) for value in values)
+    return x, y, z
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Proven bounds of a volume, m^3."""
+
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
+class Volume:
+    """The reached volume, m^3: proven bounds, estimate with its 95 % interval."""
+
+    lower: float
+    upper: float
+    estimate: float
+    ci95: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class VolumePoints:
+    """Points that the estimate drew, and how many of them are reached or could not be decided."""
+
+    drawn: int
+    reached: int
+    undecided: int
+
+
+@dataclass(frozen=True)
+class ProofSummary:
+    """The proof: ``width`` of its bounds is (upper - lower) / upper; points of samples in empty cells would refute
+    it."""
+
+    method: ProofMethod
+    cells: int
+    width: float
+    points_checked: int
+    points_in_empty_cells: int
+
+
+@dataclass(frozen=True)
+class HullSummary:
+    """Convex hull of the extreme samples in so many directions."""
+
+    volume_m3: float
+    area_m2: float
+    directions: int
+    vertices: int
+
+
+@dataclass(frozen=True)
+class GridSummary:
+    """Cubic cells in the base frame, from the lowest corner."""
+
+    origin_m: Triple
+    cell_m: float
+    shape: tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class AxisSummary:
+    """Axis 1 in the base frame: a point from which heights count, its direction, its point at joint 2's height."""
+
+    point_m: Triple
+    direction: Triple
+    shoulder_m: Triple
+
+
+@dataclass(frozen=True)
+class CellCounts:
+    """Numbers of cells of the grid, and an estimate of those that more samples would still touch."""
+
+    touched: int
+    inside_hull: int
+    touched_inside_hull: int
+    unseen_estimate: float
+
+
+@dataclass(frozen=True)
+class VoidSummary:
+    """A void inside the hull; see :class:`er3a.workspace.voids.Void`."""
+
+    kind: VoidKind
+    status: Literal["proven_empty", "undersampled"]
+    volume_m3: Bounds
+    centroid_m: Triple
+    extent_m: Triple
+    cause: VoidCause
+    relaxed: tuple[Relaxed | Unlimited, ...]
+    holds_shoulder: bool
+
+
+@dataclass(frozen=True)
+class SectionFrame:
+    """Frame about axis 1 in the base frame: x, y, z as rows, and origin."""
+
+    axes: tuple[Triple, Triple, Triple]
+    origin_m: Triple
+
+
+@dataclass(frozen=True)
+class RollSummary:
+    """The roll about the tool's direction: left to joint 6, or so many tried per direction."""
+
+    free: bool
+    per_direction: int
+
+
+@dataclass(frozen=True)
+class CapabilitySummary:
+    """What the tool can do in the cells of the section, in so many directions and sectors of azimuth."""
+
+    directions: int
+    cell_m: float
+    frame: SectionFrame
+    sectors: int
+    roll: RollSummary
+    overall: Overall
+    core_m3: Core
+
+
+@dataclass(frozen=True)
+class NeedsClosedForm:
+    """Capability and placement were not computed: they need the closed-form inverse."""
+
+    lacks: ClosedFormMissing
+    code: Literal["workspace.needs_closed_form"] = "workspace.needs_closed_form"
+
+
+@dataclass(frozen=True)
+class TaskSummary:
+    """What was asked of places for the box, as in the study."""
+
+    box_mm: Triple
+    tool_direction: Triple
+    cone_deg: float
+    limit_margin_deg: float
+    lowest_mm: float
+    clear_of_axis_mm: float
+
+
+@dataclass(frozen=True)
+class PlaceSummary:
+    """One of the best places for the box.
+
+    Attributes
+    ----------
+    branch : configuration that serves it all, None if it changes within the box
+    manipulability_m3 : least over the box and its directions; manipulability_ratio : of the arm's best
+    limit_margin_deg : least distance of joints from their limits, None without one branch
+    """
+
+    centre_m: Triple
+    size_m: Triple
+    turned: bool
+    status: Literal["proven", "sampled"]
+    branch: BranchLabel | None
+    branch_status: Literal["proven", "sampled"]
+    manipulability_m3: float
+    manipulability_ratio: float
+    limit_margin_deg: float | None
+
+
+@dataclass(frozen=True)
+class PlacementSummary:
+    """Where the box can stand: numbers of lattice points and positions, and the best places."""
+
+    task: TaskSummary
+    spacing_m: Triple
+    directions: int
+    points_serving: int
+    fitting: int
+    fitting_with_one_branch: int
+    fitting_proven: int
+    refuted: int
+    poses: int
+    places: tuple[PlaceSummary, ...]
+
+
+@dataclass(frozen=True)
+class WorkspaceSummary(Summary):
+    """The stage's summary; ``pocket_block_m`` is the edge of the blocks that open pockets were looked for on."""
+
+    verdict: Verdict[WorkspaceFinding]
+    samples: int
+    sampling: Sampling
+    volume_m3: Volume
+    volume_points: VolumePoints
+    touched_m3: float
+    proof: ProofSummary
+    hull: HullSummary
+    reach_m: Reach
+    grid: GridSummary
+    axis: AxisSummary
+    section_cell_m: float
+    cells: CellCounts
+    voids: tuple[VoidSummary, ...]
+    pocket_block_m: float
+    capability: CapabilitySummary | NeedsClosedForm
+    placement: PlacementSummary | None
+
+    @property
+    def enclosed_voids(self) -> list[VoidSummary]:
+        """The voids without a way to the outside."""
+        return [void for void in self.voids if void.kind == "enclosed"]
+
+
+@dataclass(frozen=True, eq=False)
+class WorkspaceResults(Results[WorkspaceSummary]):
+    """The stage's results; each table is written under its attribute's name."""
+
+    cells: Cells
+    section: SectionCells
+    side_view: SideViewCells
+    curve: Curve
+    cloud: Cloud
+    hull_vertices: HullVertices
+    hull_triangles: HullTriangles
+    proof: ProofCells
+    border: Border
+    drawing: Drawing
+    void_vertices: VoidVertices
+    void_triangles: VoidTriangles
+    capability: CapabilityCells
+    places: BoxPlaces
+
+
+RESULTS = WorkspaceResults

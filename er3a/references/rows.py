@@ -1,0 +1,261 @@
+"""The kinds of reference tables and what their rows state: the one registry of both, and of groups.
+
+All coordinates are in the manufacturer's base frame; angles are the manufacturer's joint angles. A new kind is a row
+class here, listed in ``KINDS``, its columns in :mod:`er3a.files.reference_rows`, and, for a new group or subject, its
+words in :mod:`er3a.pipeline.messages.references`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from er3a.references.quantities import (
+    COORDINATES,
+    ZERO_POSE,
+    AxisAngle,
+    AxisCoordinate,
+    AxisDistance,
+    Extremity,
+    Limit,
+    Point,
+    PointCoordinate,
+    Pose,
+    PoseOutside,
+    SectionAxis,
+    SectionCoordinate,
+    SectionExtent,
+    Segment,
+    SegmentAngle,
+    Side,
+    Speed,
+    Vector,
+)
+from er3a.references.reference import Reference, ReferenceSet, Row, Scalar
+from er3a.references.subjects import (
+    AxisDirection,
+    AxisPosition,
+    CornerLabel,
+    DrawingCorner,
+    DrawingExtent,
+    JointLimit,
+    JointSpeed,
+    PointAtPose,
+    PoseExcess,
+    Reach,
+    SegmentInclination,
+)
+
+ALONG = 0.9999
+POSE_SLACK_DEG = 1e-3
+
+
+@dataclass(frozen=True)
+class Group:
+    """References of one sort; ``telling``: its rank when one failed check is quoted, the smallest first."""
+
+    code: str
+    telling: int
+
+
+GROUPS: dict[str, Group] = {
+    group.code: group
+    for group in (
+        Group("zero_pose", telling=2),
+        Group("axes", telling=3),
+        Group("key_poses", telling=5),
+        Group("reach", telling=1),
+        Group("envelope", telling=4),
+        Group("limits", telling=6),
+        Group("speeds", telling=7),
+    )
+}
+"""All groups, in the order in which they are listed."""
+
+
+@dataclass(frozen=True)
+class AxisRow(Row):
+    """The line of a joint's axis in the zero pose.
+
+    ``point_mm`` is where the axis meets the next part of the arm: axis 1 the mounting plane, axes 2, 3 and 5 the arm's
+    plane of symmetry, axes 4 and 6 axis 5. Sliding it along the axis changes no check. ``signed``: ``direction`` is
+    that of positive rotation (right hand), else just the line's.
+    """
+
+    kind: ClassVar[str] = "axes"
+    groups: ClassVar[tuple[str, ...]] = ("axes",)
+    joint: int
+    direction: Vector
+    point_mm: Vector
+    signed: bool
+    uncertainty_mm: float
+    uncertainty_deg: float
+
+    def scalars(self) -> Iterator[Scalar]:
+        angle = AxisAngle(self.joint, self.direction, self.signed)
+        yield AxisDirection(self.joint, self.signed), "axes", angle, 0.0, self.uncertainty_deg
+        for coordinate, along, expected in zip(COORDINATES, self.direction, self.point_mm):
+            if abs(along) < ALONG:
+                quantity = AxisCoordinate(self.joint, coordinate, self.point_mm)
+                yield AxisPosition(self.joint, coordinate), "axes", quantity, expected, self.uncertainty_mm
+
+
+@dataclass(frozen=True)
+class PositionRow(Row):
+    """Flange or wrist centre at a pose; None for coordinates that aren't given. Without any, the row says only that the
+    pose lies within the limits."""
+
+    kind: ClassVar[str] = "positions"
+    groups: ClassVar[tuple[str, ...]] = ("zero_pose", "key_poses")
+    name: str
+    point: Point
+    pose: Pose
+    xyz_mm: tuple[float | None, float | None, float | None]
+    uncertainty_mm: float
+
+    @property
+    def group(self) -> str:
+        """zero_pose or key_poses."""
+        return "zero_pose" if self.pose == ZERO_POSE else "key_poses"
+
+    def scalars(self) -> Iterator[Scalar]:
+        for coordinate, expected in zip(COORDINATES, self.xyz_mm):
+            if expected is not None:
+                subject = PointAtPose(self.name, self.point, coordinate)
+                quantity = PointCoordinate(self.pose, self.point, coordinate)
+                yield subject, self.group, quantity, expected, self.uncertainty_mm
+        if self.xyz_mm == (None, None, None):
+            yield self.within_limits()
+
+    def within_limits(self) -> Scalar:
+        """That the pose lies within the joint limits."""
+        return PoseExcess(self.name), self.group, PoseOutside(self.pose), 0.0, POSE_SLACK_DEG
+
+
+@dataclass(frozen=True)
+class DirectionRow(Row):
+    """Angle of an arm segment from the vertical in the zero pose: 0 upright, 90 level."""
+
+    kind: ClassVar[str] = "directions"
+    groups: ClassVar[tuple[str, ...]] = ("zero_pose",)
+    segment: Segment
+    angle_from_vertical_deg: float
+    uncertainty_deg: float
+
+    def scalars(self) -> Iterator[Scalar]:
+        quantity = SegmentAngle(self.segment)
+        subject = SegmentInclination(self.segment)
+        yield subject, "zero_pose", quantity, self.angle_from_vertical_deg, self.uncertainty_deg
+
+
+ENVELOPE_CORNERS: Mapping[str, CornerLabel] = {"x": "x", "abs_x": "abs_x", "z": "z"}
+ENVELOPE_EXTENTS: Mapping[str, tuple[Extremity, SectionAxis]] = {
+    "greatest_x": ("greatest", "x"),
+    "least_x": ("least", "x"),
+    "greatest_z": ("greatest", "z"),
+    "least_z": ("least", "z"),
+}
+
+
+@dataclass(frozen=True)
+class EnvelopeRow(Row):
+    """A label of the workspace drawing: the wrist centre in the side view, x from axis 1 and z from axis 2.
+
+    ``x``, ``abs_x`` and ``z`` belong to a corner at joint angles (J2, J3); the others are extents, without angles.
+    """
+
+    kind: ClassVar[str] = "envelope"
+    groups: ClassVar[tuple[str, ...]] = ("envelope",)
+    quantity: str
+    corner_deg: tuple[float, float] | None
+    value_mm: float
+    uncertainty_mm: float
+
+    def scalars(self) -> Iterator[Scalar]:
+        if self.corner_deg is None:
+            extreme, axis = ENVELOPE_EXTENTS[self.quantity]
+            extent = SectionExtent("wrist_centre", extreme, axis)
+            yield DrawingExtent(extreme, axis), "envelope", extent, self.value_mm, self.uncertainty_mm
+            return
+        q2, q3 = self.corner_deg
+        label = ENVELOPE_CORNERS[self.quantity]
+        corner = SectionCoordinate((0.0, q2, q3, 0.0, 0.0, 0.0), "z" if label == "z" else "x", label == "abs_x")
+        yield DrawingCorner(q2, q3, label), "envelope", corner, self.value_mm, self.uncertainty_mm
+
+
+@dataclass(frozen=True)
+class ReachRow(Row):
+    """Greatest or least distance of a point from axis 1 or 2, over all joint angles within the limits."""
+
+    kind: ClassVar[str] = "reach"
+    groups: ClassVar[tuple[str, ...]] = ("reach",)
+    point: Point
+    from_axis: int
+    extreme: Extremity
+    value_mm: float
+    uncertainty_mm: float
+
+    def scalars(self) -> Iterator[Scalar]:
+        subject = Reach(self.extreme, self.point, self.from_axis)
+        quantity = AxisDistance(self.point, self.extreme, self.from_axis)
+        yield subject, "reach", quantity, self.value_mm, self.uncertainty_mm
+
+
+@dataclass(frozen=True)
+class LimitRow(Row):
+    """A joint's limits; None where the source gives none."""
+
+    kind: ClassVar[str] = "limits"
+    groups: ClassVar[tuple[str, ...]] = ("limits",)
+    joint: int
+    lower_deg: float | None
+    upper_deg: float | None
+    uncertainty_deg: float
+
+    def scalars(self) -> Iterator[Scalar]:
+        sides: tuple[tuple[Side, float | None], ...] = (("lower", self.lower_deg), ("upper", self.upper_deg))
+        for side, expected in sides:
+            yield JointLimit(self.joint, side), "limits", Limit(self.joint, side), expected, self.uncertainty_deg
+
+
+@dataclass(frozen=True)
+class SpeedRow(Row):
+    """A joint's greatest speed; None where the source gives none."""
+
+    kind: ClassVar[str] = "speeds"
+    groups: ClassVar[tuple[str, ...]] = ("speeds",)
+    joint: int
+    speed_deg_s: float | None
+    uncertainty_deg_s: float
+
+    def scalars(self) -> Iterator[Scalar]:
+        yield JointSpeed(self.joint), "speeds", Speed(self.joint), self.speed_deg_s, self.uncertainty_deg_s
+
+
+KINDS: dict[str, type[Row]] = {
+    row.kind: row for row in (AxisRow, PositionRow, DirectionRow, EnvelopeRow, ReachRow, LimitRow, SpeedRow)
+}
+
+
+def check_complete(what: str, wanted: Iterable[str], present: Iterable[str]) -> None:
+    """Refuse at once a registry that lacks something, or has something that no other knows."""
+    if differing := set(wanted) ^ set(present):
+        raise LookupError(f"{what}: {', '.join(sorted(differing))} stands in one place and not in the other")
+
+
+def reference_set(name: str, rows: Mapping[str, tuple[Row, ...]]) -> ReferenceSet:
+    """All that rows state, and that each pose at which a source shows the arm lies within its limits: one reference for
+    each pose and source."""
+    stated = [reference for table in rows.values() for row in table for reference in row.references()]
+    said = {(reference.source, reference.quantity) for reference in stated}
+    reached: dict[object, Reference] = {}
+    for row in rows.get(PositionRow.kind, ()):
+        if isinstance(row, PositionRow) and row.pose != ZERO_POSE:
+            key = (row.source, PoseOutside(row.pose))
+            if key not in said:
+                reached.setdefault(key, row.reference(row.within_limits()))
+    return ReferenceSet(name, (*stated, *reached.values()), rows)
+
+
+check_complete("groups of references", GROUPS, {group for row in KINDS.values() for group in row.groups})

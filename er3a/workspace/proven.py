@@ -1,0 +1,133 @@
+"""What the proof says of a robot: its cells, a joint vector that reaches into each, and an estimate of the volume."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from er3a.kinematics.wrist_partitioned import ClosedFormMissing, closed_form_missing
+from er3a.numerics.arrays import Flags, Reals
+from er3a.robots.robot import Robot
+from er3a.workspace.cavities import cavities, rim
+from er3a.workspace.general import prove_general
+from er3a.workspace.general_arm import general_arm
+from er3a.workspace.lookup import EMPTY, SectionMap
+from er3a.workspace.proof import Proof, prove, sharpen
+from er3a.workspace.section_arm import SectionArm, section_arm, section_frame
+from er3a.workspace.volume import VolumeEstimate, estimate_volume
+from er3a.workspace.witness import lies_in_cell, reach_points, witness_joints
+
+CellState = Literal["filled", "touched", "empty", "undecided", "partly_filled"]
+
+TARGET = 0.002
+VOID_RATIO = 0.25
+GENERAL_CELLS, GENERAL_SAMPLES, GENERAL_BOXES = 4, 250, 1000
+"""For each cell of the budget, where the general method is all there is: its cells, samples and boxes."""
+
+
+@dataclass(frozen=True)
+class SphericalWrist:
+    """The cells were decided by the method for spherical wrists."""
+
+    code: Literal["spherical_wrist"] = "spherical_wrist"
+
+
+@dataclass(frozen=True)
+class GeneralMethod:
+    """The cells were decided by the coarser method for any arm, because of what this one lacks."""
+
+    lacks: ClosedFormMissing
+    code: Literal["general_method"] = "general_method"
+
+
+ProofMethod = SphericalWrist | GeneralMethod
+
+
+@dataclass(frozen=True, eq=False)
+class Proven:
+    """What the proof says of a robot.
+
+    Attributes
+    ----------
+    arm : in its section form; None if it is not wrist-partitioned
+    proof, section : its cells, and their map
+    R, origin : frame about axis 1, see :func:`er3a.workspace.section_arm.section_frame`
+    witness : (cells, 6), rad, a joint vector that reaches into each cell, NaN where none is known
+    estimate : of the volume; method : how cells were decided
+    """
+
+    arm: SectionArm | None
+    proof: Proof
+    section: SectionMap
+    R: Reals
+    origin: Reals
+    witness: Reals
+    estimate: VolumeEstimate
+    method: ProofMethod
+
+    def in_base(self, points: Reals) -> Reals:
+        """Points (..., 3) from the frame about axis 1 to the base frame."""
+        return points @ self.R + self.origin
+
+    def in_section(self, points: Reals) -> tuple[Reals, Reals, Reals]:
+        """Distance from axis 1 (m), azimuth (rad) and height (m) of points (n, 3) in the base frame."""
+        x, y, z = self.R @ (points - self.origin).T
+        return np.hypot(x, y), np.arctan2(y, x), z
+
+    def count_in_empty(self, points: Reals) -> int:
+        """How many points (n, 3), m, base frame, lie where nothing is reached; more than none would refute the
+        proof."""
+        return int((self.section.status(*self.in_section(points)) == EMPTY).sum())
+
+    def cell_states(self) -> list[CellState]:
+        """What each cell is; touched: not proven filled, but a joint vector reaches into it."""
+        unfilled, empty = self.proof.unfilled_ratio, self.proof.empty_ratio
+        touched = np.isfinite(self.witness[:, 0])
+        states: tuple[CellState, ...] = ("filled", "empty", "partly_filled", "touched", "undecided")
+        chosen = np.select([unfilled <= 0, empty >= 1 - 1e-12, unfilled < 1 - 1e-12, touched], [0, 1, 2, 3], 4)
+        return [states[n] for n in chosen]
+
+
+def prove_robot(robot: Robot, most_cells: int, points: int, seed: int) -> Proven:
+    """Run the proof and the estimate that rests on it; bounds by lengths alone where the arm's build gives no more."""
+    if lacks := closed_form_missing(robot):
+        return _prove_general(robot, most_cells, points, seed, lacks)
+    arm = section_arm(robot)
+    section = SectionMap(prove(arm, TARGET, int((1 - VOID_RATIO) * most_cells)))
+    section = _about_voids(arm, section, int(VOID_RATIO * most_cells))
+    estimate = estimate_volume(arm, section, arm.reach, arm.heights, points, seed)
+    witness = witness_joints(robot, arm, section.proof)
+    return Proven(arm, section.proof, section, *section_frame(robot), witness, estimate, SphericalWrist())
+
+
+def _prove_general(robot: Robot, most_cells: int, points: int, seed: int, lacks: ClosedFormMissing) -> Proven:
+    arm, R, origin = general_arm(robot)
+    budgets = (GENERAL_SAMPLES * most_cells, GENERAL_BOXES * most_cells)
+    proof, theta = prove_general(arm, GENERAL_CELLS * most_cells, seed, *budgets)
+    section = SectionMap(proof)
+    q = np.tile((robot.lower + robot.upper) / 2, (len(theta), 1))
+    count = theta.shape[1]
+    turned = robot.direction[:count] * (theta - robot.offset[:count])
+    middle = q[:, :count]
+    q[:, :count] = turned + 2 * np.pi * np.round((middle - turned) / (2 * np.pi))
+    q = np.where(lies_in_cell(robot, q, proof, R, origin)[:, None], q, np.nan)
+
+    def search(local: Reals) -> Flags:
+        cells = section.cell_of(np.hypot(local[:, 0], local[:, 1]), local[:, 2])
+        starts = np.where(np.isfinite(q[cells]), q[cells], (robot.lower + robot.upper) / 2)
+        return np.isfinite(reach_points(robot, local @ R + origin, starts)[:, 0])
+
+    estimate = estimate_volume(search, section, arm.reach, arm.heights, points, seed)
+    return Proven(None, proof, section, R, origin, q, estimate, GeneralMethod(lacks))
+
+
+def _about_voids(arm: SectionArm, section: SectionMap, most_cells: int) -> SectionMap:
+    """Spend cells on the rims of enclosed voids, round by round."""
+    while True:
+        chosen = rim(section, cavities(section)[0])
+        most_cells -= 4 * int(chosen.sum())
+        if most_cells < 0 or not chosen.any():
+            return section
+        section = SectionMap(sharpen(arm, section.proof, chosen))

@@ -1,0 +1,105 @@
+"""Sentences of faults, conclusions and advice."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from er3a.diagnosis import conclusions, fault_kinds
+from er3a.diagnosis.conclusions import (
+    Conclusion,
+    FlangePositionDecides,
+    LimitDecides,
+    MainFault,
+    MostLikelyFault,
+    NextMeasurement,
+    NoFewFaultsExplain,
+    NothingToExplain,
+)
+from er3a.diagnosis.fault_kinds import (
+    Fault,
+    SwappedEntries,
+    WrongAlphaSign,
+    WrongConvention,
+    WrongLength,
+    WrongLimits,
+    WrongOffset,
+    WrongScale,
+    WrongUnit,
+    rounded,
+)
+from er3a.diagnosis.faults import repairs_of, slopes
+from er3a.files.robot_library import load_robot
+from er3a.kinematics.table_batch import tables_of
+from er3a.pipeline.messages.diagnosis import both
+from er3a.pipeline.messages.say import say
+
+
+@pytest.mark.parametrize(
+    ("found", "text"),
+    [
+        (WrongOffset(2, 0.0, -90.0), "joint 2: offset -90 deg missing"),
+        (WrongOffset(3, 180.0, 0.0), "joint 3: offset is 180 deg, 0 deg fits"),
+        (WrongAlphaSign(3, 90.0, -90.0), "joint 3: alpha has the wrong sign (90 deg given, -90 deg fits)"),
+        (WrongLength(6, "d", 0.0, 78.50004), "joint 6: d missing, 78.5 mm fits"),
+        (WrongLength(4, "d", 301.5, 299.0), "joint 4: d is 301.5 mm, 299 mm fits"),
+        (WrongLimits(None, "crossed"), "every joint: limits crossed"),
+        (WrongLimits(3, "lower_sign"), "joint 3: lower limit has the wrong sign"),
+        (WrongUnit("a", "metres_as_millimetres"), "column a: metres read as millimetres (1000 times too small)"),
+        (SwappedEntries(None), "columns a and d are swapped"),
+        (WrongScale(1 / 1.05), "all lengths: scale wrong, times 0.952381 fits"),
+        (WrongConvention("standard"), "the table is a modified one, read as standard"),
+        (LimitDecides(3, "upper"), "the upper limit of joint 3 would tell them apart"),
+        (
+            FlangePositionDecides((0.0, 45.0, 0.0, 0.0, 0.0, 0.0), 0.5, 12.34),
+            "the flange's position at joints (0, 45, 0, 0, 0, 0) deg would tell 50% of the pairs apart, by up to 12 mm",
+        ),
+        (
+            MostLikelyFault((WrongOffset(2, 0.0, -90.0),), 1432.8, 0.0, "mm"),
+            "Most likely fault: joint 2: offset -90 deg missing; residual falls from 1433 mm to 0.0 mm.",
+        ),
+        (
+            NoFewFaultsExplain(7260, 1432.8, 321.04, "mm"),
+            "No one or two faults explain the data: the best of 7260 hypotheses still leaves 321 mm of 1433 mm. "
+            "This is another arm, or more than two numbers are wrong.",
+        ),
+    ],
+)
+def test_sentences(found, text):
+    assert say(found) == text
+
+
+def test_every_repair_and_free_number_has_a_sentence_of_its_own():
+    table = tables_of(load_robot("er3a_c60_article"))
+    faults = [repair.fault for repair in repairs_of(table)]
+    faults += [slope.fault(float(slope.entry(table)[0]), 0.01) for slope in slopes()]
+    assert {type(fault) for fault in faults} == set(get_args(Fault))
+    assert len({say(fault) for fault in faults}) == len(set(faults)) == len(faults)
+
+
+def test_all_that_a_diagnosis_can_find_has_a_sentence():
+    for kind in (*get_args(Fault), *get_args(Conclusion), *get_args(NextMeasurement)):
+        assert say.dispatch(kind) is not say.dispatch(object), kind
+
+
+def test_two_faults_are_joined_and_numbers_agree():
+    assert both((SwappedEntries(None), WrongScale(2.0))) == (
+        "columns a and d are swapped and all lengths: scale wrong, times 2 fits"
+    )
+    assert "the one reference" in say(NothingToExplain(1))
+    assert "all 12 references" in say(NothingToExplain(12))
+    assert "leave open" in say(MainFault((SwappedEntries(None),), 10.0, 0.4, "mm"))
+
+
+def test_fitted_numbers_to_four_digits_are_the_same_fault():
+    assert rounded(WrongLength(1, "a", 50.0, 69.999991)) == rounded(WrongLength(1, "a", 50.0, 70.000012))
+    assert rounded(WrongLength(1, "a", 50.0, 70.01)) != rounded(WrongLength(1, "a", 50.0, 70.06))
+    assert rounded(WrongScale(np.float64(0.9523809))) == WrongScale(0.952381)
+
+
+@pytest.mark.parametrize("room", [conclusions, fault_kinds])
+def test_codes_are_different(room):
+    codes = [kind.code for kind in vars(room).values() if isinstance(kind, type) and hasattr(kind, "code")]
+    assert len(set(codes)) == len(codes)

@@ -1,0 +1,91 @@
+"""A new kind of reference is one row class, its columns and the words of its group; whatever is forgotten raises."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+import pytest
+
+from er3a.files.csv_file import Column, Written
+from er3a.files.reference_rows import FORMATS, Format
+from er3a.files.reference_sets import load_references
+from er3a.files.robot_library import load_robot
+from er3a.pipeline.messages import references as words
+from er3a.pipeline.messages.say import say
+from er3a.references.predict import predict
+from er3a.references.quantities import ModelState, Quantity
+from er3a.references.reference import Row
+from er3a.references.rows import GROUPS, KINDS, Group, check_complete
+from er3a.references.subjects import ReferenceSubject, Subject
+
+
+@dataclass(frozen=True)
+class StandingHeight(Quantity):
+    """Height of axis 2 over the base in the zero pose."""
+
+    def value(self, state: ModelState) -> np.ndarray:
+        return state.axis(2)[1][..., 2]
+
+
+@dataclass(frozen=True)
+class Shoulder(Subject):
+    """The shoulder's height."""
+
+    code: Literal["shoulder"] = "shoulder"
+
+
+@dataclass(frozen=True)
+class HeightRow(Row):
+    """A height that a source states."""
+
+    kind: ClassVar[str] = "heights"
+    groups: ClassVar[tuple[str, ...]] = ("heights",)
+    height_mm: float
+    uncertainty_mm: float
+
+    def scalars(self):
+        yield Shoulder(), "heights", StandingHeight(), self.height_mm, self.uncertainty_mm
+
+
+@pytest.fixture
+def with_heights(monkeypatch):
+    columns = {"height_mm": Column(Written), "uncertainty_mm": Column(Written, optional=True)}
+    monkeypatch.setitem(GROUPS, "heights", Group("heights", telling=8))
+    monkeypatch.setitem(KINDS, "heights", HeightRow)
+    monkeypatch.setitem(FORMATS, "heights", Format(columns, digits=("height_mm",)))
+
+
+@pytest.mark.usefixtures("with_heights")
+def test_a_new_kind_is_read_and_predicted(tmp_path):
+    (tmp_path / "heights.csv").write_text("height_mm,uncertainty_mm,source,grade\n321.5,,a drawing,official\n")
+    (reference,) = load_references(tmp_path).references
+    assert (reference.group, reference.subject.key, reference.uncertainty) == ("heights", "shoulder()", 0.05)
+    assert predict(load_robot("er3a_c60"), (reference,)) == pytest.approx([321.5])
+
+
+def test_a_kind_without_columns_or_words_raises_at_once(monkeypatch):
+    monkeypatch.setitem(KINDS, "heights", HeightRow)
+    monkeypatch.setitem(GROUPS, "heights", Group("heights", telling=8))
+    for registry in (FORMATS, words.GROUP_WORDS, words.MISSING_WORDS):
+        with pytest.raises(LookupError, match="heights"):
+            check_complete("heights", KINDS if registry is FORMATS else GROUPS, registry)
+
+
+@pytest.mark.parametrize("kind", KINDS.values())
+def test_every_group_of_a_kind_is_listed(kind):
+    assert set(kind.groups) <= set(GROUPS)
+    assert len({group.telling for group in GROUPS.values()}) == len(GROUPS)
+
+
+@pytest.mark.parametrize("name", ["er3a_c60", "er3a_c60_article", "er3_600"])
+def test_every_subject_has_a_sentence_a_key_and_a_place_in_the_union(name):
+    references = load_references(name).references
+    for reference in references:
+        assert say(reference.subject)
+        assert say(reference.subject.whole)
+        assert isinstance(reference.subject, ReferenceSubject)
+        assert reference.group in GROUPS
+    keys = {reference.subject.key: reference.subject for reference in references}
+    assert all(keys[reference.subject.key] == reference.subject for reference in references)
