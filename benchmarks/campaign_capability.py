@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 
 import numpy as np
-from er3a.pipeline.stages.workspace.capability_numbers import rings
 from scipy.spatial.transform import Rotation
 
 from er3a import load_robot
@@ -13,6 +12,7 @@ from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
 from er3a.robots.robot import Robot
+from er3a.workspace.capability import rings
 from er3a.workspace.dexterous import dexterous_core
 from er3a.workspace.directions import from_polar, poses, roll_of, tool_rotations
 from er3a.workspace.interval_inverse import GOOD, NEVER, SLOTS, branches, theta_ranges

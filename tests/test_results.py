@@ -18,9 +18,9 @@ import pandas as pd
 import pytest
 
 from er3a.errors import ResultError, WriteError
+from er3a.files.kept_files import half_written, sha256, write_atomically
 from er3a.files.robot_library import ROBOTS
 from er3a.pipeline.code_digest import code_digest
-from er3a.files.kept_files import half_written, sha256, write_atomically
 from er3a.pipeline.results import (
     CHECKSUMS,
     FORMAT_VERSION,

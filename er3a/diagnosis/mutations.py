@@ -11,8 +11,9 @@ from er3a.diagnosis.fault_kinds import Fault, WrongLength, WrongScale
 from er3a.diagnosis.faults import LengthColumn, repairs_of
 from er3a.diagnosis.ranking import rank, usable
 from er3a.kinematics.table_batch import COLUMNS, Tables, robot_of, tables_of
+from er3a.numerics.arrays import Reals
 from er3a.references.predict import predict_tables
-from er3a.references.quantities import MM, Quantity, Reals
+from er3a.references.quantities import MM, Quantity
 from er3a.references.reference import Reference, ReferenceSet, expected_of, quantities_of
 from er3a.robots.robot import Robot
 

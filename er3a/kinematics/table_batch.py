@@ -23,7 +23,7 @@ class Tables:
     a, d : (H, 6), m; alpha, beta, offset, lower, upper : (H, 6), rad; direction : (H, 6), +1 or -1
     """
 
-    modified: Reals
+    modified: Flags
     a: Reals
     alpha: Reals
     beta: Reals

@@ -51,7 +51,7 @@ class TooFast:
 
 
 @dataclass(frozen=True)
-class OutOfReach:
+class PathOutOfReach:
     """No branch reaches the pose; per side of the arm, why."""
 
     reasons: tuple[Unsolved, ...]
@@ -111,14 +111,14 @@ def too_fast(robot: Robot, t: Reals, velocity: Reals, speed: Callable[[Reals], R
     return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
 
 
-def unreachable(followed: Followed) -> list[Interval[OutOfReach]]:
+def unreachable(followed: Followed) -> list[Interval[PathOutOfReach]]:
     """Where no branch of the closed form reaches the pose, with the distance that is missing at the worst point."""
     robot, found = followed.robot, []
     for first, last in runs(np.isnan(followed.q[:, 0])):
         poses = followed.line.poses(followed.progress[first:last])
         gap = solve_slots(robot, poses, np.zeros((len(poses), 6)))[2]
         worst = int(np.argmax(gap.min(axis=1)))
-        cause = OutOfReach(inverse(robot, poses[worst]).unsolved)
+        cause = PathOutOfReach(inverse(robot, poses[worst]).unsolved)
         found.append(Interval(float(followed.t[first]), float(followed.t[last - 1]), cause))
     return found
 

@@ -88,7 +88,7 @@ def test_each_kind_of_path_is_in_the_study(results, name):
     (gap,) = out.unreachable
     assert 0 < gap.t0_s < gap.t1_s == out.duration_s
     assert 0 < gap.s0_m < gap.s1_m == pytest.approx(out.length_m)
-    assert gap.cause.reasons
+    assert {reason.why.code for reason in gap.cause.reasons} == {"wrist_too_far"}
     assert paths["line_collides"].verdict == "collides"
 
 

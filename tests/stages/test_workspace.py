@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 from pathlib import Path
 
@@ -14,10 +15,12 @@ from er3a.errors import InputError, ResultError
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
-from er3a.pipeline.results import read_summary, read_table
+from er3a.kinematics.wrist_partitioned import NoWristCentre
+from er3a.pipeline.results import read_stage
+from er3a.pipeline.stages import run
+from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.workspace.compute import compute
-from er3a.pipeline.stages.workspace.record import record
-from er3a.pipeline.stages.workspace.report import report
+from er3a.pipeline.stages.workspace.findings import VoidUnexpected
 from er3a.pipeline.stages.workspace.sample import sample
 from er3a.pipeline.study import load_study
 from tests.stages.workspace_arms import locked_file, make_study, skew_file, tally_of
@@ -31,7 +34,7 @@ def files_of(folder: Path) -> dict[str, bytes]:
 
 def test_results_do_not_depend_on_the_parts(tmp_path):
     study = make_study()
-    compute(study, "er3_600", tmp_path / "none")
+    run.compute("workspace", study, "er3_600", tmp_path / "none")
     expected = files_of(tmp_path / "none")
     assert set(expected) == {
         "cells.parquet",
@@ -55,39 +58,45 @@ def test_results_do_not_depend_on_the_parts(tmp_path):
         paths = [tmp_path / f"{parts}-{part}.npz" for part in range(1, parts + 1)]
         for part, path in enumerate(paths, start=1):
             sample(study, "er3_600", part, parts, path)
-        compute(study, "er3_600", tmp_path / str(parts), paths[::-1])
+        run.compute("workspace", study, "er3_600", tmp_path / str(parts), paths[::-1])
         assert files_of(tmp_path / str(parts)) == expected
 
 
-def test_tables_agree_with_the_summary(tmp_path):
+def test_tables_agree_with_the_summary():
     study = make_study()
-    compute(study, "er3_600", tmp_path)
-    summary, cells, curve, section, cloud, hull = (
-        read_summary(tmp_path),
-        *(read_table(tmp_path / f"{name}.parquet") for name in ("cells", "curve", "section", "cloud", "hull_vertices")),
-    )
-    assert cells["samples"].sum() == section["samples"].sum() == summary["samples"] == 60_001
-    for _, rows in curve.groupby("cell_mm"):
-        assert rows["touched_m3"].is_monotonic_increasing
-        assert rows["samples"].iloc[-1] == 60_001
-    finest = curve[curve["cell_mm"] == curve["cell_mm"].min()]
-    assert finest["touched_m3"].iloc[-1] == pytest.approx(summary["touched_m3"], rel=1e-12)
-    assert len(cloud) == 500
-    assert (cloud["manipulability_m3"] >= 0).all()
-    q = np.radians(hull[[f"q{k}_deg" for k in range(1, 7)]].to_numpy())
-    robot = study.robot("er3_600")
-    assert np.abs(forward(robot, q)[:, :3, 3] - hull[["x_m", "y_m", "z_m"]].to_numpy()).max() < 1e-12
-    assert 0 < summary["hull"]["volume_m3"] < 1.26
+    found = compute(study, "er3_600")
+    summary, curve, hull = found.summary, found.curve, found.hull_vertices
+    assert found.cells.samples.sum() == found.section.samples.sum() == summary.samples == 60_001
+    for cell in np.unique(curve.cell_mm):
+        rows = curve.take(curve.cell_mm == cell)
+        assert (np.diff(rows.touched_m3) >= 0).all()
+        assert rows.samples[-1] == 60_001
+    finest = curve.take(curve.cell_mm == curve.cell_mm.min())
+    assert finest.touched_m3[-1] == pytest.approx(summary.touched_m3, rel=1e-12)
+    assert len(found.cloud) == 500
+    assert (found.cloud.manipulability_m3 >= 0).all()
+    reached = forward(study.robot("er3_600"), np.radians(hull.q_deg))[:, :3, 3]
+    assert np.abs(reached - hull.point_m).max() < 1e-12
+    assert 0 < summary.hull.volume_m3 < 1.26
 
 
-def test_void_centres_have_no_inverse_solution(tmp_path, random):
+def test_what_is_read_is_what_was_computed(tmp_path):
+    study = make_study()
+    found = compute(study, "er3_600")
+    run.compute("workspace", study, "er3_600", tmp_path)
+    read = read_stage(tmp_path, STAGES["workspace"]).results
+    assert read.summary == found.summary
+    for name in STAGES["workspace"].tables:
+        assert getattr(read, name).frame().equals(getattr(found, name).frame()), name
+
+
+def test_void_centres_have_no_inverse_solution(random):
     """The closed form, over random orientations, is an independent witness of what the samples left out."""
     study = make_study({"er3a_c60_article": ROBOTS / "er3a_c60_article.yaml"}, samples=4_000_000, cells_across=48)
-    compute(study, "er3a_c60_article", tmp_path)
-    summary, robot = read_summary(tmp_path), study.robot("er3a_c60_article")
-    assert summary["verdict"]["code"] == "workspace.void_unexpected"
-    assert summary["verdict"]["status"] == "caution"
-    (void,) = (void for void in summary["voids"] if void["kind"] == "enclosed" and not void["holds_shoulder"])
+    summary, robot = compute(study, "er3a_c60_article").summary, study.robot("er3a_c60_article")
+    assert isinstance(summary.verdict.finding, VoidUnexpected)
+    assert summary.verdict.status == "caution"
+    (void,) = (void for void in summary.enclosed_voids if not void.holds_shoulder)
 
     def solvable(position):
         T = np.eye(4)
@@ -98,7 +107,7 @@ def test_void_centres_have_no_inverse_solution(tmp_path, random):
                 return True
         return False
 
-    assert not solvable(void["centroid_m"])
+    assert not solvable(void.centroid_m)
     assert solvable([0.9, 0.1, 0.5])
 
 
@@ -119,41 +128,40 @@ def test_full_turn_of_joint_1_gives_a_symmetric_cloud():
 )
 def test_locked_joints_run_through_all_three_verbs(tmp_path, locked, code):
     study = make_study({"locked": locked_file(tmp_path, locked)}, samples=5000)
-    compute(study, "locked", tmp_path / "results")
-    summary = read_summary(tmp_path / "results")
-    assert code in (None, summary["verdict"]["code"])
-    report(study, "locked", tmp_path / "results", tmp_path / "workspace.html")
-    record(study, "locked", tmp_path / "results", tmp_path / "workspace.rrd")
-    assert summary["verdict"]["text"] in (tmp_path / "workspace.html").read_text(encoding="utf-8")
+    run.compute("workspace", study, "locked", tmp_path / "results")
+    verdict = json.loads((tmp_path / "results/summary.json").read_text(encoding="utf-8"))["verdict"]
+    assert code in (None, verdict["code"])
+    for verb, output in (("report", "workspace.html"), ("record", "workspace.rrd")):
+        run.show(verb, "workspace", study, "locked", tmp_path / "results", tmp_path / output)
+    assert verdict["text"] in html.unescape((tmp_path / "workspace.html").read_text(encoding="utf-8"))
     assert (tmp_path / "workspace.rrd").stat().st_size > 10_000
 
 
 def test_an_arm_without_a_spherical_wrist_gets_the_general_proof(tmp_path):
     study = make_study({"skew": skew_file(tmp_path)}, samples=10_000, cells_across=64)
-    compute(study, "skew", tmp_path)
-    summary, proof = read_summary(tmp_path), read_table(tmp_path / "proof.parquet")
-    assert summary["verdict"]["code"] == "workspace.undersampled"
-    assert 0 <= summary["volume_m3"]["lower"] < summary["volume_m3"]["estimate"] < summary["volume_m3"]["upper"]
-    assert "axes 4, 5 and 6 miss a common point" in summary["proof"]["method"]
-    assert summary["proof"]["points_in_empty_cells"] == 0
-    touched = proof[proof["status"] == "touched"]
+    found = compute(study, "skew")
+    summary = found.summary
+    assert summary.verdict.finding.code == "workspace.undersampled"
+    assert 0 <= summary.volume_m3.lower < summary.volume_m3.estimate < summary.volume_m3.upper
+    assert isinstance(summary.proof.method.lacks, NoWristCentre)
+    assert summary.proof.points_in_empty_cells == 0
+    touched = found.proof.take(found.proof.status == "touched")
     assert len(touched) > 100
-    assert touched["q1_deg"].notna().all()
+    assert np.isfinite(touched.q_deg).all()
 
 
-def test_side_view_holds_the_makers_corners(tmp_path):
+def test_side_view_holds_the_manufacturers_corners():
     """The labels of the ER3-600's drawing lie on the exact border of the wrist centre, front and back as drawn."""
-    study = make_study()
-    compute(study, "er3_600", tmp_path)
-    border, drawing, cloud = (read_table(tmp_path / f"{name}.parquet") for name in ("border", "drawing", "side_view"))
-    side = border[(border["view"] == "side") & (border["point"] == "wrist centre")]
-    for row in drawing.dropna().itertuples():
-        away = np.hypot(side["rho_m"] - row.x_m, side["z_m"] - row.z_m)
-        assert away.min() < 2e-3
-    wrist = cloud[cloud["point"] == "wrist centre"]
-    assert wrist["x_m"].max() == pytest.approx(side["rho_m"].max(), abs=0.02)
-    low = wrist[wrist["z_m"] < 0.0]
-    assert low["x_m"].max() > 0.3 > -low["x_m"].min()
+    found = compute(make_study(), "er3_600")
+    side = found.border.take((found.border.view == "side") & (found.border.point == "wrist_centre"))
+    corners = found.drawing.take(np.isfinite(found.drawing.q2_deg))
+    assert len(corners) > 0
+    for x, z in zip(corners.x_m, corners.z_m):
+        assert np.hypot(side.rho_m - x, side.z_m - z).min() < 2e-3
+    wrist = found.side_view.take(found.side_view.point == "wrist_centre")
+    assert wrist.x_m.max() == pytest.approx(side.rho_m.max(), abs=0.02)
+    low = wrist.x_m[wrist.z_m < 0.0]
+    assert low.max() > 0.3 > -low.min()
 
 
 # --- bad input ---
@@ -191,10 +199,10 @@ def test_a_damaged_part_is_named(parts, tmp_path):
     for damaged in (b"", b"no archive", whole[: len(whole) // 2], *flipped):
         second.write_bytes(damaged)
         with pytest.raises(ResultError, match=r"part_2\.npz: damaged"):
-            compute(study, "er3_600", tmp_path / "results", [first, second])
+            run.compute("workspace", study, "er3_600", tmp_path / "results", [first, second])
     second.unlink()
     with pytest.raises(ResultError, match=r"part_2\.npz: missing"):
-        compute(study, "er3_600", tmp_path / "results", [first, second])
+        run.compute("workspace", study, "er3_600", tmp_path / "results", [first, second])
     assert not (tmp_path / "results").exists()
 
 
@@ -208,7 +216,7 @@ def test_a_part_of_another_run_is_named(parts, tmp_path):
     for other, words in changed:
         sample(other, "er3_600", 2, 2, second)
         with pytest.raises(ResultError, match=rf"part_2\.npz: was sampled with .*{words}"):
-            compute(study, "er3_600", tmp_path / "results", [first, second])
+            compute(study, "er3_600", [first, second])
 
 
 def locked_copy(folder: Path) -> Path:
@@ -218,20 +226,20 @@ def locked_copy(folder: Path) -> Path:
     return path
 
 
-def test_blocks_twice_or_missing_are_named(parts, tmp_path):
+def test_blocks_twice_or_missing_are_named(parts):
     study, (first, second) = parts
     with pytest.raises(ResultError, match=r"part_1\.npz: holds block 0, which another part file holds too"):
-        compute(study, "er3_600", tmp_path / "results", [first, second, first])
+        compute(study, "er3_600", [first, second, first])
     with pytest.raises(ResultError, match=r"part_1\.npz: .*block 3 is still missing"):
-        compute(study, "er3_600", tmp_path / "results", [first])
+        compute(study, "er3_600", [first])
     with pytest.raises(ResultError, match="block 0 is still missing"):
-        compute(study, "er3_600", tmp_path / "results", [])
+        compute(study, "er3_600", [])
     with pytest.raises(InputError, match="there is no part 3 of 2"):
         sample(study, "er3_600", 3, 2, second)
 
 
 def test_summary_is_plain_finite_json(tmp_path):
-    compute(make_study(samples=5000), "er3_600", tmp_path)
+    run.compute("workspace", make_study(samples=5000), "er3_600", tmp_path)
     text = (tmp_path / "summary.json").read_text(encoding="utf-8")
     summary = json.loads(text, parse_constant=lambda word: pytest.fail(f"{word} in summary.json"))
     assert {"volume_m3", "hull", "samples", "voids", "verdict", "figures", "provenance"} <= set(summary)

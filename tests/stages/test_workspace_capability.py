@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import yaml
-from er3a.pipeline.stages.workspace.capability_numbers import CanDo, can_do
 
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.files.yaml_file import load
+from er3a.kinematics.wrist_partitioned import NoWristCentre
+from er3a.pipeline.stages.workspace.capability import ToolCapability, tool_capability
 from er3a.pipeline.stages.workspace.capability_texts import capability_context
 from er3a.pipeline.stages.workspace.cell_lookup import CellLookup
-from er3a.pipeline.study import CapabilitySettings, Study
+from er3a.pipeline.stages.workspace.entry import CapabilitySettings
+from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import Picture
 from er3a.robots.robot import Robot
 
@@ -33,27 +36,34 @@ def skew_wrist() -> Robot:
 
 
 @pytest.fixture(scope="module")
-def done() -> CanDo:
-    return can_do(load_robot("er3_600"), settings(), 0.08)
+def done() -> ToolCapability:
+    return tool_capability(load_robot("er3_600"), settings(), 0.08)
+
+
+def context_of(robot: Robot, found: ToolCapability) -> dict:
+    """What the page takes, of results that hold nothing else."""
+    summary = SimpleNamespace(capability=found.capability, placement=found.placement)
+    return capability_context(robot, SimpleNamespace(summary=summary, capability=found.cells, places=found.places))
 
 
 def test_summary_and_tables_belong_together(done):
-    can, placed = done.summary["capability"], done.summary["placement"]
-    cells, places = done.tables["capability"], done.tables["places"]
-    assert can["share"]["best"] == pytest.approx(cells["share"].max())
-    assert can["manipulability_m3"] == pytest.approx(cells["manipulability_m3"].max())
-    assert can["ways"]["most"] == cells["most_ways"].max() <= 8
-    assert 0 <= can["core_m3"]["lower"] <= can["core_m3"]["estimate"] <= can["core_m3"]["upper"]
-    assert set(np.round(cells["share"] * 40) % 1) == {0}
-    assert placed["fitting"] >= len(places) > 100
-    assert placed["fitting_proven"] > 0.5 * placed["fitting"]
-    for place in placed["places"]:
-        row = places[np.isclose(places[["x_m", "y_m", "z_m"]], place["centre_m"]).all(axis=1)].iloc[0]
-        assert row["manipulability_m3"] == pytest.approx(place["manipulability_m3"])
-        assert row["proven"] or place["status"] == "sampled"
-        assert place["room_deg"] >= 2
-        assert place["centre_m"][2] - place["size_m"][2] / 2 >= -1e-9
-    centre, size = (np.array([place[key] for place in placed["places"]]) for key in ("centre_m", "size_m"))
+    overall, core, placed = done.capability.overall, done.capability.core_m3, done.placement
+    cells, places = done.cells, done.places
+    assert overall.best_reachability == pytest.approx(cells.reachability.max())
+    assert overall.best_manipulability_m3 == pytest.approx(cells.manipulability_m3.max())
+    assert overall.most_solutions == cells.most_solutions.max() <= 8
+    assert 0 <= core.lower <= core.estimate <= core.upper
+    assert set(np.round(cells.reachability * 40) % 1) == {0}
+    assert placed.fitting >= len(places) > 100
+    assert placed.fitting_proven > 0.5 * placed.fitting
+    for place in placed.places:
+        row = np.flatnonzero(np.isclose(places.centre_m, place.centre_m).all(axis=1))[0]
+        assert places.manipulability_m3[row] == pytest.approx(place.manipulability_m3)
+        assert places.proven[row] or place.status == "sampled"
+        assert place.limit_margin_deg >= 2
+        assert place.centre_m[2] - place.size_m[2] / 2 >= -1e-9
+    centre = np.array([place.centre_m for place in placed.places])
+    size = np.array([place.size_m for place in placed.places])
     low, high = centre - size / 2, centre + size / 2
     for i in range(len(low)):
         for j in range(i):
@@ -61,35 +71,35 @@ def test_summary_and_tables_belong_together(done):
 
 
 def test_the_same_input_gives_the_same_numbers(done):
-    again = can_do(load_robot("er3_600"), settings(), 0.08)
-    assert again.summary == done.summary
-    assert all(again.tables[name].equals(table) for name, table in done.tables.items())
+    again = tool_capability(load_robot("er3_600"), settings(), 0.08)
+    assert (again.capability, again.placement) == (done.capability, done.placement)
+    assert again.cells.frame().equals(done.cells.frame())
+    assert again.places.frame().equals(done.places.frame())
 
 
 def test_slices_show_the_cells_they_cut(done):
-    cells, summary = done.tables["capability"], done.summary
-    lookup = CellLookup(summary, cells)
-    some = cells.sample(50, random_state=1)
-    row = lookup.row(some["rho_m"] + 0.02, np.radians(some["azimuth_deg"] + 1), some["z_m"] - 0.02)
-    assert row.tolist() == some.index.tolist()
+    lookup, cells = CellLookup(done.capability, done.cells), done.cells
+    some = np.random.default_rng(1).choice(len(cells), 50, replace=False)
+    row = lookup.row(cells.rho_m[some] + 0.02, np.radians(cells.azimuth_deg[some] + 1), cells.z_m[some] - 0.02)
+    assert row.tolist() == some.tolist()
     outside = lookup.row(np.array([9.0, 0.1, 0.1]), np.zeros(3), np.array([0.0, 9.0, -9.0]))
     assert outside.tolist() == [-1, -1, -1]
 
 
 def test_an_arm_without_closed_form_is_told_so():
-    done = can_do(skew_wrist(), settings(), 0.08)
-    for part in ("capability", "placement"):
-        assert not done.summary[part]["computed"]
-        assert "axes 4, 5 and 6 miss a common point" in done.summary[part]["reason"]
-    assert all(len(table) == 0 for table in done.tables.values())
-    context = capability_context(skew_wrist(), done.summary, *done.tables.values())
+    done = tool_capability(skew_wrist(), settings(), 0.08)
+    assert isinstance(done.capability.lacks, NoWristCentre)
+    assert done.placement is None
+    assert len(done.cells) == len(done.places) == 0
+    context = context_of(skew_wrist(), done)
+    assert "axes 4, 5 and 6 miss a common point" in context["missing"]
     assert not any(isinstance(value, Picture) for value in context.values())
 
 
 def test_no_place_is_no_error():
-    done = can_do(load_robot("er3_600"), settings(placement={"box_mm": [2000.0, 2000.0, 100.0]}), 0.15)
-    assert done.summary["placement"]["places"] == []
-    context = capability_context(load_robot("er3_600"), done.summary, *done.tables.values())
+    done = tool_capability(load_robot("er3_600"), settings(placement={"box_mm": [2000.0, 2000.0, 100.0]}), 0.15)
+    assert done.placement.places == ()
+    context = context_of(load_robot("er3_600"), done)
     assert context["place_rows"] == []
     assert context["place_picture"] is None
 

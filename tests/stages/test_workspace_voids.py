@@ -8,17 +8,20 @@ from scipy.spatial import ConvexHull
 
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
+from er3a.pipeline.messages.workspace import say
 from er3a.pipeline.stages.workspace.verdict import judge
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import make_grid
 from er3a.sampling.random_joints import Draw
-from er3a.sampling.reach_search import reach_figures
+from er3a.sampling.reach_search import search_reach
+from er3a.workspace.causes import Disappears, OnlySampled, Relaxed
 from er3a.workspace.cavities import cavities
 from er3a.workspace.hull import cells_inside, convex_hull
 from er3a.workspace.lookup import SectionMap
 from er3a.workspace.proof import prove
-from er3a.workspace.sampled_voids import find_voids, shape_of, unseen_cells
+from er3a.workspace.sampled_voids import find_voids, unseen_cells
 from er3a.workspace.section_arm import section_arm
+from er3a.workspace.voids import Void
 from tests.stages.workspace_arms import SEED, extreme_points, tally_of, two_link_arm
 
 # --- hull ---
@@ -69,11 +72,10 @@ def test_two_link_arm_leaves_the_ball_it_can_not_fold_into():
     robot = two_link_arm(*turn)
     grid, tally, hull, voids = voids_of(robot, 1_500_000, 40)
     assert hull.volume == pytest.approx(4 / 3 * np.pi, rel=0.02)
-    assert [void.kind for void in voids.listed] == ["enclosed"]
-    (void,) = voids.listed
+    assert [void.kind for void in voids] == ["enclosed"]
+    (void,) = voids
     assert void.status == "sampled"
-    shape = shape_of(void, grid)
-    assert shape["centroid_m"] == pytest.approx([0, 0, 0.3], abs=0.01)
+    assert void.centroid(grid) == pytest.approx([0, 0, 0.3], abs=0.01)
     centres = grid.centres(np.argwhere(tally.counts > 0))
     distance = np.linalg.norm(centres - [0, 0, 0.3], axis=1)
     diagonal = grid.cell * np.sqrt(3) / 2
@@ -87,7 +89,7 @@ def test_a_void_of_40_mm_that_a_cloud_can_not_show_is_proven():
     """Links of 0.6 and 0.4 m, and a tool of 0.16 m that turns every way: the ball of radius 40 mm can't be reached."""
     robot = two_link_arm([-180.0] * 6, [180.0] * 6).replace(d=[0.3, 0, 0, 0.4, 0, 0.16])
     _, _, _, voids = voids_of(robot, 10_000, 40)
-    assert not [void for void in voids.listed if void.kind == "enclosed" and void.status == "sampled"]
+    assert not [void for void in voids if void.kind == "enclosed" and void.status == "sampled"]
     enclosed, _ = cavities(SectionMap(prove(section_arm(robot), 0.0, 6000)))
     (ball,) = enclosed
     assert ball.centroid() == pytest.approx([0, 0, 0.3], abs=0.002)
@@ -98,7 +100,7 @@ def test_a_gap_of_joint_1_opens_the_hollow():
     """With half a turn of joint 1 and the elbow one way only, the hollow reaches the outside through the gap."""
     robot = two_link_arm([-60, -90, -60, -180, -180, -180], [60, 0, 60, 180, 180, 180])
     _, _, _, voids = voids_of(robot, 1_000_000, 40)
-    assert {void.kind for void in voids.listed} == {"open"}
+    assert {void.kind for void in voids} == {"open"}
 
 
 def test_a_locked_arm_stays_on_its_sphere():
@@ -120,19 +122,17 @@ def test_kinds_of_voids_on_a_made_up_grid():
     counts[12:17, 12:17, 12:19] = 0
     counts[9, 9, 9] = 0
     voids = find_voids(counts, inside)
-    assert [(void.kind, len(void.cells), void.status) for void in voids.listed] == [
+    assert [(void.kind, len(void.cells), void.status) for void in voids] == [
         ("open", 5 * 5 * 7, "sampled"),
         ("enclosed", 27, "sampled"),
     ]
-    assert (voids.specks, voids.speck_cells, voids.skin_cells) == (1, 1, 0)
 
 
 def test_a_thin_cloud_shows_no_voids(random):
     inside = np.ones((20, 20, 20), dtype=bool)
     counts = random.poisson(0.4, size=inside.shape)
     voids = find_voids(counts, inside)
-    assert all(void.status == "undersampled" for void in voids.listed)
-    assert voids.specks + len(voids.listed) > 0
+    assert all(void.status == "undersampled" for void in voids)
 
 
 def test_unseen_cells_are_predicted_or_understated(random):
@@ -141,33 +141,45 @@ def test_unseen_cells_are_predicted_or_understated(random):
     assert 0.5 * (uneven == 0).sum() < unseen_cells(uneven[uneven > 0]) < (uneven == 0).sum()
 
 
-def void_record(status: str, at_shoulder: bool) -> dict:
-    volume, centre = {"lower": 0.002, "upper": 0.003}, [0.1, -0.2, 0.0004]
-    return {
-        "kind": "enclosed",
-        "status": status,
-        "volume_m3": volume,
-        "centroid_m": centre,
-        "holds_shoulder": at_shoulder,
-        "cause": "vanishes when joint 3 may exceed +75 deg by 15 deg",
-    }
+def void_record(status: str, at_shoulder: bool) -> Void:
+    limit = Relaxed(3, "upper", 75.0, 15.0, 1.0)
+    proven = status == "proven_empty"
+    return Void(
+        kind="enclosed",
+        status=status,
+        lower=0.002,
+        upper=0.003,
+        centroid=np.array([0.1, -0.2, 0.0004]),
+        extent=np.full(3, 0.1),
+        cause=Disappears((limit,)) if proven else OnlySampled(),
+        relaxed=(limit,) if proven else (),
+        holds_shoulder=at_shoulder,
+        vertices=np.empty((0, 3)),
+        triangles=np.empty((0, 3), dtype=np.int64),
+    )
 
 
 @pytest.mark.parametrize(
     ("voids", "status", "code"),
     [
         ([], "pass", "no_void"),
-        ([void_record("proven empty", True)], "pass", "void_at_shoulder"),
+        ([void_record("proven_empty", True)], "pass", "void_at_shoulder"),
         ([void_record("undersampled", True)], "pass", "void_at_shoulder"),
-        ([void_record("proven empty", True), void_record("undersampled", False)], "caution", "void_uncertain"),
-        ([void_record("undersampled", False), void_record("proven empty", False)], "caution", "void_unexpected"),
+        ([void_record("proven_empty", True), void_record("undersampled", False)], "caution", "void_uncertain"),
+        ([void_record("undersampled", False), void_record("proven_empty", False)], "caution", "void_unexpected"),
     ],
 )
 def test_an_enclosed_void_away_from_the_shoulder_is_never_passed_over(voids, status, code):
-    hull = convex_hull(np.r_[np.eye(3), np.zeros((1, 3))])
-    verdict = judge(hull, voids, {"touched": 1000}, 0.0, True)
-    assert (verdict.status, verdict.code) == (status, f"workspace.{code}")
-    assert code == "no_void" or "2 L" in verdict.text
+    verdict = judge(1 / 6, voids, 1000, 0.0, True)
+    assert (verdict.status, verdict.finding.code) == (status, f"workspace.{code}")
+    assert code == "no_void" or verdict.finding.litres == 2
+    assert code == "no_void" or "2 L" in say(verdict.finding)
+
+
+def test_a_verdict_says_which_limit_makes_the_void():
+    verdict = judge(1 / 6, [void_record("proven_empty", False)], 1000, 0.0, True)
+    assert verdict.finding.cause == Disappears((Relaxed(3, "upper", 75.0, 15.0, 1.0),))
+    assert "It disappears if joint 3's upper limit is extended to +90 deg: check the limits" in say(verdict.finding)
 
 
 # --- reach ---
@@ -179,6 +191,6 @@ def test_an_enclosed_void_away_from_the_shoulder_is_never_passed_over(voids, sta
 def test_reach_meets_the_known_figures(name, reach_mm):
     robot = load_robot(name)
     q = Draw(SEED, 3000, 1).joints(robot, np.zeros(3000), np.arange(3000))
-    reach = reach_figures(robot, make_grid(robot, 16), q)
-    assert 1000 * reach["furthest_from_axis"] == pytest.approx(reach_mm, abs=0.06)
-    assert reach["nearest_to_axis"] == pytest.approx(0, abs=1e-6)
+    reach = search_reach(robot, make_grid(robot, 16), q)
+    assert 1000 * reach.furthest_from_axis == pytest.approx(reach_mm, abs=0.06)
+    assert reach.nearest_to_axis == pytest.approx(0, abs=1e-6)

@@ -115,7 +115,7 @@ def test_cells_agree_with_the_inverse_one_pose_at_a_time(robot, rolls, random):
     middles[0] = [0.35 * arm.reach, arm.centre[2]]
     directions = 12
     told = map_capability(robot, middles, directions, roll)
-    sectors = told.share.shape[1]
+    sectors = told.reachability.shape[1]
     assert sectors == (1 if robot.name == "er3a_c60_article" else 64)
     reached_somewhere = 0
     for cell, (rho, z) in enumerate(middles):
@@ -123,19 +123,19 @@ def test_cells_agree_with_the_inverse_one_pose_at_a_time(robot, rolls, random):
         turn = Rotation.from_rotvec([0, 0, TURN * sector / sectors]).as_matrix()
         point = np.array([rho, 0, z]) @ turn.T @ R + origin
         rotations = R.T @ turn @ tool_rotations(fibonacci_sphere(directions), roll)
-        ways, best = np.zeros(directions, dtype=int), 0.0
+        solutions, best = np.zeros(directions, dtype=int), 0.0
         for d, options in enumerate(rotations):
             for T in poses(point, options):
                 found = inverse(robot, T)
                 inside = found.within_limits
-                ways[d] = max(ways[d], len(set(found.branch[inside])))
+                solutions[d] = max(solutions[d], len(set(found.branch[inside])))
                 if inside.any():
                     best = max(best, np.abs(np.linalg.det(jacobian(robot, found.q[inside]))).max())
-        assert told.share[cell, sector] == pytest.approx((ways > 0).mean())
-        assert told.ways[cell, sector] == pytest.approx(ways[ways > 0].mean() if ways.any() else 0)
-        assert told.most_ways[cell, sector] == ways.max()
+        assert told.reachability[cell, sector] == pytest.approx((solutions > 0).mean())
+        assert told.solutions[cell, sector] == pytest.approx(solutions[solutions > 0].mean() if solutions.any() else 0)
+        assert told.most_solutions[cell, sector] == solutions.max()
         assert told.manipulability[cell, sector] == pytest.approx(best, abs=1e-12)
-        reached_somewhere += ways.any()
+        reached_somewhere += solutions.any()
     assert reached_somewhere >= 2
 
 
@@ -152,8 +152,8 @@ def test_a_free_roll_reaches_what_some_roll_reaches(random):
     for cell, (rho, z) in enumerate(middles):
         T = poses(np.array([rho, 0, z]) @ R + origin, tool_rotations(fibonacci_sphere(30) @ R, rolls))
         reached = inverse_batch(robot, T.reshape(-1, 4, 4)).within_limits.reshape(30, 72, 8).any(axis=(1, 2))
-        assert told.share[cell, 0] == pytest.approx(reached.mean())
-    assert 0 < told.share.min() < 1
+        assert told.reachability[cell, 0] == pytest.approx(reached.mean())
+    assert 0 < told.reachability.min() < 1
 
 
 def test_a_moved_base_changes_no_number():
@@ -162,7 +162,7 @@ def test_a_moved_base_changes_no_number():
     middles = np.array([[0.1, 0.5], [0.3, 0.4], [0.5, 0.6]])
     cells = np.column_stack([middles[:, 0] - 0.02, middles[:, 0] + 0.02, middles[:, 1] - 0.02, middles[:, 1] + 0.02])
     one, other = (map_capability(arm, middles, 100, roll_of(arm, 1)) for arm in (robot, moved))
-    assert one.share == pytest.approx(other.share)
+    assert one.reachability == pytest.approx(other.reachability)
     assert one.manipulability == pytest.approx(other.manipulability, rel=1e-9)
     one, other = (dexterous_core(arm, cells, 50, roll_of(arm, 1), 5000) for arm in (robot, moved))
     assert (one.lower, one.upper, one.poses) == pytest.approx((other.lower, other.upper, other.poses))
@@ -207,4 +207,4 @@ def test_no_random_direction_is_missed_in_the_core_and_the_real_arm_has_none(ran
     core = dexterous_core(robot, cells, 100, roll, 100_000)
     assert core.upper == 0
     middles = np.stack([cells[:, :2].mean(axis=1), cells[:, 2:].mean(axis=1)], axis=1)
-    assert map_capability(robot, middles, 150, roll).share.max() < 1
+    assert map_capability(robot, middles, 150, roll).reachability.max() < 1

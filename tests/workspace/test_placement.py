@@ -104,8 +104,8 @@ def test_the_criterion_is_the_least_over_box_and_cone(random):
     q = found.q[:, places.slot[0]]
     assert found.within_limits[:, places.slot[0]].all()
     assert np.abs(np.linalg.det(jacobian(robot, q))).min() == pytest.approx(places.least[0], rel=1e-9)
-    room = np.minimum(q - robot.lower, robot.upper - q)[:, [0, 1, 2, 4]].min()
-    assert room == pytest.approx(places.room[0], abs=1e-9)
+    limit_margin = np.minimum(q - robot.lower, robot.upper - q)[:, [0, 1, 2, 4]].min()
+    assert limit_margin == pytest.approx(places.limit_margin[0], abs=1e-9)
 
 
 def test_harder_tasks_are_never_easier():
@@ -150,7 +150,7 @@ def test_an_arm_without_limits_serves_what_lies_in_its_shell(height, answer):
     robot = shell_arm()
     task = Task(np.array([0.3, 0.2, 0.1]), np.array([0.0, 0.6, 0.8]), np.pi, -9, 0)
     centre = np.array([0.05, -0.02, height])
-    assert prove_place(robot, task, centre, False, MIXED, roll_of(robot, 1), 400_000)[0] == answer
+    assert prove_place(robot, task, centre, False, MIXED, roll_of(robot, 1), most_poses=400_000)[0] == answer
 
 
 def test_a_tool_aside_is_proven_by_rolls(random):

@@ -15,7 +15,7 @@ from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.robots.robot import Robot
 from er3a.workspace.azimuths import MOST_ARCS, measure, meets, remove
 from er3a.workspace.boundary import border
-from er3a.workspace.causes import describe, relaxations
+from er3a.workspace.causes import Disappears, cause_of, joints_behind, relaxations
 from er3a.workspace.cavities import cavities
 from er3a.workspace.lookup import EMPTY, FILLED, SectionMap
 from er3a.workspace.proof import judge, prove
@@ -135,8 +135,15 @@ def test_the_small_void_at_the_articles_shoulder_is_found():
     assert small.centroid() == pytest.approx([0, 0, 0.16977], abs=0.003)
     assert 4 / 3 * np.pi * 0.025**3 < small.lower < small.upper < 4 / 3 * np.pi * 0.065**3
     assert 0.21 < large.lower < large.upper < 0.26
-    assert describe(relaxations(robot, small)) == "vanishes when joint 3 may exceed +75 deg by 15 deg"
-    assert "joint 3 may fall below −180 deg" in describe(relaxations(robot, large))
+    cause = cause_of(*relaxations(robot, small))
+    assert isinstance(cause, Disappears)
+    assert [(limit.joint, limit.side, limit.limit_deg, limit.by_deg) for limit in cause.limits] == [
+        (3, "upper", pytest.approx(75), 15)
+    ]
+    cause = cause_of(*relaxations(robot, large))
+    limits = cause.limits if isinstance(cause, Disappears) else (cause.most,)
+    assert (3, "lower") in [(limit.joint, limit.side) for limit in limits]
+    assert joints_behind(cause) & {2, 3}
 
 
 def test_the_border_is_where_filled_meets_empty(proven):

@@ -14,9 +14,9 @@ import sys
 from pathlib import Path
 
 from er3a.errors import Er3aError
+from er3a.files.kept_files import half_written
 from er3a.pipeline.check import check_study
 from er3a.pipeline.checksums import corrupted
-from er3a.files.kept_files import half_written
 
 
 def main() -> int:

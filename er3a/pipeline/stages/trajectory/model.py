@@ -10,12 +10,13 @@ from typing import Generic, Literal, TypeVar, get_args
 
 from er3a.collision.pairs import Pair, PairOverlaps
 from er3a.findings import Finding
+from er3a.kinematics.configuration import BranchLabel
+from er3a.kinematics.singularity import SingularityType
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.tables import Flags, Reals, Table, Texts, column, per_joint, vector
 from er3a.planning.avoidance import StrategyName
 from er3a.planning.avoidance.strategies import NotUsable
-from er3a.planning.intervals import AboveLimit, BelowLimit, OutOfReach, TooFast
-from er3a.planning.near_singular import SingularityType
+from er3a.planning.intervals import AboveLimit, BelowLimit, PathOutOfReach, TooFast
 
 PathKind = Literal["joint", "joint_sequence", "line", "arc", "sequence", "table"]
 PathVerdict = Literal["unreachable", "leaves limits", "collides", "too fast", "singular", "near-singular", "safe"]
@@ -216,14 +217,14 @@ class PathSummary:
     duration_s: float
     samples: int
     length_m: float
-    branches: tuple[str, ...]
+    branches: tuple[BranchLabel, ...]
     half_turns: tuple[HalfTurn, ...]
     corner_deviation_mm: float | None
     corner_deviation_deg: float | None
     repeated_rows: tuple[int, ...]
     start_turn_deg: tuple[float, ...] | None
     singularities: tuple[Singularity, ...]
-    unreachable: tuple[Stretch[OutOfReach], ...]
+    unreachable: tuple[Stretch[PathOutOfReach], ...]
     out_of_limits: tuple[Stretch[AboveLimit | BelowLimit], ...]
     too_fast: tuple[Stretch[TooFast], ...]
     jumps: tuple[Jump, ...]

@@ -12,7 +12,8 @@ from matplotlib import colormaps
 from matplotlib.colors import LogNorm
 
 from er3a.pipeline.messages.say import say
-from er3a.pipeline.messages.trajectory import advice, path_text, type_word, verdict_word
+from er3a.pipeline.messages.trajectory import advice, path_text, type_word
+from er3a.pipeline.messages.trajectory_verdict import verdict_word
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.trajectory.model import (
     AvoidanceRows,

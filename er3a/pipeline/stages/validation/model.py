@@ -4,14 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self, get_args
 
 import numpy as np
 
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.validation.diagnosis_model import Corrections, Residuals, SetCalibration, SetDiagnosis
-from er3a.pipeline.stages.validation.findings import CheckSubject, KeyPose, ModelGroup, Note, Validated
+from er3a.pipeline.stages.validation.findings import (
+    CheckSubject,
+    KeyPose,
+    ModelGroup,
+    NearSingularLeftOut,
+    Note,
+    SelfCheck,
+    Validated,
+)
 from er3a.pipeline.tables import (
     Findings,
     Flags,
@@ -27,43 +35,82 @@ from er3a.pipeline.tables import (
 from er3a.references.subjects import ReferenceSubject
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade
 
-CheckStatus = Literal["pass", "fail", "no_reference", "conflict"]
-MODEL_GROUPS: tuple[ModelGroup, ...] = ("table_sanity", "round_trips")
+MODEL_GROUPS: tuple[ModelGroup, ...] = get_args(ModelGroup)
 
 
 @dataclass(frozen=True)
-class Check:
-    """One comparison.
+class _Compared:
+    """What the model says (``measured``) beside what it should; ``difference``: measured - expected."""
 
-    Attributes
-    ----------
-    status : ``conflict`` is a reference that the model misses while meeting another that contradicts it
-    measured : what the model says; difference : measured - expected; both None where there is nothing to compare
-    source, grade : None for checks of the model against itself
-    """
-
-    subject: CheckSubject
-    group: str
-    reference_set: str | None
-    status: CheckStatus
-    measured: float | None
-    expected: float | None
-    difference: float | None
-    tolerance: float | None
+    measured: float
+    expected: float
+    difference: float
+    tolerance: float
     unit: str
-    source: str | None
-    grade: Grade | None
-    note: Note | None = None
 
     @property
-    def is_of_model(self) -> bool:
-        """Whether it holds the model against itself."""
-        return self.group in MODEL_GROUPS
+    def tolerances_off(self) -> float:
+        """How many tolerances the difference is."""
+        return abs(self.difference) / self.tolerance
+
+
+@dataclass(frozen=True)
+class ModelCheck(_Compared):
+    """A check of the model against itself, which needs no document."""
+
+    subject: SelfCheck
+    group: ModelGroup
+    status: Literal["pass", "fail"]
+    note: NearSingularLeftOut | None = None
+    reference_set: None = None
+    source: None = None
+    grade: None = None
+    is_authoritative: ClassVar[bool] = True
+
+
+@dataclass(frozen=True)
+class ReferenceCheck(_Compared):
+    """A check against a reference; ``conflict`` is one that the model misses while meeting another that contradicts
+    it."""
+
+    subject: ReferenceSubject
+    group: str
+    status: Literal["pass", "fail", "conflict"]
+    reference_set: str
+    source: str
+    grade: Grade
+    note: None = None
 
     @property
     def is_authoritative(self) -> bool:
-        """Whether the verdict rests on it: a trustworthy document, or the model itself."""
-        return self.grade in AUTHORITATIVE_GRADES or self.is_of_model
+        """Whether the verdict may rest on it."""
+        return self.grade in AUTHORITATIVE_GRADES
+
+
+@dataclass(frozen=True)
+class Unjudged:
+    """What could be checked, had the sources, or the robot's file, a value."""
+
+    subject: CheckSubject
+    group: str
+    unit: str
+    note: Note
+    status: Literal["no_reference"] = "no_reference"
+    reference_set: str | None = None
+    measured: float | None = None
+    source: str | None = None
+    grade: Grade | None = None
+    expected: None = None
+    difference: None = None
+    tolerance: None = None
+
+    @property
+    def is_authoritative(self) -> bool:
+        """Whether the verdict could rest on it."""
+        return self.grade in AUTHORITATIVE_GRADES or self.group in MODEL_GROUPS
+
+
+Check = ModelCheck | ReferenceCheck | Unjudged
 
 
 @dataclass(frozen=True)

@@ -68,7 +68,7 @@ def record(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
             send_motion(stream, corrected, times, q, entity=f"{STAGE}/corrected")
         for start, rows in zip(starts, stations):
             _log_station(stream, float(start), rows, 0.012 * size_of(robot))
-        worst = np.array([np.nanmax(rows.deviation_mm) for rows in stations])
+        worst = np.array([np.fmax.reduce(rows.deviation_mm) for rows in stations])
         at = (starts[:, None] + [0, HOLD_S, HOLD_S + 0.01]).ravel()
         curve = np.repeat(worst, 3)
         curve[2::3] = np.nan
