@@ -16,8 +16,8 @@ from er3a.files.robot_file import Name, Text
 from er3a.files.units import JointsDeg, PositionMm, RpyDeg, Triple
 from er3a.files.yaml_file import StrictModel, load
 from er3a.geometry.transforms import transform
-from er3a.numerics.arrays import Reals
 from er3a.kinematics.configuration import BranchLabel
+from er3a.numerics.arrays import Reals
 from er3a.planning.commands import (
     Command,
     CommandSource,
