@@ -11,16 +11,19 @@ ARGS   ?=
 .DEFAULT_GOAL := help
 # A run starts dozens of short processes: without compiled modules kept on disk each would compile them anew.
 unexport PYTHONDONTWRITEBYTECODE
-.PHONY: help run test view estimate archive lint format schema words lock clean distclean campaigns
+.PHONY: help run test test-all view estimate archive lint format schema words lock clean distclean campaigns
 
 help:  ## list the targets
-	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):[^#]*## /  make \1\t/' | expand -t 18
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## /  make \1\t/' | expand -t 18
 
 run: $(VENV)/run.stamp  ## set up, run the study, write reports/index.html (ARGS="--cores 1", STUDY=config/small.yaml)
 	@$(BIN)/python workflow/scripts/run.py --study $(STUDY) -- $(ARGS)
 
-test: $(VENV)/dev.stamp  ## set up and run the tests (ARGS="-k workspace")
+test: $(VENV)/dev.stamp  ## set up and run the fast tests (ARGS="-k workspace")
 	@$(BIN)/python -m pytest $(ARGS)
+
+test-all: $(VENV)/dev.stamp  ## set up and run all tests, the long ones too
+	@$(BIN)/python -m pytest -m "" $(ARGS)
 
 view: $(VENV)/run.stamp  ## open the recordings in the Rerun viewer (ROBOT=er3a_c60 for one arm)
 	@$(BIN)/er3a view $(ROBOT)
@@ -46,7 +49,7 @@ schema: $(VENV)/run.stamp  ## write the JSON schemas again from the pydantic mod
 	$(BIN)/er3a schema
 
 words: $(VENV)/dev.stamp  ## collect the texts to be translated into er3a/pipeline/messages/locale/
-	$(BIN)/pybabel -q extract -F er3a/pipeline/messages/locale/babel.cfg -k said -k tr -k N_ --add-location=file --sort-by-file \
+	$(BIN)/pybabel -q extract -F er3a/pipeline/messages/locale/babel.cfg --no-default-keywords -k tr -k N_ -k _ -k gettext -k ngettext:1,2 -k pgettext:1c,2 -k npgettext:1c,2,3 --add-location=file --sort-by-file \
 		--omit-header --no-wrap -o er3a/pipeline/messages/locale/er3a.pot .
 	$(BIN)/pybabel -q update -D er3a -i er3a/pipeline/messages/locale/er3a.pot -d er3a/pipeline/messages/locale -l zh --no-fuzzy-matching --no-wrap \
 		--ignore-obsolete --ignore-pot-creation-date

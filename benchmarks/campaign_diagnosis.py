@@ -10,6 +10,8 @@ import numpy as np
 from er3a import load_references, load_robot
 from er3a.diagnosis.mutations import Outcome, mutations_of, noisy, try_mutation
 from er3a.diagnosis.ranking import rank, usable
+from er3a.pipeline.messages import diagnosis as _diagnosis  # noqa: F401
+from er3a.pipeline.messages.say import say
 
 ROBOTS = ("er3a_c60", "er3_600")
 NOISE_MM, DRAWS, FALSE_ALARM_DRAWS, SEED = 0.5, 3, 500, 20261120
@@ -51,7 +53,7 @@ def row(name: str, words: str, found: list[Outcome]) -> str:
 def by_kind(found: list[Outcome]) -> list[str]:
     kinds = defaultdict(list)
     for outcome in found:
-        kinds[outcome.kind].append(outcome)
+        kinds[outcome.fault.kind.replace("_", " ")].append(outcome)
     lines = ["| fault | cases | identifiable | ranked first | largest set |", "|---|---|---|---|---|"]
     for kind, own in sorted(kinds.items()):
         seen = [outcome for outcome in own if outcome.identifiable]
@@ -83,7 +85,7 @@ def table() -> str:
         for words, noise, draws in (("exact", 0.0, 1), (f"noise {NOISE_MM:g} mm", NOISE_MM, DRAWS)):
             found = outcomes(name, noise, draws, random)
             every += found
-            missed += [f"{name}, {words}: {o.fault}" for o in found if o.identifiable and not o.found]
+            missed += [f"{name}, {words}: {say(o.fault)}" for o in found if o.identifiable and not o.found]
             lines.append(row(name, words, found))
     lines += ["", "All of these by family of fault:", "", *by_kind(every), ""]
     counted = sorted({f"- {words} ({missed.count(words)})" for words in missed})

@@ -26,8 +26,8 @@ from eaik.IK_DH import DhRobot
 from benchmarks.campaign_kinematics import pinocchio_model
 from er3a import forward, inverse_batch, jacobian, load_robot, solve
 from er3a.geometry.transforms import rotation_angle
-from er3a.kinematics.batch import BatchSolutions
 from er3a.kinematics.chain import constant_links
+from er3a.kinematics.solutions import Solutions
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 POSES, FORWARD_POSES, NUMERICAL_POSES, PEER_POSES, SEED, ROUNDS = 100_000, 1_000_000, 10_000, 5_000, 20261120, 7
@@ -74,7 +74,7 @@ def inverse_rows(robot, random) -> list[str]:
         lambda: inverse_batch(robot, T, turns=True),
     )
     solved = inverse_batch(robot, T)
-    index, slot = np.nonzero(solved.valid)
+    index, slot = np.nonzero(solved.solved)
     accuracy = errors(forward(robot, solved.q[index, slot]), T[index])
     asked = T[[n for n, _ in rows]]
     lines = [
@@ -89,7 +89,7 @@ def two_thread_rows(robot, T: np.ndarray, q: np.ndarray) -> list[str]:
     """Two threads on two processors against one, in turn, and how much more work two do in all."""
     work = {1: np.inf, 2: np.inf}
 
-    def run(threads: int) -> BatchSolutions:
+    def run(threads: int) -> Solutions:
         start = time.process_time()
         solved = inverse_batch(robot, T, threads=threads)
         work[threads] = min(work[threads], time.process_time() - start)

@@ -18,7 +18,7 @@ CAMPAIGNS = (
     "singularities",
     "speed",
     "diagnosis",
-    "identification",
+    "calibration",
     "workspace",
     "paths",
     "clearance",

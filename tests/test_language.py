@@ -1,4 +1,4 @@
-"""Texts in the reader's language: composed, kept with results, said again."""
+"""Texts in the reader's language."""
 
 from __future__ import annotations
 
@@ -7,13 +7,16 @@ import gettext
 import pytest
 
 from er3a.pipeline.messages import language
-from er3a.pipeline.messages.language import joined, keeps_sentences, know, note_written, said, sentences, tr
+from er3a.pipeline.messages.language import tr
+from er3a.pipeline.messages.say import counted, joined, sentence, word
 
 GERMAN = {
     "the {joint} is {angle:.1f} deg off": "{angle} deg daneben: {joint}",
     "elbow": "Ellbogen",
-    "{first}; {rest}": "{first} | {rest}",
+    "; ": " | ",
     "{count} faults": "{count} Fehler",
+    "{count} fault of {size:.2f} mm": "{count} Fehler von {size} mm",
+    "{count} faults of {size:.2f} mm": "{count} Fehler von {size} mm",
 }
 
 
@@ -21,38 +24,26 @@ class German(gettext.NullTranslations):
     def gettext(self, message: str) -> str:
         return GERMAN.get(message, message)
 
+    def ngettext(self, msgid1: str, msgid2: str, n: int) -> str:
+        return GERMAN[msgid1 if n == 1 else msgid2]
+
 
 @pytest.fixture
 def german(monkeypatch):
     monkeypatch.setattr(language, "_catalogue", German())
-    monkeypatch.setattr(language, "_read", {})
 
 
-@keeps_sentences
-def finding() -> tuple[str, dict]:
-    said("{count} faults", count=9)  # never written
-    text = joined([said("the {joint} is {angle:.1f} deg off", joint="elbow", angle=2.04), "", "x"])
-    note_written({"a": [text, 3]})
-    return text, sentences()
+def test_a_translation_is_filled_in_with_the_formats_of_the_english_text(german):
+    off = sentence("off", "the {joint} is {angle:.1f} deg off", joint=word("joint", {"j3": "elbow"}, "j3"), angle=2.04)
+    assert off == "2.0 deg daneben: Ellbogen"
+    assert joined([off, "", "x"]) == "2.0 deg daneben: Ellbogen | x"
+    for count in (1, 2):
+        text = counted("f", "{count} fault of {size:.2f} mm", "{count} faults of {size:.2f} mm", count, size=0.5)
+        assert text == f"{count} Fehler von 0.50 mm"
 
 
-def test_a_finding_is_english_and_can_be_said_again(german):
-    text, kept = finding()
-    assert text == "the elbow is 2.0 deg off; x"
-    assert tr(text) == text
-    know(kept)
-    assert tr(text) == "2.0 deg daneben: Ellbogen | x"
-    assert "9 faults" not in kept
-
-
-def test_names_from_input_files_are_no_words(german):
-    assert tr("{own_name}: {joint}", own_name="elbow", joint="elbow") == "elbow: Ellbogen"
-
-
-def test_equal_findings_are_kept_alike_whatever_was_found_before():
-    assert finding() == finding()
-    note_written("the elbow is 2.0 deg off; x")
-    assert sentences() == {}
+def test_parts_are_no_words(german):
+    assert tr("{name}: {joint}", name="elbow", joint="elbow") == "elbow: elbow"
 
 
 def test_words_numbers_and_names(german):
@@ -60,6 +51,7 @@ def test_words_numbers_and_names(german):
     assert tr("EFORT {") == "EFORT {"
     assert tr("") == ""
     assert tr("{count} faults", count=3) == "3 Fehler"
+    assert word("joint", {"j3": "elbow"}, "j4") == "j4"
     assert joined([]) == ""
     assert joined(["one"]) == "one"
 

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
-from er3a.files.target_file import MOST_TARGETS, Target, load_targets
+from er3a.files.target_file import MOST_TARGETS, TargetEntry, load_targets, read_targets
 from er3a.kinematics.forward import forward
 
 ROBOT = load_robot("er3_600")
@@ -31,7 +31,7 @@ class PlainDumper(yaml.SafeDumper):
 
 
 def pose(**changes) -> np.ndarray:
-    return Target(**(PLACE | changes)).pose(ROBOT)
+    return TargetEntry(**(PLACE | changes)).target(ROBOT).T
 
 
 @given(angles)
@@ -72,18 +72,18 @@ def test_position_is_in_metres_inside():
 
 def test_joint_angles_give_the_pose_of_forward_kinematics():
     q_deg = [0, 45, -30, 0, 60, 0]
-    np.testing.assert_array_equal(Target(name="a", q_deg=q_deg).pose(ROBOT), forward(ROBOT, np.radians(q_deg)))
+    np.testing.assert_array_equal(TargetEntry(name="a", q_deg=q_deg).target(ROBOT).T, forward(ROBOT, np.radians(q_deg)))
 
 
 def test_reference_is_zeros_unless_given():
-    assert not Target(**TURNED).reference().any()
-    np.testing.assert_allclose(Target(**TURNED, q_ref_deg=[180, 0, 0, 0, 0, 0]).reference()[0], np.pi)
+    assert not TargetEntry(**TURNED).target(ROBOT).q_ref.any()
+    np.testing.assert_allclose(TargetEntry(**TURNED, q_ref_deg=[180, 0, 0, 0, 0, 0]).target(ROBOT).q_ref[0], np.pi)
 
 
 @pytest.mark.parametrize("name", ["er3a_c60", "er3a_c60_article", "er3_600"])
 def test_shipped_files_hold_the_article_target(name):
-    targets = {target.name: target for target in load_targets(DATA / f"{name}.yaml")}
-    T = targets["article_target"].pose(load_robot(name))
+    targets = {target.name: target for target in read_targets(DATA / f"{name}.yaml")}
+    T = targets["article_target"].target(load_robot(name)).T
     np.testing.assert_allclose(T[:3, 3], [0.5, 0.2, 0.7], atol=1e-15)
     np.testing.assert_allclose(T[:3, :3], Rotation.from_euler("ZYX", [0, 90, 0], degrees=True).as_matrix(), atol=1e-15)
     np.testing.assert_array_equal(targets["article_example"].q_deg, [0, 45, -30, 0, 60, 0])
@@ -133,7 +133,7 @@ def test_wrong_file_is_refused_with_file_and_field(case, tmp_path):
     content = {"kind": "targets", "targets": targets}
     path.write_text(yaml.dump(content, Dumper=PlainDumper), encoding="utf-8")
     with pytest.raises(InputError) as caught:
-        load_targets(path)
+        read_targets(path)
     assert caught.value.file == str(path)
     assert caught.value.field == field
     assert words in str(caught.value)
@@ -141,11 +141,11 @@ def test_wrong_file_is_refused_with_file_and_field(case, tmp_path):
 
 @pytest.mark.parametrize("rpy", [[0, 0, 0], [0.5, 90, 0], [0, 5, 0], [0, 3, 6], [0, 0.1, 0], [-180, 6.2, 180]])
 def test_small_angles_that_are_degrees_pass(rpy):
-    assert Target(**PLACE, rpy_deg=rpy).rpy_deg == rpy
+    assert TargetEntry(**PLACE, rpy_deg=rpy).rpy_deg == rpy
 
 
 def test_target_at_the_origin_passes():
-    assert Target(name="a", xyz_mm=[0, 0, 0], rpy_deg=[0, 0, 0]).xyz_mm == [0, 0, 0]
+    assert TargetEntry(name="a", xyz_mm=[0, 0, 0], rpy_deg=[0, 0, 0]).xyz_mm == [0, 0, 0]
 
 
 TABLE = "name,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg,note\na,400,0,300,0,90,0,first\nb,400,50,300,10,20,30,\n"
@@ -163,9 +163,9 @@ def table(tmp_path):
 
 
 def test_table_holds_the_same_targets_as_yaml(table):
-    first, second = load_targets(table(TABLE))
-    assert first == Target(**TURNED, note="first")
-    assert second == Target(name="b", xyz_mm=[400.0, 50, 300], rpy_deg=[10.0, 20, 30])
+    first, second = read_targets(table(TABLE))
+    assert first == TargetEntry(**TURNED, note="first")
+    assert second == TargetEntry(name="b", xyz_mm=[400.0, 50, 300], rpy_deg=[10.0, 20, 30])
 
 
 @pytest.mark.parametrize(
@@ -179,10 +179,10 @@ def test_table_holds_the_same_targets_as_yaml(table):
 def test_table_takes_each_form_of_orientation(table, form, header, values):
     reference = ",".join(f"q{joint}_ref_deg" for joint in range(1, 7))
     text = f"name,x_mm,y_mm,z_mm,{header},{reference}\na,400,0,300,{','.join(map(str, values))},1,2,3,4,5,60\n"
-    (target,) = load_targets(table(text))
+    (target,) = load_targets(table(text), ROBOT)
     expected = [values[0:3], values[3:6], values[6:9]] if form == "matrix" else values
-    np.testing.assert_allclose(target.pose(ROBOT), pose(**{form: expected}))
-    assert target.q_ref_deg == [1, 2, 3, 4, 5, 60]
+    np.testing.assert_allclose(target.T, pose(**{form: expected}))
+    assert target.q_ref_deg == (1, 2, 3, 4, 5, 60)
 
 
 @pytest.mark.parametrize(
@@ -201,7 +201,7 @@ def test_table_takes_each_form_of_orientation(table, form, header, values):
 def test_bad_table_names_row_and_column(table, old, new, where, what):
     path = table(TABLE.replace(old, new))
     with pytest.raises(InputError, match=what) as caught:
-        load_targets(path)
+        read_targets(path)
     assert caught.value.field == where
     assert str(caught.value).startswith(f"{path}: {where}: ")
 
@@ -209,13 +209,13 @@ def test_bad_table_names_row_and_column(table, old, new, where, what):
 def test_table_with_quaternion_off_unit_length_names_its_row(table):
     path = table("name,x_mm,y_mm,z_mm,qw,qx,qy,qz\na,400,0,300,1,0,0,0\nb,400,0,300,1,1,0,0\n")
     with pytest.raises(InputError, match=r"row 3, column qw, qx, qy, qz: the quaternion's length is 1.41421"):
-        load_targets(path)
+        read_targets(path)
 
 
 def test_table_without_rows_is_refused(table):
     with pytest.raises(InputError, match=r"some\.csv: rows: the list is empty"):
-        load_targets(table(TABLE.splitlines()[0] + "\n"))
+        read_targets(table(TABLE.splitlines()[0] + "\n"))
     with pytest.raises(InputError, match=r"some\.csv: header: the file is empty"):
-        load_targets(table(""))
+        read_targets(table(""))
     with pytest.raises(InputError, match=r"some\.csv: header: its columns are separated by semicolons"):
-        load_targets(table(TABLE.replace(",", ";")))
+        read_targets(table(TABLE.replace(",", ";")))

@@ -32,8 +32,8 @@ from er3a.calibration.outcomes import (
 )
 from er3a.calibration.parameters import Parameter, jacobian, moved
 from er3a.kinematics.table_batch import Tables, robot_of, tables_of
+from er3a.numerics.arrays import Reals
 from er3a.references.predict import predict_tables
-from er3a.references.quantities import Reals
 from er3a.references.reference import ReferenceSet
 from er3a.robots.robot import Robot
 

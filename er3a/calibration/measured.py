@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.errors import InputError
+from er3a.numerics.arrays import Reals
 from er3a.references.quantities import (
     COORDINATES,
     MM,
@@ -17,7 +18,6 @@ from er3a.references.quantities import (
     PointCoordinate,
     Pose,
     Quantity,
-    Reals,
     SectionCoordinate,
 )
 from er3a.references.reference import ReferenceSet, expected_of, quantities_of

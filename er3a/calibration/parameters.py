@@ -10,8 +10,9 @@ import numpy as np
 
 from er3a.calibration.outcomes import Held, LevelName, MovesNothing, NotToldApart
 from er3a.kinematics.table_batch import Tables, join, tables_of
+from er3a.numerics.arrays import Reals
 from er3a.references.predict import predict_tables
-from er3a.references.quantities import MM, Quantity, Reals
+from er3a.references.quantities import MM, Quantity
 from er3a.robots.robot import Robot
 
 LEVELS: tuple[LevelName, ...] = ("lengths", "lengths_and_offsets", "all_entries")

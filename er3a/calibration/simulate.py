@@ -12,7 +12,8 @@ from er3a.calibration.measured import Measurement
 from er3a.calibration.parameters import Parameter, moved
 from er3a.kinematics.forward import forward
 from er3a.kinematics.table_batch import robot_of, tables_of
-from er3a.references.quantities import MM, Pose, Reals
+from er3a.numerics.arrays import Reals
+from er3a.references.quantities import MM, Pose
 from er3a.robots.robot import Robot
 
 LENGTH_ERROR_M = 5e-4

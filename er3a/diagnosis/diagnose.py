@@ -21,7 +21,8 @@ from er3a.diagnosis.fault_kinds import Faults
 from er3a.diagnosis.next_measurement import what_decides
 from er3a.diagnosis.ranking import MEETS, UNITS, Ranking, rank, usable
 from er3a.kinematics.table_batch import robot_of
-from er3a.references.quantities import Reals, Unit
+from er3a.numerics.arrays import Reals
+from er3a.references.quantities import Unit
 from er3a.references.reference import Reference, ReferenceSet, expected_of, lengths_of, vectors_of
 from er3a.robots.robot import Robot
 
@@ -145,7 +146,7 @@ def _described(ranking: Ranking, group: tuple[int, ...], robot: Robot) -> Hypoth
         unit=unit,
         explains=bool((np.abs(after) <= uncertainty * MEETS).all()),
         indistinguishable_from=tuple(pool.faults[i] for i in group[1:]),
-        to_decide=what_decides(pool.tables[list(group)], robot),
+        to_decide=what_decides(pool.tables[np.array(group)], robot),
         score=float(ranking.score[best]),
         corrected=robot_of(pool.tables, best, robot),
     )

@@ -32,7 +32,8 @@ from er3a.diagnosis.fault_kinds import (
     WrongUnit,
 )
 from er3a.kinematics.table_batch import COLUMNS, Tables
-from er3a.references.quantities import MM, Reals
+from er3a.numerics.arrays import Reals
+from er3a.references.quantities import MM
 
 JOINTS = range(6)
 RADIANS_PER_DEGREE = np.pi / 180

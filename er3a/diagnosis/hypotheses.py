@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from er3a.diagnosis.fault_kinds import Faults
 from er3a.diagnosis.faults import Repair, Slope, repairs_of, slopes
 from er3a.kinematics.table_batch import Tables, join
-from er3a.references.quantities import Reals
+from er3a.numerics.arrays import Reals
 
 FREE_NUMBER = 1.5
 PROBE_M = 1e-3

@@ -14,7 +14,8 @@ from er3a.diagnosis.conclusions import (
     OrientationDecides,
 )
 from er3a.kinematics.table_batch import Tables, frames_of
-from er3a.references.quantities import MM, Pose, Reals, Side
+from er3a.numerics.arrays import Reals
+from er3a.references.quantities import MM, Pose, Side
 from er3a.robots.robot import Robot
 
 STEP_DEG = 45.0

@@ -26,8 +26,9 @@ from numpy.typing import NDArray
 from er3a.diagnosis.fault_kinds import Fault, rounded
 from er3a.diagnosis.hypotheses import Pool, evaluate
 from er3a.kinematics.table_batch import Tables, tables_of
+from er3a.numerics.arrays import Reals
 from er3a.references.predict import predict_tables
-from er3a.references.quantities import Extreme, Reals, Speed, Unit
+from er3a.references.quantities import Extreme, Speed, Unit
 from er3a.references.reference import Reference, ReferenceSet, conflicts, expected_of, quantities_of
 from er3a.robots.robot import Robot
 

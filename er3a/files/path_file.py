@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, get_args
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -16,14 +16,15 @@ from er3a.files.robot_file import Name, Text
 from er3a.files.units import JointsDeg, PositionMm, RpyDeg, Triple
 from er3a.files.yaml_file import StrictModel, load
 from er3a.geometry.transforms import transform
+from er3a.kinematics.configuration import BranchLabel
 from er3a.numerics.arrays import Reals
 from er3a.planning.commands import (
     Command,
+    CommandSource,
     JointMoveCommand,
     JointSequenceCommand,
     JointTableCommand,
     SegmentCommand,
-    Source,
     Start,
     ToolMoveCommand,
     ToolSequenceCommand,
@@ -105,7 +106,7 @@ class JointPath(NamedPath):
             )
         return self
 
-    def command(self, source: Source) -> Command:
+    def command(self, source: CommandSource) -> Command:
         """The path in SI units."""
         return JointMoveCommand(
             Start(joints=_radians(self.start_deg), after=self.after),
@@ -127,7 +128,7 @@ class JointSequencePath(Profiled):
     points_deg: Annotated[list[JointsDeg], Field(min_length=2)]
     blend_deg: Blend = 0.0
 
-    def command(self, source: Source) -> Command:
+    def command(self, source: CommandSource) -> Command:
         """The path in SI units."""
         points, blend = np.radians(self.points_deg), float(np.radians(self.blend_deg))
         return JointSequenceCommand(points, blend, self.duration_s, self.ramp, source=source)
@@ -186,7 +187,7 @@ class LinePath(ToolStart, LineTo):
 
     kind: Literal["line"]
 
-    def command(self, source: Source) -> Command:
+    def command(self, source: CommandSource) -> Command:
         """The path in SI units."""
         return ToolMoveCommand(self.start_command(), self.segment(), self.duration_s, self.ramp, source=source)
 
@@ -196,7 +197,7 @@ class ArcPath(ToolStart, ArcTo):
 
     kind: Literal["arc"]
 
-    def command(self, source: Source) -> Command:
+    def command(self, source: CommandSource) -> Command:
         """The path in SI units."""
         return ToolMoveCommand(self.start_command(), self.segment(), self.duration_s, self.ramp, source=source)
 
@@ -230,7 +231,7 @@ class SequencePath(ToolStart):
             raise ValueError(f"segments[{last}].blend_mm: the last segment has no corner at its end | Remove it")
         return self
 
-    def command(self, source: Source) -> Command:
+    def command(self, source: CommandSource) -> Command:
         """The path in SI units."""
         segments = tuple(replace(part.segment(), blend=part.blend_mm / 1000) for part in self.segments)
         return ToolSequenceCommand(self.start_command(), segments, self.duration_s, self.ramp, source=source)
@@ -251,7 +252,7 @@ class TablePath(NamedPath):
     start_branch: Text | None = None
     half_turn_axis: Triple | None = None
 
-    def command(self, source: Source) -> Command:
+    def command(self, source: CommandSource) -> Command:
         """The table's points in SI units, without those that repeat the point before.
 
         Raises
@@ -338,8 +339,9 @@ def _axis(axis: list[float] | None) -> Reals | None:
 
 
 def _branch(words: str | None) -> str | None:
-    """The code of a branch: "front, elbow up, flip" is front_elbow_up_flip."""
-    return words and re.sub(r"[ ,]+", "_", words)
+    """The code of a branch: "front, elbow up, flip" is front_elbow_up_flip; other words stay as they are."""
+    code = re.sub(r"[ ,]+", "_", words or "")
+    return code if code in get_args(BranchLabel) else words
 
 
 def _rates(degrees: list[float] | None) -> Reals | float:

@@ -19,7 +19,7 @@ BOTTOM_ROW_TOLERANCE = 1e-12
 FARTHEST_M = 100.0  # from the origin: farther off, a position was meant in mm
 
 
-def cos_sin(angle: Reals) -> tuple[Reals, Reals]:
+def cos_sin(angle: float | Reals) -> tuple[Reals, Reals]:
     """Cosine and sine, exactly 0 where the angle is a right angle to rounding (``cos(pi/2)`` is 6e-17 otherwise)."""
     c, s = np.cos(angle), np.sin(angle)
     return np.where(np.abs(c) < 1e-15, 0.0, c), np.where(np.abs(s) < 1e-15, 0.0, s)
@@ -85,7 +85,8 @@ def rotation_angle(R_a: Reals, R_b: Reals) -> Reals:
     """
     R = np.swapaxes(R_a, -1, -2) @ R_b
     skew = np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1)
-    return np.arctan2(np.linalg.norm(skew, axis=-1), np.trace(R, axis1=-2, axis2=-1) - 1.0)
+    angle: Reals = np.arctan2(np.linalg.norm(skew, axis=-1), np.trace(R, axis1=-2, axis2=-1) - 1.0)
+    return angle
 
 
 def as_floats(values: Reals, argument: str) -> Reals:
@@ -143,7 +144,7 @@ def _fault_of(T: Reals) -> str:
 
 
 @kernel
-def _all_rigid(T):
+def _all_rigid(T: Reals) -> bool:
     """Whether all matrices (N, 4, 4) are rigid transforms, not too far off."""
     for n in range(T.shape[0]):
         last = abs(T[n, 3, 0]) + abs(T[n, 3, 1]) + abs(T[n, 3, 2]) + abs(T[n, 3, 3] - 1.0)

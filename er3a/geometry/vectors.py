@@ -63,11 +63,13 @@ def signed_angle(start: Vector, end: Vector, axis: Vector) -> float:
     Projecting first, by vector products, keeps all digits where both vectors nearly lie on the axis (wrist aligned).
     """
     start, end = cross(axis, start), cross(axis, end)
-    return np.arctan2(dot(axis, cross(start, end)), dot(start, end))
+    angle: float = np.arctan2(dot(axis, cross(start, end)), dot(start, end))
+    return angle
 
 
 @kernel
 def unsigned_angle(a: Vector, b: Vector) -> float:
     """Angle (rad) between two vectors, 0 to pi."""
     c = cross(a, b)
-    return np.arctan2(np.sqrt(dot(c, c)), dot(a, b))
+    angle: float = np.arctan2(np.sqrt(dot(c, c)), dot(a, b))
+    return angle

@@ -54,7 +54,7 @@ def bend_of_wrist(robot: Robot, q: Reals) -> Reals:
     """By how much (rad, signed) joint 5 of arms (..., 6) is away from where axes 4 and 6 are in line."""
     arm = wrist_partitioned_arm(robot)
     w = [tuple(axis) for axis in arm.axes.tolist()]
-    bend = robot.direction[4] * q[..., 4] + robot.offset[4] + signed_angle(w[3], w[5], w[4])
+    bend: Reals = robot.direction[4] * q[..., 4] + robot.offset[4] + signed_angle(w[3], w[5], w[4])
     return bend - np.pi * np.round(bend / np.pi)
 
 
@@ -119,7 +119,7 @@ def _in_line(robot: Robot, T: Reals, q: Reals) -> Reals | None:
         R = T[:3, :3] @ reached[:3, :3].T  # a small turn, so its sine will do
         turn = [R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]
         miss = np.append(T[:3, 3] - reached[:3, 3], np.multiply(turn, 0.5))
-        far = max(np.linalg.norm(miss[:3]), np.linalg.norm(miss[3:]))
+        far = float(max(np.linalg.norm(miss[:3]), np.linalg.norm(miss[3:])))
         if far < least:
             best, least = q.copy(), far
         if far < ROUNDING or abs(far - before) < SETTLED * far:

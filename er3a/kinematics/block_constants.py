@@ -91,14 +91,14 @@ def block_constants(
     in_tool = tool_rotation.T @ end
     half_sum, half_difference = (b + c) / 2, (b - c) / 2
     return BlockConstants(
-        to_frame_1=tuple(map(_floats, frame_1)),
-        origin=_floats(origin),
-        wrist_in_tool=_floats(wrist_in_tool),
-        axis_6_in_tool=_floats(in_tool[:, 2]),
-        beside_6_in_tool=_floats(in_tool[:, 0]),
+        to_frame_1=(_vector(frame_1[0]), _vector(frame_1[1]), _vector(frame_1[2])),
+        origin=_vector(origin),
+        wrist_in_tool=_vector(wrist_in_tool),
+        axis_6_in_tool=_vector(in_tool[:, 2]),
+        beside_6_in_tool=_vector(in_tool[:, 0]),
         cos_12=_clean(cos_12),
         sin_12=float(sin_12),
-        point_2=_floats(plane @ (points[1] - origin)),
+        point_2=_point(plane @ (points[1] - origin)),
         sideways=_clean(w2 @ (wrist - origin)),
         upper_arm=float(np.linalg.norm(upper_arm)),
         forearm=float(np.linalg.norm(forearm)),
@@ -122,8 +122,14 @@ def block_constants(
     )
 
 
-def _floats(values: Reals) -> tuple[float, ...]:
-    return tuple(_clean(value) for value in values)
+def _vector(values: Reals) -> Vector:
+    x, y, z = map(_clean, values)
+    return x, y, z
+
+
+def _point(values: Reals) -> tuple[float, float]:
+    x, y = map(_clean, values)
+    return x, y
 
 
 def _clean(value: float) -> float:

@@ -11,11 +11,13 @@ joints, boundaries and why a pose is refused.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from er3a.geometry.angles import TURN
 from er3a.geometry.transforms import FARTHEST_M, ORTHONORMAL_TOLERANCE
 from er3a.geometry.vectors import Vector
-from er3a.kinematics.block_constants import EDGE
+from er3a.kinematics.block_constants import EDGE, BlockConstants
+from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.fast_math import arctan2
 from er3a.numerics.jit import kernel
 from er3a.robots.joint_limits import LIMIT_TOLERANCE
@@ -32,7 +34,20 @@ _VALID, _WITHIN, _PAIR_ROWS = 12, 13, 15  # two slots of a wrist: six angles eac
 
 
 @kernel
-def solve_blocks(arm, direction, offset, lower, upper, T, q_ref, q, valid, within, rigid, marked):
+def solve_blocks(
+    arm: BlockConstants,
+    direction: Reals,
+    offset: Reals,
+    lower: Reals,
+    upper: Reals,
+    T: Reals,
+    q_ref: Reals,
+    q: Reals,
+    valid: Flags,
+    within: Flags,
+    rigid: Flags,
+    marked: Flags,
+) -> None:
     """Solve poses ``T`` (N, 4, 4).
 
     Fills ``q`` (N, 8, 6), by the turns within the limits that are nearest to ``q_ref`` (N or 1, 6), rad,
@@ -76,7 +91,7 @@ def solve_blocks(arm, direction, offset, lower, upper, T, q_ref, q, valid, withi
 
 
 @kernel
-def _check(w):
+def _check(w: Reals) -> None:
     """1 where the pose is a rigid transform, to the tolerances of ``transforms.check_poses``."""
     for i in range(BLOCK):
         a, b, c, x = w[i], w[BLOCK + i], w[2 * BLOCK + i], w[3 * BLOCK + i]
@@ -93,7 +108,9 @@ def _check(w):
 
 
 @kernel
-def _manufacturers_angles(direction, offset, lower, upper, reference, pair):
+def _manufacturers_angles(
+    direction: Reals, offset: Reals, lower: Reals, upper: Reals, reference: Reals, pair: Reals
+) -> None:
     """Angles theta into the manufacturer's, by the nearest turn within the limits (``nearest_equivalent``)."""
     for i in range(BLOCK):
         pair[_WITHIN * BLOCK + i] = pair[_VALID * BLOCK + i]
@@ -119,7 +136,7 @@ def _manufacturers_angles(direction, offset, lower, upper, reference, pair):
 
 
 @kernel
-def count_turns(q, lower, upper, turns):
+def count_turns(q: Reals, lower: Reals, upper: Reals, turns: NDArray[np.int8]) -> None:
     """Least and greatest number of turns (n, 6, 2) to add to angles (n, 6) within the limits; 0 and -1 for NaN."""
     for n in range(q.shape[0]):
         for j in range(6):
@@ -141,7 +158,7 @@ def in_frame_1(rows: tuple[Vector, Vector, Vector], x: float, y: float, z: float
 
 
 @kernel
-def _shoulder(arm, w, near, far):
+def _shoulder(arm: BlockConstants, w: Reals, near: Reals, far: Reals) -> None:
     """Wrist centre and wrist axes in frame 1; both roots of theta_1."""
     for i in range(BLOCK):
         t00, t01, t02, t03 = w[i], w[BLOCK + i], w[2 * BLOCK + i], w[3 * BLOCK + i]
@@ -179,7 +196,7 @@ def _shoulder(arm, w, near, far):
 
 
 @kernel
-def _elbow(arm, w, side):
+def _elbow(arm: BlockConstants, w: Reals, side: Reals) -> None:
     """The triangle of upper arm and forearm for one shoulder branch."""
     longest, shortest = arm.upper_arm + arm.forearm, abs(arm.upper_arm - arm.forearm)
     for i in range(BLOCK):
@@ -198,7 +215,7 @@ def _elbow(arm, w, side):
 
 
 @kernel
-def _wrist(arm, w, side, sign, pair):
+def _wrist(arm: BlockConstants, w: Reals, side: Reals, sign: float, pair: Reals) -> None:
     """All angles of both wrist branches, for the elbow root of that sign."""
     half_s, half_c = arm.half_sum
     less_s, less_c = arm.half_difference
@@ -251,7 +268,9 @@ def _wrist(arm, w, side, sign, pair):
 
 
 @kernel
-def _undone(arm, x, y, z, cos_1, sin_1, c, s):
+def _undone(
+    arm: BlockConstants, x: float, y: float, z: float, cos_1: float, sin_1: float, c: float, s: float
+) -> Vector:
     """A vector of frame 1 as the wrist sees it: turned back by the first three joints, z along axis 4."""
     x, y = x * cos_1 + y * sin_1, y * cos_1 - x * sin_1
     y, z = arm.cos_12 * y - arm.sin_12 * z, arm.sin_12 * y + arm.cos_12 * z
@@ -260,7 +279,18 @@ def _undone(arm, x, y, z, cos_1, sin_1, c, s):
 
 
 @kernel
-def _outer_angles(arm, zx, zy, xx, xy, xz, px, py, cos_5, sin_5):
+def _outer_angles(
+    arm: BlockConstants,
+    zx: float,
+    zy: float,
+    xx: float,
+    xy: float,
+    xz: float,
+    px: float,
+    py: float,
+    cos_5: float,
+    sin_5: float,
+) -> tuple[float, float]:
     """phi_4 turns (px, py) to axis 6 as seen along axis 4; phi_6 is what is left for the vector beside axis 6."""
     c, s = zx * px + zy * py, zy * px - zx * py
     per = 1.0 / np.sqrt(c * c + s * s)

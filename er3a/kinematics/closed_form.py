@@ -34,6 +34,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from er3a.geometry.vectors import (
     Vector,
@@ -46,6 +47,7 @@ from er3a.geometry.vectors import (
     subtract,
     unsigned_angle,
 )
+from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
 
 SLOTS = 8
@@ -96,13 +98,14 @@ class ArmConstants(NamedTuple):
 
 
 @kernel
-def _wrap(angle):
+def _wrap(angle: float) -> float:
     """Into (-pi, pi]."""
-    return angle - 2 * np.pi * np.ceil((angle - np.pi) / (2 * np.pi))
+    wrapped: float = angle - 2 * np.pi * np.ceil((angle - np.pi) / (2 * np.pi))
+    return wrapped
 
 
 @kernel
-def _to_base(T, v):
+def _to_base(T: Reals, v: Vector) -> Vector:
     """Components in the base frame of a vector given in the tool frame."""
     return (
         T[0, 0] * v[0] + T[0, 1] * v[1] + T[0, 2] * v[2],
@@ -112,7 +115,7 @@ def _to_base(T, v):
 
 
 @kernel
-def _off_folds(angle, to_low, to_high, low_offset, high_offset):
+def _off_folds(angle: float, to_low: float, to_high: float, low_offset: float, high_offset: float) -> float:
     """An angle in 0..pi, put beside that end whose distance from the fold (m or rad) is nothing but rounding."""
     if to_low < AT_FOLD and low_offset > 0.0:
         return low_offset
@@ -122,7 +125,18 @@ def _off_folds(angle, to_low, to_high, low_offset, high_offset):
 
 
 @kernel
-def solve(arm, direction, offset, T, q_ref, keep_folds, keep_free, q, fault, gap):
+def solve(
+    arm: ArmConstants,
+    direction: Reals,
+    offset: Reals,
+    T: Reals,
+    q_ref: Reals,
+    keep_folds: bool,
+    keep_free: bool,
+    q: Reals,
+    fault: NDArray[np.int8],
+    gap: Reals,
+) -> None:
     """Fill ``q`` (N, 8, 6), ``fault`` and ``gap`` (N, 8) for poses ``T`` (N, 4, 4); see ``solve_slots``."""
     for n in range(T.shape[0]):
         tool_point = (T[n, 0, 3], T[n, 1, 3], T[n, 2, 3])
@@ -193,14 +207,22 @@ def solve(arm, direction, offset, T, q_ref, keep_folds, keep_free, q, fault, gap
 
 
 @kernel
-def _solve_wrist(arm, axis_6, beside_6, free_theta_4, keep_folds, keep_free, theta):
+def _solve_wrist(
+    arm: ArmConstants,
+    axis_6: Vector,
+    beside_6: Vector,
+    free_theta_4: float,
+    keep_folds: bool,
+    keep_free: bool,
+    theta: Reals,
+) -> float:
     """Set the last three columns of ``theta`` (2, 6) from where axis 6 and the vector beside it must turn to.
 
     Returns by how much (rad) the wrist would have to tilt further than it can; beyond the boundary ``theta`` is NaN.
     """
     b, c = arm.angle_45, arm.angle_56
     gamma = unsigned_angle(arm.axis_4, axis_6)
-    beyond = max(gamma - (b + c), np.abs(b - c) - gamma, gamma + b + c - 2 * np.pi)
+    beyond: float = max(gamma - (b + c), np.abs(b - c) - gamma, gamma + b + c - 2 * np.pi)
     if beyond > BOUNDARY_RAD:
         theta[:, :] = np.nan
         return beyond

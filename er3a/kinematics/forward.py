@@ -17,6 +17,8 @@ from er3a.numerics.fast_math import LARGEST_ANGLE, cos_sin
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 
+Row = tuple[float, float, float, float]
+
 BLOCK = 64
 _COS, _SIN = 12, 13  # rows of scratch memory behind the 3 x 4 entries of a block of poses
 
@@ -95,13 +97,13 @@ def checked_joints(q: Reals, argument: str = "q") -> Reals:
 
 
 @kernel
-def turn_row(row, c, s):
+def turn_row(row: Row, c: float, s: float) -> Row:
     """Row (4 floats) of T, after T is multiplied from the right by Rz, given its cosine and sine."""
     return row[0] * c + row[1] * s, row[1] * c - row[0] * s, row[2], row[3]
 
 
 @kernel
-def step_row(row, link):
+def step_row(row: Row, link: Reals) -> Row:
     """Row (4 floats) of T, after T is multiplied from the right by the constant transform ``link``."""
     return (
         row[0] * link[0, 0] + row[1] * link[1, 0] + row[2] * link[2, 0],
@@ -112,7 +114,7 @@ def step_row(row, link):
 
 
 @kernel
-def rows_of(T):
+def rows_of(T: Reals) -> tuple[Row, Row, Row]:
     """The three upper rows of a transform, each as 4 floats."""
     return (
         (T[0, 0], T[0, 1], T[0, 2], T[0, 3]),
@@ -122,14 +124,14 @@ def rows_of(T):
 
 
 @kernel
-def write_rows(x, y, z, out):
+def write_rows(x: Row, y: Row, z: Row, out: Reals) -> None:
     for j in range(4):
         out[0, j], out[1, j], out[2, j] = x[j], y[j], z[j]
     out[3, 0], out[3, 1], out[3, 2], out[3, 3] = 0.0, 0.0, 0.0, 1.0
 
 
 @kernel
-def _cos_sin_rows(q, direction, offset, start, k, rows):
+def _cos_sin_rows(q: Reals, direction: Reals, offset: Reals, start: int, k: int, rows: Reals) -> None:
     """Cosines and sines of joint ``k`` for a block, as rows 12 and 13; poses past the end repeat the last."""
     sign, zero, far = direction[k], offset[k], False
     for i in range(BLOCK):
@@ -146,7 +148,7 @@ def _cos_sin_rows(q, direction, offset, start, k, rows):
 
 
 @kernel
-def _forward(q, direction, offset, links, out):
+def _forward(q: Reals, direction: Reals, offset: Reals, links: Reals, out: Reals) -> None:
     rows = np.empty((_SIN + 1) * BLOCK)
     for start in range(0, q.shape[0], BLOCK):
         _fill_start(rows, links[0])
@@ -162,7 +164,7 @@ def _forward(q, direction, offset, links, out):
 
 
 @kernel
-def _turn_and_step(rows, link):
+def _turn_and_step(rows: Reals, link: Reals) -> None:
     """Multiply a block of transforms by Rz of the block's cosines and sines and by a constant transform."""
     a, b, c, x = link[0, 0], link[0, 1], link[0, 2], link[0, 3]
     d, e, f, y = link[1, 0], link[1, 1], link[1, 2], link[1, 3]
@@ -181,7 +183,7 @@ def _turn_and_step(rows, link):
 
 
 @kernel
-def _frames(q, direction, offset, links, out):
+def _frames(q: Reals, direction: Reals, offset: Reals, links: Reals, out: Reals) -> None:
     for n in range(q.shape[0]):
         x, y, z = rows_of(links[0])
         for k in range(6):
@@ -194,7 +196,7 @@ def _frames(q, direction, offset, links, out):
 
 
 @kernel
-def _jacobian(q, direction, offset, links, out):
+def _jacobian(q: Reals, direction: Reals, offset: Reals, links: Reals, out: Reals) -> None:
     rows, columns = np.empty((_SIN + 1) * BLOCK), np.empty((6, 6 * BLOCK))
     for start in range(0, q.shape[0], BLOCK):
         _fill_start(rows, links[0])
@@ -212,14 +214,14 @@ def _jacobian(q, direction, offset, links, out):
 
 
 @kernel
-def _fill_start(rows, link):
+def _fill_start(rows: Reals, link: Reals) -> None:
     for r in range(3):
         for c in range(4):
             rows[(4 * r + c) * BLOCK : (4 * r + c + 1) * BLOCK] = link[r, c]
 
 
 @kernel
-def _keep_axis(rows, sign, column):
+def _keep_axis(rows: Reals, sign: float, column: Reals) -> None:
     """A point on the joint's axis, and the axis in the sense of the manufacturer's angle."""
     for r in range(3):
         for i in range(BLOCK):
@@ -228,7 +230,7 @@ def _keep_axis(rows, sign, column):
 
 
 @kernel
-def _lever(rows, column):
+def _lever(rows: Reals, column: Reals) -> None:
     """The tool point's velocity: axis times arm from the axis to the tool point."""
     for i in range(BLOCK):
         x, y, z = rows[3 * BLOCK + i], rows[7 * BLOCK + i], rows[11 * BLOCK + i]

@@ -63,7 +63,7 @@ def inverse(robot: Robot, T: Reals, q_ref: Reals | None = None) -> Solutions:
     q = _free_joints_near(robot, T, q, q_ref, continua)
 
     slots: list[int] = []
-    for slot in np.flatnonzero(fault == REACHED):
+    for slot in np.flatnonzero(fault == REACHED).tolist():
         if not any(np.abs(wrap_to_pi(q[slot] - q[other])).max() < SAME_JOINTS for other in slots):
             slots.append(slot)
     rows = [_rows_of_branch(robot, q[slot], q_ref) for slot in slots]

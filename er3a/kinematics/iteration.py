@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.cholesky import LANES, solve_by_cholesky
 from er3a.numerics.fast_math import arctan2, cos_sin
 from er3a.numerics.jit import kernel
@@ -38,7 +39,21 @@ _STEP, _FREE, _SCALE, _TURNS, _ROWS = 42, 48, 54, 55, 57
 
 
 @kernel
-def solve_numerically(arm, limits, T, q0, mask, tolerances, length, restarts, seed, first, q, error, starts):
+def solve_numerically(
+    arm: tuple[Reals, Reals, Reals],
+    limits: tuple[Reals, Reals, bool],
+    T: Reals,
+    q0: Reals,
+    mask: Reals,
+    tolerances: Reals,
+    length: float,
+    restarts: int,
+    seed: np.uint64,
+    first: int,
+    q: Reals,
+    error: Reals,
+    starts: Integers,
+) -> None:
     """Fill ``q`` (N, 6), ``error`` (N, 2) in m and rad, ``starts`` (N,), for poses ``T`` (N, 4, 4); see ``solve``.
 
     ``first`` is the number of the first pose, which its random starts depend on. Where no start reaches the tolerances,
@@ -96,7 +111,7 @@ def solve_numerically(arm, limits, T, q0, mask, tolerances, length, restarts, se
 
 
 @kernel
-def uniform(seed, pose, start, joint):
+def uniform(seed: np.uint64, pose: int, start: int, joint: int) -> float:
     """A number in 0..1 from a counter, by SplitMix64."""
     z = np.uint64(seed) + np.uint64(0x9E3779B97F4A7C15) * np.uint64(((pose * 65536 + start) * 8 + joint) + 1)
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -106,14 +121,25 @@ def uniform(seed, pose, start, joint):
 
 
 @kernel
-def _take(w, i, T, n):
+def _take(w: Reals, i: int, T: Reals, n: int) -> None:
     for r in range(3):
         for c in range(4):
             w[(_TARGET + 4 * r + c) * LANES + i] = T[n, r, c]
 
 
 @kernel
-def _begin(w, i, q0, n, start, lower, upper, respect, seed, first):
+def _begin(
+    w: Reals,
+    i: int,
+    q0: Reals,
+    n: int,
+    start: int,
+    lower: Reals,
+    upper: Reals,
+    respect: bool,
+    seed: np.uint64,
+    first: int,
+) -> None:
     for j in range(6):
         angle = q0[n, j] if start == 0 else lower[j] + uniform(seed, first + n, start, j) * (upper[j] - lower[j])
         if respect:
@@ -122,7 +148,7 @@ def _begin(w, i, q0, n, start, lower, upper, respect, seed, first):
 
 
 @kernel
-def _evaluate(arm, mask, length, w, J):
+def _evaluate(arm: tuple[Reals, Reals, Reals], mask: Reals, length: float, w: Reals, J: Reals) -> None:
     """Pose errors in the target's tool frame and their derivatives by the joints, masked; J[k] holds 6 rows."""
     direction, offset, links = arm
     for r in range(3):
@@ -136,7 +162,7 @@ def _evaluate(arm, mask, length, w, J):
 
 
 @kernel
-def _joint(sign, zero, link, k, w, column):
+def _joint(sign: float, zero: float, link: Reals, k: int, w: Reals, column: Reals) -> None:
     """Keep the joint's point and axis, then go over its rotation and its link."""
     angles, turns = w[(_Q + k) * LANES : (_Q + k + 1) * LANES], w[_TURNS * LANES : (_TURNS + 2) * LANES]
     for i in range(LANES):
@@ -159,7 +185,7 @@ def _joint(sign, zero, link, k, w, column):
 
 
 @kernel
-def _pose_error(mask, length, w):
+def _pose_error(mask: Reals, length: float, w: Reals) -> None:
     m0, m1, m2, m3, m4, m5 = mask[0], mask[1], mask[2], mask[3], mask[4], mask[5]
     for i in range(LANES):
         a0, a1, a2, px = w[i], w[LANES + i], w[2 * LANES + i], w[3 * LANES + i]
@@ -196,7 +222,7 @@ def _pose_error(mask, length, w):
 
 
 @kernel
-def _column(mask, length, w, column):
+def _column(mask: Reals, length: float, w: Reals, column: Reals) -> None:
     """One joint's column: a point and an axis in, the derivative of the pose error out."""
     m0, m1, m2, m3, m4, m5 = mask[0] / length, mask[1] / length, mask[2] / length, mask[3], mask[4], mask[5]
     for i in range(LANES):
@@ -220,7 +246,7 @@ def _column(mask, length, w, column):
 
 
 @kernel
-def _dot_rows(a, b, out):
+def _dot_rows(a: Reals, b: Reals, out: Reals) -> None:
     """Sum over 6 rows of the products of two columns."""
     for i in range(LANES):
         total = a[i] * b[i] + a[LANES + i] * b[LANES + i] + a[2 * LANES + i] * b[2 * LANES + i]
@@ -229,7 +255,7 @@ def _dot_rows(a, b, out):
 
 
 @kernel
-def _step(lower, upper, respect, w, J, A):
+def _step(lower: Reals, upper: Reals, respect: bool, w: Reals, J: Reals, A: Reals) -> None:
     """Move by a damped step, by Cholesky factors; joints that press against a limit stay."""
     e, damping = w[_E * LANES : (_E + 6) * LANES], w[_SQUARED * LANES : (_SQUARED + 1) * LANES]
     for i in range(LANES):
@@ -261,7 +287,7 @@ def _step(lower, upper, respect, w, J, A):
 
 
 @kernel
-def _move(lower, upper, respect, w):
+def _move(lower: Reals, upper: Reals, respect: bool, w: Reals) -> None:
     """Add the step, at most ``LONGEST_STEP`` for any joint, to the lanes that are to move."""
     scale = w[_SCALE * LANES : (_SCALE + 1) * LANES]
     step = w[_STEP * LANES : (_STEP + 6) * LANES]

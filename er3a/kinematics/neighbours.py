@@ -42,7 +42,7 @@ class Neighbours:
 
 def solvable(robot: Robot, T: Reals) -> Flags:
     """Whether poses (N, 4, 4) have a solution within the limits, (N,)."""
-    found: Flags = inverse_batch(robot, T).within_limits.any(axis=1)
+    found: Flags = np.any(inverse_batch(robot, T).within_limits, axis=1)
     return found
 
 

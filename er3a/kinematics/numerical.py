@@ -41,6 +41,7 @@ def solve(
     robot: Robot,
     T: Reals,
     q0: Reals | None = None,
+    *,
     mask: Reals | None = None,
     respect_limits: bool = True,
     restarts: int = RESTARTS,
@@ -73,9 +74,9 @@ def solve(
     for name, value, most in (("restarts", restarts, 65535), ("seed", seed, 2**63 - 1)):
         if not (isinstance(value, Integral) and 0 <= value <= most):
             raise Er3aError(f"{name} is {value!r}; expected a whole number from 0 to {most}")
-    for name, value in (("position_tolerance", position_tolerance), ("rotation_tolerance", rotation_tolerance)):
-        if not value > 0:
-            raise Er3aError(f"{name} is {value!r}; expected a number above 0")
+    for name, tolerance in (("position_tolerance", position_tolerance), ("rotation_tolerance", rotation_tolerance)):
+        if not tolerance > 0:
+            raise Er3aError(f"{name} is {tolerance!r}; expected a number above 0")
     q0 = (robot.lower + robot.upper) / 2 if q0 is None else checked_joints(q0, "q0")
     if q0.shape not in ((6,), (*shape, 6)):
         raise ShapeError("q0", q0.shape, f"(6,) or {(*shape, 6)}")

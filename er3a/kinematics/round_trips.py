@@ -17,7 +17,7 @@ from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots
-from er3a.numerics.arrays import Integers
+from er3a.numerics.arrays import Flags, Integers
 from er3a.robots.robot import Robot
 
 SAME_JOINTS_RAD = 1e-6
@@ -99,16 +99,22 @@ def slot_round_trips(robot: Robot, poses: int, seed: int) -> SlotRoundTrips:
     """
     random = np.random.default_rng(seed)
     blocks = [_block(robot, random, min(BLOCK, poses - done)) for done in range(0, poses, BLOCK)]
-    table = np.array(blocks)
-    worst = table.max(axis=0)
-    return SlotRoundTrips(poses, int(table[:, 0].sum()), *map(float, worst[1:4]), int(table[:, 4].sum()))
+    near, joint, position, orientation, unsolved = np.array(blocks).T
+    return SlotRoundTrips(
+        poses=poses,
+        near_singular=int(near.sum()),
+        joint_error_deg=float(joint.max()),
+        position_error_mm=float(position.max()),
+        orientation_error_deg=float(orientation.max()),
+        unsolved=int(unsolved.sum()),
+    )
 
 
 def _block(robot: Robot, random: np.random.Generator, count: int) -> tuple[float, ...]:
     q = robot.lower + random.random((count, 6)) * (robot.upper - robot.lower)
     T = forward(robot, q)
     found = solve_slots(robot, T, np.zeros_like(q))[0]
-    solved = np.isfinite(found).all(axis=2)
+    solved: Flags = np.all(np.isfinite(found), axis=2)
     gap = np.abs(wrap_to_pi(found - q[:, None])).max(axis=2)
     nearest = np.where(solved, gap, np.inf).min(axis=1)
 

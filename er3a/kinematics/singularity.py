@@ -17,7 +17,7 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.geometry.vectors import cross, dot, subtract
+from er3a.geometry.vectors import Vector, cross, dot, subtract
 from er3a.kinematics.chain import JOINTS, arm_length, constant_links
 from er3a.kinematics.forward import checked_joints, jacobian, rows_of, step_row, turn_row
 from er3a.kinematics.wrist_partitioned import closed_form_missing, wrist_partitioned_arm
@@ -81,7 +81,7 @@ def conditioning(robot: Robot, q: Reals, length: float) -> Conditioning:
     """
     J = jacobian(robot, q)
     J[..., :3, :] /= length
-    values = np.linalg.svd(J, compute_uv=False)
+    values = np.linalg.svd(J, compute_uv=False).astype(float)
     smallest = values[..., -1]
     regular = smallest > ROUNDING * values[..., 0]
     condition = np.divide(values[..., 0], smallest, out=np.full_like(smallest, np.inf), where=regular)
@@ -105,7 +105,7 @@ def determinant_factors(robot: Robot, q: Reals) -> DeterminantFactors:
 
 
 @kernel
-def _factors(q, direction, offset, links, wrist_in_tool, out):
+def _factors(q: Reals, direction: Reals, offset: Reals, links: Reals, wrist_in_tool: Reals, out: Reals) -> None:
     """Fill ``out`` (N, 3): wrist, elbow and shoulder at joint angles ``q`` (N, 6)."""
     w, p = np.empty((6, 3)), np.empty((6, 3))
     for n in range(q.shape[0]):
@@ -133,6 +133,7 @@ def _factors(q, direction, offset, links, wrist_in_tool, out):
 
 
 @kernel
-def _angle_short_of_line(a, b, axis):
+def _angle_short_of_line(a: Vector, b: Vector, axis: Vector) -> float:
     """Signed angle from the line of a to the line of b, in (-pi/2, pi/2], as seen along the axis."""
-    return np.arctan2(dot(axis, cross(a, b)), abs(dot(a, b) - dot(a, axis) * dot(b, axis)))
+    angle: float = np.arctan2(dot(axis, cross(a, b)), abs(dot(a, b) - dot(a, axis) * dot(b, axis)))
+    return angle

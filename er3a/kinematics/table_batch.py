@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from er3a.kinematics.forward import rows_of, step_row, turn_row, write_rows
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 
@@ -23,7 +23,7 @@ class Tables:
     a, d : (H, 6), m; alpha, beta, offset, lower, upper : (H, 6), rad; direction : (H, 6), +1 or -1
     """
 
-    modified: Reals
+    modified: Flags
     a: Reals
     alpha: Reals
     beta: Reals
@@ -36,10 +36,10 @@ class Tables:
     def __len__(self) -> int:
         return len(self.modified)
 
-    def __getitem__(self, rows) -> Tables:
+    def __getitem__(self, rows: slice | Integers | Flags) -> Tables:
         return Tables(*(getattr(self, field.name)[rows] for field in fields(self)))
 
-    def with_column(self, name: str, joints, values: Reals) -> Tables:
+    def with_column(self, name: str, joints: slice | list[int] | Integers, values: Reals) -> Tables:
         """A copy with the given joints' entries (H, len(joints)) of one column replaced."""
         column = getattr(self, name).copy()
         column[:, joints] = values
@@ -71,17 +71,19 @@ def frames_of(tables: Tables, base: Reals, q: Reals) -> Reals:
     out = np.empty((len(tables), len(q), 7, 4, 4))
     none = np.zeros((len(tables), 1))
     before = tables.modified[:, None]
-    across = (
+    a, alpha, beta = (
         np.where(before, np.hstack([column, none]), np.hstack([none, column]))
         for column in (tables.a, tables.alpha, tables.beta)
     )
     d = np.hstack([none, tables.d])
-    _fill_frames(np.ascontiguousarray(base), *across, d, tables.direction, tables.offset, q, out)
+    _fill_frames(np.ascontiguousarray(base), a, alpha, beta, d, tables.direction, tables.offset, q, out)
     return out
 
 
 @kernel
-def _fill_frames(base, a, alpha, beta, d, direction, offset, q, out):
+def _fill_frames(
+    base: Reals, a: Reals, alpha: Reals, beta: Reals, d: Reals, direction: Reals, offset: Reals, q: Reals, out: Reals
+) -> None:
     links = np.zeros((7, 4, 4))
     for h in range(out.shape[0]):
         for k in range(7):

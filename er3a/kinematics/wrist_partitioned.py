@@ -148,7 +148,8 @@ def _recognised(robot: Robot) -> WristPartitionedArm | ClosedFormMissing:
 def _meeting_point(axes: Reals, points: Reals) -> tuple[Reals, float]:
     """Point nearest to all lines by least squares, and its greatest distance from a line (m)."""
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
-    meeting = np.linalg.lstsq(across.reshape(-1, 3), (across @ points[:, :, None]).reshape(-1), rcond=None)[0]
+    found = np.linalg.lstsq(across.reshape(-1, 3), (across @ points[:, :, None]).reshape(-1), rcond=None)[0]
+    meeting = found.astype(float)
     miss = np.linalg.norm((across @ (meeting - points)[:, :, None])[..., 0], axis=1).max()
     return meeting, float(miss)
 

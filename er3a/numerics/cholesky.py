@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
 
 LANES = 32
@@ -19,7 +20,7 @@ LEAST_PIVOT = 1e-15
 
 
 @kernel
-def solve_by_cholesky(A, step):
+def solve_by_cholesky(A: Reals, step: Reals) -> None:
     """Replace ``step`` (6 rows of lanes) by the solutions x of A x = step; of A (36 rows) the lower half is read."""
     for i in range(LANES):
         r_0 = 1.0 / np.sqrt(max(A[i], LEAST_PIVOT))

@@ -23,7 +23,7 @@ _TAN_PI_8 = 0.41421356237309503
 
 
 @kernel
-def cos_sin(angle):
+def cos_sin(angle: float) -> tuple[float, float]:
     """Cosine and sine of an angle of at most ``LARGEST_ANGLE``."""
     k = np.floor(angle * _PER_HALF_PI + 0.5)
     x = (angle - k * _HALF_PI_HIGH) - k * _HALF_PI_LOW
@@ -46,7 +46,7 @@ def cos_sin(angle):
 
 
 @kernel
-def arctan2(y, x):
+def arctan2(y: float, x: float) -> float:
     """Angle (rad) of the point (x, y), in (-pi, pi]; NaN at the origin."""
     ax, ay = abs(x), abs(y)
     steep = ay > ax

@@ -32,9 +32,9 @@ def kernel(function: Function) -> Function:
     No fastmath and no contraction across operations: results must not depend on the machine's vector width.
     """
     dispatcher = numba.njit(error_model="numpy", nogil=True)(function)
-    if not numba.config.DISABLE_JIT:
+    if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
         with suppress(RuntimeError):  # no folder to write into: compiled again by each process
-            dispatcher._cache = _KernelCache(function)
+            dispatcher._cache = _KernelCache(function)  # type: ignore[attr-defined, no-untyped-call]
     return cast(Function, dispatcher)
 
 
@@ -60,7 +60,7 @@ class _KernelLocator(_CacheLocator):
     def from_function(cls, py_func: Callable[..., Any], py_file: str) -> _KernelLocator | None:
         locator = cls(py_func, py_file)
         try:
-            locator.ensure_cache_path()
+            locator.ensure_cache_path()  # type: ignore[no-untyped-call]
         except OSError:
             return None
         return locator

@@ -16,11 +16,11 @@ from er3a.numerics.arrays import Reals
 from er3a.planning.arcs import arc
 from er3a.planning.commands import (
     Command,
+    CommandSource,
     JointMoveCommand,
     JointSequenceCommand,
     JointTableCommand,
     SegmentCommand,
-    Source,
     Start,
     ToolMoveCommand,
     ToolSequenceCommand,
@@ -106,7 +106,7 @@ def _joint_sequence(command: JointSequenceCommand) -> Built:
         raise command.source.error(part, problem, "Correct the point or blend_deg") from None
 
 
-def _start_joints(start: Start, source: Source, ends: Mapping[str, Reals]) -> Reals | None:
+def _start_joints(start: Start, source: CommandSource, ends: Mapping[str, Reals]) -> Reals | None:
     """Joint angles (6,) at the start in rad, where they are given or those of the path before."""
     if start.after is None:
         return start.joints
@@ -128,7 +128,7 @@ def _tool(robot: Robot, command: ToolMoveCommand | ToolSequenceCommand, ends: Ma
         return Built(tool=path, q_start=q_start, start_slot=slot)
     segments: list[Segment] = []
     for k, part in enumerate(command.segments):
-        here = Source(source.file, f"{source.field}.segments[{k}]")
+        here = CommandSource(source.file, f"{source.field}.segments[{k}]")
         segments.append(_segment(pose, part, GEOMETRY, None, here))
         pose = part.end
     blends = np.array([part.blend for part in command.segments[:-1]])
@@ -140,7 +140,9 @@ def _tool(robot: Robot, command: ToolMoveCommand | ToolSequenceCommand, ends: Ma
     return Built(tool=path, q_start=q_start, start_slot=slot)
 
 
-def _segment(T_start: Reals, part: SegmentCommand, duration: float, ramp: float | None, source: Source) -> Segment:
+def _segment(
+    T_start: Reals, part: SegmentCommand, duration: float, ramp: float | None, source: CommandSource
+) -> Segment:
     try:
         rotation_between(T_start, part.end, part.half_turn_axis)
     except PoseError as error:
@@ -184,7 +186,7 @@ def _blends(sizes: Reals, wanted: float | None) -> Reals:
     return most if wanted is None else np.minimum(most, wanted)
 
 
-def _slot(robot: Robot, name: str | None, source: Source) -> int | None:
+def _slot(robot: Robot, name: str | None, source: CommandSource) -> int | None:
     if name is None:
         return None
     labels: tuple[str, ...] = branch_labels(robot)

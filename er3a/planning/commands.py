@@ -14,7 +14,7 @@ from er3a.planning.profiles import Ends, Times
 
 
 @dataclass(frozen=True)
-class Source:
+class CommandSource:
     """Where a command was read, for errors: a file and a field in it; neither for one made in Python."""
 
     file: Path | None = None
@@ -43,7 +43,7 @@ class Start:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Command:
-    source: Source = field(default_factory=Source)
+    source: CommandSource = field(default_factory=CommandSource)
 
 
 @dataclass(frozen=True, eq=False)

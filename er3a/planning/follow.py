@@ -25,10 +25,10 @@ from er3a.geometry.angles import TURN
 from er3a.kinematics.closed_form import SLOTS
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
+from er3a.numerics.runs import runs
 from er3a.planning.branch_tracking import WIDE_STEP, Branches, branches_along, turned_difference
-from er3a.planning.followed import Followed, Jump
+from er3a.planning.followed import BranchJump, Followed
 from er3a.planning.moves import ToolPath
-from er3a.planning.singular_events import runs
 from er3a.robots.joint_limits import LIMIT_TOLERANCE, nearest_equivalent, within
 from er3a.robots.robot import Robot
 
@@ -135,10 +135,10 @@ def _turned(robot: Robot, q: Reals, slot: Integers, jumps: Flags, share: Reals, 
     return _Sequence(unwound, slot, jumps, (float(jumps.sum()), outside, travel))
 
 
-def _jump(t: Reals, q: Reals, i: int) -> Jump:
+def _jump(t: Reals, q: Reals, i: int) -> BranchJump:
     step = q[i + 1] - q[i]
     joint = int(np.argmax(np.abs(step)))
-    return Jump(float(t[i + 1]), joint + 1, float(step[joint]))
+    return BranchJump(float(t[i + 1]), joint + 1, float(step[joint]))
 
 
 @kernel

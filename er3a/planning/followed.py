@@ -26,7 +26,7 @@ JACOBIAN_STEP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Jump:
+class BranchJump:
     """A place where the branch in use ends and no other continues it.
 
     Attributes
@@ -59,7 +59,7 @@ class Followed:
     q: Reals
     slot: Integers
     start_turn: Reals
-    jumps: tuple[Jump, ...]
+    jumps: tuple[BranchJump, ...]
 
     def joints(self, t: Reals) -> Reals:
         """Joint angles (..., 6) in rad at times (...,) in s; NaN where unreachable."""

@@ -14,8 +14,9 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import Unsolved
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.numerics.arrays import Reals
+from er3a.numerics.runs import runs
 from er3a.planning.followed import Followed
-from er3a.planning.singular_events import Joints, runs
+from er3a.planning.singular_events import Joints
 from er3a.robots.joint_limits import LIMIT_TOLERANCE
 from er3a.robots.robot import Robot
 
@@ -51,7 +52,7 @@ class TooFast:
 
 
 @dataclass(frozen=True)
-class OutOfReach:
+class PathOutOfReach:
     """No branch reaches the pose; per side of the arm, why."""
 
     reasons: tuple[Unsolved, ...]
@@ -111,14 +112,14 @@ def too_fast(robot: Robot, t: Reals, velocity: Reals, speed: Callable[[Reals], R
     return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
 
 
-def unreachable(followed: Followed) -> list[Interval[OutOfReach]]:
+def unreachable(followed: Followed) -> list[Interval[PathOutOfReach]]:
     """Where no branch of the closed form reaches the pose, with the distance that is missing at the worst point."""
     robot, found = followed.robot, []
     for first, last in runs(np.isnan(followed.q[:, 0])):
         poses = followed.line.poses(followed.progress[first:last])
         gap = solve_slots(robot, poses, np.zeros((len(poses), 6)))[2]
         worst = int(np.argmax(gap.min(axis=1)))
-        cause = OutOfReach(inverse(robot, poses[worst]).unsolved)
+        cause = PathOutOfReach(inverse(robot, poses[worst]).unsolved)
         found.append(Interval(float(followed.t[first]), float(followed.t[last - 1]), cause))
     return found
 

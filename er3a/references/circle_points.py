@@ -16,7 +16,8 @@ from itertools import product
 import numpy as np
 
 from er3a.kinematics.forward import forward, frames
-from er3a.references.quantities import MM, AxisLines, Reals
+from er3a.numerics.arrays import Reals
+from er3a.references.quantities import MM, AxisLines
 from er3a.robots.robot import Robot
 
 OFF_EVERY_AXIS_MM = 100.0

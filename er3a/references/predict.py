@@ -8,7 +8,8 @@ import numpy as np
 
 from er3a.kinematics.forward import frames
 from er3a.kinematics.table_batch import Tables, frames_of
-from er3a.references.quantities import ZERO_POSE, AxisLines, Extreme, ModelState, Pose, Quantity, Reals
+from er3a.numerics.arrays import Reals
+from er3a.references.quantities import ZERO_POSE, AxisLines, Extreme, ModelState, Pose, Quantity
 from er3a.references.reach import search
 from er3a.references.reference import Reference, quantities_of
 from er3a.robots.robot import Robot

@@ -16,9 +16,9 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Literal, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
-Reals = NDArray[np.float64]
+from er3a.numerics.arrays import Reals
+
 Pose = tuple[float, float, float, float, float, float]
 Vector = tuple[float, float, float]
 Unit = Literal["mm", "deg", "deg/s"]

@@ -17,8 +17,9 @@ from scipy.optimize import minimize
 
 from er3a.kinematics.chain import JOINTS
 from er3a.kinematics.forward import frames
+from er3a.numerics.arrays import Reals
 from er3a.numerics.quasi_random import quasi_random_points
-from er3a.references.quantities import MM, Extreme, Reals
+from er3a.references.quantities import MM, Extreme
 from er3a.robots.robot import Robot
 
 SCAN = 4096

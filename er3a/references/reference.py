@@ -10,8 +10,9 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from er3a.references.quantities import Quantity, Reals, Unit
-from er3a.references.subjects import Subject
+from er3a.numerics.arrays import Reals
+from er3a.references.quantities import Quantity, Unit
+from er3a.references.subjects import ReferenceSubject
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade
 
 
@@ -28,7 +29,7 @@ class Reference:
     uncertainty : half-width of the interval that the source leaves open, same unit
     """
 
-    subject: Subject
+    subject: ReferenceSubject
     group: str
     quantity: Quantity
     expected: float | None
@@ -47,7 +48,7 @@ class Reference:
         return self.grade in AUTHORITATIVE_GRADES
 
 
-Scalar = tuple[Subject, str, Quantity, float | None, float]
+Scalar = tuple[ReferenceSubject, str, Quantity, float | None, float]
 """Subject, group, quantity, expected value and uncertainty of a reference."""
 
 

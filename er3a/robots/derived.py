@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import wraps
+from functools import update_wrapper
 from typing import Concatenate, ParamSpec, TypeVar
 
 from er3a.robots.robot import Robot
@@ -15,8 +15,7 @@ Value = TypeVar("Value")
 def derived(function: Callable[Concatenate[Robot, Rest], Value]) -> Callable[Concatenate[Robot, Rest], Value]:
     """Keep what a function gives for a robot (and further hashable arguments) as long as the robot is there."""
 
-    @wraps(function)
-    def once(robot: Robot, *rest: Rest.args, **named: Rest.kwargs) -> Value:
+    def once(robot: Robot, /, *rest: Rest.args, **named: Rest.kwargs) -> Value:
         key = (function, *rest, *named.items())
         kept = robot.derived
         if key not in kept:
@@ -24,4 +23,5 @@ def derived(function: Callable[Concatenate[Robot, Rest], Value]) -> Callable[Con
         value: Value = kept[key]
         return value
 
+    update_wrapper(once, function)
     return once

@@ -36,7 +36,8 @@ class LimitsExceeded:
 
 def within(robot: Robot, q: Reals) -> Flags:
     """Whether joint angles (..., 6) in rad lie within the limits, to 1e-9 rad; shape (...,)."""
-    fits: Flags = (np.maximum(q - robot.upper, robot.lower - q) <= LIMIT_TOLERANCE).all(axis=-1)
+    outside = np.maximum(q - robot.upper, robot.lower - q)
+    fits: Flags = np.asarray((outside <= LIMIT_TOLERANCE).all(axis=-1))
     return fits
 
 

@@ -182,14 +182,14 @@ def nearest(
     moves = np.abs(solutions.q - q_ref)
     greatest: Reals = moves.max(axis=1, initial=0.0)
     distance: Reals = np.linalg.norm(moves, axis=1)
-    refused = list(solutions.reason) if refused is None else refused
-    left = [row for row, why in enumerate(refused) if why is None]
+    allowed = solutions.within_limits if refused is None else [why is None for why in refused]
+    left = [int(row) for row in np.flatnonzero(allowed)]
     ordered: list[int] = []
     while left:
         best = _first(left, greatest, distance, solutions.branch)
         ordered.append(best)
         left.remove(best)
-    why = _why_first(solutions, ordered, moves, distance) if ordered else why_none(robot, solutions, refused)
+    why = _why_first(solutions, ordered, moves, distance) if ordered else why_none(robot, solutions, refused or ())
     return Choice(np.array(ordered, dtype=int), greatest, distance, why)
 
 
@@ -227,7 +227,7 @@ def _difference(solutions: Solutions, chosen: int, other: int) -> NextBest:
 
 
 def why_none(robot: Robot, solutions: Solutions, refused: Sequence[Refusal | None]) -> WhyNone:
-    """Why no solution is taken, where each is refused."""
+    """Why no solution is taken, where each is refused: by its limits, or by an overlap that ``refused`` tells."""
     if not len(solutions.q):
         return NoSolution(solutions.unsolved)
     overlaps = {row: why for row, why in enumerate(refused) if isinstance(why, PairOverlaps)}
@@ -236,4 +236,6 @@ def why_none(robot: Robot, solutions: Solutions, refused: Sequence[Refusal | Non
         roomiest = max(overlaps, key=lambda row: margin[row])
         return AllCollide(len(overlaps), overlaps[roomiest])
     least = int(margin.argmax())
-    return AllOutsideLimits(len(refused), int(solutions.branch[least]), solutions.label[least], solutions.reason[least])
+    return AllOutsideLimits(
+        len(solutions.q), int(solutions.branch[least]), solutions.label[least], solutions.reason[least]
+    )

@@ -52,21 +52,25 @@ def joint_weights(robot: Robot) -> Reals:
     """
     lengths = np.abs(robot.a) + np.abs(robot.d)
     outward = np.array([lengths[k:].sum() for k in range(6)]) + np.linalg.norm(robot.tool[:3, 3])
-    return np.maximum(outward / outward.max(), 0.1)
+    weights: Reals = np.maximum(outward / outward.max(), 0.1)
+    return weights
 
 
 def _greatest_move(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
-    return np.degrees(np.abs(q - q_ref).max(axis=1, initial=0.0))
+    farthest: Reals = np.abs(q - q_ref).max(axis=1, initial=0.0)
+    return np.degrees(farthest)
 
 
 def _weighted_move(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
-    return np.degrees(np.linalg.norm(joint_weights(robot) * (q - q_ref), axis=1))
+    distance: Reals = np.linalg.norm(joint_weights(robot) * (q - q_ref), axis=1)
+    return np.degrees(distance)
 
 
 def _time(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
     if not np.isfinite(robot.speed).all():
         raise Er3aError(f"{robot.name}: the rule 'time' needs joint speeds, and the robot's file gives none")
-    return (np.abs(q - q_ref) / robot.speed).max(axis=1, initial=0.0)
+    longest: Reals = (np.abs(q - q_ref) / robot.speed).max(axis=1, initial=0.0)
+    return longest
 
 
 def _manipulability(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:

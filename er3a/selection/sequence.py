@@ -113,9 +113,12 @@ def _move_costs(robot: Robot, before: Reals, after: Reals, rule: str) -> Reals:
     """Cost (n, m) of each move from joint angles (n, 6) to (m, 6)."""
     moves = np.abs(before[:, None] - after[None])
     if rule == "nearest":
-        return np.degrees(moves.max(axis=2))
+        farthest: Reals = moves.max(axis=2)
+        return np.degrees(farthest)
     if rule == "weighted":
-        return np.degrees(np.linalg.norm(joint_weights(robot) * moves, axis=2))
+        distance: Reals = np.linalg.norm(joint_weights(robot) * moves, axis=2)
+        return np.degrees(distance)
     if not np.isfinite(robot.speed).all():
         raise Er3aError(f"{robot.name}: the rule 'time' needs joint speeds, and the robot's file gives none")
-    return (moves / robot.speed).max(axis=2)
+    longest: Reals = (moves / robot.speed).max(axis=2)
+    return longest

@@ -20,10 +20,10 @@ from testing.singular_poses import CLASSES, joints_near, turned
 
 
 def assert_solves(robot, T, solved):
-    assert (np.isfinite(solved.q).all(axis=2) == solved.valid).all()
-    back, asked = forward(robot, solved.q[solved.valid]), np.broadcast_to(T[:, None], (*solved.valid.shape, 4, 4))
-    assert max(part.max(initial=0) for part in pose_errors(back, asked[solved.valid])) < 1.001e-9
-    np.testing.assert_array_equal(solved.within_limits, solved.valid & within(robot, solved.q))
+    assert (np.isfinite(solved.q).all(axis=2) == solved.solved).all()
+    back, asked = forward(robot, solved.q[solved.solved]), np.broadcast_to(T[:, None], (*solved.solved.shape, 4, 4))
+    assert max(part.max(initial=0) for part in pose_errors(back, asked[solved.solved])) < 1.001e-9
+    np.testing.assert_array_equal(solved.within_limits, solved.solved & within(robot, solved.q))
 
 
 def test_the_careful_solver_agrees(robot, random):
@@ -57,16 +57,16 @@ def test_singular_poses_keep_all_their_slots(robot, random, kind):
     solved = inverse_batch(robot, T, q)
     assert_solves(robot, T, solved)
     for n in range(0, len(q), 25):
-        assert set(np.flatnonzero(solved.valid[n])) == set(inverse(robot, T[n], q[n]).branch)
-        rows = solved.q[n][solved.valid[n]]
+        assert set(np.flatnonzero(solved.solved[n])) == set(inverse(robot, T[n], q[n]).branch)
+        rows = solved.q[n][solved.solved[n]]
         apart = np.abs(rows[:, None] - rows[None]).max(axis=-1) + np.eye(len(rows))
         assert apart.min() > 1e-9
 
 
 def test_slots_are_branches(robot, random):
     solved = inverse_batch(robot, forward(robot, joints_at_random(robot, random, 1000)))
-    slots = np.broadcast_to(np.arange(8), solved.valid.shape)
-    np.testing.assert_array_equal(branch_of(robot, solved.q[solved.valid]), slots[solved.valid])
+    slots = np.broadcast_to(np.arange(8), solved.solved.shape)
+    np.testing.assert_array_equal(branch_of(robot, solved.q[solved.solved]), slots[solved.solved])
 
 
 def test_results_do_not_depend_on_threads_or_place(robot, random):
@@ -80,13 +80,13 @@ def test_results_do_not_depend_on_threads_or_place(robot, random):
 def test_turns_are_those_of_the_single_solver(robot, random):
     T = forward(robot, joints_at_random(robot, random, 50))
     solved = inverse_batch(robot, T, turns=True)
-    assert solved.turns.shape == (50, 8, 6, 2)
+    assert solved.turn_range.shape == (50, 8, 6, 2)
     for n in range(50):
         solution = inverse(robot, T[n])
         for slot in np.flatnonzero(solved.within_limits[n]):
-            low, high = solved.turns[n, slot, :, 0], solved.turns[n, slot, :, 1]
+            low, high = solved.turn_range[n, slot, :, 0], solved.turn_range[n, slot, :, 1]
             assert np.prod(high - low + 1.0) == (solution.branch == slot).sum()
-    assert inverse_batch(robot, T).turns is None
+    assert inverse_batch(robot, T).turn_range is None
 
 
 def test_turns_are_chosen_by_the_reference(robot):
@@ -101,7 +101,7 @@ def test_turns_are_chosen_by_the_reference(robot):
 def test_no_poses_give_no_solutions(robot):
     solved = inverse_batch(robot, np.empty((0, 4, 4)), turns=True)
     assert solved.q.shape == (0, 8, 6)
-    assert solved.turns.shape == (0, 8, 6, 2)
+    assert solved.turn_range.shape == (0, 8, 6, 2)
 
 
 @pytest.mark.parametrize(

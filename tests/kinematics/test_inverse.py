@@ -14,7 +14,8 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots
-from er3a.robots.joint_limits import limit_reason, nearest_equivalent
+from er3a.pipeline.messages.kinematics import say
+from er3a.robots.joint_limits import limits_exceeded, nearest_equivalent
 from testing.arms import DEG, arms, joints_at_random, joints_within, make_arm, margin, placement, pose_errors
 
 TURN = 2 * np.pi
@@ -118,10 +119,10 @@ def test_reasons_match_limits(robot, random):
         inside = ((solution.q >= robot.lower - 1e-9) & (solution.q <= robot.upper + 1e-9)).all(axis=1)
         np.testing.assert_array_equal(solution.within_limits, inside)
         for row, ok, reason in zip(solution.q, inside, solution.reason):
-            assert (reason == "") == ok
-            for j in range(6):
-                leaves = row[j] > robot.upper[j] + 1e-9 or row[j] < robot.lower[j] - 1e-9
-                assert (f"J{j + 1} at {np.degrees(row[j]):.1f} deg" in reason) == leaves
+            assert (reason is None) == ok
+            told = {} if reason is None else {one.joint: one.angle_deg for one in reason.joints}
+            leaves = (row > robot.upper + 1e-9) | (row < robot.lower - 1e-9)
+            assert told == {j + 1: np.degrees(row[j]) for j in np.flatnonzero(leaves)}
 
 
 def test_rows_outside_use_the_turn_nearest_to_the_range():
@@ -130,9 +131,15 @@ def test_rows_outside_use_the_turn_nearest_to_the_range():
     q = np.array([170.0, 20, 20, -178, 30, 0]) * DEG
     near = nearest_equivalent(arm, q, np.zeros(6)) / DEG
     np.testing.assert_allclose(near, [170, 20, 20, 182, 30, 0], atol=1e-9)
-    assert limit_reason(arm, near * DEG) == (
+    exceeded = limits_exceeded(arm, near * DEG)
+    first, fourth = exceeded.joints
+    assert (first.joint, first.side, fourth.joint, fourth.side) == (1, "above", 4, "below")
+    assert (first.angle_deg, first.excess_deg, first.limit_deg) == pytest.approx((170, 160, 10))
+    assert (fourth.angle_deg, fourth.excess_deg, fourth.limit_deg) == pytest.approx((182, 18, 200))
+    assert say(exceeded) == (
         "J1 at 170.0 deg is 160 deg above its limit of 10 deg; J4 at 182.0 deg is 18 deg below its limit of 200 deg"
     )
+    assert limits_exceeded(arm, np.append(np.zeros(3), [205 * DEG, 0, 0])) is None
     below = nearest_equivalent(arm, np.array([0, 0, 0, 215 - 360, 0, 0]) * DEG, np.zeros(6)) / DEG
     assert below[3] == pytest.approx(215)
 

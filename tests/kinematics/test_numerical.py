@@ -13,8 +13,11 @@ from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward, frames
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.iteration import _E, _Q, _ROWS, _TARGET, LANES, _evaluate, uniform
-from er3a.kinematics.numerical import BAD_GUESS, LIMIT_BOUND, SINGULAR, SOLVED, UNREACHABLE, solve
-from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
+from er3a.kinematics.numerical import solve
+from er3a.kinematics.solutions import Iteration
+from er3a.kinematics.wrist_partitioned import closed_form_missing, wrist_partitioned_arm
+from er3a.pipeline.messages.kinematics import say
+from er3a.robots.joint_limits import within
 from testing.arms import DEG, arms, joints_at_random, joints_within, make_arm, placement, pose_errors
 from testing.singular_poses import CLASSES, joints_near
 
@@ -30,7 +33,8 @@ def test_all_reachable_poses_are_solved(robot, random, respect_limits):
     T = forward(robot, joints_at_random(robot, random, 2000))
     found = solve(robot, T, respect_limits=respect_limits)
     assert found.solved.all()
-    assert (found.outcome == SOLVED).all()
+    assert found.unsolved == ()
+    np.testing.assert_array_equal(found.within_limits, within(robot, found.q))
     distance, angle = pose_errors(forward(robot, found.q), T)
     assert max(distance.max(), angle.max()) < 1e-9
     np.testing.assert_allclose(found.position_error, distance, atol=1e-13)
@@ -126,20 +130,25 @@ def test_why_it_fails(robot, random):
     far = forward(robot, q[0])
     far[:3, 3] += [5, 0, 0]
     found = solve(robot, far, restarts=20)
-    assert (found.outcome, bool(found.solved), int(found.starts)) == (UNREACHABLE, False, 0)
-    assert "the nearest arm found misses by" in str(found.reason)
-    outcomes = solve(robot, forward(robot, q), joints_at_random(robot, random, 60), restarts=0).outcome
-    assert set(outcomes) == {SOLVED, BAD_GUESS}
+    (unsolved,) = found.unsolved
+    assert (unsolved.why.code, bool(found.solved), int(found.starts)) == ("unreachable", False, 0)
+    assert unsolved.why.miss.position_mm == found.position_error * 1000
+    assert say(unsolved).startswith("unreachable: the nearest arm found misses by ")
+    found = solve(robot, forward(robot, q), joints_at_random(robot, random, 60), restarts=0)
+    assert [one.pose for one in found.unsolved] == np.flatnonzero(~found.solved).tolist()
+    assert 0 < len(found.unsolved) < 60
+    assert {(one.why.code, one.why.solved_by) for one in found.unsolved} == {("bad_guess", "other_starts")}
     straight = joints_near(robot, "elbow", random, 1)[0]
     beyond = forward(robot, straight)
     arm = wrist_partitioned_arm(robot)
     along = beyond[:3, :3] @ arm.wrist_in_tool + beyond[:3, 3] - frames(robot, straight)[2, :3, 3]
     beyond[:3, 3] += 5e-9 * along / np.linalg.norm(along)
-    assert solve(robot, beyond, straight, respect_limits=False, restarts=20).outcome == SINGULAR
+    (unsolved,) = solve(robot, beyond, straight, respect_limits=False, restarts=20).unsolved
+    assert unsolved.why.code == "singular"
     narrow = robot.replace(lower=np.full(6, -0.05), upper=np.full(6, 0.05))
-    found = solve(narrow, forward(robot, np.full(6, 0.2)), restarts=20)
-    assert found.outcome == LIMIT_BOUND
-    assert "above its limit of 2.86479 deg" in str(found.reason)
+    (unsolved,) = solve(narrow, forward(robot, np.full(6, 0.2)), restarts=20).unsolved
+    assert unsolved.why.code == "limit_bound"
+    assert "above its limit of 2.86479 deg" in say(unsolved)
 
 
 def test_nearest_arm_of_an_unreachable_pose_is_near(robot):
@@ -156,15 +165,15 @@ def test_arms_without_closed_form_are_solved_by_iteration(random):
     for q in joints_at_random(arm, random, 5):
         T = forward(arm, q)
         solution = inverse(arm, T, q)
-        assert solution.method.startswith("iteration from 400 random starts")
-        assert "axes 4, 5 and 6 miss a common point" in solution.method
+        assert solution.method == Iteration(400, closed_form_missing(arm))
+        assert solution.method.lacking.code == "no_common_point_of_axes_4_5_6"
         assert max(part.max() for part in pose_errors(forward(arm, solution.q), T)) < 1e-9
         assert (np.abs(solution.q - q).max(axis=1) < 1e-6).any()
-        assert solution.label[0] == "arm 1"
+        assert (solution.label[0], solution.branch[0]) == ("found_arm", 0)
     T[:3, 3] += 9
     nothing = inverse(arm, T)
     assert len(nothing.q) == 0
-    assert nothing.unsolved[0].startswith("unreachable")
+    assert nothing.unsolved[0].why.code == "unreachable"
 
 
 def test_bad_arguments_are_refused(robot):

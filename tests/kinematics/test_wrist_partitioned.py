@@ -15,7 +15,16 @@ from er3a.kinematics.closed_form import OFF_AXIS, ORIENTATION, TOO_FAR, TOO_NEAR
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward, frames
 from er3a.kinematics.inverse import inverse
-from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
+from er3a.kinematics.wrist_partitioned import (
+    ElbowAxesNotParallel,
+    NeighboursParallel,
+    NoArmLength,
+    NoWristCentre,
+    closed_form_missing,
+    solve_slots,
+    wrist_partitioned_arm,
+)
+from er3a.pipeline.messages.kinematics import say
 from testing.arms import DEG, joints_at_random, make_arm, number, placement, pose_errors
 
 SIDEWAYS = {"a": [0, 0.4318, 0.0203, 0, 0, 0], "d": [0.66, 0, 0.15, 0.4318, 0, 0.05]}
@@ -28,10 +37,10 @@ def pose_with_wrist_at(robot, centre, rpy=(0.4, 0.9, -0.3)):
     return T
 
 
-def unsolved_mm(solution, side):
-    """The distance that the text for one side names."""
-    (text,) = [text for text in solution.unsolved if text.startswith(side)]
-    return float(re.search(r"would be ([\d.e+-]+) mm too (far|near)", text)[1])
+def unsolved(solution, side):
+    """Why one side has no solution."""
+    (why,) = [found.why for found in solution.unsolved if found.side == side]
+    return why
 
 
 def lengths(robot):
@@ -46,13 +55,14 @@ def test_too_far_says_by_how_much(robot, outside):
     solution = inverse(robot, pose_with_wrist_at(robot, centre))
     assert len(solution.q) == 0
     assert solution.q.shape == (0, 6)
-    assert unsolved_mm(solution, "front") == pytest.approx(outside * 1000, rel=0.1, abs=0.05)
+    assert unsolved(solution, "front").gap_mm == pytest.approx(outside * 1000, abs=1e-9)
     back = np.hypot(centre[0] + robot.a[0], centre[2] - robot.d[0]) - sum(lengths(robot))
-    assert unsolved_mm(solution, "back") == pytest.approx(back * 1000, rel=0.1, abs=0.05)
-    assert all(
-        f"the stretched arm reaches to {sum(lengths(robot)) * 1000:.1f} mm" in text for text in solution.unsolved
-    )
-    assert "e+" not in "".join(solution.unsolved)
+    assert unsolved(solution, "back").gap_mm == pytest.approx(back * 1000, abs=1e-9)
+    for found in solution.unsolved:
+        assert found.why.code == "wrist_too_far"
+        assert found.why.reach_mm == pytest.approx(sum(lengths(robot)) * 1000)
+        assert f"the stretched arm reaches to {sum(lengths(robot)) * 1000:.1f} mm" in say(found)
+        assert "e+" not in say(found)
 
 
 @settings(max_examples=100, deadline=None)
@@ -89,7 +99,7 @@ def test_boundary_of_the_folded_arm(lengths_m, angle, inside):
     reach = upper - fore - inside
     T = pose_with_wrist_at(arm, [a1 + reach * np.cos(angle), 0, 0.3 + reach * np.sin(angle)])
     _, fault, gap = (batch[0] for batch in solve_slots(arm, T[None], np.zeros((1, 6))))
-    front = slice(0, 4) if branch_labels(arm)[0].startswith("front") else slice(4, 8)
+    front = slice(0, 4) if branch_labels(arm)[0].startswith("front_") else slice(4, 8)
     if inside < 1e-9:
         rows = inverse(arm, T).q
         assert len(rows) > 0
@@ -103,8 +113,9 @@ def test_too_near_says_by_how_much(robot):
     """The wrist centre on axis 2 itself."""
     upper, fore = lengths(robot)
     solution = inverse(robot, pose_with_wrist_at(robot, [robot.a[0], 0, robot.d[0]]))
-    assert unsolved_mm(solution, "front") == pytest.approx(abs(upper - fore) * 1000, rel=0.02)
-    assert f"the folded arm reaches down to {abs(upper - fore) * 1000:.1f} mm" in solution.unsolved[0]
+    assert unsolved(solution, "front").gap_mm == pytest.approx(abs(upper - fore) * 1000, rel=0.02)
+    assert unsolved(solution, "front").code == "wrist_too_near"
+    assert unsolved(solution, "front").least_mm == pytest.approx(abs(upper - fore) * 1000)
 
 
 @pytest.mark.parametrize("inside", [1e-6, 0.01, 0.1499])
@@ -117,8 +128,8 @@ def test_too_near_to_axis_one_for_an_arm_with_sideways_offset(inside):
     np.testing.assert_allclose(gap, inside, rtol=0, atol=1e-12)
     solution = inverse(arm, T)
     for side in ("front", "back"):
-        assert unsolved_mm(solution, side) == pytest.approx(inside * 1000, rel=0.1, abs=0.05)
-    assert "too near to axis 1 for the arm's sideways offset" in solution.unsolved[0]
+        assert unsolved(solution, side).gap_mm == pytest.approx(inside * 1000, abs=1e-9)
+        assert unsolved(solution, side).code == "wrist_too_near_axis_1"
 
 
 @pytest.mark.parametrize("offset", [-5e-10, 0.0, 5e-10])
@@ -152,36 +163,34 @@ def test_wrist_that_can_t_tilt_far_enough_says_by_how_much(beyond_deg):
     assert np.isnan(slots[own]).all()
 
 
-def test_the_text_for_a_wrist_that_can_t_tilt_far_enough():
+def test_a_wrist_that_can_t_tilt_far_enough_is_named():
     arm = make_arm(alpha=np.array([-90, 0, -90, 30, 30, 0]) * DEG)
     T = pose_with_wrist_at(arm, [0.6, 0, 0.4], rpy=(0, -0.6, 0))
     solution = inverse(arm, T)
     assert len(solution.unsolved) == 2
-    assert all(
-        re.search(r"the wrist can't tilt that far; [\d.]+ deg are missing$|too far|too near", text)
-        for text in solution.unsolved
-    )
-    assert any("can't tilt" in text for text in solution.unsolved)
+    codes = {found.why.code for found in solution.unsolved}
+    assert "wrist_tilts_too_little" in codes
+    assert codes <= {"wrist_tilts_too_little", "wrist_too_far", "wrist_too_near"}
 
 
 @pytest.mark.parametrize(
     ("change", "lacks"),
     [
-        ({"alpha": np.array([-90, 1, -90, 90, -90, 0]) * DEG}, "axes 2 and 3 are not parallel"),
-        ({"alpha": np.array([0, 0, -90, 90, -90, 0]) * DEG}, "axes 1 and 2 are parallel"),
-        ({"alpha": np.array([-90, 0, -90, 0, -90, 0]) * DEG}, "axes 4 and 5 are parallel"),
-        ({"alpha": np.array([-90, 0, -90, 90, 180, 0]) * DEG}, "axes 5 and 6 are parallel"),
-        ({"d": [0.3, 0, 0, 0.35, 0.02, 0.08]}, "axes 4, 5 and 6 miss a common point by"),
-        ({"a": [0.1, 0.4, 0.05, 0.001, 0, 0]}, "axes 4, 5 and 6 miss a common point by"),
-        ({"a": [0.1, 0.0, 0.05, 0, 0, 0]}, "the upper arm or the forearm has no length"),
-        ({"a": [0.1, 0.4, 0, 0, 0, 0], "d": [0.3, 0, 0, 0, 0, 0.08]}, "the upper arm or the forearm has no length"),
+        ({"alpha": np.array([-90, 1, -90, 90, -90, 0]) * DEG}, ElbowAxesNotParallel()),
+        ({"alpha": np.array([0, 0, -90, 90, -90, 0]) * DEG}, NeighboursParallel(1, 2)),
+        ({"alpha": np.array([-90, 0, -90, 0, -90, 0]) * DEG}, NeighboursParallel(4, 5)),
+        ({"alpha": np.array([-90, 0, -90, 90, 180, 0]) * DEG}, NeighboursParallel(5, 6)),
+        ({"d": [0.3, 0, 0, 0.35, 0.02, 0.08]}, NoWristCentre(pytest.approx(10))),
+        ({"a": [0.1, 0.4, 0.05, 0.001, 0, 0]}, NoWristCentre(pytest.approx(2 / 3))),
+        ({"a": [0.1, 0.0, 0.05, 0, 0, 0]}, NoArmLength()),
+        ({"a": [0.1, 0.4, 0, 0, 0, 0], "d": [0.3, 0, 0, 0, 0, 0.08]}, NoArmLength()),
     ],
 )
 def test_other_arms_are_told_what_they_lack(change, lacks):
     arm = make_arm(**change)
-    with pytest.raises(NotWristPartitionedError, match=f"^made: no closed-form inverse, because {lacks}") as caught:
+    with pytest.raises(NotWristPartitionedError, match=r"^made: no closed-form inverse \(") as caught:
         wrist_partitioned_arm(arm)
-    assert caught.value.property_missing.startswith(lacks)
+    assert caught.value.property_missing == closed_form_missing(arm) == lacks
 
 
 def test_a_collaborative_arm_without_wrist_centre_is_told_so():
@@ -191,8 +200,9 @@ def test_a_collaborative_arm_without_wrist_centre_is_told_so():
         alpha=np.array([90, 0, 0, 90, -90, 0]) * DEG,
         d=[0.089159, 0, 0, 0.10915, 0.09465, 0.0823],
     )
-    with pytest.raises(NotWristPartitionedError, match=r"axes 4, 5 and 6 miss a common point by [\d.]+ mm"):
-        wrist_partitioned_arm(arm)
+    missing = closed_form_missing(arm)
+    assert missing.code == "no_common_point_of_axes_4_5_6"
+    assert re.fullmatch(r"axes 4, 5 and 6 miss a common point by [\d.]+ mm", say(missing))
 
 
 def test_recognised_lengths(robot):
@@ -214,9 +224,9 @@ def test_branch_labels_are_distinct_and_in_slot_order(robot):
     labels = branch_labels(robot)
     assert len(set(labels)) == 8
     for slot, label in enumerate(labels):
-        assert label.endswith(", flip" if slot % 2 else ", no flip")
-        assert label.split(",")[0] == labels[4 * (slot // 4)].split(",")[0]
-        assert label.split(",")[1] == labels[2 * (slot // 2)].split(",")[1]
+        assert label.endswith("_no_flip") == (slot % 2 == 0)
+        assert label.split("_")[0] == labels[4 * (slot // 4)].split("_")[0]
+        assert label.split("_")[2] == labels[2 * (slot // 2)].split("_")[2]
 
 
 def test_branch_labels_mean_what_they_say(robot, random):
@@ -225,7 +235,7 @@ def test_branch_labels_mean_what_they_say(robot, random):
     for q in joints_at_random(robot, random, 300):
         solution = inverse(robot, forward(robot, q))
         for row, slot in zip(solution.q, solution.branch):
-            shoulder, elbow, wrist = branch_labels(robot)[slot].split(", ")
+            shoulder, _, elbow, wrist = branch_labels(robot)[slot].split("_", 3)
             F = frames(robot, row)
             facing = np.array([np.cos(row[0]), np.sin(row[0]), 0])
             wrist_centre = F[6, :3, 3] - robot.d[5] * F[6, :3, 2]
@@ -233,14 +243,14 @@ def test_branch_labels_mean_what_they_say(robot, random):
             assert shoulder == ("front" if ahead > 0 else "back")
             checked[shoulder] += 1
             theta_5 = robot.direction[4] * row[4] + robot.offset[4]
-            assert wrist == ("flip" if np.sin(theta_5) < 0 else "no flip")
+            assert wrist == ("flip" if np.sin(theta_5) < 0 else "no_flip")
             # The line from axis 2 to the wrist centre, where it leads outward at less than 45 deg.
             outward = facing * np.sign(ahead)
             line, elbow_from_2 = wrist_centre - F[1, :3, 3], F[2, :3, 3] - F[1, :3, 3]
             if outward @ line > abs(line[2]):
                 above = elbow_from_2[2] - line[2] * (outward @ elbow_from_2) / (outward @ line)
-                assert elbow == ("elbow up" if above > 0 else "elbow down")
-                checked[elbow.split()[1]] += 1
+                assert elbow == ("up" if above > 0 else "down")
+                checked[elbow] += 1
     assert min(checked.values()) > 50
 
 

@@ -15,7 +15,7 @@ from er3a.geometry.transforms import transform
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
 from er3a.planning.build import build
-from er3a.planning.commands import Source
+from er3a.planning.commands import CommandSource
 
 HEAD = {"name": "path", "title": "A path", "samples": 20}
 DOWN = [180, 0, 0]
@@ -36,7 +36,7 @@ def built(folder: Path, entry: dict, table: str | None = None, ends=None):
     file = folder / "paths.yaml"
     before = [JOINTS | {"name": name} for name in ends or {}]
     file.write_text(json.dumps({"kind": "paths", "paths": [*before, entry]}))
-    command = load_paths(file).paths[-1].command(Source(file, f"paths[{len(before)}]"))
+    command = load_paths(file).paths[-1].command(CommandSource(file, f"paths[{len(before)}]"))
     return build(load_robot("er3a_c60"), command, ends or {})
 
 

@@ -9,12 +9,12 @@ import pytest
 
 import er3a
 from er3a.collision.clearance import clearance
+from er3a.collision.pairs import PairOverlaps
 from er3a.errors import Er3aError
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import SceneFile
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.inverse import inverse
-from er3a.pipeline.messages.say import say
 from er3a.selection.rules import RULES, available_rules, joint_weights
 from er3a.selection.select import select
 from er3a.selection.sequence import select_sequence
@@ -54,7 +54,7 @@ def test_each_rule_orders_by_its_measure(arm, solutions):
         ordered = expected[ranking.order] * (1 if RULES[name].best == "least" else -1)
         assert (np.diff(ordered) >= -1e-6).all()
         assert sorted(ranking.order) == np.flatnonzero(solutions.within_limits).tolist()
-        assert ranking.reason[ranking.chosen].startswith("place 1: ")
+        assert ranking.reason[ranking.chosen].place == 1
 
 
 def test_mix_stretches_each_rule_over_its_range(arm, solutions):
@@ -64,8 +64,9 @@ def test_mix_stretches_each_rule_over_its_range(arm, solutions):
     stretched = [(each - each[allowed].min()) / np.ptp(each[allowed]) for each in (time, limits)]
     np.testing.assert_allclose(ranking.cost, stretched[0] + 3 * stretched[1])
     assert ranking.chosen == np.flatnonzero(allowed)[ranking.cost[allowed].argmin()]
-    assert "time" in ranking.chosen_reason
-    assert "limits" in ranking.chosen_reason
+    assert [measure.rule for measure in ranking.chosen_reason.measures] == ["time", "limits"]
+    assert ranking.chosen_reason.measures[0].value == time[ranking.chosen]
+    assert ranking.chosen_reason.next_best[0].value == time[ranking.order[1]]
 
 
 def test_colliding_solutions_are_refused_with_their_pair(arm, solutions):
@@ -76,17 +77,18 @@ def test_colliding_solutions_are_refused_with_their_pair(arm, solutions):
     assert touching.any()
     for row in np.flatnonzero(touching):
         assert row not in ranking.order
-        assert ranking.reason[row].startswith(f"{say(clear.pair[row])} overlap by ")
+        assert ranking.reason[row] == PairOverlaps(clear.pair[row], -clear.distance[row] * 1000)
 
 
 def test_nothing_left_says_why(arm, solutions):
     everywhere = WALL | {"planes": [{"name": "rock", "normal": [0, 0, 1], "offset_mm": 5000}]}
     ranking = select(arm, solutions, "time", np.zeros(6), SceneFile.model_validate(everywhere).scene())
     assert ranking.chosen is None
-    assert "solutions within the limits collide: link" in ranking.chosen_reason
+    assert ranking.chosen_reason.code == "all_collide"
+    assert ranking.chosen_reason.count == solutions.within_limits.sum()
     far = forward(arm, POSE)
     far[:3, 3] += 9
-    assert select(arm, inverse(arm, far), "time", np.zeros(6)).chosen_reason.startswith("out of reach")
+    assert select(arm, inverse(arm, far), "time", np.zeros(6)).chosen_reason.code == "no_solution"
 
 
 @pytest.mark.parametrize("rule", ["nearest", "weighted", "time"])

@@ -34,6 +34,7 @@ def files_of(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
 
 
+@pytest.mark.long
 def test_results_do_not_depend_on_the_parts(tmp_path):
     study = make_study()
     run.compute("workspace", study, "er3_600", tmp_path / "none")
@@ -94,6 +95,7 @@ def test_what_is_read_is_what_was_computed(found, tmp_path):
         assert (tmp_path / "again.parquet").read_bytes() == (tmp_path / f"{name}.parquet").read_bytes(), name
 
 
+@pytest.mark.long
 def test_void_centres_have_no_inverse_solution(random):
     """The closed form, over random orientations, is an independent witness of what the samples left out."""
     study = make_study({"er3a_c60_article": ROBOTS / "er3a_c60_article.yaml"}, samples=4_000_000, cells_across=48)
@@ -126,8 +128,8 @@ def test_full_turn_of_joint_1_gives_a_symmetric_cloud():
     ("locked", "code"),
     [
         ({1: 0, 2: 0, 3: 0, 4: 0, 5: 0, 6: 90}, "workspace.flat"),
-        ({1: 10, 4: 0, 6: 0}, "workspace.flat"),
-        ({3: 20}, None),
+        pytest.param({1: 10, 4: 0, 6: 0}, "workspace.flat", marks=pytest.mark.long),
+        pytest.param({3: 20}, None, marks=pytest.mark.long),
     ],
 )
 def test_locked_joints_run_through_all_three_verbs(tmp_path, locked, code):

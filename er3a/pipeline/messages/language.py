@@ -9,6 +9,7 @@ from __future__ import annotations
 import gettext
 import io
 from pathlib import Path
+from string import Formatter
 from typing import Any
 
 LANGUAGES = ("en", "zh")
@@ -16,6 +17,13 @@ CATALOGUES = Path(__file__).with_name("locale")
 
 _catalogue: gettext.NullTranslations = gettext.NullTranslations()
 _language = "en"
+
+
+class _AsIs(Formatter):
+    """Fills in what is formatted already."""
+
+    def format_field(self, value: Any, format_spec: str) -> Any:
+        return value
 
 
 def N_(text: str) -> str:
@@ -47,8 +55,14 @@ def translations() -> gettext.NullTranslations:
 
 def tr(text: str, /, **parts: Any) -> str:
     """A text in the language in use, its fields filled in as ``str.format`` does."""
-    translated_text = _catalogue.gettext(text) if text else text
-    return translated_text.format(**parts) if parts else translated_text
+    found = _catalogue.gettext(text) if text else text
+    return filled(found, text, parts) if parts else found
+
+
+def filled(text: str, template: str, parts: dict[str, Any]) -> str:
+    """A translation of a template, its fields filled in with the formats of the template: translations have none."""
+    formats = {name: spec or "" for _, name, spec, _ in Formatter().parse(template) if name}
+    return _AsIs().format(text, **{name: format(part, formats.get(name, "")) for name, part in parts.items()})
 
 
 def translated(context: str, text: str) -> str:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from er3a.pipeline.messages.kinematics import SINGULARITIES  # noqa: F401
+import er3a.pipeline.messages.kinematics  # noqa: F401
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.say import joined, listed, say, sentence
 from er3a.planning.avoidance import StrategyName, findings
-from er3a.planning.intervals import AboveLimit, BelowLimit, OutOfReach, TooFast
+from er3a.planning.intervals import AboveLimit, BelowLimit, PathOutOfReach, TooFast
 from er3a.planning.timing import MustStandStill, NoTimeLawFound, ToppraMissing
 
 STRATEGIES: dict[StrategyName, str] = {
@@ -22,24 +22,39 @@ STRATEGIES: dict[StrategyName, str] = {
 
 @say.register
 def _(found: AboveLimit) -> str:
-    template = "J{joint} goes to {reached:.1f} deg; its upper limit is {bound:g} deg"
-    return sentence(found.code, template, joint=found.joint, reached=found.reached_deg, bound=found.limit_deg)
+    return sentence(
+        found.code,
+        "J{joint} goes to {reached:.1f} deg; its upper limit is {bound:g} deg",
+        joint=found.joint,
+        reached=found.reached_deg,
+        bound=found.limit_deg,
+    )
 
 
 @say.register
 def _(found: BelowLimit) -> str:
-    template = "J{joint} goes to {reached:.1f} deg; its lower limit is {bound:g} deg"
-    return sentence(found.code, template, joint=found.joint, reached=found.reached_deg, bound=found.limit_deg)
+    return sentence(
+        found.code,
+        "J{joint} goes to {reached:.1f} deg; its lower limit is {bound:g} deg",
+        joint=found.joint,
+        reached=found.reached_deg,
+        bound=found.limit_deg,
+    )
 
 
 @say.register
 def _(found: TooFast) -> str:
-    template = "J{joint} would need {needed:.0f} deg/s; it can do {able:g} deg/s"
-    return sentence(found.code, template, joint=found.joint, needed=found.needed_deg_s, able=found.limit_deg_s)
+    return sentence(
+        found.code,
+        "J{joint} would need {needed:.0f} deg/s; it can do {able:g} deg/s",
+        joint=found.joint,
+        needed=found.needed_deg_s,
+        able=found.limit_deg_s,
+    )
 
 
 @say.register
-def _(found: OutOfReach) -> str:
+def _(found: PathOutOfReach) -> str:
     return joined(listed(found.reasons))
 
 
@@ -95,8 +110,12 @@ def _(found: findings.EndsInRegion) -> str:
 
 @say.register
 def _(found: findings.BranchEnds) -> str:
-    template = "at t = {t:.4g} s the branch ends: J{joint} would have to jump"
-    return sentence(found.code, template, t=found.t_s, joint=found.joint)
+    return sentence(
+        found.code,
+        "at t = {t:.4g} s the branch ends: J{joint} would have to jump",
+        t=found.t_s,
+        joint=found.joint,
+    )
 
 
 @say.register
@@ -106,8 +125,11 @@ def _(found: findings.NoOtherBranch) -> str:
 
 @say.register
 def _(found: findings.NoShiftKeepsDistance) -> str:
-    template = "no shift of the tool point up to {far:.0f} mm keeps the distance"
-    return sentence(found.code, template, far=found.up_to_mm)
+    return sentence(
+        found.code,
+        "no shift of the tool point up to {far:.0f} mm keeps the distance",
+        far=found.up_to_mm,
+    )
 
 
 @say.register
@@ -132,8 +154,12 @@ def _(found: findings.PathNotFinished) -> str:
 
 @say.register
 def _(found: findings.EndsOffPath) -> str:
-    template = "it ends {mm:.3g} mm and {deg:.3g} deg from the path's end"
-    return sentence(found.code, template, mm=found.distance_mm, deg=found.angle_deg)
+    return sentence(
+        found.code,
+        "it ends {mm:.3g} mm and {deg:.3g} deg from the path's end",
+        mm=found.distance_mm,
+        deg=found.angle_deg,
+    )
 
 
 @say.register

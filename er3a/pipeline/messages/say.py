@@ -30,12 +30,13 @@ def say(finding: Any) -> str:
 
 def sentence(code: str, template: str, /, **parts: Any) -> str:
     """A text in the language in use, its fields filled in as ``str.format`` does; ``code`` tells equal texts apart."""
-    return language.translated(code, template).format(**parts)
+    return language.filled(language.translated(code, template), template, parts)
 
 
 def counted(code: str, one: str, many: str, count: int, /, **parts: Any) -> str:
     """A text whose form depends on a number, which is the field ``{count}`` in it."""
-    return language.translated_count(code, one, many, count).format(count=count, **parts)
+    found = language.translated_count(code, one, many, count)
+    return language.filled(found, one if count == 1 else many, {"count": count} | parts)
 
 
 def word(code: str, words: Mapping[KeyT, str], key: KeyT) -> str:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import er3a.pipeline.messages.collision  # noqa: F401
+from er3a.kinematics.singularity import SingularityType
+from er3a.pipeline.messages.kinematics import SINGULARITIES
 from er3a.pipeline.messages.language import N_
-from er3a.pipeline.messages.planning import SINGULARITIES
 from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
 from er3a.pipeline.messages.say import joined, listed, say, sentence, word
-from er3a.pipeline.messages.trajectory_verdict import verdict_word
 from er3a.pipeline.stages.trajectory.model import (
     BodiesOverlap,
     Jump,
@@ -18,9 +18,6 @@ from er3a.pipeline.stages.trajectory.model import (
     TriedStrategy,
 )
 from er3a.planning.avoidance import StrategyName
-from er3a.planning.near_singular import SingularityType
-
-__all__ = ["FIGURES", "advice", "kind_word", "path_text", "strategy_word", "type_word", "verdict_word"]
 
 FIGURES = {
     "paths": N_("Paths planned"),
@@ -91,8 +88,11 @@ def _apart_from_collisions(path: PathSummary) -> str:
     if path.in_joint_space:
         if not met:
             return sentence("path.no_fault", "no fault")
-        harmless = "passes singular poses ({places}), which a joint move does without harm"
-        return sentence("path.harmless", harmless, places=joined(met))
+        return sentence(
+            "path.harmless",
+            "passes singular poses ({places}), which a joint move does without harm",
+            places=joined(met),
+        )
     if met or path.jumps:
         return joined([*met, *map(say, path.jumps), _speeds(path.joint_speed_bounded)])
     if path.singularities:
@@ -119,8 +119,8 @@ def _(event: Singularity) -> str:
 
 @say.register
 def _(jump: Jump) -> str:
-    template = "the branch in use ends at t = {t:.4g} s, J{joint} would jump"
-    return sentence("path.jump", template, t=jump.t_s, joint=jump.joint)
+    parts = {"t": jump.t_s, "joint": jump.joint}
+    return sentence("path.jump", "the branch in use ends at t = {t:.4g} s, J{joint} would jump", **parts)
 
 
 @say.register
@@ -181,8 +181,8 @@ def _leaves(far_mm: float, turned_deg: float) -> str:
         return sentence("advice.tool", "the tool leaves the path by {far:.2g} mm", far=far_mm)
     if far_mm < NO_DEVIATION:
         return sentence("advice.tool", "the tool leaves the path by {turned:.2g} deg", turned=turned_deg)
-    both = "the tool leaves the path by {far:.2g} mm and {turned:.2g} deg"
-    return sentence("advice.tool", both, far=far_mm, turned=turned_deg)
+    both = {"far": far_mm, "turned": turned_deg}
+    return sentence("advice.tool", "the tool leaves the path by {far:.2g} mm and {turned:.2g} deg", **both)
 
 
 def _takes(longer_s: float) -> str:

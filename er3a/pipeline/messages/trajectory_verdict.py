@@ -31,8 +31,13 @@ def _(found: PathCounts) -> str:
     for verdict, names in unsafe.items():
         parts = {"count": len(names), "word": verdict_word(verdict), "names": ", ".join(names)}
         faults.append(sentence("trajectory.fault", "{count} {word} ({names})", **parts) if names else "")
-    one, many = N_("{safe} of {count} path is safe"), N_("{safe} of {count} paths are safe")
-    safe = counted("trajectory.paths", one, many, found.paths, safe=found.safe)
+    safe = counted(
+        "trajectory.paths",
+        "{safe} of {count} path is safe",
+        "{safe} of {count} paths are safe",
+        found.paths,
+        safe=found.safe,
+    )
     return sentence("trajectory.verdict", "{finding}.", finding=joined([safe, joined(faults, ", ")]))
 
 

@@ -45,7 +45,7 @@ NotUsable = NotPossible | PathNotFinished | EndsOffPath | LimitsExceeded | Speed
 
 
 @dataclass(frozen=True, eq=False)
-class Cost:
+class StrategyCost:
     """A strategy's motion, and what it costs.
 
     Attributes
@@ -78,7 +78,7 @@ class StrategyResult:
     """
 
     name: StrategyName
-    cost: Cost | None
+    cost: StrategyCost | None
     reasons: tuple[NotUsable, ...] = ()
 
 
@@ -95,7 +95,7 @@ def best(results: Iterable[StrategyResult], meets: bool) -> StrategyResult | Non
     meets : whether the path meets a singular pose; what goes through it is then taken only if nothing else is usable
     """
 
-    def price(cost: Cost) -> tuple[bool, float, float]:
+    def price(cost: StrategyCost) -> tuple[bool, float, float]:
         far, turned = cost.distance.max(), cost.angle.max()
         on_path = far < ON_PATH[0] and turned < ON_PATH[1]
         away = 0.0 if on_path else float(far * 1000 + np.degrees(turned))
@@ -132,5 +132,5 @@ def _tried(segment: SingularSegment, name: StrategyName) -> StrategyResult:
     if acceleration > 1 + OVER:
         reasons.append(AccelerationExceeded(acceleration))
     keeps = name in ("stop", "detour", "branch") or bool(segment.near.margin(robot, motion.q).min() > 1 - 1e-6)
-    cost = Cost(motion, found.done, distance, angle, speed, acceleration, keeps)
+    cost = StrategyCost(motion, found.done, distance, angle, speed, acceleration, keeps)
     return StrategyResult(name, cost, tuple(reasons))

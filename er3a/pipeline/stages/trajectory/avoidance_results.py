@@ -18,7 +18,7 @@ from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.pipeline.tables import Reals
 from er3a.planning.avoidance import StrategyName
 from er3a.planning.avoidance.singular_segment import SingularSegment, singular_segment
-from er3a.planning.avoidance.strategies import Cost, StrategyResult, best, compare
+from er3a.planning.avoidance.strategies import StrategyCost, StrategyResult, best, compare
 from er3a.planning.near_singular import NearSingular
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
 from er3a.robots.robot import Robot
@@ -95,9 +95,11 @@ class AvoidanceTask:
             return None, []
         speed, acceleration = slower.ratios(self.limits)
         nothing = np.zeros(len(slower.t))
-        return quickest, [StrategyResult("slow", Cost(slower, 1.0, nothing, nothing, speed, acceleration, False))]
+        return quickest, [
+            StrategyResult("slow", StrategyCost(slower, 1.0, nothing, nothing, speed, acceleration, False))
+        ]
 
-    def _meets(self, cost: Cost) -> tuple[PairOverlaps | None, float | None]:
+    def _meets(self, cost: StrategyCost) -> tuple[PairOverlaps | None, float | None]:
         """The deepest overlap on a motion, and its least clearance in mm (None if nothing can meet)."""
         if self.surroundings is None:
             return None, None
@@ -166,7 +168,7 @@ def _tried(result: StrategyResult, meets: PairOverlaps | None, clearance_mm: flo
     return TriedStrategy(result.name, motion is not None and not reasons, reasons, motion)
 
 
-def _motion(cost: Cost, clearance_mm: float | None) -> StrategyMotion:
+def _motion(cost: StrategyCost, clearance_mm: float | None) -> StrategyMotion:
     return StrategyMotion(
         done_ratio=cost.done,
         max_deviation_mm=float(cost.distance.max() * 1000),

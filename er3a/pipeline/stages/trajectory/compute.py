@@ -34,7 +34,7 @@ from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
 from er3a.pipeline.stages.trajectory.path_summary import path_summary
 from er3a.pipeline.study import Study
 from er3a.pipeline.tables import Reals
-from er3a.planning.commands import Source
+from er3a.planning.commands import CommandSource
 from er3a.planning.near_singular import NearSingular
 from er3a.planning.timing import JointLimits, joint_limits
 from er3a.robots.joint_limits import within
@@ -63,7 +63,7 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     paths: list[PathSummary] = []
     ends: dict[str, Reals] = {}
     for i, entry in enumerate(load_paths(file).paths):
-        motion = motion_of(robot, entry, settings.checks_per_sample, Source(file, f"paths[{i}]"), ends)
+        motion = motion_of(robot, entry, settings.checks_per_sample, CommandSource(file, f"paths[{i}]"), ends)
         ends[entry.name] = motion.q[-1]
         found = judge(robot, motion, near)
         avoided = avoidance.avoid(motion, found)

@@ -22,7 +22,8 @@ class TrajectorySettings(StrictModel):
 
     ``avoidance`` chooses the avoidance strategy, or compares all of them. Joints of unknown speed are taken to do
     ``assumed_speed_deg_s``; all joints to reach full speed in ``acceleration_time_s``.
-    ``scene`` holds the obstacles; no overlap with them deeper than ``penetration_tolerance_mm`` goes unnoticed between points.
+    ``scene`` holds the obstacles; no overlap with them deeper than ``penetration_tolerance_mm`` goes unnoticed between
+    points.
     """
 
     checks_per_sample: Annotated[int, Field(ge=1, le=1000)]

@@ -13,7 +13,7 @@ from er3a.planning.intervals import (
     AboveLimit,
     BelowLimit,
     Interval,
-    OutOfReach,
+    PathOutOfReach,
     TooFast,
     out_of_limits,
     too_fast,
@@ -40,7 +40,7 @@ class Judgement:
     verdict: PathVerdict
     events: list[SingularEvent]
     limits: list[Interval[AboveLimit | BelowLimit]]
-    beyond: list[Interval[OutOfReach]]
+    beyond: list[Interval[PathOutOfReach]]
     fast: list[Interval[TooFast]]
     times: Reals
     q: Reals

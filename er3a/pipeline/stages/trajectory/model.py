@@ -10,12 +10,13 @@ from typing import Generic, Literal, TypeVar, get_args
 
 from er3a.collision.pairs import Pair, PairOverlaps
 from er3a.findings import Finding
+from er3a.kinematics.configuration import BranchLabel
+from er3a.kinematics.singularity import SingularityType
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.tables import Flags, Reals, Table, Texts, column, per_joint, vector
 from er3a.planning.avoidance import StrategyName
 from er3a.planning.avoidance.strategies import NotUsable
-from er3a.planning.intervals import AboveLimit, BelowLimit, OutOfReach, TooFast
-from er3a.planning.near_singular import SingularityType
+from er3a.planning.intervals import AboveLimit, BelowLimit, PathOutOfReach, TooFast
 
 PathKind = Literal["joint", "joint_sequence", "line", "arc", "sequence", "table"]
 PathVerdict = Literal["unreachable", "leaves limits", "collides", "too fast", "singular", "near-singular", "safe"]
@@ -216,14 +217,14 @@ class PathSummary:
     duration_s: float
     samples: int
     length_m: float
-    branches: tuple[str, ...]
+    branches: tuple[BranchLabel, ...]
     half_turns: tuple[HalfTurn, ...]
     corner_deviation_mm: float | None
     corner_deviation_deg: float | None
     repeated_rows: tuple[int, ...]
     start_turn_deg: tuple[float, ...] | None
     singularities: tuple[Singularity, ...]
-    unreachable: tuple[Stretch[OutOfReach], ...]
+    unreachable: tuple[Stretch[PathOutOfReach], ...]
     out_of_limits: tuple[Stretch[AboveLimit | BelowLimit], ...]
     too_fast: tuple[Stretch[TooFast], ...]
     jumps: tuple[Jump, ...]
@@ -266,20 +267,26 @@ class TrajectorySummary(Summary):
 
 
 @dataclass(frozen=True, eq=False)
-class Samples(Table):
-    """The paths' own points; joint columns are NaN where the path can't be reached."""
+class MotionRows(Table):
+    """Motions of the arm; joint columns are NaN where the path can't be reached."""
 
     path: Texts = column("name of the path", dtype=object)
-    t_s: Reals = column("time since the path's start", "s")
-    s_m: Reals = column("way of the tool point", "m")
+    t_s: Reals = column("time since the motion's start", "s")
     q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
     q_deg_s: Reals = per_joint("q{}_deg_s", "joint velocity", "deg/s")
     q_deg_s2: Reals = per_joint("q{}_deg_s2", "joint acceleration", "deg/s^2")
     xyz_mm: Reals = vector("{}_mm", "tool point in the base frame", "mm")
     speed_ratio: Reals = column("greatest ratio of a joint's speed to its limit")
-    manipulability: Reals = column("manipulability of the scaled Jacobian")
     condition_number: Reals = column("condition number of the scaled Jacobian")
     smallest_singular_value: Reals = column("smallest singular value of the scaled Jacobian")
+
+
+@dataclass(frozen=True, eq=False)
+class Samples(MotionRows):
+    """The paths' own points."""
+
+    s_m: Reals = column("way of the tool point", "m")
+    manipulability: Reals = column("manipulability of the scaled Jacobian")
     wrist_deg: Reals = column("signed distance from the aligned wrist", "deg")
     elbow_deg: Reals = column("signed distance from the straight or folded elbow", "deg")
     shoulder_mm: Reals = column("signed distance of the wrist centre from the shoulder singularity", "mm")
@@ -306,21 +313,12 @@ class Clearances(Table):
 
 
 @dataclass(frozen=True, eq=False)
-class AvoidanceRows(Table):
+class AvoidanceRows(MotionRows):
     """Motions of the strategies, and of each path at its fastest (``fastest``)."""
 
-    path: Texts = column("name of the path", dtype=object)
     strategy: Texts = column("the strategy, or the path at its fastest", dtype=object)
-    t_s: Reals = column("time since the motion's start", "s")
-    q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
-    q_deg_s: Reals = per_joint("q{}_deg_s", "joint velocity", "deg/s")
-    q_deg_s2: Reals = per_joint("q{}_deg_s2", "joint acceleration", "deg/s^2")
-    xyz_mm: Reals = vector("{}_mm", "tool point in the base frame", "mm")
     deviation_mm: Reals = column("distance of the tool point from the path", "mm")
     deviation_deg: Reals = column("angle of the tool to the path's", "deg")
-    speed_ratio: Reals = column("greatest ratio of a joint's speed to its limit")
-    condition_number: Reals = column("condition number of the scaled Jacobian")
-    smallest_singular_value: Reals = column("smallest singular value of the scaled Jacobian")
 
 
 @dataclass(frozen=True, eq=False)

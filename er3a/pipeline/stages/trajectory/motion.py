@@ -14,7 +14,7 @@ from er3a.files.path_file import PathEntry
 from er3a.kinematics.forward import forward, jacobian
 from er3a.pipeline.tables import Reals
 from er3a.planning.build import Built, build
-from er3a.planning.commands import Source
+from er3a.planning.commands import CommandSource
 from er3a.planning.follow import follow
 from er3a.planning.followed import Followed
 from er3a.planning.moves import JointMove
@@ -52,7 +52,7 @@ class Motion:
 
 
 def motion_of(
-    robot: Robot, entry: PathEntry, checks_per_sample: int, source: Source, ends: Mapping[str, Reals]
+    robot: Robot, entry: PathEntry, checks_per_sample: int, source: CommandSource, ends: Mapping[str, Reals]
 ) -> Motion:
     """Plan a path, and follow it if it is one of the tool; ``ends`` as for :func:`er3a.planning.build.build`.
 

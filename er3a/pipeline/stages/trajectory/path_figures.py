@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 
+from er3a.kinematics.singularity import SingularityType
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.trajectory import type_word
 from er3a.pipeline.stages.trajectory.model import (
@@ -29,7 +30,6 @@ from er3a.pipeline.tables import Reals
 from er3a.pipeline.viewing.figures import svg_data_uri
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINT_NAMES, MODEL, MUTED, REFERENCE, VERDICTS
 from er3a.pipeline.viewing.palette import JOINTS as COLOURS
-from er3a.planning.near_singular import SingularityType
 from er3a.robots.robot import Robot
 
 WIDTHS = (3.2, 2.8, 2.4, 2.0, 1.6, 1.2)  # so that curves that coincide all show

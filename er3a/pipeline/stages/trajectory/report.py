@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.trajectory import (
@@ -17,8 +18,8 @@ from er3a.pipeline.messages.trajectory import (
     reasons,
     strategy_word,
     type_word,
-    verdict_word,
 )
+from er3a.pipeline.messages.trajectory_verdict import verdict_word
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.trajectory.clearance_figures import clearance_section
 from er3a.pipeline.stages.trajectory.model import (
@@ -70,6 +71,7 @@ class Section:
     kind: str
     text: str
     advice: str | None
+    branches: list[str]
     speed: str
     events: list[list[str]]
     faults: list[list[str]]
@@ -109,6 +111,7 @@ def _section(path: PathSummary, rows: Checks, figure: Drawing) -> Section:
         kind=kind_word(path.kind),
         text=path_text(path),
         advice=advice(path),
+        branches=[branch_word(label) for label in path.branches],
         speed=_speed(path),
         events=[_event_row(event) for event in path.singularities],
         faults=_faults(path),

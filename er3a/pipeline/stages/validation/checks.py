@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from er3a.pipeline.stages.validation.check_model import Check, Conflict, ModelCheck, ReferenceCheck, Statement, Unjudged
 from er3a.pipeline.stages.validation.findings import (
-    CheckSubject,
+    ModelGroup,
+    NearSingularLeftOut,
     Note,
     NotInRobotFile,
     SelfCheck,
@@ -18,17 +19,11 @@ from er3a.pipeline.stages.validation.findings import (
     SourceGivesNone,
     WholeGroup,
 )
-from er3a.pipeline.stages.validation.model import (
-    Check,
-    CheckStatus,
-    Conflict,
-    ModelGroup,
-    Statement,
-)
+from er3a.pipeline.tables import Reals
 from er3a.references.quantities import Limit, Quantity, Speed
-from er3a.references.reference import Reference, ReferenceSet, conflicts
+from er3a.references.reference import Reference, ReferenceSet, conflicts, expected_of
 from er3a.references.rows import GROUPS, AxisRow
-from er3a.references.subjects import AxisPosition, JointLimit, JointSpeed
+from er3a.references.subjects import AxisPosition, JointLimit, JointSpeed, ReferenceSubject
 
 ROUNDING = 1e-9
 
@@ -39,113 +34,122 @@ def against_itself(
     measured: float,
     tolerance: float,
     unit: str = "",
-    note: Note | None = None,
-) -> Check:
+    note: NearSingularLeftOut | None = None,
+) -> ModelCheck:
     """A check that needs no document: ``measured`` should be 0."""
-    status: CheckStatus = "pass" if abs(measured) <= tolerance else "fail"
-    return Check(SelfCheck(quantity), group, None, status, measured, 0.0, measured, tolerance, unit, None, None, note)
+    status: Literal["pass", "fail"] = "pass" if abs(measured) <= tolerance else "fail"
+    return ModelCheck(measured, 0.0, measured, tolerance, unit, SelfCheck(quantity), group, status, note)
 
 
-def nothing_to_compare(subject: CheckSubject, group: str, unit: str, note: Note, **known: Any) -> Check:
-    """A check for which there is no reference, or no value in the robot's file."""
-    values = {"reference_set": None, "measured": None, "source": None, "grade": None} | known
-    return Check(
-        subject=subject, group=group, status="no_reference", expected=None, difference=None, tolerance=None, unit=unit,
-        note=note, **values,
-    )  # fmt: skip
-
-
-def checks_of_set(references: ReferenceSet, values: NDArray[np.float64]) -> tuple[list[Check], list[Conflict]]:
+def checks_of_set(references: ReferenceSet, values: Reals) -> tuple[list[Check], list[Conflict]]:
     """Judge a model's values (n,) of the set's checkable references, and list what the set says nothing about."""
-    stated = references.checkable
-    met = [abs(value - r.expected) <= r.uncertainty + ROUNDING for r, value in zip(stated, values)]
-    pairs = conflicts(stated)
-    checks = [
-        _check(references.name, reference, float(value), _status(i, stated, met, pairs))
-        for i, (reference, value) in enumerate(zip(stated, values))
-    ]
-    return checks + _gaps(references), _conflicts(references.name, stated, values, met, pairs)
+    stated = _Stated(references.name, references.checkable, values)
+    checks = [stated.check(i) for i in range(len(values))]
+    return [*checks, *_gaps(references)], stated.conflicts()
 
 
-def _status(i: int, stated: tuple[Reference, ...], met: list[bool], pairs: list[tuple[int, int]]) -> CheckStatus:
-    if met[i]:
-        return "pass"
-    rivals = [b if a == i else a for a, b in pairs if i in (a, b)]
-    excused = any(met[k] and (stated[k].authoritative or not stated[i].authoritative) for k in rivals)
-    return "conflict" if excused else "fail"
+class _Stated:
+    """Checkable references of a set beside a model's values (n,).
+
+    Attributes
+    ----------
+    met : (n,), which of them the model meets
+    pairs : references that no model can meet both of
+    """
+
+    def __init__(self, set_name: str, references: tuple[Reference, ...], values: Reals):
+        self.set_name, self.references, self.values = set_name, references, values
+        self.expected, self.tolerance = expected_of(references)
+        self.met = np.abs(values - self.expected) <= self.tolerance + ROUNDING
+        self.pairs = conflicts(references)
+
+    def check(self, i: int) -> Check:
+        """The check of a reference; not judged where the robot's file gives no value."""
+        reference, value, expected = self.references[i], float(self.values[i]), float(self.expected[i])
+        if math.isnan(value):
+            return _without_value(self.set_name, reference, NotInRobotFile())
+        return ReferenceCheck(
+            measured=value,
+            expected=expected,
+            difference=value - expected,
+            tolerance=reference.uncertainty,
+            unit=reference.unit,
+            subject=reference.subject,
+            group=reference.group,
+            status=self._status(i),
+            reference_set=self.set_name,
+            source=reference.source,
+            grade=reference.grade,
+        )
+
+    def conflicts(self) -> list[Conflict]:
+        """What the references contradict each other about."""
+        members: dict[Quantity, set[int]] = {}
+        for pair in self.pairs:
+            members.setdefault(self.references[pair[0]].quantity, set()).update(pair)
+        return [self._conflict(sorted(rows)) for rows in members.values()]
+
+    def _conflict(self, rows: list[int]) -> Conflict:
+        first = self.references[rows[0]]
+        statements = tuple(
+            Statement(
+                expected=float(self.expected[i]),
+                tolerance=self.references[i].uncertainty,
+                difference=float(self.values[i] - self.expected[i]),
+                met=bool(self.met[i]),
+                source=self.references[i].source,
+                grade=self.references[i].grade,
+            )
+            for i in rows
+        )
+        return Conflict(self.set_name, first.subject, first.unit, float(self.values[rows[0]]), statements)
+
+    def _status(self, i: int) -> Literal["pass", "fail", "conflict"]:
+        if self.met[i]:
+            return "pass"
+        rivals = [b if a == i else a for a, b in self.pairs if i in (a, b)]
+        weak = not self.references[i].authoritative
+        excused = any(self.met[k] and (weak or self.references[k].authoritative) for k in rivals)
+        return "conflict" if excused else "fail"
 
 
-def _check(set_name: str, reference: Reference, value: float, status: CheckStatus) -> Check:
-    if math.isnan(value):
-        return nothing_to_compare(
-            reference.subject, reference.group, reference.unit, NotInRobotFile(),
-            reference_set=set_name, source=reference.source, grade=reference.grade,
-        )  # fmt: skip
-    return Check(
-        subject=reference.subject,
-        group=reference.group,
+def _without_value(set_name: str, reference: Reference, note: Note) -> Unjudged:
+    return Unjudged(
+        reference.subject,
+        reference.group,
+        reference.unit,
+        note,
         reference_set=set_name,
-        status=status,
-        measured=value,
-        expected=float(reference.expected),
-        difference=value - float(reference.expected),
-        tolerance=reference.uncertainty,
-        unit=reference.unit,
         source=reference.source,
         grade=reference.grade,
     )
 
 
-def _gaps(references: ReferenceSet) -> list[Check]:
+def _gaps(references: ReferenceSet) -> list[Unjudged]:
+    """What the set says nothing about."""
+    name, note = references.name, SetHasNoData(references.name)
     gaps = [
-        nothing_to_compare(
-            reference.subject, reference.group, reference.unit, SourceGivesNone(),
-            reference_set=references.name, source=reference.source, grade=reference.grade,
-        )
+        _without_value(name, reference, SourceGivesNone())
         for reference in references.references
         if reference.expected is None
-    ]  # fmt: skip
+    ]
     present = {reference.group for reference in references.references}
-    note = SetHasNoData(references.name)
-    for group in GROUPS:
-        if group not in present:
-            gaps.append(nothing_to_compare(WholeGroup(group), group, "", note, reference_set=references.name))
+    gaps += [
+        Unjudged(WholeGroup(group), group, "", note, reference_set=name) for group in GROUPS if group not in present
+    ]
     quantities = {reference.quantity for reference in references.references}
     with_axis = {row.joint for row in references.of(AxisRow)}
     for joint in range(1, 7):
         if "axes" in present and joint not in with_axis:
-            subject = AxisPosition(joint, None)
-            gaps.append(nothing_to_compare(subject, "axes", "mm", note, reference_set=references.name))
-        limits = [("limits", JointLimit(joint, side), Limit(joint, side)) for side in ("lower", "upper")]
-        for group, subject, quantity in (*limits, ("speeds", JointSpeed(joint), Speed(joint))):
-            if group in present and quantity not in quantities:
-                gaps.append(nothing_to_compare(subject, group, quantity.unit, note, reference_set=references.name))
+            gaps.append(Unjudged(AxisPosition(joint, None), "axes", "mm", note, reference_set=name))
+        wanted: list[tuple[str, ReferenceSubject, Quantity]] = [
+            ("limits", JointLimit(joint, "lower"), Limit(joint, "lower")),
+            ("limits", JointLimit(joint, "upper"), Limit(joint, "upper")),
+            ("speeds", JointSpeed(joint), Speed(joint)),
+        ]
+        gaps += [
+            Unjudged(subject, group, quantity.unit, note, reference_set=name)
+            for group, subject, quantity in wanted
+            if group in present and quantity not in quantities
+        ]
     return gaps
-
-
-def _conflicts(
-    set_name: str,
-    stated: tuple[Reference, ...],
-    values: NDArray[np.float64],
-    met: list[bool],
-    pairs: list[tuple[int, int]],
-) -> list[Conflict]:
-    members: dict[Quantity, set[int]] = {}
-    for pair in pairs:
-        members.setdefault(stated[pair[0]].quantity, set()).update(pair)
-    found = []
-    for rows in members.values():
-        first = stated[min(rows)]
-        statements = tuple(
-            Statement(
-                expected=float(stated[i].expected),
-                tolerance=stated[i].uncertainty,
-                difference=float(values[i] - stated[i].expected),
-                met=bool(met[i]),
-                source=stated[i].source,
-                grade=stated[i].grade,
-            )
-            for i in sorted(rows)
-        )
-        found.append(Conflict(set_name, first.subject, first.unit, float(values[min(rows)]), statements))
-    return found

@@ -4,20 +4,14 @@ from __future__ import annotations
 
 from er3a.files.reference_sets import load_references
 from er3a.kinematics.wrist_partitioned import closed_form_missing
-from er3a.pipeline.stages.validation.checks import checks_of_set, nothing_to_compare
+from er3a.pipeline.stages.validation.check_model import Check, Conflict, Unjudged
+from er3a.pipeline.stages.validation.checks import checks_of_set
 from er3a.pipeline.stages.validation.corrections import calibrate_from_sets
 from er3a.pipeline.stages.validation.diagnoses import diagnose_sets
 from er3a.pipeline.stages.validation.entry import ValidationSettings
 from er3a.pipeline.stages.validation.findings import InNoSet
 from er3a.pipeline.stages.validation.geometry_tables import axes_table, key_poses_table, section_table
-from er3a.pipeline.stages.validation.model import (
-    Check,
-    Checks,
-    Circles,
-    TableFacts,
-    ValidationResults,
-    ValidationSummary,
-)
+from er3a.pipeline.stages.validation.model import Checks, Circles, TableFacts, ValidationResults, ValidationSummary
 from er3a.pipeline.stages.validation.self_checks import round_trip_checks, table_checks
 from er3a.pipeline.stages.validation.subject import model_of
 from er3a.pipeline.stages.validation.verdict import SHOWN_DECIMALS, key_figures, set_summaries, verdict_of
@@ -54,7 +48,7 @@ def compute(study: Study, name: str) -> ValidationResults:
     values: dict[Quantity, float] = {quantity: value for quantity, (value, _) in extremes.items()}
 
     circles = circle_points(robot)
-    checks, conflicts = table_checks(robot), []
+    checks, conflicts = table_checks(robot), list[Conflict]()
     for references in sets:
         quantities = quantities_of(references.checkable)
         state = state_of(robot, quantities, extremes=values, axes=circles.axes)
@@ -95,12 +89,12 @@ def compute(study: Study, name: str) -> ValidationResults:
     )
 
 
-def _without_reference(values: dict[Quantity, float], checks: list[Check]) -> list[Check]:
+def _without_reference(values: dict[Quantity, float], checks: list[Check]) -> list[Unjudged]:
     """Reach that no reference gives, as measured."""
     stated = {check.subject for check in checks}
     subjects = {Reach(distance.extreme, distance.point, distance.axis): distance for distance in ALWAYS_SEARCHED}
     return [
-        nothing_to_compare(subject, "reach", "mm", InNoSet(), measured=values[distance])
+        Unjudged(subject, "reach", "mm", InNoSet(), measured=values[distance])
         for subject, distance in subjects.items()
         if subject not in stated
     ]

@@ -174,7 +174,11 @@ def _residual_picture(rows: Residuals, diagnosis: SetDiagnosis) -> Picture | Non
 def _hypothesis_row(hypothesis: RankedHypothesis) -> list[str]:
     words = both(hypothesis.faults)
     if alike := hypothesis.indistinguishable_from:
-        template = "{faults} (or {more} more that these references can't tell from it)"
-        words = sentence("alike", template, faults=words, more=len(alike))
+        words = sentence(
+            "alike",
+            "{faults} (or {more} more that these references can't tell from it)",
+            faults=words,
+            more=len(alike),
+        )
     numbers = [fixed(value, 1) for value in (hypothesis.residual_before, hypothesis.residual_after)]
     return [typographic(words), *numbers, hypothesis.unit]

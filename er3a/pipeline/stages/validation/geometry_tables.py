@@ -27,9 +27,9 @@ from er3a.references.quantities import (
     point_of,
     section_of,
 )
-from er3a.references.reference import ReferenceSet
+from er3a.references.reference import ReferenceSet, expected_of
 from er3a.references.rows import AxisRow, EnvelopeRow, PositionRow
-from er3a.references.subjects import DrawingCorner
+from er3a.references.subjects import DrawingCorner, DrawingExtent, Reach
 from er3a.robots.robot import Grade, Robot
 
 SECTION_STEPS = 60
@@ -133,14 +133,13 @@ def _corners(references: ReferenceSet) -> Iterator[_Look]:
 
 
 def _extremes(references: ReferenceSet, extremes: Extremes) -> Iterator[_Look]:
-    for reference in references.checkable:
-        quantity = reference.quantity
-        if not isinstance(quantity, AxisDistance | SectionExtent):
-            continue
-        value, q = extremes[quantity]
-        stated = partial(_extreme_as_stated, quantity, reference.expected, value)
-        pose = tuple(np.degrees(q).tolist())
-        yield _Look(reference.source, reference.grade, reference.group, reference.subject, quantity.point, pose, stated)
+    for reference, expected in zip(references.checkable, expected_of(references.checkable)[0]):
+        subject, quantity = reference.subject, reference.quantity
+        if isinstance(subject, Reach | DrawingExtent) and isinstance(quantity, AxisDistance | SectionExtent):
+            value, q = extremes[quantity]
+            stated = partial(_extreme_as_stated, quantity, float(expected), value)
+            pose = tuple(np.degrees(q).tolist())
+            yield _Look(reference.source, reference.grade, reference.group, subject, quantity.point, pose, stated)
 
 
 def _extreme_as_stated(

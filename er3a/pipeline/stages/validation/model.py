@@ -4,14 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal, Self
+from typing import Self
 
 import numpy as np
 
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.stages.validation.check_model import Check, Conflict
 from er3a.pipeline.stages.validation.diagnosis_model import Corrections, Residuals, SetCalibration, SetDiagnosis
-from er3a.pipeline.stages.validation.findings import CheckSubject, KeyPose, ModelGroup, Note, Validated
+from er3a.pipeline.stages.validation.findings import (
+    CheckSubject,
+    KeyPose,
+    Note,
+    Validated,
+)
 from er3a.pipeline.tables import (
     Findings,
     Flags,
@@ -24,69 +30,7 @@ from er3a.pipeline.tables import (
     per_joint,
     vector,
 )
-from er3a.references.subjects import ReferenceSubject
-from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade
-
-CheckStatus = Literal["pass", "fail", "no_reference", "conflict"]
-MODEL_GROUPS: tuple[ModelGroup, ...] = ("table_sanity", "round_trips")
-
-
-@dataclass(frozen=True)
-class Check:
-    """One comparison.
-
-    Attributes
-    ----------
-    status : ``conflict`` is a reference that the model misses while meeting another that contradicts it
-    measured : what the model says; difference : measured - expected; both None where there is nothing to compare
-    source, grade : None for checks of the model against itself
-    """
-
-    subject: CheckSubject
-    group: str
-    reference_set: str | None
-    status: CheckStatus
-    measured: float | None
-    expected: float | None
-    difference: float | None
-    tolerance: float | None
-    unit: str
-    source: str | None
-    grade: Grade | None
-    note: Note | None = None
-
-    @property
-    def is_of_model(self) -> bool:
-        """Whether it holds the model against itself."""
-        return self.group in MODEL_GROUPS
-
-    @property
-    def is_authoritative(self) -> bool:
-        """Whether the verdict rests on it: a trustworthy document, or the model itself."""
-        return self.grade in AUTHORITATIVE_GRADES or self.is_of_model
-
-
-@dataclass(frozen=True)
-class Statement:
-    """What one source says about a number that others contradict it about."""
-
-    expected: float
-    tolerance: float
-    difference: float
-    met: bool
-    source: str
-    grade: Grade
-
-
-@dataclass(frozen=True)
-class Conflict:
-    """References of one set about one number that no model can meet all."""
-
-    reference_set: str
-    subject: ReferenceSubject
-    unit: str
-    measured: float
-    statements: tuple[Statement, ...]
+from er3a.robots.robot import Grade
 
 
 @dataclass(frozen=True)

@@ -68,7 +68,7 @@ def record(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
             send_motion(stream, corrected, times, q, entity=f"{STAGE}/corrected")
         for start, rows in zip(starts, stations):
             _log_station(stream, float(start), rows, 0.012 * size_of(robot))
-        worst = np.array([np.nanmax(rows.deviation_mm) for rows in stations])
+        worst = np.array([np.fmax.reduce(rows.deviation_mm) for rows in stations])
         at = (starts[:, None] + [0, HOLD_S, HOLD_S + 0.01]).ravel()
         curve = np.repeat(worst, 3)
         curve[2::3] = np.nan
@@ -105,7 +105,7 @@ def _log_station(stream: rr.RecordingStream, start: float, rows: KeyPoses, radiu
             point = point.replace("_", " ")
             lines.append(f"- {point}: off by **{deviation:.2f} mm**, {escaped(source)} ({grade})")
     stream.log(f"{STAGE}/now", rr.TextDocument("\n".join(lines), media_type=rr.MediaType.MARKDOWN))
-    stated = rows.take(np.isfinite(rows.point_mm).all(axis=1))
+    stated = rows.take(np.flatnonzero(np.isfinite(rows.point_mm).all(axis=1)))
     points, model = stated.point_mm / 1000, stated.model_point_mm / 1000
     colours = np.array(_colours(stated.grade))
     stream.log(f"{STAGE}/reference/points", rr.Points3D(points, radii=radius, colors=colours))

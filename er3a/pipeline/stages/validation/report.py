@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.messages.say import counted, joined, say, sentence, word
+from er3a.pipeline.messages.say import counted, joined, say, word
 from er3a.pipeline.messages.validation import CONVENTIONS, FIGURES, GRADE_NAMES, GRADES, GROUPS
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation.axis_figures import axis_deviation, side_view, workspace_drawing
+from er3a.pipeline.stages.validation.check_model import ReferenceCheck, Unjudged
+from er3a.pipeline.stages.validation.check_rows import COLUMNS, Judged, blank_row, by_set, check_row, group_rows
 from er3a.pipeline.stages.validation.corrected import corrected_robot
 from er3a.pipeline.stages.validation.diagnosis_figures import correction_stories, diagnosis_stories
 from er3a.pipeline.stages.validation.model import (
     Axes,
-    Check,
     Counts,
     KeyPoses,
     Section,
@@ -28,22 +28,12 @@ from er3a.pipeline.stages.validation.model import (
 )
 from er3a.pipeline.stages.validation.subject import model_of
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.page import Picture, fixed, head_of, number, render, run_command
+from er3a.pipeline.viewing.page import Picture, fixed, head_of, render, run_command
 from er3a.references.subjects import SegmentInclination
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Robot
 
 SHOWN_FAILURES = 12
 REVERSED_DEG = 135
-DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "": 0}
-COLUMNS = (
-    N_("Check"),
-    N_("Model>"),
-    N_("Reference>"),
-    N_("Difference>"),
-    N_("Tolerance>"),
-    N_("Unit"),
-    N_("Source"),
-)
 SEGMENTS = {
     "upper_arm": N_("the upper arm stands {measured}° from the vertical where {expected}° is stated"),
     "forearm": N_("the forearm stands {measured}° from the vertical where {expected}° is stated"),
@@ -66,23 +56,13 @@ class SetStory:
     segments_hold: bool
 
 
-@dataclass(frozen=True)
-class GroupRow:
-    """One set and group: counts by status, and the check that comes nearest to failing or fails worst."""
-
-    set: str
-    group: str
-    status: str
-    counts: tuple[int, int, int]
-    worst: str
-    difference: str
-
-
 def report(study: Study, stored: Stored[ValidationResults], output: Path) -> None:
     """Write the page from the stage's results."""
     name, results, summary = stored.robot, stored.results, stored.results.summary
     robot, checks = model_of(study, name), summary.checks
-    failed = sorted((check for check in checks if check.status == "fail"), key=_tolerances_off, reverse=True)
+    judged = [check for check in checks if not isinstance(check, Unjudged)]
+    failed = [check for check in judged if check.status == "fail"]
+    failed.sort(key=lambda check: check.tolerances_off, reverse=True)
     labels = results.key_poses.take(results.key_poses.group == "envelope")
     drawn = _drawn_axes(results.axes)
     source = robot.sources.get("dh")
@@ -94,33 +74,34 @@ def report(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
         command=run_command(study, f"{name}/validation.html"),
         robot=robot,
         robot_pages=study.pages(name),
-        sets=[_set_story(found, checks, results.key_poses) for found in summary.sets],
+        sets=[_set_story(found, judged, results.key_poses) for found in summary.sets],
         diagnoses=diagnosis_stories(summary, results.residuals),
         corrections=correction_stories(summary, results.corrections),
-        groups=_groups(checks),
-        failed=[_row(check) for check in failed[:SHOWN_FAILURES]],
-        more_failed=[_row(check) for check in failed[SHOWN_FAILURES:]],
+        groups=group_rows(judged),
+        failed=[check_row(check) for check in failed[:SHOWN_FAILURES]],
+        more_failed=[check_row(check) for check in failed[SHOWN_FAILURES:]],
         passed={
-            title: [_row(check) for check in own if check.status == "pass"] for title, own in _by_set(checks).items()
+            title: [check_row(check) for check in own if check.status == "pass"]
+            for title, own in by_set(judged).items()
         },
         columns=[tr(label) for label in COLUMNS],
         conflicts=[(say(conflict.subject), conflict) for conflict in summary.conflicts],
-        blanks=[_blank(check) for check in checks if check.status == "no_reference"],
+        blanks=[blank_row(check) for check in checks if isinstance(check, Unjudged)],
         side=_side_picture(robot, drawn, summary),
         deviation=_deviation_picture(drawn) if len(drawn) else None,
         drawing=_drawing_picture(results.section, labels, summary) if len(labels) else None,
-        labels=_label_rows(labels, checks),
+        labels=_label_rows(labels, judged),
         table_source=source and (source.source, word("grade", GRADES, source.grade)),
         convention=word("convention", CONVENTIONS, robot.convention),
         grade_names={grade: word("grade", GRADE_NAMES, grade) for grade in GRADE_NAMES},
     )
 
 
-def _set_story(found: SetSummary, checks: Sequence[Check], poses: KeyPoses) -> SetStory:
-    own = [check for check in checks if check.reference_set == found.name]
+def _set_story(found: SetSummary, checks: Iterable[Judged], poses: KeyPoses) -> SetStory:
+    own = [check for check in checks if isinstance(check, ReferenceCheck) and check.reference_set == found.name]
     failed = {check.group for check in own if check.status == "fail"}
     held = {check.group for check in own if check.status == "pass"} - failed
-    segments = [check for check in own if isinstance(check.subject, SegmentInclination)]
+    segments = [(check.subject, check) for check in own if isinstance(check.subject, SegmentInclination)]
     at_zero = (poses.reference_set == found.name) & (poses.group == "zero_pose") & (poses.point == "flange")
     zero = poses.take(np.flatnonzero(at_zero)[:1])
     is_authoritative = found.authoritative.total > 0
@@ -128,13 +109,13 @@ def _set_story(found: SetSummary, checks: Sequence[Check], poses: KeyPoses) -> S
         found=found,
         counted=found.authoritative if is_authoritative else found.claims,
         is_authoritative=is_authoritative,
-        telling=[_row(check) for check in _telling(own)],
+        telling=[check_row(check) for check in _telling(own)],
         failed_groups=_group_words(failed),
         held_groups=_group_words(held),
         zero_model=_point(zero.model_point_mm),
         zero_stated=_point(zero.point_mm),
-        segments=joined(map(_segment, segments), ", "),
-        segments_hold=all(check.status == "pass" for check in segments),
+        segments=joined((_segment(subject, check) for subject, check in segments), ", "),
+        segments_hold=all(check.status == "pass" for _, check in segments),
     )
 
 
@@ -142,15 +123,15 @@ def _group_words(groups: Iterable[str]) -> str:
     return joined((word("group", GROUPS, group) for group in sorted(groups)), ", ")
 
 
-def _segment(check: Check) -> str:
+def _segment(subject: SegmentInclination, check: ReferenceCheck) -> str:
     """How a segment of the arm stands, and how it is stated to."""
-    template = SEGMENTS[check.subject.segment]
+    template = SEGMENTS[subject.segment]
     return tr(template, measured=fixed(check.measured, 0), expected=fixed(check.expected, 0))
 
 
-def _telling(own: list[Check]) -> list[Check]:
+def _telling(own: list[ReferenceCheck]) -> list[ReferenceCheck]:
     """One failed length per group, the farthest off."""
-    worst: dict[str, Check] = {}
+    worst: dict[str, ReferenceCheck] = {}
     for check in own:
         if check.status != "fail" or check.unit != "mm":
             continue
@@ -161,63 +142,6 @@ def _telling(own: list[Check]) -> list[Check]:
 
 def _point(points_mm: np.ndarray) -> str:
     return ", ".join(fixed(value, 1) for value in points_mm[0]) if len(points_mm) else ""
-
-
-def _by_set(checks: Iterable[Check]) -> dict[str, list[Check]]:
-    """Checks by the set that they come from, as the page names it."""
-    found: dict[str, list[Check]] = {}
-    for check in checks:
-        found.setdefault(check.reference_set or tr("the model itself"), []).append(check)
-    return found
-
-
-def _groups(checks: Sequence[Check]) -> list[GroupRow]:
-    rows = []
-    for title, own in _by_set(checks).items():
-        for group in dict.fromkeys(check.group for check in own):
-            part = [check for check in own if check.group == group and check.status != "no_reference"]
-            if not part:
-                continue
-            counted = Counter(check.status for check in part)
-            status = "fail" if counted["fail"] else "conflict" if counted["conflict"] else "pass"
-            worst = max(part, key=_tolerances_off)
-            rows.append(
-                GroupRow(
-                    set=title,
-                    group=word("group", GROUPS, group),
-                    status=status,
-                    counts=(counted["pass"], counted["fail"], counted["conflict"]),
-                    worst=say(worst.subject),
-                    difference=f"{_value(worst.difference, worst)} {worst.unit}".strip(),
-                )
-            )
-    return rows
-
-
-def _tolerances_off(check: Check) -> float:
-    return -1.0 if check.difference is None else abs(check.difference) / check.tolerance
-
-
-def _row(check: Check) -> list[str]:
-    values = [_value(value, check) for value in (check.measured, check.expected, check.difference)]
-    if check.grade:
-        grade = word("grade", GRADE_NAMES, check.grade)
-        source = sentence("graded", "{own_source} ({grade})", own_source=check.source, grade=grade)
-    else:
-        source = tr("the model itself")
-    return [say(check.subject), *values, f"{check.tolerance:g}", check.unit, source]
-
-
-def _value(value: float, check: Check) -> str:
-    """A value in its unit's decimals; errors of round trips, which are far smaller, with one digit."""
-    if check.group == "round_trips" and 0 < abs(value) < 1e-3:
-        return number(value, 1)
-    return fixed(value, DECIMALS[check.unit])
-
-
-def _blank(check: Check) -> list[str]:
-    measured = f"{_value(check.measured, check)} {check.unit}" if check.measured is not None else "–"
-    return [say(check.subject), measured, check.reference_set or "–", say(check.note)]
 
 
 def _drawn_axes(axes: Axes) -> Axes:
@@ -272,12 +196,12 @@ def _joints(axes: Axes) -> str:
     return joined((f"J{joint}" for joint in np.unique(axes.joint)), ", ")
 
 
-def _label_rows(labels: KeyPoses, checks: Iterable[Check]) -> list[list[str]]:
+def _label_rows(labels: KeyPoses, checks: Iterable[Judged]) -> list[list[str]]:
     """The drawing's labels with the numbers that they have in the figure."""
     numbers = {pose: place for place, pose in reversed(list(enumerate(labels.pose, 1)))}
     rows = []
     for check in checks:
-        if check.group == "envelope" and check.difference is not None:
+        if check.group == "envelope":
             values = [fixed(check.expected, 1), fixed(check.measured, 2), fixed(check.difference, 2)]
             place = numbers[check.subject.whole]
             rows.append((place, [str(place), say(check.subject), *values, f"{check.tolerance:g}"]))

@@ -9,16 +9,16 @@ import numpy as np
 
 from er3a.kinematics.round_trips import NEAR_ELBOW_DEG, NEAR_SHOULDER_MM, NEAR_WRIST_DEG, slot_round_trips
 from er3a.kinematics.wrist_partitioned import closed_form_missing
-from er3a.pipeline.stages.validation.checks import against_itself, nothing_to_compare
+from er3a.pipeline.stages.validation.check_model import Check, Unjudged
+from er3a.pipeline.stages.validation.checks import against_itself
 from er3a.pipeline.stages.validation.findings import (
     NearSingularLeftOut,
     NoClosedForm,
-    Note,
     NumbersMissing,
     SelfCheck,
     SelfChecked,
 )
-from er3a.pipeline.stages.validation.model import Check, Margins, RoundTripErrors
+from er3a.pipeline.stages.validation.model import Margins, RoundTripErrors
 from er3a.robots.robot import Robot
 
 JOINT_TOLERANCE_DEG = 1e-6
@@ -43,7 +43,7 @@ def table_checks(robot: Robot) -> list[Check]:
     checks = [against_itself(name, "table_sanity", float(count), 0.5) for name, count in faults.items()]
     missing = NumbersMissing() if checks[0].status == "fail" else closed_form_missing(robot)
     if missing:
-        return [*checks, nothing_to_compare(SelfCheck("closed_form"), "table_sanity", "", missing)]
+        return [*checks, Unjudged(SelfCheck("closed_form"), "table_sanity", "", missing)]
     return [*checks, against_itself("closed_form", "table_sanity", 0.0, 0.5)]
 
 
@@ -51,11 +51,10 @@ def round_trip_checks(robot: Robot, poses: int, seed: int) -> tuple[list[Check],
     """Round trips as checks, and their errors; None if the arm has no closed form."""
     missing = closed_form_missing(robot)
     if missing:
-        note = NoClosedForm(missing)
-        return [nothing_to_compare(SelfCheck("joints_to_pose_to_joints"), GROUP, "deg", note)], None
+        return [Unjudged(SelfCheck("joints_to_pose_to_joints"), GROUP, "deg", NoClosedForm(missing))], None
     found = slot_round_trips(robot, poses, seed)
-    note: Note = NearSingularLeftOut(poses - found.near_singular, poses, NEAR_WRIST_DEG, NEAR_SHOULDER_MM)
-    checks = [
+    note = NearSingularLeftOut(poses - found.near_singular, poses, NEAR_WRIST_DEG, NEAR_SHOULDER_MM)
+    checks: list[Check] = [
         against_itself("unsolved_poses", GROUP, float(found.unsolved), 0.5),
         against_itself("joint_error", GROUP, found.joint_error_deg, JOINT_TOLERANCE_DEG, "deg", note),
         against_itself("position_error", GROUP, found.position_error_mm, POSITION_TOLERANCE_MM, "mm"),

@@ -10,6 +10,7 @@ import numpy as np
 
 from er3a.diagnosis.conclusions import MainFault, MostLikelyFault, NoFaultStandsOut, NoFewFaultsExplain
 from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.stages.validation.check_model import Check, Conflict, ModelCheck, ReferenceCheck
 from er3a.pipeline.stages.validation.diagnosis_model import SetDiagnosis
 from er3a.pipeline.stages.validation.findings import (
     AnotherArm,
@@ -22,15 +23,7 @@ from er3a.pipeline.stages.validation.findings import (
     NothingToCompare,
     Validated,
 )
-from er3a.pipeline.stages.validation.model import (
-    Axes,
-    Check,
-    Conflict,
-    Counts,
-    KeyPoses,
-    RoundTripErrors,
-    SetSummary,
-)
+from er3a.pipeline.stages.validation.model import Axes, Counts, KeyPoses, RoundTripErrors, SetSummary
 from er3a.references.reference import ReferenceSet
 from er3a.references.rows import GROUPS
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade
@@ -69,37 +62,35 @@ def verdict_of(
     diagnoses: Mapping[str, SetDiagnosis],
 ) -> Verdict[Validated]:
     """The stage's answer."""
-    judged = [check for check in checks if check.is_authoritative and check.status != "no_reference"]
-    documented = [check for check in judged if not check.is_of_model]
+    documented = [check for check in checks if isinstance(check, ReferenceCheck) and check.is_authoritative]
     failed = [check for check in documented if check.status == "fail"]
     named = {
         name: diagnosis.conclusion
         for name, diagnosis in diagnoses.items()
         if isinstance(diagnosis.conclusion, MostLikelyFault | MainFault)
     }
-    common = {
+    common: dict[str, Any] = {
         "checks": len(documented),
         "failed": len(failed),
         "conflicts": len(conflicts),
         "sets": tuple(each.name for each in sets),
         "claims": _claims(sets, named),
     }
-    for check in judged:
-        if check.is_of_model and check.status == "fail":
-            return Verdict(
-                "fail", ModelUnsound(**common, check=check.subject, measured=check.measured, unit=check.unit)
-            )
+    for check in checks:
+        if isinstance(check, ModelCheck) and check.status == "fail":
+            found = ModelUnsound(**common, check=check.subject, measured=check.measured, unit=check.unit)
+            return Verdict("fail", found)
     if failed:
         return Verdict("fail", _missed(common, failed, documented, sets, named))
     if not documented:
         return Verdict("no_reference", NothingToCompare(**common))
     passed = sum(check.status == "pass" for check in documented)
     contradiction = _contradiction(conflicts) if conflicts else None
-    found = Confirmed(**common, passed=passed, grades=_grades(documented), contradiction=contradiction)
-    return Verdict("pass", found)
+    grades = _grades(documented)
+    return Verdict("pass", Confirmed(**common, passed=passed, grades=grades, contradiction=contradiction))
 
 
-def most_telling(failed: list[Check]) -> Check:
+def most_telling(failed: list[ReferenceCheck]) -> ReferenceCheck:
     """The failed check to quote: of those not far behind the largest difference in mm, the first of the group that
     tells most."""
     lengths = [check for check in failed if check.unit == "mm"]
@@ -118,15 +109,20 @@ def key_figures(
     """The stage's key figures; ``reach`` in mm by the figure's name."""
     counted = _counts(check for check in checks if check.is_authoritative)
     figures = [Figure("checks_passed", counted.passed, "", of=counted.passed + counted.failed)]
-    errors = [(each.authoritative.total > 0, each.zero_pose_flange_off_mm) for each in sets]
-    errors = [error for error in errors if error[1] is not None]
+    errors = [
+        (each.authoritative.total > 0, each.zero_pose_flange_off_mm)
+        for each in sets
+        if each.zero_pose_flange_off_mm is not None
+    ]
     if errors:
         figures.append(_figure("zero_pose_flange_error", max(errors)[1]))
     trusted = axes.take(np.isin(axes.grade, AUTHORITATIVE_GRADES))
     if len(trusted):
         figures.append(_figure("farthest_axis", float(trusted.distance_mm.max())))
         figures.append(_figure("most_tilted_axis", float(trusted.angle_deg.max()), "deg"))
-    labels = [abs(check.difference) for check in checks if check.group == "envelope" and check.difference is not None]
+    labels = [
+        abs(check.difference) for check in checks if isinstance(check, ReferenceCheck) and check.group == "envelope"
+    ]
     if labels:
         figures.append(_figure("worst_drawing_label", max(labels)))
     figures += [_figure(name, value) for name, value in reach.items()]
@@ -141,8 +137,8 @@ def _figure(name: str, value: float, unit: str = "mm") -> Figure:
 
 def _missed(
     common: dict[str, Any],
-    failed: list[Check],
-    documented: list[Check],
+    failed: list[ReferenceCheck],
+    documented: list[ReferenceCheck],
     sets: tuple[SetSummary, ...],
     named: Mapping[str, LikelyFault],
 ) -> Contradicted | AnotherArm:
@@ -162,8 +158,8 @@ def _missed(
 
 def _counts(checks: Iterable[Check]) -> Counts:
     counted = Counter(check.status for check in checks)
-    numbers = [counted[status] for status in ("pass", "fail", "conflict")]
-    return Counts(sum(numbers), *numbers, counted["no_reference"])
+    passed, failed, conflicting = counted["pass"], counted["fail"], counted["conflict"]
+    return Counts(passed + failed + conflicting, passed, failed, conflicting, counted["no_reference"])
 
 
 def _zero_pose_error(poses: KeyPoses, set_name: str) -> float | None:
@@ -186,6 +182,6 @@ def _contradiction(conflicts: list[Conflict]) -> Contradiction:
     return Contradiction(first.subject, first.unit, stated, len(conflicts) - 1)
 
 
-def _grades(checks: list[Check]) -> tuple[Grade, ...]:
+def _grades(checks: list[ReferenceCheck]) -> tuple[Grade, ...]:
     present = {check.grade for check in checks}
     return tuple(grade for grade in AUTHORITATIVE_GRADES if grade in present)

@@ -1,4 +1,4 @@
-"""Do the 95 % intervals of identified corrections hold the truth in 95 of 100 runs?"""
+"""Do the 95 % intervals of estimated corrections hold the truth in 95 of 100 runs?"""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ def table() -> str:
     """The evidence as Markdown."""
     random = np.random.default_rng(SEED)
     lines = [
-        "# Identification: coverage of the 95 % intervals",
+        "# Calibration: coverage of the 95 % intervals",
         "",
         f"{RUNS} arms per robot with random errors in every identifiable entry (standard deviation",
         f"{LENGTH_ERROR_M * 1000:g} mm, {np.degrees(ANGLE_ERROR_RAD):.3f} deg), each measured at {POSES} random poses",
         f"with {DEVIATION_MM:g} mm noise a coordinate; how often the interval holds the true correction. The standard",
-        f"error of a share over {RUNS} runs is 0.7 %. Seed {SEED}. Written by `make campaigns ARGS=identification`.",
+        f"error of a share over {RUNS} runs is 0.7 %. Seed {SEED}. Written by `make campaigns ARGS=calibration`.",
         "",
         "| robot | entries | all entries | lowest of one entry | highest of one entry |",
         "|---|---|---|---|---|",

@@ -1,14 +1,14 @@
-"""What is said of a target out of reach: how far the nearest poses are that can be reached."""
+"""Poses near one out of reach: how far the nearest are that can be reached."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from er3a.pipeline.stages.inverse.advice import neighbours, solvable
 from scipy.spatial.transform import Rotation
 
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
+from er3a.kinematics.neighbours import neighbours, solvable
 
 
 def test_neighbours_find_the_way_back_into_reach(random):
@@ -38,4 +38,4 @@ def test_neighbours_find_an_orientation(random):
     near = neighbours(robot, T, random)
     assert not solvable(robot, T[None])[0]
     assert 0 < near.least_turn < np.pi / 2
-    assert 0 < near.orientation_share < 1
+    assert 0 < near.orientation_ratio < 1

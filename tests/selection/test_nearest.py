@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from er3a.kinematics.admissible import limit_margin, nearest
 
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
-from er3a.kinematics.inverse import Solutions, inverse
+from er3a.kinematics.inverse import inverse
+from er3a.kinematics.solutions import Solutions
+from er3a.pipeline.messages.selection import say
+from er3a.robots.joint_limits import limit_margin
+from er3a.selection.nearest import GreatestMove, OnlyAdmissible, nearest
 
 
 def solutions_of(q, within, branch) -> Solutions:
-    q = np.array(q, dtype=float)
-    reason = tuple("" if ok else "J1 beyond" for ok in within)
-    label = tuple(f"branch {number}" for number in branch)
-    return Solutions(q, np.array(within), np.array(branch), np.zeros((len(q), 6), int), reason, (), label=label)
+    return Solutions(
+        load_robot("er3_600"), np.array(q, float), np.ones(len(q), bool), np.array(within), np.array(branch)
+    )
 
 
 def test_nearest_breaks_ties_by_all_joints_then_branch():
@@ -23,20 +25,23 @@ def test_nearest_breaks_ties_by_all_joints_then_branch():
     rows = [[1, 0.5, 0, 0, 0, 0], [1, 0, 0, 0, 0, 0], [-1, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0]]
     choice = nearest(robot, solutions_of(rows, [True, True, True, False], [0, 5, 4, 1]), np.zeros(6))
     assert choice.order.tolist() == [2, 1, 0]
-    assert "just as near" in choice.reason
+    assert (choice.reason.code, choice.reason.next_best.branch) == ("lower_branch_number", 5)
     choice = nearest(robot, solutions_of(rows[:2], [True, True], [0, 1]), np.zeros(6))
     assert choice.chosen == 1
-    assert "taken together" in choice.reason
+    assert choice.reason.code == "moves_less_together"
+    assert choice.reason.less_deg == pytest.approx(np.degrees(np.hypot(1, 0.5) - 1))
 
 
 def test_nearest_of_none_and_of_one():
     robot = load_robot("er3_600")
     choice = nearest(robot, solutions_of([[9, 0, 0, 0, 0, 0]], [False], [3]), np.zeros(6))
     assert choice.chosen is None
-    assert "the only solution leaves them" in choice.reason
+    assert (choice.reason.code, choice.reason.count, choice.reason.branch) == ("all_outside_limits", 1, 3)
+    assert [one.joint for one in choice.reason.exceeded.joints] == [1]
     choice = nearest(robot, solutions_of([[1, 0, 0, 0, 0, 0]], [True], [3]), np.zeros(6))
     assert (choice.chosen, choice.runner_up) == (0, None)
-    assert choice.reason == "greatest joint move 57.3 deg (J1); the only solution within the limits"
+    assert choice.reason == OnlyAdmissible(GreatestMove(1, np.degrees(1)))
+    assert say(choice.reason) == "greatest joint move 57.3 deg (J1); the only admissible solution"
 
 
 def test_nearest_counts_turns_from_the_reference(robot):
