@@ -56,6 +56,7 @@ class NamedPath(StrictModel):
 
     name: Name
     title: Text
+    title_zh: Text | None = None
     samples: Samples
 
 

@@ -125,6 +125,7 @@ class RobotFile(StrictModel):
     kind: Literal["robot"]
     name: Name
     title: Text
+    title_zh: Text | None = None
     zero_pose: Text
     references: list[Name] = []
     dh: DhTable

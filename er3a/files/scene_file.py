@@ -106,6 +106,7 @@ class SceneFile(StrictModel):
 
     kind: Literal["scene"]
     title: Text
+    title_zh: Text | None = None
     boxes: list[Box] = []
     cylinders: list[Cylinder] = []
     spheres: list[Sphere] = []

@@ -47,6 +47,7 @@ class TargetEntry(StrictModel):
 
     name: Name
     note: Line | None = None
+    note_zh: Line | None = None
     xyz_mm: PositionMm | None = None
     rpy_deg: Angles | None = None
     zyz_deg: Angles | None = None

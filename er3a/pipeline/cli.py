@@ -130,7 +130,7 @@ def report(
 
     loaded, folder = _folder(study, results, robot, stage)
     page = reports / robot / f"{stage}.html"
-    language.use(loaded.report.language)
+    language.use(loaded.report.language, loaded.own_titles())
     with house_style():
         run.show("report", stage, loaded, robot, folder, page)
     write_checksum(page)
@@ -280,22 +280,27 @@ def export_urdf(
 
 
 @app.command()
-def identify(
+def calibrate(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="a robot's name or file: the table to start from")],
     measurements: Annotated[str, typer.Argument(help="a CSV of measured positions, or a reference set's name")],
     output: Annotated[Path, typer.Option(help="the robot file to write")],
 ):
     """Estimate corrections to a robot's table from measured positions, and write the corrected robot file."""
-    from er3a.files.by_name import calibrate
+    from er3a.calibration.outcomes import CalibrationError
+    from er3a.files.by_name import calibrate as calibrate_robot
     from er3a.files.reference_sets import load_references
     from er3a.files.robot_library import load_robot
     from er3a.files.robot_writer import write_robot
     from er3a.pipeline.messages.calibration import lines_of
+    from er3a.pipeline.messages.say import say
 
     source = Path(measurements) if measurements.endswith(".csv") else load_references(measurements)
-    found = calibrate(load_robot(robot), source)
+    try:
+        found = calibrate_robot(load_robot(robot), source)
+    except CalibrationError as error:
+        raise Er3aError(say(error.finding)) from None
     print(lines_of(found))
-    write_robot(found.robot.replace(name=output.stem, title=f"{found.robot.title}, identified"), output)
+    write_robot(found.robot.replace(name=output.stem, title=f"{found.robot.title}, calibrated"), output)
     print(f"{output}: written")
 
 
@@ -344,7 +349,7 @@ def _complain_of_memory() -> None:
 def _study_to_show(file: Path) -> Study:
     """A study whose language is the one that pages are written in from here on."""
     study = load_study(file)
-    language.use(study.report.language)
+    language.use(study.report.language, study.own_titles())
     return study
 
 

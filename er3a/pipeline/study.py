@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 from pydantic import Field, PrivateAttr, create_model, model_validator
 
 from er3a.errors import InputError
+from er3a.files.own_titles import translations_in
 from er3a.files.robot_file import NAME_PATTERN, Name, Placement, RobotFile, Text, check_placement
 from er3a.files.robot_library import placement_transform, read_robot, robot_of, robot_path
 from er3a.files.yaml_file import StrictModel, load
@@ -172,6 +173,11 @@ class StudyBase(StrictModel):
             scene = self.scene(name, key)
             settings["scene"] = str(scene) if scene else None
         return {"seed": self.seed, "robot": entry, key: settings}
+
+    def own_titles(self) -> dict[str, str]:
+        """People's titles and notes in the language of the pages, by what they translate."""
+        files = {file for name in self.robots for stage in self.stages(name) for file in self.inputs(name, stage)}
+        return translations_in(sorted(files), self.report.language)
 
     def scenes(self, name: str, stage: str) -> list[Path]:
         """The file of :meth:`scene` as a list, empty in open space."""

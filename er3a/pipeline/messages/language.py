@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import gettext
 import io
+from collections.abc import Mapping
 from pathlib import Path
 from string import Formatter
 from typing import Any
@@ -17,6 +18,7 @@ CATALOGUES = Path(__file__).with_name("locale")
 
 _catalogue: gettext.NullTranslations = gettext.NullTranslations()
 _language = "en"
+_own: Mapping[str, str] = {}
 
 
 class _AsIs(Formatter):
@@ -31,10 +33,10 @@ def N_(text: str) -> str:
     return text
 
 
-def use(language: str) -> None:
-    """Set the language of texts for this process: one of ``LANGUAGES``."""
-    global _catalogue, _language
-    _language = language
+def use(language: str, own: Mapping[str, str] | None = None) -> None:
+    """Set the language of texts for this process: one of ``LANGUAGES``; ``own``: people's titles in that language."""
+    global _catalogue, _language, _own
+    _language, _own = language, own or {}
     _catalogue = gettext.NullTranslations() if language == "en" else _load(catalogue_file(language))
 
 
@@ -63,6 +65,11 @@ def filled(text: str, template: str, parts: dict[str, Any]) -> str:
     """A translation of a template, its fields filled in with the formats of the template: translations have none."""
     formats = {name: spec or "" for _, name, spec, _ in Formatter().parse(template) if name}
     return _AsIs().format(text, **{name: format(part, formats.get(name, "")) for name, part in parts.items()})
+
+
+def own_title(text: str) -> str:
+    """A title or note out of a person's file in the language in use, if the file says it."""
+    return _own.get(text, text)
 
 
 def translated(context: str, text: str) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from er3a.pipeline.code_digest import code_digest
+from er3a.pipeline.messages import language
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.results import AbsentResults, Input, Provenance, input_records, read_stage, result_records
 from er3a.pipeline.stages.registry import STAGES
@@ -28,7 +29,7 @@ def write_compare(study: Study, results: Path, output: Path) -> None:
         robot = study.robot(name)
         values = parameters(robot) | key_figures(results / name)
         entries[name] = {
-            "title": robot.title,
+            "title": language.own_title(robot.title),
             "values": values,
             "border": border_mm(results / name),
         }

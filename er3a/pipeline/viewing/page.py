@@ -144,7 +144,13 @@ def render(
     )
     environment.install_gettext_translations(language.translations(), newstyle=False)
     environment.policies["ext.i18n.trimmed"] = True
-    environment.filters |= {"number": number, "fixed": fixed, "tr": tr, "sentence": whole_sentence}
+    environment.filters |= {
+        "number": number,
+        "fixed": fixed,
+        "tr": tr,
+        "own": language.own_title,
+        "sentence": whole_sentence,
+    }
     html = environment.get_template(template.name).render(
         style=(_HERE / "style.css").read_text(encoding="utf-8"),
         script=(_HERE / "page.js").read_text(encoding="utf-8"),

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.results import Stored, read_stage
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceSummary
@@ -64,7 +64,9 @@ def _section(study: Study, name: str, results: Path) -> dict[str, Any]:
     own = variants[0].replaced(content, entry.tool or content.tool)
     what, unit = entry_label(ENTRIES[sweep.vary]), ENTRIES[sweep.vary].unit
     ends = {"low": _plain(min(sweep.resolved)), "high": _plain(max(sweep.resolved))}
-    title = tr("{robot}: {what} from {low} to {high} {unit}", robot=content.title, what=what, unit=unit, **ends)
+    title = tr(
+        "{robot}: {what} from {low} to {high} {unit}", robot=own_title(content.title), what=what, unit=unit, **ends
+    )
     columns, rows = _table(points, what, unit, sweep.stages)
     return {
         "name": name,
