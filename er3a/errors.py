@@ -12,7 +12,7 @@ from er3a.findings import Finding
 
 
 class Er3aError(Exception):
-    """Root of all errors that a user can cause and mend."""
+    """Root of all errors that a user can cause and correct."""
 
 
 class InputError(Er3aError):
@@ -68,7 +68,7 @@ class NotWristPartitionedError(Er3aError):
 
 
 class ResultError(Er3aError):
-    """A results file is missing, damaged or of another format version; a rerun of its stage mends it."""
+    """A results file is missing, damaged or of another format version; a rerun of its stage corrects it."""
 
     def __init__(self, file: str | Path, problem: str):
         self.file = str(file)

@@ -322,7 +322,7 @@ def schema(
 
 
 def main() -> None:
-    """Entry point: errors that a user can mend are one line on standard error and exit code 2."""
+    """Entry point: errors that a user can correct are one line on standard error and exit code 2."""
     try:
         app(standalone_mode=True)
     except Er3aError as error:

@@ -25,7 +25,7 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.absent import record_absent, report_absent
 
 FOR_A_PERSON = (InputError, ResultError, WriteError, MemoryError, OSError, ImportError)
-"""What a person mends and runs again; anything else belongs to the stage and the robot, and others go on."""
+"""What a person corrects and runs again; anything else belongs to the stage and the robot, and others go on."""
 
 
 def compute(name: str, study: Study, robot: str, folder: Path, parts: list[Path] | None = None) -> str | None:

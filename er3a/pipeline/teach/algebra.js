@@ -48,7 +48,7 @@ export function signedAngle(start, end, axis) {
 export const unsignedAngle = (a, b) => Math.atan2(norm(cross(a, b)), dot(a, b));
 
 /** The same angle in (-pi, pi]. */
-export const principal = (angle) => angle - 2 * Math.PI * Math.ceil((angle - Math.PI) / (2 * Math.PI));
+export const wrapToPi = (angle) => angle - 2 * Math.PI * Math.ceil((angle - Math.PI) / (2 * Math.PI));
 
 export const multiply = (A, B) =>
   A.map((row) => [0, 1, 2, 3].map((c) => row[0] * B[0][c] + row[1] * B[1][c] + row[2] * B[2][c] + row[3] * B[3][c]));

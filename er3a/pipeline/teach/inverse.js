@@ -14,7 +14,7 @@
  */
 
 import {
-  across, add, beside, column, cross, dot, multiply, norm, principal, rotated, scaled, signedAngle, subtract, turned,
+  across, add, beside, column, cross, dot, multiply, norm, wrapToPi, rotated, scaled, signedAngle, subtract, turned,
   turnedBack, unsignedAngle,
 } from "er3a/algebra";
 import { JOINTS } from "er3a/kinematics";
@@ -141,7 +141,7 @@ function solveSlots(table, arm, T, near) {
           continue;
         }
         const theta = [theta1, theta2, arm.elbowSign * turn, ...wrists.theta[wrist]];
-        slot.q = JOINTS.map((k) => principal(table.direction[k] * (theta[k] - table.offset[k])));
+        slot.q = JOINTS.map((k) => wrapToPi(table.direction[k] * (theta[k] - table.offset[k])));
         slot.free = ["shoulder", "elbow", "wrist"].filter((_, i) => [free1, free2, wrists.free][i]);
       }
     }
@@ -181,7 +181,7 @@ export function inverse(table, arm, T, near) {
   const slots = solveSlots(table, arm, T, near).map((slot, number) => ({ slot: number, ...slot }));
   const kept = [];
   for (const found of slots.filter((slot) => slot.q)) {
-    const same = (other) => JOINTS.every((k) => Math.abs(principal(found.q[k] - other.q[k])) < SAME_JOINTS);
+    const same = (other) => JOINTS.every((k) => Math.abs(wrapToPi(found.q[k] - other.q[k])) < SAME_JOINTS);
     if (!kept.some(same)) kept.push(found);
   }
   return {
