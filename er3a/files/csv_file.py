@@ -65,7 +65,7 @@ def read_csv(path: str | Path, columns: Mapping[str, Column]) -> list[dict[str, 
     for number, line in lines[1:]:
         if len(line) != len(header):
             problem = f"{len(line)} fields where the header has {len(header)}"
-            raise InputError(path, f"row {number}", problem, "Mend the commas; quote texts that hold one")
+            raise InputError(path, f"row {number}", problem, "Correct the commas; quote texts that hold one")
         row = {name: _value(path, number, name, text.strip(), columns[name]) for name, text in zip(header, line)}
         rows.append({"row": number, **row})
     return rows
@@ -90,7 +90,7 @@ def _lines(path: Path) -> list[tuple[int, list[str]]]:
     try:
         return [(reader.line_num, line) for line in reader if any(field.strip() for field in line)]
     except csv.Error as error:
-        raise InputError(path, f"line {reader.line_num}", f"not valid CSV ({error})", "Mend this line") from None
+        raise InputError(path, f"line {reader.line_num}", f"not valid CSV ({error})", "Correct this line") from None
 
 
 def _check_header(path: Path, header: list[str], columns: Mapping[str, Column]) -> None:

@@ -112,12 +112,12 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         where = f"line {mark.line + 1}, column {mark.column + 1}" if mark else None
-        raise InputError(path, where, error.problem or "not valid YAML", "Mend this line") from None
+        raise InputError(path, where, error.problem or "not valid YAML", "Correct this line") from None
     except RecursionError:
         raise InputError(path, None, "nested too deeply", "Input tables are flat; mend the brackets") from None
     except (yaml.YAMLError, ValueError) as error:
         reason = " ".join(str(error).split())[:200]
-        raise InputError(path, None, f"not valid YAML ({reason})", "Mend the file") from None
+        raise InputError(path, None, f"not valid YAML ({reason})", "Correct the file") from None
     if not isinstance(data, dict):
         kind = "nothing" if data is None else f"a {type(data).__name__}"
         raise InputError(path, None, f"the top level is {kind}", "Write `key: value` lines there")
@@ -136,7 +136,7 @@ def parse(model: type[Model], data: dict[str, Any], path: str | Path | None) -> 
         if named := _FIELD.match(problem):
             field, problem = ".".join(filter(None, (field, named[1]))), problem[named.end() :]
         if len(faults) > 1:
-            remedy += f" ({len(faults) - 1} more to mend after this one)"
+            remedy += f" ({len(faults) - 1} more to correct after this one)"
         raise InputError(path, field or None, problem, remedy) from None
 
 
@@ -170,7 +170,7 @@ def _explain(fault: dict[str, Any], model: type[BaseModel]) -> tuple[str, str]:
         return "missing", f"Add the key '{key}'"
     if kind == "value_error":
         problem, _, remedy = str(fault["ctx"]["error"]).partition(" | ")
-        return problem, remedy or "Mend the value"
+        return problem, remedy or "Correct the value"
     if kind == "finite_number":
         return f"{fault['input']} is not a finite number", "Write a number"
     if kind in ("too_short", "too_long") and isinstance(fault["input"], list):

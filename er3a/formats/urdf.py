@@ -194,7 +194,7 @@ def _joint_elements(path: Path) -> list[ElementTree.Element]:
     try:
         root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
-        raise InputError(path, None, f"not valid XML ({error})", "Mend the file") from None
+        raise InputError(path, None, f"not valid XML ({error})", "Correct the file") from None
     if root.tag != "robot":
         raise InputError(path, None, f"the top element is <{root.tag}>", "A URDF has <robot> (expand xacro first)")
     elements = root.findall("joint")

@@ -14,7 +14,7 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.jit import kernel
 from er3a.workspace.azimuths import MOST_ARCS, TURN, measure, meets, remove
 from er3a.workspace.empty import STACK, is_empty
-from er3a.workspace.filled import Stance, climb, reached_angles, slack, turn_aside
+from er3a.workspace.filled import SectionConfiguration, climb, reached_angles, slack, turn_aside
 from er3a.workspace.section_arm import SectionArm
 from er3a.workspace.sweep import swept_angles
 
@@ -26,7 +26,7 @@ _SPLITS = 256
 def judge_cells(
     arm: SectionArm,
     cells: Reals,
-    stances: Reals,
+    configurations: Reals,
     steps: tuple[float, float],
     most_boxes: int,
     unfilled: Reals,
@@ -40,24 +40,37 @@ def judge_cells(
     Parameters
     ----------
     cells : (n, 4), m: rho_0, rho_1, z_0, z_1
-    stances : (m, 9), see :func:`er3a.workspace.filled.stances`; steps : their spacing in theta_2 and tau, rad
+    configurations : (m, 9), see :func:`er3a.workspace.filled.configurations`; steps : their spacing in theta_2 and tau, rad
     most_boxes : of one emptiness proof
     unfilled, empty : (n, MOST_ARCS, 2), azimuths (rad) that are not proven filled, and those of them that are proven
         empty, with their counts (n,): at first of the cell that this one was split off, on return of the cell itself
-    witness : (n, 4), set to theta_2, tau, phi of a stance that reaches the cell's middle, and 1 (0 if none is known)
+    witness : (n, 4), set to theta_2, tau, phi of a configuration that reaches the cell's middle, and 1 (0 if none is known)
 
     Returns
     -------
     boxes : how many the emptiness proofs looked at
     """
     stack, splits, known = np.empty((STACK, 6)), np.empty((_SPLITS, 2)), np.empty((MOST_ARCS, 2))
-    best_of, stance_of = np.empty(2 * _SECTORS), np.empty(2 * _SECTORS, dtype=np.int64)
+    best_of, configuration_of = np.empty(2 * _SECTORS), np.empty(2 * _SECTORS, dtype=np.int64)
     boxes = 0
     for n in range(cells.shape[0]):
         rho_0, rho_1, z_0, z_1 = cells[n, 0], cells[n, 1], cells[n, 2], cells[n, 3]
         count, known_count = unfilled_count[n], empty_count[n]
         known[:known_count] = empty[n, :known_count]
-        count = _fill(arm, rho_0, rho_1, z_0, z_1, stances, steps, unfilled[n], count, best_of, stance_of, witness[n])
+        count = _fill(
+            arm,
+            rho_0,
+            rho_1,
+            z_0,
+            z_1,
+            configurations,
+            steps,
+            unfilled[n],
+            count,
+            best_of,
+            configuration_of,
+            witness[n],
+        )
         unfilled_count[n] = count
         if count == 0:
             empty_count[n] = 0
@@ -71,33 +84,38 @@ def judge_cells(
 
 
 @kernel
-def _row(stances: Reals, i: int) -> Stance:
+def _row(configurations: Reals, i: int) -> SectionConfiguration:
     return (
-        stances[i, 0],
-        stances[i, 1],
-        stances[i, 2],
-        stances[i, 3],
-        stances[i, 4],
-        stances[i, 5],
-        stances[i, 6],
-        stances[i, 7],
-        stances[i, 8],
+        configurations[i, 0],
+        configurations[i, 1],
+        configurations[i, 2],
+        configurations[i, 3],
+        configurations[i, 4],
+        configurations[i, 5],
+        configurations[i, 6],
+        configurations[i, 7],
+        configurations[i, 8],
     )
 
 
 @kernel
-def _angle(stance: Stance, side: float, rho: float, X: float) -> float:
-    """phi at which the stance reaches a point of the section."""
-    phi: float = stance[2] + side * np.arccos(min(1.0, max(-1.0, X / max(rho, 1e-12))))
+def _angle(configuration: SectionConfiguration, side: float, rho: float, X: float) -> float:
+    """phi at which the configuration reaches a point of the section."""
+    phi: float = configuration[2] + side * np.arccos(min(1.0, max(-1.0, X / max(rho, 1e-12))))
     return phi
 
 
 @kernel
 def _cover(
-    arm: SectionArm, stance: Stance, side: float, cell: tuple[float, float, float, float], arcs: Reals, count: int
+    arm: SectionArm,
+    configuration: SectionConfiguration,
+    side: float,
+    cell: tuple[float, float, float, float],
+    arcs: Reals,
+    count: int,
 ) -> int:
-    """Take what a stance provably fills out of the arcs."""
-    filled, low, high = reached_angles(arm, stance, side, cell[0], cell[1], cell[2], cell[3])
+    """Take what a configuration provably fills out of the arcs."""
+    filled, low, high = reached_angles(arm, configuration, side, cell[0], cell[1], cell[2], cell[3])
     return _take(arm, low, high, arcs, count) if filled else count
 
 
@@ -119,48 +137,53 @@ def _fill(
     rho_1: float,
     z_0: float,
     z_1: float,
-    stances: Reals,
+    configurations: Reals,
     steps: tuple[float, float],
     arcs: Reals,
     count: int,
     best_of: Reals,
-    stance_of: Integers,
+    configuration_of: Integers,
     witness: Reals,
 ) -> int:
     """Take what is proven filled out of the open arcs; returns their new count."""
     rho, z = 0.5 * (rho_0 + rho_1), 0.5 * (z_0 + z_1)
     cell = (rho_0, rho_1, z_0, z_1)
     half = 0.5 * min(rho_1 - rho_0, z_1 - z_0)
-    # A stance of the grid that misses by no more than the grid is coarse may have a neighbour that does not.
+    # A configuration of the grid that misses by no more than the grid is coarse may have a neighbour that does not.
     miss = (arm.upper_length + arm.forearm_length) * steps[0] + arm.forearm_length * steps[1]
     near = (arm.d + miss) ** 2
     best_of[:] = -miss
-    for i in range(stances.shape[0]):
-        if (rho - stances[i, 0]) ** 2 + (z - stances[i, 1]) ** 2 >= near:
+    for i in range(configurations.shape[0]):
+        if (rho - configurations[i, 0]) ** 2 + (z - configurations[i, 1]) ** 2 >= near:
             continue
         for flip in range(1 if arm.mirrored else 2):
             side = 1.0 - 2.0 * flip
-            stance = _row(stances, i)
-            value, X = slack(arm, stance, side, rho, z)
+            configuration = _row(configurations, i)
+            value, X = slack(arm, configuration, side, rho, z)
             if value <= -miss:
                 continue
             sector = 0
             if not arm.full_turn:
-                phi = _angle(stance, side, rho, X)
+                phi = _angle(configuration, side, rho, X)
                 sector = int((phi / TURN - np.floor(phi / TURN)) * _SECTORS) % _SECTORS
             if value > best_of[2 * sector + flip]:
-                best_of[2 * sector + flip], stance_of[2 * sector + flip] = value, i
+                best_of[2 * sector + flip], configuration_of[2 * sector + flip] = value, i
     deepest = 0.0
     for k in range(2 * _SECTORS):
         if best_of[k] <= -miss:
             continue
         side = 1.0 - 2.0 * (k % 2)
-        stance = climb(arm, _row(stances, stance_of[k]), side, rho, z, steps[0], steps[1])
-        value, X = slack(arm, stance, side, rho, z)
+        configuration = climb(arm, _row(configurations, configuration_of[k]), side, rho, z, steps[0], steps[1])
+        value, X = slack(arm, configuration, side, rho, z)
         if value > deepest:
             deepest = value
-            witness[0], witness[1], witness[2], witness[3] = stance[7], stance[8], _angle(stance, side, rho, X), 1.0
-        count = _cover(arm, stance, side, cell, arcs, count)
+            witness[0], witness[1], witness[2], witness[3] = (
+                configuration[7],
+                configuration[8],
+                _angle(configuration, side, rho, X),
+                1.0,
+            )
+        count = _cover(arm, configuration, side, cell, arcs, count)
         if count == 0:
             return 0
     if witness[3] > 0.0:
@@ -168,31 +191,31 @@ def _fill(
         count = _take(arm, low, high, arcs, count) if filled else count
     if arm.full_turn or deepest < half or count == 0:
         return count
-    # What is still open is beyond the deepest stances: take all that add to it, and the last one as far as it goes.
-    furthest, furthest_side = stance, 0.0
-    for i in range(stances.shape[0]):
-        if (rho - stances[i, 0]) ** 2 + (z - stances[i, 1]) ** 2 >= near:
+    # What is still open is beyond the deepest configurations: take all that add to it, and the last one as far as it goes.
+    furthest, furthest_side = configuration, 0.0
+    for i in range(configurations.shape[0]):
+        if (rho - configurations[i, 0]) ** 2 + (z - configurations[i, 1]) ** 2 >= near:
             continue
         for flip in range(1 if arm.mirrored else 2):
             side = 1.0 - 2.0 * flip
-            stance = _row(stances, i)
-            value, X = slack(arm, stance, side, rho, z)
+            configuration = _row(configurations, i)
+            value, X = slack(arm, configuration, side, rho, z)
             if value < half:
                 continue
-            phi = _angle(stance, side, rho, X)
+            phi = _angle(configuration, side, rho, X)
             if meets(arcs, count, arm.theta_1[0] + phi, arm.theta_1[1] + phi) or (
                 arm.mirrored and meets(arcs, count, arm.theta_1[0] - phi, arm.theta_1[1] - phi)
             ):
                 before = measure(arcs, count)
-                count = _cover(arm, stance, side, cell, arcs, count)
+                count = _cover(arm, configuration, side, cell, arcs, count)
                 if count == 0:
                     return 0
                 if measure(arcs, count) < before:
-                    furthest, furthest_side = stance, side
+                    furthest, furthest_side = configuration, side
     if furthest_side != 0.0:
         for sense in (1, -1):
-            stance = turn_aside(arm, furthest, furthest_side, cell, steps[0], steps[1], sense)
-            count = _cover(arm, stance, furthest_side, cell, arcs, count)
+            configuration = turn_aside(arm, furthest, furthest_side, cell, steps[0], steps[1], sense)
+            count = _cover(arm, configuration, furthest_side, cell, arcs, count)
     return count
 
 

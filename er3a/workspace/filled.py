@@ -22,15 +22,15 @@ from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
 from er3a.workspace.section_arm import ROUND_OFF, SectionArm, wrist_and_forearm
 
-Stance = tuple[float, float, float, float, float, float, float, float, float]
+SectionConfiguration = tuple[float, float, float, float, float, float, float, float, float]
 
 _SAFE = 64 * ROUND_OFF
 REFINEMENTS = 14
 
 
 @kernel
-def placed(arm: SectionArm, theta_2: float, tau: float) -> Stance:
-    """What the tests need of a stance of joints 2 and 3, as plain numbers."""
+def placed(arm: SectionArm, theta_2: float, tau: float) -> SectionConfiguration:
+    """What the tests need of a configuration of joints 2 and 3, as plain numbers."""
     W, f = wrist_and_forearm(arm, theta_2, tau)
     rho_W, rho_f = np.sqrt(W[0] * W[0] + W[1] * W[1]), np.sqrt(f[0] * f[0] + f[1] * f[1])
     phi_W = np.arctan2(W[1], W[0])
@@ -39,8 +39,8 @@ def placed(arm: SectionArm, theta_2: float, tau: float) -> Stance:
 
 
 @kernel
-def fill_stances(arm: SectionArm, steps_2: int, steps_3: int, out: Reals) -> None:
-    """Fill ``out`` (steps_2 * steps_3, 9) with stances on a grid over the limits of joints 2 and 3, ends included."""
+def fill_configurations(arm: SectionArm, steps_2: int, steps_3: int, out: Reals) -> None:
+    """Fill ``out`` (steps_2 * steps_3, 9) with configurations on a grid over the limits of joints 2 and 3, ends included."""
     for i in range(steps_2):
         theta_2 = arm.theta_2[0] + (arm.theta_2[1] - arm.theta_2[0]) * i / max(1, steps_2 - 1)
         for j in range(steps_3):
@@ -51,9 +51,11 @@ def fill_stances(arm: SectionArm, steps_2: int, steps_3: int, out: Reals) -> Non
 
 
 @kernel
-def slack(arm: SectionArm, stance: Stance, side: float, rho: float, z: float) -> tuple[float, float]:
-    """How deep (m, roughly) the point (rho, z) lies in what the stance reaches (negative: misses by that), and X."""
-    rho_W, W_z, _, f_cos, f_sin, f_z, W_f, _, _ = stance
+def slack(
+    arm: SectionArm, configuration: SectionConfiguration, side: float, rho: float, z: float
+) -> tuple[float, float]:
+    """How deep (m, roughly) the point (rho, z) lies in what the configuration reaches (negative: misses by that), and X."""
+    rho_W, W_z, _, f_cos, f_sin, f_z, W_f, _, _ = configuration
     dz = z - W_z
     inner = arm.d - np.sqrt((rho - rho_W) ** 2 + dz * dz)
     outer = np.sqrt((rho + rho_W) ** 2 + dz * dz) - arm.d
@@ -71,16 +73,22 @@ def slack(arm: SectionArm, stance: Stance, side: float, rho: float, z: float) ->
 
 @kernel
 def reached_angles(
-    arm: SectionArm, stance: Stance, side: float, rho_0: float, rho_1: float, z_0: float, z_1: float
+    arm: SectionArm,
+    configuration: SectionConfiguration,
+    side: float,
+    rho_0: float,
+    rho_1: float,
+    z_0: float,
+    z_1: float,
 ) -> tuple[bool, float, float]:
-    """Angles phi at which the stance reaches the points of a rectangle of the section.
+    """Angles phi at which the configuration reaches the points of a rectangle of the section.
 
     Returns
     -------
     filled : bool, whether it provably reaches all of them
     low, high : rad, bounds of phi over the rectangle
     """
-    rho_W, W_z, phi_W, f_cos, f_sin, f_z, W_f, _, _ = stance
+    rho_W, W_z, phi_W, f_cos, f_sin, f_z, W_f, _, _ = configuration
     if rho_W < 1e-9 or rho_0 < 1e-9 or arm.inner_low > arm.inner_high:
         return False, 0.0, 0.0
     d, size = arm.d, rho_1 + rho_W + arm.d + abs(W_z) + abs(z_0) + abs(z_1)
@@ -138,59 +146,69 @@ def _tilted(k: float, rho: float, fixed: float, z: float, W_z: float, f_z: float
 
 
 @kernel
-def _neighbour(arm: SectionArm, stance: Stance, move: int, step_2: float, step_3: float) -> Stance:
-    """The stance one step of joints 2 and 3 away, within their limits, in one of eight ways."""
+def _neighbour(
+    arm: SectionArm, configuration: SectionConfiguration, move: int, step_2: float, step_3: float
+) -> SectionConfiguration:
+    """The configuration one step of joints 2 and 3 away, within their limits, in one of eight ways."""
     da = (1.0, -1.0, 0.0, 0.0, 1.0, 1.0, -1.0, -1.0)[move] * step_2
     dt = (0.0, 0.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0)[move] * step_3
-    a = min(max(stance[7] + da, arm.theta_2[0]), arm.theta_2[1])
-    t = min(max(stance[8] + dt, arm.tau[0]), arm.tau[1])
+    a = min(max(configuration[7] + da, arm.theta_2[0]), arm.theta_2[1])
+    t = min(max(configuration[8] + dt, arm.tau[0]), arm.tau[1])
     return placed(arm, a, t)
 
 
 @kernel
-def climb(arm: SectionArm, stance: Stance, side: float, rho: float, z: float, step_2: float, step_3: float) -> Stance:
-    """Move joints 2 and 3 within their limits to where (rho, z) lies deepest; returns the stance."""
-    best, _ = slack(arm, stance, side, rho, z)
+def climb(
+    arm: SectionArm,
+    configuration: SectionConfiguration,
+    side: float,
+    rho: float,
+    z: float,
+    step_2: float,
+    step_3: float,
+) -> SectionConfiguration:
+    """Move joints 2 and 3 within their limits to where (rho, z) lies deepest; returns the configuration."""
+    best, _ = slack(arm, configuration, side, rho, z)
     for _ in range(REFINEMENTS):
         improved = False
         for move in range(8):
-            tried = _neighbour(arm, stance, move, step_2, step_3)
+            tried = _neighbour(arm, configuration, move, step_2, step_3)
             value, _ = slack(arm, tried, side, rho, z)
             if value > best:
-                best, stance, improved = value, tried, True
+                best, configuration, improved = value, tried, True
                 break
         if not improved:
             step_2, step_3 = 0.5 * step_2, 0.5 * step_3
-    return stance
+    return configuration
 
 
 @kernel
 def turn_aside(
     arm: SectionArm,
-    stance: Stance,
+    configuration: SectionConfiguration,
     side: float,
     cell: tuple[float, float, float, float],
     step_2: float,
     step_3: float,
     sense: int,
-) -> Stance:
-    """Move joints 2 and 3 so that the stance, which fills the cell, does so at angles phi as great as can be.
+) -> SectionConfiguration:
+    """Move joints 2 and 3 so that the configuration, which fills the cell, does so at angles phi as great as can be.
 
     Parameters
     ----------
     sense : 1 for great angles, -1 for small ones
     """
-    filled, low, high = reached_angles(arm, stance, side, cell[0], cell[1], cell[2], cell[3])
+    filled, low, high = reached_angles(arm, configuration, side, cell[0], cell[1], cell[2], cell[3])
     best = low if sense > 0 else -high
     for _ in range(REFINEMENTS):
         improved = False
         for move in range(8):
-            tried = _neighbour(arm, stance, move, step_2, step_3)
+            tried = _neighbour(arm, configuration, move, step_2, step_3)
             filled, low, high = reached_angles(arm, tried, side, cell[0], cell[1], cell[2], cell[3])
             value = low if sense > 0 else -high
             if filled and value > best:
-                best, stance, improved = value, tried, True
+                best, configuration, improved = value, tried, True
                 break
         if not improved:
             step_2, step_3 = 0.5 * step_2, 0.5 * step_3
-    return stance
+    return configuration

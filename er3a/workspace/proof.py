@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.workspace.azimuths import MOST_ARCS, TURN
 from er3a.workspace.cell_decision import judge_cells
-from er3a.workspace.filled import fill_stances
+from er3a.workspace.filled import fill_configurations
 from er3a.workspace.section_arm import SectionArm
 
 _STANCES = 96
@@ -21,7 +21,7 @@ _OPEN = 1e-9
 MOST_LEVEL = 7
 """Cells are not split further than this: a set without volume would never be decided."""
 _SHARE = 64
-StanceGrid = tuple[Reals, tuple[float, float]]
+ConfigurationGrid = tuple[Reals, tuple[float, float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class Proof:
     unfilled, empty : (n, MOST_ARCS, 2), rad in [0, 2 pi]: arcs of azimuth that are not proven filled, and those of them
         that are proven empty; unused rows are NaN
     level : (n,), how often the cell was split off
-    witness : (n, 4): theta_2, tau, phi of a stance that reaches the cell's middle, and 1; or zeros
+    witness : (n, 4): theta_2, tau, phi of a configuration that reaches the cell's middle, and 1; or zeros
     boxes : how many boxes the emptiness proofs looked at
     """
 
@@ -105,12 +105,12 @@ def prove(arm: SectionArm, target: float, most_cells: int, across: int = 32, thr
     across : cells along the height of the first grid
     threads : how many to use; the result does not depend on it
     """
-    stances = _stance_grid(arm)
+    configurations = _configuration_grid(arm)
     cells = _first_cells(arm, across)
     level, looked, boxes, done, settled = 0, 0, 0, [], np.zeros(2)
     parents = None
     while len(cells):
-        judged = _judge(arm, cells, stances, level, parents, threads)
+        judged = _judge(arm, cells, configurations, level, parents, threads)
         looked, boxes = looked + len(cells), boxes + judged.boxes
         volumes, reached = judged.volumes, 1 - np.stack([judged.unfilled_ratio, judged.empty_ratio])
         undecided = volumes * (reached[1] - reached[0])
@@ -130,7 +130,7 @@ def prove(arm: SectionArm, target: float, most_cells: int, across: int = 32, thr
 def sharpen(arm: SectionArm, proof: Proof, chosen: Flags) -> Proof:
     """Split the chosen cells (mask) of a proof into four each, and judge those."""
     parents = proof.rows(np.repeat(np.flatnonzero(chosen), 4))
-    finer = _judge(arm, _quarters(proof.cells[chosen]), _stance_grid(arm), 0, parents)
+    finer = _judge(arm, _quarters(proof.cells[chosen]), _configuration_grid(arm), 0, parents)
     finer = replace(finer, level=np.repeat(proof.level[chosen] + 1, 4))
     return _joined([proof.rows(~chosen), finer], proof.boxes + finer.boxes)
 
@@ -148,15 +148,15 @@ def _joined(parts: list[Proof], boxes: int) -> Proof:
 
 def judge(arm: SectionArm, cells: Reals) -> Proof:
     """Judge given cells (n, 4) once, without splitting any."""
-    return _judge(arm, np.ascontiguousarray(cells, dtype=float), _stance_grid(arm), 0)
+    return _judge(arm, np.ascontiguousarray(cells, dtype=float), _configuration_grid(arm), 0)
 
 
-def _stance_grid(arm: SectionArm) -> StanceGrid:
-    """Stances of joints 2 and 3 over their limits, and the grid's steps (rad)."""
+def _configuration_grid(arm: SectionArm) -> ConfigurationGrid:
+    """Configurations of joints 2 and 3 over their limits, and the grid's steps (rad)."""
     span_2, span_3 = arm.theta_2[1] - arm.theta_2[0], arm.tau[1] - arm.tau[0]
     count_2, count_3 = (_STANCES if span > 0 else 1 for span in (span_2, span_3))
     grid = np.empty((count_2 * count_3, 9))
-    fill_stances(arm, count_2, count_3, grid)
+    fill_configurations(arm, count_2, count_3, grid)
     return grid, (span_2 / max(1, count_2 - 1), span_3 / max(1, count_3 - 1))
 
 
@@ -181,7 +181,12 @@ def _quarters(cells: Reals) -> Reals:
 
 
 def _judge(
-    arm: SectionArm, cells: Reals, stances: StanceGrid, level: int, parents: Proof | None = None, threads: int = 1
+    arm: SectionArm,
+    cells: Reals,
+    configurations: ConfigurationGrid,
+    level: int,
+    parents: Proof | None = None,
+    threads: int = 1,
 ) -> Proof:
     """Judge cells, beginning from what is known of those they were split off."""
     n = len(cells)
@@ -194,7 +199,7 @@ def _judge(
 
     def work(part: slice) -> int:
         known = (unfilled[part], counts[0, part], empty[part], counts[1, part], witness[part])
-        return judge_cells(arm, cells[part], stances[0], stances[1], _MOST_BOXES, *known)
+        return judge_cells(arm, cells[part], configurations[0], configurations[1], _MOST_BOXES, *known)
 
     # Neighbours cost alike: small shares keep the threads busy to the end.
     parts = [slice(k, k + _SHARE) for k in range(0, n, _SHARE)]

@@ -291,7 +291,7 @@ def test_a_wrong_file_is_refused_with_field_and_remedy(write, change, field, wor
 def test_several_faults_are_counted(write):
     error = refusal(write(do(delete("title"), delete("zero_pose"), set_in("tol", to=1))))
     assert error.field == "tol"
-    assert "(2 more to mend after this one)" in error.remedy
+    assert "(2 more to correct after this one)" in error.remedy
 
 
 def test_a_key_written_twice_is_refused_with_its_line(write):
