@@ -40,11 +40,11 @@ def judge_cells(
     Parameters
     ----------
     cells : (n, 4), m: rho_0, rho_1, z_0, z_1
-    configurations : (m, 9), see :func:`er3a.workspace.filled.configurations`; steps : their spacing in theta_2 and tau, rad
+    configurations : (m, 9), see :func:`er3a.workspace.filled.configurations`; steps : spacing in theta_2 and tau, rad
     most_boxes : of one emptiness proof
     unfilled, empty : (n, MOST_ARCS, 2), azimuths (rad) that are not proven filled, and those of them that are proven
         empty, with their counts (n,): at first of the cell that this one was split off, on return of the cell itself
-    witness : (n, 4), set to theta_2, tau, phi of a configuration that reaches the cell's middle, and 1 (0 if none is known)
+    witness : (n, 4), set to theta_2, tau, phi of a configuration that reaches the cell's middle, and 1 (else 0)
 
     Returns
     -------
@@ -191,7 +191,7 @@ def _fill(
         count = _take(arm, low, high, arcs, count) if filled else count
     if arm.full_turn or deepest < half or count == 0:
         return count
-    # What is still open is beyond the deepest configurations: take all that add to it, and the last one as far as it goes.
+    # What is still open is beyond the deepest configurations: take all that add to it, the last one as far as it goes.
     furthest, furthest_side = configuration, 0.0
     for i in range(configurations.shape[0]):
         if (rho - configurations[i, 0]) ** 2 + (z - configurations[i, 1]) ** 2 >= near:

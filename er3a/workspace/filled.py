@@ -40,7 +40,7 @@ def placed(arm: SectionArm, theta_2: float, tau: float) -> SectionConfiguration:
 
 @kernel
 def fill_configurations(arm: SectionArm, steps_2: int, steps_3: int, out: Reals) -> None:
-    """Fill ``out`` (steps_2 * steps_3, 9) with configurations on a grid over the limits of joints 2 and 3, ends included."""
+    """Fill ``out`` (steps_2 * steps_3, 9) with a grid of configurations over the limits of joints 2 and 3, ends included."""
     for i in range(steps_2):
         theta_2 = arm.theta_2[0] + (arm.theta_2[1] - arm.theta_2[0]) * i / max(1, steps_2 - 1)
         for j in range(steps_3):
@@ -54,7 +54,7 @@ def fill_configurations(arm: SectionArm, steps_2: int, steps_3: int, out: Reals)
 def slack(
     arm: SectionArm, configuration: SectionConfiguration, side: float, rho: float, z: float
 ) -> tuple[float, float]:
-    """How deep (m, roughly) the point (rho, z) lies in what the configuration reaches (negative: misses by that), and X."""
+    """How deep (m, roughly) the point (rho, z) lies in what a configuration reaches (negative: it misses), and X."""
     rho_W, W_z, _, f_cos, f_sin, f_z, W_f, _, _ = configuration
     dz = z - W_z
     inner = arm.d - np.sqrt((rho - rho_W) ** 2 + dz * dz)

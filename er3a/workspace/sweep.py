@@ -1,12 +1,11 @@
 """A second proof that a cell is filled: the tool's sphere swept across it.
 
 For a point x of the cell at the angle phi, the sphere of radius d about W must pass through x with the direction in the
-zone. Move joints 1 to 3 along a short straight line from a configuration where every point of the cell lies inside the sphere
-to one where every point lies outside: by the intermediate value theorem the sphere passes through each point on the
-way. If the direction stays in the zone all along, for all points of the cell, the cell is filled. Standing still in
+zone. Move joints 1 to 3 along a short straight line from a configuration where every point of the cell lies inside the
+sphere to one where every point lies outside: by the intermediate value theorem the sphere passes through each point on
+the way. If the direction stays in the zone all along, for all points of the cell, the cell is filled. Standing still in
 joints 2 and 3 (:mod:`er3a.workspace.filled`) is the case of a line along phi, with exact ranges; here any joint may
-move, which is what it takes where the wrist must lie in the cell's own half plane.
-"""
+move, which is what it takes where the wrist must lie in the cell's own half plane."""
 
 from __future__ import annotations
 
