@@ -40,7 +40,7 @@ def placed(arm: SectionArm, theta_2: float, tau: float) -> SectionConfiguration:
 
 @kernel
 def fill_configurations(arm: SectionArm, steps_2: int, steps_3: int, out: Reals) -> None:
-    """Fill ``out`` (steps_2 * steps_3, 9) with a grid of configurations over the limits of joints 2 and 3, ends included."""
+    """Fill ``out`` (steps_2 * steps_3, 9) with a grid of configurations over the limits of joints 2 and 3."""
     for i in range(steps_2):
         theta_2 = arm.theta_2[0] + (arm.theta_2[1] - arm.theta_2[0]) * i / max(1, steps_2 - 1)
         for j in range(steps_3):

@@ -29,8 +29,7 @@ def witness_joints(robot: Robot, arm: SectionArm, proof: Proof) -> Reals:
     """Joint vectors (cells, 6), rad, that reach into the cells; NaN where none is known.
 
     The proof's configurations give joints 2 and 3 and the angle phi between arm and cell, from which the rest is found
-    by
-    iteration towards the middle of the cell. Each one is checked: it lies within the limits and in its cell.
+    by iteration towards the middle of the cell. Each one is checked: it lies within the limits and in its cell.
     """
     q = np.full((len(proof.cells), 6), np.nan)
     known = np.flatnonzero(proof.witness[:, 3] > 0)
