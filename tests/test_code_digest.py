@@ -131,6 +131,25 @@ def test_circular_imports_end(package):
     assert len(package.digests("pipeline.stages.made.compute")[0]) == 64
 
 
+def test_sentences_of_a_page_count_to_its_views_and_those_of_a_verdict_to_its_numbers_too(package):
+    stages = ("validation", "workspace", "inverse", "trajectory")
+    ask = "from er3a.pipeline.stages.registry import STAGES\n"
+    ask += f"for stage in {stages}: print(*map(STAGES[stage].digest, ('compute', 'report')))"
+
+    def changed(*paths: str) -> list[tuple[bool, ...]]:
+        """Of each stage, whether the digests of ``compute`` and ``report`` change with an edit of some files."""
+        before = package.run(ask).splitlines()
+        for path in paths:
+            package.append(path)
+        after = package.run(ask).splitlines()
+        return [tuple(a != b for a, b in zip(*map(str.split, pair))) for pair in zip(before, after, strict=True)]
+
+    assert changed(*(f"pipeline/messages/{stage}.py" for stage in stages)) == [(False, True)] * 4
+    for stage in ("inverse", "trajectory"):
+        expected = [(each == stage, each == stage) for each in stages]
+        assert changed(f"pipeline/messages/{stage}_verdict.py") == expected
+
+
 def test_unknown_module_is_refused():
     with pytest.raises(ModuleNotFoundError, match=r"er3a has no module 'er3a\.pipeline\.stages\.typo\.compute'"):
         code_digest("er3a.pipeline.stages.typo.compute")

@@ -32,7 +32,6 @@ from er3a.errors import ResultError
 from er3a.files.grades import grades_in
 from er3a.files.kept_files import read_bytes, sha256, shown_path, write_atomically
 from er3a.findings import Finding
-from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import STAGES, Study
 from er3a.pipeline.tables import table_types
@@ -157,7 +156,7 @@ def write_results(
         inputs=input_records(study.inputs(robot, stage.name)),
         config=study.computed_from(robot, stage.name),
         seed=study.seed,
-        code=code_digest(f"{stage.package}.compute", stage.verdict_messages),
+        code=stage.digest("compute"),
     )
     content = {"format_version": FORMAT_VERSION, "robot": robot, "stage": stage.name, **own}
     text = json.dumps(content | {"provenance": plain(origin)}, indent=1, ensure_ascii=False, allow_nan=False) + "\n"

@@ -22,7 +22,7 @@ from typer.testing import CliRunner
 
 from er3a.errors import ResultError
 from er3a.pipeline.cli import app
-from er3a.pipeline.results import FORMAT_VERSION, check_results, read_summary, write_checksums
+from er3a.pipeline.results import FORMAT_VERSION, check_results, read_provenance, write_checksums
 from tests.conftest import ALL_THERE
 
 STAGES = ("validation", "workspace", "inverse", "trajectory")
@@ -57,7 +57,7 @@ def test_every_stage_leaves_results_a_page_and_a_recording(small_study):
             assert (summary["robot"], summary["stage"]) == (robot, stage)
             assert summary["verdict"]["status"] in ("pass", "caution", "fail", "no_reference")
             assert summary["verdict"]["text"].endswith(".")
-            assert {"name", "value", "unit", "uncertainty"} == set(summary["figures"][0])
+            assert {"name", "value", "unit", "uncertainty", "of"} == set(summary["figures"][0])
             assert summary["provenance"]["inputs"][0]["path"] == f"data/robots/{robot}.yaml"
             for suffix in ("html", "rrd"):
                 assert (small_study.folder / "reports" / robot / f"{stage}.{suffix}").stat().st_size > 1000
@@ -125,6 +125,23 @@ def test_editing_a_template_renders_reports_only(small_study):
         }
 
 
+@pytest.mark.parametrize(
+    ("module", "old", "new", "computed"),
+    [
+        ("inverse.py", '"targets solved"', '"targets with a solution"', False),
+        ("inverse_verdict.py", '"Every target ({count}) has', '"Each target ({count}) has', True),
+    ],
+)
+def test_another_wording_of_a_page_computes_nothing_and_one_of_a_verdict_its_stage(
+    small_study, module, old, new, computed
+):
+    expected = set().union(*(views(robot, "inverse") for robot in small_study.robots))
+    if computed:
+        expected |= {f"{robot}: compute inverse" for robot in small_study.robots}
+    with edited(small_study.folder / "er3a/pipeline/messages" / module, old, new):
+        assert small_study.planned() == expected | {"write the index"}
+
+
 @pytest.mark.long
 def test_editing_the_base_template_renders_all_pages_and_no_number(small_study):
     with edited(small_study.folder / "er3a/pipeline/viewing/base.html.j2", "<main>", "<main >"):
@@ -159,7 +176,7 @@ def test_editing_a_script_writes_the_teach_panels_only(small_study):
 
 
 def test_editing_a_kinematics_module_reruns_what_uses_it(small_study):
-    with edited(small_study.folder / "er3a/kinematics/admissible.py", '"""', '"""Edited. '):
+    with edited(small_study.folder / "er3a/kinematics/neighbours.py", '"""', '"""Edited. '):
         expected = {f"{robot}: compute inverse" for robot in small_study.robots}
         for robot in small_study.robots:
             expected |= views(robot, "inverse")
@@ -246,7 +263,7 @@ def test_what_is_missing_damaged_or_of_an_older_version_is_made_again(small_stud
     with pytest.raises(ResultError, match=r"er3_600/trajectory/checks\.parquet: damaged"):
         check_results(results / "er3_600/trajectory")
     with pytest.raises(ResultError, match=f"format version 1, this er3a reads {FORMAT_VERSION}"):
-        read_summary(old.parent)
+        read_provenance(old.parent)
 
     done = run.make_run("--cores", "2", "--nocolor")
     for path in (old, *damaged, half):

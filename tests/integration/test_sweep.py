@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from er3a.pipeline.estimate.jobs import jobs_of
-from er3a.pipeline.results import read_summary
+from er3a.pipeline.results import read_stage
+from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import load_study
 from er3a.pipeline.viewing.index import write_index
 from tests.conftest import ROBOTS
@@ -55,11 +56,11 @@ def test_a_variant_at_the_base_s_own_value_gives_the_base_s_tables(swept):
 
 def test_results_tell_the_base_s_file_and_the_value(swept):
     run, _ = swept
-    summaries = [read_summary(run.folder / f"results/{name}/workspace") for name in VARIANTS]
-    for summary, value in zip(summaries, (50.0, 70.0)):
-        assert summary["provenance"]["config"]["robot"] == {"varied": {"joints.3.a_mm": value}}
-        assert summary["provenance"]["inputs"][0]["path"] == "data/robots/er3a_c60.yaml"
-    estimates = [summary["volume_m3"]["estimate"] for summary in summaries]
+    stored = [read_stage(run.folder / f"results/{name}/workspace", STAGES["workspace"]) for name in VARIANTS]
+    for each, value in zip(stored, (50.0, 70.0)):
+        assert each.provenance.config["robot"] == {"varied": {"joints.3.a_mm": value}}
+        assert each.provenance.inputs[0].path == "data/robots/er3a_c60.yaml"
+    estimates = [each.results.summary.volume_m3.estimate for each in stored]
     assert estimates == sorted(set(estimates)), "a longer arm reaches more"
 
 

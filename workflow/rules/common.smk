@@ -79,7 +79,7 @@ def computed_from(stage):
 
 def code_of(stage, verb):
     """Digest of the modules that a verb of a stage uses: Snakemake doesn't see edits of an imported package."""
-    return code_digest(f"{STAGES[stage].package}.{verb}", STAGES[stage].verdict_messages)
+    return STAGES[stage].digest(verb)
 
 
 def results_of(stage):

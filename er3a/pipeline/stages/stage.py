@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from er3a.files.yaml_file import StrictModel
 from er3a.findings import Finding
+from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.tables import table_types
 from er3a.robots.robot import Robot
 
@@ -77,3 +78,7 @@ class Stage:
     def verdict_messages(self) -> str:
         """The module that makes a sentence of the stage's verdict."""
         return f"er3a.pipeline.messages.{self.name}_verdict"
+
+    def digest(self, verb: str) -> str:
+        """The digest of what a verb's outcome depends on: its own modules, and the sentences of the verdict."""
+        return code_digest(f"{self.package}.{verb}", self.verdict_messages)
