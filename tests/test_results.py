@@ -20,6 +20,7 @@ import pytest
 from er3a.errors import ResultError, WriteError
 from er3a.files.kept_files import half_written, sha256, write_atomically
 from er3a.files.robot_library import ROBOTS
+from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.results import (
     CHECKSUMS,
@@ -38,7 +39,7 @@ from er3a.pipeline.results import (
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import load_study
-from er3a.pipeline.tables import Integers, Reals, Table, Texts, column, per_joint, vector
+from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 
 ROOT = Path(__file__).resolve().parents[1]
 

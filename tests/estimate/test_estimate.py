@@ -54,14 +54,14 @@ def test_jobs_on_one_core_take_the_sum_and_on_many_the_longest_chain():
         Job("c", "", "", needs=(0,)),
         Job("d", "", "", needs=(1, 2)),
     ]
-    seconds = {"a": 1.0, "b": 2.0, "c": 4.0, "d": 8.0}
-    assert wall_time(jobs, lambda job: seconds[job.verb], 1) == 15
-    assert wall_time(jobs, lambda job: seconds[job.verb], 2) == 13
-    assert wall_time(jobs, lambda job: seconds[job.verb], 64) == 13
+    seconds = [1.0, 2.0, 4.0, 8.0]
+    assert wall_time(jobs, seconds, 1) == 15
+    assert wall_time(jobs, seconds, 2) == 13
+    assert wall_time(jobs, seconds, 64) == 13
 
 
 def test_three_equal_jobs_take_two_rounds_on_two_cores():
-    assert wall_time([Job("a", "", str(n)) for n in range(3)], lambda job: 5.0, 2) == 10
+    assert wall_time([Job("a", "", str(n)) for n in range(3)], [5.0] * 3, 2) == 10
 
 
 def test_samples_are_shared_out_over_parts_without_loss(study):

@@ -69,13 +69,13 @@ def measured_here(study: Study, results: Path, reports: Path, logs: Path) -> Cal
         timings=timings,
         trial=tried,
         result_bytes={first: tried.result_bytes} if whole else sizes,
-        workflow=_workflow(study.file),
+        workflow=_workflow(study),
         handling_s=_handling(),
     )
 
 
-def _workflow(study_file: Path) -> Timing:
-    return timed(["snakemake", "--configfile", str(study_file), "--dry-run", "--forceall", "--quiet", "all"])
+def _workflow(study: Study) -> Timing:
+    return timed(["snakemake", "--configfile", str(study.file), "--dry-run", "--forceall", "--quiet", "all"])
 
 
 def _handling() -> float:
@@ -92,7 +92,7 @@ def cost(study: Study, calibration: Calibration, cores: int) -> Cost:
     jobs, estimates = jobs_of(study), estimates_of(study, calibration)
     least, expected, greatest = (
         calibration.workflow.seconds
-        + wall_time(jobs, lambda job, end=end: estimates[job].seconds[end] + calibration.handling_s, cores)
+        + wall_time(jobs, [estimates[job].seconds[end] + calibration.handling_s for job in jobs], cores)
         for end in range(3)
     )
     largest = sorted((estimates[job].memory_mb for job in jobs), reverse=True)[:cores]

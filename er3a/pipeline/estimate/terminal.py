@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections import Counter
+from collections import Counter, defaultdict
 
 from rich import box
 from rich.console import Console
@@ -32,8 +32,9 @@ def print_estimate(study: Study, calibration: Calibration, cores: list[int]) -> 
     kinds = Table("what", "timed", box=box.SIMPLE)
     for column in ("jobs", "core time"):
         kinds.add_column(column, justify="right")
-    estimates, seen = estimates_of(study, calibration), Counter()
-    seconds: Counter[tuple[str, str]] = Counter()
+    estimates = estimates_of(study, calibration)
+    seen: Counter[tuple[str, str]] = Counter()
+    seconds: defaultdict[tuple[str, str], float] = defaultdict(float)
     for job in jobs_of(study):
         seen[job.key[:2]] += 1
         seconds[job.key[:2]] += estimates[job].seconds[1]

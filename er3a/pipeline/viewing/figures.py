@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 from matplotlib.axes import Axes
@@ -14,6 +15,9 @@ from matplotlib.text import Text
 
 from er3a.pipeline.messages import language
 from er3a.pipeline.viewing.palette import GRID, INK, JOINTS, MUTED
+
+if TYPE_CHECKING:
+    from matplotlib.typing import RcKeyType
 
 FONTS = ["DejaVu Sans"]
 CHINESE_FONTS = (
@@ -26,7 +30,7 @@ CHINESE_FONTS = (
     "PingFang SC",
     "SimHei",
 )
-STYLE = {
+STYLE: dict[RcKeyType, Any] = {
     "axes.edgecolor": MUTED,
     "axes.grid": True,
     "axes.labelcolor": INK,

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.kinematics.solutions import Label, Method, Unsolved
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.inverse.findings import (
     Advice,
@@ -17,7 +18,7 @@ from er3a.pipeline.stages.inverse.findings import (
     Obstacle,
     SomeUnsolved,
 )
-from er3a.pipeline.tables import Findings, Flags, Integers, Reals, Table, Texts, column, findings, per_joint, vector
+from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
 from er3a.selection.nearest import Refusal, WhyFirst, WhyNone
 from er3a.selection.rules import RuleName
 

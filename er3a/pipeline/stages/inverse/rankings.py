@@ -8,7 +8,7 @@ import numpy as np
 
 from er3a.collision.scene import Scene
 from er3a.kinematics.targets import Target
-from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.stages.inverse.model import RankingRows, Sequence, Stop
 from er3a.pipeline.stages.inverse.solve_target import SolvedTarget, collides
 from er3a.robots.robot import Robot
@@ -48,8 +48,9 @@ def _measured(
         yield MIX, cost, cost
 
 
-def _places(cost: Reals, free: Flags) -> list[int]:
-    return [int((cost[free] < own - SAME_COST).sum()) + 1 if is_free else 0 for own, is_free in zip(cost, free)]
+def _places(cost: Reals, free: Flags) -> Integers:
+    places = [int((cost[free] < own - SAME_COST).sum()) + 1 if is_free else 0 for own, is_free in zip(cost, free)]
+    return np.array(places, dtype=np.int64)
 
 
 def sequence(

@@ -76,7 +76,7 @@ def _log_target(stream: rr.RecordingStream, robot: Robot, target: TargetResult, 
     root, size = f"{STAGE}/targets/{target.name}", size_of(robot)
     position = np.array(target.xyz_mm) / 1000
     w, x, y, z = target.quaternion_wxyz
-    frame = rr.Transform3D(translation=position, quaternion=[x, y, z, w])
+    frame = rr.Transform3D(translation=position, quaternion=rr.Quaternion(xyzw=[x, y, z, w]))
     axes = rr.Arrows3D(vectors=0.12 * size * np.eye(3), colors=AXES, radii=0.003 * size)
     stream.log(f"{root}/frame", frame, axes)
     ball = rr.Points3D([position], radii=0.012 * size, colors=rgb(HIGHLIGHT), labels=target.name, show_labels=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -116,7 +117,8 @@ def _rule(rule: str) -> str:
 
 
 def _rule_heading(rule: str) -> str:
-    unit = {name: own.unit for name, own in RULES.items()}.get(rule, "1")
+    units: dict[str, str] = {name: own.unit for name, own in RULES.items()}
+    unit = units.get(rule, "1")
     return f"{_rule(rule)}{'' if unit == '1' else f' ({unit})'}>"
 
 
@@ -165,7 +167,7 @@ def _self_motion(family: SelfMotion) -> str:
     )
 
 
-def _costs(summary: InverseSummary) -> dict[str, str]:
+def _costs(summary: InverseSummary) -> dict[str, Any]:
     """Unit and title of the rule that moves in the sequence are ranked by."""
     if summary.sequence is None:
         return {}

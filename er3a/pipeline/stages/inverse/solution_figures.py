@@ -22,7 +22,7 @@ from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, JOINT_NAMES, MOD
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot
 
-TITLE = {"loc": "left", "fontsize": 11, "fontweight": "bold"}
+TITLE: dict[str, Any] = {"loc": "left", "fontsize": 11, "fontweight": "bold"}
 
 
 def overlay(robot: Robot, target: TargetResult, branches: SolutionRows) -> Picture:
@@ -203,7 +203,7 @@ def _draw_joints(axes: Axes, robot: Robot, target: TargetResult, branches: Solut
             x = angles[place, joint]
             outside = not lower[joint] - 1e-6 <= x <= upper[joint] + 1e-6
             colour = colour_of(shape_of(int(branches.branch[place]), branches.label[place])) if rank else MUTED
-            style = {"marker": "o", "markersize": 4.5, "color": colour}
+            style: dict[str, Any] = {"marker": "o", "markersize": 4.5, "color": colour}
             if rank == 1:
                 style |= {"marker": "D", "markersize": 8}
             elif outside:

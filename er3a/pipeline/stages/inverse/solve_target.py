@@ -63,7 +63,9 @@ def solve_target(robot: Robot, target: Target, random: np.random.Generator, scen
     rows = _rows(robot, target, solutions, choice, refused)
     found, within = np.unique(rows.branch), np.unique(rows.branch[rows.within_limits])
     chosen = choice.chosen
-    near, obstacle, advice = None, None, ()
+    near: Neighbours | None = None
+    obstacle: Obstacle | None = None
+    advice: tuple[Advice, ...] = ()
     if chosen is not None:
         advice = _what_to_know(rows, chosen)
     elif isinstance(choice.reason, AllCollide):

@@ -10,6 +10,7 @@ from er3a.collision.bodies import Bodies, can_measure
 from er3a.files.path_file import load_paths
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, Status, Verdict
 from er3a.pipeline.stages.trajectory.avoidance_results import AvoidanceTask, speed_ratio
 from er3a.pipeline.stages.trajectory.collisions import Surroundings, clearance_rows, measured
@@ -33,7 +34,6 @@ from er3a.pipeline.stages.trajectory.model import (
 from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
 from er3a.pipeline.stages.trajectory.path_summary import path_summary
 from er3a.pipeline.study import Study
-from er3a.pipeline.tables import Reals
 from er3a.planning.commands import CommandSource
 from er3a.planning.near_singular import NearSingular
 from er3a.planning.timing import JointLimits, joint_limits

@@ -12,8 +12,9 @@ from er3a.collision.pairs import Pair, PairOverlaps
 from er3a.findings import Finding
 from er3a.kinematics.configuration import BranchLabel
 from er3a.kinematics.singularity import SingularityType
+from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
-from er3a.pipeline.tables import Flags, Reals, Table, Texts, column, per_joint, vector
+from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.planning.avoidance import StrategyName
 from er3a.planning.avoidance.strategies import NotUsable
 from er3a.planning.intervals import AboveLimit, BelowLimit, PathOutOfReach, TooFast

@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.stages.trajectory.model import AvoidanceRows, Checks, PathSummary
-from er3a.pipeline.tables import Reals
 from er3a.pipeline.viewing.palette import BODY, GRID, HIGHLIGHT, INK, LINK, MODEL, MUTED
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot

@@ -8,10 +8,10 @@ import numpy as np
 import plotly.graph_objects as go
 from markupsafe import Markup
 
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.trajectory import type_word
 from er3a.pipeline.stages.trajectory.model import AvoidanceRows, Checks, PathSummary, TrajectoryResults
-from er3a.pipeline.tables import Reals
 from er3a.pipeline.viewing.figure_3d import turning_html
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, LINK, MODEL
 from er3a.pipeline.viewing.skeleton import skeleton

@@ -15,6 +15,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 
 from er3a.kinematics.singularity import SingularityType
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.trajectory import type_word
 from er3a.pipeline.stages.trajectory.model import (
@@ -26,7 +27,6 @@ from er3a.pipeline.stages.trajectory.model import (
     Stretch,
 )
 from er3a.pipeline.stages.trajectory.oblique import draw_path
-from er3a.pipeline.tables import Reals
 from er3a.pipeline.viewing.figures import svg_data_uri
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINT_NAMES, MODEL, MUTED, REFERENCE, VERDICTS
 from er3a.pipeline.viewing.palette import JOINTS as COLOURS

@@ -11,6 +11,7 @@ import rerun.blueprint as rrb
 from matplotlib import colormaps
 from matplotlib.colors import LogNorm
 
+from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.trajectory import advice, path_text, type_word
 from er3a.pipeline.messages.trajectory_verdict import verdict_word
@@ -24,7 +25,6 @@ from er3a.pipeline.stages.trajectory.model import (
     TrajectorySummary,
 )
 from er3a.pipeline.study import Study
-from er3a.pipeline.tables import Flags, Reals
 from er3a.pipeline.viewing.arm import log_arm, send_motion, size_of
 from er3a.pipeline.viewing.palette import HIGHLIGHT, JOINT_NAMES, JOINTS, MODEL, MUTED, REFERENCE, rgb
 from er3a.pipeline.viewing.recording import ARM, TIMELINE, escaped, log_note, note_view, recording, send_series

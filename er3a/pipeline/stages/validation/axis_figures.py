@@ -159,7 +159,7 @@ def _label(axes: PlotAxes, points: Iterable[tuple[int, np.ndarray]], colour: str
             groups.append((point, [joint]))
     for point, joints in groups:
         text = ", ".join(f"J{joint}" for joint in joints)
-        axes.annotate(text, point[[0, 2]], shift, textcoords="offset points", color=colour, zorder=6)
+        axes.annotate(text, (point[0], point[2]), shift, textcoords="offset points", color=colour, zorder=6)
 
 
 def _short(source: str) -> str:

@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.validation.findings import (
     ModelGroup,
     NearSingularLeftOut,
@@ -26,7 +27,6 @@ from er3a.pipeline.stages.validation.model import (
     Statement,
     Unjudged,
 )
-from er3a.pipeline.tables import Reals
 from er3a.references.quantities import Limit, Quantity, Speed
 from er3a.references.reference import Reference, ReferenceSet, conflicts, expected_of
 from er3a.references.rows import GROUPS, AxisRow

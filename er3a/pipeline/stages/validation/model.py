@@ -9,6 +9,7 @@ from typing import ClassVar, Literal, Self, get_args
 import numpy as np
 
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.validation.diagnosis_model import Corrections, Residuals, SetCalibration, SetDiagnosis
 from er3a.pipeline.stages.validation.findings import (
@@ -20,18 +21,7 @@ from er3a.pipeline.stages.validation.findings import (
     SelfCheck,
     Validated,
 )
-from er3a.pipeline.tables import (
-    Findings,
-    Flags,
-    Integers,
-    Reals,
-    Table,
-    Texts,
-    column,
-    findings,
-    per_joint,
-    vector,
-)
+from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
 from er3a.references.subjects import ReferenceSubject
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from er3a.kinematics.forward import forward
+from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import Figure
 from er3a.pipeline.stages.workspace import table_rows
 from er3a.pipeline.stages.workspace.capability import ToolCapability, tool_capability
@@ -33,7 +34,6 @@ from er3a.pipeline.stages.workspace.sample import draw_of, sampled
 from er3a.pipeline.stages.workspace.tables import HullTriangles
 from er3a.pipeline.stages.workspace.verdict import judge
 from er3a.pipeline.study import Study
-from er3a.pipeline.tables import Flags, Reals
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import Grid, make_grid, shoulder_of
 from er3a.sampling.random_joints import Draw

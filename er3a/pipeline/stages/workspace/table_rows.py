@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er3a.kinematics.forward import forward, jacobian
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.workspace.tables import (
     Border,
     BoxPlaces,
@@ -22,7 +23,7 @@ from er3a.pipeline.stages.workspace.tables import (
     VoidTriangles,
     VoidVertices,
 )
-from er3a.pipeline.tables import Reals, Texts
+from er3a.pipeline.tables import Texts
 from er3a.robots.robot import Robot
 from er3a.sampling import touched_cells
 from er3a.sampling.tally import UNTOUCHED, Tally
