@@ -11,16 +11,19 @@ ARGS   ?=
 .DEFAULT_GOAL := help
 # A run starts dozens of short processes: without compiled modules kept on disk each would compile them anew.
 unexport PYTHONDONTWRITEBYTECODE
-.PHONY: help run test view estimate archive lint format schema words lock clean distclean campaigns
+.PHONY: help run test test-all view estimate archive lint format schema words lock clean distclean campaigns
 
 help:  ## list the targets
-	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):[^#]*## /  make \1\t/' | expand -t 18
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## /  make \1\t/' | expand -t 18
 
 run: $(VENV)/run.stamp  ## set up, run the study, write reports/index.html (ARGS="--cores 1", STUDY=config/small.yaml)
 	@$(BIN)/python workflow/scripts/run.py --study $(STUDY) -- $(ARGS)
 
-test: $(VENV)/dev.stamp  ## set up and run the tests (ARGS="-k workspace")
+test: $(VENV)/dev.stamp  ## set up and run the fast tests (ARGS="-k workspace")
 	@$(BIN)/python -m pytest $(ARGS)
+
+test-all: $(VENV)/dev.stamp  ## set up and run all tests, the long ones too
+	@$(BIN)/python -m pytest -m "" $(ARGS)
 
 view: $(VENV)/run.stamp  ## open the recordings in the Rerun viewer (ROBOT=er3a_c60 for one arm)
 	@$(BIN)/er3a view $(ROBOT)
@@ -31,9 +34,11 @@ estimate: $(VENV)/run.stamp  ## say what the study will take before it is run (S
 archive: $(VENV)/run.stamp  ## pack the finished study into er3a-study.zip, with RO-Crate metadata
 	@$(BIN)/er3a archive --study $(STUDY)
 
-lint: $(VENV)/dev.stamp  ## check format and lint of Python and Snakemake code
+lint: $(VENV)/dev.stamp  ## check format, types, imports and lint of Python and Snakemake code
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
 	$(BIN)/snakefmt --check Snakefile workflow
 	$(BIN)/snakemake --lint
 

@@ -23,6 +23,7 @@ import yaml
 from pydantic import BaseModel
 from scipy.spatial.transform import Rotation
 
+from er3a.collision.scene import Plane, Scene, Solid
 from er3a.errors import InputError
 from er3a.files.measurements import load_measurements
 from er3a.files.path_file import load_paths
@@ -30,7 +31,7 @@ from er3a.files.path_table import PathTable, read_path_table
 from er3a.files.reference_sets import check_reference_file
 from er3a.files.robot_file import RobotFile
 from er3a.files.robot_library import load_robot
-from er3a.files.scene_file import load_scene
+from er3a.files.scene_file import SHAPES, SceneFile, load_scene
 from er3a.files.target_file import read_targets
 from er3a.files.yaml_file import load
 from er3a.kinematics.forward import forward
@@ -107,7 +108,9 @@ def differing_file(path: Path) -> list[str]:
         targets, nodes = read_targets(path), written["targets"].value
         found = [] if len(targets) == len(nodes) else [f"{len(targets)} targets of {len(nodes)}"]
         return found + [word for target, each in zip(targets, nodes) for word in _differing(target, each, each.tag)]
-    loaders = {"study": load_study, "paths": load_paths, "scene": load_scene}
+    if kind == "scene":
+        return [*_differing(load(SceneFile, path), node, ""), *_differing_solids(load_scene(path), written)]
+    loaders = {"study": load_study, "paths": load_paths}
     return _differing(loaders[kind](path), node, "")
 
 
@@ -166,7 +169,7 @@ def _differing_poses(robot, written: dict[str, yaml.Node]) -> list[str]:
         T = np.eye(4)
         if group in written and isinstance(written[group], yaml.MappingNode):
             members = {key.value: value for key, value in written[group].value}
-            triples = {name: [float(part.value) for part in members[name].value] for name in members if name[3] == "_"}
+            triples = {name: _floats(members[name]) for name in members if name[3] == "_"}
             T[:3, 3] = np.array(triples.get("xyz_mm", [0, 0, 0])) / 1000
             T[:3, :3] = Rotation.from_euler("xyz", triples.get("rpy_deg", [0, 0, 0]), degrees=True).as_matrix()
         return T
@@ -188,6 +191,40 @@ def _differing_poses(robot, written: dict[str, yaml.Node]) -> list[str]:
         T = T @ about_z @ across if convention == "standard" else T @ across @ about_z
     worst = np.abs(forward(robot, np.radians(q_deg)) - T @ placement("tool")).max()
     return [] if worst < 1e-9 else [f"the pose differs from that of the written table by {worst:.3g} m"]
+
+
+def _floats(node: yaml.Node) -> float | list[float]:
+    return [float(part.value) for part in node.value] if isinstance(node, yaml.SequenceNode) else float(node.value)
+
+
+def _differing_solids(scene: Scene, written: dict[str, yaml.Node]) -> list[str]:
+    """A scene's solids in metres, and what plain arithmetic makes of the text's own numbers."""
+
+    def worst(solid: Solid, row: dict[str, yaml.Node]) -> float:
+        numbers = {
+            name: np.array(
+                [float(part.value) for part in value.value] if value.id == "sequence" else float(value.value)
+            )
+            for name, value in row.items()
+            if name != "name"
+        }
+        if isinstance(solid, Plane):
+            length = np.sqrt(np.sum(numbers["normal"] ** 2))
+            found = [solid.normal - numbers["normal"] / length, solid.offset - numbers["offset_mm"] / 1000 / length]
+        else:
+            turn = Rotation.from_euler("xyz", numbers.get("rpy_deg", np.zeros(3)), degrees=True).as_matrix()
+            found = [solid.T[:3, 3] - numbers["xyz_mm"] / 1000, solid.T[:3, :3] - turn]
+            lengths = [name for name in ("size", "radius", "length") if hasattr(solid, name)]
+            found += [getattr(solid, name) - numbers[f"{name}_mm"] / 1000 for name in lengths]
+        return max(np.abs(difference).max() for difference in found)
+
+    return [
+        f"{solid.name}: differs from the written solid"
+        for shape in SHAPES
+        if shape in written
+        for solid, node in zip(getattr(scene, shape), written[shape].value, strict=True)
+        if worst(solid, {key.value: value for key, value in node.value}) > 1e-9
+    ]
 
 
 def differing_table(path: Path) -> list[str]:

@@ -15,13 +15,30 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from er3a.files.robot_library import load_robot
 from er3a.pipeline.viewing.viewer import without_statistics
 from er3a.robots.robot import Robot
-from testing.small_study import fresh
+from testing.processes import run
+from testing.small_study import STUDY, fresh
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
+ROBOT = "er3_600"  # the one that the fast tests study
+LONGEST_S = 900
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests of the small study that ask for a robot which the fast set's lacks are long; time limits of long ones."""
+    others = {name for name in ROBOTS if name != ROBOT}
+    for item in items:
+        of_a_study = "shared_folder" in getattr(item, "fixturenames", ())
+        values = item.callspec.params.values() if of_a_study and hasattr(item, "callspec") else ()
+        if others & {str(value).partition("/")[0] for value in values}:
+            item.add_marker(pytest.mark.long)
+        if of_a_study or item.get_closest_marker("long"):
+            item.add_marker(pytest.mark.timeout(LONGEST_S))
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -54,13 +71,18 @@ class StudyRun:
 
     folder: Path
 
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """The robots of its study."""
+        return tuple(yaml.safe_load((self.folder / STUDY).read_text(encoding="utf-8"))["robots"])
+
     def snakemake(self, *words: str, check: bool = True) -> subprocess.CompletedProcess[str]:
         """Run Snakemake in the copy, on the copy's own package."""
-        return self._run([sys.executable, "-m", "snakemake", "--configfile", "config/small.yaml", *words], check)
+        return self._run([sys.executable, "-m", "snakemake", "--configfile", STUDY, *words], check)
 
     def make_run(self, *words: str, check: bool = True) -> subprocess.CompletedProcess[str]:
         """What `make run` runs once the environment stands."""
-        command = [sys.executable, "workflow/scripts/run.py", "--study", "config/small.yaml", "--", *words]
+        command = [sys.executable, "workflow/scripts/run.py", "--study", STUDY, "--", *words]
         return self._run(command, check)
 
     def environment(self) -> dict[str, str]:
@@ -73,9 +95,7 @@ class StudyRun:
         return set(re.findall(r"^Job \d+: (.+)$", output, flags=re.MULTILINE)) - {ALL_THERE}
 
     def _run(self, command: list[str], check: bool) -> subprocess.CompletedProcess[str]:
-        done = subprocess.run(
-            command, cwd=self.folder, env=self.environment(), capture_output=True, text=True, timeout=900, check=False
-        )
+        done = run(command, cwd=self.folder, env=self.environment())
         if check and done.returncode != 0:
             pytest.fail(f"{' '.join(command[1:])} ended with {done.returncode}:\n{done.stdout}\n{done.stderr}")
         return done
@@ -87,14 +107,28 @@ def copy_of_project(source_folder: Path, folder: Path) -> StudyRun:
 
 
 @pytest.fixture(scope="session")
-def shared_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder that all processes of this test run share, with the project as it stood when the first one asked."""
+def shared_folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder that all processes of this test run share, with the project as it stood when the first one asked.
+
+    Unless a long test is among those that are run, its small study has one robot.
+    """
     own = tmp_path_factory.getbasetemp()
     shared = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
     with once(shared / "snapshot") as wanted:
         if wanted:
             copy_of_project(ROOT, shared / "snapshot")
+            if not any(item.get_closest_marker("long") for item in request.session.items):
+                leave_one_robot(shared / "snapshot" / STUDY)
     return shared
+
+
+def leave_one_robot(study: Path) -> None:
+    """Take the other robots out of a study file, and leave the rest of its text as it is."""
+    text = study.read_text(encoding="utf-8")
+    for name in ROBOTS:
+        if name != ROBOT:
+            text = re.sub(rf"^  {name}:\n(    .*\n)+", "", text, flags=re.MULTILINE)
+    study.write_text(text, encoding="utf-8")
 
 
 @pytest.fixture(scope="session")

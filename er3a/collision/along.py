@@ -30,7 +30,8 @@ from scipy.optimize import brentq
 from er3a.collision.bodies import Bodies
 from er3a.collision.envelopes import link_frames
 from er3a.collision.pairs import Pair
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.arrays import Integers, Reals
+from er3a.numerics.runs import runs
 
 SHORTEST = 1e-9  # share of the duration; motion that is wide over less is a jump
 LOCATED = 1e-10  # share of the duration
@@ -130,7 +131,7 @@ def clearance_along(bodies: Bodies, joints: Joints, t: Reals, shown: Reals, dept
     for i in np.flatnonzero(np.isin(times, shown) & reached):
         motion.measure(times[i], q[i], every)
     contacts: list[Contact] = []
-    for first, last in _runs(reached):
+    for first, last in runs(reached):
         for end in (first, last - 1):
             motion.measure(times[end], q[end], every)
         part = slice(first, last)
@@ -211,7 +212,7 @@ def _contacts(motion: _Motion, times: Reals, q: Reals, near: float) -> list[Cont
         return float(motion.bodies.distances(motion.bodies.ends(motion.joints(np.array([at]))[0]), every).min())
 
     found = []
-    for a, b in _runs(overlap):
+    for a, b in runs(overlap):
         start = brentq(least, times[known[a - 1]], times[known[a]], xtol=near) if a > 0 else times[known[a]]
         end = brentq(least, times[known[b - 1]], times[known[b]], xtol=near) if b < len(known) else times[known[b - 1]]
         rows = np.array([motion.measure(times[i], q[i], every) for i in known[a:b]])
@@ -221,9 +222,3 @@ def _contacts(motion: _Motion, times: Reals, q: Reals, near: float) -> list[Cont
         at = times[known[a + int(np.argmin(rows.min(axis=1)))]]
         found.append(Contact(float(start), float(end), tuple(pairs), -float(deepest.min()), float(at)))
     return found
-
-
-def _runs(flags: Flags) -> list[tuple[int, int]]:
-    """Index ranges (first, behind the last) of the stretches of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

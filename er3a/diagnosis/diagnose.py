@@ -146,7 +146,7 @@ def _described(ranking: Ranking, group: tuple[int, ...], robot: Robot) -> Hypoth
         unit=unit,
         explains=bool((np.abs(after) <= uncertainty * MEETS).all()),
         indistinguishable_from=tuple(pool.faults[i] for i in group[1:]),
-        to_decide=what_decides(pool.tables[list(group)], robot),
+        to_decide=what_decides(pool.tables[np.array(group)], robot),
         score=float(ranking.score[best]),
         corrected=robot_of(pool.tables, best, robot),
     )

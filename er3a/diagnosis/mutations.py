@@ -86,7 +86,7 @@ def try_mutation(
     return Outcome(
         fault=mutation.fault,
         identifiable=identifiable(robot, mutation, stated, noise_mm),
-        found=any(_same(ranking.pool.tables[[row]], tables_of(robot)) for row in group) if ranking else False,
+        found=any(_same(ranking.pool.tables[np.array([row])], tables_of(robot)) for row in group) if ranking else False,
         set_size=len(group),
     )
 
@@ -108,12 +108,12 @@ def identifiable(robot: Robot, mutation: Mutation, references: Sequence[Referenc
     moved = np.zeros(len(references))
     for column in COLUMNS:
         before, after = getattr(right, column)[0], getattr(mutation.table, column)[0]
-        for j in np.flatnonzero(before != after):
+        for j in np.flatnonzero(before != after).tolist():
             if column == "direction":
                 turned = right.with_column(column, [int(j)], np.full((1, 1), after[j]))
                 moved += predict_tables(turned, robot, quantities)[0] - at_right
             else:
-                moved += _slope(right, column, int(j), robot, quantities) * (after[j] - before[j])
+                moved += _slope(right, column, j, robot, quantities) * (after[j] - before[j])
     return bool((np.abs(moved) > uncertainty + noise).any())
 
 

@@ -25,10 +25,10 @@ from er3a.geometry.angles import TURN
 from er3a.kinematics.closed_form import SLOTS
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
+from er3a.numerics.runs import runs
 from er3a.planning.branch_tracking import WIDE_STEP, Branches, branches_along, turned_difference
 from er3a.planning.followed import BranchJump, Followed
 from er3a.planning.moves import ToolPath
-from er3a.planning.singular_events import runs
 from er3a.robots.joint_limits import LIMIT_TOLERANCE, nearest_equivalent, within
 from er3a.robots.robot import Robot
 

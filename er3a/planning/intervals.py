@@ -14,8 +14,9 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import Unsolved
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.numerics.arrays import Reals
+from er3a.numerics.runs import runs
 from er3a.planning.followed import Followed
-from er3a.planning.singular_events import Joints, runs
+from er3a.planning.singular_events import Joints
 from er3a.robots.joint_limits import LIMIT_TOLERANCE
 from er3a.robots.robot import Robot
 

@@ -20,7 +20,8 @@ from scipy.optimize import brentq
 from scipy.signal import find_peaks
 
 from er3a.kinematics.singularity import TYPES, SingularityType, determinant_factors
-from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.arrays import Reals
+from er3a.numerics.runs import runs
 from er3a.planning.near_singular import NearSingular, factor_of
 from er3a.robots.robot import Robot
 
@@ -71,12 +72,6 @@ def singular_events(robot: Robot, t: Reals, q: Reals, joints: Joints, near: Near
         for stretch in runs(np.isfinite(values)):
             events += _in_stretch(kind, t, values, stretch, factor, near.of(kind))
     return sorted(events, key=lambda event: (event.t, TYPES.index(event.type)))
-
-
-def runs(flags: Flags) -> list[tuple[int, int]]:
-    """Index ranges (first, behind the last) of the stretches of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
 def _in_stretch(

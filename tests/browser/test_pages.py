@@ -43,6 +43,7 @@ def serious_faults(browser, **options) -> list[tuple[str, list[str]]]:
     return [(fault["id"], [node["html"][:200] for node in fault["nodes"][:3]]) for fault in serious]
 
 
+@pytest.mark.long
 def test_index_leads_to_every_page(browser, small_study):
     browser.get((small_study.folder / "reports/index.html").as_uri())
     links = browser.execute_script("return [...document.querySelectorAll('tbody a')].map(a => a.href)")
@@ -50,6 +51,7 @@ def test_index_leads_to_every_page(browser, small_study):
     assert found == set(PAGES) - set(OVER_ALL)
 
 
+@pytest.mark.long
 def test_comparison_shows_the_pair_that_is_picked(browser, small_study):
     browser.get((small_study.folder / "reports/compare.html").as_uri())
 

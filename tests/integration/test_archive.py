@@ -16,8 +16,6 @@ from rocrate_validator.utils.http import HttpRequester
 from er3a.errors import ResultError
 from er3a.pipeline.archive import archive
 
-ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
-
 
 @pytest.fixture
 def pack(small_study, tmp_path, monkeypatch):
@@ -37,16 +35,18 @@ def pack(small_study, tmp_path, monkeypatch):
 
 
 def test_archive_holds_pages_recordings_results_and_inputs(pack, small_study):
-    with zipfile.ZipFile(pack(*ROBOTS)) as zipped:
+    with zipfile.ZipFile(pack(*small_study.robots)) as zipped:
         names = set(zipped.namelist())
         for page in small_study.folder.glob("reports/*/*.html"):
             assert zipped.read(page.relative_to(small_study.folder).as_posix()) == page.read_bytes()
-    for robot in ROBOTS:
+    for robot in small_study.robots:
         assert {f"data/robots/{robot}.yaml", f"data/targets/{robot}.yaml", f"data/paths/{robot}.yaml"} <= names
         assert {f"reports/{robot}/workspace.rrd", f"results/{robot}/workspace/summary.json"} <= names
     assert {"reports/index.html", "config/small.yaml"} <= names
 
 
+@pytest.mark.long
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # the validator's, of the libraries that it uses
 def test_a_validator_accepts_it(pack, tmp_path, monkeypatch):
     crate = tmp_path / "crate"
     shutil.unpack_archive(pack("er3_600"), crate)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import base64
-import os
-import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+
+import pytest
+
+from testing.processes import started
 
 COMPUTED = ("compute_inverse", "compute_validation")
 
@@ -23,22 +25,15 @@ def finished_results(run) -> list[Path]:
     return [path for path in run.folder.glob("results/*/*/summary.json") if path.parent not in in_the_making]
 
 
+@pytest.mark.long
 def test_kill_9_in_mid_run_then_run_again(small_study, fresh_project):
     run = fresh_project("killed")
     command = [sys.executable, "workflow/scripts/run.py", "--study", "config/small.yaml", "--", "--cores", "2"]
-    process = subprocess.Popen(
-        command,
-        cwd=run.folder,
-        env=run.environment(),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
-    deadline = time.monotonic() + 120
-    while not finished_results(run) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
+    quiet = subprocess.DEVNULL
+    with started(command, cwd=run.folder, env=run.environment(), stdout=quiet, stderr=quiet):
+        deadline = time.monotonic() + 120
+        while not finished_results(run) and time.monotonic() < deadline:
+            time.sleep(0.05)
     finished = {path: path.stat().st_mtime_ns for path in finished_results(run)}
     assert finished
     assert any((run.folder / ".snakemake/locks").iterdir()), "the killed run should have left its lock"

@@ -15,6 +15,8 @@ from er3a.pipeline.viewing.index import write_index
 from tests.conftest import ROBOTS
 from tests.viewing.untranslated import PageTexts, plain_words, texts_from_files, wide_letters
 
+pytestmark = pytest.mark.long  # a study on top of another
+
 SWEEP = "sweeps:\n  a3: {robot: er3a_c60, vary: joints.3.a_mm, values: [50, 70], stages: [workspace]}\n"
 VARIANTS = [f"er3a_c60-a3-0{number}" for number in (1, 2)]
 JOBS = {f"{name}: {verb} workspace" for name in VARIANTS for verb in ("compute", "record", "report")} | {

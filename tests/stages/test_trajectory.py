@@ -252,6 +252,7 @@ def test_articles_moves_are_those_of_robotics_toolbox(study, results):
     np.testing.assert_allclose(line.xyz_mm / 1000, ctraj.t, atol=1e-9)
 
 
+@pytest.mark.long
 def test_equal_inputs_give_equal_bytes(study, folders, tmp_path):
     run.compute("trajectory", study, "er3a_c60_article", tmp_path)
     for file in sorted(folders["er3a_c60_article"].iterdir()):

@@ -18,7 +18,7 @@ from er3a.pipeline.checksums import check_checksum, write_checksum
 from er3a.pipeline.cli import app
 from er3a.pipeline.study import STAGES
 from er3a.pipeline.viewing.preview import draw_preview
-from tests.conftest import ROBOTS, ROOT
+from tests.conftest import ROBOT, ROBOTS, ROOT
 from tests.viewing.pictures import joints_seen
 
 RERUN = Path(sys.executable).with_name("rerun")
@@ -59,6 +59,7 @@ def test_each_entity_is_in_the_documentation_once(small_study, recording):
     assert {entity: len(rows_for(entity, stage)) for entity in entities} == dict.fromkeys(entities, 1)
 
 
+@pytest.mark.long
 def test_each_documented_entity_is_logged(small_study):
     found = {
         row
@@ -71,7 +72,7 @@ def test_each_documented_entity_is_logged(small_study):
 
 @pytest.mark.parametrize("stage", ["inverse", "trajectory"])
 def test_the_study_s_scene_is_drawn(small_study, stage):
-    entities = logged(small_study.folder / f"reports/er3a_c60/{stage}.rrd")
+    entities = logged(small_study.folder / f"reports/{ROBOT}/{stage}.rrd")
     scene = {"table", "post", "lamp", "floor"}
     assert {f"/{stage}/scene/{solid}" for solid in scene} <= entities
 
@@ -103,7 +104,7 @@ def test_the_preview_shows_the_arm_and_the_page_shows_the_preview(small_study, r
 
 @pytest.mark.parametrize("stage", STAGES)
 def test_a_preview_drawn_again_is_the_same_to_the_byte(small_study, stage, vulkan, tmp_path):
-    recording = small_study.folder / f"reports/er3a_c60/{stage}.rrd"
+    recording = small_study.folder / f"reports/{ROBOT}/{stage}.rrd"
     assert draw_preview(recording, tmp_path / "again.webp") is None
     assert (tmp_path / "again.webp").read_bytes() == recording.with_suffix(".webp").read_bytes()
 

@@ -10,7 +10,6 @@ import sys
 import threading
 import urllib.error
 import urllib.request
-from contextlib import contextmanager
 from urllib.parse import parse_qs, urlsplit
 
 import psutil
@@ -19,6 +18,7 @@ import pytest
 from er3a.pipeline.checksums import write_checksum
 from er3a.pipeline.cli import app
 from er3a.pipeline.viewing import web_viewer
+from testing.processes import started
 
 # A shell without a terminal starts what runs in the background with SIGINT ignored, and so do all its children.
 AS_FROM_A_TERMINAL = """
@@ -82,21 +82,11 @@ def test_nothing_else_is_served(root, path):
         fetched(root, path)
 
 
-@contextmanager
-def viewing_in_a_browser(reports):
-    """`er3a view` without a desktop, as started from a terminal; killed if it is still there at the end."""
-    quiet = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    command = [sys.executable, "-c", AS_FROM_A_TERMINAL, "view", "er3_600", "--reports", str(reports)]
-    with subprocess.Popen(command, env=quiet, stdout=subprocess.PIPE, text=True) as viewing:
-        try:
-            yield viewing
-        finally:
-            viewing.kill()
-
-
 @pytest.mark.parametrize("request_to_end", [signal.SIGINT, signal.SIGTERM])
 def test_without_a_desktop_view_serves_on_the_loopback_address_until_it_is_told_to_end(reports, request_to_end):
-    with viewing_in_a_browser(reports) as viewing:
+    quiet = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    command = [sys.executable, "-c", AS_FROM_A_TERMINAL, "view", "er3_600", "--reports", str(reports)]
+    with started(command, env=quiet, stdout=subprocess.PIPE) as viewing:
         told = [viewing.stdout.readline() for _ in range(3)]
         assert "Ctrl+C" in told[0]
         with urllib.request.urlopen(told[1].strip(), timeout=60) as answer:

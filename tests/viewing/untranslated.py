@@ -58,13 +58,12 @@ def catalogue_texts() -> set[str]:
 
 @contextmanager
 def wide_letters() -> Iterator[list[str]]:
-    """Views written in here are in wide letters; the list collects the texts of their figures."""
+    """Views written in here are in wide letters; the list collects the texts of their figures, which are not drawn."""
     shown: list[str] = []
-    save, to_json = Figure.savefig, go.Figure.to_json
+    to_json = go.Figure.to_json
 
-    def saved(figure, *arguments, **named):
+    def saved(figure, *_, **__):
         shown.extend(text.get_text() for text in figure.findobj(matplotlib.text.Text) if text.get_visible())
-        return save(figure, *arguments, **named)
 
     def drawn(figure, *arguments, **named):
         shown.extend(_texts_of_figure(figure.to_dict()))

@@ -47,6 +47,7 @@ def test_bounds_of_an_arm_with_a_skew_wrist(random):
     assert np.isfinite(reach_points(robot, filled, middle, restarts=200)[:, 0]).all()
 
 
+@pytest.mark.long
 def test_it_agrees_with_the_proof_for_spherical_wrists():
     robot = load_robot("er3_600")
     coarse = prove_general(general_arm(robot)[0], 16_000, 1, samples=200_000, most_boxes=500_000)[0].bounds

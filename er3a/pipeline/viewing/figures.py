@@ -11,6 +11,7 @@ import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.font_manager import fontManager
+from matplotlib.rcsetup import cycler
 from matplotlib.text import Text
 
 from er3a.pipeline.messages import language
@@ -34,7 +35,7 @@ STYLE: dict[RcKeyType, Any] = {
     "axes.edgecolor": MUTED,
     "axes.grid": True,
     "axes.labelcolor": INK,
-    "axes.prop_cycle": matplotlib.cycler(color=JOINTS),
+    "axes.prop_cycle": cycler(color=JOINTS),
     "axes.spines.right": False,
     "axes.spines.top": False,
     "axes.titlelocation": "left",

@@ -49,8 +49,8 @@ def _measured(
 
 
 def _places(cost: Reals, free: Flags) -> Integers:
-    places = [int((cost[free] < own - SAME_COST).sum()) + 1 if is_free else 0 for own, is_free in zip(cost, free)]
-    return np.array(places, dtype=np.int64)
+    better = (cost[free] < cost[:, None] - SAME_COST).sum(axis=1)
+    return np.where(free, better + 1, 0)
 
 
 def sequence(

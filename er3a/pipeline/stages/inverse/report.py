@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +18,6 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse.model import (
     SINGULAR_PARTS,
     InverseResults,
-    InverseSummary,
     RankingRows,
     SelfMotion,
     SolutionRows,
@@ -81,7 +79,7 @@ def report(study: Study, stored: Stored[InverseResults], output: Path) -> None:
         rules=[(_rule(rule), word("rule.title", RULE_TITLES, rule)) for rule in RULES],
         mix=tr(", ").join(f"{_rule(rule)} {weight:g}" for rule, weight in summary.mix.items()),
         stops=_stops(summary.sequence),
-        **_costs(summary),
+        move=_move_rule(summary.sequence),
     )
 
 
@@ -117,8 +115,7 @@ def _rule(rule: str) -> str:
 
 
 def _rule_heading(rule: str) -> str:
-    units: dict[str, str] = {name: own.unit for name, own in RULES.items()}
-    unit = units.get(rule, "1")
+    unit = next((own.unit for name, own in RULES.items() if name == rule), "1")
     return f"{_rule(rule)}{'' if unit == '1' else f' ({unit})'}>"
 
 
@@ -167,12 +164,9 @@ def _self_motion(family: SelfMotion) -> str:
     )
 
 
-def _costs(summary: InverseSummary) -> dict[str, Any]:
+def _move_rule(sequence: Visits | None) -> tuple[str, str]:
     """Unit and title of the rule that moves in the sequence are ranked by."""
-    if summary.sequence is None:
-        return {}
-    rule = summary.sequence.rule
-    return {"unit": RULES[rule].unit, "rule_title": word("rule.title", RULE_TITLES, rule)}
+    return (RULES[sequence.rule].unit, word("rule.title", RULE_TITLES, sequence.rule)) if sequence else ("", "")
 
 
 def _stops(sequence: Visits | None) -> list[list[str]]:

@@ -221,8 +221,8 @@ def _draw_joints(axes: Axes, robot: Robot, target: TargetResult, branches: Solut
     axes.set_title(tr("Joint angles, one mark a branch"), **TITLE)
     handles = []
     if not branches.within_limits.all():
-        style = {"marker": "x", "color": HIGHLIGHT, "markeredgewidth": 1.6, "linestyle": "none"}
-        handles.append(Line2D([], [], label=tr("joint beyond its limit"), **style))
+        mark: dict[str, Any] = {"marker": "x", "color": HIGHLIGHT, "markeredgewidth": 1.6, "linestyle": "none"}
+        handles.append(Line2D([], [], label=tr("joint beyond its limit"), **mark))
     return handles
 
 

@@ -268,20 +268,26 @@ class TrajectorySummary(Summary):
 
 
 @dataclass(frozen=True, eq=False)
-class Samples(Table):
-    """The paths' own points; joint columns are NaN where the path can't be reached."""
+class MotionRows(Table):
+    """Motions of the arm; joint columns are NaN where the path can't be reached."""
 
     path: Texts = column("name of the path", dtype=object)
-    t_s: Reals = column("time since the path's start", "s")
-    s_m: Reals = column("way of the tool point", "m")
+    t_s: Reals = column("time since the motion's start", "s")
     q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
     q_deg_s: Reals = per_joint("q{}_deg_s", "joint velocity", "deg/s")
     q_deg_s2: Reals = per_joint("q{}_deg_s2", "joint acceleration", "deg/s^2")
     xyz_mm: Reals = vector("{}_mm", "tool point in the base frame", "mm")
     speed_ratio: Reals = column("greatest ratio of a joint's speed to its limit")
-    manipulability: Reals = column("manipulability of the scaled Jacobian")
     condition_number: Reals = column("condition number of the scaled Jacobian")
     smallest_singular_value: Reals = column("smallest singular value of the scaled Jacobian")
+
+
+@dataclass(frozen=True, eq=False)
+class Samples(MotionRows):
+    """The paths' own points."""
+
+    s_m: Reals = column("way of the tool point", "m")
+    manipulability: Reals = column("manipulability of the scaled Jacobian")
     wrist_deg: Reals = column("signed distance from the aligned wrist", "deg")
     elbow_deg: Reals = column("signed distance from the straight or folded elbow", "deg")
     shoulder_mm: Reals = column("signed distance of the wrist centre from the shoulder singularity", "mm")
@@ -308,21 +314,12 @@ class Clearances(Table):
 
 
 @dataclass(frozen=True, eq=False)
-class AvoidanceRows(Table):
+class AvoidanceRows(MotionRows):
     """Motions of the strategies, and of each path at its fastest (``fastest``)."""
 
-    path: Texts = column("name of the path", dtype=object)
     strategy: Texts = column("the strategy, or the path at its fastest", dtype=object)
-    t_s: Reals = column("time since the motion's start", "s")
-    q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
-    q_deg_s: Reals = per_joint("q{}_deg_s", "joint velocity", "deg/s")
-    q_deg_s2: Reals = per_joint("q{}_deg_s2", "joint acceleration", "deg/s^2")
-    xyz_mm: Reals = vector("{}_mm", "tool point in the base frame", "mm")
     deviation_mm: Reals = column("distance of the tool point from the path", "mm")
     deviation_deg: Reals = column("angle of the tool to the path's", "deg")
-    speed_ratio: Reals = column("greatest ratio of a joint's speed to its limit")
-    condition_number: Reals = column("condition number of the scaled Jacobian")
-    smallest_singular_value: Reals = column("smallest singular value of the scaled Jacobian")
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,8 +17,8 @@ from er3a.pipeline.messages.trajectory import advice, path_text, type_word
 from er3a.pipeline.messages.trajectory_verdict import verdict_word
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.trajectory.model import (
-    AvoidanceRows,
     Checks,
+    MotionRows,
     PathSummary,
     PathVerdict,
     TrajectoryResults,
@@ -31,8 +31,6 @@ from er3a.pipeline.viewing.recording import ARM, TIMELINE, escaped, log_note, no
 from er3a.pipeline.viewing.scene_entities import log_scene
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot
-
-Rows = Checks | AvoidanceRows
 
 STAGE = "trajectory"
 PAUSE = 1.0  # s between two paths
@@ -74,7 +72,7 @@ def record(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
         log_arm(stream, robot, np.radians(first[0]) if len(first) else np.zeros(6))
         for path, start, repaired in _timetable(results.summary):
             if repaired:
-                rows: Rows = motions.take((motions.path == path.name) & (motions.strategy == path.strategy))
+                rows: MotionRows = motions.take((motions.path == path.name) & (motions.strategy == path.strategy))
                 _announce_repaired(stream, path, start)
             else:
                 rows = checks.take(checks.path == path.name)
@@ -137,7 +135,7 @@ def _view(robot: Robot, checks: Checks) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(origin="/", contents=[ARM, f"/{STAGE}/**"], name="Arm and path", eye_controls=eye)
 
 
-def _frames(rows: Rows) -> Flags:
+def _frames(rows: MotionRows) -> Flags:
     """Which rows to show: no more than FRAMES_PER_SECOND, ends and closest passes kept."""
     kept = np.concatenate([[True], np.diff(np.floor(rows.t_s * FRAMES_PER_SECOND)) > 0])
     kept[-1] = True
@@ -166,7 +164,7 @@ def _announce_repaired(stream: rr.RecordingStream, path: PathSummary, start: flo
     stream.log(f"{STAGE}/events", rr.TextLog(text, level=rr.TextLogLevel.INFO))
 
 
-def _run(stream: rr.RecordingStream, robot: Robot, rows: Rows, start: float, colour: str) -> None:
+def _run(stream: rr.RecordingStream, robot: Robot, rows: MotionRows, start: float, colour: str) -> None:
     """The arm, its trail and its curves over time."""
     times, points = start + rows.t_s, rows.xyz_mm / 1000
     reached = np.isfinite(rows.q_deg[:, 0])

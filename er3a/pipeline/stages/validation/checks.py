@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.numerics.arrays import Reals
+from er3a.pipeline.stages.validation.check_model import Check, Conflict, ModelCheck, ReferenceCheck, Statement, Unjudged
 from er3a.pipeline.stages.validation.findings import (
     ModelGroup,
     NearSingularLeftOut,
@@ -18,14 +19,6 @@ from er3a.pipeline.stages.validation.findings import (
     SetHasNoData,
     SourceGivesNone,
     WholeGroup,
-)
-from er3a.pipeline.stages.validation.model import (
-    Check,
-    Conflict,
-    ModelCheck,
-    ReferenceCheck,
-    Statement,
-    Unjudged,
 )
 from er3a.references.quantities import Limit, Quantity, Speed
 from er3a.references.reference import Reference, ReferenceSet, conflicts, expected_of

@@ -4,22 +4,14 @@ from __future__ import annotations
 
 from er3a.files.reference_sets import load_references
 from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.pipeline.stages.validation.check_model import Check, Conflict, Unjudged
 from er3a.pipeline.stages.validation.checks import checks_of_set
 from er3a.pipeline.stages.validation.corrections import calibrate_from_sets
 from er3a.pipeline.stages.validation.diagnoses import diagnose_sets
 from er3a.pipeline.stages.validation.entry import ValidationSettings
 from er3a.pipeline.stages.validation.findings import InNoSet
 from er3a.pipeline.stages.validation.geometry_tables import axes_table, key_poses_table, section_table
-from er3a.pipeline.stages.validation.model import (
-    Check,
-    Checks,
-    Circles,
-    Conflict,
-    TableFacts,
-    Unjudged,
-    ValidationResults,
-    ValidationSummary,
-)
+from er3a.pipeline.stages.validation.model import Checks, Circles, TableFacts, ValidationResults, ValidationSummary
 from er3a.pipeline.stages.validation.self_checks import round_trip_checks, table_checks
 from er3a.pipeline.stages.validation.subject import model_of
 from er3a.pipeline.stages.validation.verdict import SHOWN_DECIMALS, key_figures, set_summaries, verdict_of

@@ -105,7 +105,7 @@ def _log_station(stream: rr.RecordingStream, start: float, rows: KeyPoses, radiu
             point = point.replace("_", " ")
             lines.append(f"- {point}: off by **{deviation:.2f} mm**, {escaped(source)} ({grade})")
     stream.log(f"{STAGE}/now", rr.TextDocument("\n".join(lines), media_type=rr.MediaType.MARKDOWN))
-    stated = rows.take(np.all(np.isfinite(rows.point_mm), axis=1))
+    stated = rows.take(np.flatnonzero(np.isfinite(rows.point_mm).all(axis=1)))
     points, model = stated.point_mm / 1000, stated.model_point_mm / 1000
     colours = np.array(_colours(stated.grade))
     stream.log(f"{STAGE}/reference/points", rr.Points3D(points, radii=radius, colors=colours))

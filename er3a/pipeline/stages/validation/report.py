@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,50 +9,35 @@ from pathlib import Path
 import numpy as np
 
 from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.messages.say import counted, joined, say, sentence, word
+from er3a.pipeline.messages.say import counted, joined, say, word
 from er3a.pipeline.messages.validation import CONVENTIONS, FIGURES, GRADE_NAMES, GRADES, GROUPS
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation.axis_figures import axis_deviation, side_view, workspace_drawing
+from er3a.pipeline.stages.validation.check_model import ReferenceCheck, Unjudged
+from er3a.pipeline.stages.validation.check_rows import COLUMNS, Judged, blank_row, by_set, check_row, group_rows
 from er3a.pipeline.stages.validation.corrected import corrected_robot
 from er3a.pipeline.stages.validation.diagnosis_figures import correction_stories, diagnosis_stories
 from er3a.pipeline.stages.validation.model import (
     Axes,
-    Check,
     Counts,
     KeyPoses,
-    ModelCheck,
-    ReferenceCheck,
     Section,
     SetSummary,
-    Unjudged,
     ValidationResults,
     ValidationSummary,
 )
 from er3a.pipeline.stages.validation.subject import model_of
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.page import Picture, fixed, head_of, number, render, run_command
+from er3a.pipeline.viewing.page import Picture, fixed, head_of, render, run_command
 from er3a.references.subjects import SegmentInclination
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Robot
 
 SHOWN_FAILURES = 12
 REVERSED_DEG = 135
-DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "": 0}
-COLUMNS = (
-    N_("Check"),
-    N_("Model>"),
-    N_("Reference>"),
-    N_("Difference>"),
-    N_("Tolerance>"),
-    N_("Unit"),
-    N_("Source"),
-)
 SEGMENTS = {
     "upper_arm": N_("the upper arm stands {measured}° from the vertical where {expected}° is stated"),
     "forearm": N_("the forearm stands {measured}° from the vertical where {expected}° is stated"),
 }
-
-
-Judged = ModelCheck | ReferenceCheck
 
 
 @dataclass(frozen=True)
@@ -70,18 +54,6 @@ class SetStory:
     zero_stated: str
     segments: str
     segments_hold: bool
-
-
-@dataclass(frozen=True)
-class GroupRow:
-    """One set and group: counts by status, and the check that comes nearest to failing or fails worst."""
-
-    set: str
-    group: str
-    status: str
-    counts: tuple[int, int, int]
-    worst: str
-    difference: str
 
 
 def report(study: Study, stored: Stored[ValidationResults], output: Path) -> None:
@@ -105,15 +77,16 @@ def report(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
         sets=[_set_story(found, judged, results.key_poses) for found in summary.sets],
         diagnoses=diagnosis_stories(summary, results.residuals),
         corrections=correction_stories(summary, results.corrections),
-        groups=_groups(judged),
-        failed=[_row(check) for check in failed[:SHOWN_FAILURES]],
-        more_failed=[_row(check) for check in failed[SHOWN_FAILURES:]],
+        groups=group_rows(judged),
+        failed=[check_row(check) for check in failed[:SHOWN_FAILURES]],
+        more_failed=[check_row(check) for check in failed[SHOWN_FAILURES:]],
         passed={
-            title: [_row(check) for check in own if check.status == "pass"] for title, own in _by_set(judged).items()
+            title: [check_row(check) for check in own if check.status == "pass"]
+            for title, own in by_set(judged).items()
         },
         columns=[tr(label) for label in COLUMNS],
         conflicts=[(say(conflict.subject), conflict) for conflict in summary.conflicts],
-        blanks=[_blank(check) for check in checks if isinstance(check, Unjudged)],
+        blanks=[blank_row(check) for check in checks if isinstance(check, Unjudged)],
         side=_side_picture(robot, drawn, summary),
         deviation=_deviation_picture(drawn) if len(drawn) else None,
         drawing=_drawing_picture(results.section, labels, summary) if len(labels) else None,
@@ -136,7 +109,7 @@ def _set_story(found: SetSummary, checks: Iterable[Judged], poses: KeyPoses) -> 
         found=found,
         counted=found.authoritative if is_authoritative else found.claims,
         is_authoritative=is_authoritative,
-        telling=[_row(check) for check in _telling(own)],
+        telling=[check_row(check) for check in _telling(own)],
         failed_groups=_group_words(failed),
         held_groups=_group_words(held),
         zero_model=_point(zero.model_point_mm),
@@ -169,57 +142,6 @@ def _telling(own: list[ReferenceCheck]) -> list[ReferenceCheck]:
 
 def _point(points_mm: np.ndarray) -> str:
     return ", ".join(fixed(value, 1) for value in points_mm[0]) if len(points_mm) else ""
-
-
-def _by_set(checks: Iterable[Judged]) -> dict[str, list[Judged]]:
-    """Checks by the set that they come from, as the page names it."""
-    found: dict[str, list[Judged]] = {}
-    for check in checks:
-        found.setdefault(check.reference_set or tr("the model itself"), []).append(check)
-    return found
-
-
-def _groups(checks: Iterable[Judged]) -> list[GroupRow]:
-    rows = []
-    for title, own in _by_set(checks).items():
-        for group in dict.fromkeys(check.group for check in own):
-            part = [check for check in own if check.group == group]
-            counted = Counter(check.status for check in part)
-            status = "fail" if counted["fail"] else "conflict" if counted["conflict"] else "pass"
-            worst = max(part, key=lambda check: check.tolerances_off)
-            rows.append(
-                GroupRow(
-                    set=title,
-                    group=word("group", GROUPS, group),
-                    status=status,
-                    counts=(counted["pass"], counted["fail"], counted["conflict"]),
-                    worst=say(worst.subject),
-                    difference=f"{_value(worst.difference, worst)} {worst.unit}".strip(),
-                )
-            )
-    return rows
-
-
-def _row(check: Judged) -> list[str]:
-    values = [_value(value, check) for value in (check.measured, check.expected, check.difference)]
-    if isinstance(check, ReferenceCheck):
-        grade = word("grade", GRADE_NAMES, check.grade)
-        source = sentence("graded", "{own_source} ({grade})", own_source=check.source, grade=grade)
-    else:
-        source = tr("the model itself")
-    return [say(check.subject), *values, f"{check.tolerance:g}", check.unit, source]
-
-
-def _value(value: float, check: Check) -> str:
-    """A value in its unit's decimals; errors of round trips, which are far smaller, with one digit."""
-    if check.group == "round_trips" and 0 < abs(value) < 1e-3:
-        return number(value, 1)
-    return fixed(value, DECIMALS[check.unit])
-
-
-def _blank(check: Unjudged) -> list[str]:
-    measured = f"{_value(check.measured, check)} {check.unit}" if check.measured is not None else "–"
-    return [say(check.subject), measured, check.reference_set or "–", say(check.note)]
 
 
 def _drawn_axes(axes: Axes) -> Axes:

@@ -10,6 +10,7 @@ import numpy as np
 
 from er3a.diagnosis.conclusions import MainFault, MostLikelyFault, NoFaultStandsOut, NoFewFaultsExplain
 from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.stages.validation.check_model import Check, Conflict, ModelCheck, ReferenceCheck
 from er3a.pipeline.stages.validation.diagnosis_model import SetDiagnosis
 from er3a.pipeline.stages.validation.findings import (
     AnotherArm,
@@ -22,17 +23,7 @@ from er3a.pipeline.stages.validation.findings import (
     NothingToCompare,
     Validated,
 )
-from er3a.pipeline.stages.validation.model import (
-    Axes,
-    Check,
-    Conflict,
-    Counts,
-    KeyPoses,
-    ModelCheck,
-    ReferenceCheck,
-    RoundTripErrors,
-    SetSummary,
-)
+from er3a.pipeline.stages.validation.model import Axes, Counts, KeyPoses, RoundTripErrors, SetSummary
 from er3a.references.reference import ReferenceSet
 from er3a.references.rows import GROUPS
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade

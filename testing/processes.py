@@ -1,0 +1,39 @@
+"""Processes that end with what started them, all that they started themselves included."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from typing import Any
+
+
+@contextmanager
+def started(command: Sequence[Any], **options: Any) -> Iterator[subprocess.Popen[str]]:
+    """A process in a session of its own; at the end, however it comes, nothing of the session goes on.
+
+    Parameters
+    ----------
+    options : as for ``subprocess.Popen``
+    """
+    with subprocess.Popen(command, text=True, start_new_session=True, **options) as process:
+        try:
+            yield process
+        finally:
+            end(process)
+
+
+def end(process: subprocess.Popen[str]) -> None:
+    """Kill a process that was started in a session of its own, and the others of its session."""
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def run(command: Sequence[Any], **options: Any) -> subprocess.CompletedProcess[str]:
+    """What ``subprocess.run`` does with captured output, but a process that is cut off leaves none behind."""
+    with started(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **options) as process:
+        output, errors = process.communicate()
+    return subprocess.CompletedProcess(list(command), process.returncode, output, errors)
