@@ -73,7 +73,7 @@ clean:  ## remove results, reports and recordings
 	find reports -mindepth 1 ! -name README.md -delete
 
 distclean: clean  ## also remove the environment
-	rm -rf $(VENV) .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .pytest_cache .ruff_cache .mypy_cache .import_linter_cache .hypothesis
 
 # The environment: a venv, a hash-checked uv in it, then the hash-checked lock.
 $(VENV)/uv.stamp: requirements/uv.txt

@@ -9,13 +9,13 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from er3a.pipeline.estimate.cost import Calibration, cost, disk_bytes, estimates_of
+from er3a.pipeline.estimate.cost import MachineCalibration, cost, disk_bytes, estimates_of
 from er3a.pipeline.estimate.jobs import jobs_of
 from er3a.pipeline.stages.workspace.entry import WorkspaceSettings
 from er3a.pipeline.study import Study
 
 
-def print_estimate(study: Study, calibration: Calibration, cores: list[int]) -> None:
+def print_estimate(study: Study, calibration: MachineCalibration, cores: list[int]) -> None:
     """Print speeds, processor time by kind of job, wall time and memory by number of cores, and disk space."""
     console = Console()
     here = os.cpu_count() or 1

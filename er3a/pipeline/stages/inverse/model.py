@@ -10,7 +10,7 @@ import numpy as np
 from er3a.kinematics.solutions import Label, Method, Unsolved
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
-from er3a.pipeline.stages.inverse.findings import (
+from er3a.pipeline.stages.inverse.inverse_findings import (
     Advice,
     AllSolved,
     NoneSolved,
@@ -27,7 +27,7 @@ SINGULAR_PARTS = ("wrist", "elbow", "shoulder", "rank")
 
 
 @dataclass(frozen=True)
-class Neighbours:
+class NeighbourPoses:
     """Poses near a target without solution that have one; None where none was found (``kinematics.neighbours``)."""
 
     orientation_ratio: float
@@ -79,7 +79,7 @@ class TargetResult:
     unsolved: tuple[Unsolved, ...]
     method: Method
     families: tuple[SelfMotion, ...]
-    neighbours: Neighbours | None
+    neighbours: NeighbourPoses | None
     advice: tuple[Advice, ...]
 
 

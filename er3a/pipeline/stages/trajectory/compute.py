@@ -19,11 +19,11 @@ from er3a.pipeline.stages.trajectory.judgement import Judgement, judge
 from er3a.pipeline.stages.trajectory.model import (
     AllSafe,
     AvoidanceRows,
-    Checks,
     Clearances,
     LimitsUsed,
     NearThresholds,
     NoneSafe,
+    PathChecks,
     PathSummary,
     PathVerdict,
     Samples,
@@ -57,7 +57,7 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     )
     only = None if settings.avoidance == "compare" else settings.avoidance
     avoidance = AvoidanceTask(robot, near, limits, only, surroundings)
-    tables: list[Checks] = []
+    tables: list[PathChecks] = []
     clearances: list[Clearances] = []
     strategies: list[AvoidanceRows] = []
     paths: list[PathSummary] = []
@@ -72,7 +72,7 @@ def compute(study: Study, name: str) -> TrajectoryResults:
         clearances.append(clearance_rows(entry.name, along))
         strategies.append(avoided.rows)
         paths.append(path_summary(robot, motion, found, along, avoided, limits))
-    checks = Checks.stacked(tables)
+    checks = PathChecks.stacked(tables)
     own = checks.take(checks.sample)
     length = characteristic_length(robot)
     assumed = tuple(bool(value) for value in ~np.isfinite(robot.speed))
@@ -98,14 +98,14 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     )
 
 
-def _checks(robot: Robot, motion: Motion, found: Judgement, near: NearSingular, limits: JointLimits) -> Checks:
+def _checks(robot: Robot, motion: Motion, found: Judgement, near: NearSingular, limits: JointLimits) -> PathChecks:
     """One row per check point; joint columns are NaN where the path can't be reached."""
     reached = np.isfinite(found.q[:, 0])
     measures = np.full((len(found.q), 3), np.nan)
     part = conditioning(robot, found.q[reached], characteristic_length(robot))
     measures[reached] = np.stack([part.manipulability, part.condition_number, part.smallest_singular_value], axis=1)
     factors = determinant_factors(robot, found.q)
-    return Checks(
+    return PathChecks(
         path=np.full(len(found.times), motion.entry.name, object),
         t_s=found.times,
         s_m=motion.way(found.times),

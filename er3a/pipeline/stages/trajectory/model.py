@@ -297,7 +297,7 @@ class Samples(MotionRows):
 
 
 @dataclass(frozen=True, eq=False)
-class Checks(Samples):
+class PathChecks(Samples):
     """The paths' own points, those checked between them, and the closest passes."""
 
     sample: Flags = column("whether the point is one of the path's own", dtype=bool)
@@ -327,7 +327,7 @@ class TrajectoryResults(Results[TrajectorySummary]):
     """Summary and tables of the stage."""
 
     samples: Samples
-    checks: Checks
+    checks: PathChecks
     clearance: Clearances
     avoidance: AvoidanceRows
 

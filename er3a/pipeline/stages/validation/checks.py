@@ -9,7 +9,7 @@ import numpy as np
 
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.validation.check_model import Check, Conflict, ModelCheck, ReferenceCheck, Statement, Unjudged
-from er3a.pipeline.stages.validation.findings import (
+from er3a.pipeline.stages.validation.validation_findings import (
     ModelGroup,
     NearSingularLeftOut,
     Note,

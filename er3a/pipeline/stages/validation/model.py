@@ -13,7 +13,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.validation.check_model import Check, Conflict
 from er3a.pipeline.stages.validation.diagnosis_model import Corrections, Residuals, SetCalibration, SetDiagnosis
-from er3a.pipeline.stages.validation.findings import (
+from er3a.pipeline.stages.validation.validation_findings import (
     CheckSubject,
     KeyPose,
     Note,

@@ -16,7 +16,7 @@ from er3a.pipeline.messages.workspace import SWEEPS
 from er3a.pipeline.stages.workspace.model import WorkspaceResults
 from er3a.pipeline.stages.workspace.proof_figures import arcs_of, draw_labels
 from er3a.pipeline.stages.workspace.section_figures import DENSITY, log_norm, masked
-from er3a.pipeline.stages.workspace.tables import Border, SideViewCells
+from er3a.pipeline.stages.workspace.workspace_tables import Border, SideViewCells
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.palette import INK, JOINTS, REFERENCE

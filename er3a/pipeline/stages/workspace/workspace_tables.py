@@ -47,7 +47,7 @@ class SideViewCells(Table):
 
 
 @dataclass(frozen=True, eq=False)
-class Curve(Table):
+class GrowthCurve(Table):
     """Touched volume after each block of samples, at several cell sizes."""
 
     cell_mm: Reals = column("edge of the cells", "mm")
