@@ -50,12 +50,15 @@ format: $(VENV)/dev.stamp  ## format Python and Snakemake code
 schema: $(VENV)/run.stamp  ## write the JSON schemas again from the pydantic models
 	$(BIN)/er3a schema
 
+LOCALE := er3a/pipeline/messages/locale
+
 words: $(VENV)/dev.stamp  ## collect the texts to be translated into er3a/pipeline/messages/locale/
-	$(BIN)/pybabel -q extract -F er3a/pipeline/messages/locale/babel.cfg -k said -k tr -k N_ --add-location=file --sort-by-file \
-		--omit-header --no-wrap -o er3a/pipeline/messages/locale/er3a.pot .
-	$(BIN)/pybabel -q update -D er3a -i er3a/pipeline/messages/locale/er3a.pot -d er3a/pipeline/messages/locale -l zh --no-fuzzy-matching --no-wrap \
+	$(BIN)/pybabel -q extract -F $(LOCALE)/babel.cfg --no-default-keywords -k tr -k N_ -k _ -k gettext -k ngettext:1,2 \
+		-k pgettext:1c,2 -k npgettext:1c,2,3 --add-location=file --sort-by-file --omit-header --no-wrap \
+		-o $(LOCALE)/er3a.pot .
+	$(BIN)/pybabel -q update -D er3a -i $(LOCALE)/er3a.pot -d $(LOCALE) -l zh --no-fuzzy-matching --no-wrap \
 		--ignore-obsolete --ignore-pot-creation-date
-	rm er3a/pipeline/messages/locale/er3a.pot
+	rm $(LOCALE)/er3a.pot
 
 campaigns: $(VENV)/dev.stamp  ## full-size evidence: writes the tables in docs/evidence/ again
 	$(BIN)/python -m benchmarks.campaigns $(ARGS)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, get_args
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -16,6 +16,7 @@ from er3a.files.robot_file import Name, Text
 from er3a.files.units import JointsDeg, PositionMm, RpyDeg, Triple
 from er3a.files.yaml_file import StrictModel, load
 from er3a.geometry.transforms import transform
+from er3a.kinematics.configuration import BranchLabel
 from er3a.numerics.arrays import Reals
 from er3a.planning.commands import (
     Command,
@@ -338,8 +339,9 @@ def _axis(axis: list[float] | None) -> Reals | None:
 
 
 def _branch(words: str | None) -> str | None:
-    """The code of a branch: "front, elbow up, flip" is front_elbow_up_flip."""
-    return words and re.sub(r"[ ,]+", "_", words)
+    """The code of a branch: "front, elbow up, flip" is front_elbow_up_flip; other words stay as they are."""
+    code = re.sub(r"[ ,]+", "_", words or "")
+    return code if code in get_args(BranchLabel) else words
 
 
 def _rates(degrees: list[float] | None) -> Reals | float:

@@ -1,1 +1,1 @@
-"""Pure functions over arrays: no files, no stages. Angles are the maker's, lengths metres."""
+"""Pure functions over arrays: no files, no stages. Angles are the manufacturer's, lengths metres."""

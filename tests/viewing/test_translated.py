@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from importlib import import_module
 from pathlib import Path
 from string import Formatter
 
@@ -12,14 +11,16 @@ from babel.messages.extract import extract_from_dir
 from babel.messages.frontend import parse_mapping_cfg
 from babel.messages.pofile import read_po
 
-from er3a.pipeline.messages import language
+from er3a.pipeline.messages import extract, language
+from er3a.pipeline.stages.run import show
 from er3a.pipeline.study import STAGES, load_study
 from er3a.pipeline.teach.panel import write_teach_page
+from er3a.pipeline.viewing.figures import house_style
 from er3a.pipeline.viewing.index import write_index
 from tests.conftest import ROBOTS, ROOT
 from tests.viewing.untranslated import PageTexts, plain_words, texts_from_files, wide_letters
 
-KEYWORDS = {"said": None, "tr": None, "N_": None, "_": None, "gettext": None, "ngettext": (1, 2)}
+KEYWORDS = extract.KEYWORDS | {"_": None, "gettext": None, "ngettext": (1, 2)}
 CHINESE = re.compile("[\u4e00-\u9fff]")
 UPDATE = "`make words` collects texts; translate the new ones in er3a/pipeline/messages/locale/zh"
 
@@ -27,14 +28,14 @@ UPDATE = "`make words` collects texts; translate the new ones in er3a/pipeline/m
 @pytest.fixture(scope="module")
 def catalogue():
     with language.catalogue_file("zh").open("rb") as file:
-        return {_forms(entry.id): entry for entry in read_po(file) if entry.id}
+        return {(entry.context, *_forms(entry.id)): entry for entry in read_po(file) if entry.id}
 
 
 def test_the_chinese_catalogue_has_the_texts_of_the_code_and_no_others(catalogue):
     with (ROOT / "er3a/pipeline/messages/locale/babel.cfg").open() as file:
         methods, options = parse_mapping_cfg(file)
     found = extract_from_dir(str(ROOT), methods, options, keywords=KEYWORDS, strip_comment_tags=False)
-    in_code = {_forms(message) for _, _, message, _, _ in found if message}
+    in_code = {(context, *_forms(message)) for _, _, message, _, context in found if message}
     assert in_code - set(catalogue) == set(), UPDATE
     assert set(catalogue) - in_code == set(), UPDATE
 
@@ -61,9 +62,8 @@ def own_texts(small_study):
 def test_each_word_of_a_stage_s_page_can_be_translated(stage, name, small_study, own_texts, tmp_path, monkeypatch):
     monkeypatch.chdir(small_study.folder)
     study, page = load_study("config/small.yaml"), tmp_path / "page.html"
-    report = import_module(f"er3a.pipeline.stages.{stage}.report").report
-    with wide_letters() as shown:
-        report(study, name, Path("results") / name / stage, page)
+    with wide_letters() as shown, house_style():
+        show("report", stage, study, name, Path("results") / name / stage, page)
     assert plain_words([*PageTexts(page.read_text(encoding="utf-8")).texts, *shown], own_texts) == []
 
 

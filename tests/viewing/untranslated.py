@@ -44,6 +44,14 @@ class Wide(gettext.NullTranslations):
             return message
         return "".join(part if KEPT.fullmatch(part) else part.translate(WIDE) for part in KEPT.split(message))
 
+    def pgettext(self, context: str, message: str) -> str:
+        """As :meth:`gettext`."""
+        return self.gettext(message)
+
+    def npgettext(self, context: str, msgid1: str, msgid2: str, n: int) -> str:
+        """As :meth:`ngettext`."""
+        return self.ngettext(msgid1, msgid2, n)
+
     def ngettext(self, msgid1: str, msgid2: str, n: int) -> str:
         """As :meth:`gettext`, of the form for n."""
         return self.gettext(msgid1 if n == 1 else msgid2)

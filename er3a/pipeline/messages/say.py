@@ -18,8 +18,12 @@ from typing import Any, TypeVar
 
 from er3a.findings import Finding
 from er3a.pipeline.messages import language
+from er3a.pipeline.messages.language import N_
 
 KeyT = TypeVar("KeyT", bound=str)
+
+
+PAIRS = {"; ": N_("{first}; {rest}"), ", ": N_("{first}, {rest}"), " ": N_("{first} {rest}")}
 
 
 @singledispatch
@@ -51,4 +55,8 @@ def listed(findings: Iterable[Finding]) -> list[str]:
 
 def joined(texts: Iterable[str], separator: str = "; ") -> str:
     """Texts as one: apart by ``"; "``, ``", "`` or ``" "`` (whole sentences); empty ones are left out."""
-    return language.translated("joined", separator).join(text for text in texts if text)
+    told = [text for text in texts if text]
+    whole = told[-1] if told else ""
+    for text in reversed(told[:-1]):
+        whole = sentence("joined", PAIRS[separator], first=text, rest=whole)
+    return whole

@@ -2,7 +2,7 @@
  * Forward kinematics, Jacobian and nearness to singularities of a six-axis arm, from its Denavit-Hartenberg table.
  *
  * The table is the JSON form of er3a's Robot: `convention` ("standard" or "modified"), `a`, `d` (m), `alpha`, `beta`,
- * `offset`, `lower`, `upper` (rad), `direction` (+1 or -1), `base` and `tool` (4x4). Joint angles `q` are the maker's
+ * `offset`, `lower`, `upper` (rad), `direction` (+1 or -1), `base` and `tool` (4x4). Joint angles `q` are the manufacturer's
  * (rad); the table's own angle is `direction * q + offset`. Both conventions are the product
  * `links[0] Rz(theta_1) links[1] ... Rz(theta_6) links[6]` with constant links, the base in the first and the tool in
  * the last. The same formulas in Python: er3a/kinematics/chain.py, forward.py and singularity.py.
