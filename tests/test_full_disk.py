@@ -4,17 +4,26 @@ from __future__ import annotations
 
 import os
 import subprocess
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 import rerun as rr
 import rerun.blueprint as rrb
 
 from er3a.errors import WriteError
-from er3a.pipeline.results import write_table
+from er3a.files.kept_files import write_atomically
+from er3a.pipeline.tables import Reals, Table, vector
 from er3a.pipeline.viewing.recording import recording
+
+
+@dataclass(frozen=True, eq=False)
+class Points(Table):
+    """Many points."""
+
+    point_m: Reals = vector("{}_m", "where", "m")
+
 
 NOISE = np.random.default_rng(1).random((20_000, 3))
 
@@ -36,7 +45,7 @@ def small_disk(tmp_path):
 
 
 def write_large_table(path: Path) -> None:
-    write_table(path, pd.DataFrame(NOISE, columns=["x_m", "y_m", "z_m"]))
+    write_atomically(path, Points(NOISE).write)
 
 
 def write_large_recording(path: Path) -> None:

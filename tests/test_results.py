@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import itertools
 import json
 import os
 import subprocess
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -20,7 +19,6 @@ import pytest
 from er3a.errors import ResultError, WriteError
 from er3a.files.kept_files import half_written, sha256, write_atomically
 from er3a.files.robot_library import ROBOTS
-from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.results import (
     CHECKSUMS,
@@ -28,7 +26,6 @@ from er3a.pipeline.results import (
     AbsentResults,
     Figure,
     NotComputed,
-    Results,
     Summary,
     Verdict,
     check_results,
@@ -36,85 +33,16 @@ from er3a.pipeline.results import (
     read_stage,
     write_results,
 )
-from er3a.pipeline.stages.registry import STAGES
-from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import load_study
-from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
+from testing.made_stage import ROWS, STAGE, SUMMARY, Hollow, MadeResults, Rows, Solid, write
 
 ROOT = Path(__file__).resolve().parents[1]
-
-
-@dataclass(frozen=True)
-class Hollow:
-    """A finding of the stage below."""
-
-    volume_m3: float
-    code: Literal["made.hollow"] = "made.hollow"
-
-
-@dataclass(frozen=True)
-class Solid:
-    """Another, which holds one."""
-
-    apart_from: Hollow | None
-    code: Literal["made.solid"] = "made.solid"
-
-
-@dataclass(frozen=True)
-class MadeSummary(Summary):
-    """With a key of its own."""
-
-    verdict: Verdict[Hollow | Solid]
-    reach_m: tuple[float, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class Rows(Table):
-    """One column of each kind."""
-
-    x_m: Reals = column("how far", "m")
-    count: Integers = column("how many", dtype=np.int32)
-    label: Texts = column("what", dtype=object)
-    q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
-    point_mm: Reals = vector("{}_mm", "where", "mm")
-
-
-@dataclass(frozen=True, eq=False)
-class MadeResults(Results[MadeSummary]):
-    """A summary and a table."""
-
-    rows: Rows
-
-
-@dataclass(frozen=True)
-class MadeStage(Stage):
-    """A stage with the model above, which takes all else from the workspace stage."""
-
-    def module(self, name):
-        return SimpleNamespace(RESULTS=MadeResults)
-
-
-STAGE = MadeStage(**vars(STAGES["workspace"]))
-ROWS = Rows(
-    x_m=[0.1, np.nan, -0.0],
-    count=[1, 2, 3],
-    label=["a", "空洞", None],
-    q_deg=np.arange(18.0).reshape(3, 6),
-    point_mm=np.arange(9.0).reshape(3, 3),
-)
-FIGURES = (Figure("hull_volume", 1.25, "m³", 0.01), Figure("reach", None, "mm"), Figure("solved", 2, "", of=3))
-SUMMARY = MadeSummary(Verdict("fail", Hollow(0.25)), FIGURES, (0.5, 1.0))
 
 
 @pytest.fixture
 def study(monkeypatch):
     monkeypatch.chdir(ROOT)
     return load_study("config/small.yaml")
-
-
-def write(folder, study, summary=SUMMARY, rows=ROWS):
-    write_results(folder, study, "er3_600", STAGE, MadeResults(summary, rows), lambda found: f"空洞: {found.code}.")
-    return folder / "summary.json"
 
 
 def leftovers(folder):
@@ -130,7 +58,7 @@ def test_shape_of_a_summary(tmp_path, study):
         "status": "fail",
         "code": "made.hollow",
         "params": {"volume_m3": 0.25},
-        "text": "空洞: made.hollow.",
+        "text": "A hollow (空洞) of 0.25 m³.",
     }
     assert summary["figures"][1] == {"name": "reach", "value": None, "unit": "mm", "uncertainty": None, "of": None}
     assert summary["provenance"] == {
@@ -159,7 +87,7 @@ def test_results_come_back_as_written(tmp_path, study):
     stored = read_results(tmp_path, MadeResults)
     assert (stored.robot, stored.stage, stored.status) == ("er3_600", "workspace", "pass")
     assert stored.results.summary.verdict.finding == Solid(Hollow(1.5))
-    assert stored.results.summary.figures == FIGURES
+    assert stored.results.summary.figures == SUMMARY.figures
     pd.testing.assert_frame_equal(stored.results.rows.frame(), ROWS.frame())
     assert np.signbit(stored.results.rows.x_m[2])
     assert stored.results.rows.q_deg.shape == (3, 6)
@@ -252,8 +180,13 @@ def test_while_writing_the_file_is_not_there_yet(tmp_path):
     assert path.read_text() == "x"
 
 
-@pytest.mark.parametrize("keep", [0, 4, 100, -10, -1])
-@pytest.mark.parametrize("name", ["rows.parquet", "summary.json", CHECKSUMS])
+@pytest.mark.parametrize(
+    ("name", "keep"),
+    [
+        *itertools.product(["rows.parquet", "summary.json"], [0, 4, 100, -10, -1]),
+        *itertools.product([CHECKSUMS], [0, 4, 100, -10]),  # the newline at its end alone is not missed
+    ],
+)
 def test_a_file_cut_short_is_told(tmp_path, study, name, keep):
     write(tmp_path, study)
     path = tmp_path / name

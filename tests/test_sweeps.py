@@ -157,7 +157,7 @@ RANGE = {"from": None, "to": None, "steps": None}
         (RANGE | {"values": [50, 60, 50]}, "sweeps.a3.values", "50.0 stands there twice"),
         (RANGE, "sweeps.a3.from", "missing"),
         ({"stages": []}, "sweeps.a3.stages", "a list of 0 items"),
-        ({"stages": ["workspaces"]}, "sweeps.a3.stages[0]", "'workspaces' is refused"),
+        ({"stages": ["inverse", "workspaces"]}, "sweeps.a3.stages[1]", "there is no stage 'workspaces'. Known: vali"),
         ({"step": 3}, "sweeps.a3.step", "unknown key 'step'. Did you mean 'steps'?"),
         ({"from": 0.04, "to": 0.1}, "sweeps.a3", "joints.3.a_mm = 0.04: dh.rows[2].a_mm: 0.04 mm looks like metres"),
         ({"vary": "joints.3.upper_deg", "from": -90}, "sweeps.a3", "joint 3 has lower_deg -75 above upper_deg -90"),

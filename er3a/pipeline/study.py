@@ -78,9 +78,9 @@ class StudyBase(StrictModel):
     @model_validator(mode="after")
     def _sweeps_go_through_stages_that_there_are(self):
         for name, sweep in self.sweeps.items():
-            for stage in sweep.stages:
+            for place, stage in enumerate(sweep.stages):
                 if stage not in REGISTRY:
-                    problem = f"sweeps.{name}.stages: there is no stage '{stage}'"
+                    problem = f"sweeps.{name}.stages[{place}]: there is no stage '{stage}'"
                     raise ValueError(f"{problem} | Known: {', '.join(REGISTRY)}")
         return self
 

@@ -15,9 +15,10 @@ from er3a.pipeline.estimate.jobs import Job, jobs_of, wall_time
 from er3a.pipeline.estimate.speed import SamplingSpeed
 from er3a.pipeline.estimate.terminal import duration, size
 from er3a.pipeline.estimate.timings import FEW_SAMPLES, Timing, Trial, logged
-from er3a.pipeline.results import Figure, Verdict, write_summary
-from er3a.pipeline.study import SAMPLES_PER_JOB, load_study
+from er3a.pipeline.stages.workspace.entry import SAMPLES_PER_JOB
+from er3a.pipeline.study import load_study
 from er3a.pipeline.sweeps import Sweep
+from testing.made_stage import write
 
 ROOT = Path(__file__).resolve().parents[2]
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
@@ -122,14 +123,7 @@ def test_variants_take_what_their_base_takes(study, calibration):
 
 def test_timings_of_a_run_count_where_its_settings_do(study, tmp_path, monkeypatch):
     results, logs = tmp_path / "results", tmp_path / "logs"
-    write_summary(
-        results / "er3_600/workspace",
-        study,
-        "er3_600",
-        "workspace",
-        Verdict("pass", "a.b", "Fine."),
-        [Figure("x", 1, "m")],
-    )
+    write(results / "er3_600/workspace", study)
     (logs / "er3_600").mkdir(parents=True)
     for name in ("workspace.compute", "workspace.sample.1-of-1", "inverse.compute", "teach"):
         (logs / f"er3_600/{name}.tsv").write_text("s\th:m:s\tmax_rss\n4.5\t0:00:04\t300.0\n")

@@ -14,7 +14,7 @@ from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.singularity import characteristic_length, determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.pipeline.messages import planning as messages
-from er3a.planning.avoidance import StrategyName, damped_least_squares, findings, via_point
+from er3a.planning.avoidance import StrategyName, avoidance_findings, damped_least_squares, via_point
 from er3a.planning.avoidance.deviation import deviation
 from er3a.planning.avoidance.singular_segment import singular_segment
 from er3a.planning.avoidance.strategies import STRATEGIES, best, compare

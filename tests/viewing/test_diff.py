@@ -3,27 +3,30 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
-import pandas as pd
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from er3a.errors import ResultError
 from er3a.pipeline.cli import app
-from er3a.pipeline.results import Figure, Verdict, write_checksums, write_summary, write_table
+from er3a.pipeline.results import Verdict, write_checksums
+from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import load_study
 from er3a.pipeline.viewing.diff import changes, write_diff
+from testing.made_stage import ROWS, STAGE, SUMMARY, Solid, write
 
 
 @pytest.fixture
-def folders(tmp_path):
+def folders(tmp_path, monkeypatch):
     """Two equal results folders of one stage."""
+    monkeypatch.setitem(STAGES, "workspace", STAGE)
     study = load_study("config/small.yaml")
+    figures = (SUMMARY.figures[0], replace(SUMMARY.figures[1], value=700.0), SUMMARY.figures[2])
     for name in ("old", "new"):
         folder = tmp_path / name / "er3_600" / "workspace"
-        figures = [Figure("volume", 1.5, "m³", 0.01), Figure("reach", 700.0, "mm"), Figure("voids", 1, "")]
-        write_table(folder / "cells.parquet", pd.DataFrame({"x_m": [0.0, 1.0]}))
-        write_summary(folder, study, "er3_600", "workspace", Verdict("pass", "workspace.fine", "All is fine."), figures)
+        write(folder, study, replace(SUMMARY, verdict=Verdict("pass", Solid(None)), figures=figures))
     return tmp_path / "old", tmp_path / "new"
 
 
@@ -42,30 +45,40 @@ def test_equal_folders_differ_in_nothing(folders):
 
 @pytest.mark.parametrize(("moved_by", "note"), [(0.012, "within the 95 %"), (0.02, "more than the intervals")])
 def test_a_moved_figure_is_weighed_against_its_intervals(folders, moved_by, note):
-    edit(folders[1], lambda summary: summary["figures"][0].update(value=1.5 + moved_by))
+    edit(folders[1], lambda summary: summary["figures"][0].update(value=1.25 + moved_by))
     (change,) = changes(*folders)
-    assert (change.robot, change.stage, change.what) == ("er3_600", "workspace", "volume")
+    assert (change.robot, change.stage, change.what) == ("er3_600", "workspace", "Volume of the hull")
     assert change.difference == f"{moved_by:.4f} m³"
     assert change.note.startswith(note)
 
 
 def test_verdict_unit_and_missing_figure_are_named(folders):
     def change(summary):
-        summary["verdict"] |= {"status": "fail", "text": "A void."}
+        summary["verdict"] |= {"status": "fail", "code": "made.hollow", "params": {"volume_m3": 0.5}}
         summary["figures"][1] |= {"unit": "m"}
         del summary["figures"][2]
 
     edit(folders[1], change)
     found = {entry.what: entry for entry in changes(*folders)}
-    assert (found["verdict"].old, found["verdict"].new, found["verdict"].note) == ("pass", "fail", "A void.")
-    assert found["reach"].difference == "another unit"
-    assert (found["voids"].new, found["voids"].difference) == ("–", "gone")
+    verdict, solved = found["verdict"], found["Targets that are solved"]
+    assert (verdict.old, verdict.new, verdict.note) == ("pass", "fail", "A hollow (空洞) of 0.50 m³.")
+    assert found["Reach"].difference == "another unit"
+    assert (solved.old, solved.new, solved.difference) == ("2 of 3", "–", "gone")
+
+
+def test_another_wording_of_the_verdict_is_none_that_results_hold(folders):
+    edit(folders[1], lambda summary: summary["verdict"].update(text="Solid, all of it."))
+    assert changes(*folders) == []
+    edit(folders[1], lambda summary: summary["verdict"].update(code="made.hollow", params={"volume_m3": 0.5}))
+    (change,) = changes(*folders)
+    assert (change.what, change.old, change.new) == ("verdict's text", "All is solid.", "A hollow (空洞) of 0.50 m³.")
 
 
 def test_other_bytes_and_a_stage_on_one_side_are_named(folders, tmp_path):
     old, new = folders
-    write_table(new / "er3_600/workspace/cells.parquet", pd.DataFrame({"x_m": [0.0, 2.0]}))
-    assert [entry.what for entry in changes(old, new)] == ["cells.parquet"]
+    ROWS.take(np.array([0])).write(new / "er3_600/workspace/rows.parquet")
+    write_checksums(new / "er3_600/workspace")
+    assert [entry.what for entry in changes(old, new)] == ["rows.parquet"]
     (new / "er3_600/workspace").rename(new / "er3_600/inverse")
     assert [(entry.stage, entry.new) for entry in changes(old, new)] == [("inverse", "there"), ("workspace", "–")]
     write_diff(old, new, changes(old, new), tmp_path / "diff.html")

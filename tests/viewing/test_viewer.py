@@ -14,7 +14,7 @@ import psutil
 import pytest
 
 from er3a.errors import ResultError
-from er3a.pipeline.checksums import check_seal, seal
+from er3a.pipeline.checksums import check_checksum, write_checksum
 from er3a.pipeline.cli import app
 from er3a.pipeline.viewing.viewer import free_port, viewer_running, without_statistics
 
@@ -98,8 +98,8 @@ def test_a_recording_cut_in_half_is_one_line_and_is_not_opened(recording, monkey
     folder = reports / "er3_600"
     folder.mkdir()
     path = recording.rename(folder / "inverse.rrd")
-    seal(path)
-    check_seal(path)
+    write_checksum(path)
+    check_checksum(path)
     monkeypatch.setenv("DISPLAY", ":0")
     started = []
     monkeypatch.setattr(subprocess, "run", lambda command, **_: started.append(command))
