@@ -34,9 +34,11 @@ estimate: $(VENV)/run.stamp  ## say what the study will take before it is run (S
 archive: $(VENV)/run.stamp  ## pack the finished study into er3a-study.zip, with RO-Crate metadata
 	@$(BIN)/er3a archive --study $(STUDY)
 
-lint: $(VENV)/dev.stamp  ## check format and lint of Python and Snakemake code
+lint: $(VENV)/dev.stamp  ## check format, types, imports and lint of Python and Snakemake code
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
 	$(BIN)/snakefmt --check Snakefile workflow
 	$(BIN)/snakemake --lint
 
@@ -74,7 +76,7 @@ clean:  ## remove results, reports and recordings
 	find reports -mindepth 1 ! -name README.md -delete
 
 distclean: clean  ## also remove the environment
-	rm -rf $(VENV) .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .pytest_cache .ruff_cache .mypy_cache .import_linter_cache .hypothesis
 
 # The environment: a venv, a hash-checked uv in it, then the hash-checked lock.
 $(VENV)/uv.stamp: requirements/uv.txt

@@ -13,7 +13,7 @@ from pathlib import Path
 import psutil
 import yaml
 
-from er3a.pipeline.estimate.cost import Calibration, cost, disk_bytes, measured_here
+from er3a.pipeline.estimate.cost import MachineCalibration, cost, disk_bytes, measured_here
 from er3a.pipeline.estimate.terminal import duration, size
 from er3a.pipeline.estimate.timings import written_bytes
 from er3a.pipeline.study import Study, load_study
@@ -35,7 +35,7 @@ def study_of(samples: int) -> Study:
     return load_study(STUDY)
 
 
-def calibration_of(study: Study) -> Calibration:
+def calibration_of(study: Study) -> MachineCalibration:
     """What `er3a estimate` measures in the working folder."""
     return measured_here(study, Path("results"), Path("reports"), Path("logs"))
 
@@ -76,7 +76,11 @@ def table() -> str:
 
 
 def _page(
-    by_trial: Calibration, by_run: Calibration, took: float, measured: list[tuple[float, float]], whole: int
+    by_trial: MachineCalibration,
+    by_run: MachineCalibration,
+    took: float,
+    measured: list[tuple[float, float]],
+    whole: int,
 ) -> str:
     speed = by_run.speeds[ROBOT]
     lines = [

@@ -4,6 +4,7 @@ The names below are imported on first use, so that one part of the package does 
 """
 
 from importlib import import_module
+from typing import Any
 
 _PUBLIC = {
     "load_robot": "er3a.files.robot_library",
@@ -32,7 +33,7 @@ __all__ = list(_PUBLIC)
 __version__ = "0.1.0"
 
 
-def __getattr__(name):
+def __getattr__(name: str) -> Any:
     if name not in _PUBLIC:
         raise AttributeError(f"module 'er3a' has no attribute '{name}'")
     return getattr(import_module(_PUBLIC[name]), name)

@@ -7,13 +7,13 @@ union. Nothing decides by a sentence: code asks for the type or the code.
 
 from __future__ import annotations
 
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 
 class Finding(Protocol):
     """Any finding."""
 
-    __dataclass_fields__: ClassVar[dict]
+    __dataclass_fields__: ClassVar[dict[str, Any]]
 
     @property
     def code(self) -> str:

@@ -9,12 +9,13 @@ from typing import Any, Literal
 
 import numpy as np
 
+from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.messages.say import say, sentence
 from er3a.pipeline.results import Figure, Results, Summary, Verdict, write_results
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import Study
-from er3a.pipeline.tables import Integers, Reals, Table, Texts, column, per_joint, vector
+from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 
 ROBOT = "er3_600"
 

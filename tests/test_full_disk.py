@@ -14,7 +14,8 @@ import rerun.blueprint as rrb
 
 from er3a.errors import WriteError
 from er3a.files.kept_files import write_atomically
-from er3a.pipeline.tables import Reals, Table, vector
+from er3a.numerics.arrays import Reals
+from er3a.pipeline.tables import Table, vector
 from er3a.pipeline.viewing.recording import recording
 
 

@@ -110,7 +110,7 @@ def identifiable(robot: Robot, mutation: Mutation, references: Sequence[Referenc
         before, after = getattr(right, column)[0], getattr(mutation.table, column)[0]
         for j in np.flatnonzero(before != after).tolist():
             if column == "direction":
-                turned = right.with_column(column, [j], np.full((1, 1), after[j]))
+                turned = right.with_column(column, [int(j)], np.full((1, 1), after[j]))
                 moved += predict_tables(turned, robot, quantities)[0] - at_right
             else:
                 moved += _slope(right, column, j, robot, quantities) * (after[j] - before[j])

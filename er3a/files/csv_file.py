@@ -32,7 +32,7 @@ class Written(float):
 
 
 @dataclass(frozen=True)
-class Column:
+class CsvColumn:
     """One column of a CSV table.
 
     Attributes
@@ -47,7 +47,7 @@ class Column:
     choices: tuple[str, ...] = ()
 
 
-def read_csv(path: str | Path, columns: Mapping[str, Column]) -> list[dict[str, Any]]:
+def read_csv(path: str | Path, columns: Mapping[str, CsvColumn]) -> list[dict[str, Any]]:
     """Read a CSV file with exactly these columns (any order); rows as dicts with a ``row`` key (file line).
 
     Raises
@@ -93,7 +93,7 @@ def _lines(path: Path) -> list[tuple[int, list[str]]]:
         raise InputError(path, f"line {reader.line_num}", f"not valid CSV ({error})", "Correct this line") from None
 
 
-def _check_header(path: Path, header: list[str], columns: Mapping[str, Column]) -> None:
+def _check_header(path: Path, header: list[str], columns: Mapping[str, CsvColumn]) -> None:
     for name in filter(None, header):
         if header.count(name) > 1:
             raise InputError(path, f"column {name}", "stands in the header twice", "Keep one of the two")
@@ -115,7 +115,7 @@ def _check_header(path: Path, header: list[str], columns: Mapping[str, Column]) 
         raise InputError(path, f"column {missing[0]}", "missing", f"The header must hold: {', '.join(columns)}")
 
 
-def _value(path: Path, row: int, name: str, text: str, column: Column) -> Any:
+def _value(path: Path, row: int, name: str, text: str, column: CsvColumn) -> Any:
     where = f"row {row}, column {name}"
     if not text:
         if column.optional:
@@ -141,5 +141,5 @@ def _value(path: Path, row: int, name: str, text: str, column: Column) -> Any:
     return value
 
 
-def _allowed(column: Column) -> str:
+def _allowed(column: CsvColumn) -> str:
     return f" one of: {', '.join(column.choices)}" if column.choices else ""

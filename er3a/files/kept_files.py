@@ -14,7 +14,7 @@ _DIGEST_BYTES = hashlib.sha256().digest_size
 _TEMPORARY = re.compile(r"\..+\.[0-9]+(\.\w+)?")  # as `write_atomically` names them
 
 
-def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
+def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
     """Call ``write`` with a temporary path beside ``path``, then move the finished file, kept on disk, into place.
 
     Raises

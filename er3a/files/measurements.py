@@ -8,15 +8,15 @@ import numpy as np
 
 from er3a.calibration.measured import Measurement
 from er3a.errors import InputError
-from er3a.files.csv_file import Column, read_csv
+from er3a.files.csv_file import CsvColumn, read_csv
 from er3a.files.units import LEAST_SPAN_MM, WIDEST_IN_RADIANS
 from er3a.references.quantities import Pose
 
-_NUMBER = Column(float)
+_NUMBER = CsvColumn(float)
 COLUMNS = {
     **{f"q{joint}_deg": _NUMBER for joint in range(1, 7)},
-    "point": Column(str, choices=("flange", "tool")),
-    **{f"{c}_mm": Column(float, optional=True) for c in "xyz"},
+    "point": CsvColumn(str, choices=("flange", "tool")),
+    **{f"{c}_mm": CsvColumn(float, optional=True) for c in "xyz"},
     "standard_deviation_mm": _NUMBER,
 }
 POSES_TO_JUDGE_UNITS = 3

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import InputError
-from er3a.files.csv_file import Column, read_csv, read_header
+from er3a.files.csv_file import CsvColumn, read_csv, read_header
 from er3a.files.target_table import FORMS, POSITION
 from er3a.files.units import check_degrees, check_millimetres
 from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, transform
@@ -77,8 +77,8 @@ def read_path_table(path: str | Path) -> PathTable:
         remedy = f"Give the columns x_mm, y_mm, z_mm with {known}; or q1_deg .. q6_deg"
         raise InputError(path, "header", f"the table has {problem}", remedy)
     columns = JOINT_COLUMNS if of_joints else (*POSITION, *FORMS[forms[0]])
-    timed = {"t_s": Column()} if "t_s" in header else {}
-    rows = read_csv(path, timed | {name: Column() for name in columns})
+    timed = {"t_s": CsvColumn()} if "t_s" in header else {}
+    rows = read_csv(path, timed | {name: CsvColumn() for name in columns})
     if len(rows) < 2:
         raise InputError(path, None, f"the path has {_points(len(rows))}", "Give two rows at least")
     if len(rows) > MOST_ROWS:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from er3a.files.csv_file import Column, Written
+from er3a.files.csv_file import CsvColumn, Written
 from er3a.references.reference import Row
 from er3a.references.rows import ENVELOPE_CORNERS, ENVELOPE_EXTENTS, KINDS, check_complete
 from er3a.robots.robot import GRADES
@@ -16,9 +16,14 @@ Fields = dict[str, Any]
 Fault = tuple[str, str, str]
 """Column, problem and remedy."""
 
-_WORD, _NUMBER, _OPTIONAL, _JOINT = Column(str), Column(Written), Column(Written, optional=True), Column(int)
-_SOURCE = {"source": _WORD, "grade": Column(str, choices=tuple(GRADES))}
-_POINT = Column(str, choices=("flange", "wrist_centre"))
+_WORD, _NUMBER, _OPTIONAL, _JOINT = (
+    CsvColumn(str),
+    CsvColumn(Written),
+    CsvColumn(Written, optional=True),
+    CsvColumn(int),
+)
+_SOURCE = {"source": _WORD, "grade": CsvColumn(str, choices=tuple(GRADES))}
+_POINT = CsvColumn(str, choices=("flange", "wrist_centre"))
 _XYZ = ("x_mm", "y_mm", "z_mm")
 _DIRECTION = ("direction_x", "direction_y", "direction_z")
 _POSE = tuple(f"q{joint}_deg" for joint in range(1, 7))
@@ -37,7 +42,7 @@ class Format:
     mixed_lengths, mixed_limits : whether single lines in metres, or limits in radians, beside others are refused
     """
 
-    columns: Mapping[str, Column]
+    columns: Mapping[str, CsvColumn]
     digits: tuple[str, ...] = ()
     gather: Callable[[Fields], Fields] = dict
     faults: Callable[[Fields], Iterator[Fault]] = lambda fields: iter(())
@@ -45,7 +50,7 @@ class Format:
     mixed_limits: bool = False
 
     @property
-    def all_columns(self) -> dict[str, Column]:
+    def all_columns(self) -> dict[str, CsvColumn]:
         """The columns of the file."""
         return {**self.columns, **_SOURCE}
 
@@ -113,7 +118,7 @@ FORMATS: dict[str, Format] = {
         {
             "joint": _JOINT,
             **dict.fromkeys((*_DIRECTION, *_XYZ), _NUMBER),
-            "signed": Column(str, choices=("yes", "no")),
+            "signed": CsvColumn(str, choices=("yes", "no")),
             "uncertainty_mm": _NUMBER,
             "uncertainty_deg": _NUMBER,
         },
@@ -134,7 +139,7 @@ FORMATS: dict[str, Format] = {
     ),
     "directions": Format(
         {
-            "segment": Column(str, choices=("upper_arm", "forearm")),
+            "segment": CsvColumn(str, choices=("upper_arm", "forearm")),
             "angle_from_vertical_deg": _NUMBER,
             "uncertainty_deg": _OPTIONAL,
         },
@@ -142,7 +147,7 @@ FORMATS: dict[str, Format] = {
     ),
     "envelope": Format(
         {
-            "quantity": Column(str, choices=(*ENVELOPE_CORNERS, *ENVELOPE_EXTENTS)),
+            "quantity": CsvColumn(str, choices=(*ENVELOPE_CORNERS, *ENVELOPE_EXTENTS)),
             "q2_deg": _OPTIONAL,
             "q3_deg": _OPTIONAL,
             "value_mm": _NUMBER,
@@ -155,8 +160,8 @@ FORMATS: dict[str, Format] = {
     "reach": Format(
         {
             "point": _POINT,
-            "from_axis": Column(int),
-            "extreme": Column(str, choices=("greatest", "least")),
+            "from_axis": CsvColumn(int),
+            "extreme": CsvColumn(str, choices=("greatest", "least")),
             "value_mm": _NUMBER,
             "uncertainty_mm": _OPTIONAL,
         },

@@ -51,13 +51,13 @@ class ZeroRow(StrictModel):
     offset_deg: float
 
 
-class LimitRow(StrictModel):
+class JointLimitRow(StrictModel):
     joint: JointNumber
     lower_deg: float
     upper_deg: float
 
 
-class SpeedRow(StrictModel):
+class JointSpeedRow(StrictModel):
     joint: JointNumber
     speed_deg_s: Annotated[float, Field(gt=0, le=FASTEST_DEG_S)]
 
@@ -77,11 +77,11 @@ class Zero(Sourced):
 
 
 class Limits(Sourced):
-    rows: list[LimitRow]
+    rows: list[JointLimitRow]
 
 
 class Speeds(Sourced):
-    rows: list[SpeedRow]
+    rows: list[JointSpeedRow]
 
 
 class Placement(StrictModel):

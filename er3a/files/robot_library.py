@@ -77,7 +77,8 @@ def robot_of(content: RobotFile) -> Robot:
 
 def _envelopes(group: Envelopes | None) -> tuple[Envelope, ...]:
     def metres(values: list[float]) -> tuple[float, float, float]:
-        return tuple(value / 1000 for value in values)
+        x, y, z = values
+        return x / 1000, y / 1000, z / 1000
 
     capsules = group.capsules if group else []
     return tuple(Envelope(c.link, metres(c.from_mm), metres(c.to_mm), c.radius_mm / 1000) for c in capsules)

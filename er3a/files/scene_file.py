@@ -33,7 +33,7 @@ class Obstacle(StrictModel):
         return transform(np.array(self.xyz_mm) / 1000, np.radians(self.rpy_deg))
 
 
-class Box(Obstacle):
+class BoxObstacle(Obstacle):
     """``size_mm``: edges along x, y and z."""
 
     size_mm: Annotated[list[Length], Field(min_length=3, max_length=3)]
@@ -49,7 +49,7 @@ class Box(Obstacle):
         return library.Box(self.name, self.place(), np.array(self.size_mm) / 1000)
 
 
-class Cylinder(Obstacle):
+class CylinderObstacle(Obstacle):
     """A cylinder along its own z axis."""
 
     radius_mm: Length
@@ -65,7 +65,7 @@ class Cylinder(Obstacle):
         return library.Cylinder(self.name, self.place(), self.radius_mm / 1000, self.length_mm / 1000)
 
 
-class Sphere(StrictModel):
+class SphereObstacle(StrictModel):
     name: Name
     xyz_mm: PositionMm
     radius_mm: Length
@@ -81,7 +81,7 @@ class Sphere(StrictModel):
         return library.Sphere(self.name, transform(np.array(self.xyz_mm) / 1000, np.zeros(3)), self.radius_mm / 1000)
 
 
-class Plane(StrictModel):
+class PlaneObstacle(StrictModel):
     """All points p with normal . p <= offset are solid; the normal points out and needs no unit length."""
 
     name: Name
@@ -107,10 +107,10 @@ class SceneFile(StrictModel):
     kind: Literal["scene"]
     title: Text
     title_zh: Text | None = None
-    boxes: list[Box] = []
-    cylinders: list[Cylinder] = []
-    spheres: list[Sphere] = []
-    planes: list[Plane] = []
+    boxes: list[BoxObstacle] = []
+    cylinders: list[CylinderObstacle] = []
+    spheres: list[SphereObstacle] = []
+    planes: list[PlaneObstacle] = []
 
     def scene(self) -> library.Scene:
         """In the units of the library."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from er3a.errors import InputError
-from er3a.files.csv_file import Column, read_csv, read_header
+from er3a.files.csv_file import CsvColumn, read_csv, read_header
 
 POSITION = ("x_mm", "y_mm", "z_mm")
 FORMS: dict[str, tuple[str, ...]] = {
@@ -40,11 +40,11 @@ def read_target_table(path: str | Path) -> list[dict[str, Any]]:
         )
         raise InputError(path, "header", _without_one_form(header, forms), f"Give the columns {known}")
     form = forms[0]
-    columns = {"name": Column(str)} | {name: Column() for name in (*POSITION, *FORMS[form])}
+    columns = {"name": CsvColumn(str)} | {name: CsvColumn() for name in (*POSITION, *FORMS[form])}
     if "note" in present:
-        columns["note"] = Column(str, optional=True)
+        columns["note"] = CsvColumn(str, optional=True)
     if present & set(REFERENCE):
-        columns |= {name: Column() for name in REFERENCE}
+        columns |= {name: CsvColumn() for name in REFERENCE}
     return [_target(row, form) for row in read_csv(path, columns)]
 
 

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import ErrorDetails
 
 from er3a.errors import InputError
 from er3a.formats.text_file import read_text
@@ -155,7 +156,7 @@ def _dotted(loc: tuple[int | str, ...]) -> str:
     return text
 
 
-def _explain(fault: dict[str, Any], model: type[BaseModel]) -> tuple[str, str]:
+def _explain(fault: ErrorDetails, model: type[BaseModel]) -> tuple[str, str]:
     kind, key = fault["type"], fault["loc"][-1] if fault["loc"] else ""
     if kind == "extra_forbidden":
         if any(word in str(key) for word in ("coupl", "parallelogram", "mimic")):

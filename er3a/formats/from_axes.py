@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.numerics.arrays import Reals
+
 JOINTS = 6
 PARALLEL = 1e-12
 SAME_POINT_M = 1e-12
@@ -27,16 +29,16 @@ class AxisTable:
     base : (4, 4), base frame to frame 0; tool : (4, 4), frame 6 to flange
     """
 
-    a: np.ndarray
-    alpha: np.ndarray
-    d: np.ndarray
-    direction: np.ndarray
-    offset: np.ndarray
-    base: np.ndarray
-    tool: np.ndarray
+    a: Reals
+    alpha: Reals
+    d: Reals
+    direction: Reals
+    offset: Reals
+    base: Reals
+    tool: Reals
 
 
-def table_from_axes(directions: np.ndarray, points: np.ndarray, T_base_flange: np.ndarray) -> AxisTable:
+def table_from_axes(directions: Reals, points: Reals, T_base_flange: Reals) -> AxisTable:
     """Derive the table from the axes in the zero pose.
 
     Parameters
@@ -68,7 +70,7 @@ def table_from_axes(directions: np.ndarray, points: np.ndarray, T_base_flange: n
     )
 
 
-def _feet(directions: np.ndarray, points: np.ndarray, flange: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _feet(directions: Reals, points: Reals, flange: Reals) -> tuple[Reals, Reals]:
     """Feet of the common normals on each axis: from the axis before (6, 3), and to the axis behind (6, 3)."""
     incoming, outgoing = np.empty((JOINTS, 3)), np.empty((JOINTS, 3))
     incoming[0] = _foot(np.zeros(3), directions[0], points[0])
@@ -85,12 +87,13 @@ def _feet(directions: np.ndarray, points: np.ndarray, flange: np.ndarray) -> tup
     return incoming, outgoing
 
 
-def _foot(point: np.ndarray, axis: np.ndarray, on_axis: np.ndarray) -> np.ndarray:
+def _foot(point: Reals, axis: Reals, on_axis: Reals) -> Reals:
     """Point of the line nearest to ``point``."""
-    return on_axis + axis * (axis @ (point - on_axis))
+    foot: Reals = on_axis + axis * (axis @ (point - on_axis))
+    return foot
 
 
-def _senses(directions: np.ndarray, incoming: np.ndarray, outgoing: np.ndarray) -> np.ndarray:
+def _senses(directions: Reals, incoming: Reals, outgoing: Reals) -> Reals:
     """The z axes (6, 3): each axis with its sense chosen."""
     z = directions.copy()
     for i in range(JOINTS):
@@ -105,30 +108,30 @@ def _senses(directions: np.ndarray, incoming: np.ndarray, outgoing: np.ndarray) 
     return z
 
 
-def _next_x(x: np.ndarray, z_before: np.ndarray, z: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+def _next_x(x: Reals, z_before: Reals, z: Reals, start: Reals, end: Reals) -> Reals:
     """x axis along the common normal; where the axes meet, across both and turned least from the x before."""
     across = np.cross(z_before, z)
     if np.linalg.norm(across) < PARALLEL:
         gap = end - start
         return _across(gap if np.linalg.norm(gap) > SAME_POINT_M else x, z, x)
-    normal = across / np.linalg.norm(across)
+    normal: Reals = across / np.linalg.norm(across)
     gap = normal @ (end - start)
     turned = normal @ x
     sense = gap if abs(gap) > SAME_POINT_M else turned
     return -normal if sense < 0 else normal
 
 
-def _across(wanted: np.ndarray, z: np.ndarray, fallback: np.ndarray) -> np.ndarray:
+def _across(wanted: Reals, z: Reals, fallback: Reals) -> Reals:
     """Unit vector across z, nearest to ``wanted`` (to ``fallback`` if that lies along z)."""
     for vector in (wanted, fallback, np.array([0.0, 0.0, 1.0])):
-        across = vector - z * (z @ vector)
+        across: Reals = vector - z * (z @ vector)
         length = np.linalg.norm(across)
         if length > 1e-6:
             return across / length
     raise ValueError("no direction across z")
 
 
-def _frame(x: np.ndarray, z: np.ndarray, origin: np.ndarray) -> np.ndarray:
+def _frame(x: Reals, z: Reals, origin: Reals) -> Reals:
     T = np.eye(4)
     T[:3, 0], T[:3, 1], T[:3, 2], T[:3, 3] = x, np.cross(z, x), z, origin
     return T

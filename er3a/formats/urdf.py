@@ -205,13 +205,14 @@ def _joint_elements(path: Path) -> list[ElementTree.Element]:
 
 def _moves(element: ElementTree.Element, by_parent: dict[str, list[ElementTree.Element]]) -> bool:
     """Whether this joint or one behind it moves."""
-    todo, seen = [element], set()
+    todo, seen = [element], set[str]()
     while todo:
         current = todo.pop()
         if current.get("type") != "fixed":
             return True
-        child = current.find("child").get("link") if current.find("child") is not None else None
-        if child not in seen:
+        named = current.find("child")
+        child = named.get("link") if named is not None else None
+        if child is not None and child not in seen:
             seen.add(child)
             todo += by_parent.get(child, [])
     return False

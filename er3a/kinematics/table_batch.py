@@ -36,7 +36,7 @@ class Tables:
     def __len__(self) -> int:
         return len(self.modified)
 
-    def __getitem__(self, rows: slice | Integers | Flags) -> Tables:
+    def __getitem__(self, rows: slice | list[int] | Integers | Flags) -> Tables:
         return Tables(*(getattr(self, field.name)[rows] for field in fields(self)))
 
     def with_column(self, name: str, joints: slice | list[int] | Integers, values: Reals) -> Tables:

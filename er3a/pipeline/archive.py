@@ -61,7 +61,10 @@ def archive(study_file: Path, results: Path, reports: Path, output: Path) -> int
     files |= {Path(name): _ROOT / name for name in KEPT if (_ROOT / name).is_file()}
     crate = _crate(study.robots)
     for place, file in sorted(files.items()):
-        properties = {"name": place.as_posix(), "encodingFormat": _MEDIA_TYPES.get(file.suffix, "text/plain")}
+        properties: dict[str, object] = {
+            "name": place.as_posix(),
+            "encodingFormat": _MEDIA_TYPES.get(file.suffix, "text/plain"),
+        }
         if place == Path(WORKFLOW):
             properties |= {"@type": ["File", "SoftwareSourceCode"], "version": version("er3a")}
         crate.add_file(str(file), place.as_posix(), properties=properties)

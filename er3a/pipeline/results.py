@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from pathlib import Path
@@ -95,7 +95,7 @@ class Input:
 
     path: str
     sha256: str
-    grades: dict[str, list[str] | int]
+    grades: Mapping[str, list[str] | int]
 
 
 @dataclass(frozen=True)
@@ -307,8 +307,8 @@ def _parsed(path: Path, stored: dict[str, Any], kind: type[Results[Any]]) -> tup
     try:
         if isinstance(verdict, dict):
             own["verdict"] = {"status": verdict["status"], "finding": verdict["params"] | {"code": verdict["code"]}}
-        summary = _adapter(summary_type(kind)).validate_python(own)
-        return summary, _adapter(Provenance).validate_python(stored.get("provenance"))
+        of_stage: Any = summary_type(kind)
+        return _adapter(of_stage).validate_python(own), _adapter(Provenance).validate_python(stored.get("provenance"))
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))

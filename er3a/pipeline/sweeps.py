@@ -126,10 +126,10 @@ class Variant:
     def replaced(self, content: RobotFile, tool: Placement | None) -> float | None:
         """The value that the base robot itself has, given its file and its tool; None if it has none."""
         entry = self.entry
-        if entry.joint is None:
+        if isinstance(entry.column, int):
             return getattr(tool or Placement(), entry.group)[entry.column]
         group = getattr(content, entry.group)
-        return getattr(group.rows[entry.joint - 1], entry.column) if group else None
+        return getattr(group.rows[entry.joint - 1], entry.column) if group and entry.joint else None
 
     def _refusal(self, problem: str, remedy: str) -> InputError:
         return InputError(None, f"sweeps.{self.sweep}", f"{self.vary} = {self.value:.9g}: {problem}", remedy)
@@ -172,7 +172,9 @@ class Sweep(StrictModel):
     @property
     def resolved(self) -> list[float]:
         """The values, in the order in which they are written."""
-        return self.values or np.linspace(self.first, self.to, self.steps).round(DECIMALS).tolist()
+        if self.first is None or self.to is None or self.steps is None:
+            return self.values or []
+        return np.linspace(self.first, self.to, self.steps).round(DECIMALS).tolist()
 
     def variants(self, name: str) -> Iterator[Variant]:
         """The variants of the sweep of this name."""

@@ -32,9 +32,6 @@ from pydantic import TypeAdapter
 
 from er3a.findings import Finding
 
-Reals = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 Texts = NDArray[np.object_]
 Findings = NDArray[np.object_]
 

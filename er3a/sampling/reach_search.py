@@ -17,7 +17,7 @@ _STARTS = 8
 
 
 @dataclass(frozen=True)
-class Reach:
+class ReachExtremes:
     """Extreme distances of the tool point from axis 1 and heights along it, above its foot; m, to the nanometre."""
 
     furthest_from_axis: float
@@ -26,7 +26,7 @@ class Reach:
     lowest: float
 
 
-def search_reach(robot: Robot, grid: Grid, q: Reals) -> Reach:
+def search_reach(robot: Robot, grid: Grid, q: Reals) -> ReachExtremes:
     """Extremes of the tool point.
 
     Parameters
@@ -42,7 +42,7 @@ def search_reach(robot: Robot, grid: Grid, q: Reals) -> Reach:
         -_best(robot, grid, q, -height, (0.0, -1.0)),
         _best(robot, grid, q, height, (0.0, 1.0)),
     )
-    return Reach(*(round(float(value), NANOMETRES) for value in found))
+    return ReachExtremes(*(round(float(value), NANOMETRES) for value in found))
 
 
 def _best(robot: Robot, grid: Grid, q: Reals, values: Reals, factors: tuple[float, float]) -> float:

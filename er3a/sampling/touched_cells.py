@@ -17,7 +17,7 @@ SECTION_VOID_CELLS = 16
 
 
 @dataclass(frozen=True, eq=False)
-class SectionCells:
+class TouchedSection:
     """Cells of the side section that were touched, or are cut off by touched ones (the axis counts as a wall).
 
     Attributes
@@ -46,7 +46,7 @@ class Growth:
     volume: Reals
 
 
-def section_cells(tally: Tally, grid: Grid) -> SectionCells:
+def section_cells(tally: Tally, grid: Grid) -> TouchedSection:
     """The side section, all azimuths folded in."""
     padded = np.pad(tally.section == 0, ((0, 1), (1, 1)), constant_values=True)
     labels, _ = ndimage.label(padded)
@@ -56,7 +56,7 @@ def section_cells(tally: Tally, grid: Grid) -> SectionCells:
     void = is_void[labels][:-1, 1:-1]
     shown = (tally.section > 0) | void
     rho, z = (grid.section_origin + (np.argwhere(shown) + 0.5) * grid.section_cell).T
-    return SectionCells(rho, z, tally.section[shown], void[shown])
+    return TouchedSection(rho, z, tally.section[shown], void[shown])
 
 
 def touched_growth(draw: Draw, tally: Tally, grid: Grid) -> list[Growth]:

@@ -50,7 +50,7 @@ class BestByRules:
 
 
 @dataclass(frozen=True, eq=False)
-class Ranking:
+class SolutionRanking:
     """Solutions of one pose in the order of a rule or of a mix of rules.
 
     Attributes
@@ -80,7 +80,7 @@ def select(
     rule: str | Mapping[str, float],
     q_ref: Reals,
     scene: Scene | None = None,
-) -> Ranking:
+) -> SolutionRanking:
     """Rank the solutions of one pose.
 
     Parameters
@@ -112,7 +112,7 @@ def select(
         chosen_reason = BestByRules(measures[order[0]], measures[order[1]] if len(order) > 1 else ())
     else:
         chosen_reason = why_none(robot, solutions, refused)
-    return Ranking(order, measured, cost, reason, chosen_reason)
+    return SolutionRanking(order, measured, cost, reason, chosen_reason)
 
 
 def refusals(robot: Robot, solutions: Solutions, scene: Scene | None) -> tuple[Refusal | None, ...]:

@@ -52,7 +52,7 @@ class Chosen:
 
 
 @dataclass(frozen=True, eq=False)
-class Placement:
+class BoxPlacement:
     """Where a box can stand: the lattice, the places on it, and the best of them."""
 
     field: Field
@@ -67,7 +67,7 @@ class Placement:
         return self.places.rows(np.sort(first))
 
 
-def find_places(robot: Robot, task: Task, roll: Roll, coarsest: float, count: int, most_poses: int) -> Placement:
+def find_places(robot: Robot, task: Task, roll: Roll, coarsest: float, count: int, most_poses: int) -> BoxPlacement:
     """Survey where the box can stand and put the best places to the proof.
 
     Parameters
@@ -85,7 +85,7 @@ def find_places(robot: Robot, task: Task, roll: Roll, coarsest: float, count: in
     chosen = choose_places(robot, task, places, roll, count, most_poses)
     proven = places.proven.copy()
     proven[[row for row, is_proven in zip(chosen.row, chosen.proven) if is_proven]] = True
-    return Placement(field, replace(places, proven=proven), chosen)
+    return BoxPlacement(field, replace(places, proven=proven), chosen)
 
 
 def choose_places(robot: Robot, task: Task, places: Places, roll: Roll, count: int, most_poses: int) -> Chosen:

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from er3a.errors import Er3aError
 from er3a.pipeline.cli import app
-from er3a.pipeline.estimate.cost import Calibration, cost, disk_bytes, estimates_of
+from er3a.pipeline.estimate.cost import MachineCalibration, cost, disk_bytes, estimates_of
 from er3a.pipeline.estimate.jobs import Job, jobs_of, wall_time
 from er3a.pipeline.estimate.speed import SamplingSpeed
 from er3a.pipeline.estimate.terminal import duration, size
@@ -45,7 +45,7 @@ def calibration(study):
     timings = dict.fromkeys(kinds, Timing(1.0, 100.0)) | {("sample", "workspace"): Timing(2.0, 50.0)}
     trial = Trial(timings, part_bytes=1000, gather_s=0.0, result_bytes=5000)
     speeds = dict.fromkeys(ROBOTS, SamplingSpeed(MILLION, 0.9 * MILLION, 1.1 * MILLION))
-    return Calibration(speeds, {}, trial, {"er3a_c60": 5000}, Timing(3.0, 250.0), HANDLING)
+    return MachineCalibration(speeds, {}, trial, {"er3a_c60": 5000}, Timing(3.0, 250.0), HANDLING)
 
 
 def test_jobs_on_one_core_take_the_sum_and_on_many_the_longest_chain():
@@ -55,14 +55,14 @@ def test_jobs_on_one_core_take_the_sum_and_on_many_the_longest_chain():
         Job("c", "", "", needs=(0,)),
         Job("d", "", "", needs=(1, 2)),
     ]
-    seconds = {"a": 1.0, "b": 2.0, "c": 4.0, "d": 8.0}
-    assert wall_time(jobs, lambda job: seconds[job.verb], 1) == 15
-    assert wall_time(jobs, lambda job: seconds[job.verb], 2) == 13
-    assert wall_time(jobs, lambda job: seconds[job.verb], 64) == 13
+    seconds = [1.0, 2.0, 4.0, 8.0]
+    assert wall_time(jobs, seconds, 1) == 15
+    assert wall_time(jobs, seconds, 2) == 13
+    assert wall_time(jobs, seconds, 64) == 13
 
 
 def test_three_equal_jobs_take_two_rounds_on_two_cores():
-    assert wall_time([Job("a", "", str(n)) for n in range(3)], lambda job: 5.0, 2) == 10
+    assert wall_time([Job("a", "", str(n)) for n in range(3)], [5.0] * 3, 2) == 10
 
 
 def test_samples_are_shared_out_over_parts_without_loss(study):

@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 
 from er3a.errors import InputError
-from er3a.files.csv_file import Column, read_csv
+from er3a.files.csv_file import CsvColumn, read_csv
 
 COLUMNS = {
-    "name": Column(str),
-    "grade": Column(str, choices=("official", "cad")),
-    "count": Column(int),
-    "x_mm": Column(),
-    "angle_deg": Column(optional=True),
+    "name": CsvColumn(str),
+    "grade": CsvColumn(str, choices=("official", "cad")),
+    "count": CsvColumn(int),
+    "x_mm": CsvColumn(),
+    "angle_deg": CsvColumn(optional=True),
 }
 HEADER = "name,grade,count,x_mm,angle_deg\n"
 GOOD = "reach,official,1,592.8,90\n"

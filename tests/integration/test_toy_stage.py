@@ -25,7 +25,8 @@ STAGE = Stage(name="toy", title="toy", question="How long?", settings={"toy": To
 from dataclasses import dataclass
 from typing import Literal
 from er3a.pipeline.results import Results, Summary, Verdict
-from er3a.pipeline.tables import Reals, Table, column
+from er3a.numerics.arrays import Reals
+from er3a.pipeline.tables import Table, column
 
 @dataclass(frozen=True)
 class Long:

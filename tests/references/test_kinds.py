@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 import pytest
 
-from er3a.files.csv_file import Column, Written
+from er3a.files.csv_file import CsvColumn, Written
 from er3a.files.reference_rows import FORMATS, Format
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
@@ -51,7 +51,7 @@ class HeightRow(Row):
 
 @pytest.fixture
 def with_heights(monkeypatch):
-    columns = {"height_mm": Column(Written), "uncertainty_mm": Column(Written, optional=True)}
+    columns = {"height_mm": CsvColumn(Written), "uncertainty_mm": CsvColumn(Written, optional=True)}
     monkeypatch.setitem(GROUPS, "heights", Group("heights", telling=8))
     monkeypatch.setitem(KINDS, "heights", HeightRow)
     monkeypatch.setitem(FORMATS, "heights", Format(columns, digits=("height_mm",)))

@@ -29,7 +29,11 @@ from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation.checks import checks_of_set
 from er3a.pipeline.stages.validation.compute import compute
-from er3a.pipeline.stages.validation.findings import (
+from er3a.pipeline.stages.validation.model import RESULTS, ValidationResults, ValidationSummary
+from er3a.pipeline.stages.validation.record import record
+from er3a.pipeline.stages.validation.report import report
+from er3a.pipeline.stages.validation.self_checks import table_checks
+from er3a.pipeline.stages.validation.validation_findings import (
     AnotherArm,
     Contradicted,
     NothingToCompare,
@@ -37,10 +41,6 @@ from er3a.pipeline.stages.validation.findings import (
     SelfCheck,
     WholeGroup,
 )
-from er3a.pipeline.stages.validation.model import RESULTS, ValidationResults, ValidationSummary
-from er3a.pipeline.stages.validation.record import record
-from er3a.pipeline.stages.validation.report import report
-from er3a.pipeline.stages.validation.self_checks import table_checks
 from er3a.pipeline.stages.validation.verdict import verdict_of
 from er3a.pipeline.study import RobotEntry, Study, load_study
 from er3a.references.circle_points import circle_points, fit_circle

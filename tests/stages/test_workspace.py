@@ -21,9 +21,9 @@ from er3a.pipeline.results import read_stage, write_results
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.workspace.compute import compute
-from er3a.pipeline.stages.workspace.findings import VoidUnexpected
 from er3a.pipeline.stages.workspace.model import WorkspaceResults
 from er3a.pipeline.stages.workspace.sample import sample
+from er3a.pipeline.stages.workspace.workspace_findings import VoidUnexpected
 from er3a.pipeline.study import load_study
 from tests.stages.workspace_arms import locked_file, make_study, skew_file, tally_of
 

@@ -13,10 +13,10 @@ from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.files.yaml_file import load
 from er3a.kinematics.wrist_partitioned import NoWristCentre
-from er3a.pipeline.stages.workspace.capability import ToolCapability, tool_capability
 from er3a.pipeline.stages.workspace.capability_texts import capability_context
 from er3a.pipeline.stages.workspace.cell_lookup import CellLookup
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings
+from er3a.pipeline.stages.workspace.tool_capability import ToolCapability, tool_capability
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import Picture
 from er3a.robots.robot import Robot

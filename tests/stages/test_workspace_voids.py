@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.workspace import say
-from er3a.pipeline.stages.workspace.verdict import judge
+from er3a.pipeline.stages.workspace.void_verdict import judge
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import make_grid
 from er3a.sampling.random_joints import Draw

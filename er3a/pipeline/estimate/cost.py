@@ -24,7 +24,7 @@ rule idle:
 
 
 @dataclass(frozen=True)
-class Calibration:
+class MachineCalibration:
     """What was measured on this machine.
 
     Attributes
@@ -55,7 +55,7 @@ class Cost:
     memory_mb: float
 
 
-def measured_here(study: Study, results: Path, reports: Path, logs: Path) -> Calibration:
+def measured_here(study: Study, results: Path, reports: Path, logs: Path) -> MachineCalibration:
     """Measure what :func:`cost` needs: seconds, or as long as one robot's stages take if no run has timed them."""
     jobs = jobs_of(study)
     timings = logged(study, jobs, results, logs)
@@ -64,18 +64,18 @@ def measured_here(study: Study, results: Path, reports: Path, logs: Path) -> Cal
     tried = trial(study, first, whole)
     done = [name for name in study.robots if ("report", "workspace", name) in timings]
     sizes = {name: written_bytes([results / name, reports / name]) for name in done}
-    return Calibration(
+    return MachineCalibration(
         speeds={robot: sampling_speed(study, robot) for robot in study.robots},
         timings=timings,
         trial=tried,
         result_bytes={first: tried.result_bytes} if whole else sizes,
-        workflow=_workflow(study.file),
+        workflow=_workflow(study),
         handling_s=_handling(),
     )
 
 
-def _workflow(study_file: Path) -> Timing:
-    return timed(["snakemake", "--configfile", str(study_file), "--dry-run", "--forceall", "--quiet", "all"])
+def _workflow(study: Study) -> Timing:
+    return timed(["snakemake", "--configfile", str(study.file), "--dry-run", "--forceall", "--quiet", "all"])
 
 
 def _handling() -> float:
@@ -87,19 +87,19 @@ def _handling() -> float:
         return (timed([*words, "--cores", "1", "--scheduler", "greedy"]).seconds - planned) / IDLE_JOBS
 
 
-def cost(study: Study, calibration: Calibration, cores: int) -> Cost:
+def cost(study: Study, calibration: MachineCalibration, cores: int) -> Cost:
     """Wall time and memory of a study on some cores like this machine's."""
     jobs, estimates = jobs_of(study), estimates_of(study, calibration)
     least, expected, greatest = (
         calibration.workflow.seconds
-        + wall_time(jobs, lambda job, end=end: estimates[job].seconds[end] + calibration.handling_s, cores)
+        + wall_time(jobs, [estimates[job].seconds[end] + calibration.handling_s for job in jobs], cores)
         for end in range(3)
     )
     largest = sorted((estimates[job].memory_mb for job in jobs), reverse=True)[:cores]
     return Cost(cores, least, expected, greatest, calibration.workflow.memory_mb + sum(largest))
 
 
-def disk_bytes(study: Study, calibration: Calibration) -> tuple[int, int]:
+def disk_bytes(study: Study, calibration: MachineCalibration) -> tuple[int, int]:
     """Size of the study's results and views, and of sampled parts, which go once they are gathered."""
     sizes = calibration.result_bytes
     whole = sum(sizes.get(_written(name, study), mean(sizes.values())) for name in study.names)
@@ -114,14 +114,14 @@ class JobEstimate:
     memory_mb: float
 
 
-def estimates_of(study: Study, calibration: Calibration) -> dict[Job, JobEstimate]:
+def estimates_of(study: Study, calibration: MachineCalibration) -> dict[Job, JobEstimate]:
     """What each job of a study takes."""
     speeds = calibration.speeds.values()
     wander = max((speed.greatest - speed.least) / (2 * speed.mean) for speed in speeds)
     return {job: _estimate(job, study, calibration, wander) for job in jobs_of(study)}
 
 
-def _estimate(job: Job, study: Study, calibration: Calibration, wander: float) -> JobEstimate:
+def _estimate(job: Job, study: Study, calibration: MachineCalibration, wander: float) -> JobEstimate:
     """A job's own timing or its base's, else what others of its kind took; uncertain by what repeated timings differ
     and, if it is taken from others, by what those differ."""
     written = _written(job.robot, study)

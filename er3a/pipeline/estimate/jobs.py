@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from er3a.pipeline.stages.registry import STAGES
@@ -65,8 +65,8 @@ def jobs_of(study: Study) -> list[Job]:
     return jobs
 
 
-def wall_time(jobs: Sequence[Job], seconds: Callable[[Job], float], cores: int) -> float:
-    """Time (s) until the last job is done if each core takes the next job whose needs are met."""
+def wall_time(jobs: Sequence[Job], seconds: Sequence[float], cores: int) -> float:
+    """Time (s) until the last job is done, each taking its seconds, if each core takes the next whose needs are met."""
     waiting = [len(job.needs) for job in jobs]
     freed: list[list[int]] = [[] for _ in jobs]
     for number, job in enumerate(jobs):
@@ -79,7 +79,7 @@ def wall_time(jobs: Sequence[Job], seconds: Callable[[Job], float], cores: int) 
     while ready or running:
         while ready and len(running) < cores:
             number = heapq.heappop(ready)
-            heapq.heappush(running, (now + seconds(jobs[number]), number))
+            heapq.heappush(running, (now + seconds[number], number))
         now, done = heapq.heappop(running)
         for number in freed[done]:
             waiting[number] -= 1

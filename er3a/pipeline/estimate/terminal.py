@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections import Counter
+from collections import Counter, defaultdict
 
 from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from er3a.pipeline.estimate.cost import Calibration, cost, disk_bytes, estimates_of
+from er3a.pipeline.estimate.cost import MachineCalibration, cost, disk_bytes, estimates_of
 from er3a.pipeline.estimate.jobs import jobs_of
 from er3a.pipeline.stages.workspace.entry import WorkspaceSettings
 from er3a.pipeline.study import Study
 
 
-def print_estimate(study: Study, calibration: Calibration, cores: list[int]) -> None:
+def print_estimate(study: Study, calibration: MachineCalibration, cores: list[int]) -> None:
     """Print speeds, processor time by kind of job, wall time and memory by number of cores, and disk space."""
     console = Console()
     here = os.cpu_count() or 1
@@ -32,8 +32,9 @@ def print_estimate(study: Study, calibration: Calibration, cores: list[int]) -> 
     kinds = Table("what", "timed", box=box.SIMPLE)
     for column in ("jobs", "core time"):
         kinds.add_column(column, justify="right")
-    estimates, seen = estimates_of(study, calibration), Counter()
-    seconds: Counter[tuple[str, str]] = Counter()
+    estimates = estimates_of(study, calibration)
+    seen: Counter[tuple[str, str]] = Counter()
+    seconds: defaultdict[tuple[str, str], float] = defaultdict(float)
     for job in jobs_of(study):
         seen[job.key[:2]] += 1
         seconds[job.key[:2]] += estimates[job].seconds[1]

@@ -94,14 +94,14 @@ def trial(study: Study, robot: str, whole: bool) -> Trial:
         file, part = folder / "study.yaml", folder / "1-of-1.npz"
         file.write_text(yaml.safe_dump(content), encoding="utf-8")
         timings: dict[tuple[str, str], Timing] = {}
-        places = {
+        places: dict[str, list[str | Path]] = {
             "sample": ["--study", file, "--part", "1-of-1", "--output", part],
             "compute": ["--study", file, "--results", folder / "results"],
             "preview": ["--reports", folder / "reports"],
             "teach": ["--study", file, "--reports", folder / "reports"],
         }
 
-        def carry_out(verb: str, stage: str, *words: str) -> None:
+        def carry_out(verb: str, stage: str, *words: str | Path) -> None:
             options = places.get(verb, [*places["compute"], *places["preview"]])
             timings[verb, stage] = timed([str(word) for word in ("er3a", verb, *words, *options)])
 
@@ -137,8 +137,9 @@ def timed(command: list[str]) -> Timing:
     process = subprocess.Popen(
         [sys.executable, "-m", *command], env=environment, stdout=quiet, stderr=subprocess.PIPE, text=True
     )
-    with process.stderr:
-        said = process.stderr.read()
+    assert process.stderr is not None  # it is a pipe
+    with process.stderr as told:
+        said = told.read()
     _, status, usage = os.wait4(process.pid, 0)
     seconds = time.perf_counter() - start
     process.returncode = os.waitstatus_to_exitcode(status)

@@ -16,7 +16,7 @@ Message = tuple[int, str, Any, list[str]]
 
 def extract(fileobj: Any, keywords: Any, comment_tags: Any, options: Any) -> Iterator[Message]:
     """Babel's extraction method for this package: ``tr`` and ``N_``, and ``sentence`` and ``counted`` with contexts."""
-    yield from extract_python(fileobj, ("tr", "N_"), comment_tags, options)
+    yield from extract_python(fileobj, {"tr": None, "N_": None}, comment_tags, options)  # type: ignore[misc]
     fileobj.seek(0)
     yield from _of_findings(ast.parse(fileobj.read()), Path(fileobj.name))
 

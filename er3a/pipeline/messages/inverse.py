@@ -5,7 +5,7 @@ from __future__ import annotations
 from er3a.pipeline.messages.inverse_verdict import say
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.say import joined, sentence
-from er3a.pipeline.stages.inverse.findings import (
+from er3a.pipeline.stages.inverse.inverse_findings import (
     AtSingularity,
     MoveObstacle,
     NearLimit,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from er3a.pipeline.messages.say import counted, joined, listed, say, sentence
-from er3a.pipeline.stages.inverse.findings import (
+from er3a.pipeline.stages.inverse.inverse_findings import (
     AllSolved,
     BranchesCollide,
     BranchesLeaveLimits,

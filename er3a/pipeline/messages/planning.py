@@ -5,7 +5,7 @@ from __future__ import annotations
 import er3a.pipeline.messages.kinematics  # noqa: F401
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.say import joined, listed, say, sentence
-from er3a.planning.avoidance import StrategyName, findings
+from er3a.planning.avoidance import StrategyName, avoidance_findings
 from er3a.planning.intervals import AboveLimit, BelowLimit, PathOutOfReach, TooFast
 from er3a.planning.timing import MustStandStill, NoTimeLawFound, ToppraMissing
 
@@ -74,42 +74,42 @@ def _(found: ToppraMissing) -> str:
 
 
 @say.register
-def _(found: findings.NothingToAvoid) -> str:
+def _(found: avoidance_findings.NothingToAvoid) -> str:
     return sentence(found.code, "there is nothing to avoid")
 
 
 @say.register
-def _(found: findings.NoSingularRegion) -> str:
+def _(found: avoidance_findings.NoSingularRegion) -> str:
     return sentence(found.code, "there is no singular region on this path")
 
 
 @say.register
-def _(found: findings.BeginsOutOfReach) -> str:
+def _(found: avoidance_findings.BeginsOutOfReach) -> str:
     return sentence(found.code, "the path begins out of reach")
 
 
 @say.register
-def _(found: findings.EndsOutOfReach) -> str:
+def _(found: avoidance_findings.EndsOutOfReach) -> str:
     return sentence(found.code, "the path ends out of reach")
 
 
 @say.register
-def _(found: findings.PartlyOutOfReach) -> str:
+def _(found: avoidance_findings.PartlyOutOfReach) -> str:
     return sentence(found.code, "a part of the path is out of reach")
 
 
 @say.register
-def _(found: findings.BeginsInRegion) -> str:
+def _(found: avoidance_findings.BeginsInRegion) -> str:
     return sentence(found.code, "the path begins inside the region")
 
 
 @say.register
-def _(found: findings.EndsInRegion) -> str:
+def _(found: avoidance_findings.EndsInRegion) -> str:
     return sentence(found.code, "the path ends inside the region")
 
 
 @say.register
-def _(found: findings.BranchEnds) -> str:
+def _(found: avoidance_findings.BranchEnds) -> str:
     return sentence(
         found.code,
         "at t = {t:.4g} s the branch ends: J{joint} would have to jump",
@@ -119,12 +119,12 @@ def _(found: findings.BranchEnds) -> str:
 
 
 @say.register
-def _(found: findings.NoOtherBranch) -> str:
+def _(found: avoidance_findings.NoOtherBranch) -> str:
     return sentence(found.code, "the other branches are singular, beyond a limit or out of reach there too")
 
 
 @say.register
-def _(found: findings.NoShiftKeepsDistance) -> str:
+def _(found: avoidance_findings.NoShiftKeepsDistance) -> str:
     return sentence(
         found.code,
         "no shift of the tool point up to {far:.0f} mm keeps the distance",
@@ -133,27 +133,27 @@ def _(found: findings.NoShiftKeepsDistance) -> str:
 
 
 @say.register
-def _(found: findings.NoTiltKeepsDistance) -> str:
+def _(found: avoidance_findings.NoTiltKeepsDistance) -> str:
     return sentence(found.code, "no tilt of the tool up to {far:.0f} deg keeps the distance", far=found.up_to_deg)
 
 
 @say.register
-def _(found: findings.BentPathSingular) -> str:
+def _(found: avoidance_findings.BentPathSingular) -> str:
     return sentence(found.code, "the bent path runs into another singular region")
 
 
 @say.register
-def _(found: findings.NoDampingSuffices) -> str:
+def _(found: avoidance_findings.NoDampingSuffices) -> str:
     return sentence(found.code, "no damping keeps the joint speeds within their limits at this pace")
 
 
 @say.register
-def _(found: findings.PathNotFinished) -> str:
+def _(found: avoidance_findings.PathNotFinished) -> str:
     return sentence(found.code, "only {share:.0%} of the path is done", share=found.done)
 
 
 @say.register
-def _(found: findings.EndsOffPath) -> str:
+def _(found: avoidance_findings.EndsOffPath) -> str:
     return sentence(
         found.code,
         "it ends {mm:.3g} mm and {deg:.3g} deg from the path's end",
@@ -163,10 +163,10 @@ def _(found: findings.EndsOffPath) -> str:
 
 
 @say.register
-def _(found: findings.SpeedExceeded) -> str:
+def _(found: avoidance_findings.SpeedExceeded) -> str:
     return sentence(found.code, "a joint needs {share:.2f} times its greatest speed", share=found.ratio)
 
 
 @say.register
-def _(found: findings.AccelerationExceeded) -> str:
+def _(found: avoidance_findings.AccelerationExceeded) -> str:
     return sentence(found.code, "a joint needs {share:.2f} times its greatest acceleration", share=found.ratio)

@@ -8,7 +8,7 @@ import er3a.pipeline.messages.diagnosis  # noqa: F401
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.references import quoted
 from er3a.pipeline.messages.say import counted, joined, say, sentence, word
-from er3a.pipeline.stages.validation.findings import (
+from er3a.pipeline.stages.validation.validation_findings import (
     AnotherArm,
     Claims,
     Confirmed,

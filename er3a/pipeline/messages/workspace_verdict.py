@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from er3a.pipeline.messages.say import joined, say, sentence
 from er3a.pipeline.messages.workspace_proof import is_predicate
-from er3a.pipeline.stages.workspace.findings import (
+from er3a.pipeline.stages.workspace.workspace_findings import (
     Flat,
     NoVoid,
     Undersampled,

@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.messages import language
-from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.results import AbsentResults, Input, Provenance, input_records, read_stage, result_records
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
@@ -24,20 +23,21 @@ CONVENTIONS = {"standard": N_("standard"), "modified": N_("modified")}
 
 def write_compare(study: Study, results: Path, output: Path) -> None:
     """Render ``compare.html`` from the tables and summaries of all robots."""
-    entries = {}
-    for name in study.robots:
-        robot = study.robot(name)
-        values = parameters(robot) | key_figures(results / name)
-        entries[name] = {
-            "title": language.own_title(robot.title),
-            "values": values,
-            "border": border_mm(results / name),
-        }
-    rows = list(dict.fromkeys(key for entry in entries.values() for key in entry["values"]))
+    robots = {name: study.robot(name) for name in study.robots}
+    values = {name: parameters(robot) | key_figures(results / name) for name, robot in robots.items()}
+    borders = {name: border_mm(results / name) for name in robots}
+    rows = list(dict.fromkeys(key for own in values.values() for key in own))
     groups = list(dict.fromkeys(group for group, _, _ in rows))
     rows.sort(key=lambda row: groups.index(row[0]))
-    data = {name: entry | {"values": [entry["values"].get(row) for row in rows]} for name, entry in entries.items()}
-    corners = np.array([point for entry in entries.values() for line in entry["border"] for point in line] or [[0, 0]])
+    data = {
+        name: {
+            "title": own_title(robot.title),
+            "values": [values[name].get(row) for row in rows],
+            "border": borders[name],
+        }
+        for name, robot in robots.items()
+    }
+    corners = np.array([point for border in borders.values() for line in border for point in line] or [[0, 0]])
     page.render(
         Path(__file__).with_name("compare.html.j2"),
         output,

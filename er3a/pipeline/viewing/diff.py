@@ -91,7 +91,7 @@ def _records(folder: Path) -> tuple[Input, ...]:
 
 
 def _stages(folder: Path) -> set[tuple[str, str]]:
-    found = {path.parent.relative_to(folder).parts for path in folder.glob("*/*/summary.json")}
+    found = {(path.parent.parent.name, path.parent.name) for path in folder.glob("*/*/summary.json")}
     if not found:
         raise ResultError(folder, "holds no results (no ROBOT/STAGE/summary.json in it)")
     return found
@@ -99,17 +99,17 @@ def _stages(folder: Path) -> set[tuple[str, str]]:
 
 def _in_heads(robot: str, stage: str, old: Head, new: Head) -> list[Change]:
     found = []
-    statuses = [page.status_word(head.status) for head in (old, new)]
-    if statuses[0] != statuses[1]:
-        found.append(Change(robot, stage, tr("verdict"), *statuses, tr("turned"), new.text))
+    status, turned = page.status_word(old.status), page.status_word(new.status)
+    if status != turned:
+        found.append(Change(robot, stage, tr("verdict"), status, turned, tr("turned"), new.text))
     elif old.text != new.text:
         found.append(Change(robot, stage, tr("verdict's text"), old.text, new.text, tr("reworded")))
     before, after = ({figure.name: figure for figure in head.figures} for head in (old, new))
     for name in {**before, **after}:
         a, b = before.get(name), after.get(name)
-        if a != b:
-            label = (b or a).label
-            found.append(Change(robot, stage, label, _shown(a), _shown(b), *_moved(a, b)))
+        shown = b or a
+        if shown and a != b:
+            found.append(Change(robot, stage, shown.label, _shown(a), _shown(b), *_moved(a, b)))
     return found
 
 
@@ -141,7 +141,7 @@ def _in_tables(robot: str, stage: str, old: Path, new: Path) -> list[Change]:
     names = {path.name for folder in (old, new) for path in folder.iterdir() if path.is_file()}
     names -= {"summary.json", CHECKSUMS}
     for name in sorted(names):
-        sums = [sha256(folder / name)[:12] if (folder / name).is_file() else "–" for folder in (old, new)]
-        if sums[0] != sums[1]:
-            found.append(Change(robot, stage, name, *sums, tr("other bytes")))
+        before, after = (sha256(folder / name)[:12] if (folder / name).is_file() else "–" for folder in (old, new))
+        if before != after:
+            found.append(Change(robot, stage, name, before, after, tr("other bytes")))
     return found

@@ -5,15 +5,20 @@ from __future__ import annotations
 import base64
 import io
 from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.font_manager import fontManager
+from matplotlib.rcsetup import cycler
 from matplotlib.text import Text
 
 from er3a.pipeline.messages import language
 from er3a.pipeline.viewing.palette import GRID, INK, JOINTS, MUTED
+
+if TYPE_CHECKING:
+    from matplotlib.typing import RcKeyType
 
 FONTS = ["DejaVu Sans"]
 CHINESE_FONTS = (
@@ -26,11 +31,11 @@ CHINESE_FONTS = (
     "PingFang SC",
     "SimHei",
 )
-STYLE = {
+STYLE: dict[RcKeyType, Any] = {
     "axes.edgecolor": MUTED,
     "axes.grid": True,
     "axes.labelcolor": INK,
-    "axes.prop_cycle": matplotlib.cycler(color=JOINTS),
+    "axes.prop_cycle": cycler(color=JOINTS),
     "axes.spines.right": False,
     "axes.spines.top": False,
     "axes.titlelocation": "left",

@@ -44,13 +44,14 @@ def recording(output: Path, robot: str, stage: str, layout: rrb.View | rrb.Conta
     stream = rr.RecordingStream(f"{stage} {robot}", recording_id=robot, send_properties=False, batcher_config=never)
     with stream:
         # Rerun's own file writer waits for ever when the disk is full; bytes can be written like any other file.
-        collected = stream.binary_stream()
+        collected = stream.binary_stream()  # type: ignore[misc]
         # The viewer in a browser shows a blueprint only if it is active, not if it is merely the default.
         stream.send_blueprint(blueprint, make_active=True, make_default=True)
         stream.set_log_time_enabled(False)
         stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         yield stream
         content = collected.read(flush=True)
+    assert content is not None  # all of it was flushed
     write_atomically(output, lambda file: file.write_bytes(content))
 
 
@@ -89,5 +90,5 @@ def send_series(
     times, known = np.asarray(times, dtype=float), np.isfinite(values).all(axis=1)
     stream.send_columns(entity, [seconds(times[known])], rr.Scalars.columns(scalars=np.asarray(values)[known]))
     gap_starts = times[~known & np.append(True, known[:-1])]
-    cleared = rr.Clear.columns(is_recursive=np.zeros(len(gap_starts), dtype=bool))
+    cleared = rr.Clear.columns(is_recursive=np.zeros(len(gap_starts), dtype=bool))  # type: ignore[arg-type]
     stream.send_columns(entity, [seconds(gap_starts)], cleared)

@@ -130,7 +130,7 @@ def _draw_numbers(axes: Axes, points: list[Point]) -> None:
     pockets = [len(point.workspace.voids) - count for point, count in zip(points, numbers)]
     axes.plot(x, pockets, "o", color=MUTED, markerfacecolor="none", label=tr("open pockets"))
     axes.plot(x, numbers, ".", color=HIGHLIGHT, label=tr("enclosed"))
-    axes.yaxis.get_major_locator().set_params(integer=True)
+    axes.yaxis.get_major_locator().set_params(integer=True)  # type: ignore[call-arg]
     axes.set_ylim(bottom=-0.5, top=max([*pockets, *numbers, 1]) + 0.5)
     axes.set_ylabel(tr("voids"))
     axes.legend(loc="best")

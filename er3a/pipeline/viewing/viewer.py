@@ -59,7 +59,7 @@ def viewer_running(
             with suppress(ProcessLookupError):
                 os.killpg(viewer.pid, signal.SIGKILL)
             viewer.wait()
-            if messages:
+            if not isinstance(told, int):
                 told.close()
 
 

@@ -21,7 +21,7 @@ from er3a.kinematics.forward import rows_of, step_row, turn_row
 from er3a.kinematics.singularity import characteristic_length
 from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
-from er3a.planning.avoidance.findings import BeginsOutOfReach, NoDampingSuffices, NotPossible
+from er3a.planning.avoidance.avoidance_findings import BeginsOutOfReach, NoDampingSuffices, NotPossible
 from er3a.planning.avoidance.singular_segment import Avoidance, SingularSegment
 from er3a.planning.timing import Timed, joined
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.planning.avoidance.findings import BeginsOutOfReach, EndsOutOfReach, NoSingularRegion, NotPossible
+from er3a.planning.avoidance.avoidance_findings import BeginsOutOfReach, EndsOutOfReach, NoSingularRegion, NotPossible
 from er3a.planning.avoidance.singular_segment import Avoidance, SingularSegment
 from er3a.planning.timing import Timed, joined, straight
 

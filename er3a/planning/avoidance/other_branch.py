@@ -7,7 +7,7 @@ import numpy as np
 from er3a.errors import PoseError
 from er3a.kinematics.closed_form import SLOTS
 from er3a.numerics.arrays import Reals
-from er3a.planning.avoidance.findings import NoOtherBranch, NothingToAvoid, NotPossible
+from er3a.planning.avoidance.avoidance_findings import NoOtherBranch, NothingToAvoid, NotPossible
 from er3a.planning.avoidance.singular_segment import Avoidance, SingularSegment, coarse, singular_segment
 from er3a.planning.follow import follow
 from er3a.planning.followed import Followed

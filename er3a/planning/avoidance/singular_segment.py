@@ -10,7 +10,7 @@ import numpy as np
 
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.runs import runs
-from er3a.planning.avoidance.findings import NotPossible
+from er3a.planning.avoidance.avoidance_findings import NotPossible
 from er3a.planning.followed import Followed
 from er3a.planning.near_singular import NearSingular
 from er3a.planning.singular_events import SingularEvent

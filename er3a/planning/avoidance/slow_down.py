@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.planning.avoidance.findings import BranchEnds, NotPossible, PartlyOutOfReach
+from er3a.planning.avoidance.avoidance_findings import BranchEnds, NotPossible, PartlyOutOfReach
 from er3a.planning.avoidance.singular_segment import Avoidance, SingularSegment
 from er3a.planning.timing import joined
 

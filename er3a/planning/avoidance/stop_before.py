@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from er3a.planning.avoidance.findings import BeginsInRegion, NoSingularRegion, NotPossible
+from er3a.planning.avoidance.avoidance_findings import BeginsInRegion, NoSingularRegion, NotPossible
 from er3a.planning.avoidance.singular_segment import Avoidance, SingularSegment
 from er3a.planning.timing import joined
 

@@ -10,15 +10,15 @@ import numpy as np
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.planning.avoidance import StrategyName
-from er3a.planning.avoidance.damped_least_squares import damped
-from er3a.planning.avoidance.deviation import deviation
-from er3a.planning.avoidance.findings import (
+from er3a.planning.avoidance.avoidance_findings import (
     AccelerationExceeded,
     EndsOffPath,
     NotPossible,
     PathNotFinished,
     SpeedExceeded,
 )
+from er3a.planning.avoidance.damped_least_squares import damped
+from er3a.planning.avoidance.deviation import deviation
 from er3a.planning.avoidance.joint_detour import detour
 from er3a.planning.avoidance.other_branch import branch
 from er3a.planning.avoidance.singular_segment import Avoidance, SingularSegment, Strategy

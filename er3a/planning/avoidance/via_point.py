@@ -20,7 +20,7 @@ from er3a.kinematics.forward import frames
 from er3a.kinematics.singularity import TYPES, SingularityType, characteristic_length, determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Reals
-from er3a.planning.avoidance.findings import (
+from er3a.planning.avoidance.avoidance_findings import (
     BeginsInRegion,
     BentPathSingular,
     EndsInRegion,

@@ -12,7 +12,7 @@ from er3a.kinematics.round_trips import SAME_JOINTS_RAD, BatchRoundTrips, batch_
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.inverse.entry import InverseSettings
-from er3a.pipeline.stages.inverse.findings import (
+from er3a.pipeline.stages.inverse.inverse_findings import (
     AllSolved,
     NoneSolved,
     NotReproduced,

@@ -8,8 +8,9 @@ from typing import Literal
 import numpy as np
 
 from er3a.kinematics.solutions import Label, Method, Unsolved
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
-from er3a.pipeline.stages.inverse.findings import (
+from er3a.pipeline.stages.inverse.inverse_findings import (
     Advice,
     AllSolved,
     NoneSolved,
@@ -17,7 +18,7 @@ from er3a.pipeline.stages.inverse.findings import (
     Obstacle,
     SomeUnsolved,
 )
-from er3a.pipeline.tables import Findings, Flags, Integers, Reals, Table, Texts, column, findings, per_joint, vector
+from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
 from er3a.selection.nearest import Refusal, WhyFirst, WhyNone
 from er3a.selection.rules import RuleName
 
@@ -26,7 +27,7 @@ SINGULAR_PARTS = ("wrist", "elbow", "shoulder", "rank")
 
 
 @dataclass(frozen=True)
-class Neighbours:
+class NeighbourPoses:
     """Poses near a target without solution that have one; None where none was found (``kinematics.neighbours``)."""
 
     orientation_ratio: float
@@ -78,7 +79,7 @@ class TargetResult:
     unsolved: tuple[Unsolved, ...]
     method: Method
     families: tuple[SelfMotion, ...]
-    neighbours: Neighbours | None
+    neighbours: NeighbourPoses | None
     advice: tuple[Advice, ...]
 
 

@@ -36,7 +36,7 @@ NO_BREAK_SPACE = "\u00a0"
 
 
 @dataclass(frozen=True)
-class Section:
+class TargetSection:
     """What the page says about a target, in words; the worst residuals are None where nothing solves it."""
 
     target: TargetResult
@@ -83,10 +83,10 @@ def report(study: Study, stored: Stored[InverseResults], output: Path) -> None:
     )
 
 
-def _section(robot: Robot, target: TargetResult, results: InverseResults) -> Section:
+def _section(robot: Robot, target: TargetResult, results: InverseResults) -> TargetSection:
     rows = results.solutions.take(results.solutions.target == target.name)
     branches = best_of_branches(rows)
-    return Section(
+    return TargetSection(
         target=target,
         picture=overlay(robot, target, branches),
         position=_listed(target.xyz_mm),

@@ -20,7 +20,7 @@ from er3a.kinematics.solutions import ClosedForm, Solutions
 from er3a.kinematics.targets import Target
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.pipeline.stages.inverse.findings import (
+from er3a.pipeline.stages.inverse.inverse_findings import (
     Advice,
     AtSingularity,
     BranchesCollide,
@@ -36,7 +36,7 @@ from er3a.pipeline.stages.inverse.findings import (
     TurningDoesNotHelp,
     TurnTool,
 )
-from er3a.pipeline.stages.inverse.model import SINGULAR_PARTS, Neighbours, SelfMotion, SolutionRows, TargetResult
+from er3a.pipeline.stages.inverse.model import SINGULAR_PARTS, NeighbourPoses, SelfMotion, SolutionRows, TargetResult
 from er3a.robots.joint_limits import limit_margin
 from er3a.robots.robot import Robot
 from er3a.selection.nearest import AllCollide, Choice, Refusal, nearest
@@ -63,7 +63,7 @@ def solve_target(robot: Robot, target: Target, random: np.random.Generator, scen
     rows = _rows(robot, target, solutions, choice, refused)
     found, within = np.unique(rows.branch), np.unique(rows.branch[rows.within_limits])
     chosen = choice.chosen
-    near: Neighbours | None = None
+    near: NeighbourPoses | None = None
     obstacle: Obstacle | None = None
     advice: tuple[Advice, ...] = ()
     if chosen is not None:
@@ -184,9 +184,9 @@ def _obstacle(robot: Robot, target: Target, solutions: Solutions, branches: int)
     return ReachMissing(float(gap[least] * 1000))
 
 
-def _neighbours(robot: Robot, target: Target, random: np.random.Generator) -> Neighbours:
+def _neighbours(robot: Robot, target: Target, random: np.random.Generator) -> NeighbourPoses:
     near = neighbours(robot, target.T, random)
-    return Neighbours(
+    return NeighbourPoses(
         orientation_ratio=near.orientation_ratio,
         least_turn_deg=None if near.least_turn is None else float(np.degrees(near.least_turn)),
         least_shift_mm=None if near.least_shift is None else near.least_shift * 1000,
@@ -199,7 +199,7 @@ def _triple(vector: Reals) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _what_would_help(near: Neighbours) -> tuple[Advice, ...]:
+def _what_would_help(near: NeighbourPoses) -> tuple[Advice, ...]:
     turn: Advice = TurningDoesNotHelp()
     if near.least_turn_deg is not None:
         turn = TurnTool(near.orientation_ratio, near.least_turn_deg)

@@ -11,11 +11,11 @@ from er3a.collision.along import clearance_along
 from er3a.collision.pairs import PairOverlaps
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import characteristic_length, conditioning
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.trajectory.collisions import Surroundings, least_clearance
 from er3a.pipeline.stages.trajectory.judgement import Judgement
 from er3a.pipeline.stages.trajectory.model import FASTEST, AvoidanceRows, StrategyMotion, TriedStrategy
 from er3a.pipeline.stages.trajectory.motion import Motion
-from er3a.pipeline.tables import Reals
 from er3a.planning.avoidance import StrategyName
 from er3a.planning.avoidance.singular_segment import SingularSegment, singular_segment
 from er3a.planning.avoidance.strategies import StrategyCost, StrategyResult, best, compare

@@ -10,6 +10,7 @@ from er3a.collision.bodies import Bodies, can_measure
 from er3a.files.path_file import load_paths
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, Status, Verdict
 from er3a.pipeline.stages.trajectory.avoidance_results import AvoidanceTask, speed_ratio
 from er3a.pipeline.stages.trajectory.collisions import Surroundings, clearance_rows, measured
@@ -18,11 +19,11 @@ from er3a.pipeline.stages.trajectory.judgement import Judgement, judge
 from er3a.pipeline.stages.trajectory.model import (
     AllSafe,
     AvoidanceRows,
-    Checks,
     Clearances,
     LimitsUsed,
     NearThresholds,
     NoneSafe,
+    PathChecks,
     PathSummary,
     PathVerdict,
     Samples,
@@ -33,7 +34,6 @@ from er3a.pipeline.stages.trajectory.model import (
 from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
 from er3a.pipeline.stages.trajectory.path_summary import path_summary
 from er3a.pipeline.study import Study
-from er3a.pipeline.tables import Reals
 from er3a.planning.commands import CommandSource
 from er3a.planning.near_singular import NearSingular
 from er3a.planning.timing import JointLimits, joint_limits
@@ -57,7 +57,7 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     )
     only = None if settings.avoidance == "compare" else settings.avoidance
     avoidance = AvoidanceTask(robot, near, limits, only, surroundings)
-    tables: list[Checks] = []
+    tables: list[PathChecks] = []
     clearances: list[Clearances] = []
     strategies: list[AvoidanceRows] = []
     paths: list[PathSummary] = []
@@ -72,7 +72,7 @@ def compute(study: Study, name: str) -> TrajectoryResults:
         clearances.append(clearance_rows(entry.name, along))
         strategies.append(avoided.rows)
         paths.append(path_summary(robot, motion, found, along, avoided, limits))
-    checks = Checks.stacked(tables)
+    checks = PathChecks.stacked(tables)
     own = checks.take(checks.sample)
     length = characteristic_length(robot)
     assumed = tuple(bool(value) for value in ~np.isfinite(robot.speed))
@@ -98,14 +98,14 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     )
 
 
-def _checks(robot: Robot, motion: Motion, found: Judgement, near: NearSingular, limits: JointLimits) -> Checks:
+def _checks(robot: Robot, motion: Motion, found: Judgement, near: NearSingular, limits: JointLimits) -> PathChecks:
     """One row per check point; joint columns are NaN where the path can't be reached."""
     reached = np.isfinite(found.q[:, 0])
     measures = np.full((len(found.q), 3), np.nan)
     part = conditioning(robot, found.q[reached], characteristic_length(robot))
     measures[reached] = np.stack([part.manipulability, part.condition_number, part.smallest_singular_value], axis=1)
     factors = determinant_factors(robot, found.q)
-    return Checks(
+    return PathChecks(
         path=np.full(len(found.times), motion.entry.name, object),
         t_s=found.times,
         s_m=motion.way(found.times),

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.trajectory.model import PathVerdict
 from er3a.pipeline.stages.trajectory.motion import Motion
-from er3a.pipeline.tables import Reals
 from er3a.planning.intervals import (
     AboveLimit,
     BelowLimit,

@@ -12,8 +12,9 @@ from er3a.collision.pairs import Pair, PairOverlaps
 from er3a.findings import Finding
 from er3a.kinematics.configuration import BranchLabel
 from er3a.kinematics.singularity import SingularityType
+from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
-from er3a.pipeline.tables import Flags, Reals, Table, Texts, column, per_joint, vector
+from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.planning.avoidance import StrategyName
 from er3a.planning.avoidance.strategies import NotUsable
 from er3a.planning.intervals import AboveLimit, BelowLimit, PathOutOfReach, TooFast
@@ -296,7 +297,7 @@ class Samples(MotionRows):
 
 
 @dataclass(frozen=True, eq=False)
-class Checks(Samples):
+class PathChecks(Samples):
     """The paths' own points, those checked between them, and the closest passes."""
 
     sample: Flags = column("whether the point is one of the path's own", dtype=bool)
@@ -326,7 +327,7 @@ class TrajectoryResults(Results[TrajectorySummary]):
     """Summary and tables of the stage."""
 
     samples: Samples
-    checks: Checks
+    checks: PathChecks
     clearance: Clearances
     avoidance: AvoidanceRows
 

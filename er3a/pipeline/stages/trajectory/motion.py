@@ -12,7 +12,7 @@ from scipy.interpolate import CubicHermiteSpline
 from er3a.errors import PoseError
 from er3a.files.path_file import PathEntry
 from er3a.kinematics.forward import forward, jacobian
-from er3a.pipeline.tables import Reals
+from er3a.numerics.arrays import Reals
 from er3a.planning.build import Built, build
 from er3a.planning.commands import CommandSource
 from er3a.planning.follow import follow

@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.stages.trajectory.model import AvoidanceRows, Checks, PathSummary
-from er3a.pipeline.tables import Reals
+from er3a.pipeline.stages.trajectory.model import AvoidanceRows, PathChecks, PathSummary
 from er3a.pipeline.viewing.palette import BODY, GRID, HIGHLIGHT, INK, LINK, MODEL, MUTED
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot
@@ -20,7 +20,7 @@ AZIMUTH, ELEVATION = np.radians(-55.0), np.radians(24.0)
 MOST_ARMS = 3  # at singular poses
 
 
-def draw_path(ax: Axes, robot: Robot, path: PathSummary, rows: Checks, repaired: AvoidanceRows) -> None:
+def draw_path(ax: Axes, robot: Robot, path: PathSummary, rows: PathChecks, repaired: AvoidanceRows) -> None:
     """Draw the path, the repaired path, and the arm at the start, the end and the singular poses."""
     ax.set_axis_off()
     ax.set_aspect("equal")

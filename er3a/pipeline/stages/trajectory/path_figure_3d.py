@@ -8,10 +8,10 @@ import numpy as np
 import plotly.graph_objects as go
 from markupsafe import Markup
 
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.trajectory import type_word
-from er3a.pipeline.stages.trajectory.model import AvoidanceRows, Checks, PathSummary, TrajectoryResults
-from er3a.pipeline.tables import Reals
+from er3a.pipeline.stages.trajectory.model import AvoidanceRows, PathChecks, PathSummary, TrajectoryResults
 from er3a.pipeline.viewing.figure_3d import turning_html
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, LINK, MODEL
 from er3a.pipeline.viewing.skeleton import skeleton
@@ -53,7 +53,7 @@ def turning_figure(robot: Robot, results: TrajectoryResults) -> Markup:
     return turning_html(figure)
 
 
-def _add(figure: go.Figure, robot: Robot, path: PathSummary, rows: Checks, repaired: AvoidanceRows) -> int:
+def _add(figure: go.Figure, robot: Robot, path: PathSummary, rows: PathChecks, repaired: AvoidanceRows) -> int:
     """Add a path's traces; how many."""
     before = len(figure.data)
     events = [int(np.argmin(np.abs(rows.t_s - event.t_s))) for event in path.singularities]

@@ -15,18 +15,18 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 
 from er3a.kinematics.singularity import SingularityType
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.trajectory import type_word
 from er3a.pipeline.stages.trajectory.model import (
     FASTEST,
     AvoidanceRows,
-    Checks,
     NearThresholds,
+    PathChecks,
     PathSummary,
     Stretch,
 )
 from er3a.pipeline.stages.trajectory.oblique import draw_path
-from er3a.pipeline.tables import Reals
 from er3a.pipeline.viewing.figures import svg_data_uri
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINT_NAMES, MODEL, MUTED, REFERENCE, VERDICTS
 from er3a.pipeline.viewing.palette import JOINTS as COLOURS
@@ -61,7 +61,9 @@ class PathFigure:
                 ax.tick_params(labelbottom=False)
             column[-1].set_xlabel(tr("time (s)"), fontsize=FONT)
 
-    def draw(self, robot: Robot, path: PathSummary, rows: Checks, motions: AvoidanceRows, near: NearThresholds) -> str:
+    def draw(
+        self, robot: Robot, path: PathSummary, rows: PathChecks, motions: AvoidanceRows, near: NearThresholds
+    ) -> str:
         """The figure of a path as the data address of an image."""
         for ax in self.figure.axes:
             _clear(ax)
@@ -104,7 +106,7 @@ def _clear(ax: Axes) -> None:
     ax.autoscale(True)
 
 
-def _joint_curves(axes: list[Axes], robot: Robot, path: PathSummary, rows: Checks) -> None:
+def _joint_curves(axes: list[Axes], robot: Robot, path: PathSummary, rows: PathChecks) -> None:
     curves = (
         (rows.q_deg, N_("joint angle (deg)")),
         (rows.q_deg_s, N_("velocity (deg/s)")),
@@ -120,7 +122,7 @@ def _joint_curves(axes: list[Axes], robot: Robot, path: PathSummary, rows: Check
             _cut(ax, values)
 
 
-def _distances(ax: Axes, rows: Checks, near: NearThresholds) -> None:
+def _distances(ax: Axes, rows: PathChecks, near: NearThresholds) -> None:
     """Distance from each singular set, in parts of the distance below which a pass counts as near."""
     curves: tuple[tuple[SingularityType, Reals, float], ...] = (
         ("wrist", rows.wrist_deg, near.wrist_deg),
@@ -136,7 +138,7 @@ def _distances(ax: Axes, rows: Checks, near: NearThresholds) -> None:
     _key(ax, "lower left")
 
 
-def _condition(ax: Axes, rows: Checks) -> None:
+def _condition(ax: Axes, rows: PathChecks) -> None:
     values = np.where(np.isinf(rows.condition_number), np.nan, rows.condition_number)
     ax.plot(rows.t_s, values, color=MODEL)
     _logarithmic(ax, 1.0, min(1e6, 2 * np.nanmax(np.append(values, 50.0))))
@@ -154,7 +156,7 @@ def _logarithmic(ax: Axes, low: float, high: float) -> None:
     ax.yaxis.set_major_formatter(lambda value, _: f"{value:.10g}" if value < 1e5 else f"1e{round(np.log10(value))}")
 
 
-def _small_measures(ax: Axes, rows: Checks) -> None:
+def _small_measures(ax: Axes, rows: PathChecks) -> None:
     ax.plot(rows.t_s, rows.smallest_singular_value, color=REFERENCE, label=tr("smallest singular value"))
     ax.plot(rows.t_s, rows.manipulability, color=MODEL, label=tr("manipulability"))
     most = np.nanmax([*rows.smallest_singular_value, *rows.manipulability, 0.0])
@@ -163,7 +165,7 @@ def _small_measures(ax: Axes, rows: Checks) -> None:
     _key(ax, "upper left")
 
 
-def _effort(ax: Axes, path: PathSummary, rows: Checks, motions: AvoidanceRows) -> None:
+def _effort(ax: Axes, path: PathSummary, rows: PathChecks, motions: AvoidanceRows) -> None:
     """The joints' greatest ratio of speed to limit over the share of the time: programmed, repaired, at its fastest."""
     ax.plot(rows.t_s / rows.t_s[-1], rows.speed_ratio, color=HIGHLIGHT, label=tr("as programmed"))
     shown = [rows.speed_ratio]

@@ -8,6 +8,7 @@ import numpy as np
 
 from er3a.collision.along import ClearanceAlong
 from er3a.kinematics.configuration import branch_labels
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.trajectory.avoidance_results import Avoided
 from er3a.pipeline.stages.trajectory.collisions import collisions, least_clearance
 from er3a.pipeline.stages.trajectory.judgement import Judgement
@@ -22,7 +23,6 @@ from er3a.pipeline.stages.trajectory.model import (
     Stretch,
 )
 from er3a.pipeline.stages.trajectory.motion import Motion
-from er3a.pipeline.tables import Reals
 from er3a.planning.intervals import Interval
 from er3a.planning.singular_events import SingularEvent
 from er3a.planning.timing import JointLimits

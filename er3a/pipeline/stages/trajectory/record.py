@@ -11,20 +11,20 @@ import rerun.blueprint as rrb
 from matplotlib import colormaps
 from matplotlib.colors import LogNorm
 
+from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.trajectory import advice, path_text, type_word
 from er3a.pipeline.messages.trajectory_verdict import verdict_word
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.trajectory.model import (
-    Checks,
     MotionRows,
+    PathChecks,
     PathSummary,
     PathVerdict,
     TrajectoryResults,
     TrajectorySummary,
 )
 from er3a.pipeline.study import Study
-from er3a.pipeline.tables import Flags, Reals
 from er3a.pipeline.viewing.arm import log_arm, send_motion, size_of
 from er3a.pipeline.viewing.palette import HIGHLIGHT, JOINT_NAMES, JOINTS, MODEL, MUTED, REFERENCE, rgb
 from er3a.pipeline.viewing.recording import ARM, TIMELINE, escaped, log_note, note_view, recording, send_series
@@ -80,7 +80,7 @@ def record(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
             _run(stream, robot, rows.take(_frames(rows)), start, MODEL if repaired else HIGHLIGHT)
 
 
-def _layout(robot: Robot, checks: Checks) -> rrb.Horizontal:
+def _layout(robot: Robot, checks: PathChecks) -> rrb.Horizontal:
     series = rrb.Vertical(
         *(
             rrb.TimeSeriesView(
@@ -123,7 +123,7 @@ def _timetable(summary: TrajectorySummary) -> list[tuple[PathSummary, float, boo
     return runs
 
 
-def _view(robot: Robot, checks: Checks) -> rrb.Spatial3DView:
+def _view(robot: Robot, checks: PathChecks) -> rrb.Spatial3DView:
     """A view that holds the arm all along the paths."""
     reached = checks.q_deg[checks.reachable][::SKELETON_EVERY]
     points = np.concatenate([checks.xyz_mm / 1000, *(skeleton(robot, np.radians(q)) for q in reached)])
@@ -143,7 +143,7 @@ def _frames(rows: MotionRows) -> Flags:
     return shown
 
 
-def _announce(stream: rr.RecordingStream, robot: Robot, path: PathSummary, rows: Checks, start: float) -> None:
+def _announce(stream: rr.RecordingStream, robot: Robot, path: PathSummary, rows: PathChecks, start: float) -> None:
     """What is known of a path: its line, its singular poses with ghosts of the arm, its verdict and events."""
     verdict = verdict_word(path.verdict)
     stream.set_time(TIMELINE, duration=start)
@@ -194,7 +194,7 @@ def _line(points: Reals, condition: Reals) -> rr.LineStrips3D:
     return rr.LineStrips3D(strips, colors=colours[:-1], radii=0.004)
 
 
-def _ghosts(stream: rr.RecordingStream, robot: Robot, path: PathSummary, rows: Checks) -> None:
+def _ghosts(stream: rr.RecordingStream, robot: Robot, path: PathSummary, rows: PathChecks) -> None:
     """The arm as a line at each singular pose, and a point with its type at the tool; none left of the path before."""
     at = [int(np.argmin(np.abs(rows.t_s - event.t_s))) for event in path.singularities]
     labels = [

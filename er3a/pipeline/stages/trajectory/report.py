@@ -24,8 +24,8 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.trajectory.clearance_figures import clearance_section
 from er3a.pipeline.stages.trajectory.model import (
     AvoidanceRows,
-    Checks,
     NearThresholds,
+    PathChecks,
     PathSummary,
     PathVerdict,
     Singularity,
@@ -52,7 +52,7 @@ STATUS: dict[PathVerdict, str] = {
 
 
 @dataclass(frozen=True)
-class Drawing:
+class PathDrawing:
     """A drawn image for the ``picture`` macro: its data address, what it shows, what to conclude, its width."""
 
     uri: str
@@ -62,7 +62,7 @@ class Drawing:
 
 
 @dataclass(frozen=True)
-class Section:
+class PathSection:
     """A path on the page: the record, and what it says in the page's language."""
 
     path: PathSummary
@@ -76,7 +76,7 @@ class Section:
     events: list[list[str]]
     faults: list[list[str]]
     strategies: list[list[str]]
-    figure: Drawing
+    figure: PathDrawing
 
 
 def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> None:
@@ -103,8 +103,8 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
     )
 
 
-def _section(path: PathSummary, rows: Checks, figure: Drawing) -> Section:
-    return Section(
+def _section(path: PathSummary, rows: PathChecks, figure: PathDrawing) -> PathSection:
+    return PathSection(
         path=path,
         status=STATUS[path.verdict],
         verdict=verdict_word(path.verdict),
@@ -121,8 +121,8 @@ def _section(path: PathSummary, rows: Checks, figure: Drawing) -> Section:
 
 
 def _figure(
-    figure: PathFigure, robot: Robot, path: PathSummary, rows: Checks, motions: AvoidanceRows, near: NearThresholds
-) -> Drawing:
+    figure: PathFigure, robot: Robot, path: PathSummary, rows: PathChecks, motions: AvoidanceRows, near: NearThresholds
+) -> PathDrawing:
     alt = tr(
         "Panels over time for {path}: joint angles, velocities and accelerations; distances from the singular sets, "
         "condition number, manipulability; the path in space; joint speeds against their limits. {finding}.",
@@ -130,10 +130,10 @@ def _figure(
         finding=path_text(path),
     )
     uri = figure.draw(robot, path, _drawn(path, rows), motions, near)
-    return Drawing(uri, alt, _conclusion(path, rows), float(figure.figure.get_figwidth()))
+    return PathDrawing(uri, alt, _conclusion(path, rows), float(figure.figure.get_figwidth()))
 
 
-def _drawn(path: PathSummary, rows: Checks) -> Checks:
+def _drawn(path: PathSummary, rows: PathChecks) -> PathChecks:
     """The rows that a curve needs: evenly spread ones, those at singular poses, and the greatest speeds."""
     even = np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round()
     events = [int(np.argmin(np.abs(rows.t_s - event.t_s))) for event in path.singularities]
@@ -214,7 +214,7 @@ def _small(value: float) -> str:
     return "0" if value < 5e-4 else number(value, 3)
 
 
-def _conclusion(path: PathSummary, rows: Checks) -> str:
+def _conclusion(path: PathSummary, rows: PathChecks) -> str:
     """What the curves show, in one or two sentences."""
     condition, parts = rows.condition_number, []
     if path.max_joint_speed_deg_s:

@@ -43,12 +43,12 @@ def side_view(robot: Robot, stated: Axes, corrected: Robot | None, corrected_lab
         colour = REFERENCE_COLOURS[k % len(REFERENCE_COLOURS)]
         lines = list(zip(own.joint, own.direction, own.point_mm))
         label = tr("axes: {own_source}", own_source=_short(source))
-        _axes_of(axes, lines, size * (0.16 + 0.02 * k), colour, marker, points, label, hollow=True)
+        _axes_of(axes, lines, size * (0.16 + 0.02 * k), label, colour=colour, marker=marker, points=points, hollow=True)
         off = own.distance_mm > 0.05 * size
         if k == 0:
             _label(axes, zip(own.joint[off], own.point_mm[off]), colour, (10, -17))
     lines = _model_axes(robot)
-    _axes_of(axes, lines, size * 0.13, MODEL, "o", 6, tr("model's axes"), hollow=False)
+    _axes_of(axes, lines, size * 0.13, tr("model's axes"), colour=MODEL, marker="o", points=6, hollow=False)
     _label(axes, [(joint, point) for joint, _, point in lines], MODEL, (9, 9))
     equal_scale(axes, "x (mm)", "z (mm)")
     axes.margins(0.12)
@@ -125,7 +125,7 @@ def _by_source(stated: Axes) -> list[tuple[str, Axes]]:
 
 
 def _axes_of(
-    axes: PlotAxes, lines: list, half: float, colour: str, marker: str, points: float, label: str, hollow: bool
+    axes: PlotAxes, lines: list, half: float, label: str, *, colour: str, marker: str, points: float, hollow: bool
 ) -> None:
     """Axes seen end on as markers, the others as dash-dotted lines."""
     face = "none" if hollow else colour

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Literal, get_args
 
-from er3a.pipeline.stages.validation.findings import (
+from er3a.pipeline.stages.validation.validation_findings import (
     CheckSubject,
     ModelGroup,
     NearSingularLeftOut,

@@ -7,8 +7,9 @@ from typing import Literal
 
 import numpy as np
 
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.validation.check_model import Check, Conflict, ModelCheck, ReferenceCheck, Statement, Unjudged
-from er3a.pipeline.stages.validation.findings import (
+from er3a.pipeline.stages.validation.validation_findings import (
     ModelGroup,
     NearSingularLeftOut,
     Note,
@@ -19,7 +20,6 @@ from er3a.pipeline.stages.validation.findings import (
     SourceGivesNone,
     WholeGroup,
 )
-from er3a.pipeline.tables import Reals
 from er3a.references.quantities import Limit, Quantity, Speed
 from er3a.references.reference import Reference, ReferenceSet, conflicts, expected_of
 from er3a.references.rows import GROUPS, AxisRow

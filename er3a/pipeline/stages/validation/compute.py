@@ -9,11 +9,11 @@ from er3a.pipeline.stages.validation.checks import checks_of_set
 from er3a.pipeline.stages.validation.corrections import calibrate_from_sets
 from er3a.pipeline.stages.validation.diagnoses import diagnose_sets
 from er3a.pipeline.stages.validation.entry import ValidationSettings
-from er3a.pipeline.stages.validation.findings import InNoSet
 from er3a.pipeline.stages.validation.geometry_tables import axes_table, key_poses_table, section_table
 from er3a.pipeline.stages.validation.model import Checks, Circles, TableFacts, ValidationResults, ValidationSummary
 from er3a.pipeline.stages.validation.self_checks import round_trip_checks, table_checks
 from er3a.pipeline.stages.validation.subject import model_of
+from er3a.pipeline.stages.validation.validation_findings import InNoSet
 from er3a.pipeline.stages.validation.verdict import SHOWN_DECIMALS, key_figures, set_summaries, verdict_of
 from er3a.pipeline.study import Study
 from er3a.references.circle_points import CirclePoints, circle_points

@@ -9,7 +9,8 @@ from er3a.calibration.calibrate import Close
 from er3a.calibration.outcomes import CalibrationConclusion, Held, LevelName, MorePositions, NotCalibrated
 from er3a.diagnosis.conclusions import Conclusion, NextMeasurement
 from er3a.diagnosis.fault_kinds import Faults
-from er3a.pipeline.tables import Findings, Reals, Table, Texts, column, findings
+from er3a.numerics.arrays import Reals
+from er3a.pipeline.tables import Findings, Table, Texts, column, findings
 from er3a.references.quantities import Unit
 from er3a.references.subjects import ReferenceSubject
 

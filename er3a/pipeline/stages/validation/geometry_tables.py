@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er3a.kinematics.forward import frames
-from er3a.pipeline.stages.validation.findings import KeyPose, NamedPose
 from er3a.pipeline.stages.validation.model import Axes, KeyPoses, Section
+from er3a.pipeline.stages.validation.validation_findings import KeyPose, NamedPose
 from er3a.references.circle_points import CirclePoints
 from er3a.references.quantities import (
     MM,

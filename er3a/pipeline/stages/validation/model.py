@@ -9,27 +9,17 @@ from typing import Self
 import numpy as np
 
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.validation.check_model import Check, Conflict
 from er3a.pipeline.stages.validation.diagnosis_model import Corrections, Residuals, SetCalibration, SetDiagnosis
-from er3a.pipeline.stages.validation.findings import (
+from er3a.pipeline.stages.validation.validation_findings import (
     CheckSubject,
     KeyPose,
     Note,
     Validated,
 )
-from er3a.pipeline.tables import (
-    Findings,
-    Flags,
-    Integers,
-    Reals,
-    Table,
-    Texts,
-    column,
-    findings,
-    per_joint,
-    vector,
-)
+from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
 from er3a.robots.robot import Grade
 
 

@@ -11,14 +11,14 @@ from er3a.kinematics.round_trips import NEAR_ELBOW_DEG, NEAR_SHOULDER_MM, NEAR_W
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.pipeline.stages.validation.check_model import Check, Unjudged
 from er3a.pipeline.stages.validation.checks import against_itself
-from er3a.pipeline.stages.validation.findings import (
+from er3a.pipeline.stages.validation.model import Margins, RoundTripErrors
+from er3a.pipeline.stages.validation.validation_findings import (
     NearSingularLeftOut,
     NoClosedForm,
     NumbersMissing,
     SelfCheck,
     SelfChecked,
 )
-from er3a.pipeline.stages.validation.model import Margins, RoundTripErrors
 from er3a.robots.robot import Robot
 
 JOINT_TOLERANCE_DEG = 1e-6

@@ -12,7 +12,8 @@ from er3a.diagnosis.conclusions import MainFault, MostLikelyFault, NoFaultStands
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.validation.check_model import Check, Conflict, ModelCheck, ReferenceCheck
 from er3a.pipeline.stages.validation.diagnosis_model import SetDiagnosis
-from er3a.pipeline.stages.validation.findings import (
+from er3a.pipeline.stages.validation.model import Axes, Counts, KeyPoses, RoundTripErrors, SetSummary
+from er3a.pipeline.stages.validation.validation_findings import (
     AnotherArm,
     Claims,
     Confirmed,
@@ -23,7 +24,6 @@ from er3a.pipeline.stages.validation.findings import (
     NothingToCompare,
     Validated,
 )
-from er3a.pipeline.stages.validation.model import Axes, Counts, KeyPoses, RoundTripErrors, SetSummary
 from er3a.references.reference import ReferenceSet
 from er3a.references.rows import GROUPS
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade

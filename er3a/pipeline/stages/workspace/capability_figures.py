@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.stages.workspace.cell_lookup import CellLookup
 from er3a.pipeline.stages.workspace.model import CapabilitySummary, PlacementSummary, PlaceSummary, SectionFrame
-from er3a.pipeline.stages.workspace.tables import BoxPlaces, CapabilityCells, Singles
-from er3a.pipeline.tables import Flags, Integers, Reals
+from er3a.pipeline.stages.workspace.workspace_tables import BoxPlaces, CapabilityCells, Singles
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK

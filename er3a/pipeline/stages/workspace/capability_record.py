@@ -8,7 +8,7 @@ from matplotlib import colormaps
 
 from er3a.pipeline.stages.workspace.cell_lookup import CellLookup
 from er3a.pipeline.stages.workspace.model import CapabilitySummary, NeedsClosedForm, WorkspaceResults
-from er3a.pipeline.stages.workspace.tables import CapabilityCells
+from er3a.pipeline.stages.workspace.workspace_tables import CapabilityCells
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, rgb
 
 _CLASSES = (0.0, 0.25, 0.5, 0.75, 1.0)

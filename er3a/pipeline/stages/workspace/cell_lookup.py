@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.workspace.model import CapabilitySummary
-from er3a.pipeline.stages.workspace.tables import CapabilityCells
-from er3a.pipeline.tables import Reals
+from er3a.pipeline.stages.workspace.workspace_tables import CapabilityCells
 
 
 class CellLookup:

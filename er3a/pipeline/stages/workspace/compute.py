@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from er3a.kinematics.forward import forward
+from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import Figure
 from er3a.pipeline.stages.workspace import table_rows
-from er3a.pipeline.stages.workspace.capability import ToolCapability, tool_capability
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings, WorkspaceSettings
 from er3a.pipeline.stages.workspace.envelope_marks import drawing_table
 from er3a.pipeline.stages.workspace.model import (
@@ -30,14 +30,14 @@ from er3a.pipeline.stages.workspace.model import (
 )
 from er3a.pipeline.stages.workspace.parts import gather
 from er3a.pipeline.stages.workspace.sample import draw_of, sampled
-from er3a.pipeline.stages.workspace.tables import HullTriangles
-from er3a.pipeline.stages.workspace.verdict import judge
+from er3a.pipeline.stages.workspace.tool_capability import ToolCapability, tool_capability
+from er3a.pipeline.stages.workspace.void_verdict import judge
+from er3a.pipeline.stages.workspace.workspace_tables import HullTriangles
 from er3a.pipeline.study import Study
-from er3a.pipeline.tables import Flags, Reals
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import Grid, make_grid, shoulder_of
 from er3a.sampling.random_joints import Draw
-from er3a.sampling.reach_search import Reach, search_reach
+from er3a.sampling.reach_search import ReachExtremes, search_reach
 from er3a.sampling.tally import Tally
 from er3a.sampling.touched_cells import section_cells, touched_growth
 from er3a.workspace.hull import Hull, cells_inside, convex_hull
@@ -161,7 +161,9 @@ def _summary(
     )
 
 
-def _figures(reach: Reach, voids: Sequence[Void], volume: Volume, hull: Hull, samples: int) -> tuple[Figure, ...]:
+def _figures(
+    reach: ReachExtremes, voids: Sequence[Void], volume: Volume, hull: Hull, samples: int
+) -> tuple[Figure, ...]:
     low, high = volume.ci95
     enclosed = [void.lower for void in voids if void.kind == "enclosed"]
     return (

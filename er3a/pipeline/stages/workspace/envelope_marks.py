@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.files.reference_sets import MANUAL_REFS, check_reference_file
-from er3a.pipeline.stages.workspace.tables import Drawing
+from er3a.pipeline.stages.workspace.workspace_tables import Drawing
 from er3a.references.rows import EnvelopeRow
 from er3a.robots.robot import Robot
 from er3a.workspace.side_view import corner_side

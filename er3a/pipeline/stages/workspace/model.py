@@ -9,15 +9,15 @@ from typing import Literal
 from er3a.kinematics.configuration import BranchLabel
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.pipeline.results import Results, Summary, Verdict
-from er3a.pipeline.stages.workspace.findings import WorkspaceFinding
-from er3a.pipeline.stages.workspace.tables import (
+from er3a.pipeline.stages.workspace.workspace_findings import WorkspaceFinding
+from er3a.pipeline.stages.workspace.workspace_tables import (
     Border,
     BoxPlaces,
     CapabilityCells,
     Cells,
     Cloud,
-    Curve,
     Drawing,
+    GrowthCurve,
     HullTriangles,
     HullVertices,
     ProofCells,
@@ -27,7 +27,7 @@ from er3a.pipeline.stages.workspace.tables import (
     VoidVertices,
 )
 from er3a.sampling.random_joints import Sampling
-from er3a.sampling.reach_search import Reach
+from er3a.sampling.reach_search import ReachExtremes
 from er3a.workspace.capability import Overall
 from er3a.workspace.causes import Relaxed, Unlimited, VoidCause
 from er3a.workspace.dexterous import Core
@@ -233,7 +233,7 @@ class WorkspaceSummary(Summary):
     touched_m3: float
     proof: ProofSummary
     hull: HullSummary
-    reach_m: Reach
+    reach_m: ReachExtremes
     grid: GridSummary
     axis: AxisSummary
     section_cell_m: float
@@ -256,7 +256,7 @@ class WorkspaceResults(Results[WorkspaceSummary]):
     cells: Cells
     section: SectionCells
     side_view: SideViewCells
-    curve: Curve
+    curve: GrowthCurve
     cloud: Cloud
     hull_vertices: HullVertices
     hull_triangles: HullTriangles

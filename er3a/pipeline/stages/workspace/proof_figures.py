@@ -13,13 +13,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import word
 from er3a.pipeline.messages.workspace import POINTS
 from er3a.pipeline.stages.workspace.model import AxisSummary, WorkspaceResults
 from er3a.pipeline.stages.workspace.section_figures import DENSITY, log_norm, masked
-from er3a.pipeline.stages.workspace.tables import Border, Drawing, ProofCells, SectionCells
-from er3a.pipeline.tables import Flags, Integers, Reals
+from er3a.pipeline.stages.workspace.workspace_tables import Border, Drawing, ProofCells, SectionCells
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED, REFERENCE

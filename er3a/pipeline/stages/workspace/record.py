@@ -9,14 +9,14 @@ import rerun as rr
 import rerun.blueprint as rrb
 from matplotlib import colormaps
 
+from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.messages.say import say, word
 from er3a.pipeline.messages.workspace import VOID_STATUS
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.workspace.capability_record import log_capability
 from er3a.pipeline.stages.workspace.model import WorkspaceResults, WorkspaceSummary
-from er3a.pipeline.stages.workspace.tables import Cloud
+from er3a.pipeline.stages.workspace.workspace_tables import Cloud
 from er3a.pipeline.study import Study
-from er3a.pipeline.tables import Integers, Reals
 from er3a.pipeline.viewing.arm import arm_view, log_arm
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, REFERENCE, rgb

@@ -13,12 +13,12 @@ from er3a.pipeline.messages.workspace import FIGURES, VOID_KINDS, VOID_STATUS
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.workspace.capability_texts import capability_context
 from er3a.pipeline.stages.workspace.cloud_figure import turning_figure
-from er3a.pipeline.stages.workspace.findings import VoidUnexpected
 from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceResults, WorkspaceSummary
 from er3a.pipeline.stages.workspace.proof_figures import sections, slices
 from er3a.pipeline.stages.workspace.section_figures import convergence, top_view
 from er3a.pipeline.stages.workspace.side_figures import arc_rows, side_view
-from er3a.pipeline.stages.workspace.tables import Curve
+from er3a.pipeline.stages.workspace.workspace_findings import VoidUnexpected
+from er3a.pipeline.stages.workspace.workspace_tables import GrowthCurve
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import Picture, head_of, render, run_command
@@ -183,7 +183,7 @@ def _slices_caption(summary: WorkspaceSummary) -> str:
     )
 
 
-def _curve_caption(summary: WorkspaceSummary, curve: Curve) -> str:
+def _curve_caption(summary: WorkspaceSummary, curve: GrowthCurve) -> str:
     volume = summary.volume_m3
     finest = curve.touched_m3[curve.cell_mm == curve.cell_mm.min()][-1]
     if finest > volume.upper:

@@ -10,10 +10,10 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
 from er3a.kinematics.forward import forward
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.stages.workspace.model import GridSummary, WorkspaceResults
-from er3a.pipeline.stages.workspace.tables import Cells
-from er3a.pipeline.tables import Reals
+from er3a.pipeline.stages.workspace.workspace_tables import Cells
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.palette import INK, JOINTS, MUTED, REFERENCE

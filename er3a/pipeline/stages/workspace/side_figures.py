@@ -9,14 +9,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import word
 from er3a.pipeline.messages.workspace import SWEEPS
 from er3a.pipeline.stages.workspace.model import WorkspaceResults
 from er3a.pipeline.stages.workspace.proof_figures import arcs_of, draw_labels
 from er3a.pipeline.stages.workspace.section_figures import DENSITY, log_norm, masked
-from er3a.pipeline.stages.workspace.tables import Border, SideViewCells
-from er3a.pipeline.tables import Reals
+from er3a.pipeline.stages.workspace.workspace_tables import Border, SideViewCells
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.palette import INK, JOINTS, REFERENCE

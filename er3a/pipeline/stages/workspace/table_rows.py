@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er3a.kinematics.forward import forward, jacobian
-from er3a.pipeline.stages.workspace.tables import (
+from er3a.numerics.arrays import Reals
+from er3a.pipeline.stages.workspace.workspace_tables import (
     Border,
     BoxPlaces,
     CapabilityCells,
     Cells,
     Cloud,
-    Curve,
+    GrowthCurve,
     HullVertices,
     ProofCells,
     SectionCells,
@@ -22,7 +23,7 @@ from er3a.pipeline.stages.workspace.tables import (
     VoidTriangles,
     VoidVertices,
 )
-from er3a.pipeline.tables import Reals, Texts
+from er3a.pipeline.tables import Texts
 from er3a.robots.robot import Robot
 from er3a.sampling import touched_cells
 from er3a.sampling.tally import UNTOUCHED, Tally
@@ -46,7 +47,7 @@ def cells(tally: Tally, void_number: NDArray[np.int64]) -> Cells:
     )
 
 
-def section(found: touched_cells.SectionCells) -> SectionCells:
+def section(found: touched_cells.TouchedSection) -> SectionCells:
     """The side section."""
     return SectionCells(found.rho, found.z, found.samples, found.void)
 
@@ -59,10 +60,10 @@ def side_view(views: Sequence[SideView]) -> SideViewCells:
     )
 
 
-def curve(growth: Sequence[touched_cells.Growth]) -> Curve:
+def curve(growth: Sequence[touched_cells.Growth]) -> GrowthCurve:
     """Growth of the touched volume, one cell size after another."""
-    return Curve.stacked(
-        Curve(np.full(len(part.samples), part.cell * 1000), part.samples, part.volume) for part in growth
+    return GrowthCurve.stacked(
+        GrowthCurve(np.full(len(part.samples), part.cell * 1000), part.samples, part.volume) for part in growth
     )
 
 

@@ -21,13 +21,13 @@ from er3a.pipeline.stages.workspace.model import (
     TaskSummary,
     triple,
 )
-from er3a.pipeline.stages.workspace.tables import BoxPlaces, CapabilityCells
+from er3a.pipeline.stages.workspace.workspace_tables import BoxPlaces, CapabilityCells
 from er3a.robots.robot import Robot
 from er3a.workspace.capability import map_capability, overall, rings
 from er3a.workspace.dexterous import dexterous_core
 from er3a.workspace.directions import cone_directions, roll_of
 from er3a.workspace.placement import MIXED, NO, Task
-from er3a.workspace.placement_proof import Placement, find_places
+from er3a.workspace.placement_proof import BoxPlacement, find_places
 from er3a.workspace.section_arm import section_arm, section_frame
 
 MOST_ACROSS = 64
@@ -89,7 +89,9 @@ def _task(asked: BoxTask) -> Task:
     )
 
 
-def _placement_summary(robot: Robot, asked: BoxTask, task: Task, placement: Placement, best: float) -> PlacementSummary:
+def _placement_summary(
+    robot: Robot, asked: BoxTask, task: Task, placement: BoxPlacement, best: float
+) -> PlacementSummary:
     """The placement as the summary has it; ``best`` is the arm's greatest manipulability, m^3."""
     places = placement.places
     return PlacementSummary(
@@ -113,7 +115,7 @@ def _placement_summary(robot: Robot, asked: BoxTask, task: Task, placement: Plac
     )
 
 
-def _listed(robot: Robot, task: Task, placement: Placement, best: float) -> list[PlaceSummary]:
+def _listed(robot: Robot, task: Task, placement: BoxPlacement, best: float) -> list[PlaceSummary]:
     labels, places, chosen = branch_labels(robot), placement.places, placement.chosen
     return [
         PlaceSummary(

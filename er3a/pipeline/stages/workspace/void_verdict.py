@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from er3a.pipeline.results import Verdict
-from er3a.pipeline.stages.workspace.findings import (
+from er3a.pipeline.stages.workspace.workspace_findings import (
     Flat,
     NoVoid,
     Undersampled,

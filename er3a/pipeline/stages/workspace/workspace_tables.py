@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.pipeline.tables import Flags, Integers, Reals, Table, Texts, column, lists, per_joint, vector
+from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.pipeline.tables import Table, Texts, column, lists, per_joint, vector
 
 Singles = NDArray[np.float32]
 
@@ -46,7 +47,7 @@ class SideViewCells(Table):
 
 
 @dataclass(frozen=True, eq=False)
-class Curve(Table):
+class GrowthCurve(Table):
     """Touched volume after each block of samples, at several cell sizes."""
 
     cell_mm: Reals = column("edge of the cells", "mm")
