@@ -13,7 +13,7 @@ from er3a.pipeline.messages.say import counted, joined, sentence, word
 GERMAN = {
     "the {joint} is {angle:.1f} deg off": "{angle} deg daneben: {joint}",
     "elbow": "Ellbogen",
-    "; ": " | ",
+    "{first}; {rest}": "{first} | {rest}",
     "{count} faults": "{count} Fehler",
     "{count} fault of {size:.2f} mm": "{count} Fehler von {size} mm",
     "{count} faults of {size:.2f} mm": "{count} Fehler von {size} mm",

@@ -41,7 +41,9 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         command=page.run_command(study, "index.html"),
         provenance=Provenance(
             inputs=result_records(results, study.names),
-            code=code_digest(__name__, *(stage.messages for stage in STAGES.values())),
+            code=code_digest(
+                __name__, *(name for stage in STAGES.values() for name in (stage.messages, stage.verdict_messages))
+            ),
             seed=study.seed,
         ),
     )
