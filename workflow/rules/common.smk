@@ -6,7 +6,7 @@ import time
 from er3a.pipeline.code_digest import code_digest
 from er3a.errors import Er3aError
 from er3a.pipeline.messages.language import catalogue_file
-from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.stages.registry import STAGES, all_messages
 from er3a.pipeline.study import load_study
 
 DEFAULT_STUDY = "config/config.yaml"

@@ -117,7 +117,7 @@ rule index:
         "../envs/er3a.yaml"
     params:
         language=LANGUAGE,
-        code=code_digest("er3a.pipeline.viewing.index"),
+        code=code_digest("er3a.pipeline.viewing.index", *all_messages()),
     message:
         "write the index"
     shell:

@@ -9,3 +9,8 @@ from er3a.pipeline.stages.validation.entry import STAGE as VALIDATION
 from er3a.pipeline.stages.workspace.entry import STAGE as WORKSPACE
 
 STAGES: dict[str, Stage] = {stage.name: stage for stage in (VALIDATION, WORKSPACE, INVERSE, TRAJECTORY)}
+
+
+def all_messages() -> list[str]:
+    """The modules with the sentences of all stages, for pages that show more than one."""
+    return [name for stage in STAGES.values() for name in (stage.verdict_messages, stage.messages)]

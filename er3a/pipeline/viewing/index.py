@@ -9,7 +9,7 @@ from pathlib import Path
 
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.results import Provenance, result_records
-from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.stages.registry import STAGES, all_messages
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.comparison import write_compare
@@ -41,9 +41,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         command=page.run_command(study, "index.html"),
         provenance=Provenance(
             inputs=result_records(results, study.names),
-            code=code_digest(
-                __name__, *(name for stage in STAGES.values() for name in (stage.messages, stage.verdict_messages))
-            ),
+            code=code_digest(__name__, *all_messages()),
             seed=study.seed,
         ),
     )
