@@ -9,13 +9,12 @@ from pathlib import Path
 from er3a.errors import InputError
 from er3a.files.csv_file import Written, read_csv
 from er3a.files.reference_rows import FORMATS, Fields, Format, row_of
-from er3a.files.robot_library import DATA
+from er3a.files.robot_library import REFERENCES
 from er3a.files.units import LEAST_SPAN_MM, WIDEST_IN_RADIANS
 from er3a.references.quantities import Quantity
 from er3a.references.reference import Reference, ReferenceSet, Row
 from er3a.references.rows import reference_set
 
-MANUAL_REFS = DATA / "manual_refs"
 SHORTEST_BESIDE_LONG_MM, LONG_MM = 2.0, 100.0
 WIDE_DEG = 30.0
 STEP_IN_RADIANS, NEAR_STEP = math.pi / 12, 2e-3  # 15 deg, written with four digits
@@ -47,9 +46,9 @@ def load_references(name_or_folder: str | Path) -> ReferenceSet:
     """
     folder = Path(name_or_folder)
     if isinstance(name_or_folder, str) and "/" not in name_or_folder:
-        folder = MANUAL_REFS / name_or_folder
+        folder = REFERENCES / name_or_folder
     if not folder.is_dir():
-        known = ", ".join(sorted(path.name for path in MANUAL_REFS.iterdir() if path.is_dir()))
+        known = ", ".join(sorted(path.name for path in REFERENCES.iterdir() if path.is_dir()))
         raise InputError(folder, None, "there is no such reference set", f"Known: {known}; or give a folder's path")
     files = sorted(folder.glob("*.csv"))
     if not files:

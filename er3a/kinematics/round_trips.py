@@ -15,6 +15,7 @@ from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.forward import forward
+from er3a.kinematics.near_singular import NearSingular
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.numerics.arrays import Flags, Integers
@@ -23,6 +24,7 @@ from er3a.robots.robot import Robot
 SAME_JOINTS_RAD = 1e-6
 NEAR_WRIST_DEG = NEAR_ELBOW_DEG = 0.5
 NEAR_SHOULDER_MM = 1.0
+NEAR = NearSingular(np.radians(NEAR_WRIST_DEG), np.radians(NEAR_ELBOW_DEG), NEAR_SHOULDER_MM / 1000)
 BLOCK = 20_000
 
 
@@ -119,9 +121,7 @@ def _block(robot: Robot, random: np.random.Generator, count: int) -> tuple[float
     nearest = np.where(solved, gap, np.inf).min(axis=1)
 
     factors = determinant_factors(robot, q)
-    near = np.abs(factors.wrist) < np.radians(NEAR_WRIST_DEG)
-    near |= np.abs(factors.elbow) < np.radians(NEAR_ELBOW_DEG)
-    near |= np.abs(factors.shoulder) * 1000 < NEAR_SHOULDER_MM
+    near = NEAR.contains(factors)
     judged = nearest[~near & solved.any(axis=1)]
 
     rows, slots = np.nonzero(solved)

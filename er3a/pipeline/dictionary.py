@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from importlib import import_module
 from typing import Any
 
 from pydantic import TypeAdapter
@@ -65,10 +66,15 @@ def data_dictionary() -> str:
     """All tables of all stages, as Markdown."""
     parts = [HEAD]
     for stage in STAGES.values():
-        parts.append(f"## {stage.name}\n")
+        parts.append(f"## {stage.name}\n\nKey figures in `figures`:\n\n{_figures(stage)}")
         for name, table in table_types(stage.module("model").RESULTS).items():
             parts.append(f"### `{stage.name}/{name}.parquet`\n\n{_about(table)}\n\n{_columns(table)}")
     return "\n".join(parts)
+
+
+def _figures(stage: Stage) -> str:
+    names: dict[str, str] = import_module(stage.messages).FIGURES
+    return "".join(f"- `{code}`: {name}\n" for code, name in names.items())
 
 
 def _about(table: type[Table]) -> str:

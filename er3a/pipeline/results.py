@@ -176,11 +176,16 @@ def read_stage(folder: Path, stage: Stage) -> Stored[Any]:
     """
     record = _record(folder)
     if record["verdict"]["status"] == "not_computed":
-        verdict = record["verdict"]
-        absent = NotComputed(verdict["params"].get("reason", verdict["text"]))
+        absent = _reason_of_absence(record["verdict"], stage)
         origin = _adapter(Provenance).validate_python(record["provenance"])
         return Stored(record["robot"], stage.name, origin, AbsentResults(Summary(Verdict("not_computed", absent), ())))
     return read_results(folder, stage.module("model").RESULTS)
+
+
+def _reason_of_absence(verdict: dict[str, Any], stage: Stage) -> Finding:
+    kinds = {kind.code: kind for kind in (NotComputed, *stage.absences)}
+    found: Finding = _adapter(kinds[verdict["code"]]).validate_python(verdict["params"])
+    return found
 
 
 def read_results(folder: Path, kind: type[ResultsT]) -> Stored[ResultsT]:

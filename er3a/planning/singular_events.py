@@ -19,10 +19,10 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.signal import find_peaks
 
+from er3a.kinematics.near_singular import NearSingular, factor_of
 from er3a.kinematics.singularity import TYPES, SingularityType, determinant_factors
 from er3a.numerics.arrays import Reals
 from er3a.numerics.runs import runs
-from er3a.planning.near_singular import NearSingular, factor_of
 from er3a.robots.robot import Robot
 
 ON_SET = 1e-9  # rad or m: this near counts as on the singular set
@@ -70,12 +70,12 @@ def singular_events(robot: Robot, t: Reals, q: Reals, joints: Joints, near: Near
 
         values = factor_of(determinant_factors(robot, q), kind)
         for stretch in runs(np.isfinite(values)):
-            events += _in_stretch(kind, t, values, stretch, factor, near.of(kind))
+            events += _in_stretch(kind, t, values, stretch, factor, near)
     return sorted(events, key=lambda event: (event.t, TYPES.index(event.type)))
 
 
 def _in_stretch(
-    kind: SingularityType, t: Reals, values: Reals, stretch: tuple[int, int], factor: Factor, near: float
+    kind: SingularityType, t: Reals, values: Reals, stretch: tuple[int, int], factor: Factor, near: NearSingular
 ) -> list[SingularEvent]:
     """Events between two unreachable stretches (or the ends of the motion)."""
     first, last = stretch
@@ -92,14 +92,14 @@ def _in_stretch(
             if abs(factor(root)) < EDGE:
                 met.append((root, root))
     passed = []
-    for low, distance in _minima(times, f, factor, near, duration):
+    for low, distance in _minima(times, f, factor, near.of(kind), duration):
         if distance <= ON_SET:
             met.append((low, low))
         else:
             passed.append((low, distance))
     merged = _merged(sorted(met), SAME_EVENT * duration)
     events = [SingularEvent(float(a), float(b), kind, True, 0.0) for a, b in merged]
-    for a, b in runs(np.abs(f) < near):
+    for a, b in runs(near.is_near(kind, np.abs(f))):
         begin, end = times[max(a - 1, 0)], times[min(b, len(times) - 1)]
         if any(begin <= until and start <= end for start, until in merged):
             continue
@@ -109,7 +109,7 @@ def _in_stretch(
             events.append(SingularEvent(float(low), float(low), kind, False, float(distance)))
     for low, distance in passed:  # a dip between two grid points, both outside the threshold
         i = np.clip(np.searchsorted(times, low), 1, len(times) - 1)
-        if min(abs(f[i - 1]), abs(f[i])) >= near:
+        if not near.is_near(kind, np.abs(f[i - 1 : i + 1])).any():
             events.append(SingularEvent(float(low), float(low), kind, False, float(distance)))
     return events
 

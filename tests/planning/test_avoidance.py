@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward, jacobian
+from er3a.kinematics.near_singular import NearSingular, factor_of
 from er3a.kinematics.singularity import characteristic_length, determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.pipeline.messages import planning as messages
@@ -20,7 +21,6 @@ from er3a.planning.avoidance.singular_segment import singular_segment
 from er3a.planning.avoidance.strategies import STRATEGIES, best, compare
 from er3a.planning.follow import follow
 from er3a.planning.moves import line
-from er3a.planning.near_singular import NearSingular, factor_of
 from er3a.planning.singular_events import singular_events
 from er3a.planning.timing import joint_limits
 from er3a.robots.joint_limits import within

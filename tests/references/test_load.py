@@ -8,7 +8,8 @@ import pytest
 
 from er3a.errors import InputError
 from er3a.files.reference_rows import FORMATS
-from er3a.files.reference_sets import MANUAL_REFS, check_reference_file, load_references
+from er3a.files.reference_sets import check_reference_file, load_references
+from er3a.files.robot_library import REFERENCES
 from er3a.references.subjects import JointLimit, PoseExcess
 from er3a.robots.robot import GRADES
 
@@ -37,7 +38,7 @@ def test_every_committed_reference_has_source_grade_and_uncertainty(name):
 
 
 def test_folder_and_name_give_the_same_set():
-    assert load_references(MANUAL_REFS / "er3_600") == load_references("er3_600")
+    assert load_references(REFERENCES / "er3_600") == load_references("er3_600")
 
 
 def test_a_limit_that_is_not_given_is_kept_as_not_given():

@@ -41,7 +41,7 @@ class Stage:
     title, question : marked with ``N_``: the page's title, and what it answers
     settings : per key of the study file the model of what stands there; the first is the stage's own
     inputs : the files that a robot's results rest on besides its own file
-    applies : why the stage can't be computed for a robot; None if it can
+    applies : why the stage can't be computed for a robot, a finding of one of ``absences``; None if it can
     views : ``record`` (a recording, with its preview) and ``report`` (a page), as far as the stage has them
     sampled : whether ``compute`` gathers parts that jobs of their own have sampled
     """
@@ -52,6 +52,7 @@ class Stage:
     settings: Mapping[str, type[StrictModel]]
     inputs: Callable[[Study, str], list[Path]] = no_files
     applies: Callable[[Robot], Finding | None] = applies_to_all
+    absences: tuple[type[Finding], ...] = ()
     views: tuple[str, ...] = ("record", "report")
     sampled: bool = False
 

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from er3a.files.kept_files import write_atomically
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.messages.say import say, word
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import Provenance, Stored
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
@@ -102,7 +102,7 @@ def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
     shown = tuple(
         ShownFigure(
             figure.name,
-            word(f"{stage}.figure", figure_words, figure.name),
+            language.translated(f"{stage}.figure", figure_words[figure.name]),
             figure.value,
             tr("of {total}", total=figure.of) if figure.of is not None else figure.unit,
             figure.uncertainty,

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from er3a.kinematics.forward import frames
+from er3a.kinematics.near_singular import factor_of
 from er3a.kinematics.singularity import TYPES, SingularityType, characteristic_length, determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Reals
@@ -38,7 +39,6 @@ from er3a.planning.avoidance.singular_segment import (
 )
 from er3a.planning.follow import follow
 from er3a.planning.moves import ToolPath
-from er3a.planning.near_singular import factor_of
 from er3a.planning.profiles import quintic
 from er3a.planning.timing import Timed, joined, straight
 from er3a.robots.joint_limits import within

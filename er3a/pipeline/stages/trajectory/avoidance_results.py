@@ -10,6 +10,7 @@ import numpy as np
 from er3a.collision.along import clearance_along
 from er3a.collision.pairs import PairOverlaps
 from er3a.kinematics.forward import forward
+from er3a.kinematics.near_singular import NearSingular
 from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.trajectory.collisions import Surroundings, least_clearance
@@ -19,7 +20,6 @@ from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning.avoidance import StrategyName
 from er3a.planning.avoidance.singular_segment import SingularSegment, singular_segment
 from er3a.planning.avoidance.strategies import StrategyCost, StrategyResult, best, compare
-from er3a.planning.near_singular import NearSingular
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
 from er3a.robots.robot import Robot
 

@@ -9,6 +9,7 @@ import numpy as np
 from er3a.collision.bodies import Bodies, can_measure
 from er3a.files.path_file import load_paths
 from er3a.files.scene_file import load_scene
+from er3a.kinematics.near_singular import NearSingular
 from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, Status, Verdict
@@ -35,7 +36,6 @@ from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
 from er3a.pipeline.stages.trajectory.path_summary import path_summary
 from er3a.pipeline.study import Study
 from er3a.planning.commands import CommandSource
-from er3a.planning.near_singular import NearSingular
 from er3a.planning.timing import JointLimits, joint_limits
 from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.kinematics.near_singular import NearSingular
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.trajectory.model import PathVerdict
 from er3a.pipeline.stages.trajectory.motion import Motion
@@ -19,7 +20,6 @@ from er3a.planning.intervals import (
     too_fast,
     unreachable,
 )
-from er3a.planning.near_singular import NearSingular
 from er3a.planning.singular_events import SingularEvent, singular_events
 from er3a.robots.robot import Robot
 

@@ -1,4 +1,4 @@
-"""When a pose counts as near-singular: one rule for the table's column, the events and the ways to avoid them."""
+"""When a pose counts as near-singular: one rule (:meth:`NearSingular.is_near`) for columns, events and avoidance."""
 
 from __future__ import annotations
 
@@ -24,13 +24,18 @@ class NearSingular:
         """The threshold of one type, rad or m."""
         return {"wrist": self.wrist_rad, "elbow": self.elbow_rad, "shoulder": self.shoulder_m}[kind]
 
+    def is_near(self, kind: SingularityType, distance: Reals) -> Flags:
+        """Whether distances (...,), rad or m, from the singular set of one type are below its threshold; NaN is not."""
+        near: Flags = distance < self.of(kind)
+        return near
+
     def ratios(self, factors: DeterminantFactors) -> Reals:
         """Distances from the three singular sets over their thresholds, (3, ...) in the order of TYPES."""
         return np.stack([np.abs(factor_of(factors, kind)) / self.of(kind) for kind in TYPES])
 
     def contains(self, factors: DeterminantFactors) -> Flags:
         """Whether poses (...,) are near-singular; False where the factors are NaN."""
-        near: Flags = np.any(self.ratios(factors) < 1.0, axis=0)
+        near: Flags = np.any([self.is_near(kind, np.abs(factor_of(factors, kind))) for kind in TYPES], axis=0)
         return near
 
     def margin(self, robot: Robot, q: Reals) -> Reals:
