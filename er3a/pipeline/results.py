@@ -183,7 +183,8 @@ def read_stage(folder: Path, stage: Stage) -> Stored[Any]:
 
 
 def _reason_of_absence(verdict: dict[str, Any], stage: Stage) -> Finding:
-    kinds = {kind.code: kind for kind in (NotComputed, *stage.absences)}
+    known: tuple[type[Finding], ...] = (NotComputed, *stage.absences)
+    kinds = {str(kind.code): kind for kind in known}
     found: Finding = _adapter(kinds[verdict["code"]]).validate_python(verdict["params"])
     return found
 
