@@ -13,5 +13,6 @@ from er3a.pipeline.viewing.page import Head, head_of
 
 def stage_head(folder: Path, stage: Stage) -> Head:
     """The verdict and key figures that a folder holds, in the page's language."""
+    import_module(stage.verdict_messages)
     words = import_module(stage.messages)
     return head_of(read_stage(folder, stage), words.FIGURES)

@@ -31,6 +31,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         }
         for name in study.robots
     ]
+    words = [module for stage in STAGES.values() for module in (stage.messages, stage.verdict_messages)]
     page.render(
         Path(__file__).with_name("index.html.j2"),
         folder / "index.html",
@@ -41,7 +42,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         command=page.run_command(study, "index.html"),
         provenance=Provenance(
             inputs=result_records(results, study.names),
-            code=code_digest(__name__, *(stage.messages for stage in STAGES.values())),
+            code=code_digest(__name__, *words),
             seed=study.seed,
         ),
     )
