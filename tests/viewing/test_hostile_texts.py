@@ -5,22 +5,26 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from dataclasses import replace
 from html.parser import HTMLParser
-from importlib import import_module
 
-import pandas as pd
+import numpy as np
 import pytest
 import yaml
 
 from er3a.errors import InputError
-from er3a.pipeline.results import write_checksums, write_table
-from er3a.pipeline.study import STAGES, load_study
+from er3a.pipeline.results import AbsentResults, NotComputed, Summary, Verdict, read_stage, write_checksums
+from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.stages.run import show
+from er3a.pipeline.study import load_study
+from er3a.pipeline.tables import table_types
+from er3a.pipeline.viewing.absent import report_absent
 from er3a.pipeline.viewing.index import write_index
 from er3a.pipeline.viewing.recording import escaped
 
 ROBOT = "er3_600"
 HOSTILE = """ <script>alert("x")</script><img src=http://x/y onerror=alert(1)> $x^$ {{ 7*7 }} </style> ' " &amp;"""
-FROM_FILES = ("title", "note", "text", "source", "reason")
+FROM_FILES = ("title", "note", "source")
 LOADED = {"src", "srcset", "data", "poster", "background", "action"}
 
 
@@ -53,15 +57,13 @@ def hostile(small_study, tmp_path_factory):
     study = yaml.safe_load((small_study.folder / "config/small.yaml").read_text(encoding="utf-8"))
     study["robots"] = {ROBOT: study["robots"][ROBOT] | {"file": str(folder / f"{ROBOT}.yaml")}}
     (folder / "study.yaml").write_text(yaml.safe_dump(study), encoding="utf-8")
-    for stage in STAGES:
-        results = folder / "results" / ROBOT / stage
+    for name, stage in STAGES.items():
+        results = folder / "results" / ROBOT / name
         summary = results / "summary.json"
         summary.write_text(json.dumps(_with_hostile(json.loads(summary.read_text()))), encoding="utf-8")
-        for table in results.glob("*.parquet"):
-            content = pd.read_parquet(table)
-            for column in set(FROM_FILES) & set(content):
-                content[column] = content[column].astype(str) + HOSTILE
-            write_table(table, content)
+        for table, kind in table_types(stage.module("model").RESULTS).items():
+            file = results / f"{table}.parquet"
+            _with_hostile_columns(kind.read(file.read_bytes())).write(file)
         write_checksums(results)
     return load_study(folder / "study.yaml"), folder
 
@@ -75,12 +77,18 @@ def _with_hostile(value):
     return [_with_hostile(part) for part in value] if isinstance(value, list) else value
 
 
+def _with_hostile_columns(rows):
+    names = [name for name, spec in rows.columns().items() if name in FROM_FILES and not spec.kind]
+    columns = {name: [text and text + HOSTILE for text in getattr(rows, name)] for name in names}
+    return replace(rows, **{name: np.array(texts, object) for name, texts in columns.items()})
+
+
 @pytest.mark.parametrize("stage", STAGES)
 def test_a_page_shows_hostile_texts_and_does_not_act_on_them(hostile, small_study, stage, tmp_path):
     study, folder = hostile
     page, finished = tmp_path / f"{stage}.html", small_study.folder / f"reports/{ROBOT}/{stage}.html"
     shutil.copy(finished.with_suffix(".webp"), tmp_path)
-    import_module(f"er3a.pipeline.stages.{stage}.report").report(study, ROBOT, folder / "results" / ROBOT / stage, page)
+    show("report", stage, study, ROBOT, folder / "results" / ROBOT / stage, page)
     html = page.read_text(encoding="utf-8")
     found = Tags(html)
     usual = Tags(finished.read_text(encoding="utf-8"))
@@ -89,6 +97,19 @@ def test_a_page_shows_hostile_texts_and_does_not_act_on_them(hostile, small_stud
     assert all(address.startswith("data:") for address in found.loaded)
     assert "&lt;script&gt;alert(" in html
     assert "{{ 7*7 }}" in html
+
+
+def test_the_page_of_a_stage_that_was_not_computed_does_not_act_on_its_reason(hostile, tmp_path):
+    study, folder = hostile
+    stored = read_stage(folder / "results" / ROBOT / "inverse", STAGES["inverse"])
+    absent = AbsentResults(Summary(Verdict("not_computed", NotComputed(HOSTILE)), ()))
+    report_absent(study, replace(stored, results=absent), tmp_path / "inverse.html")
+    html = (tmp_path / "inverse.html").read_text(encoding="utf-8")
+    found = Tags(html)
+    assert found.handlers == []
+    assert all(address.startswith("data:") for address in found.loaded)
+    assert "&lt;script&gt;alert(" in html
+    assert "<script>alert(" not in html
 
 
 def test_the_pages_over_all_robots_do_neither(hostile, small_study, tmp_path):
