@@ -15,10 +15,11 @@ from er3a.kinematics.near_singular import NearSingular, factor_of
 from er3a.kinematics.singularity import characteristic_length, determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.pipeline.messages import planning as messages
-from er3a.planning.avoidance import StrategyName, avoidance_findings, damped_least_squares, via_point
+from er3a.planning.avoidance import avoidance_findings, damped_least_squares, via_point
 from er3a.planning.avoidance.deviation import deviation
 from er3a.planning.avoidance.singular_segment import singular_segment
 from er3a.planning.avoidance.strategies import STRATEGIES, best, compare
+from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.follow import follow
 from er3a.planning.moves import line
 from er3a.planning.singular_events import singular_events

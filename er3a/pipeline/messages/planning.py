@@ -5,7 +5,8 @@ from __future__ import annotations
 import er3a.pipeline.messages.kinematics  # noqa: F401
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.say import joined, listed, say, sentence
-from er3a.planning.avoidance import StrategyName, avoidance_findings
+from er3a.planning.avoidance import avoidance_findings
+from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.intervals import AboveLimit, BelowLimit, PathOutOfReach, TooFast
 from er3a.planning.timing import MustStandStill, NoTimeLawFound, ToppraMissing
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
-from er3a.planning.avoidance import StrategyName
 from er3a.planning.avoidance.avoidance_findings import (
     AccelerationExceeded,
     EndsOffPath,
@@ -24,6 +23,7 @@ from er3a.planning.avoidance.other_branch import branch
 from er3a.planning.avoidance.singular_segment import Avoidance, SingularSegment, Strategy
 from er3a.planning.avoidance.slow_down import slow
 from er3a.planning.avoidance.stop_before import stop
+from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.avoidance.via_point import shifted_via, tilted_via
 from er3a.planning.timing import Timed, TimingError
 from er3a.robots.joint_limits import LimitsExceeded, limits_exceeded

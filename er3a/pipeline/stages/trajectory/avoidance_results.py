@@ -17,9 +17,9 @@ from er3a.pipeline.stages.trajectory.collisions import Surroundings, least_clear
 from er3a.pipeline.stages.trajectory.judgement import Judgement
 from er3a.pipeline.stages.trajectory.model import FASTEST, AvoidanceRows, StrategyMotion, TriedStrategy
 from er3a.pipeline.stages.trajectory.motion import Motion
-from er3a.planning.avoidance import StrategyName
 from er3a.planning.avoidance.singular_segment import SingularSegment, singular_segment
 from er3a.planning.avoidance.strategies import StrategyCost, StrategyResult, best, compare
+from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
 from er3a.robots.robot import Robot
 

@@ -11,7 +11,7 @@ from er3a.files.robot_file import Text
 from er3a.files.yaml_file import StrictModel, read_yaml
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.stages.stage import Stage
-from er3a.planning.avoidance import StrategyName
+from er3a.planning.avoidance.strategy_names import StrategyName
 
 if TYPE_CHECKING:
     from er3a.pipeline.study import Study

@@ -15,8 +15,8 @@ from er3a.kinematics.singularity import SingularityType
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
-from er3a.planning.avoidance import StrategyName
 from er3a.planning.avoidance.strategies import NotUsable
+from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.intervals import AboveLimit, BelowLimit, PathOutOfReach, TooFast
 
 PathKind = Literal["joint", "joint_sequence", "line", "arc", "sequence", "table"]
