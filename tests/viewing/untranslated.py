@@ -94,6 +94,7 @@ def plain_words(texts: Iterable[str], own_texts: set[str]) -> list[str]:
         for piece in own:
             rest = rest.replace(piece, " ")
         rest = re.sub(r"\$[^$]*\$|\\\w+", " ", rest)  # formulas
+        rest = re.sub(r"\b(?:alpha|beta|offset)[1-6]\b", " ", rest)  # names of a table's entries
         if any(word.lower() not in SAME_EVERYWHERE for word in WORD.findall(rest)):
             found.append(" ".join(text.split()))
     return list(dict.fromkeys(found))
