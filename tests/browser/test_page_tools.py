@@ -11,6 +11,7 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.expected_conditions import staleness_of
 from selenium.webdriver.support.wait import WebDriverWait
 
+from er3a.pipeline.results import Provenance
 from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.page import Picture, render
 
@@ -32,7 +33,7 @@ def page(browser, tmp_path):
         template,
         tmp_path / "page.html",
         command="make run",
-        provenance={"inputs": [], "code": "0" * 64},
+        provenance=Provenance(inputs=(), code="0" * 64),
         rows=ROWS,
         picture=Picture(figure, "A line", "It rises."),
     )
