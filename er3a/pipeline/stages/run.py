@@ -22,7 +22,6 @@ from er3a.pipeline.results import (
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.absent import record_absent, report_absent
 
 FOR_A_PERSON = (InputError, ResultError, WriteError, MemoryError, OSError, ImportError)
 """What a person corrects and runs again; anything else belongs to the stage and the robot, and others go on."""
@@ -51,7 +50,7 @@ def _computed(stage: Stage, study: Study, robot: str, extra: dict[str, Any]) -> 
         raise
     except Er3aError as error:
         reason = str(error)
-    except Exception as error:
+    except Exception as error:  # a defect of one stage must not take the others with it; its trace goes to the log
         traceback.print_exc(file=sys.stderr)
         reason = f"{type(error).__name__}: {error}"
     return AbsentResults(Summary(Verdict("not_computed", NotComputed(reason)), ()))
@@ -63,6 +62,8 @@ def show(verb: str, name: str, study: Study, robot: str, folder: Path, output: P
     import_module(stage.verdict_messages)
     stored = read_stage(folder, stage)
     if isinstance(stored.results, AbsentResults):
+        from er3a.pipeline.viewing.absent import record_absent, report_absent  # computing needs no pictures
+
         {"record": record_absent, "report": report_absent}[verb](study, stored, output)
     else:
         getattr(stage.module(verb), verb)(study, stored, output)
