@@ -9,15 +9,17 @@ ROBOT  ?=
 ARGS   ?=
 
 .DEFAULT_GOAL := help
+# Commands take the study's path from the environment, where blanks and quotes in it mean nothing.
+export STUDY
 # A run starts dozens of short processes: without compiled modules kept on disk each would compile them anew.
 unexport PYTHONDONTWRITEBYTECODE
-.PHONY: help run test test-all view estimate archive lint format schema words lock clean distclean campaigns
+.PHONY: help run test test-all view estimate archive lint format schema words lock clean distclean campaigns docs evidence release-check
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## /  make \1\t/' | expand -t 18
 
 run: $(VENV)/run.stamp  ## set up, run the study, write reports/index.html (ARGS="--cores 1", STUDY=config/small.yaml)
-	@$(BIN)/python workflow/scripts/run.py --study $(STUDY) -- $(ARGS)
+	@$(BIN)/er3a run --study "$$STUDY" -- $(ARGS)
 
 test: $(VENV)/dev.stamp  ## set up and run the fast tests (ARGS="-k workspace")
 	@$(BIN)/python -m pytest $(ARGS)
@@ -29,10 +31,10 @@ view: $(VENV)/run.stamp  ## open the recordings in the Rerun viewer (ROBOT=er3a_
 	@$(BIN)/er3a view $(ROBOT)
 
 estimate: $(VENV)/run.stamp  ## say what the study will take before it is run (STUDY=..., ARGS="--cores 1,8,64")
-	@$(BIN)/er3a estimate --study $(STUDY) $(ARGS)
+	@$(BIN)/er3a estimate --study "$$STUDY" $(ARGS)
 
 archive: $(VENV)/run.stamp  ## pack the finished study into er3a-study.zip, with RO-Crate metadata
-	@$(BIN)/er3a archive --study $(STUDY)
+	@$(BIN)/er3a archive --study "$$STUDY"
 
 lint: $(VENV)/dev.stamp  ## check format, types, imports and lint of Python and Snakemake code
 	$(BIN)/ruff format --check .
@@ -63,20 +65,39 @@ words: $(VENV)/dev.stamp  ## collect the texts to be translated into er3a/pipeli
 campaigns: $(VENV)/dev.stamp  ## full-size evidence: writes the tables in docs/evidence/ again
 	$(BIN)/python -m benchmarks.campaigns $(ARGS)
 
+docs: $(VENV)/docs.stamp  ## build the documentation site in docs/_build/html, warnings as errors
+	@$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html
+	@echo "docs/_build/html/index.html"
+
+evidence: $(VENV)/run.stamp  ## list which pages of evidence rest on the code that is here
+	@$(BIN)/python -m testing.evidence
+
+release-check: $(VENV)/run.stamp  ## the same; an error unless a release could be made of this
+	@$(BIN)/python -m testing.evidence --release
+
 lock: $(VENV)/uv.stamp  ## resolve the locked requirements again
-	$(BIN)/uv pip compile pyproject.toml --extra dev --extra peers $(LOCK_FLAGS) -o requirements/dev.txt
-	$(BIN)/uv pip compile pyproject.toml -c requirements/dev.txt $(LOCK_FLAGS) -o requirements/run.txt
-	echo uv | $(BIN)/uv pip compile - $(LOCK_FLAGS) -o requirements/uv.txt
+	$(UV) pip compile pyproject.toml --extra build --extra dev --extra peers $(LOCK_FLAGS) -o requirements/dev.txt
+	$(UV) pip compile pyproject.toml --extra build -c requirements/dev.txt $(LOCK_FLAGS) -o requirements/run.txt
+	$(UV) pip compile pyproject.toml --extra docs -c requirements/dev.txt $(LOCK_FLAGS) -o requirements/docs.txt
+	echo uv >$(VENV)/uv.in
+	$(UV) pip compile $(VENV)/uv.in $(LOCK_FLAGS) -o requirements/uv.txt
 
 LOCK_FLAGS := --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-header --no-annotate --no-emit-index-url --no-emit-find-links
 
 clean:  ## remove results, reports and recordings
-	rm -rf results logs .snakemake
+	rm -rf results logs .snakemake docs/_build docs/generated
 	find reports -mindepth 1 ! -name README.md -delete
 
 distclean: clean  ## also remove the environment
 	rm -rf $(VENV) .pytest_cache .ruff_cache .mypy_cache .import_linter_cache .hypothesis
+
+# uv does not read what pip was told: certificate, proxy and index of pip's settings are handed on to it, unless its own
+# variables name others; and it takes the system's certificates, as pip does.
+of_pip = $$($(BIN)/python -m pip config list 2>/dev/null | sed -En "s/^(global|install)\.$(1)=.(.*).$$/\2/p" | tail -n 1)
+as_pip = value=$${$(1):-$${$(2):-$(call of_pip,$(3))}}; [ -z "$$value" ] || export $(1)="$$value";
+UV = $(call as_pip,SSL_CERT_FILE,PIP_CERT,cert) $(call as_pip,HTTPS_PROXY,PIP_PROXY,proxy) \
+	$(call as_pip,UV_DEFAULT_INDEX,PIP_INDEX_URL,index-url) UV_SYSTEM_CERTS=1 $(BIN)/uv
 
 # The environment: a venv, a hash-checked uv in it, then the hash-checked lock.
 $(VENV)/uv.stamp: requirements/uv.txt
@@ -88,6 +109,6 @@ $(VENV)/uv.stamp: requirements/uv.txt
 
 $(VENV)/%.stamp: requirements/%.txt pyproject.toml $(VENV)/uv.stamp
 	@echo "Setting up $(VENV) from $< ..."
-	@$(BIN)/uv pip install --quiet --python $(BIN)/python --require-hashes -r $<
-	@$(BIN)/uv pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation -e .
+	@$(UV) pip install --quiet --python $(BIN)/python --require-hashes -r $<
+	@$(UV) pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation -e .
 	@touch $@

@@ -32,4 +32,6 @@ onerror:
 
 
 onsuccess:
-    print(*told("note: "), "\nOpen reports/index.html in a browser; `make view` opens the recordings.", sep="\n")
+    print(
+        *told("note: "), f"\nOpen reports/index.html in a browser; `{view_command()}` opens the recordings.", sep="\n"
+    )

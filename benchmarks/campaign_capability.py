@@ -9,13 +9,14 @@ from scipy.spatial.transform import Rotation
 
 from er3a import load_robot
 from er3a.kinematics.batch import inverse_batch
+from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.forward import forward
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
 from er3a.robots.robot import Robot
 from er3a.workspace.capability import rings
 from er3a.workspace.dexterous import dexterous_core
 from er3a.workspace.directions import from_polar, poses, roll_of, tool_rotations
-from er3a.workspace.interval_inverse import GOOD, NEVER, SLOTS, branches, theta_ranges
+from er3a.workspace.interval_inverse import GOOD, NEVER, branches, theta_ranges
 from er3a.workspace.placement import NO, Task, fitting_places, narrowed, survey
 from er3a.workspace.placement_proof import choose_places, proven_bricks
 from er3a.workspace.section_arm import section_arm

@@ -23,9 +23,9 @@ def past_an_obstacle(robot, random) -> tuple[JointMove, Scene]:
     at = forward(robot, move.joints(np.array(random.uniform(0.2, 0.8)))[0])[:3, 3] + random.uniform(-0.12, 0.12, 3)
     radius = float(random.uniform(0.2, 5)) / 1000
     if random.uniform() < 0.5:
-        return move, Scene("bead", spheres=(Sphere("obstacle", transform(at, np.zeros(3)), radius + 1e-3),))
+        return move, Scene("bead", (Sphere("obstacle", transform(at, np.zeros(3)), radius + 1e-3),))
     T = transform(at, np.radians(random.integers(-90, 90, 3)))
-    return move, Scene("wire", cylinders=(Cylinder("obstacle", T, radius, 0.3),))
+    return move, Scene("wire", (Cylinder("obstacle", T, radius, 0.3),))
 
 
 def judged(robot, random) -> tuple[int, int, int, float, float, int]:

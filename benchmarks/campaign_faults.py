@@ -13,9 +13,11 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from er3a.pipeline.results import FORMAT_VERSION
 from testing.small_study import contents, environment, finished, run, run_command
 
 ROBOT = "er3_600"
+OLDER = FORMAT_VERSION - 1
 BLOCKS = f"results/{ROBOT}/workspace/parts/1-of-1.npz"
 MEMORY = 700_000 * 1024  # bytes of address space
 
@@ -92,7 +94,7 @@ def in_the_way(folder: Path, stack: ExitStack) -> None:
 def older(folder: Path, _: ExitStack) -> None:
     """Results of an older format version."""
     path = folder / f"results/{ROBOT}/trajectory/summary.json"
-    path.write_text(path.read_text().replace('"format_version": 2', '"format_version": 1', 1))
+    path.write_text(path.read_text().replace(f'"format_version": {FORMAT_VERSION}', f'"format_version": {OLDER}', 1))
 
 
 def taken(folder: Path, stack: ExitStack) -> None:
@@ -123,7 +125,7 @@ FAULTS = (
     Fault("summary cut in half", halve(f"{STAGE}/summary.json"), REPORT, "summary.json: damaged"),
     Fault("summary with a flipped bit", flip(f"{STAGE}/summary.json"), REPORT, "summary.json: damaged"),
     Fault("checksums with a flipped bit", flip(f"{STAGE}/SHA256SUMS", 0), REPORT, f"{STAGE}/checks.parquet: damaged"),
-    Fault("results of an older version", older, REPORT, "summary.json: format version 1"),
+    Fault("results of an older version", older, REPORT, f"summary.json: format version {OLDER}"),
     Fault("recording cut in half", halve(f"{VIEW}.rrd"), ("view", ROBOT), f"{VIEW}.rrd: damaged"),
     Fault("two runs at once", taken, (), "another run is active in this folder"),
 )  # fmt: skip

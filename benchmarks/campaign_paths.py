@@ -68,7 +68,7 @@ def avoidance_rows(robot, random) -> list[str]:
         for result in results:
             if (cost := result.cost) and (not result.reasons or result.name == "stop"):
                 cells = cost.distance.max() * 1000, np.degrees(cost.angle.max()), cost.motion.duration
-                costs[result.name].append((*cells, max(cost.speed_ratio, cost.acceleration_ratio)))
+                costs[result.name].append((*cells, max(cost.max_joint_speed_ratio, cost.max_joint_acceleration_ratio)))
         if (choice := best(results, any(event.crossing for event in events))) is not None:
             taken[choice.name] += 1
     rows = []

@@ -8,32 +8,19 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
-from pathlib import Path
 
-DOCS = Path(__file__).resolve().parents[1] / "docs"
-EVIDENCE = DOCS / "evidence"
-PARTS = {"fuzz": "reliability.md", "faults": "reliability.md", "kills": "reliability.md", "slurm": "cluster.md"}
-CAMPAIGNS = (
-    "kinematics",
-    "singularities",
-    "speed",
-    "diagnosis",
-    "calibration",
-    "workspace",
-    "paths",
-    "clearance",
-    "capability",
-    "teach",
-    "pages",
-    "estimate",
-    *PARTS,
-)
+from testing.evidence import CAMPAIGNS, PAGES, code_line, page_of
+
+END = "<!-- end of {name} -->"
 
 
-def write_part(name: str, text: str) -> None:
-    """Replace a campaign's part of a page of docs/, between the comments that mark it."""
-    page = DOCS / PARTS[name]
-    start, end = f"<!-- written by: make campaigns ARGS={name} -->\n", f"<!-- end of {name} -->"
+def write(name: str, text: str) -> None:
+    """Write a campaign's page, or replace its part of a page between the comments that mark it; name the code."""
+    page, text = page_of(name), f"{text.rstrip()}\n\n{code_line(name)}\n"
+    if name in PAGES:
+        page.write_text(text, encoding="utf-8")
+        return
+    start, end = f"<!-- written by: make campaigns ARGS={name} -->\n", END.format(name=name)
     before, _, rest = page.read_text(encoding="utf-8").partition(start)
     after = rest.partition(end)[2]
     page.write_text(f"{before}{start}\n{text}\n{end}{after}", encoding="utf-8")
@@ -47,10 +34,7 @@ def main(names: list[str]) -> int:
     for name in names or CAMPAIGNS:
         print(f"{name} ...", flush=True)
         text = import_module(f"benchmarks.campaign_{name}").table()
-        if name in PARTS:
-            write_part(name, text)
-        else:
-            (EVIDENCE / f"{name}.md").write_text(text, encoding="utf-8")
+        write(name, text)
         print(text)
     return 0
 

@@ -4,7 +4,32 @@ The names below are imported on first use, so that one part of the package does 
 """
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from er3a.errors import Er3aError as Er3aError
+    from er3a.files.by_name import calibrate as calibrate
+    from er3a.files.by_name import diagnose as diagnose
+    from er3a.files.by_name import evidence as evidence
+    from er3a.files.measurements import load_measurements as load_measurements
+    from er3a.files.reference_sets import load_references as load_references
+    from er3a.files.robot_library import load_robot as load_robot
+    from er3a.files.scene_file import load_scene as load_scene
+    from er3a.files.target_file import load_targets as load_targets
+    from er3a.formats.urdf import export_urdf as export_urdf
+    from er3a.formats.urdf import import_urdf as import_urdf
+    from er3a.kinematics.batch import inverse_batch as inverse_batch
+    from er3a.kinematics.forward import forward as forward
+    from er3a.kinematics.forward import jacobian as jacobian
+    from er3a.kinematics.inverse import inverse as inverse
+    from er3a.kinematics.numerical import solve as solve
+    from er3a.robots.conventions import to_modified as to_modified
+    from er3a.robots.conventions import to_standard as to_standard
+    from er3a.robots.robot import Robot as Robot
+    from er3a.selection.select import select as select
+    from er3a.selection.sequence import select_sequence as select_sequence
+
+from er3a.version import __version__ as __version__
 
 _PUBLIC = {
     "load_robot": "er3a.files.robot_library",
@@ -19,6 +44,7 @@ _PUBLIC = {
     "load_scene": "er3a.files.scene_file",
     "load_targets": "er3a.files.target_file",
     "diagnose": "er3a.files.by_name",
+    "evidence": "er3a.files.by_name",
     "calibrate": "er3a.files.by_name",
     "load_measurements": "er3a.files.measurements",
     "load_references": "er3a.files.reference_sets",
@@ -30,10 +56,17 @@ _PUBLIC = {
 }
 
 __all__ = list(_PUBLIC)
-__version__ = "0.1.0"
 
 
 def __getattr__(name: str) -> Any:
     if name not in _PUBLIC:
         raise AttributeError(f"module 'er3a' has no attribute '{name}'")
-    return getattr(import_module(_PUBLIC[name]), name)
+    found = getattr(import_module(_PUBLIC[name]), name)
+    if not isinstance(found, type):
+        found = import_module("er3a.public").checked(found)
+    globals()[name] = found  # so that it is the same object from now on
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, "__version__"])

@@ -36,6 +36,23 @@ class InputError(Er3aError):
         super().__init__(f"{where}: {told}" if where else told)
 
 
+class ArgumentError(Er3aError, TypeError):
+    """An argument in Python is of a kind that can't be used."""
+
+    def __init__(self, argument: str, given: object, expected: str):
+        self.argument, self.expected = argument, expected
+        shown = f"the text {given!r}" if isinstance(given, str) else f"of type {type(given).__name__}"
+        super().__init__(_line(f"{argument} is {'None' if given is None else shown}; expected {expected}", 400))
+
+
+class RobotError(Er3aError, ValueError):
+    """A robot's numbers can't be those of an arm; ``problem`` names entry and joint."""
+
+    def __init__(self, robot: str, problem: str):
+        self.robot, self.problem = robot, problem
+        super().__init__(f"{robot}: {problem}")
+
+
 class ShapeError(Er3aError, ValueError):
     """An array argument has the wrong shape."""
 
@@ -73,7 +90,7 @@ class ResultError(Er3aError):
     def __init__(self, file: str | Path, problem: str):
         self.file = str(file)
         self.problem = _line(problem, 300)
-        super().__init__(f"{file}: {self.problem}. Delete the file and run `make run`, which computes it again")
+        super().__init__(f"{file}: {self.problem}. Delete the file and run the study again, which makes it again")
 
 
 class WriteError(Er3aError):

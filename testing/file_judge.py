@@ -12,7 +12,7 @@ import time
 import traceback
 import warnings
 from collections import Counter
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from fractions import Fraction
 from io import StringIO
 from pathlib import Path
@@ -28,6 +28,7 @@ from er3a.errors import InputError
 from er3a.files.measurements import load_measurements
 from er3a.files.path_file import load_paths
 from er3a.files.path_table import PathTable, read_path_table
+from er3a.files.reference_documents import load_documents
 from er3a.files.reference_sets import check_reference_file
 from er3a.files.robot_file import RobotFile
 from er3a.files.robot_library import load_robot
@@ -237,6 +238,9 @@ def differing_table(path: Path) -> list[str]:
         return _differing_points(read_path_table(path), table)
     if path.parent.name == "targets":
         rows: list = list(read_targets(path))
+    elif path.name == "documents.csv":
+        table["derived_from"] = table["derived_from"].str.replace(" ", "")
+        rows = [replace(each, derived_from=(";".join(each.derived_from),)) for each in load_documents(path)]
     else:
         rows = list(
             load_measurements(path) if "q1_deg" in table and "grade" not in table else check_reference_file(path)

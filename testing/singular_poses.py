@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.kinematics.configuration import branch_of
+from er3a.geometry.vectors import signed_angle
 from er3a.kinematics.families import Family
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import determinant_factors
@@ -24,6 +24,23 @@ CLASSES = (
     "wrist elbow shoulder",
     "wrist folded shoulder",
 )
+
+
+def branch_of(robot: Robot, q: np.ndarray) -> np.ndarray:
+    """Slot (...,) that joint angles (..., 6) in rad belong to; on a singularity, where two meet, the lower number.
+
+    Raises
+    ------
+    NotWristPartitionedError
+    """
+    arm = wrist_partitioned_arm(robot)
+    q = np.asarray(q, float)
+    theta = robot.direction * q + robot.offset
+    w = [tuple(axis) for axis in arm.axes.tolist()]
+    elbow = arm.elbow_sign * theta[..., 2] + signed_angle(tuple(arm.upper_arm), tuple(arm.forearm), w[1])
+    wrist = theta[..., 4] + signed_angle(w[3], w[5], w[4])
+    shoulder = determinant_factors(robot, q).shoulder > 0
+    return 4 * shoulder + 2 * (np.sin(elbow) < 0) + (np.sin(wrist) < 0)
 
 
 def joints_near(robot: Robot, kind: str, random: np.random.Generator, count: int) -> np.ndarray:

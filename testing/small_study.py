@@ -33,7 +33,7 @@ def environment(folder: Path) -> dict[str, str]:
 
 def run_command(*words: str) -> list[str]:
     """What `make run` runs on the small study."""
-    return [sys.executable, "workflow/scripts/run.py", "--study", STUDY, "--", "--cores", "2", *words]
+    return [sys.executable, "-m", "er3a", "run", "--study", STUDY, "--", "--cores", "2", *words]
 
 
 def run(folder: Path) -> subprocess.CompletedProcess[str]:

@@ -82,7 +82,7 @@ class StudyRun:
 
     def make_run(self, *words: str, check: bool = True) -> subprocess.CompletedProcess[str]:
         """What `make run` runs once the environment stands."""
-        command = [sys.executable, "workflow/scripts/run.py", "--study", STUDY, "--", *words]
+        command = [sys.executable, "-m", "er3a", "run", "--study", STUDY, "--", *words]
         return self._run(command, check)
 
     def environment(self) -> dict[str, str]:

@@ -191,7 +191,7 @@ def test_a_file_cut_short_is_told(tmp_path, study, name, keep):
     write(tmp_path, study)
     path = tmp_path / name
     path.write_bytes(path.read_bytes()[:keep])
-    with pytest.raises(ResultError, match=r"(damaged|missing).*run `make run`") as caught:
+    with pytest.raises(ResultError, match=r"(damaged|missing).*run the study again") as caught:
         read_results(tmp_path, MadeResults)
     assert "\n" not in str(caught.value)
 
@@ -200,7 +200,7 @@ def test_a_file_cut_short_is_told(tmp_path, study, name, keep):
 def test_missing_files_are_told(tmp_path, study, name):
     write(tmp_path, study)
     (tmp_path / name).unlink()
-    with pytest.raises(ResultError, match=rf"{name}: missing\. Delete the file and run `make run`"):
+    with pytest.raises(ResultError, match=rf"{name}: missing\. Delete the file and run the study again"):
         read_results(tmp_path, MadeResults)
 
 
@@ -212,7 +212,7 @@ def test_missing_files_are_told(tmp_path, study, name):
         (b"\xff\xfe", "damaged"),
         (b"[]", f"format version None, this er3a reads {FORMAT_VERSION}"),
         (b'{"format_version": 3}', f"format version 3, this er3a reads {FORMAT_VERSION}"),
-        (b'{"format_version": 4, "robot": "x", "stage": "y"}', "damaged .no 'verdict' in it"),
+        (f'{{"format_version": {FORMAT_VERSION}, "robot": "x", "stage": "y"}}'.encode(), "damaged .no 'verdict' in it"),
     ],
 )
 def test_a_damaged_summary_is_told(tmp_path, content, problem):

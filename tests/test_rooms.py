@@ -13,7 +13,6 @@ FOREIGN = {
     "testing": {"tests", "benchmarks"},
     "tests": {"benchmarks"},
     "benchmarks": {"tests"},
-    "workflow": {"testing", "tests", "benchmarks"},
 }
 
 

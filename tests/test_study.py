@@ -143,7 +143,7 @@ def test_a_robot_s_own_scene_replaces_those_of_the_stages(study_with):
 
 def test_each_stage_s_inputs_exist_and_are_its_own(study, monkeypatch):
     monkeypatch.chdir(ROOT)
-    robot = ROBOTS / "er3a_c60_article.yaml"
+    robot = Path("data/robots/er3a_c60_article.yaml")
     assert study.inputs("er3a_c60_article", "workspace") == [robot]
     scene, low_floor = Path("data/scenes/table_and_post.yaml"), Path("data/scenes/wall_and_low_floor.yaml")
     targets = Path("data/targets/er3a_c60_article.yaml")
@@ -151,7 +151,7 @@ def test_each_stage_s_inputs_exist_and_are_its_own(study, monkeypatch):
     article = [robot, Path("data/paths/er3a_c60_article.yaml"), low_floor]
     assert study.inputs("er3a_c60_article", "trajectory") == article
     tables = [Path("data/paths/er3a_c60.yaml"), Path("data/paths/er3a_c60_seam.csv"), scene]
-    assert study.inputs("er3a_c60", "trajectory") == [ROBOTS / "er3a_c60.yaml", *tables]
+    assert study.inputs("er3a_c60", "trajectory") == [Path("data/robots/er3a_c60.yaml"), *tables]
     references = study.inputs("er3a_c60_article", "validation")[1:]
     assert {path.parent.name for path in references} == {"er3a_c60_article", "er3a_c60"}
     assert {path.suffix for path in references} == {".csv"}

@@ -17,20 +17,11 @@ from typing import Literal
 
 import numpy as np
 
+from er3a.calibration import outcomes
 from er3a.calibration.identifiable import Level, choose_level
 from er3a.calibration.measured import Measurement, Observations, observed
-from er3a.calibration.outcomes import (
-    CalibrationConclusion,
-    CalibrationError,
-    CorrectionsFound,
-    Held,
-    LevelName,
-    Misfit,
-    MorePositions,
-    NoCorrectionFits,
-    NoCorrectionFound,
-)
 from er3a.calibration.parameters import Parameter, jacobian, moved
+from er3a.display import Displayed, Sheet, first_rows, shortly
 from er3a.kinematics.table_batch import Tables, robot_of, tables_of
 from er3a.numerics.arrays import Reals
 from er3a.references.predict import predict_tables
@@ -84,8 +75,8 @@ class Close:
     correlation: float
 
 
-@dataclass(frozen=True, eq=False)
-class Calibration:
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration(Displayed):
     """A table's corrections.
 
     Attributes
@@ -103,10 +94,10 @@ class Calibration:
     """
 
     robot: Robot
-    level: LevelName
+    level: outcomes.LevelName
     estimates: tuple[Estimate, ...]
     correlation: Reals
-    held: tuple[Held, ...]
+    held: tuple[outcomes.Held, ...]
     close: tuple[Close, ...]
     singular_values: Reals
     coordinates: int
@@ -114,7 +105,7 @@ class Calibration:
     rms_before_mm: float
     rms_after_mm: float
     scatter: float
-    more: MorePositions | None
+    more: outcomes.MorePositions | None
 
     @property
     def fits(self) -> bool:
@@ -122,12 +113,25 @@ class Calibration:
         return self.scatter <= MOST_SCATTER
 
     @property
-    def conclusion(self) -> CalibrationConclusion:
+    def conclusion(self) -> outcomes.CalibrationConclusion:
         """What the measurements say about the table."""
         if not self.fits:
-            return Misfit(self.level, self.rms_before_mm, self.rms_after_mm)
+            return outcomes.Misfit(self.level, self.rms_before_mm, self.rms_after_mm)
         beyond = tuple(each.name for each in self.estimates if abs(each.correction) > each.half_width)
-        return CorrectionsFound(beyond) if beyond else NoCorrectionFound(len(self.estimates))
+        return outcomes.CorrectionsFound(beyond) if beyond else outcomes.NoCorrectionFound(len(self.estimates))
+
+    def sheet(self) -> Sheet:
+        """A row for each estimated entry."""
+        rows = ((each.name, each.nominal, each.correction, each.half_width, each.unit) for each in self.estimates)
+        shown, left_out = first_rows(rows, len(self.estimates))
+        rms = f"rms {shortly(self.rms_before_mm)} -> {shortly(self.rms_after_mm)} mm"
+        return Sheet(
+            f"Calibration of {self.robot.name} with {self.coordinates} coordinates at {self.poses} poses: {rms}",
+            ("entry", "nominal", "correction", "+-95 %", "unit"),
+            shown,
+            left_out,
+            (shortly(self.conclusion), *(f"held: {shortly(why)}" for why in self.held)),
+        )
 
 
 def calibrate(robot: Robot, measurements: Sequence[Measurement] | ReferenceSet) -> Calibration:
@@ -186,8 +190,8 @@ def _fit(robot: Robot, kept: list[Parameter], observations: Observations) -> _Fi
         if np.abs(step).max() < SMALL_STEP + 1e-9 * np.abs(amounts).max():
             return _Fit(amounts, before, rest, J / deviation[:, None])
     rest_mm = float(np.sqrt(np.mean((rest * deviation) ** 2)))
-    raise CalibrationError(
-        NoCorrectionFits(STEPS, rest_mm),
+    raise outcomes.CalibrationError(
+        outcomes.NoCorrectionFits(STEPS, rest_mm),
         f"no corrections make the table fit: after {STEPS} steps the positions are still {rest_mm:.3g} mm off. The "
         "table has a gross fault or is another arm's; er3a.diagnose names single faults",
     )
@@ -215,7 +219,7 @@ def _result(robot: Robot, level: Level, kept: list[Parameter], observations: Obs
         level=level.name,
         estimates=estimates,
         correlation=correlation,
-        held=level.subspace.reasons,
+        held=level.subspace.held,
         close=tuple(Close(kept[i].name, kept[j].name, float(correlation[i, j])) for i, j in zip(rows, columns)),
         singular_values=level.subspace.singular_values,
         coordinates=len(observations),

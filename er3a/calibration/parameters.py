@@ -57,14 +57,13 @@ class Subspace:
 
     Attributes
     ----------
-    kept : places of the parameters that are estimated; ``held`` : places of the others, which keep their values
-    reasons : for each held one, why
+    kept : places of the parameters that are estimated
+    held : why the others keep their values
     singular_values : of the scaled Jacobian over all parameters (one standard deviation per mm or mrad), descending
     """
 
     kept: tuple[int, ...]
-    held: tuple[int, ...]
-    reasons: tuple[Held, ...]
+    held: tuple[Held, ...]
     singular_values: Reals
 
 
@@ -129,8 +128,7 @@ def subspace(
     J = SCALE * jacobian(tables_of(robot), robot, parameters, quantities) / deviation[:, None]
     norms = np.linalg.norm(J, axis=0)
     kept: list[int] = []
-    held: list[int] = []
-    reasons: list[Held] = []
+    held: list[Held] = []
     basis: Reals = np.empty((len(J), 0))
     for k, norm in enumerate(norms):
         rest = J[:, k] - basis @ (basis.T @ J[:, k])
@@ -139,14 +137,10 @@ def subspace(
             kept.append(k)
             basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
             continue
-        held.append(k)
-        reasons.append(
-            MovesNothing(parameters[k].name)
-            if norm <= NO_EFFECT * norms.max()
-            else _told_apart_from(robot, parameters, k, kept, J)
-        )
+        still = norm <= NO_EFFECT * norms.max()
+        held.append(MovesNothing(parameters[k].name) if still else _told_apart_from(robot, parameters, k, kept, J))
     singular_values = np.asarray(np.linalg.svd(J, compute_uv=False), np.float64)
-    return Subspace(tuple(kept), tuple(held), tuple(reasons), singular_values)
+    return Subspace(tuple(kept), tuple(held), singular_values)
 
 
 def _told_apart_from(robot: Robot, parameters: Sequence[Parameter], k: int, kept: list[int], J: Reals) -> NotToldApart:

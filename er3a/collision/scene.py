@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from er3a.display import Displayed, Sheet, first_rows, shortly
+from er3a.errors import PoseError
+from er3a.geometry.transforms import check_poses
 from er3a.numerics.arrays import Reals
+
+UNIT_LENGTH = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,6 +26,14 @@ class Box:
     name: str
     T: Reals
     size: Reals
+
+    def __post_init__(self) -> None:
+        _check(self.name, self.T, *np.ravel(self.size))
+
+    @property
+    def measures(self) -> str:
+        """Where it is, and its edges, in mm."""
+        return f"{_place(self.T)}; size {shortly(tuple((1000 * np.asarray(self.size)).tolist()))}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +50,14 @@ class Cylinder:
     radius: float
     length: float
 
+    def __post_init__(self) -> None:
+        _check(self.name, self.T, self.radius, self.length)
+
+    @property
+    def measures(self) -> str:
+        """Where it is, radius and length, in mm."""
+        return f"{_place(self.T)}; radius {1000 * self.radius:.6g}, length {1000 * self.length:.6g}"
+
 
 @dataclass(frozen=True, eq=False)
 class Sphere:
@@ -48,6 +71,14 @@ class Sphere:
     name: str
     T: Reals
     radius: float
+
+    def __post_init__(self) -> None:
+        _check(self.name, self.T, self.radius)
+
+    @property
+    def measures(self) -> str:
+        """Where it is, and its radius, in mm."""
+        return f"{_place(self.T)}; radius {1000 * self.radius:.6g}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,21 +94,39 @@ class Plane:
     normal: Reals
     offset: float
 
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.offset) and abs(np.linalg.norm(self.normal) - 1.0) <= UNIT_LENGTH):
+            raise PoseError(f"the plane '{self.name}' needs a normal of length 1 and a finite offset")
+
+    @property
+    def measures(self) -> str:
+        """Its normal, and how far along it (mm) the solid ends."""
+        return f"normal {shortly(tuple(np.asarray(self.normal).tolist()))}; offset {1000 * self.offset:.6g}"
+
 
 Solid = Box | Cylinder | Sphere | Plane
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
+@dataclass(frozen=True, eq=False, repr=False)
+class Scene(Displayed):
     """What an arm may not touch; no two solids have the same name."""
 
     title: str
-    boxes: tuple[Box, ...] = ()
-    cylinders: tuple[Cylinder, ...] = ()
-    spheres: tuple[Sphere, ...] = ()
-    planes: tuple[Plane, ...] = ()
+    solids: tuple[Solid, ...]
 
-    @property
-    def solids(self) -> tuple[Solid, ...]:
-        """All of them."""
-        return (*self.boxes, *self.cylinders, *self.spheres, *self.planes)
+    def sheet(self) -> Sheet:
+        """A row for each solid."""
+        rows = ((solid.name, type(solid).__name__.lower(), solid.measures) for solid in self.solids)
+        shown, left_out = first_rows(rows, len(self.solids))
+        return Sheet(f"Scene: {shortly(self.title)}", ("name", "solid", "measures"), shown, left_out)
+
+
+def _check(name: str, T: Reals, *sizes: float) -> None:
+    """Refuse a solid that has no place or no size."""
+    check_poses(T, f"the place of '{name}'")
+    if not all(np.isfinite(size) and size > 0 for size in sizes):
+        raise PoseError(f"the solid '{name}' needs sizes above 0")
+
+
+def _place(T: Reals) -> str:
+    return f"at {shortly(tuple((1000 * T[:3, 3]).tolist()))}"

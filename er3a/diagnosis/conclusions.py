@@ -59,51 +59,124 @@ class NothingToRestOn:
 
 
 @dataclass(frozen=True)
+class Resolution:
+    """From which size on a single wrong entry would be noticed, whichever it is and whichever way it is wrong.
+
+    Attributes
+    ----------
+    length_mm, angle_deg : of those that are noticed at all; None if none is
+    half_turns : angles that are noticed, but not if they are wrong by half a turn
+    unseen : entries that could have any value, and joints that could be reversed
+    """
+
+    length_mm: float | None
+    angle_deg: float | None
+    half_turns: tuple[str, ...]
+    unseen: tuple[str, ...]
+    code: Literal["resolution"] = "resolution"
+
+
+@dataclass(frozen=True)
 class NothingToExplain:
     """All references that a diagnosis rests on are met."""
 
     references: int
+    resolution: Resolution | None = None
     code: Literal["met"] = "met"
 
 
 @dataclass(frozen=True)
 class MostLikelyFault:
-    """The best hypothesis meets all references."""
+    """The best hypothesis meets all references.
+
+    Attributes
+    ----------
+    alternatives : all others that meet them with as few faults; no reference tells them from it
+    """
 
     faults: Faults
     residual_before: float
     residual_after: float
     unit: Unit
+    alternatives: tuple[Faults, ...] = ()
     code: Literal["named"] = "named"
 
 
 @dataclass(frozen=True)
+class TooSmallToTell:
+    """Several hypotheses meet all references, but only because the disagreement is small.
+
+    Attributes
+    ----------
+    candidates : all that meet them with the fewest faults
+    residual : the disagreement; told_from : the size of it from which on the references would tell most of them apart
+    """
+
+    candidates: tuple[Faults, ...]
+    residual: float
+    told_from: float
+    unit: Unit
+    code: Literal["too_small_to_tell"] = "too_small_to_tell"
+
+
+@dataclass(frozen=True)
 class MainFault:
-    """The best hypothesis leaves less than 5 % of the residual, but more than the references allow."""
+    """No hypothesis meets all references; the best leaves less than 5 % of the residual.
+
+    Attributes
+    ----------
+    alternatives : others that no reference tells from it
+    """
 
     faults: Faults
     residual_before: float
     residual_after: float
     unit: Unit
+    alternatives: tuple[Faults, ...] = ()
     code: Literal["mostly"] = "mostly"
 
 
 @dataclass(frozen=True)
 class NoFaultStandsOut:
-    """No hypothesis does better than the table as it is."""
+    """References are missed, and no hypothesis does better than the table as it is.
 
+    Attributes
+    ----------
+    missed, references : how many are missed, of how many
+    half_widths : greatest difference, in half-widths of its reference
+    tried : hypotheses
+    """
+
+    missed: int
+    references: int
+    half_widths: float
+    tried: int
     code: Literal["no_fault_stands_out"] = "no_fault_stands_out"
 
 
 @dataclass(frozen=True)
 class NoFewFaultsExplain:
-    """No one or two faults explain the residual."""
+    """None of the single faults and pairs that were tried explains the residual.
+
+    Attributes
+    ----------
+    residual_after : what the one that is ranked first leaves; least : what that one leaves which leaves least
+    """
 
     tried: int
     residual_before: float
     residual_after: float
     unit: Unit
+    least: float
     code: Literal["unexplained"] = "unexplained"
 
 
-Conclusion = NothingToRestOn | NothingToExplain | MostLikelyFault | MainFault | NoFaultStandsOut | NoFewFaultsExplain
+Conclusion = (
+    NothingToRestOn
+    | NothingToExplain
+    | MostLikelyFault
+    | TooSmallToTell
+    | MainFault
+    | NoFaultStandsOut
+    | NoFewFaultsExplain
+)

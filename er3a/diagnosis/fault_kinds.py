@@ -2,15 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
+from er3a.references.quantities import Side
+
 FaultKind = Literal[
-    "unit", "alpha_sign", "swap", "rows", "limits", "shift", "offset", "direction", "convention", "length", "scale"
+    "unit",
+    "alpha_sign",
+    "alpha",
+    "swap",
+    "rows",
+    "limits",
+    "shift",
+    "offset",
+    "direction",
+    "convention",
+    "length",
+    "scale",
 ]
 Misread = Literal["metres_as_millimetres", "millimetres_as_metres", "radians_as_degrees", "degrees_as_radians"]
 Entries = Literal["a", "d", "lengths", "alpha", "offset", "limits", "angles"]
 LimitFault = Literal["crossed", "signs_swapped", "lower_sign", "upper_sign"]
+LengthColumn = Literal["a", "d"]
 
 
 @dataclass(frozen=True)
@@ -32,6 +46,17 @@ class WrongAlphaSign:
     fits_deg: float
     kind: ClassVar[FaultKind] = "alpha_sign"
     code: Literal["wrong_alpha_sign"] = "wrong_alpha_sign"
+
+
+@dataclass(frozen=True)
+class WrongAlpha:
+    """A joint's alpha is missing (given as 0) or wrong."""
+
+    joint: int
+    given_deg: float
+    fits_deg: float
+    kind: ClassVar[FaultKind] = "alpha"
+    code: Literal["wrong_alpha"] = "wrong_alpha"
 
 
 @dataclass(frozen=True)
@@ -113,11 +138,23 @@ class WrongLimits:
 
 
 @dataclass(frozen=True)
+class WrongLimit:
+    """One of a joint's two limits is wrong."""
+
+    joint: int
+    side: Side
+    given_deg: float
+    fits_deg: float
+    kind: ClassVar[FaultKind] = "limits"
+    code: Literal["wrong_limit"] = "wrong_limit"
+
+
+@dataclass(frozen=True)
 class WrongLength:
     """A length is missing (given as 0) or wrong."""
 
     joint: int
-    column: Literal["a", "d"]
+    column: LengthColumn
     given_mm: float
     fits_mm: float
     kind: ClassVar[FaultKind] = "length"
@@ -136,6 +173,7 @@ class WrongScale:
 Fault = (
     WrongUnit
     | WrongAlphaSign
+    | WrongAlpha
     | SwappedEntries
     | SwappedRows
     | SwappedLimits
@@ -144,6 +182,7 @@ Fault = (
     | ReversedDirection
     | WrongConvention
     | WrongLimits
+    | WrongLimit
     | WrongLength
     | WrongScale
 )
@@ -156,11 +195,43 @@ SIGNIFICANT_GIVEN, SIGNIFICANT_FITTED = 6, 4
 def rounded(fault: Fault) -> Fault:
     """The fault with fitted numbers to four digits and given ones to six: equal ones are the same fault."""
     if isinstance(fault, WrongLength):
-        given, fits = _digits(fault.given_mm, SIGNIFICANT_GIVEN), _digits(fault.fits_mm, SIGNIFICANT_FITTED)
-        return WrongLength(fault.joint, fault.column, given, fits)
+        return replace(fault, given_mm=_given(fault.given_mm), fits_mm=_fitted(fault.fits_mm))
+    if isinstance(fault, WrongOffset | WrongAlpha | WrongAlphaSign | WrongLimit):
+        return replace(fault, given_deg=_given(fault.given_deg), fits_deg=_fitted(fault.fits_deg))
     if isinstance(fault, WrongScale):
-        return WrongScale(_digits(fault.factor, SIGNIFICANT_GIVEN))
+        return WrongScale(_given(fault.factor))
     return fault
+
+
+def entry_of(fault: Fault) -> str | None:
+    """The one entry of the table that a fault is in, such as "d4", "alpha3", "lower2"; None if it is in several."""
+    match fault:
+        case WrongLength(joint, column):
+            return f"{column}{joint}"
+        case WrongOffset(joint):
+            return f"offset{joint}"
+        case WrongAlpha(joint) | WrongAlphaSign(joint):
+            return f"alpha{joint}"
+        case ReversedDirection(joint):
+            return f"direction{joint}"
+        case WrongLimit(joint, side):
+            return f"{side}{joint}"
+        case WrongLimits(int(joint), "lower_sign" | "upper_sign" as sign):
+            return f"{sign.removesuffix('_sign')}{joint}"
+    return None
+
+
+def place_of(fault: Fault) -> str | Fault:
+    """The entry that a fault is in; the fault itself if it is in several."""
+    return entry_of(fault) or rounded(fault)
+
+
+def _given(value: float) -> float:
+    return _digits(value, SIGNIFICANT_GIVEN)
+
+
+def _fitted(value: float) -> float:
+    return _digits(value, SIGNIFICANT_FITTED)
 
 
 def _digits(value: float, count: int) -> float:

@@ -1,12 +1,10 @@
-"""The faults that tables are known to have, as repairs: what to change so that a faulty table becomes right again.
-
-A *repair* changes a batch of tables at one place. Repairs with a free number (a missing length, a wrong scale) are
-*slopes*: predictions are linear in lengths, so their best value follows from least squares.
+"""The faults without a free number that tables are known to have, as repairs: what to change so that a faulty table
+becomes right again. Faults with a free number are in :mod:`er3a.diagnosis.free_numbers`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Literal
@@ -25,22 +23,22 @@ from er3a.diagnosis.fault_kinds import (
     SwappedRows,
     WrongAlphaSign,
     WrongConvention,
-    WrongLength,
+    WrongLimit,
     WrongLimits,
     WrongOffset,
-    WrongScale,
     WrongUnit,
 )
 from er3a.kinematics.table_batch import COLUMNS, Tables
 from er3a.numerics.arrays import Reals
-from er3a.references.quantities import MM
+from er3a.references.quantities import Limit, PoseOutside, Side
+from er3a.references.reference import Reference, expected_of
 
-JOINTS = range(6)
+SIDES: tuple[Side, ...] = ("lower", "upper")
 RADIANS_PER_DEGREE = np.pi / 180
 SAME = 1e-12
+DECIMALS = 9
 
 Change = Callable[[Tables], Tables]
-LengthColumn = Literal["a", "d"]
 
 
 @dataclass(frozen=True)
@@ -51,42 +49,67 @@ class Repair:
     ----------
     fault : what was wrong with a table that the repair corrects
     apply : the change
+    free : whether its number could have been any
     """
 
     fault: Fault
     apply: Change
+    free: bool = False
 
 
-@dataclass(frozen=True)
-class Slope:
-    """A change with a free number: ``apply(tables, amounts)`` adds the amount (m, or relative for a scale).
+def repairs_of(given: Tables, references: Sequence[Reference] = ()) -> list[Repair]:
+    """All repairs that change the given table (a batch of one).
 
-    ``fault(before, amount)`` is what was wrong, with the entry's value before the repair (m).
+    Parameters
+    ----------
+    references : a limit that they contradict is a repair, with the value that they state
     """
-
-    fault: Callable[[float, float], Fault]
-    apply: Callable[[Tables, Reals], Tables]
-    entry: Callable[[Tables], Reals]
-
-
-def repairs_of(given: Tables) -> list[Repair]:
-    """All repairs that change the given table (a batch of one)."""
+    joints = range(given.a.shape[-1])
     candidates = [
+        *limit_repairs(given, references),
         *_units(),
-        *_signs(given),
-        *_swaps(),
-        *_offsets(given),
-        *_directions(),
+        *_signs(given, joints),
+        *_swaps(joints),
+        *_offsets(given, joints),
+        *_directions(joints),
         *_convention(given),
-        *_limits(),
+        *_limits(joints),
     ]
     return [repair for repair in candidates if _differs(repair.apply(given), given)]
 
 
-def slopes() -> list[Slope]:
-    """All repairs with a free number: each length, and a common scale."""
-    columns: tuple[LengthColumn, ...] = ("a", "d")
-    return [*(_length(column, joint) for column in columns for joint in JOINTS), _SCALE]
+def limit_repairs(given: Tables, references: Sequence[Reference]) -> list[Repair]:
+    """Each limit that references contradict, at the middle of what they leave open; where they state no limit, at the
+    farthest pose that they show."""
+    found = []
+    for joint in range(given.a.shape[-1]):
+        for side in SIDES:
+            now = float(np.degrees(getattr(given, side)[0, joint]))
+            fits = _limit_stated(joint, side, now, references)
+            if fits is not None:
+                fault = WrongLimit(joint + 1, side, now, fits)
+                found.append(Repair(fault, _set(side, joint, np.radians(fits)), free=True))
+    return found
+
+
+def _limit_stated(joint: int, side: Side, now: float, references: Sequence[Reference]) -> float | None:
+    """What references say (deg) about a limit that is ``now``; None if they don't contradict it."""
+    stated = [r for r in references if r.quantity == Limit(joint + 1, side) and r.expected is not None]
+    if stated:
+        expected, uncertainty = expected_of(stated)
+        met = (np.abs(expected - now) <= uncertainty).all()
+        middle = (np.max(expected - uncertainty) + np.min(expected + uncertainty)) / 2
+        return None if met else round(float(middle), DECIMALS)
+    shown = [r.quantity.pose[joint] for r in references if isinstance(r.quantity, PoseOutside)]
+    if not shown:
+        return None
+    farthest = min(shown) if side == "lower" else max(shown)
+    outside = now > farthest if side == "lower" else now < farthest
+    return farthest if outside else None
+
+
+def _set(column: str, joint: int, value: float) -> Change:
+    return lambda tables: tables.with_column(column, [joint], np.full((len(tables), 1), value))
 
 
 def _differs(left: Tables, right: Tables) -> bool:
@@ -125,9 +148,9 @@ def _scaled(columns: tuple[str, ...], factor: float) -> Change:
     return lambda tables: replace(tables, **{name: getattr(tables, name) * factor for name in columns})
 
 
-def _signs(given: Tables) -> list[Repair]:
+def _signs(given: Tables, joints: range) -> list[Repair]:
     found = []
-    for j in JOINTS:
+    for j in joints:
         alpha = float(np.degrees(given.alpha[0, j]))
         found.append(Repair(WrongAlphaSign(j + 1, alpha, -alpha), _negated("alpha", j)))
     return found
@@ -145,17 +168,17 @@ _SHIFTS: tuple[tuple[Literal["rows", "a", "alpha", "d"], tuple[str, ...]], ...] 
 )
 
 
-def _swaps() -> list[Repair]:
-    found = [Repair(SwappedEntries(j + 1), _columns_swapped([j])) for j in JOINTS]
-    found.append(Repair(SwappedEntries(None), _columns_swapped(list(JOINTS))))
-    for i, j in combinations(JOINTS, 2):
-        order = list(JOINTS)
+def _swaps(joints: range) -> list[Repair]:
+    found = [Repair(SwappedEntries(j + 1), _columns_swapped([j])) for j in joints]
+    found.append(Repair(SwappedEntries(None), _columns_swapped(list(joints))))
+    for i, j in combinations(joints, 2):
+        order = list(joints)
         order[i], order[j] = j, i
         found.append(Repair(SwappedRows(i + 1, j + 1), _reordered(("a", "alpha", "d"), order)))
         found.append(Repair(SwappedLimits(i + 1, j + 1), _reordered(("lower", "upper"), order)))
     for entries, columns in _SHIFTS:
-        found.append(Repair(ShiftedRows(entries, "down"), _reordered(columns, list(np.roll(JOINTS, -1)))))
-        found.append(Repair(ShiftedRows(entries, "up"), _reordered(columns, list(np.roll(JOINTS, 1)))))
+        found.append(Repair(ShiftedRows(entries, "down"), _reordered(columns, list(np.roll(joints, -1)))))
+        found.append(Repair(ShiftedRows(entries, "up"), _reordered(columns, list(np.roll(joints, 1)))))
     return found
 
 
@@ -169,9 +192,9 @@ def _reordered(columns: tuple[str, ...], order: list[int]) -> Change:
     return lambda tables: replace(tables, **{name: getattr(tables, name)[:, order] for name in columns})
 
 
-def _offsets(given: Tables) -> list[Repair]:
+def _offsets(given: Tables, joints: range) -> list[Repair]:
     found = []
-    for j in JOINTS:
+    for j in joints:
         before = float(np.degrees(given.offset[0, j]))
         for step in (90.0, -90.0, 180.0):
             after = (before + step + 180.0) % 360.0 - 180.0 or 0.0
@@ -184,8 +207,8 @@ def _turned(joint: int, angle: float) -> Change:
     return lambda tables: tables.with_column("offset", [joint], tables.offset[:, [joint]] + angle)
 
 
-def _directions() -> list[Repair]:
-    return [Repair(ReversedDirection(j + 1), _negated("direction", j)) for j in JOINTS]
+def _directions(joints: range) -> list[Repair]:
+    return [Repair(ReversedDirection(j + 1), _negated("direction", j)) for j in joints]
 
 
 def _convention(given: Tables) -> list[Repair]:
@@ -201,11 +224,11 @@ _LIMIT_FAULTS: tuple[tuple[LimitFault, Callable[[Reals, Reals], tuple[Reals, Rea
 )
 
 
-def _limits() -> list[Repair]:
-    places: list[tuple[list[int], int | None]] = [([j], j + 1) for j in JOINTS]
+def _limits(joints: range) -> list[Repair]:
+    places: list[tuple[list[int], int | None]] = [([j], j + 1) for j in joints]
     return [
-        Repair(WrongLimits(joint, fault), _limits_changed(joints, change))
-        for joints, joint in (*places, (list(JOINTS), None))
+        Repair(WrongLimits(joint, fault), _limits_changed(changed, change))
+        for changed, joint in (*places, (list(joints), None))
         for fault, change in _LIMIT_FAULTS
     ]
 
@@ -216,20 +239,3 @@ def _limits_changed(joints: list[int], change: Callable[[Reals, Reals], tuple[Re
         return tables.with_column("lower", joints, low).with_column("upper", joints, high)
 
     return apply
-
-
-def _length(column: LengthColumn, joint: int) -> Slope:
-    return Slope(
-        lambda before, amount: WrongLength(joint + 1, column, before * MM, (before + amount) * MM),
-        lambda tables, amounts: tables.with_column(
-            column, [joint], getattr(tables, column)[:, [joint]] + amounts[:, None]
-        ),
-        lambda tables: (tables.a if column == "a" else tables.d)[:, joint],
-    )
-
-
-_SCALE = Slope(
-    lambda before, amount: WrongScale(1 + amount),
-    lambda tables, amounts: replace(tables, a=tables.a * (1 + amounts[:, None]), d=tables.d * (1 + amounts[:, None])),
-    lambda tables: np.ones(len(tables)),
-)

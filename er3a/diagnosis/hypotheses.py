@@ -1,22 +1,31 @@
-"""Every single and double repair of a table, evaluated against the references in a few batches."""
+"""Every single and double fault that a table may have, evaluated against the references in a few batches."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
 from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from er3a.diagnosis.fault_kinds import Faults
-from er3a.diagnosis.faults import Repair, Slope, repairs_of, slopes
+from er3a.diagnosis.faults import Repair, repairs_of
+from er3a.diagnosis.fitting import MEETS, Fits, Search, descend, meet
+from er3a.diagnosis.free_numbers import FreeNumber, free_numbers, moved, wrapped
+from er3a.diagnosis.scanning import COARSE, FINE, PAIRED, arm_lengths, scanned
 from er3a.kinematics.table_batch import Tables, join
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Flags, Reals
+from er3a.references.quantities import Limit, PoseOutside
+from er3a.references.reference import Reference, expected_of
 
 FREE_NUMBER = 1.5
-PROBE_M = 1e-3
-PASSES = 2  # one would do but for references to an unsigned coordinate
+UNCHANGED = 1e-9
+LEAST_SCALE = 1e-3
+SAME_ANGLE, SAME_LENGTH = 0.1, 0.02  # rad; of the arm's length
+FEW_PASSES, MANY_PASSES = 3, 10
+MOST_PROMISING = 400
 
 Difference = Callable[[Tables], Reals]
 
@@ -43,31 +52,77 @@ class Pool:
         """Number of faults of each hypothesis, (H,)."""
         return np.array([len(faults) for faults in self.faults])
 
+    def explains(self, uncertainty: Reals) -> Flags:
+        """Whether each hypothesis meets all references, (H,)."""
+        met: Flags = np.all(np.abs(self.difference) <= uncertainty * MEETS, axis=1)
+        return met
 
-def evaluate(given: Tables, difference: Difference, uncertainty: Reals) -> Pool:
-    """All single faults and all pairs of faults, free numbers solved.
 
-    Parameters
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A table and what it is held against.
+
+    Attributes
     ----------
     given : the table, a batch of one
+    references : n, which all state a value
     difference : of tables to the references, (H, n)
-    uncertainty : (n,), of the references
     """
-    repairs, free = repairs_of(given), slopes()
-    singles = [repair.apply(given) for repair in repairs]
-    pools = [_plain(singles, [(repair,) for repair in repairs], difference)]
-    starts = join([given, *singles])
-    started_by: list[tuple[Repair, ...]] = [(), *((repair,) for repair in repairs)]
-    pools.append(_with_free(starts, started_by, free, difference, uncertainty))
-    pools.append(_with_two_free(given, free, difference, uncertainty))
-    pairs: list[tuple[Repair, ...]] = []
-    pair_tables = []
-    for i, first in enumerate(repairs):
-        batch = join(singles[i + 1 :]) if i + 1 < len(repairs) else None
-        if batch is not None:
-            pair_tables.append(first.apply(batch))
-            pairs += [(first, second) for second in repairs[i + 1 :]]
-    pools.append(_plain(pair_tables, pairs, difference))
+
+    given: Tables
+    references: tuple[Reference, ...]
+    difference: Difference
+
+    @cached_property
+    def uncertainty(self) -> Reals:
+        """Half-widths (n,) of the references."""
+        return expected_of(self.references)[1]
+
+    @cached_property
+    def numbers(self) -> tuple[FreeNumber, ...]:
+        """The free numbers of the table; none if no reference is about the arm's shape."""
+        return free_numbers(self.given.a.shape[-1]) if self._about_shape.any() else ()
+
+    @cached_property
+    def repairs(self) -> list[Repair]:
+        """The repairs without free number that change the table."""
+        return repairs_of(self.given, self.references)
+
+    def _residual(self, tables: Tables) -> Reals:
+        residual: Reals = (self.difference(tables) / self.uncertainty)[:, self._about_shape]
+        return residual
+
+    @cached_property
+    def _about_shape(self) -> Flags:
+        return np.array([not isinstance(each.quantity, Limit | PoseOutside) for each in self.references])
+
+    def search(self, starts: Tables) -> Search:
+        """A search from start tables; what is said about limits depends on no free number and is left out."""
+        return Search(starts, self.numbers, self._residual)
+
+    def pool(self, tables: Tables, faults: list[Faults], cost: Reals) -> Pool:
+        """Hypotheses with what is left."""
+        return Pool(tables, self.difference(tables), faults, cost)
+
+
+def single_faults(case: Case) -> Pool:
+    """All single faults, free numbers at their best values."""
+    repairs = case.repairs
+    pools = [case.pool(join([repair.apply(case.given) for repair in repairs]), *_named([(each,) for each in repairs]))]
+    if case.numbers:
+        search = case.search(case.given)
+        fits = scanned(search, [(place,) for place in range(len(case.numbers))], FINE)
+        pools.append(_fitted(case, case.given, [()], meet(search, descend(search, fits, MANY_PASSES))))
+    return joined_pools(pools)
+
+
+def double_faults(case: Case) -> Pool:
+    """All pairs of faults, free numbers at their best values."""
+    return joined_pools([_two_repairs(case), *((_repair_and_number(case), _two_numbers(case)) if case.numbers else ())])
+
+
+def joined_pools(pools: Sequence[Pool]) -> Pool:
+    """All hypotheses of several pools, in order."""
     return Pool(
         tables=join([pool.tables for pool in pools]),
         difference=np.concatenate([pool.difference for pool in pools]),
@@ -76,62 +131,88 @@ def evaluate(given: Tables, difference: Difference, uncertainty: Reals) -> Pool:
     )
 
 
-def _plain(tables: list[Tables], repairs: list[tuple[Repair, ...]], difference: Difference) -> Pool:
-    joined = join(tables)
-    return Pool(
-        tables=joined,
-        difference=difference(joined),
-        faults=[tuple(repair.fault for repair in chosen) for chosen in repairs],
-        cost=np.array([float(len(chosen)) for chosen in repairs]),
-    )
+def _two_repairs(case: Case) -> Pool:
+    repairs = case.repairs
+    tables, pairs = [], list[tuple[Repair, ...]]()
+    singles = [repair.apply(case.given) for repair in repairs]
+    for i, first in enumerate(repairs[:-1]):
+        tables.append(first.apply(join(singles[i + 1 :])))
+        pairs += [(first, second) for second in repairs[i + 1 :]]
+    return case.pool(join(tables), *_named(pairs))
 
 
-def _with_free(
-    starts: Tables,
-    started_by: list[tuple[Repair, ...]],
-    free: list[Slope],
-    difference: Difference,
-    uncertainty: Reals,
-) -> Pool:
-    """Each start with each free number at its best value."""
-    solved: list[Tables] = []
+def _repair_and_number(case: Case) -> Pool:
+    starts = join([repair.apply(case.given) for repair in case.repairs])
+    first, group = _same_shape(starts)
+    search = case.search(starts[first])
+    fits = scanned(search, [(place,) for place in range(len(case.numbers))], COARSE)
+    fits = _best_refined(search, descend(search, fits, FEW_PASSES))
+    rows = [np.flatnonzero(fits.start == shape) for shape in group]
+    start = np.repeat(np.arange(len(starts)), [len(own) for own in rows])
+    every = fits[np.concatenate(rows)]
+    return _fitted(case, starts, [(r,) for r in case.repairs], Fits(start, every.which, every.amounts, every.left))
+
+
+def _two_numbers(case: Case) -> Pool:
+    search = case.search(case.given)
+    pairs = list(combinations(range(len(case.numbers)), 2))
+    fits = descend(search, scanned(search, pairs, PAIRED), FEW_PASSES)
+    return _fitted(case, case.given, [()], _best_refined(search, fits))
+
+
+def _best_refined(search: Search, fits: Fits) -> Fits:
+    best = np.sort(np.argsort(fits.squares, kind="stable")[:MOST_PROMISING])
+    return meet(search, fits.with_rows(best, descend(search, fits[best], MANY_PASSES)))
+
+
+def _same_shape(tables: Tables) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Tables that differ in more than limits: the first of each group, and each table's group, (H,)."""
+    names = [field.name for field in fields(tables) if field.name not in ("lower", "upper", "modified")]
+    shape = [getattr(tables, name) for name in names]
+    rows = np.hstack([tables.modified[:, None].astype(float), *shape])
+    _, first, group = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    return first, group.reshape(-1)
+
+
+def _named(chosen: Sequence[tuple[Repair, ...]]) -> tuple[list[Faults], Reals]:
+    """Faults that repairs undo, and their cost."""
+    cost = [sum(FREE_NUMBER if repair.free else 1.0 for repair in repairs) for repairs in chosen]
+    return [tuple(repair.fault for repair in repairs) for repairs in chosen], np.array(cost)
+
+
+def _fitted(case: Case, starts: Tables, chosen: Sequence[tuple[Repair, ...]], fits: Fits) -> Pool:
+    """Hypotheses of fitted numbers that change something, none twice."""
+    fits = _distinct(case, starts, fits)
+    tables = moved(starts[fits.start], case.numbers, fits.which, fits.amounts)
+    repaired, cost = _named(chosen)
+    given = np.stack([number.value(starts) for number in case.numbers], axis=1)
+    fitted = np.stack([number.value(tables) for number in case.numbers], axis=1)
     faults: list[Faults] = []
-    for slope in free:
-        amounts = np.zeros(len(starts))
-        for _ in range(PASSES):
-            amounts += _step(slope, starts, amounts, difference, uncertainty)
-        solved.append(slope.apply(starts, amounts))
-        for chosen, entry, amount in zip(started_by, slope.entry(starts), amounts):
-            faults.append((*(repair.fault for repair in chosen), slope.fault(float(entry), float(amount))))
-    joined = join(solved)
-    cost = np.tile([len(chosen) + FREE_NUMBER for chosen in started_by], len(free))
-    return Pool(joined, difference(joined), faults, cost)
+    for row, (start, places) in enumerate(zip(fits.start.tolist(), fits.which.tolist())):
+        free = []
+        for k, place in enumerate(places):
+            number, amount = case.numbers[place], float(fits.amounts[row, k])
+            best = float(fitted[row, place]) if number.column else 1 + amount
+            free.append(number.fault(float(given[start, place]), best))
+        faults.append((*repaired[start], *free))
+    return case.pool(tables, faults, cost[fits.start] + FREE_NUMBER * fits.which.shape[1])
 
 
-def _step(slope: Slope, starts: Tables, amounts: Reals, difference: Difference, uncertainty: Reals) -> Reals:
-    """Least-squares step (H,) of the free number from ``amounts``; 0 where no reference sees it."""
-    here = difference(slope.apply(starts, amounts))
-    gradient = (difference(slope.apply(starts, amounts + PROBE_M)) - here) / PROBE_M
-    weighted = gradient / uncertainty**2
-    strength = (weighted * gradient).sum(axis=1)
-    step: Reals = -(weighted * here).sum(axis=1) / np.where(strength > 0, strength, np.inf)
-    return step
-
-
-def _with_two_free(given: Tables, free: list[Slope], difference: Difference, uncertainty: Reals) -> Pool:
-    """Each pair of free numbers at its best values."""
-    base = difference(given)[0]
-    probe = np.array([PROBE_M])
-    gradients = np.array([(difference(slope.apply(given, probe))[0] - base) / PROBE_M for slope in free])
-    solved: list[Tables] = []
-    faults: list[Faults] = []
-    for i, first in enumerate(free):
-        for j in range(i + 1, len(free)):
-            system = (gradients[[i, j]] / uncertainty).T
-            amounts = np.linalg.lstsq(system, -base / uncertainty, rcond=1e-9)[0]
-            second = free[j]
-            solved.append(second.apply(first.apply(given, amounts[:1]), amounts[1:]))
-            entries = (float(first.entry(given)[0]), float(second.entry(given)[0]))
-            faults.append((first.fault(entries[0], float(amounts[0])), second.fault(entries[1], float(amounts[1]))))
-    joined = join(solved)
-    return Pool(joined, difference(joined), faults, np.full(len(joined), 2 * FREE_NUMBER))
+def _distinct(case: Case, starts: Tables, fits: Fits) -> Fits:
+    """Fits with angles within half a turn, without those that change nothing or say the same as a better one."""
+    is_angle = np.array([number.is_angle for number in case.numbers])[fits.which]
+    values = np.stack([number.value(starts) for number in case.numbers], axis=1)[fits.start[:, None], fits.which]
+    amounts = np.where(is_angle, wrapped(values + fits.amounts) - values, fits.amounts)
+    changes: Flags = np.all(np.abs(np.where(is_angle, wrapped(amounts), amounts)) > UNCHANGED, axis=1)
+    is_scale = np.array([number.column is None for number in case.numbers])[fits.which]
+    changes &= ~(is_scale & (1 + amounts < LEAST_SCALE)).any(axis=1)
+    fits = Fits(fits.start, fits.which, amounts, fits.left)
+    order = np.lexsort((fits.greatest, *fits.which.T[::-1], fits.start))
+    fits, is_angle, kept = fits[order], is_angle[order], changes[order]
+    tolerance = np.where(is_angle, SAME_ANGLE, SAME_LENGTH * arm_lengths(starts)[fits.start, None])
+    for back in range(1, PAIRED.basins):
+        same = (fits.start[back:] == fits.start[:-back]) & (fits.which[back:] == fits.which[:-back]).all(axis=1)
+        apart = fits.amounts[back:] - fits.amounts[:-back]
+        apart = np.abs(np.where(is_angle[back:], wrapped(apart), apart))
+        kept[back:] &= ~(same & (apart < tolerance[back:]).all(axis=1))
+    return fits[kept]

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from er3a.diagnosis.fault_kinds import Fault, WrongLength, WrongScale
-from er3a.diagnosis.faults import LengthColumn, repairs_of
-from er3a.diagnosis.ranking import rank, usable
+from er3a.diagnosis.fault_kinds import Faults, LengthColumn, WrongLength, WrongScale, entry_of
+from er3a.diagnosis.faults import repairs_of
+from er3a.diagnosis.fitting import MEETS
+from er3a.diagnosis.ranking import Ranking, rank, usable
 from er3a.kinematics.table_batch import COLUMNS, Tables, robot_of, tables_of
 from er3a.numerics.arrays import Reals
 from er3a.references.predict import predict_tables
@@ -28,9 +29,9 @@ STEP = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Mutation:
-    """A right table with one fault: the fault, and the faulty table (a batch of one)."""
+    """A right table with a fault or two: the faults, and the faulty table (a batch of one)."""
 
-    fault: Fault
+    faults: Faults
     table: Tables
 
 
@@ -41,13 +42,17 @@ class Outcome:
     Attributes
     ----------
     identifiable : known before any diagnosis, see :func:`identifiable`
-    found : the right table is in the first group
-    set_size : hypotheses in that group; 0 if nothing was reported
+    found : the right table, or a hypothesis about the same entries, is in the first set
+    explained : the first set meets all references
+    needless : the first set leaves references missed although the right table, which is known, meets them all
+    set_size : hypotheses in that set; 0 if nothing was reported
     """
 
-    fault: Fault
+    faults: Faults
     identifiable: bool
     found: bool
+    explained: bool
+    needless: bool
     set_size: int
 
 
@@ -55,15 +60,15 @@ def mutations_of(robot: Robot) -> Iterator[Mutation]:
     """Each kind of fault at every place where it changes the table."""
     right = tables_of(robot)
     for repair in repairs_of(right):
-        yield Mutation(repair.fault, repair.apply(right))
+        yield Mutation((repair.fault,), repair.apply(right))
     for column in LENGTH_COLUMNS:
-        for j in range(6):
+        for j in range(right.a.shape[-1]):
             length = float(getattr(right, column)[0, j])
             for wrong in ((0.0,) if length else ()) + tuple(length + by for by in WRONG_BY_M):
                 fault = WrongLength(j + 1, column, wrong * MM, length * MM)
-                yield Mutation(fault, right.with_column(column, [j], np.full((1, 1), wrong)))
+                yield Mutation((fault,), right.with_column(column, [j], np.full((1, 1), wrong)))
     for scale in SCALES:
-        yield Mutation(WrongScale(1 / scale), replace(right, a=right.a * scale, d=right.d * scale))
+        yield Mutation((WrongScale(1 / scale),), replace(right, a=right.a * scale, d=right.d * scale))
 
 
 def noisy(references: Sequence[Reference], noise_mm: float, random: np.random.Generator) -> tuple[Reference, ...]:
@@ -83,11 +88,26 @@ def try_mutation(
     stated = usable(references)
     ranking = rank(robot_of(mutation.table, 0, robot), stated)
     group = ranking.groups[0] if ranking and ranking.groups else ()
+    explained = bool(ranking and group and ranking.explains[group[0]])
+    expected, uncertainty = expected_of(stated)
+    right = predict_tables(tables_of(robot), robot, quantities_of(stated))[0]
+    met = bool((np.abs(right - expected) <= uncertainty * MEETS).all())
     return Outcome(
-        fault=mutation.fault,
+        faults=mutation.faults,
         identifiable=identifiable(robot, mutation, stated, noise_mm),
-        found=any(_same(ranking.pool.tables[np.array([row])], tables_of(robot)) for row in group) if ranking else False,
+        found=ranking is not None and any(_found(ranking, row, mutation, tables_of(robot)) for row in group),
+        explained=explained,
+        needless=met and bool(group) and not explained,
         set_size=len(group),
+    )
+
+
+def _found(ranking: Ranking, row: int, mutation: Mutation, right: Tables) -> bool:
+    """Whether a hypothesis is the right table, or explains by the very entries that are wrong."""
+    wrong = {entry_of(fault) for fault in mutation.faults}
+    named = {entry_of(fault) for fault in ranking.pool.faults[row]}
+    return (named == wrong and None not in wrong and bool(ranking.explains[row])) or _same(
+        ranking.pool.tables[[row]], right
     )
 
 
@@ -98,13 +118,24 @@ def identifiable(robot: Robot, mutation: Mutation, references: Sequence[Referenc
     differences at the right table) must move some reference by more than its uncertainty and the noise in it. A joint's
     direction and the convention have no derivative: there the change itself counts.
     """
-    right, quantities = tables_of(robot), quantities_of(references)
+    return bool((np.abs(moved_by(robot, mutation, references)) > left_open(references, noise_mm)).any())
+
+
+def left_open(references: Sequence[Reference], noise_mm: float = 0.0) -> Reals:
+    """What references (n,) leave open: their uncertainty and the noise in them."""
     _, uncertainty = expected_of(references)
     noise = np.array([noise_mm if reference.unit == "mm" else 0.0 for reference in references])
+    wide: Reals = uncertainty + noise
+    return wide
+
+
+def moved_by(robot: Robot, mutation: Mutation, references: Sequence[Reference]) -> Reals:
+    """By how much (n,) a fault moves references, to first order at the right table, in their units."""
+    right, quantities = tables_of(robot), quantities_of(references)
     at_right = predict_tables(right, robot, quantities)[0]
     if mutation.table.modified[0] != right.modified[0]:
-        moved = predict_tables(mutation.table, robot, quantities)[0] - at_right
-        return bool((np.abs(moved) > uncertainty + noise).any())
+        by_convention: Reals = predict_tables(mutation.table, robot, quantities)[0] - at_right
+        return by_convention
     moved = np.zeros(len(references))
     for column in COLUMNS:
         before, after = getattr(right, column)[0], getattr(mutation.table, column)[0]
@@ -113,11 +144,11 @@ def identifiable(robot: Robot, mutation: Mutation, references: Sequence[Referenc
                 turned = right.with_column(column, [int(j)], np.full((1, 1), after[j]))
                 moved += predict_tables(turned, robot, quantities)[0] - at_right
             else:
-                moved += _slope(right, column, j, robot, quantities) * (after[j] - before[j])
-    return bool((np.abs(moved) > uncertainty + noise).any())
+                moved += slope_of(right, column, j, robot, quantities) * (after[j] - before[j])
+    return moved
 
 
-def _slope(right: Tables, column: str, j: int, robot: Robot, quantities: Sequence[Quantity]) -> Reals:
+def slope_of(right: Tables, column: str, j: int, robot: Robot, quantities: Sequence[Quantity]) -> Reals:
     """Derivative (n,) of quantities with respect to one entry, by central differences."""
     entry = getattr(right, column)[:, [j]]
     ahead, behind = (

@@ -19,6 +19,7 @@ from er3a.references.quantities import MM, Pose, Side
 from er3a.robots.robot import Robot
 
 STEP_DEG = 45.0
+MOST_COMPARED = 60
 APART_MM = 1.0
 APART_RAD = 1e-3
 SIDES: tuple[Side, ...] = ("lower", "upper")
@@ -30,7 +31,7 @@ def what_decides(tables: Tables, robot: Robot) -> NextMeasurement | None:
 
     Parameters
     ----------
-    tables : H hypotheses, which the references at hand can't tell apart
+    tables : H hypotheses, which the references at hand can't tell apart; of very many the first are compared
 
     Returns
     -------
@@ -38,8 +39,9 @@ def what_decides(tables: Tables, robot: Robot) -> NextMeasurement | None:
     """
     if len(tables) < 2:
         return None
+    tables = tables[:MOST_COMPARED]
     poses = _candidates(robot)
-    flanges = frames_of(tables, robot.base, np.radians(poses))[:, :, 6]
+    flanges = frames_of(tables, robot.base, np.radians(poses))[:, :, -1]
     points = flanges[..., :3, 3] * MM
     apart = np.linalg.norm(points[:, None] - points[None, :], axis=-1)
     pairs = np.triu_indices(len(tables), 1)
@@ -57,12 +59,13 @@ def what_decides(tables: Tables, robot: Robot) -> NextMeasurement | None:
 
 
 def _candidates(robot: Robot) -> Reals:
-    """Poses (P, 6) in deg within the limits: one joint turned either way, pairs, and all."""
-    turned = [np.zeros(6)]
-    for j in range(6):
+    """Poses (P, n) in deg within the limits: one joint turned either way, pairs, and all."""
+    joints = len(robot.lower)
+    turned = [np.zeros(joints)]
+    for j in range(joints):
         for sign in (1, -1):
-            turned.append(sign * STEP_DEG * (np.arange(6) == j))
+            turned.append(sign * STEP_DEG * (np.arange(joints) == j))
     turned += [a + b for i, a in enumerate(turned[1:]) for b in turned[i + 2 :]]
-    turned.append(STEP_DEG * np.array([1, -1, 1, 1, 1, 1]))
+    turned.append(STEP_DEG * np.where(np.arange(joints) == 1, -1, 1))
     lower, upper = np.degrees(np.minimum(robot.lower, robot.upper)), np.degrees(np.maximum(robot.lower, robot.upper))
     return np.unique(np.round(np.clip(turned, lower, upper), 3), axis=0)

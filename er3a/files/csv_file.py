@@ -40,11 +40,13 @@ class CsvColumn:
     type : float, Written, int or str
     optional : an empty field is read as None
     choices : the allowed values, for columns of words
+    always : whether the table must have the column; without it all its values are None
     """
 
     type: type = float
     optional: bool = False
     choices: tuple[str, ...] = ()
+    always: bool = True
 
 
 def read_csv(path: str | Path, columns: Mapping[str, CsvColumn]) -> list[dict[str, Any]]:
@@ -67,7 +69,8 @@ def read_csv(path: str | Path, columns: Mapping[str, CsvColumn]) -> list[dict[st
             problem = f"{len(line)} fields where the header has {len(header)}"
             raise InputError(path, f"row {number}", problem, "Correct the commas; quote texts that hold one")
         row = {name: _value(path, number, name, text.strip(), columns[name]) for name, text in zip(header, line)}
-        rows.append({"row": number, **row})
+        absent = dict.fromkeys(name for name in columns if name not in row)
+        rows.append({"row": number, **row, **absent})
     return rows
 
 
@@ -97,7 +100,7 @@ def _check_header(path: Path, header: list[str], columns: Mapping[str, CsvColumn
     for name in filter(None, header):
         if header.count(name) > 1:
             raise InputError(path, f"column {name}", "stands in the header twice", "Keep one of the two")
-    missing = [name for name in columns if name not in header]
+    missing = [name for name, column in columns.items() if column.always and name not in header]
     for name in header:
         if name in columns:
             continue

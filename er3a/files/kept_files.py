@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from er3a.errors import ResultError, WriteError
+from er3a.files.shipped import ROOT
 
 _DIGEST_BYTES = hashlib.sha256().digest_size
 _TEMPORARY = re.compile(r"\..+\.[0-9]+(\.\w+)?")  # as `write_atomically` names them
@@ -71,7 +72,9 @@ def read_bytes(path: Path) -> bytes:
 
 
 def shown_path(path: Path) -> str:
-    """Path from the project's root, so that the summary names no machine."""
-    root = Path(__file__).resolve().parents[2]
+    """Path from the project's root or the study's folder, so that the summary names no machine."""
     resolved = Path(path).resolve()
-    return resolved.relative_to(root).as_posix() if resolved.is_relative_to(root) else resolved.name
+    for root in (ROOT, Path.cwd()):
+        if resolved.is_relative_to(root):
+            return resolved.relative_to(root).as_posix()
+    return resolved.name

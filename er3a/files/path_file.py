@@ -30,6 +30,7 @@ from er3a.planning.commands import (
     ToolSequenceCommand,
     ToolTableCommand,
 )
+from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.profiles import Times
 
 TRAPEZOID_RAMP = 1 / 3  # of a motion's time, on the way up and on the way down
@@ -52,12 +53,16 @@ class PoseEntry(StrictModel):
 
 
 class NamedPath(StrictModel):
-    """What every path has."""
+    """What every path has.
+
+    ``expect`` is the verdict that is to come out: any other then counts as a fault, and this one does not.
+    """
 
     name: Name
     title: Text
     title_zh: Text | None = None
     samples: Samples
+    expect: PathVerdict | None = None
 
 
 class Profiled(NamedPath):

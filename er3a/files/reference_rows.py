@@ -10,6 +10,7 @@ from typing import Any
 from er3a.files.csv_file import CsvColumn, Written
 from er3a.references.reference import Row
 from er3a.references.rows import ENVELOPE_CORNERS, ENVELOPE_EXTENTS, KINDS, check_complete
+from er3a.references.seen import COARSE_DEG, SEEN
 from er3a.robots.robot import GRADES
 
 Fields = dict[str, Any]
@@ -22,7 +23,14 @@ _WORD, _NUMBER, _OPTIONAL, _JOINT = (
     CsvColumn(Written, optional=True),
     CsvColumn(int),
 )
-_SOURCE = {"source": _WORD, "grade": CsvColumn(str, choices=tuple(GRADES))}
+STATED_AS = "stated_as"
+STANDARD_DEVIATION = "standard_deviation"
+_SOURCE = {
+    "source": _WORD,
+    "grade": CsvColumn(str, choices=tuple(GRADES)),
+    "origin": _WORD,
+    STATED_AS: CsvColumn(str, optional=True, choices=("half_width", STANDARD_DEVIATION), always=False),
+}
 _POINT = CsvColumn(str, choices=("flange", "wrist_centre"))
 _XYZ = ("x_mm", "y_mm", "z_mm")
 _DIRECTION = ("direction_x", "direction_y", "direction_z")
@@ -35,10 +43,11 @@ class Format:
 
     Attributes
     ----------
-    columns : without source and grade, which every table has
+    columns : without source, grade, origin and what its uncertainties are, which every table has
     digits : where a line gives no uncertainty, it is half the last digit of these columns
     gather : from a line's fields to those of the row
     faults : what is wrong with a line
+    coarse : the uncertainty where a line gives none, of tables without digits
     mixed_lengths, mixed_limits : whether single lines in metres, or limits in radians, beside others are refused
     """
 
@@ -46,6 +55,7 @@ class Format:
     digits: tuple[str, ...] = ()
     gather: Callable[[Fields], Fields] = dict
     faults: Callable[[Fields], Iterator[Fault]] = lambda fields: iter(())
+    coarse: float | None = None
     mixed_lengths: bool = False
     mixed_limits: bool = False
 
@@ -78,6 +88,12 @@ def _position_fields(fields: Fields) -> Fields:
     values = dict(fields)
     values["pose"] = tuple(values.pop(name) for name in _POSE)
     values["xyz_mm"] = tuple(values.pop(name) for name in _XYZ)
+    return values
+
+
+def _observation_fields(fields: Fields) -> Fields:
+    values = dict(fields)
+    values["pose"] = tuple(values.pop(name) for name in _POSE)
     return values
 
 
@@ -180,6 +196,35 @@ FORMATS: dict[str, Format] = {
         digits=("speed_deg_s",),
         faults=_speed_faults,
     ),
+    "observations": Format(
+        {
+            **dict.fromkeys(_POSE, _NUMBER),
+            "joint": _JOINT,
+            "point": _POINT,
+            "seen": CsvColumn(str, choices=SEEN),
+            "uncertainty_deg": _OPTIONAL,
+        },
+        gather=_observation_fields,
+        coarse=COARSE_DEG,
+    ),
+    "lengths": Format(
+        {
+            "joint": _JOINT,
+            "length": CsvColumn(str, choices=("a", "d")),
+            "value_mm": _NUMBER,
+            "uncertainty_mm": _OPTIONAL,
+        },
+        digits=("value_mm",),
+    ),
+    "angles": Format(
+        {
+            "joint": _JOINT,
+            "angle": CsvColumn(str, choices=("alpha", "offset")),
+            "value_deg": _NUMBER,
+            "uncertainty_deg": _OPTIONAL,
+        },
+        digits=("value_deg",),
+    ),
 }
 
 
@@ -187,6 +232,7 @@ def row_of(kind: str, fields: Mapping[str, Any]) -> Row:
     """The row behind the fields of a CSV line."""
     values = FORMATS[kind].gather(dict(fields))
     values["line"] = values.pop("row")
+    values["gaussian"] = values.pop(STATED_AS) == STANDARD_DEVIATION
     return KINDS[kind](**values)
 
 

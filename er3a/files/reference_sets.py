@@ -8,11 +8,14 @@ from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.files.csv_file import Written, read_csv
+from er3a.files.reference_documents import FILE as DOCUMENTS
+from er3a.files.reference_documents import check_origins, load_documents
 from er3a.files.reference_rows import FORMATS, Fields, Format, row_of
-from er3a.files.robot_library import REFERENCES
+from er3a.files.shipped import names, own_or_shipped
 from er3a.files.units import LEAST_SPAN_MM, WIDEST_IN_RADIANS
+from er3a.references.documents import Documents
 from er3a.references.quantities import Quantity
-from er3a.references.reference import Reference, ReferenceSet, Row
+from er3a.references.reference import Reference, ReferenceSet, Row, conflicts
 from er3a.references.rows import reference_set
 
 SHORTEST_BESIDE_LONG_MM, LONG_MM = 2.0, 100.0
@@ -39,6 +42,8 @@ RADIANS = Mistaken("deg", "radians", "Convert to degrees")
 def load_references(name_or_folder: str | Path) -> ReferenceSet:
     """Load a reference set by its name in data/manual_refs, or by the path of a folder.
 
+    A name is looked up below the working folder first, then among the references that come with er3a.
+
     Raises
     ------
     InputError
@@ -46,14 +51,23 @@ def load_references(name_or_folder: str | Path) -> ReferenceSet:
     """
     folder = Path(name_or_folder)
     if isinstance(name_or_folder, str) and "/" not in name_or_folder:
-        folder = REFERENCES / name_or_folder
+        folder = reference_folder(name_or_folder)
     if not folder.is_dir():
-        known = ", ".join(sorted(path.name for path in REFERENCES.iterdir() if path.is_dir()))
+        known = ", ".join(names("data/manual_refs", "*/"))
         raise InputError(folder, None, "there is no such reference set", f"Known: {known}; or give a folder's path")
-    files = sorted(folder.glob("*.csv"))
+    files = [file for file in sorted(folder.glob("*.csv")) if file.name != DOCUMENTS]
     if not files:
         raise InputError(folder, None, "the folder holds no CSV file", f"Add one of: {_file_names()}")
-    return reference_set(folder.name, {file.stem: check_reference_file(file) for file in files})
+    tables = {file.stem: check_reference_file(file) for file in files}
+    documents = load_documents(folder / DOCUMENTS)
+    for file in files:
+        check_origins(file, tables[file.stem], documents)
+    return reference_set(folder.name, tables, documents)
+
+
+def reference_folder(name: str) -> Path:
+    """The folder of a reference set: the study's own, else the project's."""
+    return own_or_shipped(f"data/manual_refs/{name}")
 
 
 def check_reference_file(path: str | Path) -> tuple[Row, ...]:
@@ -63,7 +77,8 @@ def check_reference_file(path: str | Path) -> tuple[Row, ...]:
     ------
     InputError
         for an unknown kind, a missing column, a wrong unit, an empty or non-finite number, an unknown grade, a pose
-        with missing joints, values in metres or radians, and rows of one source that repeat or contradict each other
+        with missing joints, values in metres or radians, rows of one document that repeat or contradict each other, and
+        an origin that the documents beside the file don't hold
     """
     path = Path(path)
     kind = path.stem
@@ -78,7 +93,17 @@ def check_reference_file(path: str | Path) -> tuple[Row, ...]:
     _check_units(path, FORMATS[kind], table)
     rows = tuple(row_of(kind, fields) for fields in table)
     _check_repeats(path, rows)
+    if documents := _documents_beside(path):
+        check_origins(path, rows, documents)
     return rows
+
+
+def _documents_beside(path: Path) -> Documents | None:
+    """The documents of a table's set; None if there are none that can be read, which is another file's fault."""
+    try:
+        return load_documents(path.parent / DOCUMENTS)
+    except InputError:
+        return None
 
 
 def _fill_uncertainty(format: Format, fields: Fields) -> None:
@@ -86,6 +111,8 @@ def _fill_uncertainty(format: Format, fields: Fields) -> None:
     if format.digits and fields[format.uncertainty] is None:
         decimals = [fields[name].decimals for name in format.digits if fields[name] is not None]
         fields[format.uncertainty] = 0.5 * 10.0 ** -max(decimals, default=0)
+    if format.coarse and fields[format.uncertainty] is None:
+        fields[format.uncertainty] = format.coarse
     for name, value in fields.items():
         fields[name] = float(value) if isinstance(value, Written) else value
 
@@ -117,7 +144,7 @@ def _check_span(path: Path, table: list[Fields], columns: tuple[str, ...], least
     """Refuse a table whose values are all too small."""
     present = [column for column in columns if column in table[0]]
     largest = max(_sizes(table, present))
-    if 0 < largest < least:
+    if "length" not in table[0] and 0 < largest < least:
         problem = f"the largest value is {largest:g} {mistaken.unit}, which can only be {mistaken.other}"
         raise InputError(path, f"columns {', '.join(present)}", problem, mistaken.remedy)
 
@@ -154,13 +181,23 @@ def _check_repeats(path: Path, rows: tuple[Row, ...]) -> None:
     seen: dict[tuple[str, Quantity], tuple[int, Reference]] = {}
     for row in rows:
         for reference in row.references():
-            key = (reference.source, reference.quantity)
+            key = (reference.document, reference.quantity)
             line, first = seen.setdefault(key, (row.line, reference))
             if line == row.line:
                 continue
-            same = first.expected == reference.expected
-            problem = f"{'repeats' if same else 'contradicts'} row {line} of the same source ({reference.subject.key})"
-            raise InputError(path, f"row {row.line}", problem, "Keep one of the two, or name the source of each")
+            if _same(first, reference):
+                problem = f"repeats row {line} of the same document ({reference.subject.key})"
+            elif conflicts((first, reference)):
+                problem = f"contradicts row {line} of the same document ({reference.subject.key})"
+            else:
+                continue
+            raise InputError(path, f"row {row.line}", problem, "Keep one of the two, or name the document of each")
+
+
+def _same(first: Reference, second: Reference) -> bool:
+    if first.expected is None or second.expected is None:
+        return first.expected == second.expected
+    return first.quantity.apart(first.expected, second.quantity, second.expected) == 0
 
 
 def _file_names() -> str:

@@ -22,16 +22,23 @@ JointNumber = Annotated[int, Field(ge=1, le=6)]
 
 
 class Sourced(StrictModel):
-    """A group of values with its source and grade."""
+    """A group of values with its source and grade; ``origin``: its document, by its name in the reference sets."""
 
     source: Text
     grade: Grade
+    origin: Name | None = None
 
 
-class DhRow(StrictModel):
-    """One row; ``beta_deg`` is Hayati's turn about y, in calibrated tables of arms with parallel axes."""
+class OfOneJoint(StrictModel):
+    """A row; ``origin``: its document, if that is another one than the group's."""
 
     joint: JointNumber
+    origin: Name | None = None
+
+
+class DhRow(OfOneJoint):
+    """One row; ``beta_deg`` is Hayati's turn about y, in calibrated tables of arms with parallel axes."""
+
     a_mm: float
     alpha_deg: float
     d_mm: float
@@ -45,20 +52,20 @@ def _sign(value: int) -> int:
     return value
 
 
-class ZeroRow(StrictModel):
-    joint: JointNumber
+class ZeroRow(OfOneJoint):
+    """``direction_origin``: the direction's document, if that is another one than the offset's."""
+
     direction: Annotated[int, AfterValidator(_sign), Field(json_schema_extra={"enum": [1, -1]})]
     offset_deg: float
+    direction_origin: Name | None = None
 
 
-class JointLimitRow(StrictModel):
-    joint: JointNumber
+class JointLimitRow(OfOneJoint):
     lower_deg: float
     upper_deg: float
 
 
-class JointSpeedRow(StrictModel):
-    joint: JointNumber
+class JointSpeedRow(OfOneJoint):
     speed_deg_s: Annotated[float, Field(gt=0, le=FASTEST_DEG_S)]
 
 

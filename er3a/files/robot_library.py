@@ -8,17 +8,19 @@ import numpy as np
 
 from er3a.errors import InputError
 from er3a.files.robot_file import Envelopes, Placement, RobotFile
+from er3a.files.shipped import ROOT, names, own_or_shipped
 from er3a.files.yaml_file import load
 from er3a.geometry.transforms import transform
 from er3a.robots.robot import Envelope, Robot, Source
 
-DATA = Path(__file__).resolve().parents[2] / "data"
-ROBOTS = DATA / "robots"
-REFERENCES = DATA / "manual_refs"
+ROBOTS = ROOT / "data" / "robots"
+REFERENCES = ROOT / "data" / "manual_refs"
 
 
 def load_robot(name_or_path: str | Path) -> Robot:
     """Load a robot by the name of a file in data/robots, or by a path that ends in .yaml.
+
+    A name is looked up below the working folder first, then among the robots that come with er3a.
 
     Raises
     ------
@@ -41,9 +43,10 @@ def robot_path(name_or_path: str | Path) -> Path:
     text = str(name_or_path)
     if text.endswith((".yaml", ".yml")):
         return Path(text)
-    path = ROBOTS / f"{text}.yaml"
-    if "/" in text or "\0" in text or not path.is_file():
-        known = ", ".join(sorted(file.stem for file in ROBOTS.glob("*.yaml")))
+    plain = bool(text) and "/" not in text and "\0" not in text
+    path = own_or_shipped(f"data/robots/{text}.yaml") if plain else None
+    if path is None or not path.is_file():
+        known = ", ".join(names("data/robots", "*.yaml"))
         raise InputError(None, None, f"there is no robot '{text}'", f"Known: {known}; or give a path ending in .yaml")
     return path
 
@@ -71,8 +74,31 @@ def robot_of(content: RobotFile) -> Robot:
         zero_pose=content.zero_pose,
         references=tuple(content.references),
         envelopes=_envelopes(content.envelopes),
-        sources={group: Source(value.source, value.grade) for group, value in present.items()},
+        sources={group: Source(value.source, value.grade, value.origin or "") for group, value in present.items()},
+        origins=_origins(content),
     )
+
+
+VALUES_OF_ROW = {
+    "dh": ("a", "alpha", "d", "beta"),
+    "zero": ("direction", "offset"),
+    "limits": ("lower", "upper"),
+    "speeds": ("speed",),
+}
+"""The entries that a row of each group holds."""
+
+
+def _origins(content: RobotFile) -> dict[str, str]:
+    """Documents of single entries that have another one than their group."""
+    found: dict[str, str] = {}
+    for group, columns in VALUES_OF_ROW.items():
+        for row in getattr(content, group).rows if getattr(content, group) else ():
+            if row.origin:
+                found |= {f"{column}{row.joint}": row.origin for column in columns}
+    for row in content.zero.rows:
+        if row.direction_origin:
+            found[f"direction{row.joint}"] = row.direction_origin
+    return found
 
 
 def _envelopes(group: Envelopes | None) -> tuple[Envelope, ...]:

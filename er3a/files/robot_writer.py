@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
 
 from er3a.files.kept_files import write_atomically
 from er3a.files.robot_file import SHORTEST_PLAIN_LENGTH_MM, RobotFile
+from er3a.files.robot_library import VALUES_OF_ROW
 from er3a.geometry.transforms import rpy_of
 from er3a.robots.robot import Robot, Source
 
@@ -26,17 +28,24 @@ def robot_file(robot: Robot) -> RobotFile:
 
     def sourced(group: str) -> dict:
         source = robot.sources.get(group, _UNKNOWN)
-        return {"source": source.source, "grade": source.grade}
+        return {"source": source.source, "grade": source.grade, "origin": source.origin or None}
 
-    def rows(**columns: np.ndarray) -> list[dict]:
-        return [{"joint": k + 1, **{key: _tidy(values[k]) for key, values in columns.items()}} for k in range(6)]
+    def rows(group: str, **columns: np.ndarray) -> list[dict]:
+        return [
+            {
+                "joint": k + 1,
+                **{key: _tidy(values[k]) for key, values in columns.items()},
+                **_origins(robot, group, k + 1),
+            }
+            for k in range(6)
+        ]
 
     a_mm, d_mm = robot.a * 1000, robot.d * 1000
     lengths = np.abs(np.concatenate([a_mm, d_mm]))
-    zero_rows = rows(offset_deg=np.degrees(robot.offset))
+    zero_rows = rows("zero", offset_deg=np.degrees(robot.offset))
     for row, direction in zip(zero_rows, robot.direction):
         row["direction"] = int(direction)
-    dh_rows = rows(a_mm=a_mm, alpha_deg=np.degrees(robot.alpha), d_mm=d_mm)
+    dh_rows = rows("dh", a_mm=a_mm, alpha_deg=np.degrees(robot.alpha), d_mm=d_mm)
     for row, beta in zip(dh_rows, robot.beta):
         row["beta_deg"] = _tidy(np.degrees(beta)) or None
     content = {
@@ -53,10 +62,10 @@ def robot_file(robot: Robot) -> RobotFile:
         },
         "zero": sourced("zero") | {"rows": zero_rows},
         "limits": sourced("limits")
-        | {"rows": rows(lower_deg=np.degrees(robot.lower), upper_deg=np.degrees(robot.upper))},
+        | {"rows": rows("limits", lower_deg=np.degrees(robot.lower), upper_deg=np.degrees(robot.upper))},
     }
     if np.isfinite(robot.speed).all():
-        content["speeds"] = sourced("speeds") | {"rows": rows(speed_deg_s=np.degrees(robot.speed))}
+        content["speeds"] = sourced("speeds") | {"rows": rows("speeds", speed_deg_s=np.degrees(robot.speed))}
     if robot.envelopes:
         capsules = [
             {
@@ -78,9 +87,21 @@ def robot_file(robot: Robot) -> RobotFile:
 
 def write_robot(robot: Robot, path: Path) -> None:
     """Write a robot file that :func:`er3a.load_robot` reads back to the same numbers, to 1e-12 m and rad."""
-    content = robot_file(robot).model_dump(exclude_none=True)
-    text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=110, default_flow_style=None)
+    text = yaml_text(robot_file(robot).model_dump(exclude_none=True))
     write_atomically(path, lambda file: file.write_text(text, encoding="utf-8"))
+
+
+def yaml_text(content: dict[str, Any]) -> str:
+    """The content of a file of ours as YAML: lists of numbers in brackets, keys in their order."""
+    return yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=110, default_flow_style=None)
+
+
+def _origins(robot: Robot, group: str, joint: int) -> dict[str, str | None]:
+    """The documents of a row, where they are others than the group's."""
+    named = {column: robot.origins.get(f"{column}{joint}") for column in VALUES_OF_ROW[group]}
+    direction = named.pop("direction", None)
+    row = next(iter(named.values()))
+    return {"origin": row} | ({"direction_origin": direction} if direction not in (None, row) else {})
 
 
 def _tidy(value: float) -> float:

@@ -114,13 +114,9 @@ class SceneFile(StrictModel):
 
     def scene(self) -> library.Scene:
         """In the units of the library."""
-        return library.Scene(
-            self.title,
-            tuple(box.solid() for box in self.boxes),
-            tuple(cylinder.solid() for cylinder in self.cylinders),
-            tuple(sphere.solid() for sphere in self.spheres),
-            tuple(plane.solid() for plane in self.planes),
-        )
+        obstacles: list[BoxObstacle | CylinderObstacle | SphereObstacle | PlaneObstacle]
+        obstacles = [*self.boxes, *self.cylinders, *self.spheres, *self.planes]
+        return library.Scene(self.title, tuple(obstacle.solid() for obstacle in obstacles))
 
     @model_validator(mode="after")
     def _obstacles_with_own_names(self) -> Self:

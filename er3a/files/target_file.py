@@ -19,7 +19,7 @@ from er3a.files.units import JointsDeg, PositionMm, Six, Triple, as_degrees
 from er3a.files.yaml_file import StrictModel, load, parse
 from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, transform
 from er3a.kinematics.forward import forward
-from er3a.kinematics.targets import Target
+from er3a.kinematics.targets import Target, TargetOutcome
 from er3a.robots.robot import Robot
 
 MOST_TARGETS = 50
@@ -43,6 +43,7 @@ class TargetEntry(StrictModel):
     quaternion_wxyz : of unit length to 1e-6
     matrix : rotation matrix by rows, orthonormal to 1e-6; the nearest exact rotation is used
     q_ref_deg : the joint angles that the arm comes from
+    expect : what is to come out; anything else then counts as a fault, and this does not
     """
 
     name: Name
@@ -55,6 +56,7 @@ class TargetEntry(StrictModel):
     matrix: Annotated[list[Triple], Field(min_length=3, max_length=3)] | None = None
     q_deg: Annotated[Six, as_degrees("give the pose by xyz_mm and an orientation")] | None = None
     q_ref_deg: JointsDeg = [0.0] * 6
+    expect: TargetOutcome | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -110,7 +112,7 @@ class TargetEntry(StrictModel):
 
     def target(self, robot: Robot) -> Target:
         """The target for a robot, which is needed where the pose is given by joint angles."""
-        return Target(self.name, self._pose(robot), self.note, tuple(self.q_ref_deg))
+        return Target(self.name, self._pose(robot), self.note, tuple(self.q_ref_deg), self.expect)
 
     def _pose(self, robot: Robot) -> NDArray[np.float64]:
         """T_base_tool (4, 4), m, read-only."""

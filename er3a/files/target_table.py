@@ -1,7 +1,7 @@
 """Targets as a CSV table: one row each, position in mm and the orientation in one of the four named forms.
 
-Columns: ``name``, ``x_mm``, ``y_mm``, ``z_mm``; the columns of one form (``FORMS``); optionally ``note`` and
-``q1_ref_deg`` .. ``q6_ref_deg``.
+Columns: ``name``, ``x_mm``, ``y_mm``, ``z_mm``; the columns of one form (``FORMS``); optionally ``note``,
+``expect`` (may stay empty) and ``q1_ref_deg`` .. ``q6_ref_deg``.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ FORMS: dict[str, tuple[str, ...]] = {
     "quaternion_wxyz": ("qw", "qx", "qy", "qz"),
     "matrix": tuple(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)),
 }
+TEXTS = ("note", "expect")
 REFERENCE = tuple(f"q{joint}_ref_deg" for joint in range(1, 7))
 
 
@@ -41,8 +42,7 @@ def read_target_table(path: str | Path) -> list[dict[str, Any]]:
         raise InputError(path, "header", _without_one_form(header, forms), f"Give the columns {known}")
     form = forms[0]
     columns = {"name": CsvColumn(str)} | {name: CsvColumn() for name in (*POSITION, *FORMS[form])}
-    if "note" in present:
-        columns["note"] = CsvColumn(str, optional=True)
+    columns |= {name: CsvColumn(str, optional=True) for name in TEXTS if name in present}
     if present & set(REFERENCE):
         columns |= {name: CsvColumn() for name in REFERENCE}
     return [_target(row, form) for row in read_csv(path, columns)]
@@ -55,7 +55,7 @@ def _without_one_form(header: list[str], forms: list[str]) -> str:
         return "its columns are separated by semicolons instead of commas"
     if forms:
         return f"the table has two forms of orientation, {forms[0]} and {forms[1]}"
-    strange = [name for name in header if name.strip() not in ("name", "note", *POSITION, *REFERENCE)]
+    strange = [name for name in header if name.strip() not in ("name", *TEXTS, *POSITION, *REFERENCE)]
     return "the table has no orientation" + (f" that is known, but {', '.join(strange)}" if strange else "")
 
 
@@ -63,8 +63,7 @@ def _target(row: dict[str, Any], form: str) -> dict[str, Any]:
     values = [row[name] for name in FORMS[form]]
     target = {"row": row["row"], "name": row["name"], "xyz_mm": [row[name] for name in POSITION]}
     target[form] = [values[0:3], values[3:6], values[6:9]] if form == "matrix" else values
-    if row.get("note"):
-        target["note"] = row["note"]
+    target |= {name: row[name] for name in TEXTS if row.get(name)}
     if REFERENCE[0] in row:
         target["q_ref_deg"] = [row[name] for name in REFERENCE]
     return target

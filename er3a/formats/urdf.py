@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from er3a.display import Displayed, Sheet, shortly
 from er3a.errors import InputError
 from er3a.formats.from_axes import table_from_axes
 from er3a.formats.text_file import read_text
@@ -41,8 +42,8 @@ class UrdfJoint:
     speed: float
 
 
-@dataclass(frozen=True, eq=False)
-class UrdfImport:
+@dataclass(frozen=True, eq=False, repr=False)
+class UrdfImport(Displayed):
     """A robot derived from a URDF.
 
     Attributes
@@ -54,6 +55,11 @@ class UrdfImport:
     robot: Robot
     notes: tuple[str, ...]
     misfit_m: float
+
+    def sheet(self) -> Sheet:
+        """The robot, how well it fits, and the notes."""
+        fits = f"within {shortly(1000 * self.misfit_m)} mm of the URDF"
+        return replace(self.robot.sheet(), facts=(fits, *self.robot.sheet().facts, *self.notes))
 
 
 def import_urdf(path: str | Path, snap: bool = False) -> UrdfImport:
@@ -81,30 +87,18 @@ def import_urdf(path: str | Path, snap: bool = False) -> UrdfImport:
     table = table_from_axes(np.array(directions), np.array(points), T)
     moving = [joint for joint in joints if joint.type in MOVING]
     source = Source(f"Derived from the joint axes of {path.name}", "export")
+    sources = dict.fromkeys(("dh", "zero", "limits", "speeds", "base", "tool"), source)
     limit_note = "; +-360 deg assumed for joints without a limit" if any(j.type == "continuous" for j in moving) else ""
     robot = Robot(
-        name=_name(path),
+        name=robot_name(path),
         title=path.stem[:200],
         convention="standard",
-        a=table.a,
-        alpha=table.alpha,
-        d=table.d,
-        direction=table.direction,
-        offset=table.offset,
         lower=np.array([joint.lower for joint in moving]),
         upper=np.array([joint.upper for joint in moving]),
         speed=np.array([joint.speed for joint in moving]),
-        base=table.base,
-        tool=table.tool,
         zero_pose="As the URDF has it with all joints at 0.",
-        sources={
-            "dh": source,
-            "zero": source,
-            "limits": Source(source.source + limit_note, "export"),
-            "speeds": source,
-            "base": source,
-            "tool": source,
-        },
+        sources=sources | {"limits": Source(source.source + limit_note, "export")},
+        **vars(table),
     )
     q = np.random.default_rng(0).uniform(-math.pi, math.pi, (MISFIT_POSES, JOINTS))
     misfit = np.linalg.norm((forward(robot, q) - _chain_forward(joints, q))[:, :3, 3], axis=1).max()
@@ -150,7 +144,8 @@ def _words(values: np.ndarray) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-def _name(path: Path) -> str:
+def robot_name(path: Path) -> str:
+    """A name for the robot in a file, from the file's: small letters, digits and underscores, 64 at most."""
     name = "".join(c if c.isalnum() and c.isascii() else "_" for c in path.stem.lower()).strip("_")[:64]
     return name or "imported"
 
@@ -251,6 +246,8 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool, notes: list[str
         notes.append(f"{where} is continuous: +-360 deg were assumed as its limits")
     if limit is not None and limit.get("velocity"):
         speed = _numbers(path, where, limit, "velocity", None)[0] or math.nan
+        if speed < 0:
+            raise InputError(path, where, f"velocity {speed:g} is below 0", "Write the greatest speed, or 0 if unknown")
     return UrdfJoint(name, kind, transform(xyz, rpy), direction / (length or 1.0), lower, upper, speed)
 
 

@@ -26,7 +26,7 @@ def cos_sin(angle: float | Reals) -> tuple[Reals, Reals]:
 
 
 def rot_x(angle: float) -> Reals:
-    """Rotation about x by ``angle`` (rad) as a transform, shape (4, 4)."""
+    """Rotation about x by ``angle`` (rad) as a transform [1]_, shape (4, 4)."""
     c, s = cos_sin(angle)
     return np.array([[1, 0, 0, 0], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1]], dtype=float)
 

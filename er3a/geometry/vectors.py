@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
 
 Vector = tuple[float, float, float]
@@ -42,6 +43,16 @@ def subtract(a: Vector, b: Vector) -> Vector:
 def scaled(a: Vector, factor: float) -> Vector:
     """Product with a number."""
     return a[0] * factor, a[1] * factor, a[2] * factor
+
+
+@kernel
+def in_frame_of(T: Reals, v: Vector) -> Vector:
+    """Components, in the frame that a transform T leads to, of a vector given in the frame it leads from."""
+    return (
+        T[0, 0] * v[0] + T[0, 1] * v[1] + T[0, 2] * v[2],
+        T[1, 0] * v[0] + T[1, 1] * v[1] + T[1, 2] * v[2],
+        T[2, 0] * v[0] + T[2, 1] * v[1] + T[2, 2] * v[2],
+    )
 
 
 @kernel

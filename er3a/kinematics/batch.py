@@ -21,11 +21,7 @@ SMALLEST_PART = 8 * BLOCK
 
 
 def inverse_batch(
-    robot: Robot,
-    T: Reals,
-    q_ref: Reals | None = None,
-    turns: bool = False,
-    threads: int = 1,
+    robot: Robot, T: Reals, q_ref: Reals | None = None, turns: bool = False, threads: int = 1
 ) -> Solutions:
     """All closed-form solutions of a wrist-partitioned arm for many poses of the tool.
 
@@ -59,7 +55,7 @@ def inverse_batch(
     def solve(part: slice) -> None:
         own = reference if len(reference) == 1 else reference[part]
         rows = (q[part], valid[part], inside[part], rigid[part], marked[part])
-        solve_blocks(arm, robot.direction, robot.offset, robot.lower, robot.upper, T[part], own, *rows)
+        solve_blocks(arm, (robot.direction, robot.offset, robot.lower, robot.upper), T[part], own, rows)
 
     parallel_for(count, threads, SMALLEST_PART, solve)
     if not rigid.all():

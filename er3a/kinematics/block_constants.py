@@ -57,12 +57,7 @@ class BlockConstants(NamedTuple):
 
 
 def block_constants(
-    axes: Reals,
-    points: Reals,
-    wrist: Reals,
-    tool_rotation: Reals,
-    wrist_in_tool: Reals,
-    elbow_sign: float,
+    axes: Reals, points: Reals, wrist: Reals, tool_rotation: Reals, wrist_in_tool: Reals, elbow_sign: float
 ) -> BlockConstants:
     """Constants of an arm given as its axis lines with all theta at 0 (see ``WristPartitionedArm``), base frame."""
     w1, w2, w4, w5, w6 = (axes[k] for k in (0, 1, 3, 4, 5))

@@ -26,6 +26,8 @@ BLOCK = 64
 NEAR = 1e-6  # m or rad from where a joint becomes free
 PER_TURN = 1 / TURN
 
+Joints = tuple[Reals, Reals, Reals, Reals]
+
 # Rows of scratch memory; a row holds one number of each pose of the block. Offsets are constants, so that the compiler
 # sees that rows don't overlap.
 _Z6, _X6, _PLANE, _MARK, _RIGID, _POSE_ROWS = 12, 15, 18, 19, 20, 21  # the pose itself (3 x 4) comes first
@@ -35,25 +37,18 @@ _VALID, _WITHIN, _PAIR_ROWS = 12, 13, 15  # two slots of a wrist: six angles eac
 
 @kernel
 def solve_blocks(
-    arm: BlockConstants,
-    direction: Reals,
-    offset: Reals,
-    lower: Reals,
-    upper: Reals,
-    T: Reals,
-    q_ref: Reals,
-    q: Reals,
-    valid: Flags,
-    within: Flags,
-    rigid: Flags,
-    marked: Flags,
+    arm: BlockConstants, joints: Joints, T: Reals, q_ref: Reals, out: tuple[Reals, Flags, Flags, Flags, Flags]
 ) -> None:
     """Solve poses ``T`` (N, 4, 4).
 
-    Fills ``q`` (N, 8, 6), by the turns within the limits that are nearest to ``q_ref`` (N or 1, 6), rad,
-    NaN where a slot has no solution, and per slot ``valid`` and ``within`` the limits (N, 8). ``rigid`` (N,) tells
-    which poses are rigid transforms, ``marked`` (N,) which are left to the careful solver.
+    Parameters
+    ----------
+    joints : direction, offset, lower and upper limits (6,)
+    out : fills ``q`` (N, 8, 6), by the turns within the limits that are nearest to ``q_ref`` (N or 1, 6), rad,
+        NaN where a slot has no solution, and per slot ``valid`` and ``within`` the limits (N, 8). ``rigid`` (N,) tells
+        which poses are rigid transforms, ``marked`` (N,) which are left to the careful solver.
     """
+    q, valid, within, rigid, marked = out
     pose, sides = np.empty(_POSE_ROWS * BLOCK), np.empty((2, _SIDE_ROWS * BLOCK))
     pairs, reference = np.empty((4, _PAIR_ROWS * BLOCK)), np.empty(6 * BLOCK)
     for start in range(0, T.shape[0], BLOCK):
@@ -77,7 +72,7 @@ def solve_blocks(
             if pair % 2 == 0:
                 _elbow(arm, pose, side)
             _wrist(arm, pose, side, 1.0 - 2.0 * (pair % 2), pairs[pair])
-            _manufacturers_angles(direction, offset, lower, upper, reference, pairs[pair])
+            _manufacturers_angles(joints, reference, pairs[pair])
             for i in range(size):
                 for row in range(6):
                     q[start + i, 2 * pair, row] = pairs[pair, row * BLOCK + i]
@@ -108,10 +103,9 @@ def _check(w: Reals) -> None:
 
 
 @kernel
-def _manufacturers_angles(
-    direction: Reals, offset: Reals, lower: Reals, upper: Reals, reference: Reals, pair: Reals
-) -> None:
+def _manufacturers_angles(joints: Joints, reference: Reals, pair: Reals) -> None:
     """Angles theta into the manufacturer's, by the nearest turn within the limits (``nearest_equivalent``)."""
+    direction, offset, lower, upper = joints
     for i in range(BLOCK):
         pair[_WITHIN * BLOCK + i] = pair[_VALID * BLOCK + i]
         pair[(_WITHIN + 1) * BLOCK + i] = pair[_VALID * BLOCK + i]
@@ -150,11 +144,7 @@ def count_turns(q: Reals, lower: Reals, upper: Reals, turns: NDArray[np.int8]) -
 def in_frame_1(rows: tuple[Vector, Vector, Vector], x: float, y: float, z: float) -> Vector:
     """A vector turned by a rotation given as three rows."""
     a, b, c = rows
-    return (
-        a[0] * x + a[1] * y + a[2] * z,
-        b[0] * x + b[1] * y + b[2] * z,
-        c[0] * x + c[1] * y + c[2] * z,
-    )
+    return a[0] * x + a[1] * y + a[2] * z, b[0] * x + b[1] * y + b[2] * z, c[0] * x + c[1] * y + c[2] * z
 
 
 @kernel
@@ -236,12 +226,10 @@ def _wrist(arm: BlockConstants, w: Reals, side: Reals, sign: float, pair: Reals)
         theta_1 = arctan2(side[_SIN_1 * BLOCK + i], side[_COS_1 * BLOCK + i])
         pair[i], pair[6 * BLOCK + i] = theta_1, theta_1
         cos_1, sin_1 = side[_COS_1 * BLOCK + i], side[_SIN_1 * BLOCK + i]
-        zx, zy, zz = _undone(
-            arm, w[_Z6 * BLOCK + i], w[(_Z6 + 1) * BLOCK + i], w[(_Z6 + 2) * BLOCK + i], cos_1, sin_1, c, s_
-        )
-        xx, xy, xz = _undone(
-            arm, w[_X6 * BLOCK + i], w[(_X6 + 1) * BLOCK + i], w[(_X6 + 2) * BLOCK + i], cos_1, sin_1, c, s_
-        )
+        x, y, z = w[_Z6 * BLOCK + i], w[(_Z6 + 1) * BLOCK + i], w[(_Z6 + 2) * BLOCK + i]
+        zx, zy, zz = seen_by_wrist(arm, x, y, z, cos_1, sin_1, c, s_)
+        x, y, z = w[_X6 * BLOCK + i], w[(_X6 + 1) * BLOCK + i], w[(_X6 + 2) * BLOCK + i]
+        beside_6 = seen_by_wrist(arm, x, y, z, cos_1, sin_1, c, s_)
         # Half the angle between axes 4 and 6 as a point, then half of phi_5 by the spherical triangle.
         tilt = np.sqrt(zx * zx + zy * zy)
         length = np.sqrt(tilt * tilt + zz * zz)
@@ -261,14 +249,14 @@ def _wrist(arm: BlockConstants, w: Reals, side: Reals, sign: float, pair: Reals)
         py = arm.sin_difference - 2.0 * arm.cos_45 * arm.sin_56 * upper * per
         px = -arm.sin_56 * sin_5
         pair[4 * BLOCK + i], pair[10 * BLOCK + i] = phi_5 - arm.turn_5, -phi_5 - arm.turn_5
-        phi_4, phi_6 = _outer_angles(arm, zx, zy, xx, xy, xz, px, py, cos_5, sin_5)
+        phi_4, phi_6 = _outer_angles(arm, zx, zy, beside_6, px, py, cos_5, sin_5)
         pair[3 * BLOCK + i], pair[5 * BLOCK + i] = phi_4 - arm.turn_4, phi_6
-        phi_4, phi_6 = _outer_angles(arm, zx, zy, xx, xy, xz, -px, py, cos_5, -sin_5)
+        phi_4, phi_6 = _outer_angles(arm, zx, zy, beside_6, -px, py, cos_5, -sin_5)
         pair[9 * BLOCK + i], pair[11 * BLOCK + i] = phi_4 - arm.turn_4, phi_6
 
 
 @kernel
-def _undone(
+def seen_by_wrist(
     arm: BlockConstants, x: float, y: float, z: float, cos_1: float, sin_1: float, c: float, s: float
 ) -> Vector:
     """A vector of frame 1 as the wrist sees it: turned back by the first three joints, z along axis 4."""
@@ -280,22 +268,13 @@ def _undone(
 
 @kernel
 def _outer_angles(
-    arm: BlockConstants,
-    zx: float,
-    zy: float,
-    xx: float,
-    xy: float,
-    xz: float,
-    px: float,
-    py: float,
-    cos_5: float,
-    sin_5: float,
+    arm: BlockConstants, zx: float, zy: float, beside_6: Vector, px: float, py: float, cos_5: float, sin_5: float
 ) -> tuple[float, float]:
     """phi_4 turns (px, py) to axis 6 as seen along axis 4; phi_6 is what is left for the vector beside axis 6."""
     c, s = zx * px + zy * py, zy * px - zx * py
     per = 1.0 / np.sqrt(c * c + s * s)
     phi_4 = arctan2(s, c)
-    c, s = c * per, s * per
+    (xx, xy, xz), c, s = beside_6, c * per, s * per
     x, y = xx * c + xy * s, xy * c - xx * s
     y, z = y * arm.cos_45 + xz * arm.sin_45, xz * arm.cos_45 - y * arm.sin_45
     x, y = x * cos_5 + y * sin_5, y * cos_5 - x * sin_5

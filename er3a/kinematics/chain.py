@@ -25,6 +25,7 @@ from er3a.robots.robot import Robot
 
 JOINTS = 6
 ALONG_Z, TO_NEXT_AXIS = 0, 1
+ON_AXIS = 1e-12  # m; a point this near to an axis is not moved by its joint
 
 
 @derived
@@ -56,6 +57,15 @@ def constant_links(robot: Robot, frame: int | None = None) -> Reals:
         links[count] = links[count] @ robot.tool
     links.setflags(write=False)
     return links
+
+
+def moving_tip(links: Reals) -> tuple[int, Reals]:
+    """The outermost joint (from 0) that moves the tool point, and the point (3,), m, in that joint's turning frame."""
+    last, tip = JOINTS - 1, links[JOINTS, :3, 3]
+    while last > 0 and np.hypot(tip[0], tip[1]) <= ON_AXIS:
+        tip = links[last, :3, :3] @ tip + links[last, :3, 3]
+        last -= 1
+    return last, tip
 
 
 def link_parts(robot: Robot) -> Reals:

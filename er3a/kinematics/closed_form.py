@@ -41,6 +41,7 @@ from er3a.geometry.vectors import (
     add,
     cross,
     dot,
+    in_frame_of,
     rotated,
     scaled,
     signed_angle,
@@ -49,6 +50,9 @@ from er3a.geometry.vectors import (
 )
 from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
+
+Joints = tuple[Reals, Reals]
+Slots = tuple[Reals, NDArray[np.int8], Reals]
 
 SLOTS = 8
 BOUNDARY_M = 1e-9
@@ -105,16 +109,6 @@ def _wrap(angle: float) -> float:
 
 
 @kernel
-def _to_base(T: Reals, v: Vector) -> Vector:
-    """Components in the base frame of a vector given in the tool frame."""
-    return (
-        T[0, 0] * v[0] + T[0, 1] * v[1] + T[0, 2] * v[2],
-        T[1, 0] * v[0] + T[1, 1] * v[1] + T[1, 2] * v[2],
-        T[2, 0] * v[0] + T[2, 1] * v[1] + T[2, 2] * v[2],
-    )
-
-
-@kernel
 def _off_folds(angle: float, to_low: float, to_high: float, low_offset: float, high_offset: float) -> float:
     """An angle in 0..pi, put beside that end whose distance from the fold (m or rad) is nothing but rounding."""
     if to_low < AT_FOLD and low_offset > 0.0:
@@ -126,22 +120,14 @@ def _off_folds(angle: float, to_low: float, to_high: float, low_offset: float, h
 
 @kernel
 def solve(
-    arm: ArmConstants,
-    direction: Reals,
-    offset: Reals,
-    T: Reals,
-    q_ref: Reals,
-    keep_folds: bool,
-    keep_free: bool,
-    q: Reals,
-    fault: NDArray[np.int8],
-    gap: Reals,
+    arm: ArmConstants, joints: Joints, T: Reals, q_ref: Reals, keep_folds: bool, keep_free: bool, out: Slots
 ) -> None:
     """Fill ``q`` (N, 8, 6), ``fault`` and ``gap`` (N, 8) for poses ``T`` (N, 4, 4); see ``solve_slots``."""
+    (direction, offset), (q, fault, gap) = joints, out
     for n in range(T.shape[0]):
         tool_point = (T[n, 0, 3], T[n, 1, 3], T[n, 2, 3])
-        v = subtract(add(tool_point, _to_base(T[n], arm.wrist_in_tool)), arm.point_1)
-        axis_6, beside_6 = _to_base(T[n], arm.axis_6_in_tool), _to_base(T[n], arm.beside_6_in_tool)
+        v = subtract(add(tool_point, in_frame_of(T[n], arm.wrist_in_tool)), arm.point_1)
+        axis_6, beside_6 = in_frame_of(T[n], arm.axis_6_in_tool), in_frame_of(T[n], arm.beside_6_in_tool)
 
         along = dot(arm.axis_1, v)
         A, B = dot(arm.axis_2, v) - along * arm.cos_12, -dot(arm.axis_2, cross(arm.axis_1, v))
@@ -188,16 +174,9 @@ def solve(
                     q[n, slot + wrist, 0] = theta_1
                     q[n, slot + wrist, 1] = theta_2
                     q[n, slot + wrist, 2] = arm.elbow_sign * turn
-                free_theta_4 = direction[3] * q_ref[n, 3] + offset[3]
-                beyond = _solve_wrist(
-                    arm,
-                    rotated(axis_6_1, arm.axis_2, c, s),
-                    rotated(beside_6_1, arm.axis_2, c, s),
-                    free_theta_4,
-                    keep_folds,
-                    keep_free,
-                    q[n, slot : slot + 2],
-                )
+                free_4, pair = direction[3] * q_ref[n, 3] + offset[3], q[n, slot : slot + 2]
+                axis_6_3, beside_6_3 = rotated(axis_6_1, arm.axis_2, c, s), rotated(beside_6_1, arm.axis_2, c, s)
+                beyond = _solve_wrist(arm, axis_6_3, beside_6_3, free_4, keep_folds, keep_free, pair)
                 for wrist in range(slot, slot + 2):
                     if beyond > BOUNDARY_RAD:
                         fault[n, wrist] = ORIENTATION
@@ -208,13 +187,7 @@ def solve(
 
 @kernel
 def _solve_wrist(
-    arm: ArmConstants,
-    axis_6: Vector,
-    beside_6: Vector,
-    free_theta_4: float,
-    keep_folds: bool,
-    keep_free: bool,
-    theta: Reals,
+    arm: ArmConstants, axis_6: Vector, beside_6: Vector, free_4: float, keep_folds: bool, keep_free: bool, theta: Reals
 ) -> float:
     """Set the last three columns of ``theta`` (2, 6) from where axis 6 and the vector beside it must turn to.
 
@@ -239,7 +212,7 @@ def _solve_wrist(
         tilted = rotated(arm.axis_6, arm.axis_5, c_5, s_5)
         theta_4 = signed_angle(tilted, axis_6, arm.axis_4)
         if aligned:
-            theta_4 = free_theta_4 + (np.pi if keep_free and k == 1 else 0.0)
+            theta_4 = free_4 + (np.pi if keep_free and k == 1 else 0.0)
         rest = rotated(beside_6, arm.axis_4, np.cos(theta_4), -np.sin(theta_4))
         rest = rotated(rest, arm.axis_5, c_5, -s_5)
         theta[k, 3], theta[k, 4], theta[k, 5] = theta_4, theta_5, signed_angle(arm.beside_6, rest, arm.axis_6)

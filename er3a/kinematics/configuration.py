@@ -10,15 +10,13 @@ that a branch can only change where the arm passes a singularity of that part:
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
-from er3a.geometry.vectors import signed_angle
 from er3a.kinematics.closed_form import BOUNDARY_M, SLOTS
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
-from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.derived import derived
 from er3a.robots.robot import Robot
 
@@ -33,37 +31,7 @@ BranchLabel = Literal[
     "back_elbow_down_no_flip",
     "back_elbow_down_flip",
 ]
-LABELS: dict[Side, tuple[BranchLabel, ...]] = {  # by side, then elbow up or down and wrist
-    "front": (
-        "front_elbow_up_no_flip",
-        "front_elbow_up_flip",
-        "front_elbow_down_no_flip",
-        "front_elbow_down_flip",
-    ),
-    "back": (
-        "back_elbow_up_no_flip",
-        "back_elbow_up_flip",
-        "back_elbow_down_no_flip",
-        "back_elbow_down_flip",
-    ),
-}
-
-
-def branch_of(robot: Robot, q: Reals) -> Integers:
-    """Slot (...,) that joint angles (..., 6) in rad belong to; on a singularity, where two meet, the lower number.
-
-    Raises
-    ------
-    NotWristPartitionedError
-    """
-    arm = wrist_partitioned_arm(robot)
-    q = np.asarray(q, float)
-    theta = robot.direction * q + robot.offset
-    w = [tuple(axis) for axis in arm.axes.tolist()]
-    elbow = arm.elbow_sign * theta[..., 2] + signed_angle(tuple(arm.upper_arm), tuple(arm.forearm), w[1])
-    wrist = theta[..., 4] + signed_angle(w[3], w[5], w[4])
-    shoulder = determinant_factors(robot, q).shoulder > 0
-    return 4 * shoulder + 2 * (np.sin(elbow) < 0) + (np.sin(wrist) < 0)
+LABELS: tuple[BranchLabel, ...] = get_args(BranchLabel)
 
 
 @derived
@@ -86,7 +54,7 @@ def branch_labels(robot: Robot) -> tuple[BranchLabel, ...]:
         outward = _outward(slot) * np.cross(w1, w2)
         bend = 1.0 if slot % 4 < 2 else -1.0
         down = bend * (np.cross(w2, outward) @ w1) >= 0
-        labels.append(LABELS[side_of(robot, slot)][2 * int(down) + slot % 2])
+        labels.append(LABELS[4 * (side_of(robot, slot) == "back") + 2 * int(down) + slot % 2])
     return tuple(labels)
 
 

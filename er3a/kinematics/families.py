@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from er3a.display import Displayed, Sheet, shortly
 from er3a.geometry.angles import TURN, wrap_to_pi
 from er3a.kinematics.aligned_wrist import (
     SOLVES_M,
@@ -38,8 +39,8 @@ CURVES: tuple[tuple[SingularityType, int, int], ...] = (("shoulder", 4, 0), ("el
 FREE_JOINT: dict[SingularityType, int] = {"shoulder": 0, "elbow": 1}
 
 
-@dataclass(frozen=True, eq=False)
-class Family:
+@dataclass(frozen=True, eq=False, repr=False)
+class Family(Displayed):
     """A continuum of solutions of one pose.
 
     For kind *wrist* its members are ``q0 + t * direction``. For the others joint 1 (*shoulder*) or 2 (*elbow*) is that
@@ -76,6 +77,13 @@ class Family:
         q = nearest_equivalent(self.robot, _nearest_wrists(self.robot, q, self.q0), self.q0)
         q[:, joint] = self.q0[joint] + t.reshape(-1)
         return q.reshape(*t.shape, 6)
+
+    def sheet(self) -> Sheet:
+        """A line: kind, range and the nearest member."""
+        low, high = np.degrees(self.range).tolist()
+        within = "within the limits" if self.within_limits else "outside the limits"
+        q0 = shortly(tuple(np.degrees(self.q0).tolist()))
+        return Sheet(f"Family {self.kind}, t from {shortly(low)} to {shortly(high)} deg, {within}, q0_deg {q0}")
 
 
 def families(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[Family, ...]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.errors import ShapeError
+from er3a.errors import ArgumentError, ShapeError
 from er3a.geometry.transforms import as_floats
 from er3a.kinematics.chain import JOINTS, constant_links
 from er3a.numerics.arrays import Reals
@@ -46,6 +46,8 @@ def forward(robot: Robot, q: Reals, frame: int | None = None, out: Reals | None 
     shape = (*q.shape[:-1], 4, 4)
     if out is None:
         out = np.empty(shape)
+    elif not isinstance(out, np.ndarray):
+        raise ArgumentError("out", out, f"an array of shape {shape}")
     elif out.shape != shape or out.dtype != np.float64 or not out.flags.carray:
         raise ShapeError("out", out.shape, f"{shape}, float64, C-contiguous and writeable")
     links = constant_links(robot, frame)

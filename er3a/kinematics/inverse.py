@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er3a.errors import Er3aError, PoseError, ShapeError
-from er3a.geometry.angles import TURN, wrap_to_pi
+from er3a.geometry.angles import TURN, greatest_move, wrap_to_pi
 from er3a.geometry.transforms import check_poses
 from er3a.kinematics.closed_form import FREE, OFF_AXIS, ORIENTATION, REACHED, TOO_FAR
 from er3a.kinematics.configuration import side_of
@@ -68,7 +68,7 @@ def inverse(robot: Robot, T: Reals, q_ref: Reals | None = None) -> Solutions:
             slots.append(slot)
     rows = [_rows_of_branch(robot, q[slot], q_ref) for slot in slots]
     for family in continua:
-        if family.within_limits and np.abs(np.concatenate(rows) - family.q0).max(axis=1).min() > SAME_MEMBER:
+        if family.within_limits and greatest_move(np.concatenate(rows), family.q0).min() > SAME_MEMBER:
             slots.append(family.branches[0])
             rows.append(family.q0[None])
     q, branch = _stacked(slots, rows)
@@ -101,13 +101,7 @@ def checked_reference(q_ref: Reals | None) -> Reals:
     return q_ref
 
 
-def _free_joints_near(
-    robot: Robot,
-    T: Reals,
-    q: Reals,
-    q_ref: Reals,
-    continua: tuple[Family, ...],
-) -> Reals:
+def _free_joints_near(robot: Robot, T: Reals, q: Reals, q_ref: Reals, continua: tuple[Family, ...]) -> Reals:
     """The slots (8, 6) with free joints where their nearest family has them, unless they are nearer as they are.
 
     A family solves the pose to 1e-9, so next to a second singularity its nearest member can lie 1e-8 rad from arms
@@ -135,7 +129,7 @@ def _rows_of_branch(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
         raise Er3aError(f"{robot.name}: the limits allow more than {MOST_ROWS} turns of one pose; narrow them")
     choices = [q[j] + TURN * np.arange(low[j], high[j] + 1) for j in range(6)]
     rows = np.stack(np.meshgrid(*choices, indexing="ij"), axis=-1).reshape(-1, 6)
-    return rows[np.argsort(np.abs(rows - q_ref).max(axis=1), kind="stable")]
+    return rows[np.argsort(greatest_move(rows, q_ref), kind="stable")]
 
 
 def _unsolved(robot: Robot, fault: NDArray[np.int8], gap: Reals) -> tuple[SideUnsolved, ...]:

@@ -37,29 +37,23 @@ LEAST_DAMPING = 1e-15
 _FRAME, _TARGET, _Q, _E, _W, _SQUARED, _POSITION, _ROTATION = 0, 12, 24, 30, 36, 39, 40, 41
 _STEP, _FREE, _SCALE, _TURNS, _ROWS = 42, 48, 54, 55, 57
 
+Arm = tuple[Reals, Reals, Reals]  # direction, offset, links
+Limits = tuple[Reals, Reals, bool]  # lower, upper, and whether the iteration keeps to them
+Goal = tuple[Reals, Reals, float]  # mask, tolerances, length
+Draws = tuple[int, np.uint64, int]  # restarts, seed, number of the first pose
+
 
 @kernel
 def solve_numerically(
-    arm: tuple[Reals, Reals, Reals],
-    limits: tuple[Reals, Reals, bool],
-    T: Reals,
-    q0: Reals,
-    mask: Reals,
-    tolerances: Reals,
-    length: float,
-    restarts: int,
-    seed: np.uint64,
-    first: int,
-    q: Reals,
-    error: Reals,
-    starts: Integers,
+    arm: Arm, limits: Limits, T: Reals, q0: Reals, goal: Goal, draws: Draws, out: tuple[Reals, Reals, Integers]
 ) -> None:
     """Fill ``q`` (N, 6), ``error`` (N, 2) in m and rad, ``starts`` (N,), for poses ``T`` (N, 4, 4); see ``solve``.
 
-    ``first`` is the number of the first pose, which its random starts depend on. Where no start reaches the tolerances,
-    ``q`` is the nearest arm found and ``starts`` is 0.
+    Random starts depend on the pose's number. Where no start reaches the tolerances, ``q`` is the nearest arm found and
+    ``starts`` is 0.
     """
-    lower, upper, respect = limits
+    (lower, upper, respect), (mask, tolerances, length), (restarts, _, _) = limits, goal, draws
+    q, error, starts = out
     w, J, A = np.zeros(_ROWS * LANES), np.zeros(36 * LANES), np.zeros(36 * LANES)
     pose, start, count = np.full(LANES, -1), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64)
     mark, since, best = np.empty(LANES), np.zeros(LANES, np.int64), np.empty(LANES)
@@ -68,7 +62,7 @@ def solve_numerically(
         _take(w, i, T, min(taken, T.shape[0] - 1))
         if taken < T.shape[0]:
             pose[i], start[i], count[i], mark[i], since[i], best[i] = taken, 0, 0, np.inf, 0, np.inf
-            _begin(w, i, q0, taken, 0, lower, upper, respect, seed, first)
+            _begin(w, i, q0, taken, 0, limits, draws)
             taken += 1
             active += 1
     while active > 0:
@@ -96,7 +90,7 @@ def solve_numerically(
             count[i], mark[i], since[i] = 0, np.inf, 0
             if not solved and start[i] < restarts:
                 start[i] += 1
-                _begin(w, i, q0, n, start[i], lower, upper, respect, seed, first)
+                _begin(w, i, q0, n, start[i], limits, draws)
                 continue
             starts[n] = start[i] + 1 if solved else 0
             pose[i], start[i], best[i] = -1, 0, np.inf
@@ -104,7 +98,7 @@ def solve_numerically(
             if taken < T.shape[0]:
                 pose[i] = taken
                 _take(w, i, T, taken)
-                _begin(w, i, q0, taken, 0, lower, upper, respect, seed, first)
+                _begin(w, i, q0, taken, 0, limits, draws)
                 taken += 1
                 active += 1
         _step(lower, upper, respect, w, J, A)
@@ -128,18 +122,8 @@ def _take(w: Reals, i: int, T: Reals, n: int) -> None:
 
 
 @kernel
-def _begin(
-    w: Reals,
-    i: int,
-    q0: Reals,
-    n: int,
-    start: int,
-    lower: Reals,
-    upper: Reals,
-    respect: bool,
-    seed: np.uint64,
-    first: int,
-) -> None:
+def _begin(w: Reals, i: int, q0: Reals, n: int, start: int, limits: Limits, draws: Draws) -> None:
+    (lower, upper, respect), (_, seed, first) = limits, draws
     for j in range(6):
         angle = q0[n, j] if start == 0 else lower[j] + uniform(seed, first + n, start, j) * (upper[j] - lower[j])
         if respect:
@@ -148,7 +132,7 @@ def _begin(
 
 
 @kernel
-def _evaluate(arm: tuple[Reals, Reals, Reals], mask: Reals, length: float, w: Reals, J: Reals) -> None:
+def _evaluate(arm: Arm, mask: Reals, length: float, w: Reals, J: Reals) -> None:
     """Pose errors in the target's tool frame and their derivatives by the joints, masked; J[k] holds 6 rows."""
     direction, offset, links = arm
     for r in range(3):

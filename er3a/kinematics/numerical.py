@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from numbers import Integral
+from numbers import Integral, Real
 
 import numpy as np
 
@@ -75,7 +75,7 @@ def solve(
         if not (isinstance(value, Integral) and 0 <= value <= most):
             raise Er3aError(f"{name} is {value!r}; expected a whole number from 0 to {most}")
     for name, tolerance in (("position_tolerance", position_tolerance), ("rotation_tolerance", rotation_tolerance)):
-        if not tolerance > 0:
+        if not (isinstance(tolerance, Real) and tolerance > 0):
             raise Er3aError(f"{name} is {tolerance!r}; expected a number above 0")
     q0 = (robot.lower + robot.upper) / 2 if q0 is None else checked_joints(q0, "q0")
     if q0.shape not in ((6,), (*shape, 6)):
@@ -137,12 +137,11 @@ class _Search:
         q, error, starts = np.empty((count, 6)), np.empty((count, 2)), np.empty(count, dtype=np.int64)
         arm = robot.direction, robot.offset, constant_links(robot)
         limits = (robot.lower, robot.upper, True) if respect else (np.full(6, -np.pi), np.full(6, np.pi), False)
-        q0 = np.ascontiguousarray(q0)
+        q0, length = np.ascontiguousarray(q0), arm_length(robot)
 
         def part(rows: slice) -> None:
-            own = (q[rows], error[rows], starts[rows])
-            constants = (self.mask, self.tolerances, arm_length(robot), restarts, np.uint64(self.seed), rows.start)
-            solve_numerically(arm, limits, T[rows], q0[rows], *constants, *own)
+            goal, draws = (self.mask, self.tolerances, length), (restarts, np.uint64(self.seed), rows.start)
+            solve_numerically(arm, limits, T[rows], q0[rows], goal, draws, (q[rows], error[rows], starts[rows]))
 
         parallel_for(count, threads, SMALLEST_PART, part)
         return (q if respect else wrap_to_pi(q)), error, starts

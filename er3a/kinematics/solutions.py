@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from er3a.display import MOST_ROWS, Displayed, Sheet, first_rows, shortly
 from er3a.geometry.angles import TURN, wrap_to_pi
 from er3a.kinematics.configuration import BranchLabel, branch_labels
 from er3a.kinematics.families import Family
@@ -141,8 +142,8 @@ class PoseUnsolved:
 Unsolved = SideUnsolved | PoseUnsolved
 
 
-@dataclass(frozen=True, eq=False)
-class Solutions:
+@dataclass(frozen=True, eq=False, repr=False)
+class Solutions(Displayed):
     """Joint solutions of one pose (``inverse``) or of many (``inverse_batch``, ``solve``).
 
     What is told of each solution has the leading axes of ``q``: (n,) from ``inverse``; (N, 8) from ``inverse_batch``,
@@ -203,10 +204,63 @@ class Solutions:
 
     def take(self, rows: NDArray[Any]) -> Solutions:
         """Some of the solutions of one pose."""
-        return replace(
-            self,
-            q=self.q[rows],
-            solved=self.solved[rows],
-            within_limits=self.within_limits[rows],
-            branch=self.branch[rows],
+        names = "q", "solved", "within_limits", "branch"
+        return replace(self, **{name: getattr(self, name)[rows] for name in names})
+
+    def sheet(self) -> Sheet:
+        """One pose: each solution. Many: how many solutions each pose has, or the arm that iteration found for it."""
+        if self.position_error is not None:
+            return self._sheet_of_search()
+        return self._sheet_of_pose() if self.q.ndim == 2 else self._sheet_of_batch()
+
+    def _counted(self) -> str:
+        return f"{np.count_nonzero(self.solved)} solutions, {np.count_nonzero(self.within_limits)} within the limits"
+
+    def _sheet_of_pose(self) -> Sheet:
+        rows = (
+            (row, label, *angles, bool(inside), why)
+            for row, label, angles, inside, why in zip(
+                range(len(self.q)), self.label, np.degrees(self.q), self.within_limits, self.reason
+            )
         )
+        shown, left_out = first_rows(rows, len(self.q))
+        return Sheet(
+            f"Solutions of one pose of {self.robot.name}: {self._counted()} ({self.method.code})",
+            ("row", "branch", *_ANGLES, "within", "reason"),
+            shown,
+            left_out,
+            facts=(
+                *(f"self-motion: {family!r}" for family in self.families),
+                *(f"unsolved: {shortly(why)}" for why in self.unsolved),
+            ),
+        )
+
+    def _sheet_of_batch(self) -> Sheet:
+        solved, inside = (each.sum(axis=-1) for each in (self.solved, self.within_limits))
+        shown, left_out = first_rows(zip(range(len(self.q)), solved, inside), len(self.q))
+        columns = ("pose", "solutions", "within the limits")
+        return Sheet(
+            f"Solutions of {len(self.q)} poses of {self.robot.name}: {self._counted()}", columns, shown, left_out
+        )
+
+    def _sheet_of_search(self) -> Sheet:
+        q, solved = self.q.reshape(-1, 6), self.solved.reshape(-1)
+        first = np.degrees(q[:MOST_ROWS])
+        errors = [np.asarray(error).reshape(-1) for error in (self.position_error, self.rotation_error)]
+        rows = (
+            (pose, bool(done), *angles, 1000 * position, turn)
+            for pose, done, angles, position, turn in zip(
+                range(len(q)), solved, first, errors[0], np.degrees(errors[1])
+            )
+        )
+        shown, left_out = first_rows(rows, len(q))
+        return Sheet(
+            f"Search for {len(q)} pose{'s' * (len(q) != 1)} of {self.robot.name}: {np.count_nonzero(solved)} solved",
+            ("pose", "solved", *_ANGLES, "off_mm", "off_deg"),
+            shown,
+            left_out,
+            facts=tuple(f"unsolved: {shortly(why)}" for why in self.unsolved[:MOST_ROWS]),
+        )
+
+
+_ANGLES = tuple(f"q{joint}_deg" for joint in range(1, 7))

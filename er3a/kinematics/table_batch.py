@@ -69,21 +69,31 @@ def frames_of(tables: Tables, base: Reals, q: Reals) -> Reals:
     """Frames (H, P, 7, 4, 4) of each table at joint angles (P, 6) in rad, as :func:`er3a.kinematics.forward.frames` has
     them for one robot without tool; entry 6 is the flange."""
     out = np.empty((len(tables), len(q), 7, 4, 4))
-    none = np.zeros((len(tables), 1))
-    before = tables.modified[:, None]
-    a, alpha, beta = (
-        np.where(before, np.hstack([column, none]), np.hstack([none, column]))
-        for column in (tables.a, tables.alpha, tables.beta)
-    )
-    d = np.hstack([none, tables.d])
-    _fill_frames(np.ascontiguousarray(base), a, alpha, beta, d, tables.direction, tables.offset, q, out)
+    fill_frames(np.ascontiguousarray(base), *kernel_columns(tables), q, out)
     return out
 
 
+def kernel_columns(tables: Tables) -> tuple[Reals, Reals, Reals, Reals, Reals, Reals]:
+    """What kernels take of tables: a, alpha, beta and d (H, 7) of the link behind each joint, the base's first, then
+    direction and offset (H, 6)."""
+    count, joints = tables.d.shape
+    a, alpha, beta, d = np.zeros((4, count, joints + 1))
+    d[:, 1:] = tables.d
+    own = 0 if tables.modified.all() else 1
+    for link, column in ((a, tables.a), (alpha, tables.alpha), (beta, tables.beta)):
+        link[:, own : own + joints] = column
+    if own and tables.modified.any():
+        rows = tables.modified
+        for link, column in ((a, tables.a), (alpha, tables.alpha), (beta, tables.beta)):
+            link[rows, :joints], link[rows, joints] = column[rows], 0.0
+    return a, alpha, beta, d, tables.direction, tables.offset
+
+
 @kernel
-def _fill_frames(
+def fill_frames(
     base: Reals, a: Reals, alpha: Reals, beta: Reals, d: Reals, direction: Reals, offset: Reals, q: Reals, out: Reals
 ) -> None:
+    """Fill ``out`` (H, P, 7, 4, 4) with frames of tables (see ``kernel_columns``) at joint angles (P, 6)."""
     links = np.zeros((7, 4, 4))
     for h in range(out.shape[0]):
         for k in range(7):

@@ -3,28 +3,41 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
+from er3a.display import Displayed, Sheet, shortly
+from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Reals
 
+TargetOutcome = Literal["reached", "unreachable", "leaves limits", "collides"]
+"""Whether an admissible solution exists, or what stands against it."""
 
-@dataclass(frozen=True, eq=False)
-class Target:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Target(Displayed):
     """A pose of the tool.
 
     Attributes
     ----------
     T : (4, 4), T_base_tool, m, in the frame that the robot's base is placed in
     q_ref_deg : 6, the joint angles that the arm comes from, as they are written
+    expect : what is to come out, where the target says so
     """
 
     name: str
     T: Reals
     note: str | None = None
     q_ref_deg: tuple[float, ...] = (0.0,) * 6
+    expect: TargetOutcome | None = None
 
     @property
     def q_ref(self) -> Reals:
         """``q_ref_deg`` in rad, (6,)."""
         return np.radians(self.q_ref_deg)
+
+    def sheet(self) -> Sheet:
+        """A line: name, position and roll, pitch, yaw."""
+        xyz, rpy = (shortly(tuple(values.tolist())) for values in (1000 * self.T[:3, 3], np.degrees(rpy_of(self.T))))
+        return Sheet(f"Target {self.name}: xyz_mm {xyz}; rpy_deg {rpy}")

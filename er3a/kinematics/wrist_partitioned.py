@@ -229,10 +229,8 @@ def solve_slots(
     fault : (N, 8), int8: REACHED, TOO_FAR, TOO_NEAR, OFF_AXIS or ORIENTATION
     gap : (N, 8): by how much, in m (rad for ORIENTATION)
     """
-    count = T.shape[0]
-    q = np.full((count, SLOTS, 6), np.nan)
-    fault = np.zeros((count, SLOTS), dtype=np.int8)
-    gap = np.zeros((count, SLOTS))
+    shape = T.shape[0], SLOTS
+    q, fault, gap = np.full((*shape, 6), np.nan), np.zeros(shape, dtype=np.int8), np.zeros(shape)
     T, q_ref = np.ascontiguousarray(T), np.ascontiguousarray(q_ref)
-    solve(_constants(robot), robot.direction, robot.offset, T, q_ref, keep_folds, keep_free, q, fault, gap)
+    solve(_constants(robot), (robot.direction, robot.offset), T, q_ref, keep_folds, keep_free, (q, fault, gap))
     return q, fault, gap

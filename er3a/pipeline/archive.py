@@ -7,7 +7,6 @@ References
 
 from __future__ import annotations
 
-from importlib.metadata import version
 from pathlib import Path
 
 from rocrate.model.person import Person
@@ -15,11 +14,13 @@ from rocrate.rocrate import ROCrate
 
 from er3a.errors import ResultError
 from er3a.files.kept_files import write_atomically
+from er3a.files.shipped import ROOT
+from er3a.pipeline.checksums import OVERALL
 from er3a.pipeline.results import check_results
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import load_study
+from er3a.version import __version__
 
-_ROOT = Path(__file__).resolve().parents[2]
 WORKFLOW = "Snakefile"
 KEPT = (WORKFLOW, "requirements/run.txt", "README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md")
 LICENCE = "https://spdx.org/licenses/MIT"
@@ -31,6 +32,7 @@ _MEDIA_TYPES = {
     ".csv": "text/csv",
     ".yaml": "application/yaml",
     ".md": "text/markdown",
+    ".xml": "application/xml",
 }
 
 
@@ -57,8 +59,8 @@ def archive(study_file: Path, results: Path, reports: Path, output: Path) -> int
                 files[Path("reports") / name / f"{stage}.rrd"] = _there(reports / name / f"{stage}.rrd")
         for page in study.pages(name):
             files[Path("reports") / name / f"{page}.html"] = _there(reports / name / f"{page}.html")
-    files |= {Path("reports") / name: _there(reports / name) for name in ("index.html", "compare.html")}
-    files |= {Path(name): _ROOT / name for name in KEPT if (_ROOT / name).is_file()}
+    files |= {Path("reports") / name: _there(reports / name) for name in OVERALL}
+    files |= {Path(name): ROOT / name for name in KEPT if (ROOT / name).is_file()}
     crate = _crate(study.robots)
     for place, file in sorted(files.items()):
         properties: dict[str, object] = {
@@ -66,7 +68,7 @@ def archive(study_file: Path, results: Path, reports: Path, output: Path) -> int
             "encodingFormat": _MEDIA_TYPES.get(file.suffix, "text/plain"),
         }
         if place == Path(WORKFLOW):
-            properties |= {"@type": ["File", "SoftwareSourceCode"], "version": version("er3a")}
+            properties |= {"@type": ["File", "SoftwareSourceCode"], "version": __version__}
         crate.add_file(str(file), place.as_posix(), properties=properties)
     write_atomically(output, crate.write_zip)
     return len(files)
@@ -92,8 +94,8 @@ def _crate(robots) -> ROCrate:
 
 def _place(file: Path) -> Path:
     """Where an input stands in the archive: as the study or the project has it, else below ``inputs``."""
-    if file.is_relative_to(_ROOT):
-        return file.relative_to(_ROOT)
+    if file.is_relative_to(ROOT):
+        return file.relative_to(ROOT)
     return Path("inputs") / file.name if file.is_absolute() or ".." in file.parts else file
 
 

@@ -7,9 +7,12 @@ from pathlib import Path
 from pydantic import BaseModel
 
 from er3a.errors import InputError
+from er3a.files.dh_table import read_dh_table
 from er3a.files.measurements import load_measurements
 from er3a.files.path_file import PathFile, TablePath, load_paths
 from er3a.files.path_table import read_path_table
+from er3a.files.reference_documents import FILE as DOCUMENTS
+from er3a.files.reference_documents import load_documents
 from er3a.files.reference_rows import FORMATS
 from er3a.files.reference_sets import check_reference_file, load_references
 from er3a.files.robot_file import RobotFile
@@ -46,6 +49,9 @@ def check_file(path: Path) -> str:
     if path.suffix == ".csv" and path.parent.name == "paths":
         read_path_table(path)
         return "a path"
+    if path.name == DOCUMENTS:
+        load_documents(path)
+        return "documents of references"
     if path.suffix == ".csv":
         return _check_table(path)
     if path.suffix not in (".yaml", ".yml"):
@@ -62,6 +68,9 @@ def _check_table(path: Path) -> str:
     if path.stem not in FORMATS and "q1_deg" in read_text(path).partition("\n")[0]:
         load_measurements(path)
         return "measured positions"
+    if path.stem not in FORMATS and "alpha_deg" in read_text(path).partition("\n")[0]:
+        read_dh_table(path, "arm")
+        return "a D-H table"
     check_reference_file(path)
     return f"references about {path.stem}"
 

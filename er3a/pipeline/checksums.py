@@ -10,7 +10,7 @@ from er3a.files.kept_files import read_checked, sha256, write_atomically
 from er3a.pipeline.results import check_results
 from er3a.pipeline.study import Study
 
-OVERALL = ("index.html", "compare.html")
+OVERALL = ("index.html", "compare.html", "junit.xml")
 
 
 def write_checksum(path: Path) -> None:

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import ast
 import hashlib
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
-_PACKAGE = Path(__file__).resolve().parents[1]
+_ROOT = Path(__file__).resolve().parents[2]
+_PACKAGE = _ROOT / "er3a"
 VIEWS = ("report.py", "page.py", "panel.py", "index.py")
 
 
@@ -19,42 +21,60 @@ VIEWS = ("report.py", "page.py", "panel.py", "index.py")
 def code_digest(*modules: str) -> str:
     """SHA-256 over the sources of modules, of all modules of er3a that they import (transitively), and of templates
     (``*.j2``, ``*.css``, ``*.js``) that stand beside those that are part of a view."""
-    reached: set[Path] = set()
     for module in modules:
-        if _file(module) is None:
+        if _file(module, _ROOT) is None:
             raise ModuleNotFoundError(f"er3a has no module '{module}'")
-        reached |= _reached(module)
+    return digest_of(sources(modules), _PACKAGE)
+
+
+def digest_of(files: Iterable[Path], folder: Path) -> str:
+    """SHA-256 over files and their places in a folder."""
     digest = hashlib.sha256()
-    for path in sorted(reached):
-        digest.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    for path in sorted(files):
+        digest.update(path.relative_to(folder).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()
 
 
-def _reached(module: str) -> set[Path]:
+def sources(modules: Iterable[str], root: Path = _ROOT) -> set[Path]:
+    """The files of modules below ``root``, of those there that they import (transitively), and templates of views."""
     found: set[Path] = set()
-    todo = [module]
+    todo = list(modules)
     while todo:
-        path = _file(todo.pop())
+        path = _file(todo.pop(), root)
         if path is None or path in found:
             continue
         found.add(path)
         if path.name in VIEWS:
             found |= {file for kind in ("j2", "css", "js") for file in path.parent.glob(f"*.{kind}")}
-        todo += _imports(path)
+        todo += _imports(path, root)
     return found
 
 
 @cache
-def _imports(path: Path) -> tuple[str, ...]:
+def _imports(path: Path, root: Path) -> tuple[str, ...]:
+    """All names that a file imports, public names of er3a by the modules that they come from."""
     names: list[str] = []
     for node in ast.walk(ast.parse(path.read_bytes())):
         if isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module == "er3a":
+            names += [_public(root).get(alias.name, f"er3a.{alias.name}") for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
             names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
-    return tuple(name for name in names if name.split(".")[0] == "er3a")
+    return tuple(names)
 
 
-def _file(module: str) -> Path | None:
-    path = _PACKAGE.joinpath(*module.split(".")[1:]).with_suffix(".py")
+@cache
+def _public(root: Path) -> dict[str, str]:
+    """The public names of er3a, and their modules, as its ``__init__`` tells them."""
+    tree = ast.parse((root / "er3a" / "__init__.py").read_bytes())
+    for node in tree.body:
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_PUBLIC":
+            public: dict[str, str] = ast.literal_eval(node.value)
+            return public
+    return {}
+
+
+def _file(module: str, root: Path) -> Path | None:
+    path = root.joinpath(*module.split(".")).with_suffix(".py")
     return path if path.is_file() else None

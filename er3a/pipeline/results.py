@@ -20,7 +20,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar, get_args, get_origin
@@ -36,7 +36,7 @@ from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import STAGES, Study
 from er3a.pipeline.tables import table_types
 
-FORMAT_VERSION = 4
+FORMAT_VERSION = 5
 SUMMARY = "summary.json"
 CHECKSUMS = "SHA256SUMS"
 
@@ -110,12 +110,18 @@ class Provenance:
 
 @dataclass(frozen=True, eq=False)
 class Stored(Generic[ResultsT]):
-    """Results as they were read, and where they come from."""
+    """Results as they were read, and where they come from.
+
+    Attributes
+    ----------
+    rests_on : statuses of the stages without which they mean little, as far as those were computed
+    """
 
     robot: str
     stage: str
     provenance: Provenance
     results: ResultsT
+    rests_on: Mapping[str, Status] = field(default_factory=dict)
 
     @property
     def status(self) -> Status:
@@ -175,11 +181,16 @@ def read_stage(folder: Path, stage: Stage) -> Stored[Any]:
         naming the file that is missing, damaged or of another format version
     """
     record = _record(folder)
+    rests_on: dict[str, Status] = {
+        name: _record(folder.parent / name)["verdict"]["status"]
+        for name in stage.rests_on
+        if (folder.parent / name / SUMMARY).exists()
+    }
     if record["verdict"]["status"] == "not_computed":
-        absent = _reason_of_absence(record["verdict"], stage)
+        absent = AbsentResults(Summary(Verdict("not_computed", _reason_of_absence(record["verdict"], stage)), ()))
         origin = _adapter(Provenance).validate_python(record["provenance"])
-        return Stored(record["robot"], stage.name, origin, AbsentResults(Summary(Verdict("not_computed", absent), ())))
-    return read_results(folder, stage.module("model").RESULTS)
+        return Stored(record["robot"], stage.name, origin, absent, rests_on)
+    return replace(read_results(folder, stage.module("model").RESULTS), rests_on=rests_on)
 
 
 def _reason_of_absence(verdict: dict[str, Any], stage: Stage) -> Finding:
@@ -232,6 +243,15 @@ def _record(folder: Path) -> dict[str, Any]:
 def read_provenance(folder: Path) -> Provenance:
     """What a stage's results rest on, whatever they are."""
     return _adapter(Provenance).validate_python(_record(folder)["provenance"])
+
+
+def read_verdict(folder: Path) -> tuple[Status, str, str]:
+    """Status, code and English text of a stage's verdict; :class:`ResultError` as :func:`read_stage`."""
+    verdict = _record(folder)["verdict"]
+    try:
+        return verdict["status"], verdict["code"], verdict["text"]
+    except (KeyError, TypeError):
+        raise ResultError(folder / SUMMARY, "damaged (verdict without status, code or text)") from None
 
 
 def check_results(folder: Path) -> None:

@@ -18,11 +18,15 @@ from er3a.pipeline.sweeps import Sweep, Variant
 from er3a.robots.robot import Robot
 
 STAGES = tuple(REGISTRY)
+ExpectedStatus = Literal["pass", "caution", "fail", "no_reference"]
 SettingsT = TypeVar("SettingsT", bound=StrictModel)
 
 
 class RobotEntry(StrictModel):
-    """One robot of the study. ``base`` and ``tool`` replace those of its file, ``scene`` those of the stages."""
+    """One robot of the study. ``base`` and ``tool`` replace those of its file, ``scene`` those of the stages.
+
+    ``expect`` says by stage what its verdict is to be: one that is as expected is no news, any other is a fault.
+    """
 
     file: Text | None = None
     targets: Text
@@ -30,6 +34,14 @@ class RobotEntry(StrictModel):
     scene: Text | None = None
     base: Placement | None = None
     tool: Placement | None = None
+    expect: dict[Text, ExpectedStatus] = {}
+
+    @model_validator(mode="after")
+    def _expects_of_stages_that_there_are(self):
+        for stage in self.expect:
+            if stage not in REGISTRY:
+                raise ValueError(f"expect.{stage}: there is no such stage | Known: {', '.join(REGISTRY)}")
+        return self
 
     @model_validator(mode="after")
     def _placements_plausible(self):
@@ -164,7 +176,7 @@ class StudyBase(StrictModel):
 
     def settings(self, name: str, key: str) -> dict[str, Any]:
         """What of the study concerns one of its keys, for a robot; of a key without settings seed and robot alone."""
-        entry = self.entry(name).model_dump(exclude={"targets", "paths", "file", "scene"}, exclude_none=True)
+        entry = self.entry(name).model_dump(exclude={"targets", "paths", "file", "scene", "expect"}, exclude_none=True)
         if variant := self.variants.get(name):
             entry["varied"] = {variant.vary: variant.value}
         own = getattr(self, key, None)

@@ -9,33 +9,24 @@ import numpy as np
 from er3a.errors import PoseError
 from er3a.geometry.transforms import check_poses
 from er3a.numerics.arrays import Reals
-from er3a.planning.moves import rotation_between, turning_poses
-from er3a.planning.profiles import Rates, one_go
+from er3a.planning.moves import Segment, rotation_between
 
 ON_A_LINE = 1e-6  # rad; three points this near to a straight line fix no circle
 
 
 @dataclass(frozen=True, eq=False)
-class Arc:
+class Arc(Segment):
     """A circular arc of the tool point.
 
     Attributes
     ----------
-    T_start : (4, 4), T_base_tool at the start
     centre, normal : (3,), m and unit vector, of the circle; the arc turns about the normal
     angle : rad, greater than 0, less than a full circle
-    rotation : (3,), rad, rotation vector of the tool from start to end in the base frame
-    duration, half_turn, ramp : as of :class:`er3a.planning.moves.Line`
     """
 
-    T_start: Reals
     centre: Reals
     normal: Reals
     angle: float
-    rotation: Reals
-    duration: float
-    half_turn: bool = False
-    ramp: float | None = None
 
     @property
     def radius(self) -> float:
@@ -47,22 +38,8 @@ class Arc:
         """See :class:`er3a.planning.moves.ToolPath`."""
         return self.radius * self.angle
 
-    @property
-    def turned(self) -> float:
-        """See :class:`er3a.planning.moves.ToolPath`."""
-        return float(np.linalg.norm(self.rotation))
-
-    def progress(self, t: Reals) -> Rates:
-        """See :class:`er3a.planning.moves.ToolPath`."""
-        return one_go(self.duration, self.ramp)(t)
-
-    def poses(self, progress: Reals) -> Reals:
-        """See :class:`er3a.planning.moves.ToolPath`."""
-        progress = np.asarray(progress, float)
-        return turning_poses(self.T_start, self.points(progress), self.rotation, progress)
-
     def points(self, progress: Reals) -> Reals:
-        """The tool point (..., 3), m, at shares of the way (...,)."""
+        """See :class:`er3a.planning.moves.Segment`."""
         return self.centre + self._spokes(np.asarray(progress, float))
 
     def twists(self, progress: Reals) -> tuple[Reals, Reals]:
@@ -71,14 +48,6 @@ class Arc:
         turning = np.broadcast_to(self.rotation, spokes.shape)
         first = np.concatenate([self.angle * np.cross(self.normal, spokes), turning], axis=-1)
         return first, np.concatenate([-(self.angle**2) * spokes, np.zeros_like(spokes)], axis=-1)
-
-    def way(self, progress: Reals) -> Reals:
-        """See :class:`er3a.planning.moves.ToolPath`."""
-        return self.length * np.asarray(progress)
-
-    def half_turns(self) -> tuple[tuple[int, Reals], ...]:
-        """See :class:`er3a.planning.moves.ToolPath`."""
-        return ((1, self.rotation / np.pi),) if self.half_turn else ()
 
     def _spokes(self, progress: Reals) -> Reals:
         """From the centre to the tool point, (..., 3)."""
@@ -119,4 +88,4 @@ def arc(
     last = b - to_centre
     angle = np.arctan2(normal @ np.cross(-to_centre, last), -to_centre @ last) % (2 * np.pi)
     rotation, half_turn = rotation_between(T_start, T_end, half_turn_axis)
-    return Arc(T_start, start + to_centre, normal, float(angle), rotation, duration, half_turn, ramp)
+    return Arc(T_start, rotation, duration, half_turn, ramp, start + to_centre, normal, float(angle))

@@ -15,7 +15,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from er3a.geometry.angles import wrap_to_pi
-from er3a.kinematics.closed_form import REACHED, SLOTS
+from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.forward import frames
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
@@ -38,7 +38,6 @@ class Branches:
     ----------
     t : (N,), s, rising; progress : (N,), share of the way
     q : (N, 8, 6), rad in (-pi, pi], NaN where a branch has no solution
-    gap : (N, 8), by how much a branch misses the pose, m or rad; 0 where it has a solution
     free_wrist : (N, 8) bool, whether joints 4 and 6 can turn against each other with the tool at rest
     free_shoulder : (N, 8) bool, whether joint 1 can turn with the wrist centre at rest
     straight : (N, 8) bool, whether the arm is stretched or folded, so that both elbow branches are one
@@ -48,7 +47,6 @@ class Branches:
     t: Reals
     progress: Reals
     q: Reals
-    gap: Reals
     free_wrist: Flags
     free_shoulder: Flags
     straight: Flags
@@ -110,8 +108,8 @@ def onto_axis_1(robot: Robot, T: Reals) -> Reals:
 
 def _solve_at(robot: Robot, line: ToolPath, t: Reals) -> Branches:
     progress = line.progress(t)[0]
-    q, fault, gap = solve_slots(robot, line.poses(progress), np.zeros((len(t), 6)))
-    return Branches(t, progress, q, np.where(fault == REACHED, 0.0, gap), *_free(robot, q))
+    q = solve_slots(robot, line.poses(progress), np.zeros((len(t), 6)))[0]
+    return Branches(t, progress, q, *_free(robot, q))
 
 
 def _free(robot: Robot, q: Reals) -> tuple[Flags, Flags, Flags, Reals]:
@@ -139,12 +137,16 @@ def _closest_passes(grid: Branches) -> Reals:
     return np.unique(np.concatenate(found))
 
 
-def vertex(x: Reals, y: Reals, i: Integers) -> Reals:
-    """Lowest points of the parabolas through the points i - 1, i, i + 1, each kept between its outer points."""
+def parabolas(x: Reals, y: Reals, i: Integers) -> tuple[Reals, Reals]:
+    """Slope at the point i, and curvature, of the parabolas through the points i - 1, i, i + 1."""
     left, right = x[i] - x[i - 1], x[i + 1] - x[i]
     rise, fall = (y[i + 1] - y[i]) / right, (y[i] - y[i - 1]) / left
-    curvature = (rise - fall) / (left + right)
-    slope = (fall * right + rise * left) / (left + right)
+    return (fall * right + rise * left) / (left + right), (rise - fall) / (left + right)
+
+
+def vertex(x: Reals, y: Reals, i: Integers) -> Reals:
+    """Lowest points of the parabolas through the points i - 1, i, i + 1, each kept between its outer points."""
+    slope, curvature = parabolas(x, y, i)
     curved = curvature > 0
     lowest = x[i[curved]] - slope[curved] / (2 * curvature[curved])
     return np.clip(lowest, x[i[curved] - 1], x[i[curved] + 1])

@@ -13,21 +13,10 @@ from er3a.errors import PathError, PoseError
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
+from er3a.planning import commands
 from er3a.planning.arcs import arc
-from er3a.planning.commands import (
-    Command,
-    CommandSource,
-    JointMoveCommand,
-    JointSequenceCommand,
-    JointTableCommand,
-    SegmentCommand,
-    Start,
-    ToolMoveCommand,
-    ToolSequenceCommand,
-    ToolTableCommand,
-)
-from er3a.planning.moves import JointMove, Line, ToolPath, line, rotation_between
-from er3a.planning.sequences import TURN_LENGTH, JointSequence, Segment, joint_sequence, segment_path
+from er3a.planning.moves import JointMove, Segment, ToolPath, line, rotation_between
+from er3a.planning.sequences import TURN_LENGTH, JointSequence, joint_sequence, segment_path
 from er3a.robots.robot import Robot
 
 GEOMETRY = 1.0  # s; a segment's own duration is of no account in a sequence
@@ -60,7 +49,7 @@ class Built:
         return move.duration
 
 
-def build(robot: Robot, command: Command, ends: Mapping[str, Reals]) -> Built:
+def build(robot: Robot, command: commands.Command, ends: Mapping[str, Reals]) -> Built:
     """Make a path of a command.
 
     Parameters
@@ -74,29 +63,29 @@ def build(robot: Robot, command: Command, ends: Mapping[str, Reals]) -> Built:
         corner that can't be rounded so far, an earlier path without end
     """
     match command:
-        case JointMoveCommand():
+        case commands.JointMoveCommand():
             return _joint_move(command, ends)
-        case JointSequenceCommand():
+        case commands.JointSequenceCommand():
             return _joint_sequence(command)
-        case ToolMoveCommand() | ToolSequenceCommand():
+        case commands.ToolMoveCommand() | commands.ToolSequenceCommand():
             return _tool(robot, command, ends)
-        case JointTableCommand():
+        case commands.JointTableCommand():
             sizes = np.abs(np.diff(command.points, axis=0)).max(axis=1)
             joints = joint_sequence(command.points, _blends(sizes, command.blend), command.timing)
             return Built(joints=joints, repeated_rows=command.repeated_rows)
-        case ToolTableCommand():
+        case commands.ToolTableCommand():
             return _tool_table(robot, command)
     assert_never(command)
 
 
-def _joint_move(command: JointMoveCommand, ends: Mapping[str, Reals]) -> Built:
+def _joint_move(command: commands.JointMoveCommand, ends: Mapping[str, Reals]) -> Built:
     start = _start_joints(command.start, command.source, ends)
     if start is None:
         raise command.source.error("start", "a joint move starts at joint angles", "Give them, or an earlier path")
     return Built(joints=JointMove(start, command.end, command.duration, command.velocities, command.accelerations))
 
 
-def _joint_sequence(command: JointSequenceCommand) -> Built:
+def _joint_sequence(command: commands.JointSequenceCommand) -> Built:
     blends = np.full(len(command.points) - 2, command.blend)
     try:
         return Built(joints=joint_sequence(command.points, blends, command.duration, command.ramp))
@@ -106,7 +95,7 @@ def _joint_sequence(command: JointSequenceCommand) -> Built:
         raise command.source.error(part, problem, "Correct the point or blend_deg") from None
 
 
-def _start_joints(start: Start, source: CommandSource, ends: Mapping[str, Reals]) -> Reals | None:
+def _start_joints(start: commands.Start, source: commands.CommandSource, ends: Mapping[str, Reals]) -> Reals | None:
     """Joint angles (6,) at the start in rad, where they are given or those of the path before."""
     if start.after is None:
         return start.joints
@@ -116,19 +105,21 @@ def _start_joints(start: Start, source: CommandSource, ends: Mapping[str, Reals]
     return ends[start.after]
 
 
-def _tool(robot: Robot, command: ToolMoveCommand | ToolSequenceCommand, ends: Mapping[str, Reals]) -> Built:
+def _tool(
+    robot: Robot, command: commands.ToolMoveCommand | commands.ToolSequenceCommand, ends: Mapping[str, Reals]
+) -> Built:
     source = command.source
     q_start = _start_joints(command.start, source, ends)
     pose = command.start.pose if q_start is None else forward(robot, q_start)
     if pose is None:
         raise source.error("start", "a path of the tool starts somewhere", "Give joint angles, a pose or a path before")
     slot = _slot(robot, command.start.branch, source)
-    if isinstance(command, ToolMoveCommand):
+    if isinstance(command, commands.ToolMoveCommand):
         path: ToolPath = _segment(pose, command.segment, command.duration, command.ramp, source)
         return Built(tool=path, q_start=q_start, start_slot=slot)
     segments: list[Segment] = []
     for k, part in enumerate(command.segments):
-        here = CommandSource(source.file, f"{source.field}.segments[{k}]")
+        here = commands.CommandSource(source.file, f"{source.field}.segments[{k}]")
         segments.append(_segment(pose, part, GEOMETRY, None, here))
         pose = part.end
     blends = np.array([part.blend for part in command.segments[:-1]])
@@ -141,7 +132,7 @@ def _tool(robot: Robot, command: ToolMoveCommand | ToolSequenceCommand, ends: Ma
 
 
 def _segment(
-    T_start: Reals, part: SegmentCommand, duration: float, ramp: float | None, source: CommandSource
+    T_start: Reals, part: commands.SegmentCommand, duration: float, ramp: float | None, source: commands.CommandSource
 ) -> Segment:
     try:
         rotation_between(T_start, part.end, part.half_turn_axis)
@@ -155,7 +146,7 @@ def _segment(
         raise source.error("via_mm", str(error), "Give three points that fix a circle") from None
 
 
-def _tool_table(robot: Robot, command: ToolTableCommand) -> Built:
+def _tool_table(robot: Robot, command: commands.ToolTableCommand) -> Built:
     segments = _lines(command)
     sizes = np.array([max(part.length, part.turned * TURN_LENGTH) for part in segments])
     path = segment_path(segments, _blends(sizes, command.blend), command.timing)
@@ -163,10 +154,10 @@ def _tool_table(robot: Robot, command: ToolTableCommand) -> Built:
     return Built(tool=path, start_slot=slot, repeated_rows=command.repeated_rows)
 
 
-def _lines(command: ToolTableCommand) -> list[Line]:
+def _lines(command: commands.ToolTableCommand) -> list[Segment]:
     """Lines from point to point; the half-turn axis is for those that turn by half a turn."""
     axis, source = command.half_turn_axis, command.source
-    segments = []
+    segments: list[Segment] = []
     for name, (a, b) in zip(command.names[1:], pairwise(command.poses)):
         part = line(a, b, GEOMETRY)
         if part.half_turn and axis is not None:
@@ -186,7 +177,7 @@ def _blends(sizes: Reals, wanted: float | None) -> Reals:
     return most if wanted is None else np.minimum(most, wanted)
 
 
-def _slot(robot: Robot, name: str | None, source: CommandSource) -> int | None:
+def _slot(robot: Robot, name: str | None, source: commands.CommandSource) -> int | None:
     if name is None:
         return None
     labels: tuple[str, ...] = branch_labels(robot)

@@ -149,11 +149,6 @@ class ToolTableCommand(_Command):
     half_turn_axis: Reals | None = None
 
 
-Command = (
-    JointMoveCommand
-    | JointSequenceCommand
-    | ToolMoveCommand
-    | ToolSequenceCommand
-    | JointTableCommand
-    | ToolTableCommand
-)
+JointCommand = JointMoveCommand | JointSequenceCommand | JointTableCommand
+ToolCommand = ToolMoveCommand | ToolSequenceCommand | ToolTableCommand
+Command = JointCommand | ToolCommand

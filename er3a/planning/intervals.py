@@ -15,6 +15,7 @@ from er3a.kinematics.solutions import Unsolved
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.numerics.arrays import Reals
 from er3a.numerics.runs import runs
+from er3a.planning.branch_tracking import parabolas
 from er3a.planning.followed import Followed
 from er3a.planning.singular_events import Joints
 from er3a.robots.joint_limits import LIMIT_TOLERANCE
@@ -142,11 +143,8 @@ def _peaks_between(t: Reals, values: Reals, function: Callable[[float], float]) 
     inner = values[1:-1]
     tops = 1 + np.flatnonzero((inner <= 0) & (inner > values[:-2]) & (inner >= values[2:]))
     found = []
-    for i in tops:
-        before, after = t[i] - t[i - 1], t[i + 1] - t[i]
-        rising, falling = (values[i] - values[i - 1]) / before, (values[i + 1] - values[i]) / after
-        slope, bend = (rising * after + falling * before) / (before + after), (rising - falling) / (before + after)
-        if values[i] + slope**2 / (2 * bend) <= 0:
+    for i, slope, curvature in zip(tops, *parabolas(t, values, tops)):
+        if values[i] - slope**2 / (2 * curvature) <= 0:
             continue
         near = {"bounds": (t[i - 1], t[i + 1]), "method": "bounded", "options": {"xatol": 1e-10 * (t[-1] - t[0])}}
         best = minimize_scalar(lambda at: -function(at), **near)

@@ -14,6 +14,7 @@ References
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -23,7 +24,7 @@ from scipy.spatial.transform import Rotation
 from er3a.errors import PoseError
 from er3a.geometry.transforms import check_poses
 from er3a.numerics.arrays import Reals
-from er3a.planning.profiles import Ends, Rates, one_go, quintic
+from er3a.planning.profiles import Ends, FromRestToRest, Rates, quintic
 
 HALF_TURN_TOLERANCE = 1e-9
 
@@ -86,58 +87,50 @@ class JointMove:
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
-    """A straight line of the tool.
+class Segment(ABC):
+    """What a :class:`Line` and an :class:`er3a.planning.arcs.Arc` of the tool share.
 
     Attributes
     ----------
     T_start : (4, 4), T_base_tool at the start
-    translation : (3,), m, from start to end in the base frame
-    rotation : (3,), rad, rotation vector from start to end in the base frame
+    rotation : (3,), rad, rotation vector of the tool from start to end in the base frame
     duration : s
     half_turn : whether the rotation is half a turn, so that its sense had to be chosen
     ramp : share of the time of each ramp of a trapezoid; None for the quintic
     """
 
     T_start: Reals
-    translation: Reals
     rotation: Reals
     duration: float
-    half_turn: bool = False
-    ramp: float | None = None
+    half_turn: bool
+    ramp: float | None
 
     @property
+    @abstractmethod
     def length(self) -> float:
         """Length of the tool point's way, m."""
-        return float(np.linalg.norm(self.translation))
+
+    @abstractmethod
+    def points(self, progress: Reals) -> Reals:
+        """The tool point (..., 3), m, at shares of the way (...,)."""
+
+    @abstractmethod
+    def twists(self, progress: Reals) -> tuple[Reals, Reals]:
+        """See :class:`ToolPath`."""
 
     @property
     def turned(self) -> float:
         """See :class:`ToolPath`."""
         return float(np.linalg.norm(self.rotation))
 
-    @property
-    def twist(self) -> Reals:
-        """Velocity of the tool per unit of progress, (6,): m, then rad, in the base frame; the same all along."""
-        return np.concatenate([self.translation, self.rotation])
-
     def progress(self, t: Reals) -> Rates:
         """See :class:`ToolPath`."""
-        return one_go(self.duration, self.ramp)(t)
+        return FromRestToRest(np.array([0.0, self.duration]), np.array([0.0, 1.0]), self.ramp)(t)
 
     def poses(self, progress: Reals) -> Reals:
         """See :class:`ToolPath`."""
         progress = np.asarray(progress, float)
         return turning_poses(self.T_start, self.points(progress), self.rotation, progress)
-
-    def points(self, progress: Reals) -> Reals:
-        """The tool point (..., 3), m, at shares of the way (...,)."""
-        return self.T_start[:3, 3] + np.asarray(progress)[..., None] * self.translation
-
-    def twists(self, progress: Reals) -> tuple[Reals, Reals]:
-        """See :class:`ToolPath`."""
-        shape = (*np.shape(progress), 6)
-        return np.broadcast_to(self.twist, shape), np.zeros(shape)
 
     def way(self, progress: Reals) -> Reals:
         """See :class:`ToolPath`."""
@@ -148,12 +141,29 @@ class Line:
         return ((1, self.rotation / np.pi),) if self.half_turn else ()
 
 
+@dataclass(frozen=True, eq=False)
+class Line(Segment):
+    """A straight line of the tool; ``translation`` (3,), m, leads from start to end in the base frame."""
+
+    translation: Reals
+
+    @property
+    def length(self) -> float:
+        """See :class:`ToolPath`."""
+        return float(np.linalg.norm(self.translation))
+
+    def points(self, progress: Reals) -> Reals:
+        """See :class:`Segment`."""
+        return self.T_start[:3, 3] + np.asarray(progress)[..., None] * self.translation
+
+    def twists(self, progress: Reals) -> tuple[Reals, Reals]:
+        """See :class:`ToolPath`."""
+        shape = (*np.shape(progress), 6)
+        return np.broadcast_to(np.concatenate([self.translation, self.rotation]), shape), np.zeros(shape)
+
+
 def line(
-    T_start: Reals,
-    T_end: Reals,
-    duration: float,
-    half_turn_axis: Reals | None = None,
-    ramp: float | None = None,
+    T_start: Reals, T_end: Reals, duration: float, half_turn_axis: Reals | None = None, ramp: float | None = None
 ) -> Line:
     """The straight line between two poses of the tool.
 
@@ -171,7 +181,7 @@ def line(
     """
     T_start, T_end = check_poses(T_start, "T_start"), check_poses(T_end, "T_end")
     rotation, half_turn = rotation_between(T_start, T_end, half_turn_axis)
-    return Line(T_start, T_end[:3, 3] - T_start[:3, 3], rotation, duration, half_turn, ramp)
+    return Line(T_start, rotation, duration, half_turn, ramp, T_end[:3, 3] - T_start[:3, 3])
 
 
 def rotation_between(T_start: Reals, T_end: Reals, half_turn_axis: Reals | None = None) -> tuple[Reals, bool]:

@@ -36,12 +36,7 @@ class Times:
 
 
 def quintic(
-    t: Reals,
-    duration: float,
-    start: Reals,
-    end: Reals,
-    velocities: Ends = (0.0, 0.0),
-    accelerations: Ends = (0.0, 0.0),
+    t: Reals, duration: float, start: Reals, end: Reals, velocities: Ends = (0.0, 0.0), accelerations: Ends = (0.0, 0.0)
 ) -> Rates:
     """Polynomial of fifth degree that meets position, velocity and acceleration at both ends [1]_.
 
@@ -123,11 +118,6 @@ class FromRestToRest:
         x, dx, ddx = quintic(tau, 1.0, zero, one) if self.ramp is None else trapezoid(tau, 1.0, self.ramp)
         step = self.progress[i] - self.progress[i - 1]
         return self.progress[i - 1] + step * x, step * dx / duration, step * ddx / duration**2
-
-
-def one_go(duration: float, ramp: float | None = None) -> FromRestToRest:
-    """From rest at 0 to rest at ``duration`` (s) without a halt."""
-    return FromRestToRest(np.array([0.0, duration]), np.array([0.0, 1.0]), ramp)
 
 
 class Timetable:

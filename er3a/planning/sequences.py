@@ -9,7 +9,7 @@ sides run on into each other.
 from __future__ import annotations
 
 from collections.abc import Sequence as Many
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -18,16 +18,13 @@ from er3a.errors import PathError
 from er3a.numerics.arrays import Flags, Reals
 from er3a.planning.arcs import Arc
 from er3a.planning.curves import GAUSS_POINTS, GAUSS_WEIGHTS, POWERS, Curve, joining, straight
-from er3a.planning.moves import Line
+from er3a.planning.moves import Segment
 from er3a.planning.profiles import FromRestToRest, Rates, TimeLaw, Times, Timetable
 from er3a.planning.rotation_curves import spin
 
 TURN_LENGTH = 0.1  # m per rad
 NO_WAY = 1e-12  # m; shorter segments are left out
 RUNS_ON = 1e-9  # relative difference of twists below which a corner is none
-PASSES = 33  # points at which the distance from a corner is taken
-
-Segment = Line | Arc
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +39,7 @@ class SegmentPath:
     origins : (n, 3, 3), the orientation that each piece's rotation vectors start from
     arcs : per piece the arc that it is a part of, else None
     arc_shares : (n, 2), where on its arc a piece starts and ends
-    corners : (c,), shares of the way of the corners
-    deviation : (c,), m, by how much the rounded path passes each corner
+    turned : rad, by how much the tool turns in all
     turns : half turns, as of :class:`er3a.planning.moves.ToolPath`
     """
 
@@ -53,8 +49,6 @@ class SegmentPath:
     origins: Reals
     arcs: tuple[Arc | None, ...]
     arc_shares: Reals
-    corners: Reals
-    deviation: Reals
     turned: float
     turns: tuple[tuple[int, Reals], ...]
 
@@ -129,15 +123,11 @@ class JointSequence:
     duration : s
     law : when the arm is where
     curve : joint angles (k = 6), rad, over the share of the way
-    corners : (c,), shares of the way of the corners
-    deviation : (c,), rad, by how much the rounded path passes each corner, in the joint that does it most
     """
 
     duration: float
     law: TimeLaw
     curve: Curve
-    corners: Reals
-    deviation: Reals
 
     def joints(self, t: Reals) -> Rates:
         """Angles (rad), velocities (rad/s) and accelerations (rad/s^2) at times (...,) in s; each (..., 6)."""
@@ -196,23 +186,17 @@ def segment_path(
             after = _beside(onward, starts[k + 1], sizes[k + 1], starts[k + 1])
             span = 2 * blends[k]
             pieces.append(_Piece(span, joining(before, after, span), onward.T_start[:3, :3]))
-    corners, law, duration = _timed(sizes, np.asarray(blends) == 0, np.array(runs_on, bool), timing, ramp)
-    path = SegmentPath(
+    law, duration = _timed(sizes, np.asarray(blends) == 0, np.array(runs_on, bool), timing, ramp)
+    return SegmentPath(
         duration=duration,
         law=law,
         curve=_curve([piece.span for piece in pieces], [piece.coefficients for piece in pieces]),
         origins=np.array([piece.origin for piece in pieces]),
         arcs=tuple(piece.arc for piece in pieces),
         arc_shares=np.array([piece.arc_shares for piece in pieces]),
-        corners=corners[1:-1],
-        deviation=np.zeros(len(segments) - 1),
         turned=float(sum(part.turned for part in segments)),
         turns=tuple((k + 1, axis) for k, part in enumerate(segments) for _, axis in part.half_turns()),
     )
-    points = np.reshape([part.T_start[:3, 3] for part in segments[1:]], (-1, 1, 3))
-    near = _passes(corners, np.asarray(blends) / sizes.sum())
-    away = path._values(near)[0][..., :3] - points
-    return replace(path, deviation=np.linalg.norm(away, axis=-1).min(axis=-1))
 
 
 def joint_sequence(points: Reals, blends: Reals, timing: float | Times, ramp: float | None = None) -> JointSequence:
@@ -239,11 +223,8 @@ def joint_sequence(points: Reals, blends: Reals, timing: float | Times, ramp: fl
             span = 2 * cut[k + 1]
             spans.append(span)
             coefficients.append(joining((b, rates[k], still), (onward, rates[k + 1], still), span))
-    corners, law, duration = _timed(sizes, np.asarray(blends) == 0, runs_on, timing, ramp)
-    curve = _curve(spans, coefficients)
-    way = curve(_passes(corners, np.asarray(blends) / sizes.sum()))[0]
-    passed = np.abs(way - points[1:-1, None]).max(axis=-1).min(axis=-1)
-    return JointSequence(duration, law, curve, corners[1:-1], passed)
+    law, duration = _timed(sizes, np.asarray(blends) == 0, runs_on, timing, ramp)
+    return JointSequence(duration, law, _curve(spans, coefficients))
 
 
 def _check(sizes: Reals, blends: Reals, unit: float, name: str) -> None:
@@ -273,17 +254,11 @@ def _curve(spans: list[float], coefficients: list[Reals]) -> Curve:
 
 def _timed(
     sizes: Reals, sharp: Flags, runs_on: Flags, timing: float | Times, ramp: float | None
-) -> tuple[Reals, TimeLaw, float]:
-    """Shares of the way of all corners with start and end, the law of time, and the duration."""
+) -> tuple[TimeLaw, float]:
+    """The law of time, and the duration."""
     corners = np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum()
     corners[-1] = 1.0
     halt = np.concatenate([[True], sharp & ~runs_on, [True]])
     if isinstance(timing, Times):
-        law: TimeLaw = Timetable(timing.times, corners[timing.corner], halt[timing.corner])
-        return corners, law, float(timing.times[-1])
-    return corners, FromRestToRest(timing * corners[halt], corners[halt], ramp), float(timing)
-
-
-def _passes(corners: Reals, blends: Reals) -> Reals:
-    """Shares of the way (c, PASSES) about each corner."""
-    return corners[1:-1, None] + blends[:, None] * np.linspace(-1, 1, PASSES)
+        return Timetable(timing.times, corners[timing.corner], halt[timing.corner]), float(timing.times[-1])
+    return FromRestToRest(timing * corners[halt], corners[halt], ramp), float(timing)

@@ -16,6 +16,7 @@ from er3a.robots.robot import Robot
 
 REACH_STARTS = 32
 CHUNK = 2048
+TABLE_COLUMNS = ("a", "alpha", "d", "offset")
 
 
 def predict(robot: Robot, references: Sequence[Reference], starts: int = REACH_STARTS) -> Reals:
@@ -63,6 +64,8 @@ def state_of(
         speed=robot.speed,
         extremes=extremes,
         axes=axes,
+        columns={name: getattr(robot, name) for name in TABLE_COLUMNS}
+        | {"twist": robot.alpha[1:] if robot.convention == "modified" else robot.alpha[:-1]},
     )
 
 
@@ -77,21 +80,27 @@ def predict_tables(tables: Tables, robot: Robot, quantities: Sequence[Quantity])
     -------
     values : (H, n), in the quantities' units
     """
-    poses = _poses_of(quantities)
     values = np.empty((len(tables), len(quantities)))
     for start in range(0, len(tables), CHUNK):
-        part = tables[start : start + CHUNK]
-        state = ModelState(
-            frames=frames_of(part, robot.base, np.radians(poses)),
-            index=_places(poses),
-            direction=part.direction,
-            lower=part.lower,
-            upper=part.upper,
-            speed=robot.speed,
-            extremes={},
-        )
-        values[start : start + CHUNK] = read(quantities, state)
+        part = slice(start, start + CHUNK)
+        values[part] = read(quantities, state_of_tables(tables[part], robot, quantities))
     return values
+
+
+def state_of_tables(tables: Tables, robot: Robot, quantities: Sequence[Quantity]) -> ModelState:
+    """The state of many tables, for quantities none of which is an extreme over the limits."""
+    poses = _poses_of(quantities)
+    return ModelState(
+        frames=frames_of(tables, robot.base, np.radians(poses)),
+        index=_places(poses),
+        direction=tables.direction,
+        lower=tables.lower,
+        upper=tables.upper,
+        speed=robot.speed,
+        extremes={},
+        columns={name: getattr(tables, name) for name in TABLE_COLUMNS}
+        | {"twist": np.where(tables.modified[:, None], tables.alpha[:, 1:], tables.alpha[:, :-1])},
+    )
 
 
 def _poses_of(quantities: Sequence[Quantity]) -> tuple[Pose, ...]:

@@ -45,6 +45,7 @@ class ModelState:
     index : place of each pose (manufacturer's angles, deg) among the P
     direction, lower, upper, speed : (..., 6), of the robot
     extremes : value (mm) of each :class:`Extreme` that was searched for
+    columns : (..., 6) each, of the table: a, d in m, alpha, offset in rad; ``twist`` (..., 5), between joint axes
     axes : the joints' axis lines in the zero pose, if they were measured on the model; else those of the frames
     """
 
@@ -56,6 +57,7 @@ class ModelState:
     speed: Reals
     extremes: Mapping[Quantity, float]
     axes: AxisLines | None = None
+    columns: Mapping[str, Reals] = field(default_factory=dict)
 
     def at(self, pose: Pose) -> Reals:
         """Frames (..., 7, 4, 4) at a pose."""
@@ -92,6 +94,10 @@ class Quantity(ABC):
     def value(self, state: ModelState) -> Reals:
         """The model's value, shape (...,), in this quantity's unit."""
 
+    def off(self, state: ModelState, expected: float) -> Reals:
+        """Components (..., k) whose length is how far the model is from ``expected``; smooth where that is 0."""
+        return np.asarray(self.value(state) - expected)[..., None]
+
     @property
     def vector(self) -> Hashable:
         """What it is a coordinate of; coordinates of one vector from one source add up to a distance."""
@@ -113,6 +119,14 @@ class AxisAngle(Quantity):
 
     def value(self, state: ModelState) -> Reals:
         return angle_between(state.axis(self.joint)[0], np.array(self.toward), self.signed)
+
+    def off(self, state: ModelState, expected: float) -> Reals:
+        axis, toward = state.axis(self.joint)[0], np.array(self.toward)
+        if expected:
+            return super().off(state, expected)
+        return turned_apart(
+            axis if self.signed else axis * np.where(_dot(axis, toward) < 0, -1.0, 1.0)[..., None], toward
+        )
 
     def apart(self, expected: float, other: Quantity, other_expected: float) -> float:
         same = cast(AxisAngle, other)
@@ -183,7 +197,7 @@ class CarriedCoordinate(QuantityAtPose):
 
 @dataclass(frozen=True)
 class SectionCoordinate(QuantityAtPose):
-    """The wrist centre in a side view (joint 1 at 0): x from axis 1, z from axis 2; ``unsigned``: |x|, |z|."""
+    """The wrist centre in a side view (joint 1 at 0): x from axis 1, z from axis 2; ``unsigned``: ``|x|``, ``|z|``."""
 
     coordinate: SectionAxis
     unsigned: bool
@@ -208,6 +222,13 @@ class SegmentAngle(Quantity):
     unit: ClassVar[Unit] = "deg"
 
     def value(self, state: ModelState) -> Reals:
+        return angle_between(self._direction(state), np.array([0.0, 0.0, 1.0]), True)
+
+    def off(self, state: ModelState, expected: float) -> Reals:
+        upright = np.array([0.0, 0.0, 1.0])
+        return super().off(state, expected) if expected else turned_apart(self._direction(state), upright)
+
+    def _direction(self, state: ModelState) -> Reals:
         T = state.at(ZERO_POSE)
         if self.segment == "upper_arm":
             axis, vector = T[..., 1, :3, 2], T[..., 2, :3, 3] - T[..., 1, :3, 3]
@@ -215,7 +236,7 @@ class SegmentAngle(Quantity):
         else:
             axis = T[..., 3, :3, 2]
             vector = axis * np.where(_dot(axis, T[..., 4, :3, 3] - T[..., 2, :3, 3]) < 0, -1.0, 1.0)[..., None]
-        return angle_between(vector, np.array([0.0, 0.0, 1.0]), True)
+        return vector
 
 
 @dataclass(frozen=True)
@@ -322,6 +343,26 @@ def angle_between(a: Reals, b: Reals, signed: bool) -> Reals:
     """Angle in deg; of lines (at most 90) if not signed."""
     cross, dot = np.cross(a, b), _dot(a, b)
     return np.degrees(np.arctan2(np.sqrt(_dot(cross, cross)), dot if signed else np.abs(dot)))
+
+
+def turned_apart(a: Reals, b: Reals) -> Reals:
+    """Vectors (..., 2) across b whose length is the angle in deg from b to a; smooth but for opposite directions."""
+    cross = _cross(b, a)
+    sine, cosine = np.sqrt(_dot(cross, cross)), _dot(a, b)
+    angle = np.degrees(np.arctan2(sine, cosine))
+    size = np.where(sine > 0, angle / np.where(sine > 0, sine, 1.0), 0.0)
+    first = _cross(b, np.eye(3)[np.abs(b).argmin(axis=-1)])
+    first = first / np.sqrt(_dot(first, first))[..., None]
+    along = np.where((sine == 0) & (cosine < 0), 180.0, size * _dot(cross, first))
+    second = _cross(b, first)
+    across = size * _dot(cross, second) / np.sqrt(_dot(second, second))
+    return np.stack([along, across], axis=-1)
+
+
+def _cross(a: Reals, b: Reals) -> Reals:
+    """Cross products of vectors (..., 3), without the detours of ``np.cross``."""
+    (a0, a1, a2), (b0, b1, b2) = ((v[..., 0], v[..., 1], v[..., 2]) for v in (a, b))
+    return np.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=-1)
 
 
 def _dot(a: Reals, b: Reals) -> Reals:

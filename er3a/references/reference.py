@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
+from er3a.display import Displayed, Sheet, first_rows
 from er3a.numerics.arrays import Reals
+from er3a.references.documents import Documents
 from er3a.references.quantities import Quantity, Unit
 from er3a.references.subjects import ReferenceSubject
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade
+
+INTERVAL_95 = 1.959963984540054
 
 
 @dataclass(frozen=True)
@@ -27,6 +31,8 @@ class Reference:
     quantity : what it is about, as a model has it
     expected : in the quantity's unit; None where the source says that it gives no value
     uncertainty : half-width of the interval that the source leaves open, same unit
+    origin : the document that it rests on; empty if none is named
+    deviation : standard deviation, if that is what the source states; ``uncertainty`` is half of the 95 % interval then
     """
 
     subject: ReferenceSubject
@@ -36,6 +42,13 @@ class Reference:
     uncertainty: float
     source: str
     grade: Grade
+    origin: str = ""
+    deviation: float | None = None
+
+    @property
+    def document(self) -> str:
+        """What tells its document from others: its origin, else its source."""
+        return self.origin or self.source
 
     @property
     def unit(self) -> Unit:
@@ -54,7 +67,9 @@ Scalar = tuple[ReferenceSubject, str, Quantity, float | None, float]
 
 @dataclass(frozen=True)
 class Row(ABC):
-    """What every row of a reference table has: its line in the file, its source and grade.
+    """What every row of a reference table has: its line in the file, its source, grade and document.
+
+    ``gaussian``: its uncertainties are standard deviations, and not half-widths.
 
     A kind of reference is a row class: ``kind`` is the name of its tables, ``groups`` those of its references, and
     ``scalars`` splits a row into them. :data:`er3a.references.rows.KINDS` lists all kinds.
@@ -65,6 +80,8 @@ class Row(ABC):
     line: int
     source: str
     grade: Grade
+    origin: str = field(default="", kw_only=True)
+    gaussian: bool = field(default=False, kw_only=True)
 
     @abstractmethod
     def scalars(self) -> Iterator[Scalar]:
@@ -76,14 +93,17 @@ class Row(ABC):
 
     def reference(self, scalar: Scalar) -> Reference:
         """A number with the row's source and grade."""
-        return Reference(*scalar, self.source, self.grade)
+        if not self.gaussian:
+            return Reference(*scalar, self.source, self.grade, self.origin)
+        reference = Reference(*scalar, self.source, self.grade, self.origin)
+        return replace(reference, uncertainty=INTERVAL_95 * reference.uncertainty, deviation=reference.uncertainty)
 
 
 RowT = TypeVar("RowT", bound=Row)
 
 
-@dataclass(frozen=True)
-class ReferenceSet:
+@dataclass(frozen=True, repr=False)
+class ReferenceSet(Displayed):
     """All references of one folder.
 
     Attributes
@@ -91,11 +111,13 @@ class ReferenceSet:
     name : the folder's name
     references : the scalars
     rows : the rows they come from, per kind
+    documents : that their origins name
     """
 
     name: str
     references: tuple[Reference, ...]
     rows: Mapping[str, tuple[Row, ...]] = field(hash=False)
+    documents: Documents = field(default_factory=Documents, hash=False)
 
     @property
     def checkable(self) -> tuple[Reference, ...]:
@@ -105,6 +127,18 @@ class ReferenceSet:
     def of(self, kind: type[RowT]) -> tuple[RowT, ...]:
         """The rows of a kind."""
         return tuple(row for row in self.rows.get(kind.kind, ()) if isinstance(row, kind))
+
+    def sheet(self) -> Sheet:
+        """How many numbers each group has, and by which grades."""
+        groups = sorted({each.group for each in self.references})
+        rows = (
+            (group, len(own), tuple(sorted({each.grade for each in own})))
+            for group in groups
+            for own in [[each for each in self.references if each.group == group]]
+        )
+        shown, left_out = first_rows(rows, len(groups))
+        heading = f"Reference set {self.name}: {len(self.references)} numbers, {len(self.checkable)} to check against"
+        return Sheet(heading, ("group", "numbers", "grades"), shown, left_out)
 
 
 def quantities_of(references: Iterable[Reference]) -> tuple[Quantity, ...]:

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
+from er3a.references.documents import Documents
 from er3a.references.quantities import (
     COORDINATES,
     ZERO_POSE,
@@ -33,14 +34,17 @@ from er3a.references.quantities import (
     Vector,
 )
 from er3a.references.reference import Reference, ReferenceSet, Row, Scalar
+from er3a.references.seen import Seen, SeenMotion, TableEntry
 from er3a.references.subjects import (
     AxisDirection,
     AxisPosition,
     CornerLabel,
     DrawingCorner,
     DrawingExtent,
+    EntryOfTable,
     JointLimit,
     JointSpeed,
+    MotionOfJoint,
     PointAtPose,
     PoseExcess,
     Reach,
@@ -233,8 +237,69 @@ class SpeedRow(Row):
         yield JointSpeed(self.joint), "speeds", Speed(self.joint), self.speed_deg_s, self.uncertainty_deg_s
 
 
+@dataclass(frozen=True)
+class ObservationRow(Row):
+    """Where to a point moves, or how the tool tilts or turns, while one joint is jogged in + from a pose."""
+
+    kind: ClassVar[str] = "observations"
+    groups: ClassVar[tuple[str, ...]] = ("key_poses",)
+    pose: Pose
+    joint: int
+    point: Point
+    seen: Seen
+    uncertainty_deg: float
+
+    def scalars(self) -> Iterator[Scalar]:
+        quantity = SeenMotion(self.pose, self.joint, self.point, self.seen)
+        yield MotionOfJoint(self.joint, self.point, self.seen), "key_poses", quantity, 0.0, self.uncertainty_deg
+
+
+@dataclass(frozen=True)
+class LengthRow(Row):
+    """A length of the table, measured on the arm: a between two axes, or d along an axis."""
+
+    kind: ClassVar[str] = "lengths"
+    groups: ClassVar[tuple[str, ...]] = ("axes",)
+    joint: int
+    length: Literal["a", "d"]
+    value_mm: float
+    uncertainty_mm: float
+
+    def scalars(self) -> Iterator[Scalar]:
+        quantity = TableEntry(self.length, self.joint)
+        yield EntryOfTable(self.length, self.joint), "axes", quantity, self.value_mm, self.uncertainty_mm
+
+
+@dataclass(frozen=True)
+class AngleRow(Row):
+    """An angle of the table, measured on the arm: alpha between two axes, or the offset at the zero mark."""
+
+    kind: ClassVar[str] = "angles"
+    groups: ClassVar[tuple[str, ...]] = ("axes",)
+    joint: int
+    angle: Literal["alpha", "offset"]
+    value_deg: float
+    uncertainty_deg: float
+
+    def scalars(self) -> Iterator[Scalar]:
+        quantity = TableEntry(self.angle, self.joint)
+        yield EntryOfTable(self.angle, self.joint), "axes", quantity, self.value_deg, self.uncertainty_deg
+
+
 KINDS: dict[str, type[Row]] = {
-    row.kind: row for row in (AxisRow, PositionRow, DirectionRow, EnvelopeRow, ReachRow, LimitRow, SpeedRow)
+    row.kind: row
+    for row in (
+        AxisRow,
+        PositionRow,
+        DirectionRow,
+        EnvelopeRow,
+        ReachRow,
+        LimitRow,
+        SpeedRow,
+        ObservationRow,
+        LengthRow,
+        AngleRow,
+    )
 }
 
 
@@ -244,7 +309,7 @@ def check_complete(what: str, wanted: Iterable[str], present: Iterable[str]) -> 
         raise LookupError(f"{what}: {', '.join(sorted(differing))} stands in one place and not in the other")
 
 
-def reference_set(name: str, rows: Mapping[str, tuple[Row, ...]]) -> ReferenceSet:
+def reference_set(name: str, rows: Mapping[str, tuple[Row, ...]], documents: Documents | None = None) -> ReferenceSet:
     """All that rows state, and that each pose at which a source shows the arm lies within its limits: one reference for
     each pose and source."""
     stated = [reference for table in rows.values() for row in table for reference in row.references()]
@@ -255,7 +320,7 @@ def reference_set(name: str, rows: Mapping[str, tuple[Row, ...]]) -> ReferenceSe
             key = (row.source, PoseOutside(row.pose))
             if key not in said:
                 reached.setdefault(key, row.reference(row.within_limits()))
-    return ReferenceSet(name, (*stated, *reached.values()), rows)
+    return ReferenceSet(name, (*stated, *reached.values()), rows, documents or Documents())
 
 
 check_complete("groups of references", GROUPS, {group for row in KINDS.values() for group in row.groups})

@@ -118,6 +118,25 @@ class JointSpeed(Subject):
     code: Literal["joint_speed"] = "joint_speed"
 
 
+@dataclass(frozen=True)
+class MotionOfJoint(Subject):
+    """What is seen while a joint is jogged in +."""
+
+    joint: int
+    point: Point
+    seen: str
+    code: Literal["motion_of_joint"] = "motion_of_joint"
+
+
+@dataclass(frozen=True)
+class EntryOfTable(Subject):
+    """An entry of the table, measured by itself."""
+
+    column: Literal["a", "d", "alpha", "offset"]
+    joint: int
+    code: Literal["entry_of_table"] = "entry_of_table"
+
+
 ReferenceSubject = (
     AxisDirection
     | AxisPosition
@@ -129,4 +148,6 @@ ReferenceSubject = (
     | Reach
     | JointLimit
     | JointSpeed
+    | MotionOfJoint
+    | EntryOfTable
 )

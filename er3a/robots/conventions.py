@@ -21,9 +21,7 @@ def to_modified(robot: Robot) -> Robot:
         return robot
     return robot.replace(
         convention="modified",
-        a=np.roll(robot.a, 1) * _NOT_FIRST,
-        alpha=np.roll(robot.alpha, 1) * _NOT_FIRST,
-        beta=np.roll(robot.beta, 1) * _NOT_FIRST,
+        **{column: np.roll(getattr(robot, column), 1) * _NOT_FIRST for column in _SHIFTED},
         tool=translation(robot.a[5], 0, 0) @ rot_x(robot.alpha[5]) @ rot_y(robot.beta[5]) @ robot.tool,
     )
 
@@ -34,11 +32,10 @@ def to_standard(robot: Robot) -> Robot:
         return robot
     return robot.replace(
         convention="standard",
-        a=np.roll(robot.a * _NOT_FIRST, -1),
-        alpha=np.roll(robot.alpha * _NOT_FIRST, -1),
-        beta=np.roll(robot.beta * _NOT_FIRST, -1),
+        **{column: np.roll(getattr(robot, column) * _NOT_FIRST, -1) for column in _SHIFTED},
         base=robot.base @ rot_x(robot.alpha[0]) @ translation(robot.a[0], 0, 0) @ rot_y(robot.beta[0]),
     )
 
 
+_SHIFTED = "a", "alpha", "beta"
 _NOT_FIRST = np.array([0.0, 1.0, 1.0, 1.0, 1.0, 1.0])

@@ -41,6 +41,13 @@ def within(robot: Robot, q: Reals) -> Flags:
     return fits
 
 
+def theta_limits(robot: Robot) -> Reals:
+    """Ends (6, 2), rad, of the range of each of the table's angles theta, the lower first."""
+    ends = robot.direction[:, None] * np.stack([robot.lower, robot.upper], axis=1) + robot.offset[:, None]
+    ends.sort(axis=1)
+    return ends
+
+
 def limit_margin(robot: Robot, q: Reals) -> Reals:
     """Least distance (...,) in rad of any joint of (..., 6) from its limits; negative outside them."""
     margin: Reals = np.minimum(q - robot.lower, robot.upper - q).min(axis=-1)

@@ -9,20 +9,25 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from er3a.errors import ShapeError
+from er3a.display import Displayed, Sheet, shortly
+from er3a.errors import RobotError, ShapeError
+from er3a.geometry.transforms import as_floats, rpy_of
 from er3a.numerics.arrays import Reals
 
-Grade = Literal["official", "cad", "export", "claim", "inferred"]
+Convention = Literal["standard", "modified"]
+CONVENTIONS: tuple[Convention, ...] = get_args(Convention)
+Grade = Literal["official", "measured", "cad", "export", "claim", "inferred"]
 GRADES: tuple[Grade, ...] = get_args(Grade)
-AUTHORITATIVE_GRADES: tuple[Grade, ...] = ("official", "cad", "export")
+AUTHORITATIVE_GRADES: tuple[Grade, ...] = ("official", "measured", "cad", "export")
 
 
 @dataclass(frozen=True)
 class Source:
-    """Where a group of values comes from, and how far it can be relied on (``GRADES``)."""
+    """Where a group of values comes from, how far it can be relied on (``GRADES``), and its document, if named."""
 
     source: str
     grade: Grade
+    origin: str = ""
 
 
 @dataclass(frozen=True)
@@ -41,8 +46,8 @@ class Envelope:
     radius: float
 
 
-@dataclass(frozen=True, eq=False)
-class Robot:
+@dataclass(frozen=True, eq=False, repr=False)
+class Robot(Displayed):
     """A six-revolute serial arm. SI units; angles are in rad, arrays are read-only.
 
     The D-H angle of joint i is ``theta_i = direction_i * q_i + offset_i``, where q is what the teach pendant shows.
@@ -63,11 +68,19 @@ class Robot:
     envelopes : capsules around the links; empty where the file gives none
     derived : what :func:`er3a.robots.derived.derived` keeps of this robot
     sources : per group of values ("dh", "zero", "limits", "speeds", "base", "tool", "envelopes") its source and grade
+    origins : documents of single entries ("d4", "direction2", "lower6") that have another one than their group
+
+    Raises
+    ------
+    ShapeError, PoseError
+        for arrays of another shape, or of something that is no number
+    RobotError
+        for a convention or a direction that there isn't
     """
 
     name: str
     title: str
-    convention: Literal["standard", "modified"]
+    convention: Convention
     a: Reals
     alpha: Reals
     d: Reals
@@ -83,17 +96,25 @@ class Robot:
     references: tuple[str, ...] = ()
     envelopes: tuple[Envelope, ...] = ()
     sources: Mapping[str, Source] = field(default_factory=dict)
+    origins: Mapping[str, str] = field(default_factory=dict)
     derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         for key in ("a", "alpha", "d", "beta", "direction", "offset", "lower", "upper", "speed", "base", "tool"):
-            array = np.array(getattr(self, key), dtype=float)
+            array = np.array(as_floats(getattr(self, key), key))
             expected = (4, 4) if key in ("base", "tool") else (6,)
             if array.shape != expected:
                 raise ShapeError(key, array.shape, str(expected))
             array.setflags(write=False)
             object.__setattr__(self, key, array)
+        if self.convention not in CONVENTIONS:
+            raise RobotError(self.name, f"the convention is {self.convention!r}; expected one of {CONVENTIONS}")
+        wrong = np.flatnonzero(np.abs(self.direction) != 1)
+        if wrong.size:
+            value = self.direction[wrong[0]]
+            raise RobotError(self.name, f"direction of joint {wrong[0] + 1} is {value:g}; expected 1 or -1")
         object.__setattr__(self, "sources", MappingProxyType(dict(self.sources)))
+        object.__setattr__(self, "origins", MappingProxyType(dict(self.origins)))
 
     def without_tool(self) -> Robot:
         """The robot with its flange as tool: references speak of the flange, which is frame 6 of the table."""
@@ -102,3 +123,34 @@ class Robot:
     def replace(self, **changes: Any) -> Robot:
         """A copy with other values for some attributes."""
         return replace(self, **changes)
+
+    def sheet(self) -> Sheet:
+        """The table in mm and degrees, and where tool and base are."""
+        columns = [
+            np.arange(1, 7),
+            *(
+                1000 * self.a,
+                np.degrees(self.alpha),
+                1000 * self.d,
+                *([np.degrees(self.beta)] if self.beta.any() else []),
+            ),
+            *(self.direction.astype(int), np.degrees(self.offset)),
+            *(np.degrees(self.lower), np.degrees(self.upper), np.degrees(self.speed)),
+        ]
+        names = ["joint", "a_mm", "alpha_deg", "d_mm", *(["beta_deg"] if self.beta.any() else [])]
+        names += ["direction", "offset_deg", "lower_deg", "upper_deg", "speed_deg_s"]
+        placed = [("base", self.base), ("tool", self.tool)]
+        return Sheet(
+            f"Robot {self.name}: {shortly(self.title)} ({self.convention} D-H)",
+            tuple(names),
+            tuple(tuple(shortly(value) for value in row) for row in zip(*columns)),
+            facts=(
+                *(f"{name}: {_placement(T)}" for name, T in placed if (np.eye(4) != T).any()),
+                *([f"references: {', '.join(self.references)}"] if self.references else []),
+            ),
+        )
+
+
+def _placement(T: Reals) -> str:
+    xyz, rpy = (shortly(tuple(values.tolist())) for values in (1000 * T[:3, 3], np.degrees(rpy_of(T))))
+    return f"xyz_mm {xyz}; rpy_deg {rpy}"

@@ -19,6 +19,8 @@ from er3a.numerics.arrays import Integers, Reals, Singles
 from er3a.numerics.jit import kernel
 
 NearLists = tuple[Reals, Integers, Integers, Reals]
+Cells = tuple[Reals, float, tuple[int, int, int]]
+Furthest = tuple[Reals, Reals, Integers, Integers]  # directions (D, 3) and what Extremes holds
 
 _PATCHES = 16
 _SAFETY = 1 - 1e-5
@@ -49,11 +51,8 @@ class Extremes:
         """The further of the two in each direction, the earlier sample at a tie."""
         earlier = (other.block < self.block) | ((other.block == self.block) & (other.sample < self.sample))
         take = (other.support > self.support) | ((other.support == self.support) & earlier & (other.block != NONE))
-        return Extremes(
-            np.where(take, other.support, self.support),
-            np.where(take, other.block, self.block),
-            np.where(take, other.sample, self.sample),
-        )
+        names = "support", "block", "sample"
+        return Extremes(*(np.where(take, getattr(other, name), getattr(self, name)) for name in names))
 
 
 def cube_map() -> Reals:
@@ -72,10 +71,8 @@ def cube_map() -> Reals:
 
         centre = unit(middle[:, None], middle[None, :])
         corners = unit(edge[:, None], edge[None, :])
-        cosine = np.min(
-            [np.sum(centre * corners[i : i + _PATCHES, j : j + _PATCHES], axis=-1) for i in (0, 1) for j in (0, 1)],
-            axis=0,
-        )
+        near = [corners[i : i + _PATCHES, j : j + _PATCHES] for i in (0, 1) for j in (0, 1)]
+        cosine = np.min([np.sum(centre * corner, axis=-1) for corner in near], axis=0)
         centres.append(centre.reshape(-1, 3))
         radii.append(np.arccos(np.minimum(cosine, 1)).ravel())
     return np.concatenate([np.concatenate(centres).T, np.concatenate(radii)[None] + 1e-6])
@@ -154,13 +151,7 @@ def _set_lists(directions: Reals, seen: Reals, patches: Reals, least: Reals, lis
 
 @kernel
 def refresh(
-    directions: Reals,
-    support: Reals,
-    inner: Reals,
-    patches: Reals,
-    lists: NearLists,
-    grid: tuple[Reals, float, tuple[int, int, int]],
-    idle: Singles,
+    directions: Reals, support: Reals, inner: Reals, patches: Reals, lists: NearLists, grid: Cells, idle: Singles
 ) -> None:
     """Set the lists of the patches, and where samples of each cell are idle, from the support so far.
 
@@ -203,19 +194,9 @@ def near_lists(patches: int) -> NearLists:
 
 
 @kernel
-def take_point(
-    point: Vector,
-    block: int,
-    sample: int,
-    directions: Reals,
-    inner: Reals,
-    lists: NearLists,
-    support: Reals,
-    blocks: Integers,
-    samples: Integers,
-) -> None:
+def take_point(point: Vector, block: int, sample: int, inner: Reals, lists: NearLists, furthest: Furthest) -> None:
     """Take one point (x, y, z) into the extremes; samples of a block come in their order."""
-    complete, count, near, limits = lists
+    (complete, count, near, limits), (directions, support, blocks, samples) = lists, furthest
     x, y, z = point[0] - inner[0], point[1] - inner[1], point[2] - inner[2]
     squared, patch = x * x + y * y + z * z, _patch(x, y, z)
     listed = squared < complete[patch]

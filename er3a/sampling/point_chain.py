@@ -18,7 +18,7 @@ import numpy as np
 
 from er3a.geometry.transforms import translation
 from er3a.geometry.vectors import Vector
-from er3a.kinematics.chain import JOINTS, constant_links
+from er3a.kinematics.chain import JOINTS, constant_links, moving_tip
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
 from er3a.numerics.arrays import Reals, Singles
 from er3a.numerics.jit import kernel
@@ -59,10 +59,7 @@ class PointChain(NamedTuple):
 def point_chain(robot: Robot) -> PointChain:
     """The chain to the tool point."""
     links = constant_links(robot)
-    last, point = JOINTS - 1, links[JOINTS, :3, 3]
-    while last > 0 and np.hypot(point[0], point[1]) <= _SMALL:
-        point = links[last, :3, :3] @ point + links[last, :3, 3]
-        last -= 1
+    last, point = moving_tip(links)
     first = robot.direction * robot.lower + robot.offset
     steps = np.zeros((JOINTS, 5))
     for k in range(1, last + 1):

@@ -15,7 +15,7 @@ from er3a.geometry.sphere import fibonacci_sphere
 from er3a.numerics.arrays import Integers, Reals, Singles, Words
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
-from er3a.sampling.extreme_samples import Extremes, NearLists, cube_map, near_lists, refresh, take_point
+from er3a.sampling.extreme_samples import Extremes, Furthest, NearLists, cube_map, near_lists, refresh, take_point
 from er3a.sampling.grid import Grid
 from er3a.sampling.point_chain import (
     ROWS,
@@ -33,7 +33,7 @@ Tallies = NDArray[np.uint32]
 _Block = tuple[np.uint64, int, int, Words]
 _Voxels = tuple[Reals, float, tuple[int, int, int], Tallies]
 _Section = tuple[np.float32, np.float32, np.int32, np.int32, Tallies]
-_Watch = tuple[tuple[Reals, Reals, Integers, Integers], tuple[Reals, Reals, NearLists, Singles], Integers]
+_Watch = tuple[Furthest, tuple[Reals, Reals, NearLists, Singles], Integers]
 
 UNTOUCHED = np.iinfo(np.int32).max
 PORTION = 1 << 22
@@ -135,18 +135,12 @@ def _side_cells(
 
 
 @kernel
-def _voxels(
-    rows: Singles,
-    chain: PointChain,
-    origin: Reals,
-    per_length: np.float32,
-    ny: np.int32,
-    nz: np.int32,
-    inner: Reals,
-    cells: NDArray[np.int32],
-    squared: Singles,
+def _voxel_of(
+    rows: Singles, chain: PointChain, voxels: _Voxels, inner: Reals, cells: NDArray[np.int32], squared: Singles
 ) -> None:
     """Number of the voxel of each point, and its squared distance (m^2) from the inner point."""
+    origin, cell, shape, _ = voxels
+    per_length, ny, nz = np.float32(1.0 / cell), np.int32(shape[1]), np.int32(shape[2])
     first, span, base = chain[2][0], chain[3][0], chain[5]
     a, b, c = np.float32(base[0, 0]), np.float32(base[0, 1]), np.float32(base[0, 2])
     d, e, f = np.float32(base[1, 0]), np.float32(base[1, 1]), np.float32(base[1, 2])
@@ -172,7 +166,8 @@ def _sample(
     seed, block, first, sobol = draw
     origin, cell, shape, counts = voxels
     lowest, per_length, n_rho, n_z, side = section
-    (directions, support, hull_block, hull_sample), (inner, patches, near, idle), state = watch
+    furthest, (inner, patches, near, idle), state = watch
+    directions, support, _, _ = furthest
     rows, cells = np.empty(ROWS, dtype=np.float32), np.empty(CHUNK, dtype=np.int32)
     squared = np.empty(CHUNK, dtype=np.float32)
     for begin in range(start, stop, CHUNK):
@@ -189,13 +184,11 @@ def _sample(
             for i in range(count):
                 x, y, z = point_in_base(chain, rows, i)
                 inner[0], inner[1], inner[2] = inner[0] + x / count, inner[1] + y / count, inner[2] + z / count
-        shape_y, shape_z = np.int32(shape[1]), np.int32(shape[2])
-        _voxels(rows, chain, origin, np.float32(1.0 / cell), shape_y, shape_z, inner, cells, squared)
+        _voxel_of(rows, chain, voxels, inner, cells, squared)
         for i in range(count):
             counts[cells[i]] += np.uint32(1)
             if squared[i] >= idle[cells[i]]:
-                point = point_in_base(chain, rows, i)
-                take_point(point, block, begin + i, directions, inner, near, support, hull_block, hull_sample)
+                take_point(point_in_base(chain, rows, i), block, begin + i, inner, near, furthest)
         state[0] += count
         if state[0] >= state[1] and directions.shape[0] > 0:
             refresh(directions, support, inner, patches, near, (origin, cell, shape), idle)

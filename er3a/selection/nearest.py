@@ -1,6 +1,7 @@
 """Which of several joint solutions is nearest to where the arm comes from, and why it is taken, or why none is.
 
-Of the admissible solutions the one is taken whose greatest joint move from the reference is least: where all joints
+Of the admissible solutions the one is taken whose greatest joint move from the reference is least
+(:func:`er3a.geometry.angles.greatest_move`, the measure of *nearest* wherever solutions are ranked): where all joints
 start and stop together, that joint decides how long the move takes. Between equals (to 1e-9 rad) the least root of the
 summed squares of all joint moves decides, then the lower branch number.
 """
@@ -14,6 +15,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.collision.pairs import PairOverlaps
+from er3a.geometry.angles import greatest_move
 from er3a.kinematics.solutions import Label, Solutions, Unsolved
 from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.joint_limits import LimitsExceeded, limit_margin
@@ -160,17 +162,9 @@ class Choice:
         """The row taken; None if no solution is admissible."""
         return int(self.order[0]) if len(self.order) else None
 
-    @property
-    def runner_up(self) -> int | None:
-        """The next best row."""
-        return int(self.order[1]) if len(self.order) > 1 else None
-
 
 def nearest(
-    robot: Robot,
-    solutions: Solutions,
-    q_ref: Reals,
-    refused: Sequence[Refusal | None] | None = None,
+    robot: Robot, solutions: Solutions, q_ref: Reals, refused: Sequence[Refusal | None] | None = None
 ) -> Choice:
     """Order the admissible solutions of one pose as the module says.
 
@@ -179,12 +173,10 @@ def nearest(
     q_ref : (6,), rad, the joint angles that the arm comes from
     refused : why each row is not admissible, None for those that are; left out, the limits alone refuse
     """
-    moves = np.abs(solutions.q - q_ref)
-    greatest: Reals = moves.max(axis=1, initial=0.0)
+    moves, greatest = np.abs(solutions.q - q_ref), greatest_move(solutions.q, q_ref)
     distance: Reals = np.linalg.norm(moves, axis=1)
     allowed = solutions.within_limits if refused is None else [why is None for why in refused]
-    left = [int(row) for row in np.flatnonzero(allowed)]
-    ordered: list[int] = []
+    left, ordered = np.flatnonzero(allowed).tolist(), list[int]()
     while left:
         best = _first(left, greatest, distance, solutions.branch)
         ordered.append(best)

@@ -17,6 +17,7 @@ from er3a.collision.bodies import can_measure
 from er3a.collision.clearance import clearance
 from er3a.collision.scene import Scene
 from er3a.errors import Er3aError
+from er3a.geometry.angles import greatest_move
 from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.joint_limits import limit_margin
@@ -33,7 +34,7 @@ class Rule:
     ----------
     unit : of the measure
     best : "least" or "greatest" measure
-    measure : (robot, q (n, 6), q_ref (6,), scene) -> (n,)
+    measure : (robot, q (..., 6), q_ref (..., 6), scene) -> (...,)
     """
 
     unit: str
@@ -57,19 +58,18 @@ def joint_weights(robot: Robot) -> Reals:
 
 
 def _greatest_move(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
-    farthest: Reals = np.abs(q - q_ref).max(axis=1, initial=0.0)
-    return np.degrees(farthest)
+    return np.degrees(greatest_move(q, q_ref))
 
 
 def _weighted_move(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
-    distance: Reals = np.linalg.norm(joint_weights(robot) * (q - q_ref), axis=1)
+    distance: Reals = np.linalg.norm(joint_weights(robot) * (q - q_ref), axis=-1)
     return np.degrees(distance)
 
 
 def _time(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
     if not np.isfinite(robot.speed).all():
         raise Er3aError(f"{robot.name}: the rule 'time' needs joint speeds, and the robot's file gives none")
-    longest: Reals = (np.abs(q - q_ref) / robot.speed).max(axis=1, initial=0.0)
+    longest: Reals = (np.abs(q - q_ref) / robot.speed).max(axis=-1, initial=0.0)
     return longest
 
 
@@ -101,11 +101,7 @@ def available_rules(robot: Robot) -> tuple[RuleName, ...]:
     return tuple(name for name in RULES if known.get(name, True))
 
 
-def mixed_cost(
-    weights: Mapping[RuleName, float],
-    costs: Mapping[RuleName, Reals],
-    allowed: Flags,
-) -> Reals:
+def mixed_cost(weights: Mapping[RuleName, float], costs: Mapping[RuleName, Reals], allowed: Flags) -> Reals:
     """The weighted sum (n,) of costs (n,) per rule, each stretched to 0..1 over the allowed rows."""
     total = np.zeros(len(allowed))
     for name, weight in weights.items():

@@ -11,6 +11,7 @@ import numpy as np
 from er3a.collision.clearance import clearance
 from er3a.collision.pairs import PairOverlaps
 from er3a.collision.scene import Scene
+from er3a.display import Displayed, Sheet, first_rows, shortly
 from er3a.errors import ShapeError
 from er3a.kinematics.inverse import checked_reference
 from er3a.kinematics.solutions import Solutions
@@ -49,8 +50,8 @@ class BestByRules:
     code: Literal["best_by_rules"] = "best_by_rules"
 
 
-@dataclass(frozen=True, eq=False)
-class SolutionRanking:
+@dataclass(frozen=True, eq=False, repr=False)
+class SolutionRanking(Displayed):
     """Solutions of one pose in the order of a rule or of a mix of rules.
 
     Attributes
@@ -73,13 +74,25 @@ class SolutionRanking:
         """The row taken; None if there is none."""
         return int(self.order[0]) if len(self.order) else None
 
+    def sheet(self) -> Sheet:
+        """The rows in order with what they are ranked by, then those that are refused."""
+        refused = [row for row, why in enumerate(self.reason) if not isinstance(why, Placed)]
+        rows = (
+            (place, row, self.cost[row], *(values[row] for values in self.measured.values()), why)
+            for place, row, why in (
+                *((place + 1, row, None) for place, row in enumerate(self.order)),
+                *((None, row, self.reason[row]) for row in refused),
+            )
+        )
+        shown, left_out = first_rows(rows, len(self.reason))
+        units = [f"{name} ({RULES[name].unit})" for name in self.measured]
+        heading = f"Ranking of {len(self.reason)} solutions, {len(self.order)} admissible"
+        taken = f"row {self.chosen} is taken" if len(self.order) else f"none is taken: {shortly(self.chosen_reason)}"
+        return Sheet(f"{heading}; {taken}", ("place", "row", "cost", *units, "refused"), shown, left_out)
+
 
 def select(
-    robot: Robot,
-    solutions: Solutions,
-    rule: str | Mapping[str, float],
-    q_ref: Reals,
-    scene: Scene | None = None,
+    robot: Robot, solutions: Solutions, rule: str | Mapping[str, float], q_ref: Reals, scene: Scene | None = None
 ) -> SolutionRanking:
     """Rank the solutions of one pose.
 
@@ -128,12 +141,7 @@ def refusals(robot: Robot, solutions: Solutions, scene: Scene | None) -> tuple[R
 
 
 def _ordered(
-    robot: Robot,
-    solutions: Solutions,
-    rules: Sequence[RuleName],
-    cost: Reals,
-    allowed: Flags,
-    q_ref: Reals,
+    robot: Robot, solutions: Solutions, rules: Sequence[RuleName], cost: Reals, allowed: Flags, q_ref: Reals
 ) -> Integers:
     """Allowed rows by cost; equals by the rule *nearest*."""
     by_move = {int(row): k for k, row in enumerate(nearest(robot, solutions, q_ref).order)}

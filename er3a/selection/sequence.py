@@ -13,25 +13,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
 from er3a.collision.clearance import clearance
 from er3a.collision.scene import Scene
+from er3a.display import Displayed, Sheet, first_rows
 from er3a.errors import Er3aError
 from er3a.kinematics.inverse import checked_reference
 from er3a.kinematics.solutions import Solutions
 from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import Robot
-from er3a.selection.rules import joint_weights
+from er3a.selection.rules import RULES
 
 MoveRule = Literal["nearest", "weighted", "time"]
-MOVES: tuple[MoveRule, ...] = ("nearest", "weighted", "time")
+MOVES: tuple[MoveRule, ...] = get_args(MoveRule)
 
 
-@dataclass(frozen=True, eq=False)
-class SequenceChoice:
+@dataclass(frozen=True, eq=False, repr=False)
+class SequenceChoice(Displayed):
     """Solutions of a sequence of poses.
 
     Attributes
@@ -47,13 +48,16 @@ class SequenceChoice:
     greedy_rows: Integers
     greedy_cost: float
 
+    def sheet(self) -> Sheet:
+        """The row taken of each pose, with its joint angles."""
+        rows = ((pose, row, *angles) for pose, row, angles in zip(range(len(self.q)), self.rows, np.degrees(self.q)))
+        shown, left_out = first_rows(rows, len(self.q))
+        heading = f"Sequence of {len(self.q)} poses: cost {self.cost:.6g}; nearest each time: {self.greedy_cost:.6g}"
+        return Sheet(heading, ("pose", "row", *(f"q{joint}_deg" for joint in range(1, 7))), shown, left_out)
+
 
 def select_sequence(
-    robot: Robot,
-    poses: Sequence[Solutions],
-    q_ref: Reals,
-    rule: MoveRule = "nearest",
-    scene: Scene | None = None,
+    robot: Robot, poses: Sequence[Solutions], q_ref: Reals, rule: MoveRule = "nearest", scene: Scene | None = None
 ) -> SequenceChoice:
     """Choose one solution of each pose so that all moves together cost least.
 
@@ -109,16 +113,6 @@ def _usable(robot: Robot, solutions: Solutions, scene: Scene | None, number: int
     return rows
 
 
-def _move_costs(robot: Robot, before: Reals, after: Reals, rule: str) -> Reals:
+def _move_costs(robot: Robot, before: Reals, after: Reals, rule: MoveRule) -> Reals:
     """Cost (n, m) of each move from joint angles (n, 6) to (m, 6)."""
-    moves = np.abs(before[:, None] - after[None])
-    if rule == "nearest":
-        farthest: Reals = moves.max(axis=2)
-        return np.degrees(farthest)
-    if rule == "weighted":
-        distance: Reals = np.linalg.norm(joint_weights(robot) * moves, axis=2)
-        return np.degrees(distance)
-    if not np.isfinite(robot.speed).all():
-        raise Er3aError(f"{robot.name}: the rule 'time' needs joint speeds, and the robot's file gives none")
-    longest: Reals = (moves / robot.speed).max(axis=2)
-    return longest
+    return RULES[rule].measure(robot, after[None], before[:, None], None)

@@ -112,11 +112,10 @@ def mesh(blocks: Blocks, mask: Flags) -> tuple[Reals, Integers]:
     -------
     vertices : (V, 3), m, in the frame about axis 1; triangles : (F, 3)
     """
-    n = np.array(mask.shape)
     faces = []
     for axis in range(3):
-        wrapped = axis == 2
-        padded = np.concatenate([np.take(mask, [-1], axis), mask], axis) if wrapped else _padded(mask, axis)
+        width = [(1, 1) if k == axis else (0, 0) for k in range(3)]
+        padded = np.concatenate([np.take(mask, [-1], axis), mask], axis) if axis == 2 else np.pad(mask, width)
         step = np.diff(padded.astype(np.int8), axis=axis)
         index = np.argwhere(step != 0)
         others = [k for k in range(3) if k != axis]
@@ -126,14 +125,9 @@ def mesh(blocks: Blocks, mask: Flags) -> tuple[Reals, Integers]:
             corners[:, corner, others[1]] += j
         faces.append(corners.reshape(-1, 3))
     corners = np.concatenate(faces)
-    corners[:, 2] %= n[2]
+    corners[:, 2] %= mask.shape[2]
     used, number = np.unique(corners, axis=0, return_inverse=True)
     quads = number.reshape(-1, 4)
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     rho, z, azimuth = blocks.rho[used[:, 0]], blocks.z[used[:, 1]], blocks.azimuth[used[:, 2]]
     return np.stack([rho * np.cos(azimuth), rho * np.sin(azimuth), z], axis=1), triangles
-
-
-def _padded(mask: Flags, axis: int) -> Flags:
-    width = [(1, 1) if k == axis else (0, 0) for k in range(3)]
-    return np.pad(mask, width)

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import kernel
+from er3a.numerics.runs import runs
 from er3a.workspace.empty import STACK, is_empty
 from er3a.workspace.section_arm import SectionArm
 
@@ -90,22 +91,16 @@ def _candidates(arm: SectionArm) -> Iterator[tuple[Swept, Reals]]:
     upper, forearm, tool = (complex(v[0], v[2]) for v in (arm.upper, arm.forearm, arm.direction))
     tool = arm.d * tool
     tilts = _tilts(arm)
-    tilt_ends = sorted({end for low, high in tilts for end in (low, high) if abs(end) > _ANGLE and end < np.pi}) or [
-        0.0
-    ]
+    ends = {end for tilt in tilts for end in tilt if abs(end) > _ANGLE and end < np.pi}
+    tilt_ends = sorted(ends) or [0.0]
 
     def in_line(fixed: complex, moving: complex, ranges: list[tuple[float, float]]) -> list[float]:
         """Angles within the ranges at which e^(-i angle) moving points along or against ``fixed``."""
         if min(abs(fixed), abs(moving)) < 1e-9:
             return []
         angle = -np.angle(fixed / moving)
-        found = {
-            float(turned)
-            for low, high in ranges
-            for half in range(-4, 5)
-            if low - _ANGLE <= (turned := angle + half * np.pi) <= high + _ANGLE
-        }
-        return sorted(found)
+        turns = [float(angle + half * np.pi) for half in range(-4, 5)]
+        return sorted({turn for low, high in ranges for turn in turns if low - _ANGLE <= turn <= high + _ANGLE})
 
     def sweep(joint: int, low: float, high: float, values: tuple[float, float, float]) -> tuple[Swept, Reals]:
         joints = np.tile(np.array(values), (SAMPLES, 1))
@@ -114,9 +109,8 @@ def _candidates(arm: SectionArm) -> Iterator[tuple[Swept, Reals]]:
 
     stands = [(tau, gamma) for tau in arm.tau for gamma in tilt_ends]
     for tau in arm.tau:
-        stands += [
-            (tau, gamma) for gamma in in_line(upper + np.exp(-1j * tau) * forearm, np.exp(-1j * tau) * tool, tilts)
-        ]
+        bend = np.exp(-1j * tau)
+        stands += [(tau, gamma) for gamma in in_line(upper + bend * forearm, bend * tool, tilts)]
     for gamma in [*tilt_ends, *in_line(forearm, tool, tilts)]:
         stands += [(tau, gamma) for tau in in_line(upper, forearm + np.exp(-1j * gamma) * tool, [arm.tau])]
     for tau, gamma in stands:
@@ -162,5 +156,4 @@ def _unreachable(arm: SectionArm, rings: Reals, angles: Reals, out: Flags) -> No
 
 def _runs(kept: Flags) -> list[slice]:
     """Stretches of at least three points in a row."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], kept.astype(np.int8), [0]])))
-    return [slice(a, b) for a, b in zip(edges[::2], edges[1::2]) if b - a >= 3]
+    return [slice(a, b) for a, b in runs(kept) if b - a >= 3]

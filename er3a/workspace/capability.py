@@ -24,15 +24,15 @@ import numpy as np
 from er3a.geometry.sphere import fibonacci_sphere
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.block_constants import BlockConstants
+from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import kernel
-from er3a.robots.joint_limits import LIMIT_TOLERANCE
+from er3a.robots.joint_limits import LIMIT_TOLERANCE, theta_limits
 from er3a.robots.robot import Robot
-from er3a.workspace.directions import Roll, left_to_roll, poses, tool_rotations
-from er3a.workspace.interval_inverse import FREE, SLOTS
+from er3a.workspace.directions import Roll, left_to_roll, poses, tool_rotations, with_full_turn
 from er3a.workspace.proof import ring_volumes
-from er3a.workspace.section_arm import section_frame
+from er3a.workspace.section_arm import FULL_TURN, section_frame
 
 SECTORS = 64
 """Sectors of azimuth with a limited joint 1, the first about azimuth 0; one bit each in a proof's masks."""
@@ -49,7 +49,7 @@ class Capability:
     reachability : ratio of the directions that are reached [1]_
     solutions : branches within limits, the mean over reached directions (0 where none is), of the roll that has most
     most_solutions : the most branches that any direction has
-    manipulability : m^3, the greatest |det J| [2]_ of any reached pose
+    manipulability : m^3, the greatest ``|det J|`` [2]_ of any reached pose
     """
 
     reachability: Reals
@@ -95,7 +95,7 @@ def overall(capability: Capability, cells: Reals) -> Overall:
 
 def sector_count(robot: Robot) -> int:
     """How many sectors of azimuth differ."""
-    return 1 if robot.upper[0] - robot.lower[0] >= FREE else SECTORS
+    return 1 if robot.upper[0] - robot.lower[0] >= FULL_TURN else SECTORS
 
 
 def map_capability(robot: Robot, middles: Reals, directions: int, roll: Roll) -> Capability:
@@ -111,12 +111,11 @@ def map_capability(robot: Robot, middles: Reals, directions: int, roll: Roll) ->
     NotWristPartitionedError
     """
     R, origin = section_frame(robot)
-    asked = _joint_1_free(left_to_roll(robot, roll))
+    asked = with_full_turn(left_to_roll(robot, roll), 0)
     arm = constants_for_blocks(robot)
     rotations = R.T @ tool_rotations(fibonacci_sphere(directions), roll)
     sectors = sector_count(robot)
-    range_1 = np.sort(robot.direction[0] * np.array([robot.lower[0], robot.upper[0]]) + robot.offset[0])
-    out = [np.zeros((len(middles), sectors)) for _ in range(4)]
+    reachability, solutions, most, best = np.zeros((4, len(middles), sectors))
     per_cell = directions * len(roll.angles)
     points = np.stack([middles[:, 0], np.zeros(len(middles)), middles[:, 1]], axis=1) @ R + origin
     for start in range(0, len(middles), step := max(1, _POSES // per_cell)):
@@ -127,18 +126,13 @@ def map_capability(robot: Robot, middles: Reals, directions: int, roll: Roll) ->
         shape = (len(T), directions, len(roll.angles), SLOTS)
         values = manipulability(arm, theta).reshape(shape)
         within = found.within_limits.reshape(shape)
-        _tally(theta[..., 0].reshape(shape), within, values, range_1, *(array[part] for array in out))
-    return Capability(*out)
-
-
-def _joint_1_free(robot: Robot) -> Robot:
-    lower, upper = robot.lower.copy(), robot.upper.copy()
-    lower[0], upper[0] = -np.pi, np.pi
-    return robot.replace(lower=lower, upper=upper)
+        out = reachability[part], solutions[part], most[part], best[part]
+        _tally(theta[..., 0].reshape(shape), within, values, theta_limits(robot)[0], out)
+    return Capability(reachability, solutions, most, best)
 
 
 def manipulability(arm: BlockConstants, theta: Reals) -> Reals:
-    """|det J| in m^3 for the table's angles (..., 6): the product of the shoulder's, elbow's and wrist's factors.
+    """``|det J|`` in m^3 for the table's angles (..., 6): the product of the shoulder's, elbow's and wrist's factors.
 
     The determinant is that of the Jacobian at the wrist centre, where it falls into blocks (Siciliano et al.,
     *Robotics*, section 3.3.1): axis 1 moves the wrist by its distance ahead of axis 1, axes 2 and 3 by the triangle's
@@ -153,16 +147,10 @@ def manipulability(arm: BlockConstants, theta: Reals) -> Reals:
 
 @kernel
 def _tally(
-    theta_1: Reals,
-    within: Flags,
-    values: Reals,
-    range_1: Reals,
-    reachability: Reals,
-    solutions: Reals,
-    most: Reals,
-    best: Reals,
+    theta_1: Reals, within: Flags, values: Reals, range_1: Reals, out: tuple[Reals, Reals, Reals, Reals]
 ) -> None:
-    """Sum up cells: ``theta_1``, ``within``, ``values`` are (cells, directions, rolls, slots), the rest is filled."""
+    """Sum up cells: ``theta_1``, ``within``, ``values`` are (cells, directions, rolls, slots), ``out`` is filled."""
+    reachability, solutions, most, best = out
     sectors = reachability.shape[1]
     width = _TURN / sectors
     count, reached = np.zeros(sectors, dtype=np.int64), np.zeros(sectors, dtype=np.int64)
@@ -175,7 +163,7 @@ def _tally(
                     if not within[cell, d, roll, slot]:
                         continue
                     first, many = 0, sectors
-                    if range_1[1] - range_1[0] < FREE:
+                    if range_1[1] - range_1[0] < FULL_TURN:
                         at = theta_1[cell, d, roll, slot]
                         first = int(np.ceil((range_1[0] - LIMIT_TOLERANCE - at) / width))
                         last = int(np.floor((range_1[1] + LIMIT_TOLERANCE - at) / width))

@@ -202,12 +202,9 @@ def _ratio_sampled(
     low, high = cavity.arcs[chosen].T
     inside = (rho > a.min()) & (rho < b.max()) & (z > c.min()) & (z < d.max())
     rho, azimuth, z = rho[inside], azimuth[inside] % (2 * np.pi), z[inside]
-    hit = np.array(
-        [
-            ((rho > a[n]) & (rho < b[n]) & (z > c[n]) & (z < d[n]) & (azimuth >= low[n]) & (azimuth <= high[n])).any()
-            for n in range(len(chosen))
-        ],
-        dtype=bool,
-    )
+    hit = np.zeros(len(chosen), dtype=bool)
+    for n in range(len(chosen)):
+        in_cell = (rho > a[n]) & (rho < b[n]) & (z > c[n]) & (z < d[n])
+        hit[n] = (in_cell & (azimuth >= low[n]) & (azimuth <= high[n])).any()
     volumes = cavity.volumes[chosen]
     return float(volumes[hit].sum() / volumes.sum()) if len(chosen) else 0.0

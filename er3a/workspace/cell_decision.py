@@ -14,9 +14,13 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.jit import kernel
 from er3a.workspace.azimuths import MOST_ARCS, TURN, measure, meets, remove
 from er3a.workspace.empty import STACK, is_empty
-from er3a.workspace.filled import SectionConfiguration, climb, reached_angles, slack, turn_aside
-from er3a.workspace.section_arm import SectionArm
+from er3a.workspace.filled import ConfigurationGrid, SectionConfiguration, climb, reached_angles, slack, turn_aside
+from er3a.workspace.section_arm import Cell, SectionArm
 from er3a.workspace.sweep import swept_angles
+
+Known = tuple[Reals, int]
+Arcs = tuple[Reals, Integers]  # azimuths, and how many
+Best = tuple[Reals, Integers]  # per sector and flip: the greatest slack, and its configuration
 
 _SECTORS = 12
 _SPLITS = 256
@@ -24,23 +28,15 @@ _SPLITS = 256
 
 @kernel
 def judge_cells(
-    arm: SectionArm,
-    cells: Reals,
-    configurations: Reals,
-    steps: tuple[float, float],
-    most_boxes: int,
-    unfilled: Reals,
-    unfilled_count: Integers,
-    empty: Reals,
-    empty_count: Integers,
-    witness: Reals,
+    arm: SectionArm, cells: Reals, grid: ConfigurationGrid, most_boxes: int, unfilled: Arcs, empty: Arcs, witness: Reals
 ) -> int:
     """Decide cells as far as one look goes, beginning from what is known of them.
 
     Parameters
     ----------
     cells : (n, 4), m: rho_0, rho_1, z_0, z_1
-    configurations : (m, 9), see :func:`er3a.workspace.filled.configurations`; steps : spacing in theta_2 and tau, rad
+    grid : configurations (m, 9), see :func:`er3a.workspace.filled.fill_configurations`, and their spacing in theta_2
+        and tau, rad
     most_boxes : of one emptiness proof
     unfilled, empty : (n, MOST_ARCS, 2), azimuths (rad) that are not proven filled, and those of them that are proven
         empty, with their counts (n,): at first of the cell that this one was split off, on return of the cell itself
@@ -51,51 +47,30 @@ def judge_cells(
     boxes : how many the emptiness proofs looked at
     """
     stack, splits, known = np.empty((STACK, 6)), np.empty((_SPLITS, 2)), np.empty((MOST_ARCS, 2))
-    best_of, configuration_of = np.empty(2 * _SECTORS), np.empty(2 * _SECTORS, dtype=np.int64)
+    best = np.empty(2 * _SECTORS), np.empty(2 * _SECTORS, dtype=np.int64)
+    (unfilled_arcs, unfilled_count), (empty_arcs, empty_count) = unfilled, empty
     boxes = 0
     for n in range(cells.shape[0]):
-        rho_0, rho_1, z_0, z_1 = cells[n, 0], cells[n, 1], cells[n, 2], cells[n, 3]
-        count, known_count = unfilled_count[n], empty_count[n]
-        known[:known_count] = empty[n, :known_count]
-        count = _fill(
-            arm,
-            rho_0,
-            rho_1,
-            z_0,
-            z_1,
-            configurations,
-            steps,
-            unfilled[n],
-            count,
-            best_of,
-            configuration_of,
-            witness[n],
-        )
+        cell = cells[n, 0], cells[n, 1], cells[n, 2], cells[n, 3]
+        known_count = empty_count[n]
+        known[:known_count] = empty_arcs[n, :known_count]
+        count = _fill(arm, cell, grid, unfilled_arcs[n], unfilled_count[n], best, witness[n])
         unfilled_count[n] = count
         if count == 0:
             empty_count[n] = 0
             continue
         for k in range(count):
-            empty[n, k, 0], empty[n, k, 1] = unfilled[n, k, 0], unfilled[n, k, 1]
-        cell, parent = (rho_0, rho_1, z_0, z_1), (known, known_count)
-        empty_count[n], used = _exclude(arm, cell, most_boxes, empty[n], count, parent, stack, splits)
+            empty_arcs[n, k, 0], empty_arcs[n, k, 1] = unfilled_arcs[n, k, 0], unfilled_arcs[n, k, 1]
+        parent, memory = (known, known_count), (stack, splits)
+        empty_count[n], used = _exclude(arm, cell, most_boxes, empty_arcs[n], count, parent, memory)
         boxes += used
     return boxes
 
 
 @kernel
 def _row(configurations: Reals, i: int) -> SectionConfiguration:
-    return (
-        configurations[i, 0],
-        configurations[i, 1],
-        configurations[i, 2],
-        configurations[i, 3],
-        configurations[i, 4],
-        configurations[i, 5],
-        configurations[i, 6],
-        configurations[i, 7],
-        configurations[i, 8],
-    )
+    row = configurations[i]
+    return row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8]
 
 
 @kernel
@@ -107,15 +82,10 @@ def _angle(configuration: SectionConfiguration, side: float, rho: float, X: floa
 
 @kernel
 def _cover(
-    arm: SectionArm,
-    configuration: SectionConfiguration,
-    side: float,
-    cell: tuple[float, float, float, float],
-    arcs: Reals,
-    count: int,
+    arm: SectionArm, configuration: SectionConfiguration, side: float, cell: Cell, arcs: Reals, count: int
 ) -> int:
     """Take what a configuration provably fills out of the arcs."""
-    filled, low, high = reached_angles(arm, configuration, side, cell[0], cell[1], cell[2], cell[3])
+    filled, low, high = reached_angles(arm, configuration, side, cell)
     return _take(arm, low, high, arcs, count) if filled else count
 
 
@@ -132,23 +102,12 @@ def _take(arm: SectionArm, low: float, high: float, arcs: Reals, count: int) -> 
 
 @kernel
 def _fill(
-    arm: SectionArm,
-    rho_0: float,
-    rho_1: float,
-    z_0: float,
-    z_1: float,
-    configurations: Reals,
-    steps: tuple[float, float],
-    arcs: Reals,
-    count: int,
-    best_of: Reals,
-    configuration_of: Integers,
-    witness: Reals,
+    arm: SectionArm, cell: Cell, grid: ConfigurationGrid, arcs: Reals, count: int, best: Best, witness: Reals
 ) -> int:
     """Take what is proven filled out of the open arcs; returns their new count."""
-    rho, z = 0.5 * (rho_0 + rho_1), 0.5 * (z_0 + z_1)
-    cell = (rho_0, rho_1, z_0, z_1)
-    half = 0.5 * min(rho_1 - rho_0, z_1 - z_0)
+    (configurations, steps), (best_of, configuration_of) = grid, best
+    rho, z = 0.5 * (cell[0] + cell[1]), 0.5 * (cell[2] + cell[3])
+    half = 0.5 * min(cell[1] - cell[0], cell[3] - cell[2])
     # A configuration of the grid that misses by no more than the grid is coarse may have a neighbour that does not.
     miss = (arm.upper_length + arm.forearm_length) * steps[0] + arm.forearm_length * steps[1]
     near = (arm.d + miss) ** 2
@@ -173,16 +132,12 @@ def _fill(
         if best_of[k] <= -miss:
             continue
         side = 1.0 - 2.0 * (k % 2)
-        configuration = climb(arm, _row(configurations, configuration_of[k]), side, rho, z, steps[0], steps[1])
+        configuration = climb(arm, _row(configurations, configuration_of[k]), side, rho, z, steps)
         value, X = slack(arm, configuration, side, rho, z)
         if value > deepest:
             deepest = value
-            witness[0], witness[1], witness[2], witness[3] = (
-                configuration[7],
-                configuration[8],
-                _angle(configuration, side, rho, X),
-                1.0,
-            )
+            witness[0], witness[1] = configuration[7], configuration[8]
+            witness[2], witness[3] = _angle(configuration, side, rho, X), 1.0
         count = _cover(arm, configuration, side, cell, arcs, count)
         if count == 0:
             return 0
@@ -214,21 +169,14 @@ def _fill(
                     furthest, furthest_side = configuration, side
     if furthest_side != 0.0:
         for sense in (1, -1):
-            configuration = turn_aside(arm, furthest, furthest_side, cell, steps[0], steps[1], sense)
+            configuration = turn_aside(arm, furthest, furthest_side, cell, steps, sense)
             count = _cover(arm, configuration, furthest_side, cell, arcs, count)
     return count
 
 
 @kernel
 def _exclude(
-    arm: SectionArm,
-    cell: tuple[float, float, float, float],
-    most_boxes: int,
-    arcs: Reals,
-    count: int,
-    parent: tuple[Reals, int],
-    stack: Reals,
-    splits: Reals,
+    arm: SectionArm, cell: Cell, most_boxes: int, arcs: Reals, count: int, parent: Known, memory: tuple[Reals, Reals]
 ) -> tuple[int, int]:
     """Take what the arm may reach out of the arcs, so that what is left is empty; returns their count and the boxes.
 
@@ -236,7 +184,7 @@ def _exclude(
     ----------
     parent : arcs that are known to be empty, and their count
     """
-    rho, (known, known_count) = 0.5 * (cell[0] + cell[1]), parent
+    rho, (known, known_count), (stack, splits) = 0.5 * (cell[0] + cell[1]), parent, memory
     most = np.pi if arm.mirrored else TURN
     proven, boxes = is_empty(arm, cell, 0.0, most, most_boxes, stack)
     if proven:

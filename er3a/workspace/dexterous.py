@@ -10,17 +10,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from er3a.geometry.sphere import fibonacci_sphere
 from er3a.kinematics.block_constants import BlockConstants
+from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
 from er3a.numerics.arrays import Reals, Words
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 from er3a.workspace.capability import SECTORS, sector_count
 from er3a.workspace.directions import Roll, left_to_roll, point_tool, tool_rotations
-from er3a.workspace.interval_inverse import GOOD, NEVER, SLOTS, branches, theta_ranges
+from er3a.workspace.interval_inverse import GOOD, NEVER, States, branches, theta_ranges
 from er3a.workspace.proof import ring_volumes
 from er3a.workspace.section_arm import section_frame
 
@@ -31,6 +31,13 @@ _TURN = 2 * np.pi
 _STRIDE = 0.381966
 _ALL = np.uint64(0xFFFFFFFFFFFFFFFF)
 _ONE, _NONE = np.uint64(1), np.uint64(0)
+
+_Asked = tuple[BlockConstants, Reals]
+_Frame = tuple[Reals, Reals]
+_Tries = tuple[Reals, Reals]  # rotations to try against a ring, and rolls
+_Numbers = tuple[float, float, float, float]
+_Masks = tuple[Words, Words, Words]
+_Found = tuple[States, Reals]
 
 
 @dataclass(frozen=True)
@@ -65,11 +72,10 @@ def dexterous_core(robot: Robot, cells: Reals, directions: int, roll: Roll, most
     NotWristPartitionedError
     """
     asked = left_to_roll(robot, roll)
-    arm, ranges = constants_for_blocks(asked), theta_ranges(asked)
-    R, origin = section_frame(robot)
+    arm, frame = constants_for_blocks(asked), section_frame(robot)
     sectors = sector_count(robot)
     order = np.argsort(np.arange(directions) * _STRIDE % 1)
-    against = R.T @ tool_rotations(fibonacci_sphere(directions)[order], roll)
+    against = frame[0].T @ tool_rotations(fibonacci_sphere(directions)[order], roll)
     angles = np.array(roll.angles)
     numbers = (roll.half_step, roll.beside, roll.reach, float(arm.upper_arm + arm.forearm))
     open_sectors = np.full(len(cells), _ONE if sectors == 1 else _ALL)
@@ -77,7 +83,8 @@ def dexterous_core(robot: Robot, cells: Reals, directions: int, roll: Roll, most
     for level in range(_MOST_LEVEL + 1):
         good, likely = np.zeros((2, len(cells)), dtype=np.uint64)
         left = most_poses - used
-        used += _judge(arm, ranges, R, origin, cells, against, angles, numbers, left, open_sectors, good, likely)
+        masks = open_sectors, good, likely
+        used += _judge((arm, theta_ranges(asked)), frame, cells, (against, angles), numbers, left, masks)
         looked += len(cells)
         shares = ring_volumes(cells) / sectors
         lower += float(shares @ np.bitwise_count(good))
@@ -110,9 +117,9 @@ def _arc(first: int, many: int) -> np.uint64:
 
 
 @kernel
-def _sectors(ranges: Reals, state: NDArray[np.int8], theta_1: Reals) -> tuple[np.uint64, np.uint64]:
+def _sectors(ranges: Reals, branch: _Found) -> tuple[np.uint64, np.uint64]:
     """Masks of the sectors where some branch is good, and where none is."""
-    good, maybe = _NONE, _NONE
+    good, maybe, (state, theta_1) = _NONE, _NONE, branch
     least, most, width = ranges[0, 0], ranges[0, 1], _TURN / SECTORS
     for slot in range(SLOTS):
         if state[slot] == NEVER:
@@ -133,36 +140,26 @@ def _sectors(ranges: Reals, state: NDArray[np.int8], theta_1: Reals) -> tuple[np
 
 @kernel
 def _judge(
-    arm: BlockConstants,
-    ranges: Reals,
-    R: Reals,
-    origin: Reals,
-    cells: Reals,
-    against: Reals,
-    angles: Reals,
-    numbers: tuple[float, float, float, float],
-    most_poses: int,
-    open_sectors: Words,
-    good: Words,
-    likely: Words,
+    asked: _Asked, frame: _Frame, cells: Reals, tries: _Tries, numbers: _Numbers, most_poses: int, masks: _Masks
 ) -> int:
     """Judge the open sectors of cells; returns how many neighbourhoods of poses were looked at.
 
-    ``open_sectors`` keeps those that stay undecided, ``good`` is set to those in the core, ``likely`` to the undecided
-    ones whose middles none of ``against`` refuses.
+    Of the masks ``open_sectors`` keeps those that stay undecided, ``good`` is set to those in the core, ``likely`` to
+    the undecided ones whose middles no rotation tried refuses.
     """
-    half_step, beside, reach, length = numbers
+    (arm, ranges), (R, origin), (open_sectors, good, likely) = asked, frame, masks
+    (against, angles), (_, _, reach, length) = tries, numbers
     T, state, theta_1 = np.eye(4), np.empty(SLOTS, dtype=np.int8), np.empty((SLOTS, 2))
-    stack, frame = np.empty((_STACK, 4)), R.T
+    stack, branch = np.empty((_STACK, 4)), (state, theta_1)
     used = 0
     for n in range(cells.shape[0]):
         rho, z = 0.5 * (cells[n, 0] + cells[n, 1]), 0.5 * (cells[n, 2] + cells[n, 3])
         radius = 0.5 * np.hypot(cells[n, 1] - cells[n, 0], cells[n, 3] - cells[n, 2])
         for i in range(3):
             T[i, 3] = origin[i] + rho * R[0, i] + z * R[2, i]
-        rest, spent = _not_out(arm, ranges, T, against, radius, half_step, beside, open_sectors[n], state, theta_1)
+        rest, spent = _not_out(asked, T, against, radius, numbers, open_sectors[n], branch)
         open_sectors[n] = rest
-        middle, more = _not_out(arm, ranges, T, against, 0.0, half_step, beside, rest, state, theta_1)
+        middle, more = _not_out(asked, T, against, 0.0, numbers, rest, branch)
         used += spent + more
         rest, smallest = middle, max(radius / length, _SMALLEST)
         stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = 0.0, np.pi, 0.0, _TURN
@@ -176,9 +173,9 @@ def _judge(
             here = _NONE
             if delta < _LARGEST:
                 for j in range(angles.shape[0]):
-                    point_tool(T, frame, 0.5 * (p_0 + p_1), 0.5 * (a_0 + a_1), np.cos(angles[j]), np.sin(angles[j]))
+                    point_tool(T, R.T, 0.5 * (p_0 + p_1), 0.5 * (a_0 + a_1), np.cos(angles[j]), np.sin(angles[j]))
                     branches(arm, ranges, T, radius, delta, reach, state, theta_1)
-                    found, _ = _sectors(ranges, state, theta_1)
+                    found, _ = _sectors(ranges, branch)
                     here |= found
                     used += 1
                     if rest & ~here == _NONE:
@@ -196,18 +193,10 @@ def _judge(
 
 @kernel
 def _not_out(
-    arm: BlockConstants,
-    ranges: Reals,
-    T: Reals,
-    against: Reals,
-    radius: float,
-    half_step: float,
-    beside: float,
-    rest: np.uint64,
-    state: NDArray[np.int8],
-    theta_1: Reals,
+    asked: _Asked, T: Reals, against: Reals, radius: float, numbers: _Numbers, rest: np.uint64, branch: _Found
 ) -> tuple[np.uint64, int]:
     """Which of the sectors ``rest`` may reach all directions from somewhere within the radius of the pose's point."""
+    (arm, ranges), (half_step, beside, _, _), (state, theta_1) = asked, numbers, branch
     used = 0
     for d in range(against.shape[0]):
         if rest == _NONE:
@@ -217,7 +206,7 @@ def _not_out(
             for i in range(3):
                 T[i, 0], T[i, 1], T[i, 2] = against[d, j, i, 0], against[d, j, i, 1], against[d, j, i, 2]
             branches(arm, ranges, T, radius, half_step, beside, state, theta_1)
-            _, none = _sectors(ranges, state, theta_1)
+            _, none = _sectors(ranges, branch)
             missed &= none
             used += 1
             if missed == _NONE:

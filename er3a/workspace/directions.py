@@ -59,10 +59,13 @@ def roll_of(robot: Robot, rolls: int) -> Roll:
 
 def left_to_roll(robot: Robot, roll: Roll) -> Robot:
     """The robot with a full turn of joint 6 if it is what a free roll is made of."""
-    if not roll.free:
-        return robot
+    return with_full_turn(robot, 5) if roll.free else robot
+
+
+def with_full_turn(robot: Robot, joint: int) -> Robot:
+    """The robot with a full turn of one joint (from 0)."""
     lower, upper = robot.lower.copy(), robot.upper.copy()
-    lower[5], upper[5] = -np.pi, np.pi
+    lower[joint], upper[joint] = -np.pi, np.pi
     return robot.replace(lower=lower, upper=upper)
 
 

@@ -2,7 +2,7 @@
 
 A cell is a ring about axis 1 with a rectangle as section, of middle (rho, z) and half sides h; only the angle phi
 between the cell's azimuth and the arm's plane matters, so the box is over (phi, theta_2, tau). A tool point at
-x + delta in the cell needs, with v = x - W (see :mod:`er3a.workspace.section_arm`),
+x + delta in the cell needs, with v = x - W (see :mod:`er3a.workspace.section_arm`)::
 
     |v + delta|^2 = d^2     and     d low <= (v + delta) . f <= d high.
 
@@ -27,7 +27,7 @@ import numpy as np
 from er3a.geometry.vectors import cross, dot, subtract
 from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
-from er3a.workspace.section_arm import ROUND_OFF, SectionArm, along_change, turned, wrist_and_forearm
+from er3a.workspace.section_arm import ROUND_OFF, Cell, SectionArm, along_change, turned, wrist_and_forearm
 
 STACK = 512
 _SMALL = 0.1
@@ -56,12 +56,7 @@ def _chord(half_width: float) -> float:
 
 @kernel
 def is_empty(
-    arm: SectionArm,
-    cell: tuple[float, float, float, float],
-    phi_low: float,
-    phi_high: float,
-    most_boxes: int,
-    stack: Reals,
+    arm: SectionArm, cell: Cell, phi_low: float, phi_high: float, most_boxes: int, stack: Reals
 ) -> tuple[bool, int]:
     """Whether no tool point enters a ring at angles phi_low to phi_high (rad) from the arm's plane.
 

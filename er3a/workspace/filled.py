@@ -1,11 +1,11 @@
 """Proof that the tool point can be brought to every point of a cell.
 
 Hold joints 2 and 3 still: W and f stand in the arm's plane, and the tool point moves on its zone while joint 1 turns
-the cell towards it. A point (rho, z) of the section is reached at an azimuth phi from the arm's plane with
+the cell towards it. A point (rho, z) of the section is reached at an azimuth phi from the arm's plane with::
 
     |x(phi) - W| = d:    X = rho cos(phi - phi_W) = (rho^2 + z^2 - 2 z W_z + |W|^2 - d^2) / (2 rho_W)
 
-if |X| <= rho, and if the direction lies in the zone: ``d low <= (x - W) . f <= d high``. X is monotone in rho and
+if ``|X| <= rho``, and if the direction lies in the zone: ``d low <= (x - W) . f <= d high``. X is monotone in rho and
 quadratic in z, so its range over a rectangle of the section is exact, and so is that of ``(x - W) . f`` where f lies
 in W's half plane; the rest is interval arithmetic. A pair (theta_2, tau) for which all conditions hold over the
 rectangle proves the ring filled, at every azimuth that joint 1 brings phi to for all of its points: from
@@ -20,9 +20,10 @@ import numpy as np
 from er3a.geometry.vectors import dot
 from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
-from er3a.workspace.section_arm import ROUND_OFF, SectionArm, wrist_and_forearm
+from er3a.workspace.section_arm import ROUND_OFF, Cell, Range, SectionArm, wrist_and_forearm
 
 SectionConfiguration = tuple[float, float, float, float, float, float, float, float, float]
+ConfigurationGrid = tuple[Reals, Range]
 
 _SAFE = 64 * ROUND_OFF
 REFINEMENTS = 14
@@ -73,13 +74,7 @@ def slack(
 
 @kernel
 def reached_angles(
-    arm: SectionArm,
-    configuration: SectionConfiguration,
-    side: float,
-    rho_0: float,
-    rho_1: float,
-    z_0: float,
-    z_1: float,
+    arm: SectionArm, configuration: SectionConfiguration, side: float, cell: Cell
 ) -> tuple[bool, float, float]:
     """Angles phi at which the configuration reaches the points of a rectangle of the section.
 
@@ -89,6 +84,7 @@ def reached_angles(
     low, high : rad, bounds of phi over the rectangle
     """
     rho_W, W_z, phi_W, f_cos, f_sin, f_z, W_f, _, _ = configuration
+    rho_0, rho_1, z_0, z_1 = cell
     if rho_W < 1e-9 or rho_0 < 1e-9 or arm.inner_low > arm.inner_high:
         return False, 0.0, 0.0
     d, size = arm.d, rho_1 + rho_W + arm.d + abs(W_z) + abs(z_0) + abs(z_1)
@@ -159,16 +155,10 @@ def _neighbour(
 
 @kernel
 def climb(
-    arm: SectionArm,
-    configuration: SectionConfiguration,
-    side: float,
-    rho: float,
-    z: float,
-    step_2: float,
-    step_3: float,
+    arm: SectionArm, configuration: SectionConfiguration, side: float, rho: float, z: float, steps: Range
 ) -> SectionConfiguration:
     """Move joints 2 and 3 within their limits to where (rho, z) lies deepest; returns the configuration."""
-    best, _ = slack(arm, configuration, side, rho, z)
+    (best, _), (step_2, step_3) = slack(arm, configuration, side, rho, z), steps
     for _ in range(REFINEMENTS):
         improved = False
         for move in range(8):
@@ -184,13 +174,7 @@ def climb(
 
 @kernel
 def turn_aside(
-    arm: SectionArm,
-    configuration: SectionConfiguration,
-    side: float,
-    cell: tuple[float, float, float, float],
-    step_2: float,
-    step_3: float,
-    sense: int,
+    arm: SectionArm, configuration: SectionConfiguration, side: float, cell: Cell, steps: Range, sense: int
 ) -> SectionConfiguration:
     """Move joints 2 and 3 so that the configuration, which fills the cell, does so at angles phi as great as can be.
 
@@ -198,13 +182,13 @@ def turn_aside(
     ----------
     sense : 1 for great angles, -1 for small ones
     """
-    filled, low, high = reached_angles(arm, configuration, side, cell[0], cell[1], cell[2], cell[3])
+    (_, low, high), (step_2, step_3) = reached_angles(arm, configuration, side, cell), steps
     best = low if sense > 0 else -high
     for _ in range(REFINEMENTS):
         improved = False
         for move in range(8):
             tried = _neighbour(arm, configuration, move, step_2, step_3)
-            filled, low, high = reached_angles(arm, tried, side, cell[0], cell[1], cell[2], cell[3])
+            filled, low, high = reached_angles(arm, tried, side, cell)
             value = low if sense > 0 else -high
             if filled and value > best:
                 best, configuration, improved = value, tried, True

@@ -11,13 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from er3a.geometry.vectors import Vector
-from er3a.kinematics.chain import JOINTS, constant_links
+from er3a.kinematics.chain import constant_links, moving_tip
 from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
-from er3a.workspace.section_arm import FULL_TURN
-
-_SMALL = 1e-12
+from er3a.workspace.section_arm import FULL_TURN, at_most_a_turn
 
 
 class GeneralArm(NamedTuple):
@@ -50,24 +48,12 @@ class GeneralArm(NamedTuple):
 def general_arm(robot: Robot) -> tuple[GeneralArm, Reals, Reals]:
     """The chain of a robot, and the frame about axis 1: x, y, z in the base frame as rows (3, 3), and origin (3,)."""
     links = constant_links(robot)
-    last, tip = JOINTS - 1, links[JOINTS, :3, 3]
-    while last > 0 and np.hypot(tip[0], tip[1]) <= _SMALL:
-        tip = links[last, :3, :3] @ tip + links[last, :3, 3]
-        last -= 1
-    ends = np.sort(robot.direction[:, None] * np.stack([robot.lower, robot.upper], axis=1) + robot.offset[:, None])
-    full = ends[:, 1] - ends[:, 0] >= FULL_TURN
-    ends[full, 1] = ends[full, 0] + 2 * np.pi
-    ends = ends[: last + 1]
+    last, tip = moving_tip(links)
+    lower, upper = at_most_a_turn(robot)[: last + 1].T.copy()
     levers, heights = _levers(links, tip, last)
-    arm = GeneralArm(
-        np.ascontiguousarray(links[: last + 1]),
-        np.ascontiguousarray(tip),
-        ends[:, 0].copy(),
-        ends[:, 1].copy(),
-        levers,
-        heights,
-        bool(full[0]),
-    )
+    full_turn = bool(upper[0] - lower[0] >= FULL_TURN)
+    chain = np.ascontiguousarray(links[: last + 1])
+    arm = GeneralArm(chain, np.ascontiguousarray(tip), lower, upper, levers, heights, full_turn)
     return arm, links[0, :3, :3].T, links[0, :3, 3]
 
 

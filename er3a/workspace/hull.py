@@ -66,10 +66,7 @@ def cells_inside(hull: Hull, grid: Grid) -> Flags:
     inside = np.zeros(grid.shape, dtype=bool)
     if not len(hull.triangles):
         return inside
-    a, b, c = (hull.vertices[hull.triangles[:, i]] for i in range(3))
-    normals = np.cross(b - a, c - a)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    offsets = np.einsum("ij,ij->i", normals, a)
+    normals, offsets = _planes(hull)
     x, y, z = (grid.origin[i] + (np.arange(grid.shape[i]) + 0.5) * grid.cell for i in range(3))
     up, down, upright = normals[:, 2] > _FLAT, normals[:, 2] < -_FLAT, np.abs(normals[:, 2]) <= _FLAT
     for i in range(grid.shape[0]):
@@ -81,15 +78,20 @@ def cells_inside(hull: Hull, grid: Grid) -> Flags:
     return inside
 
 
+def _planes(hull: Hull) -> tuple[Reals, Reals]:
+    """The faces' planes: normals (F, 3) of unit length, outwards, and distances (F,) from the origin along them."""
+    a, b, c = (hull.vertices[hull.triangles[:, i]] for i in range(3))
+    normals = np.cross(b - a, c - a)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals, np.einsum("ij,ij->i", normals, a)
+
+
 def depth_inside(hull: Hull, points: Reals) -> Reals:
     """Distance (...,) in m of points (..., 3) to the nearest face's plane, negative outside, -inf for a flat hull."""
     flat = points.reshape(-1, 3)
     depth = np.full(len(flat), np.inf if len(hull.triangles) else -np.inf)
     if len(hull.triangles):
-        a, b, c = (hull.vertices[hull.triangles[:, i]] for i in range(3))
-        normals = np.cross(b - a, c - a)
-        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        offsets = np.einsum("ij,ij->i", normals, a)
+        normals, offsets = _planes(hull)
         for start in range(0, len(flat), 4096):
             part = slice(start, start + 4096)
             depth[part] = (offsets - flat[part] @ normals.T).min(axis=1)

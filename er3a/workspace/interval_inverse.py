@@ -16,26 +16,27 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.geometry.vectors import Vector
+from er3a.geometry.vectors import Vector, cross, in_frame_of
 from er3a.kinematics.block_constants import BlockConstants
-from er3a.kinematics.block_inverse import in_frame_1
+from er3a.kinematics.block_inverse import in_frame_1, seen_by_wrist
 from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
+from er3a.robots.joint_limits import theta_limits
 from er3a.robots.robot import Robot
+from er3a.workspace.section_arm import FULL_TURN
 
-SLOTS = 8
+States = NDArray[np.int8]
+
 GOOD, OPEN, NEVER = 1, 0, -1
 PAD = 1e-9
 """Added to every range (m and rad), far above the rounding of a length or an angle here."""
-FREE = 2 * np.pi - 1e-12
 _TURN = 2 * np.pi
 
 
 def theta_ranges(robot: Robot) -> Reals:
     """Ranges (6, 2) in rad of the table's angles theta; a full turn or more is ``-inf`` to ``inf``."""
-    ends = robot.direction[:, None] * np.stack([robot.lower, robot.upper], axis=1) + robot.offset[:, None]
-    ends.sort(axis=1)
-    ends[ends[:, 1] - ends[:, 0] >= FREE] = [-np.inf, np.inf]
+    ends = theta_limits(robot)
+    ends[ends[:, 1] - ends[:, 0] >= FULL_TURN] = [-np.inf, np.inf]
     return ends
 
 
@@ -63,9 +64,7 @@ def misses(ranges: Reals, joint: int, low: float, high: float) -> bool:
 
 @kernel
 def _to_frame_1(arm: BlockConstants, T: Reals, v: Vector) -> Vector:
-    x = T[0, 0] * v[0] + T[0, 1] * v[1] + T[0, 2] * v[2]
-    y = T[1, 0] * v[0] + T[1, 1] * v[1] + T[1, 2] * v[2]
-    z = T[2, 0] * v[0] + T[2, 1] * v[1] + T[2, 2] * v[2]
+    x, y, z = in_frame_of(T, v)
     return in_frame_1(arm.to_frame_1, x, y, z)
 
 
@@ -106,14 +105,7 @@ def _tilt_to_phi_5(arm: BlockConstants, tilt: float) -> float:
 
 @kernel
 def branches(
-    arm: BlockConstants,
-    ranges: Reals,
-    T: Reals,
-    rho: float,
-    delta: float,
-    lever: float,
-    state: NDArray[np.int8],
-    theta_1: Reals,
+    arm: BlockConstants, ranges: Reals, T: Reals, rho: float, delta: float, lever: float, state: States, theta_1: Reals
 ) -> None:
     """Judge the eight branches over a neighbourhood.
 
@@ -162,7 +154,7 @@ def branches(
 
     zx, zy, zz = _to_frame_1(arm, T, arm.axis_6_in_tool)
     polar_6 = np.arctan2(np.hypot(zx, zy), zz)
-    bx, by, bz = _to_frame_1(arm, T, arm.beside_6_in_tool)
+    beside_6 = _to_frame_1(arm, T, arm.beside_6_in_tool)
     longest, shortest = arm.upper_arm + arm.forearm, abs(arm.upper_arm - arm.forearm)
     orthogonal = arm.cos_45 == 0.0 and arm.cos_56 == 0.0
     angle_45, angle_56 = np.arctan2(arm.sin_45, arm.cos_45), np.arctan2(arm.sin_56, arm.cos_56)
@@ -213,7 +205,7 @@ def branches(
             angle = up + sign * gamma
             c, s = np.cos(angle), np.sin(angle)
             c, s = c * arm.cos_forearm - s * arm.sin_forearm, s * arm.cos_forearm + c * arm.sin_forearm
-            fx, fy, fz = _seen(arm, zx, zy, zz, cos_1, sin_1, c, s)
+            fx, fy, fz = seen_by_wrist(arm, zx, zy, zz, cos_1, sin_1, c, s)
             height_4 = arm.cos_lean * -arm.sin_12 * s + arm.sin_lean * arm.cos_12
             polar_4 = np.arccos(min(1.0, max(-1.0, height_4)))
             about = turn_2 + delta + 2.0 * PAD
@@ -229,7 +221,7 @@ def branches(
             phi_low = _tilt_to_phi_5(arm, max(tilt_low, tilt_least)) - PAD
             phi_high = _tilt_to_phi_5(arm, min(tilt_high, tilt_most)) + PAD
             swing_46 = _swing(np.sin(turned), np.sin(tilt)) + PAD if turned < min(tilt, np.pi - tilt) else np.pi
-            gx, gy = _beside(arm, bx, by, bz, zx, zy, zz, cos_1, sin_1, c, s)
+            gx, gy = _beside(arm, beside_6, (zx, zy, zz), cos_1, sin_1, c, s)
 
             for flip in range(2):
                 low_5 = (phi_low if flip == 0 else -phi_high) - arm.turn_5
@@ -256,30 +248,12 @@ def branches(
 
 
 @kernel
-def _seen(arm: BlockConstants, x: float, y: float, z: float, cos_1: float, sin_1: float, c: float, s: float) -> Vector:
-    """A vector of frame 1 as the wrist sees it: turned back by the first three joints, z along axis 4."""
-    x, y = x * cos_1 + y * sin_1, y * cos_1 - x * sin_1
-    y, z = arm.cos_12 * y - arm.sin_12 * z, arm.sin_12 * y + arm.cos_12 * z
-    x, y = x * c + y * s, y * c - x * s
-    return arm.sin_lean * x - arm.cos_lean * z, y, arm.cos_lean * x + arm.sin_lean * z
-
-
-@kernel
 def _beside(
-    arm: BlockConstants,
-    bx: float,
-    by: float,
-    bz: float,
-    zx: float,
-    zy: float,
-    zz: float,
-    cos_1: float,
-    sin_1: float,
-    c: float,
-    s: float,
+    arm: BlockConstants, beside_6: Vector, axis_6: Vector, cos_1: float, sin_1: float, c: float, s: float
 ) -> tuple[float, float]:
     """Axis 4 as the tool sees it: its parts along the vector beside axis 6, and along axis 6 times that vector."""
-    _, _, along = _seen(arm, bx, by, bz, cos_1, sin_1, c, s)
-    wx, wy, wz = zy * bz - zz * by, zz * bx - zx * bz, zx * by - zy * bx
-    _, _, across = _seen(arm, wx, wy, wz, cos_1, sin_1, c, s)
+    x, y, z = beside_6
+    _, _, along = seen_by_wrist(arm, x, y, z, cos_1, sin_1, c, s)
+    x, y, z = cross(axis_6, beside_6)
+    _, _, across = seen_by_wrist(arm, x, y, z, cos_1, sin_1, c, s)
     return along, across

@@ -46,18 +46,15 @@ class SectionMap:
     def status(self, rho: Reals, azimuth: Reals, z: Reals) -> Integers:
         """FILLED, EMPTY or UNDECIDED for points (n,) about axis 1 (m, rad, m); outside of all cells is empty."""
         cell, azimuth = self.cell_of(rho, z), np.asarray(azimuth) % TURN
-        unfilled = _within(self.proof.unfilled[cell], azimuth)
-        empty = _within(self.proof.empty[cell], azimuth) | (cell == OUTSIDE)
+        unfilled = holds_azimuth(self.proof.unfilled[cell], azimuth)
+        empty = holds_azimuth(self.proof.empty[cell], azimuth) | (cell == OUTSIDE)
         return np.where(empty, EMPTY, np.where(unfilled, UNDECIDED, FILLED))
 
     @cached_property
     def neighbours(self) -> NDArray[np.int32]:
         """Pairs (m, 2) of cells that share a stretch of border."""
-        pairs = [
-            np.stack([self.owner[:-1].ravel(), self.owner[1:].ravel()]),
-            np.stack([self.owner[:, :-1].ravel(), self.owner[:, 1:].ravel()]),
-        ]
-        found = np.concatenate(pairs, axis=1)
+        across, along = (self.owner[:-1], self.owner[1:]), (self.owner[:, :-1], self.owner[:, 1:])
+        found = np.concatenate([np.reshape(pair, (2, -1)) for pair in (across, along)], axis=1)
         found = np.sort(found[:, found[0] != found[1]], axis=0)
         return np.unique(found, axis=1).T
 
@@ -70,5 +67,6 @@ class SectionMap:
         return touches
 
 
-def _within(arcs: Reals, azimuth: Reals) -> Flags:
+def holds_azimuth(arcs: Reals, azimuth: Reals) -> Flags:
+    """Whether azimuths (n,) in rad lie in sets of arcs (n, MOST_ARCS, 2)."""
     return np.asarray(((arcs[..., 0] <= azimuth[:, None]) & (azimuth[:, None] <= arcs[..., 1])).any(axis=1))

@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from er3a.kinematics.batch import inverse_batch
+from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot
 from er3a.workspace.capability import manipulability
 from er3a.workspace.directions import Roll, cone_directions, left_to_roll, poses, tool_rotations
-from er3a.workspace.interval_inverse import FREE, SLOTS
-from er3a.workspace.section_arm import section_arm, section_frame
+from er3a.workspace.section_arm import FULL_TURN, section_arm, section_frame
 
 NO = -1.0
 MIXED = -1
@@ -55,7 +55,7 @@ class Task:
 def narrowed(robot: Robot, margin: float) -> Robot:
     """The robot with the limits of joints that have less than a full turn drawn in by ``margin`` (rad)."""
     span = robot.upper - robot.lower
-    inward = np.where(span < FREE, np.minimum(margin, span / 2), 0.0)
+    inward = np.where(span < FULL_TURN, np.minimum(margin, span / 2), 0.0)
     return robot.replace(lower=robot.lower + inward, upper=robot.upper - inward)
 
 
@@ -158,7 +158,7 @@ def serve(robot: Robot, points: Reals, rotations: Reals, roll: Roll) -> tuple[Re
     least, least_any, limit_margin : (n, 8), (n,), (n, 8), as in :class:`Field`
     """
     asked, arm = left_to_roll(robot, roll), constants_for_blocks(robot)
-    limited = np.flatnonzero(asked.upper - asked.lower < FREE)
+    limited = np.flatnonzero(asked.upper - asked.lower < FULL_TURN)
     least, least_any = np.full((len(points), SLOTS), np.inf), np.full(len(points), np.inf)
     limit_margin = np.full((len(points), SLOTS), np.inf)
     alive = np.arange(len(points))

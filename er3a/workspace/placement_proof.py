@@ -10,22 +10,25 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from er3a.kinematics.block_constants import BlockConstants
+from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 from er3a.workspace.directions import Roll, across, left_to_roll, point_tool
-from er3a.workspace.interval_inverse import GOOD, NEVER, SLOTS, branches, holds, misses, theta_ranges
+from er3a.workspace.interval_inverse import GOOD, NEVER, States, branches, holds, misses, theta_ranges
 from er3a.workspace.placement import MIXED, NO, Field, Places, Task, fitting_places, narrowed, survey
+from er3a.workspace.section_arm import section_frame
 
 Answer = Literal["proven", "refuted", "undecided"]
 PROVEN: Answer = "proven"
 REFUTED: Answer = "refuted"
 _ANSWERS: tuple[Answer, ...] = ("undecided", PROVEN, REFUTED)
 Constants = tuple[BlockConstants, Reals, Reals, float, Reals, float, float]
+SAME_DIRECTION = 1e-9
+"""Directions are the same if their product lacks less of 1."""
 _STACK = 512
 _MOST_TRIES = 200
 _POSES_PER_BRICK = 512
@@ -89,7 +92,9 @@ def find_places(robot: Robot, task: Task, roll: Roll, coarsest: float, count: in
 
 
 def choose_places(robot: Robot, task: Task, places: Places, roll: Roll, count: int, most_poses: int) -> Chosen:
-    """Take up to ``count`` places in their order, none overlapping one before it, each put to the proof.
+    """Take up to ``count`` places in their order, each put to the proof.
+
+    None overlaps one before it, or is one before it turned about axis 1.
 
     A place whose one branch is refuted is tried with any mix of branches.
 
@@ -126,8 +131,20 @@ def choose_places(robot: Robot, task: Task, places: Places, roll: Roll, count: i
         proven.append(answer == PROVEN or bool(places.proven[row]))
         branch_proven.append(answer == PROVEN and slot != MIXED)
         apart = np.abs(places.centre - places.centre[row]) >= (sizes + sizes[row]) / 2 - 1e-9
-        free &= apart.any(axis=1)
+        free &= apart.any(axis=1) & ~_turned_about_axis_1(robot, task, places.centre, row)
     return Chosen(rows, slots, proven, branch_proven, refuted, used)
+
+
+def _turned_about_axis_1(robot: Robot, task: Task, centre: Reals, row: int) -> Flags:
+    """Which places (n, 3) are that of ``row`` but for a turn about axis 1, where the task looks the same after one."""
+    R, origin = section_frame(robot)
+    if abs(task.axis @ R[2]) < 1 - SAME_DIRECTION:
+        return np.zeros(len(centre), dtype=bool)
+    local = (centre - origin) @ R.T
+    rho = np.hypot(local[:, 0], local[:, 1])
+    near = np.abs(rho - rho[row]) < task.box[:2].min() - 1e-9
+    same: Flags = near & (np.abs(local[:, 2] - local[row, 2]) < task.box[2] - 1e-9)
+    return same
 
 
 def prove_place(
@@ -155,7 +172,7 @@ def prove_place(
     answer = used = 0
     # Coarse pieces first, everywhere: what refutes a place is found before effort goes into its rims.
     for smallest in _SMALLEST:
-        answer, spent = _prove(*constants, middle, half, slot, most_poses - used, smallest)
+        answer, spent = _prove(constants, middle, half, slot, most_poses - used, smallest)
         used += int(spent)
         if answer or used >= most_poses:
             break
@@ -175,7 +192,7 @@ def proven_bricks(robot: Robot, task: Task, field: Field, roll: Roll) -> Flags:
     bricks = np.argwhere(serving)
     good = np.zeros(len(bricks), dtype=bool)
     centres = field.origin + (bricks + 0.5) * field.spacing
-    _prove_all(*_constants(robot, task, roll), centres, field.spacing / 2, MIXED, _POSES_PER_BRICK, good)
+    _prove_all(_constants(robot, task, roll), centres, field.spacing / 2, MIXED, _POSES_PER_BRICK, good)
     proven = np.zeros(serving.shape, dtype=bool)
     proven[tuple(bricks.T)] = good
     return proven
@@ -192,40 +209,16 @@ def _constants(robot: Robot, task: Task, roll: Roll) -> Constants:
 
 
 @kernel
-def _prove_all(
-    arm: BlockConstants,
-    ranges: Reals,
-    frame: Reals,
-    half_angle: float,
-    angles: Reals,
-    reach: float,
-    scale: float,
-    centres: Reals,
-    half: Reals,
-    slot: int,
-    most_poses: int,
-    good: Flags,
-) -> None:
+def _prove_all(constants: Constants, centres: Reals, half: Reals, slot: int, most_poses: int, good: Flags) -> None:
     for n in range(centres.shape[0]):
-        numbers = (centres[n], half, slot, most_poses, 0.0)
-        good[n] = _prove(arm, ranges, frame, half_angle, angles, reach, scale, *numbers)[0] == 1
+        good[n] = _prove(constants, centres[n], half, slot, most_poses, 0.0)[0] == 1
 
 
 @kernel
 def _prove(
-    arm: BlockConstants,
-    ranges: Reals,
-    frame: Reals,
-    half_angle: float,
-    angles: Reals,
-    reach: float,
-    scale: float,
-    centre: Reals,
-    half: Reals,
-    slot: int,
-    most_poses: int,
-    smallest: float,
+    constants: Constants, centre: Reals, half: Reals, slot: int, most_poses: int, smallest: float
 ) -> tuple[int, int]:
+    arm, ranges, frame, half_angle, angles, reach, scale = constants
     T, state, theta_1 = np.eye(4), np.empty(SLOTS, dtype=np.int8), np.empty((SLOTS, 2))
     stack, size = np.empty((_STACK, 10)), np.empty(5)
     for k in range(3):
@@ -278,7 +271,7 @@ def _prove(
 
 
 @kernel
-def _some(ranges: Reals, state: NDArray[np.int8], theta_1: Reals, slot: int) -> bool:
+def _some(ranges: Reals, state: States, theta_1: Reals, slot: int) -> bool:
     """Whether some branch, or the one asked for, is good with joint 1 too."""
     for k in range(SLOTS):
         if (slot == MIXED or k == slot) and state[k] == GOOD and holds(ranges, 0, theta_1[k, 0], theta_1[k, 1]):
@@ -287,7 +280,7 @@ def _some(ranges: Reals, state: NDArray[np.int8], theta_1: Reals, slot: int) -> 
 
 
 @kernel
-def _none(ranges: Reals, state: NDArray[np.int8], theta_1: Reals, slot: int) -> bool:
+def _none(ranges: Reals, state: States, theta_1: Reals, slot: int) -> bool:
     """Whether no branch, or not the one asked for, is possible."""
     for k in range(SLOTS):
         if (slot == MIXED or k == slot) and state[k] != NEVER and not misses(ranges, 0, theta_1[k, 0], theta_1[k, 1]):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.workspace.azimuths import MOST_ARCS, TURN
 from er3a.workspace.cell_decision import judge_cells
-from er3a.workspace.filled import fill_configurations
+from er3a.workspace.filled import ConfigurationGrid, fill_configurations
 from er3a.workspace.section_arm import SectionArm
 
 _STANCES = 96
@@ -21,7 +21,7 @@ _OPEN = 1e-9
 MOST_LEVEL = 7
 """Cells are not split further than this: a set without volume would never be decided."""
 _SHARE = 64
-ConfigurationGrid = tuple[Reals, tuple[float, float]]
+_ARRAYS = "cells", "unfilled", "empty", "level", "witness"
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,14 +47,7 @@ class Proof:
 
     def rows(self, chosen: NDArray[Any]) -> Proof:
         """The same with some of the cells."""
-        return Proof(
-            self.cells[chosen],
-            self.unfilled[chosen],
-            self.empty[chosen],
-            self.level[chosen],
-            self.witness[chosen],
-            self.boxes,
-        )
+        return replace(self, **{name: getattr(self, name)[chosen] for name in _ARRAYS})
 
     @property
     def volumes(self) -> Reals:
@@ -136,14 +129,8 @@ def sharpen(arm: SectionArm, proof: Proof, chosen: Flags) -> Proof:
 
 
 def _joined(parts: list[Proof], boxes: int) -> Proof:
-    return Proof(
-        np.concatenate([part.cells for part in parts]),
-        np.concatenate([part.unfilled for part in parts]),
-        np.concatenate([part.empty for part in parts]),
-        np.concatenate([part.level for part in parts]),
-        np.concatenate([part.witness for part in parts]),
-        boxes,
-    )
+    arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS}
+    return replace(parts[0], **arrays, boxes=boxes)
 
 
 def judge(arm: SectionArm, cells: Reals) -> Proof:
@@ -181,12 +168,7 @@ def _quarters(cells: Reals) -> Reals:
 
 
 def _judge(
-    arm: SectionArm,
-    cells: Reals,
-    configurations: ConfigurationGrid,
-    level: int,
-    parents: Proof | None = None,
-    threads: int = 1,
+    arm: SectionArm, cells: Reals, grid: ConfigurationGrid, level: int, parents: Proof | None = None, threads: int = 1
 ) -> Proof:
     """Judge cells, beginning from what is known of those they were split off."""
     n = len(cells)
@@ -198,8 +180,8 @@ def _judge(
         counts = np.isfinite([unfilled[..., 0], empty[..., 0]]).sum(axis=2)
 
     def work(part: slice) -> int:
-        known = (unfilled[part], counts[0, part], empty[part], counts[1, part], witness[part])
-        return judge_cells(arm, cells[part], configurations[0], configurations[1], _MOST_BOXES, *known)
+        known = (unfilled[part], counts[0, part]), (empty[part], counts[1, part])
+        return judge_cells(arm, cells[part], grid, _MOST_BOXES, *known, witness[part])
 
     # Neighbours cost alike: small shares keep the threads busy to the end.
     parts = [slice(k, k + _SHARE) for k in range(0, n, _SHARE)]

@@ -74,10 +74,7 @@ def find_voids(counts: Integers, inside: Flags) -> list[SampledVoid]:
     untouched = counts == 0
     enclosed_labels = _enclosed(untouched)
     open_labels = _pockets(untouched, inside & (enclosed_labels == 0))
-    found = [
-        *_judged("enclosed", np.where(inside, enclosed_labels, 0), counts),
-        *_judged("open", open_labels, counts),
-    ]
+    found = [*_judged("enclosed", np.where(inside, enclosed_labels, 0), counts), *_judged("open", open_labels, counts)]
     return sorted(found, key=lambda void: (-len(void.cells), tuple(void.cells[0])))
 
 

@@ -27,9 +27,12 @@ from er3a.geometry.vectors import Vector, add, cross, dot, scaled, subtract
 from er3a.kinematics.wrist_partitioned import WristPartitionedArm, wrist_partitioned_arm
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import kernel
+from er3a.robots.joint_limits import theta_limits
 from er3a.robots.robot import Robot
 
 Range = tuple[float, float]
+Cell = tuple[float, float, float, float]
+"""A rectangle of the section, m: rho_0, rho_1, z_0, z_1."""
 
 ROUND_OFF = 1e-12
 """Bound (m per metre of reach, and rad) on the rounding of any length or angle computed here."""
@@ -66,9 +69,9 @@ class SectionArm(NamedTuple):
     outer_high: float
     inner_low: float
     inner_high: float
-    theta_1: tuple[float, float]
-    theta_2: tuple[float, float]
-    tau: tuple[float, float]
+    theta_1: Range
+    theta_2: Range
+    tau: Range
     full_turn: bool
     mirrored: bool
 
@@ -113,7 +116,7 @@ def section_arm(robot: Robot, wrist_centre: bool = False) -> SectionArm:
     """
     arm = wrist_partitioned_arm(robot)
     R, origin = section_frame(robot)
-    limits = [_turned(robot, k) for k in range(6)]
+    limits = [(low, high) for low, high in at_most_a_turn(robot).tolist()]
     tau = limits[2] if arm.elbow_sign > 0 else (-limits[2][1], -limits[2][0])
     centre = arm.points[1] + arm.axes[1] * (arm.axes[1] @ (arm.wrist - arm.points[1])) - origin
     zone = (0.0, -1.0, 1.0, -1.0, 1.0) if wrist_centre else _zone(arm, limits)
@@ -139,11 +142,12 @@ def section_arm(robot: Robot, wrist_centre: bool = False) -> SectionArm:
     )
 
 
-def _turned(robot: Robot, k: int) -> tuple[float, float]:
-    """Range of theta of joint k, cut down to a full turn."""
-    ends = robot.direction[k] * np.array([robot.lower[k], robot.upper[k]]) + robot.offset[k]
-    low, high = float(ends.min()), float(ends.max())
-    return (low, high) if high - low < FULL_TURN else (low, low + 2 * np.pi)
+def at_most_a_turn(robot: Robot) -> Reals:
+    """Ends (6, 2), rad, of the range of each theta, cut down to a full turn."""
+    ends = theta_limits(robot)
+    full = ends[:, 1] - ends[:, 0] >= FULL_TURN
+    ends[full, 1] = ends[full, 0] + 2 * np.pi
+    return ends
 
 
 def _vector(array: Reals) -> Vector:

@@ -13,7 +13,7 @@ import numpy as np
 
 from er3a.geometry.vectors import Vector, cross, dot, subtract
 from er3a.numerics.jit import kernel
-from er3a.workspace.section_arm import ROUND_OFF, SectionArm, along_change, turned, wrist_and_forearm
+from er3a.workspace.section_arm import ROUND_OFF, Cell, Range, SectionArm, along_change, turned, wrist_and_forearm
 
 DIRECTIONS = 4
 _PIECES = 4
@@ -28,9 +28,7 @@ def _direction(k: int) -> Vector:
 
 
 @kernel
-def _plan(
-    arm: SectionArm, phi: float, theta_2: float, tau: float, way: Vector, cell: tuple[float, float, float, float]
-) -> tuple[float, float]:
+def _plan(arm: SectionArm, phi: float, theta_2: float, tau: float, way: Vector, cell: Cell) -> tuple[float, float]:
     """Half-length (rad) of the line that sweeps the cell, and the margin (m) by which it should succeed."""
     rho, z = 0.5 * (cell[0] + cell[1]), 0.5 * (cell[2] + cell[3])
     h_rho, h_z = 0.5 * (cell[1] - cell[0]), 0.5 * (cell[3] - cell[2])
@@ -65,15 +63,7 @@ def _plan(
 
 
 @kernel
-def _sweeps(
-    arm: SectionArm,
-    phi: float,
-    theta_2: float,
-    tau: float,
-    way: Vector,
-    t: float,
-    cell: tuple[float, float, float, float],
-) -> bool:
+def _sweeps(arm: SectionArm, phi: float, theta_2: float, tau: float, way: Vector, t: float, cell: Cell) -> bool:
     """Whether the line of half-length t provably sweeps the whole cell."""
     for sign in (-1.0, 1.0):
         a, b = theta_2 + sign * t * way[1], tau + sign * t * way[2]
@@ -119,12 +109,7 @@ def _sweeps(
 
 @kernel
 def swept_angles(
-    arm: SectionArm,
-    phi: float,
-    theta_2: float,
-    tau: float,
-    cell: tuple[float, float, float, float],
-    steps: tuple[float, float],
+    arm: SectionArm, phi: float, theta_2: float, tau: float, cell: Cell, steps: Range
 ) -> tuple[bool, float, float]:
     """Look about a configuration for a line that sweeps the cell.
 

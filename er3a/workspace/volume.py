@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.workspace.lookup import EMPTY, FILLED, SectionMap
+from er3a.workspace.lookup import EMPTY, FILLED, SectionMap, holds_azimuth
 from er3a.workspace.proof import judge
 from er3a.workspace.section_arm import SectionArm
 
@@ -68,14 +68,9 @@ def estimate_volume(
         status[open_points[found]] = FILLED
     reached, undecided = int((status == FILLED).sum()), int(((status != FILLED) & (status != EMPTY)).sum())
     solid = np.pi * reach**2 * (high - low)
-    return VolumeEstimate(
-        points,
-        reached,
-        undecided,
-        float(solid * (reached + undecided / 2) / points),
-        float(solid * wilson(reached, points)[0]),
-        float(solid * wilson(reached + undecided, points)[1]),
-    )
+    value = float(solid * (reached + undecided / 2) / points)
+    least, most = wilson(reached, points)[0], wilson(reached + undecided, points)[1]
+    return VolumeEstimate(points, reached, undecided, value, float(solid * least), float(solid * most))
 
 
 def _decide(arm: SectionArm, rho: Reals, azimuth: Reals, z: Reals, status: Integers) -> None:
@@ -87,9 +82,7 @@ def _decide(arm: SectionArm, rho: Reals, azimuth: Reals, z: Reals, status: Integ
         half = POINT * 10.0 ** (-n) / 2
         r, h = np.maximum(rho[left], 2 * half), z[left]
         looked = judge(arm, np.stack([r - half, r + half, h - half, h + half], axis=1))
-        turn = azimuth[left][:, None]
-        unfilled = ((looked.unfilled[..., 0] <= turn) & (turn <= looked.unfilled[..., 1])).any(axis=1)
-        empty = ((looked.empty[..., 0] <= turn) & (turn <= looked.empty[..., 1])).any(axis=1)
+        unfilled, empty = (holds_azimuth(arcs, azimuth[left]) for arcs in (looked.unfilled, looked.empty))
         status[left] = np.where(empty, EMPTY, np.where(unfilled, status[left], FILLED))
 
 
@@ -99,26 +92,3 @@ def wilson(hits: int, points: int) -> tuple[float, float]:
     middle = (share + z2 / (2 * points)) / (1 + z2 / points)
     half = _NORMAL_95 / (1 + z2 / points) * np.sqrt(share * (1 - share) / points + z2 / (4 * points**2))
     return (max(0.0, middle - half) if hits else 0.0), (min(1.0, middle + half) if hits < points else 1.0)
-
-
-def stratified_volume(arm: SectionArm, section: SectionMap, points: int, seed: int) -> float:
-    """Estimate (m^3) that spends its points where the proof leaves something open: the rest is known exactly.
-
-    Each point stands for its whole ring (the symmetry about axis 1): what counts is how much of it is reached.
-    """
-    proof = section.proof
-    volume = proof.volumes * (proof.unfilled_ratio - proof.empty_ratio)
-    share = np.cumsum(volume) / volume.sum()
-    random = np.random.Generator(np.random.Philox(key=seed))
-    unit = random.random((points, 2))
-    # Evenly spaced strata over the open volume, one point in each.
-    cell = np.searchsorted(share, (np.arange(points) + random.random(points)) / points).clip(max=len(share) - 1)
-    a, b, c, d = proof.cells[cell].T
-    rho, z = np.sqrt(a * a + (b * b - a * a) * unit[:, 0]), c + (d - c) * unit[:, 1]
-    half = POINT / 2
-    rho = np.maximum(rho, 2 * half)
-    looked = judge(arm, np.stack([rho - half, rho + half, z - half, z + half], axis=1))
-    open_before = (proof.unfilled_ratio - proof.empty_ratio)[cell]
-    lost = looked.unfilled_ratio / 2 + looked.empty_ratio / 2
-    reached = np.clip(1 - proof.empty_ratio[cell] - lost, 0, None) - (1 - proof.unfilled_ratio[cell])
-    return proof.bounds[0] + float(volume.sum() * np.clip(reached / open_before, 0, 1).mean())

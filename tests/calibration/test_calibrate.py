@@ -13,13 +13,13 @@ import er3a
 from er3a.calibration.measured import observed
 from er3a.calibration.outcomes import CalibrationError, MorePositions, MovesNothing, NoCorrectionFits, NotToldApart
 from er3a.calibration.parameters import jacobian, parallel_pairs, parameters_of
-from er3a.calibration.simulate import covered, measured
 from er3a.errors import InputError
 from er3a.files.measurements import COLUMNS, load_measurements
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.table_batch import tables_of
 from er3a.pipeline.cli import app
 from er3a.robots.conventions import to_modified
+from testing.simulated_measurements import covered, measured
 
 HEADER = ",".join(COLUMNS) + "\n"
 TRUSTED = ("er3a_c60", "er3_600")

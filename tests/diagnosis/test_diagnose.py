@@ -168,7 +168,8 @@ def test_faults_that_references_see_are_ranked_first(name, noise_mm, every, rand
     ]
     seen = [outcome for outcome in outcomes if outcome.identifiable]
     assert len(seen) > 0.85 * len(outcomes)
-    assert [outcome.fault for outcome in seen if not outcome.found] == []
+    assert [outcome.faults for outcome in seen if not outcome.found] == []
+    assert not any(outcome.needless for outcome in outcomes)
     assert np.median([outcome.set_size for outcome in seen]) == 1
 
 

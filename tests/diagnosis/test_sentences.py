@@ -15,22 +15,30 @@ from er3a.diagnosis.conclusions import (
     MainFault,
     MostLikelyFault,
     NextMeasurement,
+    NoFaultStandsOut,
     NoFewFaultsExplain,
     NothingToExplain,
+    Resolution,
+    TooSmallToTell,
 )
 from er3a.diagnosis.fault_kinds import (
     Fault,
+    ReversedDirection,
     SwappedEntries,
+    WrongAlpha,
     WrongAlphaSign,
     WrongConvention,
     WrongLength,
+    WrongLimit,
     WrongLimits,
     WrongOffset,
     WrongScale,
     WrongUnit,
     rounded,
 )
-from er3a.diagnosis.faults import repairs_of, slopes
+from er3a.diagnosis.faults import repairs_of
+from er3a.diagnosis.free_numbers import free_numbers
+from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.table_batch import tables_of
 from er3a.pipeline.messages.diagnosis import both
@@ -61,9 +69,34 @@ from er3a.pipeline.messages.say import say
             "Most likely fault: joint 2: offset -90 deg missing; residual falls from 1433 mm to 0.0 mm.",
         ),
         (
-            NoFewFaultsExplain(7260, 1432.8, 321.04, "mm"),
-            "No one or two faults explain the data: the best of 7260 hypotheses still leaves 321 mm of 1433 mm. "
-            "This is another arm, or more than two numbers are wrong.",
+            NoFewFaultsExplain(7260, 1432.8, 444.2, "mm", 321.04),
+            "No one or two faults explain the data, of 7260 that were tried: the first in rank still leaves 444 mm of "
+            "1433 mm, and none leaves less than 321 mm. This is another arm, or more than two numbers are wrong, or "
+            "one is in a way that was not tried, or a reference is.",
+        ),
+        (
+            MostLikelyFault((WrongOffset(4, 0.0, 180.0),), 136.0, 0.0, "mm", ((ReversedDirection(5),),)),
+            "Most likely fault: one of 2 that these references can't tell apart (joint 4: offset 180 deg missing; "
+            "joint 5: direction reversed); residual falls from 136 mm to 0.0 mm.",
+        ),
+        (
+            TooSmallToTell(((WrongLength(3, "a", 70.06, 70.0),), (WrongScale(0.99994),)), 0.06, 0.3, "mm"),
+            "The disagreement (0.06 mm) is too small for these references to tell which of 2 faults it is: joint 3: a "
+            "is 70.06 mm, 70 mm fits; all lengths: scale wrong, times 0.99994 fits. From about 0.30 mm on they would "
+            "tell them apart, as far as they ever do.",
+        ),
+        (
+            NoFaultStandsOut(1, 45, 2.5, 9000),
+            "1 of 45 references is missed, by up to 2.5 times what it leaves open, but none of the 9000 faults and "
+            "pairs of faults that were tried does better than the table as it is.",
+        ),
+        (WrongAlpha(3, -70.0, -89.99997), "joint 3: alpha is -70 deg, -90 deg fits"),
+        (WrongLimit(3, "lower", -75.0, -65.0), "joint 3: lower limit is -75 deg, -65 deg fits"),
+        (
+            Resolution(0.0512, 0.051, ("offset4",), ("offset6", "direction5")),
+            "A length that is wrong alone would be noticed from 0.051 mm on. An angle that is wrong alone would be "
+            "noticed from 0.051 deg on. Half a turn too much would not be noticed in offset4. Nothing at all would be "
+            "noticed of errors in offset6, direction5.",
         ),
     ],
 )
@@ -73,8 +106,8 @@ def test_sentences(found, text):
 
 def test_every_repair_and_free_number_has_a_sentence_of_its_own():
     table = tables_of(load_robot("er3a_c60_article"))
-    faults = [repair.fault for repair in repairs_of(table)]
-    faults += [slope.fault(float(slope.entry(table)[0]), 0.01) for slope in slopes()]
+    faults = [repair.fault for repair in repairs_of(table, load_references("er3a_c60").references)]
+    faults += [number.fault(float(number.value(table)[0]), 0.01) for number in free_numbers(6)]
     assert {type(fault) for fault in faults} == set(get_args(Fault))
     assert len({say(fault) for fault in faults}) == len(set(faults)) == len(faults)
 

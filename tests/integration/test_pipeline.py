@@ -267,7 +267,9 @@ def test_what_is_missing_damaged_or_of_an_older_version_is_made_again(small_stud
 
     done = run.make_run("--cores", "2", "--nocolor")
     for path in (old, *damaged, half):
-        (line,) = (line for line in done.stdout.splitlines() if line.startswith(f"{path.relative_to(run.folder)}: "))
+        (line,) = (
+            line for line in done.stderr.splitlines() if line.startswith(f"note: {path.relative_to(run.folder)}: ")
+        )
         assert line.endswith("; it is made again")
     jobs = set(re.findall(r"^Job \d+: (.+)$", done.stdout + done.stderr, flags=re.MULTILINE)) - {ALL_THERE}
     expected = {*views("er3_600", "validation"), "er3_600: report workspace", "write the index"}

@@ -15,6 +15,8 @@ from testing.small_study import STUDY
 FILES = {
     "pipeline/stages/toy/__init__.py": '"""How long the arm is."""\n',
     "pipeline/stages/toy/entry.py": '''"""The stage in the registry."""
+from dataclasses import dataclass
+from typing import Literal
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.stages.stage import Stage
 
@@ -22,7 +24,17 @@ class ToySettings(StrictModel):
     """``factor``: how many arms in a row."""
     factor: int = 2
 
-STAGE = Stage(name="toy", title="toy", question="How long?", settings={"toy": ToySettings}, views=("report",))
+@dataclass(frozen=True)
+class TooLong:
+    """A link is too long for this stage."""
+    length_m: float
+    code: Literal["toy.too_long"] = "toy.too_long"
+
+def applies(robot):
+    return TooLong(robot.a.max()) if robot.a.max() > 0.4 else None
+
+STAGE = Stage(name="toy", title="toy", question="How long?", settings={"toy": ToySettings}, views=("report",),
+              applies=applies, absences=(TooLong,))
 ''',
     "pipeline/stages/toy/model.py": '''"""What the stage finds."""
 from dataclasses import dataclass
@@ -83,7 +95,12 @@ FIGURES = {"sum": "All lengths"}
 ''',
     "pipeline/messages/toy_verdict.py": '''"""The verdict."""
 from er3a.pipeline.messages.say import say, sentence
+from er3a.pipeline.stages.toy.entry import TooLong
 from er3a.pipeline.stages.toy.model import Long
+
+@say.register
+def _(found: TooLong) -> str:
+    return sentence(found.code, "A link of {length:.2f} m is too long.", length=found.length_m)
 
 @say.register
 def _(found: Long) -> str:
@@ -153,9 +170,19 @@ def test_a_robot_for_which_it_fails_has_a_reason_and_the_index_stands(with_toy):
         assert reason in (folder / "other" / page).read_text(encoding="utf-8")
 
 
+def test_a_robot_to_which_it_does_not_apply_has_a_reason_of_its_own(with_toy):
+    summary = with_toy.folder / "results/er3a_c60_article/toy/summary.json"
+    verdict = json.loads(summary.read_text(encoding="utf-8"))["verdict"]
+    assert (verdict["status"], verdict["code"]) == ("not_computed", "toy.too_long")
+    assert verdict["params"] == {"length_m": 0.65}
+    assert verdict["text"] == "A link of 0.65 m is too long."
+    assert verdict["text"] in (with_toy.folder / "reports/er3a_c60_article/toy.html").read_text(encoding="utf-8")
+
+
 def test_the_index_shows_it(with_toy):
     er3a(with_toy, "index")
     index = (with_toy.folder / "reports/index.html").read_text(encoding="utf-8")
+    assert "A link of 0.65 m is too long." in index
     assert "How long?" in index
     assert "The arm is 1.00 m long." in index
 

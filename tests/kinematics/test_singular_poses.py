@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from er3a.kinematics.aligned_wrist import bend_of_wrist
-from er3a.kinematics.configuration import branch_of
 from er3a.kinematics.families import Family, _nearest_wrists
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
@@ -15,6 +14,7 @@ from testing.arms import DEG, joints_at_random, make_arm, margin, pose_errors
 from testing.singular_poses import (
     CLASSES,
     admissible_slots,
+    branch_of,
     family_holds,
     joints_near,
     tolerance,

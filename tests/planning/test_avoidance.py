@@ -83,7 +83,7 @@ def test_slowing_down_stays_on_the_path_and_takes_the_spike(results):
     case, price = segment_of("wrist_near"), results["wrist_near"]["slow"].cost
     programmed = np.abs(case.followed.rates(case.t)[1] / case.limits.speed).max()
     assert programmed > 1.05
-    assert price.speed_ratio <= 1 + 1e-6
+    assert price.max_joint_speed_ratio <= 1 + 1e-6
     assert price.distance.max() < 1e-9
     assert price.angle.max() < 1e-9
     assert 4.0 < price.motion.duration < 4.5

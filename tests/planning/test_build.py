@@ -103,7 +103,8 @@ def test_table_without_times_is_run_in_its_duration_and_leaves_repeated_points_o
     found = built(tmp_path, TABLE, rows + "400,100,300,180,0,30\n")
     assert found.repeated_rows == (3,)
     assert found.duration == 2
-    assert found.tool.deviation[0] == pytest.approx(3 / 8 * 0.05 * np.sin(np.pi / 4), rel=1e-3)
+    away = found.tool.poses(np.linspace(0, 1, 20_001))[:, :3, 3] - [0.3, 0.1, 0.3]
+    assert np.linalg.norm(away, axis=1).min() == pytest.approx(3 / 8 * 0.05 * np.sin(np.pi / 4), rel=1e-3)
     halted = built(tmp_path, TABLE | {"blend_mm": 0}, rows + "400,100,300,180,0,30\n")
     np.testing.assert_allclose(halted.tool.law.times, [0, 1, 2])
 

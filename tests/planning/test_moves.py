@@ -62,9 +62,9 @@ def test_twist_is_the_derivative_of_the_pose(random):
     way, step = line(random_pose(random), random_pose(random), 2.0), 1e-6
     before, here, after = way.poses(np.array([0.4 - step, 0.4, 0.4 + step]))
     slope = (after - before) / (2 * step)
-    np.testing.assert_allclose(slope[:3, 3], way.twist[:3], atol=1e-8)
+    np.testing.assert_allclose(slope[:3, 3], way.twists(np.array(0.5))[0][:3], atol=1e-8)
     spin = slope[:3, :3] @ here[:3, :3].T
-    np.testing.assert_allclose([spin[2, 1], spin[0, 2], spin[1, 0]], way.twist[3:], atol=1e-8)
+    np.testing.assert_allclose([spin[2, 1], spin[0, 2], spin[1, 0]], way.twists(np.array(0.5))[0][3:], atol=1e-8)
 
 
 def test_half_turn_of_the_article_goes_counter_clockwise_unless_told_otherwise():

@@ -59,7 +59,8 @@ def with_heights(monkeypatch):
 
 @pytest.mark.usefixtures("with_heights")
 def test_a_new_kind_is_read_and_predicted(tmp_path):
-    (tmp_path / "heights.csv").write_text("height_mm,uncertainty_mm,source,grade\n321.5,,a drawing,official\n")
+    (tmp_path / "documents.csv").write_text("name,title,publisher,derived_from\nd,a drawing,a maker,\n")
+    (tmp_path / "heights.csv").write_text("height_mm,uncertainty_mm,source,grade,origin\n321.5,,a drawing,official,d\n")
     (reference,) = load_references(tmp_path).references
     assert (reference.group, reference.subject.key, reference.uncertainty) == ("heights", "shoulder()", 0.05)
     assert predict(load_robot("er3a_c60"), (reference,)) == pytest.approx([321.5])

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from er3a.errors import InputError
 from er3a.files.reference_rows import FORMATS
 from er3a.files.reference_sets import check_reference_file, load_references
-from er3a.files.robot_library import REFERENCES
+from er3a.files.robot_library import REFERENCES, load_robot
+from er3a.references.predict import predict
 from er3a.references.subjects import JointLimit, PoseExcess
 from er3a.robots.robot import GRADES
 
@@ -21,9 +23,21 @@ REACH = "point,from_axis,extreme,value_mm,uncertainty_mm,source,grade\n"
 SPEEDS = "joint,speed_deg_s,uncertainty_deg_s,source,grade\n"
 
 
+DOCUMENTS = (
+    "name,title,publisher,derived_from\nm,a manual,a maker,\ntable,a table,a maker,\ndrawing,a drawing,a maker,\n"
+)
+
+
+def with_origins(text: str) -> str:
+    """A table whose rows name their source as their document."""
+    header, *rows = text.splitlines()
+    return "\n".join([f"{header},origin", *(f"{row},{row.rsplit(',', 2)[1] or 'm'}" for row in rows)]) + "\n"
+
+
 def written(folder: Path, name: str, text: str) -> Path:
     path = folder / name
-    path.write_text(text, encoding="utf-8")
+    path.write_text(with_origins(text), encoding="utf-8")
+    (folder / "documents.csv").write_text(DOCUMENTS, encoding="utf-8")
     return path
 
 
@@ -118,6 +132,77 @@ def test_unknown_set_and_empty_folder(tmp_path):
         load_references("er4")
     with pytest.raises(InputError, match=r"axes\.csv"):
         load_references(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("documents", "limits", "words"),
+    [
+        (DOCUMENTS, LIMITS + "1,-170,170,0.5,m,official\n", ["limits.csv", "column origin", "missing"]),
+        (DOCUMENTS, with_origins(LIMITS + "1,-170,170,0.5,m,official\n")[:-2] + "\n", ["row 2", "origin", "empty"]),
+        (DOCUMENTS, with_origins(LIMITS + "1,-170,170,0.5,rumour,official\n"), ["row 2", "origin", "'rumour'"]),
+        (
+            DOCUMENTS.replace("a manual,a maker,", "a manual,a maker,table").replace(
+                "a table,a maker,", "a table,a maker,drawing; m"
+            ),
+            with_origins(LIMITS + "1,-170,170,0.5,m,official\n"),
+            ["documents.csv", "derived_from", "circle", "m from table from m"],
+        ),
+        (
+            DOCUMENTS.replace("a manual,a maker,", "a manual,a maker,hearsay"),
+            with_origins(LIMITS + "1,-170,170,0.5,m,official\n"),
+            ["documents.csv", "row 2", "derived_from", "'hearsay'"],
+        ),
+        (DOCUMENTS + "m,again,a maker,\n", with_origins(LIMITS + "1,9,20,0.5,m,official\n"), ["row 5", "twice"]),
+        (DOCUMENTS.replace("m,a man", "none,a man"), with_origins(LIMITS + "1,9,20,0.5,m,cad\n"), ["row 2", "'none'"]),
+    ],
+)
+def test_documents_that_are_missing_unknown_or_made_from_each_other(tmp_path, documents, limits, words):
+    (tmp_path / "documents.csv").write_text(documents, encoding="utf-8")
+    (tmp_path / "limits.csv").write_text(limits, encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        load_references(tmp_path)
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_a_set_without_documents_is_refused(tmp_path):
+    written(tmp_path, "limits.csv", LIMITS + "1,-170,170,0.5,m,official\n")
+    (tmp_path / "documents.csv").unlink()
+    with pytest.raises(InputError, match=r"documents\.csv"):
+        load_references(tmp_path)
+
+
+def test_rows_of_one_document_under_two_sources_may_not_contradict_each_other(tmp_path):
+    rows = '1,-170,170,0.5,"drawing, view A",official,m\n1,-165,170,0.5,"drawing, view B",official,m\n'
+    (tmp_path / "documents.csv").write_text(DOCUMENTS, encoding="utf-8")
+    (tmp_path / "limits.csv").write_text(LIMITS.strip() + ",origin\n" + rows, encoding="utf-8")
+    with pytest.raises(InputError, match=r"row 3.*contradicts row 2 of the same document"):
+        load_references(tmp_path)
+
+
+def test_standard_deviations_become_95_percent_intervals(tmp_path):
+    row = "point,from_axis,extreme,value_mm,uncertainty_mm,source,grade,stated_as,origin\n"
+    (tmp_path / "documents.csv").write_text(DOCUMENTS, encoding="utf-8")
+    text = row + "flange,1,greatest,600,0.5,m,measured,standard_deviation,m\n"
+    (tmp_path / "reach.csv").write_text(text, encoding="utf-8")
+    (reference,) = load_references(tmp_path).references
+    assert (reference.deviation, reference.uncertainty) == (0.5, pytest.approx(0.98, abs=1e-3))
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "expected"),
+    [
+        ("observations.csv", "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,joint,point,seen,uncertainty_deg,source,grade\n"
+         "0,0,0,0,0,0,5,flange,tilts_up,,m,measured\n", (0.0, 60.0)),
+        ("lengths.csv", "joint,length,value_mm,uncertainty_mm,source,grade\n2,a,270,,m,measured\n", (270.0, 0.5)),
+        ("angles.csv", "joint,angle,value_deg,uncertainty_deg,source,grade\n3,alpha,-90.0,,m,cad\n", (-90.0, 0.05)),
+    ],
+)  # fmt: skip
+def test_what_is_measured_on_the_arm_itself(tmp_path, name, text, expected):
+    written(tmp_path, name, text)
+    (reference,) = load_references(tmp_path).references
+    assert (reference.expected, reference.uncertainty) == expected
+    assert np.abs(predict(load_robot("er3a_c60"), [reference]) - expected[0]) <= reference.uncertainty
 
 
 def test_a_pose_that_a_source_shows_counts_as_within_the_limits_once(tmp_path):

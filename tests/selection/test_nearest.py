@@ -39,7 +39,7 @@ def test_nearest_of_none_and_of_one():
     assert (choice.reason.code, choice.reason.count, choice.reason.branch) == ("all_outside_limits", 1, 3)
     assert [one.joint for one in choice.reason.exceeded.joints] == [1]
     choice = nearest(robot, solutions_of([[1, 0, 0, 0, 0, 0]], [True], [3]), np.zeros(6))
-    assert (choice.chosen, choice.runner_up) == (0, None)
+    assert choice.order.tolist() == [0]
     assert choice.reason == OnlyAdmissible(GreatestMove(1, np.degrees(1)))
     assert say(choice.reason) == "greatest joint move 57.3 deg (J1); the only admissible solution"
 

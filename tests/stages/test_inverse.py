@@ -174,9 +174,10 @@ def test_unreachable_target_is_a_verdict(computed):
     assert target.solutions == 0
     assert (target.reason.code, target.obstacle.code) == ("no_solution", "reach_missing")
     assert target.obstacle.gap_mm == min(unsolved.why.gap_mm for unsolved in target.unsolved)
-    assert (verdict.status, verdict.finding.code) == ("caution", "inverse.some_unsolved")
-    assert {one.name: one.obstacle for one in verdict.finding.unsolved}["too_far"] == target.obstacle
-    assert f"too_far ({target.obstacle.gap_mm:.0f} mm out of reach)" in say(verdict.finding)
+    assert (target.outcome, target.expect) == ("unreachable", "unreachable")
+    assert (verdict.status, verdict.finding.code) == ("pass", "inverse.all_solved")
+    assert ("too_far", "unreachable") in {(one.name, one.found) for one in verdict.finding.demonstrations}
+    assert "as expected: " in say(verdict.finding)
     arm, near = load_robot(name), target.neighbours
     assert np.linalg.norm(np.array(near.shifted_to_mm) - target.xyz_mm) == pytest.approx(near.least_shift_mm)
     assert [advice.code for advice in target.advice][1] == "shift_tool"

@@ -3,8 +3,11 @@ import shlex
 import sys
 import time
 
+from snakemake.dag import PeriodicityDetector
+
 from er3a.pipeline.code_digest import code_digest
 from er3a.errors import Er3aError
+from er3a.files.shipped import view_command
 from er3a.pipeline.messages.language import catalogue_file
 from er3a.pipeline.stages.registry import STAGES, all_messages
 from er3a.pipeline.study import load_study
@@ -29,6 +32,11 @@ ROBOTS = STUDY.names
 # Pages depend on the words of their language, results and recordings don't.
 LANGUAGE = STUDY.report.language
 CATALOGUE = [] if LANGUAGE == "en" else os.path.relpath(catalogue_file(LANGUAGE))
+
+
+# Snakemake takes a name that repeats one part twenty times for a rule that feeds itself for ever. Robots and stages are
+# lists of names here, in which nothing grows.
+PeriodicityDetector.is_periodic = lambda self, value: None
 
 
 wildcard_constraints:
@@ -100,6 +108,12 @@ def of_all(path, view=None):
 def viewed(wildcards):
     """Input function: the results that a stage's views show."""
     return [path.format(robot=wildcards.robot) for path in results_of(wildcards.stage)]
+
+
+def rests_on(wildcards):
+    """Input function: the verdicts that a stage's page says first."""
+    others = [stage for stage in STAGES[wildcards.stage].rests_on if stage in STUDY.stages(wildcards.robot)]
+    return [f"results/{wildcards.robot}/{stage}/summary.json" for stage in others]
 
 
 def preview(wildcards):

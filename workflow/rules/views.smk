@@ -39,6 +39,7 @@ rule preview:
 rule report:
     input:
         viewed,
+        rests_on,
         CATALOGUE,
         preview=preview,
     output:
@@ -109,6 +110,7 @@ rule index:
             category="all robots",
             labels={"page": "two robots side by side"},
         ),
+        "reports/junit.xml",
     log:
         "logs/index.log",
     benchmark:
@@ -117,6 +119,7 @@ rule index:
         "../envs/er3a.yaml"
     params:
         language=LANGUAGE,
+        expected={name: STUDY.entry(name).expect for name in STUDY.robots},
         code=code_digest("er3a.pipeline.viewing.index", *all_messages()),
     message:
         "write the index"

@@ -7,6 +7,7 @@ from pathlib import Path
 from statistics import mean
 from tempfile import TemporaryDirectory
 
+from er3a.files.shipped import ROOT
 from er3a.pipeline.estimate.jobs import Job, jobs_of, wall_time
 from er3a.pipeline.estimate.speed import SamplingSpeed, sampling_speed
 from er3a.pipeline.estimate.timings import FEW_SAMPLES, Key, Timing, Trial, logged, timed, trial, written_bytes
@@ -75,7 +76,19 @@ def measured_here(study: Study, results: Path, reports: Path, logs: Path) -> Mac
 
 
 def _workflow(study: Study) -> Timing:
-    return timed(["snakemake", "--configfile", str(study.file), "--dry-run", "--forceall", "--quiet", "all"])
+    return timed(
+        [
+            "snakemake",
+            "--snakefile",
+            str(ROOT / "Snakefile"),
+            "--dry-run",
+            "--forceall",
+            "--quiet",
+            "all",
+            "--configfile",
+            str(study.file),
+        ]
+    )
 
 
 def _handling() -> float:

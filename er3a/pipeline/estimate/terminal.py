@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter, defaultdict
+from dataclasses import asdict
 
 from rich import box
 from rich.console import Console
@@ -58,6 +59,18 @@ def print_estimate(study: Study, calibration: MachineCalibration, cores: list[in
         "From and to: how much repeated timings differed, and robots from each other where one stands for others. "
         "A machine that gets busier, and the queue of a cluster, come on top."
     )
+
+
+def estimate_record(study: Study, calibration: MachineCalibration, cores: list[int]) -> dict[str, object]:
+    """The same as plain data, for another program: seconds, MB and bytes."""
+    whole, parts = disk_bytes(study, calibration)
+    return {
+        "robots": study.names,
+        "samples_per_second_and_core": {robot: asdict(speed) for robot, speed in calibration.speeds.items()},
+        "costs": [asdict(cost(study, calibration, number)) for number in cores],
+        "disk_bytes": whole,
+        "more_while_sampling_bytes": parts,
+    }
 
 
 def duration(seconds: float) -> str:

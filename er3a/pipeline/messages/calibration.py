@@ -147,6 +147,31 @@ def lines_of(found: Calibration) -> str:
     return "\n".join(lines)
 
 
+def calibration_record(found: Calibration) -> dict[str, object]:
+    """A calibration as plain data, for another program; corrections in mm and deg with half their 95 % interval."""
+    return {
+        "level": found.level,
+        "coordinates": found.coordinates,
+        "poses": found.poses,
+        "rms_before_mm": found.rms_before_mm,
+        "rms_after_mm": found.rms_after_mm,
+        "scatter": found.scatter,
+        "fits": found.fits,
+        "entries": [
+            {
+                "name": each.name,
+                "nominal": each.nominal,
+                "correction": each.correction,
+                "half_width": each.half_width,
+                "unit": each.unit,
+            }
+            for each in found.estimates
+        ],
+        "held": [say(reason) for reason in found.held],
+        "more": say(found.more) if found.more else None,
+    }
+
+
 def _listed(words: Sequence[str]) -> str:
     """Words in a row, with "and" before the last."""
     return sentence("list", "{others} and {last}", others=joined(words[:-1], ", "), last=words[-1])

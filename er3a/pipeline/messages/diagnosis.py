@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from er3a.diagnosis.conclusions import (
     FlangePositionDecides,
     LimitDecides,
@@ -13,6 +15,8 @@ from er3a.diagnosis.conclusions import (
     NothingToExplain,
     NothingToRestOn,
     OrientationDecides,
+    Resolution,
+    TooSmallToTell,
 )
 from er3a.diagnosis.fault_kinds import (
     Faults,
@@ -21,16 +25,18 @@ from er3a.diagnosis.fault_kinds import (
     SwappedEntries,
     SwappedLimits,
     SwappedRows,
+    WrongAlpha,
     WrongAlphaSign,
     WrongConvention,
     WrongLength,
+    WrongLimit,
     WrongLimits,
     WrongOffset,
     WrongScale,
     WrongUnit,
 )
 from er3a.pipeline.messages.language import N_
-from er3a.pipeline.messages.say import counted, say, sentence, word
+from er3a.pipeline.messages.say import counted, joined, say, sentence, word
 
 ENTRIES = {
     "a": N_("column a"),
@@ -67,10 +73,16 @@ LIMIT_FAULTS = {
     "lower_sign": N_("lower limit has the wrong sign"),
     "upper_sign": N_("upper limit has the wrong sign"),
 }
+ONE_LIMIT = {
+    "lower": N_("lower limit is {given:g} deg, {fits:.4g} deg fits"),
+    "upper": N_("upper limit is {given:g} deg, {fits:.4g} deg fits"),
+}
 LIMITS = {
     "lower": N_("the lower limit of joint {joint} would tell them apart"),
     "upper": N_("the upper limit of joint {joint} would tell them apart"),
 }
+LEAST_SHOWN = 0.005
+MOST_LISTED = 24
 
 
 def both(faults: Faults) -> str:
@@ -82,7 +94,9 @@ def both(faults: Faults) -> str:
 
 
 def shown(value: float) -> str:
-    """A residual: one decimal below 100, none above."""
+    """A residual: two decimals below 1, one below 100, none above; one that rounds to nothing is 0.0."""
+    if LEAST_SHOWN <= value < 1:
+        return f"{value:.2f}"
     return f"{value:.1f}" if value < 100 else f"{value:.0f}"
 
 
@@ -99,6 +113,17 @@ def _(found: WrongAlphaSign) -> str:
         given=found.given_deg,
         fits=found.fits_deg,
     )
+    return _at_joint(found.joint, fault)
+
+
+@say.register
+def _(found: WrongAlpha) -> str:
+    if found.given_deg == 0:
+        fault = sentence(found.code, "alpha {fits:.4g} deg missing", fits=found.fits_deg)
+    else:
+        fault = sentence(
+            found.code, "alpha is {given:g} deg, {fits:.4g} deg fits", given=found.given_deg, fits=found.fits_deg
+        )
     return _at_joint(found.joint, fault)
 
 
@@ -129,10 +154,10 @@ def _(found: ShiftedRows) -> str:
 @say.register
 def _(found: WrongOffset) -> str:
     if found.given_deg == 0:
-        fault = sentence(found.code, "offset {fits:g} deg missing", fits=found.fits_deg)
+        fault = sentence(found.code, "offset {fits:.4g} deg missing", fits=found.fits_deg)
     else:
         fault = sentence(
-            found.code, "offset is {given:g} deg, {fits:g} deg fits", given=found.given_deg, fits=found.fits_deg
+            found.code, "offset is {given:g} deg, {fits:.4g} deg fits", given=found.given_deg, fits=found.fits_deg
         )
     return _at_joint(found.joint, fault)
 
@@ -151,6 +176,12 @@ def _(found: WrongConvention) -> str:
 def _(found: WrongLimits) -> str:
     fault = word(found.code, LIMIT_FAULTS, found.fault)
     return _at(sentence("place", "every joint"), fault) if found.joint is None else _at_joint(found.joint, fault)
+
+
+@say.register
+def _(found: WrongLimit) -> str:
+    fault = sentence(found.code, ONE_LIMIT[found.side], given=found.given_deg, fits=found.fits_deg)
+    return _at_joint(found.joint, fault)
 
 
 @say.register
@@ -216,12 +247,37 @@ def _(found: NothingToRestOn) -> str:
 
 @say.register
 def _(found: NothingToExplain) -> str:
-    return counted(
+    met = counted(
         found.code,
         "Nothing to explain: the one reference about poses, axes and limits is met.",
         "Nothing to explain: all {count} references about poses, axes and limits are met.",
         found.references,
     )
+    return joined([met, say(found.resolution) if found.resolution else ""], " ")
+
+
+@say.register
+def _(found: Resolution) -> str:
+    texts = []
+    if found.length_mm is not None:
+        texts.append(
+            sentence(
+                found.code, "A length that is wrong alone would be noticed from {mm:.2g} mm on.", mm=found.length_mm
+            )
+        )
+    if found.angle_deg is not None:
+        texts.append(
+            sentence(
+                found.code, "An angle that is wrong alone would be noticed from {deg:.2g} deg on.", deg=found.angle_deg
+            )
+        )
+    if found.half_turns:
+        entries = joined(found.half_turns, ", ")
+        texts.append(sentence(found.code, "Half a turn too much would not be noticed in {entries}.", entries=entries))
+    if found.unseen:
+        entries = joined(found.unseen, ", ")
+        texts.append(sentence(found.code, "Nothing at all would be noticed of errors in {entries}.", entries=entries))
+    return joined(texts, " ")
 
 
 @say.register
@@ -230,41 +286,83 @@ def _(found: MostLikelyFault) -> str:
 
 
 @say.register
+def _(found: TooSmallToTell) -> str:
+    return sentence(
+        found.code,
+        "The disagreement ({residual} {unit}) is too small for these references to tell which of {count} faults it is: "
+        "{candidates}. From about {told} {unit} on they would tell them apart, as far as they ever do.",
+        residual=shown(found.residual),
+        count=len(found.candidates),
+        candidates=_candidates(found.candidates),
+        told=shown(found.told_from),
+        unit=found.unit,
+    )
+
+
+@say.register
 def _(found: MainFault) -> str:
     return sentence(
         found.code,
-        "Most likely fault: {hypothesis}, which is still more than the references leave open.",
+        "The best that was tried: {hypothesis}, which is still more than the references leave open.",
         hypothesis=_residual_falls(found),
     )
 
 
 @say.register
 def _(found: NoFaultStandsOut) -> str:
-    return sentence(found.code, "The residuals look like noise, so no table entry is indicated.")
+    return counted(
+        found.code,
+        "{count} of {references} references is missed, by up to {times:.3g} times what it leaves open, but none of the "
+        "{tried} faults and pairs of faults that were tried does better than the table as it is.",
+        "{count} of {references} references are missed, by up to {times:.3g} times what they leave open, but none of "
+        "the {tried} faults and pairs of faults that were tried does better than the table as it is.",
+        found.missed,
+        references=found.references,
+        times=found.half_widths,
+        tried=found.tried,
+    )
 
 
 @say.register
 def _(found: NoFewFaultsExplain) -> str:
     return sentence(
         found.code,
-        "No one or two faults explain the data: the best of {tried} hypotheses still leaves {after} {unit} of {before} "
-        "{unit}. This is another arm, or more than two numbers are wrong.",
+        "No one or two faults explain the data, of {tried} that were tried: the first in rank still leaves {after} "
+        "{unit} of {before} {unit}, and none leaves less than {least} {unit}. This is another arm, or more than two "
+        "numbers are wrong, or one is in a way that was not tried, or a reference is.",
         tried=found.tried,
         after=shown(found.residual_after),
         before=shown(found.residual_before),
+        least=shown(found.least),
         unit=found.unit,
     )
 
 
 def _residual_falls(found: MostLikelyFault | MainFault) -> str:
+    faults = both(found.faults)
+    if found.alternatives:
+        faults = sentence(
+            "one_of",
+            "one of {count} that these references can't tell apart ({candidates})",
+            count=1 + len(found.alternatives),
+            candidates=_candidates((found.faults, *found.alternatives)),
+        )
     return sentence(
         "residual_falls",
         "{faults}; residual falls from {before} {unit} to {after} {unit}",
-        faults=both(found.faults),
+        faults=faults,
         before=shown(found.residual_before),
         after=shown(found.residual_after),
         unit=found.unit,
     )
+
+
+def _candidates(members: Sequence[Faults]) -> str:
+    """All members of a set; of a set that no one would read, the first."""
+    texts = [both(faults) for faults in members[:MOST_LISTED]]
+    if more := len(members) - len(texts):
+        texts.append(counted("candidates", "{count} more", "{count} more", more))
+    return joined(texts)
 
 
 def _at_joint(joint: int, fault: str) -> str:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from er3a.pipeline.messages.expectations import demonstrated
 from er3a.pipeline.messages.say import counted, joined, listed, say, sentence
+from er3a.pipeline.stages.expectations import Demonstration
 from er3a.pipeline.stages.inverse.inverse_findings import (
     AllSolved,
     BranchesCollide,
@@ -33,27 +35,29 @@ def _(found: NotReproduced) -> str:
 
 @say.register
 def _(found: AllSolved) -> str:
-    return sentence(
+    every = sentence(
         found.code,
         "Every target ({count}) has a solution {where}.",
         count=found.targets,
         where=_where(found.collisions),
     )
+    return _and_demonstrations(every if found.targets else "", found.demonstrations)
 
 
 @say.register
 def _(found: NoneSolved) -> str:
-    return sentence(
+    none = sentence(
         found.code,
         "No target has a solution {where}: {none_for}.",
         where=_where(found.collisions),
         none_for=_none_for(found.unsolved),
     )
+    return _and_demonstrations(none, found.demonstrations)
 
 
 @say.register
 def _(found: SomeUnsolved) -> str:
-    return counted(
+    some = counted(
         found.code,
         "{count} of {total} targets has a solution {where}; none for {none_for}.",
         "{count} of {total} targets have a solution {where}; none for {none_for}.",
@@ -62,6 +66,12 @@ def _(found: SomeUnsolved) -> str:
         where=_where(found.collisions),
         none_for=_none_for(found.unsolved),
     )
+    return _and_demonstrations(some, found.demonstrations)
+
+
+def _and_demonstrations(text: str, shown: tuple[Demonstration, ...]) -> str:
+    told = demonstrated(shown)
+    return joined([text, sentence("trajectory.verdict", "{finding}.", finding=told) if told else ""], " ")
 
 
 def _where(collisions: bool) -> str:

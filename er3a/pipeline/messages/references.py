@@ -10,8 +10,10 @@ from er3a.references.subjects import (
     AxisPosition,
     DrawingCorner,
     DrawingExtent,
+    EntryOfTable,
     JointLimit,
     JointSpeed,
+    MotionOfJoint,
     PointAtPose,
     PoseExcess,
     Reach,
@@ -40,6 +42,26 @@ MISSING_WORDS = {
 POINT_WORDS = {"flange": N_("flange"), "wrist_centre": N_("wrist centre")}
 SEGMENT_WORDS = {"upper_arm": N_("upper arm from the vertical"), "forearm": N_("forearm from the vertical")}
 LABELS = {"abs_x": "|x|"}
+MOTION_WORDS = {
+    "up": N_("the {point} moves up"),
+    "down": N_("the {point} moves down"),
+    "left": N_("the {point} moves to the left"),
+    "right": N_("the {point} moves to the right"),
+    "forward": N_("the {point} moves forward"),
+    "back": N_("the {point} moves back"),
+    "tilts_up": N_("the tool tilts up"),
+    "tilts_down": N_("the tool tilts down"),
+    "tilts_left": N_("the tool tilts to the left"),
+    "tilts_right": N_("the tool tilts to the right"),
+    "tilts_forward": N_("the tool tilts forward"),
+    "tilts_back": N_("the tool tilts back"),
+    "clockwise_looking_up": N_("the tool turns clockwise for who looks up"),
+    "clockwise_looking_down": N_("the tool turns clockwise for who looks down"),
+    "clockwise_looking_left": N_("the tool turns clockwise for who looks left"),
+    "clockwise_looking_right": N_("the tool turns clockwise for who looks right"),
+    "clockwise_looking_forward": N_("the tool turns clockwise for who looks forward"),
+    "clockwise_looking_back": N_("the tool turns clockwise for who looks back"),
+}
 
 check_complete("words for groups of references", GROUPS, GROUP_WORDS)
 check_complete("words for groups that a set lacks", GROUPS, MISSING_WORDS)
@@ -105,6 +127,21 @@ def _(found: JointLimit) -> str:
 @say.register
 def _(found: JointSpeed) -> str:
     return sentence(found.code, "joint {joint} speed", joint=found.joint)
+
+
+@say.register
+def _(found: MotionOfJoint) -> str:
+    return sentence(found.code, "+J{joint}: {motion}", joint=found.joint, motion=motion_seen(found))
+
+
+@say.register
+def _(found: EntryOfTable) -> str:
+    return sentence(found.code, "{own_entry}, measured", own_entry=f"{found.column}{found.joint}")
+
+
+def motion_seen(found: MotionOfJoint) -> str:
+    """What is seen, as a clause."""
+    return sentence("motion", MOTION_WORDS[found.seen], point=word("point", POINT_WORDS, found.point))
 
 
 def _seen(subject: PointAtPose | PoseExcess) -> str:

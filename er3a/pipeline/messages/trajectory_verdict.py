@@ -2,19 +2,10 @@
 
 from __future__ import annotations
 
-from er3a.pipeline.messages.language import N_
-from er3a.pipeline.messages.say import counted, joined, say, sentence, word
-from er3a.pipeline.stages.trajectory.model import PathCounts, PathVerdict
-
-VERDICTS: dict[PathVerdict, str] = {
-    "unreachable": N_("unreachable"),
-    "leaves limits": N_("leaves limits"),
-    "collides": N_("collides"),
-    "too fast": N_("too fast"),
-    "singular": N_("singular"),
-    "near-singular": N_("near-singular"),
-    "safe": N_("safe"),
-}
+from er3a.pipeline.messages.expectations import demonstrated, outcome_word
+from er3a.pipeline.messages.say import counted, joined, say, sentence
+from er3a.pipeline.stages.trajectory.model import PathCounts
+from er3a.planning.path_verdicts import PathVerdict
 
 
 @say.register
@@ -29,7 +20,7 @@ def _(found: PathCounts) -> str:
     }
     faults = []
     for verdict, names in unsafe.items():
-        parts = {"count": len(names), "word": verdict_word(verdict), "names": ", ".join(names)}
+        parts = {"count": len(names), "word": outcome_word(verdict), "names": ", ".join(names)}
         faults.append(sentence("trajectory.fault", "{count} {word} ({names})", **parts) if names else "")
     safe = counted(
         "trajectory.paths",
@@ -38,9 +29,5 @@ def _(found: PathCounts) -> str:
         found.paths,
         safe=found.safe,
     )
-    return sentence("trajectory.verdict", "{finding}.", finding=joined([safe, joined(faults, ", ")]))
-
-
-def verdict_word(verdict: PathVerdict) -> str:
-    """A path's verdict in words."""
-    return word("trajectory.path", VERDICTS, verdict)
+    told = [safe if found.paths else "", joined(faults, ", "), demonstrated(found.demonstrations)]
+    return sentence("trajectory.verdict", "{finding}.", finding=joined(told))

@@ -20,7 +20,8 @@ from er3a.pipeline.stages.validation.validation_findings import (
 )
 
 FIGURES = {
-    "checks_passed": N_("Checks passed"),
+    "independent_checks": N_("Independent checks passed"),
+    "consistency_checks": N_("Consistency checks passed"),
     "zero_pose_flange_error": N_("Zero pose: flange off by"),
     "farthest_axis": N_("Joint axes: farthest off"),
     "most_tilted_axis": N_("Joint axes: most tilted"),
@@ -31,6 +32,7 @@ FIGURES = {
 }
 GRADES = {
     "official": N_("the manufacturer's own document"),
+    "measured": N_("measured on the arm"),
     "cad": N_("measured on a CAD model that carries the model's name"),
     "export": N_("a URDF exported from CAD"),
     "claim": N_("an article's text"),
@@ -38,6 +40,7 @@ GRADES = {
 }
 GRADE_NAMES = {
     "official": N_("official"),
+    "measured": N_("measured"),
     "cad": N_("cad"),
     "export": N_("export"),
     "claim": N_("claim"),

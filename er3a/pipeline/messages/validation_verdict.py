@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import er3a.pipeline.messages.diagnosis  # noqa: F401
+from er3a.identifiability.reactions import CheckTally
+from er3a.pipeline.messages.evidence import PART_WORDS
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.references import quoted
 from er3a.pipeline.messages.say import counted, joined, say, sentence, word
@@ -14,8 +16,10 @@ from er3a.pipeline.stages.validation.validation_findings import (
     Confirmed,
     Contradicted,
     Contradiction,
+    LeftOpen,
     ModelUnsound,
     NothingToCompare,
+    PartFound,
     SelfCheck,
 )
 from er3a.robots.robot import Grade
@@ -33,7 +37,7 @@ SELF_CHECKS = {
     "position_error": N_("worst position error"),
     "orientation_error": N_("worst orientation error"),
 }
-GRADES = {"official": N_("official"), "cad": N_("CAD"), "export": N_("exported")}
+GRADES = {"official": N_("official"), "measured": N_("measured"), "cad": N_("CAD"), "export": N_("exported")}
 
 
 @say.register
@@ -43,22 +47,74 @@ def _(found: SelfCheck) -> str:
 
 @say.register
 def _(found: Confirmed) -> str:
-    grades = _grades(found.grades)
-    if found.contradiction is None:
-        text = sentence(
-            found.code,
-            "The model meets all {passed} checks against {grades} data.",
-            passed=found.passed,
-            grades=grades,
-        )
-        return joined([text, *map(say, found.claims)], " ")
     text = sentence(
         found.code,
-        "The model meets all {passed} checks against {grades} data that can be met.",
-        passed=found.passed,
-        grades=grades,
+        "Independent documents settle all that moves the tool: {passed} of {total} independent checks against {grades} "
+        "data pass.",
+        passed=found.counts.independent.passed,
+        total=found.counts.independent.total,
+        grades=_grades(found.grades),
     )
-    return joined([text, say(found.contradiction), *map(say, found.claims)], " ")
+    return joined([text, *_contradiction(found.contradiction), *map(say, found.claims)], " ")
+
+
+@say.register
+def _(found: LeftOpen) -> str:
+    own = found.counts.independent
+    parts = [say(part) for part in found.parts if part.status != "settled"]
+    told = [_what_speaks(own), sentence(found.code, "{parts}.", parts=joined(parts)) if parts else ""]
+    if found.off.moves:
+        told.append(
+            sentence(
+                found.code,
+                "For what is open or weak the tool could be off by up to {mm:.0f} mm and {deg:.0f} deg.",
+                mm=found.off.mm,
+                deg=found.off.deg,
+            )
+        )
+    if found.next_measurement:
+        told.append(sentence(found.code, "To settle most: {measurement}.", measurement=say(found.next_measurement)))
+    return joined([*told, *_contradiction(found.contradiction), *map(say, found.claims)], " ")
+
+
+def _what_speaks(own: CheckTally) -> str:
+    if not own.total:
+        return sentence("validation.left_open", "No independent document speaks of this table.")
+    return sentence(
+        "validation.left_open",
+        "Nothing independent contradicts the table ({passed} of {total} independent checks pass), but:",
+        passed=own.passed,
+        total=own.total,
+    )
+
+
+@say.register
+def _(found: PartFound) -> str:
+    part, settled = word("part", PART_WORDS, found.part), found.settled
+    told = sentence(
+        found.code,
+        "{part}: {settled} of {entries} entries settled",
+        part=part,
+        settled=settled,
+        entries=found.entries,
+    )
+    excluded = sentence(found.code, "excluded: {names}", names=shortened(found.contradicted))
+    left = sentence(found.code, "open: {names}", names=shortened(found.open))
+    parts = [told, excluded if found.contradicted else "", left if found.open else ""]
+    return joined(parts, ", ")
+
+
+def shortened(names: Sequence[str]) -> str:
+    """Names of entries, joints of one kind together: direction 1, 4, 5, 6."""
+    by_kind: dict[str, list[str]] = {}
+    for name in names:
+        kind = name.rstrip("0123456789")
+        by_kind.setdefault(kind, []).append(name[len(kind) :])
+    return joined((f"{kind} {', '.join(own)}" if own[0] else kind for kind, own in by_kind.items()), ", ")
+
+
+def _contradiction(found: Contradiction | None) -> list[str]:
+    return [say(found)] if found else []
 
 
 @say.register

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import traceback
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ from er3a.pipeline.results import (
     write_results,
 )
 from er3a.pipeline.stages.registry import STAGES
-from er3a.pipeline.stages.stage import Stage
+from er3a.pipeline.stages.stage import Compute, Stage, View
 from er3a.pipeline.study import Study
 
 FOR_A_PERSON = (InputError, ResultError, WriteError, MemoryError, OSError, ImportError)
@@ -45,7 +46,8 @@ def _computed(stage: Stage, study: Study, robot: str, extra: dict[str, Any]) -> 
     try:
         if finding := stage.applies(study.robot(robot)):
             return AbsentResults(Summary(Verdict("not_computed", finding), ()))
-        return stage.module("compute").compute(study, robot, **extra)
+        computing: Compute = partial(stage.module("compute").compute, **extra)
+        return computing(study, robot)
     except FOR_A_PERSON:
         raise
     except Er3aError as error:
@@ -64,6 +66,7 @@ def show(verb: str, name: str, study: Study, robot: str, folder: Path, output: P
     if isinstance(stored.results, AbsentResults):
         from er3a.pipeline.viewing.absent import record_absent, report_absent  # computing needs no pictures
 
-        {"record": record_absent, "report": report_absent}[verb](study, stored, output)
+        view: View = {"record": record_absent, "report": report_absent}[verb]
     else:
-        getattr(stage.module(verb), verb)(study, stored, output)
+        view = getattr(stage.module(verb), verb)
+    view(study, stored, output)

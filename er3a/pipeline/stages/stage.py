@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from er3a.files.yaml_file import StrictModel
 from er3a.findings import Finding
@@ -15,6 +15,7 @@ from er3a.pipeline.tables import table_types
 from er3a.robots.robot import Robot
 
 if TYPE_CHECKING:
+    from er3a.pipeline.results import Results, Stored
     from er3a.pipeline.study import Study
 
 
@@ -26,6 +27,21 @@ def applies_to_all(robot: Robot) -> Finding | None:
 def no_files(study: Study, robot: str) -> list[Path]:
     """For stages that read nothing but the robot's file."""
     return []
+
+
+class Compute(Protocol):
+    """What a stage's ``compute.compute`` is: a robot's results from the study.
+
+    A stage that is sampled takes the files of its ``parts`` besides.
+    """
+
+    def __call__(self, study: Study, name: str, /) -> Results[Any]: ...
+
+
+class View(Protocol):
+    """What a stage's ``record.record`` and ``report.report`` are: they write a view of stored results."""
+
+    def __call__(self, study: Study, stored: Stored[Any], output: Path, /) -> None: ...
 
 
 @dataclass(frozen=True)
@@ -43,6 +59,7 @@ class Stage:
     inputs : the files that a robot's results rest on besides its own file
     applies : why the stage can't be computed for a robot, a finding of one of ``absences``; None if it can
     views : ``record`` (a recording, with its preview) and ``report`` (a page), as far as the stage has them
+    rests_on : names of the stages whose verdict its pages say first
     sampled : whether ``compute`` gathers parts that jobs of their own have sampled
     """
 
@@ -54,6 +71,7 @@ class Stage:
     applies: Callable[[Robot], Finding | None] = applies_to_all
     absences: tuple[type[Finding], ...] = ()
     views: tuple[str, ...] = ("record", "report")
+    rests_on: tuple[str, ...] = ()
     sampled: bool = False
 
     def module(self, name: str) -> Any:

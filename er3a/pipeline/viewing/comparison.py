@@ -97,5 +97,5 @@ def border_mm(folder: Path) -> list[list[list[float]]]:
     if isinstance(results, AbsentResults):
         return []
     border: pd.DataFrame = results.border.frame()
-    arcs = border[border["point"] == BORDER_POINT].groupby("arc", sort=False)
+    arcs = border[(border["point"] == BORDER_POINT) & (border["view"] == "section")].groupby("arc", sort=False)
     return [(arc[["rho_m", "z_m"]].to_numpy() * 1000).round(2).tolist() for _, arc in arcs]

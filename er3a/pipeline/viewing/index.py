@@ -11,16 +11,18 @@ from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.results import Provenance, result_records
 from er3a.pipeline.stages.registry import STAGES, all_messages
 from er3a.pipeline.study import Study
+from er3a.pipeline.verdicts import read_verdicts
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.comparison import write_compare
 from er3a.pipeline.viewing.heads import stage_head
+from er3a.pipeline.viewing.junit import write_junit
 from er3a.pipeline.viewing.sweep_section import sweep_sections
 
 SHOWN_FIGURES = 3
 
 
 def write_index(study: Study, results: Path, folder: Path) -> None:
-    """Render ``index.html`` and ``compare.html`` into a folder, from the results of all robots and stages.
+    """Render ``index.html``, ``compare.html`` and ``junit.xml`` from the results of all robots and stages.
 
     The comparison offers the robots that are written in the study, not the variants that sweeps make of them.
     """
@@ -28,6 +30,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         {
             "robot": study.robot(name),
             "heads": [stage_head(results / name / stage.name, stage) for stage in STAGES.values()],
+            "expected": study.entry(name).expect,
         }
         for name in study.robots
     ]
@@ -46,3 +49,4 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         ),
     )
     write_compare(study, results, folder / "compare.html")
+    write_junit(read_verdicts(study, results), folder / "junit.xml")

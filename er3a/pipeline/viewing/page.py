@@ -7,6 +7,7 @@ import os
 import platform
 import shlex
 import subprocess
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -16,7 +17,9 @@ import jinja2
 from matplotlib.figure import Figure
 
 from er3a.files.kept_files import write_atomically
+from er3a.files.shipped import INSTALLED, ROOT, view_command
 from er3a.pipeline.messages import language
+from er3a.pipeline.messages.foundations import caveat
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import Provenance, Stored
@@ -24,9 +27,9 @@ from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import svg_data_uri
 from er3a.pipeline.viewing.numbers import fixed, number
+from er3a.version import __version__
 
 _HERE = Path(__file__).parent
-_ROOT = _HERE.parents[2]
 SHOWN_VERSIONS = ("numpy", "scipy", "numba", "open3d-cpu", "rerun-sdk", "matplotlib")
 VERDICT_WORDS = {
     "pass": N_("pass"),
@@ -81,7 +84,10 @@ class ShownFigure:
 
 @dataclass(frozen=True)
 class Head:
-    """What frames a stage's page: its verdict as a sentence, key figures, and where the numbers come from."""
+    """What frames a stage's page: its verdict as a sentence, key figures, and where the numbers come from.
+
+    ``caveats`` by the stage that it rests on: what to know first.
+    """
 
     robot: str
     stage: str
@@ -89,6 +95,7 @@ class Head:
     text: str
     figures: tuple[ShownFigure, ...]
     provenance: Provenance
+    caveats: Mapping[str, str]
 
 
 def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
@@ -110,7 +117,8 @@ def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
         )
         for figure in stored.results.summary.figures
     )
-    return Head(stored.robot, stage, verdict.status, say(verdict.finding), shown, stored.provenance)
+    caveats = {other: text for other, status in stored.rests_on.items() if (text := caveat(status))}
+    return Head(stored.robot, stage, verdict.status, say(verdict.finding), shown, stored.provenance, caveats)
 
 
 def render(
@@ -144,6 +152,7 @@ def render(
     )
     environment.install_gettext_translations(language.translations(), newstyle=False)  # type: ignore[attr-defined]
     environment.policies["ext.i18n.trimmed"] = True
+    environment.globals["view_command"] = view_command
     environment.filters |= {
         "number": number,
         "fixed": fixed,
@@ -185,7 +194,10 @@ def run_command(study: Study, page: str) -> str | None:
     """
     if study.file is None:
         return None
-    return shlex.join(["make", "run", f"STUDY={os.path.relpath(study.file)}", f"ARGS=reports/{page}"])
+    file = os.path.relpath(study.file)
+    if INSTALLED:
+        return shlex.join(["er3a", "run", "--study", file, f"reports/{page}"])
+    return shlex.join(["make", "run", f"STUDY={file}", f"ARGS=reports/{page}"])
 
 
 def _preview(picture: Path) -> str | None:
@@ -200,7 +212,7 @@ def status_word(status: str) -> str:
 
 
 def _versions() -> dict[str, str]:
-    found = {"python": platform.python_version(), "er3a": version("er3a")}
+    found = {"python": platform.python_version(), "er3a": __version__}
     for name in SHOWN_VERSIONS:
         try:
             found[name] = version(name)
@@ -213,14 +225,14 @@ def _commit() -> str | None:
     """Commit of the project's checkout, with ``+ changes`` if it is dirty; None outside a checkout."""
 
     def git(*words: str) -> str | None:
-        command = ["git", "-C", str(_ROOT), *words]
+        command = ["git", "-C", str(ROOT), *words]
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=False)
         except (OSError, subprocess.TimeoutExpired):
             return None
         return done.stdout.strip() if done.returncode == 0 else None
 
-    if git("rev-parse", "--show-toplevel") != str(_ROOT):
+    if git("rev-parse", "--show-toplevel") != str(ROOT):
         return None
     commit = git("rev-parse", "--short=12", "HEAD")
     return commit and commit + (" + changes" if git("status", "--porcelain", "--untracked-files=no") else "")

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from er3a.collision.scene import Plane, Scene
+from er3a.collision.scene import Box, Cylinder, Plane, Scene, Sphere
 from er3a.files.scene_file import load_scene
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.study import Study
@@ -34,15 +34,18 @@ def _solids(
 ) -> Iterator[tuple[str, Reals, rr.Boxes3D | rr.Cylinders3D | rr.Ellipsoids3D]]:
     """Name, place (4, 4) and shape of each solid; planes are squares of ``plane_size`` (m) nearest to the base (3,)."""
     style: dict[str, Any] = {"colors": [(*rgb(MUTED), 120)], "fill_mode": "transparentfillmajorwireframe"}
-    for box in scene.boxes:
-        yield box.name, box.T, rr.Boxes3D(sizes=[box.size], **style)
-    for cylinder in scene.cylinders:
-        yield cylinder.name, cylinder.T, rr.Cylinders3D(lengths=[cylinder.length], radii=[cylinder.radius], **style)
-    for sphere in scene.spheres:
-        yield sphere.name, sphere.T, rr.Ellipsoids3D(radii=[sphere.radius], **style)
-    for plane in scene.planes:
-        slab = rr.Boxes3D(sizes=[[plane_size, plane_size, _PLANE_THICKNESS]], **style)
-        yield plane.name, _below(plane, base), slab
+    for solid in scene.solids:
+        match solid:
+            case Box():
+                yield solid.name, solid.T, rr.Boxes3D(sizes=[solid.size], **style)
+            case Cylinder():
+                shape = rr.Cylinders3D(lengths=[solid.length], radii=[solid.radius], **style)
+                yield solid.name, solid.T, shape
+            case Sphere():
+                yield solid.name, solid.T, rr.Ellipsoids3D(radii=[solid.radius], **style)
+            case Plane():
+                slab = rr.Boxes3D(sizes=[[plane_size, plane_size, _PLANE_THICKNESS]], **style)
+                yield solid.name, _below(solid, base), slab
 
 
 def _below(plane: Plane, base: Reals) -> Reals:

@@ -103,22 +103,10 @@ class NoDampingSuffices:
     code: Literal["no_damping_suffices"] = "no_damping_suffices"
 
 
-NotPossible = (
-    NothingToAvoid
-    | NoSingularRegion
-    | BeginsOutOfReach
-    | EndsOutOfReach
-    | PartlyOutOfReach
-    | BeginsInRegion
-    | EndsInRegion
-    | BranchEnds
-    | NoOtherBranch
-    | NoShiftKeepsDistance
-    | NoTiltKeepsDistance
-    | BentPathSingular
-    | NoDampingSuffices
-    | NoTimeLaw
-)
+PathUnfit = NothingToAvoid | NoSingularRegion | BeginsOutOfReach | EndsOutOfReach | PartlyOutOfReach
+RegionUnfit = BeginsInRegion | EndsInRegion | BranchEnds | NoOtherBranch
+NoWay = NoShiftKeepsDistance | NoTiltKeepsDistance | BentPathSingular | NoDampingSuffices | NoTimeLaw
+NotPossible = PathUnfit | RegionUnfit | NoWay
 
 
 @dataclass(frozen=True)

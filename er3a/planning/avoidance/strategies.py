@@ -52,7 +52,7 @@ class StrategyCost:
     ----------
     done : share of the path that is done
     distance, angle : (N,), m and rad: how far the tool is from the path
-    speed_ratio, acceleration_ratio : greatest ratio of a joint's speed, or acceleration, to its limit
+    max_joint_speed_ratio, max_joint_acceleration_ratio : of a joint's speed, or acceleration, to its limit
     keeps_clear : whether the arm keeps its distance from the singular sets wherever the tool is on or beside the path
         (a joint move may pass them: joint moves are unaffected by singularities)
     """
@@ -61,8 +61,8 @@ class StrategyCost:
     done: float
     distance: Reals
     angle: Reals
-    speed_ratio: float
-    acceleration_ratio: float
+    max_joint_speed_ratio: float
+    max_joint_acceleration_ratio: float
     keeps_clear: bool
 
 

@@ -11,6 +11,7 @@ from er3a.files.target_file import load_targets
 from er3a.kinematics.round_trips import SAME_JOINTS_RAD, BatchRoundTrips, batch_round_trips
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
 from er3a.pipeline.stages.inverse.entry import InverseSettings
 from er3a.pipeline.stages.inverse.inverse_findings import (
     AllSolved,
@@ -72,18 +73,22 @@ def compute(study: Study, name: str) -> InverseResults:
 
 def _verdict(
     targets: Sequence[TargetResult], worst: tuple[float, float], trips: BatchRoundTrips | None, collisions: bool
-) -> Verdict[AllSolved | SomeUnsolved | NoneSolved | NotReproduced]:
+) -> Verdict[AllSolved | SomeUnsolved | NoneSolved | NotReproduced | ExpectationsUnmet]:
     position, orientation = worst
     lost = trips.poses - trips.own_found if trips else 0
     if lost or position > REPRODUCED_M or orientation > REPRODUCED_RAD:
         return Verdict("fail", NotReproduced(position * 1000, float(np.degrees(orientation)), lost))
-    unsolved = tuple(UnsolvedTarget(target.name, target.obstacle) for target in targets if target.obstacle)
-    count, solved = len(targets), len(targets) - len(unsolved)
+    if unmet := unmet_expectations(targets):
+        return Verdict("fail", unmet)
+    shown = demonstrations(targets, "reached")
+    asked = [target for target in targets if target.expect in (None, "reached")]
+    unsolved = tuple(UnsolvedTarget(target.name, target.obstacle) for target in asked if target.obstacle)
+    count, solved = len(asked), len(asked) - len(unsolved)
     if not unsolved:
-        return Verdict("pass", AllSolved(count, solved, unsolved, collisions))
+        return Verdict("pass", AllSolved(count, solved, unsolved, collisions, shown))
     if not solved:
-        return Verdict("fail", NoneSolved(count, solved, unsolved, collisions))
-    return Verdict("caution", SomeUnsolved(count, solved, unsolved, collisions))
+        return Verdict("fail", NoneSolved(count, solved, unsolved, collisions, shown))
+    return Verdict("caution", SomeUnsolved(count, solved, unsolved, collisions, shown))
 
 
 def _figures(

@@ -41,4 +41,5 @@ STAGE = Stage(
     question=N_("Which joint solutions reach a pose?"),
     settings={"inverse": InverseSettings},
     inputs=_inputs,
+    rests_on=("validation",),
 )

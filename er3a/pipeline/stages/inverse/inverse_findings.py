@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from er3a.pipeline.stages.expectations import Demonstration
+
 
 @dataclass(frozen=True)
 class NothingFound:
@@ -127,12 +129,16 @@ class NotReproduced:
 
 @dataclass(frozen=True)
 class AllSolved:
-    """Every target has an admissible solution; ``collisions``: a scene was given, so it is free of collisions too."""
+    """Every target has an admissible solution, but for those that are meant to have none (``demonstrations``).
+
+    ``collisions``: a scene was given, so the solutions are free of collisions too. Demonstrations are not counted.
+    """
 
     targets: int
     solved: int
     unsolved: tuple[UnsolvedTarget, ...]
     collisions: bool
+    demonstrations: tuple[Demonstration, ...]
     code: Literal["inverse.all_solved"] = "inverse.all_solved"
 
 
@@ -144,6 +150,7 @@ class SomeUnsolved:
     solved: int
     unsolved: tuple[UnsolvedTarget, ...]
     collisions: bool
+    demonstrations: tuple[Demonstration, ...]
     code: Literal["inverse.some_unsolved"] = "inverse.some_unsolved"
 
 
@@ -155,4 +162,5 @@ class NoneSolved:
     solved: int
     unsolved: tuple[UnsolvedTarget, ...]
     collisions: bool
+    demonstrations: tuple[Demonstration, ...]
     code: Literal["inverse.none_solved"] = "inverse.none_solved"

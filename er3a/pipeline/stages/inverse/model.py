@@ -8,8 +8,10 @@ from typing import Literal
 import numpy as np
 
 from er3a.kinematics.solutions import Label, Method, Unsolved
+from er3a.kinematics.targets import TargetOutcome
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.stages.expectations import ExpectationsUnmet
 from er3a.pipeline.stages.inverse.inverse_findings import (
     Advice,
     AllSolved,
@@ -58,6 +60,7 @@ class TargetResult:
     rows_within_limits : solutions within the limits, turns included
     chosen_deg, chosen_branch : the solution taken; None if there is none
     reason : why it was taken, or why none was; obstacle : the latter in short, None where one was taken
+    outcome, expect : what it came to, and what its file says that it should
     unsolved : why branches, or the pose, have no solution
     neighbours : only for targets without a solution within the limits
     """
@@ -76,6 +79,8 @@ class TargetResult:
     chosen_branch: int | None
     reason: WhyFirst | WhyNone
     obstacle: Obstacle | None
+    outcome: TargetOutcome
+    expect: TargetOutcome | None
     unsolved: tuple[Unsolved, ...]
     method: Method
     families: tuple[SelfMotion, ...]
@@ -142,7 +147,7 @@ class InverseSummary(Summary):
     round_trips : None for arms without a closed form
     """
 
-    verdict: Verdict[AllSolved | SomeUnsolved | NoneSolved | NotReproduced]
+    verdict: Verdict[AllSolved | SomeUnsolved | NoneSolved | NotReproduced | ExpectationsUnmet]
     mix: dict[RuleName, float]
     scene: str | None
     targets: tuple[TargetResult, ...]

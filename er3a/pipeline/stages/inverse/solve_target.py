@@ -17,7 +17,7 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.neighbours import neighbours
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
 from er3a.kinematics.solutions import ClosedForm, Solutions
-from er3a.kinematics.targets import Target
+from er3a.kinematics.targets import Target, TargetOutcome
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.stages.inverse.inverse_findings import (
@@ -92,6 +92,8 @@ def solve_target(robot: Robot, target: Target, random: np.random.Generator, scen
         chosen_branch=None if chosen is None else int(rows.branch[chosen]),
         reason=choice.reason,
         obstacle=obstacle,
+        outcome=_outcome(obstacle),
+        expect=target.expect,
         unsolved=solutions.unsolved,
         method=solutions.method,
         families=tuple(map(_self_motion, solutions.families)),
@@ -182,6 +184,18 @@ def _obstacle(robot: Robot, target: Target, solutions: Solutions, branches: int)
     if fault[least] == ORIENTATION:
         return TiltMissing(float(np.degrees(gap[least])))
     return ReachMissing(float(gap[least] * 1000))
+
+
+def _outcome(obstacle: Obstacle | None) -> TargetOutcome:
+    match obstacle:
+        case None:
+            return "reached"
+        case BranchesLeaveLimits():
+            return "leaves limits"
+        case BranchesCollide():
+            return "collides"
+        case _:
+            return "unreachable"
 
 
 def _neighbours(robot: Robot, target: Target, random: np.random.Generator) -> NeighbourPoses:

@@ -176,9 +176,9 @@ def _motion(cost: StrategyCost, clearance_mm: float | None) -> StrategyMotion:
         duration_s=cost.motion.duration,
         keeps_clear=cost.keeps_clear,
         max_joint_speed_deg_s=_greatest_deg(cost.motion.velocity),
-        max_joint_speed_ratio=cost.speed_ratio,
+        max_joint_speed_ratio=cost.max_joint_speed_ratio,
         max_joint_acceleration_deg_s2=_greatest_deg(cost.motion.acceleration),
-        max_joint_acceleration_ratio=cost.acceleration_ratio,
+        max_joint_acceleration_ratio=cost.max_joint_acceleration_ratio,
         clearance_mm=clearance_mm,
     )
 

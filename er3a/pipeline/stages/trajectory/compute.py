@@ -13,6 +13,7 @@ from er3a.kinematics.near_singular import NearSingular
 from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, Status, Verdict
+from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
 from er3a.pipeline.stages.trajectory.avoidance_results import AvoidanceTask, speed_ratio
 from er3a.pipeline.stages.trajectory.collisions import Surroundings, clearance_rows, measured
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
@@ -26,7 +27,6 @@ from er3a.pipeline.stages.trajectory.model import (
     NoneSafe,
     PathChecks,
     PathSummary,
-    PathVerdict,
     Samples,
     SomeUnsafe,
     TrajectoryResults,
@@ -36,6 +36,7 @@ from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
 from er3a.pipeline.stages.trajectory.path_summary import path_summary
 from er3a.pipeline.study import Study
 from er3a.planning.commands import CommandSource
+from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.timing import JointLimits, joint_limits
 from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
@@ -76,14 +77,13 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     own = checks.take(checks.sample)
     length = characteristic_length(robot)
     assumed = tuple(bool(value) for value in ~np.isfinite(robot.speed))
+    used = LimitsUsed(_degrees(limits.speed), assumed, _degrees(limits.acceleration), settings.acceleration_time_s)
     summary = TrajectorySummary(
         verdict=_verdict(paths),
-        figures=_figures(paths, length, surroundings is not None, any(assumed)),
+        figures=_figures(paths, length, surroundings is not None, used),
         characteristic_length_m=length,
         near=thresholds,
-        joint_limits=LimitsUsed(
-            _degrees(limits.speed), assumed, _degrees(limits.acceleration), settings.acceleration_time_s
-        ),
+        joint_limits=used,
         scene=scene.title if scene else None,
         clearance_measured=surroundings is not None,
         penetration_tolerance_mm=settings.penetration_tolerance_mm,
@@ -127,15 +127,19 @@ def _checks(robot: Robot, motion: Motion, found: Judgement, near: NearSingular, 
     )
 
 
-def _verdict(paths: list[PathSummary]) -> Verdict[AllSafe | SomeUnsafe | NoneSafe]:
+def _verdict(paths: list[PathSummary]) -> Verdict[AllSafe | SomeUnsafe | NoneSafe | ExpectationsUnmet]:
+    if unmet := unmet_expectations(paths):
+        return Verdict("fail", unmet)
+    asked = [path for path in paths if path.expect in (None, "safe")]
+
     def named(verdict: PathVerdict) -> tuple[str, ...]:
-        return tuple(path.name for path in paths if path.verdict == verdict)
+        return tuple(path.name for path in asked if path.verdict == verdict)
 
     safe = len(named("safe"))
-    finding = AllSafe if safe == len(paths) else SomeUnsafe if safe else NoneSafe
-    status: Status = "pass" if safe == len(paths) else "caution" if safe else "fail"
+    finding = AllSafe if safe == len(asked) else SomeUnsafe if safe else NoneSafe
+    status: Status = "pass" if safe == len(asked) else "caution" if safe else "fail"
     counts = finding(
-        paths=len(paths),
+        paths=len(asked),
         safe=safe,
         unreachable=named("unreachable"),
         leaves_limits=named("leaves limits"),
@@ -143,16 +147,17 @@ def _verdict(paths: list[PathSummary]) -> Verdict[AllSafe | SomeUnsafe | NoneSaf
         too_fast=named("too fast"),
         singular=named("singular"),
         near_singular=named("near-singular"),
+        demonstrations=demonstrations(paths, "safe"),
     )
     return Verdict(status, counts)
 
 
-def _figures(paths: list[PathSummary], length: float, measured: bool, assumed: bool) -> tuple[Figure, ...]:
+def _figures(paths: list[PathSummary], length: float, measured: bool, limits: LimitsUsed) -> tuple[Figure, ...]:
     events = [event for path in paths for event in path.singularities]
     bounded = [path for path in paths if path.max_joint_speed_deg_s]
-    ratios = [path.max_joint_speed_ratio for path in bounded if path.max_joint_speed_ratio is not None]
     agreement = max((path.velocity_check_deg_s * 1e6 for path in bounded), default=None)
-    fastest = max((max(path.max_joint_speed_deg_s or ()) for path in bounded), default=None)
+    speeds = [speed for path in bounded for speed in zip(path.max_joint_speed_deg_s or (), limits.speed_deg_s)]
+    speed, limit = max(speeds, key=lambda pair: pair[0] / pair[1], default=(None, None))
     colliding = sum(bool(path.collisions) for path in paths)
     return (
         Figure("paths", len(paths), ""),
@@ -160,8 +165,12 @@ def _figures(paths: list[PathSummary], length: float, measured: bool, assumed: b
         Figure("singular_poses", sum(event.crossing for event in events), ""),
         Figure("near_passes", sum(not event.crossing for event in events), ""),
         Figure("colliding", colliding if measured else None, ""),
-        Figure("max_joint_speed", fastest, "deg/s"),
-        Figure("assumed_speed_ratio" if assumed else "speed_ratio", max(ratios, default=None), ""),
+        Figure("max_joint_speed", speed, "deg/s"),
+        Figure(
+            "assumed_speed_ratio" if any(limits.speed_assumed) else "speed_ratio",
+            speed / limit if speed is not None and limit is not None else None,
+            "",
+        ),
         Figure("velocity_check", agreement, "µdeg/s"),
         Figure("characteristic_length", length * 1000, "mm"),
     )

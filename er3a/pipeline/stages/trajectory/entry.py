@@ -57,4 +57,5 @@ STAGE = Stage(
     question=N_("Do the paths run into singularities?"),
     settings={"trajectory": TrajectorySettings},
     inputs=_inputs,
+    rests_on=("validation",),
 )

@@ -8,7 +8,6 @@ import numpy as np
 
 from er3a.kinematics.near_singular import NearSingular
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.stages.trajectory.model import PathVerdict
 from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning.intervals import (
     AboveLimit,
@@ -20,6 +19,7 @@ from er3a.planning.intervals import (
     too_fast,
     unreachable,
 )
+from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.singular_events import SingularEvent, singular_events
 from er3a.robots.robot import Robot
 

@@ -6,7 +6,7 @@ Times count from a path's start, ways along the tool point's path. Angles are th
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Generic, Literal, TypeVar, get_args
+from typing import Generic, Literal, TypeVar
 
 from er3a.collision.pairs import Pair, PairOverlaps
 from er3a.findings import Finding
@@ -14,25 +14,29 @@ from er3a.kinematics.configuration import BranchLabel
 from er3a.kinematics.singularity import SingularityType
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.planning.avoidance.strategies import NotUsable
 from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.intervals import AboveLimit, BelowLimit, PathOutOfReach, TooFast
+from er3a.planning.path_verdicts import PathVerdict
 
 PathKind = Literal["joint", "joint_sequence", "line", "arc", "sequence", "table"]
-PathVerdict = Literal["unreachable", "leaves limits", "collides", "too fast", "singular", "near-singular", "safe"]
-PATH_VERDICTS: tuple[PathVerdict, ...] = get_args(PathVerdict)
-"""The gravest first."""
-
 FASTEST: Literal["fastest"] = "fastest"
 """In the table of strategies: the path itself, as fast as the joints can."""
+
+SAME_SPEED = 1e-9
+"""Speeds whose relative difference is less are equal but for rounding."""
 
 CauseT = TypeVar("CauseT", bound=Finding)
 
 
 @dataclass(frozen=True)
 class PathCounts:
-    """How many paths there are, how many are safe, and the names of the others by their verdict."""
+    """How many paths there are, how many are safe, and the names of the others by their verdict.
+
+    ``demonstrations``, paths that fail as they are meant to, count for none of these.
+    """
 
     paths: int
     safe: int
@@ -42,6 +46,7 @@ class PathCounts:
     too_fast: tuple[str, ...]
     singular: tuple[str, ...]
     near_singular: tuple[str, ...]
+    demonstrations: tuple[Demonstration, ...]
 
 
 @dataclass(frozen=True)
@@ -199,6 +204,7 @@ class PathSummary:
 
     Attributes
     ----------
+    expect : the verdict that its file expects
     in_joint_space : whether it is a move of the joints, which singular poses do no harm
     branches : of the closed form, in the order in which they serve
     start_turn_deg : by which the arm turns at rest before it starts; None in joint space
@@ -214,6 +220,7 @@ class PathSummary:
     title: str
     kind: PathKind
     verdict: PathVerdict
+    expect: PathVerdict | None
     in_joint_space: bool
     duration_s: float
     samples: int
@@ -241,6 +248,19 @@ class PathSummary:
     strategy: StrategyName | None
 
     @property
+    def fastest_joint(self) -> int | None:
+        """The joint (from 0) that turns fastest, of equals the first; None where speeds have no bound."""
+        if not self.max_joint_speed_deg_s:
+            return None
+        nearly = max(self.max_joint_speed_deg_s) * (1 - SAME_SPEED)
+        return next(joint for joint, speed in enumerate(self.max_joint_speed_deg_s) if speed >= nearly)
+
+    @property
+    def outcome(self) -> PathVerdict:
+        """What it came to."""
+        return self.verdict
+
+    @property
     def chosen(self) -> TriedStrategy | None:
         """The strategy to take."""
         return next((tried for tried in self.avoidance if tried.name == self.strategy), None)
@@ -257,7 +277,7 @@ class TrajectorySummary(Summary):
     penetration_tolerance_mm : no overlap deeper than this goes unnoticed between points
     """
 
-    verdict: Verdict[AllSafe | SomeUnsafe | NoneSafe]
+    verdict: Verdict[AllSafe | SomeUnsafe | NoneSafe | ExpectationsUnmet]
     characteristic_length_m: float
     near: NearThresholds
     joint_limits: LimitsUsed

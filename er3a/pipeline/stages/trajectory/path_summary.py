@@ -13,17 +13,16 @@ from er3a.pipeline.stages.trajectory.avoidance_results import Avoided
 from er3a.pipeline.stages.trajectory.collisions import collisions, least_clearance
 from er3a.pipeline.stages.trajectory.judgement import Judgement
 from er3a.pipeline.stages.trajectory.model import (
-    PATH_VERDICTS,
     CauseT,
     HalfTurn,
     Jump,
     PathSummary,
-    PathVerdict,
     Singularity,
     Stretch,
 )
 from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning.intervals import Interval
+from er3a.planning.path_verdicts import PATH_VERDICTS, PathVerdict
 from er3a.planning.singular_events import SingularEvent
 from er3a.planning.timing import JointLimits
 from er3a.robots.robot import Robot
@@ -49,6 +48,7 @@ def path_summary(
         title=entry.title,
         kind=entry.kind,
         verdict=min(verdicts, key=PATH_VERDICTS.index),
+        expect=entry.expect,
         in_joint_space=followed is None,
         duration_s=float(motion.built.duration),
         samples=entry.samples,

@@ -12,15 +12,14 @@ from matplotlib import colormaps
 from matplotlib.colors import LogNorm
 
 from er3a.numerics.arrays import Flags, Reals
+from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.trajectory import advice, path_text, type_word
-from er3a.pipeline.messages.trajectory_verdict import verdict_word
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.trajectory.model import (
     MotionRows,
     PathChecks,
     PathSummary,
-    PathVerdict,
     TrajectoryResults,
     TrajectorySummary,
 )
@@ -30,6 +29,7 @@ from er3a.pipeline.viewing.palette import HIGHLIGHT, JOINT_NAMES, JOINTS, MODEL,
 from er3a.pipeline.viewing.recording import ARM, TIMELINE, escaped, log_note, note_view, recording, send_series
 from er3a.pipeline.viewing.scene_entities import log_scene
 from er3a.pipeline.viewing.skeleton import skeleton
+from er3a.planning.path_verdicts import PathVerdict
 from er3a.robots.robot import Robot
 
 STAGE = "trajectory"
@@ -145,7 +145,7 @@ def _frames(rows: MotionRows) -> Flags:
 
 def _announce(stream: rr.RecordingStream, robot: Robot, path: PathSummary, rows: PathChecks, start: float) -> None:
     """What is known of a path: its line, its singular poses with ghosts of the arm, its verdict and events."""
-    verdict = verdict_word(path.verdict)
+    verdict = outcome_word(path.verdict)
     stream.set_time(TIMELINE, duration=start)
     sentence = f"## {path.name}\n**{verdict}**: {path_text(path)}.\n\n{escaped(path.title)}."
     stream.log(f"{STAGE}/now", rr.TextDocument(sentence, media_type=rr.MediaType.MARKDOWN))
@@ -241,7 +241,7 @@ def _events(stream: rr.RecordingStream, path: PathSummary, start: float) -> None
 def _note(robot: Robot, summary: TrajectorySummary) -> str:
     rows = []
     for path, start, repaired in _timetable(summary):
-        name, verdict = (f"{path.name}, repaired", "–") if repaired else (path.name, verdict_word(path.verdict))
+        name, verdict = (f"{path.name}, repaired", "–") if repaired else (path.name, outcome_word(path.verdict))
         rows.append(f"| {start:.0f} s | {name} | {verdict} |")
     return "\n".join(
         [

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import say
@@ -19,7 +20,6 @@ from er3a.pipeline.messages.trajectory import (
     strategy_word,
     type_word,
 )
-from er3a.pipeline.messages.trajectory_verdict import verdict_word
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.trajectory.clearance_figures import clearance_section
 from er3a.pipeline.stages.trajectory.model import (
@@ -27,7 +27,6 @@ from er3a.pipeline.stages.trajectory.model import (
     NearThresholds,
     PathChecks,
     PathSummary,
-    PathVerdict,
     Singularity,
     StrategyMotion,
     TrajectoryResults,
@@ -37,6 +36,7 @@ from er3a.pipeline.stages.trajectory.path_figure_3d import turning_figure
 from er3a.pipeline.stages.trajectory.path_figures import PathFigure
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import fixed, head_of, number, render, run_command
+from er3a.planning.path_verdicts import PathVerdict
 from er3a.robots.robot import Robot
 
 DRAWN = 250
@@ -107,7 +107,7 @@ def _section(path: PathSummary, rows: PathChecks, figure: PathDrawing) -> PathSe
     return PathSection(
         path=path,
         status=STATUS[path.verdict],
-        verdict=verdict_word(path.verdict),
+        verdict=outcome_word(path.verdict),
         kind=kind_word(path.kind),
         text=path_text(path),
         advice=advice(path),
@@ -217,8 +217,8 @@ def _small(value: float) -> str:
 def _conclusion(path: PathSummary, rows: PathChecks) -> str:
     """What the curves show, in one or two sentences."""
     condition, parts = rows.condition_number, []
-    if path.max_joint_speed_deg_s:
-        joint = int(np.argmax(path.max_joint_speed_deg_s))
+    joint = path.fastest_joint
+    if path.max_joint_speed_deg_s and joint is not None:
         speed = number(path.max_joint_speed_deg_s[joint], 3)
         parts.append(tr("J{joint} is the fastest joint, with {speed} deg/s.", joint=joint + 1, speed=speed))
     elif rows.reachable.any():
@@ -234,9 +234,9 @@ def _conclusion(path: PathSummary, rows: PathChecks) -> str:
 
 
 def _speed(path: PathSummary) -> str:
-    if not path.max_joint_speed_deg_s:
+    joint = path.fastest_joint
+    if not path.max_joint_speed_deg_s or joint is None:
         return "–" if not path.joint_speed_bounded and path.verdict == "unreachable" else tr("unbounded")
-    joint = int(np.argmax(path.max_joint_speed_deg_s))
     return f"{number(path.max_joint_speed_deg_s[joint], 3)} (J{joint + 1})"
 
 

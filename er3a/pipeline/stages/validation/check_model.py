@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Literal, get_args
 
+from er3a.identifiability.reactions import CheckKind
 from er3a.pipeline.stages.validation.validation_findings import (
     CheckSubject,
     ModelGroup,
@@ -42,6 +43,7 @@ class ModelCheck(_Compared):
     group: ModelGroup
     status: Literal["pass", "fail"]
     note: NearSingularLeftOut | None = None
+    kind: None = None
     reference_set: None = None
     source: None = None
     grade: None = None
@@ -51,7 +53,11 @@ class ModelCheck(_Compared):
 @dataclass(frozen=True)
 class ReferenceCheck(_Compared):
     """A check against a reference; ``conflict`` is one that the model misses while meeting another that contradicts
-    it."""
+    it.
+
+    ``kind`` is what it rests on; ``independent_of`` names the entries that it reacts to and whose document is another,
+    with nothing in common.
+    """
 
     subject: ReferenceSubject
     group: str
@@ -59,6 +65,8 @@ class ReferenceCheck(_Compared):
     reference_set: str
     source: str
     grade: Grade
+    kind: CheckKind
+    independent_of: tuple[str, ...]
     note: None = None
 
     @property
@@ -83,6 +91,7 @@ class Unjudged:
     expected: None = None
     difference: None = None
     tolerance: None = None
+    kind: None = None
 
     @property
     def is_authoritative(self) -> bool:

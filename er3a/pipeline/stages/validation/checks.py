@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
 
+from er3a.identifiability.reactions import CheckBasis
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.validation.check_model import Check, Conflict, ModelCheck, ReferenceCheck, Statement, Unjudged
 from er3a.pipeline.stages.validation.validation_findings import (
@@ -41,9 +43,14 @@ def against_itself(
     return ModelCheck(measured, 0.0, measured, tolerance, unit, SelfCheck(quantity), group, status, note)
 
 
-def checks_of_set(references: ReferenceSet, values: Reals) -> tuple[list[Check], list[Conflict]]:
-    """Judge a model's values (n,) of the set's checkable references, and list what the set says nothing about."""
-    stated = _Stated(references.name, references.checkable, values)
+def checks_of_set(
+    references: ReferenceSet, values: Reals, bases: Sequence[CheckBasis]
+) -> tuple[list[Check], list[Conflict]]:
+    """Judge a model's values (n,) of the set's checkable references, and list what the set says nothing about.
+
+    ``bases`` (n,): what each of these checks rests on.
+    """
+    stated = _Stated(references.name, references.checkable, values, bases)
     checks = [stated.check(i) for i in range(len(values))]
     return [*checks, *_gaps(references)], stated.conflicts()
 
@@ -57,8 +64,8 @@ class _Stated:
     pairs : references that no model can meet both of
     """
 
-    def __init__(self, set_name: str, references: tuple[Reference, ...], values: Reals):
-        self.set_name, self.references, self.values = set_name, references, values
+    def __init__(self, set_name: str, references: tuple[Reference, ...], values: Reals, bases: Sequence[CheckBasis]):
+        self.set_name, self.references, self.values, self.bases = set_name, references, values, bases
         self.expected, self.tolerance = expected_of(references)
         self.met = np.abs(values - self.expected) <= self.tolerance + ROUNDING
         self.pairs = conflicts(references)
@@ -80,6 +87,8 @@ class _Stated:
             reference_set=self.set_name,
             source=reference.source,
             grade=reference.grade,
+            kind=self.bases[i].kind,
+            independent_of=self.bases[i].independent_of,
         )
 
     def conflicts(self) -> list[Conflict]:
@@ -128,10 +137,11 @@ def _without_value(set_name: str, reference: Reference, note: Note) -> Unjudged:
 def _gaps(references: ReferenceSet) -> list[Unjudged]:
     """What the set says nothing about."""
     name, note = references.name, SetHasNoData(references.name)
+    stated = {reference.quantity for reference in references.checkable}
     gaps = [
         _without_value(name, reference, SourceGivesNone())
         for reference in references.references
-        if reference.expected is None
+        if reference.expected is None and reference.quantity not in stated
     ]
     present = {reference.group for reference in references.references}
     gaps += [

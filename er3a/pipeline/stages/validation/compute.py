@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from er3a.files.reference_sets import load_references
+from er3a.identifiability.evidence import evidence_of
+from er3a.identifiability.proposals import proposals_of
+from er3a.identifiability.reactions import bases_of
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.pipeline.stages.validation.check_model import Check, Conflict, Unjudged
 from er3a.pipeline.stages.validation.checks import checks_of_set
@@ -10,17 +15,26 @@ from er3a.pipeline.stages.validation.corrections import calibrate_from_sets
 from er3a.pipeline.stages.validation.diagnoses import diagnose_sets
 from er3a.pipeline.stages.validation.entry import ValidationSettings
 from er3a.pipeline.stages.validation.geometry_tables import axes_table, key_poses_table, section_table
-from er3a.pipeline.stages.validation.model import Checks, Circles, TableFacts, ValidationResults, ValidationSummary
+from er3a.pipeline.stages.validation.model import (
+    Checks,
+    Circles,
+    TableEvidence,
+    TableFacts,
+    ValidationResults,
+    ValidationSummary,
+)
+from er3a.pipeline.stages.validation.parts_found import parts_found
 from er3a.pipeline.stages.validation.self_checks import round_trip_checks, table_checks
 from er3a.pipeline.stages.validation.subject import model_of
 from er3a.pipeline.stages.validation.validation_findings import InNoSet
-from er3a.pipeline.stages.validation.verdict import SHOWN_DECIMALS, key_figures, set_summaries, verdict_of
+from er3a.pipeline.stages.validation.verdict import SHOWN_DECIMALS, counts_of, key_figures, set_summaries, verdict_of
 from er3a.pipeline.study import Study
 from er3a.references.circle_points import CirclePoints, circle_points
+from er3a.references.documents import Documents
 from er3a.references.predict import read, state_of
 from er3a.references.quantities import MM, ZERO_POSE, AxisDistance, Extreme, Quantity
 from er3a.references.reach import search
-from er3a.references.reference import quantities_of
+from er3a.references.reference import ReferenceSet, quantities_of
 from er3a.references.subjects import Reach
 from er3a.robots.robot import Robot
 
@@ -52,7 +66,8 @@ def compute(study: Study, name: str) -> ValidationResults:
     for references in sets:
         quantities = quantities_of(references.checkable)
         state = state_of(robot, quantities, extremes=values, axes=circles.axes)
-        judged, contradictions = checks_of_set(references, read(quantities, state))
+        bases = bases_of(robot, references.checkable, references.documents)
+        judged, contradictions = checks_of_set(references, read(quantities, state), bases)
         checks += judged
         conflicts += contradictions
     checks += _without_reference(values, checks)
@@ -65,8 +80,10 @@ def compute(study: Study, name: str) -> ValidationResults:
     found = {each.reference_set: each for each in diagnoses}
     summaries = set_summaries(sets, checks, poses, found)
     reach = {"wrist_centre_reach": values[WRIST_REACH], "flange_reach": values[FLANGE_REACH]}
+    evidence = evidence_of_table(robot, sets)
+    counts = counts_of(checks)
     summary = ValidationSummary(
-        verdict=verdict_of(checks, conflicts, summaries, found),
+        verdict=verdict_of(checks, conflicts, summaries, found, evidence),
         figures=key_figures(checks, axes, summaries, reach, trips),
         checks=tuple(checks),
         conflicts=tuple(conflicts),
@@ -77,6 +94,8 @@ def compute(study: Study, name: str) -> ValidationResults:
         table=TableFacts(robot.convention, closed_form_missing(robot)),
         round_trips=trips,
         section_origin_mm=_section_origin_mm(robot),
+        counts=counts,
+        evidence=evidence,
     )
     return ValidationResults(
         summary=summary,
@@ -86,6 +105,23 @@ def compute(study: Study, name: str) -> ValidationResults:
         section=section_table(robot, extremes),
         residuals=residuals,
         corrections=corrections,
+    )
+
+
+def evidence_of_table(robot: Robot, sets: Sequence[ReferenceSet]) -> TableEvidence | None:
+    """What independent documents settle of the table; None where no reference states a value."""
+    references = [reference for own in sets for reference in own.references]
+    if not any(reference.expected is not None for reference in references):
+        return None
+    documents = Documents({name: each for own in sets for name, each in own.documents.by_name.items()})
+    found = evidence_of(robot, references, documents)
+    return TableEvidence(
+        tolerance=found.tolerance,
+        entries=found.entries,
+        combinations=found.combinations,
+        parts=parts_found(found),
+        proposals=tuple(proposals_of(found).values()),
+        table_meets=found.table_meets,
     )
 
 

@@ -42,6 +42,7 @@ def _ranked(hypothesis: Hypothesis) -> RankedHypothesis:
         residual_after=hypothesis.residual_after,
         unit=hypothesis.unit,
         explains=hypothesis.explains,
+        half_widths=hypothesis.half_widths,
         indistinguishable_from=hypothesis.indistinguishable_from,
         to_decide=hypothesis.to_decide,
         score=hypothesis.score,

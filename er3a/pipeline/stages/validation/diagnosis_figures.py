@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from er3a.diagnosis.conclusions import MainFault, MostLikelyFault
+from er3a.diagnosis.conclusions import MainFault, MostLikelyFault, TooSmallToTell
 from er3a.pipeline.messages.calibration import level
 from er3a.pipeline.messages.diagnosis import both
 from er3a.pipeline.messages.language import tr
@@ -37,7 +37,6 @@ class DiagnosisStory:
 
     reference_set: str
     text: str
-    alike: list[str]
     to_decide: str
     others_title: str
     others: list[list[str]]
@@ -71,12 +70,11 @@ def correction_stories(summary: ValidationSummary, corrections: Corrections) -> 
 
 
 def _diagnosis_story(diagnosis: SetDiagnosis, residuals: Residuals) -> DiagnosisStory:
-    named = isinstance(diagnosis.conclusion, MostLikelyFault | MainFault)
+    named = isinstance(diagnosis.conclusion, MostLikelyFault | MainFault | TooSmallToTell)
     best = diagnosis.hypotheses[0] if named else None
     return DiagnosisStory(
         reference_set=diagnosis.reference_set,
         text=typographic(say(diagnosis.conclusion)),
-        alike=[typographic(both(faults)) for faults in best.indistinguishable_from] if best else [],
         to_decide=typographic(say(best.to_decide)) if best and best.to_decide else "",
         others_title=tr("Next-best hypotheses") if named else tr("The best hypotheses, none of which will do"),
         others=[_hypothesis_row(each) for each in diagnosis.hypotheses[1 if named else 0 : SHOWN_HYPOTHESES]],
@@ -158,8 +156,8 @@ def _residual_picture(rows: Residuals, diagnosis: SetDiagnosis) -> Picture | Non
         return None
     shown = missed.take(np.arange(len(missed)) < SHOWN_RESIDUALS)
     still = int((missed.after > missed.uncertainty).sum())
-    if isinstance(diagnosis.conclusion, MostLikelyFault):
-        caption = tr("Correcting the named fault takes every residual below the uncertainty of its reference.")
+    if isinstance(diagnosis.conclusion, MostLikelyFault | TooSmallToTell):
+        caption = tr("With the best hypothesis corrected, every number is within what its reference leaves open.")
     elif diagnosis.hypotheses:
         caption = tr("Even the best hypothesis leaves {still} of {all} references missed.", still=still, all=len(rows))
     else:
@@ -181,4 +179,4 @@ def _hypothesis_row(hypothesis: RankedHypothesis) -> list[str]:
             more=len(alike),
         )
     numbers = [fixed(value, 1) for value in (hypothesis.residual_before, hypothesis.residual_after)]
-    return [typographic(words), *numbers, hypothesis.unit]
+    return [typographic(words), *numbers, hypothesis.unit, fixed(hypothesis.score, 1)]

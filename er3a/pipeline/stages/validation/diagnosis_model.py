@@ -26,6 +26,7 @@ class RankedHypothesis:
     residual_after: float
     unit: Unit
     explains: bool
+    half_widths: float
     indistinguishable_from: tuple[Faults, ...]
     to_decide: NextMeasurement | None
     score: float

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
-from er3a.files.robot_library import REFERENCES
+from er3a.files.reference_sets import reference_folder
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.stages.stage import Stage
@@ -24,7 +24,7 @@ class ValidationSettings(StrictModel):
 
 
 def _inputs(study: Study, robot: str) -> list[Path]:
-    return [file for name in study.references(robot) for file in sorted((REFERENCES / name).glob("*.csv"))]
+    return [file for name in study.references(robot) for file in sorted(reference_folder(name).glob("*.csv"))]
 
 
 STAGE = Stage(

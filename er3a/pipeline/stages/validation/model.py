@@ -8,6 +8,9 @@ from typing import Self
 
 import numpy as np
 
+from er3a.identifiability.entry_evidence import EntryEvidence, Tolerance
+from er3a.identifiability.proposals import Proposal
+from er3a.identifiability.reactions import CheckCounts
 from er3a.kinematics.round_trips import SlotRoundTrips
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -18,6 +21,7 @@ from er3a.pipeline.stages.validation.validation_findings import (
     CheckSubject,
     KeyPose,
     Note,
+    PartFound,
     Validated,
 )
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
@@ -88,9 +92,35 @@ class RoundTripErrors(SlotRoundTrips):
 
 
 @dataclass(frozen=True)
+class TableEvidence:
+    """What independent documents settle of the table, entry by entry (``er3a.identifiability``).
+
+    Attributes
+    ----------
+    tolerance : how far a settled entry may leave the tool off
+    combinations : what of entries that are gauge is determined together
+    proposals : the cheapest measurement for each entry that isn't settled, as far as one settles it
+    table_meets : whether the table as it is meets all independent references
+    """
+
+    tolerance: Tolerance
+    entries: tuple[EntryEvidence, ...]
+    combinations: tuple[EntryEvidence, ...]
+    parts: tuple[PartFound, ...]
+    proposals: tuple[Proposal, ...]
+    table_meets: bool
+
+
+@dataclass(frozen=True)
 class ValidationSummary(Summary):
-    """The stage's summary; ``section_origin_mm``: where the workspace drawing has its origin, x of axis 1 and z of axis
-    2 in the base frame."""
+    """The stage's summary.
+
+    Attributes
+    ----------
+    section_origin_mm : where the workspace drawing has its origin, x of axis 1 and z of axis 2 in the base frame
+    counts : checks against references by what they rest on
+    evidence : None where no reference speaks about the table
+    """
 
     verdict: Verdict[Validated]
     checks: tuple[Check, ...]
@@ -102,6 +132,8 @@ class ValidationSummary(Summary):
     table: TableFacts
     round_trips: RoundTripErrors | None
     section_origin_mm: tuple[float, float]
+    counts: CheckCounts
+    evidence: TableEvidence | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +151,7 @@ class Checks(Table):
     unit: Texts = column("unit of the numbers", dtype=object)
     source: Texts = column("source of the reference", dtype=object)
     grade: Texts = column("grade of the source", dtype=object)
+    kind: Texts = column("what it rests on: independent, consistency or claim; none without a document", dtype=object)
     note: Findings = findings("why it is not judged, or how", Note)
 
     @classmethod

@@ -30,7 +30,8 @@ LEAST_ARROW_MM = 0.1
 NOTE = """# Key poses of {title}
 
 {text}
-
+"""
+POSES = """
 **Look first** at the curve below, the largest deviation at each pose: go to the pose where it is highest. The arm stops
 {hold:g} s at each pose that a reference names; press play, or drag the time.
 
@@ -47,16 +48,18 @@ def record(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
     stations = _stations(poses)
     starts = STATION_S * np.arange(len(stations))
     corrected, fault = corrected_robot(robot, results.summary.diagnoses)
+    curve_view = rrb.TimeSeriesView(origin=f"/{STAGE}/curves/deviation", name="Largest deviation (mm)")
     words = rrb.Vertical(
         note_view(STAGE),
         rrb.TextDocumentView(origin=f"/{STAGE}/now", name="This pose"),
-        rrb.TimeSeriesView(origin=f"/{STAGE}/curves/deviation", name="Largest deviation (mm)"),
-        row_shares=[4, 3, 3],
+        *([curve_view] if len(poses) else []),
+        row_shares=[4, 3, 3] if len(poses) else [4, 3],
         name="Words and curve",
     )
     layout = rrb.Horizontal(_view(robot, poses, axes), words, column_shares=[2, 1], name="Key poses")
     with recording(output, name, STAGE, layout) as stream:
-        note = NOTE.format(title=escaped(robot.title), text=say(results.summary.verdict.finding), hold=HOLD_S)
+        note = NOTE.format(title=escaped(robot.title), text=say(results.summary.verdict.finding))
+        note += POSES.format(hold=HOLD_S) if len(poses) else ""
         note += f"- see-through arm: the same table, {fault}\n" if corrected is not None else ""
         log_note(stream, STAGE, note)
         _log_axes(stream, axes, size_of(robot), end=starts[1] - MOVE_S if len(starts) > 1 else None)
@@ -68,6 +71,8 @@ def record(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
             send_motion(stream, corrected, times, q, entity=f"{STAGE}/corrected")
         for start, rows in zip(starts, stations):
             _log_station(stream, float(start), rows, 0.012 * size_of(robot))
+        if not len(poses):
+            return
         worst = np.array([np.fmax.reduce(rows.deviation_mm) for rows in stations])
         at = (starts[:, None] + [0, HOLD_S, HOLD_S + 0.01]).ravel()
         curve = np.repeat(worst, 3)
@@ -93,6 +98,8 @@ def _motion(stations: list[KeyPoses], starts: np.ndarray) -> tuple[np.ndarray, n
     for k in range(len(stations) - 1):
         times.append(starts[k] + HOLD_S + share * MOVE_S)
         q.append(corners[k] + smooth[:, None] * (corners[k + 1] - corners[k]))
+    times.append(starts[-1:] + HOLD_S)
+    q.append(corners[-1:])
     return np.concatenate(times), np.concatenate(q)
 
 
@@ -157,7 +164,7 @@ def _view(robot: Robot, poses: KeyPoses, axes: Axes) -> rrb.Spatial3DView:
     centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
     eye = rrb.EyeControls3D(
         kind="Orbital",
-        position=centre + np.array([0.5, -1.6, 0.35]) * radius * 1.1,
+        position=centre + np.array([0.5, -1.6, 0.35]) * radius * 1.3,
         look_target=centre,
         eye_up=[0, 0, 1],
     )

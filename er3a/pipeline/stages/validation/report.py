@@ -17,6 +17,7 @@ from er3a.pipeline.stages.validation.check_model import ReferenceCheck, Unjudged
 from er3a.pipeline.stages.validation.check_rows import COLUMNS, Judged, blank_row, by_set, check_row, group_rows
 from er3a.pipeline.stages.validation.corrected import corrected_robot
 from er3a.pipeline.stages.validation.diagnosis_figures import correction_stories, diagnosis_stories
+from er3a.pipeline.stages.validation.evidence_section import evidence_section
 from er3a.pipeline.stages.validation.model import (
     Axes,
     Counts,
@@ -74,6 +75,7 @@ def report(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
         command=run_command(study, f"{name}/validation.html"),
         robot=robot,
         robot_pages=study.pages(name),
+        table_evidence=evidence_section(summary.evidence),
         sets=[_set_story(found, judged, results.key_poses) for found in summary.sets],
         diagnoses=diagnosis_stories(summary, results.residuals),
         corrections=correction_stories(summary, results.corrections),

@@ -5,7 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from er3a.diagnosis.conclusions import MainFault, MostLikelyFault
+from er3a.diagnosis.conclusions import MainFault, MostLikelyFault, TooSmallToTell
+from er3a.identifiability.proposals import Proposal
+from er3a.identifiability.reactions import CheckCounts
+from er3a.identifiability.tool_motion import ToolOff
+from er3a.identifiability.verdict_parts import PartName, PartStatus
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.references.subjects import DrawingCorner, DrawingExtent, Reach, ReferenceSubject, Subject
 from er3a.robots.robot import Grade
@@ -123,7 +127,7 @@ Note = (
 )
 
 
-LikelyFault = MostLikelyFault | MainFault
+LikelyFault = MostLikelyFault | MainFault | TooSmallToTell
 
 
 @dataclass(frozen=True)
@@ -168,12 +172,54 @@ class _Judged:
 
 @dataclass(frozen=True)
 class Confirmed(_Judged):
-    """The model meets all that it can."""
+    """The model meets all that it can, and independent documents settle all that moves the tool."""
 
-    passed: int
+    counts: CheckCounts
     grades: tuple[Grade, ...]
     contradiction: Contradiction | None
     code: Literal["validation.confirmed"] = "validation.confirmed"
+
+
+@dataclass(frozen=True)
+class PartFound:
+    """What is known of a part of the table.
+
+    Attributes
+    ----------
+    status : the gravest of its entries'
+    entries, settled : how many it has, and how many of these are settled or mean nothing alone
+    contradicted, open : names of such entries
+    off : how far the tool could be off for what is weak or open; what only its own document speaks of has no bound
+    """
+
+    part: PartName
+    status: PartStatus
+    entries: int
+    settled: int
+    contradicted: tuple[str, ...]
+    open: tuple[str, ...]
+    off: ToolOff
+    code: Literal["part_found"] = "part_found"
+
+
+@dataclass(frozen=True)
+class LeftOpen(_Judged):
+    """Nothing contradicts the table, but independent documents don't settle all that moves the tool.
+
+    Attributes
+    ----------
+    counts : of the checks against references
+    parts : of the table
+    off : how far the tool could be off for what is left open, all over the joint ranges
+    next_measurement : the one that settles the entry for which it could be off farthest
+    """
+
+    counts: CheckCounts
+    parts: tuple[PartFound, ...]
+    off: ToolOff
+    next_measurement: Proposal | None
+    contradiction: Contradiction | None
+    code: Literal["validation.left_open"] = "validation.left_open"
 
 
 @dataclass(frozen=True)
@@ -226,4 +272,4 @@ class AnotherArm(_Missed):
     code: Literal["validation.another_arm"] = "validation.another_arm"
 
 
-Validated = Confirmed | NothingToCompare | ModelUnsound | Contradicted | AnotherArm
+Validated = Confirmed | LeftOpen | NothingToCompare | ModelUnsound | Contradicted | AnotherArm

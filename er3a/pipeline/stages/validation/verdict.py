@@ -4,21 +4,27 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from functools import reduce
 from typing import Any
 
 import numpy as np
 
-from er3a.diagnosis.conclusions import MainFault, MostLikelyFault, NoFaultStandsOut, NoFewFaultsExplain
+from er3a.diagnosis.conclusions import NoFaultStandsOut, NoFewFaultsExplain
+from er3a.identifiability.proposals import Proposal
+from er3a.identifiability.reactions import CheckCounts, count_checks
+from er3a.identifiability.tool_motion import NOT_OFF, ToolOff
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.validation.check_model import Check, Conflict, ModelCheck, ReferenceCheck
 from er3a.pipeline.stages.validation.diagnosis_model import SetDiagnosis
-from er3a.pipeline.stages.validation.model import Axes, Counts, KeyPoses, RoundTripErrors, SetSummary
+from er3a.pipeline.stages.validation.model import Axes, Counts, KeyPoses, RoundTripErrors, SetSummary, TableEvidence
+from er3a.pipeline.stages.validation.parts_found import OF_THE_TOOL
 from er3a.pipeline.stages.validation.validation_findings import (
     AnotherArm,
     Claims,
     Confirmed,
     Contradicted,
     Contradiction,
+    LeftOpen,
     LikelyFault,
     ModelUnsound,
     NothingToCompare,
@@ -60,6 +66,7 @@ def verdict_of(
     conflicts: list[Conflict],
     sets: tuple[SetSummary, ...],
     diagnoses: Mapping[str, SetDiagnosis],
+    evidence: TableEvidence | None,
 ) -> Verdict[Validated]:
     """The stage's answer."""
     documented = [check for check in checks if isinstance(check, ReferenceCheck) and check.is_authoritative]
@@ -67,7 +74,7 @@ def verdict_of(
     named = {
         name: diagnosis.conclusion
         for name, diagnosis in diagnoses.items()
-        if isinstance(diagnosis.conclusion, MostLikelyFault | MainFault)
+        if isinstance(diagnosis.conclusion, LikelyFault)
     }
     common: dict[str, Any] = {
         "checks": len(documented),
@@ -84,10 +91,35 @@ def verdict_of(
         return Verdict("fail", _missed(common, failed, documented, sets, named))
     if not documented:
         return Verdict("no_reference", NothingToCompare(**common))
-    passed = sum(check.status == "pass" for check in documented)
     contradiction = _contradiction(conflicts) if conflicts else None
-    grades = _grades(documented)
-    return Verdict("pass", Confirmed(**common, passed=passed, grades=grades, contradiction=contradiction))
+    common |= {"counts": counts_of(checks), "contradiction": contradiction}
+    parts = evidence.parts if evidence else ()
+    moving = [part for part in parts if part.part in OF_THE_TOOL]
+    if not moving or any(part.status != "settled" for part in moving):
+        off = reduce(ToolOff.worse, (part.off for part in moving), NOT_OFF)
+        return Verdict(
+            "caution", LeftOpen(**common, parts=parts, off=off, next_measurement=_next_measurement(evidence))
+        )
+    return Verdict("pass", Confirmed(**common, grades=_grades(documented)))
+
+
+def _next_measurement(evidence: TableEvidence | None) -> Proposal | None:
+    """What would settle the entry that leaves most open: what is open first, then by how far the tool could be off."""
+    if evidence is None:
+        return None
+    by_name = {each.entry: each for each in (*evidence.entries, *evidence.combinations)}
+
+    def gravity(proposal: Proposal) -> tuple[bool, float, float]:
+        each = by_name[proposal.entry]
+        return each.status == "open", each.off.mm, each.off.deg
+
+    return max(evidence.proposals, key=gravity, default=None)
+
+
+def counts_of(checks: Iterable[Check]) -> CheckCounts:
+    """Checks against references by what they rest on."""
+    referenced = [check for check in checks if isinstance(check, ReferenceCheck)]
+    return count_checks([check.kind for check in referenced], [check.status for check in referenced])
 
 
 def most_telling(failed: list[ReferenceCheck]) -> ReferenceCheck:
@@ -107,8 +139,12 @@ def key_figures(
     trips: RoundTripErrors | None,
 ) -> tuple[Figure, ...]:
     """The stage's key figures; ``reach`` in mm by the figure's name."""
-    counted = _counts(check for check in checks if check.is_authoritative)
-    figures = [Figure("checks_passed", counted.passed, "", of=counted.passed + counted.failed)]
+    counts = counts_of(checks)
+    figures = [
+        Figure(name, tally.passed, "", of=tally.total)
+        for name, tally in (("independent_checks", counts.independent), ("consistency_checks", counts.consistency))
+        if tally.total
+    ]
     errors = [
         (each.authoritative.total > 0, each.zero_pose_flange_off_mm)
         for each in sets

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from er3a.files.robot_library import REFERENCES
+from er3a.files.reference_sets import reference_folder
 from er3a.files.units import FARTHEST_MM, Triple, check_millimetres
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
@@ -95,7 +95,7 @@ class CapabilitySettings(StrictModel):
 
 
 def _inputs(study: Study, robot: str) -> list[Path]:
-    return [file for name in study.references(robot) for file in [REFERENCES / name / "envelope.csv"] if file.is_file()]
+    return [file for name in study.references(robot) if (file := reference_folder(name) / "envelope.csv").is_file()]
 
 
 STAGE = Stage(
@@ -104,5 +104,6 @@ STAGE = Stage(
     question=N_("What can it reach, where are the voids?"),
     settings={"workspace": WorkspaceSettings, "capability": CapabilitySettings},
     inputs=_inputs,
+    rests_on=("validation",),
     sampled=True,
 )

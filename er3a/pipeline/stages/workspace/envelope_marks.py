@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.files.reference_sets import check_reference_file
-from er3a.files.robot_library import REFERENCES
+from er3a.files.reference_sets import check_reference_file, reference_folder
 from er3a.pipeline.stages.workspace.workspace_tables import Drawing
 from er3a.references.rows import EnvelopeRow
 from er3a.robots.robot import Robot
@@ -41,6 +40,6 @@ def drawing_table(robot: Robot, shoulder_m: float) -> Drawing:
 
 
 def _labels(robot: Robot) -> list[EnvelopeRow]:
-    files = [REFERENCES / reference / "envelope.csv" for reference in robot.references]
+    files = [reference_folder(reference) / "envelope.csv" for reference in robot.references]
     rows = [row for file in files if file.is_file() for row in check_reference_file(file)]
     return [row for row in rows if isinstance(row, EnvelopeRow)]

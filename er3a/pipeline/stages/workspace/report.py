@@ -50,6 +50,7 @@ def report(study: Study, stored: Stored[WorkspaceResults], output: Path) -> None
         voids_more=max(0, len(summary.voids) - LISTED),
         unexpected=isinstance(summary.verdict.finding, VoidUnexpected),
         wide=100 * summary.proof.width,
+        has_drawing=len(results.drawing) > 0,
         **_context(robot, results),
     )
 
@@ -92,9 +93,7 @@ def _side(robot: Robot, results: WorkspaceResults) -> Picture | None:
         labels = tr("No drawing of this arm's envelope is on file to compare with.")
     return Picture(
         side_view(results, not np.array_equal(robot.tool, np.eye(4))),
-        tr(
-            "Side views of wrist centre and flange in the arm's plane, with exact borders and the manufacturer's labels"
-        ),
+        tr("Side views of wrist centre and flange in the arm's plane, with exact borders"),
         joined([exact, labels], " "),
     )
 

@@ -1,0 +1,1 @@
+"""Which numbers of a table its documents settle, and which nothing does."""

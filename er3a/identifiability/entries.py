@@ -1,0 +1,102 @@
+"""The entries of a table, and the document that each rests on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, cast
+
+import numpy as np
+
+from er3a.kinematics.table_batch import Tables
+from er3a.numerics.arrays import Reals
+from er3a.references.quantities import MM
+from er3a.robots.robot import Robot
+
+Column = Literal["a", "alpha", "d", "beta", "offset", "direction", "lower", "upper", "speed"]
+EntryUnit = Literal["mm", "deg", "deg/s", ""]
+LENGTHS: tuple[Column, ...] = ("a", "d")
+CONTINUOUS: tuple[Column, ...] = ("a", "alpha", "d", "offset")
+GROUP_OF: dict[Column, str] = {
+    "a": "dh",
+    "alpha": "dh",
+    "d": "dh",
+    "beta": "dh",
+    "offset": "zero",
+    "direction": "zero",
+    "lower": "limits",
+    "upper": "limits",
+    "speed": "speeds",
+}
+SCALE_M, SCALE_RAD = 1e-3, np.radians(0.1)
+"""Steps of lengths and angles that move a tool about as far: 1 mm, and 0.1 deg at half a metre."""
+
+
+@dataclass(frozen=True)
+class TableNumber:
+    """One number of a table; ``joint`` counts from 1."""
+
+    column: Column
+    joint: int
+
+    @property
+    def name(self) -> str:
+        """Such as ``d4`` or ``direction5``."""
+        return f"{self.column}{self.joint}"
+
+    @property
+    def unit(self) -> EntryUnit:
+        """mm, deg, deg/s, or nothing for a direction."""
+        if self.column in LENGTHS:
+            return "mm"
+        return "" if self.column == "direction" else "deg/s" if self.column == "speed" else "deg"
+
+    @property
+    def in_unit(self) -> float:
+        """Factor from SI to the unit."""
+        return MM if self.column in LENGTHS else 1.0 if self.column == "direction" else 180 / np.pi
+
+    @property
+    def scale(self) -> float:
+        """A step in SI that moves a tool by about a millimetre."""
+        return SCALE_M if self.column in LENGTHS else float(SCALE_RAD)
+
+    def value(self, robot: Robot) -> float:
+        """The robot's value, in the unit."""
+        return round(float(getattr(robot, self.column)[self.joint - 1] * self.in_unit), 9)
+
+
+def entries_of(robot: Robot) -> tuple[TableNumber, ...]:
+    """All entries of a robot's table: geometry, zero and directions, limits, and the speeds that it gives."""
+    joints = range(1, len(robot.a) + 1)
+    columns = cast(tuple[Column, ...], ("direction", "lower", "upper"))
+    speeds = [TableNumber("speed", j) for j in joints if np.isfinite(robot.speed[j - 1])]
+    return (*continuous_of(robot), *(TableNumber(column, j) for column in columns for j in joints), *speeds)
+
+
+def continuous_of(robot: Robot) -> tuple[TableNumber, ...]:
+    """Entries that can take any value; Hayati's beta where the table has it."""
+    joints = range(1, len(robot.a) + 1)
+    found = [TableNumber(column, j) for column in CONTINUOUS for j in joints]
+    return (*found, *(TableNumber("beta", j) for j in joints if robot.beta[j - 1]))
+
+
+def document_of(robot: Robot, entry: TableNumber) -> str:
+    """The document that an entry rests on: its own, else its group's, else the group's source, else the table."""
+    if entry.name in robot.origins:
+        return robot.origins[entry.name]
+    source = robot.sources.get(GROUP_OF[entry.column])
+    return (source.origin or source.source) if source else f"the table of {robot.name}"
+
+
+def shifted(table: Tables, entries: Sequence[TableNumber], amounts: Reals) -> Tables:
+    """A table (a batch of one) with amounts (H, k) in m and rad added to k entries: a batch of H."""
+    count = len(amounts)
+    columns: dict[str, Reals] = {}
+    for k, entry in enumerate(entries):
+        if entry.column not in columns:
+            columns[entry.column] = np.repeat(getattr(table, entry.column), count, axis=0)
+        columns[entry.column][:, entry.joint - 1] += amounts[:, k]
+    others = [name for name in Tables.__dataclass_fields__ if name not in columns]
+    kept = {name: np.repeat(getattr(table, name), count, axis=0) for name in others}
+    return Tables(**{**kept, **columns})

@@ -1,0 +1,107 @@
+"""What evidence of a table consists of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+from er3a.identifiability.alternatives import Alternative
+from er3a.identifiability.entries import EntryUnit
+from er3a.identifiability.tool_motion import NOT_OFF, ToolOff
+from er3a.references.reference import Reference
+from er3a.robots.robot import Robot
+
+Status = Literal["settled", "weak", "contradicted", "consistent", "open", "gauge", "given"]
+TOLERANCE_MM, TOLERANCE_DEG = 5.0, 0.5
+"""How far a settled entry may leave the tool off: what an arm of this size is off without calibration. What matters
+less is the business of a calibration and says nothing about the table."""
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """How far the tool may be off for an entry that counts as settled, anywhere in the joint ranges."""
+
+    mm: float = TOLERANCE_MM
+    deg: float = TOLERANCE_DEG
+
+
+@dataclass(frozen=True)
+class OtherReading:
+    """A table that differs in a few entries, and that evidence allows.
+
+    Attributes
+    ----------
+    entries : those that differ, with their values there in their units
+    off : how far the tool is off then; not at all, where it is the same robot
+    excluded_by : documents that exclude it, though not independent ones
+    """
+
+    entries: tuple[tuple[str, float], ...]
+    off: ToolOff
+    excluded_by: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class EntryEvidence:
+    """What is known of an entry.
+
+    Attributes
+    ----------
+    entry : such as ``d4``; of a combination that alone is determined, such as ``d2 + d3``
+    value, unit : in the robot's file
+    status : see :data:`Status`
+    interval : what independent evidence leaves open for it, the others free; None for what has no number
+    by : documents that speak of it: independent ones if there are any, else its own
+    alternatives : other readings of the table that concern it, and combinations with it that are the same robot
+    document : that it rests on
+    off : how far the tool could be off for it
+    """
+
+    entry: str
+    value: float | None
+    unit: EntryUnit
+    status: Status
+    interval: tuple[float, float] | None
+    by: tuple[str, ...]
+    alternatives: tuple[OtherReading, ...]
+    document: str
+    off: ToolOff = NOT_OFF
+
+    @property
+    def moves_tool(self) -> bool:
+        """Whether it is one of those that say where the tool is."""
+        return not self.entry.startswith(("lower", "upper", "speed"))
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What references say about a table.
+
+    Attributes
+    ----------
+    entries : of the table, base and tool
+    combinations : what of entries that are gauge is determined together
+    conflicts : pairs of references that contradict each other
+    readings : tables that independent evidence of some entry allows, see :class:`Alternative`
+    allowed : those that all trusted references allow
+    unmet : documents without any table near this one that meets all that they say
+    table_meets : whether the table as it is meets all independent references
+    """
+
+    robot: Robot
+    tolerance: Tolerance
+    entries: tuple[EntryEvidence, ...]
+    combinations: tuple[EntryEvidence, ...]
+    conflicts: tuple[tuple[Reference, Reference], ...]
+    readings: tuple[Alternative, ...]
+    allowed: tuple[Alternative, ...]
+    unmet: tuple[str, ...]
+    table_meets: bool
+
+    def __getitem__(self, entry: str) -> EntryEvidence:
+        return self._by_name[entry]
+
+    @cached_property
+    def _by_name(self) -> dict[str, EntryEvidence]:
+        return {each.entry: each for each in (*self.entries, *self.combinations)}

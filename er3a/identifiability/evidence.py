@@ -1,0 +1,377 @@
+"""TableNumber by entry: what independent documents settle of a table, what they leave open, and what they exclude."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from math import isnan
+
+from er3a.identifiability.alternatives import Alternative, alternatives_to, gauge_flips
+from er3a.identifiability.continuous import Extent, Extents
+from er3a.identifiability.entries import (
+    TableNumber,
+    continuous_of,
+    document_of,
+    entries_of,
+)
+from er3a.identifiability.entry_evidence import EntryEvidence, Evidence, OtherReading, Status, Tolerance
+from er3a.identifiability.feasible import MET
+from er3a.identifiability.flips import flips_of
+from er3a.identifiability.gauge import Gauge, gauge_of
+from er3a.identifiability.limits import judge_limit
+from er3a.identifiability.reactions import reactions
+from er3a.identifiability.requirements import Asked, Requirement, requirements_of
+from er3a.identifiability.tool_motion import NOT_OFF, ToolOff, ToolRange
+from er3a.kinematics.table_batch import tables_of
+from er3a.numerics.arrays import Flags
+from er3a.references.documents import Documents
+from er3a.references.reference import Reference, conflicts
+from er3a.robots.robot import Robot
+
+ROUNDING = 1e-9
+SHOWN_STEP = 5.0
+
+
+def evidence_of(
+    robot: Robot,
+    references: Sequence[Reference],
+    documents: Documents,
+    tolerance: Tolerance | None = None,
+    only: Sequence[str] | None = None,
+) -> Evidence:
+    """What independent references settle of a robot's table.
+
+    Parameters
+    ----------
+    references : of all sets together; official, measured, CAD and export ones count, if there are any, else claims do
+    tolerance : how far the tool may be off for what counts as settled
+    only : names of the entries that are asked for; all by default
+
+    Returns
+    -------
+    evidence : the same for the same input
+    """
+    return _Judge(robot, references, documents, tolerance or Tolerance()).evidence(only)
+
+
+class _Judge:
+    """Evidence in the making: what is independent of an entry depends on its document only, so work is done once for
+    each set of references that is independent of some."""
+
+    def __init__(self, robot: Robot, references: Sequence[Reference], documents: Documents, tolerance: Tolerance):
+        self.robot, self.documents, self.tolerance = robot, documents, tolerance
+        self.references = [reference for reference in references if reference.expected is not None]
+        self.table, self.entries = tables_of(robot), entries_of(robot)
+        self.free = continuous_of(robot)
+        self.reacts = reactions(robot, self.references, self.entries)
+        self.tool = ToolRange(robot, self.table)
+        self.gauge: Gauge = gauge_of(robot, self.free)
+        trusted = [i for i, reference in enumerate(self.references) if reference.authoritative]
+        self.trusted = tuple(trusted or range(len(self.references)))
+        self._asked: dict[tuple[int, ...], Asked] = {}
+        self._alternatives: dict[tuple[int, ...], list[Alternative]] = {}
+        self._readings: dict[Alternative, OtherReading] = {}
+        self._repairs: dict[tuple[int, ...], list[Alternative]] = {}
+        self._extents: dict[tuple[int, ...], Extents] = {}
+        flips = flips_of(robot, [])
+        self.same = gauge_flips(self.tool, flips)
+        self.values = {entry.name: entry.value(robot) for entry in self.entries}
+        self.conflicts = conflicts(self.references)
+
+    def evidence(self, only: Sequence[str] | None = None) -> Evidence:
+        """All of it, or about some entries."""
+        judged = [self._judged(entry) for entry in self.entries if only is None or entry.name in only]
+        sums = [self._combination(i) for i in range(len(self.gauge.determined)) if self._wanted_sum(i, only)]
+        return Evidence(
+            robot=self.robot,
+            tolerance=self.tolerance,
+            entries=(*judged, *self._given()),
+            combinations=tuple(sums),
+            conflicts=tuple((self.references[i], self.references[j]) for i, j in self.conflicts),
+            readings=self._all_readings(),
+            allowed=tuple(self._alternatives_of(self.trusted)),
+            unmet=self._unmet(),
+            table_meets=all(each.table_meets for each in self._extents.values()),
+        )
+
+    def _unmet(self) -> tuple[str, ...]:
+        without = [own for own, each in self._extents.items() if not each.met]
+        return tuple(sorted({name for own in without for name in self._documents(own)}))
+
+    def _wanted_sum(self, row: int, only: Sequence[str] | None) -> bool:
+        return only is None or _sum_of(self._factors(row)) in only
+
+    def _factors(self, row: int) -> list[tuple[TableNumber, float]]:
+        return [(entry, float(f)) for entry, f in zip(self.free, self.gauge.determined[row]) if f]
+
+    def _all_readings(self) -> tuple[Alternative, ...]:
+        found = {each.entries: each for own in self._alternatives.values() for each in own}
+        return tuple(found.values())
+
+    def _judged(self, entry: TableNumber) -> EntryEvidence:
+        if entry.column in ("lower", "upper", "speed"):
+            return self._bound(entry)
+        if entry.column == "direction":
+            return self._direction(entry)
+        return self._number(entry)
+
+    def _independent(self, document: str) -> tuple[int, ...]:
+        """Trusted references of documents that are independent of one; of those that contradict another which the table
+        meets, only beside that other."""
+        own = {i for i in self.trusted if self.documents.independent(self.references[i].document, document)}
+        return tuple(sorted(i for i in own if self._outvoted.get(i, own) & own))
+
+    @cached_property
+    def _outvoted(self) -> dict[int, set[int]]:
+        """References that the table misses, with those that it meets and that contradict them."""
+        asked = Asked(self.robot, [each for pair in self.conflicts for i in pair for each in self._alone(i)])
+        if not len(asked):
+            return {}
+        missed = asked.violation(asked.off(self.table, afresh=True)) > ROUNDING
+        by_place = {each.references[0]: bool(own) for each, own in zip(asked.order, missed)}
+        found: dict[int, set[int]] = {}
+        for pair in self.conflicts:
+            for i, j in (pair, pair[::-1]):
+                if by_place.get(i) and not by_place[j]:
+                    found.setdefault(i, set()).add(j)
+        return found
+
+    def _alone(self, i: int) -> list[Requirement]:
+        return [replace(asked, references=(i,)) for asked in requirements_of([self.references[i]])]
+
+    def _speaking(self, entry: TableNumber, among: Sequence[int]) -> tuple[int, ...]:
+        row: Flags = self.reacts[:, self.entries.index(entry)]
+        return tuple(i for i in among if row[i])
+
+    def _documents(self, places: Sequence[int]) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(self.references[i].document for i in places))
+
+    def _number(self, entry: TableNumber) -> EntryEvidence:
+        document = document_of(self.robot, entry)
+        own = self._independent(document)
+        speaking = self._speaking(entry, own)
+        extents = self._extents_of(own)
+        extent = extents.of(entry)
+        concerned = [each for each in self._alternatives_of(own) if entry.name in each.names]
+        by_all = self._names_open(self.trusted)
+        gauge = self.free.index(entry) in self._in_gauge
+        status: Status = "weak"
+        if extent.excluded or entry.name in self._repaired(own):
+            status = "contradicted"
+        elif gauge:
+            status = "gauge"
+        elif not speaking:
+            consistent = self._speaking(entry, range(len(self.references)))
+            status = "consistent" if consistent and entry.name not in by_all else "open"
+            status = "contradicted" if consistent and self._excluded_by_all(entry) else status
+        elif entry.name in by_all:
+            status = "open"
+        elif not concerned and extents.met and extent.off.within(self.tolerance.mm, self.tolerance.deg):
+            status = "settled"
+        return self._described(entry, status, extent, concerned, speaking)
+
+    def _direction(self, entry: TableNumber) -> EntryEvidence:
+        own = self._independent(document_of(self.robot, entry))
+        speaking = self._speaking(entry, own)
+        concerned = [each for each in self._alternatives_of(own) if entry.name in each.names]
+        value = self.values[entry.name]
+        interval = (-1.0, 1.0) if concerned else (value, value)
+        if entry.name in self._repaired(own):
+            status: Status = "contradicted"
+            interval = (-value, -value)
+        elif concerned:
+            if entry.name in self._names_open(self.trusted):
+                status = "open"
+            else:
+                status = "weak" if speaking else "contradicted" if self._excluded_by_all(entry) else "consistent"
+        else:
+            status = "settled" if own else "open"
+        off = _worst([each.off for each in concerned])
+        return self._described(entry, status, Extent(*interval, off, False), concerned, speaking)
+
+    def _excluded_by_all(self, entry: TableNumber) -> bool:
+        """Whether what an entry rests on itself excludes it: then it was not even taken over rightly."""
+        if entry.name in self._repaired(self.trusted):
+            return True
+        extents = self._extents_of(self.trusted)
+        return entry.column != "direction" and not extents.table_meets and extents.of(entry).excluded
+
+    def _bound(self, entry: TableNumber) -> EntryEvidence:
+        own = self._independent(document_of(self.robot, entry))
+        speaking = self._speaking(entry, own)
+        all_speaking = self._speaking(entry, range(len(self.references)))
+        status, interval = judge_limit(self.robot, entry, [self.references[i] for i in speaking], bool(all_speaking))
+        trusted = [self.references[i] for i in all_speaking if i in self.trusted]
+        if status == "consistent" and trusted and judge_limit(self.robot, entry, trusted, True)[0] == "contradicted":
+            status = "contradicted"
+        return EntryEvidence(
+            entry=entry.name,
+            value=self.values[entry.name],
+            unit=entry.unit,
+            status=status,
+            interval=interval,
+            by=self._documents(speaking or all_speaking),
+            alternatives=(),
+            document=document_of(self.robot, entry),
+        )
+
+    def _described(
+        self, entry: TableNumber, status: Status, extent: Extent, concerned: list[Alternative], speaking: Sequence[int]
+    ) -> EntryEvidence:
+        readings = [self._reading(each) for each in concerned]
+        readings += [
+            OtherReading(tuple((name, self._flipped(name)) for name in names), NOT_OFF)
+            for names in self.same
+            if entry.name in names
+        ]
+        readings += [self._shift(k) for k in range(len(self.gauge.directions)) if self._shifts(k, entry)]
+        known = speaking or self._speaking(entry, range(len(self.references)))
+        off = _worst([extent.off, *(each.off for each in concerned)])
+        return EntryEvidence(
+            entry=entry.name,
+            value=self.values[entry.name],
+            unit=entry.unit,
+            status=status,
+            interval=_interval(extent),
+            by=self._documents(known),
+            alternatives=tuple(readings),
+            document=document_of(self.robot, entry),
+            off=NOT_OFF if status in ("settled", "gauge") else off,
+        )
+
+    def _combination(self, row: int) -> EntryEvidence:
+        """What of entries that are gauge is determined together."""
+        factors = self._factors(row)
+        first = factors[0][0]
+        document = document_of(self.robot, first)
+        own = self._independent(document)
+        extents = self._extents_of(own)
+        extent = extents.along(self.gauge.determined[row])
+        speaking = sorted({i for entry, _ in factors for i in self._speaking(entry, own)})
+        everyone = sorted({i for entry, _ in factors for i in self._speaking(entry, range(len(self.references)))})
+        status: Status = "weak"
+        if extent.excluded:
+            status = "contradicted"
+        elif not speaking:
+            status = "consistent" if everyone else "open"
+        elif extents.met and extent.off.within(self.tolerance.mm, self.tolerance.deg):
+            status = "settled"
+        return EntryEvidence(
+            entry=_sum_of(factors),
+            value=sum(f * self.values[entry.name] for entry, f in factors),
+            unit=first.unit,
+            status=status,
+            interval=_interval(extent),
+            by=self._documents(speaking or everyone),
+            alternatives=(),
+            document=document,
+            off=NOT_OFF if status == "settled" else extent.off,
+        )
+
+    def _given(self) -> list[EntryEvidence]:
+        found = []
+        for name in ("base", "tool"):
+            source = self.robot.sources.get(name)
+            document = (source.origin or source.source) if source else ""
+            found.append(EntryEvidence(name, None, "", "given", None, (), (), document))
+        return found
+
+    def _reading(self, alternative: Alternative) -> OtherReading:
+        if alternative not in self._readings:
+            violated = self._asked_of(tuple(range(len(self.references)))).excluding(alternative.table, self.table)
+            reading = OtherReading(alternative.entries, alternative.off, self._documents(violated))
+            self._readings[alternative] = reading
+        return self._readings[alternative]
+
+    def _flipped(self, name: str) -> float:
+        value = self.values.get(name, 0.0)
+        if name.startswith(("offset", "alpha")):
+            return value + 180.0 if value <= 0 else value - 180.0
+        return -value
+
+    def _shifts(self, k: int, entry: TableNumber) -> bool:
+        return entry in self.free and bool(self.gauge.directions[k][self.free.index(entry)])
+
+    def _shift(self, k: int) -> OtherReading:
+        """A combination that moves no tool, with a step of 5 units for its first entry."""
+        own = [(entry, f) for entry, f in zip(self.free, self.gauge.directions[k]) if f]
+        entry, f = own[0]
+        step = SHOWN_STEP / (f * entry.scale * entry.in_unit)
+        return OtherReading(
+            tuple((e.name, self.values[e.name] + step * g * e.scale * e.in_unit) for e, g in own), NOT_OFF
+        )
+
+    @cached_property
+    def _in_gauge(self) -> set[int]:
+        return {k for k, held in enumerate(self.gauge.support()) if held}
+
+    def _asked_of(self, own: tuple[int, ...]) -> Asked:
+        if own not in self._asked:
+            requirements = requirements_of([self.references[i] for i in own])
+            placed = [replace(each, references=tuple(own[i] for i in each.references)) for each in requirements]
+            self._asked[own] = Asked(self.robot, placed)
+        return self._asked[own]
+
+    def _geometric(self, own: tuple[int, ...]) -> tuple[int, ...]:
+        """Those of the references that ask for something of the tool's place."""
+        return tuple(i for each in self._asked_of(own).requirements for i in each.references)
+
+    def _alternatives_of(self, own: tuple[int, ...]) -> list[Alternative]:
+        """What else evidence allows: alternatives to the table, or to one near it that meets the evidence."""
+        own = self._geometric(own)
+        if own not in self._alternatives:
+            table = self._extents_of(own).met_by
+            self._alternatives[own] = alternatives_to(table, self._asked_of(own), self.tool)
+        return self._alternatives[own]
+
+    def _repairs_of(self, own: tuple[int, ...]) -> list[Alternative]:
+        """Discrete changes by which a table that misses evidence misses less of it."""
+        own = self._geometric(own)
+        if own not in self._repairs:
+            asked = self._asked_of(own)
+            missed = len(asked) and asked.violation(asked.off(self.table, afresh=True)).max() > MET
+            found = alternatives_to(self.table, asked, self.tool) if missed else []
+            self._repairs[own] = [each for each in found if each.repairs]
+        return self._repairs[own]
+
+    def _names_open(self, own: tuple[int, ...]) -> set[str]:
+        return {name for each in self._alternatives_of(own) for name in each.names}
+
+    def _repaired(self, own: tuple[int, ...]) -> set[str]:
+        """Entries that a discrete change sets right: those in every smallest change that repairs most."""
+        repairing = self._repairs_of(own)
+        if not repairing:
+            return set()
+        fewest = min(len(each.entries) for each in repairing)
+        return set.intersection(*(set(each.names) for each in repairing if len(each.entries) == fewest))
+
+    def _extents_of(self, own: tuple[int, ...]) -> Extents:
+        own = self._geometric(own)
+        if own not in self._extents:
+            fewest = min(self._repairs_of(own), key=lambda each: len(each.entries), default=None)
+            table = fewest.table if fewest else self.table
+            speaking = [k for k, entry in enumerate(self.free) if self._speaking(entry, own)]
+            self._extents[own] = Extents(self._asked_of(own), table, self.free, speaking, self.gauge, self.tool)
+        return self._extents[own]
+
+
+def _sum_of(factors: Sequence[tuple[TableNumber, float]]) -> str:
+    text = ""
+    for entry, factor in factors:
+        sign = ("-" if factor < 0 else "") if not text else (" - " if factor < 0 else " + ")
+        size = "" if abs(abs(factor) - 1) < 1e-9 else f"{abs(factor):.3g} "
+        text += f"{sign}{size}{entry.name}"
+    return text
+
+
+def _interval(extent: Extent) -> tuple[float, float] | None:
+    """Bounds to nine decimals; None where nothing meets the evidence."""
+    return None if isnan(extent.low) else (round(extent.low, 9), round(extent.high, 9))
+
+
+def _worst(found: Sequence[ToolOff]) -> ToolOff:
+    worst = NOT_OFF
+    for each in found:
+        worst = worst.worse(each)
+    return worst

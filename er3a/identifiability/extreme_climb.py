@@ -1,0 +1,199 @@
+"""Kernels that climb to the greatest or least value of a measure of one arm, from where it was attained before.
+
+Newton's method with Levenberg's damping within the joint limits; bounds that are in the way are held. Derivatives are
+central differences.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from er3a.kinematics.table_batch import Tables, fill_frames, kernel_columns
+from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.jit import kernel
+from er3a.references.quantities import FRAME_OF_POINT, AxisDistance, Extreme, SectionExtent
+
+STEP = 1e-4
+STEPS = 40
+LONGEST_STEP = 0.5
+ENOUGH_M = 1e-9
+DISTANCE, SECTION_X, SECTION_Z = 0, 1, 2
+
+Columns = tuple[Reals, Reals, Reals, Reals, Reals, Reals]
+What = tuple[int, int, int, float]
+"""Measure, axis, frame and sign."""
+
+
+def measure_code(quantity: Extreme) -> tuple[int, int, int] | None:
+    """Which measure, of which axis and frame; None for one that the kernels don't know."""
+    frame = FRAME_OF_POINT[quantity.point]
+    if isinstance(quantity, AxisDistance):
+        return DISTANCE, quantity.axis - 1, frame
+    if isinstance(quantity, SectionExtent):
+        return (SECTION_X if quantity.coordinate == "x" else SECTION_Z), 0, frame
+    return None
+
+
+def climb_to_extreme(
+    table: Tables, base: Reals, code: tuple[int, int, int], sign: float, starts: Reals, joints: Integers
+) -> tuple[Reals, float]:
+    """The joint vector (n,) at which a measure of a table (a batch of one) is greatest, and ``sign`` times it in m.
+
+    Parameters
+    ----------
+    sign : 1 for the greatest, -1 for the least value
+    starts : (P, n), climbed from the first and, if another is higher than where that leads, from the best of them
+    joints : (d,), those that are turned
+    """
+    columns = kernel_columns(table)
+    q = np.ascontiguousarray(starts)
+    lower, upper = np.minimum(table.lower[0], table.upper[0]), np.maximum(table.lower[0], table.upper[0])
+    value = _climb(np.ascontiguousarray(base), columns, (lower, upper), q, joints, (*code, sign))
+    return q[0], float(value)
+
+
+@kernel
+def _measure(base: Reals, columns: Columns, q: Reals, what: What, out: tuple[Reals, Reals]) -> None:
+    """Fill frames and ``sign`` times the measure (P,) at joint vectors (P, n)."""
+    frames, values = out
+    a, alpha, beta, d, direction, offset = columns
+    fill_frames(base, a, alpha, beta, d, direction, offset, q, frames)
+    kind, axis, frame, sign = what
+    for p in range(q.shape[0]):
+        T = frames[0, p]
+        if kind == SECTION_X:
+            values[p] = sign * (T[frame, 0, 3] - T[0, 0, 3])
+        elif kind == SECTION_Z:
+            values[p] = sign * (T[frame, 2, 3] - T[1, 2, 3])
+        else:
+            x, y, z = (
+                T[frame, 0, 3] - T[axis, 0, 3],
+                T[frame, 1, 3] - T[axis, 1, 3],
+                T[frame, 2, 3] - T[axis, 2, 3],
+            )
+            u, v, w = T[axis, 0, 2], T[axis, 1, 2], T[axis, 2, 2]
+            values[p] = sign * np.sqrt((v * z - w * y) ** 2 + (w * x - u * z) ** 2 + (u * y - v * x) ** 2)
+
+
+@kernel
+def _climb(
+    base: Reals, columns: Columns, bounds: tuple[Reals, Reals], starts: Reals, joints: Integers, what: What
+) -> float:
+    count = starts.shape[0]
+    frames, values = np.empty((1, count, starts.shape[1] + 1, 4, 4)), np.empty(count)
+    best = _from(base, columns, bounds, starts[0], joints, what)
+    if count > 1:
+        _measure(base, columns, starts, what, (frames, values))
+        other = 1 + np.argmax(values[1:])
+        if values[other] > best + ENOUGH_M:
+            second = _from(base, columns, bounds, starts[other], joints, what)
+            if second > best:
+                starts[0] = starts[other]
+                best = second
+    return best
+
+
+@kernel
+def _from(base: Reals, columns: Columns, bounds: tuple[Reals, Reals], q: Reals, joints: Integers, what: What) -> float:
+    """Climb from q (n,), which is changed to where that leads; the value there."""
+    lower, upper = bounds
+    n, k = q.shape[0], joints.shape[0]
+    points = 1 + 2 * k + k * (k - 1) // 2
+    stencil, values = np.empty((points, n)), np.empty(points)
+    frames = np.empty((1, points, n + 1, 4, 4))
+    trial, trial_value, trial_frames = np.empty((1, n)), np.empty(1), np.empty((1, 1, n + 1, 4, 4))
+    slope, curvature = np.empty(k), np.empty((k, k))
+    damping, here = 0.0, -np.inf
+    for _ in range(STEPS):
+        _fill_stencil(q, joints, stencil)
+        _measure(base, columns, stencil, what, (frames, values))
+        here = values[0]
+        _slope_and_curvature(values, slope, curvature)
+        free = np.ones(k, np.bool_)
+        for i in range(k):
+            j = joints[i]
+            free[i] = not ((q[j] <= lower[j] and slope[i] <= 0) or (q[j] >= upper[j] and slope[i] >= 0))
+        size = np.abs(curvature).max() + 1e-9
+        gained = 0.0
+        for _ in range(8):
+            step, definite = _damped(slope, curvature, free, damping * size)
+            if definite:
+                longest = np.abs(step).max()
+                share = min(1.0, LONGEST_STEP / longest) if longest > 0 else 0.0
+                trial[0] = q
+                for i in range(k):
+                    j = joints[i]
+                    trial[0, j] = min(max(q[j] + share * step[i], lower[j]), upper[j])
+                _measure(base, columns, trial, what, (trial_frames, trial_value))
+                gained = trial_value[0] - here
+                if gained > 0:
+                    break
+            damping = max(4 * damping, 1e-3)
+        if gained <= ENOUGH_M:
+            if gained > 0:
+                q[:] = trial[0]
+                here = trial_value[0]
+            break
+        q[:] = trial[0]
+        here = trial_value[0]
+        damping = damping / 8 if damping > 1e-3 else 0.0
+    return here
+
+
+@kernel
+def _fill_stencil(q: Reals, joints: Integers, stencil: Reals) -> None:
+    k = joints.shape[0]
+    at = 1 + 2 * k
+    stencil[:] = q
+    for i in range(k):
+        stencil[1 + i, joints[i]] += STEP
+        stencil[1 + k + i, joints[i]] -= STEP
+        for j in range(i):
+            stencil[at, joints[i]] += STEP
+            stencil[at, joints[j]] += STEP
+            at += 1
+
+
+@kernel
+def _slope_and_curvature(values: Reals, slope: Reals, curvature: Reals) -> None:
+    k = slope.shape[0]
+    at = 1 + 2 * k
+    for i in range(k):
+        slope[i] = (values[1 + i] - values[1 + k + i]) / (2 * STEP)
+        curvature[i, i] = (values[1 + i] - 2 * values[0] + values[1 + k + i]) / STEP**2
+        for j in range(i):
+            curvature[i, j] = (values[at] - values[1 + i] - values[1 + j] + values[0]) / STEP**2
+            curvature[j, i] = curvature[i, j]
+            at += 1
+
+
+@kernel
+def _damped(slope: Reals, curvature: Reals, free: Flags, damping: float) -> tuple[Reals, bool]:
+    """Step uphill by (damping - curvature)^-1 slope over the free joints, and whether that matrix is definite."""
+    k = slope.shape[0]
+    low = np.zeros((k, k))
+    step = np.zeros(k)
+    for i in range(k):
+        for j in range(i + 1):
+            total = (damping if i == j else 0.0) - curvature[i, j]
+            if not (free[i] and free[j]):
+                total = 1.0 if i == j else 0.0
+            for m in range(j):
+                total -= low[i, m] * low[j, m]
+            if i == j:
+                if total <= 1e-12:
+                    return step, False
+                low[i, i] = np.sqrt(total)
+            else:
+                low[i, j] = total / low[j, j]
+    for i in range(k):
+        total = slope[i] if free[i] else 0.0
+        for m in range(i):
+            total -= low[i, m] * step[m]
+        step[i] = total / low[i, i]
+    for i in range(k - 1, -1, -1):
+        total = step[i]
+        for m in range(i + 1, k):
+            total -= low[m, i] * step[m]
+        step[i] = total / low[i, i]
+    return step, True

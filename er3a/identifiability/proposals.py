@@ -1,0 +1,217 @@
+"""The cheapest measurement that would settle an entry: a look before a rule, a rule before a tracker.
+
+A direction is settled by jogging the joint and looking; where to look is chosen so that the answer does not hang on
+what else is open. A length or an angle is measured by itself, as finely as its tolerance asks for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, cast
+
+import numpy as np
+
+from er3a.identifiability.entries import TableNumber, entries_of, shifted
+from er3a.identifiability.entry_evidence import EntryEvidence, Evidence
+from er3a.identifiability.tool_motion import ToolRange
+from er3a.kinematics.table_batch import join, tables_of
+from er3a.numerics.arrays import Reals
+from er3a.references.predict import predict, predict_tables
+from er3a.references.quantities import Limit, Point, Pose, Quantity, Side, Speed
+from er3a.references.reference import Reference
+from er3a.references.seen import COARSE_DEG, SEEN, Manner, Seen, SeenMotion, TableEntry
+from er3a.references.subjects import EntryOfTable, JointLimit, JointSpeed, MotionOfJoint, ReferenceSubject
+from er3a.robots.robot import Robot
+
+MEASURED = "measured"
+PLAIN_DEG = 50.0  # of the direction that is named, within which a motion is plain to see
+BENT_DEG = 45.0
+LENGTH_MM, ANGLE_DEG, LIMIT_DEG, SPEED_SHARE = 1.0, 0.5, 0.5, 0.02
+SHARE_OF_TOLERANCE = 0.4
+SETTLED = ("settled", "given", "gauge", "contradicted")
+WAYS_TO_LOOK: tuple[tuple[Point, Manner], ...] = (
+    ("flange", "tilts"),
+    ("flange", "moves"),
+    ("wrist_centre", "moves"),
+    ("flange", "turns"),
+)
+
+
+@dataclass(frozen=True)
+class LookAtMotion:
+    """Jog a joint in + from a pose and look where to a point or the tool goes; ``seen`` is what the table says."""
+
+    entry: str
+    joint: int
+    point: Point
+    pose_deg: Pose
+    seen: Seen
+    code: Literal["look_at_motion"] = "look_at_motion"
+
+
+@dataclass(frozen=True)
+class ReadLimit:
+    """Jog a joint to its limit and read its angle."""
+
+    entry: str
+    joint: int
+    side: Side
+    half_width_deg: float
+    code: Literal["read_limit"] = "read_limit"
+
+
+@dataclass(frozen=True)
+class TimeJoint:
+    """Time a joint's turn at full speed."""
+
+    entry: str
+    joint: int
+    half_width_deg_s: float
+    code: Literal["time_joint"] = "time_joint"
+
+
+@dataclass(frozen=True)
+class MeasureAngle:
+    """Measure an angle of the table: between two axes, or at the zero mark."""
+
+    entry: str
+    column: Literal["alpha", "offset"]
+    joint: int
+    half_width_deg: float
+    code: Literal["measure_angle"] = "measure_angle"
+
+
+@dataclass(frozen=True)
+class MeasureLength:
+    """Measure a length of the table, between two axes or along one."""
+
+    entry: str
+    column: Literal["a", "d"]
+    joint: int
+    half_width_mm: float
+    code: Literal["measure_length"] = "measure_length"
+
+
+Proposal = LookAtMotion | ReadLimit | TimeJoint | MeasureAngle | MeasureLength
+
+
+def proposals_of(evidence: Evidence) -> dict[str, Proposal]:
+    """For each entry that isn't settled, the cheapest measurement that would settle it, by the entry's name; entries
+    that no single measurement of these kinds settles are left out."""
+    robot = evidence.robot
+    tool = ToolRange(robot, tables_of(robot))
+    by_name = {entry.name: entry for entry in entries_of(robot)}
+    found: dict[str, Proposal] = {}
+    for each in (*evidence.entries, *evidence.combinations):
+        if each.status in SETTLED:
+            continue
+        entry = by_name.get(each.entry) or by_name[each.entry.split()[0].lstrip("-")]
+        if proposal := _proposal(evidence, each, entry, tool):
+            found[each.entry] = proposal
+    return found
+
+
+def measured(proposal: Proposal, arm: Robot, origin: str = MEASURED) -> Reference:
+    """What the proposed measurement shows on an arm, as a reference."""
+    subject, quantity, group = _about(proposal)
+    expected = float(predict(arm, [_plain(quantity, subject, group)])[0])
+    width = COARSE_DEG
+    if isinstance(proposal, LookAtMotion):
+        if expected > 90.0 and isinstance(quantity, SeenMotion):
+            quantity = replace(quantity, seen=opposite(proposal.seen))
+            subject = replace(cast(MotionOfJoint, subject), seen=quantity.seen)
+        expected = 0.0
+    elif isinstance(proposal, MeasureLength):
+        width = proposal.half_width_mm
+    elif isinstance(proposal, TimeJoint):
+        width = proposal.half_width_deg_s
+    else:
+        width = proposal.half_width_deg
+    return Reference(subject, group, quantity, expected, width, origin, "measured", origin)
+
+
+def opposite(seen: Seen) -> Seen:
+    """What is seen if the joint turns the other way."""
+    turned = {"up": "down", "left": "right", "forward": "back"}
+    turned |= {other: one for one, other in turned.items()}
+    stem, _, last = seen.rpartition("_")
+    return cast(Seen, f"{stem}_{turned[last]}" if stem else turned[last])
+
+
+def _about(proposal: Proposal) -> tuple[ReferenceSubject, Quantity, str]:
+    joint = proposal.joint
+    if isinstance(proposal, LookAtMotion):
+        motion = SeenMotion(proposal.pose_deg, joint, proposal.point, proposal.seen)
+        return MotionOfJoint(joint, proposal.point, proposal.seen), motion, "key_poses"
+    if isinstance(proposal, ReadLimit):
+        return JointLimit(joint, proposal.side), Limit(joint, proposal.side), "limits"
+    if isinstance(proposal, TimeJoint):
+        return JointSpeed(joint), Speed(joint), "speeds"
+    return EntryOfTable(proposal.column, joint), TableEntry(proposal.column, joint), "axes"
+
+
+def _plain(quantity: Quantity, subject: ReferenceSubject, group: str) -> Reference:
+    return Reference(subject, group, quantity, 0.0, 1.0, MEASURED, "measured")
+
+
+def _proposal(evidence: Evidence, each: EntryEvidence, entry: TableNumber, tool: ToolRange) -> Proposal | None:
+    name, j = each.entry, entry.joint
+    if entry.column == "direction":
+        return _look(evidence, entry)
+    if entry.column == "lower" or entry.column == "upper":
+        return ReadLimit(name, j, entry.column, LIMIT_DEG)
+    if entry.column == "speed":
+        return TimeJoint(name, j, round(SPEED_SHARE * entry.value(evidence.robot), 3))
+    if entry.column == "a" or entry.column == "d":
+        return MeasureLength(name, entry.column, j, min(LENGTH_MM, SHARE_OF_TOLERANCE * evidence.tolerance.mm))
+    if entry.column == "alpha" or entry.column == "offset":
+        return MeasureAngle(name, entry.column, j, _fine_enough(evidence, entry, tool))
+    return None
+
+
+def _fine_enough(evidence: Evidence, entry: TableNumber, tool: ToolRange) -> float:
+    """Half-width in deg with which the tool stays within the tolerance, as a round number."""
+    one_degree = tool.off(shifted(tool.table, [entry], np.array([[np.radians(1.0)]])))
+    most = min(ANGLE_DEG, evidence.tolerance.deg)
+    if one_degree.mm > 0:
+        most = min(most, evidence.tolerance.mm / one_degree.mm)
+    exact = SHARE_OF_TOLERANCE * most
+    digit = 10.0 ** np.floor(np.log10(exact))
+    return float(round(np.floor(exact / digit + 1e-9) * digit, 9))
+
+
+def _look(evidence: Evidence, entry: TableNumber) -> LookAtMotion | None:
+    """What to look at to tell a joint's direction, whatever else is open."""
+    robot = evidence.robot
+    others = [each for each in evidence.allowed if entry.name not in each.names]
+    own = [each for each in evidence.readings if entry.name in each.names]
+    tables = join([tables_of(robot), *(each.table for each in (*others, *own))])
+    unaffected = len(others) + 1
+    for pose in _poses(robot):
+        for point, manner in WAYS_TO_LOOK:
+            motions = [SeenMotion(pose, entry.joint, point, seen) for seen in SEEN]
+            motions = [motion for motion in motions if motion.manner == manner]
+            values = predict_tables(tables, robot, motions)
+            best = int(np.argmin(values[0]))
+            plain = values[:unaffected, best].max() < PLAIN_DEG
+            turned = (values[unaffected:, best] > 180.0 - PLAIN_DEG).all()
+            if plain and turned:
+                return LookAtMotion(entry.name, entry.joint, point, pose, motions[best].seen)
+    return None
+
+
+def _poses(robot: Robot) -> Iterator[Pose]:
+    """Poses to look from: the zero pose, then one joint bent, within the limits."""
+    lower, upper = np.degrees(robot.lower), np.degrees(robot.upper)
+    zero = np.clip(np.zeros(len(lower)), lower, upper)
+    yield _pose(zero)
+    for joint in range(len(lower)):
+        for bend in (BENT_DEG, -BENT_DEG):
+            bent: Reals = zero.copy()
+            bent[joint] = np.clip(bend, lower[joint], upper[joint])
+            yield _pose(bent)
+
+
+def _pose(angles: Sequence[float] | Reals) -> Pose:
+    return cast(Pose, tuple(float(angle) for angle in angles))

@@ -1,0 +1,160 @@
+"""Which references react to which entries, and which of them are independent of which."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from er3a.identifiability.entries import TableNumber, document_of, entries_of, shifted
+from er3a.identifiability.requirements import FollowedExtreme
+from er3a.kinematics.table_batch import Tables, join, tables_of
+from er3a.numerics.arrays import Flags, Reals
+from er3a.references.documents import Documents
+from er3a.references.predict import predict_tables
+from er3a.references.quantities import Extreme, PoseOutside, Quantity, Speed
+from er3a.references.reference import Reference, quantities_of
+from er3a.robots.robot import Robot
+
+PROBE_M, PROBE_RAD = 0.01, np.radians(5.0)
+REACTS = 1e-6  # of the quantity's unit
+REACTS_MM = 1e-4  # of an extreme, which is searched for
+
+CheckKind = Literal["independent", "consistency", "claim"]
+
+
+@dataclass(frozen=True)
+class CheckBasis:
+    """What a check against a reference rests on.
+
+    Attributes
+    ----------
+    kind : a claim, if its grade is none that a verdict may rest on; independent, if its document is so of an entry that
+        it reacts to; else it shows only that the table was derived consistently
+    reacts_to : names of the entries that it reacts to
+    independent_of : those of them whose document is another, with nothing in common
+    same_publisher : those of these whose document has the same publisher
+    """
+
+    kind: CheckKind
+    reacts_to: tuple[str, ...]
+    independent_of: tuple[str, ...]
+    same_publisher: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class CheckTally:
+    """How many checks of one kind there are, and what became of them; ``conflicting``: missed, but contradicted by
+    another reference that is met."""
+
+    passed: int = 0
+    failed: int = 0
+    conflicting: int = 0
+
+    @property
+    def total(self) -> int:
+        """All of them."""
+        return self.passed + self.failed + self.conflicting
+
+
+@dataclass(frozen=True)
+class CheckCounts:
+    """Checks against references by what they rest on."""
+
+    independent: CheckTally
+    consistency: CheckTally
+    claims: CheckTally
+
+
+def count_checks(kinds: Sequence[CheckKind], statuses: Sequence[Literal["pass", "fail", "conflict"]]) -> CheckCounts:
+    """Counts of checks, each with its kind and status."""
+
+    def tally(kind: CheckKind) -> CheckTally:
+        own = [status for each, status in zip(kinds, statuses) if each == kind]
+        return CheckTally(own.count("pass"), own.count("fail"), own.count("conflict"))
+
+    return CheckCounts(tally("independent"), tally("consistency"), tally("claim"))
+
+
+def bases_of(robot: Robot, references: Sequence[Reference], documents: Documents) -> list[CheckBasis]:
+    """What the check against each reference rests on."""
+    entries = entries_of(robot)
+    reacts = reactions(robot, references, entries)
+    found = []
+    for row, reference in zip(reacts, references):
+        touched = [entry for entry, own in zip(entries, row) if own]
+        free = [e for e in touched if documents.independent(reference.document, document_of(robot, e))]
+        related = [e for e in free if documents.same_publisher(reference.document, document_of(robot, e))]
+        kind: CheckKind = "claim" if not reference.authoritative else "independent" if free else "consistency"
+        found.append(CheckBasis(kind, _names(touched), _names(free), _names(related)))
+    return found
+
+
+def reactions(robot: Robot, references: Sequence[Reference], entries: Sequence[TableNumber]) -> Flags:
+    """Whether the model's value (n, k) for each reference changes with each entry, the others as they are.
+
+    Lengths are moved by 10 mm and angles by 5 deg to either side, because extremes and axes in line have no slope."""
+    quantities = quantities_of(references)
+    reacts = np.zeros((len(quantities), len(entries)), dtype=bool)
+    table = tables_of(robot)
+    probes, owner = _probes(table, entries)
+    plain = [i for i, quantity in enumerate(quantities) if not isinstance(quantity, Extreme | Speed | PoseOutside)]
+    if plain:
+        values = predict_tables(join([table, *probes]), robot, [quantities[i] for i in plain])
+        changed = ~(np.abs(values[1:] - values[0]) <= REACTS)
+        for k, row in zip(owner, changed):
+            reacts[plain, k] |= row
+    for extreme in {quantity for quantity in quantities if isinstance(quantity, Extreme)}:
+        rows = [i for i, other in enumerate(quantities) if other == extreme]
+        reacts[np.ix_(rows, list(_moving_extreme(robot, extreme, table, probes, owner)))] = True
+    for i, quantity in enumerate(quantities):
+        for k, entry in enumerate(entries):
+            reacts[i, k] |= _bounds(quantity, entry)
+    return reacts
+
+
+def _bounds(quantity: Quantity, entry: TableNumber) -> bool:
+    """Whether a quantity is the speed of an entry, or a pose that one of its limits must let pass."""
+    if isinstance(quantity, Speed):
+        return entry.column == "speed" and entry.joint == quantity.joint
+    if isinstance(quantity, PoseOutside):
+        angle = quantity.pose[entry.joint - 1]
+        return (entry.column == "upper" and angle > 0) or (entry.column == "lower" and angle < 0)
+    return False
+
+
+def _moving_extreme(robot: Robot, quantity: Extreme, table: Tables, probes: list[Tables], owner: list[int]) -> set[int]:
+    followed = FollowedExtreme(quantity, robot)
+    own = followed.at(table)
+    moving: set[int] = set()
+    for k, probe in zip(owner, probes):
+        if k not in moving:
+            followed.known = False
+            if abs(followed.at(probe) - own) > REACTS_MM:
+                moving.add(k)
+    return moving
+
+
+def _probes(table: Tables, entries: Sequence[TableNumber]) -> tuple[list[Tables], list[int]]:
+    """Tables in which one entry is another, and the place of that entry."""
+    found: list[Tables] = []
+    owner: list[int] = []
+    for k, entry in enumerate(entries):
+        if entry.column == "speed":
+            continue
+        if entry.column == "direction":
+            changed = [table.with_column("direction", [entry.joint - 1], -table.direction[:, [entry.joint - 1]])]
+        else:
+            size = PROBE_M if entry.unit == "mm" else PROBE_RAD
+            amounts: Reals = np.array([[size], [-size]])
+            both = shifted(table, [entry], amounts)
+            changed = [both[[0]], both[[1]]]
+        found += changed
+        owner += [k] * len(changed)
+    return found, owner
+
+
+def _names(entries: Sequence[TableNumber]) -> tuple[str, ...]:
+    return tuple(entry.name for entry in entries)

@@ -1,0 +1,268 @@
+"""What references ask of a table's geometry, as smooth numbers that an optimiser can follow.
+
+A reference with a half-width asks for |off| <= half-width; one with a standard deviation is a term of a likelihood. Of
+references that contradict each other, either may be right, so they ask for no more than the hull of what they leave
+open. Extremes over the joint limits are followed along with where they are attained: their derivative with respect to
+the table is that at the maximiser (envelope theorem).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from er3a.identifiability.entries import TableNumber, shifted
+from er3a.identifiability.extreme_climb import climb_to_extreme, measure_code
+from er3a.identifiability.peaks import box_points, climb, peak
+from er3a.kinematics.table_batch import Tables, frames_of, tables_of
+from er3a.numerics.arrays import Reals
+from er3a.references.predict import state_of_tables
+from er3a.references.quantities import FRAME_OF_POINT, MM, Extreme, Limit, PoseOutside, Quantity, Speed
+from er3a.references.reference import Reference, conflicts
+from er3a.robots.robot import Robot
+
+LIKELY = 4.0  # standard deviations, beyond which a discrete alternative is excluded
+SLIGHT = 1e-3  # of a half-width
+SLOPE_STEP = 1e-3  # of an entry's scale
+SCANNED, WATCHED, OVERTAKEN_M = 512, 48, 1e-9
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """One number that is asked for.
+
+    Attributes
+    ----------
+    half_width : or the standard deviation, if ``gaussian``
+    references : places of the references that ask for it
+    """
+
+    quantity: Quantity
+    expected: float
+    half_width: float
+    gaussian: bool
+    references: tuple[int, ...]
+
+
+def requirements_of(references: Sequence[Reference]) -> list[Requirement]:
+    """What references ask of a table; those about limits and speeds ask nothing of it."""
+    asked = {
+        i: reference
+        for i, reference in enumerate(references)
+        if reference.expected is not None and not isinstance(reference.quantity, Limit | Speed | PoseOutside)
+    }
+    rivals: dict[int, set[int]] = {}
+    for i, j in conflicts(references):
+        if i in asked and j in asked:
+            together = {i, j} | rivals.get(i, set()) | rivals.get(j, set())
+            rivals.update(dict.fromkeys(together, together))
+    found = []
+    for i, reference in asked.items():
+        if i in rivals:
+            if i == min(rivals[i]):
+                found.append(_hull(references, sorted(rivals[i])))
+            continue
+        stated = _stated(reference)
+        width = reference.deviation or reference.uncertainty
+        found.append(Requirement(reference.quantity, stated, width, reference.deviation is not None, (i,)))
+    return found
+
+
+def _hull(references: Sequence[Reference], places: list[int]) -> Requirement:
+    first = references[places[0]]
+    stated = [_stated(references[i]) for i in places]
+    if all(type(references[i].quantity).apart is Quantity.apart for i in places):
+        low = min(value - references[i].uncertainty for value, i in zip(stated, places))
+        high = max(value + references[i].uncertainty for value, i in zip(stated, places))
+        return Requirement(first.quantity, (low + high) / 2, (high - low) / 2, False, tuple(places))
+    width = max(
+        first.quantity.apart(stated[0], references[i].quantity, value) + references[i].uncertainty
+        for value, i in zip(stated, places)
+    )
+    return Requirement(first.quantity, stated[0], width, False, tuple(places))
+
+
+def _stated(reference: Reference) -> float:
+    return float(reference.expected if reference.expected is not None else np.nan)
+
+
+class FollowedExtreme:
+    """An extreme over the joint limits, and where it was attained last."""
+
+    def __init__(self, quantity: Extreme, robot: Robot):
+        self.quantity, self.base = quantity, robot.base
+        self.count = len(robot.a)
+        moving = FRAME_OF_POINT[quantity.point]
+        self.joints = list(range(1, min(moving, self.count)))  # none of the measures changes with joint 1
+        self.sign = 1.0 if quantity.extreme == "greatest" else -1.0
+        self.q = np.zeros(self.count)
+        self.known = False
+        self.code = measure_code(quantity)
+        box = np.zeros(len(self.joints)), np.ones(len(self.joints))
+        self.watched, self.scanned = box_points(*box, WATCHED), box_points(*box, SCANNED)
+
+    def at(self, table: Tables) -> float:
+        """The extreme in mm of a table (a batch of one)."""
+        if self.code is not None:
+            lower, upper = table.lower[0], table.upper[0]
+            q = self.q if self.known else np.zeros(self.count)
+            shares = self.watched if self.known else self.scanned
+            points = np.zeros((1 + len(shares), self.count))
+            points[0] = np.clip(q, np.minimum(lower, upper), np.maximum(lower, upper))
+            points[1:, self.joints] = lower[self.joints] + shares * (upper - lower)[self.joints]
+            points[0, 0] = 0.0
+            starts = points
+            self.q, value = climb_to_extreme(table, self.base, self.code, self.sign, starts, np.array(self.joints))
+            self.known = True
+            return self.sign * value * MM
+        lower, upper = table.lower[0, self.joints], table.upper[0, self.joints]
+        lower, upper = np.minimum(lower, upper), np.maximum(lower, upper)
+
+        def measured(q: Reals) -> Reals:
+            values: Reals = self.sign * self._measure(table, self._whole(q))[0]
+            return values
+
+        if self.known:
+            q, value = climb(measured, np.clip(self.q[self.joints], lower, upper), lower, upper)
+            points = box_points(lower, upper, WATCHED)
+            values = measured(points)
+            if values.max() > value + OVERTAKEN_M:
+                q, value = peak(measured, lower, upper, points)
+        else:
+            q, value = peak(measured, lower, upper)
+        self.q, self.known = self._whole(q), True
+        return self.sign * value * MM
+
+    def along(self, tables: Tables) -> Reals:
+        """The measure (H,) in mm of many tables where the extreme was attained last."""
+        measured: Reals = self._measure(tables, self.q[None])[:, 0] * MM
+        return measured
+
+    def _measure(self, tables: Tables, q: Reals) -> Reals:
+        measured: Reals = self.quantity.measure(frames_of(tables, self.base, q))
+        return measured
+
+    def _whole(self, q: Reals) -> Reals:
+        whole = np.zeros((*q.shape[:-1], self.count))
+        whole[..., self.joints] = q
+        return whole
+
+
+class Asked:
+    """Requirements beside a robot's table: how far tables are off, in half-widths.
+
+    Attributes
+    ----------
+    blocks : of each requirement with a half-width, its slice of the components
+    gaussian : slices of those with a standard deviation
+    """
+
+    def __init__(self, robot: Robot, requirements: Sequence[Requirement]):
+        self.robot, self.requirements = robot, tuple(requirements)
+        self.plain = [each for each in requirements if not isinstance(each.quantity, Extreme)]
+        self.extreme = [
+            (each, FollowedExtreme(each.quantity, robot)) for each in requirements if isinstance(each.quantity, Extreme)
+        ]
+        self.order = (*self.plain, *(each for each, _ in self.extreme))
+        self._slices: list[slice] | None = None
+
+    def __len__(self) -> int:
+        return len(self.order)
+
+    def off(self, table: Tables, afresh: bool = False) -> Reals:
+        """Components (m,) of a table (a batch of one); ``afresh``: extremes are looked for all over the joint
+        ranges."""
+        parts = self._plain_off(table)
+        for each, followed in self.extreme:
+            followed.known &= not afresh
+            parts.append(np.array([[(followed.at(table) - each.expected) / each.half_width]]))
+        joined: Reals = self._joined(parts, 1)[0]
+        return joined
+
+    def plain_violation(self, tables: Tables) -> Reals:
+        """Violations (H, r) of many tables, of the requirements that are no extremes (the first ones)."""
+        lengths = [
+            np.linalg.norm(off, axis=-1) / (LIKELY if each.gaussian else 1.0)
+            for off, each in zip(self._plain_off(tables), self.plain)
+        ]
+        return np.stack(lengths, axis=-1) - 1.0
+
+    def excluding(self, table: Tables, nominal: Tables) -> tuple[int, ...]:
+        """Places of references that a table misses though another one meets them."""
+        if not len(self):
+            return ()
+        violations = [self.violation(self.off(each, afresh=True)) for each in (table, nominal)]
+        missed = (violations[0] > SLIGHT) & (violations[1] <= SLIGHT)
+        return tuple(i for each, own in zip(self.order, missed) if own for i in each.references)
+
+    def follow(self, places: Sequence[Reals]) -> None:
+        """Follow extremes from where they were attained (see ``places``)."""
+        for (_, followed), q in zip(self.extreme, places):
+            followed.q, followed.known = q, True
+
+    @property
+    def places(self) -> tuple[Reals, ...]:
+        """Where extremes were attained last."""
+        return tuple(followed.q for _, followed in self.extreme)
+
+    def off_near(self, tables: Tables) -> Reals:
+        """Components (H, m) of many tables, extremes where they were attained last."""
+        parts = self._plain_off(tables)
+        for each, followed in self.extreme:
+            parts.append(((followed.along(tables) - each.expected) / each.half_width)[:, None])
+        return self._joined(parts, len(tables))
+
+    def slope(self, table: Tables, entries: Sequence[TableNumber]) -> Reals:
+        """Derivative (m, k) with respect to entries, in their scales, at the table whose ``off`` was asked for last."""
+        k = len(entries)
+        scale = np.array([entry.scale for entry in entries])
+        steps = SLOPE_STEP * np.concatenate([np.eye(k), -np.eye(k)]) * scale
+        off = self.off_near(shifted(table, entries, steps))
+        slope: Reals = (off[:k] - off[k:]).T / (2 * SLOPE_STEP)
+        return slope
+
+    def violation(self, off: Reals) -> Reals:
+        """How far each requirement is exceeded (..., r), in half-widths (or four standard deviations) less one."""
+        return (
+            np.stack(
+                [
+                    np.linalg.norm(off[..., part], axis=-1) / (LIKELY if each.gaussian else 1.0)
+                    for part, each in zip(self.slices, self.order)
+                ],
+                axis=-1,
+            )
+            - 1.0
+        )
+
+    @property
+    def slices(self) -> list[slice]:
+        """The components of each requirement, in ``order``."""
+        if self._slices is None:
+            self.off(tables_of(self.robot))
+        return self._slices or []
+
+    @property
+    def bounded(self) -> list[slice]:
+        """Components of requirements with a half-width."""
+        return [part for part, each in zip(self.slices, self.order) if not each.gaussian]
+
+    @property
+    def likely(self) -> list[int]:
+        """Components of requirements with a standard deviation."""
+        return [i for part, each in zip(self.slices, self.order) if each.gaussian for i in range(part.start, part.stop)]
+
+    def _plain_off(self, tables: Tables) -> list[Reals]:
+        if not self.plain:
+            return []
+        state = state_of_tables(tables, self.robot, [each.quantity for each in self.plain])
+        return [each.quantity.off(state, each.expected) / each.half_width for each in self.plain]
+
+    def _joined(self, parts: list[Reals], count: int) -> Reals:
+        if not parts:
+            self._slices = []
+            return np.empty((count, 0))
+        ends = np.cumsum([part.shape[-1] for part in parts])
+        self._slices = [slice(end - part.shape[-1], end) for part, end in zip(parts, ends.tolist())]
+        return np.concatenate(parts, axis=-1)

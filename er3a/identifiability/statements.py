@@ -1,0 +1,148 @@
+"""Two statements about a table that are never mixed: that it is not the robot which other documents describe, and that
+it does not agree with its own text."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from er3a.diagnosis.ranking import rank
+from er3a.identifiability.entries import TableNumber, document_of, entries_of, shifted
+from er3a.identifiability.feasible import MET
+from er3a.identifiability.requirements import Asked, requirements_of
+from er3a.kinematics.table_batch import Tables, tables_of
+from er3a.references.documents import Documents
+from er3a.references.reference import Reference, ReferenceSet, conflicts, lengths_of, vectors_of
+from er3a.robots.robot import Robot
+
+QUARTERS = (-1, 1, 2)
+MOST_FAULTS = 2
+
+
+@dataclass(frozen=True)
+class NotTheRobotDescribed:
+    """No one or two corrections make the table the robot that other documents describe.
+
+    Attributes
+    ----------
+    against : titles of these documents
+    mismatch_mm : the greatest difference to them in a position, as the table is
+    left_mm : what the best of one or two corrections leaves of it
+    tried : how many were
+    """
+
+    against: tuple[str, ...]
+    mismatch_mm: float
+    left_mm: float
+    tried: int
+    code: Literal["not_the_robot_described"] = "not_the_robot_described"
+
+
+@dataclass(frozen=True)
+class InconsistentWithOwnText:
+    """A table does not agree with what its own author says beside it.
+
+    Attributes
+    ----------
+    entry, given, needed, unit : the one change by a quarter or half turn, or of a sign, that makes it agree; None if
+        there is none
+    against : titles of the author's other documents
+    missed : how many of their statements it misses
+    """
+
+    entry: str | None
+    given: float | None
+    needed: float | None
+    unit: str
+    against: tuple[str, ...]
+    missed: int
+    code: Literal["inconsistent_with_own_text"] = "inconsistent_with_own_text"
+
+
+def not_the_robot_described(robot: Robot, references: ReferenceSet) -> NotTheRobotDescribed | None:
+    """Whether trusted documents of another origin describe another robot; None if they don't, or if a correction or two
+    would make it theirs."""
+    foreign = [
+        reference
+        for reference in references.checkable
+        if reference.authoritative and _foreign(robot, reference, references.documents)
+    ]
+    ranking = rank(robot, foreign) if foreign else None
+    if ranking is None:
+        return None
+    lengths = [reference.unit == "mm" for reference in ranking.references]
+    stated = [reference for reference, own in zip(ranking.references, lengths) if own]
+    vectors = vectors_of(stated)
+    before = lengths_of(ranking.before[lengths], vectors).max(initial=0.0)
+    few = ranking.pool.count <= MOST_FAULTS
+    left = lengths_of(ranking.pool.difference[few][:, lengths], vectors).max(axis=1, initial=0.0)
+    allowed = max((reference.uncertainty for reference in stated), default=0.0)
+    if left.min() <= allowed * np.sqrt(3):
+        return None
+    named = dict.fromkeys(_title(reference, references.documents) for reference in ranking.references)
+    return NotTheRobotDescribed(tuple(named), float(before), float(left.min()), int(few.sum()))
+
+
+def inconsistent_with_own_text(robot: Robot, references: ReferenceSet) -> InconsistentWithOwnText | None:
+    """Whether a table misses what its own publisher says in other words; None if it doesn't, or nothing is said."""
+    stated = references.checkable
+    contested = {i for pair in conflicts(stated) for i in pair}
+    own = [
+        reference
+        for i, reference in enumerate(stated)
+        if i not in contested and _own_text(robot, reference, references.documents)
+    ]
+    asked = Asked(robot, requirements_of(own))
+    if not len(asked):
+        return None
+    missed = int((asked.violation(asked.off(tables_of(robot), afresh=True)) > MET).sum())
+    if not missed:
+        return None
+    named = tuple(dict.fromkeys(_title(reference, references.documents) for reference in own))
+    entry, table = _one_change(robot, asked)
+    if entry is None or table is None:
+        return InconsistentWithOwnText(None, None, None, "", named, missed)
+    needed = float(getattr(table, entry.column)[0, entry.joint - 1] * entry.in_unit)
+    return InconsistentWithOwnText(entry.name, entry.value(robot), round(needed, 9), entry.unit, named, missed)
+
+
+def _one_change(robot: Robot, asked: Asked) -> tuple[TableNumber | None, Tables | None]:
+    """The first single change, quarter turns of offsets first, with which all is met."""
+    table = tables_of(robot)
+    turning = [entry for entry in entries_of(robot) if entry.column in ("offset", "alpha", "direction")]
+    turning.sort(key=lambda entry: ("offset", "direction", "alpha").index(entry.column))
+    for entry in turning:
+        at = [entry.joint - 1]
+        changed = (
+            [table.with_column("direction", at, -table.direction[:, at])]
+            if entry.column == "direction"
+            else [shifted(table, [entry], np.array([[quarters * np.pi / 2]])) for quarters in QUARTERS]
+        )
+        for each in changed:
+            if asked.violation(asked.off(each, afresh=True)).max() <= MET:
+                return entry, each
+    return None, None
+
+
+def _documents_of(robot: Robot) -> Sequence[str]:
+    geometry = [entry for entry in entries_of(robot) if entry.column not in ("lower", "upper", "speed")]
+    return tuple(dict.fromkeys(document_of(robot, entry) for entry in geometry))
+
+
+def _foreign(robot: Robot, reference: Reference, documents: Documents) -> bool:
+    return all(documents.independent(reference.document, own) for own in _documents_of(robot))
+
+
+def _own_text(robot: Robot, reference: Reference, documents: Documents) -> bool:
+    """Whether a reference is of the table's publisher, and made neither from the table nor with it."""
+    tables = _documents_of(robot)
+    related = any(documents.same_publisher(reference.document, own) for own in tables)
+    return related and all(documents.independent(reference.document, own) for own in tables)
+
+
+def _title(reference: Reference, documents: Documents) -> str:
+    known = documents.by_name.get(reference.document)
+    return known.title if known else reference.source

@@ -1,0 +1,301 @@
+"""Seven revolute joints whose first three axes meet in S and last three in W, at a given arm angle: eight solutions.
+
+The distance of S and W gives joint 4 by two roots. The arm then turns as a whole about the line S W; the arm angle
+tells by how much: it is the angle about that line from the plane with a reference direction (axis 1 unless given) to
+the elbow, the direction ``+-(axis 4 x S W)``, + where joint 4 is bent in the positive sense [1]_. Shoulder and wrist
+are three joints through a point each, with two roots. The slot is ``4 elbow + 2 shoulder + wrist``.
+
+References
+----------
+.. [1] K. Kreutz-Delgado, M. Long, H. Seraji, "Kinematic analysis of 7-DOF manipulators", Int. J. Robotics Research 11
+   (1992).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from er3a.geometry.angles import TURN
+from er3a.geometry.vectors import Vector
+from er3a.kinematics.classes.links import axes_of, poses_of
+from er3a.kinematics.classes.spherical_joints import (
+    Rows,
+    SphericalConstants,
+    frame_along,
+    rows_of_vectors,
+    spherical_constants,
+    three_angles,
+    vector_of,
+)
+from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.fast_math import arctan2, cos_sin
+from er3a.numerics.jit import kernel
+
+SLOTS = 8
+BLOCK = 64
+MEETS_M = 1e-9
+NEAR = 1e-9
+
+
+class ArmAngleConstants(NamedTuple):
+    """The arm with all joints at 0, m and rad.
+
+    ``elbow`` has as rows the direction from axis 4 to S, the one across it, and axis 4. ``base`` and ``forearm`` bring
+    the base's and the elbow's coordinates into the frames before axis 1 and axis 5. ``axis_3``, ``beside_3`` are
+    directions behind joint 3 in the elbow's coordinates, ``axis_7_in_tool`` and ``beside_7_in_tool`` behind joint 7.
+    """
+
+    shoulder: Vector
+    wrist_in_tool: Vector
+    reference: Vector
+    elbow: Rows
+    base: Rows
+    forearm: Rows
+    axis_3: Vector
+    beside_3: Vector
+    axis_7_in_tool: Vector
+    beside_7_in_tool: Vector
+    first_three: SphericalConstants
+    last_three: SphericalConstants
+    upper_arm: float
+    lower_arm: float
+    height: float
+    zero_4: float
+
+
+@dataclass(frozen=True, eq=False)
+class ArmAngleArm:
+    """The solver of one arm: its links (8, 4, 4) and constants."""
+
+    links: Reals
+    constants: ArmAngleConstants
+
+
+def arm_angle_arm(links: Reals, reference: Reals | None = None) -> ArmAngleArm | None:
+    """The solver for links (8, 4, 4), or None if the chain is of another kind. Axes meet to 1e-9 m.
+
+    ``reference`` (3,) is the direction that the arm angle is taken from, in the base frame; None means axis 1.
+    """
+    axes, points = axes_of(links)
+    S, W = _meeting(axes[:3], points[:3]), _meeting(axes[4:], points[4:])
+    if S is None or W is None:
+        return None
+    for k in (0, 1, 4, 5):
+        if np.linalg.norm(np.cross(axes[k], axes[k + 1])) < 1e-6:
+            return None
+    w, P = axes[3], points[3]
+    to_s, to_w = (x - P - ((x - P) @ w) * w for x in (S, W))
+    ls, lw = float(np.linalg.norm(to_s)), float(np.linalg.norm(to_w))
+    if min(ls, lw) < MEETS_M:
+        return None
+    x = to_s / ls
+    elbow = np.array([x, np.cross(w, x), w])
+    T = poses_of(links, np.zeros(7))
+    base = frame_along(axes[0])
+    first, G = spherical_constants(axes[:3], base)
+    forearm = frame_along(axes[4])
+    last, H = spherical_constants(axes[4:], forearm)
+    reference = axes[0] if reference is None else np.asarray(reference, float)
+    constants = ArmAngleConstants(
+        shoulder=vector_of(S),
+        wrist_in_tool=vector_of(T[:3, :3].T @ (W - T[:3, 3])),
+        reference=vector_of(reference / np.linalg.norm(reference)),
+        elbow=rows_of_vectors(elbow),
+        base=rows_of_vectors(base),
+        forearm=rows_of_vectors(forearm @ elbow.T),
+        axis_3=vector_of(elbow @ G[:, 2]),
+        beside_3=vector_of(elbow @ G[:, 0]),
+        axis_7_in_tool=vector_of(T[:3, :3].T @ H[:, 2]),
+        beside_7_in_tool=vector_of(T[:3, :3].T @ H[:, 0]),
+        first_three=first,
+        last_three=last,
+        upper_arm=ls,
+        lower_arm=lw,
+        height=float((W - S) @ w),
+        zero_4=float(np.arctan2(to_w @ elbow[1], to_w @ elbow[0])),
+    )
+    return ArmAngleArm(np.ascontiguousarray(links, dtype=float), constants)
+
+
+def _meeting(axes: Reals, points: Reals) -> Reals | None:
+    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
+    right = (across @ points[:, :, None]).reshape(-1)
+    found = np.asarray(np.linalg.lstsq(across.reshape(-1, 3), right, rcond=None)[0], dtype=float)
+    miss = np.linalg.norm((across @ (found - points)[:, :, None])[..., 0], axis=1).max()
+    return found if miss < MEETS_M else None
+
+
+def solve_at_arm_angle(arm: ArmAngleArm, T: Reals, psi: Reals | float) -> tuple[Reals, Flags]:
+    """All solutions for poses T (N, 4, 4), m, at arm angles psi (N,) or one, rad.
+
+    Returns
+    -------
+    q : (N, 8, 7), rad, in (-pi, pi]; NaN where a slot has none
+    singular : (N,), where S W lies along the reference (no arm angle is defined: another reference is needed), or a
+        wrist, shoulder or elbow is within 1e-9 of a singularity
+    """
+    T = np.ascontiguousarray(T, dtype=float)
+    angles = np.ascontiguousarray(np.broadcast_to(np.asarray(psi, float), (len(T),)))
+    q, singular = np.empty((len(T), SLOTS, 7)), np.empty(len(T), dtype=bool)
+    solve_arm_angle_blocks(arm.constants, T, angles, q, singular)
+    return q, singular
+
+
+def arm_angles_of(arm: ArmAngleArm, q: Reals) -> Reals:
+    """Arm angle (...,) in rad of joint angles (..., 7)."""
+    q = np.asarray(q, float)
+    k, flat = arm.constants, q.reshape(-1, 7)
+    front = poses_of(np.concatenate([arm.links[:4], np.eye(4)[None]])[:4], flat[:, :3])
+    zero = poses_of(arm.links[:4], np.zeros(3))
+    R3 = front[:, :3, :3] @ zero[:3, :3].T
+    T = poses_of(arm.links, flat)
+    n = T[:, :3, 3] + T[:, :3, :3] @ np.array(k.wrist_in_tool) - np.array(k.shoulder)
+    n /= np.linalg.norm(n, axis=1)[:, None]
+    bend = np.sin(flat[:, 3] + k.zero_4)
+    e = np.cross(R3 @ np.array(k.elbow[2]), n) * np.where(bend < 0, -1.0, 1.0)[:, None]
+    r = np.array(k.reference) - (n @ np.array(k.reference))[:, None] * n
+    psi = np.arctan2(np.einsum("ni,ni->n", n, np.cross(r, e)), np.einsum("ni,ni->n", r, e))
+    return np.asarray(psi.reshape(q.shape[:-1]))
+
+
+@kernel
+def solve_arm_angle_blocks(k: ArmAngleConstants, T: Reals, psi: Reals, q: Reals, singular: Flags) -> None:
+    """Fill ``q`` (N, 8, 7) and ``singular`` (N,) for poses T (N, 4, 4) and arm angles psi (N,)."""
+    w, out = np.empty(44 * BLOCK), np.empty(8 * BLOCK)
+    for start in range(0, T.shape[0], BLOCK):
+        size = min(BLOCK, T.shape[0] - start)
+        _turned_about_line(k, T, psi, start, size, w)
+        for elbow in range(2):
+            _elbow(k, w, 1.0 - 2.0 * elbow)
+            for root in range(4):
+                first = root < 2
+                sign = 1.0 - 2.0 * (root % 2)
+                _three(k.first_three if first else k.last_three, w, 24 if first else 30, sign, out)
+                for i in range(size):
+                    for other in range(2):
+                        slot = 4 * elbow + (2 * (root % 2) + other if first else 2 * other + root % 2)
+                        base = 0 if first else 4
+                        q[start + i, slot, base] = out[i]
+                        q[start + i, slot, base + 1] = out[BLOCK + i]
+                        q[start + i, slot, base + 2] = out[2 * BLOCK + i]
+                        if first:
+                            q[start + i, slot, 3] = w[36 * BLOCK + i]
+        for i in range(size):
+            singular[start + i] = w[38 * BLOCK + i] > 0.0
+            for slot in range(SLOTS):
+                total = 0.0
+                for j in range(7):
+                    total += q[start + i, slot, j]
+                if np.isnan(total):
+                    for j in range(7):
+                        q[start + i, slot, j] = np.nan
+
+
+@kernel
+def _dot(r: Vector, x: float, y: float, z: float) -> float:
+    return r[0] * x + r[1] * y + r[2] * z
+
+
+@kernel
+def _turned_about_line(k: ArmAngleConstants, T: Reals, psi: Reals, start: int, size: int, w: Reals) -> None:
+    """Rows 0-8 of ``w``: n, e and n x e in the frame before axis 1; 9-14 axis 7 and the vector beside it along those;
+    37 the distance of S and W, 38 whether the pose is singular."""
+    for i in range(BLOCK):
+        m = start + min(i, size - 1)
+        t, u = k.wrist_in_tool, k.shoulder
+        vx = T[m, 0, 0] * t[0] + T[m, 0, 1] * t[1] + T[m, 0, 2] * t[2] + T[m, 0, 3] - u[0]
+        vy = T[m, 1, 0] * t[0] + T[m, 1, 1] * t[1] + T[m, 1, 2] * t[2] + T[m, 1, 3] - u[1]
+        vz = T[m, 2, 0] * t[0] + T[m, 2, 1] * t[1] + T[m, 2, 2] * t[2] + T[m, 2, 3] - u[2]
+        distance = np.sqrt(vx * vx + vy * vy + vz * vz)
+        per = 1.0 / distance
+        nx, ny, nz = vx * per, vy * per, vz * per
+        r = k.reference
+        # e = cos r + sin n x r with r made perpendicular; n x r needs no projection
+        ax, ay, az = ny * r[2] - nz * r[1], nz * r[0] - nx * r[2], nx * r[1] - ny * r[0]
+        length = np.sqrt(ax * ax + ay * ay + az * az)
+        per = 1.0 / length
+        ax, ay, az = ax * per, ay * per, az * per
+        bx, by, bz = ay * nz - az * ny, az * nx - ax * nz, ax * ny - ay * nx
+        c, s = cos_sin(psi[m])
+        ex, ey, ez = c * bx + s * ax, c * by + s * ay, c * bz + s * az
+        fx, fy, fz = ny * ez - nz * ey, nz * ex - nx * ez, nx * ey - ny * ex
+        for row in range(3):
+            w[row * BLOCK + i] = _dot(k.base[row], nx, ny, nz)
+            w[(3 + row) * BLOCK + i] = _dot(k.base[row], ex, ey, ez)
+            w[(6 + row) * BLOCK + i] = _dot(k.base[row], fx, fy, fz)
+        a, b = k.axis_7_in_tool, k.beside_7_in_tool
+        zx = T[m, 0, 0] * a[0] + T[m, 0, 1] * a[1] + T[m, 0, 2] * a[2]
+        zy = T[m, 1, 0] * a[0] + T[m, 1, 1] * a[1] + T[m, 1, 2] * a[2]
+        zz = T[m, 2, 0] * a[0] + T[m, 2, 1] * a[1] + T[m, 2, 2] * a[2]
+        xx = T[m, 0, 0] * b[0] + T[m, 0, 1] * b[1] + T[m, 0, 2] * b[2]
+        xy = T[m, 1, 0] * b[0] + T[m, 1, 1] * b[1] + T[m, 1, 2] * b[2]
+        xz = T[m, 2, 0] * b[0] + T[m, 2, 1] * b[1] + T[m, 2, 2] * b[2]
+        w[9 * BLOCK + i], w[12 * BLOCK + i] = nx * zx + ny * zy + nz * zz, nx * xx + ny * xy + nz * xz
+        w[10 * BLOCK + i], w[13 * BLOCK + i] = ex * zx + ey * zy + ez * zz, ex * xx + ey * xy + ez * xz
+        w[11 * BLOCK + i], w[14 * BLOCK + i] = fx * zx + fy * zy + fz * zz, fx * xx + fy * xy + fz * xz
+        w[37 * BLOCK + i] = distance
+        w[38 * BLOCK + i] = 1.0 if (length < NEAR) | (distance < NEAR) else 0.0
+
+
+@kernel
+def _elbow(k: ArmAngleConstants, w: Reals, sign: float) -> None:
+    """Joint 4 by one root (row 36, NaN if S and W are too far or near), then axis 3 before axis 1 (rows 24-29, with the
+    vector beside it) and axis 7 before axis 5 (rows 30-35)."""
+    reach, least = k.upper_arm + k.lower_arm, k.upper_arm - k.lower_arm
+    for i in range(BLOCK):
+        distance = w[37 * BLOCK + i]
+        squared = distance * distance - k.height * k.height
+        far, near = reach * reach - squared, squared - least * least
+        slack = NEAR * NEAR * reach * reach
+        valid = (far > -slack) & (near > -slack)
+        straight = (abs(far) < NEAR * NEAR) | (abs(near) < NEAR * NEAR)
+        w[38 * BLOCK + i] = 1.0 if straight else w[38 * BLOCK + i]
+        far, near = max(far, 0.0), max(near, 0.0)
+        root_far, root_near = np.sqrt(far), np.sqrt(near)
+        bend = 2.0 * sign * arctan2(root_near, root_far)
+        per = 1.0 / (far + near)
+        c, s = (far - near) * per, 2.0 * sign * root_far * root_near * per
+        theta = bend - k.zero_4
+        theta -= TURN * np.ceil(theta * (1.0 / TURN) - 0.5)
+        w[36 * BLOCK + i] = theta if valid else np.nan
+        per = 1.0 / distance
+        x, y, h = (k.lower_arm * c - k.upper_arm) * per, k.lower_arm * s * per, k.height * per
+        length = np.sqrt(x * x + y * y)
+        per = sign / length
+        ex, ey = -y * per, x * per
+        fx, fy, fz = -h * ey, h * ex, x * ey - y * ex
+        for vector in range(2):
+            v0, v1, v2 = k.axis_3 if vector == 0 else k.beside_3
+            a, b, d = x * v0 + y * v1 + h * v2, ex * v0 + ey * v1, fx * v0 + fy * v1 + fz * v2
+            for row in range(3):
+                w[(24 + 3 * vector + row) * BLOCK + i] = (
+                    w[row * BLOCK + i] * a + w[(3 + row) * BLOCK + i] * b + w[(6 + row) * BLOCK + i] * d
+                )
+            a, b, d = (
+                w[(9 + 3 * vector) * BLOCK + i],
+                w[(10 + 3 * vector) * BLOCK + i],
+                w[(11 + 3 * vector) * BLOCK + i],
+            )
+            p0, p1, p2 = a * x + b * ex + d * fx, a * y + b * ey + d * fy, a * h + d * fz
+            # undone: joint 4, about the elbow's third direction
+            ct, st = cos_sin(theta)
+            p0, p1 = p0 * ct + p1 * st, p1 * ct - p0 * st
+            for row in range(3):
+                w[(30 + 3 * vector + row) * BLOCK + i] = _dot(k.forearm[row], p0, p1, p2)
+
+
+@kernel
+def _three(k: SphericalConstants, w: Reals, row: int, sign: float, out: Reals) -> None:
+    for i in range(BLOCK):
+        z, x = row * BLOCK + i, (row + 3) * BLOCK + i
+        a, b, c, valid, least = three_angles(
+            k, w[z], w[z + BLOCK], w[z + 2 * BLOCK], w[x], w[x + BLOCK], w[x + 2 * BLOCK], sign
+        )
+        w[38 * BLOCK + i] = 1.0 if abs(least) < NEAR else w[38 * BLOCK + i]
+        one = 1.0 if valid > 0.0 else np.nan
+        out[i] = (a - TURN * np.ceil(a * (1.0 / TURN) - 0.5)) * one
+        out[BLOCK + i] = (b - TURN * np.ceil(b * (1.0 / TURN) - 0.5)) * one
+        out[2 * BLOCK + i] = c * one

@@ -1,0 +1,137 @@
+"""Which solver an arm's geometry asks for, with the tolerances by which it is told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from er3a.kinematics.classes.arm_angle import arm_angle_arm
+from er3a.kinematics.classes.links import axes_of, size_of
+from er3a.kinematics.classes.parallel_axes import three_parallel
+from er3a.kinematics.classes.scara import scara
+from er3a.numerics.arrays import Flags, Reals
+
+PARALLEL = 1e-9  # rad
+MEETS_M = 1e-9
+NEARLY = 1e-3  # rad or parts of the arm's size: a property that the arm has nearly
+
+ArmClassCode = Literal[
+    "spherical_wrist",
+    "three_parallel",
+    "general_six",
+    "six_one_prismatic",
+    "arm_angle",
+    "redundant",
+    "scara",
+    "free_roll",
+    "unsolved",
+]
+SLOTS_OF: dict[ArmClassCode, int] = {
+    "spherical_wrist": 8,
+    "three_parallel": 8,
+    "general_six": 16,
+    "six_one_prismatic": 16,
+    "arm_angle": 8,
+    "redundant": 16,
+    "scara": 2,
+    "free_roll": 16,
+    "unsolved": 0,
+}
+
+
+@dataclass(frozen=True)
+class AxisPair:
+    """Two neighbouring axes (numbers from 1): the angle between them (rad, 0 to pi/2) and how far they miss (m)."""
+
+    first: int
+    angle: float
+    miss: float
+
+
+@dataclass(frozen=True)
+class ArmClass:
+    """An arm's class, its number of slots, and neighbouring axes that are parallel or meet nearly, but not quite."""
+
+    code: ArmClassCode
+    slots: int
+    nearly_parallel: tuple[AxisPair, ...]
+    nearly_meeting: tuple[AxisPair, ...]
+
+
+def arm_class(links: Reals, sliding: Flags | None = None) -> ArmClass:
+    """The class of a chain with constant links (n + 1, 4, 4); ``sliding`` (n,) tells prismatic joints.
+
+    - ``spherical_wrist``: six revolute joints, axes 4, 5, 6 meet to 1e-9 m, 2 and 3 are parallel to 1e-9 rad;
+    - ``three_parallel``: axes 2, 3, 4 parallel, 5 and 6 meet; ``general_six``: any other six revolute joints;
+    - ``six_one_prismatic``: six joints, one of them prismatic;
+    - ``arm_angle``: seven revolute joints, the first three axes meet, and the last three; ``redundant``: other seven;
+    - ``scara``: four joints with one direction, one of them prismatic; ``free_roll``: five revolute joints, solved with
+      a sixth about the tool's z axis, for tools that may turn about it;
+    - ``unsolved``: none of these.
+    """
+    sliding = np.zeros(len(links) - 1, dtype=bool) if sliding is None else np.asarray(sliding, dtype=bool)
+    pairs = _neighbours(links)
+    size = size_of(links)
+    code = _code(links, sliding, pairs)
+    parallel = tuple(pair for pair in pairs if PARALLEL < pair.angle < NEARLY)
+    meeting = tuple(pair for pair in pairs if MEETS_M < pair.miss < NEARLY * size)
+    return ArmClass(code, SLOTS_OF[code], parallel, meeting)
+
+
+def _code(links: Reals, sliding: Flags, pairs: tuple[AxisPair, ...]) -> ArmClassCode:
+    n = len(sliding)
+    if n == 4:
+        return "scara" if scara(links, sliding) else "unsolved"
+    if n == 5 and not sliding.any():
+        return "free_roll"
+    if n == 6 and sliding.any():
+        return "six_one_prismatic" if sliding.sum() == 1 else "unsolved"
+    if n == 6:
+        if pairs[1].angle < PARALLEL and _meet(links, (3, 4, 5)):
+            return "spherical_wrist"
+        return "three_parallel" if three_parallel(links) else "general_six"
+    if n == 7 and not sliding.any():
+        return "arm_angle" if arm_angle_arm(links) else "redundant"
+    return "unsolved"
+
+
+def _neighbours(links: Reals) -> tuple[AxisPair, ...]:
+    axes, points = axes_of(links)
+    found = []
+    for k in range(len(axes) - 1):
+        across = np.cross(axes[k], axes[k + 1])
+        sine = float(np.linalg.norm(across))
+        apart = points[k + 1] - points[k]
+        miss = np.linalg.norm(np.cross(apart, axes[k])) if sine < PARALLEL else abs(apart @ across) / sine
+        found.append(AxisPair(k + 1, float(np.arctan2(sine, abs(axes[k] @ axes[k + 1]))), float(miss)))
+    return tuple(found)
+
+
+def _meet(links: Reals, numbers: tuple[int, ...]) -> bool:
+    axes, points = axes_of(links)
+    a, p = axes[list(numbers)], points[list(numbers)]
+    across = np.eye(3) - a[:, :, None] * a[:, None, :]
+    right = (across @ p[:, :, None]).reshape(-1)
+    place = np.linalg.lstsq(across.reshape(-1, 3), right, rcond=None)[0]
+    return bool(np.linalg.norm((across @ (place - p)[:, :, None])[..., 0], axis=1).max() < MEETS_M)
+
+
+def with_joint_fixed(links: Reals, joint: int, value: float) -> Reals:
+    """Links (n, 4, 4) of the chain with one revolute joint (number from 0) held at a value in rad.
+
+    With :mod:`six_revolute` this solves any seven-joint arm at one value of the joint that is taken as its redundancy.
+    """
+    c, s = np.cos(value), np.sin(value)
+    turn = np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
+    held = np.array(links[joint] @ turn @ links[joint + 1])
+    return np.concatenate([links[:joint], held[None], links[joint + 2 :]])
+
+
+def with_free_roll(links: Reals) -> Reals:
+    """Links of the chain with one more revolute joint, about the tool's z axis: for tools that may turn about it.
+
+    Solved for any pose with the wanted tool point and axis, its last joint is the turn that is left over.
+    """
+    return np.concatenate([links, np.eye(4)[None]])

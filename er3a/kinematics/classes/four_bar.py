@@ -1,0 +1,170 @@
+"""Poses of an arm with axes 2, 3, 4 parallel, singular ones included: rows and continua.
+
+Where axis 6 is parallel to the three (q5 = 0 of a UR) the turn phi about them is free: axis 4 runs on a circle about W,
+where axes 5 and 6 meet, while joints 2 and 3 follow, a four-bar linkage. Its members are told by phi in closed form,
+and the ends of its ranges follow from the triangle's inequality.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from er3a.geometry.angles import TURN
+from er3a.kinematics.classes.links import size_of
+from er3a.kinematics.classes.parallel_axes import (
+    SLOTS,
+    ParallelConstants,
+    ThreeParallel,
+    polish_rows,
+    solve_parallel_blocks,
+)
+from er3a.kinematics.classes.spherical_joints import about_z
+from er3a.numerics.arrays import Flags, Reals
+
+SAME_FAMILY = 1e-6  # rad, of joints 1 and 5
+FREE = 1e-9  # rad between axis 6 and the parallel axes within which joint 5's roots are one family
+
+
+@dataclass(frozen=True, eq=False)
+class FourBar:
+    """A continuum of solutions: axis 6 along the parallel axes, links 2, 3, 4 and the way to W turn as a four-bar.
+
+    Attributes
+    ----------
+    arm : the solver
+    theta_1, theta_5 : rad, the same in all members
+    wrist : (2,), m, W in the plane; total : rad, constant sum (or difference) of phi and ``sense_6`` joint 6
+    intervals : (k, 2), rad, ranges of phi that the arm reaches; both elbows meet at an end; a full turn has none
+    """
+
+    arm: ThreeParallel
+    theta_1: float
+    theta_5: float
+    wrist: Reals
+    total: float
+    sense_6: float
+    intervals: Reals
+
+    def members(self, phi: Reals, elbow: int) -> Reals:
+        """Joint angles (..., 6) in rad at turns phi (...,) with one elbow (0 or 1); NaN outside the intervals."""
+        k = self.arm.constants
+        phi = np.asarray(phi, float)
+        c, s = np.cos(phi), np.sin(phi)
+        x = self.wrist[0] - (c * k.rest[0] - s * k.rest[1]) - k.axis_2[0]
+        y = self.wrist[1] - (s * k.rest[0] + c * k.rest[1]) - k.axis_2[1]
+        squared = x * x + y * y
+        far, near = (k.upper_arm + k.forearm) ** 2 - squared, squared - (k.upper_arm - k.forearm) ** 2
+        slack = 1e-12 * (k.upper_arm + k.forearm) ** 2
+        bend = 2 * np.arctan2(np.sqrt(np.maximum(far, 0)), np.sqrt(np.maximum(near, 0))) * (1 - 2 * elbow)
+        bend = np.where((far < -slack) | (near < -slack), np.nan, bend)
+        first = np.arctan2(y, x) - np.arctan2(k.forearm * np.sin(bend), k.upper_arm + k.forearm * np.cos(bend))
+        q = np.empty((*phi.shape, 6))
+        q[..., 0], q[..., 4] = self.theta_1, self.theta_5
+        q[..., 1], q[..., 2] = first - k.zero_2, k.sense_3 * (bend - k.zero_3)
+        q[..., 3] = k.sense_4 * (phi - k.zero_sum - (first - k.zero_2) - (bend - k.zero_3))
+        q[..., 5] = self.sense_6 * (self.total - phi)
+        return np.where(np.isfinite(bend)[..., None], wrapped(q), np.nan)
+
+
+def wrapped(q: Reals) -> Reals:
+    """Angles into (-pi, pi]."""
+    return np.asarray(q - TURN * np.ceil((q - np.pi) / TURN))
+
+
+def solve_three_parallel(arm: ThreeParallel, T: Reals) -> tuple[Reals, Flags]:
+    """All solutions for poses T (N, 4, 4), m.
+
+    Returns
+    -------
+    q : (N, 8, 6), rad, in (-pi, pi]; NaN where a slot has none
+    singular : (N,), True where branches meet to 1e-6: there rows were polished by Newton's steps, and
+        :func:`four_bars` may have a family, of whose each range and elbow the middle is a row
+    """
+    T = np.ascontiguousarray(T, dtype=float)
+    q, marked = np.empty((len(T), SLOTS, 6)), np.empty(len(T), dtype=bool)
+    solve_parallel_blocks(arm.constants, T, 0.0, q, marked)
+    left = np.flatnonzero(marked)
+    if left.size:
+        rows = np.empty((left.size, SLOTS, 6))
+        solve_parallel_blocks(arm.constants, T[left], arm.constants.near_m, rows, np.empty(left.size, dtype=bool))
+        polish_rows(arm.links, size_of(arm.links), T[left], rows)
+        for row, n in zip(rows, left):
+            _put_members(row, four_bars(arm, T[n]))
+        q[left] = rows
+    return q, marked
+
+
+def _put_members(rows: Reals, families: tuple[FourBar, ...]) -> None:
+    """Put the middle of each range of each family, with both elbows, into the rows (8, 6) of its joints 1 and 5."""
+    for family in families:
+        same = np.abs(wrapped(rows[:, [0, 4]] - [family.theta_1, family.theta_5])).max(axis=1) < SAME_FAMILY
+        rows[same] = np.nan
+        for low, high in family.intervals:
+            for elbow in (0, 1):
+                free = np.flatnonzero(np.isnan(rows[:, 0]))
+                if free.size:
+                    rows[free[0]] = family.members(np.array(0.5 * (low + high)), elbow)
+
+
+def four_bars(arm: ThreeParallel, T: Reals) -> tuple[FourBar, ...]:
+    """The continua of solutions of one pose T (4, 4)."""
+    k = arm.constants
+    p = (T[:3, :3] @ np.array(k.wrist_in_tool) + T[:3, 3] - np.array(k.place)) @ np.array(k.turn).T
+    axis_6 = np.array(k.turn) @ T[:3, :3] @ np.array(k.axis_6_in_tool)
+    beside = np.array(k.turn) @ T[:3, :3] @ np.array(k.beside_6_in_tool)
+    across, wanted = float(np.hypot(p[0], p[1])), (k.height - k.cos_lean * p[2]) / k.sin_lean
+    if abs(wanted) > across + k.near_m:
+        return ()
+    spread = np.arctan2(np.sqrt(max((across - wanted) * (across + wanted), 0.0)), wanted)
+    found: list[FourBar] = []
+    for theta_1 in sorted({np.arctan2(p[1], p[0]) + spread, np.arctan2(p[1], p[0]) - spread}):
+        back = about_z(-theta_1)
+        to_plane = np.array([[k.cos_lean, 0, -k.sin_lean], [0, 1, 0], [k.sin_lean, 0, k.cos_lean]]) @ back
+        z, x, W = to_plane @ axis_6, to_plane @ beside, (to_plane @ p)[:2]
+        if np.hypot(z[0], z[1]) > FREE:
+            continue
+        up = 1.0 if z[2] > 0 else -1.0
+        # w, axis 5, axis 6 lie in one plane: phi_5 is 0 (axis 6 = w) or pi (against it)
+        phi_5 = 0.0 if up > 0 else np.pi
+        if abs(k.cos_w5 * k.cos_56 + k.sin_w5 * k.sin_56 * (1.0 if up > 0 else -1.0) - up) > 1e-9:
+            continue
+        # Rz(phi) Rx(w5) Rz(phi_5) Rx(-s56) Rz(theta_6): a turn by phi + theta_6, or Rz(phi) Ry(pi) Rz(theta_6)
+        total = float(np.arctan2(x[1], x[0])) - phi_5
+        intervals = _intervals(k, W)
+        if len(intervals) and not any(abs(np.cos(theta_1 - other.theta_1) - 1) < 1e-12 for other in found):
+            found.append(
+                FourBar(
+                    arm,
+                    float(wrapped(np.array(theta_1))),
+                    float(wrapped(np.array(phi_5 - k.zero_5))),
+                    W,
+                    total,
+                    up,
+                    intervals,
+                )
+            )
+    return tuple(found)
+
+
+def _intervals(k: ParallelConstants, W: Reals) -> Reals:
+    """Ranges of phi in which axis 4, on its circle about W, is within the reach of joints 2 and 3."""
+    away, rest = W - np.array(k.axis_2), np.array(k.rest)
+    D, r = float(np.linalg.norm(away)), float(np.linalg.norm(rest))
+    least, most = (k.upper_arm - k.forearm) ** 2, (k.upper_arm + k.forearm) ** 2
+    if D * r < 1e-15:
+        inside = least <= D * D + r * r <= most
+        return np.array([[-np.pi, np.pi]]) if inside else np.empty((0, 2))
+    middle = float(np.arctan2(away[1], away[0]) - np.arctan2(rest[1], rest[0]))
+    low, high = (D * D + r * r - most) / (2 * D * r), (D * D + r * r - least) / (2 * D * r)  # bounds of the cosine
+    if low > 1 or high < -1:
+        return np.empty((0, 2))
+    near, far = float(np.arccos(min(high, 1.0))), float(np.arccos(max(low, -1.0)))
+    if near == 0.0 and far == np.pi:
+        return np.array([[middle - np.pi, middle + np.pi]])
+    if near == 0.0:
+        return np.array([[middle - far, middle + far]])
+    if far == np.pi:
+        return np.array([[middle + near, middle + TURN - near]])
+    return np.array([[middle - far, middle - near], [middle + near, middle + far]])

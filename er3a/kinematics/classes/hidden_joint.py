@@ -1,0 +1,401 @@
+"""Six revolute joints reduced to one: a determinant that vanishes at one joint's angle of each solution.
+
+The chain and the pose close a loop of six joints, ``Rz(x_1) K_1 ... Rz(x_6) K_6 = 1``, which can be read from any joint
+on and in either sense. Joint 6's axis, as fifteen numbers (:mod:`lines`), is seen from joint 2 in two ways:
+
+    K_2 Rz(x_3) K_3 Rz(x_4) K_4 Rz(x_5) K_5 axis = Rz(-x_2) K_1^-1 Rz(-x_1) K_6^-1 axis
+
+Six of the rows, those along joint 2, are linear in cos and sin of x_1 alone; the eight across it, as four complex
+numbers, are ``exp(-i x_2)`` times a linear form. Orthogonal matrices take both joints out and leave six equations in
+joints 3, 4 and 5 [1]_. With x_3 fixed they are biquadratic in the tangents of half the other two angles; multiplied by
+one tangent they are twelve linear equations for twelve monomials [1]_. Entries are linear in cos x_3 and sin x_3, so
+the determinant is a trigonometric polynomial of degree 8 in x_3 (of Raghavan and Roth's degree 24 the factor
+``(1 + tan^2)^4`` has gone): twenty samples give it, and three more numbers that would vanish without rounding.
+
+Special lengths and angles make the determinant vanish for some readings of the loop, never for all in arms that were
+met; :mod:`six_revolute` chooses among the twelve.
+
+References
+----------
+.. [1] M. Raghavan, B. Roth, "Inverse kinematics of the general 6R manipulator and related linkages", J. Mech. Design
+   115 (1993).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from er3a.kinematics.classes.circle_zeros import HARMONICS, SAMPLE_ANGLES, SAMPLES
+from er3a.kinematics.classes.lines import NUMBERS, carry, slid_parts, turned_parts
+from er3a.kinematics.classes.links import invert_rigid
+from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.jit import kernel
+
+EQUATIONS, MONOMIALS = 6, 9
+SHIFT_4, SHIFT_5 = 0.7312, -1.1753  # angles from which halves are taken, so that no usual angle is at infinity
+ROUNDING = 2e-15
+_ALONG = (2, 5, 8, 11, 12, 13)
+
+
+class Reading(NamedTuple):
+    """The loop read from one joint on in one sense.
+
+    ``joint`` (6,) is the arm's joint at each place, ``sense`` +1 or -1 the sign of its angle there, ``links`` (6, 4, 4)
+    the links behind them with the pose's left out, which stands at ``place`` and is inverted if ``sense`` is -1.
+    ``left`` (14, 27) are the left side's coefficients if the pose is not in it. ``slides`` (6,) tells the prismatic
+    joints, which may stand at places 4 and 5 only.
+    """
+
+    joint: Integers
+    sense: float
+    links: Reals
+    place: int
+    left: Reals
+    slides: Flags
+
+
+class Scratch(NamedTuple):
+    """Memory of one pose: links of the loop, both sides' numbers, the six equations."""
+
+    links: Reals
+    left: Reals
+    right: Reals
+    equations: Reals
+    samples: Reals
+    terms: Reals
+    work: Reals
+    along: Reals
+
+
+def new_scratch() -> Scratch:
+    """Memory for :func:`equations_of_pose` and what follows."""
+    return Scratch(
+        links=np.zeros((6, 4, 4)),
+        left=np.zeros((14, 27)),
+        right=np.zeros((3, NUMBERS)),
+        equations=np.zeros((3, EQUATIONS, MONOMIALS)),
+        samples=np.zeros(SAMPLES),
+        terms=np.zeros(SAMPLES),
+        work=np.zeros((12, 9)),
+        along=np.zeros((6, 30)),
+    )
+
+
+def readings_of(links: Reals, sliding: Flags) -> list[Reading]:
+    """All readings of the loop (twelve, or those with the prismatic joints at places 4 and 5); ``links`` (7, 4, 4) with
+    L_0 = 1 (base in the pose), ``sliding`` (6,)."""
+    found = []
+    for backwards in (False, True):
+        for shift in range(6):
+            arranged = np.empty((6, 4, 4))
+            joint = np.empty(6, dtype=np.int64)
+            place = -1
+            for i in range(6):
+                k = (4 - i - shift) % 6 if backwards else (i + shift) % 6
+                joint[i] = (5 - i - shift) % 6 if backwards else k
+                K = np.array(links[k + 1])
+                arranged[i] = np.linalg.inv(K) if backwards else K
+                if k == 5:
+                    place = i
+            slides = sliding[joint]
+            if slides[[0, 1, 2, 5]].any():
+                continue
+            reading = Reading(joint, -1.0 if backwards else 1.0, arranged, place, np.zeros((14, 27)), slides)
+            if place in (0, 5):
+                left_side(arranged, slides, reading.left)
+            found.append(reading)
+    return found
+
+
+@kernel
+def left_side(links: Reals, slides: Flags, left: Reals) -> None:
+    """Coefficients (14, 27) of the left side: rows along joint 2, then real and imaginary parts of those across it;
+    columns (cos, sin, 1) of x_3 times squares and product of cosine and sine of half x_4 times those of x_5; of a
+    prismatic joint 1, x and x^2 instead."""
+    axis = np.zeros(NUMBERS)
+    axis[5], axis[14] = 1.0, 1.0
+    first, last, carried = np.empty(NUMBERS), np.empty(NUMBERS), np.empty(NUMBERS)
+    parts_5, parts_4, parts_3 = np.empty((3, NUMBERS)), np.empty((3, NUMBERS)), np.empty((3, NUMBERS))
+    c4, s4, c5, s5 = np.cos(SHIFT_4), np.sin(SHIFT_4), np.cos(SHIFT_5), np.sin(SHIFT_5)
+    left[:, :] = 0.0
+    carry(links[4], axis, first)
+    if slides[4]:
+        slid_parts(first, parts_5)
+    else:
+        turned_parts(first, parts_5)
+    for k in range(3):
+        carry(links[3], parts_5[k], last)
+        if slides[3]:
+            slid_parts(last, parts_4)
+        else:
+            turned_parts(last, parts_4)
+        for j in range(3):
+            carry(links[2], parts_4[j], last)
+            turned_parts(last, parts_3)
+            for i in range(3):
+                carry(links[1], parts_3[i], carried)
+                # (cos, sin, 1) of an angle in monomials (C^2, C S, S^2) of half its distance from the shift
+                for u in range(3):
+                    w4 = _monomial(j, u, c4, s4, slides[3])
+                    for v in range(3):
+                        w = w4 * _monomial(k, v, c5, s5, slides[4])
+                        if w != 0.0:
+                            column = 9 * i + 3 * u + v
+                            for r in range(6):
+                                left[r, column] += w * carried[_ALONG[r]]
+                            for b in range(4):
+                                left[6 + 2 * b, column] += w * carried[3 * b]
+                                left[7 + 2 * b, column] += w * carried[3 * b + 1]
+
+
+@kernel
+def _monomial(part: int, power: int, c: float, s: float, slides: bool) -> float:
+    """Coefficient of C^2, C S or S^2 (``power``) in the cosine, the sine or 1 (``part``) of an angle shifted by (c, s);
+    in 1, x or x^2 if the joint is prismatic, x = S / C."""
+    if slides:
+        return 1.0 if part == power else 0.0
+    if part == 2:
+        return 0.0 if power == 1 else 1.0
+    if part == 0:
+        return c if power == 0 else (-2.0 * s if power == 1 else -c)
+    return s if power == 0 else (2.0 * c if power == 1 else -s)
+
+
+@kernel
+def equations_of_pose(reading: Reading, pose_link: Reals, m: Scratch) -> None:
+    """Fill ``m.equations`` (3, 6, 9) for the loop closed by the pose's link, and ``m.right``."""
+    for i in range(6):
+        m.links[i] = reading.links[i]
+    if reading.sense > 0.0:
+        m.links[reading.place] = pose_link
+    else:
+        invert_rigid(pose_link, m.links[reading.place])
+    left = reading.left
+    if reading.place != 0 and reading.place != 5:
+        left = m.left
+        left_side(m.links, reading.slides, left)
+    _right_side(m)
+    _without_first_joint(left, reading.slides, m)
+    _without_second_joint(left, m)
+    for r in range(EQUATIONS):
+        total = 0.0
+        for i in range(3):
+            for j in range(MONOMIALS):
+                total += m.equations[i, r, j] * m.equations[i, r, j]
+        per = 1.0 / np.sqrt(total) if total > 0.0 else 0.0
+        for i in range(3):
+            for j in range(MONOMIALS):
+                m.equations[i, r, j] *= per
+
+
+@kernel
+def _right_side(m: Scratch) -> None:
+    """``m.right`` (3, 15): K_1^-1 Rz(-x_1) K_6^-1 axis = cos right[0] + sin right[1] + right[2]."""
+    axis, seen = np.zeros(NUMBERS), np.empty(NUMBERS)
+    axis[5], axis[14] = 1.0, 1.0
+    K, parts = np.empty((4, 4)), np.empty((3, NUMBERS))
+    invert_rigid(m.links[5], K)
+    carry(K, axis, seen)
+    turned_parts(seen, parts)
+    for j in range(NUMBERS):
+        parts[1, j] = -parts[1, j]
+    invert_rigid(m.links[0], K)
+    for i in range(3):
+        carry(K, parts[i], m.right[i])
+
+
+@kernel
+def _without_first_joint(left: Reals, slides: Flags, m: Scratch) -> None:
+    """Four equations from the rows along joint 2: two reflections take cos x_1 and sin x_1 out of all but two rows.
+
+    ``m.along`` (6, 30) keeps the reflected rows: cos, sin, constant, then the left side.
+    """
+    A = m.along
+    for r in range(6):
+        for i in range(3):
+            A[r, i] = m.right[i, _ALONG[r]]
+        for j in range(27):
+            A[r, 3 + j] = left[r, j]
+    for k in range(2):
+        squares = 0.0
+        for r in range(k, 6):
+            squares += A[r, k] * A[r, k]
+        norm = np.sqrt(squares)
+        if norm == 0.0:
+            continue
+        if A[k, k] > 0.0:
+            norm = -norm
+        v = np.zeros(6)
+        for r in range(k, 6):
+            v[r] = A[r, k]
+        v[k] -= norm
+        beta = 0.0
+        for r in range(k, 6):
+            beta += v[r] * v[r]
+        for j in range(k, 30):
+            total = 0.0
+            for r in range(k, 6):
+                total += v[r] * A[r, j]
+            total *= 2.0 / beta
+            for r in range(k, 6):
+                A[r, j] -= total * v[r]
+    for r in range(4):
+        for i in range(3):
+            for j in range(MONOMIALS):
+                m.equations[i, r, j] = A[2 + r, 3 + 9 * i + j]
+        # the constant 1 is (C^2 + S^2) (C^2 + S^2); of a prismatic joint C^2
+        for i in (0, 2):
+            for j in (0, 2):
+                if not (slides[3] and i == 2) and not (slides[4] and j == 2):
+                    m.equations[2, r, 3 * i + j] -= A[2 + r, 2]
+
+
+@kernel
+def _without_second_joint(left: Reals, m: Scratch) -> None:
+    """Two equations from the rows across joint 2: the complex row that is orthogonal to the right side's columns."""
+    B, normal, v = np.empty((4, 3), np.complex128), np.zeros((3, 4), np.complex128), np.zeros(4, np.complex128)
+    for b in range(4):
+        for i in range(3):
+            B[b, i] = complex(m.right[i, 3 * b], m.right[i, 3 * b + 1])
+    for k in range(3):
+        total = 0.0
+        for r in range(k, 4):
+            total += B[r, k].real ** 2 + B[r, k].imag ** 2
+        norm = np.sqrt(total)
+        if norm == 0.0:
+            continue
+        head = abs(B[k, k])
+        phase = B[k, k] / head if head > 0.0 else 1.0 + 0.0j
+        for r in range(k, 4):
+            normal[k, r] = B[r, k]
+        normal[k, k] += phase * norm
+        beta = 2.0 * norm * (norm + head)
+        for r in range(k, 4):
+            normal[k, r] /= np.sqrt(0.5 * beta)
+        for j in range(k, 3):
+            inner = 0.0 + 0.0j
+            for r in range(k, 4):
+                inner += np.conj(normal[k, r]) * B[r, j]
+            for r in range(k, 4):
+                B[r, j] -= inner * normal[k, r]
+    v[3] = 1.0
+    for k in range(2, -1, -1):
+        inner = 0.0 + 0.0j
+        for r in range(k, 4):
+            inner += np.conj(normal[k, r]) * v[r]
+        for r in range(k, 4):
+            v[r] -= inner * normal[k, r]
+    for i in range(3):
+        for j in range(MONOMIALS):
+            re, im = 0.0, 0.0
+            for b in range(4):
+                x, y = left[6 + 2 * b, 9 * i + j], left[7 + 2 * b, 9 * i + j]
+                re += v[b].real * x + v[b].imag * y
+                im += v[b].real * y - v[b].imag * x
+            m.equations[i, 4, j], m.equations[i, 5, j] = re, im
+
+
+@kernel
+def at_angle(equations: Reals, angle: float, F: Reals) -> None:
+    """The equations (6, 9) at one value of the hidden joint."""
+    c, s = np.cos(angle), np.sin(angle)
+    for r in range(EQUATIONS):
+        for j in range(MONOMIALS):
+            F[r, j] = c * equations[0, r, j] + s * equations[1, r, j] + equations[2, r, j]
+
+
+@kernel
+def nine_rows(F: Reals, M: Reals) -> tuple[float, float]:
+    """``M`` (9, 9), singular where the twelve equations are, from equations F (6, 9), which it changes.
+
+    Six rows are F; three are combinations of F without C^2 of joint 4, one power further. Returns the factor by which
+    the determinant of M is that of the twelve equations, and its smallest pivot.
+    """
+    for r in range(6):
+        for j in range(9):
+            M[r, j] = F[r, j]
+    factor, least = 1.0, np.inf
+    for k in range(3):
+        pivot = k
+        for r in range(k + 1, 6):
+            if abs(F[r, k]) > abs(F[pivot, k]):
+                pivot = r
+        if pivot != k:
+            factor = -factor
+            for j in range(k, 9):
+                F[k, j], F[pivot, j] = F[pivot, j], F[k, j]
+        factor *= F[k, k]
+        least = min(least, abs(F[k, k]))
+        if F[k, k] == 0.0:
+            continue
+        per = 1.0 / F[k, k]
+        for r in range(k + 1, 6):
+            x = F[r, k] * per
+            for j in range(k + 1, 9):
+                F[r, j] -= x * F[k, j]
+    for r in range(3):
+        for j in range(6):
+            M[6 + r, j] = F[3 + r, 3 + j]
+        for j in range(6, 9):
+            M[6 + r, j] = 0.0
+    return factor, least
+
+
+@kernel
+def determinant(M: Reals) -> tuple[float, float]:
+    """Determinant of M (9, 9), which it changes, and its smallest pivot."""
+    value, least = 1.0, np.inf
+    for k in range(9):
+        pivot = k
+        for r in range(k + 1, 9):
+            if abs(M[r, k]) > abs(M[pivot, k]):
+                pivot = r
+        if M[pivot, k] == 0.0:
+            return 0.0, 0.0
+        if pivot != k:
+            value = -value
+            for j in range(k, 9):
+                M[k, j], M[pivot, j] = M[pivot, j], M[k, j]
+        value *= M[k, k]
+        least = min(least, abs(M[k, k]))
+        per = 1.0 / M[k, k]
+        for r in range(k + 1, 9):
+            x = M[r, k] * per
+            for j in range(k + 1, 9):
+                M[r, j] -= x * M[k, j]
+    return value, least
+
+
+@kernel
+def determinant_at(equations: Reals, angle: float, F: Reals, M: Reals) -> tuple[float, float]:
+    """The determinant of the twelve equations at an angle, and about how much of it is rounding."""
+    at_angle(equations, angle, F)
+    factor, least = nine_rows(F, M)
+    value, smallest = determinant(M)
+    least = min(least, smallest)
+    value *= factor
+    return value, ROUNDING * abs(value) / least if least > 0.0 else 0.0
+
+
+@kernel
+def sampled_determinant(m: Scratch) -> tuple[float, float]:
+    """Fill ``m.terms`` with the determinant's coefficients 1, cos, sin, ...; returns the largest sample and the noise.
+
+    Noise: the size of the three terms behind degree 8, which are nothing but rounding.
+    """
+    F, M = np.empty((6, 9)), np.empty((9, 9))
+    peak = 0.0
+    for i in range(SAMPLES):
+        m.samples[i] = determinant_at(m.equations, SAMPLE_ANGLES[i], F, M)[0]
+        peak = max(peak, abs(m.samples[i]))
+    noise = 0.0
+    for k in range(SAMPLES):
+        total = 0.0
+        for i in range(SAMPLES):
+            total += HARMONICS[k, i] * m.samples[i]
+        m.terms[k] = total
+        if k >= 17:
+            noise = max(noise, abs(total))
+    return peak, noise

@@ -1,0 +1,342 @@
+"""Six revolute joints with axes 2, 3, 4 parallel and axes 5, 6 meeting (UR and its like): eight solutions.
+
+The three parallel joints move the rest in a plane across w, their common direction, so W, where axes 5 and 6 meet,
+keeps its component along w [1]_:
+
+1. ``w(theta_1) . W = h``: two roots for joint 1;
+2. to a turn phi = theta_2 + theta_3 + theta_4 about w, joints 5 and 6 are a spherical wrist (w, axis 5, axis 6): two
+   roots for joint 5, then phi and joint 6 by one angle each;
+3. axis 4 then has its place in the plane, which joints 2 and 3 reach as a triangle with two roots.
+
+Angles come from half-angle tangents and no sine of a joint is evaluated (see :mod:`er3a.kinematics.block_inverse`). The
+slot is ``4 shoulder + 2 wrist + elbow``, each 0 for the positive root.
+
+Where axis 6 is parallel to w (q5 = 0 of a UR) the roots of step 2 meet and phi is free: see :mod:`four_bar`.
+
+References
+----------
+.. [1] K. P. Hawkins, "Analytic inverse kinematics for the Universal Robots UR-5/UR-10 arms", Georgia Tech, 2013.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from er3a.geometry.angles import TURN
+from er3a.geometry.vectors import Vector
+from er3a.kinematics.classes.links import axes_of, poses_of, size_of
+from er3a.kinematics.classes.polish import newton
+from er3a.kinematics.classes.spherical_joints import Rows, about_x, about_z, vector_of
+from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.fast_math import arctan2
+from er3a.numerics.jit import kernel
+
+SLOTS = 8
+BLOCK = 64
+NEAR = 1e-6  # rad or parts of the arm's size from where branches meet: left to the careful solver
+PARALLEL = 1e-9  # rad
+MEETS_M = 1e-9
+SOLVES = 1e-10
+
+_W, _Z6, _X6, _MARK = (
+    0,
+    3,
+    6,
+    9,
+)  # rows of a block: wrist, axis 6, a vector beside it, whether left to the careful solver
+_POSE_ROWS = 10
+
+
+class ParallelConstants(NamedTuple):
+    """The arm in a frame with z on axis 1 and w in the plane of x and z; lengths in m, angles in rad.
+
+    ``place`` and ``turn`` bring the base into that frame. Plane coordinates are across w, the first one in the plane of
+    w and axis 1. ``axis_2`` and ``rest`` are axis 2 there and the way from axis 4 to W at phi = 0.
+    """
+
+    turn: Rows
+    place: Vector
+    wrist_in_tool: Vector
+    axis_6_in_tool: Vector
+    beside_6_in_tool: Vector
+    cos_lean: float
+    sin_lean: float
+    height: float
+    axis_2: tuple[float, float]
+    upper_arm: float
+    forearm: float
+    rest: tuple[float, float]
+    zero_2: float
+    zero_3: float
+    zero_5: float
+    zero_sum: float
+    sense_3: float
+    sense_4: float
+    cos_w5: float
+    sin_w5: float
+    cos_56: float
+    sin_56: float
+    half_sum: tuple[float, float]
+    half_difference: tuple[float, float]
+    near_m: float
+
+
+@dataclass(frozen=True, eq=False)
+class ThreeParallel:
+    """The solver of one arm: its links (7, 4, 4) and constants."""
+
+    links: Reals
+    constants: ParallelConstants
+
+
+def three_parallel(links: Reals) -> ThreeParallel | None:
+    """The solver for links (7, 4, 4), or None if the chain is of another kind.
+
+    Tolerances: axes parallel to 1e-9 rad, meeting to 1e-9 m.
+    """
+    axes, points = axes_of(links)
+    w = axes[1]
+    if max(np.linalg.norm(np.cross(w, axes[2])), np.linalg.norm(np.cross(w, axes[3]))) > PARALLEL:
+        return None
+    beside = [np.linalg.norm(np.cross(w, axes[k])) for k in (0, 4)] + [np.linalg.norm(np.cross(axes[4], axes[5]))]
+    if min(beside) < 1e-6:
+        return None
+    wrist = _meeting(axes[4], points[4], axes[5], points[5])
+    if wrist is None:
+        return None
+    constants = _constants(links, axes, points, wrist)
+    if min(constants.upper_arm, constants.forearm) < MEETS_M:
+        return None
+    return ThreeParallel(np.ascontiguousarray(links, dtype=float), constants)
+
+
+def _meeting(a: Reals, p: Reals, b: Reals, r: Reals) -> Reals | None:
+    """Where two lines meet; None if they miss each other."""
+    n = np.cross(a, b)
+    s = np.linalg.solve(np.column_stack([a, -b, n]), r - p)
+    return p + s[0] * a if abs(s[2]) * np.linalg.norm(n) < MEETS_M else None
+
+
+def _constants(links: Reals, axes: Reals, points: Reals, wrist: Reals) -> ParallelConstants:
+    w = axes[1]
+    z = axes[0]
+    x = w - (w @ z) * z
+    x /= np.linalg.norm(x)
+    turn = np.array([x, np.cross(z, x), z])
+    origin = points[0]
+    local = (np.vstack([points, wrist]) - origin) @ turn.T
+    cos_lean, sin_lean = float(w @ z), float(w @ x)
+    plane = local @ np.array([[cos_lean, 0, -sin_lean], [0, 1, 0]]).T
+    to_plane = np.array([[cos_lean, 0, -sin_lean], [0, 1, 0], [sin_lean, 0, cos_lean]]) @ turn
+    first, second, rest = plane[2] - plane[1], plane[3] - plane[2], plane[6] - plane[3]
+    zero_2 = float(np.arctan2(first[1], first[0]))
+    zero_3 = float(np.arctan2(second[1], second[0])) - zero_2
+    axis_5, axis_6 = to_plane @ axes[4], to_plane @ axes[5]
+    zero_sum = float(np.arctan2(axis_5[1], axis_5[0])) + np.pi / 2
+    w5 = float(np.arctan2(np.hypot(axis_5[0], axis_5[1]), axis_5[2]))
+    s56 = float(np.arctan2(np.linalg.norm(np.cross(axis_5, axis_6)), axis_5 @ axis_6))
+    B = about_z(zero_sum) @ about_x(w5)
+    seen = B.T @ axis_6
+    zero_5 = float(np.arctan2(-seen[0], seen[1]))
+    beside = to_plane.T @ (B @ about_z(zero_5) @ about_x(-s56))[:, 0]
+    T = poses_of(links, np.zeros(6))
+    c, s = np.cos(zero_sum), np.sin(zero_sum)
+    return ParallelConstants(
+        turn=(vector_of(turn[0]), vector_of(turn[1]), vector_of(turn[2])),
+        place=vector_of(origin),
+        wrist_in_tool=vector_of(T[:3, :3].T @ (wrist - T[:3, 3])),
+        axis_6_in_tool=vector_of(T[:3, :3].T @ axes[5]),
+        beside_6_in_tool=vector_of(T[:3, :3].T @ beside),
+        cos_lean=cos_lean,
+        sin_lean=sin_lean,
+        height=float(w @ (wrist - origin)),
+        axis_2=(float(plane[1, 0]), float(plane[1, 1])),
+        upper_arm=float(np.linalg.norm(first)),
+        forearm=float(np.linalg.norm(second)),
+        rest=(float(c * rest[0] + s * rest[1]), float(c * rest[1] - s * rest[0])),
+        zero_2=zero_2,
+        zero_3=zero_3,
+        zero_5=zero_5,
+        zero_sum=zero_sum,
+        sense_3=float(np.sign(axes[2] @ w)),
+        sense_4=float(np.sign(axes[3] @ w)),
+        cos_w5=float(np.cos(w5)),
+        sin_w5=float(np.sin(w5)),
+        cos_56=float(np.cos(s56)),
+        sin_56=float(np.sin(s56)),
+        half_sum=(float(np.sin((w5 + s56) / 2)), float(np.cos((w5 + s56) / 2))),
+        half_difference=(float(np.sin((w5 - s56) / 2)), float(np.cos((w5 - s56) / 2))),
+        near_m=NEAR * size_of(links),
+    )
+
+
+@kernel
+def solve_parallel_blocks(k: ParallelConstants, T: Reals, slack: float, q: Reals, marked: Flags) -> None:
+    """Fill ``q`` (N, 8, 6) and ``marked`` (N,) for poses T (N, 4, 4); roots that miss by less than ``slack`` (m) are
+    taken as met."""
+    pose, side, out = np.empty(_POSE_ROWS * BLOCK), np.empty(12 * BLOCK), np.empty(13 * BLOCK)
+    for start in range(0, T.shape[0], BLOCK):
+        size = min(BLOCK, T.shape[0] - start)
+        _into_frame(k, T, start, size, pose)
+        for shoulder in range(2):
+            _first_joint(k, pose, side, 1.0 - 2.0 * shoulder, slack)
+            for wrist in range(2):
+                _wrist_and_elbow(k, pose, side, 1.0 - 2.0 * wrist, slack, out)
+                slot = 4 * shoulder + 2 * wrist
+                for i in range(size):
+                    for j in range(6):
+                        q[start + i, slot, j] = out[j * BLOCK + i]
+                        q[start + i, slot + 1, j] = out[(6 + j) * BLOCK + i]
+        for i in range(size):
+            marked[start + i] = pose[_MARK * BLOCK + i] > 0.0
+
+
+@kernel
+def _into_frame(k: ParallelConstants, T: Reals, start: int, size: int, pose: Reals) -> None:
+    """W, axis 6 and the vector beside it in the arm's frame."""
+    for i in range(BLOCK):
+        n = start + min(i, size - 1)
+        for row in range(3):
+            r0, r1, r2 = k.turn[row]
+            p, z, x = 0.0, 0.0, 0.0
+            for axis, r in ((0, r0), (1, r1), (2, r2)):
+                a, b, c = T[n, axis, 0], T[n, axis, 1], T[n, axis, 2]
+                u, v, e = k.wrist_in_tool, k.axis_6_in_tool, k.beside_6_in_tool
+                p += r * (a * u[0] + b * u[1] + c * u[2] + T[n, axis, 3] - k.place[axis])
+                z += r * (a * v[0] + b * v[1] + c * v[2])
+                x += r * (a * e[0] + b * e[1] + c * e[2])
+            pose[(_W + row) * BLOCK + i] = p
+            pose[(_Z6 + row) * BLOCK + i] = z
+            pose[(_X6 + row) * BLOCK + i] = x
+        pose[_MARK * BLOCK + i] = 0.0
+
+
+@kernel
+def _first_joint(k: ParallelConstants, pose: Reals, side: Reals, sign: float, slack: float) -> None:
+    """Joint 1 by one root; then W in the plane, axis 6 and the vector beside it as seen from link 1, into ``side``."""
+    for i in range(BLOCK):
+        x, y, z = pose[i], pose[BLOCK + i], pose[2 * BLOCK + i]
+        across = np.sqrt(x * x + y * y)
+        wanted = (k.height - k.cos_lean * z) / k.sin_lean
+        gap = across - abs(wanted)
+        under = (across - wanted) * (across + wanted)
+        root = sign * np.sqrt(max(under, 0.0))
+        per = 1.0 / (across * across)
+        c, s = (x * wanted - y * root) * per, (y * wanted + x * root) * per
+        pose[_MARK * BLOCK + i] = 1.0 if (abs(gap) < k.near_m) | (across < k.near_m) else pose[_MARK * BLOCK + i]
+        side[i] = arctan2(s, c)
+        side[BLOCK + i] = 1.0 if gap > -slack else 0.0
+        for vector in range(3):
+            vx, vy = pose[3 * vector * BLOCK + i], pose[(3 * vector + 1) * BLOCK + i]
+            vz = pose[(3 * vector + 2) * BLOCK + i]
+            u, v = c * vx + s * vy, c * vy - s * vx
+            side[(2 + 3 * vector) * BLOCK + i] = k.cos_lean * u - k.sin_lean * vz
+            side[(3 + 3 * vector) * BLOCK + i] = v
+            side[(4 + 3 * vector) * BLOCK + i] = k.sin_lean * u + k.cos_lean * vz
+
+
+@kernel
+def _wrist_and_elbow(k: ParallelConstants, pose: Reals, side: Reals, sign: float, slack: float, out: Reals) -> None:
+    """All joints of both elbows for one root of joint 5."""
+    sum_s, sum_c = k.half_sum
+    less_s, less_c = k.half_difference
+    per_turn, nan = 1.0 / TURN, np.nan
+    slack = slack * NEAR  # a miss of d beyond an edge is a value of order d^2 below 0
+    for i in range(BLOCK):
+        zx, zy, zz = side[5 * BLOCK + i], side[6 * BLOCK + i], side[7 * BLOCK + i]
+        xx, xy, xz = side[8 * BLOCK + i], side[9 * BLOCK + i], side[10 * BLOCK + i]
+        tilt = np.sqrt(zx * zx + zy * zy)
+        length = np.sqrt(tilt * tilt + zz * zz)
+        total = length + abs(zz)
+        cos_half, sin_half = tilt if zz < 0.0 else total, total if zz < 0.0 else tilt
+        per = 1.0 / (cos_half * cos_half + sin_half * sin_half)
+        upper = (cos_half * less_s + sin_half * less_c) * (sin_half * less_c - cos_half * less_s) * per
+        lower = (cos_half * sum_s + sin_half * sum_c) * (cos_half * sum_s - sin_half * sum_c) * per
+        mark = (tilt < NEAR) | (abs(upper) < NEAR * NEAR) | (abs(lower) < NEAR * NEAR)
+        valid = (side[BLOCK + i] > 0.0) & (upper > -slack) & (lower > -slack)
+        upper, lower = max(upper, 0.0), max(lower, 0.0)
+        a, d = np.sqrt(upper), sign * np.sqrt(lower)
+        per = 1.0 / (upper + lower)
+        phi_5 = 2.0 * sign * arctan2(a, np.sqrt(lower))
+        cos_5, sin_5 = (lower - upper) * per, 2.0 * a * d * per
+        # axis 6 as seen with phi = 0, then phi by one angle
+        px, py = -sin_5 * k.sin_56, k.cos_w5 * cos_5 * k.sin_56 - k.sin_w5 * k.cos_56
+        c, s = zx * px + zy * py, zy * px - zx * py
+        size = np.sqrt(c * c + s * s)
+        lost = size < 1e-30
+        per = 1.0 / (1.0 if lost else size)
+        c, s = 1.0 if lost else c * per, 0.0 if lost else s * per
+        phi = arctan2(s, c)
+        ux, uy = xx * c + xy * s, xy * c - xx * s
+        uy, uz = uy * k.cos_w5 + xz * k.sin_w5, xz * k.cos_w5 - uy * k.sin_w5
+        ux, uy = ux * cos_5 + uy * sin_5, uy * cos_5 - ux * sin_5
+        theta_6 = arctan2(uy * k.cos_56 - uz * k.sin_56, ux)
+        # axis 4's place, from axis 2
+        x = side[2 * BLOCK + i] - (c * k.rest[0] - s * k.rest[1]) - k.axis_2[0]
+        y = side[3 * BLOCK + i] - (s * k.rest[0] + c * k.rest[1]) - k.axis_2[1]
+        squared = x * x + y * y
+        reach, least = k.upper_arm + k.forearm, k.upper_arm - k.forearm
+        far, near = (reach * reach - squared), (squared - least * least)
+        edge = k.near_m * reach * NEAR
+        mark = mark | (abs(far) < edge) | (abs(near) < edge) | (squared < k.near_m * k.near_m)
+        marked = mark & (side[BLOCK + i] > 0.0)
+        pose[_MARK * BLOCK + i] = 1.0 if marked else pose[_MARK * BLOCK + i]
+        valid = valid & (far > -slack) & (near > -slack)
+        far, near = max(far, 0.0), max(near, 0.0)
+        root_far, root_near = np.sqrt(far), np.sqrt(near)
+        bend = 2.0 * arctan2(root_far, root_near)
+        per = 1.0 / (far + near)
+        cos_bend, sin_bend = (near - far) * per, 2.0 * root_far * root_near * per
+        along, beside = k.upper_arm + k.forearm * cos_bend, k.forearm * sin_bend
+        one = 1.0 if valid else nan
+        theta_5 = (phi_5 - k.zero_5) * one
+        theta_5 -= TURN * np.ceil(theta_5 * per_turn - 0.5)
+        for elbow in range(2):
+            bent = beside if elbow == 0 else -beside
+            first = arctan2(y * along - x * bent, x * along + y * bent) - k.zero_2
+            second = (bend if elbow == 0 else -bend) - k.zero_3
+            theta_3 = k.sense_3 * second
+            theta_4 = k.sense_4 * (phi - k.zero_sum - first - second)
+            first -= TURN * np.ceil(first * per_turn - 0.5)
+            theta_3 -= TURN * np.ceil(theta_3 * per_turn - 0.5)
+            theta_4 -= TURN * np.ceil(theta_4 * per_turn - 0.5)
+            out[(6 * elbow) * BLOCK + i] = side[i] * one
+            out[(6 * elbow + 1) * BLOCK + i] = first * one
+            out[(6 * elbow + 2) * BLOCK + i] = theta_3 * one
+            out[(6 * elbow + 3) * BLOCK + i] = theta_4 * one
+            out[(6 * elbow + 4) * BLOCK + i] = theta_5
+            out[(6 * elbow + 5) * BLOCK + i] = theta_6 * one
+
+
+@kernel
+def polish_rows(links: Reals, size: float, T: Reals, q: Reals) -> None:
+    """Newton's steps on rows (N, 8, 6) near singular poses; rows that do not solve the pose, and the second of two
+    that meet, become NaN."""
+    scaled, pose, w, J = links.copy(), np.empty((4, 4)), np.empty((8, 4, 4)), np.empty((6, 7))
+    dq, columns, sliding = np.empty(12), np.zeros(6, np.int64), np.zeros(6, np.bool_)
+    scaled[:, :3, 3] /= size
+    for n in range(T.shape[0]):
+        pose[:, :] = T[n]
+        pose[:3, 3] /= size
+        for slot in range(SLOTS):
+            row = q[n, slot]
+            if np.isnan(row).any():
+                row[:] = np.nan
+                continue
+            residual, _ = newton(scaled, sliding, pose, row, 8, w, J, dq, columns)
+            if not residual < SOLVES:
+                row[:] = np.nan
+                continue
+            for j in range(6):
+                row[j] -= TURN * np.ceil((row[j] - np.pi) / TURN)
+            for other in range(slot):
+                apart = 0.0
+                for j in range(6):
+                    away = row[j] - q[n, other, j]
+                    apart = max(apart, abs(away - TURN * np.round(away / TURN)))
+                if apart < NEAR:
+                    row[:] = np.nan
+                    break

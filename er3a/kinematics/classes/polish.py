@@ -1,0 +1,209 @@
+"""Newton's method on the pose of six joints, aware of the Jacobian's rank, and the twin of a root near a fold.
+
+The Jacobian is the geometric one with lengths divided by the chain's size; the rotation error is half the sum of the
+vector products of the axes. Complete pivoting tells directions that the pose does not determine; they get no step. At a
+simple root convergence is quadratic, at a double root the error halves in each step while the residual is its square.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from er3a.kinematics.classes.links import multiply_rigid, turn_behind
+from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.jit import kernel
+
+SOLVES = 1e-12  # residual, rad and parts of the chain's size
+LEAST_PIVOT = 1e-9
+LARGEST_STEP = 0.7
+NEAR_FOLD = 2e-2
+PROBE = 1e-2
+
+
+@kernel
+def residual_and_jacobian(links: Reals, sliding: Flags, T: Reals, q: Reals, w: Reals, J: Reals) -> float:
+    """Fill ``J`` (6, 7), its last column the pose error; returns the error's largest component.
+
+    ``links`` (7, 4, 4) and ``T`` (4, 4) have lengths in units of the chain's size; ``w`` (8, 4, 4) is scratch memory.
+    """
+    n = q.shape[0]
+    frame, other = w[0], w[1]
+    for i in range(4):
+        for j in range(4):
+            frame[i, j] = links[0, i, j]
+    for k in range(n):
+        for i in range(3):
+            J[3 + i, k] = frame[i, 2]
+            w[2, i, k % 4] = frame[i, 3]
+            w[3 + k // 4, i, k % 4] = frame[i, 3]
+        if sliding[k]:
+            for i in range(3):
+                frame[i, 3] += frame[i, 2] * q[k]
+        else:
+            turn_behind(frame, np.cos(q[k]), np.sin(q[k]))
+        multiply_rigid(frame, links[k + 1], other)
+        frame, other = other, frame
+    p0, p1, p2 = frame[0, 3], frame[1, 3], frame[2, 3]
+    for k in range(n):
+        z0, z1, z2 = J[3, k], J[4, k], J[5, k]
+        if sliding[k]:
+            J[0, k], J[1, k], J[2, k] = z0, z1, z2
+            J[3, k], J[4, k], J[5, k] = 0.0, 0.0, 0.0
+        else:
+            r0, r1, r2 = p0 - w[3 + k // 4, 0, k % 4], p1 - w[3 + k // 4, 1, k % 4], p2 - w[3 + k // 4, 2, k % 4]
+            J[0, k], J[1, k], J[2, k] = z1 * r2 - z2 * r1, z2 * r0 - z0 * r2, z0 * r1 - z1 * r0
+    largest = 0.0
+    for i in range(3):
+        a, b = (i + 1) % 3, (i + 2) % 3
+        turn = 0.0
+        for j in range(3):
+            turn += frame[a, j] * T[b, j] - frame[b, j] * T[a, j]
+        J[i, n] = T[i, 3] - frame[i, 3]
+        J[3 + i, n] = 0.5 * turn
+        largest = max(largest, max(abs(J[i, n]), abs(J[3 + i, n])))
+    trace = 0.0
+    for i in range(3):
+        for j in range(3):
+            trace += frame[i, j] * T[i, j]
+    if trace < 0.0:  # turned by more than 90 deg, where the sum of products shrinks again
+        largest = max(largest, 1.0)
+    return largest
+
+
+@kernel
+def eliminate(J: Reals, columns: Integers) -> float:
+    """Reduce J (6, 7) by complete pivoting; returns the ratio of the last pivot to the first."""
+    for k in range(6):
+        columns[k] = k
+    first = 0.0
+    for k in range(6):
+        best, row, column = -1.0, k, k
+        for r in range(k, 6):
+            for c in range(k, 6):
+                if abs(J[r, c]) > best:
+                    best, row, column = abs(J[r, c]), r, c
+        if row != k:
+            for c in range(7):
+                J[k, c], J[row, c] = J[row, c], J[k, c]
+        if column != k:
+            columns[k], columns[column] = columns[column], columns[k]
+            for r in range(6):
+                J[r, k], J[r, column] = J[r, column], J[r, k]
+        if k == 0:
+            first = best
+        if best == 0.0:
+            return 0.0
+        per = 1.0 / J[k, k]
+        for r in range(k + 1, 6):
+            x = J[r, k] * per
+            for c in range(k + 1, 7):
+                J[r, c] -= x * J[k, c]
+    return abs(J[5, 5]) / first if first > 0.0 else 0.0
+
+
+@kernel
+def _step(J: Reals, columns: Integers, dq: Reals) -> None:
+    """The step that an eliminated system asks for, none in directions without a pivot."""
+    first = abs(J[0, 0])
+    for k in range(5, -1, -1):
+        total = J[k, 6]
+        for c in range(k + 1, 6):
+            total -= J[k, c] * dq[columns[c]]
+        dq[columns[k]] = total / J[k, k] if abs(J[k, k]) > LEAST_PIVOT * first else 0.0
+
+
+@kernel
+def newton(
+    links: Reals, sliding: Flags, T: Reals, q: Reals, most: int, w: Reals, J: Reals, dq: Reals, columns: Integers
+) -> tuple[float, float]:
+    """Move q to a root; returns the residual there and the last pivot's ratio at the last step (1 if none was made)."""
+    pivot, least = 1.0, np.inf
+    best = dq[6:12]
+    for _ in range(most):
+        error = residual_and_jacobian(links, sliding, T, q, w, J)
+        if error >= least and least < 1e-8:  # rounding is reached
+            for k in range(6):
+                q[k] = best[k]
+            return least, pivot
+        if error < least:
+            least = error
+            for k in range(6):
+                best[k] = q[k]
+        if error < 2e-16:
+            return error, pivot
+        pivot = eliminate(J, columns)
+        _step(J, columns, dq)
+        size = 0.0
+        for k in range(6):
+            size = max(size, abs(dq[k]))
+        if not size < 1e6:
+            return np.inf, pivot
+        shrink = LARGEST_STEP / size if size > LARGEST_STEP else 1.0
+        for k in range(6):
+            q[k] += shrink * dq[k]
+        if size < 1e-9 and error < 1e-8 and pivot > 1e-5:  # the next error is its square
+            return size * size + 2e-16, pivot
+    error = residual_and_jacobian(links, sliding, T, q, w, J)
+    if error > least:
+        for k in range(6):
+            q[k] = best[k]
+        return least, pivot
+    return error, pivot
+
+
+@kernel
+def twin_start(
+    links: Reals, sliding: Flags, T: Reals, q: Reals, start: Reals, w: Reals, J: Reals, columns: Integers
+) -> bool:
+    """Where the other root is that meets this one at a fold, to second order; False where none is near.
+
+    Along the direction v that moves the pose least, the eliminated error's last component is ``s t + k t^2``: zero at 0
+    and at -s / k.
+    """
+    v = np.zeros(6)
+    residual_and_jacobian(links, sliding, T, q, w, J)
+    if eliminate(J, columns) > NEAR_FOLD:
+        return False
+    largest = 1.0
+    v[columns[5]] = 1.0
+    for k in range(4, -1, -1):
+        if J[k, k] == 0.0:
+            return False
+        total = 0.0
+        for c in range(k + 1, 6):
+            total -= J[k, c] * v[columns[c]]
+        v[columns[k]] = total / J[k, k]
+        largest = max(largest, abs(v[columns[k]]))
+    for k in range(6):
+        v[k] /= largest
+    # left null vector by the transposed Jacobian
+    residual_and_jacobian(links, sliding, T, q, w, J)
+    for r in range(6):
+        for c in range(r):
+            J[r, c], J[c, r] = J[c, r], J[r, c]
+    for r in range(6):
+        J[r, 6] = 0.0
+    eliminate(J, columns)
+    u = np.zeros(6)
+    u[columns[5]] = 1.0
+    for k in range(4, -1, -1):
+        if J[k, k] == 0.0:
+            return False
+        total = 0.0
+        for c in range(k + 1, 6):
+            total -= J[k, c] * u[columns[c]]
+        u[columns[k]] = total / J[k, k]
+    values = np.zeros(2)
+    for side in range(2):
+        for k in range(6):
+            start[k] = q[k] + (PROBE if side else -PROBE) * v[k]
+        residual_and_jacobian(links, sliding, T, start, w, J)
+        for r in range(6):
+            values[side] += u[r] * J[r, 6]
+    slope, curve = (values[1] - values[0]) / (2 * PROBE), (values[1] + values[0]) / (2 * PROBE * PROBE)
+    if abs(curve) * 0.5 < abs(slope) or curve == 0.0:
+        return False
+    t = -slope / curve
+    for k in range(6):
+        start[k] = q[k] + t * v[k]
+    return True

@@ -1,0 +1,92 @@
+"""Four joints with one common direction, three revolute and one prismatic in any order (SCARA): two solutions.
+
+They move a body in a plane across that direction, along it and about it; a pose is met in x, y, z and yaw, and how far
+its axis is tilted from theirs is told beside the solutions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from er3a.geometry.angles import TURN
+from er3a.kinematics.classes.links import axes_of, poses_of
+from er3a.numerics.arrays import Flags, Integers, Reals
+
+SLOTS = 2
+PARALLEL = 1e-9
+LEAST_LINK_M = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Scara:
+    """Plane coordinates are along the rows of ``frame`` (3, 3), the last one the common direction, at the first axis.
+
+    ``turning`` (3,) and ``sliding`` are joint numbers, ``sense`` (4,) +1 or -1 against the common direction.
+    """
+
+    links: Reals
+    frame: Reals
+    origin: Reals
+    turning: Integers
+    sliding: int
+    sense: Reals
+    upper_arm: Reals
+    forearm: Reals
+    rest: Reals
+    tool: Reals
+
+
+def scara(links: Reals, sliding: Flags) -> Scara | None:
+    """The solver for links (5, 4, 4), or None if the chain is of another kind. Axes are parallel to 1e-9 rad."""
+    if len(links) != 5 or np.sum(sliding) != 1:
+        return None
+    axes, points = axes_of(links)
+    w = axes[0]
+    if np.linalg.norm(np.cross(axes, w), axis=1).max() > PARALLEL:
+        return None
+    x = np.cross(w, np.eye(3)[np.argmin(np.abs(w))])
+    x /= np.linalg.norm(x)
+    frame = np.array([x, np.cross(w, x), w])
+    turning = np.flatnonzero(~np.asarray(sliding))
+    T = poses_of(links, np.zeros(4), np.asarray(sliding))
+    a, b, c = (points[turning] - points[turning[0]]) @ frame.T
+    end = frame @ (T[:3, 3] - points[turning[0]])
+    if min(np.linalg.norm((b - a)[:2]), np.linalg.norm((c - b)[:2])) < LEAST_LINK_M:
+        return None
+    slide = int(np.flatnonzero(sliding)[0])
+    sense = np.sign(axes @ w)
+    return Scara(links, frame, points[turning[0]], turning, slide, sense, (b - a)[:2], (c - b)[:2], end - c, T)
+
+
+def solve_scara(arm: Scara, T: Reals) -> tuple[Reals, Reals]:
+    """Solutions q (N, 2, 4), rad and m, elbow turned the positive way first, NaN out of reach; tilt (N,) in rad.
+
+    Poses T (N, 4, 4) are met in position and in the turn about the common direction.
+    """
+    T = np.asarray(T, float)
+    end = (T[:, :3, 3] - arm.origin) @ arm.frame.T
+    R = arm.frame @ T[:, :3, :3] @ (arm.frame @ arm.tool[:3, :3]).T
+    yaw = np.arctan2(R[:, 1, 0] - R[:, 0, 1], R[:, 0, 0] + R[:, 1, 1])
+    tilt = np.arctan2(np.hypot(R[:, 0, 2], R[:, 1, 2]), R[:, 2, 2])
+    c, s = np.cos(yaw), np.sin(yaw)
+    x = end[:, 0] - (c * arm.rest[0] - s * arm.rest[1])
+    y = end[:, 1] - (s * arm.rest[0] + c * arm.rest[1])
+    first, second = float(np.linalg.norm(arm.upper_arm)), float(np.linalg.norm(arm.forearm))
+    squared = x * x + y * y
+    far, near = (first + second) ** 2 - squared, squared - (first - second) ** 2
+    slack = 1e-15 * (first + second) ** 2
+    far, near = (np.where(v < -slack, np.nan, np.maximum(v, 0)) for v in (far, near))
+    zero_1 = np.arctan2(arm.upper_arm[1], arm.upper_arm[0])
+    zero_2 = np.arctan2(arm.forearm[1], arm.forearm[0]) - zero_1
+    q = np.empty((len(T), SLOTS, 4))
+    for slot, sign in enumerate((1.0, -1.0)):
+        bend = sign * 2 * np.arctan2(np.sqrt(far), np.sqrt(near))
+        turn_1 = np.arctan2(y, x) - np.arctan2(second * np.sin(bend), first + second * np.cos(bend)) - zero_1
+        turn_2 = bend - zero_2
+        for joint, turn in zip(arm.turning, (turn_1, turn_2, yaw - turn_1 - turn_2)):
+            turn = turn * arm.sense[joint]
+            q[:, slot, joint] = turn - TURN * np.ceil((turn - np.pi) / TURN)
+        q[:, slot, arm.sliding] = arm.sense[arm.sliding] * (end[:, 2] - (arm.frame @ (arm.tool[:3, 3] - arm.origin))[2])
+    return np.where(np.isfinite(q).all(axis=2, keepdims=True), q, np.nan), tilt

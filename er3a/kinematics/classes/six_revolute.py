@@ -1,0 +1,229 @@
+"""All solutions, up to sixteen, of any chain of six revolute joints.
+
+One joint's angle follows from the zeros of a trigonometric polynomial (:mod:`hidden_joint`, :mod:`circle_zeros`); the
+null vector of its matrix gives two more, the remaining three follow one by one, and Newton's method on the chain itself
+(:mod:`polish`) decides what is a solution.
+
+Nothing is claimed beyond what was measured on the way: the polynomial's noise is known from terms that would vanish, a
+place where it sinks into the noise is searched like a zero, and if the noise is large, a zero yields no solution, or a
+place is dark, further readings of the loop are taken, whose solutions are united.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from er3a.kinematics.classes.hidden_joint import Reading, equations_of_pose, readings_of, sampled_determinant
+from er3a.kinematics.classes.links import inverse_rigid, invert_rigid, multiply_rigid, poses_of, size_of
+from er3a.kinematics.classes.loop_rows import Memory, hidden_angles, new_memory, pairs_at, remaining_joints
+from er3a.kinematics.classes.polish import SOLVES, newton, residual_and_jacobian, twin_start
+from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.jit import kernel
+
+SLOTS = 16
+SAME_ZERO = 1e-9  # rad: zeros of two intervals that overlap
+SAME = 1e-6  # rad: nearer rows are one
+MAYBE_SAME = 1e-2  # rad: rows nearer than this are one if what lies midway solves the pose too
+DARK = 200.0  # noise is taken as so many times what it was measured to be
+LOUD = 1e-7
+FAMILY_PEAK = 1e-25
+MOST_READINGS = 4
+TRIALS = 24
+
+CERTAIN, UNCERTAIN, CONTINUUM = 0, 1, 2
+
+
+@dataclass(frozen=True, eq=False)
+class SixRevolute:
+    """What the solver keeps of a chain: links in units of its size, and readings of its loop, best first."""
+
+    links: Reals
+    size: float
+    sliding: Flags
+    readings: tuple[Reading, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class RowsFound:
+    """Solutions of a batch of poses.
+
+    Attributes
+    ----------
+    q : (N, 16, 6), rad, in (-pi, pi], in order of the first joint; NaN behind the last
+    count : (N,)
+    certainty : (N,), CERTAIN, UNCERTAIN (no reading of the loop was free of doubt) or CONTINUUM (in every reading
+        the determinant vanishes: the arm moves with its tool at rest, rows are members)
+    """
+
+    q: Reals
+    count: Integers
+    certainty: Integers
+
+
+def prepared(links: Reals, sliding: Flags | None = None, seed: int = 7) -> SixRevolute:
+    """The solver for a chain with constant links (7, 4, 4); readings are tried out on poses of random joints.
+
+    ``sliding`` (6,) tells prismatic joints; one of them, or two neighbours, are within what the method can do.
+    """
+    sliding = np.zeros(6, dtype=bool) if sliding is None else np.asarray(sliding, dtype=bool)
+    size = size_of(links)
+    scaled = np.array(links, float)
+    scaled[:, :3, 3] /= size
+    bare = scaled.copy()
+    bare[0] = np.eye(4)
+    random = np.random.default_rng(seed)
+    q = random.uniform(-1, 1, (TRIALS, 6)) * np.where(sliding, 1.0, np.pi)
+    T = poses_of(bare, q, sliding)
+    memory = new_memory(sliding)
+    ranked: list[tuple[bool, int, bool, float, int, Reading]] = []
+    for number, reading in enumerate(readings_of(bare, sliding)):
+        good = _trial(reading, bare, T, memory)
+        ranked.append((good < 0.5, -round(4 * good), reading.place not in (0, 5), -good, number, reading))
+    ranked.sort(key=lambda entry: entry[:-1])
+    return SixRevolute(scaled, size, sliding, tuple(entry[5] for entry in ranked if entry[3] < 0))
+
+
+def _trial(reading: Reading, links: Reals, T: Reals, memory: Memory) -> float:
+    """Share of poses in which this reading has a clear polynomial without dark places."""
+    good = 0.0
+    for pose in T:
+        equations_of_pose(reading, links[6] @ inverse_rigid(pose), memory.elimination)
+        peak, noise = sampled_determinant(memory.elimination)
+        if peak < FAMILY_PEAK or noise > LOUD * peak:
+            continue
+        level = DARK * max(noise, 1e-16 * peak)
+        count = hidden_angles(memory.elimination, level, memory)
+        good += 0.25 if count < 0 else 0.5 + 0.5 * bool((memory.zeros[:count, 2] == 1.0).all())
+    return good / len(T)
+
+
+def solve_six_revolute(arm: SixRevolute, T: Reals) -> RowsFound:
+    """All solutions for poses T (N, 4, 4), m; each reading takes the poses that those before it left in doubt."""
+    T = np.ascontiguousarray(T, dtype=float)
+    q, count = np.full((len(T), SLOTS, 6), np.nan), np.zeros(len(T), dtype=np.int64)
+    certainty = np.full(len(T), CONTINUUM)
+    memory, left = new_memory(arm.sliding), np.arange(len(T))
+    for reading in arm.readings[:MOST_READINGS]:
+        verdicts = np.empty(len(left), dtype=np.int64)
+        rows_by_reading(reading, arm.links, arm.size, T, left, memory, q, count, verdicts)
+        certainty[left] = np.minimum(certainty[left], verdicts)
+        left = left[verdicts != CERTAIN]
+    _in_order(q, count)
+    q[:, :, arm.sliding] *= arm.size
+    return RowsFound(q, count, certainty)
+
+
+@kernel
+def rows_by_reading(
+    reading: Reading,
+    links: Reals,
+    size: float,
+    T: Reals,
+    numbers: Integers,
+    m: Memory,
+    q: Reals,
+    count: Integers,
+    verdicts: Integers,
+) -> None:
+    """Add to ``q`` (N, 16, 6) and ``count`` (N,) what one reading of the loop finds at the poses with these numbers."""
+    pose, rest, pose_link = np.empty((4, 4)), np.empty((4, 4)), np.empty((4, 4))
+    for i in range(numbers.shape[0]):
+        n = numbers[i]
+        pose[:, :] = T[n]
+        for j in range(3):
+            pose[j, 3] /= size
+        # K_6 = L_6 T^-1 L_0
+        invert_rigid(pose, rest)
+        multiply_rigid(rest, links[0], pose_link)
+        multiply_rigid(links[6], pose_link, rest)
+        verdicts[i], count[n] = _by_reading(reading, links, pose, rest, m, q[n], count[n])
+
+
+@kernel
+def _in_order(q: Reals, count: Integers) -> None:
+    for n in range(q.shape[0]):
+        for r in range(count[n]):
+            least = r
+            for other in range(r + 1, count[n]):
+                if q[n, other, 0] < q[n, least, 0]:
+                    least = other
+            if least != r:
+                for k in range(6):
+                    q[n, r, k], q[n, least, k] = q[n, least, k], q[n, r, k]
+
+
+@kernel
+def _by_reading(
+    reading: Reading, links: Reals, pose: Reals, pose_link: Reals, m: Memory, q: Reals, rows: int
+) -> tuple[int, int]:
+    """Add the solutions that one reading of the loop finds; returns its verdict and how many rows there are."""
+    e = m.elimination
+    equations_of_pose(reading, pose_link, e)
+    peak, noise = sampled_determinant(e)
+    if peak < FAMILY_PEAK:
+        return CONTINUUM, rows
+    verdict = UNCERTAIN if noise > LOUD * peak else CERTAIN
+    level = DARK * max(noise, 1e-16 * peak)
+    zeros = hidden_angles(e, level, m)
+    if zeros < 0:
+        return UNCERTAIN, rows
+    earlier, told = rows, 0
+    for z in range(zeros):
+        solved, candidates = False, 0
+        again = False
+        for other in range(z):
+            again = again or abs(m.zeros[z, 0] - m.zeros[other, 0]) < SAME_ZERO
+        told += not again
+        pairs = pairs_at(e, m.zeros[z, 0], reading.slides, m)
+        for p in range(pairs):
+            m.x[0, 2], m.x[0, 3], m.x[0, 4] = m.zeros[z, 0], m.pairs[p, 0], m.pairs[p, 1]
+            candidates = remaining_joints(reading, e, m)
+            for k in range(candidates):
+                for i in range(6):
+                    m.candidate[reading.joint[i]] = reading.sense * m.x[k, i]
+                residual, pivot = newton(links, m.sliding, pose, m.candidate, 8, m.frames, m.J, m.dq, m.columns)
+                if residual < SOLVES:
+                    away = m.candidate[reading.joint[2]] * reading.sense - m.zeros[z, 0]
+                    away -= 2 * np.pi * np.round(away / (2 * np.pi))
+                    solved = solved or abs(away) < 1e-2
+                    rows = _add(links, pose, m, m.candidate, q, rows)
+                    if pivot < 1e-3 and twin_start(
+                        links, m.sliding, pose, m.candidate, m.start, m.frames, m.J, m.columns
+                    ):
+                        residual, _ = newton(links, m.sliding, pose, m.start, 12, m.frames, m.J, m.dq, m.columns)
+                        if residual < SOLVES:
+                            rows = _add(links, pose, m, m.start, q, rows)
+        if m.zeros[z, 2] == 0.0 or not solved:
+            verdict = UNCERTAIN
+    # Complex zeros come in pairs, and each zero tells a solution of its own.
+    if rows % 2 == 1 or (earlier == 0 and rows < told):
+        verdict = UNCERTAIN
+    return verdict, rows
+
+
+@kernel
+def _add(links: Reals, pose: Reals, m: Memory, found: Reals, q: Reals, rows: int) -> int:
+    """Add a row unless it stands there."""
+    for k in range(6):
+        if not m.sliding[k]:
+            found[k] -= 2 * np.pi * np.ceil((found[k] - np.pi) / (2 * np.pi))
+    middle = np.empty(6)
+    for r in range(rows):
+        apart = 0.0
+        for k in range(6):
+            away = found[k] - q[r, k]
+            if not m.sliding[k]:
+                away -= 2 * np.pi * np.round(away / (2 * np.pi))
+            apart = max(apart, abs(away))
+            middle[k] = q[r, k] + 0.5 * away
+        if apart < SAME:
+            return rows
+        if apart < MAYBE_SAME and residual_and_jacobian(links, m.sliding, pose, middle, m.frames, m.J) < SOLVES:
+            return rows
+    if rows < SLOTS:
+        for k in range(6):
+            q[rows, k] = found[k]
+        return rows + 1
+    return rows

@@ -1,0 +1,95 @@
+"""Robot files and what belongs to them: in from URDF and out to it, corrected by measurements, schemas."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from er3a.errors import Er3aError
+from er3a.pipeline.commands.options import ROBOT_FILES, AnyRobot, AsJson, app, print_json, print_note
+from er3a.pipeline.stages.registry import STAGES
+
+
+@app.command(rich_help_panel=ROBOT_FILES)
+def import_urdf(
+    file: Annotated[Path, typer.Argument(help="a URDF of a six-axis serial arm")],
+    output: Annotated[Path, typer.Option(help="the robot file to write")],
+    snap: Annotated[bool, typer.Option(help="take angles within 1e-4 rad of a right angle for it, and say so")] = False,
+    as_json: AsJson = False,
+):
+    """Derive a robot file (D-H table, directions, offsets, limits) from a URDF's axes."""
+    from er3a.files.robot_writer import write_robot
+    from er3a.formats.urdf import import_urdf as read_urdf
+
+    imported = read_urdf(file, snap=snap)
+    write_robot(imported.robot.replace(name=output.stem), output)
+    for note in imported.notes:
+        print_note(note)
+    if as_json:
+        print_json({"output": str(output), "misfit_mm": imported.misfit_m * 1000, "notes": imported.notes})
+        return
+    print(f"{output}: written; differs from the URDF by at most {imported.misfit_m * 1000:.2g} mm on random poses")
+
+
+@app.command(rich_help_panel=ROBOT_FILES)
+def export_urdf(
+    robot: AnyRobot,
+    output: Annotated[Path, typer.Option(help="the URDF to write")],
+):
+    """Write a robot as URDF."""
+    from er3a.files.kept_files import write_atomically
+    from er3a.files.robot_library import load_robot
+    from er3a.formats.urdf import export_urdf as urdf_text
+
+    text = urdf_text(load_robot(robot))
+    write_atomically(output, lambda path: path.write_text(text, encoding="utf-8"))
+    print(f"{output}: written")
+
+
+@app.command(rich_help_panel=ROBOT_FILES)
+def calibrate(
+    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="a robot's name or file: the table to start from")],
+    measurements: Annotated[str, typer.Argument(help="a CSV of measured positions, or a reference set's name")],
+    output: Annotated[Path, typer.Option(help="the robot file to write")],
+    as_json: AsJson = False,
+):
+    """Estimate corrections to a robot's table from measured positions, and write the corrected robot file."""
+    from er3a.calibration.outcomes import CalibrationError
+    from er3a.files.by_name import calibrate as calibrate_robot
+    from er3a.files.reference_sets import load_references
+    from er3a.files.robot_library import load_robot
+    from er3a.files.robot_writer import write_robot
+    from er3a.pipeline.messages.calibration import calibration_record, lines_of
+    from er3a.pipeline.messages.say import say
+
+    source = Path(measurements) if measurements.endswith(".csv") else load_references(measurements)
+    try:
+        found = calibrate_robot(load_robot(robot), source)
+    except CalibrationError as error:
+        raise Er3aError(say(error.finding)) from None
+    write_robot(found.robot.replace(name=output.stem, title=f"{found.robot.title}, calibrated"), output)
+    if as_json:
+        print_json({"output": str(output), **calibration_record(found)})
+        return
+    print(lines_of(found))
+    print(f"{output}: written")
+
+
+@app.command(rich_help_panel=ROBOT_FILES)
+def schema(
+    folder: Annotated[Path, typer.Option(help="where the schemas of input files go")] = Path("config"),
+    docs: Annotated[Path, typer.Option(help="where the documents about results go")] = Path("docs/results"),
+):
+    """Write the JSON schemas of input files and of results, and the dictionary of all tables."""
+    from er3a.pipeline.check import SCHEMAS
+    from er3a.pipeline.dictionary import data_dictionary, summary_schema
+
+    schemas = {folder / f"{kind}.schema.json": model.model_json_schema() for kind, model in SCHEMAS.items()}
+    schemas |= {docs / f"{name}.schema.json": summary_schema(stage) for name, stage in STAGES.items()}
+    for file, content in schemas.items():
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    (docs / "dictionary.md").write_text(data_dictionary(), encoding="utf-8")

@@ -1,0 +1,151 @@
+"""One job each: what the rules of the workflow call, and a person may call by hand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from er3a.errors import Er3aError
+from er3a.pipeline.commands.options import (
+    DEFAULT_REPORTS,
+    DEFAULT_RESULTS,
+    DEFAULT_STUDY,
+    JOBS,
+    Reports,
+    Results,
+    RobotName,
+    StageName,
+    StudyFile,
+    app,
+    print_note,
+)
+from er3a.pipeline.messages import language
+from er3a.pipeline.stages import run
+from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.study import Study, load_study
+
+
+@app.command(rich_help_panel=JOBS)
+def sample(
+    robot: RobotName,
+    part: Annotated[str, typer.Option(help="which part of the blocks, e.g. 2-of-4")],
+    output: Annotated[Path, typer.Option(help="the part's file")],
+    study: StudyFile = DEFAULT_STUDY,
+):
+    """Draw one part of the workspace's seeded sample blocks."""
+    number, _, count = part.partition("-of-")
+    if not (number.isdigit() and count.isdigit() and 1 <= int(number) <= int(count)):
+        raise Er3aError(f"--part is '{part}'; expected for example 2-of-4")
+    from er3a.pipeline.stages.workspace.sample import sample as draw
+
+    draw(load_study(study), robot, int(number), int(count), output)
+
+
+@app.command(rich_help_panel=JOBS)
+def compute(
+    stage: StageName,
+    robot: RobotName,
+    parts: Annotated[
+        list[Path] | None, typer.Argument(help="workspace only: sampled parts; drawn here if absent")
+    ] = None,
+    study: StudyFile = DEFAULT_STUDY,
+    results: Results = DEFAULT_RESULTS,
+):
+    """Compute a stage's numbers: tables and summary.json."""
+    loaded, folder = _folder(study, results, robot, stage)
+    if parts and not STAGES[stage].sampled:
+        raise Er3aError(f"the stage {stage} takes no sampled parts")
+    if absent := run.compute(stage, loaded, robot, folder, parts):
+        print_note(f"{robot}, {stage}: {absent}")
+
+
+@app.command(rich_help_panel=JOBS)
+def record(
+    stage: StageName,
+    robot: RobotName,
+    study: StudyFile = DEFAULT_STUDY,
+    results: Results = DEFAULT_RESULTS,
+    reports: Reports = DEFAULT_REPORTS,
+):
+    """Write a stage's Rerun recording from its results, in English: the viewer has no other letters."""
+    from er3a.pipeline.checksums import write_checksum
+
+    loaded, folder = _folder(study, results, robot, stage)
+    recording = reports / robot / f"{stage}.rrd"
+    run.show("record", stage, loaded, robot, folder, recording)
+    write_checksum(recording)
+
+
+@app.command(rich_help_panel=JOBS)
+def preview(stage: StageName, robot: RobotName, reports: Reports = DEFAULT_REPORTS):
+    """Draw a stage's recording as a picture for its page; an empty file where nothing can draw it."""
+    from er3a.pipeline.checksums import check_checksum, write_checksum
+    from er3a.pipeline.viewing.preview import draw_preview
+
+    recording = reports / robot / f"{stage}.rrd"
+    check_checksum(recording)
+    picture = recording.with_suffix(".webp")
+    if problem := draw_preview(recording, picture):
+        print_note(f"previews of recordings were skipped: {problem}")
+    write_checksum(picture)
+
+
+@app.command(rich_help_panel=JOBS)
+def report(
+    stage: StageName,
+    robot: RobotName,
+    study: StudyFile = DEFAULT_STUDY,
+    results: Results = DEFAULT_RESULTS,
+    reports: Reports = DEFAULT_REPORTS,
+):
+    """Write a stage's page from its results."""
+    from er3a.pipeline.checksums import write_checksum
+    from er3a.pipeline.viewing.figures import house_style
+
+    loaded, folder = _folder(study, results, robot, stage)
+    page = reports / robot / f"{stage}.html"
+    language.use(loaded.report.language, loaded.own_titles())
+    with house_style():
+        run.show("report", stage, loaded, robot, folder, page)
+    write_checksum(page)
+
+
+@app.command(rich_help_panel=JOBS)
+def teach(robot: RobotName, study: StudyFile = DEFAULT_STUDY, reports: Reports = DEFAULT_REPORTS):
+    """Write a robot's teach panel: sliders, the arm in 3-D, its pose and all ways to it, in one page."""
+    from er3a.pipeline.checksums import write_checksum
+    from er3a.pipeline.teach.panel import write_teach_page
+
+    page = reports / robot / "teach.html"
+    write_teach_page(_study_to_show(study), robot, page)
+    write_checksum(page)
+
+
+@app.command(rich_help_panel=JOBS)
+def index(study: StudyFile = DEFAULT_STUDY, results: Results = DEFAULT_RESULTS, reports: Reports = DEFAULT_REPORTS):
+    """Write the pages over all robots and stages: the index and the comparison of two robots."""
+    from er3a.pipeline.checksums import OVERALL, write_checksum
+    from er3a.pipeline.viewing.figures import house_style
+    from er3a.pipeline.viewing.index import write_index
+
+    with house_style():
+        write_index(_study_to_show(study), results, reports)
+    for page in OVERALL:
+        write_checksum(reports / page)
+
+
+def _study_to_show(file: Path) -> Study:
+    """A study whose language is the one that pages are written in from here on."""
+    study = load_study(file)
+    language.use(study.report.language, study.own_titles())
+    return study
+
+
+def _folder(study_file: Path, results: Path, robot: str, stage: str) -> tuple[Study, Path]:
+    if stage not in STAGES:
+        raise Er3aError(f"there is no stage '{stage}'; known: {', '.join(STAGES)}")
+    study = load_study(study_file)
+    study.entry(robot)
+    return study, results / robot / stage

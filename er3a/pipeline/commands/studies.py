@@ -1,0 +1,228 @@
+"""A study from start to end: made, checked, run, looked at, compared, packed."""
+
+from __future__ import annotations
+
+import shlex
+import subprocess
+from collections.abc import Sequence
+from dataclasses import asdict, astuple
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from er3a.errors import Er3aError
+from er3a.pipeline.commands.options import (
+    DEFAULT_REPORTS,
+    DEFAULT_RESULTS,
+    DEFAULT_STUDY,
+    FIRST,
+    AsJson,
+    FailOn,
+    Reports,
+    Results,
+    SomeRobot,
+    StudyFile,
+    app,
+    print_error,
+    print_json,
+    print_note,
+)
+from er3a.pipeline.messages import language
+from er3a.pipeline.study import load_study
+from er3a.pipeline.verdicts import StageVerdict, read_verdicts
+
+
+@app.command(rich_help_panel=FIRST)
+def new(
+    folder: Annotated[Path, typer.Argument(help="where the study is written; no file that is there is touched")],
+    urdf: Annotated[Path | None, typer.Option(help="the arm, as URDF")] = None,
+    dh: Annotated[Path | None, typer.Option(help="the arm, as a CSV table: joint, a_mm, alpha_deg, d_mm ...")] = None,
+    robot: Annotated[str | None, typer.Option(help="the arm, by the name or the file of a robot of er3a")] = None,
+    name: Annotated[str | None, typer.Option(help="the robot's name in the study; by default that of its file")] = None,
+    modified: Annotated[bool, typer.Option(help="the table of --dh is modified (Craig), not standard")] = False,
+):
+    """Write a study to start from: robot file, targets and paths that the arm can do, a scene, a README."""
+    from er3a.pipeline.new_study.brought_arm import arm_of
+    from er3a.pipeline.new_study.write import write_study
+
+    arm = arm_of(urdf, dh, robot, name=name, modified=modified)
+    for note in arm.notes:
+        print_note(note)
+    for file in write_study(arm, folder):
+        print(f"{file}: written")
+    print(f"Next: cd {shlex.quote(str(folder))} && er3a run")
+
+
+@app.command(rich_help_panel=FIRST)
+def check(
+    files: Annotated[list[Path], typer.Argument(help="robot, study, target, path, scene or reference files")],
+    as_json: AsJson = False,
+):
+    """Check input files and say of each what it is, or what is wrong with it."""
+    from er3a.pipeline.check import check_file
+
+    found: list[dict[str, object]] = []
+    for file in files:
+        try:
+            kind = check_file(file)
+        except Er3aError as error:
+            print_error(error)
+            parts = {key: getattr(error, key, None) for key in ("field", "problem", "remedy")}
+            found.append({"file": str(file), "in_order": False, **parts})
+            continue
+        found.append({"file": str(file), "in_order": True, "kind": kind})
+        if not as_json:
+            print(f"{file}: {kind}, in order")
+    if as_json:
+        print_json(found)
+    if not all(each["in_order"] for each in found):
+        raise typer.Exit(2)
+
+
+@app.command(rich_help_panel=FIRST, context_settings={"ignore_unknown_options": True})
+def run(
+    words: Annotated[
+        list[str] | None, typer.Argument(metavar="[SNAKEMAKE]...", help="files to make, and options of Snakemake")
+    ] = None,
+    study: StudyFile = DEFAULT_STUDY,
+    fail_on: Annotated[FailOn | None, typer.Option(help="exit code 1 for verdicts from this one on")] = None,
+):
+    """Carry out the study of this folder; what is done already is not done again."""
+    from er3a.pipeline.run_study import run_study
+
+    if not run_study(study, DEFAULT_RESULTS, DEFAULT_REPORTS, words or []):
+        raise typer.Exit(2)
+    if fail_on:
+        _end_with_findings(read_verdicts(load_study(study), DEFAULT_RESULTS), fail_on)
+
+
+@app.command(rich_help_panel=FIRST)
+def verdicts(
+    study: StudyFile = DEFAULT_STUDY,
+    results: Results = DEFAULT_RESULTS,
+    fail_on: Annotated[FailOn | None, typer.Option(help="exit code 1 for verdicts from this one on")] = None,
+    as_json: AsJson = False,
+):
+    """Say what a finished study came to: the verdict of each stage of each robot."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Column, Table
+    from rich.text import Text
+
+    found = read_verdicts(load_study(study), results)
+    if as_json:
+        print_json([asdict(verdict) for verdict in found])
+    else:
+        columns = ("robot", "stage", "verdict", Column("finding", overflow="fold"))
+        table = Table(*columns, box=box.SIMPLE, padding=0)
+        for each in found:
+            table.add_row(each.robot, each.stage, each.status.replace("_", " "), Text(each.text))
+        Console().print(table)
+    if fail_on:
+        _end_with_findings(found, fail_on)
+
+
+def _end_with_findings(found: Sequence[StageVerdict], level: FailOn) -> None:
+    """Name the findings at a level, and end with 1 if there are any."""
+    counted = [verdict for verdict in found if verdict.counts(level.value)]
+    for verdict in counted:
+        print_note(f"{verdict.robot}, {verdict.stage} ({verdict.status.replace('_', ' ')}): {verdict.text}")
+    if counted:
+        raise typer.Exit(1)
+
+
+@app.command(rich_help_panel=FIRST)
+def view(
+    robot: SomeRobot = None,
+    reports: Reports = DEFAULT_REPORTS,
+):
+    """Open the recordings in the Rerun viewer; where there is no desktop, serve them to a browser."""
+    from er3a.pipeline.checksums import check_checksum
+    from er3a.pipeline.viewing.viewer import has_display, viewer_command, without_statistics
+    from er3a.pipeline.viewing.web_viewer import serve
+
+    recordings = sorted(reports.glob(f"{robot or '*'}/*.rrd"))
+    if not recordings:
+        raise Er3aError(f"no recordings below {reports / (robot or '')}; run the study first")
+    for recording in recordings:
+        check_checksum(recording)
+    if not has_display():
+        serve(recordings)
+        return
+    with without_statistics() as environment:
+        done = subprocess.run(viewer_command(recordings), env=environment, check=False)
+    raise typer.Exit(done.returncode)
+
+
+@app.command(rich_help_panel=FIRST)
+def estimate(
+    cores: Annotated[str, typer.Option(help="numbers of cores, of one machine or of nodes together")] = "1,2,8,64",
+    study: StudyFile = DEFAULT_STUDY,
+    results: Results = DEFAULT_RESULTS,
+    reports: Reports = DEFAULT_REPORTS,
+    logs: Annotated[Path, typer.Option(help="folder of a run's timings")] = Path("logs"),
+    as_json: AsJson = False,
+):
+    """Say what the study will take: samples/s, wall time, memory and disk, from a short calibration on this machine."""
+    from rich.console import Console
+
+    from er3a.pipeline.estimate.cost import measured_here
+    from er3a.pipeline.estimate.terminal import estimate_record, print_estimate
+
+    numbers = cores.split(",")
+    if not all(number.strip().isdigit() and int(number) > 0 for number in numbers):
+        raise Er3aError(f"--cores is '{cores}'; expected numbers such as 1,2,8,64")
+    loaded = load_study(study)
+    with Console(stderr=True).status("Measuring on this machine ..."):
+        measured = measured_here(loaded, results, reports, logs)
+    counts = sorted({int(number) for number in numbers})
+    if as_json:
+        print_json(estimate_record(loaded, measured, counts))
+    else:
+        print_estimate(loaded, measured, counts)
+
+
+@app.command(rich_help_panel=FIRST)
+def diff(
+    old: Annotated[Path, typer.Argument(help="a results folder")],
+    new: Annotated[Path, typer.Argument(help="another results folder")],
+    output: Annotated[Path | None, typer.Option(help="also write them as a page")] = None,
+    words: Annotated[str, typer.Option("--language", help=" | ".join(language.LANGUAGES))] = "en",
+    as_json: AsJson = False,
+):
+    """Compare two results folders: verdicts, key figures and tables that moved. Exit code 1 if anything differs."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Column, Table
+
+    from er3a.pipeline.viewing.diff import COLUMNS, changes, write_diff
+
+    if words not in language.LANGUAGES:
+        raise Er3aError(f"--language is '{words}'; known: {', '.join(language.LANGUAGES)}")
+    language.use(words)
+    found = changes(old, new)
+    if as_json:
+        print_json([asdict(change) for change in found])
+    else:
+        table = Table(*(Column(language.tr(column), overflow="fold") for column in COLUMNS), box=box.SIMPLE, padding=0)
+        for change in found:
+            table.add_row(*astuple(change))
+        Console().print(table if found else language.tr("Nothing differs."))
+    if output:
+        write_diff(old, new, found, output)
+    if found:
+        raise typer.Exit(1)
+
+
+@app.command(rich_help_panel=FIRST)
+def archive(
+    output: Annotated[Path, typer.Option(help="the zip to write")] = Path("er3a-study.zip"),
+    study: StudyFile = DEFAULT_STUDY,
+    results: Results = DEFAULT_RESULTS,
+    reports: Reports = DEFAULT_REPORTS,
+):
+    """Pack a finished study into one zip with RO-Crate metadata."""
+    from er3a.pipeline.archive import archive as pack
+
+    print(f"{output}: written, {pack(study, results, reports, output)} files with RO-Crate metadata")

@@ -1,0 +1,1 @@
+"""A study to start from, written for an arm that a person brings."""

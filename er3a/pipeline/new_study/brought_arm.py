@@ -1,0 +1,94 @@
+"""The arm of a new study: from a URDF, a D-H table, or a robot that er3a knows."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from er3a.errors import Er3aError, InputError
+from er3a.files.dh_table import read_dh_table
+from er3a.files.robot_file import NAME_PATTERN, RobotFile
+from er3a.files.robot_library import read_robot, robot_of, robot_path
+from er3a.files.robot_writer import robot_file, yaml_text
+from er3a.formats.text_file import read_text
+from er3a.formats.urdf import import_urdf, robot_name
+from er3a.robots.robot import Robot
+
+SCHEMA_LINE = "# yaml-language-server: $schema=../../config/robot.schema.json\n"
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """An arm, and what its file in the study says.
+
+    Attributes
+    ----------
+    text : of the robot file
+    notes : what was assumed about it, in words
+    """
+
+    robot: Robot
+    text: str
+    notes: tuple[str, ...] = ()
+
+
+def arm_of(
+    urdf: Path | None, dh: Path | None, robot: str | None, *, name: str | None = None, modified: bool = False
+) -> Arm:
+    """The arm that exactly one of a URDF, a D-H table and a robot's name or file describes.
+
+    Parameters
+    ----------
+    name : of the robot in the study; by default that of the file
+    modified : whether the D-H table is modified (Craig)
+
+    Raises
+    ------
+    Er3aError
+        for none or several of them, a name that no robot can have, and what reading the file refuses
+    """
+    given = [word for word, value in {"--urdf": urdf, "--dh": dh, "--robot": robot}.items() if value is not None]
+    if len(given) != 1:
+        problem = f"{' and '.join(given)} each name an arm" if given else "which arm?"
+        raise Er3aError(f"{problem} Give one of --urdf FILE, --dh FILE.csv and --robot NAME")
+    if name is not None and not re.match(NAME_PATTERN, name):
+        told = "small letters, digits, - and _, a letter or digit first, 64 at most"
+        raise Er3aError(f"--name '{name}' can't be a robot's name: {told}")
+    if modified and dh is None:
+        raise Er3aError("--modified says how a table is meant; give it with --dh")
+    if urdf is not None:
+        return _from_urdf(urdf, name or robot_name(urdf))
+    if dh is not None:
+        content, notes = read_dh_table(dh, name or robot_name(dh), "modified" if modified else "standard")
+        return Arm(robot_of(content), _text(content), notes)
+    return _known(str(robot), name)
+
+
+def _from_urdf(path: Path, name: str) -> Arm:
+    imported = import_urdf(path, snap=True)
+    robot = imported.robot.replace(name=name)
+    try:
+        content = robot_file(robot)
+    except ValidationError as error:
+        problem, _, remedy = str(error.errors()[0].get("ctx", {}).get("error", "")).partition(" | ")
+        raise InputError(path, None, problem or "its values make no robot file", remedy or "Check its units") from None
+    misfit = f"the table's flange differs from the URDF's by at most {imported.misfit_m * 1000:.2g} mm on random poses"
+    return Arm(robot_of(content), _text(content), (*imported.notes, misfit))
+
+
+def _known(robot: str, name: str | None) -> Arm:
+    """A robot file as it is written, with its comments; under another name if one is asked for."""
+    path = robot_path(robot)
+    content = read_robot(path)
+    text = read_text(path)
+    if name is not None and name != content.name:
+        content = content.model_copy(update={"name": name})
+        text = re.sub(r"^name:.*$", f"name: {name}", text, count=1, flags=re.MULTILINE)
+    return Arm(robot_of(content), text)
+
+
+def _text(content: RobotFile) -> str:
+    return SCHEMA_LINE + yaml_text(content.model_dump(exclude_none=True))

@@ -1,0 +1,65 @@
+"""What a target or a path is said to come to, against what it came to: findings of the stages that judge them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+from er3a.kinematics.targets import TargetOutcome
+from er3a.planning.path_verdicts import PathVerdict
+
+Outcome = TargetOutcome | PathVerdict
+
+
+@dataclass(frozen=True)
+class UnmetExpectation:
+    """Something came to another end than the file expects."""
+
+    name: str
+    expected: Outcome
+    found: Outcome
+    code: Literal["unmet_expectation"] = "unmet_expectation"
+
+
+@dataclass(frozen=True)
+class Demonstration:
+    """A target or a path that fails as it is meant to."""
+
+    name: str
+    found: Outcome
+    code: Literal["demonstration"] = "demonstration"
+
+
+@dataclass(frozen=True)
+class ExpectationsUnmet:
+    """Of so many expectations these are not met."""
+
+    expectations: int
+    unmet: tuple[UnmetExpectation, ...]
+    code: Literal["expectations_unmet"] = "expectations_unmet"
+
+
+class Judged(Protocol):
+    """A target or a path with what it came to, and what it is said to come to."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def expect(self) -> Outcome | None: ...
+
+    @property
+    def outcome(self) -> Outcome: ...
+
+
+def unmet_expectations(judged: Iterable[Judged]) -> ExpectationsUnmet | None:
+    """The expectations that are not met; None if all are."""
+    told = [(each, each.expect) for each in judged if each.expect is not None]
+    unmet = tuple(UnmetExpectation(each.name, expect, each.outcome) for each, expect in told if expect != each.outcome)
+    return ExpectationsUnmet(len(told), unmet) if unmet else None
+
+
+def demonstrations(judged: Iterable[Judged], sound: Outcome) -> tuple[Demonstration, ...]:
+    """What fails as it is meant to; ``sound``: what counts as no failure."""
+    return tuple(Demonstration(each.name, each.outcome) for each in judged if each.expect == each.outcome != sound)

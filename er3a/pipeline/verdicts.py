@@ -1,0 +1,53 @@
+"""The verdicts of a finished study, for whoever reads no page: a terminal, another program, continuous integration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from er3a.pipeline.results import NotComputed, Status, read_verdict
+from er3a.pipeline.study import Study
+
+Level = Literal["caution", "fail"]
+_COUNTED: dict[Level, tuple[Status, ...]] = {"caution": ("caution", "fail"), "fail": ("fail",)}
+
+
+@dataclass(frozen=True)
+class StageVerdict:
+    """What a stage says of a robot.
+
+    Attributes
+    ----------
+    code : of the finding; text : in English
+    """
+
+    robot: str
+    stage: str
+    status: Status
+    code: str
+    text: str
+
+    @property
+    def broken(self) -> bool:
+        """Whether the stage could not be computed although it applies to the robot."""
+        return self.status == "not_computed" and self.code == NotComputed.code
+
+    def counts(self, level: Level) -> bool:
+        """Whether this is a finding at a level; a stage that broke is one at each, for it hides what it would say."""
+        return self.broken or self.status in _COUNTED[level]
+
+
+def read_verdicts(study: Study, results: Path) -> list[StageVerdict]:
+    """The verdicts of all stages of all robots, in the study's order.
+
+    Raises
+    ------
+    ResultError
+        a stage has no results, or they are damaged or of another format version
+    """
+    return [
+        StageVerdict(robot, stage, *read_verdict(results / robot / stage))
+        for robot in study.names
+        for stage in study.stages(robot)
+    ]

@@ -1,0 +1,9 @@
+"""What can be said of a path."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+PathVerdict = Literal["unreachable", "leaves limits", "collides", "too fast", "singular", "near-singular", "safe"]
+PATH_VERDICTS: tuple[PathVerdict, ...] = get_args(PathVerdict)
+"""The gravest first."""

@@ -1,0 +1,247 @@
+"""Puts the flat code of a routine together while its text is read: loops and branches become jumps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from er3a.errors import InputError
+from er3a.programs.instructions import Aside, Place, Remark, Unknown
+from er3a.programs.syntax import (
+    Assign,
+    Binary,
+    Branch,
+    Constant,
+    Expression,
+    Fixed,
+    GoTo,
+    Operation,
+    Return,
+    Routine,
+    RoutineParameter,
+    Unary,
+    Variable,
+)
+
+MOST_NESTED = 200
+
+
+@dataclass
+class Block:
+    """A loop or branch that is still open."""
+
+    kind: str
+    place: Place
+    start: int
+    exits: list[int] = field(default_factory=list)  # jumps behind the block
+    skips: list[int] = field(default_factory=list)  # branches or jumps to the next arm, or to the next round
+    subject: Expression | None = None
+    step: Expression | None = None
+    word: str = ""  # what it is called in the text
+
+
+LOOPS = ("loop", "while", "for", "repeat")
+
+
+class CodeBuilder:
+    """The code of one routine."""
+
+    def __init__(self, name: str, parameters: tuple[RoutineParameter, ...], place: Place, thread: bool = False):
+        self.name, self.parameters, self.place, self.thread = name, parameters, place, thread
+        self.code: list[Operation] = []
+        self.blocks: list[Block] = []
+        self._labels: dict[str, int] = {}
+        self._gotos: list[tuple[int, str]] = []
+        self._hidden = 0
+
+    def add(self, operation: Operation) -> None:
+        """One more operation."""
+        self.code.append(operation)
+
+    def remark(self, place: Place, text: str) -> None:
+        """A comment."""
+        self.add(Fixed(place, Remark(text)))
+
+    def aside(self, place: Place, text: str) -> None:
+        """An instruction that moves nothing."""
+        self.add(Fixed(place, Aside(text)))
+
+    def unknown(self, place: Place, text: str, may_move: bool = True) -> None:
+        """An instruction that is not understood."""
+        self.add(Fixed(place, Unknown(text, may_move)))
+
+    def inside(self, *kinds: str) -> bool:
+        """Whether the innermost block is one of these."""
+        return bool(self.blocks) and self.blocks[-1].kind in kinds
+
+    def open_if(self, place: Place, condition: Expression, text: str) -> None:
+        """``IF condition``."""
+        self._open("if", place)
+        self._test(place, condition, text)
+
+    def next_arm(self, place: Place, condition: Expression | None, text: str) -> None:
+        """``ELSE``, or ``ELSEIF`` with its condition."""
+        block = self._innermost("if", place)
+        block.exits.append(self._jump(place))
+        self._patch(block.skips)
+        block.skips = []
+        if condition is not None:
+            self._test(place, condition, text)
+
+    def open_while(self, place: Place, condition: Expression, text: str) -> None:
+        """``WHILE condition``; a condition that is always true makes a loop for ever."""
+        if isinstance(condition, Constant) and condition.value is True:
+            self._open("loop", place, "while")
+            return
+        self._open("while", place)
+        self._test(place, condition, text)
+
+    def open_loop(self, place: Place) -> None:
+        """``LOOP``."""
+        self._open("loop", place)
+
+    def open_repeat(self, place: Place) -> None:
+        """``REPEAT``."""
+        self._open("repeat", place)
+
+    def open_for(
+        self, place: Place, name: str, first: Expression, last: Expression, step: Expression | None, text: str
+    ) -> None:
+        """``FOR name = first TO last STEP step``; the last and the step are fixed when the loop is entered."""
+        if len(self.blocks) >= MOST_NESTED:
+            self._open("for", place)
+        self._hidden += 1
+        limit, by = (Variable(f"%{part}{self._hidden}") for part in ("last", "step"))
+        counter = Variable(name)
+        self.add(Assign(place, counter, first, text))
+        self.add(Assign(place, limit, last, text, local=True))
+        self.add(Assign(place, by, Constant(1) if step is None else step, text, local=True))
+        self._open("for", place)
+        self.blocks[-1].subject, self.blocks[-1].step = counter, by
+        span = Binary("*", Binary("-", limit, counter), by)
+        self._test(place, Binary(">=", span, Constant(0)), text)
+
+    def open_switch(self, place: Place, subject: Expression) -> None:
+        """``SWITCH subject``."""
+        self._open("switch", place)
+        self.blocks[-1].subject = subject
+
+    def case(self, place: Place, values: list[Expression] | None, text: str) -> None:
+        """``CASE values``, or ``DEFAULT`` for None."""
+        block = self._innermost("switch", place)
+        if block.skips or block.exits:
+            block.exits.append(self._jump(place))
+        self._patch(block.skips)
+        block.skips = []
+        if values is None:
+            return
+        assert block.subject is not None
+        tests: list[Expression] = [Binary("==", block.subject, value) for value in values]
+        condition = tests[0]
+        for test in tests[1:]:
+            condition = Binary("OR", condition, test)
+        self._test(place, condition, text)
+
+    def close(self, kind: str, place: Place, until: Expression | None = None, text: str = "") -> None:
+        """End of the innermost block, which must be of this kind."""
+        block = self._innermost(kind, place)
+        if kind == "repeat":
+            assert until is not None
+            self._patch(block.skips)
+            self.add(Branch(place, until, block.start, text))
+        elif block.kind in LOOPS:
+            if block.kind == "for":
+                self._count(block, place)
+            self.add(GoTo(place, block.start, endless=block.kind == "loop"))
+        if kind != "repeat":
+            self._patch(block.skips)
+        self._patch(block.exits)
+        self.blocks.pop()
+
+    def leave_loop(self, place: Place) -> None:
+        """``EXIT``, ``break``."""
+        self._loop(place).exits.append(self._jump(place))
+
+    def next_round(self, place: Place) -> None:
+        """``continue`` of a loop with its condition at the top."""
+        loop = self._loop(place)
+        if loop.kind == "repeat":
+            loop.skips.append(self._jump(place))
+            return
+        if loop.kind == "for":
+            self._count(loop, place)
+        self.add(GoTo(place, loop.start, endless=loop.kind == "loop"))
+
+    def label(self, name: str) -> None:
+        """A place to go to."""
+        self._labels[name] = len(self.code)
+
+    def goto(self, place: Place, name: str) -> None:
+        """``GOTO name``."""
+        self._gotos.append((self._jump(place), name))
+
+    def routine(self, end: Place) -> Routine:
+        """The finished routine.
+
+        Raises
+        ------
+        InputError
+            for a block without end, or a label that is not there
+        """
+        if self.blocks:
+            block = self.blocks[-1]
+            raise fault(block.place, f"the {block.word.upper()} that begins here has no end", "Close it")
+        for at, name in self._gotos:
+            place = self.code[at].place
+            if name not in self._labels:
+                raise fault(place, f"there is no label '{name}'", "Name a label of this routine")
+            self.code[at] = GoTo(place, self._labels[name], endless=self._labels[name] <= at)
+        return Routine(self.name, self.parameters, (*self.code, Return(end)), self.place, self.thread)
+
+    def _open(self, kind: str, place: Place, word: str = "") -> None:
+        if len(self.blocks) >= MOST_NESTED:
+            raise fault(place, f"more than {MOST_NESTED} blocks within each other", "Nest fewer")
+        self.blocks.append(Block(kind, place, len(self.code), word=word or kind))
+
+    def _innermost(self, word: str, place: Place) -> Block:
+        if not self.blocks or self.blocks[-1].word != word:
+            opened = f"the {self.blocks[-1].word.upper()} of line {self.blocks[-1].place.line}" if self.blocks else None
+            problem = f"ends or continues a {word.upper()}, but {opened or 'none'} is open"
+            raise fault(place, problem, "Close blocks in the order in which they were opened")
+        return self.blocks[-1]
+
+    def _count(self, block: Block, place: Place) -> None:
+        assert block.subject is not None
+        assert block.step is not None
+        self.add(Assign(place, block.subject, Binary("+", block.subject, block.step), ""))
+
+    def _loop(self, place: Place) -> Block:
+        for block in reversed(self.blocks):
+            if block.kind in LOOPS:
+                return block
+        raise fault(place, "leaves a loop, but none is open", "Remove it")
+
+    def _test(self, place: Place, condition: Expression, text: str) -> None:
+        self.blocks[-1].skips.append(len(self.code))
+        self.add(Branch(place, condition, -1, text))
+
+    def _jump(self, place: Place) -> int:
+        self.add(GoTo(place, -1))
+        return len(self.code) - 1
+
+    def _patch(self, places: list[int]) -> None:
+        for at in places:
+            operation = self.code[at]
+            if isinstance(operation, Branch):
+                self.code[at] = replace(operation, otherwise=len(self.code))
+            elif isinstance(operation, GoTo):
+                self.code[at] = replace(operation, to=len(self.code))
+
+
+def negated(condition: Expression) -> Expression:
+    """The opposite of a condition."""
+    return Unary("NOT", condition)
+
+
+def fault(place: Place, problem: str, remedy: str) -> InputError:
+    """An error at a place of a program."""
+    return InputError(place.file, place.where, problem, remedy)

@@ -1,0 +1,104 @@
+"""CSV tables of a motion over time.
+
+Columns, in this order: ``t_s`` (from 0, rising); ``q1_deg`` ... ``q6_deg``, the joints; ``x_mm, y_mm, z_mm`` and
+``roll_deg, pitch_deg, yaw_deg``, the tool in the base frame with R = Rz(yaw) Ry(pitch) Rx(roll). The poses follow from
+the joints and are for the reader; ``t_s`` may be left out, and other columns are passed over. Lines that begin with
+``#`` are comments.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from itertools import pairwise
+
+import numpy as np
+
+from er3a.errors import InputError
+from er3a.geometry.transforms import rpy_of
+from er3a.numerics.arrays import Reals
+from er3a.programs.code_builder import CodeBuilder
+from er3a.programs.instructions import ArmMotion, JointTarget, Place, Rate
+from er3a.programs.program_findings import NothingMoves, ProgramFinding
+from er3a.programs.program_text import ProgramText
+from er3a.programs.syntax import Fixed, Program
+
+TIME = "t_s"
+JOINT_COLUMNS = tuple(f"q{i}_deg" for i in range(1, 7))
+POSE_COLUMNS = ("x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg")
+DECIMALS = 6
+
+
+def write_csv(times: Reals, joints: Reals, poses: Reals, head: tuple[str, ...] = ()) -> str:
+    """A table of a motion.
+
+    Parameters
+    ----------
+    times : (n,), s
+    joints : (n, 6), rad
+    poses : (n, 4, 4), T_base_tool, m
+    head : comments, one to a line
+    """
+    turned = np.degrees(rpy_of(poses))
+    rows = np.column_stack([times, np.degrees(joints), poses[:, :3, 3] * 1000, turned])
+    rows = np.round(rows, DECIMALS) + 0.0
+    lines = [f"# {line}" for line in head]
+    lines.append(",".join((TIME, *JOINT_COLUMNS, *POSE_COLUMNS)))
+    lines += [",".join(f"{value:.{DECIMALS}f}" for value in row) for row in rows]
+    return "\n".join(lines) + "\n"
+
+
+def read_csv_program(source: ProgramText) -> Program:
+    """Joint moves through the rows of a table.
+
+    Raises
+    ------
+    InputError
+        for a column that is missing, a value that is no finite number, times that do not rise
+    """
+    kept = [(i, line) for i, line in enumerate(source.lines, 1) if line.strip() and not line.startswith("#")]
+    rows = list(csv.reader((line for _, line in kept), strict=False))
+    if not rows:
+        raise InputError(source.path, None, "holds no rows", f"Give the columns {', '.join(JOINT_COLUMNS)}")
+    head = [name.strip() for name in rows[0]]
+    twice = next((name for name in head if head.count(name) > 1), None)
+    missing = next((name for name in JOINT_COLUMNS if name not in head), None)
+    if twice or missing:
+        problem = f"the column {twice or missing} is {'there twice' if twice else 'missing'}"
+        raise InputError(source.path, f"line {kept[0][0]}", problem, f"Give {', '.join(JOINT_COLUMNS)} once each")
+    columns = [head.index(name) for name in JOINT_COLUMNS]
+    timed = head.index(TIME) if TIME in head else None
+    table = [
+        _numbers(source, number, row, columns + ([] if timed is None else [timed]), head)
+        for (number, _), row in zip(kept[1:], rows[1:])
+    ]
+    if timed is not None:
+        for i, (before, after) in enumerate(pairwise(table)):
+            if not after[6] > before[6]:
+                problem = f"t_s is {after[6]:g} after {before[6]:g}"
+                raise InputError(source.path, f"line {kept[i + 2][0]}", problem, "Times must rise")
+    builder = CodeBuilder("MAIN", (), Place(source.path, 1))
+    for i, values in enumerate(table):
+        place = Place(source.path, kept[i + 1][0])
+        speed = Rate(values[6] - table[i - 1][6], "s") if timed is not None and i else None
+        builder.add(Fixed(place, ArmMotion("joint", JointTarget(np.radians(values[:6])), "row", speed=speed)))
+    findings: tuple[ProgramFinding, ...] = (*source.findings, *(() if table else (NothingMoves(),)))
+    routine = builder.routine(Place(source.path, len(source.lines)))
+    return Program(
+        "csv", source.path.stem, source.path, {"MAIN": routine}, "MAIN", findings=findings, lines=source.lines
+    )
+
+
+def _numbers(source: ProgramText, line: int, row: list[str], columns: list[int], head: list[str]) -> list[float]:
+    found = []
+    for column in columns:
+        text = row[column].strip() if column < len(row) else ""
+        try:
+            value = float(text) if text.isascii() and "_" not in text else math.nan
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            problem = f"'{text[:40]}' is no finite number" if text else "a value is missing"
+            raise InputError(source.path, f"line {line}, column {head[column]}", problem, "Write a number")
+        found.append(value)
+    return found

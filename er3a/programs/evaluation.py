@@ -1,0 +1,291 @@
+"""Variables of a running program, and the values of expressions.
+
+Names with fields and indices are looked up as a whole (``$VEL.CP``, ``XP[3]``) where no record or list is kept under
+the shorter name. What is not there is :class:`~er3a.programs.values.Unclear`, and so is all that is made of it.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+from er3a.programs.position import Cell, Position
+from er3a.programs.syntax import (
+    Aggregate,
+    Binary,
+    Constant,
+    Element,
+    Expression,
+    Invocation,
+    Listed,
+    Member,
+    Opaque,
+    Unary,
+    Variable,
+)
+from er3a.programs.values import Record, Unclear, Value, number
+
+LONGEST_TEXT = 10_000
+LARGEST_WHOLE = 2**62
+
+COMPARISONS: Mapping[str, Callable[[float, float], bool]] = {
+    "<": operator.lt,
+    ">": operator.gt,
+    "<=": operator.le,
+    ">=": operator.ge,
+}
+ARITHMETIC: Mapping[str, Callable[[float, float], float]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "%": operator.mod,
+    "MOD": operator.mod,
+}
+IN_DEGREES: Mapping[str, Callable[[float], float]] = {
+    "SIN": lambda x: math.sin(math.radians(x)),
+    "COS": lambda x: math.cos(math.radians(x)),
+    "TAN": lambda x: math.tan(math.radians(x)),
+    "ACOS": lambda x: math.degrees(math.acos(x)),
+    "SQRT": math.sqrt,
+    "ABS": abs,
+}
+SAME = {"AND": "AND", "and": "AND", "B_AND": "AND", "&": "AND", "OR": "OR", "or": "OR", "B_OR": "OR"}
+EXCLUSIVE = {"EXOR", "XOR", "xor", "B_EXOR"}
+
+
+class Functions(Protocol):
+    """What a language adds to evaluation."""
+
+    whole_division: bool
+    first_index: int
+
+    def function(self, memory: Memory, name: str, given: Invocation) -> Value:
+        """The value of a function that is not in the program."""
+
+    def listed(self, kind: str, values: tuple[Value, ...]) -> Value:
+        """The value of ``[...]`` or ``p[...]``."""
+
+    def product(self, left: Value, right: Value) -> Value:
+        """``left : right``, of two positions."""
+
+    def constant(self, memory: Memory, name: str) -> Value | None:
+        """The value of a name that the language itself gives, if it does: a frame, where the arm stands."""
+
+
+class Memory:
+    """Variables: those of the program, and those of the routine that runs.
+
+    Attributes
+    ----------
+    shared, local : values by name
+    types : declared types by name
+    kept : what a language keeps until the next value is given
+    beside : names that a thread changes, so that their values are unclear
+    here : where the arm stands
+    cell : what is known of the cell
+    """
+
+    def __init__(self, functions: Functions, cell: Cell):
+        self.functions, self.cell = functions, cell
+        self.here = Position(cell.start)
+        self.shared: dict[str, Value] = {}
+        self.local: dict[str, Value] = {}
+        self.types: dict[str, str] = {}
+        self.kept: dict[object, object] = {}
+        self.beside: frozenset[str] = frozenset()
+
+    def copy(self) -> Memory:
+        """Another that goes its own way from here."""
+        other = Memory(self.functions, self.cell)
+        other.here = self.here
+        other.shared, other.local, other.types = dict(self.shared), dict(self.local), self.types
+        other.beside = self.beside
+        return other
+
+    def read(self, name: str) -> Value | None:
+        """The value of a whole name, or None."""
+        if name in self.local:
+            return self.local[name]
+        if self.beside and root(name) in self.beside:
+            return Unclear(name)
+        value = self.shared.get(name)
+        return self.functions.constant(self, name) if value is None else value
+
+    def write(self, name: str, value: Value, local: bool = False) -> None:
+        """Give a whole name a value."""
+        self.kept.clear()
+        if local or (self.local and root(name) in self.local):
+            self.local[name] = value
+        else:
+            self.shared[name] = value
+
+    def assign(self, target: Expression, value: Value, local: bool = False) -> None:
+        """Give a variable, a field or an element a value."""
+        if isinstance(target, Member) and self._set_field(target, value):
+            return
+        if isinstance(target, Element):
+            changed = self._with_element(target, value)
+            if changed is not None:
+                self.assign(target.of, changed)
+                return
+        key = self.key(target)
+        if key is not None:
+            self.write(key, self._typed(key, value), local)
+
+    def _set_field(self, target: Member, value: Value) -> bool:
+        """Give a field of a kept value a value; False if the field is kept under its whole name."""
+        of, name = self.value(target.of), self.key(target.of)
+        if isinstance(of, Record):
+            self.assign(target.of, of.having(target.name, value))
+            return True
+        if name is None or not isinstance(of, Unclear) or self.read(name) is None:
+            return False
+        if of.text == name:  # declared, without a value yet
+            self.assign(target.of, Record("", ((target.name, value),)))
+        return True
+
+    def key(self, target: Expression) -> str | None:
+        """The whole name of a variable, field or element; None if an index is unclear or it is none of these."""
+        match target:
+            case Variable(name=name):
+                return name
+            case Member(of=of, name=name):
+                start = self.key(of)
+                return None if start is None else f"{start}.{name}"
+            case Element(of=of, indices=indices):
+                start = self.key(of)
+                found = [number(self.value(each)) for each in indices]
+                if start is None or None in found:
+                    return None
+                return f"{start}[{','.join(f'{each:g}' for each in found)}]"
+        return None
+
+    def value(self, expression: Expression) -> Value:
+        """The value of an expression."""
+        match expression:
+            case Constant(value=value):
+                return value
+            case Variable(name=name):
+                found = self.read(name)
+                return Unclear(name) if found is None else found
+            case Member() | Element():
+                return self._part(expression)
+            case Unary(operator=sign, of=of):
+                return _unary(sign, self.value(of))
+            case Binary():
+                return self._binary(expression)
+            case Invocation(function=function):
+                return self.functions.function(self, function, expression)
+            case Aggregate(kind=kind, items=items):
+                return Record(kind, tuple((name, self.value(each)) for name, each in items))
+            case Listed(kind=kind, items=listed):
+                return self.functions.listed(kind, tuple(map(self.value, listed)))
+            case Opaque(text=text):
+                return Unclear(text)
+
+    def _part(self, expression: Member | Element) -> Value:
+        of = self.value(expression.of)
+        if isinstance(of, Record) and isinstance(expression, Member):
+            found = of.get(expression.name)
+        elif isinstance(of, (Record, tuple)) and isinstance(expression, Element) and len(expression.indices) == 1:
+            values = of.values() if isinstance(of, Record) else of
+            at = number(self.value(expression.indices[0]))
+            place = None if at is None else at - self.functions.first_index
+            found = values[int(place)] if place is not None and 0 <= place < len(values) else None
+        else:
+            key = self.key(expression)
+            found = None if key is None else self.read(key)
+            if found is None and isinstance(of, Unclear):
+                return Unclear(key or of.text)
+        return Unclear(self.key(expression) or "an element") if found is None else found
+
+    def _with_element(self, target: Element, value: Value) -> Value | None:
+        """The list or record that an element belongs to, with that element changed; None if it belongs to none."""
+        of = self.value(target.of)
+        at = number(self.value(target.indices[0])) if len(target.indices) == 1 else None
+        if not isinstance(of, (tuple, Record)) or at is None:
+            return None
+        place = int(at) - self.functions.first_index
+        values = of.values() if isinstance(of, Record) else of
+        if not 0 <= place < len(values):
+            return None
+        if isinstance(of, Record):
+            return of.having(of.items[place][0], value)
+        return (*of[:place], value, *of[place + 1 :])
+
+    def _typed(self, key: str, value: Value) -> Value:
+        kind = self.types.get(root(key), "")
+        if not isinstance(value, bool) and isinstance(value, (int, float)):
+            if kind in ("REAL", "LREAL") and not isinstance(value, float):
+                return float(value)
+            if kind in ("INT", "DINT", "SINT", "LINT") and isinstance(value, float) and abs(value) < LARGEST_WHOLE:
+                return round(value)
+        return value
+
+    def _binary(self, expression: Binary) -> Value:
+        sign, left = expression.operator, self.value(expression.left)
+        logic = SAME.get(sign)
+        if logic == "AND" and left is False:
+            return False
+        if logic == "OR" and left is True:
+            return True
+        right = self.value(expression.right)
+        if logic is not None:
+            decisive = logic == "OR"
+            if right is decisive:
+                return decisive
+            if isinstance(left, bool) and isinstance(right, bool):
+                return not decisive
+        if sign == ":":
+            return self.functions.product(left, right)
+        for side in (left, right):
+            if isinstance(side, Unclear):
+                return side
+        if sign in ("==", "=", "<>", "!="):
+            return (left == right) == (sign in ("==", "="))
+        if sign in EXCLUSIVE and isinstance(left, bool) and isinstance(right, bool):
+            return left != right
+        return self._computed(sign, left, right)
+
+    def _computed(self, sign: str, left: Value, right: Value) -> Value:
+        if sign == "+" and isinstance(left, str) and isinstance(right, str) and len(left + right) < LONGEST_TEXT:
+            return left + right
+        a, b = number(left), number(right)
+        if a is None or b is None:
+            return Unclear(f"... {sign} ...")
+        if sign in COMPARISONS:
+            return COMPARISONS[sign](a, b)
+        whole = isinstance(left, int) and isinstance(right, int)
+        try:
+            if sign == "/":
+                return int(a / b) if whole and self.functions.whole_division else a / b
+            if sign in ("^", "**"):
+                power = a**b
+                return Unclear("a root") if isinstance(power, complex) else power
+            if sign not in ARITHMETIC:
+                return Unclear(f"... {sign} ...")
+            found = ARITHMETIC[sign](a, b)
+        except (ZeroDivisionError, OverflowError, ValueError):
+            return Unclear("a division by zero or an overflow")
+        return int(found) if whole and abs(found) < 2**53 else found
+
+
+def root(name: str) -> str:
+    """The variable that a whole name belongs to: ``XP`` of ``XP[3]`` and ``XP.X``."""
+    dot, bracket = name.find("."), name.find("[")
+    ends = [at for at in (dot, bracket) if at > 0]
+    return name[: min(ends)] if ends else name
+
+
+def _unary(sign: str, value: Value) -> Value:
+    if isinstance(value, Unclear):
+        return value
+    if sign in ("NOT", "not", "!", "B_NOT"):
+        return not value if isinstance(value, bool) else Unclear(f"{sign} ...")
+    plain = number(value)
+    if plain is None:
+        return Unclear(f"{sign} ...")
+    assert isinstance(value, (int, float))
+    return -value if sign == "-" else value

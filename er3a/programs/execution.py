@@ -1,0 +1,130 @@
+"""What running a program gives: its instructions in the order of their execution, and how each way through it ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from er3a.programs.instructions import ArmMotion, Decision, Instruction, Listing, Place, alike
+from er3a.programs.syntax import Program
+
+EndKind = Literal["end", "repeats", "joins", "drifts", "limit", "recursion"]
+
+
+@dataclass(frozen=True)
+class RunLimits:
+    """How far a program is followed.
+
+    Attributes
+    ----------
+    operations : in all
+    ways : sides of branches on what only the cell knows
+    rounds : of a loop without end whose state does not repeat
+    depth : of calls within calls
+    """
+
+    operations: int = 2_000_000
+    ways: int = 2_000
+    rounds: int = 1_000
+    depth: int = 40
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """An instruction that is carried out.
+
+    Attributes
+    ----------
+    place : where it stands
+    calls : where the routines were called that it stands in, the outermost first
+    before : number of the step before it; -1 for the first
+    """
+
+    instruction: Instruction
+    place: Place
+    calls: tuple[Place, ...]
+    before: int
+
+
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """How a way through the program ends.
+
+    Attributes
+    ----------
+    kind : it is over; it ``repeats`` what it did, for ever; it ``joins`` another way, being in its state; it
+        ``drifts``, being a loop for ever whose state does not repeat; or a limit of the run was met, or of calls within
+        calls
+    step : number of its last step; -1 if it has none
+    repeats_from : number of the step that follows the last, where it repeats or joins; None if no step does
+    """
+
+    kind: EndKind
+    step: int
+    place: Place
+    repeats_from: int | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Execution:
+    """A program that was run.
+
+    Attributes
+    ----------
+    steps : of all ways; each names the one before it
+    endings : one for each way
+    """
+
+    program: Program
+    steps: tuple[Step, ...]
+    endings: tuple[Ending, ...]
+
+    @property
+    def complete(self) -> bool:
+        """Whether every way was followed to its end, or until it repeats."""
+        return all(each.kind in ("end", "repeats", "joins") for each in self.endings)
+
+    @property
+    def motions(self) -> tuple[int, ...]:
+        """Numbers of the steps that move the arm."""
+        return tuple(i for i, step in enumerate(self.steps) if isinstance(step.instruction, ArmMotion))
+
+    def way(self, ending: Ending) -> tuple[int, ...]:
+        """Numbers of the steps of a way, from the first."""
+        found = []
+        at = ending.step
+        while at >= 0:
+            found.append(at)
+            at = self.steps[at].before
+        return tuple(reversed(found))
+
+    def main(self) -> Ending:
+        """The way with the most motions; the first of them if there are several."""
+        moves = [0] * (len(self.steps) + 1)
+        for i, step in enumerate(self.steps):
+            moves[i] = moves[step.before] + isinstance(step.instruction, ArmMotion)
+        return max(self.endings, key=lambda ending: moves[ending.step])
+
+    def listing(self, ending: Ending | None = None) -> Listing:
+        """A way as a sequence without branches, to be written; by default :meth:`main`."""
+        ending = ending or self.main()
+        way = self.way(ending)
+        again = ending.repeats_from if ending.kind == "repeats" else None
+        kept = [i for i in way if not isinstance(self.steps[i].instruction, Decision)]
+        start = None if again is None else sum(i < again for i in kept)
+        if start is not None and start >= len(kept):
+            start = None
+        while start is not None and self._same_round(kept, start):
+            length = len(kept) - start
+            del kept[start:]
+            start -= length
+        instructions = tuple(self.steps[i].instruction for i in kept)
+        return Listing(self.program.name, instructions, repeats_from=start, language=self.program.language)
+
+    def _same_round(self, kept: list[int], start: int) -> bool:
+        """Whether what is repeated was carried out right before already."""
+        length = len(kept) - start
+        if start < length:
+            return False
+        pairs = ((self.steps[kept[i - length]], self.steps[kept[i]]) for i in range(start, len(kept)))
+        return all(a.place == b.place and alike(a.instruction, b.instruction) for a, b in pairs)

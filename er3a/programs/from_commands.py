@@ -1,0 +1,219 @@
+"""From a path's command to a sequence of instructions: lines stay lines, joint moves joint moves, tables points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import assert_never
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from er3a.kinematics.forward import forward
+from er3a.numerics.arrays import Reals
+from er3a.planning.commands import (
+    Command,
+    JointMoveCommand,
+    JointSequenceCommand,
+    JointTableCommand,
+    SegmentCommand,
+    ToolMoveCommand,
+    ToolSequenceCommand,
+    ToolTableCommand,
+)
+from er3a.planning.profiles import Times
+from er3a.programs.instructions import (
+    FINE,
+    ArmMotion,
+    Instruction,
+    JointTarget,
+    Listing,
+    MotionKind,
+    NamedFrame,
+    Pause,
+    PoseTarget,
+    Rate,
+    Zone,
+)
+from er3a.programs.program_findings import HalfTurnsSplit, WriteFinding
+from er3a.robots.robot import Robot
+
+TO_START = Rate(0.1, "share")
+HALF_TURN = 1e-9  # rad
+TURN_LENGTH = 0.1  # m per rad, of a turn on the spot, when time is shared out
+
+
+@dataclass(frozen=True, eq=False)
+class PathListing:
+    """A path as a sequence.
+
+    Attributes
+    ----------
+    start : (6,), rad, its first target
+    """
+
+    listing: Listing
+    start: Reals
+    findings: tuple[WriteFinding, ...] = ()
+
+
+def listing_of(
+    command: Command, robot: Robot, start: Reals, name: str = "path", title: str = "", ends: Reals | None = None
+) -> PathListing:
+    """A path's command as a sequence that begins with a joint motion to its start.
+
+    Parameters
+    ----------
+    start : (6,), rad, joints at the path's start
+    ends : (n, 6), rad, joints at the end of each segment or row behind the start, where they are known: they fix the
+        branch for languages that write joints
+    """
+    making = _Making(robot, start)
+    match command:
+        case JointMoveCommand():
+            making.joints(command.end[None], np.array([command.duration]), [FINE])
+        case JointSequenceCommand():
+            points = command.points[1:]
+            zones = [Zone("angle", command.blend)] * (len(points) - 1) + [FINE]
+            making.joints(points, _shared(_joint_sizes(command.points), command.duration), _plain(zones))
+        case JointTableCommand():
+            points = command.points[1:]
+            zone = Zone("angle", command.blend) if command.blend is not None else Zone("named", 0.0, "half")
+            zones = [zone] * (len(points) - 1) + [FINE]
+            making.halts = _halts(command.timing, len(points))
+            making.joints(points, _row_times(command.timing, _joint_sizes(command.points)), _plain(zones))
+        case ToolMoveCommand():
+            making.segments((command.segment,), command.duration, ends)
+        case ToolSequenceCommand():
+            making.segments(command.segments, command.duration, ends)
+        case ToolTableCommand():
+            parts = tuple(
+                SegmentCommand(pose, blend=command.blend or 0.0 if i < len(command.poses) - 2 else 0.0)
+                for i, pose in enumerate(command.poses[1:])
+            )
+            sizes = making.sizes(parts)
+            making.halts = _halts(command.timing, len(parts))
+            making.segments(parts, _row_times(command.timing, sizes), ends)
+        case _:
+            assert_never(command)
+    findings = (HalfTurnsSplit(making.split),) if making.split else ()
+    return PathListing(Listing(name, tuple(making.found), title), start, findings)
+
+
+class _Making:
+    """Puts the instructions of a path together."""
+
+    def __init__(self, robot: Robot, start: Reals):
+        self.tool, self.base = NamedFrame("", robot.tool), NamedFrame("", np.eye(4))
+        self.to_robot = np.linalg.inv(robot.base)
+        self.pose: Reals = self.to_robot @ forward(robot, start)
+        self.found: list[Instruction] = [self._motion("joint", JointTarget(start), TO_START, FINE)]
+        self.split = 0
+        self.halts: dict[int, float] = {}
+
+    def joints(self, points: Reals, times: Reals, zones: list[Zone]) -> None:
+        """Joint motions to points (n, 6)."""
+        for i, (point, seconds, zone) in enumerate(zip(points, times, zones)):
+            blend = FINE if i in self.halts else zone
+            self.found.append(self._motion("joint", JointTarget(point), Rate(float(seconds), "s"), blend))
+            self._rest(i)
+
+    def sizes(self, parts: tuple[SegmentCommand, ...]) -> Reals:
+        """Lengths of segments (m), where a turn counts too."""
+        found, pose = [], self.pose
+        for part in parts:
+            end = self.to_robot @ part.end
+            turn = float(np.linalg.norm(_turn(pose, end)))
+            found.append(max(float(np.linalg.norm(end[:3, 3] - pose[:3, 3])), TURN_LENGTH * turn))
+            pose = end
+        return np.array(found)
+
+    def segments(self, parts: tuple[SegmentCommand, ...], timing: float | Reals, ends: Reals | None) -> None:
+        """Lines and arcs; ``timing`` in all, or of each."""
+        times = _shared(self.sizes(parts), timing) if isinstance(timing, float | int) else timing
+        for i, part in enumerate(parts):
+            end = self.to_robot @ part.end
+            zone = Zone("distance", part.blend) if part.blend > 0 and i not in self.halts else FINE
+            seconds = float(times[i])
+            joints = None if ends is None else ends[i]
+            if part.via is not None:
+                via = end.copy()
+                via[:3, 3] = (self.to_robot @ np.append(part.via, 1.0))[:3]
+                rate, target = Rate(seconds, "s"), PoseTarget(end, joints=joints)
+                self.found.append(self._motion("arc", target, rate, zone, PoseTarget(via)))
+            else:
+                self._line(end, part.half_turn_axis, seconds, zone, joints)
+            self.pose = end
+            self._rest(i)
+
+    def _rest(self, number: int) -> None:
+        if number in self.halts:
+            self.found.append(Pause(self.halts[number]))
+
+    def _line(self, end: Reals, axis: Reals | None, seconds: float, zone: Zone, joints: Reals | None) -> None:
+        turn = _turn(self.pose, end)
+        if abs(float(np.linalg.norm(turn)) - np.pi) < HALF_TURN:
+            self.split += 1
+            middle = self.pose.copy()
+            middle[:3, 3] = (self.pose[:3, 3] + end[:3, 3]) / 2
+            sense = _sense(turn / np.pi, None if axis is None else self.to_robot[:3, :3] @ axis)
+            middle[:3, :3] = Rotation.from_rotvec(sense * turn / 2).as_matrix() @ self.pose[:3, :3]
+            seconds /= 2
+            self.found.append(self._motion("line", PoseTarget(middle), Rate(seconds, "s"), FINE))
+        self.found.append(self._motion("line", PoseTarget(end, joints=joints), Rate(seconds, "s"), zone))
+
+    def _motion(
+        self,
+        kind: MotionKind,
+        target: JointTarget | PoseTarget,
+        speed: Rate,
+        zone: Zone,
+        via: PoseTarget | None = None,
+    ) -> ArmMotion:
+        return ArmMotion(kind, target, via=via, speed=speed, zone=zone, tool=self.tool, base=self.base)
+
+
+def _plain(zones: list[Zone]) -> list[Zone]:
+    """Zones of no size are stops."""
+    return [FINE if zone.kind == "angle" and zone.value <= 0 else zone for zone in zones]
+
+
+def _joint_sizes(points: Reals) -> Reals:
+    found: Reals = np.abs(np.diff(points, axis=0)).max(axis=1)
+    return found
+
+
+def _shared(sizes: Reals, duration: float) -> Reals:
+    """A duration shared out by size."""
+    total = sizes.sum()
+    found: Reals = duration * (sizes / total if total > 0 else np.full(len(sizes), 1 / len(sizes)))
+    return found
+
+
+def _row_times(timing: float | Times, sizes: Reals) -> Reals:
+    """Seconds from each point of a table to the next."""
+    if not isinstance(timing, Times):
+        return _shared(sizes, float(timing))
+    here = [timing.times[timing.corner == i] for i in range(len(sizes) + 1)]
+    return np.array([after[0] - before[-1] for before, after in pairwise(here)])
+
+
+def _halts(timing: float | Times, count: int) -> dict[int, float]:
+    """Seconds for which a timed table rests at a point, by the number of the motion that ends there."""
+    if not isinstance(timing, Times):
+        return {}
+    rests = {i: float(np.ptp(timing.times[timing.corner == i + 1])) for i in range(count)}
+    return {i: seconds for i, seconds in rests.items() if seconds > 0}
+
+
+def _turn(start: Reals, end: Reals) -> Reals:
+    found: Reals = Rotation.from_matrix(end[:3, :3] @ start[:3, :3].T).as_rotvec()
+    return found
+
+
+def _sense(axis: Reals, wanted: Reals | None) -> float:
+    """+1 or -1, the sense of a half turn: of :func:`er3a.planning.moves.rotation_between`."""
+    if wanted is not None:
+        return float(np.sign(axis @ wanted)) or 1.0
+    upward = next((part for part in axis[::-1] if abs(part) > HALF_TURN), 1.0)
+    return float(np.sign(upward))

@@ -1,0 +1,193 @@
+"""Writes KUKA KRL: a .src file with its .dat file.
+
+Joint motions are in axis form, because status and turn would need KUKA's own zero and signs; positions keep the S and
+T that were read, and get none otherwise.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from er3a.numerics.arrays import Reals
+from er3a.programs.angle_conventions import numbers_of
+from er3a.programs.instructions import ArmMotion, JointTarget, Listing, NamedFrame, Output, Pause, PoseTarget, Zone
+from er3a.programs.krl_targets import AXIS_KEYS, FRAME_KEYS
+from er3a.programs.rates import share_of_greatest, tool_speed
+from er3a.programs.resolving import ReadyMotion
+from er3a.programs.writing import WriteOptions, Writer, ascii_text, fixed, short
+
+DIGITS = 6
+KNOWN_FRAMES = ("TOOL_DATA[", "BASE_DATA[", "$NULLFRAME", "$WORLD", "$ROBROOT")
+
+
+class KrlWriter(Writer):
+    """Writes KRL."""
+
+    language = "krl"
+
+    def __init__(self, listing: Listing, options: WriteOptions):
+        super().__init__(listing, options)
+        self.settings: dict[str, str] = {}
+
+    def files(self, head: list[str]) -> dict[str, str]:
+        """The .src and the .dat file."""
+        body = [f"; {ascii_text(line)}" for line in head]
+        body += ["BAS(#INITMOV,0)", *self.lines]
+        lines = ["&ACCESS RVP", "&REL 1", f"DEF {self.name}( )", *body, "END", ""]
+        data = [f"DEFDAT {self.name} PUBLIC", "EXT BAS (BAS_COMMAND :IN,REAL :IN)", "ENDDAT", ""]
+        return {".src": "\n".join(lines), ".dat": "\n".join(data)}
+
+    def begin_loop(self) -> None:
+        """``LOOP``; what was set before does not count within."""
+        self.lines.append("LOOP")
+        self.settings.clear()
+
+    def end_loop(self) -> None:
+        """``ENDLOOP``."""
+        self.lines.append("ENDLOOP")
+
+    def comment(self, text: str) -> None:
+        """``; text``."""
+        self.lines.append(f"; {ascii_text(text)}")
+
+    def pause(self, pause: Pause) -> None:
+        """WAIT SEC, WAIT FOR, HALT."""
+        if pause.seconds is not None:
+            self.lines.append(f"WAIT SEC {short(pause.seconds)}")
+        else:
+            self.lines.append("HALT" if pause.condition is None else f"WAIT FOR {pause.condition}")
+
+    def output(self, output: Output) -> None:
+        """``$OUT[8]=TRUE``."""
+        called = "(" in output.value
+        self.lines.append(output.value if called else f"{output.name}={output.value}")
+
+    def verbatim(self, text: str) -> None:
+        """A line as it was read."""
+        self.lines.append(text)
+
+    def motion(self, ready: ReadyMotion) -> None:
+        """PTP, LIN, CIRC with what has to be set before."""
+        motion = ready.motion
+        target = self._target(ready)
+        via = None if ready.via is None else _frame_text(ready.via)
+        if target is None or (motion.kind == "arc" and via is None):
+            self.left_out(motion)
+            return
+        self._frame("$TOOL", motion.tool)
+        self._frame("$BASE", motion.base)
+        self._speeds(ready)
+        zone = self._zone(motion)
+        if motion.kind == "spline":
+            self.count["splines"] += 1
+        if motion.kind == "arc":
+            angle = "" if motion.angle is None else f", CA {fixed(math.degrees(motion.angle), DIGITS)}"
+            self.lines.append(f"CIRC {via}, {target}{angle}{zone}")
+        else:
+            self.lines.append(f"{'PTP' if motion.kind == 'joint' else 'LIN'} {target}{zone}")
+
+    def _target(self, ready: ReadyMotion) -> str | None:
+        target = ready.motion.target
+        if ready.motion.kind == "joint":
+            turns = dict(target.configuration) if isinstance(target, PoseTarget) else {}
+            if isinstance(target, PoseTarget) and {"S", "T"} <= turns.keys() and self.own:
+                return _frame_text(target.pose, turns)
+            if ready.joints is not None:
+                return _axes_text(ready.joints)
+            return _axes_text(target.joints) if isinstance(target, JointTarget) else None
+        if ready.pose is None:
+            return None
+        turns = dict(target.configuration) if isinstance(target, PoseTarget) and self.own else {}
+        return _frame_text(ready.pose, turns)
+
+    def _frame(self, variable: str, frame: NamedFrame) -> None:
+        if frame.name.startswith(KNOWN_FRAMES):
+            text = frame.name
+        elif frame.pose is not None:
+            null = np.array_equal(frame.pose, np.eye(4))
+            text = "$NULLFRAME" if null else _frame_text(frame.pose).replace("{", "{FRAME: ", 1)
+        else:
+            if frame.name:
+                self.name_tool(frame.name)
+            return
+        self._set(variable, f"{variable}={text}")
+
+    def _speeds(self, ready: ReadyMotion) -> None:
+        motion = ready.motion
+        if motion.kind == "joint":
+            self._joint_speed(ready)
+            acceleration = motion.acceleration
+            if acceleration is not None and acceleration.unit == "share":
+                self._set("acc", f"BAS(#ACC_PTP,{short(acceleration.value * 100, 3)})")
+            return
+        speed = tool_speed(ready)
+        if speed is not None and speed > 0:
+            self._set("$VEL.CP", f"$VEL.CP={short(speed)}")
+        if motion.speed is not None and motion.speed.unit != "m/s":
+            self.count["estimated"] += 1
+        if motion.acceleration is not None and motion.acceleration.unit == "m/s2":
+            self._set("$ACC.CP", f"$ACC.CP={short(motion.acceleration.value)}")
+
+    def _joint_speed(self, ready: ReadyMotion) -> None:
+        speed = ready.motion.speed
+        share = share_of_greatest(ready, self.robot)
+        if speed is None or (share is None and speed.unit == "share"):
+            return
+        if speed.unit != "share":
+            self.count["estimated"] += 1
+        if share is None:
+            return
+        if share > 1 + 1e-9:
+            self.count["cut"] += 1
+        self._set("vel", f"BAS(#VEL_PTP,{short(min(max(share, 0.001), 1) * 100, 3)})")
+
+    def _zone(self, motion: ArmMotion) -> str:
+        zone = motion.zone
+        found = _joint_zone(zone) if motion.kind == "joint" else _line_zone(zone)
+        if found is None:
+            self.count["zones"] += zone.kind != "fine"
+            return ""
+        word, variable, value = found
+        if variable:
+            self._set(variable, f"{variable}={short(value, 3)}")
+        return f" {word}"
+
+    def _set(self, key: str, line: str) -> None:
+        """A line that sets something, unless it is set so already."""
+        if self.settings.get(key) != line:
+            self.settings[key] = line
+            self.lines.append(line)
+
+
+def _joint_zone(zone: Zone) -> tuple[str, str, float] | None:
+    if zone.kind == "share":
+        return "C_PTP", "$APO.CPTP", zone.value * 100
+    return ("C_PTP", "", 0.0) if zone.text == "C_PTP" and zone.kind == "named" else None
+
+
+def _line_zone(zone: Zone) -> tuple[str, str, float] | None:
+    match zone.kind:
+        case "distance":
+            return "C_DIS", "$APO.CDIS", zone.value * 1000
+        case "angle":
+            return "C_ORI", "$APO.CORI", math.degrees(zone.value)
+        case "velocity":
+            return "C_VEL", "$APO.CVEL", zone.value * 100
+        case "named" if zone.text in ("C_DIS", "C_ORI", "C_VEL"):
+            return zone.text, "", 0.0
+    return None
+
+
+def _axes_text(joints: Reals) -> str:
+    parts = [
+        f"{key} {fixed(math.degrees(value), DIGITS)}" for key, value in zip(AXIS_KEYS, joints) if not np.isnan(value)
+    ]
+    return "{" + ",".join(parts) + "}"
+
+
+def _frame_text(pose: Reals, turns: dict[str, float | str] | None = None) -> str:
+    parts = [f"{key} {fixed(value, DIGITS)}" for key, value in zip(FRAME_KEYS, numbers_of(pose, "kuka"))]
+    parts += [f"{key} {int(float(value))}" for key, value in (turns or {}).items() if key in ("S", "T")]
+    return "{" + ",".join(parts) + "}"

@@ -1,0 +1,211 @@
+"""Words of program text, and the expressions that all languages share.
+
+A language gives the regular expression of its words and the ranks of its operators; what is special in it (aggregates,
+``p[...]``) it adds by overriding :meth:`Words.special`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from er3a.programs.syntax import (
+    Binary,
+    Constant,
+    Element,
+    Expression,
+    Invocation,
+    Member,
+    Unary,
+    Variable,
+)
+
+DEEPEST = 40
+LONGEST = 200
+NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+
+
+class MisreadError(Exception):
+    """A statement that does not follow the grammar; it never leaves this package."""
+
+
+@dataclass(frozen=True)
+class Lexicon:
+    """How a language is spelled.
+
+    Attributes
+    ----------
+    pattern : with the groups ``number``, ``text``, ``name`` and ``mark``; what lies between words is skipped
+    ranks : of operators of two operands, from 1; the higher binds tighter
+    right : operators that stand before one operand, with the rank of what they take
+    constants : names that are values, in capital letters
+    folds : whether ``a`` and ``A`` are one name
+    """
+
+    pattern: re.Pattern[str]
+    ranks: Mapping[str, int]
+    right: Mapping[str, int]
+    constants: Mapping[str, bool]
+    folds: bool = False
+
+
+class Words:
+    """The words of a statement, read one after another."""
+
+    def __init__(self, lexicon: Lexicon, text: str):
+        self.lexicon = lexicon
+        self.kinds: list[str] = []
+        self.texts: list[str] = []
+        self.at, self._depth, self._length = 0, 0, 0
+        folds = lexicon.folds
+        for match in lexicon.pattern.finditer(text):
+            kind = match.lastgroup or ""
+            self.kinds.append(kind)
+            self.texts.append(match.group().upper() if folds and kind == "name" else match.group())
+        self.kinds.append("end")
+        self.texts.append("")
+
+    @property
+    def kind(self) -> str:
+        """Kind of the next word."""
+        return self.kinds[self.at]
+
+    @property
+    def next(self) -> str:
+        """The next word, in capital letters where the language does not care."""
+        return self.texts[self.at]
+
+    def take(self) -> str:
+        """The next word, which is passed."""
+        word = self.texts[self.at]
+        if self.kinds[self.at] != "end":
+            self.at += 1
+        return word
+
+    def accept(self, word: str) -> bool:
+        """Pass the next word if it is this one."""
+        if self.texts[self.at] == word and self.kinds[self.at] != "text":
+            self.at += 1
+            return True
+        return False
+
+    def expect(self, word: str) -> None:
+        """Pass the next word, which must be this one."""
+        if not self.accept(word):
+            raise MisreadError(f"'{word}' expected before '{self.next}'")
+
+    def name(self) -> str:
+        """A name, which is passed."""
+        if self.kind != "name":
+            raise MisreadError(f"a name expected before '{self.next}'")
+        return self.take()
+
+    def finish(self) -> None:
+        """Nothing may follow."""
+        if self.kind != "end":
+            raise MisreadError(f"'{self.next}' not expected")
+
+    def expression(self, rank: int = 1) -> Expression:
+        """An expression whose operators have this rank or a higher one."""
+        self._depth += 1
+        if self._depth > DEEPEST:
+            raise MisreadError("nested too deeply")
+        found = self._unary()
+        ranks = self.lexicon.ranks
+        while (binds := ranks.get(self.texts[self.at], 0)) >= rank and self.kinds[self.at] != "text":
+            self._length += 1
+            if self._length > LONGEST:
+                raise MisreadError("too long an expression")
+            operator = self.take()
+            found = Binary(operator, found, self.expression(binds + 1))
+        self._depth -= 1
+        return found
+
+    def arguments(self, close: str = ")") -> tuple[tuple[Expression | None, ...], tuple[tuple[str, Expression], ...]]:
+        """Arguments up to the closing bracket, by place and by name; an empty place is None."""
+        placed: list[Expression | None] = []
+        named: list[tuple[str, Expression]] = []
+        named_next = "=" not in self.lexicon.ranks
+        while not self.accept(close):
+            if self.kind == "end":
+                raise MisreadError(f"'{close}' is missing")
+            if named_next and self.kind == "name" and self.texts[self.at + 1] == "=":
+                name = self.take()
+                self.take()
+                named.append((name, self.expression()))
+            else:
+                placed.append(None if self.next in (",", close) and self.kind == "mark" else self.expression())
+            if not self.accept(","):
+                self.expect(close)
+                break
+        return tuple(placed), tuple(named)
+
+    def special(self) -> Expression | None:
+        """An expression that this language alone has; None if none begins here."""
+        return None
+
+    def reference(self) -> Expression:
+        """A name with the fields, indices and arguments behind it."""
+        name = self.take()
+        value = self.lexicon.constants.get(name.upper())
+        if value is not None:
+            return Constant(value)
+        found: Expression = Variable(name)
+        while self.kind == "mark":
+            if self.accept("."):
+                found = Member(found, self.name())
+            elif self.accept("["):
+                placed, _ = self.arguments("]")
+                found = Element(found, tuple(each for each in placed if each is not None))
+            elif self.next == "(":
+                self.take()
+                found = Invocation(dotted(found), *self.arguments())
+            else:
+                break
+        return found
+
+    def _unary(self) -> Expression:
+        operator = self.texts[self.at]
+        if operator in self.lexicon.right and self.kinds[self.at] != "text":
+            self.take()
+            of = self.expression(self.lexicon.right[operator])
+            if operator in "+-" and isinstance(of, Constant) and isinstance(of.value, (int, float)):
+                return Constant(-of.value if operator == "-" else of.value)
+            return Unary(operator, of)
+        return self._primary()
+
+    def _primary(self) -> Expression:
+        if (special := self.special()) is not None:
+            return special
+        kind = self.kind
+        if kind == "number":
+            return Constant(as_number(self.take()))
+        if kind == "text":
+            return Constant(self.take()[1:-1])
+        if kind == "name":
+            return self.reference()
+        if self.accept("("):
+            found = self.expression()
+            self.expect(")")
+            return found
+        raise MisreadError(f"'{self.next}' not expected")
+
+
+def as_number(text: str) -> int | float:
+    """A number as it is written: whole if it has no point and no exponent."""
+    if text.isascii() and text.isdigit():
+        return int(text) if len(text) < 19 else float(text)
+    return float(text)
+
+
+def dotted(expression: Expression) -> str:
+    """The text of a name with fields, such as ``tcpip.sockopen``."""
+    match expression:
+        case Variable(name=name):
+            return name
+        case Member(of=of, name=name):
+            return f"{dotted(of)}.{name}"
+        case Element(of=of):
+            return f"{dotted(of)}[]"
+    raise MisreadError("not a name")

@@ -1,0 +1,148 @@
+"""What is to be said about a program's text, and about what was written of one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from er3a.programs.instructions import Place
+
+
+@dataclass(frozen=True)
+class DataFileMissing:
+    """The file with the program's points (.dat, .var) is not beside it."""
+
+    file: str
+    code: Literal["program_data_file_missing"] = "program_data_file_missing"
+
+
+@dataclass(frozen=True)
+class NameTwice:
+    """A name is given twice; the later one counts."""
+
+    name: str
+    place: Place
+    code: Literal["program_name_twice"] = "program_name_twice"
+
+
+@dataclass(frozen=True)
+class NotUnderstood:
+    """A piece of text that is kept, but not understood."""
+
+    text: str
+    place: Place
+    code: Literal["program_not_understood"] = "program_not_understood"
+
+
+@dataclass(frozen=True)
+class OtherEncoding:
+    """The text is not UTF-8; it was read as ``encoding``."""
+
+    encoding: str
+    code: Literal["program_other_encoding"] = "program_other_encoding"
+
+
+@dataclass(frozen=True)
+class NothingMoves:
+    """No instruction of the program moves the arm."""
+
+    code: Literal["program_nothing_moves"] = "program_nothing_moves"
+
+
+ProgramFinding = DataFileMissing | NameTwice | NotUnderstood | OtherEncoding | NothingMoves
+
+
+@dataclass(frozen=True)
+class ArcsSplit:
+    """Arcs were written as lines that stay within a distance of them."""
+
+    arcs: int
+    lines: int
+    deviation_m: float
+    code: Literal["written_arcs_split"] = "written_arcs_split"
+
+
+@dataclass(frozen=True)
+class ZonesDropped:
+    """Zones that the language has no equal for were written as stops."""
+
+    zones: int
+    code: Literal["written_zones_dropped"] = "written_zones_dropped"
+
+
+@dataclass(frozen=True)
+class SplinesAsLines:
+    """Points of splines were written as straight lines."""
+
+    points: int
+    code: Literal["written_splines_as_lines"] = "written_splines_as_lines"
+
+
+@dataclass(frozen=True)
+class SpeedsEstimated:
+    """Durations were written as speeds; the controller's own ramps decide the time."""
+
+    motions: int
+    code: Literal["written_speeds_estimated"] = "written_speeds_estimated"
+
+
+@dataclass(frozen=True)
+class SpeedsCut:
+    """Speeds above what the joints can do were written as the greatest."""
+
+    motions: int
+    code: Literal["written_speeds_cut"] = "written_speeds_cut"
+
+
+@dataclass(frozen=True)
+class HalfTurnsSplit:
+    """Lines with a turn by 180 deg were written as two halves, so that the sense of the turn is fixed."""
+
+    lines: int
+    code: Literal["written_half_turns_split"] = "written_half_turns_split"
+
+
+@dataclass(frozen=True)
+class TargetsLeftOut:
+    """Motions whose targets the program does not give were written as comments."""
+
+    motions: int
+    code: Literal["written_targets_left_out"] = "written_targets_left_out"
+
+
+@dataclass(frozen=True)
+class ToolNotGiven:
+    """The tool is known by its name alone; it has to be set on the controller."""
+
+    name: str
+    code: Literal["written_tool_not_given"] = "written_tool_not_given"
+
+
+@dataclass(frozen=True)
+class ValuesRounded:
+    """Speeds or zones were rounded down to those that the language has names for."""
+
+    values: int
+    code: Literal["written_values_rounded"] = "written_values_rounded"
+
+
+@dataclass(frozen=True)
+class NotTranslated:
+    """Signals, waits for conditions and unknown text of another language were written as comments."""
+
+    instructions: int
+    code: Literal["written_not_translated"] = "written_not_translated"
+
+
+WriteFinding = (
+    ArcsSplit
+    | ZonesDropped
+    | SplinesAsLines
+    | SpeedsEstimated
+    | SpeedsCut
+    | HalfTurnsSplit
+    | TargetsLeftOut
+    | ToolNotGiven
+    | ValuesRounded
+    | NotTranslated
+)

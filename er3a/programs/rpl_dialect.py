@@ -1,0 +1,173 @@
+"""What RPL's motions, points and functions mean: mm and degrees; a, b, c turn about z, y, x in this order."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from er3a.programs.angle_conventions import pose_of
+from er3a.programs.evaluation import IN_DEGREES, Memory
+from er3a.programs.instructions import (
+    FINE,
+    ArmMotion,
+    Aside,
+    Instruction,
+    JointTarget,
+    NamedFrame,
+    PoseTarget,
+    Rate,
+    Target,
+    Unknown,
+    UnresolvedTarget,
+    Zone,
+)
+from er3a.programs.rpl_words import CONFIGURATION, FIELDS, JOINTS, OUTER, POSITION
+from er3a.programs.syntax import Doing, Expression, Invocation, Move
+from er3a.programs.values import Record, Unclear, Value, finite, number, numbers, shown
+
+SPEED = re.compile(r"v(\d+(?:\.\d+)?)(perc)?$", re.IGNORECASE)
+ZONE = re.compile(r"z(\d+(?:\.\d+)?)$", re.IGNORECASE)
+NO_BASE = "wobj0"
+LIBRARIES = ("tcpip.", "io.", "fidbus.", "sys.", "str.", "log.")
+
+
+class RplDialect:
+    """RPL, as a run needs it."""
+
+    modal: frozenset[str] = frozenset()
+    local_by_default = False
+    whole_division = True
+    first_index = 1
+
+    def begin(self, memory: Memory) -> None:
+        """No variable is there from the start."""
+
+    def is_signal(self, name: str) -> bool:
+        """Outputs, and what goes to the field bus."""
+        return name.startswith(("io.", "fidbus."))
+
+    def named(self, name: str) -> bool:
+        """Tools are named in each motion."""
+        return False
+
+    def constant(self, memory: Memory, name: str) -> Value | None:
+        """There is none."""
+        return None
+
+    def product(self, left: Value, right: Value) -> Value:
+        """There is none."""
+        return Unclear("a product")
+
+    def listed(self, kind: str, values: tuple[Value, ...]) -> Value:
+        """RPL has no lists."""
+        return values
+
+    def function(self, memory: Memory, name: str, given: Invocation) -> Value:
+        """Points, OFFSET, some mathematics."""
+        values = [None if each is None else memory.value(each) for each in given.arguments]
+        if name in FIELDS:
+            return _point(name, values)
+        if name == "OFFSET" and values and isinstance(values[0], Record):
+            return _offset(values[0], values[1:])
+        plain = numbers(tuple(values))
+        if name.upper() in IN_DEGREES and plain is not None and len(plain) == 1:
+            try:
+                return float(IN_DEGREES[name.upper()](plain[0]))
+            except (ValueError, OverflowError):
+                pass
+        return Unclear(f"{name}({', '.join('' if each is None else shown(each) for each in values)})")
+
+    def motion(self, memory: Memory, move: Move) -> ArmMotion:
+        """MJOINT and MLIN: target, speed, zone, tool, reference frame."""
+        given = list(move.arguments)[:5]
+        given += [None] * (5 - len(given))
+        point = Unclear(move.text) if given[0] is None else memory.value(given[0])
+        tool, base = (_word(memory, each) for each in given[3:])
+        frames = memory.cell.frames
+        base_pose = frames.get(base or NO_BASE)
+        if base_pose is None and base in ("", NO_BASE):
+            base_pose = np.eye(4)
+        return ArmMotion(
+            "joint" if move.form == "MJOINT" else "line",
+            _target(point, move.text),
+            move.form,
+            speed=_speed(_word(memory, given[1])),
+            zone=_zone(_word(memory, given[2])),
+            tool=NamedFrame(tool, frames.get(tool)),
+            base=NamedFrame(base or NO_BASE, base_pose),
+        )
+
+    def carry_out(self, memory: Memory, doing: Doing) -> Instruction | None:
+        """Functions of libraries move nothing; others are unknown."""
+        call = doing.what
+        assert isinstance(call, Invocation)
+        return Aside(doing.text) if call.function.startswith(LIBRARIES) else Unknown(doing.text)
+
+
+def _word(memory: Memory, expression: Expression | None) -> str:
+    """The name of a speed, zone or tool, also where a variable of the program holds it."""
+    return "" if expression is None else shown(memory.value(expression))
+
+
+def _speed(word: str) -> Rate | None:
+    match = SPEED.match(word)
+    if match is None:
+        return None
+    value = float(match[1])
+    return Rate(value / 100, "share", word) if match[2] else Rate(value / 1000, "m/s", word)
+
+
+def _zone(word: str) -> Zone:
+    match = ZONE.match(word)
+    if match is not None:
+        return Zone("distance", float(match[1]) / 1000, word)
+    return FINE if word in ("fine", "") else Zone("named", 0.0, word)
+
+
+def _point(name: str, values: list[Value | None]) -> Value:
+    """A point of its parts; an unclear one makes it unclear only when it is gone to."""
+    fields = FIELDS[name]
+    if not 6 <= len(values) <= len(fields) or None in values:
+        return Unclear(f"{name}({', '.join('' if each is None else shown(each) for each in values)})")
+    given = [each for each in values if each is not None]
+    if name == "EPOINTC" and len(given) == 10 and isinstance(given[6], str):
+        fields = FIELDS["POINTC"]
+    return Record(name, tuple(zip(fields, given)))
+
+
+def _offset(point: Record, by: list[Value | None]) -> Value:
+    for key, step in zip(POSITION, by):
+        old = point.get(key)
+        for part in (old, step):
+            if isinstance(part, Unclear):
+                return part
+        a, b = number(old), number(step)
+        if a is None or b is None:
+            return Unclear(f"OFFSET({shown(point)})")
+        point = point.having(key, a + b)
+    return point
+
+
+def _target(value: Value, text: str) -> Target:
+    if isinstance(value, Unclear):
+        finite_word = value.text.upper().lstrip("+-") not in ("NAN", "INF")
+        return UnresolvedTarget(value.text, "undefined" if finite_word else "not_finite")
+    if not isinstance(value, Record):
+        return UnresolvedTarget(text, "not_understood")
+    keys = JOINTS if value.kind in ("POINTJ", "EPOINTJ") else POSITION
+    parts = [value.get(key) for key in keys]
+    for part in parts:
+        if isinstance(part, Unclear):
+            return _target(part, text)
+    plain = numbers(tuple(parts))
+    if plain is None:
+        return UnresolvedTarget(text, "not_understood")
+    if not finite(plain):
+        return UnresolvedTarget(text, "not_finite")
+    outer = tuple((key, part) for key in OUTER if (part := number(value.get(key))))
+    if keys is JOINTS:
+        return JointTarget(np.radians(plain), outer)
+    given = ((key, value.get(key)) for key in CONFIGURATION)
+    configuration = tuple((key, part) for key, part in given if isinstance(part, (int, float, str)))
+    return PoseTarget(pose_of(plain, "efort"), configuration, external=outer)

@@ -1,0 +1,193 @@
+"""Reads EFORT's RPL as text: a .pgm file with the .var file beside it.
+
+Statements that are not understood are kept; blocks, comments and texts without an end are errors.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from er3a.errors import InputError
+from er3a.programs.code_builder import CodeBuilder, fault
+from er3a.programs.instructions import Place
+from er3a.programs.krl_reader import data_file_of
+from er3a.programs.lexing import MisreadError
+from er3a.programs.linking import linked
+from er3a.programs.program_findings import DataFileMissing, NameTwice, NotUnderstood, ProgramFinding
+from er3a.programs.program_text import ProgramText, read_program_text
+from er3a.programs.rpl_words import RplWords, expression, initial, plain_statement
+from er3a.programs.syntax import Assign, Program, Return, Variable
+
+BREAKS = re.compile(r"\(\*(?!\s*,)|//|[\"';\n]|\b(?:THEN|DO|ELSE|REPEAT|OF)\b")
+CASE_LABEL = re.compile(r"\s*(-?\w+(?:\s*,\s*-?\w+)*)\s*:(?!=)")
+VARIABLE = re.compile(
+    r"\s*(?:Routine|Module|Input|Output|Global|Local)\s+(?:Var|Const|Retain|Persistent)\s+(\w+)\s+(\w+)"
+    r"\s*(\[[^\]]*\])?\s*(?::?=\s*(.*?))?\s*;?\s*$",
+    re.IGNORECASE,
+)
+MAIN = "MAIN"
+
+
+def read_rpl(source: ProgramText) -> Program:
+    """The program of a .pgm file.
+
+    Raises
+    ------
+    InputError
+        for texts, comments and blocks without an end
+    """
+    place = Place(source.path, 1)
+    builder = CodeBuilder(MAIN, (), place)
+    for place, text, comment in _statements(source):
+        if comment:
+            builder.remark(place, text)
+        else:
+            _statement(builder, place, text)
+    data, findings = _variables(source)
+    by_name, more = linked([builder.routine(place)])
+    findings = [*source.findings, *findings, *more]
+    return Program("rpl", source.path.stem, source.path, by_name, MAIN, tuple(data), tuple(findings), source.lines)
+
+
+def _variables(source: ProgramText) -> tuple[list[Assign], list[ProgramFinding]]:
+    """Declarations of the .var file."""
+    path = data_file_of(source.path, ".var")
+    if path is None:
+        return [], [DataFileMissing(source.path.with_suffix(".var").name)]
+    data: list[Assign] = []
+    found: list[ProgramFinding] = []
+    seen: set[str] = set()
+    for number, line in enumerate(read_program_text(path).lines, 1):
+        place = Place(path, number)
+        match = VARIABLE.match(line)
+        if match is None:
+            if line.strip() and not line.strip().startswith(("(*", "//")):
+                found.append(NotUnderstood(line.strip(), place))
+            continue
+        kind, name, _, first = match.groups()
+        if name in seen:
+            found.append(NameTwice(name, place))
+        seen.add(name)
+        value = initial(first, kind.upper()) if first else None
+        data.append(Assign(place, Variable(name), value, line.strip(), kind.upper()))
+    return data, found
+
+
+def _statements(source: ProgramText) -> Iterator[tuple[Place, str, bool]]:
+    """Statements and comments with their first line; the bool says that it is a comment."""
+    text, line, at, start = source.text, 1, 0, 0
+    first, parts = 1, list[str]()
+    while (found := BREAKS.search(text, at)) is not None:
+        mark = found.group()
+        end = found.end()
+        if mark == "\n":
+            line += 1
+            at = end
+            if not "".join((*parts, text[start:end])).strip():
+                start, first, parts = end, line, []
+            continue
+        if mark in ("(*", "//"):
+            close = text.find("*)" if mark == "(*" else "\n", end)
+            if close < 0 and mark == "(*":
+                raise fault(Place(source.path, line), "a comment has no end", "Close it with *)")
+            close = len(text) if close < 0 else close
+            yield Place(source.path, line), text[end:close].strip(), True
+            parts.append(text[start : found.start()])
+            line += text.count("\n", end, close)
+            at = start = min(close + (2 if mark == "(*" else 0), len(text))
+        elif mark in "\"'":
+            close = text.find(mark, end)
+            if close < 0 or "\n" in text[end:close]:
+                raise fault(Place(source.path, line), "a text has no end", f"Close it with {mark}")
+            at = close + 1
+        else:
+            parts.append(text[start : end - (mark == ";")])
+            yield Place(source.path, first), " ".join("".join(parts).split()), False
+            at = start = end
+            first, parts = line, []
+    rest = " ".join("".join((*parts, text[start:])).split())
+    if rest:
+        raise fault(Place(source.path, first), f"'{rest[:40]}' has no end", "End each statement with ;")
+
+
+def _statement(builder: CodeBuilder, place: Place, text: str) -> None:
+    if builder.inside("switch") and (label := CASE_LABEL.match(text)) is not None:
+        values = [expression(part) for part in label[1].split(",")]
+        builder.case(place, values, label[1])
+        text = text[label.end() :].strip()
+    if not text:
+        return
+    first = re.split(r"\W", text, maxsplit=1)[0].upper()
+    try:
+        if not _block(builder, place, text, first):
+            plain_statement(builder, place, text)
+    except MisreadError:
+        builder.unknown(place, text)
+    except RecursionError:
+        raise InputError(place.file, place.where, "nested too deeply", "Split this statement") from None
+
+
+def _block(builder: CodeBuilder, place: Place, text: str, first: str) -> bool:
+    """Begin or end a block, or leave one; False if the statement does neither."""
+    inner = text.partition(" ")[2]
+    match first:
+        case "IF":
+            builder.open_if(place, expression(_until(inner, "THEN", place)), text)
+        case "ELSIF":
+            builder.next_arm(place, expression(_until(inner, "THEN", place)), text)
+        case "ELSE":
+            if builder.inside("switch"):
+                builder.case(place, None, text)
+            else:
+                builder.next_arm(place, None, text)
+        case "WHILE":
+            builder.open_while(place, expression(_until(inner, "DO", place)), text)
+        case "FOR":
+            _for(builder, place, _until(inner, "DO", place), text)
+        case "REPEAT":
+            builder.open_repeat(place)
+        case "UNTIL":
+            condition = re.sub(r"\s*\bEND_REPEAT$", "", inner)
+            builder.close("repeat", place, expression(condition), text)
+        case "CASE":
+            builder.open_switch(place, expression(_until(inner, "OF", place)))
+        case "END_IF" | "END_WHILE" | "END_FOR" | "END_CASE":
+            kind = {"END_CASE": "switch"}.get(first, first[4:].lower())
+            builder.close(kind, place)
+        case "END_REPEAT":
+            pass
+        case "EXIT":
+            builder.leave_loop(place)
+        case "CONTINUE":
+            builder.next_round(place)
+        case "RETURN":
+            builder.add(Return(place, expression(inner) if inner else None))
+        case "GOTO":
+            builder.goto(place, inner)
+        case "LABEL":
+            builder.label(inner)
+        case _:
+            return False
+    return True
+
+
+def _until(text: str, end: str, place: Place) -> str:
+    if not text.upper().endswith(end):
+        raise fault(place, f"'{text[:60]}' lacks {end}", f"Write {end} behind it")
+    return text[: -len(end)].strip()
+
+
+def _for(builder: CodeBuilder, place: Place, head: str, text: str) -> None:
+    words = RplWords(head)
+    try:
+        name = words.name()
+        words.expect(":=")
+        first = words.expression()
+        words.expect("TO")
+        last = words.expression()
+        step = words.expression() if words.accept("BY") else None
+        words.finish()
+    except MisreadError as error:
+        raise fault(place, f"this FOR can't be read ({error})", "Write FOR i := 1 TO 9 DO") from None
+    builder.open_for(place, name, first, last, step, text)

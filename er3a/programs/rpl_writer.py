@@ -1,0 +1,290 @@
+"""Writes EFORT's RPL, as text (.pgm with its .var) and as the controller's XML (.XPL).
+
+Targets are joints, because the meaning of a configuration's number (CFGn) is not known; positions keep the one that
+they were read with. Arcs become lines, and tools have to be set on the controller.
+"""
+
+from __future__ import annotations
+
+import math
+import zlib
+from bisect import bisect_right
+from dataclasses import dataclass
+from xml.sax.saxutils import escape
+
+from er3a.numerics.arrays import Reals
+from er3a.programs.angle_conventions import numbers_of
+from er3a.programs.circle import chords
+from er3a.programs.instructions import FINE, ArmMotion, Listing, Output, Pause, PoseTarget, Zone
+from er3a.programs.rates import share_of_greatest, tool_speed
+from er3a.programs.resolving import ReadyMotion
+from er3a.programs.rpl_dialect import SPEED, ZONE
+from er3a.programs.writing import WriteOptions, Writer, fixed, short
+
+DIGITS = 6
+PERCENTS = (1, 2, 5, 10, 15, 20, 25, 30, 40, 50, 60, 70, 75, 80, 90, 100)
+SPEEDS_MM_S = (5, 10, 20, 30, 40, 50, 60, 80, 100, 150, 200, 300, 400, 500, 600, 800, 1000, 1500, 2000)
+ZONES_MM = (1, 5, 10, 15, 20, 30, 40, 50, 60, 80, 100, 150, 200)
+USUAL_JOINT, USUAL_LINE = "v50perc", "v100"
+
+
+@dataclass(frozen=True)
+class RplItem:
+    """A statement, for text and XML alike.
+
+    Attributes
+    ----------
+    kind : name of the XML element
+    parts : names and texts of its children
+    """
+
+    kind: str
+    parts: tuple[tuple[str, str], ...] = ()
+
+
+class RplWriter(Writer):
+    """Writes RPL as text."""
+
+    language = "rpl"
+    longest_name = 31
+
+    def __init__(self, listing: Listing, options: WriteOptions):
+        super().__init__(listing, options)
+        self.items: list[RplItem] = []
+
+    def files(self, head: list[str]) -> dict[str, str]:
+        """The .pgm file, and the .var file, which is empty: no variable is used."""
+        lines = [f"(* {_comment(line)} *)" for line in head]
+        indent = ""
+        for item in self.items:
+            if item.kind == "end":
+                indent = ""
+            lines.append(indent + _text(item))
+            if item.kind == "while":
+                indent = "    "
+        return {".pgm": "\n".join((*lines, "")), ".var": ""}
+
+    def begin_loop(self) -> None:
+        """``WHILE true DO``."""
+        self.items.append(RplItem("while"))
+
+    def end_loop(self) -> None:
+        """``END_WHILE;``."""
+        self.items.append(RplItem("end"))
+
+    def comment(self, text: str) -> None:
+        """A comment."""
+        self.items.append(RplItem("rem", (("text", text),)))
+
+    def pause(self, pause: Pause) -> None:
+        """DWELL, WAIT; a wait for the operator is a comment."""
+        if pause.seconds is not None:
+            self.items.append(RplItem("dwell", (("expr", short(pause.seconds)),)))
+        elif pause.condition is not None:
+            self.items.append(RplItem("wait", (("condition", pause.condition),)))
+        else:
+            self.comment("wait for the operator")
+
+    def output(self, output: Output) -> None:
+        """``io.DOut[8] := true;``."""
+        value = output.value.lower() if output.value in ("TRUE", "FALSE") else output.value
+        self.items.append(RplItem("set", (("dest", output.name), ("expr", value))))
+
+    def verbatim(self, text: str) -> None:
+        """A statement as it was read."""
+        self.items.append(RplItem("raw", (("text", " ".join(text.split())),)))
+
+    def motion(self, ready: ReadyMotion) -> None:
+        """MJOINT, MLIN."""
+        motion = ready.motion
+        if motion.kind == "arc":
+            self._arc(ready)
+            return
+        target = self._target(ready)
+        if target is None:
+            self.left_out(motion)
+            return
+        if motion.kind == "spline":
+            self.count["splines"] += 1
+        form = "mjoint" if motion.kind == "joint" else "mlin"
+        self._move(form, target, motion, self._speed(ready), motion.zone)
+
+    def _move(self, form: str, target: str, motion: ArmMotion, speed: str, zone: Zone) -> None:
+        parts = [("target", target), ("speed", speed), ("zone", self._zone(zone)), ("tool", self._tool(motion))]
+        base = motion.base.name
+        if self.own and base not in ("", "wobj0"):
+            parts.append(("refsys", base))
+        self.items.append(RplItem(form, tuple(parts)))
+
+    def _target(self, ready: ReadyMotion) -> str | None:
+        target = ready.motion.target
+        if isinstance(target, PoseTarget) and self.own:
+            given = dict(target.configuration)
+            if {"cfg", "t1", "t2", "t3"} <= given.keys():
+                number = given["cfg"]
+                word = number if isinstance(number, str) else f"CFG{int(number)}"
+                turns = ",".join(str(int(float(given[key]))) for key in ("t1", "t2", "t3"))
+                values = ",".join(fixed(value, DIGITS) for value in numbers_of(target.pose, "efort"))
+                return f'POINTC({values},"{word}",{turns})'
+        return None if ready.joints is None else _joints_text(ready.joints)
+
+    def _arc(self, ready: ReadyMotion) -> None:
+        """Lines near the arc, through the joints that the arm's table gives."""
+        motion, near = ready.motion, ready.joints_before
+        frames = (motion.tool, motion.base)
+        poses = None
+        if ready.pose is not None and ready.pose_before is not None and ready.via is not None and motion.angle is None:
+            poses = chords(ready.pose_before, ready.via, ready.pose, self.options.arc_deviation)
+        targets: list[str] = []
+        for i, pose in enumerate(() if poses is None else poses):
+            last = poses is not None and i == len(poses) - 1
+            near = ready.joints if last and ready.joints is not None else self.resolver.solve(pose, frames, near)
+            if near is None:
+                break
+            targets.append(_joints_text(near))
+        if poses is None or len(targets) < len(poses):
+            self.left_out(motion)
+            return
+        self.count["arcs"] += 1
+        self.count["chords"] += len(targets)
+        speed = self._speed(ready)
+        longest = (ready.length or 0.0) / len(targets) / 2
+        passing = Zone("distance", min(max(longest, 0.001), 0.2))
+        for i, target in enumerate(targets):
+            zone = motion.zone if i == len(targets) - 1 else passing
+            self._move("mlin", target, motion, speed, zone)
+
+    def _speed(self, ready: ReadyMotion) -> str:
+        """The name of a speed: the one that was read, or the next slower one."""
+        speed = ready.motion.speed
+        if speed is not None and self.own and SPEED.match(speed.text):
+            return speed.text
+        joint = ready.motion.kind == "joint"
+        value = share_of_greatest(ready, self.robot) if joint else tool_speed(ready)
+        if value is None or speed is None:
+            self.count["estimated"] += speed is not None
+            return USUAL_JOINT if joint else USUAL_LINE
+        self.count["estimated"] += speed.unit == "s"
+        if joint:
+            self.count["cut"] += value > 1 + 1e-9
+            return f"v{self._rounded(min(value, 1.0) * 100, PERCENTS)}perc"
+        return f"v{self._rounded(value * 1000, SPEEDS_MM_S)}"
+
+    def _rounded(self, value: float, names: tuple[int, ...]) -> int:
+        found = names[max(bisect_right(names, value * (1 + 1e-9)) - 1, 0)]
+        self.count["rounded"] += abs(found - value) > 1e-6
+        return found
+
+    def _zone(self, zone: Zone) -> str:
+        if zone == FINE:
+            return "fine"
+        if self.own and (ZONE.match(zone.text) or zone.kind == "named"):
+            return zone.text
+        if zone.kind == "distance" and zone.value >= ZONES_MM[0] / 1000:
+            return f"z{self._rounded(zone.value * 1000, ZONES_MM)}"
+        self.count["zones"] += 1
+        return "fine"
+
+    def _tool(self, motion: ArmMotion) -> str:
+        name = motion.tool.name
+        if self.own and name:
+            return name
+        pose = motion.tool.pose
+        if name or (pose is not None and abs(pose[:3, 3]).max() > 0):
+            self.name_tool(name or f"the one with its point at ({_point(pose)}) mm of the flange")
+        return "tool0"
+
+
+class XplWriter(RplWriter):
+    """Writes RPL as the controller's XML."""
+
+    language = "xpl"
+
+    def files(self, head: list[str]) -> dict[str, str]:
+        """The .XPL file."""
+        main: list[str] = [_element(RplItem("rem", (("text", line),))) for line in head]
+        inner: list[str] = []
+        into = main
+        for item in self.items:
+            if item.kind == "while":
+                main.append("<while>\n<cond>true</cond>\n<pouref>1</pouref>\n</while>")
+                into = inner
+            elif item.kind != "end":
+                into.append(_element(item))
+        body = _body(main)
+        nested = f"<Pou>\n<Name>1</Name>\n{_body(inner)}\n</Pou>\n" if into is inner else ""
+        pous = f"<Pous>\n<Pou>\n<Name>Main</Name>\n<Type>Program</Type>\n{body}\n{nested}</Pou>\n</Pous>"
+        number = f"0x{zlib.crc32(pous.encode()):08x}"
+        return {".XPL": SHELL.format(number=number, pous=pous)}
+
+
+SHELL = """<?xml version="1.0" encoding="utf-8"?>
+<Xpl-source>
+<HostEnvironment>
+<Config>
+<FileId>{number}</FileId>
+<Target>Robox ArmMotion Control</Target>
+<XplType>RoboticProgramLanguage</XplType>
+</Config>
+</HostEnvironment>
+<XplEnvironment>
+<Title LcId="1033">
+<![CDATA[XPL program]]>
+</Title>
+<Description LcId="1033">
+<![CDATA[XPL program]]>
+</Description>
+<Version>1.0.0</Version>
+<Author>er3a</Author>
+{pous}
+</XplEnvironment>
+</Xpl-source>
+"""
+
+
+def _body(elements: list[str]) -> str:
+    return "\n".join(("<Body>", *elements, "</Body>"))
+
+
+def _element(item: RplItem) -> str:
+    """A statement as XML; text of RPL that has no element is kept as a comment."""
+    kind, parts = item.kind, item.parts
+    if kind == "raw":
+        kind, parts = "rem", (("text", f"not translated: {parts[0][1]}"),)
+    if kind == "wait":
+        parts = (("condition", parts[0][1].replace("NOT ", "!")),)
+    inner = "".join(f"<{name}>{escape(text)}</{name}>\n" for name, text in parts)
+    return f"<{kind}>\n{inner}</{kind}>"
+
+
+def _text(item: RplItem) -> str:
+    """A statement as text."""
+    values = [text for _, text in item.parts]
+    match item.kind:
+        case "mjoint" | "mlin":
+            return f"{item.kind.upper()}({', '.join(values)});"
+        case "set":
+            return f"{values[0]} := {values[1]};"
+        case "wait":
+            return f"WAIT({values[0].replace('!', 'NOT ', 1) if values[0].startswith('!') else values[0]});"
+        case "dwell":
+            return f"DWELL({values[0]});"
+        case "rem":
+            return f"(* {_comment(values[0])} *)"
+        case "while":
+            return "WHILE true DO"
+        case "end":
+            return "END_WHILE;"
+    return f"{values[0].rstrip(';')};"
+
+
+def _comment(text: str) -> str:
+    return text.replace("*)", "* )").replace("(*", "( *")
+
+
+def _joints_text(joints: Reals) -> str:
+    return f"POINTJ({','.join(fixed(math.degrees(value), DIGITS) for value in joints)})"
+
+
+def _point(pose: Reals | None) -> str:
+    return "" if pose is None else ", ".join(f"{value * 1000:g}" for value in pose[:3, 3])

@@ -1,0 +1,55 @@
+"""Runs a program that was read: :func:`execute`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from er3a.geometry.transforms import check_poses
+from er3a.kinematics.forward import forward
+from er3a.numerics.arrays import Reals
+from er3a.programs.dialect import Dialect
+from er3a.programs.execution import Execution, RunLimits
+from er3a.programs.krl_dialect import KrlDialect
+from er3a.programs.machine import Machine
+from er3a.programs.position import Cell
+from er3a.programs.rpl_dialect import RplDialect
+from er3a.programs.syntax import Language, Program
+from er3a.programs.urscript_dialect import UrScriptDialect
+from er3a.robots.robot import Robot
+
+DIALECTS: Mapping[Language, type[Dialect]] = {
+    "krl": KrlDialect,
+    "urscript": UrScriptDialect,
+    "rpl": RplDialect,
+    "xpl": RplDialect,
+    "csv": RplDialect,
+}
+
+
+def execute(
+    program: Program,
+    robot: Robot | None = None,
+    start: Reals | None = None,
+    frames: Mapping[str, Reals] | None = None,
+    limits: RunLimits | None = None,
+) -> Execution:
+    """The instructions of a program in the order of their execution, on every way through it.
+
+    Parameters
+    ----------
+    robot : the arm, for what the text gives by where the arm stands: partial and relative targets
+    start : (6,), rad, joints where the program starts
+    frames : T_flange_tool of tools and T_robot_base of bases (4, 4) in m, by the program's names for them
+    """
+    flange = None
+    if robot is not None:
+        bare = robot.without_tool().replace(base=np.eye(4))
+
+        def flange(joints: Reals) -> Reals:
+            return forward(bare, joints)
+
+    known = {name: check_poses(pose, name) for name, pose in (frames or {}).items()}
+    cell = Cell(flange, start, known)
+    return Machine(program, DIALECTS[program.language](), cell, limits or RunLimits()).run()

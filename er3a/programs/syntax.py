@@ -1,0 +1,298 @@
+"""A program as it was read: routines of flat code, whose jumps are numbers, with expressions that a run evaluates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from er3a.programs.instructions import Instruction, Place
+from er3a.programs.program_findings import ProgramFinding
+from er3a.programs.values import Value
+
+START = "%start"
+"""Result of the call with which a program begins whose variables are those of its first routine."""
+
+Language = Literal["krl", "urscript", "rpl", "xpl", "csv"]
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """A value that stands in the text."""
+
+    value: Value
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A name."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """``of.name``."""
+
+    of: Expression
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Element:
+    """``of[i, j]``."""
+
+    of: Expression
+    indices: tuple[Expression, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Invocation:
+    """A function with its arguments; None for one that is left out."""
+
+    function: str
+    arguments: tuple[Expression | None, ...]
+    keywords: tuple[tuple[str, Expression], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Unary:
+    """``-x``, ``not x``."""
+
+    operator: str
+    of: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Binary:
+    """Two operands."""
+
+    operator: str
+    left: Expression
+    right: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Aggregate:
+    """KRL's ``{E6POS: X 1, Y 2}``."""
+
+    kind: str
+    items: tuple[tuple[str, Expression], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Listed:
+    """``[1, 2]`` or, with kind ``p``, URScript's ``p[...]``."""
+
+    kind: str
+    items: tuple[Expression, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Opaque:
+    """An expression that is not understood."""
+
+    text: str
+
+
+Expression = Constant | Variable | Member | Element | Invocation | Unary | Binary | Aggregate | Listed | Opaque
+
+
+@dataclass(frozen=True, slots=True)
+class Assign:
+    """``target = value``; ``type_name`` where it is declared here, in the routine alone if ``local``."""
+
+    place: Place
+    target: Expression
+    value: Expression | None
+    text: str
+    type_name: str = ""
+    local: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class GoTo:
+    """Go on at ``to``; ``endless`` if this is the end of a loop without a condition."""
+
+    place: Place
+    to: int
+    endless: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """Go on if the condition holds, else at ``otherwise``."""
+
+    place: Place
+    condition: Expression
+    otherwise: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """Carry out a routine of the program; its value goes to the variable ``result``."""
+
+    place: Place
+    routine: str
+    arguments: tuple[Expression | None, ...]
+    keywords: tuple[tuple[str, Expression], ...]
+    text: str
+    result: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Return:
+    """Leave the routine."""
+
+    place: Place
+    value: Expression | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Halt:
+    """The program is over, wherever it is."""
+
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """A motion whose arguments are evaluated when it is reached.
+
+    Attributes
+    ----------
+    form : the language's word
+    words : flags behind it, such as ``C_DIS`` or ``#TOOL``
+    settings : what holds for this motion alone (KRL's WITH; URScript's keywords)
+    """
+
+    place: Place
+    form: str
+    arguments: tuple[Expression | None, ...]
+    text: str
+    words: tuple[str, ...] = ()
+    settings: tuple[tuple[str, Expression], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """A wait of so many ``seconds``, or for a condition, or for the operator."""
+
+    place: Place
+    kind: Literal["seconds", "condition", "operator"]
+    of: Expression | None
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Doing:
+    """An expression that is evaluated for what it does: a call of a function that is not in the program."""
+
+    place: Place
+    what: Expression
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Fixed:
+    """An instruction that needs no evaluation."""
+
+    place: Place
+    instruction: Instruction
+
+
+Operation = Assign | GoTo | Branch | Call | Return | Halt | Move | Waiting | Doing | Fixed
+
+
+@dataclass(frozen=True, slots=True)
+class RoutineParameter:
+    """A routine's parameter; ``out`` if the caller's variable gets its last value."""
+
+    name: str
+    out: bool = False
+    default: Expression | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Routine:
+    """Code with a name; a run ends behind its last operation.
+
+    Attributes
+    ----------
+    thread : whether it runs beside the program, so that a run of the program does not carry it out
+    """
+
+    name: str
+    parameters: tuple[RoutineParameter, ...]
+    code: tuple[Operation, ...]
+    place: Place
+    thread: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Program:
+    """A program that was read.
+
+    Attributes
+    ----------
+    entry : the routine with which it begins
+    data : declarations (of a .dat or .var file, or of global variables), carried out first
+    findings : what is to be said about the text
+    """
+
+    language: Language
+    name: str
+    file: Path | None
+    routines: Mapping[str, Routine]
+    entry: str
+    data: tuple[Assign, ...] = ()
+    findings: tuple[ProgramFinding, ...] = ()
+    lines: tuple[str, ...] = field(default=(), repr=False)
+
+    def operations(self) -> Iterator[Operation]:
+        """All that the text holds, whether it is ever reached or not."""
+        for routine in self.routines.values():
+            yield from routine.code
+
+
+def inner(expression: Expression | None) -> tuple[Expression, ...]:
+    """The expressions right below one."""
+    match expression:
+        case Member(of=of) | Unary(of=of):
+            return (of,)
+        case Element(of=of, indices=indices):
+            return (of, *indices)
+        case Invocation(arguments=arguments, keywords=keywords):
+            return (*(each for each in arguments if each is not None), *(each for _, each in keywords))
+        case Binary(left=left, right=right):
+            return (left, right)
+        case Aggregate(items=items):
+            return tuple(each for _, each in items)
+        case Listed(items=listed):
+            return listed
+        case _:
+            return ()
+
+
+def expressions_of(operation: Operation) -> tuple[Expression, ...]:
+    """The expressions that an operation evaluates."""
+    match operation:
+        case Assign(target=target, value=value):
+            found: tuple[Expression | None, ...] = (target, value)
+        case Branch(condition=condition):
+            found = (condition,)
+        case Call(arguments=arguments, keywords=keywords):
+            found = (*arguments, *(each for _, each in keywords))
+        case Return(value=value):
+            found = (value,)
+        case Move(arguments=arguments, settings=settings):
+            found = (*arguments, *(each for _, each in settings))
+        case Waiting(of=of):
+            found = (of,)
+        case Doing(what=what):
+            found = (what,)
+        case _:
+            found = ()
+    return tuple(each for each in found if each is not None)

@@ -1,0 +1,315 @@
+"""Reads URScript.
+
+Lines that are not understood are kept; blocks, brackets and texts without an end are errors.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from er3a.errors import InputError
+from er3a.programs.code_builder import CodeBuilder, fault
+from er3a.programs.instructions import Place
+from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, Words
+from er3a.programs.linking import linked
+from er3a.programs.program_text import ProgramText
+from er3a.programs.syntax import (
+    START,
+    Assign,
+    Call,
+    Constant,
+    Doing,
+    Expression,
+    Fixed,
+    Halt,
+    Invocation,
+    Listed,
+    Move,
+    Opaque,
+    Program,
+    Return,
+    Routine,
+    RoutineParameter,
+    Waiting,
+)
+from er3a.programs.values import POSE_KEYS, Record
+
+UR = Lexicon(
+    re.compile(
+        rf"""(?P<text>"[^"]*"|'[^']*')|(?P<number>0x[0-9A-Fa-f]+|{NUMBER})|(?P<name>[^\W\d]\w*)"""
+        r"""|(?P<mark>==|!=|<=|>=|[^\s\w])"""
+    ),
+    ranks={
+        "or": 1,
+        "xor": 2,
+        "and": 3,
+        **dict.fromkeys(("==", "!=", "<", ">", "<=", ">="), 5),
+        "+": 6,
+        "-": 6,
+        **dict.fromkeys(("*", "/", "%"), 7),
+        "^": 8,
+    },
+    right={"not": 5, "-": 8, "+": 8},
+    constants={"TRUE": True, "FALSE": False},
+)
+MOTIONS = frozenset(("movej", "movel", "movep", "movec"))
+LONGEST_STATEMENT = 500  # lines
+
+
+PLAIN = re.compile(
+    rf"(mov[ejlp]+)\((p?)\[((?:\s*[-+]?{NUMBER}\s*,?){{6}})\]((?:\s*,\s*[avtr]\s*=\s*[-+]?{NUMBER})*)\s*\)$"
+)
+
+
+class UrWords(Words):
+    """Words of a statement of URScript."""
+
+    def __init__(self, text: str):
+        super().__init__(UR, text)
+
+    def special(self) -> Expression | None:
+        """Lists and poses."""
+        kind = "p" if self.next == "p" and self.texts[self.at + 1] == "[" else ""
+        if kind:
+            self.take()
+        elif self.next != "[" or self.kind == "text":
+            return None
+        self.take()
+        placed, _ = self.arguments("]")
+        if None in placed:
+            raise MisreadError("an element is missing")
+        found: Expression = Listed(kind, tuple(each for each in placed if each is not None))
+        return found
+
+
+def read_urscript(source: ProgramText) -> Program:
+    """The program of a .script file: its statements, or its first routine that no other calls.
+
+    Raises
+    ------
+    InputError
+        for texts, brackets and blocks without an end
+    """
+    reader = _UrReader(source)
+    routines = reader.read()
+    by_name, findings = linked(routines)
+    return Program(
+        "urscript",
+        source.path.stem,
+        source.path,
+        by_name,
+        "",
+        findings=(*source.findings, *findings),
+        lines=source.lines,
+    )
+
+
+class _UrReader:
+    def __init__(self, source: ProgramText):
+        self.source = source
+        self.routines: list[Routine] = []
+        self.open = [CodeBuilder("", (), Place(source.path, 1))]
+
+    def read(self) -> list[Routine]:
+        """All routines; the one without a name holds what stands outside of others."""
+        place = Place(self.source.path, 1)
+        for place, text, comment in self._statements():
+            if text:
+                self._statement(place, text)
+            elif comment:
+                self.open[-1].remark(place, comment)
+        if len(self.open) > 1:
+            builder = self.open[-1]
+            if builder.blocks:
+                builder.routine(place)
+            raise fault(builder.place, f"{builder.name} has no end", "Close it with end")
+        top = self.open[0]
+        if not any(isinstance(each, (Doing, Move, Call)) for each in top.code):
+            called = {name for each in self.routines for name in _called(each)}
+            starts = [each for each in self.routines if not each.thread and each.name not in called]
+            if starts:
+                top.add(Call(starts[0].place, starts[0].name, (), (), starts[0].name, START))
+        return [*self.routines, top.routine(place)]
+
+    def _statements(self) -> Iterator[tuple[Place, str, str]]:
+        """Statements with their first line: lines are joined while a bracket is open."""
+        parts: list[str] = []
+        depth, first = 0, 0
+        for number, line in enumerate(self.source.lines, 1):
+            text, comment, change = _split(line, Place(self.source.path, number))
+            if not parts:
+                first = number
+            depth += change
+            place = Place(self.source.path, first)
+            if depth > 0 and number - first < LONGEST_STATEMENT:
+                parts.append(text)
+                continue
+            if depth != 0:
+                raise fault(place, "a bracket has no partner", "Close each bracket")
+            yield place, " ".join((*parts, text)).strip(), comment
+            parts = []
+        if depth > 0:
+            raise fault(Place(self.source.path, first), "a bracket has no end", "Close it")
+
+    def _statement(self, place: Place, text: str) -> None:
+        builder = self.open[-1]
+        if (plain := PLAIN.match(text)) is not None and plain[1] in MOTIONS and plain[3].count(",") == 5:
+            builder.add(_plain_motion(place, plain))
+            return
+        if text.startswith("$"):
+            builder.remark(place, text)
+            return
+        try:
+            self._read(builder, UrWords(text.removesuffix(";")), place, text)
+        except MisreadError:
+            if re.match(r"(def|thread|sec|if|while|elif|else)\b.*:$", text):
+                raise fault(place, f"'{text[:60]}' can't be read", "Correct this line") from None
+            builder.unknown(place, text)
+        except RecursionError:
+            raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
+
+    def _read(self, builder: CodeBuilder, words: UrWords, place: Place, text: str) -> None:
+        first = words.next
+        follows = words.texts[min(words.at + 1, len(words.texts) - 1)]
+        if first in ("def", "thread", "sec"):
+            self._begin(words, place)
+        elif first in ("if", "while", "elif", "else"):
+            words.take()
+            _block(builder, first, words, place, text)
+        elif first == "end" and follows in ("", ":"):
+            self._close(builder, place)
+        elif first == "return":
+            words.take()
+            value = None if words.kind == "end" else words.expression()
+            words.finish()
+            builder.add(Return(place, value))
+        elif first in ("break", "continue") and not follows:
+            (builder.leave_loop if first == "break" else builder.next_round)(place)
+        elif first == "halt":
+            builder.add(Halt(place))
+        elif first in ("run", "join", "kill", "enter_critical", "exit_critical", "pass") and follows not in ("=", "("):
+            builder.aside(place, text)
+        else:
+            _plain(builder, words, place, text)
+
+    def _begin(self, words: UrWords, place: Place) -> None:
+        kind = words.take()
+        name = words.name()
+        parameters = []
+        words.expect("(")
+        while not words.accept(")"):
+            parameter = words.name()
+            default = words.expression() if words.accept("=") else None
+            parameters.append(RoutineParameter(parameter, False, default))
+            if not words.accept(","):
+                words.expect(")")
+                break
+        words.accept(":")
+        words.finish()
+        if len(self.open) > 50:
+            raise fault(place, "more than 50 routines within each other", "Nest fewer")
+        self.open.append(CodeBuilder(name, tuple(parameters), place, thread=kind == "thread"))
+
+    def _close(self, builder: CodeBuilder, place: Place) -> None:
+        if builder.blocks:
+            builder.close(builder.blocks[-1].word, place)
+            return
+        if len(self.open) == 1:
+            raise fault(place, "an end without a beginning", "Remove it")
+        self.routines.append(builder.routine(place))
+        self.open.pop()
+
+
+def _plain_motion(place: Place, plain: re.Match[str]) -> Move:
+    """A motion to numbers alone, without a look at its words."""
+    numbers = tuple(map(float, plain[3].split(",")))
+    target = Constant(Record("p", tuple(zip(POSE_KEYS, numbers))) if plain[2] else numbers)
+    pairs = (part.split("=") for part in plain[4].split(",")[1:])
+    settings = tuple((name.strip(), Constant(float(value))) for name, value in pairs)
+    return Move(place, plain[1], (target,), plain.group(), (), settings)
+
+
+def _split(line: str, place: Place) -> tuple[str, str, int]:
+    """A line without its comment, the comment, and by how many brackets it opens more than it closes."""
+    kept, comment = line, ""
+    if '"' in line or "'" in line:
+        kept, comment, bare = _outside_texts(line, place)
+    else:
+        at = line.find("#")
+        if at >= 0:
+            kept, comment = line[:at], line[at + 1 :]
+        bare = kept
+    opened = bare.count("(") + bare.count("[") - bare.count(")") - bare.count("]")
+    return kept.strip(), comment.strip(), opened
+
+
+def _outside_texts(line: str, place: Place) -> tuple[str, str, str]:
+    quote = ""
+    bare: list[str] = []
+    for at, letter in enumerate(line):
+        if quote:
+            if letter == quote:
+                quote = ""
+        elif letter in "\"'":
+            quote = letter
+        elif letter == "#":
+            return line[:at], line[at + 1 :], "".join(bare)
+        else:
+            bare.append(letter)
+    if quote:
+        raise fault(place, "a text has no end", f"Close it with {quote}")
+    return line, "", "".join(bare)
+
+
+def _block(builder: CodeBuilder, first: str, words: UrWords, place: Place, text: str) -> None:
+    if first == "else":
+        words.accept(":")
+        words.finish()
+        builder.next_arm(place, None, text)
+        return
+    try:
+        condition = words.expression()
+        words.accept(":")
+        words.finish()
+    except MisreadError:
+        condition = Opaque(text.partition(" ")[2].rstrip(":"))
+    told = text.rstrip(":")
+    if first == "if":
+        builder.open_if(place, condition, told)
+    elif first == "while":
+        builder.open_while(place, condition, told)
+    else:
+        builder.next_arm(place, condition, told)
+
+
+def _plain(builder: CodeBuilder, words: UrWords, place: Place, text: str) -> None:
+    """An assignment or a call."""
+    scope = words.take() if words.next in ("global", "local") and words.kinds[words.at + 1] == "name" else ""
+    left = words.expression()
+    if words.accept("="):
+        if words.next == "run":
+            builder.aside(place, text)
+            return
+        value = words.expression()
+        words.finish()
+        builder.add(Assign(place, left, value, text, "global" if scope == "global" else "", scope == "local"))
+        return
+    words.finish()
+    if scope:
+        builder.add(Assign(place, left, None, text, scope, scope == "local"))
+    elif not isinstance(left, Invocation):
+        raise MisreadError("neither an assignment nor a call")
+    elif left.function in MOTIONS:
+        builder.add(Move(place, left.function, left.arguments, text, (), left.keywords))
+    elif left.function == "sleep" and len(left.arguments) == 1:
+        builder.add(Waiting(place, "seconds", left.arguments[0], text))
+    else:
+        builder.add(Doing(place, left, text))
+
+
+def _called(routine: Routine) -> Iterator[str]:
+    """Functions that a routine calls as statements or in expressions."""
+    for operation in routine.code:
+        if not isinstance(operation, Fixed):
+            yield from re.findall(r"\w+(?=\s*\()", getattr(operation, "text", ""))

@@ -1,0 +1,147 @@
+"""Writes URScript: metres, radians, rotation vectors."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from er3a.numerics.arrays import Reals
+from er3a.programs.angle_conventions import numbers_of
+from er3a.programs.instructions import Output, Pause, PoseTarget
+from er3a.programs.rates import duration, leading_joint_speed, tool_speed
+from er3a.programs.resolving import ReadyMotion
+from er3a.programs.urscript_dialect import DEFAULTS
+from er3a.programs.writing import Writer, fixed, short
+
+DIGITS = 9
+
+
+class UrScriptWriter(Writer):
+    """Writes URScript."""
+
+    language = "urscript"
+    longest_name = 40
+    indent = "  "
+    tcp = ""
+
+    def files(self, head: list[str]) -> dict[str, str]:
+        """The .script file."""
+        lines = [f"def {self.name}():", *(f"  # {line}" for line in head), *self.lines, "end", ""]
+        return {".script": "\n".join(lines)}
+
+    def begin_loop(self) -> None:
+        """``while (True):``; what was set before does not count within."""
+        self._line("while (True):")
+        self.indent, self.tcp = "    ", ""
+
+    def end_loop(self) -> None:
+        """``end``."""
+        self.indent = "  "
+        self._line("end")
+
+    def comment(self, text: str) -> None:
+        """``# text``."""
+        self._line(text if text.startswith("$ ") else f"# {text}")
+
+    def pause(self, pause: Pause) -> None:
+        """``sleep``, or a message that the operator has to close."""
+        if pause.seconds is not None:
+            self._line(f"sleep({short(pause.seconds)})")
+        elif pause.condition is not None:
+            self.verbatim(pause.condition)
+        else:
+            self._line('popup("Go on?", "Program", False, False, blocking=True)')
+
+    def output(self, output: Output) -> None:
+        """``set_digital_out(0, True)``."""
+        name, _, rest = output.name.partition("[")
+        value = output.value.capitalize() if output.value in ("TRUE", "FALSE") else output.value
+        self._line(f"set_{name}({rest.rstrip(']')}, {value})" if rest else f"set_{output.name}({value})")
+
+    def verbatim(self, text: str) -> None:
+        """A line as it was read."""
+        self._line(" ".join(text.split()))
+
+    def motion(self, ready: ReadyMotion) -> None:
+        """movej, movel, movep, movec."""
+        motion = ready.motion
+        target = self._target(ready)
+        base = motion.base
+        if target is None or (motion.kind == "arc" and ready.via is None) or motion.angle is not None:
+            self.left_out(motion)
+            return
+        if base.pose is None and base.name:
+            self.name_tool(base.name)
+        self._tool(ready)
+        if motion.kind == "spline":
+            self.count["splines"] += 1
+        if motion.kind == "joint":
+            form = "movej"
+        elif motion.kind == "arc":
+            form = "movec"
+        else:
+            form = "movep" if motion.form == "movep" else "movel"
+        via = "" if ready.via is None else f"{_pose_text(self._in_robot(ready, ready.via))}, "
+        self._line(f"{form}({via}{target}{self._speed(ready, form)}{self._zone(ready)})")
+
+    def _target(self, ready: ReadyMotion) -> str | None:
+        target = ready.motion.target
+        if ready.motion.kind == "joint":
+            if isinstance(target, PoseTarget) and target.joints is None and (self.own or ready.joints is None):
+                pose = _pose_text(self._in_robot(ready, target.pose))
+                near = "" if target.near is None else f", qnear={_joints_text(target.near)}"
+                return f"get_inverse_kin({pose}{near})" if near else pose
+            return None if ready.joints is None else _joints_text(ready.joints)
+        return None if ready.pose is None else _pose_text(self._in_robot(ready, ready.pose))
+
+    def _in_robot(self, ready: ReadyMotion, pose: Reals) -> Reals:
+        base = ready.motion.base.pose
+        if base is None or np.array_equal(base, np.eye(4)):
+            return pose
+        found: Reals = base @ pose
+        return found
+
+    def _tool(self, ready: ReadyMotion) -> None:
+        tool = ready.motion.tool
+        if tool.pose is None:
+            if tool.name:
+                self.name_tool(tool.name)
+            return
+        line = f"set_tcp({_pose_text(tool.pose)})"
+        if line != self.tcp:
+            self.tcp = line
+            self._line(line)
+
+    def _speed(self, ready: ReadyMotion, form: str) -> str:
+        """Acceleration and speed, or the motion's time."""
+        motion = ready.motion
+        usual_a, usual_v = DEFAULTS[form]
+        joint = motion.kind == "joint"
+        given = motion.acceleration
+        a = given.value if given is not None and given.unit == ("rad/s2" if joint else "m/s2") else usual_a
+        speed = motion.speed
+        if speed is not None and speed.unit == "s" and form in ("movej", "movel") and speed.value > 0:
+            return f", a={short(a)}, t={short(speed.value)}"
+        v = leading_joint_speed(ready, self.robot) if joint else tool_speed(ready)
+        if v is None and joint and (seconds := duration(ready)) is not None:
+            return f", a={short(a)}, t={short(seconds)}"
+        if speed is not None and speed.unit == "s":
+            self.count["estimated"] += 1
+        return f", a={short(a)}, v={short(v if v is not None and v > 0 else usual_v)}"
+
+    def _zone(self, ready: ReadyMotion) -> str:
+        zone = ready.motion.zone
+        if zone.kind == "distance" and zone.value > 0:
+            return f", r={short(zone.value)}"
+        self.count["zones"] += zone.kind != "fine"
+        return ""
+
+    def _line(self, text: str) -> None:
+        self.lines.append(self.indent + text)
+
+
+def _joints_text(joints: Reals) -> str:
+    return "[" + ", ".join(fixed(float(value), DIGITS) for value in joints) + "]"
+
+
+def _pose_text(pose: Reals) -> str:
+    return "p[" + ", ".join(fixed(value, DIGITS) for value in numbers_of(pose, "ur")) + "]"

@@ -1,0 +1,204 @@
+"""Reads EFORT's controller files (.XPL): RPL as XML.
+
+Elements that are not understood are kept; a loop's body is another ``Pou`` that is named by its number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from er3a.errors import InputError
+from er3a.programs.code_builder import CodeBuilder, fault
+from er3a.programs.instructions import Disabled, Place
+from er3a.programs.linking import linked
+from er3a.programs.program_text import ProgramText
+from er3a.programs.rpl_words import expression, initial
+from er3a.programs.syntax import (
+    Assign,
+    Doing,
+    Expression,
+    Fixed,
+    Invocation,
+    Move,
+    Program,
+    Routine,
+    RoutineParameter,
+    Variable,
+    Waiting,
+)
+from er3a.programs.xml_tree import XmlNode, read_xml
+
+TOP = "Xpl-source"
+MOST_LOOPS = 50
+MOTION_PARTS = ("target", "speed", "zone", "tool", "refsys")
+
+
+def read_xpl(source: ProgramText) -> Program:
+    """The program of an .XPL file.
+
+    Raises
+    ------
+    InputError
+        for text that is no XML, entities, loops whose body is missing or is the loop itself
+    """
+    if not source.text.lstrip().startswith("<"):
+        problem = "is text, not XML: the controller refuses it (alarm 4902)"
+        raise InputError(source.path, None, problem, "Save it as .pgm, or export it from the pendant")
+    top = read_xml(source)
+    environment = top.child("XplEnvironment")
+    if top.tag != TOP or environment is None:
+        problem = f"the top element is <{top.tag}>" if top.tag != TOP else "holds no <XplEnvironment>"
+        raise InputError(source.path, f"line {top.line}", problem, f"An .XPL file has <{TOP}> with <XplEnvironment>")
+    pous = [each for group in environment.all("Pous") for each in group.all("Pou")]
+    if not pous:
+        raise InputError(source.path, f"line {environment.line}", "holds no <Pou>", "Give a program with its Main")
+    routines = [_Pou(source, pou).routine() for pou in pous]
+    by_name, findings = linked(routines)
+    entry = next((pou for pou in pous if pou.text_of("Type") == "Program"), pous[0])
+    data = tuple(
+        _declared(source, var, local=False)
+        for group in environment.all("VarDeclarations")
+        for kind in group.children
+        for var in kind.all("Var")
+    )
+    found = (*source.findings, *findings)
+    return Program("xpl", source.path.stem, source.path, by_name, entry.text_of("Name"), data, found, source.lines)
+
+
+def _declared(source: ProgramText, var: XmlNode, local: bool) -> Assign:
+    kind, name, first = var.text_of("Type"), var.text_of("Name"), var.text_of("InitValue")
+    place = Place(source.path, var.line, f"Var {name}")
+    value = initial(first, kind) if first else None
+    return Assign(place, Variable(name), value, f"{kind} {name} := {first}", kind, local)
+
+
+class _Pou:
+    """One routine, with the bodies of its loops."""
+
+    def __init__(self, source: ProgramText, pou: XmlNode):
+        self.source, self.pou = source, pou
+        self.name = pou.text_of("Name")
+        self.place = Place(source.path, pou.line, self.name)
+
+    def routine(self) -> Routine:
+        interface = [
+            var
+            for group in self.pou.all("VarDeclarations")
+            for kind in group.all("VarInterface")
+            for var in kind.all("Var")
+        ]
+        parameters = tuple(
+            RoutineParameter(var.text_of("Name"), var.text_of("Attrib") not in ("In", "")) for var in interface
+        )
+        builder = CodeBuilder(self.name, parameters, self.place)
+        for group in self.pou.all("VarDeclarations"):
+            for kind in group.all("VarLocal"):
+                for var in kind.all("Var"):
+                    builder.add(_declared(self.source, var, local=True))
+        self._body(builder, self.pou, self.name, ())
+        return builder.routine(self.place)
+
+    def _body(self, builder: CodeBuilder, pou: XmlNode, path: str, within: tuple[XmlNode, ...]) -> None:
+        counts: dict[str, int] = {}
+        for body in pou.all("Body"):
+            for element in body.children:
+                counts[element.tag] = counts.get(element.tag, 0) + 1
+                place = Place(self.source.path, element.line, f"{path}/{element.tag}[{counts[element.tag]}]")
+                if element.attributes.get("disable", "").lower() == "true":
+                    builder.add(Fixed(place, Disabled(text_of(element))))
+                elif element.tag in ("while", "for"):
+                    self._loop(builder, element, place, (*within, pou))
+                else:
+                    _element(builder, element, place)
+
+    def _loop(self, builder: CodeBuilder, element: XmlNode, place: Place, within: tuple[XmlNode, ...]) -> None:
+        name = element.text_of("pouref")
+        body = self._named(name, within)
+        if body is None:
+            raise fault(place, f"there is no <Pou> '{name}' for the loop's body", "Add it, or correct <pouref>")
+        if body in within or len(within) > MOST_LOOPS:
+            raise fault(place, f"the loop's body '{name}' holds the loop itself", "Give each loop its own <Pou>")
+        told = text_of(element)
+        if element.tag == "while":
+            builder.open_while(place, expression(element.text_of("cond")), told)
+        else:
+            first, last = (expression(element.text_of(tag)) for tag in ("from", "to"))
+            step = expression(element.text_of("by")) if element.child("by") is not None else None
+            builder.open_for(place, element.text_of("var"), first, last, step, told)
+        self._body(builder, body, f"{place.element}/{name}", within)
+        builder.close(element.tag, place)
+
+    def _named(self, name: str, within: tuple[XmlNode, ...]) -> XmlNode | None:
+        """The body of a loop: the nearest around that has this name."""
+        for pou in reversed(within):
+            for each in pou.all("Pou"):
+                if each.text_of("Name") == name:
+                    return each
+        return next((each for each in _below(self.pou) if each.text_of("Name") == name), None)
+
+
+def _below(pou: XmlNode) -> Iterator[XmlNode]:
+    for each in pou.all("Pou"):
+        yield each
+        yield from _below(each)
+
+
+def _element(builder: CodeBuilder, element: XmlNode, place: Place) -> None:
+    """An element that is no loop."""
+    told = text_of(element)
+    if element.tag in ("mjoint", "mlin"):
+        parts = [element.child(tag) for tag in MOTION_PARTS]
+        given = tuple(None if part is None else expression(part.text) for part in parts)
+        builder.add(Move(place, element.tag.upper(), given, told))
+    elif element.tag == "set":
+        target = expression(element.text_of("dest"))
+        builder.add(Assign(place, target, expression(element.text_of("expr")), told))
+    elif element.tag == "wait":
+        condition = element.text_of("condition")
+        builder.add(Waiting(place, "condition", expression(condition), condition))
+    elif element.tag == "dwell":
+        builder.add(Waiting(place, "seconds", expression(element.text_of("expr")), told))
+    elif element.tag == "rem":
+        builder.remark(place, element.text_of("text"))
+    elif element.tag == "call" and (routine := element.child("subroutine")) is not None:
+        name = routine.text_of("name")
+        given_arguments: tuple[Expression, ...] = ()
+        for arguments in routine.all("args"):
+            given_arguments = tuple(expression(each.text) for each in arguments.all("arg") if each.text)
+        builder.add(Doing(place, Invocation(name, given_arguments), told))
+    else:
+        builder.unknown(place, told)
+
+
+def text_of(element: XmlNode) -> str:
+    """An element as one line of RPL, as far as it has an equal there."""
+    inner = element.text_of
+    match element.tag:
+        case "mjoint" | "mlin":
+            given = [part for tag in MOTION_PARTS if (part := inner(tag))]
+            return f"{element.tag.upper()}({', '.join(given)})"
+        case "set":
+            return f"{inner('dest')} := {inner('expr')}"
+        case "wait":
+            return f"WAIT({inner('condition')})"
+        case "dwell":
+            return f"DWELL({inner('expr')})"
+        case "while":
+            return f"WHILE {inner('cond')} DO"
+        case "for":
+            return f"FOR {inner('var')} := {inner('from')} TO {inner('to')} DO"
+        case "rem":
+            return f"(* {inner('text')} *)"
+        case "call":
+            routine = element.child("subroutine")
+            if routine is not None:
+                given = [each.text for arguments in routine.all("args") for each in arguments.all("arg") if each.text]
+                return f"{routine.text_of('name')}({', '.join(given)})"
+    return f"<{element.tag}> {' '.join(_texts(element))}"[:200]
+
+
+def _texts(element: XmlNode) -> Iterator[str]:
+    if element.text:
+        yield element.text
+    for each in element.children:
+        yield from _texts(each)

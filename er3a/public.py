@@ -1,0 +1,86 @@
+"""The edge of the library: what every public function checks before it begins.
+
+Public functions are those that ``er3a`` names. Arguments of er3a's own types are compared with the function's
+annotations, and robots are asked for numbers that can't be an arm's (:mod:`er3a.robots.usable`). Arrays are checked by
+the functions themselves. The same functions inside the library take what they are given, because validation computes
+with tables that no arm can have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import update_wrapper
+from inspect import Parameter, signature
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+
+from er3a.errors import ArgumentError
+from er3a.robots.robot import Robot
+from er3a.robots.usable import check_robot
+
+Check = Callable[[Any], None]
+Function = TypeVar("Function", bound=Callable[..., Any])
+LOOK_FOR_CROSSED_LIMITS = {"diagnose"}
+CONTAINERS = (Sequence, Mapping)
+CALLED = {str: "a text", Path: "a path", NoneType: "None"}
+
+
+def checked(function: Function) -> Function:
+    """The function as ``er3a`` offers it: it refuses unusable arguments with an :class:`er3a.Er3aError`."""
+    checks = _checks(function)
+
+    def public(*args: Any, **named: Any) -> Any:
+        for place, name, check in checks:
+            if place < len(args):
+                check(args[place])
+            elif name in named:
+                check(named[name])
+        return function(*args, **named)
+
+    update_wrapper(public, function)
+    public.__module__ = "er3a"  # where a pickle finds it
+    return cast(Function, public)
+
+
+def _checks(function: Callable[..., Any]) -> tuple[tuple[int, str, Check], ...]:
+    hints = get_type_hints(function)
+    found = []
+    for place, (name, parameter) in enumerate(signature(function).parameters.items()):
+        check = _check_of(name, hints[name], function.__name__ in LOOK_FOR_CROSSED_LIMITS)
+        if check is not None:
+            found.append((place if parameter.kind is not Parameter.KEYWORD_ONLY else 1_000, name, check))
+    return tuple(found)
+
+
+def _check_of(name: str, hint: Any, crossed_limits: bool) -> Check | None:
+    """What checks an argument of this annotation; None for those that functions check themselves."""
+    if hint is Robot:
+        return lambda value: check_robot(value, crossed_limits)
+    allowed = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
+    plain = tuple(each for each in allowed if isinstance(each, type) and (_ours(each) or each in CALLED))
+    listed = tuple(get_args(each)[0] for each in allowed if get_origin(each) is Sequence and _ours(get_args(each)[0]))
+    if len(plain) + len(listed) != len(allowed):
+        return None
+    expected = " or ".join(
+        [CALLED.get(each, _article(each)) for each in plain] + [f"several {each.__name__}" for each in listed]
+    )
+
+    def check(value: Any) -> None:
+        if isinstance(value, plain):
+            return
+        if not listed or isinstance(value, str) or not isinstance(value, Sequence):
+            raise ArgumentError(name, value, expected)
+        for number, each in enumerate(value):
+            if not isinstance(each, listed):
+                raise ArgumentError(f"{name}[{number}]", each, " or ".join(map(_article, listed)))
+
+    return check
+
+
+def _ours(kind: Any) -> bool:
+    return isinstance(kind, type) and kind.__module__.startswith("er3a.")
+
+
+def _article(kind: type) -> str:
+    return f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}"

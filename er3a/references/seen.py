@@ -1,0 +1,142 @@
+"""Coarse observations, which need no instrument: one joint is jogged a little, and where to a point or the tool goes is
+seen.
+
+Left and right, forward and back are the base's: forward is +x, left +y, up +z. A tilt is the motion of the direction in
+which the tool points. A turn is clockwise for who looks forward, up, and so on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass, field
+from typing import ClassVar, Literal, get_args
+
+import numpy as np
+
+from er3a.numerics.arrays import Reals
+from er3a.references.quantities import (
+    FRAME_OF_POINT,
+    MM,
+    ModelState,
+    Point,
+    Quantity,
+    QuantityAtPose,
+    Unit,
+    Vector,
+    angle_between,
+    turned_apart,
+)
+
+Seen = Literal[
+    "up", "down", "left", "right", "forward", "back",
+    "tilts_up", "tilts_down", "tilts_left", "tilts_right", "tilts_forward", "tilts_back",
+    "clockwise_looking_up", "clockwise_looking_down", "clockwise_looking_left", "clockwise_looking_right",
+    "clockwise_looking_forward", "clockwise_looking_back",
+]  # fmt: skip
+SEEN: tuple[Seen, ...] = get_args(Seen)
+TOWARD: dict[str, Vector] = {
+    "up": (0.0, 0.0, 1.0),
+    "down": (0.0, 0.0, -1.0),
+    "left": (0.0, 1.0, 0.0),
+    "right": (0.0, -1.0, 0.0),
+    "forward": (1.0, 0.0, 0.0),
+    "back": (-1.0, 0.0, 0.0),
+}
+Manner = Literal["moves", "tilts", "turns"]
+MANNERS: dict[str, Manner] = {"tilts": "tilts", "clockwise": "turns"}
+COARSE_DEG = 60.0
+"""Half-width of what the eye can be trusted with: a motion up and to the side may be seen as either."""
+STILL = 1e-9
+PARALLEL = np.sin(np.radians(1.0))
+
+
+@dataclass(frozen=True)
+class SeenMotion(QuantityAtPose):
+    """Angle between a motion while one joint is jogged in + and the direction in which it was seen; 90 if nothing
+    moves."""
+
+    joint: int
+    point: Point
+    seen: Seen = field(compare=False)
+    unit: ClassVar[Unit] = "deg"
+
+    def value(self, state: ModelState) -> Reals:
+        return angle_between(*self._directions(state), True)
+
+    def off(self, state: ModelState, expected: float) -> Reals:
+        return turned_apart(*self._directions(state)) if expected == 0 else super().off(state, expected)
+
+    @property
+    def vector(self) -> Hashable:
+        return self.pose, self.joint, self.point, self.manner
+
+    @property
+    def manner(self) -> Manner:
+        """Whether a point moves, or the tool tilts or turns."""
+        return MANNERS.get(self.seen.partition("_")[0], "moves") if "_" in self.seen else "moves"
+
+    def apart(self, expected: float, other: Quantity, other_expected: float) -> float:
+        if not isinstance(other, SeenMotion) or other.manner != self.manner:
+            return 0.0
+        return float(angle_between(self._seen_toward(), other._seen_toward(), True))
+
+    def _seen_toward(self) -> Reals:
+        return np.array(TOWARD[self.seen.rpartition("_")[2]])
+
+    def _directions(self, state: ModelState) -> tuple[Reals, Reals]:
+        """The motion's direction and the one that was seen, (..., 3) each."""
+        T = state.at(self.pose)
+        axis = T[..., self.joint - 1, :3, 2] * state.direction[..., self.joint - 1, None]
+        if self.manner == "turns":
+            return axis, self._seen_toward()
+        pointing = T[..., -1, :3, 2]
+        arm = T[..., FRAME_OF_POINT[self.point], :3, 3] - T[..., self.joint - 1, :3, 3]
+        motion = np.cross(axis, pointing if self.manner == "tilts" else arm)
+        toward = np.broadcast_to(self._seen_toward(), motion.shape)
+        still = np.linalg.norm(motion, axis=-1, keepdims=True) < STILL
+        across = np.roll(toward, 1, axis=-1)  # stands for a motion that isn't there: square to every direction
+        return np.where(still, across, motion), toward
+
+
+@dataclass(frozen=True)
+class TableEntry(Quantity):
+    """An entry of the table itself, measured by itself: a length (a, d) in mm, or an angle (alpha, offset) in deg.
+
+    A length d is the way along an axis between the common normals with the axes before and after it that are not
+    parallel to it: between parallel axes the normal is anywhere, so their d is one length together.
+    """
+
+    column: Literal["a", "d", "alpha", "offset"]
+    joint: int
+
+    @property
+    def unit(self) -> Unit:  # type: ignore[override]
+        """mm or deg."""
+        return "mm" if self.column in ("a", "d") else "deg"
+
+    def value(self, state: ModelState) -> Reals:
+        column = state.columns[self.column]
+        if self.column == "d":
+            return self._along_parallel(column, state.columns["twist"]) * MM
+        entry = column[..., self.joint - 1]
+        return entry * MM if self.unit == "mm" else np.degrees(entry)
+
+    def _along_parallel(self, d: Reals, twist: Reals) -> Reals:
+        """Sum (...,) of d over the axes that are parallel to the joint's, each counted along it."""
+        at = self.joint - 1
+        factors = np.where(np.abs(np.sin(twist)) < PARALLEL, np.cos(twist), 0.0)
+        total: Reals = d[..., at]
+        for steps in (range(at, d.shape[-1] - 1), range(at - 1, -1, -1)):
+            factor = np.ones(d.shape[:-1])
+            for k in steps:
+                factor = factor * factors[..., k]
+                total = total + factor * d[..., k + 1 if k >= at else k]
+        return total
+
+    def off(self, state: ModelState, expected: float) -> Reals:
+        off = self.value(state) - expected
+        return (off if self.unit == "mm" else off - 360.0 * np.round(off / 360.0))[..., None]
+
+    def apart(self, expected: float, other: Quantity, other_expected: float) -> float:
+        off = expected - other_expected
+        return abs(off) if self.unit == "mm" else abs(off - 360.0 * round(off / 360.0))

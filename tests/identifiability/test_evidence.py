@@ -1,0 +1,347 @@
+"""What documents settle of a table: the shipped robots, changed ones, foreign ones, against independent computation."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import er3a
+from er3a.files.reference_sets import load_references
+from er3a.files.robot_library import load_robot
+from er3a.identifiability.entries import continuous_of, entries_of
+from er3a.identifiability.entry_evidence import Evidence, Tolerance
+from er3a.identifiability.evidence import evidence_of
+from er3a.identifiability.proposals import measured, proposals_of
+from er3a.identifiability.verdict_parts import parts_of, settles_tool
+from er3a.references.documents import Document, Documents
+from er3a.references.quantities import CarriedCoordinate, PointCoordinate
+from er3a.references.reference import Reference
+from er3a.references.subjects import PointAtPose
+from er3a.robots.robot import Robot
+
+TRACKER = ("tracker", "measured", "tracker")
+LENGTHS = ("a1", "a2", "a3", "d1", "d4", "d6")
+
+
+@cache
+def evidence(name: str) -> Evidence:
+    return er3a.evidence(load_robot(name))
+
+
+def about(robot: Robot, *only: str, extra: tuple[Reference, ...] = ()) -> Evidence:
+    """Evidence about some entries, from the sets that the robot's file names and further references."""
+    sets = [load_references(name) for name in robot.references]
+    documents = {name: document for each in sets for name, document in each.documents.by_name.items()}
+    stated = [reference for each in sets for reference in each.references]
+    return evidence_of(robot, [*stated, *extra], Documents(documents), only=only)
+
+
+def changed(robot: Robot, entry: str, by: float) -> Robot:
+    """A robot with one entry changed by an amount in its unit."""
+    found = next(each for each in entries_of(robot) if each.name == entry)
+    column = getattr(robot, found.column).copy()
+    column[found.joint - 1] += by / found.in_unit
+    return robot.replace(**{found.column: column})
+
+
+def turned(robot: Robot, *joints: int) -> Robot:
+    """A robot with joints reversed."""
+    signs = np.array([-1.0 if joint in joints else 1.0 for joint in range(1, 7)])
+    return robot.replace(direction=robot.direction * signs)
+
+
+def test_signs_that_no_document_fixes_are_open():
+    found = evidence("er3_600")
+    for joint in (1, 4, 5, 6):
+        assert found[f"direction{joint}"].status == "open"
+        (reading,) = [each for each in found[f"direction{joint}"].alternatives if each.off.moves]
+        assert reading.entries == ((f"direction{joint}", -1.0),)
+    assert found["direction5"].off.mm == pytest.approx(2 * 78.5)
+    same = [{name for name, _ in each.entries} for each in found["direction5"].alternatives if not each.off.moves]
+    assert {"direction5", "offset4", "offset6"} in same
+
+
+def test_joints_reversed_that_no_document_fixes_are_still_open():
+    found = about(turned(load_robot("er3_600"), 1, 4, 5), "direction1", "direction4", "direction5")
+    assert {each.status for each in found.entries if each.entry.startswith("direction")} == {"open"}
+
+
+@pytest.mark.parametrize("name", ["er3_600", "er3a_c60"])
+def test_lengths_along_parallel_axes_mean_something_together_only(name):
+    found = evidence(name)
+    for entry in ("d2", "d3"):
+        assert found[entry].status == "gauge"
+        shifts = [dict(each.entries) for each in found[entry].alternatives if not each.off.moves]
+        assert {"d2": 5.0, "d3": -5.0} in [{k: round(v, 6) for k, v in each.items()} for each in shifts]
+    assert [each.entry for each in found.combinations] == ["d2 + d3"]
+
+
+def test_what_the_second_cad_model_settles_of_the_er3a_c60():
+    found = evidence("er3a_c60")
+    for entry in LENGTHS:
+        assert found[entry].status == "settled"
+        assert found[entry].by == ("vrml_2020",)
+        low, high = found[entry].interval
+        assert low < found[entry].value < high < found[entry].value + 1
+    for joint in range(1, 7):
+        direction = found[f"direction{joint}"]
+        assert direction.status == "consistent"
+        assert [each.excluded_by for each in direction.alternatives if each.off.moves] == [("urdf_2017",)]
+    assert found["offset6"].status == found["alpha6"].status == "open"  # nothing shows how the flange is turned
+    assert found["upper6"].status == "consistent"
+    assert found["base"].status == found["tool"].status == "given"
+
+
+def test_the_table_read_from_the_step_model_is_consistent_with_it():
+    found = evidence("er3_600")
+    assert {found[entry].status for entry in ("d1", "d6", "a5", "alpha4", "offset5")} == {"consistent"}
+    assert {found[entry].status for entry in ("a1", "a2", "offset2")} == {"settled"}  # by the drawing
+    assert found["a2"].by == ("drawing_v1_1", "quick_manual")
+    assert {found[entry].status for entry in ("d4", "a3", "offset3")} == {"weak"}  # one for the other
+    assert {found[f"direction{joint}"].status for joint in (2, 3)} == {"consistent"}
+    assert found["speed1"].status == found["lower1"].status == "consistent"
+    assert [round(bound, 1) for bound in found["upper2"].interval] == [84.6, 85.0]  # the drawing's least x
+
+
+def test_every_interval_holds_its_value_and_every_status_has_its_reason():
+    for name in ("er3_600", "er3a_c60"):
+        for each in evidence(name).entries:
+            if each.interval is not None:
+                assert each.interval[0] <= each.value <= each.interval[1]
+            assert each.by or each.status in ("open", "given")
+
+
+@pytest.mark.parametrize(
+    ("entry", "by", "status"),
+    [
+        ("d1", 5.0, "contradicted"),
+        ("a3", 1.0, "contradicted"),
+        ("a3", 0.3, "settled"),
+        ("d4", 0.15, "settled"),
+        ("d4", 0.5, "contradicted"),
+        ("alpha3", 180.0, "contradicted"),
+        ("offset2", 10.0, "contradicted"),
+        ("alpha2", 0.5, "contradicted"),
+        ("lower1", 10.0, "contradicted"),
+    ],
+)
+def test_a_value_is_contradicted_outside_its_interval_and_not_inside(entry, by, status):
+    found = about(changed(load_robot("er3a_c60"), entry, by), entry)
+    assert found[entry].status == status
+
+
+def test_one_wrong_length_accuses_no_other():
+    found = about(changed(load_robot("er3a_c60"), "d1", 5.0), *LENGTHS)
+    assert {entry: found[entry].status for entry in LENGTHS} == dict.fromkeys(LENGTHS, "settled") | {
+        "d1": "contradicted"
+    }
+
+
+def test_a_sign_that_its_own_document_excludes_is_contradicted():
+    assert about(turned(load_robot("er3_600"), 2), "direction2")["direction2"].status == "contradicted"
+    assert about(turned(load_robot("er3a_c60"), 5), "direction5")["direction5"].status == "contradicted"
+
+
+@pytest.mark.parametrize("name", ["er3_600", "er3a_c60"])
+@pytest.mark.parametrize("entry", ["direction1", "direction2", "direction4", "direction5", "offset6", "upper4"])
+def test_the_proposed_measurement_settles_or_contradicts(name, entry):
+    robot = load_robot(name)
+    proposal = proposals_of(evidence(name))[entry]
+    shown = measured(proposal, robot)
+    assert about(robot, entry, extra=(shown,))[entry].status == "settled"
+    joint = int(entry[-1])
+    other = turned(robot, joint) if entry.startswith("direction") else changed(robot, entry, 20.0)
+    assert about(robot, entry, extra=(measured(proposal, other),))[entry].status == "contradicted"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["er3_600", "er3a_c60"])
+def test_every_proposed_measurement_settles_its_entry(name):
+    robot, found = load_robot(name), evidence(name)
+    proposals = proposals_of(found)
+    settled = ("settled", "given", "gauge")
+    assert set(proposals) == {e.entry for e in (*found.entries, *found.combinations) if e.status not in settled}
+    for entry, proposal in proposals.items():
+        assert about(robot, entry, extra=(measured(proposal, robot),))[entry].status == "settled", entry
+
+
+def test_all_measurements_together_settle_the_tool():
+    robot = load_robot("er3a_c60")
+    shown = [measured(proposal, robot) for proposal in proposals_of(evidence("er3a_c60")).values()]
+    found = evidence_of(robot, [*load_references("er3a_c60").references, *shown], load_references("er3a_c60").documents)
+    assert settles_tool(found)
+    assert {part.code: part.status for part in parts_of(found)} == {
+        "geometry": "settled",
+        "zero_and_directions": "settled",
+        "limits": "settled",
+        "speeds": "absent",
+    }
+
+
+def test_parts_say_how_far_the_tool_could_be_off():
+    parts = {part.code: part for part in parts_of(evidence("er3_600"))}
+    assert not settles_tool(evidence("er3_600"))
+    assert parts["zero_and_directions"].status == "open"
+    assert parts["zero_and_directions"].off.mm > 1300  # with joint 1 reversed, at 90 deg, stretched out
+    assert {parts["limits"].status, parts["speeds"].status} <= {"weak", "consistent"}
+
+
+def test_a_tighter_tolerance_settles_less():
+    robot = load_robot("er3a_c60")
+    references = load_references("er3a_c60")
+    found = evidence_of(robot, references.references, references.documents, Tolerance(0.5, 0.05), only=["a3", "d4"])
+    assert (found["a3"].status, found["d4"].status) == ("weak", "settled")
+
+
+def test_the_same_input_gives_the_same_evidence():
+    names = ("a3", "d4", "direction5", "upper2")
+    first, second = (about(load_robot("er3_600"), *names) for _ in range(2))
+    assert [(e.entry, e.status, e.interval) for e in first.entries] == [
+        (e.entry, e.status, e.interval) for e in second.entries
+    ]
+
+
+def puma() -> Robot:
+    """Puma 560, standard D-H (Corke and Armstrong-Helouvry, ICRA 1994)."""
+    right = np.pi / 2
+    return Robot(
+        name="puma560",
+        title="Puma 560",
+        convention="standard",
+        a=np.array([0, 431.8, 20.3, 0, 0, 0]) / 1000,
+        alpha=np.array([right, 0, -right, right, -right, 0]),
+        d=np.array([671.8, 0, 150.05, 431.8, 0, 56.25]) / 1000,
+        direction=np.ones(6),
+        offset=np.zeros(6),
+        lower=np.radians([-160, -110, -135, -266, -100, -266]),
+        upper=np.radians([160, 110, 135, 266, 100, 266]),
+    )
+
+
+def frame_of(robot: Robot, q_deg: np.ndarray) -> np.ndarray:
+    """Forward kinematics of standard rows, by itself."""
+    T = np.eye(4)
+    for k, angle in enumerate(np.radians(q_deg)):
+        theta = robot.direction[k] * angle + robot.offset[k]
+        c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(robot.alpha[k]), np.sin(robot.alpha[k])
+        a, d = robot.a[k], robot.d[k]
+        T = T @ np.array([[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, d], [0, 0, 0, 1]])
+    return T
+
+
+def tracked(robot: Robot, poses: np.ndarray, half_width: float) -> list[Reference]:
+    """Positions of the flange as a tracker would show them."""
+    found = []
+    for n, pose in enumerate(poses):
+        at = tuple(float(angle) for angle in pose)
+        for k, coordinate in enumerate("xyz"):
+            quantity = PointCoordinate(at, "flange", coordinate)
+            subject = PointAtPose(f"pose {n}", "flange", coordinate)
+            expected = float(frame_of(robot, pose)[k, 3] * 1000)
+            found.append(Reference(subject, "key_poses", quantity, expected, half_width, *TRACKER))
+    return found
+
+
+def poses(random: np.random.Generator, count: int) -> np.ndarray:
+    return np.round(np.degrees(random.uniform(puma().lower, puma().upper, (count, 6))))
+
+
+def test_a_tracker_settles_a_foreign_arm_but_for_how_its_flange_is_turned(random):
+    robot = puma()
+    found = evidence_of(robot, tracked(robot, poses(random, 30), 0.1), Documents())
+    statuses = {each.entry: each.status for each in found.entries}
+    assert {statuses[f"direction{joint}"] for joint in range(1, 6)} == {"settled"}
+    assert {statuses[name] for name in ("a2", "a3", "d4", "alpha1", "offset2", "offset3", "alpha4")} == {"settled"}
+    assert statuses["d2"] == statuses["d3"] == "gauge"
+    assert {statuses["offset6"], statuses["alpha6"], statuses["direction6"]} <= {"open", "weak"}
+    wrong = evidence_of(
+        changed(robot, "a2", 3.0), tracked(robot, poses(random, 30), 0.1), Documents(), only=["a2", "d4"]
+    )
+    assert (wrong["a2"].status, wrong["d4"].status) == ("contradicted", "settled")
+
+
+def test_standard_deviations_give_the_interval_of_least_squares(random):
+    """Three points that the flange carries: 1.96 standard errors, from a Jacobian made by itself."""
+    robot, at, sigma = puma(), poses(random, 15), 0.2
+    points = [(0.0, 0.0, 0.0), (100.0, 0.0, 0.0), (0.0, 100.0, 50.0)]
+    names = [entry.name for entry in continuous_of(robot) if entry.name != "d2"]
+
+    def seen(arm: Robot) -> np.ndarray:
+        frames = [frame_of(arm, pose) for pose in at]
+        return np.concatenate([T[:3, 3] * 1000 + T[:3, :3] @ np.array(point) for T in frames for point in points])
+
+    quantities = [
+        CarriedCoordinate(tuple(map(float, pose)), point, coordinate)
+        for pose in at
+        for point in points
+        for coordinate in "xyz"
+    ]
+    stated = [
+        Reference(PointAtPose("p", "flange", None), "key_poses", quantity, value, 1.96 * sigma, *TRACKER, sigma)
+        for quantity, value in zip(quantities, seen(robot).tolist())
+    ]
+    found = evidence_of(robot, stated, Documents(), only=["a2", "d4", "offset3", "alpha5"])
+    J = np.array([(seen(changed(robot, name, 1e-4)) - seen(changed(robot, name, -1e-4))) / 2e-4 for name in names]).T
+    error = sigma * np.linalg.norm(np.linalg.pinv(J), axis=1)
+    for name in ("a2", "d4", "offset3", "alpha5"):
+        low, high = found[name].interval
+        assert (high - low) / 2 == pytest.approx(1.96 * error[names.index(name)], rel=0.02)
+
+
+def test_no_feasible_table_lies_outside_the_intervals(random):
+    """Tables on rays from the true one, as far as an own forward kinematics says that they are feasible."""
+    robot, at, half_width = puma(), poses(random, 8), 0.5
+    free = [entry for entry in continuous_of(robot) if entry.name != "d2"]
+    found = evidence_of(robot, tracked(robot, at, half_width), Documents(), only=[entry.name for entry in free])
+    true = np.array([frame_of(robot, pose)[:3, 3] * 1000 for pose in at])
+    scale = np.array([1.0 if entry.unit == "mm" else 0.1 for entry in free])
+
+    def feasible(amounts: np.ndarray) -> bool:
+        arm = robot
+        for entry, amount in zip(free, amounts):
+            arm = changed(arm, entry.name, amount)
+        places = np.array([frame_of(arm, pose)[:3, 3] * 1000 for pose in at])
+        return bool(np.abs(places - true).max() <= half_width)
+
+    J = np.array([_slope(robot, entry.name, at) for entry in free]).T * scale
+    for ray in range(60):
+        direction = random.normal(size=len(free))
+        if ray % 2:
+            direction = np.linalg.lstsq(J, random.uniform(-half_width, half_width, len(J)), rcond=1e-6)[0]
+        inside, outside = 0.0, 64.0
+        for _ in range(30):
+            middle = (inside + outside) / 2
+            inside, outside = (middle, outside) if feasible(middle * direction * scale) else (inside, middle)
+        for entry, amount in zip(free, inside * direction * scale):
+            if found[entry.name].status != "gauge":
+                low, high = found[entry.name].interval
+                assert low - 0.02 * (high - low) <= found[entry.name].value + amount <= high + 0.02 * (high - low)
+
+
+def _slope(robot: Robot, name: str, at: np.ndarray) -> np.ndarray:
+    arms = [changed(robot, name, step) for step in (1e-4, -1e-4)]
+    up, down = (np.concatenate([frame_of(arm, pose)[:3, 3] * 1000 for pose in at]) for arm in arms)
+    return (up - down) / 2e-4
+
+
+def test_derived_documents_prove_nothing(random):
+    """The same tracker once as a document of its own, once made from what the table was made from."""
+    robot = puma().replace(origins={entry.name: "manual" for entry in entries_of(puma())})
+    stated = tracked(robot, poses(random, 30), 0.1)
+    for parents, status in (((), "settled"), (("manual",), "consistent"), (("drawing",), "consistent")):
+        documents = Documents.of(
+            [
+                Document("drawing", "a drawing", "a maker"),
+                Document("manual", "a manual", "a maker", ("drawing",)),
+                Document("tracker", "a tracker", "a laboratory", parents),
+            ]
+        )
+        assert evidence_of(robot, stated, documents, only=["a2"])["a2"].status == status
+
+
+def test_a_robot_without_references_has_everything_open():
+    found = evidence_of(puma(), [], Documents())
+    assert {each.status for each in found.entries} == {"open", "gauge", "given"}
+    assert found.table_meets

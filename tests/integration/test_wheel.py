@@ -1,0 +1,115 @@
+"""The wheel, as a stranger has it: installed in an environment of its own, used in an empty folder."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from er3a import __version__
+from er3a.files.robot_library import load_robot
+from er3a.formats.urdf import export_urdf
+from testing.processes import run
+from testing.small_study import ROOT
+
+ROBOTS_BLOCK = re.compile(r"^robots:\n(?:[ #].*\n|\n)+", re.MULTILINE)
+DH = """joint,a_mm,alpha_deg,d_mm,offset_deg,direction,lower_deg,upper_deg,speed_deg_s
+1,0,-90,400,0,1,-170,170,300
+2,350,0,0,-90,1,-90,120,300
+3,40,-90,0,0,1,-190,60,300
+4,0,90,360,0,1,-180,180,400
+5,0,-90,0,0,1,-120,120,400
+6,0,0,80,0,1,-350,350,500
+"""
+pytestmark = pytest.mark.long
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("wheel")
+    built = run([sys.executable, "-m", "hatchling", "build", "--target", "wheel", "--directory", folder], cwd=ROOT)
+    assert built.returncode == 0, built.stderr
+    (found,) = folder.glob("*.whl")
+    return found
+
+
+@pytest.fixture(scope="module")
+def er3a(wheel, tmp_path_factory):
+    """Calls the installed er3a in a folder. Its libraries are those that the tests run on, its er3a is the wheel's."""
+    place = tmp_path_factory.mktemp("fresh") / "venv"
+    uv = Path(sys.prefix, "bin/uv")
+    subprocess.run([uv, "venv", "--quiet", "--python", sys.executable, place], check=True)
+    (packages,) = place.glob("lib/python*/site-packages")
+    libraries = [path for path in sys.path if path.endswith("site-packages")]
+    (packages / "libraries.pth").write_text("\n".join(libraries) + "\n", encoding="utf-8")
+    install = [uv, "pip", "install", "--quiet", "--offline", "--no-deps", "--python", place / "bin/python", wheel]
+    subprocess.run(install, check=True)
+    kept = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+
+    def call(folder: Path, *words: str | Path) -> subprocess.CompletedProcess[str]:
+        return run([place / "bin/er3a", *words], cwd=folder, env=kept)
+
+    return call
+
+
+def test_a_wheel_holds_what_a_study_needs(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+    assert f"er3a-{__version__}-" in wheel.name
+    for folder in ("data", "workflow", "profiles"):
+        files = [path for path in (ROOT / folder).rglob("*") if path.is_file() and "__pycache__" not in path.parts]
+        assert {f"er3a/shipped/{path.relative_to(ROOT).as_posix()}" for path in files} <= names
+    needed = ("Snakefile", "config/study.schema.json", "config/config.yaml", "requirements/run.txt")
+    assert {f"er3a/shipped/{name}" for name in needed} | {"er3a/py.typed"} <= names
+    assert any(name.endswith("LC_MESSAGES/er3a.po") for name in names)
+    assert [name for name in names if name.startswith(("tests/", "testing/", "benchmarks/"))] == []
+
+
+@pytest.mark.parametrize(
+    ("source", "name", "validated"),
+    [("--urdf", "odd_arm", False), ("--dh", "table", False), ("--robot", "er3_600", True)],
+)
+def test_a_study_from_nothing_to_its_reports(er3a, tmp_path, source, name, validated):
+    (tmp_path / "Odd arm.urdf").write_text(export_urdf(load_robot("er3a_c60")), encoding="utf-8")
+    (tmp_path / "table.csv").write_text(DH, encoding="utf-8")
+    given = {"--urdf": "Odd arm.urdf", "--dh": "table.csv", "--robot": "er3_600"}[source]
+    made = er3a(tmp_path, "new", "my cell", source, given)
+    assert made.returncode == 0, made.stderr
+    cell = tmp_path / "my cell"
+    written = [line.removesuffix(": written") for line in made.stdout.splitlines() if line.endswith(": written")]
+    checked = er3a(tmp_path, "check", *(file for file in written if file.endswith(".yaml")))
+    assert checked.returncode == 0, checked.stderr
+    again = er3a(tmp_path, "new", "my cell", source, given)
+    assert (again.returncode, again.stderr.splitlines()[-1].startswith("error: ")) == (2, True)
+    study = cell / "config/config.yaml"
+    study.write_text(_on_small_budgets(study.read_text(encoding="utf-8")), encoding="utf-8")
+
+    done = er3a(cell, "run", "--cores", "2")
+    assert done.returncode == 0, done.stderr
+    pages = {path.relative_to(cell / "reports").as_posix() for path in (cell / "reports").rglob("*.html")}
+    stages = ("validation", "workspace", "inverse", "trajectory")
+    assert pages == {"index.html", "compare.html", *(f"{name}/{page}.html" for page in (*stages, "teach"))}
+    verdicts = {each["stage"]: each["status"] for each in json.loads(er3a(cell, "verdicts", "--json").stdout)}
+    assert verdicts["inverse"] == verdicts["trajectory"] == "pass"
+    assert (verdicts["validation"] != "no_reference") == validated
+    cases = ElementTree.parse(cell / "reports/junit.xml").findall(".//testcase")
+    assert [case.get("name") for case in cases] == list(stages)
+    foot = (cell / f"reports/{name}/validation.html").read_text(encoding="utf-8")
+    assert f"er3a run --study config/config.yaml reports/{name}/validation.html" in foot
+    assert str(tmp_path) not in foot
+    assert "Nothing to be done" in er3a(cell, "run").stderr
+
+
+def _on_small_budgets(written: str) -> str:
+    """The small study's budgets with the robot and the scene of a new study."""
+    small = (ROOT / "config/small.yaml").read_text(encoding="utf-8")
+    robots = ROBOTS_BLOCK.search(written)
+    assert robots is not None
+    return re.sub(r"data/scenes/\w+\.yaml", "data/scenes/cell.yaml", ROBOTS_BLOCK.sub(robots[0], small, count=1))

@@ -1,0 +1,254 @@
+"""KRL as pendants save it and people write it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from er3a.errors import InputError
+from er3a.files.robot_library import load_robot
+from er3a.kinematics.forward import forward
+from er3a.programs.instructions import Aside, Decision, JointTarget, Output, Pause, PoseTarget, Unknown
+from er3a.programs.program_findings import DataFileMissing, NameTwice, NotUnderstood
+from er3a.programs.read_program import read_program
+from er3a.programs.run_program import execute
+
+DATA = """&ACCESS RVP
+DEFDAT weld PUBLIC
+EXT BAS (BAS_COMMAND :IN,REAL :IN )
+DECL E6POS XP1={X 500.0,Y 10.0,Z 400.0,A 0.0,B 90.0,C 0.0,S 2,T 35,E1 0.0,E2 0.0,E3 0.0,E4 0.0,E5 0.0,E6 0.0}
+DECL FDAT FP1={TOOL_NO 3,BASE_NO 0,IPO_FRAME #BASE,POINT2[] " ",TQ_STATE FALSE}
+DECL LDAT LCPDAT1={VEL 2.0,ACC 80.0,APO_DIST 50.0,APO_FAC 50.0,AXIS_VEL 100.0,ORI_TYP #VAR}
+DECL PDAT PPDAT1={VEL 100.0,ACC 60.0,APO_DIST 20.0,APO_MODE #CPTP}
+DECL E6POS ROW[3]
+ROW[2]={X 510.0,Y 20.0,Z 410.0,A 0.0,B 90.0,C 0.0}
+SIGNAL GRIPPER $OUT[8]
+ENDDAT
+"""
+
+
+def run(folder, body, data=DATA, more="", **given):
+    """A program with this body, run."""
+    path = folder / "weld.src"
+    path.write_text(f"&ACCESS RVP\nDEF weld( )\n{body}\nEND\n{more}", encoding="utf-8")
+    if data is not None:
+        (folder / "weld.dat").write_text(data, encoding="utf-8")
+    return execute(read_program(path), **given)
+
+
+def moves(execution):
+    """The motions of all steps."""
+    return [step.instruction for step in execution.steps if hasattr(step.instruction, "target")]
+
+
+def test_inline_forms_give_speed_zone_tool_and_base(tmp_path):
+    body = """;FOLD LIN P1 CONT Vel=2 m/s CPDAT1 Tool[3]:gun Base[0];%{PE}%R 8.3.44,%MKUKATPBASIS,%CMOVE,%VLIN
+$BWDSTART=FALSE
+LDAT_ACT=LCPDAT1
+FDAT_ACT=FP1
+BAS(#CP_PARAMS,2)
+LIN XP1 C_DIS C_DIS
+;ENDFOLD
+PDAT_ACT=PPDAT1
+BAS(#PTP_PARAMS,70)
+PTP XP1 C_PTP"""
+    line, joint = moves(run(tmp_path, body))
+    assert (line.speed.value, line.speed.unit) == (2.0, "m/s")
+    assert (line.acceleration.value, line.acceleration.unit) == (0.8, "share")
+    assert (line.zone.kind, line.zone.value) == ("distance", 0.05)
+    assert (line.tool.name, line.base.name) == ("TOOL_DATA[3]", "$NULLFRAME")
+    assert line.target.configuration == (("S", 2.0), ("T", 35.0))
+    np.testing.assert_allclose(line.target.pose[:3, 3], [0.5, 0.01, 0.4])
+    assert (joint.speed.value, joint.acceleration.value) == (0.7, 0.6)
+    assert (joint.zone.kind, joint.zone.value) == ("share", 0.2)
+
+
+def test_settings_behind_with_hold_for_their_motion_alone(tmp_path):
+    body = """$VEL.CP=0.5
+SLIN XP1 WITH $VEL=SVEL_CP(0.1, ,LCPDAT1), $TOOL=STOOL2(FP1), $BASE=SBASE(FP1.BASE_NO), $APO=SAPO(LCPDAT1) C_SPL
+SPTP XP1 WITH $VEL_AXIS[1]=SVEL_JOINT(30.0), $TOOL=STOOL2(FP1), $ACC_AXIS[1]=SACC_JOINT(PPDAT1)
+LIN XP1"""
+    slow, joint, after = moves(run(tmp_path, body))
+    assert (slow.speed.value, slow.zone.value, slow.tool.name) == (0.1, 0.05, "TOOL_DATA[3]")
+    assert (joint.speed.value, joint.acceleration.value) == (0.3, 0.6)
+    assert (after.speed.value, after.tool.name, after.acceleration) == (0.5, "", None)
+
+
+def test_a_partial_position_keeps_the_rest(tmp_path):
+    first, second, third = moves(run(tmp_path, "LIN XP1\nLIN {X 100}\nPTP {A3 10}"))
+    np.testing.assert_allclose(second.target.pose[:3, 3], [0.1, 0.01, 0.4])
+    np.testing.assert_allclose(second.target.pose[:3, :3], first.target.pose[:3, :3], atol=1e-12)
+    assert np.isnan(third.target.joints).tolist() == [True, True, False, True, True, True]
+
+
+def test_a_partial_position_behind_axes_needs_the_arm(tmp_path):
+    robot, q = load_robot("er3a_c60"), np.radians([10.0, -20.0, 15.0, 5.0, -60.0, 20.0])
+    frames, axes = "$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n", "PTP {A1 10,A2 -20,A3 15,A4 5,A5 -60,A6 20}\n"
+    body = f"{frames}{axes}LIN {{X 100}}\nLIN_REL {{Z 10}} #TOOL"
+    unknown = moves(run(tmp_path, body))
+    assert [each.target.reason for each in unknown[1:]] == ["position_unknown"] * 2
+    _, known, up = moves(run(tmp_path, body, robot=robot))
+    T = forward(robot, q)
+    np.testing.assert_allclose(known.target.pose[1:], T[1:], atol=1e-12)
+    assert known.target.pose[0, 3] == pytest.approx(0.1)
+    np.testing.assert_allclose(up.target.pose[:3, 3], known.target.pose[:3, 3] + 0.01 * T[:3, 2], atol=1e-12)
+
+
+def test_positions_are_computed_with(tmp_path):
+    body = """DECL E6POS P
+DECL INT i
+P=XP1
+FOR i=1 TO 3 STEP 2
+P.X=XP1.X+i*10
+LIN P
+ENDFOR
+LIN XP1:{X 0,Y 0,Z 10,A 0,B 0,C 0}
+LIN ROW[2]
+LIN lifted(XP1, 50.0)"""
+    more = "DEFFCT E6POS lifted(q:IN,dz:IN)\nDECL E6POS q\nDECL REAL dz\nq.Z=q.Z+dz\nRETURN q\nENDFCT\n"
+    found = [each.target.pose[:3, 3] * 1000 for each in moves(run(tmp_path, body, more=more))]
+    wanted = [[510, 10, 400], [530, 10, 400], [510, 10, 400], [510, 20, 410], [500, 10, 450]]
+    np.testing.assert_allclose(found, wanted, atol=1e-9)
+
+
+def test_subroutines_take_arguments_and_give_values_back(tmp_path):
+    body = "DECL INT n\nn=2\ngo(n, 3)\nIF n==5 THEN\nPTP {A1 1,A2 0,A3 0,A4 0,A5 0,A6 0}\nENDIF"
+    more = "DEF go(a:OUT,b:IN)\nINT a\nINT b\nPTP {A1 9,A2 0,A3 0,A4 0,A5 0,A6 0}\na=a+b\nEND\n"
+    execution = run(tmp_path, body, more=more)
+    steps = [step for step in execution.steps if hasattr(step.instruction, "target")]
+    assert [round(float(np.degrees(step.instruction.target.joints[0]))) for step in steps] == [9, 1]
+    assert [[place.line for place in step.calls] for step in steps] == [[5], []]
+    assert steps[0].place.line == 13
+
+
+def test_branches_on_inputs_are_followed_on_both_sides(tmp_path):
+    body = """LOOP
+IF $IN[1] AND NOT $IN[2] THEN
+PTP {A1 1,A2 0,A3 0,A4 0,A5 0,A6 0}
+ELSE
+PTP {A1 2,A2 0,A3 0,A4 0,A5 0,A6 0}
+ENDIF
+WAIT SEC 0.5
+WAIT FOR $IN[3]
+GRIPPER=TRUE
+ENDLOOP"""
+    execution = run(tmp_path, body)
+    assert execution.complete
+    angles = {round(float(np.degrees(each.target.joints[0]))) for each in moves(execution)}
+    assert angles == {1, 2}
+    kinds = [type(step.instruction) for step in execution.steps]
+    assert (
+        kinds.count(Decision) == len([step for step in execution.steps if isinstance(step.instruction, Decision)]) >= 2
+    )
+    said = [step.instruction for step in execution.steps]
+    assert Pause(0.5) in said
+    assert Pause(condition="$IN[3]") in said
+    assert Output("$OUT[8]", "TRUE") in said
+
+
+def test_a_counter_of_parts_does_not_hide_that_a_loop_repeats(tmp_path):
+    execution = run(tmp_path, "DECL INT n\nn=0\nLOOP\nn=n+1\nPTP {A1 1,A2 0,A3 0,A4 0,A5 0,A6 0}\nENDLOOP")
+    assert [each.kind for each in execution.endings] == ["repeats"]
+    assert len(moves(execution)) <= 2
+
+
+def test_a_loop_that_drifts_is_told_from_one_that_repeats(tmp_path):
+    body = "DECL E6POS P\nP=XP1\nLOOP\nP.X=P.X+1\nLIN P\nENDLOOP"
+    execution = run(tmp_path, body)
+    assert [each.kind for each in execution.endings] == ["drifts"]
+    assert not execution.complete
+
+
+def test_recursion_ends(tmp_path):
+    execution = run(tmp_path, "again()", more="DEF again()\nPTP {A1 1,A2 0,A3 0,A4 0,A5 0,A6 0}\nagain()\nEND\n")
+    assert [each.kind for each in execution.endings] == ["recursion"]
+
+
+@pytest.mark.parametrize(
+    ("body", "angles"),
+    [
+        ("i=0\nREPEAT\ni=i+1\nMOVE\nUNTIL i>=3", [1, 2, 3]),
+        ("i=0\nWHILE i<3\ni=i+1\nMOVE\nENDWHILE", [1, 2, 3]),
+        ("FOR i=3 TO 1 STEP -1\nMOVE\nENDFOR", [3, 2, 1]),
+        ("i=0\nLOOP\ni=i+1\nMOVE\nIF i==2 THEN\nEXIT\nENDIF\nENDLOOP", [1, 2]),
+        ("i=1\nagain:\nMOVE\ni=i+1\nIF i<3 THEN\nGOTO again\nENDIF", [1, 2]),
+        ("i=2\nSWITCH i\nCASE 1\ni=7\nCASE 2,3\ni=8\nDEFAULT\ni=9\nENDSWITCH\nMOVE", [8]),
+        ("i=5\nSWITCH i\nCASE 1\ni=7\nDEFAULT\ni=9\nENDSWITCH\nMOVE", [9]),
+        ("i=7/2\nMOVE", [3]),
+        ("i='H1F'\nMOVE", [31]),
+    ],
+)
+def test_control_structures(body, angles, tmp_path):
+    move = "PTP {A1 i,A2 0,A3 0,A4 0,A5 0,A6 0}"
+    execution = run(tmp_path, "DECL INT i\n" + body.replace("MOVE", move))
+    assert [round(float(np.degrees(each.target.joints[0]))) for each in moves(execution)] == angles
+    assert [each.kind for each in execution.endings] == ["end"]
+
+
+def test_arcs_and_splines(tmp_path):
+    body = "LIN XP1\nCIRC {X 510,Y 20,Z 400,A 0,B 90,C 0},{X 520,Y 10,Z 400,A 0,B 90,C 0},CA 90 C_DIS"
+    body += "\nSPLINE\nSPL XP1\nSLIN ROW[2]\nENDSPLINE"
+    _, arc, point, line = moves(run(tmp_path, body))
+    assert (arc.kind, arc.zone.kind) == ("arc", "named")
+    assert arc.angle == pytest.approx(np.pi / 2)
+    np.testing.assert_allclose(arc.via.pose[:3, 3], [0.51, 0.02, 0.4])
+    assert (point.kind, line.kind) == ("spline", "line")
+    assert point.spline_block == line.spline_block is not None
+
+
+def test_what_is_not_understood_is_kept_and_named(tmp_path):
+    execution = run(tmp_path, "PTP {A1 0,A2 0,A3 0,A4 0,A5 0,A6 0}\n???\nSOME_TECH(1,#ON)\nPTP XHOME\nLIN {X NAN}")
+    said = [step.instruction for step in execution.steps]
+    assert Unknown("???") in said
+    assert Unknown("SOME_TECH(1,#ON)") in said
+    assert any(isinstance(each, NotUnderstood) and each.place.line == 4 for each in execution.program.findings)
+    home, lost = (each.target for each in moves(execution)[1:])
+    assert (home.text, home.reason) == ("XHOME", "undefined")
+    assert lost.reason == "not_finite"
+
+
+def test_triggers_and_interrupts_move_nothing_unless_they_call(tmp_path):
+    body = "INTERRUPT DECL 3 WHEN $STOPMESS==TRUE DO IR_STOPM ( )"
+    body += "\nTRIGGER WHEN PATH=0 DELAY=0 DO $OUT[1]=TRUE"
+    body += "\nINTERRUPT DECL 4 WHEN $IN[1] DO flee()"
+    kinds = [type(step.instruction) for step in run(tmp_path, body).steps]
+    assert kinds == [Aside, Aside, Unknown]
+
+
+def test_a_missing_data_file_and_a_name_given_twice_are_findings(tmp_path):
+    execution = run(tmp_path, "PTP XP1", data=None)
+    assert DataFileMissing("weld.dat") in execution.program.findings
+    assert moves(execution)[0].target.text == "XP1"
+    twice = DATA.replace("ROW[2]=", "DECL E6POS XP1={X 1.0,Y 2.0,Z 3.0,A 0.0,B 0.0,C 0.0}\nROW[2]=")
+    execution = run(tmp_path, "PTP XP1", data=twice, more="DEF weld( )\nEND\n")
+    assert sum(isinstance(each, NameTwice) for each in execution.program.findings) == 2
+
+
+def test_external_axes_are_kept(tmp_path):
+    found = moves(
+        run(tmp_path, "PTP {A1 0,A2 0,A3 0,A4 0,A5 0,A6 0,E1 120.5}\nLIN {X 1,Y 2,Z 3,A 0,B 0,C 0,E1 7,E2 0}")
+    )
+    assert isinstance(found[0].target, JointTarget)
+    assert isinstance(found[1].target, PoseTarget)
+    assert [each.target.external for each in found] == [(("E1", 120.5),), (("E1", 7.0),)]
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("DEF a()\nIF TRUE THEN\nEND\n", "the IF that begins here has no end"),
+        ("DEF a()\nLOOP\nENDWHILE\n", "the LOOP of line 2 is open"),
+        ("DEF a()\nENDIF\nEND\n", "none is open"),
+        ('DEF a()\nX="open\nEND\n', "a text has no end"),
+        ("DEF a()\nGOTO nowhere\nEND\n", "no label"),
+        ("DEF a()\nPTP {A1 0}\n", "has no END"),
+        ("DEF (\nEND\n", "head of a routine"),
+        ("PTP {A1 0}\n", "outside of any routine"),
+    ],
+)
+def test_what_has_no_end_is_an_error_with_its_line(text, told, tmp_path):
+    path = tmp_path / "a.src"
+    path.write_text(text)
+    with pytest.raises(InputError, match="line") as caught:
+        read_program(path)
+    assert told in str(caught.value)

@@ -1,0 +1,262 @@
+"""What is written is read back: texts are equal, joints and poses to the digits that are printed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from er3a.files.robot_library import load_robot
+from er3a.kinematics.forward import forward
+from er3a.planning.commands import (
+    JointSequenceCommand,
+    JointTableCommand,
+    SegmentCommand,
+    Start,
+    ToolSequenceCommand,
+    ToolTableCommand,
+)
+from er3a.planning.profiles import Times
+from er3a.programs.from_commands import listing_of
+from er3a.programs.instructions import ArmMotion, JointTarget, Listing, Output, Pause, PoseTarget, Rate, Remark, Zone
+from er3a.programs.program_findings import (
+    ArcsSplit,
+    HalfTurnsSplit,
+    NotTranslated,
+    SpeedsCut,
+    SpeedsEstimated,
+    TargetsLeftOut,
+    ToolNotGiven,
+    ValuesRounded,
+    ZonesDropped,
+)
+from er3a.programs.read_program import read_program
+from er3a.programs.run_program import execute
+from er3a.programs.write_program import write_program
+from er3a.programs.writing import WriteOptions
+
+LANGUAGES = ("krl", "urscript", "rpl", "xpl")
+ROBOT = load_robot("er3a_c60")
+PRINTED = {"krl": 1e-6, "rpl": 1e-6, "xpl": 1e-6, "urscript": np.degrees(1e-9)}  # deg
+
+
+def saved(folder, written):
+    """The file of a program that was written, with those beside it."""
+    paths = [folder / (written.name + suffix) for suffix in written.files]
+    for path, text in zip(paths, written.files.values()):
+        path.write_text(text, encoding="utf-8")
+    return paths[0]
+
+
+def read_back(folder, written):
+    """A program that was written, run."""
+    program = read_program(saved(folder, written))
+    assert [finding for finding in program.findings if finding.code != "program_data_file_missing"] == []
+    return execute(program, ROBOT)
+
+
+def joints_inside(rng, count):
+    """Random joints within the limits."""
+    return rng.uniform(ROBOT.lower, ROBOT.upper, (count, 6))
+
+
+def tool_path(bends: int = 0):
+    """A start and lines and arcs that the arm can do."""
+    q = np.radians([10.0, -20.0, 15.0, 5.0, -60.0, 20.0])
+    T = forward(ROBOT, q)
+    first, last = T.copy(), T.copy()
+    first[:3, 3] += [0.03, 0.08, -0.02]
+    first[:3, :3] = Rotation.from_rotvec([0.0, 0.1, 0.05]).as_matrix() @ T[:3, :3]
+    last[:3, 3] += [0.0, 0.1, 0.0]
+    via = first[:3, 3] + [0.0, 0.02, 0.03]
+    parts = [SegmentCommand(first, blend=0.01), SegmentCommand(last, via=via, blend=0.0), SegmentCommand(T)]
+    return q, ToolSequenceCommand(Start(joints=q), tuple(parts[: bends or None]), 5.0)
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_joints_of_random_paths_come_back_to_the_digits_printed(language, tmp_path):
+    rng = np.random.default_rng(7)
+    for number in range(25):  # 1000 paths in the long form below
+        path = joints_inside(rng, int(rng.integers(2, 9)))
+        listing = listing_of(JointSequenceCommand(path, 0.0, 4.0), ROBOT, path[0], f"path_{number}").listing
+        execution = read_back(tmp_path, write_program(listing, language, WriteOptions(ROBOT)))
+        visited = [each.target.joints for each in execution.listing().motions]
+        np.testing.assert_allclose(np.degrees(visited), np.degrees(path), rtol=0, atol=PRINTED[language] * 0.51)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_joints_of_1000_random_paths_come_back_to_the_digits_printed(language, tmp_path):
+    rng = np.random.default_rng(8)
+    for _ in range(1000):
+        path = joints_inside(rng, 4)
+        listing = listing_of(JointSequenceCommand(path, 0.0, 4.0), ROBOT, path[0]).listing
+        execution = read_back(tmp_path, write_program(listing, language, WriteOptions(ROBOT)))
+        visited = [each.target.joints for each in execution.listing().motions]
+        np.testing.assert_allclose(np.degrees(visited), np.degrees(path), rtol=0, atol=PRINTED[language] * 0.51)
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_lines_and_arcs_are_written_read_and_written_again(language, tmp_path):
+    q, command = tool_path()
+    path = listing_of(command, ROBOT, q, "weld")
+    written = write_program(path.listing, language, WriteOptions(ROBOT))
+    execution = read_back(tmp_path, written)
+    again = write_program(execution.listing(), language, WriteOptions(ROBOT))
+    assert again.files == written.files
+    kinds = [each.kind for each in execution.listing().motions]
+    assert kinds[:2] == ["joint", "line"]
+    assert ("arc" in kinds) == (language in ("krl", "urscript"))
+
+
+@pytest.mark.parametrize("language", ["krl", "urscript"])
+def test_poses_come_back_to_the_digits_printed(language, tmp_path):
+    q, command = tool_path()
+    path = listing_of(command, ROBOT, q)
+    execution = read_back(tmp_path, write_program(path.listing, language, WriteOptions(ROBOT)))
+    for wanted, found in zip(path.listing.motions, execution.listing().motions, strict=True):
+        if isinstance(wanted.target, PoseTarget):
+            np.testing.assert_allclose(found.target.pose, wanted.target.pose, atol=2e-8)
+        if wanted.kind == "arc":
+            np.testing.assert_allclose(found.via.pose[:3, 3], wanted.via.pose[:3, 3], atol=2e-9)
+
+
+@pytest.mark.parametrize("language", ["rpl", "xpl"])
+def test_arcs_become_lines_within_the_deviation_that_is_said(language, tmp_path):
+    q, command = tool_path(2)
+    path = listing_of(command, ROBOT, q)
+    written = write_program(path.listing, language, WriteOptions(ROBOT, arc_deviation=2e-4))
+    split = next(each for each in written.findings if isinstance(each, ArcsSplit))
+    assert split.arcs == 1
+    text = next(iter(written.files.values()))
+    assert f"1 arc(s) as {split.lines} lines that stay within 0.2 mm" in text
+    moves = read_back(tmp_path, written).listing().motions
+    ends = np.array([forward(ROBOT, each.target.joints)[:3, 3] for each in moves[-split.lines - 1 :]])
+    start, via, end = ends[0], command.segments[1].via, ends[-1]
+    a, b = via - start, end - start
+    normal = np.cross(a, b)
+    to_centre = np.cross((a @ a) * b - (b @ b) * a, normal) / (2 * normal @ normal)
+    radius = np.linalg.norm(to_centre)
+    middles = (ends[1:] + ends[:-1]) / 2
+    for points in (ends, middles):
+        off = np.abs(np.linalg.norm(points - start - to_centre, axis=1) - radius)
+        assert off.max() < 2.01e-4
+    assert (
+        np.abs(np.linalg.norm(middles - start - to_centre, axis=1) - radius).max() > 0.5e-4
+    )  # no more lines than need be
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_loop_for_ever_is_written_read_and_written_again(language, tmp_path):
+    rng = np.random.default_rng(3)
+    path = joints_inside(rng, 4)
+    motions = [ArmMotion("joint", JointTarget(q), speed=Rate(0.5, "share")) for q in path]
+    listing = Listing("palletise", (Remark("begin"), *motions[:2], Pause(0.5), *motions[2:]), repeats_from=2)
+    written = write_program(listing, language, WriteOptions(ROBOT))
+    execution = read_back(tmp_path, written)
+    assert [each.kind for each in execution.endings] == ["repeats"]
+    back = execution.listing()
+    assert back.repeats_from == 2
+    assert len(back.motions) == 4
+    assert write_program(back, language, WriteOptions(ROBOT)).files == written.files
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_timed_tables_become_points_and_their_halts_waits(language, tmp_path):
+    q, _ = tool_path()
+    T = forward(ROBOT, q)
+    poses = np.repeat(T[None], 4, axis=0)
+    poses[:, 0, 3] += [0.0, 0.02, 0.04, 0.04]
+    poses[3, 1, 3] += 0.03
+    timing = Times(np.array([0.0, 1.0, 2.0, 2.5, 3.0]), np.array([0, 1, 2, 2, 3]))
+    command = ToolTableCommand(poses, ("a", "b", "c", "d"), timing, blend=0.005)
+    listing = listing_of(command, ROBOT, q).listing
+    assert [each.seconds for each in listing.instructions if isinstance(each, Pause)] == [0.5]
+    assert [each.speed.value for each in listing.motions[1:]] == [1.0, 1.0, 0.5]
+    assert [each.zone.kind for each in listing.motions] == ["fine", "distance", "fine", "fine"]
+    found = read_back(tmp_path, write_program(listing, language, WriteOptions(ROBOT))).listing()
+    assert [type(each) for each in found.instructions if not isinstance(each, Remark)] == [
+        *(ArmMotion, ArmMotion, ArmMotion, Pause, ArmMotion)
+    ]
+    ends = [each.target for each in found.motions[1:]]
+    points = [each.pose if isinstance(each, PoseTarget) else forward(ROBOT, each.joints) for each in ends]
+    np.testing.assert_allclose(points, poses[1:], atol=1e-7)
+
+
+def test_joint_tables_become_joint_moves():
+    rng = np.random.default_rng(2)
+    path = joints_inside(rng, 5)
+    listing = listing_of(JointTableCommand(path, 4.0, 0.1), ROBOT, path[0]).listing
+    assert [each.kind for each in listing.motions] == ["joint"] * 5
+    np.testing.assert_array_equal([each.target.joints for each in listing.motions], path)
+    assert sum(each.speed.value for each in listing.motions[1:]) == pytest.approx(4.0)
+
+
+def test_a_turn_by_180_deg_is_written_in_two_halves_of_the_sense_that_is_asked():
+    q = np.radians([0.0, -20.0, 15.0, 0.0, -60.0, 0.0])
+    T = forward(ROBOT, q)
+    end = T.copy()
+    end[:3, :3] = Rotation.from_rotvec([0, 0, np.pi]).as_matrix() @ T[:3, :3]
+    for axis, sense in ((None, 1), (np.array([0.0, 0.0, -1.0]), -1)):
+        part = SegmentCommand(end, half_turn_axis=axis)
+        path = listing_of(ToolSequenceCommand(Start(joints=q), (part,), 2.0), ROBOT, q)
+        assert path.findings == (HalfTurnsSplit(1),)
+        middle = path.listing.motions[1].target.pose
+        turn = Rotation.from_matrix(middle[:3, :3] @ T[:3, :3].T).as_rotvec()
+        np.testing.assert_allclose(turn, [0, 0, sense * np.pi / 2], atol=1e-9)
+
+
+def test_what_a_language_has_no_equal_for_is_said_in_the_head():
+    rng = np.random.default_rng(5)
+    a = joints_inside(rng, 1)[0]
+    b = 0.9 * a
+    moves = (
+        ArmMotion("joint", JointTarget(a), speed=Rate(3.0, "share"), zone=Zone("angle", 0.1)),
+        ArmMotion("joint", JointTarget(b), speed=Rate(2.0, "s")),
+        Output("io.DOut[3]", "TRUE"),
+    )
+    listing = Listing("mixed", moves, language="rpl")
+    written = write_program(listing, "krl", WriteOptions(ROBOT))
+    assert written.findings == (ZonesDropped(1), SpeedsEstimated(1), SpeedsCut(1), NotTranslated(1))
+    head = written.files[".src"].split("BAS(")[0]
+    for words in ("zone(s)", "duration(s)", "above the joints' greatest", "other language"):
+        assert words in head
+    rpl = write_program(Listing("mixed", moves[1:2]), "rpl", WriteOptions(ROBOT, start=a))
+    assert {type(each) for each in rpl.findings} == {SpeedsEstimated, ValuesRounded}
+
+
+def test_a_pose_without_an_arm_is_left_out_where_joints_are_written():
+    listing = Listing("poses", (ArmMotion("line", PoseTarget(np.eye(4))),))
+    assert TargetsLeftOut(1) in write_program(listing, "rpl").findings
+    assert "LIN {X 0.000000" in write_program(listing, "krl").files[".src"]
+
+
+def test_no_configuration_is_ever_guessed():
+    q, command = tool_path()
+    listing = listing_of(command, ROBOT, q).listing
+    for language in LANGUAGES:
+        text = "".join(write_program(listing, language, WriteOptions(ROBOT)).files.values())
+        assert "CFG" not in text
+        assert ",S " not in text
+        assert ",T " not in text
+
+
+def test_tools_are_written_as_each_language_has_them(tmp_path):
+    tool = np.eye(4)
+    tool[:3, 3] = [0.0, 0.01, 0.12]
+    robot = ROBOT.replace(tool=tool)
+    q, _ = tool_path()
+    end = forward(robot, q)
+    end[0, 3] += 0.02
+    command = ToolSequenceCommand(Start(joints=q), (SegmentCommand(end),), 2.0)
+    listing = listing_of(command, robot, q).listing
+    krl = write_program(listing, "krl", WriteOptions(robot))
+    assert "$TOOL={FRAME: X 0.000000,Y 10.000000,Z 120.000000" in krl.files[".src"]
+    ur = write_program(listing, "urscript", WriteOptions(robot))
+    assert "set_tcp(p[0.000000000, 0.010000000, 0.120000000" in ur.files[".script"]
+    rpl = write_program(listing, "rpl", WriteOptions(robot))
+    assert any(isinstance(each, ToolNotGiven) for each in rpl.findings)
+    for written in (krl, ur):
+        moves = execute(read_program(saved(tmp_path, written)), robot).listing().motions
+        np.testing.assert_allclose(moves[1].tool.pose, tool, atol=1e-9)
+        np.testing.assert_allclose(moves[1].target.pose, end, atol=2e-8)

@@ -1,0 +1,60 @@
+"""What files expect of targets and paths, and what becomes of the verdict."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from er3a.errors import InputError
+from er3a.files.path_file import load_paths
+from er3a.files.target_file import read_targets
+from er3a.pipeline.messages.expectations import demonstrated, say
+from er3a.pipeline.stages.expectations import Outcome, demonstrations, unmet_expectations
+
+
+@dataclass(frozen=True)
+class Came:
+    """Something that was judged."""
+
+    name: str
+    outcome: Outcome
+    expect: Outcome | None = None
+
+
+def test_what_is_expected_and_comes_is_a_demonstration():
+    judged = [Came("out", "unreachable", "unreachable"), Came("fine", "safe", "safe"), Came("bad", "collides")]
+    assert unmet_expectations(judged) is None
+    assert [shown.name for shown in demonstrations(judged, "safe")] == ["out"]
+    assert demonstrated(demonstrations(judged, "safe")) == "1 fails as expected: out (unreachable)"
+
+
+def test_what_comes_otherwise_is_named_with_both_outcomes():
+    found = unmet_expectations(
+        [Came("out", "safe", "unreachable"), Came("line", "too fast", "safe"), Came("x", "safe")]
+    )
+    assert found is not None
+    assert [each.name for each in found.unmet] == ["out", "line"]
+    assert say(found) == (
+        "2 of 2 expectations are not met: out (safe; expected: unreachable); line (too fast; expected: safe)."
+    )
+    assert demonstrations([Came("out", "safe", "unreachable")], "safe") == ()
+
+
+def test_files_hold_expectations(tmp_path: Path):
+    table = tmp_path / "targets.csv"
+    table.write_text(
+        "name,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg,expect\na,500,0,400,180,0,0,\nb,900,0,9,0,0,0,unreachable\n"
+    )
+    assert [target.expect for target in read_targets(table)] == [None, "unreachable"]
+    paths = tmp_path / "paths.yaml"
+    text = (
+        "kind: paths\npaths:\n  - {name: a, kind: joint, title: A, samples: 9, duration_s: 1, expect: EXPECT,\n"
+        "     start_deg: [0, 0, 0, 0, 0, 0], end_deg: [10, 0, 0, 0, 0, 0]}\n"
+    )
+    paths.write_text(text.replace("EXPECT", "leaves limits"))
+    assert load_paths(paths).paths[0].expect == "leaves limits"
+    paths.write_text(text.replace("EXPECT", "fine"))
+    with pytest.raises(InputError, match=r"paths\[0\].expect"):
+        load_paths(paths)

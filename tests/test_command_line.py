@@ -1,0 +1,164 @@
+"""Manners of the command line: exit codes, what goes where, JSON, completion, colours."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import er3a
+from er3a.files.robot_library import load_robot
+from er3a.kinematics.forward import forward
+from testing import processes
+from testing.small_study import STUDY
+
+ROOT = Path(__file__).resolve().parents[1]
+FIRST_FIVE = ("new", "check", "run", "verdicts", "view")
+
+
+def called(*words: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "er3a", *map(str, words)]
+    kept = {key: value for key, value in os.environ.items() if key not in ("NO_COLOR", "FORCE_COLOR")}
+    return subprocess.run(
+        command, cwd=ROOT, env=kept | environment, capture_output=True, text=True, check=False, timeout=120
+    )
+
+
+def test_a_bare_call_shows_the_five_commands_that_a_newcomer_needs():
+    done = called()
+    assert done.returncode == 0
+    shown = [line.split()[1] for line in done.stdout.splitlines() if line.startswith("  er3a ")]
+    assert tuple(shown) == FIRST_FIVE
+    assert "\x1b" not in done.stdout
+
+
+def test_the_version_stands_in_one_place():
+    done = called("--version")
+    assert (done.returncode, done.stdout) == (0, f"er3a {er3a.__version__}\n")
+    project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    assert 'dynamic = ["version"]' in project
+    assert er3a.__version__ not in project
+
+
+def test_all_commands_have_help():
+    shown = called("--help").stdout
+    assert shown.index("A study") < shown.index("Robot files") < shown.index("Single jobs")
+    assert "\x1b" not in shown
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [("er3a ch", "check"), ("er3a compute val", "validation"), ("er3a report inverse er3_", "er3_600")],
+)
+def test_completion_knows_commands_stages_and_robots(typed, offered):
+    words = {"COMP_WORDS": typed, "COMP_CWORD": str(len(typed.split()) - 1)}
+    done = subprocess.run(
+        [sys.executable, "-c", "from er3a.pipeline.cli import app; app(prog_name='er3a')"],
+        cwd=ROOT,
+        env=os.environ | words | {"_ER3A_COMPLETE": "complete_bash"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert offered in done.stdout.split()
+
+
+def test_check_for_programs(tmp_path):
+    bad = tmp_path / "bad.yaml"
+    bad.write_text("kind: robot\nname: bad\n")
+    done = called("check", "data/robots/er3_600.yaml", bad, "--json")
+    first, second = json.loads(done.stdout)
+    assert done.returncode == 2
+    assert first == {"file": "data/robots/er3_600.yaml", "in_order": True, "kind": "a robot"}
+    assert second["in_order"] is False
+    assert second["problem"] == "missing"
+    assert done.stderr.startswith(f"error: {bad}: ")
+
+
+def test_notes_go_to_standard_error_and_results_to_standard_output(tmp_path):
+    urdf = tmp_path / "arm.urdf"
+    assert called("export-urdf", "er3_600", "--output", urdf).returncode == 0
+    text = urdf.read_text().replace("1.5707963267948966", "1.5708", 1)
+    urdf.write_text(text)
+    done = called("import-urdf", urdf, "--output", tmp_path / "arm.yaml", "--snap", "--json")
+    assert done.stderr.startswith("note: ")
+    told = json.loads(done.stdout)
+    assert told["output"] == str(tmp_path / "arm.yaml")
+    assert told["misfit_mm"] < 1e-6
+    assert len(told["notes"]) == 1
+
+
+def test_calibration_for_programs(tmp_path):
+    robot = load_robot("er3_600")
+    random = np.random.default_rng(1)
+    q = random.uniform(np.maximum(robot.lower, -1.5), np.minimum(robot.upper, 1.5), (40, 6))
+    longer = robot.replace(a=robot.a + np.array([0, 0.0004, 0, 0, 0, 0]))
+    table = tmp_path / "measured.csv"
+    header = [*(f"q{joint}_deg" for joint in range(1, 7)), "point", "x_mm", "y_mm", "z_mm", "standard_deviation_mm"]
+    rows = [
+        [*map(repr, np.degrees(angles).tolist()), "flange", *map(repr, (T[:3, 3] * 1000).tolist()), "0.05"]
+        for angles, T in zip(q, forward(longer, q))
+    ]
+    table.write_text("\n".join(",".join(row) for row in (header, *rows)), encoding="utf-8")
+    done = called("calibrate", "er3_600", table, "--output", tmp_path / "new.yaml", "--json")
+    told = json.loads(done.stdout)
+    (upper_arm,) = (entry for entry in told["entries"] if entry["name"] == "a2")
+    assert abs(upper_arm["correction"] - 0.4) < 0.01
+    assert told["fits"]
+    assert Path(told["output"]).is_file()
+
+
+def test_a_program_reads_verdicts_and_continuous_integration_an_exit_code(small_study):
+    results = small_study.folder / "results"
+    study = small_study.folder / "config/small.yaml"
+
+    def verdicts(*words: str) -> subprocess.CompletedProcess[str]:
+        return called("verdicts", "--study", study, "--results", results, *words)
+
+    found = json.loads(verdicts("--json").stdout)
+    assert {each["robot"] for each in found} == set(small_study.robots)
+    assert {"robot", "stage", "status", "code", "text"} == set(found[0])
+    statuses = {each["status"] for each in found}
+    assert verdicts("--fail-on", "fail").returncode == int("fail" in statuses)
+    done = verdicts("--fail-on", "caution")
+    assert done.returncode == int(bool({"fail", "caution"} & statuses))
+    assert done.stderr.count("note: ") == sum(each["status"] in ("fail", "caution") for each in found)
+    assert "\x1b" not in done.stdout
+    assert verdicts("--fail-on", "never").returncode == 2
+
+
+def test_a_run_ends_with_1_for_findings_and_with_2_for_an_input(small_study):
+    def run(study: str, level: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "er3a", "run", "--study", study, "--fail-on", level]
+        return processes.run(command, cwd=small_study.folder, env=small_study.environment() | {"NO_COLOR": "1"})
+
+    cases = list(ElementTree.parse(small_study.folder / "reports/junit.xml").iter("testcase"))
+    assert len(cases) == 4 * len(small_study.robots)
+    failures = [case for case in cases if case.find("failure") is not None]
+    found = [case for case in cases if case.find("failure") is not None or case.find("system-out") is not None]
+    assert found, "the small study should have something to tell"
+    done = run(STUDY, "caution")
+    assert done.returncode == 1, done.stderr
+    assert "\x1b" not in done.stdout + done.stderr
+    assert run(STUDY, "fail").returncode == int(bool(failures))
+    done = run("nowhere.yaml", "fail")
+    assert (done.returncode, done.stderr) == (2, "error: nowhere.yaml: there is no such file. Check the path\n")
+
+
+def test_diff_ends_with_1_if_anything_differs(small_study, tmp_path):
+    results = small_study.folder / "results"
+    same = called("diff", results, results)
+    assert (same.returncode, same.stdout) == (0, "Nothing differs.\n")
+    assert json.loads(called("diff", results, results, "--json").stdout) == []
+    fewer = shutil.copytree(results, tmp_path / "fewer")
+    shutil.rmtree(fewer / small_study.robots[0] / "inverse")
+    done = called("diff", results, fewer, "--json")
+    assert done.returncode == 1
+    assert json.loads(done.stdout)[0]["stage"] == "inverse"

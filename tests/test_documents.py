@@ -1,0 +1,220 @@
+"""README and docs hold what the project does: their code runs, their commands exist, their settings are accepted."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from textwrap import dedent
+from typing import Any
+
+import jsonschema
+import pytest
+import typer
+import yaml
+
+from er3a.files.robot_file import RobotFile
+from er3a.files.yaml_file import parse, read_yaml
+from er3a.pipeline.cli import app
+from er3a.pipeline.study import Study
+from testing.evidence import CAMPAIGNS
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = sorted(
+    page
+    for page in (*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), ROOT / "data/manual_refs/README.md")
+    if page.name != "CHANGELOG.md" and not {"_build", "generated"} & set(page.parts)
+)
+NOTEBOOKS = sorted((ROOT / "docs/notebooks").glob("*.md"))
+FENCED = re.compile(r"^( *)```(\S*)[^\n]*\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)
+SETTING = re.compile(r"`([a-z_]+: [^`]+)`")
+DOTTED = re.compile(r"`(validation|workspace|capability|inverse|trajectory|report)\.([a-z_]+)`")
+MODULES = {"report.py"}
+COMMAND = re.compile(r"`((?:er3a|make) [^`]+)`")
+PLACEHOLDERS = {"NAME", "FILE", "ROBOT", "OLD", "NEW", "..."}
+STANDS_FOR = {
+    "FILE": str(ROOT / "data/robots/er3_600.yaml"),
+    "文件": str(ROOT / "data/robots/er3_600.yaml"),  # README.zh-CN.md
+    "data/robots/my_arm.yaml": "my_arm.yaml",
+    "my_arm": "er3_600",
+}
+RUN = ("export-urdf", "import-urdf", "check")  # what is exported is imported, and what is imported is checked
+
+
+def name_of(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
+
+
+def blocks(page: Path, *languages: str) -> list[str]:
+    """The fenced blocks of a page in some languages."""
+    text = page.read_text(encoding="utf-8")
+    return [dedent(found[3]) for found in FENCED.finditer(text) if found[2] in languages]
+
+
+def prose(page: Path) -> str:
+    """A page without its fenced blocks."""
+    return FENCED.sub("", page.read_text(encoding="utf-8"))
+
+
+def all_blocks(*languages: str) -> list[Any]:
+    return [
+        pytest.param(block, id=f"{name_of(page)}-{number}")
+        for page in PAGES
+        for number, block in enumerate(blocks(page, *languages))
+    ]
+
+
+@pytest.mark.parametrize("block", all_blocks("python"))
+def test_python_in_documents_runs(block, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    exec(compile(block, "a document", "exec"), {})
+
+
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda page: page.stem)
+def test_notebooks_run_to_their_end(notebook, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("matplotlib.pyplot.show", lambda: None)
+    cells = blocks(notebook, "{code-cell}")
+    assert len(cells) > 4
+    names: dict[str, Any] = {}
+    for cell in cells:
+        exec(compile(cell, notebook.name, "exec"), names)
+
+
+def merged(into: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
+    """Settings with others put into them, section by section."""
+    both = dict(into)
+    for key, value in new.items():
+        below = both.get(key)
+        both[key] = merged(below, value) if isinstance(value, dict) and isinstance(below, dict) else value
+    return both
+
+
+@pytest.mark.parametrize("block", all_blocks("yaml"))
+def test_yaml_in_documents_is_accepted(block):
+    settings = yaml.safe_load(block)
+    if set(settings) <= set(Study.model_fields):
+        model, base = Study, "config/small.yaml"
+    else:
+        model, base = RobotFile, "data/robots/er3_600.yaml"
+    assert set(settings) <= set(model.model_fields)
+    parse(model, merged(read_yaml(ROOT / base), settings), base)
+
+
+def paragraphs_of_settings() -> Iterator[Any]:
+    """Paragraphs that advise settings such as ``samples: 100``, without those that stand for something else."""
+    for page in PAGES:
+        for number, paragraph in enumerate(re.split(r"\n\s*\n", prose(page))):
+            given = [text for text in SETTING.findall(paragraph) if not PLACEHOLDERS & set(re.findall(r"[A-Z]+", text))]
+            if given:
+                yield pytest.param(given, id=f"{name_of(page)}-{number}")
+
+
+def places_of(key: str) -> list[tuple[dict[str, Any], dict[str, Any]]]:
+    """The schema of each property with this name in any input file, with the schema that it is part of."""
+    found = []
+    for path in sorted((ROOT / "config").glob("*.schema.json")):
+        schema = json.loads(path.read_text(encoding="utf-8"))
+        for part in (schema, *schema.get("$defs", {}).values()):
+            if key in part.get("properties", {}):
+                found.append((part["properties"][key], schema))
+    return found
+
+
+def accepted(key: str, value: Any) -> bool:
+    return any(
+        jsonschema.Draft202012Validator({**wanted, "$defs": schema.get("$defs", {})}).is_valid(value)
+        for wanted, schema in places_of(key)
+    )
+
+
+@pytest.mark.parametrize("given", list(paragraphs_of_settings()))
+def test_settings_that_a_page_advises_are_accepted_one_by_one_and_together(given):
+    settings = merged({}, {key: value for text in given for key, value in yaml.safe_load(text).items()})
+    for key, value in settings.items():
+        assert accepted(key, value), (key, value)
+    study = read_yaml(ROOT / "config/config.yaml")
+    for section, now in study.items():
+        if isinstance(now, dict) and section != "robots":
+            study[section] = {key: settings.get(key, value) for key, value in now.items()}
+    parse(Study, study, "config/config.yaml")
+
+
+def test_a_setting_beyond_the_schema_would_be_seen():
+    assert accepted("samples", 100_000_000_000)
+    assert not accepted("samples", 1_000_000_000_000)
+    assert not accepted("no_such_setting", 1)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_settings_named_with_their_section_exist(page):
+    named = {f"{section}.{key}" for section, key in DOTTED.findall(prose(page))} - MODULES
+    schema = json.loads((ROOT / "config/study.schema.json").read_text(encoding="utf-8"))
+
+    def known(section: str) -> set[str]:
+        wanted = json.dumps(schema["properties"][section])
+        (definition,) = set(re.findall(r"#/\$defs/(\w+)", wanted))
+        return set(schema["$defs"][definition]["properties"])
+
+    assert [each for each in named if each.split(".")[1] not in known(each.split(".")[0])] == []
+
+
+def commands(page: Path) -> list[str]:
+    """The commands of er3a and make that a page names, within its text and in blocks of their own."""
+    lines = [
+        line.split("  #")[0].strip() for block in blocks(page, "", "console", "bash") for line in block.splitlines()
+    ]
+    own = [line.removeprefix(".venv/bin/") for line in lines]
+    return COMMAND.findall(prose(page)) + [line for line in own if line.startswith(("er3a ", "make "))]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_commands_of_documents_exist(page):
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+    known: Any = typer.main.get_command(app)
+    for command in commands(page):
+        program, verb, *words = shlex.split(command)
+        if program == "make":
+            assert verb in targets, command
+            assert_make_words(verb, words)
+            continue
+        assert verb in known.commands or verb.startswith("-"), command
+        parameters = known.commands[verb].params if verb in known.commands else known.params
+        options = {option for each in parameters for option in each.opts}
+        assert [word for word in words if word.startswith("--") and word.split("=")[0] not in options] == [], command
+
+
+def assert_make_words(target: str, words: list[str]) -> None:
+    """Variables are those of the Makefile, studies are files, and campaigns exist."""
+    for word in words:
+        name, _, value = word.partition("=")
+        assert name in {"STUDY", "ROBOT", "ARGS", "PYTHON"}, word
+        if name == "STUDY" and not PLACEHOLDERS & {value}:
+            assert (ROOT / value).is_file(), word
+        if target == "campaigns":
+            assert value in CAMPAIGNS, word
+
+
+def test_commands_that_need_no_study_run_as_they_stand_in_the_documents(tmp_path):
+    found = {command for page in PAGES for command in commands(page) if command.startswith("er3a ")}
+    lines = sorted((RUN.index(line.split()[1]), line) for line in found if line.split()[1] in RUN)
+    assert {RUN[place] for place, _ in lines} == set(RUN)
+    for _, line in lines:
+        words = [STANDS_FOR.get(word, word) for word in shlex.split(line)[1:]]
+        done = subprocess.run(
+            [sys.executable, "-m", "er3a", *words], cwd=tmp_path, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, (line, done.stderr)
+
+
+def test_links_between_documents_lead_somewhere():
+    broken = []
+    for page in PAGES:
+        for target in re.findall(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", prose(page)):
+            if not (page.parent / target).exists() and "generated/" not in target:
+                broken.append((name_of(page), target))
+    assert broken == []

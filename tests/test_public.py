@@ -1,0 +1,330 @@
+"""What ``import er3a`` gives: names that complete, refusals in words, objects that show themselves in a few lines."""
+
+from __future__ import annotations
+
+import ast
+import html.parser
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import er3a
+from er3a.calibration.measured import Measurement
+from er3a.collision.scene import Box, Plane, Scene
+from er3a.diagnosis.diagnose import diagnosis_of
+from er3a.display import Displayed, Sheet, as_html, as_text
+from er3a.files.reference_sets import load_references
+from er3a.kinematics import forward as forward_module
+from er3a.robots.robot import Robot
+from er3a.robots.usable import check_robot
+
+PACKAGE = Path(er3a.__file__).parent
+Q = np.radians([20, 10, 15, 30, 40, 50])
+MOST_LETTERS = 4000
+
+
+@pytest.fixture(scope="module")
+def arm() -> Robot:
+    return er3a.load_robot("er3_600")
+
+
+@pytest.fixture(scope="module")
+def pose(arm: Robot) -> np.ndarray:
+    return er3a.forward(arm, Q)
+
+
+# Calls with a robot and a pose: each public function that takes a robot, by its name.
+CALLS: dict[str, Callable[[Any, np.ndarray], Any]] = {
+    "forward": lambda robot, T: er3a.forward(robot, Q),
+    "jacobian": lambda robot, T: er3a.jacobian(robot, Q),
+    "inverse": lambda robot, T: er3a.inverse(robot, T),
+    "inverse_batch": lambda robot, T: er3a.inverse_batch(robot, T[None]),
+    "solve": lambda robot, T: er3a.solve(robot, T, restarts=0),
+    "select": lambda robot, T: er3a.select(robot, er3a.inverse(er3a.load_robot("er3_600"), T), "nearest", Q),
+    "select_sequence": lambda robot, T: er3a.select_sequence(robot, [er3a.inverse(er3a.load_robot("er3_600"), T)], Q),
+    "load_targets": lambda robot, T: er3a.load_targets("data/targets/er3_600.yaml", robot),
+    "diagnose": lambda robot, T: er3a.diagnose(robot, "er3_600"),
+    "calibrate": lambda robot, T: er3a.calibrate(robot, load_references("er3_600")),
+    "to_modified": lambda robot, T: er3a.to_modified(robot),
+    "to_standard": lambda robot, T: er3a.to_standard(robot),
+    "export_urdf": lambda robot, T: er3a.export_urdf(robot),
+}
+
+
+def with_entry(name: str, value: float, joint: int = 3) -> Callable[[Robot], Robot]:
+    """A robot with one entry changed."""
+
+    def change(robot: Robot) -> Robot:
+        column = getattr(robot, name).copy()
+        column[joint - 1] = value
+        return robot.replace(**{name: column})
+
+    return change
+
+
+def with_tool(change: Callable[[np.ndarray], None]) -> Callable[[Robot], Robot]:
+    """A robot with a changed tool."""
+
+    def tool(robot: Robot) -> Robot:
+        T = np.eye(4)
+        change(T)
+        return robot.replace(tool=T)
+
+    return tool
+
+
+def mirrored(T: np.ndarray) -> None:
+    T[0, 0] = -1.0
+
+
+def stretched(T: np.ndarray) -> None:
+    T[0, 0] = 1.01
+
+
+def holed(T: np.ndarray) -> None:
+    T[1, 3] = np.nan
+
+
+UNUSABLE: dict[str, tuple[Callable[[Robot], Any], str]] = {
+    "text": (lambda robot: "er3_600", "robot is the text 'er3_600'"),
+    "none": (lambda robot: None, "robot is None"),
+    "array": (lambda robot: np.eye(4), "robot is of type ndarray"),
+    "nan": (with_entry("a", np.nan), "a of joint 3 is nan"),
+    "infinite": (with_entry("alpha", np.inf), "alpha of joint 3 is inf"),
+    "endless limit": (with_entry("upper", np.inf), "upper of joint 3 is inf"),
+    "speed": (with_entry("speed", -1.0), "speed of joint 3 is -1"),
+    "mirrored tool": (with_tool(mirrored), "left-handed"),
+    "stretched tool": (with_tool(stretched), "not orthonormal"),
+    "tool with a hole": (with_tool(holed), "NaN or infinity"),
+}
+
+
+def refusal(call: Callable[[], Any]) -> str:
+    """The message of the error that a call must end with."""
+    with pytest.raises(er3a.Er3aError) as caught:
+        call()
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def test_calls_cover_every_public_function_that_takes_a_robot():
+    taking = {
+        name
+        for name in er3a.__all__
+        if not isinstance(getattr(er3a, name), type) and "robot" in getattr(er3a, name).__wrapped__.__annotations__
+    }
+    assert taking == set(CALLS)
+
+
+@pytest.mark.parametrize("unusable", UNUSABLE)
+@pytest.mark.parametrize("name", CALLS)
+def test_every_public_function_refuses_an_unusable_robot(arm, pose, name, unusable):
+    make, message = UNUSABLE[unusable]
+    assert message in refusal(lambda: CALLS[name](make(arm), pose))
+
+
+@pytest.mark.parametrize("name", sorted(set(CALLS) - {"diagnose"}))
+def test_crossed_limits_are_refused(arm, pose, name):
+    crossed = arm.replace(lower=arm.upper, upper=arm.lower)
+    assert "limits of joint 1 are crossed: lower 170 deg, upper -170 deg" in refusal(lambda: CALLS[name](crossed, pose))
+
+
+def test_crossed_limits_are_what_diagnosis_looks_for(arm):
+    crossed = arm.replace(lower=arm.upper, upper=arm.lower)
+    assert "wrong_limits" in repr(er3a.diagnose(crossed, "er3_600")[0])
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"convention": "craig"}, "convention is 'craig'; expected one of"),
+        ({"convention": None}, "convention is None"),
+        ({"direction": [1, 1, 2, 1, 1, 1]}, "direction of joint 3 is 2; expected 1 or -1"),
+        ({"direction": [1, 1, np.nan, 1, 1, 1]}, "direction of joint 3 is nan"),
+        ({"a": "0 1 2"}, "no real number"),
+        ({"a": np.zeros(5)}, r"a has shape (5,); expected (6,)"),
+        ({"tool": np.eye(3)}, r"tool has shape (3, 3); expected (4, 4)"),
+    ],
+)
+def test_a_robot_is_refused_where_no_source_could_print_it(arm, changes, message):
+    assert message in refusal(lambda: arm.replace(**changes))
+
+
+NO_POSE = {
+    "not orthonormal": (lambda T: T @ np.diag([1.001, 1, 1, 1]), "not orthonormal"),
+    "left-handed": (lambda T: T @ np.diag([-1.0, 1, 1, 1]), "left-handed"),
+    "shape": (lambda T: T[:3], "has shape"),
+    "NaN": (lambda T: np.where(np.arange(4) == 3, np.nan, T), "NaN or infinity"),
+    "text": (lambda T: "pose", "no real number"),
+    "none": (lambda T: None, "T "),
+    "mm": (lambda T: T + 1000 * np.eye(4, k=3), "divide it by 1000"),
+}
+
+
+@pytest.mark.parametrize("kind", NO_POSE)
+@pytest.mark.parametrize("name", ["inverse", "inverse_batch", "solve"])
+def test_a_matrix_that_is_no_pose_is_refused(arm, pose, name, kind):
+    make, message = NO_POSE[kind]
+    batch = [make(pose)] if name == "inverse_batch" and kind not in ("text", "none") else make(pose)
+    assert message in refusal(lambda: getattr(er3a, name)(arm, batch))
+
+
+def test_one_bad_pose_of_a_large_batch_is_named(arm, pose):
+    T = np.tile(pose, (5000, 1, 1))
+    T[4321, 0, 0] += 0.1
+    assert refusal(lambda: er3a.inverse_batch(arm, T)).startswith("T[4321] ")
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda arm, T: er3a.select(arm, T, "nearest", Q), "solutions is of type ndarray; expected a Solutions"),
+        (lambda arm, T: er3a.select(arm, er3a.inverse(arm, T), "nearest", Q, scene="wall"), "scene is the text 'wall'"),
+        (lambda arm, T: er3a.select(arm, er3a.inverse(arm, T), None, Q), "the rule is None"),
+        (lambda arm, T: er3a.select_sequence(arm, [T], Q), "poses[0] is of type ndarray"),
+        (lambda arm, T: er3a.select_sequence(arm, er3a.inverse(arm, T), Q), "poses is of type Solutions"),
+        (lambda arm, T: er3a.diagnose(arm, None), "references is None"),
+        (lambda arm, T: er3a.calibrate(arm, [1]), "measurements[0] is of type int; expected a Measurement"),
+        (lambda arm, T: er3a.load_robot(None), "name_or_path is None; expected a text or a path"),
+        (lambda arm, T: er3a.load_robot("er3"), "there is no robot 'er3'"),
+        (lambda arm, T: er3a.load_scene(3), "path is of type int"),
+        (lambda arm, T: er3a.load_targets(None, arm), "path is None"),
+        (lambda arm, T: er3a.load_measurements(None), "path is None"),
+        (lambda arm, T: er3a.load_references(None), "name_or_folder is None"),
+        (lambda arm, T: er3a.import_urdf(None), "path is None"),
+        (lambda arm, T: er3a.forward(arm, "abc"), "q holds something that is no real number"),
+        (lambda arm, T: er3a.forward(arm, None), "q has shape"),
+        (lambda arm, T: er3a.forward(arm, Q, frame="tool"), "frame is 'tool'"),
+        (lambda arm, T: er3a.forward(arm, Q, out=1), "out is of type int"),
+        (lambda arm, T: er3a.jacobian(arm, Q[:5]), "q has shape (5,)"),
+        (lambda arm, T: er3a.solve(arm, T, position_tolerance="fine"), "position_tolerance is 'fine'"),
+        (lambda arm, T: er3a.inverse_batch(arm, T[None], threads=0), "threads is 0"),
+        (lambda arm, T: er3a.inverse(arm, T, q_ref=Q * np.nan), "q_ref holds NaN"),
+        (lambda arm, T: Box("box", 2 * np.eye(4), np.ones(3)), "the place of 'box'"),
+        (lambda arm, T: Box("box", np.eye(4), np.zeros(3)), "'box' needs sizes above 0"),
+        (lambda arm, T: Plane("floor", np.array([0.0, 0.0, 2.0]), 0.0), "'floor' needs a normal of length 1"),
+    ],
+)
+def test_unusable_arguments_are_refused_by_name(arm, pose, call, message):
+    assert message in refusal(lambda: call(arm, pose))
+
+
+def test_positional_and_named_arguments_are_checked_alike(pose):
+    assert refusal(lambda: er3a.forward(robot="er3_600", q=Q)) == refusal(lambda: er3a.forward("er3_600", Q))
+
+
+def test_whether_a_robot_is_usable_is_found_out_once(arm, monkeypatch):
+    robot = arm.replace(title="asked twice")
+    check_robot(robot)
+    monkeypatch.setattr("er3a.robots.usable.check_poses", lambda *_: pytest.fail("asked again"))
+    check_robot(robot)
+
+
+def test_public_functions_give_what_those_of_the_library_give(arm):
+    assert (er3a.forward(arm, Q) == forward_module.forward(arm, Q)).all()
+    assert er3a.forward.__doc__ == forward_module.forward.__doc__
+    assert pickle.loads(pickle.dumps(er3a.forward)) is er3a.forward
+
+
+def test_names_complete_and_type_checkers_see_the_same():
+    assert set(dir(er3a)) == {*er3a.__all__, "__version__"}
+    assert (PACKAGE / "py.typed").is_file()
+    tree = ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8"))
+    (seen,) = (node for node in tree.body if isinstance(node, ast.If))
+    imported = {alias.asname: node.module for node in seen.body for alias in node.names}
+    assert imported == er3a._PUBLIC
+
+
+def test_an_unknown_name_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="has no attribute 'forwards'"):
+        er3a.forwards  # noqa: B018
+
+
+def shown_objects(arm: Robot, pose: np.ndarray) -> dict[str, Any]:
+    """Objects of every type that a user gets."""
+    far = pose.copy()
+    far[0, 3] = 9.0
+    solutions = er3a.inverse(arm, pose)
+    points = [Measurement(k, tuple(np.degrees(Q) + k), "flange", (None, 0.0, 1.0), 0.1) for k in range(5000)]
+    return {
+        "robot": arm,
+        "robot that can't be": arm.replace(a=np.full(6, np.nan)),
+        "solutions": solutions,
+        "self-motions": er3a.inverse(arm, er3a.forward(arm, np.zeros(6))),
+        "no solutions": er3a.inverse(arm, far),
+        "batch": er3a.inverse_batch(arm, np.tile(pose, (20_000, 1, 1))),
+        "search": er3a.solve(arm, np.tile(pose, (300, 1, 1))),
+        "failed search": er3a.solve(arm, far, restarts=1),
+        "ranking": er3a.select(arm, solutions, {"nearest": 1, "limits": 1}, Q),
+        "empty ranking": er3a.select(arm, er3a.inverse(arm, far), "nearest", Q),
+        "sequence": er3a.select_sequence(arm, [solutions] * 40, Q),
+        "hypotheses": er3a.diagnose(er3a.load_robot("er3a_c60_article"), "er3a_c60"),
+        "no hypotheses": er3a.diagnose(arm, "er3_600"),
+        "diagnosis": diagnosis_of(arm, load_references("er3_600")),
+        "calibration": er3a.calibrate(arm, load_references("er3_600")),
+        "references": er3a.load_references("er3_600"),
+        "scene": er3a.load_scene("data/scenes/table_and_post.yaml"),
+        "target": er3a.load_targets("data/targets/er3_600.yaml", arm)[0],
+        "measurement": points[0],
+        "empty scene": Scene("nothing"),
+    }
+
+
+class Cells(html.parser.HTMLParser):
+    """The numbers of cells in the rows of a table."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.rows: list[int] = []
+
+    def handle_starttag(self, tag: str, attrs: Any) -> None:
+        if tag == "tr":
+            self.rows.append(0)
+        elif tag in ("td", "th"):
+            self.rows[-1] += 1
+
+
+def test_objects_show_themselves_in_a_few_lines_and_as_tables(arm, pose):
+    for name, each in shown_objects(arm, pose).items():
+        text = repr(each)
+        assert len(text) < MOST_LETTERS, name
+        assert text.count("\n") < 40, name
+        assert str(each) == text
+        if isinstance(each, Displayed):
+            cells = Cells()
+            cells.feed(each._repr_html_())
+            assert len(set(cells.rows)) <= 1, name
+            assert len(each._repr_html_()) < 2 * MOST_LETTERS, name
+
+
+def test_a_robot_s_table_reads_as_its_file_does(arm):
+    rows = repr(arm).splitlines()
+    assert rows[1].split()[:4] == ["joint", "a_mm", "alpha_deg", "d_mm"]
+    assert rows[3].split()[:8] == ["2", "295", "0", "0", "-1", "-90", "-135", "85"]
+
+
+def test_solutions_name_branch_limits_and_the_reason_of_a_refusal(arm):
+    narrow = arm.replace(upper=np.where(np.arange(6) == 3, 0.2, arm.upper))
+    text = repr(er3a.inverse(narrow, er3a.forward(arm, Q)))
+    assert "front_elbow_up_no_flip" in text
+    assert "limit_exceeded (joint=4, side=above, angle_deg=30" in text
+
+
+def test_hypotheses_remain_a_list(arm):
+    assert er3a.diagnose(arm, "er3_600") == []
+
+
+def test_what_files_hold_is_escaped_in_tables(arm):
+    hostile = arm.replace(title="<script>alert(1)</script>\x1b[31m")
+    assert "<script>" not in hostile._repr_html_()
+    assert "\x1b" not in repr(hostile)
+
+
+def test_rows_left_out_are_counted():
+    sheet = Sheet("Heading", ("a", "b"), (("1", "22"), ("333", "4")), 7, ("a fact",))
+    assert as_text(sheet).splitlines() == ["Heading", "    a   b", "    1  22", "  333   4", "  ... 7 more", "  a fact"]
+    assert "<p>... 7 more</p>" in as_html(sheet)
