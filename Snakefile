@@ -33,5 +33,7 @@ onerror:
 
 onsuccess:
     print(
-        *told("note: "), f"\nOpen reports/index.html in a browser; `{view_command()}` opens the recordings.", sep="\n"
+        *told("note: "),
+        f"\nOpen reports/index.html in a browser; `{view_command()}` opens the recordings.",
+        sep="\n",
     )
