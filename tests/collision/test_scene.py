@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
+from er3a.collision.scene import Box, Cylinder, Plane, Sphere
 from er3a.errors import InputError
 from er3a.files.scene_file import load_scene
 from er3a.geometry.transforms import translation
@@ -27,19 +28,20 @@ def write(folder: Path, **shapes) -> Path:
 
 def test_shipped_scene_holds_one_of_each():
     scene = load_scene(SHIPPED)
-    assert [scene.boxes[0].name, scene.cylinders[0].name, scene.spheres[0].name, scene.planes[0].name] == [
-        "table",
-        "post",
-        "lamp",
-        "floor",
+    assert [(type(solid), solid.name) for solid in scene.solids] == [
+        (Box, "table"),
+        (Cylinder, "post"),
+        (Sphere, "lamp"),
+        (Plane, "floor"),
     ]
-    np.testing.assert_array_equal(scene.boxes[0].T, translation(0.5, 0, 0.08))
+    np.testing.assert_array_equal(scene.solids[0].T, translation(0.5, 0, 0.08))
 
 
 def test_normal_comes_at_unit_length(tmp_path):
     scene = load_scene(write(tmp_path, planes=[PLANE]))
-    np.testing.assert_array_equal(scene.planes[0].normal, [0, 0, 1])
-    assert scene.planes[0].offset == -0.0025
+    (plane,) = scene.solids
+    np.testing.assert_array_equal(plane.normal, [0, 0, 1])
+    assert plane.offset == -0.0025
 
 
 BAD = {
