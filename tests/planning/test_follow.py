@@ -60,7 +60,8 @@ def test_velocities_satisfy_the_jacobian_and_the_differences_of_the_angles(robot
     t, step = np.linspace(0.1, 0.9, 30), 1e-5
     q, v, a = followed.rates(t)
     before, after = followed.rates(t - step), followed.rates(t + step)
-    twist = way.twist * way.progress(t)[1][:, None]
+    progress, rate, _ = way.progress(t)
+    twist = way.twists(progress)[0] * rate[:, None]
     np.testing.assert_allclose(np.einsum("nij,nj->ni", jacobian(robot, q), v), twist, atol=1e-9)
     scale = np.abs(v).max()
     np.testing.assert_allclose((after[0] - before[0]) / (2 * step), v, atol=1e-6 * scale)
