@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import re
-import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -105,14 +104,15 @@ def evidence(root: Path = ROOT) -> tuple[Evidence, ...]:
 
 def papers_out_of_order(root: Path = ROOT) -> tuple[str, ...]:
     """What a release's papers say against each other."""
-    version = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+    version = re.findall(
+        r'^__version__ = "(.+)"$', (root / "er3a/version.py").read_text(encoding="utf-8"), re.MULTILINE
+    )[0]
     stated = {
-        "er3a/__init__.py": rf'^__version__ = "{re.escape(version)}"$',
         "CITATION.cff": rf"^version: {re.escape(version)}$",
         "CHANGELOG.md": rf"^## \[{re.escape(version)}\] - \d{{4}}-\d\d-\d\d$",
     }
     missing = [
-        f"{file} does not name version {version} of pyproject.toml"
+        f"{file} does not name version {version} of er3a/version.py"
         for file, line in stated.items()
         if not re.search(line, (root / file).read_text(encoding="utf-8"), re.MULTILINE)
     ]

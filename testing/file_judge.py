@@ -219,11 +219,10 @@ def _differing_solids(scene: Scene, written: dict[str, yaml.Node]) -> list[str]:
             found += [getattr(solid, name) - numbers[f"{name}_mm"] / 1000 for name in lengths]
         return max(np.abs(difference).max() for difference in found)
 
+    nodes = [node for shape in SHAPES if shape in written for node in written[shape].value]
     return [
         f"{solid.name}: differs from the written solid"
-        for shape in SHAPES
-        if shape in written
-        for solid, node in zip(getattr(scene, shape), written[shape].value, strict=True)
+        for solid, node in zip(scene.solids, nodes, strict=True)
         if worst(solid, {key.value: value for key, value in node.value}) > 1e-9
     ]
 

@@ -14,7 +14,7 @@ from er3a.pipeline.results import FORMAT_VERSION
 from testing.evidence import CAMPAIGNS, ROOT, code_line, digest, evidence, files_of, main, papers_out_of_order
 
 COPIED = ("er3a", "testing", "benchmarks", "docs")
-PAPERS = ("pyproject.toml", "CITATION.cff", "CHANGELOG.md")
+PAPERS = ("CITATION.cff", "CHANGELOG.md")
 
 
 @pytest.fixture

@@ -48,6 +48,7 @@ CALLS: dict[str, Callable[[Any, np.ndarray], Any]] = {
     "select_sequence": lambda robot, T: er3a.select_sequence(robot, [er3a.inverse(er3a.load_robot("er3_600"), T)], Q),
     "load_targets": lambda robot, T: er3a.load_targets("data/targets/er3_600.yaml", robot),
     "diagnose": lambda robot, T: er3a.diagnose(robot, "er3_600"),
+    "evidence": lambda robot, T: er3a.evidence(robot, "er3_600"),
     "calibrate": lambda robot, T: er3a.calibrate(robot, load_references("er3_600")),
     "to_modified": lambda robot, T: er3a.to_modified(robot),
     "to_standard": lambda robot, T: er3a.to_standard(robot),
@@ -270,7 +271,7 @@ def shown_objects(arm: Robot, pose: np.ndarray) -> dict[str, Any]:
         "scene": er3a.load_scene("data/scenes/table_and_post.yaml"),
         "target": er3a.load_targets("data/targets/er3_600.yaml", arm)[0],
         "measurement": points[0],
-        "empty scene": Scene("nothing"),
+        "empty scene": Scene("nothing", ()),
     }
 
 

@@ -34,7 +34,7 @@ DEEPEST = 4.0
 NEAR_NULL = 1e-4
 
 
-class Memory(NamedTuple):
+class LoopMemory(NamedTuple):
     """Scratch memory of one thread."""
 
     elimination: Scratch
@@ -55,9 +55,9 @@ class Memory(NamedTuple):
     sliding: Flags
 
 
-def new_memory(sliding: Flags) -> Memory:
+def new_memory(sliding: Flags) -> LoopMemory:
     """Memory for one thread; ``sliding`` (6,) tells prismatic joints."""
-    return Memory(
+    return LoopMemory(
         elimination=new_scratch(),
         found=np.zeros((MOST_ZEROS, 3)),
         zeros=np.zeros((MOST_ZEROS, 3)),
@@ -78,7 +78,7 @@ def new_memory(sliding: Flags) -> Memory:
 
 
 @kernel
-def hidden_angles(e: Scratch, level: float, m: Memory) -> int:
+def hidden_angles(e: Scratch, level: float, m: LoopMemory) -> int:
     """Fill ``m.zeros`` (48, 3) with the hidden joint's possible angles, column 2 is 0 where it is not one clear zero.
 
     Dark intervals are sampled anew by determinants on them alone, whose rounding is that of their own size.
@@ -134,7 +134,7 @@ def hidden_angles(e: Scratch, level: float, m: Memory) -> int:
 
 
 @kernel
-def pairs_at(e: Scratch, angle: float, slides: Flags, m: Memory) -> int:
+def pairs_at(e: Scratch, angle: float, slides: Flags, m: LoopMemory) -> int:
     """Angles of joints 4 and 5 at a zero, into ``m.pairs``: from null vectors of the nine equations."""
     at_angle(e.equations, angle, m.F)
     nine_rows(m.F, m.M)
@@ -269,7 +269,7 @@ def _pencil(Y: Reals, step: int, slides: Flags, pairs: Reals, count: int) -> int
 
 
 @kernel
-def remaining_joints(reading: Reading, e: Scratch, m: Memory) -> int:
+def remaining_joints(reading: Reading, e: Scratch, m: LoopMemory) -> int:
     """Joints 1, 2 and 6 for joints 3, 4, 5 in ``m.x[0]``; two rows of ``m.x`` where the first is not told by one."""
     x = m.x[0]
     half_4, half_5 = 0.5 * (x[3] - SHIFT_4), 0.5 * (x[4] - SHIFT_5)

@@ -17,7 +17,7 @@ import numpy as np
 
 from er3a.kinematics.classes.hidden_joint import Reading, equations_of_pose, readings_of, sampled_determinant
 from er3a.kinematics.classes.links import inverse_rigid, invert_rigid, multiply_rigid, poses_of, size_of
-from er3a.kinematics.classes.loop_rows import Memory, hidden_angles, new_memory, pairs_at, remaining_joints
+from er3a.kinematics.classes.loop_rows import LoopMemory, hidden_angles, new_memory, pairs_at, remaining_joints
 from er3a.kinematics.classes.polish import SOLVES, newton, residual_and_jacobian, twin_start
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
@@ -85,7 +85,7 @@ def prepared(links: Reals, sliding: Flags | None = None, seed: int = 7) -> SixRe
     return SixRevolute(scaled, size, sliding, tuple(entry[5] for entry in ranked if entry[3] < 0))
 
 
-def _trial(reading: Reading, links: Reals, T: Reals, memory: Memory) -> float:
+def _trial(reading: Reading, links: Reals, T: Reals, memory: LoopMemory) -> float:
     """Share of poses in which this reading has a clear polynomial without dark places."""
     good = 0.0
     for pose in T:
@@ -122,7 +122,7 @@ def rows_by_reading(
     size: float,
     T: Reals,
     numbers: Integers,
-    m: Memory,
+    m: LoopMemory,
     q: Reals,
     count: Integers,
     verdicts: Integers,
@@ -156,7 +156,7 @@ def _in_order(q: Reals, count: Integers) -> None:
 
 @kernel
 def _by_reading(
-    reading: Reading, links: Reals, pose: Reals, pose_link: Reals, m: Memory, q: Reals, rows: int
+    reading: Reading, links: Reals, pose: Reals, pose_link: Reals, m: LoopMemory, q: Reals, rows: int
 ) -> tuple[int, int]:
     """Add the solutions that one reading of the loop finds; returns its verdict and how many rows there are."""
     e = m.elimination
@@ -204,7 +204,7 @@ def _by_reading(
 
 
 @kernel
-def _add(links: Reals, pose: Reals, m: Memory, found: Reals, q: Reals, rows: int) -> int:
+def _add(links: Reals, pose: Reals, m: LoopMemory, found: Reals, q: Reals, rows: int) -> int:
     """Add a row unless it stands there."""
     for k in range(6):
         if not m.sliding[k]:
