@@ -25,8 +25,8 @@ const IDENTITY = translation(0, 0, 0);
  * precedes joint 1 (base not included), entry k what follows the rotation of joint k.
  */
 export function linkParts(table) {
-  const parts = Array.from({ length: 7 }, () => ({ along: IDENTITY, across: IDENTITY }));
-  for (const k of JOINTS) {
+  const parts = Array.from({ length: table.a.length + 1 }, () => ({ along: IDENTITY, across: IDENTITY }));
+  for (const k of table.a.keys()) {
     const turn = multiply(rotX(table.alpha[k]), rotY(table.beta[k]));
     parts[k + 1].along = translation(0, 0, table.d[k]);
     parts[table.convention === "standard" ? k + 1 : k].across = multiply(translation(table.a[k], 0, 0), turn);

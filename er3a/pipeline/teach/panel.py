@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import json
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +17,13 @@ from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import Provenance, input_records
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.study import Study
+from er3a.pipeline.teach.scripts import import_map
 from er3a.pipeline.teach.words import WORDS
 from er3a.pipeline.viewing.page import render, run_command
 from er3a.pipeline.viewing.palette import BODY, INK, JOINT_NAMES, JOINTS, LINK
 from er3a.robots.robot import Robot
 
 _HERE = Path(__file__).parent
-MODULES = tuple(sorted(path.stem for path in _HERE.glob("*.js")))
 TABLE = ("a", "alpha", "d", "beta", "direction", "offset", "lower", "upper", "base", "tool")
 NEAR_LIMIT = np.radians(5.0)
 NEAR_SINGULAR = 1e-2  # smallest singular value below which an arm without named singularities is warned of one
@@ -51,7 +49,7 @@ def write_teach_page(study: Study, name: str, output: Path) -> None:
         degrees=float(np.degrees(1.0)),
         words=panel["words"],
         panel=panel,
-        modules=json.dumps({"imports": {f"er3a/{module}": _module(module) for module in MODULES}}),
+        modules=import_map(sorted(_HERE.glob("*.js"))),
         command=run_command(study, f"{name}/teach.html"),
         provenance=Provenance(
             inputs=input_records(study.inputs(name, "teach")),
@@ -88,9 +86,3 @@ def _translated(words: Any) -> Any:
     if isinstance(words, dict):
         return {key: _translated(word) for key, word in words.items()}
     return [_translated(word) for word in words] if isinstance(words, list) else tr(words)
-
-
-def _module(name: str) -> str:
-    """A script as an address of its own, so that the scripts of one file can import each other."""
-    source = (_HERE / f"{name}.js").read_bytes()
-    return "data:text/javascript;base64," + base64.b64encode(source).decode("ascii")

@@ -1,15 +1,15 @@
 /**
  * The arm's shapes, made from its table as recordings make them: rods along the links, drums on the joints' axes.
  *
- * A solid is `{frame, before, points, faces}`: it moves with `frame` (0 the base, k the frame that joint k turns, 7 the
- * tool) and is painted as if it were nearer by `before` (m), so that a drum hides the rod in it. A face is
+ * A solid is `{frame, before, points, faces}`: it moves with `frame` (0 the base, k the frame that joint k moves, the
+ * last the tool) and is painted as if it were nearer by `before` (m), so that a drum hides the rod in it. A face is
  * `{corners, colour}`, the corners (indices of points) counter-clockwise as seen from outside.
  */
 
 import { add, beside, column, cross, moved, norm, scaled, subtract, turnedBack, unit } from "er3a/algebra";
-import { JOINTS, linkParts } from "er3a/kinematics";
+import { linkParts } from "er3a/kinematics";
 
-const TAPER = [1.0, 0.92, 0.8, 0.66, 0.55, 0.45]; // how much thinner the arm is at each joint
+const TAPER = [1.0, 0.92, 0.8, 0.66, 0.55, 0.45]; // how much thinner the arm is at each joint; the last for all behind
 const THICKNESS = 0.046; // radius of the first joint's rods, in parts of the arm's size
 const ROD_SIDES = 14;
 const DRUM_SIDES = 22;
@@ -22,33 +22,36 @@ export function armSolids(table, size, colours) {
   const body = { colour: colours.body, sides: ROD_SIDES };
   const link = { colour: colours.link, sides: ROD_SIDES };
   const origin = [0, 0, 0];
+  const last = parts.length;
   const solids = [
     rod(0, origin, [0, 0, 0.9 * thickest], 2.3 * thickest, { ...body, sides: DRUM_SIDES }),
     rod(0, origin, column(parts[0].across, 3), 0.75 * thickest, body),
   ];
   drums(table, size).forEach(({ middle, half }, k) => {
-    const radius = thickest * TAPER[k];
+    const radius = thickest * taper(k);
     const along = column(parts[k + 1].along, 3);
     const corner = moved(parts[k + 1].along, column(parts[k + 1].across, 3));
     const ends = [[0, 0, -half], [0, 0, half]].map((end) => add(middle, end));
-    const drum = { colour: colours.joints[k], sides: DRUM_SIDES, mark: colours.mark, before: radius };
+    const drum = { colour: colours.joints[k % colours.joints.length], sides: DRUM_SIDES, mark: colours.mark, before: radius };
     solids.push(rod(k + 1, origin, along, 0.75 * radius, link), rod(k + 1, along, corner, 0.75 * radius, link));
     solids.push(rod(k + 1, ...ends, radius, drum));
   });
   const thin = 0.3 * thickest;
-  solids.push(rod(7, scaled(turnedBack(table.tool, column(table.tool, 3)), -1), origin, thin, body));
-  solids.push(rod(7, [0, 0, -0.25 * thin], [0, 0, 0.25 * thin], 2 * thin, { ...body, sides: DRUM_SIDES }));
+  solids.push(rod(last, scaled(turnedBack(table.tool, column(table.tool, 3)), -1), origin, thin, body));
+  solids.push(rod(last, [0, 0, -0.25 * thin], [0, 0, 0.25 * thin], 2 * thin, { ...body, sides: DRUM_SIDES }));
   return solids.filter(Boolean);
 }
 
 /** Middles (m, in the frame that the joint turns) of the joints' drums, and their half length. */
 export function drums(table, size) {
   const parts = linkParts(table);
-  return JOINTS.map((k) => ({
-    middle: scaled(column(parts[k + 1].along, 3), 0.5),
-    half: 1.3 * THICKNESS * size * TAPER[k],
+  return parts.slice(1).map(({ along }, k) => ({
+    middle: scaled(column(along, 3), 0.5),
+    half: 1.3 * THICKNESS * size * taper(k),
   }));
 }
+
+const taper = (k) => TAPER[Math.min(k, TAPER.length - 1)];
 
 /**
  * A rod with flat ends, cut into rings about as long as they are thick so that they sort well by distance; null where
@@ -82,4 +85,60 @@ function rod(frame, start, end, radius, { colour, sides, mark = colour, before =
   faces.push({ corners: [...ends].reverse(), colour });
   faces.push({ corners: ends.map((i) => rings * sides + i), colour });
   return { frame, before, points, faces };
+}
+
+const BOX_CORNERS = [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
+const PIECES = 6; // of a box's edge, so that its faces sort well by distance
+const BELTS = 10; // of a ball, from pole to pole
+
+/** What stands around an arm: `{kind, T, size | radius, length, colour}`, m; all in frame 0. */
+export function sceneSolids(things) {
+  const made = { box, cylinder, sphere };
+  return things.map((thing) => placed(made[thing.kind](thing), thing.T));
+}
+
+function placed(solid, T) {
+  return { ...solid, frame: 0, points: solid.points.map((point) => moved(T, point)) };
+}
+
+function box({ size, colour }) {
+  const half = scaled(size, 0.5);
+  const at = (i) => [[-1, 1, 1, -1][i % 4], [-1, -1, 1, 1][i % 4], i < 4 ? -1 : 1].map((sign, k) => sign * half[k]);
+  const points = [];
+  const faces = [];
+  for (const [a, b, c, d] of BOX_CORNERS.map((corners) => corners.map(at))) {
+    const first = points.length;
+    for (let i = 0; i <= PIECES; i++) {
+      for (let j = 0; j <= PIECES; j++) {
+        const [u, v] = [i / PIECES, j / PIECES];
+        const edge = (p, q) => add(scaled(p, 1 - u), scaled(q, u));
+        points.push(add(scaled(edge(a, b), 1 - v), scaled(edge(d, c), v)));
+        if (i === 0 || j === 0) continue;
+        const corner = (k, l) => first + (i - k) * (PIECES + 1) + (j - l);
+        faces.push({ corners: [corner(1, 1), corner(0, 1), corner(0, 0), corner(1, 0)], colour });
+      }
+    }
+  }
+  return { before: 0, points, faces };
+}
+
+function cylinder({ radius, length, colour }) {
+  return rod(0, [0, 0, -length / 2], [0, 0, length / 2], radius, { colour, sides: DRUM_SIDES });
+}
+
+function sphere({ radius, colour }) {
+  const sides = 2 * BELTS;
+  const points = [];
+  const faces = [];
+  for (let belt = 0; belt <= BELTS; belt++) {
+    const [c, s] = [Math.cos((Math.PI * belt) / BELTS), Math.sin((Math.PI * belt) / BELTS)];
+    for (let i = 0; i < sides; i++) {
+      const angle = (2 * Math.PI * i) / sides;
+      points.push([radius * s * Math.cos(angle), radius * s * Math.sin(angle), -radius * c]);
+      const [a, b] = [(belt - 1) * sides + i, (belt - 1) * sides + ((i + 1) % sides)];
+      if (belt === 1) faces.push({ corners: [a, b + sides, a + sides], colour });
+      else if (belt > 1) faces.push({ corners: [a, b, b + sides, a + sides], colour });
+    }
+  }
+  return { before: 0, points, faces };
 }

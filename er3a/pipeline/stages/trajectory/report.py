@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
@@ -20,6 +22,7 @@ from er3a.pipeline.messages.trajectory import (
     strategy_word,
     type_word,
 )
+from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, moment, player, player_style
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.trajectory.clearance_figures import clearance_section
 from er3a.pipeline.stages.trajectory.model import (
@@ -29,7 +32,9 @@ from er3a.pipeline.stages.trajectory.model import (
     PathSummary,
     Singularity,
     StrategyMotion,
+    Stretch,
     TrajectoryResults,
+    TrajectorySummary,
     TriedStrategy,
 )
 from er3a.pipeline.stages.trajectory.path_figure_3d import turning_figure
@@ -53,12 +58,13 @@ STATUS: dict[PathVerdict, str] = {
 
 @dataclass(frozen=True)
 class PathDrawing:
-    """A drawn image for the ``picture`` macro: its data address, what it shows, what to conclude, its width."""
+    """A drawn image: address, what it shows, what to conclude, width in inches, and where its curves over time are."""
 
     uri: str
     alt: str
     caption: str
     inches: float
+    panels: list[list[float]]
 
 
 @dataclass(frozen=True)
@@ -83,6 +89,7 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
     """Write the trajectory page of a robot."""
     robot, results = study.robot(stored.robot), stored.results
     summary, checks, motions = results.summary, results.checks, results.avoidance
+    scene = study.scene(stored.robot, stored.stage)
     figure, sections = PathFigure(), []
     for path in summary.paths:
         rows, own = checks.take(checks.path == path.name), motions.take(motions.path == path.name)
@@ -100,7 +107,23 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
         clearance=clearance_section(results),
         assumed=assumed,
         turning=turning_figure(robot, results),
+        player=player(robot, _motions(summary, checks), scene and load_scene(scene)),
+        player_style=player_style(),
     )
+
+
+def _motions(summary: TrajectorySummary, checks: PathChecks) -> list[PlayedMotion]:
+    """The paths as programmed, as far as the arm reaches them."""
+    motions = []
+    for path in summary.paths:
+        rows = checks.take((checks.path == path.name) & checks.reachable)
+        motions.append(PlayedMotion(path.name, path_text(path), rows.t_s, np.radians(rows.q_deg), _events(path)))
+    return motions
+
+
+def _events(path: PathSummary) -> list[PlayedEvent]:
+    passes = [PlayedEvent(e.t_s, e.until_s, _singular(e), "caution") for e in path.singularities]
+    return passes + [PlayedEvent(s.t0_s, s.t1_s, word, "fail") for word, stretches in _kinds(path) for s in stretches]
 
 
 def _section(path: PathSummary, rows: PathChecks, figure: PathDrawing) -> PathSection:
@@ -113,7 +136,7 @@ def _section(path: PathSummary, rows: PathChecks, figure: PathDrawing) -> PathSe
         advice=advice(path),
         branches=[branch_word(label) for label in path.branches],
         speed=_speed(path),
-        events=[_event_row(event) for event in path.singularities],
+        events=[_event_row(path.name, event) for event in path.singularities],
         faults=_faults(path),
         strategies=_strategies(path),
         figure=figure,
@@ -130,7 +153,7 @@ def _figure(
         finding=path_text(path),
     )
     uri = figure.draw(robot, path, _drawn(path, rows), motions, near)
-    return PathDrawing(uri, alt, _conclusion(path, rows), float(figure.figure.get_figwidth()))
+    return PathDrawing(uri, alt, _conclusion(path, rows), float(figure.figure.get_figwidth()), figure.panels())
 
 
 def _drawn(path: PathSummary, rows: PathChecks) -> PathChecks:
@@ -142,23 +165,31 @@ def _drawn(path: PathSummary, rows: PathChecks) -> PathChecks:
     return rows.take(np.unique(np.concatenate([even, events, fast]).astype(int)))
 
 
-def _faults(path: PathSummary) -> list[list[str]]:
-    kinds = (
+def _singular(event: Singularity) -> str:
+    word = type_word(event.type)
+    return tr("singular: {type}", type=word) if event.crossing else tr("near-singular: {type}", type=word)
+
+
+def _kinds(path: PathSummary) -> tuple[tuple[str, tuple[Stretch[Any], ...]], ...]:
+    return (
         (tr("not reachable"), path.unreachable),
         (tr("outside limits"), path.out_of_limits),
         (tr("too fast"), path.too_fast),
         (tr("collision"), path.collisions),
     )
+
+
+def _faults(path: PathSummary) -> list[list[str]]:
     return [
         [
             word,
-            fixed(part.t0_s, 3),
-            fixed(part.t1_s, 3),
+            moment(path.name, part.t0_s, fixed(part.t0_s, 3)),
+            moment(path.name, part.t1_s, fixed(part.t1_s, 3)),
             fixed(part.s0_m * 1000, 1),
             fixed(part.s1_m * 1000, 1),
             say(part.cause),
         ]
-        for word, stretches in kinds
+        for word, stretches in _kinds(path)
         for part in stretches
     ]
 
@@ -240,10 +271,9 @@ def _speed(path: PathSummary) -> str:
     return f"{number(path.max_joint_speed_deg_s[joint], 3)} (J{joint + 1})"
 
 
-def _event_row(event: Singularity) -> list[str]:
-    when = fixed(event.t_s, 6)
-    if event.until_s > event.t_s:
-        when += f" – {fixed(event.until_s, 6)}"
+def _event_row(path: str, event: Singularity) -> list[str]:
+    until = f" – {fixed(event.until_s, 6)}" if event.until_s > event.t_s else ""
+    when = moment(path, event.t_s, fixed(event.t_s, 6) + until)
     if event.crossing:
         return [type_word(event.type), when, tr("meets it"), "0"]
     distance, unit = (event.distance_deg, "deg") if event.distance_mm is None else (event.distance_mm, "mm")

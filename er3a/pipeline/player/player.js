@@ -1,0 +1,201 @@
+/**
+ * Plays motions of an arm on a page: a time bar, play and step, events, and a cursor in every plot over time.
+ *
+ * Poses come with the page, so nothing is computed here but what lies between two of them. Any element of the page may
+ * have `data-play="MOTION"` and `data-t="SECONDS"`: it then leads to that moment. A plot is a figure with
+ * `data-play="MOTION"` and `data-panels`, a list of `[left, bottom, right, top, t0, t1]` in parts of its picture.
+ */
+
+import { add, column, scaled } from "er3a/algebra";
+import { Orbit } from "er3a/orbit";
+import { decodePoses, poseBetween } from "er3a/poses";
+import { eyeOf, Picture } from "er3a/scene";
+import { armSolids, sceneSolids } from "er3a/solids";
+
+const place = document.getElementById("player");
+const data = JSON.parse(document.getElementById("player-data").textContent);
+const { words, table } = data;
+const part = (name) => place.querySelector(`.${name}`);
+const [canvas, chooser, bar, clock, told] = ["arm", "motion", "time", "clock", "told"].map(part);
+const motions = new Map(data.motions.map((motion) => [motion.name, prepared(motion)]));
+const solids = armSolids(table, data.size, data.colours);
+const surroundings = sceneSolids(data.scene);
+const picture = new Picture(canvas);
+const floor = data.floor ?? column(table.base, 3)[2];
+
+let motion = motions.values().next().value;
+let t = 0;
+let playing = false;
+let last = 0;
+let awaited = false;
+
+const orbit = new Orbit(canvas, data.target, 0.75 * data.size, refresh);
+const plots = [...document.querySelectorAll("figure[data-panels]")].map(withCursors);
+
+function prepared(motion) {
+  return { ...motion, poses: decodePoses(motion.poses, motion.times.length, table.a.length + 1) };
+}
+
+const start = () => motion.times[0];
+const end = () => motion.times.at(-1);
+const fixed = (value) => value.toFixed(3).replace("-", "−");
+
+/** Shows a moment of a motion; `name` is that of the motion, null for the one that is shown. */
+export function goTo(name, time) {
+  if (name !== null && motions.has(name)) motion = motions.get(name);
+  t = Math.min(end(), Math.max(start(), time));
+  refresh();
+}
+
+function play(on) {
+  if (on && t >= end()) t = start();
+  playing = on;
+  part("play").textContent = on ? words.pause : words.play;
+  last = performance.now();
+  refresh();
+}
+
+function refresh() {
+  if (!awaited) requestAnimationFrame(frame);
+  awaited = true;
+}
+
+function frame(now) {
+  awaited = false;
+  if (playing) {
+    t += ((now - last) / 1000) * Number(part("speed").value);
+    last = now;
+    if (t >= end()) {
+      t = end();
+      play(false);
+    }
+  }
+  draw();
+  tell();
+  if (playing) refresh();
+}
+
+function draw() {
+  const poses = [table.base, ...poseBetween(motion.times, motion.poses, t)];
+  const { page } = orbit;
+  picture.fit();
+  picture.begin(eyeOf(orbit));
+  picture.floor(column(table.base, 3), data.size / 10, floor, page.grid);
+  picture.shadow(solids, poses, floor, page.grid);
+  picture.solids([{ solids: surroundings, poses: [table.base], ghost: false }, { solids, poses, ghost: false }]);
+  picture.line(motion.trail, page.ink, 1.5);
+  for (const { from, to, text, t0, t1 } of motion.marks ?? []) {
+    if (t < t0 || t > t1) continue;
+    picture.line([from, to], data.colours.mark, 3);
+    picture.word(text, scaled(add(from, to), 0.5), page.ink, page.halo);
+  }
+  toolFrame(poses.at(-1));
+}
+
+function toolFrame(T) {
+  const origin = column(T, 3);
+  for (const c of [0, 1, 2]) picture.line([origin, add(origin, scaled(column(T, c), 0.09 * data.size))], data.axes[c], 2.5);
+}
+
+/** Time bar, clock, events and the cursors of the plots. */
+function tell() {
+  if (bar.dataset.motion !== motion.name) newMotion();
+  bar.value = String(t);
+  bar.setAttribute("aria-valuetext", `${fixed(t)} s`);
+  clock.textContent = words.clock.replace("{t}", fixed(t)).replace("{end}", fixed(end()));
+  const near = motion.events.filter((event) => t >= event.t - 1e-9 && t <= event.until + 1e-9);
+  const text = near.map((event) => event.text).join("; ") || motion.text;
+  if (told.textContent !== text) told.textContent = text;
+  for (const plot of plots) plot(motion.name, t);
+}
+
+function newMotion() {
+  bar.dataset.motion = chooser.value = motion.name;
+  Object.assign(bar, { min: String(start()), max: String(end()), step: "any" });
+  const ticks = motion.events.map((event) => {
+    const tick = document.createElement("button");
+    const at = (value) => (100 * (value - start())) / (end() - start() || 1);
+    Object.assign(tick, { type: "button", className: `tick ${event.status}`, title: event.text, tabIndex: -1 });
+    tick.style.left = `${at(event.t)}%`;
+    tick.style.width = `${Math.max(0, at(event.until) - at(event.t))}%`;
+    tick.addEventListener("click", () => goTo(null, event.t));
+    return tick;
+  });
+  part("ticks").replaceChildren(...ticks);
+}
+
+/** Lays a cursor over each panel of a plot; returns what moves them. */
+function withCursors(figure) {
+  const name = figure.dataset.play;
+  const image = figure.querySelector("img");
+  const panels = JSON.parse(figure.dataset.panels).map(([left, bottom, right, top, t0, t1]) => {
+    const cursor = document.createElement("span");
+    cursor.className = "cursor";
+    figure.append(cursor);
+    return { left, bottom, right, top, t0, t1, cursor };
+  });
+  /** The picture's own edge in the figure: its place less border and padding. */
+  const inner = () => {
+    const style = getComputedStyle(image);
+    const edge = parseFloat(style.paddingLeft) + parseFloat(style.borderLeftWidth);
+    const [x, y] = [image.offsetLeft + edge, image.offsetTop + edge];
+    return { x, y, width: image.offsetWidth - 2 * edge, height: image.offsetHeight - 2 * edge };
+  };
+  image.addEventListener("click", (event) => {
+    const { width, height } = inner();
+    const edge = (image.offsetWidth - width) / 2;
+    const [u, v] = [(event.offsetX - edge) / width, 1 - (event.offsetY - edge) / height];
+    const panel = panels.find(({ left, right, bottom, top }) => u >= left && u <= right && v >= bottom && v <= top);
+    if (!panel) return;
+    goTo(name, panel.t0 + ((u - panel.left) / (panel.right - panel.left)) * (panel.t1 - panel.t0));
+    dock();
+  });
+  return (shown, time) => {
+    const { x, y, width, height } = inner();
+    for (const { left, right, bottom, top, t0, t1, cursor } of panels) {
+      cursor.hidden = shown !== name || time < t0 || time > t1;
+      const u = left + ((time - t0) / (t1 - t0 || 1)) * (right - left);
+      cursor.style.left = `${x + u * width}px`;
+      cursor.style.top = `${y + (1 - top) * height}px`;
+      cursor.style.height = `${(top - bottom) * height}px`;
+    }
+  };
+}
+
+/** Keeps the player in sight beside what the reader points at. */
+function dock() {
+  const { top, bottom } = place.getBoundingClientRect();
+  place.style.minHeight = `${bottom - top}px`; // the page stays as it is when the player leaves its place
+  place.classList.toggle("docked", bottom < 80 || top > innerHeight - 80);
+  refresh();
+}
+
+const step = (sign) => {
+  const i = motion.times.findIndex((time) => time > t + 1e-9);
+  const before = motion.times.findLastIndex((time) => time < t - 1e-9);
+  play(false);
+  goTo(null, motion.times[sign > 0 ? (i < 0 ? motion.times.length - 1 : i) : Math.max(0, before)]);
+};
+const nextEvent = () => {
+  const event = motion.events.find((each) => each.t > t + 1e-6) ?? motion.events[0];
+  if (event) goTo(null, event.t);
+};
+
+part("play").addEventListener("click", () => play(!playing));
+part("back").addEventListener("click", () => step(-1));
+part("forward").addEventListener("click", () => step(1));
+part("next").addEventListener("click", nextEvent);
+part("undock").addEventListener("click", () => place.classList.remove("docked"));
+chooser.addEventListener("change", () => goTo(chooser.value, motions.get(chooser.value).times[0]));
+bar.addEventListener("input", () => goTo(null, Number(bar.value)));
+for (const link of document.querySelectorAll("[data-t]")) {
+  link.addEventListener("click", (event) => {
+    event.preventDefault();
+    goTo(link.dataset.play, Number(link.dataset.t));
+    dock();
+  });
+}
+addEventListener("resize", refresh);
+part("controls").hidden = false;
+refresh();
+performance.mark("player");

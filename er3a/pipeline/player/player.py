@@ -1,0 +1,175 @@
+"""What a page's player is given: an arm, what stands around it, and its motions as poses that are only drawn."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+from markupsafe import Markup
+from scipy.spatial.transform import Rotation
+
+from er3a.collision.scene import Box, Cylinder, Plane, Scene, Sphere
+from er3a.kinematics.forward import frames
+from er3a.numerics.arrays import Reals
+from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.teach.scripts import TEACH, import_map
+from er3a.pipeline.viewing.arm import size_of
+from er3a.pipeline.viewing.palette import BODY, INK, JOINTS, LINK
+from er3a.robots.robot import Robot
+
+_HERE = Path(__file__).parent
+MOST_FRAMES = 240
+TRAIL_POINTS = 200
+SCENE_COLOUR = "#b9a78f"
+AXES = ("#b42318", "#18794e", "#0b5c94")
+LEVEL = 1e-6  # by which a plane's normal may differ from the vertical to be drawn as the floor
+WORDS = {
+    "player": N_("The motions, played"),
+    "motion": N_("motion"),
+    "play": N_("Play"),
+    "pause": N_("Pause"),
+    "back": N_("one step back"),
+    "forward": N_("one step forward"),
+    "next": N_("Next event"),
+    "speed": N_("speed ×"),
+    "time": N_("time of the motion"),
+    "clock": N_("t = {t} s of {end} s"),
+    "undock": N_("put the player back in its place"),
+    "picture": N_("The arm on its path. Drag or use the arrow keys to turn the picture, + and − to zoom."),
+    "help": N_(
+        "Drag to turn, wheel or + and − to zoom. A click into a plot or on a time leads to that moment; coloured marks "
+        "on the time bar are events."
+    ),
+    "no_script": N_("The player needs scripts; the recording of this stage shows the same in the Rerun viewer."),
+}
+
+
+@dataclass(frozen=True)
+class PlayedEvent:
+    """Something to be seen at ``t`` (s), until ``until``; ``status`` (``caution`` or ``fail``) colours it."""
+
+    t: float
+    until: float
+    text: str
+    status: str
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A line between two points (m), with a word, shown from ``t0`` to ``t1`` (s)."""
+
+    t0: float
+    t1: float
+    start: tuple[float, float, float]
+    end: tuple[float, float, float]
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class PlayedMotion:
+    """A motion of the arm.
+
+    Attributes
+    ----------
+    name, text : what it is called, and what is said of it where no event is near
+    t : (N,), s, rising; q : (N, n), joint coordinates, finite
+    """
+
+    name: str
+    text: str
+    t: Reals
+    q: Reals
+    events: Sequence[PlayedEvent] = ()
+    marks: Sequence[Mark] = field(default=())
+
+
+def player(robot: Robot, motions: Sequence[PlayedMotion], scene: Scene | None = None) -> Markup:
+    """The player as HTML, one a page; empty where there is no motion."""
+    shown = [motion for motion in motions if len(motion.t) > 1]
+    if not shown:
+        return Markup()
+    words = {key: tr(word) for key, word in WORDS.items()}
+    environment = jinja2.Environment(loader=jinja2.FileSystemLoader(_HERE), autoescape=True, trim_blocks=True)
+    return Markup(
+        environment.get_template("player.html.j2").render(
+            words=words,
+            motions=shown,
+            data=_data(robot, shown, scene, words),
+            scripts=import_map([*sorted(TEACH.glob("*.js")), _HERE / "poses.js"]),
+            script=(_HERE / "player.js").read_text(encoding="utf-8"),
+        )
+    )
+
+
+def moment(motion: str, t: float, text: str) -> Markup:
+    """A text, for a table's cell, that leads the page's player to time ``t`` (s) of a motion."""
+    return Markup('<a href="#player" data-play="{}" data-t="{}">{}</a>').format(motion, t, text)
+
+
+def player_style() -> Markup:
+    """The player's style sheet, for a page's head."""
+    return Markup(f"<style>{(_HERE / 'player.css').read_text(encoding='utf-8')}</style>")
+
+
+def _data(robot: Robot, motions: Sequence[PlayedMotion], scene: Scene | None, words: dict[str, str]) -> dict[str, Any]:
+    size = size_of(robot)
+    solids = scene.solids if scene else ()
+    floors = [s.offset for s in solids if isinstance(s, Plane) and s.normal[2] > 1 - LEVEL]
+    return {
+        "table": {
+            "convention": robot.convention,
+            **{key: getattr(robot, key).tolist() for key in ("a", "d", "alpha", "beta", "base", "tool")},
+        },
+        "size": size,
+        "target": (robot.base @ [0, 0, 0.35 * size, 1])[:3].tolist(),
+        "colours": {"joints": JOINTS, "link": LINK, "body": BODY, "mark": INK},
+        "axes": AXES,
+        "floor": max(floors) if floors else None,
+        "scene": [_solid(solid) for solid in solids if not isinstance(solid, Plane)],
+        "motions": [_motion(robot, motion) for motion in motions],
+        "words": words,
+    }
+
+
+def _solid(solid: Box | Cylinder | Sphere) -> dict[str, Any]:
+    """An obstacle as the drawing code takes it."""
+    common = {"T": np.asarray(solid.T).tolist(), "colour": SCENE_COLOUR}
+    if isinstance(solid, Box):
+        return {"kind": "box", "size": np.asarray(solid.size).tolist(), **common}
+    if isinstance(solid, Cylinder):
+        return {"kind": "cylinder", "radius": solid.radius, "length": solid.length, **common}
+    return {"kind": "sphere", "radius": solid.radius, **common}
+
+
+def _motion(robot: Robot, motion: PlayedMotion) -> dict[str, Any]:
+    rows = _shown(motion)
+    T = frames(robot, motion.q[rows])
+    turns = Rotation.from_matrix(T[..., :3, :3].reshape(-1, 3, 3)).as_quat(scalar_first=True).reshape(*T.shape[:2], 4)
+    poses = np.concatenate([T[..., :3, 3], turns], axis=-1).astype("<f4")
+    trail = T[:: max(1, len(rows) // TRAIL_POINTS), -1, :3, 3]
+    return {
+        "name": motion.name,
+        "text": motion.text,
+        "times": np.round(motion.t[rows], 6).tolist(),
+        "poses": base64.b64encode(poses.tobytes()).decode("ascii"),
+        "trail": np.round(trail, 5).tolist(),
+        "events": [asdict(event) for event in sorted(motion.events, key=lambda event: event.t)],
+        "marks": [
+            {"from": mark.start, "to": mark.end, "text": mark.text, "t0": mark.t0, "t1": mark.t1}
+            for mark in motion.marks
+        ],
+    }
+
+
+def _shown(motion: PlayedMotion) -> np.ndarray:
+    """Rows to be drawn: evenly spread in time, and those next to events."""
+    even = np.searchsorted(motion.t, np.linspace(motion.t[0], motion.t[-1], min(MOST_FRAMES, len(motion.t))))
+    events = np.searchsorted(motion.t, [time for event in motion.events for time in (event.t, event.until)])
+    rows = np.unique(np.clip(np.concatenate([even, events, [0, len(motion.t) - 1]]), 0, len(motion.t) - 1))
+    _, first = np.unique(np.round(motion.t[rows], 6), return_index=True)
+    return rows[first].astype(int)
