@@ -1,0 +1,122 @@
+"""The player in a real browser: it draws the poses that it was given; events and plots lead to their moments."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from selenium.webdriver.common.by import By
+from selenium.webdriver.support.wait import WebDriverWait
+
+from er3a.files.robot_library import load_robot
+from er3a.files.scene_file import load_scene
+from er3a.kinematics.forward import frames
+from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, moment, player, player_style
+from er3a.pipeline.results import Provenance
+from er3a.pipeline.viewing.page import render
+from testing.small_study import ROOT
+
+TEMPLATE = """{% extends "base.html.j2" %}
+{% block head %}{{ player_style }}{% endblock %}
+{% block title %}Test{% endblock %}
+{% block header %}<h1>Test page</h1>{% endblock %}
+{% block content %}{{ player }}<p>{{ link }}</p>
+<figure data-play="bow" data-panels="[[0.1, 0.1, 0.9, 0.9, 0.0, 2.0]]"><img alt="" src="data:image/svg+xml,%3Csvg
+xmlns='http://www.w3.org/2000/svg' width='400' height='200'/%3E"></figure><p style="height: 300vh"></p>{% endblock %}"""
+T = np.linspace(0.0, 2.0, 50)
+READ = """const [i, done] = arguments;
+import("er3a/poses").then(({ decodePoses, poseBetween }) => {
+  const { motions, table } = JSON.parse(document.getElementById("player-data").textContent);
+  const [motion] = motions;
+  done(poseBetween(motion.times, decodePoses(motion.poses, motion.times.length, table.a.length + 1), motion.times[i]));
+});"""
+
+
+def bow(robot) -> PlayedMotion:
+    q = np.linspace(0.2, 0.8, len(T))[:, None] * robot.upper
+    return PlayedMotion("bow", "It bows.", T, q, [PlayedEvent(1.2, 1.3, "stretched", "caution")])
+
+
+@pytest.fixture
+def page(browser, tmp_path):
+    robot = load_robot("er3a_c60")
+    still = PlayedMotion("still", "It stands.", np.array([0.0, 1.0]), np.zeros((2, 6)))
+    scene = load_scene(ROOT / "data/scenes/table_and_post.yaml")
+    (tmp_path / "page.html.j2").write_text(TEMPLATE, encoding="utf-8")
+    render(
+        tmp_path / "page.html.j2",
+        tmp_path / "page.html",
+        command=None,
+        provenance=Provenance(inputs=(), code="0" * 64),
+        player=player(robot, [bow(robot), still], scene),
+        player_style=player_style(),
+        link=moment("bow", 1.25, "the event"),
+    )
+    browser.get_log("browser")
+    browser.get((tmp_path / "page.html").as_uri())
+    WebDriverWait(browser, 10).until(lambda _: clock(browser))
+    return browser
+
+
+def clock(browser) -> str:
+    return browser.find_element(By.CSS_SELECTOR, ".player .clock").text
+
+
+def told(browser) -> str:
+    return browser.find_element(By.CSS_SELECTOR, ".player .told").text
+
+
+def until(browser, seen) -> None:
+    WebDriverWait(browser, 10).until(lambda _: seen())
+
+
+def test_it_draws_the_poses_of_forward_kinematics(page):
+    robot = load_robot("er3a_c60")
+    page.set_script_timeout(10)
+    for i in (0, 17, 49):
+        drawn = np.array(page.execute_async_script(READ, i))
+        np.testing.assert_allclose(drawn, frames(robot, bow(robot).q[i]), atol=1e-6)
+    assert [line for line in page.get_log("browser") if line["level"] == "SEVERE"] == []
+
+
+def test_an_event_leads_to_its_moment_and_the_plot_s_cursor_follows(page):
+    page.execute_script("document.querySelector('[data-t]').click()")
+    until(page, lambda: "1.250 s" in clock(page))
+    assert told(page) == "stretched"
+    cursor = page.find_element(By.CSS_SELECTOR, ".cursor")
+    image = page.find_element(By.CSS_SELECTOR, "figure[data-panels] img")
+    edge = page.execute_script(
+        "const s = getComputedStyle(arguments[0]); return parseFloat(s.paddingLeft) + parseFloat(s.borderLeftWidth)",
+        image,
+    )
+    width = image.rect["width"] - 2 * edge
+    expected = image.rect["x"] + edge + (0.1 + 0.8 * 1.25 / 2.0) * width
+    assert cursor.rect["x"] == pytest.approx(expected, abs=1.5)
+
+
+def test_it_plays_to_the_end_and_stops(page):
+    page.execute_script("document.querySelector('.player .speed').value = '2'")
+    button = page.find_element(By.CSS_SELECTOR, ".player .play")
+    button.click()
+    until(page, lambda: clock(page).startswith("t = 2.000 s"))
+    until(page, lambda: button.text == "Play")
+    assert told(page) == "It bows."
+
+
+def test_another_motion_starts_at_its_start(page):
+    page.execute_script(
+        "const chooser = document.querySelector('.player .motion');"
+        "chooser.value = 'still'; chooser.dispatchEvent(new Event('change'))"
+    )
+    until(page, lambda: told(page) == "It stands.")
+    assert clock(page) == "t = 0.000 s of 1.000 s"
+    assert not page.find_element(By.CSS_SELECTOR, ".cursor").is_displayed()
+
+
+def test_it_stays_in_sight_beside_a_plot_far_down_the_page(page):
+    page.execute_script("window.scrollTo(0, document.body.scrollHeight)")
+    page.execute_script("document.querySelector('[data-t]').click()")
+    until(page, lambda: "docked" in page.find_element(By.ID, "player").get_attribute("class"))
+    stand = page.execute_script(
+        "const r = document.querySelector('.player .stand').getBoundingClientRect(); return [r.top, r.bottom]"
+    )
+    assert 0 <= stand[0] < stand[1] <= page.execute_script("return innerHeight")
