@@ -57,10 +57,14 @@ def inverse_batch(
         rows = (q[part], valid[part], inside[part], rigid[part], marked[part])
         solve_blocks(arm, (robot.direction, robot.offset, robot.lower, robot.upper), T[part], own, rows)
 
-    parallel_for(count, threads, SMALLEST_PART, solve)
-    if not rigid.all():
+    plain = robot.coupling is None and not robot.combined and not robot.continuous.any()
+    if plain:
+        parallel_for(count, threads, SMALLEST_PART, solve)
+        if not rigid.all():
+            check_poses(T)
+    else:
         check_poses(T)
-    left = np.flatnonzero(marked)
+    left = np.flatnonzero(marked) if plain else np.arange(count)
     if left.size:
         own = np.broadcast_to(reference, (count, 6))[left]
         found, fault, _ = solve_slots(robot, T[left], own, keep_folds=True, keep_free=True)

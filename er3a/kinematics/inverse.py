@@ -122,13 +122,14 @@ def _free_joints_near(robot: Robot, T: Reals, q: Reals, q_ref: Reals, continua: 
 
 
 def _rows_of_branch(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
+    q = np.where(robot.continuous, q + TURN * np.round((q_ref - q) / TURN), q)
     low, high = turn_bounds(robot, q)
     if (low > high).any():
         return nearest_equivalent(robot, q, q_ref)[None]
     if np.prod(high - low + 1) > MOST_ROWS:
         raise Er3aError(f"{robot.name}: the limits allow more than {MOST_ROWS} turns of one pose; narrow them")
-    choices = [q[j] + TURN * np.arange(low[j], high[j] + 1) for j in range(6)]
-    rows = np.stack(np.meshgrid(*choices, indexing="ij"), axis=-1).reshape(-1, 6)
+    choices = [q[j] + TURN * np.arange(low[j], high[j] + 1) for j in range(robot.joints)]
+    rows = np.stack(np.meshgrid(*choices, indexing="ij"), axis=-1).reshape(-1, robot.joints)
     return rows[np.argsort(greatest_move(rows, q_ref), kind="stable")]
 
 

@@ -20,6 +20,7 @@ from er3a.kinematics.solutions import (
     WristTooNearAxis1,
 )
 from er3a.kinematics.wrist_partitioned import (
+    CoupledWrist,
     ElbowAxesNotParallel,
     NeighboursParallel,
     NoArmLength,
@@ -111,6 +112,11 @@ def _(found: NotSixTurning) -> str:
     if found.sliding:
         return sentence(found.code, "{count} of its joints slide", count=found.sliding)
     return sentence(found.code, "it has {count} joints", count=found.joints)
+
+
+@say.register
+def _(found: CoupledWrist) -> str:
+    return sentence(found.code, "its joints are coupled in another way than by whole turns among the first three")
 
 
 @say.register
