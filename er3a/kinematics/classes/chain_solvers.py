@@ -16,11 +16,12 @@ import numpy as np
 from er3a.geometry.angles import TURN
 from er3a.kinematics.classes.arm_angle import ArmAngleArm, arm_angle_arm, arm_angles_of, solve_at_arm_angle
 from er3a.kinematics.classes.four_bar import four_bars, solve_three_parallel
+from er3a.kinematics.classes.gantry import Gantry, gantry, solve_gantry
 from er3a.kinematics.classes.links import axes_of, inverse_rigid, poses_of, size_of
 from er3a.kinematics.classes.parallel_axes import ThreeParallel, three_parallel
 from er3a.kinematics.classes.scara import Scara, scara, solve_scara
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, SixRevolute, prepared, solve_six_revolute
-from er3a.kinematics.classes.spherical_joints import about_x, about_z
+from er3a.kinematics.classes.spherical_joints import about_x, about_z, frame_along
 from er3a.kinematics.closed_form import REACHED, ArmConstants, solve
 from er3a.kinematics.wrist_partitioned import WristPartitionedArm, constants_of, recognised
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -30,6 +31,7 @@ ArmClassCode = Literal[
     "three_parallel",
     "general_six",
     "six_one_prismatic",
+    "gantry",
     "arm_angle",
     "redundant",
     "scara",
@@ -39,8 +41,16 @@ ArmClassCode = Literal[
     "unsolved",
 ]
 FULL_RANK = 1e-7
+LEFT_OVER = 1e-6  # rad by which a pose may miss those that fewer than six joints can take
 NEAR_SINGULAR = 1e-7  # rad or parts of the reach: a closed form's row so near to its singular sets is looked at again
-PREFERENCE: tuple[ArmClassCode, ...] = ("spherical_wrist", "three_parallel", "arm_angle", "general_six", "six_one_prismatic")
+PREFERENCE: tuple[ArmClassCode, ...] = (
+    "spherical_wrist",
+    "three_parallel",
+    "arm_angle",
+    "gantry",
+    "general_six",
+    "six_one_prismatic",
+)
 
 
 @dataclass(frozen=True)
@@ -156,6 +166,19 @@ class ArmAngle:
 
 
 @dataclass(frozen=True, eq=False)
+class ThreeSliding(_Fixed):
+    """Six joints, three of which slide."""
+
+    arm: Gantry
+    code: ArmClassCode = "gantry"
+    slots: int = 2
+
+    def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
+        q, singular = solve_gantry(self.arm, T)
+        return q, np.where(singular, CONTINUUM, CERTAIN)
+
+
+@dataclass(frozen=True, eq=False)
 class PlanarFour(_Fixed):
     """Four joints of one direction, one of them sliding."""
 
@@ -184,6 +207,8 @@ class Completed(_Fixed):
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
         x, certainty = self.rest.rows(T, values)
+        if self.code == "planar_wrist":  # what these joints would have to turn, the tool can't
+            x[np.abs(_turned(x[:, :, list(self.lacking)])).max(axis=2) > LEFT_OVER] = np.nan
         x = np.delete(x, self.lacking, axis=2)
         for first in range(x.shape[1]):  # rows that differ in the joints that are not there
             same = np.abs(_turned(x[:, first + 1 :] - x[:, first : first + 1])).max(axis=2, initial=0.0) < 1e-9
@@ -295,6 +320,9 @@ def _of_six(links: Reals, sliding: Flags) -> ChainSolver:
         parallel = three_parallel(links)
         if parallel is not None:
             return ParallelAxes(parallel)
+    three = gantry(links, sliding)
+    if three is not None:
+        return ThreeSliding(three)
     if full_rank(links, sliding):
         arm = prepared(links, sliding)
         if arm.readings:
@@ -385,28 +413,28 @@ def _completed(links: Reals, sliding: Flags) -> ChainSolver:
 def _completions(links: Reals, n: int) -> list[tuple[ArmClassCode, tuple[int, ...], Reals]]:
     """Code, places of the added joints, and links (7, 4, 4) with them."""
     eye = np.eye(4)
-
-    def turned(R: Reals) -> Reals:
-        T = np.eye(4)
-        T[:3, :3] = R
-        return T
-
-    to_x, to_y = turned(about_z(np.pi / 2) @ about_x(np.pi / 2)), turned(about_x(-np.pi / 2))
-    found: list[tuple[ArmClassCode, tuple[int, ...], Reals]] = []
+    axes, _ = axes_of(links)
     if n == 5:
-        found.append(("free_roll", (5,), np.concatenate([links, eye[None]])))
-        axes, points = axes_of(links)
+        found: list[tuple[ArmClassCode, tuple[int, ...], Reals]] = [
+            ("free_roll", (5,), np.concatenate([links, eye[None]]))
+        ]
         across = np.cross(axes[3], axes[4])
         if np.linalg.norm(across) > 1e-6:
             found.append(("planar_wrist", (4,), _with_joint_between(links, 4, across)))
-    elif n == 4:
-        for to in (to_x, to_y):
-            found.append(("planar_wrist", (4, 5), np.concatenate([links[:-1], [links[-1] @ to], [inverse_rigid(to)], [eye]])))
-    else:
-        found.append(
-            ("position", (3, 4, 5), np.concatenate([links, [to_y], [inverse_rigid(to_y)], [eye]]))
-        )
-    return found
+        return found
+    if n == 4:
+        w = poses_of(links, np.zeros(4))[:3, :3].T @ axes[3]
+        first, second = eye.copy(), eye.copy()
+        second[:3, :3] = frame_along(w)[[1, 2, 0]].T  # z across the last axis
+        first[:3, :3] = frame_along(w)[[2, 0, 1]].T  # z across both
+        more = [links[-1] @ first, inverse_rigid(first) @ second, inverse_rigid(second)]
+        return [("planar_wrist", (4, 5), np.concatenate([links[:-1], more]))]
+    # a wrist about the tool point, askew, so that the tool's own orientation is none of its singular ones
+    askew = eye.copy()
+    askew[:3, :3] = about_x(0.9)
+    last = eye.copy()
+    last[:3, :3] = about_z(0.7) @ about_x(1.1)
+    return [("position", (3, 4, 5), np.concatenate([links, [askew], [inverse_rigid(askew)], [last]]))]
 
 
 def _with_joint_between(links: Reals, joint: int, axis: Reals) -> Reals:
