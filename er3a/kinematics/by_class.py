@@ -16,12 +16,13 @@ from er3a.errors import ShapeError
 from er3a.geometry.angles import TURN, wrap_to_pi
 from er3a.geometry.transforms import as_floats
 from er3a.kinematics.chain import constant_links, joint_starts, row_values
-from er3a.kinematics.classes.chain_solvers import ChainSolver, Redundancy, Unsolved, chain_solver
+from er3a.kinematics.classes.chain_solvers import ArmClassCode, ChainSolver, Redundancy, Unsolved, chain_solver
 from er3a.kinematics.classes.links import size_of
 from er3a.kinematics.classes.self_motion import PoseChain
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM
 from er3a.kinematics.self_motions import SelfMotionCurve, self_motion_of
 from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.threads import parallel_for
 from er3a.robots.derived import derived
 from er3a.robots.joint_limits import nearest_equivalent
 from er3a.robots.robot import Robot
@@ -29,6 +30,7 @@ from er3a.robots.robot import Robot
 SAME_ROW = 1e-6  # rad or parts of the arm's size
 SOLVES = 1e-9
 STARTS = {CONTINUUM: 240, 1: 60}
+SMALLEST_PART = 64
 SCANNED = 16  # values of a redundancy parameter from which self-motions are collected
 
 
@@ -192,6 +194,73 @@ def _apart(robot: Robot, rows: Reals) -> Reals:
     return np.array(kept).reshape(-1, robot.joints)
 
 
-def near_reference(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
-    """Rows in the turns nearest to the reference within the limits."""
-    return nearest_equivalent(robot, q, q_ref)
+def slots_of_class(
+    robot: Robot, T: Reals, q_ref: Reals, values: Reals, threads: int = 1
+) -> tuple[Reals, Integers, dict[int, Settled]]:
+    """All slots for poses (N, 4, 4): joint values (N, S, n) by the turns nearest to the reference (N, n); certainty (N,).
+
+    Poses at which branches meet, or that left a doubt, are settled one by one; those are told by their number.
+    """
+    count, slots = len(T), arm_solver(robot).chain.slots
+    q, certainty = np.empty((count, slots, robot.joints)), np.empty(count, dtype=np.int64)
+
+    def part(rows: slice) -> None:
+        found = class_rows(robot, T[rows], values[rows])
+        q[rows], certainty[rows] = found.q, found.certainty
+
+    parallel_for(count, threads, SMALLEST_PART, part)
+    settled = {}
+    for n in np.flatnonzero(certainty != CERTAIN).tolist():
+        solved = q[n][np.isfinite(q[n, :, 0])]
+        settled[n] = settle(robot, T[n], solved, q_ref[n], values[n : n + 1], int(certainty[n]))
+        q[n] = _in_slots(robot, q[n], settled[n])
+    return nearest_equivalent(robot, q, q_ref[:, None]), certainty, settled
+
+
+def _in_slots(robot: Robot, rows: Reals, settled: Settled) -> Reals:
+    """Rows (S, n) that stand alone in their slots; those on a self-motion give way to its member nearest to the
+    reference, and what was found besides takes free slots."""
+    kept, left = np.full_like(rows, np.nan), []
+    for row in settled.alone:
+        away = np.where(robot.slides, rows - row, rows - row - TURN * np.round((rows - row) / TURN))
+        far = np.where(np.isnan(rows[:, 0]), np.inf, np.abs(away).max(axis=1))
+        slot = int(far.argmin())
+        if far[slot] < SAME_ROW and np.isnan(kept[slot, 0]):
+            kept[slot] = row
+        else:
+            left.append(row)
+    left += [motion.q0 for motion in settled.motions]
+    free = np.flatnonzero(np.isnan(kept[:, 0]))
+    taken = np.flatnonzero(np.isnan(kept[:, 0]) & np.isfinite(rows[:, 0]))
+    order = [*taken, *(slot for slot in free if slot not in set(taken.tolist()))]
+    for slot, row in zip(order, left):
+        kept[slot] = row
+    return kept
+
+
+def slot_of(robot: Robot, T: Reals, q: Reals) -> int:
+    """The slot of joint values (n,) that solve a pose (4, 4); 0 if they are none of its class's rows."""
+    values = checked_parameters(robot, None, q[None], 1)
+    rows = class_rows(robot, T[None], values).q[0]
+    away = np.where(robot.slides, rows - q, rows - q - TURN * np.round((rows - q) / TURN))
+    far = np.where(np.isnan(rows[:, 0]), np.inf, np.abs(away).max(axis=1))
+    return int(far.argmin()) if far.min() < SAME_ROW else 0
+
+
+TASKS: dict[ArmClassCode, tuple[int, ...]] = {
+    "free_roll": (1, 1, 1, 1, 1, 0),
+    "position": (1, 1, 1, 0, 0, 0),
+    "scara": (1, 1, 1, 0, 0, 1),
+}
+
+
+@derived
+def task_mask(robot: Robot) -> Reals:
+    """Which of x, y, z and the rotations about x, y, z of the tool's frame the arm's solutions meet, six of 1 or 0.
+
+    All, but for arms with fewer than six joints: five leave the turn about the tool's axis (if they can't do it
+    themselves), a SCARA the tool's tilt, three joints the orientation.
+    """
+    mask = np.array(TASKS.get(arm_solver(robot).chain.code, (1,) * 6), dtype=float)
+    mask.setflags(write=False)
+    return mask

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er3a.errors import NotWristPartitionedError
+from er3a.geometry.angles import wrap_to_pi
 from er3a.geometry.vectors import Vector, signed_angle, unsigned_angle
 from er3a.kinematics.block_constants import BlockConstants, block_constants
-from er3a.kinematics.chain import axes_at_zero_theta
+from er3a.kinematics.chain import axes_at_zero_theta, row_values
 from er3a.kinematics.closed_form import BOUNDARY_M, BOUNDARY_RAD, FOLD_OFFSET, SLOTS, ArmConstants, solve
 from er3a.numerics.arrays import Reals
 from er3a.robots.derived import derived
@@ -239,6 +240,8 @@ def solve_slots(
     """
     shape = T.shape[0], SLOTS
     q, fault, gap = np.full((*shape, 6), np.nan), np.zeros(shape, dtype=np.int8), np.zeros(shape)
-    T, q_ref = np.ascontiguousarray(T), np.ascontiguousarray(q_ref)
+    T, q_ref = np.ascontiguousarray(T), np.ascontiguousarray(row_values(robot, q_ref))
     solve(_constants(robot), (robot.direction, robot.offset), T, q_ref, keep_folds, keep_free, (q, fault, gap))
+    if robot.coupling is not None:
+        q = wrap_to_pi(q @ np.linalg.inv(robot.coupling).T)
     return q, fault, gap

@@ -9,7 +9,7 @@ they lack, and of what those turn it is told.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Literal, Protocol, get_args
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from er3a.kinematics.classes.parallel_axes import ThreeParallel, three_parallel
 from er3a.kinematics.classes.scara import Scara, scara, solve_scara
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, SixRevolute, prepared, solve_six_revolute
 from er3a.kinematics.classes.spherical_joints import about_x, about_z, frame_along
-from er3a.kinematics.closed_form import REACHED, ArmConstants, solve
+from er3a.kinematics.closed_form import BOUNDARY_M, REACHED, ArmConstants, solve
 from er3a.kinematics.wrist_partitioned import WristPartitionedArm, constants_of, recognised
 from er3a.numerics.arrays import Flags, Integers, Reals
 
@@ -41,6 +41,29 @@ ArmClassCode = Literal[
     "unsolved",
 ]
 FULL_RANK = 1e-7
+SlotName = Literal[
+    "front_elbow_up_no_flip",
+    "front_elbow_up_flip",
+    "front_elbow_down_no_flip",
+    "front_elbow_down_flip",
+    "back_elbow_up_no_flip",
+    "back_elbow_up_flip",
+    "back_elbow_down_no_flip",
+    "back_elbow_down_flip",
+    "shoulder_plus_elbow_plus_wrist_plus",
+    "shoulder_plus_elbow_plus_wrist_minus",
+    "shoulder_plus_elbow_minus_wrist_plus",
+    "shoulder_plus_elbow_minus_wrist_minus",
+    "shoulder_minus_elbow_plus_wrist_plus",
+    "shoulder_minus_elbow_plus_wrist_minus",
+    "shoulder_minus_elbow_minus_wrist_plus",
+    "shoulder_minus_elbow_minus_wrist_minus",
+    "elbow_plus",
+    "elbow_minus",
+    "wrist_plus",
+    "wrist_minus",
+]
+SLOT_NAMES: tuple[SlotName, ...] = get_args(SlotName)
 LEFT_OVER = 1e-6  # rad by which a pose may miss those that fewer than six joints can take
 NEAR_SINGULAR = 1e-7  # rad or parts of the reach: a closed form's row so near to its singular sets is looked at again
 PREFERENCE: tuple[ArmClassCode, ...] = (
@@ -66,6 +89,8 @@ class ChainSolver(Protocol):
 
     ``rows`` takes poses (N, 4, 4) in m and values (N, k) of the k parameters; it gives joint values (N, slots, n), NaN
     in empty slots, and how sure it is (N,): CERTAIN, UNCERTAIN, or CONTINUUM where branches meet or a joint is free.
+    ``names`` tells the slots' names, with joint values (n,) of the manufacturer's zero pose; none where no sign factors
+    separate the solutions.
     """
 
     code: ArmClassCode
@@ -77,6 +102,8 @@ class ChainSolver(Protocol):
     def values_of(self, x: Reals) -> Reals: ...
 
     def seeds(self, T: Reals, values: Reals) -> Reals: ...
+
+    def names(self, x: Reals) -> tuple[SlotName, ...]: ...
 
 
 class _Fixed:
@@ -91,12 +118,15 @@ class _Fixed:
         """Members (k, n) of continua of one pose (4, 4) that the class knows without a search."""
         return np.empty((0, 6))
 
+    def names(self, x: Reals) -> tuple[SlotName, ...]:
+        return ()
+
 
 @dataclass(frozen=True, eq=False)
 class SphericalWrist(_Fixed):
     """Axes 2 and 3 parallel, and a spherical wrist."""
 
-    arm: WristPartitionedArm
+    links: Reals
     constants: ArmConstants
     code: ArmClassCode = "spherical_wrist"
     slots: int = 8
@@ -108,6 +138,14 @@ class SphericalWrist(_Fixed):
         solve(self.constants, plain, np.ascontiguousarray(T), np.zeros((len(T), 6)), True, True, (q, fault, gap))
         q[fault != REACHED] = np.nan
         return q, np.where(_branches_meet(q, ((4, 0), (2, 2), (1, 4))), CONTINUUM, CERTAIN)
+
+    def names(self, x: Reals) -> tuple[SlotName, ...]:
+        k = self.constants
+        w1, w2 = np.array(k.axis_1), np.array(k.axis_2)
+        T = poses_of(self.links, x)
+        W = T[:3, 3] + T[:3, :3] @ np.array(k.wrist_in_tool) - np.array(k.point_1)
+        side = float(np.cross(w1, w2) @ _turned_back(W, w1, x[0]))
+        return _three_signs(w1, w2, side if abs(side) > BOUNDARY_M else 1.0, wrist_last=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +168,13 @@ class ParallelAxes(_Fixed):
             for elbow in (0, 1)
         ]
         return np.concatenate([np.empty((0, 6)), *found])
+
+    def names(self, x: Reals) -> tuple[SlotName, ...]:
+        axes, points = axes_of(self.arm.links)
+        T = poses_of(self.arm.links, x)
+        W = T[:3, 3] + T[:3, :3] @ np.array(self.arm.constants.wrist_in_tool) - points[0]
+        side = float(np.cross(axes[0], axes[1]) @ _turned_back(W, axes[0], x[0]))
+        return _three_signs(axes[0], axes[1], side if abs(side) > BOUNDARY_M else 1.0, wrist_last=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,6 +209,11 @@ class ArmAngle:
     def seeds(self, T: Reals, values: Reals) -> Reals:
         return np.empty((0, 7))
 
+    def names(self, x: Reals) -> tuple[SlotName, ...]:
+        # slots are 4 elbow + 2 shoulder + wrist
+        first = SLOT_NAMES.index("shoulder_plus_elbow_plus_wrist_plus")
+        return tuple(SLOT_NAMES[first + 4 * (s // 2 % 2) + 2 * (s // 4) + s % 2] for s in range(8))
+
 
 @dataclass(frozen=True, eq=False)
 class ThreeSliding(_Fixed):
@@ -176,6 +226,9 @@ class ThreeSliding(_Fixed):
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
         q, singular = solve_gantry(self.arm, T)
         return q, np.where(singular, CONTINUUM, CERTAIN)
+
+    def names(self, x: Reals) -> tuple[SlotName, ...]:
+        return "wrist_plus", "wrist_minus"
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,6 +244,9 @@ class PlanarFour(_Fixed):
 
     def seeds(self, T: Reals, values: Reals) -> Reals:
         return np.empty((0, 4))
+
+    def names(self, x: Reals) -> tuple[SlotName, ...]:
+        return "elbow_plus", "elbow_minus"
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,6 +273,13 @@ class Completed(_Fixed):
 
     def seeds(self, T: Reals, values: Reals) -> Reals:
         return np.empty((0, 6 - len(self.lacking)))
+
+    def names(self, x: Reals) -> tuple[SlotName, ...]:
+        if self.code == "position":  # rows that differ in the joints that are not there are one
+            return ()
+        full = np.zeros(6)
+        full[[j for j in range(6) if j not in self.lacking]] = x
+        return self.rest.names(full)
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,6 +327,9 @@ class LockedJoint:
     def seeds(self, T: Reals, values: Reals) -> Reals:
         return np.empty((0, len(self.sliding)))
 
+    def names(self, x: Reals) -> tuple[SlotName, ...]:
+        return self.rest.names(np.delete(x, self.joint)) if self.rest is not None else ()
+
 
 @dataclass(frozen=True, eq=False)
 class Unsolved(_Fixed):
@@ -278,6 +344,30 @@ class Unsolved(_Fixed):
 
     def seeds(self, T: Reals, values: Reals) -> Reals:
         return np.empty((0, self.joints))
+
+
+def _turned_back(v: Reals, axis: Reals, angle: float) -> Reals:
+    """A vector as seen with joint 1 at 0."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.asarray(c * v - s * np.cross(axis, v) + (1 - c) * (axis @ v) * axis)
+
+
+def _three_signs(w1: Reals, w2: Reals, zero_side: float, wrist_last: bool) -> tuple[SlotName, ...]:
+    """Names of the slots ``4 shoulder + 2 elbow + wrist``, or with wrist and elbow exchanged.
+
+    As :func:`er3a.kinematics.configuration.branch_labels`: *front* is where the wrist is in the zero pose; *up*: with
+    the arm stretched out level on that side the elbow is above the line from shoulder to wrist.
+    """
+    names = []
+    for slot in range(8):
+        shoulder, elbow, wrist = slot // 4, slot // 2 % 2, slot % 2
+        if not wrist_last:
+            elbow, wrist = wrist, elbow
+        outward = (-1.0 if shoulder == 0 else 1.0) * np.cross(w1, w2)
+        back = (outward @ np.cross(w1, w2)) * zero_side < 0
+        down = (1.0 if elbow == 0 else -1.0) * (np.cross(w2, outward) @ w1) >= 0
+        names.append(SLOT_NAMES[4 * int(back) + 2 * int(down) + wrist])
+    return tuple(names)
 
 
 def _turned(x: Reals) -> Reals:
@@ -316,7 +406,7 @@ def _of_six(links: Reals, sliding: Flags) -> ChainSolver:
         axes, points = axes_of(links)
         wrist = recognised(axes, points, poses_of(links, np.zeros(6)))
         if isinstance(wrist, WristPartitionedArm):
-            return SphericalWrist(wrist, constants_of(wrist))
+            return SphericalWrist(links, constants_of(wrist))
         parallel = three_parallel(links)
         if parallel is not None:
             return ParallelAxes(parallel)
