@@ -26,6 +26,15 @@ PARALLEL = 1e-9
 
 
 @dataclass(frozen=True)
+class NotSixTurning:
+    """The arm has another number of joints than six, or one of them slides."""
+
+    joints: int
+    sliding: int
+    code: Literal["not_six_turning_joints"] = "not_six_turning_joints"
+
+
+@dataclass(frozen=True)
 class ElbowAxesNotParallel:
     """Axes 2 and 3 are not parallel."""
 
@@ -56,7 +65,7 @@ class NoArmLength:
     code: Literal["upper_arm_or_forearm_without_length"] = "upper_arm_or_forearm_without_length"
 
 
-ClosedFormMissing = ElbowAxesNotParallel | NeighboursParallel | NoWristCentre | NoArmLength
+ClosedFormMissing = NotSixTurning | ElbowAxesNotParallel | NeighboursParallel | NoWristCentre | NoArmLength
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +129,8 @@ def closed_form_missing(robot: Robot) -> ClosedFormMissing | None:
 
 @derived
 def _recognised(robot: Robot) -> WristPartitionedArm | ClosedFormMissing:
+    if robot.rows != 6 or robot.joints != 6 or robot.sliding.any():
+        return NotSixTurning(robot.joints, int(robot.sliding.sum()))
     return recognised(*axes_at_zero_theta(robot))
 
 
