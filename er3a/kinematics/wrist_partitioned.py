@@ -142,7 +142,11 @@ def _recognised(robot: Robot) -> WristPartitionedArm | ClosedFormMissing:
         return NotSixTurning(robot.joints, int(robot.sliding.sum()))
     if robot.coupling is not None and not _couples_the_arm_alone(robot.coupling):
         return CoupledWrist()
-    axes, points, T_base_tool = axes_at_zero_theta(robot)
+    return recognised(*axes_at_zero_theta(robot))
+
+
+def recognised(axes: Reals, points: Reals, T_base_tool: Reals) -> WristPartitionedArm | ClosedFormMissing:
+    """The arm, or what it lacks, of six axes (directions (6, 3) and points (6, 3), m) and the tool's pose (4, 4)."""
     if np.linalg.norm(np.cross(axes[1], axes[2])) > PARALLEL:
         return ElbowAxesNotParallel()
     for i, j in ((0, 1), (3, 4), (4, 5)):
@@ -187,7 +191,11 @@ def _meeting_point(axes: Reals, points: Reals) -> tuple[Reals, float]:
 
 @derived
 def _constants(robot: Robot) -> ArmConstants:
-    arm = wrist_partitioned_arm(robot)
+    return constants_of(wrist_partitioned_arm(robot))
+
+
+def constants_of(arm: WristPartitionedArm) -> ArmConstants:
+    """The arm as the kernel takes it."""
     w = [_vector(axis) for axis in arm.axes]
     beside_6 = np.cross(arm.axes[5], np.eye(3)[np.argmin(np.abs(arm.axes[5]))])
     beside_6 /= np.linalg.norm(beside_6)
