@@ -14,9 +14,11 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from er3a.kinematics.by_class import arm_solver, to_rows
+from er3a.kinematics.classes.chain_solvers import SlotName
 from er3a.kinematics.closed_form import BOUNDARY_M, SLOTS
 from er3a.kinematics.singularity import determinant_factors
-from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
+from er3a.kinematics.wrist_partitioned import closed_form_missing, wrist_partitioned_arm
 from er3a.robots.derived import derived
 from er3a.robots.robot import Robot
 
@@ -56,6 +58,14 @@ def branch_labels(robot: Robot) -> tuple[BranchLabel, ...]:
         down = bend * (np.cross(w2, outward) @ w1) >= 0
         labels.append(LABELS[4 * (side_of(robot, slot) == "back") + 2 * int(down) + slot % 2])
     return tuple(labels)
+
+
+@derived
+def slot_labels(robot: Robot) -> tuple[BranchLabel | SlotName, ...]:
+    """The codes of the slots of the arm's class; empty where no signs separate its solutions, which are numbered."""
+    if not closed_form_missing(robot):
+        return branch_labels(robot)
+    return arm_solver(robot).chain.names(to_rows(robot, np.zeros(robot.joints)))
 
 
 @derived

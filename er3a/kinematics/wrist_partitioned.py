@@ -13,15 +13,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er3a.errors import NotWristPartitionedError
+from er3a.geometry.angles import wrap_to_pi
 from er3a.geometry.vectors import Vector, signed_angle, unsigned_angle
 from er3a.kinematics.block_constants import BlockConstants, block_constants
-from er3a.kinematics.chain import axes_at_zero_theta
+from er3a.kinematics.chain import axes_at_zero_theta, row_values
 from er3a.kinematics.closed_form import BOUNDARY_M, BOUNDARY_RAD, FOLD_OFFSET, SLOTS, ArmConstants, solve
 from er3a.numerics.arrays import Reals
 from er3a.robots.derived import derived
 from er3a.robots.robot import Robot
 
 PARALLEL = 1e-9
+
+
+@dataclass(frozen=True)
+class NotSixTurning:
+    """The arm has another number of joints than six, or one of them slides."""
+
+    joints: int
+    sliding: int
+    code: Literal["not_six_turning_joints"] = "not_six_turning_joints"
+
+
+@dataclass(frozen=True)
+class CoupledWrist:
+    """The coupling is none of whole turns among the first three joints."""
+
+    code: Literal["coupled_wrist"] = "coupled_wrist"
 
 
 @dataclass(frozen=True)
@@ -55,7 +72,9 @@ class NoArmLength:
     code: Literal["upper_arm_or_forearm_without_length"] = "upper_arm_or_forearm_without_length"
 
 
-ClosedFormMissing = ElbowAxesNotParallel | NeighboursParallel | NoWristCentre | NoArmLength
+ClosedFormMissing = (
+    NotSixTurning | CoupledWrist | ElbowAxesNotParallel | NeighboursParallel | NoWristCentre | NoArmLength
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +138,15 @@ def closed_form_missing(robot: Robot) -> ClosedFormMissing | None:
 
 @derived
 def _recognised(robot: Robot) -> WristPartitionedArm | ClosedFormMissing:
-    axes, points, T_base_tool = axes_at_zero_theta(robot)
+    if robot.rows != 6 or robot.joints != 6 or robot.sliding.any():
+        return NotSixTurning(robot.joints, int(robot.sliding.sum()))
+    if robot.coupling is not None and not _couples_the_arm_alone(robot.coupling):
+        return CoupledWrist()
+    return recognised(*axes_at_zero_theta(robot))
+
+
+def recognised(axes: Reals, points: Reals, T_base_tool: Reals) -> WristPartitionedArm | ClosedFormMissing:
+    """The arm, or what it lacks, of six axes (directions (6, 3) and points (6, 3), m) and the tool's pose (4, 4)."""
     if np.linalg.norm(np.cross(axes[1], axes[2])) > PARALLEL:
         return ElbowAxesNotParallel()
     for i, j in ((0, 1), (3, 4), (4, 5)):
@@ -145,6 +172,14 @@ def _recognised(robot: Robot) -> WristPartitionedArm | ClosedFormMissing:
     )
 
 
+def _couples_the_arm_alone(coupling: Reals) -> bool:
+    """Whether a coupling (6, 6) leaves the wrist alone, and takes whole turns to whole turns both ways."""
+    rest = coupling.copy()
+    rest[:3, :3] = np.eye(3)
+    whole = np.array_equal(coupling, np.round(coupling)) and round(abs(float(np.linalg.det(coupling)))) == 1
+    return whole and np.array_equal(rest, np.eye(6))
+
+
 def _meeting_point(axes: Reals, points: Reals) -> tuple[Reals, float]:
     """Point nearest to all lines by least squares, and its greatest distance from a line (m)."""
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
@@ -156,7 +191,11 @@ def _meeting_point(axes: Reals, points: Reals) -> tuple[Reals, float]:
 
 @derived
 def _constants(robot: Robot) -> ArmConstants:
-    arm = wrist_partitioned_arm(robot)
+    return constants_of(wrist_partitioned_arm(robot))
+
+
+def constants_of(arm: WristPartitionedArm) -> ArmConstants:
+    """The arm as the kernel takes it."""
     w = [_vector(axis) for axis in arm.axes]
     beside_6 = np.cross(arm.axes[5], np.eye(3)[np.argmin(np.abs(arm.axes[5]))])
     beside_6 /= np.linalg.norm(beside_6)
@@ -231,6 +270,8 @@ def solve_slots(
     """
     shape = T.shape[0], SLOTS
     q, fault, gap = np.full((*shape, 6), np.nan), np.zeros(shape, dtype=np.int8), np.zeros(shape)
-    T, q_ref = np.ascontiguousarray(T), np.ascontiguousarray(q_ref)
+    T, q_ref = np.ascontiguousarray(T), np.ascontiguousarray(row_values(robot, q_ref))
     solve(_constants(robot), (robot.direction, robot.offset), T, q_ref, keep_folds, keep_free, (q, fault, gap))
+    if robot.coupling is not None:
+        q = wrap_to_pi(q @ np.round(np.linalg.inv(robot.coupling)).T)
     return q, fault, gap
