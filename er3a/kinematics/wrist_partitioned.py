@@ -19,7 +19,16 @@ from er3a.kinematics.block_constants import BlockConstants, block_constants
 from er3a.kinematics.chain import axes_at_zero_theta, constant_links, row_values
 from er3a.kinematics.classes.four_bar import solve_near_reference
 from er3a.kinematics.classes.parallel_axes import ThreeParallel, three_parallel
-from er3a.kinematics.closed_form import BOUNDARY_M, BOUNDARY_RAD, FOLD_OFFSET, SLOTS, ArmConstants, solve
+from er3a.kinematics.closed_form import (
+    BOUNDARY_M,
+    BOUNDARY_RAD,
+    FOLD_OFFSET,
+    REACHED,
+    SLOTS,
+    TOO_FAR,
+    ArmConstants,
+    solve,
+)
 from er3a.numerics.arrays import Reals
 from er3a.robots.derived import derived
 from er3a.robots.robot import Robot
