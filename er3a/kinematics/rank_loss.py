@@ -149,9 +149,7 @@ def _refined(
     return t, q
 
 
-def _stretches(
-    robot: Robot, t: Reals, q: Reals, joints: Callable[[Reals], Reals], threshold: float
-) -> list[RankLoss]:
+def _stretches(robot: Robot, t: Reals, q: Reals, joints: Callable[[Reals], Reals], threshold: float) -> list[RankLoss]:
     smallest, sign = _smallest_and_sign(robot, q)
     changes = np.flatnonzero(sign[:-1] * sign[1:] < 0)
     low = smallest <= threshold

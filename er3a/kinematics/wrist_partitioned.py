@@ -270,6 +270,11 @@ def parallel_axes_arm(robot: Robot) -> ThreeParallel | None:
     return three_parallel(constant_links(robot))
 
 
+def has_branches(robot: Robot) -> bool:
+    """Whether the arm has the eight branches of :mod:`er3a.kinematics.configuration`, told by signs of three factors."""
+    return closed_form_missing(robot) is None or parallel_axes_arm(robot) is not None
+
+
 def _slots_of_parallel_axes(
     robot: Robot, arm: ThreeParallel, T: Reals, q_ref: Reals
 ) -> tuple[Reals, NDArray[np.int8], Reals]:
