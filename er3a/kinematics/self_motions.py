@@ -83,9 +83,7 @@ def _place_of(lengths: Reals, t: Reals, closed: bool) -> Reals:
     return np.interp(t - laps * lap, lengths, np.arange(len(lengths))) + laps * last
 
 
-def self_motion_of(
-    robot: Robot, T: Reals, chain: PoseChain, curve: Curve, q_ref: Reals
-) -> list[SelfMotionCurve]:
+def self_motion_of(robot: Robot, T: Reals, chain: PoseChain, curve: Curve, q_ref: Reals) -> list[SelfMotionCurve]:
     """One for each part of a curve that lies within the joint limits; one for the whole of it if none does."""
     q = _joints(robot, curve.points)
     steps = np.diff(np.where(robot.slides, q / chain.size, q), axis=0)
