@@ -7,18 +7,21 @@ NumPy, and extremes over the joint limits are looked for on grids. Nothing here 
 from __future__ import annotations
 
 import csv
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 import yaml
+from scipy.optimize import least_squares
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 TRUSTED = ("official", "measured", "cad", "export")
 COLUMNS = ("a", "d", "alpha", "offset", "direction", "lower", "upper")
 IN_UNIT = {"a": 1000.0, "d": 1000.0, "alpha": 180 / np.pi, "offset": 180 / np.pi, "direction": 1.0}
-GRID = 25
+GRID, CLOSER = 31, 6
+INSIDE = 0.9  # of a half-width, up to which a fit leaves alone what it meets
 
 Rows = dict[str, np.ndarray]
 """Columns of H tables, (H, 6) each: m and rad."""
@@ -60,12 +63,11 @@ def stacked(tables: list[Rows]) -> Rows:
     return {name: np.concatenate([each[name] for each in tables]) for name in COLUMNS}
 
 
-def frames(rows: Rows, q: np.ndarray) -> np.ndarray:
-    """Frames (H, P, 7, 4, 4) of H tables at P joint vectors (P, 6) in rad; Rz(theta) Tz(d) Tx(a) Rx(alpha)."""
-    count, poses = len(rows["a"]), len(q)
-    T = np.broadcast_to(np.eye(4), (count, poses, 4, 4))
+def frames(rows: Rows, q: np.ndarray, joints: int = 6) -> np.ndarray:
+    """Frames (H, P, joints + 1, 4, 4) of H tables at P joint vectors (P, 6) in rad; Rz(theta) Tz(d) Tx(a) Rx(alpha)."""
+    T = np.broadcast_to(np.eye(4), (len(rows["a"]), len(q), 4, 4))
     found = [T]
-    for j in range(6):
+    for j in range(joints):
         theta = rows["direction"][:, None, j] * q[None, :, j] + rows["offset"][:, None, j]
         a, d, alpha = (np.broadcast_to(rows[name][:, None, j], theta.shape) for name in ("a", "d", "alpha"))
         c, s, ca, sa, none = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha), np.zeros_like(theta)
@@ -102,57 +104,68 @@ def statements_of(robot: str) -> list[Statement]:
     return found
 
 
-def _angle(a: np.ndarray, b: np.ndarray, signed: bool) -> np.ndarray:
-    cosine = (a @ b) / np.linalg.norm(a, axis=-1) / np.linalg.norm(b)
-    return np.degrees(np.arccos(np.clip(cosine if signed else np.abs(cosine), -1, 1)))
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300)
 
 
-def _extreme(rows: Rows, measure, sign: float) -> np.ndarray:
-    """The greatest (``sign`` 1) or least measure (H,) over joints 2 to 4, on a grid that closes in on its best place."""
-    values = []
+def _apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Unit vectors (H, 3) from one, as vectors as long as the angle between them in deg."""
+    chord = _unit(a) - _unit(b)
+    length = np.linalg.norm(chord, axis=-1, keepdims=True)
+    angle = np.degrees(2 * np.arcsin(np.clip(length / 2, 0, 1)))
+    return chord * angle / np.maximum(length, 1e-300)
+
+
+def _extreme(
+    rows: Rows, measure: Callable[[np.ndarray], np.ndarray], sign: float, joints: int, at: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """The greatest (``sign`` 1) or least measure (H, 1) over the joints, on grids that close in on the best place, and
+    that place (6,) of the last table; or the measure at a place that is known."""
+    if at is not None:
+        return measure(frames(rows, at[None], joints)), at
+    values, place = [], np.zeros(6)
     for h in range(len(rows["a"])):
         one = {name: each[[h]] for name, each in rows.items()}
-        low, high = one["lower"][0, 1:4], one["upper"][0, 1:4]
-        turns = GRID if one["a"][0, 3] or abs(np.sin(one["alpha"][0, 3])) < 1e-12 else 1
-        counts, best = (4 * GRID, 4 * GRID, turns), -np.inf
-        for _ in range(6):
-            grid = np.array(list(product(*(np.linspace(a, b, n) for a, b, n in zip(low, high, counts)))))
-            q = np.zeros((len(grid), 6))
-            q[:, 1:4] = grid
-            seen = sign * measure(frames(one, q))[0]
-            best = max(best, float(seen.max()))
-            at, wide = grid[seen.argmax()], (high - low) / 8
-            low = np.maximum(one["lower"][0, 1:4], at - wide)
-            high = np.minimum(one["upper"][0, 1:4], at + wide)
-            counts = (GRID, GRID, min(turns, 9))
-        values.append(sign * best)
-    return np.array(values)
+        least, most = one["lower"][0, 1:joints], one["upper"][0, 1:joints]
+        moving = joints > 4 or bool(one["a"][0, 3])
+        low, high, best = least, most, -np.inf
+        counts = [GRID, GRID, 9 if moving else 1, 9][: joints - 1]
+        for _ in range(CLOSER):
+            grid = np.stack(np.meshgrid(*map(np.linspace, low, high, counts), indexing="ij"), -1)
+            q = np.zeros((grid[..., 0].size, 6))
+            q[:, 1:joints] = grid.reshape(-1, joints - 1)
+            seen = sign * measure(frames(one, q, joints))[0]
+            if seen.max() > best:
+                best, place = float(seen.max()), q[seen.argmax()]
+            near, wide = q[seen.argmax(), 1:joints], (high - low) / np.maximum(np.array(counts) - 1, 1) * 1.5
+            low, high = np.maximum(least, near - wide), np.minimum(most, near + wide)
+            counts = [9, 9, 5 if moving else 1, 5][: joints - 1]
+        values.append([sign * best])
+    return np.array(values), place
 
 
-def off(rows: Rows, said: Statement) -> np.ndarray | None:
-    """How far tables are off a statement (H,), in its half-widths, coordinate by coordinate the worst; None for what
-    says nothing of an arm's shape."""
+def components(rows: Rows, said: Statement, at: np.ndarray | None = None) -> list[np.ndarray]:
+    """Parts (H, k) by which tables are off a statement, in its half-widths, the length of each being what counts; none
+    for what says nothing of an arm's shape. ``at``: where extremes are read instead of being looked for."""
+    if said.kind in ("envelope", "reach"):
+        return [_extent(rows, said, at)[0]]
     width = said.number("uncertainty_mm")
     if said.kind == "axes":
         joint, signed = int(said.row["joint"]) - 1, said.row["signed"] == "yes"
-        T = frames(rows, np.zeros((1, 6)))[:, 0, joint]
+        T = frames(rows, np.zeros((1, 6)), joint)[:, 0, joint]
         axis = T[:, :3, 2] * rows["direction"][:, joint, None]
         stated = np.array([said.number(f"direction_{c}") for c in "xyz"])
-        turned = _angle(axis, stated, signed) / said.number("uncertainty_deg")
-        point = np.array([said.number(f"{c}_mm") for c in "xyz"])
-        foot = 1000 * T[:, :3, 3]
+        toward = axis if signed else axis * np.where(axis @ stated < 0, -1.0, 1.0)[:, None]
+        point, foot = np.array([said.number(f"{c}_mm") for c in "xyz"]), 1000 * T[:, :3, 3]
         near = foot + axis * np.einsum("hk,hk->h", axis, point - foot)[:, None]
-        return np.maximum(turned, np.abs(near - point).max(axis=1) / width)
+        return [_apart(toward, stated) / said.number("uncertainty_deg"), *np.split((near - point) / width, 3, axis=1)]
     if said.kind == "positions":
         given = [said.number(f"{c}_mm") for c in "xyz"]
-        places = [k for k, value in enumerate(given) if value is not None]
-        if not places:
-            return None
         pose = np.radians([[said.number(f"q{j}_deg") for j in range(1, 7)]])
         T = frames(rows, pose)[:, 0, 6 if said.row["point"] == "flange" else 4]
-        return np.abs(1000 * T[:, places, 3] - np.array([given[k] for k in places])).max(axis=1) / width
+        return [(1000 * T[:, [k], 3] - value) / width for k, value in enumerate(given) if value is not None]
     if said.kind == "directions":
-        T = frames(rows, np.zeros((1, 6)))[:, 0]
+        T = frames(rows, np.zeros((1, 6)), 4)[:, 0]
         if said.row["segment"] == "upper_arm":
             axis, along = T[:, 1, :3, 2], T[:, 2, :3, 3] - T[:, 1, :3, 3]
             along = along - axis * np.einsum("hk,hk->h", axis, along)[:, None]
@@ -161,38 +174,79 @@ def off(rows: Rows, said: Statement) -> np.ndarray | None:
             toward = np.einsum("hk,hk->h", along, T[:, 4, :3, 3] - T[:, 2, :3, 3])
             along = along * np.where(toward < 0, -1.0, 1.0)[:, None]
         stated, width = said.number("angle_from_vertical_deg"), said.number("uncertainty_deg")
-        return np.abs(_angle(along, np.array([0.0, 0.0, 1.0]), True) - stated) / width
-    if said.kind == "envelope":
+        if stated == 0:
+            return [_apart(along, np.array([0.0, 0.0, 1.0])) / width]
+        return [(np.degrees(np.arccos(np.clip(_unit(along)[:, [2]], -1, 1))) - stated) / width]
+    return []
 
-        def section(T: np.ndarray, k: int) -> np.ndarray:
-            origin = T[..., 0, 0, 3] if k == 0 else T[..., 1, 2, 3]
-            return 1000 * (T[..., 4, k, 3] - origin)
 
-        quantity, stated = said.row["quantity"], said.number("value_mm")
-        k = 0 if quantity.endswith("x") else 2
-        if said.row["q2_deg"]:
-            q = np.radians([[0, said.number("q2_deg"), said.number("q3_deg"), 0, 0, 0]])
-            value = section(frames(rows, q), k)[:, 0]
-            value = np.abs(value) if quantity.startswith("abs") else value
-        else:
-            value = _extreme(rows, lambda T: section(T, k), -1.0 if quantity.startswith("least") else 1.0)
-        return np.abs(value - stated) / width
+def _extent(rows: Rows, said: Statement, at: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None]:
+    """How far (H, 1) tables are off a drawing's label or a reach, and where it was read."""
+    width, stated = said.number("uncertainty_mm"), said.number("value_mm")
     if said.kind == "reach":
+        count, k = 4 if said.row["point"] == "wrist_centre" else 6, int(said.row["from_axis"]) - 1
 
         def distance(T: np.ndarray) -> np.ndarray:
-            k = int(said.row["from_axis"]) - 1
-            point = T[..., 4 if said.row["point"] == "wrist_centre" else 6, :3, 3]
-            return 1000 * np.linalg.norm(np.cross(T[..., k, :3, 2], point - T[..., k, :3, 3]), axis=-1)
+            return 1000 * np.linalg.norm(np.cross(T[..., k, :3, 2], T[..., count, :3, 3] - T[..., k, :3, 3]), axis=-1)
 
-        sign = 1.0 if said.row["extreme"] == "greatest" else -1.0
-        return np.abs(_extreme(rows, distance, sign) - said.number("value_mm")) / width
-    return None
+        value, at = _extreme(rows, distance, 1.0 if said.row["extreme"] == "greatest" else -1.0, count, at)
+        return (value - stated) / width, at
+    quantity = said.row["quantity"]
+    k = 0 if quantity.endswith("x") else 2
+
+    def section(T: np.ndarray) -> np.ndarray:
+        return 1000 * (T[..., 4, k, 3] - (T[..., 0, 0, 3] if k == 0 else T[..., 1, 2, 3]))
+
+    if said.row["q2_deg"]:
+        value = section(frames(rows, np.radians([[0, said.number("q2_deg"), said.number("q3_deg"), 0, 0, 0]]), 4))
+        return ((np.abs(value) if quantity.startswith("abs") else value) - stated) / width, at
+    value, at = _extreme(rows, section, -1.0 if quantity.startswith("least") else 1.0, 4, at)
+    return (value - stated) / width, at
+
+
+def off(rows: Rows, said: Statement) -> np.ndarray | None:
+    """How far tables are off a statement (H,), in its half-widths, coordinate by coordinate the worst; None for what
+    says nothing of an arm's shape."""
+    lengths = [np.linalg.norm(part, axis=1) for part in components(rows, said)]
+    return np.max(lengths, axis=0) if lengths else None
 
 
 def worst(rows: Rows, stated: list[Statement]) -> np.ndarray:
     """The greatest miss (H,) of statements, in half-widths; 1 and less is met."""
     found = [each for each in (off(rows, said) for said in stated) if each is not None]
     return np.max(found, axis=0) if found else np.zeros(len(rows["a"]))
+
+
+def fitted(rows: Rows, stated: list[Statement], free: list[str], passes: int = 40) -> Rows:
+    """A table near one (a batch of one) whose entries ``free`` bring what exceeds the half-widths down, by least
+    squares of the excess."""
+    scale = np.array([1e-3 if entry[0] in "ad" and entry[1].isdigit() else 2e-3 for entry in free])
+
+    def at(steps: np.ndarray) -> Rows:
+        copy = {name: np.repeat(values, len(steps), axis=0) for name, values in rows.items()}
+        for k, entry in enumerate(free):
+            copy[entry[:-1]][:, int(entry[-1]) - 1] += steps[:, k] * scale[k]
+        return copy
+
+    def excess(steps: np.ndarray, places: dict[int, np.ndarray | None]) -> np.ndarray:
+        tables, found = at(steps), []
+        for n, said in enumerate(stated):
+            for part in components(tables, said, places.get(n)):
+                length = np.linalg.norm(part, axis=1, keepdims=True)
+                found.append(part * np.maximum(1 - INSIDE / np.maximum(length, 1e-300), 0))
+        return np.concatenate(found, axis=1)
+
+    def slope(steps: np.ndarray) -> np.ndarray:
+        here = at(steps[None])
+        places = {
+            n: _extent(here, said, None)[1] for n, said in enumerate(stated) if said.number("value_mm") is not None
+        }
+        moved = np.concatenate([steps + 1e-4 * np.eye(len(free)), steps - 1e-4 * np.eye(len(free))])
+        values = excess(moved, places)
+        return (values[: len(free)] - values[len(free) :]).T / 2e-4
+
+    found = least_squares(lambda steps: excess(steps[None], {})[0], np.zeros(len(free)), slope, max_nfev=passes)
+    return at(found.x[None])
 
 
 def tool_off(rows: Rows, others: Rows, poses: int = 4000) -> tuple[np.ndarray, np.ndarray]:

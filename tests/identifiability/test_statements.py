@@ -20,7 +20,7 @@ from er3a.references.documents import Document, Documents
 def test_checks_by_what_they_rest_on(name, independent, consistency, claims):
     references = load_references(name)
     bases = bases_of(load_robot(name), references.checkable, references.documents)
-    counts = count_checks(bases, ["pass"] * len(bases))
+    counts = count_checks([basis.kind for basis in bases], ["pass"] * len(bases))
     assert [each.total for each in (counts.independent, counts.consistency, counts.claims)] == [
         independent,
         consistency,
