@@ -11,6 +11,7 @@ from er3a.identifiability.entries import TableNumber, shifted
 from er3a.identifiability.feasible import MET, WIDEST_DEG, OpenTable, Region, farthest
 from er3a.identifiability.gauge import Gauge
 from er3a.identifiability.requirements import Asked
+from er3a.identifiability.restarts import amounts_between
 from er3a.identifiability.tool_motion import NOT_OFF, ToolOff, ToolRange
 from er3a.kinematics.table_batch import Tables
 from er3a.numerics.arrays import Reals
@@ -26,12 +27,14 @@ class Extent:
     ----------
     off : how far the tool is off at most if it alone is anywhere in there
     excluded : whether the table's value is not
+    at_least : whether more may be left open: the search was cut off
     """
 
     low: float
     high: float
     off: ToolOff
     excluded: bool
+    at_least: bool = False
 
 
 class Extents:
@@ -41,6 +44,7 @@ class Extents:
     ----------
     table : from which the search starts (a batch of one)
     entries : all that can take any value; speaking : places of those to which a requirement reacts
+    found : a table that meets the requirements, if the search from ``table`` is known to find none
     """
 
     def __init__(
@@ -51,6 +55,7 @@ class Extents:
         speaking: Sequence[int],
         gauge: Gauge,
         tool: ToolRange,
+        found: Tables | None = None,
     ):
         self.asked, self.table, self.entries, self.tool = asked, table, tuple(entries), tool
         self.speaking = list(speaking)
@@ -58,7 +63,8 @@ class Extents:
         held = held[np.linalg.norm(held, axis=1) > 0]
         self.held = held / np.linalg.norm(held, axis=1, keepdims=True) if len(held) else held
         self.region = Region(asked, table, [entries[k] for k in self.speaking], self.held)
-        self.start: OpenTable | None = self.region.start(np.zeros(len(self.speaking))) if self.speaking else None
+        begun = np.zeros(len(self.speaking)) if found is None else amounts_between(table, found, self.region.entries)
+        self.start: OpenTable | None = self.region.start(begun) if self.speaking else None
         self.table_meets = table is tool.table and (self.start is None or not self.start.amounts.any())
         self.met = self.start is None or self.start.open
 
@@ -87,13 +93,14 @@ class Extents:
         if not self.met:
             return Extent(np.nan, np.nan, NOT_OFF, bool(self._blamed(factors)))
         toward = factors[self.speaking]
-        high = self.region.extent(self.start, toward)[0]
-        low = -self.region.extent(self.start, -toward)[0]
+        high, above = self.region.extent(self.start, toward)
+        low, below = self.region.extent(self.start, -toward)
+        low = -low
         excluded = not low - ALREADY <= 0 <= high + ALREADY and not self._could_stay(toward)
         if not excluded:
             low, high = min(low, 0.0), max(high, 0.0)
         off = self._off(factors, low).worse(self._off(factors, high))
-        return Extent(value + low * factor, value + high * factor, off, excluded)
+        return Extent(value + low * factor, value + high * factor, off, excluded, not (above and below))
 
     def _values(self) -> list[float]:
         return [float(getattr(self.table, e.column)[0, e.joint - 1] * e.in_unit) for e in self.entries]

@@ -56,6 +56,7 @@ class EntryEvidence:
     alternatives : other readings of the table that concern it, and combinations with it that are the same robot
     document : that it rests on
     off : how far the tool could be off for it
+    at_least : whether interval and off are what was found, and more may be left open
     """
 
     entry: str
@@ -67,6 +68,7 @@ class EntryEvidence:
     alternatives: tuple[OtherReading, ...]
     document: str
     off: ToolOff = NOT_OFF
+    at_least: bool = False
 
     @property
     def moves_tool(self) -> bool:

@@ -22,8 +22,9 @@ from er3a.identifiability.gauge import Gauge, gauge_of
 from er3a.identifiability.limits import judge_limit
 from er3a.identifiability.reactions import reactions
 from er3a.identifiability.requirements import Asked, Requirement, requirements_of
+from er3a.identifiability.restarts import open_table
 from er3a.identifiability.tool_motion import NOT_OFF, ToolOff, ToolRange
-from er3a.kinematics.table_batch import tables_of
+from er3a.kinematics.table_batch import Tables, tables_of
 from er3a.numerics.arrays import Flags
 from er3a.references.documents import Documents
 from er3a.references.reference import Reference, conflicts
@@ -74,6 +75,7 @@ class _Judge:
         self._readings: dict[Alternative, OtherReading] = {}
         self._repairs: dict[tuple[int, ...], list[Alternative]] = {}
         self._extents: dict[tuple[int, ...], Extents] = {}
+        self._found: list[Tables] = []
         flips = flips_of(robot, [])
         self.same = gauge_flips(self.tool, flips)
         self.values = {entry.name: entry.value(robot) for entry in self.entries}
@@ -167,7 +169,7 @@ class _Judge:
             status = "contradicted" if consistent and self._excluded_by_all(entry) else status
         elif entry.name in by_all:
             status = "open"
-        elif not concerned and extents.met and extent.off.within(self.tolerance.mm, self.tolerance.deg):
+        elif not concerned and extents.met and self._small(extent):
             status = "settled"
         return self._described(entry, status, extent, concerned, speaking)
 
@@ -177,7 +179,9 @@ class _Judge:
         concerned = [each for each in self._alternatives_of(own) if entry.name in each.names]
         value = self.values[entry.name]
         interval = (-1.0, 1.0) if concerned else (value, value)
-        if entry.name in self._repaired(own):
+        extents = self._extents_of(own)
+        reversed_ = extents.met_by.direction[0, entry.joint - 1] != value
+        if entry.name in self._repaired(own) or (reversed_ and extents.met and not concerned):
             status: Status = "contradicted"
             interval = (-value, -value)
         elif concerned:
@@ -186,7 +190,7 @@ class _Judge:
             else:
                 status = "weak" if speaking else "contradicted" if self._excluded_by_all(entry) else "consistent"
         else:
-            status = "settled" if own else "open"
+            status = "settled" if own and extents.met else "weak" if speaking else "open"
         off = _worst([each.off for each in concerned])
         return self._described(entry, status, Extent(*interval, off, False), concerned, speaking)
 
@@ -238,7 +242,12 @@ class _Judge:
             alternatives=tuple(readings),
             document=document_of(self.robot, entry),
             off=NOT_OFF if status in ("settled", "gauge") else off,
+            at_least=extent.at_least and status == "weak",
         )
+
+    def _small(self, extent: Extent) -> bool:
+        """Whether what is left open moves the tool by less than the tolerance, as far as a finished search can tell."""
+        return not extent.at_least and extent.off.within(self.tolerance.mm, self.tolerance.deg)
 
     def _combination(self, row: int) -> EntryEvidence:
         """What of entries that are gauge is determined together."""
@@ -255,7 +264,7 @@ class _Judge:
             status = "contradicted"
         elif not speaking:
             status = "consistent" if everyone else "open"
-        elif extents.met and extent.off.within(self.tolerance.mm, self.tolerance.deg):
+        elif extents.met and self._small(extent):
             status = "settled"
         return EntryEvidence(
             entry=_sum_of(factors),
@@ -267,6 +276,7 @@ class _Judge:
             alternatives=(),
             document=document,
             off=NOT_OFF if status == "settled" else extent.off,
+            at_least=extent.at_least and status == "weak",
         )
 
     def _given(self) -> list[EntryEvidence]:
@@ -352,8 +362,21 @@ class _Judge:
             fewest = min(self._repairs_of(own), key=lambda each: len(each.entries), default=None)
             table = fewest.table if fewest else self.table
             speaking = [k for k, entry in enumerate(self.free) if self._speaking(entry, own)]
-            self._extents[own] = Extents(self._asked_of(own), table, self.free, speaking, self.gauge, self.tool)
+            asked = self._asked_of(own)
+            near = Extents(asked, table, self.free, speaking, self.gauge, self.tool)
+            self._extents[own] = near if near.met else self._far(asked, near)
         return self._extents[own]
+
+    def _far(self, asked: Asked, near: Extents) -> Extents:
+        """What evidence leaves open far from the table, where nothing near it will do; ``near`` if there is nothing."""
+        known = [each for each in self._found if asked.violation(asked.off(each, afresh=True)).max() <= MET]
+        found = known[0] if known else open_table(asked, self.table, near.region.entries, near.held)
+        if found is None:
+            return near
+        self._found.append(found)
+        joints = list(range(found.direction.shape[1]))
+        table = self.table.with_column("direction", joints, found.direction)
+        return Extents(asked, table, self.free, near.speaking, self.gauge, self.tool, found)
 
 
 def _sum_of(factors: Sequence[tuple[TableNumber, float]]) -> str:

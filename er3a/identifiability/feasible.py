@@ -5,7 +5,10 @@ table, within a trust region that grows while steps succeed; a step that leaves 
 steps on what it exceeds. Angles to a direction (cones) are bounded by eight tangents and one that follows the point.
 Standard deviations bound the likelihood: chi squared may exceed its least by 3.84, the 95 % profile interval of one
 number [1]_; that ball is bounded by tangents, one of them across the direction that is maximised, so that the extent is
-exact where nothing else bounds it and on the safe side elsewhere. Combinations that move no tool are held.
+exact where nothing else bounds it and on the safe side elsewhere. Combinations that move no tool are held. An extreme
+over the joint limits that is attained in several places at once has kinks, at which such steps can end too early; so
+each extent is looked for a second time with the entries held that make them. An extent is one that tables attain; what
+lies beyond was not found.
 
 References
 ----------
@@ -23,14 +26,15 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 from er3a.identifiability.entries import TableNumber, shifted
 from er3a.identifiability.requirements import Asked
 from er3a.kinematics.table_batch import Tables
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Flags, Reals
 
 PROFILE = 1.959963984540054
 TANGENTS = 8
 MET = 1e-3  # of a half-width
 LEAST_MM, WIDEST_DEG = 1000.0, 180.0
 FIRST_TRUST, LEAST_TRUST, GROWTH, SHRINKING = 4.0, 1e-3, 3.0, 0.4
-STEPS, RETURNS = 20, 8
+STEPS, RETURNS = 40, 8
+FOLLOWED = 0.05  # of a half-width, by which an extreme that was followed may be missed
 IDLE_COST, EXCESS_COST = 1e-4, 1e3
 SETTLED_GAIN = 4e-3
 SEARCH_STEPS = 40
@@ -84,6 +88,7 @@ class Region:
         widest = np.array([farthest(table) if entry.unit == "mm" else WIDEST_DEG for entry in entries])
         self.widest = widest / np.array([entry.in_unit for entry in entries]) / self.scale
         self.basis = np.linalg.svd(gauge, full_matrices=True)[2][len(gauge) :].T if len(gauge) else np.eye(len(entries))
+        self._kinked: Flags | None = None
 
     def at(self, amounts: Reals) -> Tables:
         """The table with amounts (k,) added."""
@@ -169,30 +174,47 @@ class Region:
                 break
         return amounts, off
 
-    def extent(self, start: OpenTable, toward: Reals) -> tuple[float, Reals]:
-        """How far the set extends from a start along ``toward`` (k,), and the amounts there."""
+    def extent(self, start: OpenTable, toward: Reals) -> tuple[float, bool]:
+        """How far the set extends from a start along ``toward`` (k,), and whether the search came to its end."""
+        kinks = self._kinks(start) & (toward == 0)
+        ways = [self.gauge] + ([np.concatenate([self.gauge, np.eye(len(toward))[kinks]])] if kinks.any() else [])
+        found = [Region(self.asked, self.table, self.entries, held)._followed(start, toward) for held in ways]
+        return max(found)
+
+    def _kinks(self, start: OpenTable) -> Flags:
+        if self._kinked is None:
+            self._kinked = self.asked.kinked(self.at(start.amounts), self.entries)
+        return self._kinked
+
+    def _followed(self, start: OpenTable, toward: Reals) -> tuple[float, bool]:
+        """The extent along one way, as far as it goes."""
         amounts, off, slope = start.amounts, start.off, start.slope
-        places, trust = start.places, FIRST_TRUST
+        places, trust, finished = start.places, FIRST_TRUST, False
+        passed = [amounts]
         self.asked.follow(places)
-        begun = best = float(toward @ amounts)
         for _ in range(STEPS):
             step = self._step(amounts, off, slope, toward, start.chi2, trust)
-            gain = float(toward @ step)
-            if gain < SETTLED_GAIN * max(1.0, abs(best - begun)) * min(1.0, trust):
+            gained = float(toward @ (amounts - start.amounts))
+            finished = float(toward @ step) < SETTLED_GAIN * max(1.0, abs(gained)) * min(1.0, trust)
+            if finished:
                 break
             trial, trial_off = self._returned(amounts + step, slope)
-            allowed = self._allowed(trial_off, start.chi2)
-            if allowed and toward @ trial > best:
+            if self._allowed(trial_off, start.chi2) and toward @ trial > toward @ amounts:
                 long = np.abs(step).max() > 0.9 * trust
-                amounts, off, best = trial, trial_off, float(toward @ trial)
+                amounts, off = trial, trial_off
+                passed.append(amounts)
                 slope, places = self.slope(amounts), self.asked.places
                 trust = trust * GROWTH if long else trust
             else:
                 trust = min(trust, float(np.abs(step).max())) * SHRINKING
-                if trust < LEAST_TRUST:
+                finished = trust < LEAST_TRUST
+                if finished:
                     break
                 self.asked.follow(places)
-        return best, amounts
+        while len(passed) > 1 and self.excess(self.off(passed[-1], afresh=True)) > FOLLOWED:
+            passed.pop()
+            finished = False
+        return float(toward @ passed[-1]), finished
 
     def _allowed(self, off: Reals, chi2: float) -> bool:
         likely = (off[self.asked.likely] ** 2).sum()

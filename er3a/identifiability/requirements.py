@@ -17,7 +17,7 @@ from er3a.identifiability.entries import TableNumber, shifted
 from er3a.identifiability.extreme_climb import climb_to_extreme, measure_code
 from er3a.identifiability.peaks import box_points, climb, peak
 from er3a.kinematics.table_batch import Tables, frames_of, tables_of
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Flags, Reals
 from er3a.references.predict import state_of_tables
 from er3a.references.quantities import FRAME_OF_POINT, MM, Extreme, Limit, PoseOutside, Quantity, Speed
 from er3a.references.reference import Reference, conflicts
@@ -27,6 +27,8 @@ LIKELY = 4.0  # standard deviations, beyond which a discrete alternative is excl
 SLIGHT = 1e-3  # of a half-width
 SLOPE_STEP = 1e-3  # of an entry's scale
 SCANNED, WATCHED, OVERTAKEN_M = 512, 48, 1e-9
+ACROSS, OVERTAKINGS = np.linspace(0.0, 1.0, 9), 4
+KINK_STEP, KINK = 1.0, 1.0  # of an entry's scale, and of a half-width
 
 
 @dataclass(frozen=True)
@@ -113,8 +115,12 @@ class FollowedExtreme:
             points[0] = np.clip(q, np.minimum(lower, upper), np.maximum(lower, upper))
             points[1:, self.joints] = lower[self.joints] + shares * (upper - lower)[self.joints]
             points[0, 0] = 0.0
-            starts = points
-            self.q, value = climb_to_extreme(table, self.base, self.code, self.sign, starts, np.array(self.joints))
+            joints, value, last = np.array(self.joints), -np.inf, points
+            for _ in range(OVERTAKINGS):
+                self.q, now = climb_to_extreme(table, self.base, self.code, self.sign, last, joints)
+                if now <= value + OVERTAKEN_M:
+                    break
+                value, last = now, np.concatenate([self.q[None], self._across(table, self.q)])
             self.known = True
             return self.sign * value * MM
         lower, upper = table.lower[0, self.joints], table.upper[0, self.joints]
@@ -134,6 +140,15 @@ class FollowedExtreme:
             q, value = peak(measured, lower, upper)
         self.q, self.known = self._whole(q), True
         return self.sign * value * MM
+
+    def _across(self, table: Tables, q: Reals) -> Reals:
+        """Joint vectors (P, n) with one joint elsewhere than in q (n,): where a climb that ended on a saddle goes on."""
+        lower, upper = table.lower[0], table.upper[0]
+        found = np.repeat(q[None], len(ACROSS) * len(self.joints), axis=0)
+        for place, joint in enumerate(self.joints):
+            rows = slice(place * len(ACROSS), (place + 1) * len(ACROSS))
+            found[rows, joint] = lower[joint] + ACROSS * (upper - lower)[joint]
+        return found
 
     def along(self, tables: Tables) -> Reals:
         """The measure (H,) in mm of many tables where the extreme was attained last."""
@@ -222,6 +237,19 @@ class Asked:
         off = self.off_near(shifted(table, entries, steps))
         slope: Reals = (off[:k] - off[k:]).T / (2 * SLOPE_STEP)
         return slope
+
+    def kinked(self, table: Tables, entries: Sequence[TableNumber]) -> Flags:
+        """Which entries (k,) make an extreme have a kink at a table: it is attained in several places at once there, and
+        they take it in different directions."""
+        here = self.off(table, afresh=True)
+        found = np.zeros(len(entries), dtype=bool)
+        for k, entry in enumerate(entries if self.extreme else ()):
+            ahead, behind = (
+                self.off(shifted(table, [entry], np.array([[sign * KINK_STEP * entry.scale]])), afresh=True)
+                for sign in (1, -1)
+            )
+            found[k] = np.abs(ahead + behind - 2 * here).max() > KINK
+        return found
 
     def violation(self, off: Reals) -> Reals:
         """How far each requirement is exceeded (..., r), in half-widths (or four standard deviations) less one."""

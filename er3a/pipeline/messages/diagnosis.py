@@ -74,14 +74,14 @@ LIMIT_FAULTS = {
     "upper_sign": N_("upper limit has the wrong sign"),
 }
 ONE_LIMIT = {
-    "lower": N_("lower limit is {given:g} deg, {fits:.4g} deg fits"),
-    "upper": N_("upper limit is {given:g} deg, {fits:.4g} deg fits"),
+    "lower": N_("lower limit is {given:g} deg, {fits} deg fits"),
+    "upper": N_("upper limit is {given:g} deg, {fits} deg fits"),
 }
 LIMITS = {
     "lower": N_("the lower limit of joint {joint} would tell them apart"),
     "upper": N_("the upper limit of joint {joint} would tell them apart"),
 }
-LEAST_SHOWN = 0.005
+LEAST_SHOWN, LEAST_FITTED = 0.005, 5e-5
 MOST_LISTED = 24
 
 
@@ -98,6 +98,18 @@ def shown(value: float) -> str:
     if LEAST_SHOWN <= value < 1:
         return f"{value:.2f}"
     return f"{value:.1f}" if value < 100 else f"{value:.0f}"
+
+
+def fitted(found: WrongAlpha | WrongOffset | WrongLimit | WrongLength) -> str:
+    """The value that fits: to four digits, or to as many as tell it from the one that is given."""
+    given, fits = (
+        (found.given_mm, found.fits_mm) if isinstance(found, WrongLength) else (found.given_deg, found.fits_deg)
+    )
+    if abs(fits) < LEAST_FITTED:
+        return "0"
+    return next(
+        (text for digits in (4, 5, 6) if (text := f"{fits:.{digits}g}") != f"{given:.{digits}g}"), f"{fits:.7g}"
+    )
 
 
 @say.register
@@ -119,10 +131,10 @@ def _(found: WrongAlphaSign) -> str:
 @say.register
 def _(found: WrongAlpha) -> str:
     if found.given_deg == 0:
-        fault = sentence(found.code, "alpha {fits:.4g} deg missing", fits=found.fits_deg)
+        fault = sentence(found.code, "alpha {fits} deg missing", fits=fitted(found))
     else:
         fault = sentence(
-            found.code, "alpha is {given:g} deg, {fits:.4g} deg fits", given=found.given_deg, fits=found.fits_deg
+            found.code, "alpha is {given:g} deg, {fits} deg fits", given=found.given_deg, fits=fitted(found)
         )
     return _at_joint(found.joint, fault)
 
@@ -154,10 +166,10 @@ def _(found: ShiftedRows) -> str:
 @say.register
 def _(found: WrongOffset) -> str:
     if found.given_deg == 0:
-        fault = sentence(found.code, "offset {fits:.4g} deg missing", fits=found.fits_deg)
+        fault = sentence(found.code, "offset {fits} deg missing", fits=fitted(found))
     else:
         fault = sentence(
-            found.code, "offset is {given:g} deg, {fits:.4g} deg fits", given=found.given_deg, fits=found.fits_deg
+            found.code, "offset is {given:g} deg, {fits} deg fits", given=found.given_deg, fits=fitted(found)
         )
     return _at_joint(found.joint, fault)
 
@@ -180,21 +192,21 @@ def _(found: WrongLimits) -> str:
 
 @say.register
 def _(found: WrongLimit) -> str:
-    fault = sentence(found.code, ONE_LIMIT[found.side], given=found.given_deg, fits=found.fits_deg)
+    fault = sentence(found.code, ONE_LIMIT[found.side], given=found.given_deg, fits=fitted(found))
     return _at_joint(found.joint, fault)
 
 
 @say.register
 def _(found: WrongLength) -> str:
     if found.given_mm == 0:
-        fault = sentence(found.code, "{entry} missing, {fits:.4g} mm fits", entry=found.column, fits=found.fits_mm)
+        fault = sentence(found.code, "{entry} missing, {fits} mm fits", entry=found.column, fits=fitted(found))
     else:
         fault = sentence(
             found.code,
-            "{entry} is {given:.6g} mm, {fits:.4g} mm fits",
+            "{entry} is {given:.6g} mm, {fits} mm fits",
             entry=found.column,
             given=found.given_mm,
-            fits=found.fits_mm,
+            fits=fitted(found),
         )
     return _at_joint(found.joint, fault)
 
