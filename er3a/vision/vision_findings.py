@@ -1,0 +1,173 @@
+"""What hand-eye calibration finds: samples that don't fit, directions, motion that tells too little."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from er3a.errors import Er3aError
+
+SuspectKind = Literal["half_turn_x", "half_turn_y", "half_turn_z", "quarter_turn_z", "mirrored_tilt", "rotation"]
+"""Turns of the board, as detected, about its own axes that would mend a sample; ``mirrored_tilt``: the other of the two
+poses in which a flat board looks alike; ``rotation``: none of these."""
+
+
+@dataclass(frozen=True)
+class RotationMismatch:
+    """Hand and board turn by different angles between this sample and the others; ``off_deg`` in the median."""
+
+    sample: str
+    kind: SuspectKind
+    off_deg: float
+    code: Literal["rotation_mismatch"] = "rotation_mismatch"
+
+
+@dataclass(frozen=True)
+class FarFromFit:
+    """A sample is farther from what all others predict than their scatter allows, with this probability."""
+
+    sample: str
+    off_mm: float
+    off_deg: float
+    probability: float
+    code: Literal["far_from_fit"] = "far_from_fit"
+
+
+@dataclass(frozen=True)
+class RepeatedPose:
+    """The flange stands where it stood in another sample; ``apart``: what the two saw of the board differs by."""
+
+    sample: str
+    first: str
+    apart_mm: float
+    apart_deg: float
+    code: Literal["repeated_pose"] = "repeated_pose"
+
+
+Suspect = RotationMismatch | FarFromFit | RepeatedPose
+
+
+@dataclass(frozen=True)
+class NoMajority:
+    """No more than half of the samples agree on how far hand and board turn; ``pairs`` of ``of`` differ."""
+
+    pairs: int
+    of: int
+    median_deg: float
+    code: Literal["no_majority"] = "no_majority"
+
+
+@dataclass(frozen=True)
+class QuaternionOrder:
+    """Turning angles agree if quaternions of one stream are read in the other order."""
+
+    stream: Literal["flange", "target"]
+    median_before_deg: float
+    median_after_deg: float
+    code: Literal["quaternion_order"] = "quaternion_order"
+
+
+@dataclass(frozen=True)
+class BoardScale:
+    """The distances seen ask for a board larger by this factor, beyond its 95 % interval."""
+
+    factor: float
+    half_width: float
+    code: Literal["board_scale"] = "board_scale"
+
+
+@dataclass(frozen=True)
+class LittleMotion:
+    """The samples turn little: the greatest angle between two, and of the rotation axes to their common direction."""
+
+    greatest_turn_deg: float
+    axes_apart_deg: float
+    code: Literal["little_motion"] = "little_motion"
+
+
+@dataclass(frozen=True)
+class MoreScatter:
+    """The residuals are larger than the stated standard deviations allow."""
+
+    scatter: float
+    largest: float
+    code: Literal["more_scatter"] = "more_scatter"
+
+
+CalibrationWarning = NoMajority | QuaternionOrder | BoardScale | LittleMotion | MoreScatter
+
+
+@dataclass(frozen=True)
+class TooFewSamples:
+    """Hand-eye calibration needs three samples at least."""
+
+    samples: int
+    needed: int
+    code: Literal["too_few_samples"] = "too_few_samples"
+
+
+@dataclass(frozen=True)
+class AllSamplesEqual:
+    """The flange never moved, or the board never did."""
+
+    stream: Literal["flange", "target"]
+    code: Literal["all_samples_equal"] = "all_samples_equal"
+
+
+@dataclass(frozen=True)
+class ParallelAxes:
+    """All motions turn about one direction (by the flange's axes at a sample), so that the shift along it is open."""
+
+    axis: tuple[float, float, float]
+    spread_deg: float
+    code: Literal["parallel_axes"] = "parallel_axes"
+
+
+@dataclass(frozen=True)
+class NoRotation:
+    """The flange moves but does not turn, so that the camera's position is open."""
+
+    greatest_turn_deg: float
+    code: Literal["no_rotation"] = "no_rotation"
+
+
+@dataclass(frozen=True)
+class NothingFits:
+    """The search for the likeliest poses does not end: the two streams don't belong together."""
+
+    code: Literal["nothing_fits"] = "nothing_fits"
+
+
+NotCalibratable = TooFewSamples | AllSamplesEqual | ParallelAxes | NoRotation | NothingFits
+
+
+class HandEyeError(Er3aError):
+    """Samples don't determine hand-eye and board pose; see ``finding``."""
+
+    def __init__(self, finding: NotCalibratable):
+        self.finding = finding
+        super().__init__(f"no hand-eye calibration ({finding.code.replace('_', ' ')})")
+
+
+DirectionStatus = Literal["best", "same_problem", "excluded", "open"]
+
+
+@dataclass(frozen=True)
+class DirectionTried:
+    """The samples with one stream or both inverted.
+
+    Attributes
+    ----------
+    status : ``best`` of those tried; ``same_problem`` as the best, with the two unknowns swapped; ``excluded`` by the
+        residuals (probability below 0.001); ``open``: they can't tell
+    rms_mm, rms_deg : of the residuals, by coordinate; None where nothing fits
+    probability : that residuals of a right direction are this much larger than the best's
+    """
+
+    flange_inverted: bool
+    target_inverted: bool
+    status: DirectionStatus
+    rms_mm: float | None
+    rms_deg: float | None
+    probability: float
+    code: Literal["direction_tried"] = "direction_tried"
