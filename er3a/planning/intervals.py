@@ -51,6 +51,11 @@ class TooFast:
     limit_deg_s: float
     code: Literal["too_fast"] = "too_fast"
 
+    @property
+    def ratio(self) -> float:
+        """What is needed over what is allowed."""
+        return self.needed_deg_s / self.limit_deg_s
+
 
 @dataclass(frozen=True)
 class TooFastIfAssumed:
@@ -60,6 +65,11 @@ class TooFastIfAssumed:
     needed_deg_s: float
     limit_deg_s: float
     code: Literal["too_fast_if_assumed"] = "too_fast_if_assumed"
+
+    @property
+    def ratio(self) -> float:
+        """What is needed over what is allowed."""
+        return self.needed_deg_s / self.limit_deg_s
 
 
 @dataclass(frozen=True)
@@ -71,6 +81,11 @@ class AccelerationTooGreat:
     limit_deg_s2: float
     code: Literal["acceleration_too_great"] = "acceleration_too_great"
 
+    @property
+    def ratio(self) -> float:
+        """What is needed over what is allowed."""
+        return self.needed_deg_s2 / self.limit_deg_s2
+
 
 @dataclass(frozen=True)
 class AccelerationTooGreatIfAssumed:
@@ -81,6 +96,11 @@ class AccelerationTooGreatIfAssumed:
     limit_deg_s2: float
     code: Literal["acceleration_too_great_if_assumed"] = "acceleration_too_great_if_assumed"
 
+    @property
+    def ratio(self) -> float:
+        """What is needed over what is allowed."""
+        return self.needed_deg_s2 / self.limit_deg_s2
+
 
 @dataclass(frozen=True)
 class JerkTooGreat:
@@ -90,6 +110,11 @@ class JerkTooGreat:
     needed_deg_s3: float | None
     limit_deg_s3: float
     code: Literal["jerk_too_great"] = "jerk_too_great"
+
+    @property
+    def ratio(self) -> float:
+        """What is needed over what is allowed."""
+        return np.inf if self.needed_deg_s3 is None else self.needed_deg_s3 / self.limit_deg_s3
 
 
 RateCause = TooFast | TooFastIfAssumed | AccelerationTooGreat | AccelerationTooGreatIfAssumed | JerkTooGreat

@@ -161,9 +161,7 @@ class PiecewiseMotion:
 
     def scaled(self, factor: float) -> PiecewiseMotion:
         """The same way in ``factor`` times the time."""
-        return PiecewiseMotion(
-            self.times * factor, self.angle, self.velocity / factor, self.acceleration / factor**2
-        )
+        return PiecewiseMotion(self.times * factor, self.angle, self.velocity / factor, self.acceleration / factor**2)
 
 
 def polynomial_motion(rates: Callable[[Reals], Rates], breaks: Reals, degree: int) -> PiecewiseMotion:

@@ -93,9 +93,7 @@ def _shoulder(robot: Robot, motion: PiecewiseMotion) -> Pieces:
     times = np.append(starts, motion.times[-1])
     x = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
     inner = -1 + 2 * (within[:, None] + (x + 1) / 2) / parts[piece][:, None]
-    q2, q3 = (
-        np.stack([chebyshev.chebval(row, motion.angle[i, :, j]) for i, row in zip(piece, inner)]) for j in (1, 2)
-    )
+    q2, q3 = (np.stack([chebyshev.chebval(row, motion.angle[i, :, j]) for i, row in zip(piece, inner)]) for j in (1, 2))
     values = forms.shoulder_at(q2, q2 + forms.sense * q3)
     basis = np.cos(np.outer(np.arange(DEGREE + 1), np.arccos(x))) * 2 / (DEGREE + 1)
     basis[0] /= 2
@@ -144,4 +142,3 @@ def _passes(size: Reals, crossed: Flags, near: float) -> Iterator[int]:
     for k in np.flatnonzero(below).tolist():
         if size[k] > ON_SET and not crossed[max(k - 1, 0) : k + 1].any():
             yield k
-

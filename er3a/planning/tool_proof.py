@@ -31,10 +31,13 @@ from er3a.kinematics.near_singular import NearSingular
 from er3a.kinematics.singularity import TYPES, characteristic_length, determinant_factors
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.runs import runs
+from er3a.planning.follow import follow
 from er3a.planning.followed import Followed
-from er3a.planning.intervals import Interval, RateLimit
+from er3a.planning.intervals import Interval, RateCause, RateLimit, rate_interval
+from er3a.planning.moves import ToolPath
 from er3a.planning.piecewise import PiecewiseMotion, greatest_between, polynomial_motion
 from er3a.planning.profiles import TimeLaw, times_at
+from er3a.planning.singular_events import singular_events
 from er3a.robots.joint_limits import LIMIT_TOLERANCE
 from er3a.robots.robot import Robot
 
@@ -45,6 +48,8 @@ MOST_INTERVALS = 60_000
 FIRST_INTERVALS = 64
 GROWN = 0.5  # b sqrt(n) C h V up to which a motion is continued
 ATTEMPTS = 3
+MOST_ROUNDS = 3
+STEP_ASIDE = 1e-10  # share of the duration
 
 Quantity = Literal["singular", "limits", "speed", "acceleration", "jerk", "near"]
 QUANTITIES: tuple[Quantity, ...] = ("singular", "limits", "speed", "acceleration", "jerk", "near")
@@ -70,6 +75,8 @@ class ToolProof:
     velocity, acceleration : (m, n), bounds of their sizes, rad/s and rad/s^2; infinite where nothing is proven
     t, q : (k,) s and (k, n) rad, the ends and middles of all intervals; q NaN where unreachable
     middles, rates : the middles (m,) in s, with velocity and acceleration there, (m, 2, n)
+    jerk : (m, n), rad/s^3, met in each interval, where a limit of jerk is to be settled; else 0
+    steps : times (k,) in s at which the acceleration steps, and by how much, (k, n) in rad/s^2; the same
     undecided : stretches, and what is open there; a rate is not where its limit is exceeded elsewhere
     """
 
@@ -81,6 +88,8 @@ class ToolProof:
     q: Reals
     middles: Reals
     rates: Reals
+    jerk: Reals
+    steps: tuple[Reals, Reals]
     undecided: tuple[Interval[Undecided], ...]
 
     def rate_bounds(self, start: Reals, end: Reals) -> tuple[Reals, Reals]:
@@ -123,10 +132,38 @@ class _Settled:
     acceleration: Reals
     q: Reals
     rates: Reals
+    jerk: Reals
 
     def part(self, wanted: Flags) -> _Settled:
         """Some of the intervals."""
         return _Settled(*(getattr(self, name)[wanted] for name in self.__dataclass_fields__))
+
+
+def follow_and_prove(
+    robot: Robot, line: ToolPath, t: Reals, wanted: Wanted, q_start: Reals | None = None, start_slot: int | None = None
+) -> tuple[Followed, ToolProof]:
+    """Follow a path (:func:`er3a.planning.follow.follow`), and settle it.
+
+    Where a pose proves out of reach between others that are not, the path is followed again with that pose among them.
+    """
+    for _ in range(MOST_ROUNDS):
+        followed = follow(robot, line, t, q_start, start_slot)
+        events = singular_events(robot, followed.t, followed.q, followed.joints, wanted.near)
+        beyond = np.flatnonzero(np.diff(np.isnan(followed.q[:, 0])))
+        known = [
+            [time for event in events if event.crossing for time in (event.t, event.until)],
+            [jump.t for jump in followed.jumps],
+            followed.t[beyond],
+        ]
+        proof = prove(followed, wanted, np.unique(np.concatenate([np.asarray(part, float) for part in known])))
+        lost = np.isnan(proof.q[:, 0])
+        after = np.clip(np.searchsorted(followed.t, proof.t), 1, len(followed.t) - 1)
+        reached = np.isfinite(followed.q[:, 0])
+        lost &= reached[after] & reached[after - 1]
+        if not lost.any():
+            break
+        t = np.union1d(followed.t, proof.t[lost])
+    return followed, proof
 
 
 def prove(followed: Followed, wanted: Wanted, singular: Reals) -> ToolProof:
@@ -164,6 +201,30 @@ def prove(followed: Followed, wanted: Wanted, singular: Reals) -> ToolProof:
     return _proof(followed, done, singular)
 
 
+def jerk_intervals(proof: ToolProof, limit: RateLimit) -> list[Interval[RateCause]]:
+    """Where joints exceed a limit of jerk; a step of the acceleration exceeds any."""
+    found: list[Interval[RateCause]] = []
+    for j in np.flatnonzero(np.isfinite(limit.most)).tolist():
+        size = np.abs(proof.jerk[:, j])
+        for first, last in runs(size > limit.allowed[j]):
+            stretch = float(proof.times[first]), float(proof.times[last])
+            found.append(rate_interval(limit, j, *stretch, float(size[first:last].max())))
+        for k in np.flatnonzero(np.abs(proof.steps[1][:, j]) > limit.step_allowed[j]).tolist():
+            found.append(rate_interval(limit, j, float(proof.steps[0][k]), float(proof.steps[0][k]), np.inf))
+    return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
+
+
+def _acceleration_steps(followed: Followed) -> tuple[Reals, Reals]:
+    """Times at which pieces of the law or of the curve meet, start and end among them, and the accelerations' steps."""
+    law, duration = followed.line.law, followed.line.duration
+    times = np.unique(np.concatenate([law.breaks, times_at(law, followed.line.edges)]))
+    aside = STEP_ASIDE * duration
+    behind = followed.rates(np.minimum(times + aside, duration))[2]
+    before = followed.rates(np.maximum(times - aside, 0.0))[2]
+    behind[times >= duration - aside], before[times <= aside] = 0.0, 0.0  # at rest
+    return times, behind - before
+
+
 def law_motion(law: TimeLaw) -> PiecewiseMotion:
     """A law of time as polynomials, n = 1."""
 
@@ -186,8 +247,9 @@ def _distance(points: Reals, start: Reals, end: Reals) -> Reals:
 
 
 def _proof(followed: Followed, done: list[_Settled], singular: Reals) -> ToolProof:
-    whole = _Settled(*(np.concatenate([getattr(part, name) for part in done]) for name in _Settled.__dataclass_fields__))
-    whole = _Settled(*(getattr(whole, name)[np.argsort(whole.start)] for name in _Settled.__dataclass_fields__))
+    order = np.argsort(np.concatenate([part.start for part in done]))
+    names = _Settled.__dataclass_fields__
+    whole = _Settled(*(np.concatenate([getattr(part, name) for part in done])[order] for name in names))
     times = np.append(whole.start, whole.end[-1])
     middles = (whole.start + whole.end) / 2
     t = np.concatenate([times, middles])
@@ -209,6 +271,8 @@ def _proof(followed: Followed, done: list[_Settled], singular: Reals) -> ToolPro
         q=q[order],
         middles=middles,
         rates=whole.rates,
+        jerk=whole.jerk,
+        steps=_acceleration_steps(followed),
         undecided=tuple(sorted(undecided, key=lambda part: part.start)),
     )
 
@@ -236,10 +300,11 @@ def _settle(followed: Followed, wanted: Wanted, progress: PiecewiseMotion, start
     outside = _outside(robot, np.stack([q_start, q, q_end])).any(axis=0)
     sure = ~_outside(robot, np.stack([q - bounds.change, q + bounds.change])).any(axis=0)
     open_[:, 1], broken[:, 1] = known & ~(sure | outside).all(axis=1), outside.any(axis=1)
+    asks_jerk = any(limit.order == 3 for limit in wanted.rates)
+    jerk = _mean_jerk(followed, start, end) if asks_jerk else np.zeros_like(q)
     for limit in wanted.rates:
         k = 1 + limit.order
-        measured = (velocity, acceleration)[limit.order - 1] if limit.order < 3 else _mean_jerk(followed, start, end)
-        over = np.abs(measured) > limit.allowed
+        over = np.abs((velocity, acceleration, jerk)[limit.order - 1]) > limit.allowed
         sure = (highest[limit.order] <= limit.allowed) | ~np.isfinite(limit.most)
         open_[:, k], broken[:, k] = known & ~(sure | over).all(axis=1), over.any(axis=1)
     open_[known, 5] = _near_open(factor_forms(robot), robot, wanted.near, q[known], bounds.change[known])
@@ -253,6 +318,7 @@ def _settle(followed: Followed, wanted: Wanted, progress: PiecewiseMotion, start
         acceleration=np.where(known[:, None], highest[2], np.inf),
         q=q,
         rates=rates,
+        jerk=jerk,
     )
 
 
@@ -297,8 +363,8 @@ def _continued(followed: Followed, q: Reals, dq: Reals, ddq: Reals, s: tuple[Rea
     high2 = np.minimum(np.abs(ddq) + h * third, most[:, None])
     high1 = np.abs(dq) + h * np.abs(ddq) + h**2 * third / 2
     change = h * np.abs(dq) + h**2 * np.abs(ddq) / 2 + h**3 * third / 6
-    parts = (np.where(proven[:, None], part, np.inf) for part in (change, high1, high2, np.broadcast_to(third, q.shape)))
-    return _Bounds(proven, *parts)
+    found = (change, high1, high2, np.broadcast_to(third, q.shape))
+    return _Bounds(proven, *(np.where(proven[:, None], part, np.inf) for part in found))
 
 
 def _inverse_and_reach(robot: Robot, q: Reals, length: float) -> tuple[Reals, Reals]:

@@ -12,6 +12,8 @@ OUTCOMES: dict[Outcome, str] = {
     "collides": N_("collides"),
     "too fast": N_("too fast"),
     "singular": N_("singular"),
+    "too fast for the assumed limits": N_("too fast for the assumed limits"),
+    "undecided": N_("undecided"),
     "near-singular": N_("near-singular"),
     "safe": N_("safe"),
     "reached": N_("reached"),

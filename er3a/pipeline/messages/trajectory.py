@@ -18,6 +18,7 @@ from er3a.pipeline.stages.trajectory.model import (
     TriedStrategy,
 )
 from er3a.planning.avoidance.strategy_names import StrategyName
+from er3a.planning.intervals import RateCause
 
 FIGURES = {
     "paths": N_("Paths planned"),
@@ -82,8 +83,10 @@ def path_text(path: PathSummary) -> str:
 def _apart_from_collisions(path: PathSummary) -> str:
     if path.unreachable:
         return joined(map(_when, path.unreachable))
-    if faults := path.out_of_limits or path.too_fast:
+    if faults := path.out_of_limits or _worst(path.too_fast):
         return joined([*map(say, faults), *map(say, path.singularities)])
+    if path.undecided:
+        return joined([*map(say, path.undecided), *map(say, path.singularities)])
     met = [say(event) for event in path.singularities if event.crossing]
     if path.in_joint_space:
         if not met:
@@ -98,6 +101,14 @@ def _apart_from_collisions(path: PathSummary) -> str:
     if path.singularities:
         return joined(map(say, path.singularities))
     return sentence("path.safe", "no singular pose near, within limits and reach")
+
+
+def _worst(stretches: tuple[Stretch[RateCause], ...]) -> list[Stretch[RateCause]]:
+    """Of each kind of limit the stretch that exceeds it most."""
+    found: dict[str, Stretch[RateCause]] = {}
+    for part in sorted(stretches, key=lambda stretch: stretch.cause.ratio, reverse=True):
+        found.setdefault(part.cause.code, part)
+    return list(found.values())
 
 
 def _speeds(bounded: bool) -> str:

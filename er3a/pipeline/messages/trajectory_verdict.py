@@ -16,6 +16,8 @@ def _(found: PathCounts) -> str:
         "collides": found.collides,
         "too fast": found.too_fast,
         "singular": found.singular,
+        "too fast for the assumed limits": found.too_fast_if_assumed,
+        "undecided": found.undecided,
         "near-singular": found.near_singular,
     }
     faults = []

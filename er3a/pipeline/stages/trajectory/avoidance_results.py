@@ -88,7 +88,7 @@ class AvoidanceTask:
         t, q = nodes_along(motion.joints, motion.t, motion.q, self.limits)
         try:
             quickest = fastest(q, self.limits)
-            if found.verdict != "too fast":
+            if not found.fast:
                 return quickest, []
             slower = fastest(q, self.limits, t)
         except TimingError:
@@ -103,13 +103,11 @@ class AvoidanceTask:
         """The deepest overlap on a motion, and its least clearance in mm (None if nothing can meet)."""
         if self.surroundings is None:
             return None, None
-        t, q = cost.motion.t, cost.motion.q
-
-        def joints(at: Reals) -> Reals:
-            return np.stack([np.interp(at, t, q[:, j]) for j in range(6)], axis=-1)
-
-        grid = np.linspace(0.0, t[-1], CLEARANCE_TIMES)
-        along = clearance_along(self.surroundings.bodies, joints, grid, grid, self.surroundings.tolerance)
+        curve = cost.motion.curve
+        grid = np.linspace(0.0, curve.duration, CLEARANCE_TIMES)
+        along = clearance_along(
+            self.surroundings.bodies, curve.joints, curve.rate_bounds, grid, grid, self.surroundings.tolerance
+        )
         least = least_clearance(along)
         if least is None:
             return None, None

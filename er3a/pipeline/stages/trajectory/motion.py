@@ -9,16 +9,18 @@ import numpy as np
 from scipy.integrate import cumulative_simpson
 from scipy.interpolate import CubicHermiteSpline
 
+from er3a.collision.along import RateBounds
 from er3a.errors import PoseError
 from er3a.files.path_file import PathEntry
 from er3a.kinematics.forward import forward, jacobian
 from er3a.numerics.arrays import Reals
 from er3a.planning.build import Built, build
 from er3a.planning.commands import CommandSource
-from er3a.planning.follow import follow
 from er3a.planning.followed import Followed
 from er3a.planning.moves import JointMove
+from er3a.planning.piecewise import PiecewiseMotion
 from er3a.planning.sequences import JointSequence
+from er3a.planning.tool_proof import ToolProof, Wanted, follow_and_prove
 from er3a.robots.robot import Robot
 
 
@@ -36,6 +38,8 @@ class Motion:
     tool : T_base_tool (n, 4, 4) that the path asks for at times (n,)
     way : length of the tool point's way (n,) in m at times (n,)
     followed : how a path of the tool is followed; None for one in joint space
+    polynomials : a move of the joints, exactly; None for a path of the tool
+    proof : what is known of a path of the tool between the poses that are solved
     """
 
     entry: PathEntry
@@ -49,12 +53,28 @@ class Motion:
     tool: Callable[[Reals], Reals]
     way: Callable[[Reals], Reals]
     followed: Followed | None
+    polynomials: PiecewiseMotion | None
+    proof: ToolProof | None
+
+    @property
+    def rate_bounds(self) -> RateBounds:
+        """Bounds of speeds and accelerations between times, as :func:`er3a.collision.along.clearance_along` takes."""
+        known = self.polynomials or self.proof
+        assert known is not None
+        return known.rate_bounds
 
 
 def motion_of(
-    robot: Robot, entry: PathEntry, checks_per_sample: int, source: CommandSource, ends: Mapping[str, Reals]
+    robot: Robot,
+    entry: PathEntry,
+    checks_per_sample: int,
+    source: CommandSource,
+    ends: Mapping[str, Reals],
+    wanted: Wanted,
 ) -> Motion:
     """Plan a path, and follow it if it is one of the tool; ``ends`` as for :func:`er3a.planning.build.build`.
+
+    ``wanted`` is what is to be settled between the poses that are solved.
 
     Raises
     ------
@@ -71,7 +91,7 @@ def motion_of(
     if path is None:
         raise ValueError(f"{entry.name}: neither a move of the joints nor a path of the tool")
     try:
-        followed = follow(robot, path, checks, built.q_start, built.start_slot)
+        followed, proof = follow_and_prove(robot, path, checks, wanted, built.q_start, built.start_slot)
     except PoseError:
         branch = getattr(entry, "start_branch", None)
         problem = f"'{branch}' has no solution at the start pose"
@@ -88,6 +108,8 @@ def motion_of(
         tool=lambda t: path.poses(path.progress(t)[0]),
         way=lambda t: path.way(path.progress(t)[0]),
         followed=followed,
+        polynomials=None,
+        proof=proof,
     )
 
 
@@ -109,4 +131,6 @@ def _joint_motion(
         tool=lambda t: forward(robot, move.joints(t)[0]),
         way=way,
         followed=None,
+        polynomials=move.polynomials(),
+        proof=None,
     )

@@ -44,6 +44,8 @@ STATUS: dict[PathVerdict, str] = {
     "safe": "pass",
     "near-singular": "caution",
     "singular": "caution",
+    "too fast for the assumed limits": "caution",
+    "undecided": "caution",
     "too fast": "fail",
     "leaves limits": "fail",
     "collides": "fail",
@@ -147,6 +149,7 @@ def _faults(path: PathSummary) -> list[list[str]]:
         (tr("not reachable"), path.unreachable),
         (tr("outside limits"), path.out_of_limits),
         (tr("too fast"), path.too_fast),
+        (tr("undecided"), path.undecided),
         (tr("collision"), path.collisions),
     )
     return [
