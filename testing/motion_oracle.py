@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -205,7 +206,7 @@ def arm_of(table) -> Arm:
     step, sense, zero = 1e-4, [], []
     for k in range(3):
         moved = planar(spread + step * np.eye(6)[k])
-        turned = moved[k] - base_pose[k] - (0 if k < 2 else 0)
+        turned = moved[k] - base_pose[k]
         sense.append(np.sign(np.angle(np.exp(1j * turned))))
     F, centre = base_pose[4], base_pose[5]
     zero.append(base_pose[0])
@@ -245,7 +246,7 @@ def tool_path(spec) -> tuple[Callable, float]:
     """Poses (n, 4, 4) of the tool at times (n,), and the duration."""
     poses = [_pose(p) for p in spec["poses"]]
     T = spec["duration_s"]
-    turns = [Rotation.from_matrix(b[:3, :3] @ a[:3, :3].T).as_rotvec() for a, b in zip(poses, poses[1:])]
+    turns = [Rotation.from_matrix(b[:3, :3] @ a[:3, :3].T).as_rotvec() for a, b in pairwise(poses)]
     if spec["kind"] == "arc":
         start, via, end = poses[0][:3, 3], np.array(spec["via_mm"]) / 1000, poses[1][:3, 3]
         centre, normal, angle = _circle(start, via, end)

@@ -90,7 +90,7 @@ class Bodies:
         return found
 
     def least(self, q: Reals) -> tuple[Reals, Integers]:
-        """Least distance (N,) in m of arms (N, n), negative by the depth of overlap, and the pair's number (-1: none)."""
+        """Least distance (N,) in m of arms (N, n), negative by the depth of overlap; the pair's number (-1: none)."""
         every = np.arange(len(self.pairs))
         if not every.size:
             return np.full(len(q), np.inf), np.full(len(q), -1)

@@ -2,10 +2,11 @@
 
 On the grid of :mod:`er3a.planning.branch_tracking`, dynamic programming [1]_ finds for each branch at the start the
 best way to continue to the end. Best means, in this order: fewest jumps (a joint would have to move far in no time),
-least time outside the limits, least joint travel, and among equals the greatest distance from the limits. Whole turns cost no states of their own: along a continuous sequence
-they are fixed by the first angle, so each joint's turn is chosen once per stretch, by least time outside the limits,
-then nearest to the joints before. Among the branches at the start, the best whole sequence wins; given start joints
-admit only the branches that they lie on (several, if the start is singular).
+least time outside the limits, least joint travel, and among equals the greatest distance from the limits. Whole turns
+cost no states of their own: along a continuous sequence they are fixed by the first angle, so each joint's turn is
+chosen once per stretch, by least time outside the limits, then nearest to the joints before. Among the branches at the
+start, the best whole sequence wins; given start joints admit only the branches that they lie on (several, if the start
+is singular).
 
 An unreachable pose interrupts the sequence; the stretch behind it is solved on its own.
 

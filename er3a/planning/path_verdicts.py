@@ -6,6 +6,7 @@ from typing import Literal, get_args
 
 PathVerdict = Literal[
     "unreachable",
+    "none found",
     "leaves limits",
     "collides",
     "too fast",

@@ -30,10 +30,11 @@ from er3a.collision.envelopes import link_frames
 from er3a.collision.pairs import PairOverlaps
 from er3a.errors import PathError
 from er3a.numerics.arrays import Reals
+from er3a.planning.piecewise import PiecewiseMotion
 from er3a.planning.polynomial_checks import limit_intervals
-from er3a.planning.profiles import FromRestToRest
+from er3a.planning.profiles import FromRestToRest, Rates
 from er3a.planning.sequences import JointSequence, joint_sequence
-from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, joined, standing
+from er3a.planning.timing import JointLimits, Timed, TimingError, ToppraMissing, fastest, joined, standing
 from er3a.robots.joint_limits import LimitsExceeded, limits_exceeded
 from er3a.robots.robot import Robot
 
@@ -48,6 +49,7 @@ NODES = 240
 SHOWN = 101
 STILL = 1e-9  # rad
 STREAM = 17
+MOST_PAIRS = 4
 
 
 @dataclass(frozen=True)
@@ -83,6 +85,14 @@ class EndOutsideLimits:
 
 
 @dataclass(frozen=True)
+class EndUnreached:
+    """No joint angles within the limits reach the start (or the end)."""
+
+    end: Literal["start", "end"]
+    code: Literal["end_unreached"] = "end_unreached"
+
+
+@dataclass(frozen=True)
 class NoneFound:
     """No way was found within so many rounds; there may be one."""
 
@@ -90,7 +100,9 @@ class NoneFound:
     code: Literal["none_found"] = "none_found"
 
 
-NoWayAround = PlannerMissing | NothingMeasured | EndOverlaps | EndOutsideLimits | NoneFound
+NoWayAround = (
+    PlannerMissing | ToppraMissing | NothingMeasured | EndOverlaps | EndOutsideLimits | EndUnreached | NoneFound
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,9 +166,46 @@ def way_around(task: PlanningTask, start: Reals, end: Reals) -> WayAround | NoWa
             return corners
         corners = _shortened(moves, corners, np.random.default_rng([task.seed, STREAM, attempt]))
         for motion in _timed(task, corners):
+            if isinstance(motion, ToppraMissing):
+                return motion
             if found := _proven(task, corners, motion):
                 return found
     return NoneFound(rounds)
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedMove:
+    """A planned motion as a move of the joints, as :class:`er3a.planning.moves.JointMove` is one."""
+
+    curve: PiecewiseMotion
+
+    @property
+    def duration(self) -> float:
+        """s"""
+        return self.curve.duration
+
+    def joints(self, t: Reals) -> Rates:
+        """Angles (rad), velocities (rad/s) and accelerations (rad/s^2) at times (...,) in s; each (..., n)."""
+        return self.curve.rates(t)
+
+    def polynomials(self) -> PiecewiseMotion:
+        """The motion itself."""
+        return self.curve
+
+
+def way_between(task: PlanningTask, starts: Reals, ends: Reals) -> WayAround | NoWayAround:
+    """The motion between the nearest pair of starts (k, n) and ends (m, n) in rad between which one is found."""
+    pairs = sorted(
+        (float(np.abs(end - start).max()), i, j) for i, start in enumerate(starts) for j, end in enumerate(ends)
+    )
+    if not len(starts) or not len(ends):
+        return EndUnreached("end" if len(starts) else "start")
+    found: WayAround | NoWayAround = NoneFound(0)
+    for _, i, j in pairs[:MOST_PAIRS]:
+        found = way_around(task, starts[i], ends[j])
+        if isinstance(found, WayAround):
+            break
+    return found
 
 
 class _Moves:
@@ -209,7 +258,7 @@ def _tree(task: PlanningTask, moves: _Moves, start: Reals, end: Reals, attempt: 
         return np.array([state[j] for j in range(n)])
 
     class Advancement(base.MotionValidator):  # type: ignore[misc]
-        def checkMotion(self, first: Any, second: Any) -> bool:  # noqa: N802
+        def checkMotion(self, first: Any, second: Any) -> bool:
             return moves.free(joints(first), joints(second))
 
     info.setStateValidityChecker(lambda state: moves.clear(joints(state)) >= moves.margin)
@@ -265,7 +314,7 @@ def _between(corners: Reals, lengths: Reals, at: float) -> Reals:
     return np.array([np.interp(at, lengths, column) for column in corners.T])
 
 
-def _timed(task: PlanningTask, corners: Reals) -> Iterator[Timed]:
+def _timed(task: PlanningTask, corners: Reals) -> Iterator[Timed | ToppraMissing]:
     """The way with corners rounded less and less, timed under the limits."""
     sides = np.abs(np.diff(corners, axis=0)).max(axis=1)
     for share in ROUNDINGS if len(corners) > 2 else (0.0,):
@@ -273,8 +322,11 @@ def _timed(task: PlanningTask, corners: Reals) -> Iterator[Timed]:
         try:
             way = joint_sequence(corners, blends, 1.0)
             yield _with_jerk(way, task.limits) if task.limits.jerk is not None else _quickest(way, task.limits)
-        except (PathError, TimingError):
+        except PathError:
             continue
+        except TimingError as error:
+            if isinstance(error.finding, ToppraMissing):
+                yield error.finding
 
 
 def _quickest(way: JointSequence, limits: JointLimits) -> Timed:

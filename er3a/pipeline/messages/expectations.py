@@ -8,6 +8,7 @@ from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet, 
 
 OUTCOMES: dict[Outcome, str] = {
     "unreachable": N_("unreachable"),
+    "none found": N_("none found"),
     "leaves limits": N_("leaves limits"),
     "collides": N_("collides"),
     "too fast": N_("too fast"),

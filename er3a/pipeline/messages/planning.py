@@ -19,6 +19,14 @@ from er3a.planning.intervals import (
 )
 from er3a.planning.timing import MustStandStill, NoTimeLawFound, ToppraMissing
 from er3a.planning.tool_proof import Quantity, Undecided
+from er3a.planning.way_around import (
+    EndOutsideLimits,
+    EndOverlaps,
+    EndUnreached,
+    NoneFound,
+    NothingMeasured,
+    PlannerMissing,
+)
 
 STRATEGIES: dict[StrategyName, str] = {
     "slow": N_("Keep the path and slow down"),
@@ -28,6 +36,7 @@ STRATEGIES: dict[StrategyName, str] = {
     "damped": N_("Let damped least squares leave the path"),
     "detour": N_("Cross the region by a joint move"),
     "stop": N_("Stop before the region with an alarm"),
+    "planned": N_("Take a planned motion of the joints instead"),
 }
 
 
@@ -141,6 +150,42 @@ def _(found: NoTimeLawFound) -> str:
 @say.register
 def _(found: ToppraMissing) -> str:
     return sentence(found.code, "the library toppra is not installed; it has wheels for Linux on x86-64 only")
+
+
+@say.register
+def _(found: PlannerMissing) -> str:
+    return sentence(found.code, "the planner OMPL is not installed; it has wheels for Linux on x86-64 only")
+
+
+@say.register
+def _(found: NothingMeasured) -> str:
+    return sentence(found.code, "distances can't be measured here, so nothing can be planned")
+
+
+@say.register
+def _(found: EndOverlaps) -> str:
+    if found.end == "start":
+        return sentence(found.code, "at its start {overlap}", overlap=say(found.overlap))
+    return sentence(found.code, "at its end {overlap}", overlap=say(found.overlap))
+
+
+@say.register
+def _(found: EndOutsideLimits) -> str:
+    if found.end == "start":
+        return sentence(found.code, "at its start {limits}", limits=say(found.limits))
+    return sentence(found.code, "at its end {limits}", limits=say(found.limits))
+
+
+@say.register
+def _(found: EndUnreached) -> str:
+    if found.end == "start":
+        return sentence(found.code, "no joint angles within the limits reach its start")
+    return sentence(found.code, "no joint angles within the limits reach its end")
+
+
+@say.register
+def _(found: NoneFound) -> str:
+    return sentence(found.code, "the planner found no way in {rounds} rounds; there may be one", rounds=found.rounds)
 
 
 @say.register

@@ -39,6 +39,7 @@ KINDS: dict[PathKind, str] = {
     "arc": N_("circular arc"),
     "sequence": N_("lines and arcs in sequence"),
     "table": N_("path from a table"),
+    "plan": N_("planned motion"),
 }
 STRATEGIES: dict[StrategyName, str] = {
     "slow": N_("slow down on the path"),
@@ -48,6 +49,7 @@ STRATEGIES: dict[StrategyName, str] = {
     "damped": N_("damped least squares"),
     "detour": N_("joint move across the region"),
     "stop": N_("stop before it, with an alarm"),
+    "planned": N_("planned motion of the joints"),
 }
 MOST_PAIRS = 3
 NO_DEVIATION = 0.005  # mm or deg
@@ -81,6 +83,9 @@ def path_text(path: PathSummary) -> str:
 
 
 def _apart_from_collisions(path: PathSummary) -> str:
+    if path.no_way:
+        shown = sentence("path.shown", "shown is the straight joint move")
+        return joined([say(path.no_way), shown])
     if path.unreachable:
         return joined(map(_when, path.unreachable))
     if faults := path.out_of_limits or _worst(path.too_fast):

@@ -12,6 +12,7 @@ from er3a.planning.path_verdicts import PathVerdict
 def _(found: PathCounts) -> str:
     unsafe: dict[PathVerdict, tuple[str, ...]] = {
         "unreachable": found.unreachable,
+        "none found": found.none_found,
         "leaves limits": found.leaves_limits,
         "collides": found.collides,
         "too fast": found.too_fast,

@@ -40,6 +40,7 @@ from er3a.planning.commands import CommandSource
 from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.timing import JointLimits
 from er3a.planning.tool_proof import Wanted
+from er3a.planning.way_around import PlanningTask
 from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
 
@@ -59,7 +60,9 @@ def compute(study: Study, name: str) -> TrajectoryResults:
         Surroundings(Bodies(robot, scene), settings.penetration_tolerance_mm / 1000) if can_measure() else None
     )
     only = None if settings.avoidance == "compare" else settings.avoidance
-    avoidance = AvoidanceTask(robot, near, limits, only, surroundings)
+    bodies, tolerance = surroundings.bodies if surroundings else None, settings.penetration_tolerance_mm / 1000
+    planning = PlanningTask(robot, bodies, tolerance, limits, study.seed)
+    avoidance = AvoidanceTask(robot, near, limits, only, surroundings, planning)
     tables: list[PathChecks] = []
     clearances: list[Clearances] = []
     strategies: list[AvoidanceRows] = []
@@ -67,11 +70,12 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     ends: dict[str, Reals] = {}
     for i, entry in enumerate(load_paths(file).paths):
         source = CommandSource(file, f"paths[{i}]")
-        motion = motion_of(robot, entry, settings.checks_per_sample, source, ends, Wanted(limits.rates, near))
+        wanted = Wanted(limits.rates, near)
+        motion = motion_of(robot, entry, settings.checks_per_sample, source, ends, wanted, planning)
         ends[entry.name] = motion.q[-1]
         found = judge(robot, motion, near, limits)
-        avoided = avoidance.avoid(motion, found)
         along = measured(surroundings, motion) if surroundings else None
+        avoided = avoidance.avoid(motion, found, along)
         tables.append(_checks(robot, motion, found, near, limits))
         clearances.append(clearance_rows(entry.name, along))
         strategies.append(avoided.rows)
@@ -152,6 +156,7 @@ def _verdict(paths: list[PathSummary]) -> Verdict[AllSafe | SomeUnsafe | NoneSaf
         paths=len(asked),
         safe=safe,
         unreachable=named("unreachable"),
+        none_found=named("none found"),
         leaves_limits=named("leaves limits"),
         collides=named("collides"),
         too_fast=named("too fast"),

@@ -92,7 +92,9 @@ def judge(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits)
     edge = any(interval.start > 0 or interval.end < times[-1] for interval in beyond)
     bounded = not edge and not jumps and not (np.isfinite(q[:, 0]) & np.isnan(velocity[:, 0])).any()
     return Judgement(
-        verdict=_verdict(found, bool(beyond), bool(jumps), motion.followed is not None),
+        verdict="none found"
+        if motion.no_way
+        else _verdict(found, bool(beyond), bool(jumps), motion.followed is not None),
         events=found.events,
         limits=found.limits,
         beyond=beyond,

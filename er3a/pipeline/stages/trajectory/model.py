@@ -21,8 +21,9 @@ from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.intervals import AboveLimit, BelowLimit, PathOutOfReach, RateCause
 from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.tool_proof import Undecided
+from er3a.planning.way_around import NoWayAround
 
-PathKind = Literal["joint", "joint_sequence", "line", "arc", "sequence", "table"]
+PathKind = Literal["joint", "joint_sequence", "line", "arc", "sequence", "table", "plan"]
 FASTEST: Literal["fastest"] = "fastest"
 """In the table of strategies: the path itself, as fast as the joints can."""
 
@@ -42,6 +43,7 @@ class PathCounts:
     paths: int
     safe: int
     unreachable: tuple[str, ...]
+    none_found: tuple[str, ...]
     leaves_limits: tuple[str, ...]
     collides: tuple[str, ...]
     too_fast: tuple[str, ...]
@@ -220,6 +222,7 @@ class PathSummary:
     max_joint_speed_deg_s, max_joint_speed_ratio, max_joint_acceleration_ratio : None where speeds have no bound
     velocity_check_deg_s : greatest difference of joint velocities by the Jacobian and by differences of angles
     clearance : None where none could be measured
+    no_way : why no motion was planned, of one that is to be
     fastest_s : of the exact path under the joint limits; None where no motion follows it
     avoidance : the strategies tried; none where the path is safe
     strategy : the one to take
@@ -253,6 +256,7 @@ class PathSummary:
     velocity_check_deg_s: float
     collisions: tuple[Stretch[BodiesOverlap], ...]
     clearance: LeastClearance | None
+    no_way: NoWayAround | None
     fastest_s: float | None
     avoidance: tuple[TriedStrategy, ...]
     strategy: StrategyName | None

@@ -73,6 +73,7 @@ def path_summary(
         velocity_check_deg_s=float(np.degrees(found.velocity_check)),
         collisions=_stretches(motion, contacts),
         clearance=least_clearance(along),
+        no_way=motion.no_way,
         fastest_s=avoided.fastest_s,
         avoidance=avoided.tried,
         strategy=avoided.chosen,

@@ -59,6 +59,7 @@ LEVELS: dict[PathVerdict, rr.TextLogLevel] = {
     "too fast": rr.TextLogLevel.ERROR,
     "leaves limits": rr.TextLogLevel.ERROR,
     "collides": rr.TextLogLevel.ERROR,
+    "none found": rr.TextLogLevel.ERROR,
     "unreachable": rr.TextLogLevel.ERROR,
 }
 

@@ -50,6 +50,7 @@ STATUS: dict[PathVerdict, str] = {
     "leaves limits": "fail",
     "collides": "fail",
     "unreachable": "fail",
+    "none found": "fail",
 }
 
 
