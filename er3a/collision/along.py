@@ -8,9 +8,12 @@ Halving ends where M is twice the ``depth`` asked for, so that no overlap deeper
 thin the obstacle, and the least clearance is found to within it.
 
 M is the longer way of a capsule's two ends (its other points move no farther), in space for a solid, in the frame of
-the other link for two links. The way is measured on a grid of the motion so fine that no end moves by more than
-twice the depth from point to point, as chords through the middle plus the bulge of the parabola through the three
-points: that the motion is no more curved than this between two grid points is assumed.
+the other link for two links. The way is bounded on a grid of the motion so fine that no end moves by more than
+twice the depth from point to point: a chord over a time h, plus A h^2 / 3, where A bounds the end's acceleration.
+With levers of at most L, joint speeds v and accelerations a, A = L (sum |a| + (sum |v|)^2), and v and a are bounds over
+the whole interval, which whoever knows the motion gives. Where the motion has no such bounds (at singular poses of a
+path of the tool, through which nothing is proven) the bulge of the parabola through three points takes the place of
+A h^2 / 3.
 
 References
 ----------
@@ -22,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -38,6 +42,7 @@ LOCATED = 1e-10  # share of the duration
 CHUNK = 20_000  # points whose ends are held in memory at a time
 
 Joints = Callable[[Reals], Reals]
+RateBounds = Callable[[Reals, Reals], tuple[Reals, Reals]]
 
 
 @dataclass(frozen=True)
@@ -85,8 +90,8 @@ class ClearanceAlong:
 class _Motion:
     """Distances along a motion, remembered per time."""
 
-    def __init__(self, bodies: Bodies, joints: Joints) -> None:
-        self.bodies, self.joints = bodies, joints
+    def __init__(self, bodies: Bodies, joints: Joints, rates: RateBounds) -> None:
+        self.bodies, self.joints, self.rates = bodies, joints, rates
         self.known: dict[float, Reals] = {}
         own = np.flatnonzero(bodies.second >= 0)
         solid = np.flatnonzero(bodies.second < 0)
@@ -94,6 +99,15 @@ class _Motion:
         self._own, self._moving = own, moving
         self.track = np.empty(len(bodies.pairs), dtype=int)  # of a pair: which tracked capsule's way counts
         self.track[own], self.track[solid] = np.arange(len(own)), len(own) + track
+
+    @cached_property
+    def lever(self) -> float:
+        """No point of a body is farther from a joint's axis that moves it, m."""
+        rest = np.zeros(len(self.bodies.robot.lower))
+        T = link_frames(self.bodies.robot, rest)
+        links = np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1).sum()
+        origins = T[[capsule.link for capsule in self.bodies.capsules], None, :3, 3]
+        return float(links + np.linalg.norm(self.bodies.ends(rest) - origins, axis=-1).max())
 
     def tracked(self, q: Reals) -> Reals:
         """End points (..., tracks, 2, 3): of links in other links' frames, then of capsules in space."""
@@ -112,17 +126,21 @@ class _Motion:
         return found
 
 
-def clearance_along(bodies: Bodies, joints: Joints, t: Reals, shown: Reals, depth: float) -> ClearanceAlong:
+def clearance_along(
+    bodies: Bodies, joints: Joints, rates: RateBounds, t: Reals, shown: Reals, depth: float
+) -> ClearanceAlong:
     """Measure clearance along a motion.
 
     Parameters
     ----------
+    rates : bounds (k, n) of the sizes of joint speeds (rad/s) and accelerations (rad/s^2) between times (k,) and (k,);
+        infinite where there are none
     joints : angles (n, 6) in rad at times (n,) in s; NaN where the motion is unknown
     t : (N,), s, rising: where the motion is known or not; refined as needed
     shown : times (K,) of ``t`` at which the clearance is wanted
     depth : m; see the module's text
     """
-    motion = _Motion(bodies, joints)
+    motion = _Motion(bodies, joints, rates)
     every = np.arange(len(bodies.pairs))
     if not every.size:
         return ClearanceAlong(shown, np.full(len(shown), np.nan), (None,) * len(shown), (), 0)
@@ -154,26 +172,32 @@ def _fine(motion: _Motion, t: Reals, step: float) -> tuple[Reals, Reals, Reals]:
     """
     times, q = t, motion.joints(t)
     while True:
-        middle = (times[:-1] + times[1:]) / 2
-        q_middle = motion.joints(middle)
-        cuts = range(0, len(middle), CHUNK)
-        steps = np.concatenate([_steps(motion, q[k : k + CHUNK + 1], q_middle[k : k + CHUNK]) for k in cuts])
+        cuts = range(0, len(times) - 1, CHUNK)
+        steps = np.concatenate([_steps(motion, times[k : k + CHUNK + 1], q[k : k + CHUNK + 1]) for k in cuts])
         wide = (steps.max(axis=1) > step) & (np.diff(times) > SHORTEST * (t[-1] - t[0]))
         if not wide.any():
             break
-        times = np.concatenate([times, middle[wide]])
+        middle = (times[:-1] + times[1:])[wide] / 2
+        times = np.concatenate([times, middle])
         order = np.argsort(times, kind="stable")
-        times, q = times[order], np.concatenate([q, q_middle[wide]])[order]
+        times, q = times[order], np.concatenate([q, motion.joints(middle)])[order]
     steps = np.nan_to_num(steps, nan=0.0)  # beside an unknown pose; stretches between them are summed up apart
     return times, q, np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
 
 
-def _steps(motion: _Motion, q: Reals, q_middle: Reals) -> Reals:
-    """How far the tracked ends move at most between neighbours (n + 1, 6), by way of the middles; (n, tracks)."""
-    here, half = motion.tracked(q), motion.tracked(q_middle)
-    chords = np.linalg.norm(half - here[:-1], axis=-1) + np.linalg.norm(here[1:] - half, axis=-1)
-    bulge = np.linalg.norm(here[:-1] - 2 * half + here[1:], axis=-1)
-    moved: Reals = (chords + bulge).max(axis=-1)
+def _steps(motion: _Motion, times: Reals, q: Reals) -> Reals:
+    """How far the tracked ends move at most between neighbouring times (m + 1,); (m, tracks)."""
+    here = motion.tracked(q)
+    h = np.diff(times)
+    speed, acceleration = (bound.sum(axis=1) for bound in motion.rates(times[:-1], times[1:]))
+    bulge = motion.lever * (acceleration + speed**2) * h**2 / 3
+    moved: Reals = np.linalg.norm(np.diff(here, axis=0), axis=-1).max(axis=-1) + bulge[:, None]
+    free = np.flatnonzero(~np.isfinite(bulge))
+    if free.size:
+        half = motion.tracked(motion.joints(times[free] + h[free] / 2))
+        chords = np.linalg.norm(half - here[free], axis=-1) + np.linalg.norm(here[free + 1] - half, axis=-1)
+        bent = np.linalg.norm(here[free] - 2 * half + here[free + 1], axis=-1)
+        moved[free] = (chords + bent).max(axis=-1)
     return moved
 
 

@@ -89,6 +89,14 @@ class Bodies:
             )
         return found
 
+    def least(self, q: Reals) -> tuple[Reals, Integers]:
+        """Least distance (N,) in m of arms (N, n), negative by the depth of overlap; the pair's number (-1: none)."""
+        every = np.arange(len(self.pairs))
+        if not every.size:
+            return np.full(len(q), np.inf), np.full(len(q), -1)
+        found = np.array([self.distances(ends, every) for ends in self.ends(q)]).reshape(len(q), -1)
+        return found.min(axis=1), found.argmin(axis=1)
+
 
 @lru_cache(maxsize=64)
 def self_pairs(robot: Robot) -> tuple[tuple[int, int], ...]:

@@ -24,6 +24,7 @@ from er3a.planning.commands import (
     JointMoveCommand,
     JointSequenceCommand,
     JointTableCommand,
+    PlanCommand,
     SegmentCommand,
     Start,
     ToolMoveCommand,
@@ -299,7 +300,33 @@ class TablePath(NamedPath):
         )
 
 
-PathEntry = JointPath | JointSequencePath | LinePath | ArcPath | SequencePath | TablePath
+class PlanEnds(StrictModel):
+    """Between what a motion is planned: joint angles, or poses of the tool."""
+
+    from_: Annotated[JointsDeg | PoseEntry, Field(alias="from")]
+    to: JointsDeg | PoseEntry
+
+
+class PlanPath(NamedPath):
+    """A motion that the planner finds: from rest to rest, clear of the scene and of the arm itself."""
+
+    kind: Literal["plan"]
+    plan: PlanEnds
+
+    def ends(self) -> tuple[Reals, Reals]:
+        """Joint angles (6,) in rad or poses (4, 4) at both ends."""
+        start, end = (
+            part.pose() if isinstance(part, PoseEntry) else np.radians(part) for part in (self.plan.from_, self.plan.to)
+        )
+        return start, end
+
+    def command(self, source: CommandSource) -> Command:
+        """What is to be planned."""
+        start, end = self.ends()
+        return PlanCommand(start, end, source=source)
+
+
+PathEntry = PlanPath | JointPath | JointSequencePath | LinePath | ArcPath | SequencePath | TablePath
 
 
 class PathFile(StrictModel):
@@ -331,7 +358,7 @@ def load_paths(path: str | Path) -> PathFile:
     try:
         return load(PathFile, path)
     except InputError as error:
-        kinds = "joint_sequence|joint|line|arc|sequence|table"
+        kinds = "joint_sequence|joint|line|arc|sequence|table|plan"
         field = error.field and re.sub(rf"((?:paths|segments)\[\d+\])\.(?:{kinds})\b", r"\1", error.field)
         raise InputError(error.file, field, error.problem, error.remedy) from None
 

@@ -38,6 +38,11 @@ class Arc(Segment):
         """See :class:`er3a.planning.moves.ToolPath`."""
         return self.radius * self.angle
 
+    @property
+    def bend(self) -> float:
+        """See :class:`er3a.planning.moves.Segment`."""
+        return self.angle
+
     def points(self, progress: Reals) -> Reals:
         """See :class:`er3a.planning.moves.Segment`."""
         return self.centre + self._spokes(np.asarray(progress, float))

@@ -17,6 +17,7 @@ from er3a.planning import commands
 from er3a.planning.arcs import arc
 from er3a.planning.moves import JointMove, Segment, ToolPath, line, rotation_between
 from er3a.planning.sequences import TURN_LENGTH, JointSequence, joint_sequence, segment_path
+from er3a.planning.way_around import PlannedMove
 from er3a.robots.robot import Robot
 
 GEOMETRY = 1.0  # s; a segment's own duration is of no account in a sequence
@@ -35,7 +36,7 @@ class Built:
     repeated_rows : lines of the table that repeat the point before
     """
 
-    joints: JointMove | JointSequence | None = None
+    joints: JointMove | JointSequence | PlannedMove | None = None
     tool: ToolPath | None = None
     q_start: Reals | None = None
     start_slot: int | None = None
@@ -75,6 +76,8 @@ def build(robot: Robot, command: commands.Command, ends: Mapping[str, Reals]) ->
             return Built(joints=joints, repeated_rows=command.repeated_rows)
         case commands.ToolTableCommand():
             return _tool_table(robot, command)
+        case commands.PlanCommand():
+            raise command.source.error("plan", "a motion is planned in a scene", "Run the trajectory stage")
     assert_never(command)
 
 

@@ -149,6 +149,14 @@ class ToolTableCommand(_Command):
     half_turn_axis: Reals | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class PlanCommand(_Command):
+    """A motion to be planned, between joint angles (n,) in rad or poses (4, 4)."""
+
+    start: Reals
+    end: Reals
+
+
 JointCommand = JointMoveCommand | JointSequenceCommand | JointTableCommand
 ToolCommand = ToolMoveCommand | ToolSequenceCommand | ToolTableCommand
-Command = JointCommand | ToolCommand
+Command = JointCommand | ToolCommand | PlanCommand

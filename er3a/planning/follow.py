@@ -2,10 +2,11 @@
 
 On the grid of :mod:`er3a.planning.branch_tracking`, dynamic programming [1]_ finds for each branch at the start the
 best way to continue to the end. Best means, in this order: fewest jumps (a joint would have to move far in no time),
-least time outside the limits, least joint travel. Whole turns cost no states of their own: along a continuous sequence
-they are fixed by the first angle, so each joint's turn is chosen once per stretch, by least time outside the limits,
-then nearest to the joints before. Among the branches at the start, the best whole sequence wins; given start joints
-admit only the branches that they lie on (several, if the start is singular).
+least time outside the limits, least joint travel, and among equals the greatest distance from the limits. Whole turns
+cost no states of their own: along a continuous sequence they are fixed by the first angle, so each joint's turn is
+chosen once per stretch, by least time outside the limits, then nearest to the joints before. Among the branches at the
+start, the best whole sequence wins; given start joints admit only the branches that they lie on (several, if the start
+is singular).
 
 An unreachable pose interrupts the sequence; the stretch behind it is solved on its own.
 
@@ -29,13 +30,14 @@ from er3a.numerics.runs import runs
 from er3a.planning.branch_tracking import WIDE_STEP, Branches, branches_along, turned_difference, wrist_joints
 from er3a.planning.followed import BranchJump, Followed
 from er3a.planning.moves import ToolPath
-from er3a.robots.joint_limits import LIMIT_TOLERANCE, nearest_equivalent, within
+from er3a.robots.joint_limits import LIMIT_TOLERANCE, limit_margin, nearest_equivalent, within
 from er3a.robots.robot import Robot
 
 JUMP_COST = 1e7
 OUTSIDE_COST = 1e4  # for the whole duration
 SAME_JOINTS = 1e-6
 SWITCH_STEP = 1e-4
+EQUAL = 6  # digits of rad to which travel and margin count
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +47,7 @@ class _Sequence:
     q: Reals
     slot: Integers
     jumps: Flags
-    cost: tuple[float, float, float]
+    cost: tuple[float, float, float, float]
 
 
 def follow(
@@ -134,7 +136,8 @@ def _turned(robot: Robot, q: Reals, slot: Integers, jumps: Flags, share: Reals, 
         outside += min(priced)[0]
         unwound[:, j] += TURN * min(priced)[2]
     travel = float(np.linalg.norm(steps, axis=1).sum() + np.linalg.norm(unwound[0] - reference))
-    return _Sequence(unwound, slot, jumps, (float(jumps.sum()), outside, travel))
+    margin = float(limit_margin(robot, unwound).min())
+    return _Sequence(unwound, slot, jumps, (float(jumps.sum()), outside, round(travel, EQUAL), -round(margin, EQUAL)))
 
 
 def _jump(t: Reals, q: Reals, i: int) -> BranchJump:

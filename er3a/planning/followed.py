@@ -122,7 +122,7 @@ class Followed:
         q, dq, ddq : (n, 6), rad
         """
         q = self.joints_at(progress)
-        dq, ddq = self._through_jacobian(q, progress)
+        dq, ddq = self.through_jacobian(q, progress)
         for aside in BESIDE:
             rows = np.flatnonzero(np.isnan(dq[:, 0]) & np.isfinite(q[:, 0]))
             if rows.size:
@@ -144,7 +144,7 @@ class Followed:
         """Derivatives on both sides of points of the way, averaged where they agree; NaN elsewhere."""
         before = np.where(progress < aside, progress + aside, progress - aside)
         after = np.where(progress > 1 - aside, progress - aside, progress + aside)
-        sides = [self._through_jacobian(self.joints_at(side), side) for side in (before, after)]
+        sides = [self.through_jacobian(self.joints_at(side), side) for side in (before, after)]
         merged = []
         for a, b in zip(*sides):
             scale = np.maximum(np.abs(a).max(axis=1), np.abs(b).max(axis=1)) + self._size
@@ -152,7 +152,8 @@ class Followed:
             merged.append(np.where(agree[:, None], (a + b) / 2, np.nan))
         return merged[0], merged[1]
 
-    def _through_jacobian(self, q: Reals, progress: Reals) -> tuple[Reals, Reals]:
+    def through_jacobian(self, q: Reals, progress: Reals) -> tuple[Reals, Reals]:
+        """First and second derivative of joints (n, 6) by progress; NaN where the Jacobian is singular."""
         length = characteristic_length(self.robot)
         dq, ddq = np.full_like(q, np.nan), np.full_like(q, np.nan)
         rows = np.flatnonzero(np.isfinite(q[:, 0]))

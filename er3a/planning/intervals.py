@@ -13,7 +13,7 @@ from er3a.findings import Finding
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import Unsolved
 from er3a.kinematics.wrist_partitioned import solve_slots
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.runs import runs
 from er3a.planning.branch_tracking import parabolas
 from er3a.planning.followed import Followed
@@ -51,6 +51,74 @@ class TooFast:
     limit_deg_s: float
     code: Literal["too_fast"] = "too_fast"
 
+    @property
+    def ratio(self) -> float:
+        """What is needed over what is allowed."""
+        return self.needed_deg_s / self.limit_deg_s
+
+
+@dataclass(frozen=True)
+class TooFastIfAssumed:
+    """A joint (from 1), whose greatest speed is assumed, would have to turn faster."""
+
+    joint: int
+    needed_deg_s: float
+    limit_deg_s: float
+    code: Literal["too_fast_if_assumed"] = "too_fast_if_assumed"
+
+    @property
+    def ratio(self) -> float:
+        """What is needed over what is allowed."""
+        return self.needed_deg_s / self.limit_deg_s
+
+
+@dataclass(frozen=True)
+class AccelerationTooGreat:
+    """A joint (from 1) would have to accelerate more than it can."""
+
+    joint: int
+    needed_deg_s2: float
+    limit_deg_s2: float
+    code: Literal["acceleration_too_great"] = "acceleration_too_great"
+
+    @property
+    def ratio(self) -> float:
+        """What is needed over what is allowed."""
+        return self.needed_deg_s2 / self.limit_deg_s2
+
+
+@dataclass(frozen=True)
+class AccelerationTooGreatIfAssumed:
+    """A joint (from 1), whose greatest acceleration is assumed, would have to accelerate more."""
+
+    joint: int
+    needed_deg_s2: float
+    limit_deg_s2: float
+    code: Literal["acceleration_too_great_if_assumed"] = "acceleration_too_great_if_assumed"
+
+    @property
+    def ratio(self) -> float:
+        """What is needed over what is allowed."""
+        return self.needed_deg_s2 / self.limit_deg_s2
+
+
+@dataclass(frozen=True)
+class JerkTooGreat:
+    """A joint (from 1) would need a jerk beyond its limit; None where its acceleration steps."""
+
+    joint: int
+    needed_deg_s3: float | None
+    limit_deg_s3: float
+    code: Literal["jerk_too_great"] = "jerk_too_great"
+
+    @property
+    def ratio(self) -> float:
+        """What is needed over what is allowed."""
+        return np.inf if self.needed_deg_s3 is None else self.needed_deg_s3 / self.limit_deg_s3
+
+
+RateCause = TooFast | TooFastIfAssumed | AccelerationTooGreat | AccelerationTooGreatIfAssumed | JerkTooGreat
+
 
 @dataclass(frozen=True)
 class PathOutOfReach:
@@ -60,6 +128,7 @@ class PathOutOfReach:
     code: Literal["out_of_reach"] = "out_of_reach"
 
 
+OVER = 1e-6  # relative, by which rounding may exceed a limit of rates
 CauseT = TypeVar("CauseT", bound=Finding)
 
 
@@ -72,6 +141,43 @@ class Interval(Generic[CauseT]):
     cause: CauseT
 
 
+@dataclass(frozen=True, eq=False)
+class RateLimit:
+    """A limit of the joints' rates.
+
+    Attributes
+    ----------
+    order : 1 for speed, 2 for acceleration, 3 for jerk
+    most : (n,), rad/s, rad/s^2 or rad/s^3; NaN where there is none
+    assumed : (n,) bool, whether it is assumed
+    step_allowed : (n,), rad/s^2, by which an acceleration may step all the same; for jerk
+    """
+
+    order: Literal[1, 2, 3]
+    most: Reals
+    assumed: Flags
+    step_allowed: Reals
+
+    @property
+    def allowed(self) -> Reals:
+        """(n,), what rounding may make of the limit."""
+        return self.most * (1 + OVER)
+
+
+def rate_interval(limit: RateLimit, joint: int, start: float, end: float, most: float) -> Interval[RateCause]:
+    """A stretch on which a joint (from 0) exceeds a limit, by its greatest value there."""
+    needed, allowed = np.degrees([most, limit.most[joint]]).tolist()
+    cause: RateCause
+    if limit.order == 3:
+        cause = JerkTooGreat(joint + 1, needed if np.isfinite(needed) else None, allowed)
+    elif limit.order == 2:
+        made = AccelerationTooGreatIfAssumed if limit.assumed[joint] else AccelerationTooGreat
+        cause = made(joint + 1, needed, allowed)
+    else:
+        cause = (TooFastIfAssumed if limit.assumed[joint] else TooFast)(joint + 1, needed, allowed)
+    return Interval(start, end, cause)
+
+
 def out_of_limits(robot: Robot, t: Reals, q: Reals, joints: Joints) -> list[Interval[AboveLimit | BelowLimit]]:
     """Where joints leave their limits, one interval per joint and side, its ends located on the motion.
 
@@ -80,7 +186,7 @@ def out_of_limits(robot: Robot, t: Reals, q: Reals, joints: Joints) -> list[Inte
     t : (N,), s; q : (N, 6), rad, NaN where unreachable; joints : angles (..., 6) at times (...,)
     """
     found: list[Interval[AboveLimit | BelowLimit]] = []
-    for j in range(6):
+    for j in range(q.shape[-1]):
         for sign, limit, finding in ((1.0, robot.upper[j], AboveLimit), (-1.0, robot.lower[j], BelowLimit)):
 
             def beyond(at: float, j: int = j, sign: float = sign, limit: float = limit) -> float:
@@ -93,23 +199,23 @@ def out_of_limits(robot: Robot, t: Reals, q: Reals, joints: Joints) -> list[Inte
     return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
 
 
-def too_fast(robot: Robot, t: Reals, velocity: Reals, speed: Callable[[Reals], Reals]) -> list[Interval[TooFast]]:
-    """Where joints would have to turn faster than they can; none for joints of unknown speed.
+def rates_exceeded(
+    t: Reals, values: Reals, limit: RateLimit, rate: Callable[[Reals], Reals]
+) -> list[Interval[RateCause]]:
+    """Where joints exceed a limit of speed or acceleration; none for joints without one.
 
     Parameters
     ----------
-    t : (N,), s; velocity : (N, 6), rad/s, NaN where unknown; speed : the same at times (n,)
+    t : (N,), s; values : (N, n), speeds or accelerations, NaN where unknown; rate : the same at times (k,)
     """
     found = []
-    for j in np.flatnonzero(np.isfinite(robot.speed)).tolist():
+    for j in np.flatnonzero(np.isfinite(limit.most)).tolist():
 
         def excess(at: float, j: int = j) -> float:
-            return float(np.abs(speed(np.array([at]))[0, j]) - robot.speed[j])
+            return float(np.abs(rate(np.array([at]))[0, j]) - limit.allowed[j])
 
-        values = np.abs(velocity[:, j]) - robot.speed[j]
-        for start, end, most in _where_positive(t, values, excess):
-            needed, able = np.degrees([robot.speed[j] + most, robot.speed[j]]).tolist()
-            found.append(Interval(start, end, TooFast(j + 1, needed, able)))
+        for start, end, most in _where_positive(t, np.abs(values[:, j]) - limit.allowed[j], excess):
+            found.append(rate_interval(limit, j, start, end, limit.allowed[j] + most))
     return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
 
 

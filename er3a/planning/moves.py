@@ -24,7 +24,8 @@ from scipy.spatial.transform import Rotation
 from er3a.errors import PoseError
 from er3a.geometry.transforms import check_poses
 from er3a.numerics.arrays import Reals
-from er3a.planning.profiles import Ends, FromRestToRest, Rates, quintic
+from er3a.planning.piecewise import PiecewiseMotion, polynomial_motion
+from er3a.planning.profiles import Ends, FromRestToRest, Rates, TimeLaw, quintic
 
 HALF_TURN_TOLERANCE = 1e-9
 
@@ -60,6 +61,19 @@ class ToolPath(Protocol):
     def way(self, progress: Reals) -> Reals:
         """Length of the tool point's way so far, m, at shares of the way (...,)."""
 
+    @property
+    def law(self) -> TimeLaw: ...
+
+    @property
+    def edges(self) -> Reals:
+        """Shares of the way (m,), from 0 to 1, between which the twist and its derivative are continuous."""
+
+    def twist_bounds(self, start: Reals, end: Reals) -> Reals:
+        """Bounds (k, 3, 2) of the sizes of twist, its first and its second derivative by progress.
+
+        Linear (m), then angular (rad), between shares (k,) and (k,), no edge in between.
+        """
+
     def half_turns(self) -> tuple[tuple[int, Reals], ...]:
         """Turns by exactly 180 deg: number of the segment (from 1), and the axis (3,) in the base frame taken."""
 
@@ -84,6 +98,10 @@ class JointMove:
     def joints(self, t: Reals) -> tuple[Reals, Reals, Reals]:
         """Angles (rad), velocities (rad/s) and accelerations (rad/s^2) at times (...,) in s; each (..., 6)."""
         return quintic(t, self.duration, self.start, self.end, self.velocities, self.accelerations)
+
+    def polynomials(self) -> PiecewiseMotion:
+        """The move as one polynomial."""
+        return polynomial_motion(self.joints, np.array([0.0, self.duration]), 5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +143,28 @@ class Segment(ABC):
 
     def progress(self, t: Reals) -> Rates:
         """See :class:`ToolPath`."""
-        return FromRestToRest(np.array([0.0, self.duration]), np.array([0.0, 1.0]), self.ramp)(t)
+        return self.law(t)
+
+    @property
+    def law(self) -> TimeLaw:
+        """See :class:`ToolPath`."""
+        return FromRestToRest(np.array([0.0, self.duration]), np.array([0.0, 1.0]), self.ramp)
+
+    @property
+    def edges(self) -> Reals:
+        """See :class:`ToolPath`."""
+        return np.array([0.0, 1.0])
+
+    @property
+    def bend(self) -> float:
+        """Angle by which the tool point's way turns, rad."""
+        return 0.0
+
+    def twist_bounds(self, start: Reals, end: Reals) -> Reals:
+        """See :class:`ToolPath`."""
+        linear = self.length * np.array([1.0, self.bend, self.bend**2])
+        bounds = np.stack([linear, [self.turned, 0.0, 0.0]], axis=-1)
+        return np.broadcast_to(bounds, (len(start), 3, 2))
 
     def poses(self, progress: Reals) -> Reals:
         """See :class:`ToolPath`."""

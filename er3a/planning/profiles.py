@@ -18,6 +18,8 @@ from scipy.interpolate import PchipInterpolator
 from er3a.numerics.arrays import Integers, Reals
 
 Rates = tuple[Reals, Reals, Reals]
+HALVINGS = 60
+SAME_SHARE = 1e-13
 Ends = tuple[Reals | float, Reals | float]
 
 
@@ -89,7 +91,19 @@ def trapezoid(t: Reals, duration: float, ramp: float) -> Rates:
 
 
 class TimeLaw(Protocol):
-    """Share of the way done (0..1) at times (...,) in s, with its first and second derivative by time."""
+    """Share of the way done (0..1) at times (...,) in s, with its first and second derivative by time.
+
+    Attributes
+    ----------
+    breaks : (m,), s, from start to end: between two of them the share is a polynomial
+    degree : of the polynomials, at most
+    """
+
+    @property
+    def breaks(self) -> Reals: ...
+
+    @property
+    def degree(self) -> int: ...
 
     def __call__(self, t: Reals) -> Rates: ...
 
@@ -107,6 +121,19 @@ class FromRestToRest:
     times: Reals
     progress: Reals
     ramp: float | None = None
+
+    @property
+    def breaks(self) -> Reals:
+        """See :class:`TimeLaw`."""
+        if self.ramp is None:
+            return self.times
+        part = self.ramp * np.diff(self.times)
+        return np.unique(np.concatenate([self.times, self.times[:-1] + part, self.times[1:] - part]))
+
+    @property
+    def degree(self) -> int:
+        """See :class:`TimeLaw`."""
+        return 5 if self.ramp is None else 2
 
     def __call__(self, t: Reals) -> Rates:
         """See :class:`TimeLaw`."""
@@ -136,6 +163,16 @@ class Timetable:
         slopes[[0, -1]] = 0.0
         self._slopes = slopes
 
+    @property
+    def breaks(self) -> Reals:
+        """See :class:`TimeLaw`."""
+        return self.times
+
+    @property
+    def degree(self) -> int:
+        """See :class:`TimeLaw`."""
+        return 3
+
     def __call__(self, t: Reals) -> Rates:
         """See :class:`TimeLaw`."""
         t = np.clip(np.asarray(t, float), self.times[0], self.times[-1])
@@ -146,3 +183,19 @@ class Timetable:
         c2, c3 = 3 * step - 2 * v0 - v1, v0 + v1 - 2 * step
         x = start + u * (v0 + u * (c2 + u * c3))
         return x, (v0 + u * (2 * c2 + 3 * u * c3)) / h, (2 * c2 + 6 * u * c3) / h**2
+
+
+def times_at(law: TimeLaw, shares: Reals) -> Reals:
+    """When a law has done shares (k,) of the way, s; the first such time to rounding."""
+    breaks = law.breaks
+    done = law(breaks)[0]
+    after = np.clip(np.searchsorted(done, shares, side="left"), 1, len(breaks) - 1)
+    low, high = breaks[after - 1].copy(), breaks[after].copy()
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        early = law(middle)[0] < shares
+        low, high = np.where(early, middle, low), np.where(early, high, middle)
+    for k in (0, -1):  # a halt is at rest, so that rounding would shift the time by much
+        beside = breaks[np.clip(after + k, 0, len(breaks) - 1)]
+        high = np.where(np.abs(law(beside)[0] - shares) < SAME_SHARE, beside, high)
+    return high

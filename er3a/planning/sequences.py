@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence as Many
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -19,11 +20,14 @@ from er3a.numerics.arrays import Flags, Reals
 from er3a.planning.arcs import Arc
 from er3a.planning.curves import GAUSS_POINTS, GAUSS_WEIGHTS, POWERS, Curve, joining, straight
 from er3a.planning.moves import Segment
-from er3a.planning.profiles import FromRestToRest, Rates, TimeLaw, Times, Timetable
+from er3a.planning.piecewise import PiecewiseMotion, polynomial_motion
+from er3a.planning.profiles import FromRestToRest, Rates, TimeLaw, Times, Timetable, times_at
 from er3a.planning.rotation_curves import spin
 
 TURN_LENGTH = 0.1  # m per rad
 NO_WAY = 1e-12  # m; shorter segments are left out
+SIX_POINTS = 2.0  # Lebesgue constant of the six points of extreme value, 1.99: polynomials up to degree 5 exceed
+# their greatest size at these points by no more
 RUNS_ON = 1e-9  # relative difference of twists below which a corner is none
 
 
@@ -56,6 +60,41 @@ class SegmentPath:
     def length(self) -> float:
         """Length of the tool point's way, m."""
         return float(self.way(np.array(1.0)))
+
+    @property
+    def edges(self) -> Reals:
+        """See :class:`er3a.planning.moves.ToolPath`."""
+        return self.curve.edges
+
+    def twist_bounds(self, start: Reals, end: Reals) -> Reals:
+        """See :class:`er3a.planning.moves.ToolPath`.
+
+        The angular velocity of a rotation vector w is J(w) w', and J is the mean over u in 0..1 of the rotations by
+        u w, so that its change with w is at most 1/2 and the next 1/3.
+        """
+        piece = self.curve.piece((start + end) / 2)[0]
+        first, second, third = np.moveaxis(self._slopes[piece], 1, 0)
+        spin_slope = second[:, 1] + first[:, 1] ** 2 / 2
+        spin_bend = third[:, 1] + 1.5 * first[:, 1] * second[:, 1] + first[:, 1] ** 3 / 3
+        return np.stack(
+            [first, np.stack([second[:, 0], spin_slope], -1), np.stack([third[:, 0], spin_bend], -1)], axis=1
+        )
+
+    @cached_property
+    def _slopes(self) -> Reals:
+        """(n, 3, 2) bounds on each piece of the derivatives 1 to 3 by progress of position and rotation vector."""
+        spans, found = np.diff(self.curve.edges), np.empty((len(self.origins), 3, 2))
+        series = self.curve.coefficients
+        for order in range(3):
+            series = series[:, 1:] * np.arange(1, series.shape[1])[:, None]
+            x = (1 - np.cos(np.pi * np.arange(POWERS) / (POWERS - 1))) / 2
+            values = np.einsum("mpk,xp->mxk", series, x[:, None] ** np.arange(series.shape[1]))
+            size = np.linalg.norm(values.reshape(*values.shape[:2], 2, 3), axis=-1).max(axis=1)
+            found[:, order] = SIX_POINTS * size / spans[:, None] ** (order + 1)
+        for k, arc in ((k, arc) for k, arc in enumerate(self.arcs) if arc is not None):
+            rate = (self.arc_shares[k, 1] - self.arc_shares[k, 0]) / spans[k]
+            found[k, :, 0] = [arc.length * rate * (arc.angle * rate) ** order for order in range(3)]
+        return found
 
     def progress(self, t: Reals) -> Rates:
         """See :class:`er3a.planning.moves.ToolPath`."""
@@ -135,6 +174,11 @@ class JointSequence:
         q, dq, ddq = self.curve(progress)
         speed, acceleration = speed[..., None], acceleration[..., None]
         return q, dq * speed, ddq * speed**2 + dq * acceleration
+
+    def polynomials(self) -> PiecewiseMotion:
+        """The sequence as polynomials in time: of each piece of the curve within each piece of the law."""
+        breaks = np.unique(np.concatenate([self.law.breaks, times_at(self.law, self.curve.edges[1:-1])]))
+        return polynomial_motion(self.joints, breaks, self.law.degree * (POWERS - 1))
 
 
 @dataclass(frozen=True, eq=False)

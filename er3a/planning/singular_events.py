@@ -97,11 +97,11 @@ def _in_stretch(
             met.append((low, low))
         else:
             passed.append((low, distance))
-    merged = _merged(sorted(met), SAME_EVENT * duration)
-    events = [SingularEvent(float(a), float(b), kind, True, 0.0) for a, b in merged]
+    crossings = merged(sorted(met), SAME_EVENT * duration)
+    events = [SingularEvent(float(a), float(b), kind, True, 0.0) for a, b in crossings]
     for a, b in runs(near.is_near(kind, np.abs(f))):
         begin, end = times[max(a - 1, 0)], times[min(b, len(times) - 1)]
-        if any(begin <= until and start <= end for start, until in merged):
+        if any(begin <= until and start <= end for start, until in crossings):
             continue
         here = [(distance, low) for low, distance in passed if begin <= low <= end]
         if here:
@@ -165,11 +165,12 @@ def _minima(times: Reals, f: Reals, factor: Factor, near: float, duration: float
     return found
 
 
-def _merged(spans: list[tuple[float, float]], gap: float) -> list[tuple[float, float]]:
-    merged: list[tuple[float, float]] = []
+def merged(spans: list[tuple[float, float]], gap: float) -> list[tuple[float, float]]:
+    """Spans, sorted by their starts, with those put together that are no more than a gap apart."""
+    kept: list[tuple[float, float]] = []
     for start, until in spans:
-        if merged and start - merged[-1][1] <= gap:
-            merged[-1] = (merged[-1][0], max(until, merged[-1][1]))
+        if kept and start - kept[-1][1] <= gap:
+            kept[-1] = (kept[-1][0], max(until, kept[-1][1]))
         else:
-            merged.append((start, until))
-    return merged
+            kept.append((start, until))
+    return kept

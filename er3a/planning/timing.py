@@ -16,13 +16,17 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from er3a.errors import Er3aError
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Flags, Reals
+from er3a.planning.intervals import OVER, RateLimit
+from er3a.planning.piecewise import PiecewiseMotion, polynomial_motion
+from er3a.planning.profiles import Rates
 from er3a.robots.robot import Robot
 
 LONGEST_STEP = 0.02  # share of the whole way between two nodes
@@ -31,6 +35,7 @@ SHORTEST_STEP = 2e-4  # s at full speed; bends sharper than this count as corner
 SAME_NODE = 1e-5  # s at full speed
 MOST_ROUNDS = 30
 STRAIGHT_NODES = 81
+SPLINE_DEGREE = 6  # in time, of a cubic at an even acceleration
 
 
 @dataclass(frozen=True)
@@ -67,10 +72,32 @@ class TimingError(Er3aError):
 
 @dataclass(frozen=True, eq=False)
 class JointLimits:
-    """Greatest joint speeds (6,) in rad/s and accelerations (6,) in rad/s^2."""
+    """Limits of the joints' rates, each (n,).
+
+    Attributes
+    ----------
+    speed, acceleration : greatest, rad/s and rad/s^2
+    jerk : greatest, rad/s^3, where one is given
+    speed_assumed : (n,) bool, whether the speed is assumed; None for no joint
+    acceleration_assumed : whether the accelerations are
+    """
 
     speed: Reals
     acceleration: Reals
+    jerk: Reals | None = None
+    speed_assumed: Flags | None = None
+    acceleration_assumed: bool = True
+
+    @cached_property
+    def rates(self) -> tuple[RateLimit, ...]:
+        """One limit for each order of rates."""
+        none, step = np.zeros(len(self.speed), bool), OVER * self.acceleration
+        assumed = none if self.speed_assumed is None else self.speed_assumed
+        found = [
+            RateLimit(1, self.speed, assumed, step),
+            RateLimit(2, self.acceleration, none | self.acceleration_assumed, step),
+        ]
+        return (*found, *([] if self.jerk is None else [RateLimit(3, self.jerk, none, step)]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,33 +106,70 @@ class Timed:
 
     Attributes
     ----------
-    t : (N,), s, rising from 0
-    q, velocity, acceleration : (N, 6), rad, rad/s, rad/s^2
+    curve : the motion itself
+    t : (N,), s, rising from 0: where its pieces meet
+    q, velocity, acceleration : (N, n), rad, rad/s, rad/s^2, there
     """
 
-    t: Reals
-    q: Reals
-    velocity: Reals
-    acceleration: Reals
+    curve: PiecewiseMotion
+
+    @cached_property
+    def _rates(self) -> Rates:
+        return self.curve.rates(self.t)
+
+    @property
+    def t(self) -> Reals:
+        """See above."""
+        return self.curve.times
+
+    @property
+    def q(self) -> Reals:
+        """See above."""
+        return self._rates[0]
+
+    @property
+    def velocity(self) -> Reals:
+        """See above."""
+        return self._rates[1]
+
+    @property
+    def acceleration(self) -> Reals:
+        """See above."""
+        return self._rates[2]
 
     @property
     def duration(self) -> float:
         """s"""
-        return float(self.t[-1])
+        return self.curve.duration
 
     def ratios(self, limits: JointLimits) -> tuple[float, float]:
-        """Greatest ratio of a joint's speed to its limit, and of its acceleration to its limit."""
-        speed = np.abs(self.velocity / limits.speed).max()
-        return float(speed), float(np.abs(self.acceleration / limits.acceleration).max())
+        """Greatest ratio of a joint's speed to its limit, and of its acceleration to its limit, on the whole curve."""
+        speed, acceleration = self.greatest
+        return float((speed / limits.speed).max()), float((acceleration / limits.acceleration).max())
+
+    @cached_property
+    def greatest(self) -> tuple[Reals, Reals]:
+        """Greatest speed (n,) in rad/s and acceleration (n,) in rad/s^2 of each joint."""
+        return self.curve.greatest(self.curve.velocity), self.curve.greatest(self.curve.acceleration)
 
 
-def joint_limits(robot: Robot, assumed_speed: Reals, acceleration_time: float) -> JointLimits:
-    """The robot's joint speeds, with ``assumed_speed`` (6,) in rad/s where they are unknown.
+def joint_limits(
+    robot: Robot,
+    assumed_speed: Reals,
+    acceleration_time: float,
+    acceleration: Reals | None = None,
+    jerk: Reals | None = None,
+) -> JointLimits:
+    """The robot's joint speeds, with ``assumed_speed`` (n,) in rad/s where they are unknown.
 
-    Tables give no accelerations: each joint is taken to reach its full speed in ``acceleration_time`` seconds.
+    Tables give no accelerations: where none are given (n,), each joint is taken to reach its full speed in
+    ``acceleration_time`` seconds.
     """
-    speed = np.where(np.isfinite(robot.speed), robot.speed, assumed_speed)
-    return JointLimits(speed, speed / acceleration_time)
+    known = np.isfinite(robot.speed)
+    speed = np.where(known, robot.speed, assumed_speed)
+    if acceleration is None:
+        return JointLimits(speed, speed / acceleration_time, jerk, ~known)
+    return JointLimits(speed, acceleration, jerk, ~known, acceleration_assumed=False)
 
 
 def nodes_along(joints: Callable[[Reals], Reals], t: Reals, q: Reals, limits: JointLimits) -> tuple[Reals, Reals]:
@@ -139,7 +203,8 @@ def fastest(q: Reals, limits: JointLimits, programmed: Reals | None = None) -> T
 
     Parameters
     ----------
-    programmed : (N,), s, rising: times at which the programme is at the nodes; no stretch is run faster
+    programmed : (N,), s, rising: times at which the programme is at the nodes; no stretch is run faster, but for
+        what the nodes leave open of the programme's speed, and the whole takes no less time
 
     Raises
     ------
@@ -156,19 +221,38 @@ def fastest(q: Reals, limits: JointLimits, programmed: Reals | None = None) -> T
     q, way = q[kept], way[kept]
     if len(way) == 2:
         q, way = np.linspace(q[0], q[1], STRAIGHT_NODES), np.linspace(0.0, way[1], STRAIGHT_NODES)
-        programmed, kept = None, kept[:1]
+        programmed = None
     spline = CubicSpline(way, q)
-    least = np.zeros(len(way) - 1) if programmed is None else np.diff(programmed[kept])
     cap = None if programmed is None else np.gradient(way, programmed[kept])
-    speed, pull = _toppra(way, spline, limits, cap)
+    speed = _toppra(way, spline, limits, cap)
     pace = (speed[:-1] + speed[1:]) / 2
     if (pace <= 0).any():
         raise TimingError(MustStandStill())
-    t = np.concatenate([[0.0], np.cumsum(np.maximum(np.diff(way) / pace, least))])
-    slope, bend = spline(way, 1), spline(way, 2)
-    pull = np.append(pull, pull[-1])
-    velocity = slope * speed[:, None]
-    return Timed(t, q, velocity, bend * speed[:, None] ** 2 + slope * pull[:, None])
+    t = np.concatenate([[0.0], np.cumsum(np.diff(way) / pace)])
+    return within_limits(polynomial_motion(_along(way, spline, speed, t), t, SPLINE_DEGREE), limits, elapsed)
+
+
+def within_limits(curve: PiecewiseMotion, limits: JointLimits, least: float = 0.0) -> Timed:
+    """A motion, evenly slowed down if it exceeds a limit of speed or acceleration anywhere, or takes less than s."""
+    motion = Timed(curve)
+    speed, acceleration = motion.ratios(limits)
+    factor = max(speed, np.sqrt(acceleration), least / motion.duration)
+    return motion if factor <= 1 else Timed(curve.scaled(factor))
+
+
+def _along(way: Reals, spline: CubicSpline, speed: Reals, t: Reals) -> Callable[[Reals], Rates]:
+    """The way run at speeds (N,) at its nodes at times (N,), evenly accelerated between them."""
+    pull = np.diff(speed**2) / (2 * np.diff(way))
+
+    def rates(at: Reals) -> Rates:
+        i = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(pull) - 1)
+        since = at - t[i]
+        place = way[i] + since * (speed[i] + since * pull[i] / 2)
+        pace, pull_here = (speed[i] + since * pull[i])[..., None], pull[i][..., None]
+        slope = spline(place, 1)
+        return spline(place), slope * pace, spline(place, 2) * pace**2 + slope * pull_here
+
+    return rates
 
 
 def straight(start: Reals, end: Reals, limits: JointLimits) -> Timed:
@@ -177,35 +261,52 @@ def straight(start: Reals, end: Reals, limits: JointLimits) -> Timed:
 
 
 def standing(q: Reals, duration: float) -> Timed:
-    """Rest at joint angles (6,)."""
-    t = np.array([0.0, duration])
-    return Timed(t, np.stack([q, q]), np.zeros((2, 6)), np.zeros((2, 6)))
+    """Rest at joint angles (n,)."""
+    still = np.zeros((1, 1, len(q)))
+    return Timed(PiecewiseMotion(np.array([0.0, duration]), q[None, None], still, still))
+
+
+def through(t: Reals, q: Reals) -> Timed:
+    """The smooth motion from rest to rest through angles (N, n) in rad at times (N,) in s: a cubic spline."""
+    spline = CubicSpline(t, q, bc_type="clamped")
+    return Timed(polynomial_motion(lambda at: (spline(at), spline(at, 1), spline(at, 2)), t, 3))
 
 
 def joined(parts: list[Timed]) -> Timed:
     """Motions one after another, each starting at rest where the one before ended at rest."""
-    starts = np.concatenate([[0.0], np.cumsum([part.t[-1] for part in parts])])
-    t = np.concatenate([part.t + start for part, start in zip(parts, starts)])
-    q, velocity, acceleration = (
-        np.concatenate([getattr(part, key) for part in parts]) for key in ("q", "velocity", "acceleration")
-    )
-    first = np.concatenate([[True], np.diff(t) > 0])
-    return Timed(t[first], q[first], velocity[first], acceleration[first])
+    curves = [part.curve for part in parts if part.duration > 0] or [parts[-1].curve]
+    starts = np.concatenate([[0.0], np.cumsum([curve.duration for curve in curves])])
+    times = np.concatenate([[0.0], *(curve.times[1:] + start for curve, start in zip(curves, starts))])
+    series = (_stacked([getattr(curve, key) for curve in curves]) for key in ("angle", "velocity", "acceleration"))
+    return Timed(PiecewiseMotion(times, *series))
 
 
-def _toppra(way: Reals, spline: CubicSpline, limits: JointLimits, cap: Reals | None) -> tuple[Reals, Reals]:
-    """Speed along the way at its nodes (N,), and acceleration (N - 1,) between them."""
+def _stacked(series: list[Reals]) -> Reals:
+    """Series (m, d + 1, n) of all pieces, those of lower degree filled up with zeros."""
+    most = max(part.shape[1] for part in series)
+    return np.concatenate([np.pad(part, ((0, 0), (0, most - part.shape[1]), (0, 0))) for part in series])
+
+
+def _toppra(way: Reals, spline: CubicSpline, limits: JointLimits, cap: Reals | None) -> Reals:
+    """Speed along the way at its nodes (N,)."""
     try:
         with warnings.catch_warnings():  # of escapes in docstrings, when Python compiles the library
             warnings.simplefilter("ignore")
             from toppra.algorithm import TOPPRA
-            from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint, LinearConstraint
+            from toppra.constraint import (
+                DiscretizationType,
+                JointAccelerationConstraint,
+                JointVelocityConstraint,
+                LinearConstraint,
+            )
             from toppra.interpolator import AbstractGeometricPath
     except ModuleNotFoundError:
         raise TimingError(ToppraMissing()) from None
 
+    count = spline.c.shape[-1]
+
     class Way(AbstractGeometricPath):  # type: ignore[misc]
-        dof, waypoints = 6, None
+        dof, waypoints = count, None
         path_interval = np.array([way[0], way[-1]])
 
         def __call__(self, at: Reals, order: int = 0) -> Any:
@@ -217,20 +318,18 @@ def _toppra(way: Reals, spline: CubicSpline, limits: JointLimits, cap: Reals | N
         """The programme's speed along the way as an upper bound."""
 
         def get_dof(self) -> int:
-            return 6
+            return count
 
         def compute_constraint_params(self, path: Any, gridpoints: Any) -> tuple[Reals | None, ...]:
             return None, None, None, None, None, None, np.stack([np.zeros_like(most), most], axis=1)
 
-    both = (
-        np.stack([-limits.speed, limits.speed], axis=1),
-        np.stack([-limits.acceleration, limits.acceleration], axis=1),
-    )
-    constraints = [JointVelocityConstraint(both[0]), JointAccelerationConstraint(both[1])]
+    speeds, accelerations = (np.stack([-most, most], axis=1) for most in (limits.speed, limits.acceleration))
+    at_both_ends = JointAccelerationConstraint(accelerations, discretization_scheme=DiscretizationType.Interpolation)
+    constraints = [JointVelocityConstraint(speeds), at_both_ends]
     if cap is not None:
         constraints.append(Programme())
     solver = TOPPRA(constraints, Way(), gridpoints=way, solver_wrapper="seidel")
-    pull, speed, _ = solver.compute_parameterization(0, 0)
+    _, speed, _ = solver.compute_parameterization(0, 0)
     if speed is None or not np.isfinite(speed).all():
         raise TimingError(NoTimeLawFound())
-    return speed, pull
+    return np.asarray(speed)

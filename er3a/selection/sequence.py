@@ -57,7 +57,12 @@ class SequenceChoice(Displayed):
 
 
 def select_sequence(
-    robot: Robot, poses: Sequence[Solutions], q_ref: Reals, rule: MoveRule = "nearest", scene: Scene | None = None
+    robot: Robot,
+    poses: Sequence[Solutions],
+    q_ref: Reals,
+    rule: MoveRule = "nearest",
+    scene: Scene | None = None,
+    acceleration: Reals | None = None,
 ) -> SequenceChoice:
     """Choose one solution of each pose so that all moves together cost least.
 
@@ -66,6 +71,7 @@ def select_sequence(
     poses : the solutions of each pose, in order; rows outside the limits or in collision are left out
     q_ref : (6,), rad, where the arm starts
     rule : how a move costs: "nearest" (greatest joint move), "weighted" or "time"
+    acceleration : (n,), rad/s^2; moves by "time" then run from rest to rest, else at full speed throughout
 
     Raises
     ------
@@ -79,10 +85,10 @@ def select_sequence(
     usable = [_usable(robot, solutions, scene, number) for number, solutions in enumerate(poses)]
     q_ref = checked_reference(robot, q_ref)
     sets = [solutions.q[rows] for solutions, rows in zip(poses, usable)]
-    total = _move_costs(robot, q_ref[None], sets[0], rule)[0]
+    total = _move_costs(robot, q_ref[None], sets[0], rule, acceleration)[0]
     came_from = []
     for before, after in pairwise(sets):
-        through = total[:, None] + _move_costs(robot, before, after, rule)
+        through = total[:, None] + _move_costs(robot, before, after, rule, acceleration)
         came_from.append(through.argmin(axis=0))
         total = through.min(axis=0)
     best = [int(total.argmin())]
@@ -91,7 +97,7 @@ def select_sequence(
     best.reverse()
     greedy, greedy_cost, at = [], 0.0, q_ref
     for q in sets:
-        costs = _move_costs(robot, at[None], q, rule)[0]
+        costs = _move_costs(robot, at[None], q, rule, acceleration)[0]
         greedy.append(int(costs.argmin()))
         greedy_cost += float(costs.min())
         at = q[greedy[-1]]
@@ -104,6 +110,13 @@ def select_sequence(
     )
 
 
+def rest_to_rest(angle: Reals, speed: Reals, acceleration: Reals) -> Reals:
+    """Least time (..., n) in s in which joints turn by angles (..., n) from rest to rest, on triangle or trapezoid."""
+    short = angle < speed**2 / acceleration
+    time: Reals = np.where(short, 2 * np.sqrt(angle / acceleration), angle / speed + speed / acceleration)
+    return time
+
+
 def _usable(robot: Robot, solutions: Solutions, scene: Scene | None, number: int) -> Integers:
     rows = np.flatnonzero(solutions.within_limits)
     if scene is not None and rows.size:
@@ -113,6 +126,8 @@ def _usable(robot: Robot, solutions: Solutions, scene: Scene | None, number: int
     return rows
 
 
-def _move_costs(robot: Robot, before: Reals, after: Reals, rule: MoveRule) -> Reals:
+def _move_costs(robot: Robot, before: Reals, after: Reals, rule: MoveRule, acceleration: Reals | None) -> Reals:
     """Cost (n, m) of each move from joint angles (n, 6) to (m, 6)."""
+    if rule == "time" and acceleration is not None:
+        return rest_to_rest(np.abs(after[None] - before[:, None]), robot.speed, acceleration).max(axis=-1, initial=0.0)
     return RULES[rule].measure(robot, after[None], before[:, None], None)

@@ -18,7 +18,7 @@ def test_a_single_joint_takes_the_time_of_the_trapezoid(angle):
     exact = 2 * np.sqrt(angle / a) if angle < v**2 / a else angle / v + v / a
     motion = straight(np.zeros(6), np.array([angle, 0, 0, 0, 0, 0]), LIMITS)
     assert motion.duration == pytest.approx(exact, rel=2e-3)
-    np.testing.assert_array_equal(motion.q[-1], [angle, 0, 0, 0, 0, 0])
+    np.testing.assert_allclose(motion.q[-1], [angle, 0, 0, 0, 0, 0], rtol=0, atol=1e-14)
 
 
 def test_limits_hold_and_one_of_them_is_in_use_everywhere(random):
@@ -78,7 +78,7 @@ def test_rest_and_chains():
     both = joined([standing(np.zeros(6), 1.0), move, standing(np.ones(6), 0.0)])
     assert both.duration == pytest.approx(1.0 + move.duration)
     assert (np.diff(both.t) > 0).all()
-    np.testing.assert_array_equal(both.q[-1], np.ones(6))
+    np.testing.assert_allclose(both.q[-1], np.ones(6), rtol=0, atol=1e-14)
 
 
 def test_unknown_speeds_are_assumed_and_known_ones_kept():

@@ -8,10 +8,13 @@ from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet, 
 
 OUTCOMES: dict[Outcome, str] = {
     "unreachable": N_("unreachable"),
+    "none found": N_("none found"),
     "leaves limits": N_("leaves limits"),
     "collides": N_("collides"),
     "too fast": N_("too fast"),
     "singular": N_("singular"),
+    "too fast for the assumed limits": N_("too fast for the assumed limits"),
+    "undecided": N_("undecided"),
     "near-singular": N_("near-singular"),
     "safe": N_("safe"),
     "reached": N_("reached"),

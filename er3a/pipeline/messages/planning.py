@@ -4,11 +4,29 @@ from __future__ import annotations
 
 import er3a.pipeline.messages.kinematics  # noqa: F401
 from er3a.pipeline.messages.language import N_
-from er3a.pipeline.messages.say import joined, listed, say, sentence
+from er3a.pipeline.messages.say import joined, listed, say, sentence, word
 from er3a.planning.avoidance import avoidance_findings
 from er3a.planning.avoidance.strategy_names import StrategyName
-from er3a.planning.intervals import AboveLimit, BelowLimit, PathOutOfReach, TooFast
+from er3a.planning.intervals import (
+    AboveLimit,
+    AccelerationTooGreat,
+    AccelerationTooGreatIfAssumed,
+    BelowLimit,
+    JerkTooGreat,
+    PathOutOfReach,
+    TooFast,
+    TooFastIfAssumed,
+)
 from er3a.planning.timing import MustStandStill, NoTimeLawFound, ToppraMissing
+from er3a.planning.tool_proof import Quantity, Undecided
+from er3a.planning.way_around import (
+    EndOutsideLimits,
+    EndOverlaps,
+    EndUnreached,
+    NoneFound,
+    NothingMeasured,
+    PlannerMissing,
+)
 
 STRATEGIES: dict[StrategyName, str] = {
     "slow": N_("Keep the path and slow down"),
@@ -18,6 +36,7 @@ STRATEGIES: dict[StrategyName, str] = {
     "damped": N_("Let damped least squares leave the path"),
     "detour": N_("Cross the region by a joint move"),
     "stop": N_("Stop before the region with an alarm"),
+    "planned": N_("Take a planned motion of the joints instead"),
 }
 
 
@@ -55,6 +74,65 @@ def _(found: TooFast) -> str:
 
 
 @say.register
+def _(found: TooFastIfAssumed) -> str:
+    return sentence(
+        found.code,
+        "J{joint} would need {needed:.0f} deg/s; {able:g} deg/s are assumed",
+        joint=found.joint,
+        needed=found.needed_deg_s,
+        able=found.limit_deg_s,
+    )
+
+
+@say.register
+def _(found: AccelerationTooGreat) -> str:
+    return sentence(
+        found.code,
+        "J{joint} would need {needed:.0f} deg/s²; it can do {able:g} deg/s²",
+        joint=found.joint,
+        needed=found.needed_deg_s2,
+        able=found.limit_deg_s2,
+    )
+
+
+@say.register
+def _(found: AccelerationTooGreatIfAssumed) -> str:
+    return sentence(
+        found.code,
+        "J{joint} would need {needed:.0f} deg/s²; {able:g} deg/s² are assumed",
+        joint=found.joint,
+        needed=found.needed_deg_s2,
+        able=found.limit_deg_s2,
+    )
+
+
+@say.register
+def _(found: JerkTooGreat) -> str:
+    values = {"joint": found.joint, "able": found.limit_deg_s3}
+    if found.needed_deg_s3 is None:
+        return sentence(found.code, "J{joint}'s acceleration steps; its jerk may be {able:g} deg/s³", **values)
+    needed = found.needed_deg_s3
+    return sentence(
+        found.code, "J{joint} would need {needed:.0f} deg/s³; its jerk may be {able:g} deg/s³", needed=needed, **values
+    )
+
+
+OPEN: dict[Quantity, str] = {
+    "singular": N_("whether a singular pose is met"),
+    "limits": N_("whether the joints keep their limits"),
+    "speed": N_("whether the joints keep their speeds"),
+    "acceleration": N_("whether the joints keep their accelerations"),
+    "jerk": N_("whether the joints keep their jerk"),
+    "near": N_("how near a singular pose is"),
+}
+
+
+@say.register
+def _(found: Undecided) -> str:
+    return sentence(found.code, "the bounds do not settle {what}", what=word("undecided", OPEN, found.quantity))
+
+
+@say.register
 def _(found: PathOutOfReach) -> str:
     return joined(listed(found.reasons))
 
@@ -72,6 +150,42 @@ def _(found: NoTimeLawFound) -> str:
 @say.register
 def _(found: ToppraMissing) -> str:
     return sentence(found.code, "the library toppra is not installed; it has wheels for Linux on x86-64 only")
+
+
+@say.register
+def _(found: PlannerMissing) -> str:
+    return sentence(found.code, "the planner OMPL is not installed; it has wheels for Linux on x86-64 only")
+
+
+@say.register
+def _(found: NothingMeasured) -> str:
+    return sentence(found.code, "distances can't be measured here, so nothing can be planned")
+
+
+@say.register
+def _(found: EndOverlaps) -> str:
+    if found.end == "start":
+        return sentence(found.code, "at its start {overlap}", overlap=say(found.overlap))
+    return sentence(found.code, "at its end {overlap}", overlap=say(found.overlap))
+
+
+@say.register
+def _(found: EndOutsideLimits) -> str:
+    if found.end == "start":
+        return sentence(found.code, "at its start {limits}", limits=say(found.limits))
+    return sentence(found.code, "at its end {limits}", limits=say(found.limits))
+
+
+@say.register
+def _(found: EndUnreached) -> str:
+    if found.end == "start":
+        return sentence(found.code, "no joint angles within the limits reach its start")
+    return sentence(found.code, "no joint angles within the limits reach its end")
+
+
+@say.register
+def _(found: NoneFound) -> str:
+    return sentence(found.code, "the planner found no way in {rounds} rounds; there may be one", rounds=found.rounds)
 
 
 @say.register

@@ -18,6 +18,7 @@ from er3a.pipeline.stages.trajectory.model import (
     TriedStrategy,
 )
 from er3a.planning.avoidance.strategy_names import StrategyName
+from er3a.planning.intervals import RateCause
 
 FIGURES = {
     "paths": N_("Paths planned"),
@@ -38,6 +39,7 @@ KINDS: dict[PathKind, str] = {
     "arc": N_("circular arc"),
     "sequence": N_("lines and arcs in sequence"),
     "table": N_("path from a table"),
+    "plan": N_("planned motion"),
 }
 STRATEGIES: dict[StrategyName, str] = {
     "slow": N_("slow down on the path"),
@@ -47,6 +49,7 @@ STRATEGIES: dict[StrategyName, str] = {
     "damped": N_("damped least squares"),
     "detour": N_("joint move across the region"),
     "stop": N_("stop before it, with an alarm"),
+    "planned": N_("planned motion of the joints"),
 }
 MOST_PAIRS = 3
 NO_DEVIATION = 0.005  # mm or deg
@@ -80,10 +83,15 @@ def path_text(path: PathSummary) -> str:
 
 
 def _apart_from_collisions(path: PathSummary) -> str:
+    if path.no_way:
+        shown = sentence("path.shown", "shown is the straight joint move")
+        return joined([say(path.no_way), shown])
     if path.unreachable:
         return joined(map(_when, path.unreachable))
-    if faults := path.out_of_limits or path.too_fast:
+    if faults := path.out_of_limits or _worst(path.too_fast):
         return joined([*map(say, faults), *map(say, path.singularities)])
+    if path.undecided:
+        return joined([*map(say, path.undecided), *map(say, path.singularities)])
     met = [say(event) for event in path.singularities if event.crossing]
     if path.in_joint_space:
         if not met:
@@ -98,6 +106,14 @@ def _apart_from_collisions(path: PathSummary) -> str:
     if path.singularities:
         return joined(map(say, path.singularities))
     return sentence("path.safe", "no singular pose near, within limits and reach")
+
+
+def _worst(stretches: tuple[Stretch[RateCause], ...]) -> list[Stretch[RateCause]]:
+    """Of each kind of limit the stretch that exceeds it most."""
+    found: dict[str, Stretch[RateCause]] = {}
+    for part in sorted(stretches, key=lambda stretch: stretch.cause.ratio, reverse=True):
+        found.setdefault(part.cause.code, part)
+    return list(found.values())
 
 
 def _speeds(bounded: bool) -> str:

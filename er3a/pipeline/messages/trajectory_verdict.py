@@ -12,10 +12,13 @@ from er3a.planning.path_verdicts import PathVerdict
 def _(found: PathCounts) -> str:
     unsafe: dict[PathVerdict, tuple[str, ...]] = {
         "unreachable": found.unreachable,
+        "none found": found.none_found,
         "leaves limits": found.leaves_limits,
         "collides": found.collides,
         "too fast": found.too_fast,
         "singular": found.singular,
+        "too fast for the assumed limits": found.too_fast_if_assumed,
+        "undecided": found.undecided,
         "near-singular": found.near_singular,
     }
     faults = []

@@ -29,9 +29,12 @@ from er3a.pipeline.new_study.surroundings import SampledReach
 from er3a.pipeline.stages.trajectory.collisions import Surroundings, measured
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.stages.trajectory.judgement import judge
+from er3a.pipeline.stages.trajectory.limits import limits_of
 from er3a.pipeline.stages.trajectory.motion import motion_of
 from er3a.planning.commands import CommandSource
-from er3a.planning.intervals import out_of_limits, too_fast
+from er3a.planning.polynomial_checks import limit_intervals, rate_intervals
+from er3a.planning.timing import JointLimits
+from er3a.planning.tool_proof import Wanted
 from er3a.robots.joint_limits import limit_margin
 from er3a.robots.robot import Robot
 from er3a.selection.select import refusals
@@ -80,10 +83,12 @@ class TaskSearch:
     settings: TrajectorySettings
     closed_form: bool = field(init=False)
     near: NearSingular = field(init=False)
+    limits: JointLimits = field(init=False)
 
     def __post_init__(self) -> None:
         self.closed_form = has_branches(self.robot)
         wrist, elbow = np.radians([self.settings.near_wrist_deg, self.settings.near_elbow_deg])
+        self.limits = limits_of(self.robot, self.settings)
         self.near = NearSingular(float(wrist), float(elbow), self.settings.near_shoulder_mm / 1000)
 
     def spots(self) -> list[Spot]:
@@ -184,15 +189,18 @@ class TaskSearch:
     def _safe(self, written: dict[str, Any]) -> bool:
         """Whether the trajectory stage would call a path safe."""
         entry: PathEntry = parse(PathFile, {"kind": "paths", "paths": [written]}, None).paths[0]
+        wanted = Wanted(self.limits.rates, self.near)
         try:
-            motion = motion_of(self.robot, entry, self.settings.checks_per_sample, CommandSource(None, ""), {})
+            motion = motion_of(self.robot, entry, self.settings.checks_per_sample, CommandSource(None, ""), {}, wanted)
         except Er3aError:
             return False
         if self.closed_form:
-            if judge(self.robot, motion, self.near).verdict != "safe":
+            if judge(self.robot, motion, self.near, self.limits).verdict != "safe":
                 return False
-        elif out_of_limits(self.robot, motion.t, motion.q, motion.joints) or too_fast(
-            self.robot, motion.t, motion.rates(motion.t)[1], lambda t: motion.rates(t)[1]
+        elif (
+            (curve := motion.polynomials) is None
+            or limit_intervals(self.robot, curve)
+            or any(rate_intervals(curve, limit) for limit in self.limits.rates)
         ):
             return False
         if not can_measure():

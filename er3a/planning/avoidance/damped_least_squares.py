@@ -23,7 +23,7 @@ from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
 from er3a.planning.avoidance.avoidance_findings import BeginsOutOfReach, NoDampingSuffices, NotPossible
 from er3a.planning.avoidance.singular_segment import Avoidance, SingularSegment
-from er3a.planning.timing import Timed, joined
+from er3a.planning.timing import Timed, joined, through
 
 STEPS = 1000
 THRESHOLD = 0.1  # of the smallest singular value, linear rows divided by the characteristic length
@@ -60,13 +60,7 @@ def _run(segment: SingularSegment, t: Reals, T: Reals, damping: float) -> Timed:
     q[0] = segment.q[0]
     length = characteristic_length(robot)
     _damped_steps(robot.direction, robot.offset, constant_links(robot), T, t[1] - t[0], length, damping, q)
-    velocity = _slope(q, t)
-    velocity[0] = velocity[-1] = 0.0
-    return Timed(t, q, velocity, _slope(velocity, t))
-
-
-def _slope(values: Reals, t: Reals) -> Reals:
-    return np.asarray(np.gradient(values, t, axis=0))
+    return through(t, q)
 
 
 @kernel

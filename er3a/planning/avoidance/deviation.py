@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 from scipy.spatial import cKDTree
 
 from er3a.numerics.arrays import Reals
-from er3a.planning.moves import ToolPath
 
 POINTS = 2001
 LENGTH = 0.001 / np.radians(1.0)  # m per rad
 
 
-def deviation(line: ToolPath, T: Reals) -> tuple[Reals, Reals, Reals]:
+class HasPoses(Protocol):
+    """A way of the tool in space."""
+
+    def poses(self, progress: Reals) -> Reals:
+        """T_base_tool (..., 4, 4) at shares of the way (...,)."""
+
+
+def deviation(line: HasPoses, T: Reals) -> tuple[Reals, Reals, Reals]:
     """Distance and angle of poses from the path's nearest pose, where 1 mm weighs as much as 1 deg.
 
     Parameters

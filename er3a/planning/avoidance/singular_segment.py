@@ -38,8 +38,9 @@ class SingularSegment:
     followed : the path as it is followed
     t, q : (N,) s and (N, 6) rad, along the path; q NaN where unreachable
     near : the distances that the path is to keep
-    limits : of the joints
+    limits : of the joints' rates, to which motions are timed
     fixed_start : whether the joints at the start are given, or only the tool's pose
+    allowed : what the joints can do, if motions are to be timed to less
     """
 
     followed: Followed
@@ -48,6 +49,7 @@ class SingularSegment:
     near: NearSingular
     limits: JointLimits
     fixed_start: bool
+    allowed: JointLimits | None = None
 
     @property
     def robot(self) -> Robot:
@@ -105,6 +107,7 @@ def singular_segment(
     limits: JointLimits,
     events: list[SingularEvent] | None = None,
     fixed_start: bool = False,
+    allowed: JointLimits | None = None,
 ) -> SingularSegment:
     """What is to be avoided on a path, at its own grid points and at its events."""
     inner = [event.t for event in events or [] if 0 < event.t < followed.t[-1]]
@@ -114,4 +117,4 @@ def singular_segment(
         new = ~np.isin(t, followed.t)
         q = np.empty((len(t), 6))
         q[~new], q[new] = followed.q, followed.joints(t[new])
-    return SingularSegment(followed, t, q, near, limits, fixed_start)
+    return SingularSegment(followed, t, q, near, limits, fixed_start, allowed)

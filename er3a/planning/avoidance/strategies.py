@@ -26,6 +26,7 @@ from er3a.planning.avoidance.stop_before import stop
 from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.avoidance.via_point import shifted_via, tilted_via
 from er3a.planning.timing import Timed, TimingError
+from er3a.planning.way_around import NoWayAround
 from er3a.robots.joint_limits import LimitsExceeded, limits_exceeded
 
 STRATEGIES: dict[StrategyName, Strategy] = {
@@ -41,7 +42,9 @@ ARRIVED = 1e-3, np.radians(0.1)  # m and rad from the path's end
 ON_PATH = 1e-6, np.radians(1e-4)
 OVER = 1e-6  # relative, by which rounding may exceed a limit
 
-NotUsable = NotPossible | PathNotFinished | EndsOffPath | LimitsExceeded | SpeedExceeded | AccelerationExceeded
+NotUsable = (
+    NotPossible | PathNotFinished | EndsOffPath | LimitsExceeded | SpeedExceeded | AccelerationExceeded | NoWayAround
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +118,7 @@ def _tried(segment: SingularSegment, name: StrategyName) -> StrategyResult:
     robot, motion, line = segment.robot, found.motion, segment.followed.line
     T = forward(robot, motion.q)
     distance, angle, _ = deviation(line, T)
-    speed, acceleration = motion.ratios(segment.limits)
+    speed, acceleration = motion.ratios(segment.allowed or segment.limits)
     reasons: list[NotUsable] = []
     last = line.poses(np.array(1.0))
     left = float(np.linalg.norm(T[-1, :3, 3] - last[:3, 3]))

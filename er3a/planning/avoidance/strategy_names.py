@@ -4,4 +4,4 @@ from __future__ import annotations
 
 from typing import Literal
 
-StrategyName = Literal["slow", "branch", "via_shift", "via_tilt", "damped", "detour", "stop"]
+StrategyName = Literal["slow", "branch", "via_shift", "via_tilt", "damped", "detour", "stop", "planned"]

@@ -34,6 +34,8 @@ from er3a.pipeline.stages.inverse.model import (
 from er3a.pipeline.stages.inverse.rankings import rankings, sequence
 from er3a.pipeline.stages.inverse.solution_map import solution_map
 from er3a.pipeline.stages.inverse.solve_target import solve_target
+from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
+from er3a.pipeline.stages.trajectory.limits import limits_of
 from er3a.pipeline.study import Study
 
 STAGE = "inverse"
@@ -46,7 +48,7 @@ def compute(study: Study, name: str) -> InverseResults:
     """Solve the targets of a robot of the study."""
     robot = study.robot(name)
     targets = load_targets(study.entry(name).targets, robot)
-    settings = study.section(InverseSettings)
+    settings, motion = study.section(InverseSettings), study.section(TrajectorySettings)
     scene_file = study.scene(name, STAGE)
     scene = load_scene(scene_file) if scene_file else None
     solved = [
@@ -66,7 +68,7 @@ def compute(study: Study, name: str) -> InverseResults:
         mix=settings.mix,
         scene=scene.title if scene else None,
         targets=results,
-        sequence=sequence(robot, targets, solved, scene),
+        sequence=sequence(robot, targets, solved, scene, limits_of(robot, motion).acceleration),
         round_trips=_round_trips(trips) if trips else None,
     )
     number_of_solutions = solution_map(robot, settings.map_cells) if has_branches(robot) else MapRows.empty()

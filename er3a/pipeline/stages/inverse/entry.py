@@ -11,6 +11,7 @@ from er3a.files.robot_file import Text
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.stages.stage import Stage
+from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 
 if TYPE_CHECKING:
     from er3a.pipeline.study import Study
@@ -39,7 +40,7 @@ STAGE = Stage(
     name="inverse",
     title=N_("inverse"),
     question=N_("Which joint solutions reach a pose?"),
-    settings={"inverse": InverseSettings},
+    settings={"inverse": InverseSettings, "trajectory": TrajectorySettings},
     inputs=_inputs,
     rests_on=("validation",),
 )

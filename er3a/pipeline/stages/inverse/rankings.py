@@ -54,14 +54,18 @@ def _places(cost: Reals, free: Flags) -> Integers:
 
 
 def sequence(
-    robot: Robot, targets: tuple[Target, ...], solved: list[SolvedTarget], scene: Scene | None
+    robot: Robot,
+    targets: tuple[Target, ...],
+    solved: list[SolvedTarget],
+    scene: Scene | None,
+    acceleration: Reals | None = None,
 ) -> Sequence | None:
     """Visiting all targets that are reached, in order: the best rows as a whole, against the greedy ones."""
     reached = [one for one in solved if one.result.chosen_deg is not None]
     if len(reached) < 2:
         return None
     rule: MoveRule = "time" if "time" in available_rules(robot) else "nearest"
-    found = select_sequence(robot, [one.solutions for one in reached], targets[0].q_ref, rule, scene)
+    found = select_sequence(robot, [one.solutions for one in reached], targets[0].q_ref, rule, scene, acceleration)
     stops = tuple(
         Stop(
             target=one.result.name,

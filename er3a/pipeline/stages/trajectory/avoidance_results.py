@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from er3a.collision.along import clearance_along
+from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.pairs import PairOverlaps
 from er3a.kinematics.forward import forward
+from er3a.kinematics.inverse import inverse
 from er3a.kinematics.near_singular import NearSingular
 from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.numerics.arrays import Reals
@@ -17,12 +18,16 @@ from er3a.pipeline.stages.trajectory.collisions import Surroundings, least_clear
 from er3a.pipeline.stages.trajectory.judgement import Judgement
 from er3a.pipeline.stages.trajectory.model import FASTEST, AvoidanceRows, StrategyMotion, TriedStrategy
 from er3a.pipeline.stages.trajectory.motion import Motion
+from er3a.planning.avoidance.deviation import deviation
 from er3a.planning.avoidance.singular_segment import SingularSegment, singular_segment
 from er3a.planning.avoidance.strategies import StrategyCost, StrategyResult, best, compare
 from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
+from er3a.planning.way_around import PlanningTask, WayAround, way_between
+from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
 
+LEAST_RATIO = 1e-3  # of the limits, below which a path counts as standing still
 ROWS = 250  # of each motion in the table
 CLEARANCE_TIMES = 41
 
@@ -56,11 +61,14 @@ class AvoidanceTask:
     limits: JointLimits
     only: StrategyName | None
     surroundings: Surroundings | None
+    planning: PlanningTask
 
-    def avoid(self, motion: Motion, found: Judgement) -> Avoided:
+    def avoid(self, motion: Motion, found: Judgement, along: ClearanceAlong | None) -> Avoided:
         """Compare the strategies where a path is not safe; find its fastest time law where it can be run as it is.
 
-        A strategy on whose motion the arm meets its surroundings or itself is not usable.
+        A strategy on whose motion the arm meets its surroundings or itself is not usable. Where the path keeps the
+        joints' limits of rates, strategies are timed to need no more of them than the path does, so that none is worse
+        than what it mends. Where it collides or can't be run at all, a motion is planned between its ends.
         """
         results: list[StrategyResult] = []
         if motion.followed is None:
@@ -70,7 +78,10 @@ class AvoidanceTask:
             segment = singular_segment(motion.followed, self.near, self.limits, found.events, fixed_start)
             quickest = _quickest(segment)
             if found.verdict != "safe":
-                results = compare(segment, self.only)
+                results = compare(replace(segment, limits=self._no_more_than(found), allowed=self.limits), self.only)
+        collides = along is not None and bool(along.contacts)
+        if (collides or found.beyond or found.limits) and motion.no_way is None and self.only in (None, "planned"):
+            results += self._planned(motion)
         met = {result.name: self._meets(result.cost) for result in results if result.cost}
         free = [result for result in results if result.name not in met or met[result.name][0] is None]
         meets = motion.followed is not None and any(event.crossing for event in found.events)
@@ -83,12 +94,43 @@ class AvoidanceTask:
             rows=AvoidanceRows.stacked(self._tables(motion, results, quickest)),
         )
 
+    def _no_more_than(self, found: Judgement) -> JointLimits:
+        """The limits, or what of them the path needs if that is less."""
+        if found.fast or found.greatest_speed is None or found.greatest_acceleration is None:
+            return self.limits
+        speed = float((found.greatest_speed / self.limits.speed).max())
+        acceleration = float((found.greatest_acceleration / self.limits.acceleration).max())
+        speed, acceleration = (min(1.0, max(ratio, LEAST_RATIO)) for ratio in (speed, acceleration))
+        return replace(
+            self.limits, speed=self.limits.speed * speed, acceleration=self.limits.acceleration * acceleration
+        )
+
+    def _planned(self, motion: Motion) -> list[StrategyResult]:
+        """The planner's motion between the ends of a path, where both can be reached."""
+        tool = motion.tool(np.array([0.0, motion.built.duration]))
+        ends = [self._end(q, T) for q, T in zip(motion.q[[0, -1]], tool)]
+        found = way_between(self.planning, *ends)
+        if not isinstance(found, WayAround):
+            return [StrategyResult("planned", None, (found,))]
+        timed = found.motion
+        path = motion.built.tool or _ToolWay(motion)
+        distance, angle, _ = deviation(path, forward(self.robot, timed.q))
+        cost = StrategyCost(timed, 1.0, distance, angle, *timed.ratios(self.limits), keeps_clear=True)
+        return [StrategyResult("planned", cost)]
+
+    def _end(self, q: Reals, T: Reals) -> Reals:
+        """Joint angles (k, n) within the limits at an end of a path: its own, else others that reach the pose."""
+        if np.isfinite(q).all() and within(self.robot, q):
+            return q[None]
+        solved = inverse(self.robot, T)
+        return solved.q[solved.within_limits]
+
     def _joint_move(self, motion: Motion, found: Judgement) -> tuple[Timed | None, list[StrategyResult]]:
         """Fastest time law; slowing down is the only strategy that a joint move can need."""
         t, q = nodes_along(motion.joints, motion.t, motion.q, self.limits)
         try:
             quickest = fastest(q, self.limits)
-            if found.verdict != "too fast":
+            if not found.fast:
                 return quickest, []
             slower = fastest(q, self.limits, t)
         except TimingError:
@@ -103,13 +145,11 @@ class AvoidanceTask:
         """The deepest overlap on a motion, and its least clearance in mm (None if nothing can meet)."""
         if self.surroundings is None:
             return None, None
-        t, q = cost.motion.t, cost.motion.q
-
-        def joints(at: Reals) -> Reals:
-            return np.stack([np.interp(at, t, q[:, j]) for j in range(6)], axis=-1)
-
-        grid = np.linspace(0.0, t[-1], CLEARANCE_TIMES)
-        along = clearance_along(self.surroundings.bodies, joints, grid, grid, self.surroundings.tolerance)
+        curve = cost.motion.curve
+        grid = np.linspace(0.0, curve.duration, CLEARANCE_TIMES)
+        along = clearance_along(
+            self.surroundings.bodies, curve.joints, curve.rate_bounds, grid, grid, self.surroundings.tolerance
+        )
         least = least_clearance(along)
         if least is None:
             return None, None
@@ -145,6 +185,17 @@ class AvoidanceTask:
             condition_number=measures.condition_number,
             smallest_singular_value=measures.smallest_singular_value,
         )
+
+
+@dataclass(frozen=True, eq=False)
+class _ToolWay:
+    """The way of the tool on a move of the joints."""
+
+    motion: Motion
+
+    def poses(self, progress: Reals) -> Reals:
+        """T_base_tool (..., 4, 4) at shares of the time (...,)."""
+        return self.motion.tool(np.asarray(progress) * self.motion.built.duration)
 
 
 def speed_ratio(velocity: Reals, limits: JointLimits) -> Reals:

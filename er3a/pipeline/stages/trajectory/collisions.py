@@ -23,7 +23,9 @@ class Surroundings:
 
 def measured(surroundings: Surroundings, motion: Motion) -> ClearanceAlong:
     """Clearance along a motion, shown at its samples."""
-    return clearance_along(surroundings.bodies, motion.joints, motion.t, motion.samples, surroundings.tolerance)
+    return clearance_along(
+        surroundings.bodies, motion.joints, motion.rate_bounds, motion.t, motion.samples, surroundings.tolerance
+    )
 
 
 def collisions(along: ClearanceAlong | None) -> list[Interval[BodiesOverlap]]:

@@ -18,6 +18,7 @@ from er3a.pipeline.stages.trajectory.avoidance_results import AvoidanceTask, spe
 from er3a.pipeline.stages.trajectory.collisions import Surroundings, clearance_rows, measured
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.stages.trajectory.judgement import Judgement, judge
+from er3a.pipeline.stages.trajectory.limits import limits_of
 from er3a.pipeline.stages.trajectory.model import (
     AllSafe,
     AvoidanceRows,
@@ -37,7 +38,9 @@ from er3a.pipeline.stages.trajectory.path_summary import path_summary
 from er3a.pipeline.study import Study
 from er3a.planning.commands import CommandSource
 from er3a.planning.path_verdicts import PathVerdict
-from er3a.planning.timing import JointLimits, joint_limits
+from er3a.planning.timing import JointLimits
+from er3a.planning.tool_proof import Wanted
+from er3a.planning.way_around import PlanningTask
 from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
 
@@ -50,25 +53,29 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     near = NearSingular(
         float(np.radians(thresholds.wrist_deg)), float(np.radians(thresholds.elbow_deg)), thresholds.shoulder_mm / 1000
     )
-    limits = joint_limits(robot, np.radians(settings.assumed_speed_deg_s), settings.acceleration_time_s)
+    limits = limits_of(robot, settings)
     scene_file = study.scene(name, "trajectory")
     scene = load_scene(scene_file) if scene_file else None
     surroundings = (
         Surroundings(Bodies(robot, scene), settings.penetration_tolerance_mm / 1000) if can_measure() else None
     )
     only = None if settings.avoidance == "compare" else settings.avoidance
-    avoidance = AvoidanceTask(robot, near, limits, only, surroundings)
+    bodies, tolerance = surroundings.bodies if surroundings else None, settings.penetration_tolerance_mm / 1000
+    planning = PlanningTask(robot, bodies, tolerance, limits, study.seed)
+    avoidance = AvoidanceTask(robot, near, limits, only, surroundings, planning)
     tables: list[PathChecks] = []
     clearances: list[Clearances] = []
     strategies: list[AvoidanceRows] = []
     paths: list[PathSummary] = []
     ends: dict[str, Reals] = {}
     for i, entry in enumerate(load_paths(file).paths):
-        motion = motion_of(robot, entry, settings.checks_per_sample, CommandSource(file, f"paths[{i}]"), ends)
+        source = CommandSource(file, f"paths[{i}]")
+        wanted = Wanted(limits.rates, near)
+        motion = motion_of(robot, entry, settings.checks_per_sample, source, ends, wanted, planning)
         ends[entry.name] = motion.q[-1]
-        found = judge(robot, motion, near)
-        avoided = avoidance.avoid(motion, found)
+        found = judge(robot, motion, near, limits)
         along = measured(surroundings, motion) if surroundings else None
+        avoided = avoidance.avoid(motion, found, along)
         tables.append(_checks(robot, motion, found, near, limits))
         clearances.append(clearance_rows(entry.name, along))
         strategies.append(avoided.rows)
@@ -77,7 +84,14 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     own = checks.take(checks.sample)
     length = characteristic_length(robot)
     assumed = tuple(bool(value) for value in ~np.isfinite(robot.speed))
-    used = LimitsUsed(_degrees(limits.speed), assumed, _degrees(limits.acceleration), settings.acceleration_time_s)
+    used = LimitsUsed(
+        speed_deg_s=_degrees(limits.speed),
+        speed_assumed=assumed,
+        acceleration_deg_s2=_degrees(limits.acceleration),
+        acceleration_assumed=limits.acceleration_assumed,
+        acceleration_time_s=settings.acceleration_time_s,
+        jerk_deg_s3=None if limits.jerk is None else _degrees(limits.jerk),
+    )
     summary = TrajectorySummary(
         verdict=_verdict(paths),
         figures=_figures(paths, length, surroundings is not None, used),
@@ -142,10 +156,13 @@ def _verdict(paths: list[PathSummary]) -> Verdict[AllSafe | SomeUnsafe | NoneSaf
         paths=len(asked),
         safe=safe,
         unreachable=named("unreachable"),
+        none_found=named("none found"),
         leaves_limits=named("leaves limits"),
         collides=named("collides"),
         too_fast=named("too fast"),
         singular=named("singular"),
+        too_fast_if_assumed=named("too fast for the assumed limits"),
+        undecided=named("undecided"),
         near_singular=named("near-singular"),
         demonstrations=demonstrations(paths, "safe"),
     )

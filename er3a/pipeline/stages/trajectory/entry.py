@@ -21,7 +21,9 @@ class TrajectorySettings(StrictModel):
     """Where a path counts as near-singular, and how many points are checked between two samples.
 
     ``avoidance`` chooses the avoidance strategy, or compares all of them. Joints of unknown speed are taken to do
-    ``assumed_speed_deg_s``; all joints to reach full speed in ``acceleration_time_s``.
+    ``assumed_speed_deg_s``; all joints to reach full speed in ``acceleration_time_s``, unless their greatest
+    accelerations are given (``acceleration_deg_s2``, one for each joint). ``jerk_deg_s3`` bounds the jerk; left out,
+    nothing does.
     ``scene`` holds the obstacles; no overlap with them deeper than ``penetration_tolerance_mm`` goes unnoticed between
     points.
     """
@@ -35,6 +37,8 @@ class TrajectorySettings(StrictModel):
         list[Annotated[float, Field(gt=0, le=10_000)]], Field(min_length=6, max_length=6)
     ] = [180, 180, 180, 360, 360, 360]
     acceleration_time_s: Annotated[float, Field(gt=0, le=10)] = 0.25
+    acceleration_deg_s2: Annotated[list[Annotated[float, Field(gt=0, le=1e6)]], Field(min_length=1)] | None = None
+    jerk_deg_s3: Annotated[list[Annotated[float, Field(gt=0, le=1e9)]], Field(min_length=1)] | None = None
     scene: Text | None = None
     penetration_tolerance_mm: Annotated[float, Field(ge=0.05, le=100)] = 1.0
 

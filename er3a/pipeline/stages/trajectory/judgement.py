@@ -11,18 +11,25 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning.intervals import (
     AboveLimit,
+    AccelerationTooGreatIfAssumed,
     BelowLimit,
     Interval,
     PathOutOfReach,
-    TooFast,
+    RateCause,
+    TooFastIfAssumed,
     out_of_limits,
-    too_fast,
+    rates_exceeded,
     unreachable,
 )
 from er3a.planning.path_verdicts import PathVerdict
+from er3a.planning.piecewise import PiecewiseMotion
+from er3a.planning.polynomial_checks import limit_intervals, polynomial_events, rate_intervals
 from er3a.planning.singular_events import SingularEvent, singular_events
+from er3a.planning.timing import JointLimits
+from er3a.planning.tool_proof import Undecided, jerk_intervals
 from er3a.robots.robot import Robot
 
+ASSUMED = (TooFastIfAssumed, AccelerationTooGreatIfAssumed)
 SPEED_STEP = 1e-5  # share of the duration
 
 
@@ -32,7 +39,10 @@ class Judgement:
 
     Attributes
     ----------
-    times, q, velocity, acceleration : (N,) s and (N, 6) in rad, rad/s, rad/s^2 at all points checked
+    fast : where a joint exceeds a limit of speed, acceleration or jerk
+    undecided : where the bounds leave something open
+    times, q, velocity, acceleration : (N,) s and (N, n) in rad, rad/s, rad/s^2 at all points of the table
+    greatest_speed, greatest_acceleration : (n,), rad/s and rad/s^2; None where they have no bound
     speed_bounded : False where the exact path needs a joint speed without bound
     velocity_check : rad/s, greatest difference between velocities through the Jacobian and by differences of angles
     """
@@ -41,54 +51,118 @@ class Judgement:
     events: list[SingularEvent]
     limits: list[Interval[AboveLimit | BelowLimit]]
     beyond: list[Interval[PathOutOfReach]]
-    fast: list[Interval[TooFast]]
+    fast: list[Interval[RateCause]]
+    undecided: list[Interval[Undecided]]
     times: Reals
     q: Reals
     velocity: Reals
     acceleration: Reals
+    greatest_speed: Reals | None
+    greatest_acceleration: Reals | None
     speed_bounded: bool
     velocity_check: float
 
 
-def judge(robot: Robot, motion: Motion, near: NearSingular) -> Judgement:
-    """Check a motion at its check points, at its closest passes, and at what lies between by root finding.
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """Faults of a motion, and its greatest speeds and accelerations (n,)."""
+
+    events: list[SingularEvent]
+    limits: list[Interval[AboveLimit | BelowLimit]]
+    fast: list[Interval[RateCause]]
+    undecided: list[Interval[Undecided]]
+    greatest: tuple[Reals, Reals]
+
+
+def judge(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits) -> Judgement:
+    """Check a motion: exactly if it is one of the joints, by bounds between the poses solved if it is one of the tool.
 
     Parameters
     ----------
     near : distances below which a pass counts as near-singular
     """
-    events = singular_events(robot, motion.t, motion.q, motion.joints, near)
-    times = np.unique(np.concatenate([motion.checks, [event.t for event in events]]))
+    if motion.polynomials is not None:
+        found = _joint_faults(robot, motion.polynomials, near, limits)
+    else:
+        found = _tool_faults(robot, motion, near, limits)
+    times = np.unique(np.concatenate([motion.checks, [event.t for event in found.events]]))
     q, velocity, acceleration = motion.rates(times)
-    limits = out_of_limits(robot, motion.t, motion.q, motion.joints)
     beyond = unreachable(motion.followed) if motion.followed else []
-    fast = too_fast(robot, times, velocity, lambda t: motion.rates(t)[1])
     jumps = motion.followed.jumps if motion.followed else ()
     edge = any(interval.start > 0 or interval.end < times[-1] for interval in beyond)
     bounded = not edge and not jumps and not (np.isfinite(q[:, 0]) & np.isnan(velocity[:, 0])).any()
-    verdict: PathVerdict = "safe"
-    if beyond:
-        verdict = "unreachable"
-    elif limits:
-        verdict = "leaves limits"
-    elif fast:
-        verdict = "too fast"
-    elif motion.followed and (jumps or any(event.crossing for event in events)):
-        verdict = "singular"
-    elif motion.followed and events:
-        verdict = "near-singular"
     return Judgement(
-        verdict=verdict,
-        events=events,
-        limits=limits,
+        verdict="none found"
+        if motion.no_way
+        else _verdict(found, bool(beyond), bool(jumps), motion.followed is not None),
+        events=found.events,
+        limits=found.limits,
         beyond=beyond,
-        fast=fast,
+        fast=found.fast,
+        undecided=found.undecided,
         times=times,
         q=q,
         velocity=velocity,
         acceleration=acceleration,
+        greatest_speed=found.greatest[0] if bounded else None,
+        greatest_acceleration=found.greatest[1] if bounded else None,
         speed_bounded=bool(bounded),
         velocity_check=_velocity_check(motion),
+    )
+
+
+def _verdict(found: _Found, beyond: bool, jumps: bool, of_tool: bool) -> PathVerdict:
+    known = [part for part in found.fast if not isinstance(part.cause, ASSUMED)]
+    faults: dict[PathVerdict, object] = {
+        "unreachable": beyond,
+        "leaves limits": found.limits,
+        "too fast": known,
+        "singular": of_tool and (jumps or any(event.crossing for event in found.events)),
+        "too fast for the assumed limits": found.fast,
+        "undecided": found.undecided,
+        "near-singular": of_tool and found.events,
+    }
+    return next((verdict for verdict, there in faults.items() if there), "safe")
+
+
+def _joint_faults(robot: Robot, motion: PiecewiseMotion, near: NearSingular, limits: JointLimits) -> _Found:
+    return _Found(
+        events=polynomial_events(robot, motion, near),
+        limits=limit_intervals(robot, motion),
+        fast=[part for limit in limits.rates for part in rate_intervals(motion, limit)],
+        undecided=[],
+        greatest=(motion.greatest(motion.velocity), motion.greatest(motion.acceleration)),
+    )
+
+
+def _tool_faults(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits) -> _Found:
+    """Faults at the poses solved for the proof, between which it leaves no room for others."""
+    proof = motion.proof
+    assert proof is not None
+    t, kept = np.unique(np.concatenate([motion.t, proof.t]), return_index=True)
+    q = np.concatenate([motion.q, proof.q])[kept]
+    events = singular_events(robot, t, q, motion.joints, near)
+    more = np.unique(np.concatenate([motion.t, [event.t for event in events]]))
+    more = more[~np.isin(more, proof.middles)]
+    rates = np.concatenate([np.stack(motion.rates(more)[1:], axis=1), proof.rates])
+    at = np.concatenate([more, proof.middles])
+    order = np.argsort(at)
+    at, rates = at[order], rates[order]
+    fast: list[Interval[RateCause]] = []
+    for limit in limits.rates:
+        if limit.order == 3:
+            fast += jerk_intervals(proof, limit)
+            continue
+        part = limit.order
+        fast += rates_exceeded(at, rates[:, part - 1], limit, lambda t, part=part: motion.rates(t)[part])
+    unknown = np.full(2, np.nan)
+    greatest = np.nanmax(np.abs(rates), axis=0) if np.isfinite(rates).any() else np.tile(unknown[:, None], q.shape[1])
+    return _Found(
+        events=events,
+        limits=out_of_limits(robot, t, q, motion.joints),
+        fast=fast,
+        undecided=list(proof.undecided),
+        greatest=(greatest[0], greatest[1]),
     )
 
 

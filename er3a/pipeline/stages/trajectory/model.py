@@ -18,10 +18,12 @@ from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.planning.avoidance.strategies import NotUsable
 from er3a.planning.avoidance.strategy_names import StrategyName
-from er3a.planning.intervals import AboveLimit, BelowLimit, PathOutOfReach, TooFast
+from er3a.planning.intervals import AboveLimit, BelowLimit, PathOutOfReach, RateCause
 from er3a.planning.path_verdicts import PathVerdict
+from er3a.planning.tool_proof import Undecided
+from er3a.planning.way_around import NoWayAround
 
-PathKind = Literal["joint", "joint_sequence", "line", "arc", "sequence", "table"]
+PathKind = Literal["joint", "joint_sequence", "line", "arc", "sequence", "table", "plan"]
 FASTEST: Literal["fastest"] = "fastest"
 """In the table of strategies: the path itself, as fast as the joints can."""
 
@@ -41,10 +43,13 @@ class PathCounts:
     paths: int
     safe: int
     unreachable: tuple[str, ...]
+    none_found: tuple[str, ...]
     leaves_limits: tuple[str, ...]
     collides: tuple[str, ...]
     too_fast: tuple[str, ...]
     singular: tuple[str, ...]
+    too_fast_if_assumed: tuple[str, ...]
+    undecided: tuple[str, ...]
     near_singular: tuple[str, ...]
     demonstrations: tuple[Demonstration, ...]
 
@@ -81,17 +86,21 @@ class NearThresholds:
 
 @dataclass(frozen=True)
 class LimitsUsed:
-    """The joint limits that motions are timed with; all accelerations are assumed.
+    """The joint limits that motions are judged by and timed with.
 
     Attributes
     ----------
-    acceleration_time_s : in which each joint is taken to reach its full speed
+    acceleration_assumed : whether the study gives no accelerations, so that each joint is taken to reach its full speed
+        in ``acceleration_time_s``
+    jerk_deg_s3 : None where nothing bounds the jerk
     """
 
     speed_deg_s: tuple[float, ...]
     speed_assumed: tuple[bool, ...]
     acceleration_deg_s2: tuple[float, ...]
+    acceleration_assumed: bool
     acceleration_time_s: float
+    jerk_deg_s3: tuple[float, ...] | None
 
 
 @dataclass(frozen=True)
@@ -208,9 +217,12 @@ class PathSummary:
     in_joint_space : whether it is a move of the joints, which singular poses do no harm
     branches : of the closed form, in the order in which they serve
     start_turn_deg : by which the arm turns at rest before it starts; None in joint space
+    too_fast : where a joint exceeds a limit of speed, acceleration or jerk
+    undecided : where the bounds between the poses that are solved leave something open
     max_joint_speed_deg_s, max_joint_speed_ratio, max_joint_acceleration_ratio : None where speeds have no bound
     velocity_check_deg_s : greatest difference of joint velocities by the Jacobian and by differences of angles
     clearance : None where none could be measured
+    no_way : why no motion was planned, of one that is to be
     fastest_s : of the exact path under the joint limits; None where no motion follows it
     avoidance : the strategies tried; none where the path is safe
     strategy : the one to take
@@ -234,7 +246,8 @@ class PathSummary:
     singularities: tuple[Singularity, ...]
     unreachable: tuple[Stretch[PathOutOfReach], ...]
     out_of_limits: tuple[Stretch[AboveLimit | BelowLimit], ...]
-    too_fast: tuple[Stretch[TooFast], ...]
+    too_fast: tuple[Stretch[RateCause], ...]
+    undecided: tuple[Stretch[Undecided], ...]
     jumps: tuple[Jump, ...]
     max_joint_speed_deg_s: tuple[float, ...] | None
     max_joint_speed_ratio: float | None
@@ -243,6 +256,7 @@ class PathSummary:
     velocity_check_deg_s: float
     collisions: tuple[Stretch[BodiesOverlap], ...]
     clearance: LeastClearance | None
+    no_way: NoWayAround | None
     fastest_s: float | None
     avoidance: tuple[TriedStrategy, ...]
     strategy: StrategyName | None

@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.integrate import cumulative_simpson
 from scipy.interpolate import CubicHermiteSpline
 
+from er3a.collision.along import RateBounds
 from er3a.errors import PoseError
 from er3a.files.path_file import PathEntry
 from er3a.kinematics.forward import forward, jacobian
+from er3a.kinematics.inverse import inverse
 from er3a.numerics.arrays import Reals
 from er3a.planning.build import Built, build
-from er3a.planning.commands import CommandSource
-from er3a.planning.follow import follow
+from er3a.planning.commands import CommandSource, PlanCommand
 from er3a.planning.followed import Followed
 from er3a.planning.moves import JointMove
+from er3a.planning.piecewise import PiecewiseMotion
 from er3a.planning.sequences import JointSequence
+from er3a.planning.timing import standing, straight
+from er3a.planning.tool_proof import ToolProof, Wanted, follow_and_prove
+from er3a.planning.way_around import NoWayAround, PlannedMove, PlanningTask, WayAround, way_between
 from er3a.robots.robot import Robot
 
 
@@ -36,6 +41,9 @@ class Motion:
     tool : T_base_tool (n, 4, 4) that the path asks for at times (n,)
     way : length of the tool point's way (n,) in m at times (n,)
     followed : how a path of the tool is followed; None for one in joint space
+    polynomials : a move of the joints, exactly; None for a path of the tool
+    proof : what is known of a path of the tool between the poses that are solved
+    no_way : why nothing was planned where a motion was to be; the motion is then the straight joint move
     """
 
     entry: PathEntry
@@ -49,29 +57,48 @@ class Motion:
     tool: Callable[[Reals], Reals]
     way: Callable[[Reals], Reals]
     followed: Followed | None
+    polynomials: PiecewiseMotion | None
+    proof: ToolProof | None
+    no_way: NoWayAround | None = None
+
+    @property
+    def rate_bounds(self) -> RateBounds:
+        """Bounds of speeds and accelerations between times, as :func:`er3a.collision.along.clearance_along` takes."""
+        known = self.polynomials or self.proof
+        assert known is not None
+        return known.rate_bounds
 
 
 def motion_of(
-    robot: Robot, entry: PathEntry, checks_per_sample: int, source: CommandSource, ends: Mapping[str, Reals]
+    robot: Robot,
+    entry: PathEntry,
+    checks_per_sample: int,
+    source: CommandSource,
+    ends: Mapping[str, Reals],
+    wanted: Wanted,
+    task: PlanningTask | None = None,
 ) -> Motion:
     """Plan a path, and follow it if it is one of the tool; ``ends`` as for :func:`er3a.planning.build.build`.
+
+    ``wanted`` is what is to be settled between the poses that are solved; ``task`` is for motions to be planned.
 
     Raises
     ------
     InputError
         for what :func:`er3a.planning.build.build` refuses, and a start branch that has no solution at the start
     """
-    built = build(robot, entry.command(source), ends)
-    samples = np.linspace(0.0, built.duration, entry.samples)
-    checks = np.linspace(0.0, built.duration, (entry.samples - 1) * (checks_per_sample + 1) + 1)
-    checks[:: checks_per_sample + 1] = samples
+    command = entry.command(source)
+    if isinstance(command, PlanCommand) and task is not None:
+        return _planned(task, entry, command, checks_per_sample)
+    built = build(robot, command, ends)
+    samples, checks = _times(entry, built.duration, checks_per_sample)
     if built.joints is not None:
         return _joint_motion(robot, entry, built, built.joints, samples, checks)
     path = built.tool
     if path is None:
         raise ValueError(f"{entry.name}: neither a move of the joints nor a path of the tool")
     try:
-        followed = follow(robot, path, checks, built.q_start, built.start_slot)
+        followed, proof = follow_and_prove(robot, path, checks, wanted, built.q_start, built.start_slot)
     except PoseError:
         branch = getattr(entry, "start_branch", None)
         problem = f"'{branch}' has no solution at the start pose"
@@ -88,11 +115,50 @@ def motion_of(
         tool=lambda t: path.poses(path.progress(t)[0]),
         way=lambda t: path.way(path.progress(t)[0]),
         followed=followed,
+        polynomials=None,
+        proof=proof,
     )
 
 
+def _planned(task: PlanningTask, entry: PathEntry, command: PlanCommand, checks_per_sample: int) -> Motion:
+    """A planned motion; where none is found the straight joint move, with the reason."""
+    robot = task.robot
+    starts, ends = (joints_at(robot, end) for end in (command.start, command.end))
+    found = way_between(task, starts, ends)
+    if isinstance(found, WayAround):
+        curve, reason = found.motion.curve, None
+    elif len(starts) and len(ends):
+        curve, reason = straight(starts[0], ends[0], task.limits).curve, found
+    else:
+        curve, reason = standing(np.clip(np.zeros(len(robot.lower)), robot.lower, robot.upper), 1.0).curve, found
+    built = Built(joints=PlannedMove(curve))
+    motion = _joint_motion(robot, entry, built, PlannedMove(curve), *_times(entry, built.duration, checks_per_sample))
+    return replace(motion, no_way=reason)
+
+
+def joints_at(robot: Robot, end: Reals) -> Reals:
+    """Joint angles (k, n) within the limits at joint angles (n,) or a pose (4, 4): as given, or all that reach it."""
+    if end.ndim == 1:
+        return end[None]
+    solved = inverse(robot, end)
+    return solved.q[solved.within_limits]
+
+
+def _times(entry: PathEntry, duration: float, checks_per_sample: int) -> tuple[Reals, Reals]:
+    """Samples, and the points checked."""
+    samples = np.linspace(0.0, duration, entry.samples)
+    checks = np.linspace(0.0, duration, (entry.samples - 1) * (checks_per_sample + 1) + 1)
+    checks[:: checks_per_sample + 1] = samples
+    return samples, checks
+
+
 def _joint_motion(
-    robot: Robot, entry: PathEntry, built: Built, move: JointMove | JointSequence, samples: Reals, checks: Reals
+    robot: Robot,
+    entry: PathEntry,
+    built: Built,
+    move: JointMove | JointSequence | PlannedMove,
+    samples: Reals,
+    checks: Reals,
 ) -> Motion:
     q, velocity, _ = move.joints(checks)
     speed = np.linalg.norm(np.einsum("nij,nj->ni", jacobian(robot, q)[:, :3], velocity), axis=1)
@@ -109,4 +175,6 @@ def _joint_motion(
         tool=lambda t: forward(robot, move.joints(t)[0]),
         way=way,
         followed=None,
+        polynomials=move.polynomials(),
+        proof=None,
     )

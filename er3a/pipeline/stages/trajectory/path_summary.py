@@ -40,7 +40,6 @@ def path_summary(
     followed, entry = motion.followed, motion.entry
     labels = branch_labels(robot)
     slots = [] if followed is None else [int(slot) for slot in dict.fromkeys(followed.slot) if slot >= 0]
-    speed, acceleration = (_known(found, values) for values in (found.velocity, found.acceleration))
     contacts = collisions(along)
     verdicts: list[PathVerdict] = [found.verdict, "collides"] if contacts else [found.verdict]
     return PathSummary(
@@ -63,25 +62,26 @@ def path_summary(
         unreachable=_stretches(motion, found.beyond),
         out_of_limits=_stretches(motion, found.limits),
         too_fast=_stretches(motion, found.fast),
+        undecided=_stretches(motion, found.undecided),
         jumps=tuple(
             Jump(jump.t, jump.joint, float(np.degrees(jump.angle))) for jump in (followed.jumps if followed else ())
         ),
-        max_joint_speed_deg_s=_degrees(speed.max(axis=0)) if len(speed) else None,
-        max_joint_speed_ratio=_greatest(speed / limits.speed),
-        max_joint_acceleration_ratio=_greatest(acceleration / limits.acceleration),
+        max_joint_speed_deg_s=None if found.greatest_speed is None else _degrees(found.greatest_speed),
+        max_joint_speed_ratio=_ratio(found.greatest_speed, limits.speed),
+        max_joint_acceleration_ratio=_ratio(found.greatest_acceleration, limits.acceleration),
         joint_speed_bounded=found.speed_bounded,
         velocity_check_deg_s=float(np.degrees(found.velocity_check)),
         collisions=_stretches(motion, contacts),
         clearance=least_clearance(along),
+        no_way=motion.no_way,
         fastest_s=avoided.fastest_s,
         avoidance=avoided.tried,
         strategy=avoided.chosen,
     )
 
 
-def _known(found: Judgement, values: Reals) -> Reals:
-    """Sizes of velocities or accelerations (N, 6) where they are known; none where they have no bound."""
-    return np.abs(values[np.isfinite(values[:, 0])] if found.speed_bounded else values[:0])
+def _ratio(greatest: Reals | None, most: Reals) -> float | None:
+    return None if greatest is None else float((greatest / most).max())
 
 
 def _half_turns(motion: Motion) -> tuple[HalfTurn, ...]:

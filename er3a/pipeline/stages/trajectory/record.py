@@ -54,9 +54,12 @@ LEVELS: dict[PathVerdict, rr.TextLogLevel] = {
     "safe": rr.TextLogLevel.INFO,
     "near-singular": rr.TextLogLevel.WARN,
     "singular": rr.TextLogLevel.WARN,
+    "too fast for the assumed limits": rr.TextLogLevel.WARN,
+    "undecided": rr.TextLogLevel.WARN,
     "too fast": rr.TextLogLevel.ERROR,
     "leaves limits": rr.TextLogLevel.ERROR,
     "collides": rr.TextLogLevel.ERROR,
+    "none found": rr.TextLogLevel.ERROR,
     "unreachable": rr.TextLogLevel.ERROR,
 }
 
@@ -231,6 +234,7 @@ def _events(stream: rr.RecordingStream, path: PathSummary, start: float) -> None
         (path.unreachable, "not reachable"),
         (path.out_of_limits, "limit"),
         (path.too_fast, "speed"),
+        (path.undecided, "undecided"),
         (path.collisions, "collision"),
     ):
         for part in stretches:

@@ -49,10 +49,13 @@ STATUS: dict[PathVerdict, str] = {
     "safe": "pass",
     "near-singular": "caution",
     "singular": "caution",
+    "too fast for the assumed limits": "caution",
+    "undecided": "caution",
     "too fast": "fail",
     "leaves limits": "fail",
     "collides": "fail",
     "unreachable": "fail",
+    "none found": "fail",
 }
 
 
@@ -175,6 +178,7 @@ def _kinds(path: PathSummary) -> tuple[tuple[str, tuple[Stretch[Any], ...]], ...
         (tr("not reachable"), path.unreachable),
         (tr("outside limits"), path.out_of_limits),
         (tr("too fast"), path.too_fast),
+        (tr("undecided"), path.undecided),
         (tr("collision"), path.collisions),
     )
 

@@ -1,0 +1,232 @@
+"""Motions that are polynomials in time, piece by piece: their extremes, roots and bounds, whatever they are sampled at.
+
+Each piece is held as Chebyshev series of angle, velocity and acceleration. Where a series rises or falls is told by the
+roots of its derivative, the eigenvalues of its colleague matrix [1]_; between two of them it is monotone, so that every
+sign change is one root, and bisected. The sum of the coefficients' sizes bounds a series on its piece, which spares
+most pieces that work.
+
+References
+----------
+.. [1] L. N. Trefethen, *Approximation Theory and Approximation Practice*, SIAM 2013, chapter 18.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from scipy.optimize import brentq
+
+from er3a.numerics.arrays import Integers, Reals
+from er3a.planning.profiles import Rates
+
+NEARLY_REAL = 1e-3  # imaginary part of a double root that rounding has split; more break points do no harm
+TRIMMED = 1e-15  # of the greatest coefficient
+SAME_TIME = 1e-13  # share of the duration
+LOCATED = 1e-14  # share of the duration
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """A scalar function of time, one Chebyshev series for each piece.
+
+    Attributes
+    ----------
+    times : (m + 1,), s, rising; series : (m, d + 1)
+    """
+
+    times: Reals
+    series: Reals
+
+    @cached_property
+    def range(self) -> tuple[Reals, Reals]:
+        """Bounds (m,) from below and above on each piece."""
+        beside = np.abs(self.series[:, 1:]).sum(axis=1)
+        return self.series[:, 0] - beside, self.series[:, 0] + beside
+
+    def nodes(self, i: int) -> tuple[Reals, Reals]:
+        """Times at which piece i begins, turns and ends, and the values there; it is monotone between them."""
+        x = np.concatenate([[-1.0], turning_points(self.series[i]), [1.0]])
+        a, b = self.times[i], self.times[i + 1]
+        t = a + (b - a) * (x + 1) / 2
+        t[[0, -1]] = a, b
+        return t, chebyshev.chebval(x, self.series[i])
+
+    def root(self, i: int, start: float, end: float, level: float) -> float:
+        """When piece i passes a level between two times at which it is on either side of it."""
+        a, b = self.times[i], self.times[i + 1]
+        series = self.series[i].copy()
+        series[0] -= level
+
+        def value(t: float) -> float:
+            return float(chebyshev.chebval(2 * (t - a) / (b - a) - 1, series))
+
+        low, high = value(start), value(end)
+        if not low * high < 0:
+            return start if abs(low) < abs(high) else end
+        return float(brentq(value, start, end, xtol=max(LOCATED * (b - a), 1e-300), rtol=4 * np.finfo(float).eps))
+
+    def above(self, level: float) -> list[tuple[float, float, float]]:
+        """Stretches on which the function is greater than a level: start, end, and its greatest value there."""
+        found: list[tuple[float, float, float]] = []
+        for i in np.flatnonzero(self.range[1] > level).tolist():
+            t, values = self.nodes(i)
+            for k in range(len(t) - 1):
+                if max(values[k], values[k + 1]) <= level:
+                    continue
+                start = float(t[k]) if values[k] > level else self.root(i, t[k], t[k + 1], level)
+                end = float(t[k + 1]) if values[k + 1] > level else self.root(i, t[k], t[k + 1], level)
+                most = float(max(values[k], values[k + 1]))
+                if found and found[-1][1] >= start:
+                    start, _, before = found.pop()
+                    most = max(most, before)
+                found.append((start, end, most))
+        return found
+
+    def greatest(self) -> float:
+        """The greatest value."""
+        ends = np.max([chebyshev.chebval(x, self.series.T) for x in (-1.0, 0.0, 1.0)])
+        for i in np.flatnonzero(self.range[1] > ends).tolist():
+            ends = max(ends, self.nodes(i)[1].max())
+        return float(ends)
+
+
+@dataclass(frozen=True, eq=False)
+class PiecewiseMotion:
+    """A motion of n joints.
+
+    Attributes
+    ----------
+    times : (m + 1,), s, rising from 0
+    angle, velocity, acceleration : (m, d + 1, n), Chebyshev series over each piece; rad, rad/s, rad/s^2
+    """
+
+    times: Reals
+    angle: Reals
+    velocity: Reals
+    acceleration: Reals
+
+    @property
+    def duration(self) -> float:
+        """s"""
+        return float(self.times[-1])
+
+    @cached_property
+    def jerk(self) -> Reals:
+        """(m, d + 1, n), rad/s^3; between pieces the acceleration may step (:attr:`steps`)."""
+        return _slope(self.times, self.acceleration)
+
+    @cached_property
+    def steps(self) -> Reals:
+        """(m - 1, n), rad/s^2, by which the acceleration steps between pieces; and from and to rest, (m + 1, n)."""
+        signs = np.where(np.arange(self.acceleration.shape[1]) % 2, -1.0, 1.0)[:, None]
+        first, last = (self.acceleration * signs).sum(axis=1), self.acceleration.sum(axis=1)
+        rest = np.zeros((1, first.shape[1]))
+        return np.abs(np.concatenate([first, rest]) - np.concatenate([rest, last]))
+
+    def rates(self, t: Reals) -> Rates:
+        """Angles, velocities and accelerations at times (...,), each (..., n)."""
+        t = np.asarray(t, float)
+        i = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.times) - 2)
+        x = 2 * (t - self.times[i]) / (self.times[i + 1] - self.times[i]) - 1
+        q, velocity, acceleration = (
+            _evaluated(series[i], x) for series in (self.angle, self.velocity, self.acceleration)
+        )
+        return q, velocity, acceleration
+
+    def joints(self, t: Reals) -> Reals:
+        """Angles (..., n) at times (...,)."""
+        return self.rates(t)[0]
+
+    def of_joint(self, series: Reals, j: int, sign: float = 1.0) -> Pieces:
+        """One joint's function of time."""
+        return Pieces(self.times, sign * series[:, :, j])
+
+    def greatest(self, series: Reals) -> Reals:
+        """Greatest size (n,) of angle, velocity, acceleration or jerk of each joint."""
+        joints = range(series.shape[2])
+        return np.array([max(self.of_joint(series, j, sign).greatest() for sign in (1.0, -1.0)) for j in joints])
+
+    def rate_bounds(self, start: Reals, end: Reals) -> tuple[Reals, Reals]:
+        """Bounds (k, n) of the sizes of velocity and acceleration between times (k,) and (k,)."""
+        first = np.clip(np.searchsorted(self.times, start, side="right") - 1, 0, len(self.times) - 2)
+        last = np.clip(np.searchsorted(self.times, end, side="left") - 1, first, len(self.times) - 2)
+        velocity, acceleration = (
+            greatest_between(np.abs(series).sum(axis=1), first, last) for series in (self.velocity, self.acceleration)
+        )
+        return velocity, acceleration
+
+    def scaled(self, factor: float) -> PiecewiseMotion:
+        """The same way in ``factor`` times the time."""
+        return PiecewiseMotion(self.times * factor, self.angle, self.velocity / factor, self.acceleration / factor**2)
+
+
+def polynomial_motion(rates: Callable[[Reals], Rates], breaks: Reals, degree: int) -> PiecewiseMotion:
+    """A motion whose angles are polynomials of at most so high a degree between break points (m + 1,) in s."""
+    breaks = np.asarray(breaks, float)
+    kept = np.concatenate([[True], np.diff(breaks) > SAME_TIME * (breaks[-1] - breaks[0])])
+    times = breaks[kept]
+    times[-1] = breaks[-1]
+    x = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
+    t = times[:-1, None] + np.diff(times)[:, None] * (x + 1) / 2
+    values = rates(t)
+    return PiecewiseMotion(times, *(_trimmed(_interpolated(part)) for part in values))
+
+
+def turning_points(series: Reals) -> Reals:
+    """Where (x within -1..1) a Chebyshev series (d + 1,) has slope 0, and perhaps some points more."""
+    slope = chebyshev.chebder(series)
+    size = np.abs(slope)
+    if not size.max() > 0 or abs(slope[0]) > size[1:].sum():
+        return np.empty(0)
+    slope = slope[: np.flatnonzero(size > TRIMMED * size.max())[-1] + 1]
+    if len(slope) < 2:
+        return np.empty(0)
+    roots = chebyshev.chebroots(slope)
+    real: Reals = np.sort(roots[np.abs(roots.imag) < NEARLY_REAL].real)
+    return real[(real > -1) & (real < 1)]
+
+
+def greatest_between(values: Reals, first: Integers, last: Integers) -> Reals:
+    """Greatest of rows first..last (both included) of values (m, n), for ranges (k,); (k, n)."""
+    found = np.maximum(values[first], values[last])
+    for k in np.flatnonzero(last > first + 1):
+        found[k] = values[first[k] : last[k] + 1].max(axis=0)
+    return found
+
+
+def _interpolated(values: Reals) -> Reals:
+    """Chebyshev coefficients (m, d + 1, n) through values (m, d + 1, n) at the Chebyshev points."""
+    count = values.shape[1]
+    angles = np.pi * (np.arange(count) + 0.5) / count
+    basis = np.cos(np.outer(np.arange(count), angles)) * 2 / count
+    basis[0] /= 2
+    found: Reals = np.einsum("kc,mcn->mkn", basis, values)
+    return found
+
+
+def _trimmed(series: Reals) -> Reals:
+    """Without the highest coefficients if all pieces lack them."""
+    size = np.abs(series)
+    kept = np.flatnonzero((size > TRIMMED * size.max(axis=1, keepdims=True)).any(axis=(0, 2)))
+    return series[:, : (int(kept[-1]) if kept.size else 0) + 1]
+
+
+def _slope(times: Reals, series: Reals) -> Reals:
+    if series.shape[1] < 2:
+        return np.zeros_like(series)
+    found: Reals = chebyshev.chebder(series, axis=1) * (2 / np.diff(times))[:, None, None]
+    return found
+
+
+def _evaluated(series: Reals, x: Reals) -> Reals:
+    """Series (..., d + 1, n) at x (...,), by Clenshaw's recurrence."""
+    x = x[..., None]
+    b1 = b2 = np.zeros(series.shape[:-2] + series.shape[-1:])
+    for k in range(series.shape[-2] - 1, 0, -1):
+        b1, b2 = series[..., k, :] + 2 * x * b1 - b2, b1
+    value: Reals = series[..., 0, :] + x * b1 - b2
+    return value

@@ -1,0 +1,429 @@
+"""What an arm does between the points at which a path of the tool is solved: bounds instead of samples.
+
+With q(s) the joints along the share s of the way, J q' = v, where v is the tool's twist per unit of s (its linear part
+divided by a characteristic length). From one solved pose the motion is continued by bounds alone: as long as the joints
+have turned by little, the inverse of J has grown by little, so that
+
+    |q''| <= B (|v'| + C V^2),   |q'''| <= B (|v''| + 3 C V |q''| + C V^3),   B = b / (1 - b sqrt(n) C h V),
+
+with b the norm of the inverse at the pose solved, h the way from there, V the sum of the joints' rates, and C the
+greatest length of a column of J (turning an earlier joint turns a column, turning a later one turns its lever: no
+derivative of a column is longer). Where the bound on q'' that is put in comes out no greater, the motion exists over
+the whole interval, on one branch and without a singular pose [1]_; Taylor's formula then bounds angles, speeds,
+accelerations and distances from singular sets on it. An interval that settles less than is asked is halved. What is
+left when intervals are short beyond use is *undecided*.
+
+References
+----------
+.. [1] J. M. Ortega, W. C. Rheinboldt, *Iterative Solution of Nonlinear Equations in Several Variables*, section 10.4.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from er3a.kinematics.factor_forms import ELBOW_JOINT, WRIST_JOINT, FactorForms, factor_forms
+from er3a.kinematics.forward import frames, jacobian
+from er3a.kinematics.near_singular import NearSingular
+from er3a.kinematics.singularity import TYPES, characteristic_length, determinant_factors
+from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.runs import runs
+from er3a.planning.follow import follow
+from er3a.planning.followed import Followed
+from er3a.planning.intervals import Interval, RateCause, RateLimit, rate_interval
+from er3a.planning.moves import ToolPath
+from er3a.planning.piecewise import PiecewiseMotion, greatest_between, polynomial_motion
+from er3a.planning.profiles import TimeLaw, times_at
+from er3a.planning.singular_events import singular_events
+from er3a.robots.joint_limits import LIMIT_TOLERANCE
+from er3a.robots.robot import Robot
+
+SHORTEST = 1e-9  # share of the duration
+SETTLED_ELSEWHERE = 1e-5  # share of the duration: shortest interval for what another interval breaks already
+BESIDE_EVENT = 2e-3, 1e-4  # shares of the duration: so near to a known singular pose no interval is made shorter
+MOST_INTERVALS = 60_000
+FIRST_INTERVALS = 64
+GROWN = 0.5  # b sqrt(n) C h V up to which a motion is continued
+ATTEMPTS = 3
+MOST_ROUNDS = 3
+STEP_ASIDE = 1e-10  # share of the duration
+
+Quantity = Literal["singular", "limits", "speed", "acceleration", "jerk", "near"]
+QUANTITIES: tuple[Quantity, ...] = ("singular", "limits", "speed", "acceleration", "jerk", "near")
+RATES = slice(2, 5)
+
+
+@dataclass(frozen=True)
+class Undecided:
+    """What the bounds do not settle."""
+
+    quantity: Quantity
+    code: Literal["undecided"] = "undecided"
+
+
+@dataclass(frozen=True, eq=False)
+class ToolProof:
+    """What is known of all times of a followed path.
+
+    Attributes
+    ----------
+    times : (m + 1,), s, rising: ends of the intervals
+    proven : (m,) bool, whether the arm follows the path over the interval, without a singular pose
+    velocity, acceleration : (m, n), bounds of their sizes, rad/s and rad/s^2; infinite where nothing is proven
+    t, q : (k,) s and (k, n) rad, the ends and middles of all intervals; q NaN where unreachable
+    middles, rates : the middles (m,) in s, with velocity and acceleration there, (m, 2, n)
+    jerk : (m, n), rad/s^3, met in each interval, where a limit of jerk is to be settled; else 0
+    steps : times (k,) in s at which the acceleration steps, and by how much, (k, n) in rad/s^2; the same
+    undecided : stretches, and what is open there; a rate is not where its limit is exceeded elsewhere
+    """
+
+    times: Reals
+    proven: Flags
+    velocity: Reals
+    acceleration: Reals
+    t: Reals
+    q: Reals
+    middles: Reals
+    rates: Reals
+    jerk: Reals
+    steps: tuple[Reals, Reals]
+    undecided: tuple[Interval[Undecided], ...]
+
+    def rate_bounds(self, start: Reals, end: Reals) -> tuple[Reals, Reals]:
+        """As :meth:`er3a.planning.piecewise.PiecewiseMotion.rate_bounds`."""
+        last = len(self.proven) - 1
+        first = np.clip(np.searchsorted(self.times, start, side="right") - 1, 0, last)
+        behind = np.clip(np.searchsorted(self.times, end, side="left") - 1, first, last)
+        return greatest_between(self.velocity, first, behind), greatest_between(self.acceleration, first, behind)
+
+
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """What is to be settled: limits of rates, and the distances of near passes."""
+
+    rates: tuple[RateLimit, ...]
+    near: NearSingular
+
+
+@dataclass(frozen=True, eq=False)
+class _Bounds:
+    """Over intervals (k,): angles' change, sizes of rates (k, n), and whether the motion was continued."""
+
+    proven: Flags
+    change: Reals
+    first: Reals
+    second: Reals
+    third: Reals
+
+
+@dataclass(frozen=True, eq=False)
+class _Settled:
+    """What came of intervals (k,): flags (k, quantities) of what is open and what is broken, bounds and middles."""
+
+    start: Reals
+    end: Reals
+    proven: Flags
+    open: Flags
+    broken: Flags
+    velocity: Reals
+    acceleration: Reals
+    q: Reals
+    rates: Reals
+    jerk: Reals
+
+    def part(self, wanted: Flags) -> _Settled:
+        """Some of the intervals."""
+        return _Settled(*(getattr(self, name)[wanted] for name in self.__dataclass_fields__))
+
+
+def follow_and_prove(
+    robot: Robot, line: ToolPath, t: Reals, wanted: Wanted, q_start: Reals | None = None, start_slot: int | None = None
+) -> tuple[Followed, ToolProof]:
+    """Follow a path (:func:`er3a.planning.follow.follow`), and settle it.
+
+    Where a pose proves out of reach between others that are not, the path is followed again with that pose among them.
+    """
+    for _ in range(MOST_ROUNDS):
+        followed = follow(robot, line, t, q_start, start_slot)
+        events = singular_events(robot, followed.t, followed.q, followed.joints, wanted.near)
+        beyond = np.flatnonzero(np.diff(np.isnan(followed.q[:, 0])))
+        known = [
+            [time for event in events if event.crossing for time in (event.t, event.until)],
+            [jump.t for jump in followed.jumps],
+            followed.t[beyond],
+        ]
+        proof = prove(followed, wanted, np.unique(np.concatenate([np.asarray(part, float) for part in known])))
+        lost = np.isnan(proof.q[:, 0])
+        after = np.clip(np.searchsorted(followed.t, proof.t), 1, len(followed.t) - 1)
+        reached = np.isfinite(followed.q[:, 0])
+        lost &= reached[after] & reached[after - 1]
+        if not lost.any():
+            break
+        t = np.union1d(followed.t, proof.t[lost])
+    return followed, proof
+
+
+def prove(followed: Followed, wanted: Wanted, singular: Reals) -> ToolProof:
+    """Settle a followed path.
+
+    Parameters
+    ----------
+    singular : (k,), s, times at which the path is known to be singular or to end: there nothing can be proven
+    """
+    law = followed.line.law
+    duration = followed.line.duration
+    progress = law_motion(law)
+    breaks = [followed.t, np.linspace(0, duration, FIRST_INTERVALS), law.breaks]
+    edges = np.unique(np.concatenate([*breaks, times_at(law, followed.line.edges)]))
+    edges = edges[np.concatenate([[True], np.diff(edges) > SHORTEST * duration])]
+    edges[-1] = duration
+    start, end = edges[:-1], edges[1:]
+    done: list[_Settled] = []
+    count, broken = 0, np.zeros(len(QUANTITIES), bool)
+    while len(start):
+        found = _settle(followed, wanted, progress, start, end)
+        count += len(start)
+        broken |= found.broken.any(axis=0)
+        least = np.where(broken, SETTLED_ELSEWHERE, SHORTEST) * duration
+        least[0] = (SETTLED_ELSEWHERE if broken.any() else SHORTEST) * duration
+        beside = _distance(singular, start, end) < BESIDE_EVENT[0] * duration
+        shortest = np.where(beside[:, None], np.maximum(least, BESIDE_EVENT[1] * duration), least)
+        again = (found.open & ((end - start)[:, None] > 2 * shortest)).any(axis=1) & (count <= MOST_INTERVALS)
+        done.append(found.part(~again))
+        middle = (start + end)[again] / 2
+        start = np.concatenate([start[again], middle])
+        end = np.concatenate([middle, end[again]])
+    for part in done:
+        part.open[:, RATES] &= ~broken[RATES]
+    return _proof(followed, done, singular)
+
+
+def jerk_intervals(proof: ToolProof, limit: RateLimit) -> list[Interval[RateCause]]:
+    """Where joints exceed a limit of jerk; a step of the acceleration exceeds any."""
+    found: list[Interval[RateCause]] = []
+    for j in np.flatnonzero(np.isfinite(limit.most)).tolist():
+        size = np.abs(proof.jerk[:, j])
+        for first, last in runs(size > limit.allowed[j]):
+            stretch = float(proof.times[first]), float(proof.times[last])
+            found.append(rate_interval(limit, j, *stretch, float(size[first:last].max())))
+        for k in np.flatnonzero(np.abs(proof.steps[1][:, j]) > limit.step_allowed[j]).tolist():
+            found.append(rate_interval(limit, j, float(proof.steps[0][k]), float(proof.steps[0][k]), np.inf))
+    return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
+
+
+def _acceleration_steps(followed: Followed) -> tuple[Reals, Reals]:
+    """Times at which pieces of the law or of the curve meet, start and end among them, and the accelerations' steps."""
+    law, duration = followed.line.law, followed.line.duration
+    times = np.unique(np.concatenate([law.breaks, times_at(law, followed.line.edges)]))
+    aside = STEP_ASIDE * duration
+    behind = followed.rates(np.minimum(times + aside, duration))[2]
+    before = followed.rates(np.maximum(times - aside, 0.0))[2]
+    behind[times >= duration - aside], before[times <= aside] = 0.0, 0.0  # at rest
+    return times, behind - before
+
+
+def law_motion(law: TimeLaw) -> PiecewiseMotion:
+    """A law of time as polynomials, n = 1."""
+
+    def rates(t: Reals) -> tuple[Reals, Reals, Reals]:
+        share, speed, acceleration = law(t)
+        return share[..., None], speed[..., None], acceleration[..., None]
+
+    return polynomial_motion(rates, law.breaks, law.degree)
+
+
+def _distance(points: Reals, start: Reals, end: Reals) -> Reals:
+    """Of intervals (k,) from the nearest of some points."""
+    if not points.size:
+        return np.full(len(start), np.inf)
+    points = np.sort(points)
+    after = np.searchsorted(points, start)
+    ahead = np.append(points, np.inf)[after] - end
+    behind = start - np.append(-np.inf, points)[after]
+    return np.maximum(np.minimum(ahead, behind), 0.0)
+
+
+def _proof(followed: Followed, done: list[_Settled], singular: Reals) -> ToolProof:
+    order = np.argsort(np.concatenate([part.start for part in done]))
+    names = _Settled.__dataclass_fields__
+    whole = _Settled(*(np.concatenate([getattr(part, name) for part in done])[order] for name in names))
+    times = np.append(whole.start, whole.end[-1])
+    middles = (whole.start + whole.end) / 2
+    t = np.concatenate([times, middles])
+    q = np.concatenate([followed.joints(times), whole.q])
+    order = np.argsort(t, kind="stable")
+    duration = followed.line.duration
+    undecided: list[Interval[Undecided]] = []
+    for k, quantity in enumerate(QUANTITIES):
+        for first, last in runs(whole.open[:, k]):
+            start, end = np.array([whole.start[first]]), np.array([whole.end[last - 1]])
+            if _distance(singular, start, end)[0] > BESIDE_EVENT[0] * duration:
+                undecided.append(Interval(float(start[0]), float(end[0]), Undecided(quantity)))
+    return ToolProof(
+        times=times,
+        proven=whole.proven,
+        velocity=whole.velocity,
+        acceleration=whole.acceleration,
+        t=t[order],
+        q=q[order],
+        middles=middles,
+        rates=whole.rates,
+        jerk=whole.jerk,
+        steps=_acceleration_steps(followed),
+        undecided=tuple(sorted(undecided, key=lambda part: part.start)),
+    )
+
+
+def _settle(followed: Followed, wanted: Wanted, progress: PiecewiseMotion, start: Reals, end: Reals) -> _Settled:
+    """What the bounds say of intervals (k,)."""
+    robot, count = followed.robot, len(start)
+    middle, half = (start + end) / 2, (end - start) / 2
+    (s_start, s, s_end), (_, speed, _), (_, pull, _) = (
+        part.reshape(3, count) for part in (x[:, 0] for x in progress.rates(np.concatenate([start, middle, end])))
+    )
+    shares, at = np.unique(np.concatenate([s_start, s_end]), return_inverse=True)
+    q_start, q_end = followed.joints_at(shares)[at].reshape(2, count, -1)
+    q = followed.joints_at(s)
+    dq, ddq = followed.through_jacobian(q, s)
+    bounds = _continued(followed, q, dq, ddq, (s_start, s, s_end))
+    for beside in (q_start, q_end):
+        bounds.proven[:] &= (np.abs(beside - q) <= bounds.change * (1 + 1e-6) + LIMIT_TOLERANCE).all(axis=1)
+    velocity, acceleration = dq * speed[:, None], ddq * speed[:, None] ** 2 + dq * pull[:, None]
+    rates, highest = _rate_bounds(bounds, velocity, acceleration, progress, (start, end), (speed, pull, half))
+    unreached = np.isnan(np.stack([q_start, q, q_end])[..., 0])
+    open_, broken = np.zeros((2, count, len(QUANTITIES)), bool)
+    known = bounds.proven
+    open_[:, 0] = ~known & ~unreached.all(axis=0)
+    outside = _outside(robot, np.stack([q_start, q, q_end])).any(axis=0)
+    sure = ~_outside(robot, np.stack([q - bounds.change, q + bounds.change])).any(axis=0)
+    open_[:, 1], broken[:, 1] = known & ~(sure | outside).all(axis=1), outside.any(axis=1)
+    asks_jerk = any(limit.order == 3 for limit in wanted.rates)
+    jerk = _mean_jerk(followed, start, end) if asks_jerk else np.zeros_like(q)
+    for limit in wanted.rates:
+        k = 1 + limit.order
+        over = np.abs((velocity, acceleration, jerk)[limit.order - 1]) > limit.allowed
+        sure = (highest[limit.order] <= limit.allowed) | ~np.isfinite(limit.most)
+        open_[:, k], broken[:, k] = known & ~(sure | over).all(axis=1), over.any(axis=1)
+    open_[known, 5] = _near_open(factor_forms(robot), robot, wanted.near, q[known], bounds.change[known])
+    return _Settled(
+        start=start,
+        end=end,
+        proven=bounds.proven,
+        open=open_,
+        broken=broken,
+        velocity=np.where(known[:, None], highest[1], np.inf),
+        acceleration=np.where(known[:, None], highest[2], np.inf),
+        q=q,
+        rates=rates,
+        jerk=jerk,
+    )
+
+
+def _continued(followed: Followed, q: Reals, dq: Reals, ddq: Reals, s: tuple[Reals, Reals, Reals]) -> _Bounds:
+    """Continue the motion from solved poses (k, n) at middles over intervals, by the formulas of the module's text."""
+    robot, n = followed.robot, q.shape[-1]
+    length, root = characteristic_length(robot), np.sqrt(n)
+    count = len(q)
+    solved = np.isfinite(dq[:, 0])
+    h = np.maximum(s[2] - s[1], s[1] - s[0])
+    sizes = followed.line.twist_bounds(s[0], s[2]) / np.array([length, 1.0])
+    v1, v2 = np.linalg.norm(sizes, axis=-1)[:, 1:].T
+    b, reach = np.full(count, np.inf), np.full(count, np.inf)
+    b[solved], reach[solved] = _inverse_and_reach(robot, q[solved], length)
+    sum_first, first, second = (np.full(count, np.inf) for _ in range(3))
+    sum_first[solved] = np.abs(dq[solved]).sum(axis=1)
+    first[solved], second[solved] = np.linalg.norm(dq[solved], axis=1), np.linalg.norm(ddq[solved], axis=1)
+    with np.errstate(all="ignore"):
+
+        def formulas(most: Reals) -> tuple[Reals, Reals, Reals]:
+            """Bounds of q'' and q''' if q'' is no greater than ``most``, and whether the motion is continued."""
+            V = sum_first + root * h * most
+            C = np.sqrt(1 + (reach * np.exp(np.minimum(h * V, 1.0))) ** 2)
+            grown = b * root * C * h * V
+            B = b / (1 - grown)
+            within = (grown < GROWN) & (h * V < 1.0)
+            return B * (v1 + C * V**2), B * (v2 + 3 * C * V * root * most + C * V**3), within
+
+        most = np.maximum(1.5 * b * (v1 + np.sqrt(1 + reach**2) * sum_first**2), second)
+        proven = np.zeros(count, bool)
+        for _ in range(ATTEMPTS):
+            bound, _, within = formulas(most)
+            now = solved & within & (bound <= most)
+            proven |= now
+            most = np.where(proven, np.minimum(most, np.where(now, bound, np.inf)), 1.3 * np.maximum(bound, most))
+        third = np.full(count, np.inf)
+        for _ in range(ATTEMPTS):
+            bound, next_, _ = formulas(most)
+            third = np.minimum(third, next_)
+            most = np.minimum(np.minimum(most, bound), second + h * third)
+    h, third = h[:, None], third[:, None]
+    high2 = np.minimum(np.abs(ddq) + h * third, most[:, None])
+    high1 = np.abs(dq) + h * np.abs(ddq) + h**2 * third / 2
+    change = h * np.abs(dq) + h**2 * np.abs(ddq) / 2 + h**3 * third / 6
+    found = (change, high1, high2, np.broadcast_to(third, q.shape))
+    return _Bounds(proven, *(np.where(proven[:, None], part, np.inf) for part in found))
+
+
+def _inverse_and_reach(robot: Robot, q: Reals, length: float) -> tuple[Reals, Reals]:
+    """Norm (k,) of the inverse of the scaled Jacobian, and greatest lever of the tool point over the length."""
+    J = jacobian(robot, q)
+    J[..., :3, :] /= length
+    least = np.linalg.svd(J, compute_uv=False)[..., -1]
+    lever = np.linalg.norm(J[..., :3, :], axis=-2).max(axis=-1)
+    T = frames(robot, q)
+    far = np.linalg.norm(T[:, -1:, :3, 3] - T[:, :-1, :3, 3], axis=-1).max(axis=-1) / length
+    return 1 / least, np.maximum(lever, far)
+
+
+def _rate_bounds(
+    bounds: _Bounds,
+    velocity: Reals,
+    acceleration: Reals,
+    progress: PiecewiseMotion,
+    ends: tuple[Reals, Reals],
+    law: tuple[Reals, Reals, Reals],
+) -> tuple[Reals, dict[int, Reals]]:
+    """Rates at the middles (k, 2, n), and bounds of speed, acceleration and jerk over the intervals."""
+    speed, pull, half = (part[:, None] for part in law)
+    piece = np.clip(np.searchsorted(progress.times, (ends[0] + ends[1]) / 2) - 1, 0, len(progress.times) - 2)
+    jerk = np.abs(progress.jerk[piece, :, 0]).sum(axis=1)[:, None]
+    most_pull = np.abs(pull) + half * jerk
+    most_speed = speed + half * np.abs(pull) + half**2 * jerk / 2
+    with np.errstate(invalid="ignore"):
+        third = bounds.third * most_speed**3 + 3 * bounds.second * most_speed * most_pull + bounds.first * jerk
+        fast = np.abs(velocity) + half * np.abs(acceleration) + half**2 * third / 2
+        hard = np.abs(acceleration) + half * third
+    return np.stack([velocity, acceleration], axis=1), {1: fast, 2: hard, 3: third}
+
+
+def _mean_jerk(followed: Followed, start: Reals, end: Reals) -> Reals:
+    """Mean jerk (k, n) over intervals: there is a time in each at which it is met, joint by joint."""
+    inner = (end - start) * 1e-3  # off the ends, where the law's acceleration may step
+    first, last = start + inner, end - inner
+    rates: Reals = (followed.rates(last)[2] - followed.rates(first)[2]) / (last - first)[:, None]
+    return rates
+
+
+def _outside(robot: Robot, q: Reals) -> Flags:
+    """Whether angles (..., n) are outside the limits."""
+    outside: Flags = (q < robot.lower - LIMIT_TOLERANCE) | (q > robot.upper + LIMIT_TOLERANCE)
+    return outside
+
+
+def _near_open(forms: FactorForms, robot: Robot, near: NearSingular, q: Reals, change: Reals) -> Flags:
+    """Whether it is open that an interval keeps its distance from each singular set."""
+    in_q2, in_both = forms.shoulder_slopes
+    moved = {
+        "wrist": change[:, WRIST_JOINT],
+        "elbow": change[:, ELBOW_JOINT],
+        "shoulder": in_q2 * change[:, 1] + in_both * (change[:, 1] + change[:, 2]),
+    }
+    factors = determinant_factors(robot, q)
+    found = np.zeros(len(q), bool)
+    for kind in TYPES:
+        size = np.abs(getattr(factors, kind))
+        found |= (size >= near.of(kind)) & (size - moved[kind] < near.of(kind))
+    return found

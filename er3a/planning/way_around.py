@@ -1,0 +1,368 @@
+"""A way around: a joint motion between two joint vectors that is proven to keep clear, or that none was found.
+
+RRT-Connect [1]_ of OMPL [2]_ joins the ends by straight moves in joint space. A move is tried by conservative
+advancement: from an arm that is d clear no body can be met before the joints' turns, each times the longest lever that
+it swings, add up to d. Random short cuts follow, then corners are rounded as far as they stay clear, and the rounded
+way is timed. What is handed out is proven as it is run (:mod:`er3a.collision.along`): on the timed curve itself.
+
+The search ends after a number of rounds, not of seconds, and draws from its own seed alone: equal tasks, equal motions.
+
+References
+----------
+.. [1] J. J. Kuffner, S. M. LaValle, "RRT-Connect: an efficient approach to single-query path planning", ICRA 2000.
+.. [2] I. A. Sucan, M. Moll, L. E. Kavraki, "The Open Motion Planning Library", IEEE Robotics and Automation Magazine
+   19(4), 2012.
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, Literal
+
+import numpy as np
+
+from er3a.collision.along import ClearanceAlong, clearance_along
+from er3a.collision.bodies import Bodies
+from er3a.collision.envelopes import link_frames
+from er3a.collision.pairs import PairOverlaps
+from er3a.errors import PathError
+from er3a.numerics.arrays import Reals
+from er3a.planning.piecewise import PiecewiseMotion
+from er3a.planning.polynomial_checks import limit_intervals
+from er3a.planning.profiles import FromRestToRest, Rates
+from er3a.planning.sequences import JointSequence, joint_sequence
+from er3a.planning.timing import JointLimits, Timed, TimingError, ToppraMissing, fastest, joined, standing
+from er3a.robots.joint_limits import LimitsExceeded, limits_exceeded
+from er3a.robots.robot import Robot
+
+ROUNDS = 4000
+SHORT_CUTS = 120
+LONGEST_MOVE = 1.5  # rad of all joints together, by which a tree grows at a time
+SHORTEST_STEP = 2e-3  # rad of the joint that turns most, by which a move advances beside an obstacle
+MARGINS = (0.008, 0.003, 0.0)  # m beyond the tolerance, tried in this order
+FROM_LIMITS = np.radians(2.0)  # by which drawn joints keep from their limits
+ROUNDINGS = (1.0, 0.5, 0.2, 0.0)  # of half of the shorter side
+NODES = 240
+SHOWN = 101
+STILL = 1e-9  # rad
+STREAM = 17
+MOST_PAIRS = 4
+
+
+@dataclass(frozen=True)
+class PlannerMissing:
+    """The library that plans is not installed."""
+
+    code: Literal["planner_missing"] = "planner_missing"
+
+
+@dataclass(frozen=True)
+class NothingMeasured:
+    """Without distances nothing can be planned."""
+
+    code: Literal["nothing_measured"] = "nothing_measured"
+
+
+@dataclass(frozen=True)
+class EndOverlaps:
+    """At the start (or the end) something overlaps."""
+
+    end: Literal["start", "end"]
+    overlap: PairOverlaps
+    code: Literal["end_overlaps"] = "end_overlaps"
+
+
+@dataclass(frozen=True)
+class EndOutsideLimits:
+    """At the start (or the end) joints are outside their limits."""
+
+    end: Literal["start", "end"]
+    limits: LimitsExceeded
+    code: Literal["end_outside_limits"] = "end_outside_limits"
+
+
+@dataclass(frozen=True)
+class EndUnreached:
+    """No joint angles within the limits reach the start (or the end)."""
+
+    end: Literal["start", "end"]
+    code: Literal["end_unreached"] = "end_unreached"
+
+
+@dataclass(frozen=True)
+class NoneFound:
+    """No way was found within so many rounds; there may be one."""
+
+    rounds: int
+    code: Literal["none_found"] = "none_found"
+
+
+NoWayAround = (
+    PlannerMissing | ToppraMissing | NothingMeasured | EndOverlaps | EndOutsideLimits | EndUnreached | NoneFound
+)
+
+
+@dataclass(frozen=True, eq=False)
+class WayAround:
+    """A motion that keeps clear.
+
+    Attributes
+    ----------
+    corners : (k, n), rad, start and end among them
+    motion : rounded and timed
+    along : its clearance, proven
+    """
+
+    corners: Reals
+    motion: Timed
+    along: ClearanceAlong
+
+
+@dataclass(frozen=True, eq=False)
+class PlanningTask:
+    """What all motions of a robot have in common.
+
+    Attributes
+    ----------
+    tolerance : m, no deeper overlap goes unnoticed; planned motions have none at all where they are measured
+    """
+
+    robot: Robot
+    bodies: Bodies | None
+    tolerance: float
+    limits: JointLimits
+    seed: int
+    rounds: int = ROUNDS
+
+
+def way_around(task: PlanningTask, start: Reals, end: Reals) -> WayAround | NoWayAround:
+    """Find a motion from joint angles (n,) to (n,) in rad."""
+    if task.bodies is None:
+        return NothingMeasured()
+    ends: tuple[tuple[Literal["start", "end"], Reals], ...] = (("start", start), ("end", end))
+    for name, q in ends:
+        if outside := limits_exceeded(task.robot, q):
+            return EndOutsideLimits(name, outside)
+    clear, pairs = task.bodies.least(np.stack([start, end]))
+    for (name, _), distance, pair in zip(ends, clear, pairs):
+        if distance <= 0:
+            return EndOverlaps(name, PairOverlaps(task.bodies.pairs[pair], -float(distance) * 1000))
+    if np.abs(end - start).max() < STILL:
+        return _proven(task, np.stack([start, end]), standing(start, 0.0)) or NoneFound(0)
+    rounds = 0
+    for attempt, margin in enumerate(MARGINS):
+        moves = _Moves(task.robot, task.bodies, min(task.tolerance + margin, 0.5 * float(clear.min())))
+        if moves.free(start, end):
+            corners: Reals | None = np.stack([start, end])
+        else:
+            corners = _tree(task, moves, start, end, attempt)
+            rounds += task.rounds
+        if corners is None:
+            continue
+        if isinstance(corners, PlannerMissing):
+            return corners
+        corners = _shortened(moves, corners, np.random.default_rng([task.seed, STREAM, attempt]))
+        for motion in _timed(task, corners):
+            if isinstance(motion, ToppraMissing):
+                return motion
+            if found := _proven(task, corners, motion):
+                return found
+    return NoneFound(rounds)
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedMove:
+    """A planned motion as a move of the joints, as :class:`er3a.planning.moves.JointMove` is one."""
+
+    curve: PiecewiseMotion
+
+    @property
+    def duration(self) -> float:
+        """s"""
+        return self.curve.duration
+
+    def joints(self, t: Reals) -> Rates:
+        """Angles (rad), velocities (rad/s) and accelerations (rad/s^2) at times (...,) in s; each (..., n)."""
+        return self.curve.rates(t)
+
+    def polynomials(self) -> PiecewiseMotion:
+        """The motion itself."""
+        return self.curve
+
+
+def way_between(task: PlanningTask, starts: Reals, ends: Reals) -> WayAround | NoWayAround:
+    """The motion between the nearest pair of starts (k, n) and ends (m, n) in rad between which one is found."""
+    pairs = sorted(
+        (float(np.abs(end - start).max()), i, j) for i, start in enumerate(starts) for j, end in enumerate(ends)
+    )
+    if not len(starts) or not len(ends):
+        return EndUnreached("end" if len(starts) else "start")
+    found: WayAround | NoWayAround = NoneFound(0)
+    for _, i, j in pairs[:MOST_PAIRS]:
+        found = way_around(task, starts[i], ends[j])
+        if isinstance(found, WayAround):
+            break
+    return found
+
+
+class _Moves:
+    """Straight moves in joint space, tried by conservative advancement."""
+
+    def __init__(self, robot: Robot, bodies: Bodies, margin: float) -> None:
+        self.bodies, self.margin = bodies, margin
+        T = link_frames(robot, np.zeros(len(robot.lower)))
+        origins = T[[capsule.link for capsule in bodies.capsules], None, :3, 3]
+        reach = np.linalg.norm(bodies.ends(np.zeros(len(robot.lower))) - origins, axis=-1).max()
+        lengths = np.linalg.norm(np.diff(T[1:, :3, 3], axis=0), axis=1)
+        self.levers = reach + np.append(np.cumsum(lengths[::-1])[::-1], 0.0)
+
+    def clear(self, q: Reals) -> float:
+        """Least distance of an arm, m."""
+        return float(self.bodies.least(q[None])[0][0])
+
+    def free(self, a: Reals, b: Reals) -> bool:
+        """Whether the move from a to b (n,) keeps the margin."""
+        turn = np.abs(b - a)
+        swing, least = float(self.levers @ turn), SHORTEST_STEP / max(float(turn.max()), SHORTEST_STEP)
+        share = 0.0
+        while share < 1.0:
+            spare = self.clear(a + share * (b - a)) - self.margin
+            if spare < 0:
+                return False
+            share += max(spare / swing, least) if swing > 0 else 1.0
+        return self.clear(b) >= self.margin
+
+
+def _tree(task: PlanningTask, moves: _Moves, start: Reals, end: Reals, attempt: int) -> Any:
+    """Corners (k, n) of a way of free moves; None if none was found."""
+    try:
+        from ompl import base, geometric, util
+    except ImportError:
+        return PlannerMissing()
+    util.noOutputHandler()
+    util.RNG.setSeed(1 + (task.seed * len(MARGINS) + attempt) % (2**31 - 1))
+    n, robot = len(start), task.robot
+    space, bounds = base.RealVectorStateSpace(n), base.RealVectorBounds(n)
+    for j in range(n):
+        both = min(start[j], end[j]), max(start[j], end[j])
+        inner = min(FROM_LIMITS, (robot.upper[j] - robot.lower[j]) / 4)
+        bounds.setLow(j, float(min(both[0], robot.lower[j] + inner)))
+        bounds.setHigh(j, float(max(both[1], robot.upper[j] - inner)))
+    space.setBounds(bounds)
+    info = base.SpaceInformation(space)
+
+    def joints(state: Any) -> Reals:
+        return np.array([state[j] for j in range(n)])
+
+    class Advancement(base.MotionValidator):  # type: ignore[misc]
+        def checkMotion(self, first: Any, second: Any) -> bool:
+            return moves.free(joints(first), joints(second))
+
+    info.setStateValidityChecker(lambda state: moves.clear(joints(state)) >= moves.margin)
+    validator = Advancement(info)
+    info.setMotionValidator(validator)
+    info.setup()
+    problem = base.ProblemDefinition(info)
+    states = [space.allocState(), space.allocState()]
+    for state, q in zip(states, (start, end)):
+        for j in range(n):
+            state[j] = float(q[j])
+    problem.setStartAndGoalStates(*states)
+    planner = geometric.RRTConnect(info)
+    planner.setRange(LONGEST_MOVE)
+    planner.setProblemDefinition(problem)
+    planner.setup()
+    rounds = iter(range(task.rounds))
+    planner.solve(base.PlannerTerminationCondition(lambda: next(rounds, None) is None))
+    found = None
+    if problem.hasExactSolution():
+        path = problem.getSolutionPath()
+        found = np.array([joints(path.getState(k)) for k in range(path.getStateCount())])
+        found[[0, -1]] = start, end
+    del planner, problem, info, validator, space, states
+    gc.collect()
+    return found
+
+
+def _shortened(moves: _Moves, corners: Reals, random: np.random.Generator) -> Reals:
+    """Corners with random short cuts taken, and those left out that straight moves can do without."""
+    for _ in range(SHORT_CUTS):
+        if len(corners) < 3:
+            break
+        lengths = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(corners, axis=0)).max(axis=1))])
+        first, last = np.sort(random.uniform(0.0, lengths[-1], 2))
+        i, k = (int(np.searchsorted(lengths, at, side="right")) - 1 for at in (first, last))
+        k = min(k, len(corners) - 2)
+        if i >= k:
+            continue
+        a, b = (_between(corners, lengths, at) for at in (first, last))
+        if moves.free(a, b):
+            corners = np.concatenate([corners[: i + 1], [a, b], corners[k + 1 :]])
+    kept = [0]
+    while kept[-1] < len(corners) - 1:
+        ahead = range(len(corners) - 1, kept[-1], -1)
+        kept.append(next(j for j in ahead if j == kept[-1] + 1 or moves.free(corners[kept[-1]], corners[j])))
+    shortened = corners[kept]
+    steps = np.abs(np.diff(shortened, axis=0)).max(axis=1)
+    return shortened[np.concatenate([[True], steps > STILL])]
+
+
+def _between(corners: Reals, lengths: Reals, at: float) -> Reals:
+    return np.array([np.interp(at, lengths, column) for column in corners.T])
+
+
+def _timed(task: PlanningTask, corners: Reals) -> Iterator[Timed | ToppraMissing]:
+    """The way with corners rounded less and less, timed under the limits."""
+    sides = np.abs(np.diff(corners, axis=0)).max(axis=1)
+    for share in ROUNDINGS if len(corners) > 2 else (0.0,):
+        blends = share * np.minimum(sides[:-1], sides[1:]) / 2
+        try:
+            way = joint_sequence(corners, blends, 1.0)
+            yield _with_jerk(way, task.limits) if task.limits.jerk is not None else _quickest(way, task.limits)
+        except PathError:
+            continue
+        except TimingError as error:
+            if isinstance(error.finding, ToppraMissing):
+                yield error.finding
+
+
+def _quickest(way: JointSequence, limits: JointLimits) -> Timed:
+    """As fast as speeds and accelerations allow, from halt to halt."""
+    law = way.law
+    assert isinstance(law, FromRestToRest)
+    parts = []
+    for a, b in pairwise(law.progress.tolist()):
+        count = max(9, round(NODES * (b - a)))
+        parts.append(fastest(way.curve(np.linspace(a, b, count))[0], limits))
+    return joined(parts)
+
+
+def _with_jerk(way: JointSequence, limits: JointLimits) -> Timed:
+    """On quintics from halt to halt, in the time in which speeds, accelerations and jerks keep their limits."""
+    curve = way.polynomials()
+    assert limits.jerk is not None
+    speed, acceleration, jerk = (
+        float((curve.greatest(series) / most).max())
+        for series, most in (
+            (curve.velocity, limits.speed),
+            (curve.acceleration, limits.acceleration),
+            (curve.jerk, limits.jerk),
+        )
+    )
+    return Timed(curve.scaled(max(speed, np.sqrt(acceleration), np.cbrt(jerk))))
+
+
+def _proven(task: PlanningTask, corners: Reals, motion: Timed) -> WayAround | None:
+    """The motion with its clearance, if it meets nothing and keeps its limits."""
+    assert task.bodies is not None
+    curve = motion.curve
+    if curve.duration == 0:
+        curve = standing(corners[0], 1.0).curve
+    if limit_intervals(task.robot, curve):
+        return None
+    grid = np.linspace(0.0, curve.duration, SHOWN)
+    along = clearance_along(task.bodies, curve.joints, curve.rate_bounds, grid, grid, task.tolerance)
+    return None if along.contacts else WayAround(corners, motion, along)

@@ -1,0 +1,206 @@
+"""Random paths of every kind, what the trajectory stage says of them, and what of that the oracle contradicts."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from er3a.files.path_file import PathFile
+from er3a.files.yaml_file import parse
+from er3a.geometry.transforms import rpy_of
+from er3a.kinematics.forward import forward
+from er3a.kinematics.near_singular import NearSingular
+from er3a.kinematics.singularity import TYPES
+from er3a.pipeline.stages.trajectory.judgement import Judgement, judge
+from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
+from er3a.planning.commands import CommandSource
+from er3a.planning.timing import joint_limits
+from er3a.planning.tool_proof import Wanted
+from testing.motion_oracle import GRAZING, TOUCH, arm_of, factors, joint_path, truth
+
+NEAR = NearSingular(float(np.radians(5)), float(np.radians(5)), 0.03)
+ASSUMED = np.radians([180, 180, 180, 360, 360, 360])
+JOINT_KINDS = ("joint moves", "joint sequences", "joint tables")
+TOOL_KINDS = ("lines", "arcs", "rounded sequences")
+BESIDE = 3  # points of the oracle by which its times may be off
+CHECKS = 4
+
+
+@dataclass
+class Tally:
+    """Counts over paths: what the oracle finds, what of it is missed, what is invented, paths left undecided."""
+
+    paths: int = 0
+    crossings: int = 0
+    missed_crossings: int = 0
+    invented_crossings: int = 0
+    stretches: list[int] = field(default_factory=lambda: [0, 0, 0])
+    missed: list[int] = field(default_factory=lambda: [0, 0, 0])
+    invented: list[int] = field(default_factory=lambda: [0, 0, 0])
+    unreachable: int = 0
+    missed_unreachable: int = 0
+    undecided: int = 0
+    safe: int = 0
+    wrong_safe: int = 0
+
+
+def table_of(robot) -> dict:
+    """An arm's table as plain numbers."""
+    names = ("convention", "a", "alpha", "d", "offset", "direction", "lower", "upper", "base", "tool")
+    return {name: getattr(robot, name) for name in names}
+
+
+def random_spec(robot, kind, random, folder: Path) -> tuple[dict, dict]:
+    """A path as plain numbers, and as the path file writes it."""
+    return _joint_spec(robot, kind, random, folder) if kind in JOINT_KINDS else _tool_spec(robot, kind, random)
+
+
+def _joint_spec(robot, kind, random, folder):
+    low, high = np.degrees([robot.lower, robot.upper])
+    wide = random.uniform(0.7, 1.02)
+    if kind == "joint moves":
+        ends = random.uniform(low, high, (2, 6)) * wide
+        rates = random.normal(0, [[60] * 6, [60] * 6, [150] * 6, [150] * 6])
+        spec = {"kind": "joint", "start_deg": ends[0], "end_deg": ends[1], "duration_s": random.uniform(0.6, 3)}
+        names = ("start_velocity_deg_s", "end_velocity_deg_s", "start_acceleration_deg_s2", "end_acceleration_deg_s2")
+        spec |= dict(zip(names, rates))
+        return spec, _written(spec)
+    count = int(random.integers(3, 20))
+    points = random.uniform(low, high, (count, 6)) * wide
+    shortest = np.abs(np.diff(points, axis=0)).max(axis=1).min()
+    blend = random.choice([0.0, random.uniform(0, 0.5) * shortest])
+    duration = count * random.uniform(0.3, 1.5)
+    if kind == "joint sequences":
+        spec = {"kind": "joint_sequence", "points_deg": points, "blend_deg": blend, "duration_s": duration}
+        written = _written(spec)
+        if random.random() < 0.5:
+            spec["ramp_share"] = written["ramp_share"] = float(random.uniform(0.1, 0.5))
+            written["profile"] = "trapezoid"
+        return spec, written
+    times = np.concatenate([[0.0], np.cumsum(random.uniform(0.3, 1.5, count - 1))])
+    file = folder / f"{random.integers(1 << 40)}.csv"
+    with file.open("w", newline="") as out:
+        rows = csv.writer(out)
+        rows.writerow(["t_s", *(f"q{j}_deg" for j in range(1, 7))])
+        rows.writerows([repr(float(t)), *map(repr, map(float, q))] for t, q in zip(times, points))
+    spec = {"kind": "table", "points_deg": points, "blend_deg": blend, "times_s": times}
+    return spec, {"kind": "table", "file": str(file), "blend_deg": float(blend)}
+
+
+def _tool_spec(robot, kind, random):
+    q = random.uniform(robot.lower, robot.upper) * 0.9
+    count = {"lines": 1, "arcs": 2, "rounded sequences": int(random.integers(2, 5))}[kind]
+    q = q + np.concatenate([np.zeros((1, 6)), np.cumsum(random.uniform(-0.3, 0.3, (count, 6)), axis=0)])
+    T = forward(robot, q)
+    values = np.concatenate([T[:, :3, 3] * 1000, np.degrees([rpy_of(pose) for pose in T])], axis=1)
+    spec = {"poses": values, "duration_s": count * random.uniform(0.3, 3.0), "q_start": q[0], "kind": kind}
+    start = {"start_deg": np.degrees(q[0]).tolist()}
+    ends = [{"xyz_mm": v[:3].tolist(), "rpy_deg": v[3:].tolist()} for v in values]
+    if kind == "arcs":
+        spec |= {"kind": "arc", "via_mm": values[1, :3], "poses": values[[0, 2]]}
+        written = {"kind": "arc", "via_mm": ends[1]["xyz_mm"], "end": ends[2]}
+    elif kind == "lines":
+        written = {"kind": "line", "end": ends[1]}
+    else:
+        sizes = np.linalg.norm(np.diff(values[:, :3], axis=0), axis=1)
+        blends = random.uniform(0, 0.5, count - 1) * np.minimum(sizes[:-1], sizes[1:])
+        spec["blends_mm"] = blends
+        parts = [{"kind": "line", "end": end, "blend_mm": float(b)} for end, b in zip(ends[1:], [*blends, 0.0])]
+        written = {"kind": "sequence", "segments": parts}
+    written |= start | {"duration_s": float(spec["duration_s"])}
+    if random.random() < 0.3:
+        spec["ramp_share"] = written["ramp_share"] = float(random.uniform(0.1, 0.5))
+        written["profile"] = "trapezoid"
+    return spec, written
+
+
+def _written(spec):
+    return {key: value.tolist() if isinstance(value, np.ndarray) else float(value) if key != "kind" else value
+            for key, value in spec.items()}  # fmt: skip
+
+
+def judged(robot, written, samples) -> tuple[Motion, Judgement]:
+    """What the stage says of a path, at so many samples."""
+    limits = joint_limits(robot, ASSUMED, 0.25)
+    whole = {"name": "x", "title": "x", "samples": samples, **written}
+    entry = parse(PathFile, {"kind": "paths", "paths": [whole]}, None).paths[0]
+    motion = motion_of(robot, entry, CHECKS, CommandSource(None, ""), {}, Wanted(limits.rates, NEAR))
+    return motion, judge(robot, motion, NEAR, limits)
+
+
+def compare(robot, spec, written, samples, tally: Tally) -> list[str]:
+    """Add a path to the tally; what is missed or invented, in words."""
+    limits = joint_limits(robot, ASSUMED, 0.25)
+    arm = arm_of(table_of(robot))
+    seen = truth(spec, arm, (limits.speed, limits.acceleration), spec.get("q_start"))
+    motion, found = judged(robot, written, samples)
+    wrong: list[str] = []
+    tally.paths += 1
+    tally.undecided += found.verdict == "undecided"
+    tally.safe += found.verdict == "safe"
+    if seen.out_of_reach or found.beyond:
+        tally.unreachable += 1
+        if not (seen.out_of_reach and found.beyond):
+            tally.missed_unreachable += 1
+            wrong.append(f"reach: oracle {seen.out_of_reach}, stage {bool(found.beyond)}")
+        return wrong
+    if any(event.crossing for event in found.events) and "q_start" in spec:
+        return wrong  # which branch goes on behind it is a choice
+    near = BESIDE * (seen.t[1] - seen.t[0])
+    claimed = [(0, part.cause.joint - 1, part.start, part.end) for part in found.limits]
+    claimed += [(_order(part.cause.code), part.cause.joint - 1, part.start, part.end) for part in found.fast]
+    for order, joint, start, end in seen.stretches:
+        tally.stretches[order] += 1
+        if not any(c[:2] == (order, joint) and c[2] <= end + near and c[3] >= start - near for c in claimed):
+            tally.missed[order] += 1
+            wrong.append(f"missed order {order} J{joint + 1} {start:.6f}..{end:.6f}")
+    shown = [(order, joint, start, end) for order, joint, start, end in seen.stretches]
+    for order, joint, start, end in claimed:
+        if end - start > 2 * near and not any(
+            s[:2] == (order, joint) and s[2] <= end + near and s[3] >= start - near for s in shown
+        ):
+            ratio = _ratio(motion, limits, order, joint, start, end)
+            if ratio > 1 + 3 * GRAZING:
+                tally.invented[order] += 1
+                wrong.append(f"invented order {order} J{joint + 1} {start:.6f}..{end:.6f} ratio {ratio}")
+    if seen.stretches and found.verdict == "safe":
+        tally.wrong_safe += 1
+    if "q_start" not in spec:
+        _crossings(arm, spec, seen, found, tally, wrong)
+    return wrong
+
+
+def _ratio(motion, limits, order, joint, start, end):
+    if order == 0:
+        return 2.0
+    values = motion.rates(np.linspace(start, end, 50))[order][:, joint]
+    return float(np.nanmax(np.abs(values)) / (limits.speed, limits.acceleration)[order - 1][joint])
+
+
+def _order(code: str) -> int:
+    return 1 if code.startswith("too_fast") else 2
+
+
+def _crossings(arm, spec, seen, found, tally, wrong):
+    """One to one: of two next to each other with no way between them, either may be called a touch."""
+    near = 1e-6 * seen.t[-1]
+    joints = joint_path(spec)[0]
+    for kind, name in enumerate(TYPES):
+        theirs = [time for k, time in seen.crossings if k == kind]
+        ours = [(event.t, event.until) for event in found.events if event.crossing and event.type == name]
+        tally.crossings += len(theirs)
+        for time in theirs:
+            at = next((event for event in ours if event[0] - near <= time <= event[1] + near), None)
+            if at is None:
+                tally.missed_crossings += 1
+                wrong.append(f"missed {name} crossing at {time:.9f}")
+            elif at[0] == at[1]:
+                ours.remove(at)
+        for start, _ in ours:
+            size = abs(factors(arm, joints(np.array([start])))[0, kind])
+            if size > TOUCH:
+                tally.invented_crossings += 1
+                wrong.append(f"invented {name} crossing at {start:.9f}, distance {size:.2e}")

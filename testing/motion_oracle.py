@@ -1,0 +1,419 @@
+"""What random paths do, worked out apart from er3a: dense points, and roots polished on the same formulas.
+
+Paths come as plain numbers in degrees, millimetres and seconds, arms as their tables. Laws of time, rounded corners and
+rotations are written down once more; joints of paths of the tool follow from plane trigonometry, for arms with a
+vertical first axis, parallel axes 2 and 3 in the plane of axis 1, and a spherical wrist. Speeds and accelerations of
+those are differences of their angles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.spatial.transform import Rotation
+
+POINTS = 500_001
+GRAZING = 1e-5  # relative, of limits of rates
+GRAZING_RAD = 1e-7  # of joint limits
+TOUCH = 1e-7  # rad or m, between two crossings next to one another
+
+
+# ---------------------------------------------------------------- paths in joint space
+
+
+def quintic_law(u):
+    """Share of the way from rest to rest at shares (n,) of the time."""
+    return u**3 * (10 - 15 * u + 6 * u**2)
+
+
+def trapezoid_law(u, ramp):
+    """The same with even ramps."""
+    top = 1 / (1 - ramp)
+    up, down = top * u**2 / (2 * ramp), 1 - top * (1 - u) ** 2 / (2 * ramp)
+    return np.where(u < ramp, up, np.where(u > 1 - ramp, down, top * (u - ramp / 2)))
+
+
+def halting_law(corners, halts, duration, ramp):
+    """Share of the way at times, at rest at the corners that are halts, the time shared by the way."""
+    stops = corners[halts]
+
+    def law(t):
+        times = stops * duration
+        i = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(stops) - 2)
+        u = np.clip((t - times[i]) / (times[i + 1] - times[i]), 0, 1)
+        done = quintic_law(u) if ramp is None else trapezoid_law(u, ramp)
+        return stops[i] + (stops[i + 1] - stops[i]) * done
+
+    return law
+
+
+def timed_law(corners, halts, times):
+    """Through corners at their times: monotone cubics, at rest where they halt."""
+    slopes = PchipInterpolator(times, corners).derivative()(times)
+    slopes[halts] = 0.0
+
+    def law(t):
+        i = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 2)
+        h = times[i + 1] - times[i]
+        u = (t - times[i]) / h
+        rest = (1 + 2 * u) * (1 - u) ** 2 * corners[i] + u**2 * (3 - 2 * u) * corners[i + 1]
+        return rest + h * u * (1 - u) * ((1 - u) * slopes[i] - u * slopes[i + 1])
+
+    return law
+
+
+def hermite(ends, starts, length):
+    """The quintic (as powers of 0..length) with value, slope and second derivative (3, k) at either end."""
+    rows = np.zeros((6, 6))
+    for order in range(3):
+        for power in range(order, 6):
+            falling = np.prod([power - i for i in range(order)]) if order else 1.0
+            rows[order, power] = falling * (0.0 if power > order else 1.0)
+            rows[3 + order, power] = falling * length ** (power - order)
+    return np.linalg.solve(rows, np.concatenate([ends, starts]))
+
+
+def rounded(corners, sides, blends):
+    """A curve over its way: value at ways (n,), straight sides with rounded corners.
+
+    corners : values (m + 1, k), or per side the values at its beginning and end; sides : (m,) lengths of way
+    """
+    starts = np.concatenate([[0.0], np.cumsum(sides)])
+    begin, end = corners
+    rates = (end - begin) / sides[:, None]
+    pieces = []
+    for k, blend in enumerate(blends):
+        if blend > 0:
+            before = np.stack([end[k] - blend * rates[k], rates[k], 0 * rates[k]])
+            after = np.stack([begin[k + 1] + blend * rates[k + 1], rates[k + 1], 0 * rates[k]])
+            jump = end[k] - begin[k + 1]  # another frame behind the corner
+            before[0] -= jump
+            pieces.append((starts[k + 1], blend, hermite(before, after, 2 * blend)))
+
+    def value(way):
+        i = np.clip(np.searchsorted(starts, way, side="right") - 1, 0, len(sides) - 1)
+        found = begin[i] + (way - starts[i])[:, None] * rates[i]
+        frame = i.copy()
+        for k, (at, blend, c) in zip(np.flatnonzero(blends > 0), pieces):
+            here = (way > at - blend) & (way < at + blend)
+            x = (way[here] - at + blend)[:, None] ** np.arange(6)
+            found[here], frame[here] = x @ c, k + 1
+        return found, frame
+
+    return value
+
+
+def joint_path(spec) -> tuple[Callable, np.ndarray]:
+    """Angles (n, 6) in rad at times (n,), and the times at which pieces meet."""
+    if spec["kind"] == "joint":
+        T = spec["duration_s"]
+        ends = [np.radians([spec["start_deg"], spec["start_velocity_deg_s"], spec["start_acceleration_deg_s2"]])]
+        ends.append(np.radians([spec["end_deg"], spec["end_velocity_deg_s"], spec["end_acceleration_deg_s2"]]))
+        c = hermite(*ends, T)
+        return (lambda t: t[:, None] ** np.arange(6) @ c), np.array([0.0, T])
+    points = np.radians(spec["points_deg"])
+    sides = np.abs(np.diff(points, axis=0)).max(axis=1)
+    most = np.minimum(sides[:-1], sides[1:]) / 2
+    blends = np.full(len(sides) - 1, np.radians(spec["blend_deg"])) if spec["kind"] != "table" else None
+    blends = np.minimum(most, np.radians(spec["blend_deg"])) if blends is None else blends
+    corners = np.concatenate([[0.0], np.cumsum(sides)])
+    halts = np.concatenate([[True], blends == 0, [True]])
+    if spec["kind"] == "table":
+        law, T = timed_law(corners, halts, np.array(spec["times_s"])), spec["times_s"][-1]
+    else:
+        T = spec["duration_s"]
+        share = halting_law(corners / corners[-1], halts, T, spec.get("ramp_share"))
+
+        def law(t):
+            return share(t) * corners[-1]
+
+    curve = rounded((points[:-1], points[1:]), sides, blends)
+    return (lambda t: curve(law(t))[0]), np.array([0.0, T])
+
+
+# ---------------------------------------------------------------- arms
+
+
+@dataclass(frozen=True)
+class Arm:
+    """What plane trigonometry needs of an arm, read off its chain at rest."""
+
+    links: np.ndarray
+    direction: np.ndarray
+    offset: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    wrist_in_tool: np.ndarray
+    base: np.ndarray  # (3,), where axis 1 stands
+    plane: np.ndarray  # (4,): r and z of joint 2, lengths of upper arm and forearm
+    zero: np.ndarray  # (3,): azimuth, and angles of upper arm and forearm, at q = 0
+    sense: np.ndarray  # (3,), by which q1..q3 turn them
+
+
+def _turn(angle):
+    T = np.zeros((*np.shape(angle), 4, 4))
+    T[..., 0, 0] = T[..., 1, 1] = np.cos(angle)
+    T[..., 1, 0], T[..., 0, 1] = np.sin(angle), -np.sin(angle)
+    T[..., 2, 2] = T[..., 3, 3] = 1.0
+    return T
+
+
+def _fixed(axis, angle, along):
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_rotvec(angle * np.eye(3)[axis]).as_matrix()
+    T[:3, 3] = along
+    return T
+
+
+def arm_of(table) -> Arm:
+    """From a table: dict of convention, a, alpha, d, offset, direction, lower, upper, base, tool (SI)."""
+    links = [np.array(table["base"])]
+    for a, alpha, d in zip(table["a"], table["alpha"], table["d"]):
+        across = _fixed(0, alpha, [a, 0, 0])
+        rise = _fixed(2, 0.0, [0, 0, d])
+        if table["convention"] == "standard":
+            links.append(rise @ across)
+        else:
+            links[-1] = links[-1] @ across
+            links.append(rise)
+    links[-1] = links[-1] @ np.array(table["tool"])
+    links = np.array(links)
+    direction, offset = np.array(table["direction"], float), np.array(table["offset"], float)
+
+    def frames(q):
+        T, found = links[0], []
+        for k in range(6):
+            found.append(T)
+            T = T @ _turn(direction[k] * q[k] + offset[k]) @ links[k + 1]
+        return [*found, T]
+
+    def planar(q):
+        F = frames(q)
+        centre = _meeting(F[3:6])
+        top = F[0][:3, 3]
+        azimuth = np.arctan2(*(centre - top)[1::-1])
+        out = np.array([np.cos(azimuth), np.sin(azimuth), 0])
+        joints = [((p - top) @ out, (p - top)[2]) for p in (F[1][:3, 3], F[2][:3, 3], centre)]
+        (x2, z2), (x3, z3), (xw, zw) = joints
+        return azimuth, np.arctan2(z3 - z2, x3 - x2), np.arctan2(zw - z3, xw - x3), (x2, z2), F, centre
+
+    spread = np.array([0.0, 0.3, -0.2, 0, 0, 0])  # away from a wrist centre above axis 1
+    base_pose = planar(spread)
+    step, sense, zero = 1e-4, [], []
+    for k in range(3):
+        moved = planar(spread + step * np.eye(6)[k])
+        turned = moved[k] - base_pose[k]
+        sense.append(np.sign(np.angle(np.exp(1j * turned))))
+    F, centre = base_pose[4], base_pose[5]
+    zero.append(base_pose[0])
+    zero += [base_pose[1] - sense[1] * spread[1]]
+    zero += [base_pose[2] - sense[1] * spread[1] - sense[2] * spread[2]]
+    upper = np.linalg.norm(F[2][:3, 3] - F[1][:3, 3])
+    fore = np.linalg.norm(centre - F[2][:3, 3])
+    return Arm(
+        links, direction, offset, np.array(table["lower"]), np.array(table["upper"]),
+        (np.linalg.inv(F[6]) @ np.append(centre, 1.0))[:3], F[0][:3, 3],
+        np.array([*base_pose[3], upper, fore]), np.array(zero), np.array(sense),
+    )  # fmt: skip
+
+
+def _meeting(frames):
+    """The point next to the z axes of frames."""
+    A, b = np.zeros((3, 3)), np.zeros(3)
+    for T in frames:
+        across = np.eye(3) - np.outer(T[:3, 2], T[:3, 2])
+        A += across
+        b += across @ T[:3, 3]
+    return np.linalg.solve(A, b)
+
+
+def factors(arm: Arm, q):
+    """Signed distances (n, 3) from the wrist (sine), elbow (sine) and shoulder (m) sets."""
+    upper = arm.zero[1] + arm.sense[1] * q[:, 1]
+    fore = arm.zero[2] + arm.sense[1] * q[:, 1] + arm.sense[2] * q[:, 2]
+    r = arm.plane[0] + arm.plane[2] * np.cos(upper) + arm.plane[3] * np.cos(fore)
+    return np.stack([np.sin(arm.direction[4] * q[:, 4] + arm.offset[4]), np.sin(fore - upper), r], axis=1)
+
+
+# ---------------------------------------------------------------- paths of the tool
+
+
+def tool_path(spec) -> tuple[Callable, float]:
+    """Poses (n, 4, 4) of the tool at times (n,), and the duration."""
+    poses = [_pose(p) for p in spec["poses"]]
+    T = spec["duration_s"]
+    turns = [Rotation.from_matrix(b[:3, :3] @ a[:3, :3].T).as_rotvec() for a, b in pairwise(poses)]
+    if spec["kind"] == "arc":
+        start, via, end = poses[0][:3, 3], np.array(spec["via_mm"]) / 1000, poses[1][:3, 3]
+        centre, normal, angle = _circle(start, via, end)
+
+        def arc(t):
+            s = quintic_law(t / T) if spec.get("ramp_share") is None else trapezoid_law(t / T, spec["ramp_share"])
+            spin = Rotation.from_rotvec(np.outer(s * angle, normal))
+            return _stack(centre + spin.apply(start - centre), Rotation.from_rotvec(s[:, None] * turns[0]), poses[:1])
+
+        return arc, T
+    steps = zip(poses, poses[1:], turns)
+    sides = np.array([max(np.linalg.norm(b[:3, 3] - a[:3, 3]), 0.1 * np.linalg.norm(w)) for a, b, w in steps])
+    turns = np.array(turns)
+    blends = np.array(spec.get("blends_mm", [])) / 1000
+    points = np.array([pose[:3, 3] for pose in poses])
+    begin = np.concatenate([points[:-1], 0 * turns], axis=1)
+    end = np.concatenate([points[1:], turns], axis=1)
+    corners = np.concatenate([[0.0], np.cumsum(sides)])
+    halts = np.concatenate([[True], blends == 0, [True]])
+    share = halting_law(corners / corners[-1], halts, T, spec.get("ramp_share"))
+    # The position goes on behind a corner; only the rotation vector starts anew from the corner's orientation.
+    curve = rounded((begin, end), sides, blends)
+
+    def sequence(t):
+        x, frame = curve(share(t) * corners[-1])
+        return _stack(x[:, :3], Rotation.from_rotvec(x[:, 3:]), [poses[k] for k in range(len(sides))], frame)
+
+    return sequence, T
+
+
+def _pose(values):
+    """4x4 of x, y, z in mm and roll, pitch, yaw in deg."""
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_euler("ZYX", values[:2:-1], degrees=True).as_matrix()
+    T[:3, 3] = np.array(values[:3]) / 1000
+    return T
+
+
+def _circle(a, b, c):
+    u, v = b - a, c - a
+    w = np.cross(u, v)
+    centre = a + (np.cross(w, u) * (v @ v) + np.cross(v, w) * (u @ u)) / (2 * w @ w)
+    normal = w / np.linalg.norm(w)
+    x = (a - centre) / np.linalg.norm(a - centre)
+    angle = np.arctan2((c - centre) @ np.cross(normal, x), (c - centre) @ x) % (2 * np.pi)
+    return centre, normal, angle
+
+
+def _stack(points, spin, starts, frame=None):
+    T = np.zeros((len(points), 4, 4))
+    first = np.array([pose[:3, :3] for pose in starts])[np.zeros(len(points), int) if frame is None else frame]
+    T[:, :3, :3] = spin.as_matrix() @ first
+    T[:, :3, 3], T[:, 3, 3] = points, 1.0
+    return T
+
+
+def joints_of(arm: Arm, T, q_start):
+    """Angles (n, 6) along poses (n, 4, 4) on the branch of the start, made continuous; NaN where out of reach."""
+    centre = T[:, :3, 3] + T[:, :3, :3] @ arm.wrist_in_tool - arm.base
+    r, z = np.hypot(centre[:, 0], centre[:, 1]), centre[:, 2]
+    at_start = factors(arm, q_start[None])[0]
+    front, bent = np.sign(at_start[2]), np.sign(at_start[1])
+    x2, z2, upper, fore = arm.plane
+    x, z = front * r - x2, z - z2
+    far = np.hypot(x, z)
+    cosine = (far**2 + upper**2 - fore**2) / (2 * far * upper)
+    with np.errstate(invalid="ignore"):
+        inner = np.arccos(cosine)
+    lean = np.arctan2(z, x) - bent * inner
+    pitch = np.arctan2(z - upper * np.sin(lean), x - upper * np.cos(lean))
+    azimuth = np.arctan2(centre[:, 1], centre[:, 0]) + (np.pi if front < 0 else 0.0)
+    q = np.empty((len(T), 6))
+    q[:, 0] = arm.sense[0] * (azimuth - arm.zero[0])
+    q[:, 1] = arm.sense[1] * (lean - arm.zero[1])
+    q[:, 2] = arm.sense[2] * (pitch - arm.zero[2] - (lean - arm.zero[1]))
+    R = arm.links[0][:3, :3]
+    for k in range(3):
+        R = R @ _turn(arm.direction[k] * q[:, k] + arm.offset[k])[:, :3, :3] @ arm.links[k + 1][:3, :3]
+    M = np.swapaxes(R, 1, 2) @ T[:, :3, :3] @ arm.links[6][:3, :3].T
+    L4, L5 = arm.links[4][:3, :3], arm.links[5][:3, :3]
+    # M = Rz L4 Rz L5 Rz: its last entry is p cos + s sin + c of the middle angle.
+    p, s, c = L4[2, 0] * L5[0, 2] + L4[2, 1] * L5[1, 2], L4[2, 1] * L5[0, 2] - L4[2, 0] * L5[1, 2], L4[2, 2] * L5[2, 2]
+    wanted = (M[:, 2, 2] - c) / np.hypot(p, s)
+    start5 = arm.direction[4] * q_start[4] + arm.offset[4]
+    mid = np.arctan2(s, p)
+    side = np.sign(np.sin(start5 - mid))
+    theta5 = mid + side * _accurate_acos(wanted, M, L4, L5)
+    N = L4 @ _turn(theta5)[:, :3, :3] @ L5
+    theta4 = np.arctan2(M[:, 1, 2], M[:, 0, 2]) - np.arctan2(N[:, 1, 2], N[:, 0, 2])
+    theta6 = np.arctan2(-M[:, 2, 1], M[:, 2, 0]) - np.arctan2(-N[:, 2, 1], N[:, 2, 0])
+    for k, theta in ((3, theta4), (4, theta5), (5, theta6)):
+        q[:, k] = arm.direction[k] * (theta - arm.offset[k])
+    good = np.isfinite(q).all(axis=1)
+    if good.any():
+        q[good] = np.unwrap(q[good], axis=0)
+        q += 2 * np.pi * np.round((q_start - q[np.argmax(good)]) / (2 * np.pi))
+    return q
+
+
+def _accurate_acos(cosine, M, L4, L5):
+    """The angle by its sine too, which the cosine alone loses next to 0 and pi; for links at right angles."""
+    sine = np.hypot(M[:, 0, 2], M[:, 1, 2])
+    return np.arctan2(sine, np.clip(cosine, -1, 1))
+
+
+# ---------------------------------------------------------------- comparison
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What dense points show: times, crossings (type number, time), and stretches (order, joint, start, end, ratio)."""
+
+    t: np.ndarray
+    crossings: list[tuple[int, float]]
+    stretches: list[tuple[int, int, float, float]]
+    out_of_reach: bool
+
+
+def truth(spec, arm: Arm, limits, q_start=None, points=POINTS) -> Truth:
+    """Look at a path; limits: (speed, acceleration), each (6,)."""
+    if q_start is None:
+        joints, ends = joint_path(spec)
+        duration = ends[-1]
+    else:
+        path, duration = tool_path(spec)
+
+        def joints(t):
+            return joints_of(arm, path(t), q_start)
+
+    t = np.linspace(0, duration, points)
+    q = joints(t)
+    missing = np.isnan(q[:, 0])
+    h = t[1] - t[0]
+    speed = np.gradient(q, h, axis=0, edge_order=2)
+    pull = np.full_like(q, np.nan)
+    pull[1:-1] = (q[2:] - 2 * q[1:-1] + q[:-2]) / h**2
+    noise = np.array([8 * np.finfo(float).eps * np.pi * 4 / h, 32 * np.finfo(float).eps * np.pi * 4 / h**2])
+    found: list[tuple[int, int, float, float]] = []
+    for j in range(6):
+        outside = (q[:, j] > arm.upper[j] + GRAZING_RAD) | (q[:, j] < arm.lower[j] - GRAZING_RAD)
+        found += [(0, j, t[a], t[b]) for a, b in _runs(outside)]
+        for order, values in ((1, speed), (2, pull)):
+            most = limits[order - 1][j]
+            above = np.abs(values[:, j]) > most * (1 + GRAZING) + noise[order - 1]
+            found += [(order, j, t[a], t[b]) for a, b in _runs(above)]
+    crossings = []
+    if q_start is None:
+        f = factors(arm, q)
+        for kind in range(3):
+            for i in np.flatnonzero(f[:-1, kind] * f[1:, kind] < 0):
+                root = _polished(lambda x, kind=kind: factors(arm, joints(x))[:, kind], t[i], t[i + 1])
+                crossings.append((kind, root))
+    return Truth(t, crossings, found, bool(missing.any()))
+
+
+def _polished(f, low, high):
+    """The root between two times, by halving."""
+    rising = f(np.array([high]))[0] > 0
+    for _ in range(60):
+        middle = (low + high) / 2
+        if (f(np.array([middle]))[0] > 0) == rising:
+            high = middle
+        else:
+            low = middle
+    return (low + high) / 2
+
+
+def _runs(flags):
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int))).reshape(-1, 2)
+    return [(a, b - 1) for a, b in edges]
