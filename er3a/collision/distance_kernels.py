@@ -540,3 +540,13 @@ def search_boxes(layout: Layout, k: int, box: Reals, overlapping: bool, most: in
             stack[row, 1 - side, cut] = (low[cut] + high[cut]) / 2
         height += 2
     return outcome, looked, least
+
+
+@kernel
+def distances_from_hull(points: Reals, hull: Reals, found: Reals) -> None:
+    """Distances (N,) of points (N, 3) from the hull of points (m, 3); 0 inside."""
+    w, room, near = np.empty((len(hull) + 1, 3)), np.empty((ROOM, 3)), np.empty((2, 3))
+    w[1:] = hull
+    for n in range(len(points)):
+        w[0] = points[n]
+        found[n] = _cores(w, (0, 1, 1, len(w)), 0.0, 0.0, room, near)

@@ -24,10 +24,10 @@ def overlap_depth(first: Reals, second: Reals) -> float:
     return max(0.0, float(-offsets.max()))
 
 
-def cylinder_points(ends: Reals, disc: float) -> Reals:
-    """Points (2 * RIM, 3) whose hull holds a cylinder with ends (2, 3) and a radius, 0.05 % of it too wide."""
+def cylinder_points(ends: Reals, disc: float, rim: int = RIM) -> Reals:
+    """Points (2 * rim, 3) whose hull holds a cylinder with ends (2, 3) and a radius, 0.05 % of it too wide for 96."""
     axis = ends[1] - ends[0]
     across = np.linalg.svd(axis[None])[2][1:]
-    angle = 2 * np.pi * np.arange(RIM) / RIM
-    rim = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ across * disc / np.cos(np.pi / RIM)
-    return np.concatenate([ends[0] + rim, ends[1] + rim])
+    angle = 2 * np.pi * np.arange(rim) / rim
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ across * disc / np.cos(np.pi / rim)
+    return np.concatenate([ends[0] + circle, ends[1] + circle])

@@ -18,10 +18,11 @@ from er3a.display import Displayed, Sheet, shortly
 from er3a.errors import InputError
 from er3a.formats.from_axes import table_from_axes
 from er3a.formats.text_file import read_text
+from er3a.formats.urdf_shapes import collision_shapes, numbers
 from er3a.geometry.transforms import rot_z, rpy_of, transform
 from er3a.kinematics.chain import JOINTS, constant_links
-from er3a.kinematics.forward import forward
-from er3a.robots.robot import Robot, Source
+from er3a.kinematics.forward import forward, frames
+from er3a.robots.robot import Envelope, Hull, Robot, Source
 
 MOVING = ("revolute", "continuous")
 SNAP_RAD = 1e-4
@@ -102,7 +103,37 @@ def import_urdf(path: str | Path, snap: bool = False) -> UrdfImport:
     )
     q = np.random.default_rng(0).uniform(-math.pi, math.pi, (MISFIT_POSES, JOINTS))
     misfit = np.linalg.norm((forward(robot, q) - _chain_forward(joints, q))[:, :3, 3], axis=1).max()
-    return UrdfImport(robot, tuple(notes), float(misfit))
+    envelopes, hulls, told = link_shapes(path, robot)
+    if envelopes or hulls:
+        sources |= {"envelopes": Source(f"Collision geometry of {path.name}", "export")}
+        robot = robot.replace(envelopes=envelopes, hulls=hulls, sources=sources)
+    return UrdfImport(robot, (*notes, *told), float(misfit))
+
+
+def link_shapes(path: Path, robot: Robot) -> tuple[tuple[Envelope, ...], tuple[Hull, ...], tuple[str, ...]]:
+    """The collision geometry of a URDF, in the frames of the links of the robot made from it, and notes in words."""
+    chain = {joint.name for joint in _chain(path, False)[0]}
+    zero = np.concatenate([robot.base[None], frames(robot, np.zeros(len(robot.a)))])
+    joints = {_link(path, element, "child"): element for element in _joint_elements(path)}
+    envelopes, hulls, notes = list[Envelope](), list[Hull](), list[str]()
+    for link in ElementTree.fromstring(read_text(path)).findall("link"):
+        T, turned, name = np.eye(4), 0, link.get("name", "?")
+        while name in joints:
+            element = joints[name]
+            joint = _joint(path, element, False, [])
+            if joint.type in MOVING and joint.name not in chain:
+                break
+            T, turned = joint.T_parent_joint @ T, turned + (joint.type in MOVING)
+            name = _link(path, element, "parent")
+        if name in joints:
+            notes.append(f"link {link.get('name')} moves beside the arm's chain; its shape is left out")
+            continue
+        placed = np.linalg.inv(zero[turned]) @ T
+        for collision in link.findall("collision"):
+            found = collision_shapes(path, collision, placed, turned, notes)
+            envelopes += [shape for shape in found if isinstance(shape, Envelope)]
+            hulls += [shape for shape in found if isinstance(shape, Hull)]
+    return tuple(envelopes), tuple(hulls), tuple(notes)
 
 
 def export_urdf(robot: Robot) -> str:
@@ -229,43 +260,26 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool, notes: list[str
     if kind not in (*MOVING, "fixed"):
         raise InputError(path, where, f"type '{kind}' is not supported", "er3a reads revolute and fixed joints")
     origin, axis, limit = (element.find(tag) for tag in ("origin", "axis", "limit"))
-    xyz = _numbers(path, where, origin, "xyz", (0.0, 0.0, 0.0))
-    rpy = _numbers(path, where, origin, "rpy", (0.0, 0.0, 0.0))
+    xyz = numbers(path, where, origin, "xyz", (0.0, 0.0, 0.0))
+    rpy = numbers(path, where, origin, "rpy", (0.0, 0.0, 0.0))
     if snap:
         rpy = _snapped(rpy, where, notes)
-    direction = _numbers(path, where, axis, "xyz", (1.0, 0.0, 0.0))
+    direction = numbers(path, where, axis, "xyz", (1.0, 0.0, 0.0))
     length = np.linalg.norm(direction)
     if kind != "fixed" and length < 1e-9:
         raise InputError(path, where, "the axis has no length", 'Write for example <axis xyz="0 0 1"/>')
     lower, upper, speed = -CONTINUOUS_TURN, CONTINUOUS_TURN, math.nan
     if kind == "revolute":
-        lower, upper = (_numbers(path, where, limit, key, None)[0] for key in ("lower", "upper"))
+        lower, upper = (numbers(path, where, limit, key, None)[0] for key in ("lower", "upper"))
         if lower > upper:
             raise InputError(path, where, f"lower limit {lower:g} above upper {upper:g}", "Swap them")
     elif kind == "continuous":
         notes.append(f"{where} is continuous: +-360 deg were assumed as its limits")
     if limit is not None and limit.get("velocity"):
-        speed = _numbers(path, where, limit, "velocity", None)[0] or math.nan
+        speed = numbers(path, where, limit, "velocity", None)[0] or math.nan
         if speed < 0:
             raise InputError(path, where, f"velocity {speed:g} is below 0", "Write the greatest speed, or 0 if unknown")
     return UrdfJoint(name, kind, transform(xyz, rpy), direction / (length or 1.0), lower, upper, speed)
-
-
-def _numbers(
-    path: Path, where: str, element: ElementTree.Element | None, key: str, default: tuple[float, ...] | None
-) -> np.ndarray:
-    text = element.get(key) if element is not None else None
-    if text is None:
-        if default is None:
-            raise InputError(path, where, f"has no {key}", f"Add {key} to its <limit>")
-        return np.array(default)
-    try:
-        values = np.array([float(word) for word in text.split()])
-    except ValueError:
-        values = np.array([math.nan])
-    if len(values) != (3 if default else 1) or not np.isfinite(values).all():
-        raise InputError(path, f"{where}, {key}", f"'{text[:60]}' is not what stands there", "Write finite numbers")
-    return values
 
 
 def _snapped(rpy: np.ndarray, where: str, notes: list[str]) -> np.ndarray:

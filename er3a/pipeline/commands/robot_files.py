@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from er3a.errors import Er3aError
+from er3a.formats.mesh_file import Unit
 from er3a.pipeline.commands.options import ROBOT_FILES, AnyRobot, AsJson, app, print_json, print_note
 from er3a.pipeline.stages.registry import STAGES
 
@@ -47,6 +48,29 @@ def export_urdf(
     text = urdf_text(load_robot(robot))
     write_atomically(output, lambda path: path.write_text(text, encoding="utf-8"))
     print(f"{output}: written")
+
+
+@app.command(rich_help_panel=ROBOT_FILES)
+def mesh(
+    file: Annotated[Path, typer.Argument(help="a closed mesh: STL, OBJ, DAE or GLB")],
+    unit: Annotated[Unit, typer.Option(help="of the mesh's lengths: m or mm")],
+    output: Annotated[Path, typer.Option(help="the file of convex pieces to write, .json")],
+    threshold: Annotated[float, typer.Option(min=0.01, max=1, help="concavity that may be left in a piece")] = 0.05,
+    seed: Annotated[int, typer.Option(min=0, help="of the search for cuts")] = 0,
+    as_json: AsJson = False,
+):
+    """Split a mesh of a link, a tool or an obstacle into convex pieces, for robot and scene files."""
+    from er3a.files.mesh_import import import_mesh
+
+    if output.suffix != ".json":
+        raise Er3aError(f"{output}: files of convex pieces end in .json; write --output {output.stem}.json")
+    found = import_mesh(file, output, unit, threshold, seed)
+    if as_json:
+        print_json(found.model_dump(exclude={"pieces_mm"}) | {"output": str(output), "pieces": len(found.pieces_mm)})
+        return
+    print(f"{output}: written; convex pieces: {len(found.pieces_mm)}, of {found.triangles} triangles")
+    print(f"the mesh stands out of them by at most {found.uncovered_mm:.3g} mm, which is added to them as a margin")
+    print(f"they stand out of the mesh by {found.excess_mm:.3g} mm, as measured")
 
 
 @app.command(rich_help_panel=ROBOT_FILES)
