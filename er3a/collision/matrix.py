@@ -43,7 +43,8 @@ from er3a.robots.robot import PairRule, Robot
 PairState = Literal["never", "joined", "meets", "undecided", "allowed", "watched"]
 
 SAMPLES = 1024
-BOXES = 100_000
+BOXES = 20_000
+BOXES_MORE = 500  # for the other bodies of two links that are known to meet
 GROWTH, GROWTHS = 1.25, 12  # of the region around a joint, until the rest comes apart
 
 
@@ -124,11 +125,14 @@ def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int = 
     layout = layout_of(robot, flat, [(2 * k, 2 * k + 1) for k in range(len(pairs))])
     q, distance = _sampled(robot, layout)
     box = np.stack([robot.lower, robot.upper])
+    meets = (distance.min(axis=0) < 0) & (distance.max(axis=0) >= 0)
+    if meets.any():
+        boxes = min(boxes, BOXES_MORE)
     found = []
     for k, pair in enumerate(pairs):
         at, least = np.empty(len(robot.a)), distance[:, k]
         overlapping = bool(least[0] < 0)
-        if (least.min() < 0) != (least.max() < 0):
+        if meets[k]:
             found.append(Judged("meets", (pair,), q[least.argmin()]))
             continue
         outcome, looked, bound = search_boxes(layout, k, box, overlapping, boxes, at)
@@ -195,7 +199,7 @@ def _nearest_points(robot: Robot, pair: tuple[Body, Body], q: Reals) -> list[Rea
 def _row(first: str, second: str, found: Sequence[Judged], reason: str) -> MatrixRow:
     """One row over all pairs of bodies of two links; the gravest of what watched ones are."""
     watched = [each for each in found if each.bodies]
-    grave = ("undecided", "meets", "joined", "watched", "allowed", "never")
+    grave = ("meets", "undecided", "joined", "watched", "allowed", "never")
     state = min((each.state for each in watched or found), key=grave.index)
     witness = next((each.witness for each in found if each.witness is not None), None)
     bounds = [each.least for each in found if each.state == "never"]

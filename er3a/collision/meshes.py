@@ -17,6 +17,7 @@ from scipy.spatial import ConvexHull, QhullError
 from er3a.collision.distance_kernels import distances_from_hull
 from er3a.errors import Er3aError
 from er3a.geometry.open3d_loader import load_open3d
+from er3a.geometry.sphere import fibonacci_sphere
 from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import Envelope
 
@@ -62,7 +63,7 @@ def convex_pieces(vertices: Reals, faces: Integers, threshold: float, seed: int)
     corners = vertices[faces]
     volume = float(np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum()) / 6
     if hull.volume - volume <= CONVEX * hull.volume:
-        return ConvexPieces((vertices[hull.vertices],), 0.0, 0.0)
+        return hull_of(vertices)
     try:
         import coacd
     except ImportError:
@@ -74,6 +75,20 @@ def convex_pieces(vertices: Reals, faces: Integers, threshold: float, seed: int)
     parts = coacd.run_coacd(mesh, threshold=threshold, seed=seed, decimate=True, max_ch_vertex=MOST_CORNERS)
     pieces = tuple(_corners(np.asarray(points) * size + middle) for points, _ in parts)
     return ConvexPieces(pieces, uncovered(vertices, faces, pieces), _excess(vertices, faces, pieces, seed))
+
+
+def hull_of(points: Reals) -> ConvexPieces:
+    """The hull of points (n, 3), m, with at most ``MOST_CORNERS`` of its corners: those that lie farthest out.
+
+    What the corners left out stand out by is the margin; the excess is not that of a mesh, but 0: corners are points.
+    """
+    corners = points[ConvexHull(points).vertices]
+    if len(corners) <= MOST_CORNERS:
+        return ConvexPieces((corners,), 0.0, 0.0)
+    kept = _corners(corners[np.unique((fibonacci_sphere(MOST_CORNERS) @ corners.T).argmax(axis=1))])
+    away = np.empty(len(corners))
+    distances_from_hull(corners, kept, away)
+    return ConvexPieces((kept,), float(away.max()) + ROUNDING, 0.0)
 
 
 def uncovered(vertices: Reals, faces: Integers, pieces: Sequence[Reals]) -> float:

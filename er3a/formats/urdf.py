@@ -63,7 +63,7 @@ class UrdfImport(Displayed):
         return replace(self.robot.sheet(), facts=(fits, *self.robot.sheet().facts, *self.notes))
 
 
-def import_urdf(path: str | Path, snap: bool = False) -> UrdfImport:
+def import_urdf(path: str | Path, snap: bool = False, split: bool = False) -> UrdfImport:
     """Derive D-H table, directions, offsets, limits and speeds from a URDF's axes.
 
     The flange is the end of the fixed joints behind joint 6, or joint 6's own link frame if they branch.
@@ -71,6 +71,8 @@ def import_urdf(path: str | Path, snap: bool = False) -> UrdfImport:
     Parameters
     ----------
     snap : take angles within 1e-4 rad of a multiple of 90 deg for that multiple; each such change is noted
+    split : split closed collision meshes that are not convex into convex pieces, which may take a minute for each;
+        otherwise their hulls are taken
 
     Raises
     ------
@@ -103,14 +105,16 @@ def import_urdf(path: str | Path, snap: bool = False) -> UrdfImport:
     )
     q = np.random.default_rng(0).uniform(-math.pi, math.pi, (MISFIT_POSES, JOINTS))
     misfit = np.linalg.norm((forward(robot, q) - _chain_forward(joints, q))[:, :3, 3], axis=1).max()
-    envelopes, hulls, told = link_shapes(path, robot)
+    envelopes, hulls, told = link_shapes(path, robot, split)
     if envelopes or hulls:
         sources |= {"envelopes": Source(f"Collision geometry of {path.name}", "export")}
         robot = robot.replace(envelopes=envelopes, hulls=hulls, sources=sources)
     return UrdfImport(robot, (*notes, *told), float(misfit))
 
 
-def link_shapes(path: Path, robot: Robot) -> tuple[tuple[Envelope, ...], tuple[Hull, ...], tuple[str, ...]]:
+def link_shapes(
+    path: Path, robot: Robot, split: bool
+) -> tuple[tuple[Envelope, ...], tuple[Hull, ...], tuple[str, ...]]:
     """The collision geometry of a URDF, in the frames of the links of the robot made from it, and notes in words."""
     chain = {joint.name for joint in _chain(path, False)[0]}
     zero = np.concatenate([robot.base[None], frames(robot, np.zeros(len(robot.a)))])
@@ -130,7 +134,7 @@ def link_shapes(path: Path, robot: Robot) -> tuple[tuple[Envelope, ...], tuple[H
             continue
         placed = np.linalg.inv(zero[turned]) @ T
         for collision in link.findall("collision"):
-            found = collision_shapes(path, collision, placed, turned, notes)
+            found = collision_shapes(path, collision, (placed, turned), notes, split)
             envelopes += [shape for shape in found if isinstance(shape, Envelope)]
             hulls += [shape for shape in found if isinstance(shape, Hull)]
     return tuple(envelopes), tuple(hulls), tuple(notes)

@@ -1,7 +1,7 @@
 """Collision geometry of a URDF's links as capsules and convex hulls.
 
-Boxes and meshes become hulls, cylinders prisms around them, spheres capsules without length. A mesh that is closed and
-not convex is split into convex pieces, any other one is taken as its hull, which holds it.
+Boxes become hulls, cylinders prisms around them, spheres capsules without length. A mesh is taken as its hull, which
+holds it, or split into convex pieces if it is closed and that is asked for.
 """
 
 from __future__ import annotations
@@ -11,9 +11,8 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
-from er3a.collision.meshes import ConvexPieces, convex_pieces
+from er3a.collision.meshes import ConvexPieces, convex_pieces, hull_of
 from er3a.collision.overlap_depth import cylinder_points
 from er3a.collision.shapes import CORNERS
 from er3a.errors import Er3aError, InputError
@@ -27,9 +26,16 @@ THRESHOLD, SEED = 0.05, 0
 
 
 def collision_shapes(
-    path: Path, collision: ElementTree.Element, T_link: Reals, link: int, notes: list[str]
+    path: Path, collision: ElementTree.Element, place: tuple[Reals, int], notes: list[str], split: bool
 ) -> list[Envelope | Hull]:
-    """Shapes of one ``<collision>``; ``T_link`` (4, 4) takes the URDF link's frame to that of our link of a number."""
+    """Shapes of one ``<collision>``.
+
+    Parameters
+    ----------
+    place : (4, 4), from the URDF link's frame to that of our link, and the number of that link
+    notes : gets what was assumed or left out; split : whether meshes are split into convex pieces
+    """
+    T_link, link = place
     origin, geometry = collision.find("origin"), collision.find("geometry")
     where = f"collision of link {link}"
     xyz, rpy = (numbers(path, where, origin, key, (0.0, 0.0, 0.0)) for key in ("xyz", "rpy"))
@@ -46,7 +52,7 @@ def collision_shapes(
             x, y, z = T[:3, 3].tolist()
             return [Envelope(link, (x, y, z), (x, y, z), float(numbers(path, where, shape, "radius", None)[0]))]
         case "mesh":
-            found = _mesh(path, where, shape, notes)
+            found = _mesh(path, where, shape, notes, split)
             if found is None:
                 return []
             pieces = found
@@ -57,20 +63,22 @@ def collision_shapes(
     return [Hull(link, tuple((x, y, z) for x, y, z in piece.tolist()), pieces.uncovered) for piece in placed]
 
 
-def _mesh(path: Path, where: str, shape: ElementTree.Element | None, notes: list[str]) -> ConvexPieces | None:
+def _mesh(
+    path: Path, where: str, shape: ElementTree.Element | None, notes: list[str], split: bool
+) -> ConvexPieces | None:
     name = shape.get("filename", "") if shape is not None else ""
     file = _found(path, name)
     if file is None:
         notes.append(f"{where}: the mesh {name} was not found; the link has no shape of it")
         return None
     scale = numbers(path, where, shape, "scale", (1.0, 1.0, 1.0))
-    try:
-        mesh = read_mesh(file, "m", scale)
-        return convex_pieces(mesh.vertices, mesh.faces, THRESHOLD, SEED)
-    except Er3aError:  # not closed, or nothing splits it here
-        vertices = read_vertices(file) * scale
-        notes.append(f"{where}: the mesh {file.name} is not closed, or not convex without coacd; its hull is taken")
-        return ConvexPieces((vertices[ConvexHull(vertices).vertices],), 0.0, 0.0)
+    if split:
+        try:
+            mesh = read_mesh(file, "m", scale)
+            return convex_pieces(mesh.vertices, mesh.faces, THRESHOLD, SEED)
+        except Er3aError as error:
+            notes.append(f"{where}: the hull of {file.name} is taken ({error})")
+    return hull_of(read_vertices(file) * scale)
 
 
 def _found(path: Path, name: str) -> Path | None:

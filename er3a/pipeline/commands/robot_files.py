@@ -19,13 +19,14 @@ def import_urdf(
     file: Annotated[Path, typer.Argument(help="a URDF of a six-axis serial arm")],
     output: Annotated[Path, typer.Option(help="the robot file to write")],
     snap: Annotated[bool, typer.Option(help="take angles within 1e-4 rad of a right angle for it, and say so")] = False,
+    split: Annotated[bool, typer.Option(help="split collision meshes into convex pieces; else their hulls")] = False,
     as_json: AsJson = False,
 ):
     """Derive a robot file (D-H table, directions, offsets, limits) from a URDF's axes."""
     from er3a.files.robot_writer import write_robot
     from er3a.formats.urdf import import_urdf as read_urdf
 
-    imported = read_urdf(file, snap=snap)
+    imported = read_urdf(file, snap=snap, split=split)
     write_robot(imported.robot.replace(name=output.stem), output)
     for note in imported.notes:
         print_note(note)
