@@ -9,9 +9,9 @@ from itertools import product
 
 import numpy as np
 
-from er3a.collision.distance_kernels import CYLINDER, measure, some_distances, which_overlap
+from er3a.collision.distance_kernels import CYLINDER, FREE, measure, search_boxes, some_distances, which_overlap
 from er3a.collision.envelopes import link_frames
-from er3a.collision.matrix import MatrixRow, collision_matrix, matrix_of
+from er3a.collision.matrix import BOXES, MatrixRow, collision_matrix, matrix_of
 from er3a.collision.overlap_depth import cylinder_points, overlap_depth
 from er3a.collision.pairs import BASE, CarriedAndLink, CarriedAndSolid, LinkAndSolid, LinkPair, Pair, link_label
 from er3a.collision.scene import Scene
@@ -113,6 +113,21 @@ class Bodies:
         found = np.empty((len(q), len(self.pairs)), bool)
         which_overlap(self.layout, q, found)
         return found
+
+    def surface_points(self, q: Reals, pair: int) -> Reals:
+        """The points (2, 3), m, on the surfaces of a pair's bodies that are nearest, for an arm (n,)."""
+        near = self.nearest(self.ends(q), np.array([pair]))[1][0]
+        along = near[1] - near[0]
+        length = float(np.linalg.norm(along))
+        unit = along / length if length > 0 else np.zeros(3)
+        sizes = [self._all[b].radius for b in (self.layout.first[pair], self.layout.second[pair])]
+        points: Reals = np.array([near[0] + sizes[0] * unit, near[1] - sizes[1] * unit])
+        return points
+
+    def always_overlaps(self, pair: int, boxes: int = BOXES) -> bool:
+        """Whether a pair overlaps in all arms within the limits, proven."""
+        box = np.stack([self.robot.lower, self.robot.upper])
+        return search_boxes(self.layout, pair, box, True, boxes, np.empty(box.shape[1]))[0] == FREE
 
     def _depth(self, world: Reals, pair: int) -> float:
         cores = []
