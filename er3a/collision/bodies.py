@@ -5,7 +5,7 @@ The base does not move, so it is no pair with what stands around it: an arm is m
 
 from __future__ import annotations
 
-from itertools import product
+from itertools import compress, product
 
 import numpy as np
 
@@ -31,6 +31,7 @@ class Bodies:
     second : (P,) int, number of the other link's body, -1 for a solid
     pairs : P, what meets what
     matrix : what was found of each pair of links
+    joined : (P,), whether a joint joins the two, so that only overlap of what is left of them means anything
     layout : the same as arrays, solids among the bodies
     """
 
@@ -40,18 +41,20 @@ class Bodies:
         self.robot = robot
         own, carried = arm_bodies(robot), carried_bodies(robot, scene)
         matrix = collision_matrix(robot)
-        watched = list(matrix.watched)
+        watched, joined = list(matrix.watched), list(matrix.joined)
         self.matrix: tuple[MatrixRow, ...] = matrix.rows
         rules = scene.pair_rules if scene else ()
         if carried:
             more = matrix_of(robot, list(product(own, carried)), rules)
             watched += more.watched
+            joined += more.joined
             self.matrix += more.rows
         moving = [body for body in (*own, *carried) if body.link != BASE]
         solids = [body for solid in (scene.solids if scene else ()) for body in solid_bodies(solid)]
         allowed = {frozenset((rule.first, rule.second)) for rule in rules if rule.rule == "allow"}
         around = [(b, s) for s in solids for b in moving if frozenset((b.name, s.name)) not in allowed]
-        watched = [pair for pair in watched if frozenset((pair[0].name, pair[1].name)) not in allowed]
+        kept = [frozenset((a.name, b.name)) not in allowed for a, b in watched]
+        watched, joined = list(compress(watched, kept)), list(compress(joined, kept)) + [False] * len(around)
         number: dict[int, int] = {}
         bodies: list[Body] = []
         for body in (*(body for pair in watched for body in pair), *moving, *solids):
@@ -61,15 +64,16 @@ class Bodies:
         pairs = [(number[id(a)], number[id(b)]) for a, b in (*watched, *around)]
         self._all, count = tuple(bodies), len(bodies) - len(solids)
         self.capsules = self._all[:count]
-        self.layout = layout_of(robot, bodies, pairs)
+        self.layout = layout_of(robot, bodies, pairs, joined)
+        self.joined = self.layout.joined
         self.first = self.layout.first
         self.second = np.where(self.layout.second < count, self.layout.second, -1)
         self.pairs: tuple[Pair, ...] = tuple(_named(a, b) for a, b in (*watched, *around))
         most = max((len(body.points) for body in self.capsules), default=1)
         rows = [np.resize(np.arange(len(body.points)), most) for body in self.capsules]
         self._padded = np.array([body.points[row] for body, row in zip(self.capsules, rows)]).reshape(-1, most, 3)
-        kept = [np.arange(len(body.points)) + most * i for i, body in enumerate(self.capsules)]
-        self._kept = np.concatenate(kept) if kept else np.empty(0, int)
+        places = [np.arange(len(body.points)) + most * i for i, body in enumerate(self.capsules)]
+        self._kept = np.concatenate(places) if places else np.empty(0, int)
 
     def ends(self, q: Reals) -> Reals:
         """Points (..., bodies, k, 3) in m whose hulls are the cores of bodies, at joint angles (..., n) in rad.
@@ -84,6 +88,10 @@ class Bodies:
     def distances(self, ends: Reals, pairs: Integers) -> Reals:
         """Distances (len(pairs),) in m of some pairs, negative by the depth of overlap, for points of one arm."""
         return self.nearest(ends, pairs)[0]
+
+    def told(self, distances: Reals) -> Reals:
+        """Distances (..., P) as they are told: infinite for joined pairs that don't overlap."""
+        return np.where(self.joined & (distances > 0), np.inf, distances)
 
     def nearest(self, ends: Reals, pairs: Integers) -> tuple[Reals, Reals]:
         """Distances as :meth:`distances`, and the points (len(pairs), 2, 3), m, where the bodies' cores are nearest."""
@@ -102,7 +110,7 @@ class Bodies:
         measure(self.layout, q, np.empty((0, 0)), least, pair, deep)
         every = np.arange(len(self.pairs))
         for row in np.flatnonzero(deep):
-            distances = self.distances(self.ends(q[row]), every)
+            distances = self.told(self.distances(self.ends(q[row]), every))
             pair[row] = int(distances.argmin())
             least[row] = distances[pair[row]]
         return least, pair

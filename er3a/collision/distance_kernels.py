@@ -47,6 +47,7 @@ class Layout(NamedTuple):
     link : (B,), ``WORLD`` for solids; start : (B + 1,), of each body's points; points : (P, 3), m, in the link's frame
     kind : (B,); radius, disc : (B,), m; centre : (B, 3), reach : (B,), of a ball around the body, m
     first, second : (K,), numbers of bodies, the second's link being the outer one or, of a solid, the arm's the first
+    joined : (K,), whether a joint joins them, so that only overlap means anything, not how far apart they are
     inner : (K,), the joint (from 0) from which on joints change how the two lie
     """
 
@@ -64,6 +65,7 @@ class Layout(NamedTuple):
     reach: Reals
     first: Integers
     second: Integers
+    joined: Flags
     inner: Integers
 
 
@@ -147,7 +149,7 @@ def _lines(w: Reals, a0: int, a1: int, b0: int, b1: int, near: Reals) -> float:
     for r in range(3):
         near[0, r] = w[a0, r] + best_s * (w[a1, r] - w[a0, r])
         near[1, r] = w[b0, r] + best_t * (w[b1, r] - w[b0, r])
-    return np.sqrt(best)
+    return float(np.sqrt(best))
 
 
 @kernel
@@ -212,7 +214,7 @@ def _faces_origin(room: Reals, i: int, j: int, k: int, out: int) -> bool:
     x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
     here = -(x * room[i, 0] + y * room[i, 1] + z * room[i, 2])
     there = x * (room[out, 0] - room[i, 0]) + y * (room[out, 1] - room[i, 1]) + z * (room[out, 2] - room[i, 2])
-    return here * there <= 0 or abs(there) <= 1e-18
+    return bool(here * there <= 0 or abs(there) <= 1e-18)
 
 
 @kernel
@@ -300,7 +302,7 @@ def _cores(
         if square >= last or count == 4:
             break
         last = square
-    return size
+    return float(size)
 
 
 @kernel
@@ -325,7 +327,7 @@ def _above_plane(w: Reals, first: int, last: int, disc: float, plane: int, near:
             least -= disc * size
     least -= w[plane + 1, 0]
     near[1, 0], near[1, 1], near[1, 2] = near[0, 0] - least * x, near[0, 1] - least * y, near[0, 2] - least * z
-    return least
+    return float(least)
 
 
 @kernel
@@ -354,7 +356,7 @@ def _apart(middle: Reals, reach: Reals, a: int, b: int) -> float:
     square = 0.0
     for r in range(3):
         square += (middle[a, r] - middle[b, r]) ** 2
-    return np.sqrt(square) - reach[a] - reach[b]
+    return float(np.sqrt(square) - reach[a] - reach[b])
 
 
 @kernel
@@ -371,12 +373,13 @@ def measure(layout: Layout, q: Reals, found: Reals, least: Reals, pair: Integers
     """Distances of all pairs in arms (N, n); of overlapping cores the least depth that is known.
 
     ``found`` (N, K) gets them all; if it has no columns, only ``least`` (N,) and its number ``pair`` (N,) are worked
-    out, and pairs that can't be the least are left out. ``deep`` (N,) tells whether cores overlapped.
+    out, and pairs that can't be the least are left out. Joined pairs are the least only where they overlap. ``deep``
+    (N,) tells whether cores overlapped.
     """
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))
     T, w = np.empty((q.shape[1] + 1, 4, 4)), np.empty(layout.points.shape)
     middle, reach, first, second = np.empty(layout.centre.shape), layout.reach, layout.first, layout.second
-    shape = (layout.start, layout.kind, layout.radius, layout.disc)
+    shape, joined = (layout.start, layout.kind, layout.radius, layout.disc), layout.joined
     for n in range(q.shape[0]):
         place(layout, q[n], T, w, middle)
         best, at, inside = np.inf, -1, False
@@ -387,7 +390,7 @@ def measure(layout: Layout, q: Reals, found: Reals, least: Reals, pair: Integers
             inside = inside or overlap
             if found.shape[1]:
                 found[n, k] = distance
-            if distance < best:
+            if distance < best and not (joined[k] and distance >= 0):
                 best, at = distance, k
         least[n], pair[n], deep[n] = best, at, inside
 
@@ -428,13 +431,10 @@ def body_motion(T: Reals, w: Reals, first: int, last: int, joints: tuple[int, in
 
 @kernel
 def _pair_motion(layout: Layout, T: Reals, w: Reals, k: int, half: Reals) -> float:
-    """How far the bodies of a pair move against each other at most (of a cylinder's disc, all points)."""
+    """How far the bodies of a pair move against each other at most; what moves is no cylinder."""
     b = layout.first[k] if layout.link[layout.second[k]] == WORLD else layout.second[k]
     joints = (layout.inner[k], layout.link[b])
-    moved = body_motion(T, w, layout.start[b], layout.start[b + 1], joints, half)
-    for j in range(joints[0], joints[1]):
-        moved += layout.disc[b] * half[j]
-    return moved
+    return body_motion(T, w, layout.start[b], layout.start[b + 1], joints, half)
 
 
 @kernel

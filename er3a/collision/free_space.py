@@ -110,10 +110,10 @@ def sample_joint_space(bodies: Bodies, samples: int, random: np.random.Generator
     q = random.uniform(robot.lower, robot.upper, (samples, len(robot.a)))
     own = bodies.second >= 0
     hit = bodies.overlaps(q)
-    itself, scene = ~hit[:, own].any(axis=1), ~hit[:, ~own].any(axis=1)
+    itself, scene = (~np.asarray(hit[:, part].any(axis=1)) for part in (own, ~own))
     free = itself & scene
-    shares = (Share(int(flags.sum()), samples) for flags in (itself, scene, free))
-    return JointSpace(q, free, *shares, hit)
+    of_itself, of_scene, whole = (Share(int(flags.sum()), samples) for flags in (itself, scene, free))
+    return JointSpace(q, free, of_itself, of_scene, whole, hit)
 
 
 def find_places(bodies: Bodies, space: JointSpace, across: int, rounds: int, random: np.random.Generator) -> Places:

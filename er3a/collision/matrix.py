@@ -85,10 +85,14 @@ class MatrixRow:
 
 @dataclass(frozen=True, eq=False)
 class CollisionMatrix:
-    """The allowed collision matrix: a row for each pair of links, and the pairs of bodies that are watched."""
+    """The allowed collision matrix: a row for each pair of links, and the pairs of bodies that are watched.
+
+    ``joined`` says of each watched pair whether it is what is left of two bodies that a joint joins.
+    """
 
     rows: tuple[MatrixRow, ...]
     watched: tuple[tuple[Body, Body], ...] = field(repr=False)
+    joined: tuple[bool, ...] = field(repr=False)
 
 
 @derived
@@ -107,16 +111,16 @@ def matrix_of(
             inner, outer = (first, second) if first.link < second.link else (second, first)
             by_names.setdefault((inner.name, outer.name), []).append((inner, outer))
     decided = {frozenset((rule.first, rule.second)): rule for rule in rules}
-    rows, watched = [], []
-    for (first, second), bodies in by_names.items():
-        rule = decided.get(frozenset((first, second)))
+    rows, watched = [], list[tuple[tuple[Body, Body], bool]]()
+    for names, bodies in by_names.items():
+        rule = decided.get(frozenset(names))
         if rule:
             found = [Judged("allowed")] if rule.rule == "allow" else [Judged("watched", tuple(bodies))]
         else:
             found = judged_pairs(robot, bodies, boxes)
-        rows.append(_row(first, second, found, rule.reason if rule else ""))
-        watched += [pair for each in found for pair in each.bodies]
-    return CollisionMatrix(tuple(rows), tuple(watched))
+        rows.append(_row(*names, found, rule.reason if rule else ""))
+        watched += [(pair, each.state == "joined") for each in found for pair in each.bodies]
+    return CollisionMatrix(tuple(rows), tuple(pair for pair, _ in watched), tuple(joined for _, joined in watched))
 
 
 def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int = BOXES) -> list[Judged]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from er3a.collision.distance_kernels import CYLINDER, HALF_SPACE, HULL, WORLD, Layout
 from er3a.collision.envelopes import envelopes_of
+from er3a.collision.overlap_depth import cylinder_points
 from er3a.collision.pairs import link_label
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Solid, Sphere
 from er3a.kinematics.chain import constant_links
@@ -17,6 +18,7 @@ from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 
 ON_AXIS = 1e-9  # m
+SIDES = 24
 CORNERS = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 
 
@@ -50,16 +52,16 @@ def arm_bodies(robot: Robot) -> tuple[Body, ...]:
 
 
 def carried_bodies(robot: Robot, scene: Scene | None) -> tuple[Body, ...]:
-    """What the tool carries, in the frame of the last link."""
+    """What the tool carries, in the frame of the last link; a cylinder as a prism around it, under 1 % too wide."""
     if scene is None or not scene.carried:
         return ()
     last = len(robot.a)
     poses = frames(robot, np.zeros(last))
     T = np.linalg.inv(poses[last - 1]) @ poses[last]
+    bodies = [body for solid in scene.carried for body in solid_bodies(solid)]
+    points = [cylinder_points(b.points, b.disc, SIDES) if b.kind == CYLINDER else b.points for b in bodies]
     return tuple(
-        Body(body.name, last, body.points @ T[:3, :3].T + T[:3, 3], body.radius, body.kind, body.disc)
-        for solid in scene.carried
-        for body in solid_bodies(solid)
+        Body(body.name, last, corners @ T[:3, :3].T + T[:3, 3], body.radius) for body, corners in zip(bodies, points)
     )
 
 
@@ -82,7 +84,9 @@ def solid_bodies(solid: Solid) -> tuple[Body, ...]:
     return (Body(solid.name, WORLD, points @ solid.T[:3, :3].T + solid.T[:3, 3], radius, kind, disc),)
 
 
-def layout_of(robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> Layout:
+def layout_of(
+    robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]], joined: Sequence[bool] = ()
+) -> Layout:
     """Arrays of bodies and of pairs of them; the second of a pair is on the outer link, or in the world."""
     starts = np.concatenate([[0], np.cumsum([len(body.points) for body in bodies])]).astype(np.int64)
     centre, reach = np.zeros((len(bodies), 3)), np.zeros(len(bodies))
@@ -108,6 +112,7 @@ def layout_of(robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple[int, i
         reach=reach,
         first=np.array([i for i, _ in pairs], np.int64),
         second=np.array([j for _, j in pairs], np.int64),
+        joined=np.array(joined or [False] * len(pairs), bool),
         inner=np.array([_first_joint(robot, bodies[i], bodies[j]) for i, j in pairs], np.int64),
     )
 

@@ -180,8 +180,8 @@ class CollisionPairs(StrictModel):
     def rules(self) -> tuple[PairRule, ...]:
         """As the library takes them."""
         return (
-            *(PairRule(*entry.pair, "allow", entry.reason) for entry in self.allow),
-            *(PairRule(*entry.pair, "watch", entry.reason) for entry in self.watch),
+            *(PairRule(entry.pair[0], entry.pair[1], "allow", entry.reason) for entry in self.allow),
+            *(PairRule(entry.pair[0], entry.pair[1], "watch", entry.reason) for entry in self.watch),
         )
 
     def check(self, known: Collection[str]) -> None:

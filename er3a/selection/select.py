@@ -130,7 +130,7 @@ def select(
 
 def refusals(robot: Robot, solutions: Solutions, scene: Scene | None) -> tuple[Refusal | None, ...]:
     """Why each row is refused: limits that it leaves or, with a scene, what overlaps; None for the others."""
-    return solutions.reason if scene is None else refusals_of(Bodies(robot, scene), solutions)
+    return tuple(solutions.reason) if scene is None else refusals_of(Bodies(robot, scene), solutions)
 
 
 def refusals_of(bodies: Bodies, solutions: Solutions) -> tuple[Refusal | None, ...]:

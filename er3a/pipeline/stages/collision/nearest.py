@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from er3a.collision.along import clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.files.path_file import load_paths
 from er3a.files.target_file import load_targets
 from er3a.kinematics.inverse import inverse
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.collision.model import Closest, PathClearances, TargetClearances
+from er3a.pipeline.stages.trajectory.collisions import Surroundings, measured
 from er3a.pipeline.stages.trajectory.motion import motion_of
 from er3a.planning.commands import CommandSource
 from er3a.robots.robot import Robot
@@ -59,7 +59,7 @@ def path_clearances(robot: Robot, bodies: Bodies, file: Path, tolerance: float) 
     for i, entry in enumerate(load_paths(file).paths):
         motion = motion_of(robot, entry, CHECKS, CommandSource(file, f"paths[{i}]"), ends)
         ends[entry.name] = motion.q[-1]
-        along = clearance_along(bodies, motion.joints, motion.t, motion.samples, tolerance)
+        along = measured(Surroundings(bodies, tolerance), motion)
         q = motion.joints(along.t)
         known = np.isfinite(along.distance)
         near = np.full((len(q), 2, 3), np.nan)
