@@ -158,8 +158,8 @@ def clearance_along(
     at = np.array(sorted(time for time, found in motion.known.items() if not np.isnan(found).any()))
     at = np.union1d(at, shown[~np.isin(shown, at)])
     unknown = np.full(len(every), np.nan)
-    rows = np.array([motion.known.get(time, unknown) for time in at])
-    blind = np.isnan(rows).any(axis=1)
+    rows = bodies.told(np.array([motion.known.get(time, unknown) for time in at]))
+    blind = np.asarray(np.isnan(rows).any(axis=1) | np.isinf(rows).all(axis=1))
     distance = np.where(blind, np.nan, rows.min(axis=1))
     pair = tuple(None if b else bodies.pairs[int(np.argmin(row))] for b, row in zip(blind, rows))
     return ClearanceAlong(at, distance, pair, tuple(contacts), len(motion.known))
@@ -205,7 +205,8 @@ def _refine(motion: _Motion, times: Reals, q: Reals, way: Reals, step: float) ->
     """Measure between known points until every interval is free as a whole, or overlaps so, or is short."""
     every = np.arange(len(motion.bodies.pairs))
     known = [i for i, time in enumerate(times) if time in motion.known]
-    best = min(float(motion.known[times[i]].min()) for i in known)
+    bodies = motion.bodies
+    best = min(float(bodies.told(motion.known[times[i]]).min()) for i in known)
     waiting = [(a, b, every) for a, b in pairwise(known)]
     while waiting:
         a, b, pairs = waiting.pop()
@@ -214,14 +215,15 @@ def _refine(motion: _Motion, times: Reals, q: Reals, way: Reals, step: float) ->
         apart = before[pairs] + after[pairs]
         if b - a < 2 or (apart <= -moved).any():
             continue
-        open_ = apart - moved < 2 * max(best, 0.0)
+        open_ = apart - moved < np.where(bodies.joined[pairs], 0.0, 2 * max(best, 0.0))
         pairs, moved = pairs[open_], moved[open_]
         if not pairs.size or moved.max() <= step:
             continue
         middle = int(np.clip(np.searchsorted(way[a : b + 1].sum(axis=1), way[[a, b]].sum() / 2) + a, a + 1, b - 1))
         found = motion.measure(times[middle], q[middle], pairs)
-        if np.nanmin(found) < best:
-            best = float(np.nanmin(found))
+        least = float(np.nanmin(bodies.told(found)))
+        if least < best:
+            best = least
             motion.measure(times[middle], q[middle], every)
         waiting += [(a, middle, pairs), (middle, b, pairs)]
 

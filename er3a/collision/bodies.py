@@ -1,141 +1,153 @@
-"""An arm's capsules and a scene's solids as shapes of the Coal library [1]_, and the pairs of them that can meet.
+"""The pairs of bodies that can meet: of an arm with itself (:mod:`er3a.collision.matrix`) and with a scene's solids.
 
-Left out are pairs that can't tell anything: links with at most one link between them, pairs joined over a way shorter
-than their two radii (the wrist), and the base with the surroundings that it stands on.
-
-References
-----------
-.. [1] J. Pan et al., Coal (formerly hpp-fcl), an extension of the Flexible Collision Library: GJK and EPA distances.
+The base does not move, so it is no pair with what stands around it: an arm is mounted on something.
 """
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import Any
+from itertools import compress, product
 
 import numpy as np
 
-from er3a.collision.envelopes import capsule_poses, envelopes_of
-from er3a.collision.pairs import BASE, LinkAndSolid, LinkPair, Pair
-from er3a.collision.scene import Box, Cylinder, Plane, Scene, Solid, Sphere
+from er3a.collision.distance_kernels import CYLINDER, FREE, measure, search_boxes, some_distances, which_overlap
+from er3a.collision.envelopes import link_frames
+from er3a.collision.matrix import BOXES, MatrixRow, collision_matrix, matrix_of
+from er3a.collision.overlap_depth import cylinder_points, overlap_depth
+from er3a.collision.pairs import BASE, CarriedAndLink, CarriedAndSolid, LinkAndSolid, LinkPair, Pair, link_label
+from er3a.collision.scene import Scene
+from er3a.collision.shapes import Body, arm_bodies, carried_bodies, layout_of, solid_bodies
 from er3a.errors import Er3aError
-from er3a.numerics.arrays import Integers, Reals
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot
-
-try:
-    import coal
-except ImportError:  # no wheels for this platform
-    coal = None
-
-
-def can_measure() -> bool:
-    """Whether the Coal library is there."""
-    return coal is not None
 
 
 class Bodies:
-    """Pairs that can meet, numbered: first those of links with one another, then those of links with solids.
+    """Pairs that can meet, numbered: first those of the arm with itself, then those with solids.
 
     Attributes
     ----------
-    capsules : of the arm
-    first : (P,) int, number of the pair's capsule; of two links the one nearer to the base
-    second : (P,) int, number of the other link's capsule, -1 for a solid
+    capsules : all bodies that move; each has its ``link``
+    first : (P,) int, number of the pair's body; of two links the one nearer to the base
+    second : (P,) int, number of the other link's body, -1 for a solid
     pairs : P, what meets what
-
-    Raises
-    ------
-    Er3aError
-        if the Coal library is missing, or the scene is none
+    matrix : what was found of each pair of links
+    joined : (P,), whether a joint joins the two, so that only overlap of what is left of them means anything
+    layout : the same as arrays, solids among the bodies
     """
 
     def __init__(self, robot: Robot, scene: Scene | None) -> None:
-        if coal is None:
-            problem = "clearance needs the Coal library, which has no wheels for this platform; leave the scene out"
-            raise Er3aError(problem)
         if not isinstance(scene, Scene | None):
             raise Er3aError(f"the scene is a {type(scene).__name__}; expected what er3a.load_scene returns")
         self.robot = robot
-        self.capsules = envelopes_of(robot)
-        self._shapes = [
-            coal.Capsule(c.radius, float(np.linalg.norm(np.subtract(c.end, c.start)))) for c in self.capsules
-        ]
-        solids = scene.solids if scene else ()
-        self._solids = [_shape(solid) for solid in solids]
-        links = [capsule.link for capsule in self.capsules]
-        own = self_pairs(robot)
-        moving = [i for i, link in enumerate(links) if link != BASE]
-        self.first = np.array([i for i, _ in own] + [i for _ in solids for i in moving], dtype=int)
-        self.second = np.array([j for _, j in own] + [-1 for _ in solids for _ in moving], dtype=int)
-        self.pairs: tuple[Pair, ...] = (
-            *(LinkPair(links[i], links[j]) for i, j in own),
-            *(LinkAndSolid(links[i], solid.name) for solid in solids for i in moving),
-        )
-        self._solid_of = [-1] * len(own) + [k for k in range(len(solids)) for _ in moving]
+        own, carried = arm_bodies(robot), carried_bodies(robot, scene)
+        matrix = collision_matrix(robot)
+        watched, joined = list(matrix.watched), list(matrix.joined)
+        self.matrix: tuple[MatrixRow, ...] = matrix.rows
+        rules = scene.pair_rules if scene else ()
+        if carried:
+            more = matrix_of(robot, list(product(own, carried)), rules)
+            watched += more.watched
+            joined += more.joined
+            self.matrix += more.rows
+        moving = [body for body in (*own, *carried) if body.link != BASE]
+        solids = [body for solid in (scene.solids if scene else ()) for body in solid_bodies(solid)]
+        allowed = {frozenset((rule.first, rule.second)) for rule in rules if rule.rule == "allow"}
+        around = [(b, s) for s in solids for b in moving if frozenset((b.name, s.name)) not in allowed]
+        kept = [frozenset((a.name, b.name)) not in allowed for a, b in watched]
+        watched, joined = list(compress(watched, kept)), list(compress(joined, kept)) + [False] * len(around)
+        number: dict[int, int] = {}
+        bodies: list[Body] = []
+        for body in (*(body for pair in watched for body in pair), *moving, *solids):
+            if id(body) not in number:
+                number[id(body)] = len(bodies)
+                bodies.append(body)
+        pairs = [(number[id(a)], number[id(b)]) for a, b in (*watched, *around)]
+        self._all, count = tuple(bodies), len(bodies) - len(solids)
+        self.capsules = self._all[:count]
+        self.layout = layout_of(robot, bodies, pairs, joined)
+        self.joined = self.layout.joined
+        self.first = self.layout.first
+        self.second = np.where(self.layout.second < count, self.layout.second, -1)
+        self.pairs: tuple[Pair, ...] = tuple(_named(a, b) for a, b in (*watched, *around))
+        most = max((len(body.points) for body in self.capsules), default=1)
+        rows = [np.resize(np.arange(len(body.points)), most) for body in self.capsules]
+        self._padded = np.array([body.points[row] for body, row in zip(self.capsules, rows)]).reshape(-1, most, 3)
+        places = [np.arange(len(body.points)) + most * i for i, body in enumerate(self.capsules)]
+        self._kept = np.concatenate(places) if places else np.empty(0, int)
 
     def ends(self, q: Reals) -> Reals:
-        """End points (..., capsules, 2, 3) in m of the capsules' lines at joint angles (..., 6) in rad."""
-        return capsule_poses(self.robot, self.capsules, q)
+        """Points (..., bodies, k, 3) in m whose hulls are the cores of bodies, at joint angles (..., n) in rad.
+
+        Of a capsule the ends of its line. A body moves, as a set, by no more than its points do; those of a body that
+        has fewer than others come more than once.
+        """
+        T = link_frames(self.robot, q)[..., [body.link for body in self.capsules], :, :]
+        placed: Reals = np.einsum("...nij,nkj->...nki", T[..., :3, :3], self._padded) + T[..., None, :3, 3]
+        return placed
 
     def distances(self, ends: Reals, pairs: Integers) -> Reals:
-        """Distances (len(pairs),) in m of some pairs, negative by the depth of overlap, for end points (n, 2, 3)."""
-        placed = _placed(ends)
-        found = np.empty(len(pairs))
-        for row, pair in enumerate(pairs):
-            i, j, solid = self.first[pair], self.second[pair], self._solid_of[pair]
-            other, where = (self._shapes[j], placed[j]) if solid < 0 else self._solids[solid]
-            found[row] = coal.distance(
-                self._shapes[i], placed[i], other, where, coal.DistanceRequest(), coal.DistanceResult()
-            )
-        return found
+        """Distances (len(pairs),) in m of some pairs, negative by the depth of overlap, for points of one arm."""
+        return self.nearest(ends, pairs)[0]
+
+    def told(self, distances: Reals) -> Reals:
+        """Distances (..., P) as they are told: infinite for joined pairs that don't overlap."""
+        return np.where(self.joined & (distances > 0), np.inf, distances)
+
+    def nearest(self, ends: Reals, pairs: Integers) -> tuple[Reals, Reals]:
+        """Distances as :meth:`distances`, and the points (len(pairs), 2, 3), m, where the bodies' cores are nearest."""
+        world = self.layout.points.copy()
+        world[: len(self._kept)] = ends.reshape(-1, 3)[self._kept]
+        found, deep, near = np.empty(len(pairs)), np.zeros(len(pairs), bool), np.empty((len(pairs), 2, 3))
+        some_distances(self.layout, world, np.asarray(pairs, np.int64), found, deep, near)
+        for row in np.flatnonzero(deep):
+            found[row] -= self._depth(world, int(pairs[row]))
+        return found, near
 
     def least(self, q: Reals) -> tuple[Reals, Integers]:
-        """Least distance (N,) in m of arms (N, n), negative by the depth of overlap; the pair's number (-1: none)."""
+        """Least distance (N,) in m of arms (N, n), negative by the depth, and the number of its pair (-1: none)."""
+        q = np.ascontiguousarray(q, float)
+        least, pair, deep = np.empty(len(q)), np.empty(len(q), np.int64), np.zeros(len(q), bool)
+        measure(self.layout, q, np.empty((0, 0)), least, pair, deep)
         every = np.arange(len(self.pairs))
-        if not every.size:
-            return np.full(len(q), np.inf), np.full(len(q), -1)
-        found = np.array([self.distances(ends, every) for ends in self.ends(q)]).reshape(len(q), -1)
-        return found.min(axis=1), found.argmin(axis=1)
+        for row in np.flatnonzero(deep):
+            distances = self.told(self.distances(self.ends(q[row]), every))
+            pair[row] = int(distances.argmin())
+            least[row] = distances[pair[row]]
+        return least, pair
+
+    def overlaps(self, q: Reals) -> Flags:
+        """Which pairs overlap, (N, P), in arms (N, n)."""
+        q = np.ascontiguousarray(q, float)
+        found = np.empty((len(q), len(self.pairs)), bool)
+        which_overlap(self.layout, q, found)
+        return found
+
+    def surface_points(self, q: Reals, pair: int) -> Reals:
+        """The points (2, 3), m, on the surfaces of a pair's bodies that are nearest, for an arm (n,)."""
+        near = self.nearest(self.ends(q), np.array([pair]))[1][0]
+        along = near[1] - near[0]
+        length = float(np.linalg.norm(along))
+        unit = along / length if length > 0 else np.zeros(3)
+        sizes = [self._all[b].radius for b in (self.layout.first[pair], self.layout.second[pair])]
+        points: Reals = np.array([near[0] + sizes[0] * unit, near[1] - sizes[1] * unit])
+        return points
+
+    def always_overlaps(self, pair: int, boxes: int = BOXES) -> bool:
+        """Whether a pair overlaps in all arms within the limits, proven."""
+        box = np.stack([self.robot.lower, self.robot.upper])
+        return search_boxes(self.layout, pair, box, True, boxes, np.empty(box.shape[1]))[0] == FREE
+
+    def _depth(self, world: Reals, pair: int) -> float:
+        cores = []
+        for b in (self.layout.first[pair], self.layout.second[pair]):
+            points, body = world[self.layout.start[b] : self.layout.start[b + 1]], self._all[b]
+            cores.append(cylinder_points(points, body.disc) if body.kind == CYLINDER else points)
+        return overlap_depth(*cores)
 
 
-@lru_cache(maxsize=64)
-def self_pairs(robot: Robot) -> tuple[tuple[int, int], ...]:
-    """Pairs of capsules (by number) that can come apart, so that their distance means something."""
-    capsules = envelopes_of(robot)
-    lengths = {link: 0.0 for link in range(7)}
-    for capsule in capsules:
-        lengths[capsule.link] += float(np.linalg.norm(np.subtract(capsule.end, capsule.start)))
-    pairs = []
-    for i, first in enumerate(capsules):
-        for j, second in enumerate(capsules[:i]):
-            low, high = sorted((first.link, second.link))
-            between = sum(lengths[link] for link in range(low + 1, high))
-            if high - low > 2 and between > first.radius + second.radius:
-                pairs.append((j, i))
-    return tuple(pairs)
-
-
-def _shape(solid: Solid) -> tuple[Any, Any]:
-    """Shape and place of a solid."""
-    match solid:
-        case Plane():
-            return coal.Halfspace(solid.normal, solid.offset), coal.Transform3s.Identity()
-        case Box():
-            shape = coal.Box(*solid.size)
-        case Cylinder():
-            shape = coal.Cylinder(solid.radius, solid.length)
-        case Sphere():
-            shape = coal.Sphere(solid.radius)
-    return shape, coal.Transform3s(solid.T[:3, :3], solid.T[:3, 3])
-
-
-def _placed(ends: Reals) -> list[Any]:
-    """Where capsules (n, 2, 3) (along their own z, about their middle) lie."""
-    along = ends[:, 1] - ends[:, 0]
-    length = np.linalg.norm(along, axis=1, keepdims=True)
-    z = np.where(length > 0, along / np.where(length > 0, length, 1.0), [0.0, 0.0, 1.0])
-    least = np.eye(3)[np.argmin(np.abs(z), axis=1)]
-    x = np.cross(least, z)
-    x /= np.linalg.norm(x, axis=1, keepdims=True)
-    R = np.stack([x, np.cross(z, x), z], axis=-1)
-    return [coal.Transform3s(rotation, middle) for rotation, middle in zip(R, ends.mean(axis=1))]
+def _named(first: Body, second: Body) -> Pair:
+    """What the results call two bodies, the second the outer one or a solid."""
+    is_link = [body.name == link_label(body.link) for body in (first, second)]
+    if second.link < 0:
+        return LinkAndSolid(first.link, second.name) if is_link[0] else CarriedAndSolid(first.name, second.name)
+    return LinkPair(first.link, second.link) if is_link[1] else CarriedAndLink(second.name, first.link)

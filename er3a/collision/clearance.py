@@ -28,20 +28,13 @@ class Clearance:
 
 
 def clearance(robot: Robot, q: Reals, scene: Scene | None) -> Clearance:
-    """Least distance of each arm (N, 6) in rad from the scene's solids and from itself.
+    """Least distance of each arm (N, n) in rad from the scene's solids and from itself.
 
     Raises
     ------
     Er3aError
-        if the Coal library is missing, or the scene is none
+        if the scene is none
     """
     bodies = Bodies(robot, scene)
-    every = np.arange(len(bodies.pairs))
-    distances: list[float] = []
-    pairs: list[Pair | None] = []
-    for ends in bodies.ends(np.asarray(q, float).reshape(-1, 6)):
-        found = bodies.distances(ends, every)
-        least = int(np.argmin(found)) if found.size else -1
-        distances.append(found[least] if found.size else np.inf)
-        pairs.append(bodies.pairs[least] if found.size else None)
-    return Clearance(np.array(distances), tuple(pairs))
+    distance, pair = bodies.least(np.asarray(q, float).reshape(-1, len(robot.a)))
+    return Clearance(distance, tuple(bodies.pairs[k] if k >= 0 else None for k in pair))

@@ -54,7 +54,7 @@ def link_frames(robot: Robot, q: Reals) -> Reals:
     """Frames (..., 7, 4, 4) of the base and the six links at joint angles (..., 6)."""
     T = frames(robot, q)
     base = np.broadcast_to(robot.base, (*T.shape[:-3], 1, 4, 4))
-    return np.concatenate([base, T[..., :JOINTS, :, :]], axis=-3)
+    return np.concatenate([base, T[..., :-1, :, :]], axis=-3)
 
 
 def _pieces(link: int, size: float, lines: list[tuple[Reals, Reals]]) -> list[Envelope]:

@@ -36,7 +36,35 @@ class LinkAndSolid:
         return f"{link_label(self.link)}/{self.solid}"
 
 
-Pair = LinkPair | LinkAndSolid
+@dataclass(frozen=True)
+class CarriedAndLink:
+    """What the tool carries, by its name, and a link."""
+
+    carried: str
+    link: int
+    code: Literal["carried_and_link"] = "carried_and_link"
+
+    @property
+    def label(self) -> str:
+        """For columns of text."""
+        return f"{link_label(self.link)}/{self.carried}"
+
+
+@dataclass(frozen=True)
+class CarriedAndSolid:
+    """What the tool carries and a solid of the scene, by their names."""
+
+    carried: str
+    solid: str
+    code: Literal["carried_and_solid"] = "carried_and_solid"
+
+    @property
+    def label(self) -> str:
+        """For columns of text."""
+        return f"{self.carried}/{self.solid}"
+
+
+Pair = LinkPair | LinkAndSolid | CarriedAndLink | CarriedAndSolid
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from er3a.display import Displayed, Sheet, first_rows, shortly
 from er3a.errors import PoseError
 from er3a.geometry.transforms import check_poses
 from er3a.numerics.arrays import Reals
+from er3a.robots.robot import PairRule
 
 UNIT_LENGTH = 1e-6
 
@@ -104,15 +105,47 @@ class Plane:
         return f"normal {shortly(tuple(np.asarray(self.normal).tolist()))}; offset {1000 * self.offset:.6g}"
 
 
-Solid = Box | Cylinder | Sphere | Plane
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A solid of any shape, as convex pieces.
+
+    Attributes
+    ----------
+    T : (4, 4), T_world_mesh; pieces : vertices (k, 3), m, of each piece, in the mesh's frame
+    margin : m, by how far the mesh may stand out of the pieces; they are taken larger by it
+    """
+
+    name: str
+    T: Reals
+    pieces: tuple[Reals, ...]
+    margin: float
+
+    def __post_init__(self) -> None:
+        _check(self.name, self.T, *(float(np.ptp(piece, axis=0).max()) for piece in self.pieces))
+
+    @property
+    def measures(self) -> str:
+        """Where it is, and of how many pieces."""
+        return f"{_place(self.T)}; {len(self.pieces)} convex pieces, margin {1000 * self.margin:.3g}"
+
+
+Solid = Box | Cylinder | Sphere | Plane | Mesh
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Scene(Displayed):
-    """What an arm may not touch; no two solids have the same name."""
+    """What an arm may not touch; no two solids have the same name.
+
+    Attributes
+    ----------
+    carried : what the tool carries, placed in the tool's frame; it belongs to the last link
+    pair_rules : contacts that are allowed: of links, of what is carried, and of solids
+    """
 
     title: str
     solids: tuple[Solid, ...]
+    carried: tuple[Solid, ...] = ()
+    pair_rules: tuple[PairRule, ...] = ()
 
     def sheet(self) -> Sheet:
         """A row for each solid."""

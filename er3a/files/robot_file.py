@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
+from pathlib import PurePosixPath
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from er3a.files.units import FARTHEST_MM, MOST_DEG, RADIANS_BELOW_DEG, Triple, look_like_radians, suspect
 from er3a.files.yaml_file import StrictModel
-from er3a.robots.robot import MOST_JOINTS, Grade
+from er3a.robots.robot import MOST_JOINTS, Grade, PairRule
 
 NAME_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 SHORTEST_PLAIN_LENGTH_MM = 2.0
@@ -24,6 +26,17 @@ Text = Annotated[str, Field(min_length=1, max_length=2000)]
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 JointNumber = Annotated[int, Field(ge=1, le=MOST_JOINTS)]
 JointType = Literal["revolute", "prismatic"]
+
+
+def _inside_the_study(value: str) -> str:
+    path = PurePosixPath(value)
+    if path.is_absolute() or ".." in path.parts:
+        raise ValueError(f"'{value}' lies outside the study | Give a path below the folder that the study is run in")
+    return value
+
+
+PiecesPath = Annotated[Text, AfterValidator(_inside_the_study)]
+"""A file that ``er3a mesh`` wrote, below the folder that the study is run in."""
 
 
 class Sourced(StrictModel):
@@ -180,10 +193,70 @@ class Capsule(StrictModel):
         return values
 
 
-class Envelopes(Sourced):
-    """Capsules around links and tool, for clearance."""
+class LinkPieces(StrictModel):
+    """Convex pieces of a mesh (``pieces``: a file written by ``er3a mesh``), placed in the frame of joint ``link``."""
 
-    capsules: Annotated[list[Capsule], Field(min_length=1, max_length=100)]
+    link: Annotated[int, Field(ge=0)]
+    pieces: PiecesPath
+    xyz_mm: Triple = [0.0, 0.0, 0.0]
+    rpy_deg: Triple = [0.0, 0.0, 0.0]
+
+
+class LinkHull(StrictModel):
+    """The hull of points, taken larger by ``margin_mm``, in the frame that turns with joint ``link``."""
+
+    link: Annotated[int, Field(ge=0)]
+    margin_mm: Annotated[float, Field(ge=0, le=LONGEST_LENGTH_MM)] = 0.0
+    points_mm: Annotated[list[Triple], Field(min_length=4, max_length=1000)]
+
+
+class Envelopes(Sourced):
+    """Capsules around links and tool, and convex pieces of their shapes, for clearance."""
+
+    capsules: Annotated[list[Capsule], Field(max_length=100)] = []
+    meshes: Annotated[list[LinkPieces], Field(max_length=100)] = []
+    hulls: Annotated[list[LinkHull], Field(max_length=1000)] = []
+
+    @model_validator(mode="after")
+    def _holds_a_shape(self):
+        if not (self.capsules or self.meshes or self.hulls):
+            raise ValueError("no shapes | Write capsules, meshes or hulls, or leave envelopes out")
+        return self
+
+
+class DecidedPair(StrictModel):
+    """Two bodies by name (``base``, ``link_1`` ..., in a scene also solids and what is carried), and why."""
+
+    pair: Annotated[list[Name], Field(min_length=2, max_length=2)]
+    reason: Text
+
+
+class CollisionPairs(StrictModel):
+    """Pairs that are not looked at (``allow``), or looked at as a whole (``watch``), whatever the matrix finds."""
+
+    allow: list[DecidedPair] = []
+    watch: list[DecidedPair] = []
+
+    def rules(self) -> tuple[PairRule, ...]:
+        """As the library takes them."""
+        return (
+            *(PairRule(entry.pair[0], entry.pair[1], "allow", entry.reason) for entry in self.allow),
+            *(PairRule(entry.pair[0], entry.pair[1], "watch", entry.reason) for entry in self.watch),
+        )
+
+    def check(self, known: Collection[str]) -> None:
+        """Refuse names that there are not, and a pair that is decided twice: ``ValueError``."""
+        seen: set[frozenset[str]] = set()
+        for key in ("allow", "watch"):
+            for i, entry in enumerate(getattr(self, key)):
+                where, pair = f"{key}[{i}].pair", frozenset(entry.pair)
+                for name in entry.pair:
+                    if name not in known:
+                        raise ValueError(f"{where}: there is no '{name}' | Known: {', '.join(sorted(known))}")
+                if len(pair) == 1 or pair in seen:
+                    problem = "is decided twice" if pair in seen else "is one body with itself"
+                    raise ValueError(f"{where}: the pair {' and '.join(entry.pair)} {problem} | Remove it")
+                seen.add(pair)
 
 
 class RobotFile(StrictModel):
@@ -203,6 +276,7 @@ class RobotFile(StrictModel):
     base: SourcedPlacement | None = None
     tool: SourcedPlacement | None = None
     envelopes: Envelopes | None = None
+    collision: CollisionPairs | None = None
 
     @model_validator(mode="after")
     def _rows_in_order(self):
@@ -263,6 +337,19 @@ class RobotFile(StrictModel):
             rows = {joint} if joint in moved_by.get(joint, ()) else {row for row, by in moved_by.items() if joint in by}
             found.append(bool(rows & prismatic))
         return found
+
+    def _links_there_are(self):
+        count = len(self.dh.rows)
+        for key in ("meshes", "hulls"):
+            for i, shape in enumerate(getattr(self.envelopes, key) if self.envelopes else []):
+                if shape.link > count:
+                    raise ValueError(f"envelopes.{key}[{i}].link: the arm has no link {shape.link} | 0 to {count}")
+        if self.collision:
+            try:
+                self.collision.check({"base", *(f"link_{k}" for k in range(1, count + 1))})
+            except ValueError as error:
+                raise ValueError(f"collision.{error}") from None
+        return self
 
     @model_validator(mode="after")
     def _units_plausible(self):

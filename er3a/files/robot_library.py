@@ -7,11 +7,21 @@ from pathlib import Path
 import numpy as np
 
 from er3a.errors import InputError
-from er3a.files.robot_file import CombinedLimitRow, Coupling, Envelopes, JointLimitRow, Placement, RobotFile
+from er3a.files.pieces_file import load_pieces
+from er3a.files.robot_file import (
+    CombinedLimitRow,
+    Coupling,
+    Envelopes,
+    JointLimitRow,
+    LinkPieces,
+    Placement,
+    RobotFile,
+)
 from er3a.files.shipped import ROOT, names, own_or_shipped
 from er3a.files.yaml_file import load
 from er3a.geometry.transforms import transform
-from er3a.robots.robot import CombinedLimit, Envelope, Robot, Source
+from er3a.numerics.arrays import Reals
+from er3a.robots.robot import CombinedLimit, Envelope, Hull, Robot, Source
 
 ROBOTS = ROOT / "data" / "robots"
 REFERENCES = ROOT / "data" / "manual_refs"
@@ -83,6 +93,8 @@ def robot_of(content: RobotFile) -> Robot:
         zero_pose=content.zero_pose,
         references=tuple(content.references),
         envelopes=_envelopes(content.envelopes),
+        hulls=_hulls(content.envelopes),
+        pair_rules=content.collision.rules() if content.collision else (),
         sources={group: Source(value.source, value.grade, value.origin or "") for group, value in present.items()},
         origins=_origins(content),
     )
@@ -145,6 +157,25 @@ def _envelopes(group: Envelopes | None) -> tuple[Envelope, ...]:
 
     capsules = group.capsules if group else []
     return tuple(Envelope(c.link, metres(c.from_mm), metres(c.to_mm), c.radius_mm / 1000) for c in capsules)
+
+
+def _hulls(group: Envelopes | None) -> tuple[Hull, ...]:
+    """Hulls that are written in the file, and those of files of convex pieces."""
+    found: list[Hull] = []
+    for mesh in group.meshes if group else ():
+        content, T = load_pieces(own_or_shipped(mesh.pieces)), placement_transform(Placement(**_place(mesh)))
+        found += [_hull(mesh.link, p @ T[:3, :3].T + T[:3, 3], content.uncovered_mm / 1000) for p in content.pieces()]
+    for hull in group.hulls if group else ():
+        found.append(_hull(hull.link, np.array(hull.points_mm) / 1000, hull.margin_mm / 1000))
+    return tuple(found)
+
+
+def _hull(link: int, points: Reals, margin: float) -> Hull:
+    return Hull(link, tuple((float(x), float(y), float(z)) for x, y, z in points), margin)
+
+
+def _place(mesh: LinkPieces) -> dict[str, list[float]]:
+    return {"xyz_mm": mesh.xyz_mm, "rpy_deg": mesh.rpy_deg}
 
 
 def placement_transform(placement: Placement | None) -> np.ndarray:

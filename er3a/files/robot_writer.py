@@ -77,7 +77,7 @@ def robot_file(robot: Robot) -> RobotFile:
         content["speeds"] = sourced("speeds") | {"rows": speeds}
     if robot.coupling is not None:
         content["coupling"] = sourced("coupling") | {"rows": _coupling_rows(robot.coupling)}
-    if robot.envelopes:
+    if robot.envelopes or robot.hulls:
         capsules = [
             {
                 "link": envelope.link,
@@ -87,7 +87,24 @@ def robot_file(robot: Robot) -> RobotFile:
             }
             for envelope in robot.envelopes
         ]
-        content["envelopes"] = sourced("envelopes") | {"capsules": capsules}
+        hulls = [
+            {
+                "link": hull.link,
+                "margin_mm": _tidy(hull.margin * 1000),
+                "points_mm": [[_tidy(value * 1000) for value in point] for point in hull.points],
+            }
+            for hull in robot.hulls
+        ]
+        content["envelopes"] = sourced("envelopes") | {"capsules": capsules, "hulls": hulls}
+    if robot.pair_rules:
+        content["collision"] = {
+            rule: [
+                {"pair": [each.first, each.second], "reason": each.reason}
+                for each in robot.pair_rules
+                if each.rule == rule
+            ]
+            for rule in ("allow", "watch")
+        }
     for key in ("base", "tool"):
         T = getattr(robot, key)
         if not np.array_equal(T, np.eye(4)):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -10,13 +11,16 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from er3a.collision import scene as library
-from er3a.files.robot_file import Name, Text
+from er3a.files.pieces_file import load_pieces
+from er3a.files.robot_file import CollisionPairs, DecidedPair, Name, PiecesPath, Text
+from er3a.files.shipped import own_or_shipped
 from er3a.files.units import FARTHEST_MM, PositionMm, RpyDeg, Triple
 from er3a.files.yaml_file import StrictModel, load
 from er3a.geometry.transforms import transform
 
 SMALLEST_OBSTACLE_MM = 2.0
-SHAPES = ("boxes", "cylinders", "spheres", "planes")
+MOST_LINKS = 30
+SHAPES = ("boxes", "cylinders", "spheres", "planes", "meshes")
 
 Length = Annotated[float, Field(gt=0, le=FARTHEST_MM)]
 
@@ -65,6 +69,17 @@ class CylinderObstacle(Obstacle):
         return library.Cylinder(self.name, self.place(), self.radius_mm / 1000, self.length_mm / 1000)
 
 
+class MeshObstacle(Obstacle):
+    """``pieces``: a file of convex pieces, written by ``er3a mesh``."""
+
+    pieces: PiecesPath
+
+    def solid(self) -> library.Mesh:
+        """In the units of the library; :class:`InputError` for a file that is no such pieces."""
+        content = load_pieces(own_or_shipped(self.pieces))
+        return library.Mesh(self.name, self.place(), content.pieces(), content.uncovered_mm / 1000)
+
+
 class SphereObstacle(StrictModel):
     name: Name
     xyz_mm: PositionMm
@@ -101,8 +116,23 @@ class PlaneObstacle(StrictModel):
         return library.Plane(self.name, np.array(self.normal) / length, float(self.offset_mm / 1000 / length))
 
 
+class Carried(StrictModel):
+    """What the tool carries, placed in the tool's frame."""
+
+    boxes: list[BoxObstacle] = []
+    cylinders: list[CylinderObstacle] = []
+    spheres: list[SphereObstacle] = []
+    meshes: list[MeshObstacle] = []
+
+
+class AllowedPairs(CollisionPairs):
+    """Pairs that are not looked at; a scene can't ask for more than the matrix watches."""
+
+    watch: Annotated[list[DecidedPair], Field(max_length=0)] = []
+
+
 class SceneFile(StrictModel):
-    """data/scenes/NAME.yaml."""
+    """data/scenes/NAME.yaml. ``collision``: contacts of the arm, of what is carried and of solids that are allowed."""
 
     kind: Literal["scene"]
     title: Text
@@ -111,24 +141,38 @@ class SceneFile(StrictModel):
     cylinders: list[CylinderObstacle] = []
     spheres: list[SphereObstacle] = []
     planes: list[PlaneObstacle] = []
+    meshes: list[MeshObstacle] = []
+    carried: Carried = Carried()
+    collision: AllowedPairs = AllowedPairs()
 
     def scene(self) -> library.Scene:
         """In the units of the library."""
-        obstacles: list[BoxObstacle | CylinderObstacle | SphereObstacle | PlaneObstacle]
-        obstacles = [*self.boxes, *self.cylinders, *self.spheres, *self.planes]
-        return library.Scene(self.title, tuple(obstacle.solid() for obstacle in obstacles))
+        solids, carried = (
+            tuple(obstacle.solid() for shape in SHAPES for obstacle in getattr(part, shape, []))
+            for part in (self, self.carried)
+        )
+        return library.Scene(self.title, solids, carried, self.collision.rules())
 
     @model_validator(mode="after")
     def _obstacles_with_own_names(self) -> Self:
         seen: dict[str, str] = {}
-        for shape in SHAPES:
-            for i, obstacle in enumerate(getattr(self, shape)):
-                where = f"{shape}[{i}]"
-                if obstacle.name in seen:
-                    raise ValueError(f"{where}: the name '{obstacle.name}' is that of {seen[obstacle.name]} | Rename")
-                seen[obstacle.name] = where
+        for part, prefix in ((self, ""), (self.carried, "carried.")):
+            for shape in SHAPES:
+                for i, obstacle in enumerate(getattr(part, shape, [])):
+                    where = f"{prefix}{shape}[{i}]"
+                    if obstacle.name in seen:
+                        problem = f"{where}: the name '{obstacle.name}' is that of {seen[obstacle.name]}"
+                        raise ValueError(f"{problem} | Rename")
+                    if re.fullmatch(r"base|link_\d+", obstacle.name):
+                        raise ValueError(f"{where}: '{obstacle.name}' is the name of a part of the arm | Rename")
+                    seen[obstacle.name] = where
         if not seen:
             raise ValueError(f"the scene is empty | Add an obstacle under {', '.join(SHAPES)}")
+        links = ["base", *(f"link_{k}" for k in range(1, MOST_LINKS + 1))]
+        try:
+            self.collision.check({*seen, *links})
+        except ValueError as error:
+            raise ValueError(f"collision.{error}") from None
         return self
 
 

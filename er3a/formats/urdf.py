@@ -18,12 +18,14 @@ from scipy.spatial.transform import Rotation
 from er3a.display import Displayed, Sheet, shortly
 from er3a.errors import Er3aError, InputError
 from er3a.formats.from_axes import table_from_axes
-from er3a.formats.urdf_tree import UrdfChain, UrdfJoint, read_chain
+from er3a.formats.text_file import read_text
+from er3a.formats.urdf_shapes import collision_shapes
+from er3a.formats.urdf_tree import MOST_BYTES, UrdfChain, UrdfJoint, read_chain
 from er3a.geometry.transforms import rot_z, rpy_of
 from er3a.kinematics.chain import constant_links
-from er3a.kinematics.forward import forward
+from er3a.kinematics.forward import forward, frames
 from er3a.numerics.arrays import Reals
-from er3a.robots.robot import MOST_JOINTS, Robot, Source
+from er3a.robots.robot import MOST_JOINTS, Envelope, Hull, Robot, Source
 
 MISFIT_POSES = 1000
 NO_RANGE = math.pi
@@ -53,7 +55,9 @@ class UrdfImport(Displayed):
         return replace(self.robot.sheet(), facts=(fits, *self.robot.sheet().facts, *self.notes))
 
 
-def import_urdf(path: str | Path, *, base: str | None = None, tip: str | None = None, snap: bool = False) -> UrdfImport:
+def import_urdf(
+    path: str | Path, *, base: str | None = None, tip: str | None = None, snap: bool = False, split: bool = False
+) -> UrdfImport:
     """Derive D-H table, directions, offsets, limits and speeds from a URDF's axes.
 
     The flange is the end of the fixed joints behind the last joint, or that joint's own link frame if they branch.
@@ -65,6 +69,7 @@ def import_urdf(path: str | Path, *, base: str | None = None, tip: str | None = 
     path : a URDF, or expanded xacro
     base, tip : links at which the arm begins and ends; None where the file leaves no choice
     snap : take angles within 1e-4 rad of a multiple of 90 deg for that multiple; each such change is noted
+    split : split closed collision meshes into convex pieces; else their hulls are taken
 
     Raises
     ------
@@ -104,9 +109,49 @@ def import_urdf(path: str | Path, *, base: str | None = None, tip: str | None = 
     q = np.random.default_rng(0).uniform(-math.pi, math.pi, (MISFIT_POSES, len(sources)))
     given = _chain_forward(found.joints, q @ coupling.T + shift)
     misfit = np.linalg.norm((forward(robot, q) - given)[:, :3, 3], axis=1).max()
+    envelopes, hulls, told = link_shapes(path, found, robot, shift, split)
+    if envelopes or hulls:
+        shapes = {"envelopes": Source(f"Collision geometry of {path.name}", "export")}
+        robot = robot.replace(envelopes=envelopes, hulls=hulls, sources={**robot.sources, **shapes})
     names = tuple(joint.name for joint in sources)
     first, last = found.joints[0].parent, found.joints[-1].child
-    return UrdfImport(robot, (*found.notes, *notes), float(misfit), names, first, last)
+    return UrdfImport(robot, (*found.notes, *notes, *told), float(misfit), names, first, last)
+
+
+def link_shapes(
+    path: Path, found: UrdfChain, robot: Robot, shift: Reals, split: bool
+) -> tuple[tuple[Envelope, ...], tuple[Hull, ...], tuple[str, ...]]:
+    """The collision geometry of a URDF, in the frames of the links of the robot made from it, and notes in words.
+
+    Parameters
+    ----------
+    shift : (m,), rad or m, the values of the chain's moving joints at which the robot's joints are 0
+    """
+    zero = np.concatenate([robot.base[None], frames(robot, np.zeros(len(robot.lower)))])
+    above = {joint.child: joint for joint in found.all.values()}
+    place = {found.joints[0].parent: (np.eye(4), 0)}
+    for joint in found.joints:
+        T, turned = place[joint.parent]
+        T = T @ joint.T_parent_joint
+        if joint.moves:
+            T, turned = T @ _motion(joint, shift[turned : turned + 1])[0], turned + 1
+        place[joint.child] = T, turned
+    envelopes, hulls, notes = list[Envelope](), list[Hull](), list[str]()
+    for link in ElementTree.fromstring(read_text(path, MOST_BYTES)).findall("link"):
+        shapes, name, behind = link.findall("collision"), link.get("name", "?"), np.eye(4)
+        while name not in place and name in above and not above[name].moves:
+            behind = above[name].T_parent_joint @ behind
+            name = above[name].parent
+        if name not in place:
+            if shapes:
+                notes.append(f"link {link.get('name')} does not move with the arm's chain; its shape is left out")
+            continue
+        T, turned = place[name]
+        for collision in shapes:
+            made = collision_shapes(path, collision, (np.linalg.inv(zero[turned]) @ T @ behind, turned), notes, split)
+            envelopes += [shape for shape in made if isinstance(shape, Envelope)]
+            hulls += [shape for shape in made if isinstance(shape, Hull)]
+    return tuple(envelopes), tuple(hulls), tuple(notes)
 
 
 def _coupling(path: Path, found: UrdfChain, moving: list[UrdfJoint]) -> tuple[list[UrdfJoint], Reals, Reals]:

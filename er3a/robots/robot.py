@@ -59,6 +59,31 @@ class CombinedLimit:
     upper: float
 
 
+@dataclass(frozen=True)
+class Hull:
+    """A convex piece of a link: all points within ``margin`` (m) of the hull of ``points`` (m, frame as of Envelope).
+
+    The margin is by how far the mesh that the piece is part of may stand out of its pieces.
+    """
+
+    link: int
+    points: tuple[tuple[float, float, float], ...]
+    margin: float
+
+
+@dataclass(frozen=True)
+class PairRule:
+    """What a person decided of a pair of bodies: not looked at (``allow``) or looked at as a whole (``watch``).
+
+    Bodies are named ``base``, ``link_1`` ..., or as the scene names its solids and what is carried.
+    """
+
+    first: str
+    second: str
+    rule: Literal["allow", "watch"]
+    reason: str
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Robot(Displayed):
     """A serial arm of 1 to 10 joints. SI units; angles are in rad, arrays are read-only.
@@ -87,7 +112,8 @@ class Robot(Displayed):
     base : (4, 4), T_world_base; tool : (4, 4), T_flange_tool
     zero_pose : what the arm looks like at q = 0, in words
     references : names of the reference sets (folders of data/manual_refs) that it is checked against
-    envelopes : capsules around the links; empty where the file gives none
+    envelopes, hulls : capsules around the links, and convex pieces of them; both empty where the file gives none
+    pair_rules : which pairs of links a person decided on
     derived : what :func:`er3a.robots.derived.derived` keeps of this robot
     sources : per group of values ("dh", "zero", "limits", "speeds", "base", "tool", "envelopes") its source and grade
     origins : documents of single entries ("d4", "direction2", "lower6") that have another one than their group
@@ -121,6 +147,8 @@ class Robot(Displayed):
     coupling: Reals | None = None
     continuous: Flags = field(default_factory=lambda: np.empty(0, dtype=bool))
     combined: tuple[CombinedLimit, ...] = ()
+    hulls: tuple[Hull, ...] = ()
+    pair_rules: tuple[PairRule, ...] = ()
     sources: Mapping[str, Source] = field(default_factory=dict)
     origins: Mapping[str, str] = field(default_factory=dict)
     derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)

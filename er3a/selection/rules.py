@@ -13,7 +13,6 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.collision.bodies import can_measure
 from er3a.collision.clearance import clearance
 from er3a.collision.scene import Scene
 from er3a.errors import Er3aError
@@ -96,9 +95,8 @@ RULES: dict[RuleName, Rule] = {
 
 
 def available_rules(robot: Robot) -> tuple[RuleName, ...]:
-    """Names of the rules whose data the robot has, and whose library this machine."""
-    known = {"time": bool(np.isfinite(robot.speed).all()), "clearance": can_measure()}
-    return tuple(name for name in RULES if known.get(name, True))
+    """Names of the rules whose data the robot has."""
+    return tuple(name for name in RULES if name != "time" or np.isfinite(robot.speed).all())
 
 
 def mixed_cost(weights: Mapping[RuleName, float], costs: Mapping[RuleName, Reals], allowed: Flags) -> Reals:

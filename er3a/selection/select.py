@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.collision.clearance import clearance
+from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PairOverlaps
 from er3a.collision.scene import Scene
 from er3a.display import Displayed, Sheet, first_rows, shortly
@@ -130,13 +130,17 @@ def select(
 
 def refusals(robot: Robot, solutions: Solutions, scene: Scene | None) -> tuple[Refusal | None, ...]:
     """Why each row is refused: limits that it leaves or, with a scene, what overlaps; None for the others."""
+    return tuple(solutions.reason) if scene is None else refusals_of(Bodies(robot, scene), solutions)
+
+
+def refusals_of(bodies: Bodies, solutions: Solutions) -> tuple[Refusal | None, ...]:
+    """Why each row is refused: limits that it leaves, or which of the bodies overlap; None for the others."""
     refused: list[Refusal | None] = list(solutions.reason)
     inside = np.flatnonzero(solutions.within_limits)
-    if scene is not None and inside.size:
-        clear = clearance(robot, solutions.q[inside], scene)
-        for row, distance, pair in zip(inside, clear.distance, clear.pair):
-            if distance < COLLIDES and pair is not None:
-                refused[row] = PairOverlaps(pair, float(-distance * 1000))
+    distance, pair = bodies.least(solutions.q[inside])
+    for row, depth, number in zip(inside, -distance, pair):
+        if depth > COLLIDES:
+            refused[row] = PairOverlaps(bodies.pairs[number], float(depth * 1000))
     return tuple(refused)
 
 

@@ -11,6 +11,7 @@ import typer
 
 from er3a.errors import Er3aError
 from er3a.files.robot_file import NAME_PATTERN
+from er3a.formats.mesh_file import Unit
 from er3a.pipeline.commands.options import ROBOT_FILES, AnyRobot, AsJson, app, print_json, print_note
 from er3a.pipeline.stages.registry import STAGES
 
@@ -22,6 +23,7 @@ def import_urdf(
     base: Annotated[str | None, typer.Option(help="the link at which the arm begins; the root by default")] = None,
     tip: Annotated[str | None, typer.Option(help="the link at which it ends, if the file leaves a choice")] = None,
     snap: Annotated[bool, typer.Option(help="take angles within 1e-4 rad of a right angle for it, and say so")] = False,
+    split: Annotated[bool, typer.Option(help="split collision meshes into convex pieces; else their hulls")] = False,
     as_json: AsJson = False,
 ):
     """Derive a robot file (D-H table, directions, offsets, limits) from a URDF's axes."""
@@ -29,7 +31,7 @@ def import_urdf(
     from er3a.formats.urdf import import_urdf as read_urdf
     from er3a.formats.urdf import robot_name
 
-    imported = read_urdf(file, base=base, tip=tip, snap=snap)
+    imported = read_urdf(file, base=base, tip=tip, snap=snap, split=split)
     name = robot_name(output)
     output = output.with_name(f"{name}.yaml") if re.fullmatch(NAME_PATTERN, output.stem) is None else output
     write_robot(imported.robot.replace(name=output.stem), output)
@@ -54,6 +56,29 @@ def export_urdf(
     text = urdf_text(load_robot(robot))
     write_atomically(output, lambda path: path.write_text(text, encoding="utf-8"))
     print(f"{output}: written")
+
+
+@app.command(rich_help_panel=ROBOT_FILES)
+def mesh(
+    file: Annotated[Path, typer.Argument(help="a closed mesh: STL, OBJ, DAE or GLB")],
+    unit: Annotated[Unit, typer.Option(help="of the mesh's lengths: m or mm")],
+    output: Annotated[Path, typer.Option(help="the file of convex pieces to write, .json")],
+    threshold: Annotated[float, typer.Option(min=0.01, max=1, help="concavity that may be left in a piece")] = 0.05,
+    seed: Annotated[int, typer.Option(min=0, help="of the search for cuts")] = 0,
+    as_json: AsJson = False,
+):
+    """Split a mesh of a link, a tool or an obstacle into convex pieces, for robot and scene files."""
+    from er3a.files.mesh_import import import_mesh
+
+    if output.suffix != ".json":
+        raise Er3aError(f"{output}: files of convex pieces end in .json; write --output {output.stem}.json")
+    found = import_mesh(file, output, unit, threshold, seed)
+    if as_json:
+        print_json(found.model_dump(exclude={"pieces_mm"}) | {"output": str(output), "pieces": len(found.pieces_mm)})
+        return
+    print(f"{output}: written; convex pieces: {len(found.pieces_mm)}, of {found.triangles} triangles")
+    print(f"the mesh stands out of them by at most {found.uncovered_mm:.3g} mm, which is added to them as a margin")
+    print(f"they stand out of the mesh by {found.excess_mm:.3g} mm, as measured")
 
 
 @app.command(rich_help_panel=ROBOT_FILES)

@@ -1,25 +1,66 @@
-"""Sentences about what an arm meets."""
+"""What the collision page and recording say beside the verdict."""
 
 from __future__ import annotations
 
-from er3a.collision.pairs import BASE, LinkAndSolid, LinkPair, PairOverlaps
-from er3a.pipeline.messages.say import say, sentence
+from er3a.collision.matrix import PairState
+from er3a.collision.pairs import BASE, link_label
+from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.say import sentence, word
+
+FIGURES = {
+    "free_of_collisions": N_("Joint space free of collisions"),
+    "free_of_itself": N_("Free of self-collision"),
+    "free_of_scene": N_("Free of the scene"),
+    "clear_places": N_("Places reached clear of everything"),
+    "joined_places": N_("Of these, joined to home"),
+    "lost_volume": N_("Volume lost to collisions, estimate"),
+    "watched_pairs": N_("Pairs of the arm that are watched"),
+    "undecided_pairs": N_("Pairs undecided"),
+}
+STATES: dict[PairState, str] = {
+    "never": N_("never meet"),
+    "joined": N_("joined"),
+    "meets": N_("can meet"),
+    "undecided": N_("undecided"),
+    "allowed": N_("allowed"),
+    "watched": N_("asked for"),
+}
 
 
-@say.register
-def _(found: LinkPair) -> str:
-    return sentence(found.code, "{first} and {second}", first=_link(found.first), second=_link(found.second))
+def state_word(state: PairState) -> str:
+    """What holds of a pair, in short."""
+    return word("collision.state", STATES, state)
 
 
-@say.register
-def _(found: LinkAndSolid) -> str:
-    return sentence(found.code, "{link} and {own_name}", link=_link(found.link), own_name=found.solid)
+def body_word(name: str) -> str:
+    """A body of the arm, or what is carried, by its name."""
+    if name == link_label(BASE):
+        return sentence("link", "base")
+    number = name.removeprefix("link_")
+    return sentence("link", "link {number}", number=number) if number != name else name
 
 
-@say.register
-def _(found: PairOverlaps) -> str:
-    return sentence(found.code, "{pair} overlap by {depth:.1f} mm", pair=say(found.pair), depth=found.depth_mm)
+def why(state: PairState, least_mm: float, left_out_mm: float, boxes: int, witness: str, reason: str) -> str:
+    """Why a pair is watched or not.
 
-
-def _link(number: int) -> str:
-    return sentence("link", "base") if number == BASE else sentence("link", "link {number}", number=number)
+    Parameters
+    ----------
+    witness : joint angles in words; empty where there are none
+    """
+    match state:
+        case "never":
+            return tr(
+                "At least {least:.1f} mm apart in every pose; proven with {boxes} boxes.", least=least_mm, boxes=boxes
+            )
+        case "allowed" | "watched":
+            return tr("Decided in the robot or scene file: {reason}", reason=reason)
+        case "undecided":
+            return tr("Neither proven apart nor found to meet, in {boxes} boxes; watched.", boxes=boxes)
+    if not left_out_mm:
+        return tr("They meet at joints ({witness}) deg.", witness=witness)
+    joined = tr(
+        "Overlap in every pose at their joint: a region of {radius:.0f} mm there is left out.", radius=left_out_mm
+    )
+    if witness:
+        return tr("{first} {rest}", first=joined, rest=tr("Beyond it they meet at ({witness}) deg.", witness=witness))
+    return tr("{first} {rest}", first=joined, rest=tr("Nothing beyond it was found to meet."))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import er3a.pipeline.messages.collision  # noqa: F401
+import er3a.pipeline.messages.pairs  # noqa: F401
 from er3a.kinematics.solutions import SideUnsolved, Unsolved
 from er3a.pipeline.messages.kinematics import SIDES, branch_word
 from er3a.pipeline.messages.language import N_

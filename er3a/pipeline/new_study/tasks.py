@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from er3a.collision.bodies import Bodies, can_measure
+from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
 from er3a.errors import Er3aError
 from er3a.files.path_file import PathEntry, PathFile
@@ -134,8 +134,7 @@ class TaskSearch:
             solutions = inverse(self.robot, target.T, target.q_ref)
         except Er3aError:
             return None
-        scene = self.scene if can_measure() else None
-        free = np.array([why is None for why in refusals(self.robot, solutions, scene)], dtype=bool)
+        free = np.array([why is None for why in refusals(self.robot, solutions, self.scene)], dtype=bool)
         margin = limit_margin(self.robot, solutions.q)
         rows = np.flatnonzero(free & solutions.solved & (margin > LIMIT_MARGIN_RAD))
         rows = rows[self._regular(solutions.q[rows])]
@@ -203,8 +202,6 @@ class TaskSearch:
             or any(rate_intervals(curve, limit) for limit in self.limits.rates)
         ):
             return False
-        if not can_measure():
-            return True
         around = Surroundings(Bodies(self.robot, self.scene), self.settings.penetration_tolerance_mm / 1000)
         return not measured(around, motion).contacts
 

@@ -9,7 +9,6 @@ from typing import Any
 
 import jinja2
 
-from er3a.collision.bodies import can_measure
 from er3a.errors import Er3aError
 from er3a.files.kept_files import write_atomically
 from er3a.files.reference_rows import FORMATS
@@ -101,8 +100,6 @@ def _study(name: str) -> str:
     robots = f"robots:\n  {name}:\n    targets: data/targets/{name}.yaml\n    paths: data/paths/{name}.yaml\n\n"
     text = re.sub(r"^robots:\n(?:[ #].*\n|\n)+", robots, text, count=1, flags=re.MULTILINE)
     text = re.sub(r"data/scenes/\w+\.yaml", SCENE, text)
-    if not can_measure():  # nothing can be kept clear of here
-        text = re.sub(r"^  scene: .*\n", "", text, flags=re.MULTILINE).replace(", clearance: 1", "")
     text = re.sub(r"(\n  samples: )\d+", rf"\g<1>{SAMPLES}", text, count=1)
     return text.replace("The study that `make run` carries out.", "The study that `er3a run` carries out.")
 

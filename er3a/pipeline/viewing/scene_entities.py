@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 import rerun as rr
+from scipy.spatial import ConvexHull
 
-from er3a.collision.scene import Box, Cylinder, Plane, Scene, Sphere
+from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
 from er3a.files.scene_file import load_scene
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import size_of
 from er3a.pipeline.viewing.palette import MUTED, rgb
@@ -31,7 +32,7 @@ def log_scene(stream: rr.RecordingStream, study: Study, name: str, stage: str) -
 
 def _solids(
     scene: Scene, base: Reals, plane_size: float
-) -> Iterator[tuple[str, Reals, rr.Boxes3D | rr.Cylinders3D | rr.Ellipsoids3D]]:
+) -> Iterator[tuple[str, Reals, rr.Boxes3D | rr.Cylinders3D | rr.Ellipsoids3D | rr.Mesh3D]]:
     """Name, place (4, 4) and shape of each solid; planes are squares of ``plane_size`` (m) nearest to the base (3,)."""
     style: dict[str, Any] = {"colors": [(*rgb(MUTED), 120)], "fill_mode": "transparentfillmajorwireframe"}
     for solid in scene.solids:
@@ -43,9 +44,29 @@ def _solids(
                 yield solid.name, solid.T, shape
             case Sphere():
                 yield solid.name, solid.T, rr.Ellipsoids3D(radii=[solid.radius], **style)
+            case Mesh():
+                yield solid.name, solid.T, pieces_mesh(solid.pieces, (*rgb(MUTED), 120))
             case Plane():
                 slab = rr.Boxes3D(sizes=[[plane_size, plane_size, _PLANE_THICKNESS]], **style)
                 yield solid.name, _below(solid, base), slab
+
+
+def pieces_mesh(pieces: Sequence[Reals], colour: tuple[int, ...]) -> rr.Mesh3D:
+    """Convex pieces (k, 3) each, m, as one mesh."""
+    hulls = [ConvexHull(piece) for piece in pieces]
+    starts = np.cumsum([0, *(len(piece) for piece in pieces)])
+    triangles = [start + _outward(hull) for start, hull in zip(starts, hulls)]
+    return rr.Mesh3D(
+        vertex_positions=np.concatenate(pieces), triangle_indices=np.concatenate(triangles), albedo_factor=colour
+    )
+
+
+def _outward(hull: ConvexHull) -> Integers:
+    """A hull's triangles with their corners in order around the outward normal."""
+    corners = hull.points[hull.simplices]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inward = np.einsum("ij,ij->i", normal, hull.equations[:, :3]) < 0
+    return np.where(inward[:, None], hull.simplices[:, ::-1], hull.simplices)
 
 
 def _below(plane: Plane, base: Reals) -> Reals:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from er3a.collision.bodies import Bodies, can_measure
+from er3a.collision.bodies import Bodies
 from er3a.files.path_file import load_paths
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.near_singular import NearSingular
@@ -56,9 +56,7 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     limits = limits_of(robot, settings)
     scene_file = study.scene(name, "trajectory")
     scene = load_scene(scene_file) if scene_file else None
-    surroundings = (
-        Surroundings(Bodies(robot, scene), settings.penetration_tolerance_mm / 1000) if can_measure() else None
-    )
+    surroundings = Surroundings(Bodies(robot, scene), settings.penetration_tolerance_mm / 1000)
     only = None if settings.avoidance == "compare" else settings.avoidance
     bodies, tolerance = surroundings.bodies if surroundings else None, settings.penetration_tolerance_mm / 1000
     planning = PlanningTask(robot, bodies, tolerance, limits, study.seed)

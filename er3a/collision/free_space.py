@@ -1,0 +1,201 @@
+"""How much of an arm's joint space is free of overlap, where its tool gets free of it, and what can be joined to home.
+
+Shares are those of random joint vectors, with Wilson's interval [1]_. A place (a cell of space) counts as reached if a
+joint vector with the tool point in it was found, and as clear if one of those is free of overlap: that is proven by the
+vector itself. A place without one may be lost or not: how often it was tried is stated.
+
+Two free joint vectors are joined if the straight move between them is proven free along its whole way; places are
+joined to home if a chain of such moves leads there (a roadmap [2]_). What is not joined may be or not.
+
+References
+----------
+.. [1] E. B. Wilson, "Probable inference, the law of succession, and statistical inference", JASA 22, 1927.
+.. [2] L. E. Kavraki, P. Svestka, J.-C. Latombe, M. H. Overmars, "Probabilistic roadmaps for path planning in
+   high-dimensional configuration spaces", IEEE Trans. Robotics and Automation 12, 1996.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from er3a.collision.bodies import Bodies
+from er3a.collision.distance_kernels import FREE, free_between
+from er3a.kinematics.batch import inverse_batch
+from er3a.kinematics.forward import forward
+from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.numerics.arrays import Flags, Integers, Reals
+
+Z_95 = 1.959963984540054
+POSES_A_ROUND = 8  # tried in a place in one round
+DEPTH = 1e-3  # m; a move in which the arm may overlap by less than this, unproven, joins nothing
+LOOKS = 300  # arms looked at to prove one move
+
+
+@dataclass(frozen=True)
+class Share:
+    """A share of random joint vectors, with its 95 % interval."""
+
+    count: int
+    of: int
+
+    @property
+    def value(self) -> float:
+        """The share that was counted."""
+        return self.count / self.of
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Wilson's interval [1]_."""
+        n, p = self.of, self.value
+        middle = (p + Z_95**2 / (2 * n)) / (1 + Z_95**2 / n)
+        half = Z_95 / (1 + Z_95**2 / n) * float(np.sqrt(p * (1 - p) / n + Z_95**2 / (4 * n**2)))
+        return max(0.0, middle - half), min(1.0, middle + half)
+
+
+@dataclass(frozen=True, eq=False)
+class JointSpace:
+    """What random joint vectors came to.
+
+    Attributes
+    ----------
+    q : (N, n), rad; free : (N,)
+    of_itself, of_scene, whole : free of self-collision, of the scene, and of both
+    overlaps : (N, P), which pairs of bodies overlap
+    """
+
+    q: Reals
+    free: Flags
+    of_itself: Share
+    of_scene: Share
+    whole: Share
+    overlaps: Flags
+
+    def count(self, pairs: list[int]) -> int:
+        """Vectors in which any of some pairs overlaps."""
+        return int(self.overlaps[:, pairs].any(axis=1).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Cells of space that the tool point was brought to.
+
+    Attributes
+    ----------
+    corner : (3,), m, of the grid; cell : m, edge
+    index : (M, 3) int, cells; tries : (M,), arms tried there; clear : (M,)
+    witness : (M, n), rad, an arm free of overlap with its tool there, NaN where none was found
+    joined : (M,), whether the witness is joined to home
+    """
+
+    corner: Reals
+    cell: float
+    index: Integers
+    tries: Integers
+    clear: Flags
+    witness: Reals
+    joined: Flags
+
+    @property
+    def middles(self) -> Reals:
+        """Middles (M, 3), m, of the cells."""
+        return self.corner + (self.index + 0.5) * self.cell
+
+
+def sample_joint_space(bodies: Bodies, samples: int, random: np.random.Generator) -> JointSpace:
+    """Try random joint vectors, uniform within the limits."""
+    robot = bodies.robot
+    q = random.uniform(robot.lower, robot.upper, (samples, len(robot.a)))
+    own = bodies.second >= 0
+    hit = bodies.overlaps(q)
+    itself, scene = (~np.asarray(hit[:, part].any(axis=1)) for part in (own, ~own))
+    free = itself & scene
+    of_itself, of_scene, whole = (Share(int(flags.sum()), samples) for flags in (itself, scene, free))
+    return JointSpace(q, free, of_itself, of_scene, whole, hit)
+
+
+def find_places(bodies: Bodies, space: JointSpace, across: int, rounds: int, random: np.random.Generator) -> Places:
+    """Cells that the samples reach, and whether an arm free of overlap reaches each.
+
+    Parameters
+    ----------
+    across : cells along the longest side of what the samples reach
+    rounds : how often POSES_A_ROUND further poses are tried in a cell without a clear arm; all branches of each
+    """
+    robot = bodies.robot
+    T = forward(robot, space.q)
+    points = T[:, :3, 3]
+    corner = points.min(axis=0)
+    cell = float(np.ptp(points, axis=0).max()) / across * (1 + 1e-9)
+    index, where, tries = np.unique(
+        ((points - corner) / cell).astype(np.int64), axis=0, return_inverse=True, return_counts=True
+    )
+    where = where.ravel()
+    witness = np.full((len(index), len(robot.a)), np.nan)
+    free = np.flatnonzero(space.free)[::-1]
+    witness[where[free]] = space.q[free]  # the first one of each cell stays
+    tries = tries.astype(np.int64)
+    if closed_form_missing(robot) is None:
+        samples = [np.flatnonzero(where == cell) for cell in np.flatnonzero(np.isnan(witness[:, 0]))]
+        for _ in range(rounds):
+            samples = [rows for rows in samples if np.isnan(witness[where[rows[0]], 0])]
+            if samples:
+                rows = np.concatenate([random.choice(own, POSES_A_ROUND) for own in samples])
+                _try_poses(bodies, T, rows, where, (witness, tries), random)
+    clear = np.isfinite(witness[:, 0])
+    return Places(corner, cell, index, tries, clear, witness, np.zeros(len(index), bool))
+
+
+def _try_poses(
+    bodies: Bodies,
+    T: Reals,
+    rows: Integers,
+    where: Integers,
+    found: tuple[Reals, Integers],
+    random: np.random.Generator,
+) -> None:
+    """Solve the points of some samples with the orientations of others, and keep what is free of overlap."""
+    witness, tries = found
+    poses = T[rows].copy()
+    half = len(rows) // 2
+    poses[:half, :3, :3] = T[random.integers(0, len(T), half), :3, :3]
+    solved = inverse_batch(bodies.robot, poses)
+    pose, slot = np.nonzero(solved.within_limits)
+    q = solved.q[pose, slot]
+    cells = where[rows][pose]
+    np.add.at(tries, cells, 1)
+    free = ~bodies.overlaps(q).any(axis=1)
+    witness[cells[free][::-1]] = q[free][::-1]
+
+
+def joined_to_home(bodies: Bodies, places: Places, home: Reals, neighbours: int) -> Flags:
+    """Which clear places (M,) can be joined to home (n,), an arm free of overlap, by moves that are proven free.
+
+    Parameters
+    ----------
+    neighbours : moves to how many of the nearest arms are tried from each
+    """
+    clear = np.flatnonzero(places.clear)
+    q = np.concatenate([home[None], places.witness[clear]])
+    reach = np.maximum(bodies.robot.upper - bodies.robot.lower, 1e-9)
+    away, near = cKDTree(q / reach).query(q / reach, k=min(neighbours + 1, len(q)))
+    first = np.repeat(np.arange(len(q)), near.shape[1] - 1)
+    second, length = near[:, 1:].ravel(), away[:, 1:].ravel()
+    order = np.lexsort((second, first, length))
+    group = np.arange(len(q))
+
+    def root(node: int) -> int:
+        while group[node] != node:
+            group[node] = group[group[node]]
+            node = int(group[node])
+        return node
+
+    for edge in order:
+        a, b = root(int(first[edge])), root(int(second[edge]))
+        if a != b and free_between(bodies.layout, q[first[edge]], q[second[edge]], DEPTH, LOOKS)[0] == FREE:
+            group[max(a, b)] = min(a, b)
+    joined = np.zeros(len(places.clear), bool)
+    joined[clear] = [root(node) == root(0) for node in range(1, len(q))]
+    return joined

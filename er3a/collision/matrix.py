@@ -1,0 +1,219 @@
+"""Which pairs of an arm's bodies have to be looked at for collisions, each with its reason.
+
+Bodies of one link never move against each other, so they are no pair. Every other pair is looked at unless it is proven
+harmless:
+
+- *never*: the two are apart in all joint vectors within the limits, proven by bounds of the distance over boxes of
+  joint angles, which are halved until each is decided;
+- *joined*: they overlap in all of them, proven likewise, because a joint joins them. Then only the region around that
+  joint is left out: what lies within the two bodies' girths of where they overlap in the pose that holds them farthest
+  apart. What is left of them is judged again, so that an arm that folds onto itself is seen;
+- *meets*: a joint vector in which they overlap was found, and one in which they don't: watched;
+- *undecided*: none of this within the number of boxes: watched.
+
+What a person decided (``Robot.pair_rules``) goes first: *allowed* pairs are not looked at, *watched* ones as a whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+
+from er3a.collision.distance_kernels import (
+    FREE,
+    MEETS,
+    ROOM,
+    Layout,
+    measure,
+    pair_distance,
+    place,
+    search_boxes,
+)
+from er3a.collision.shapes import Body, arm_bodies, layout_of
+from er3a.collision.trimming import girth, trimmed
+from er3a.numerics.arrays import Reals
+from er3a.numerics.quasi_random import quasi_random_points
+from er3a.robots.derived import derived
+from er3a.robots.robot import PairRule, Robot
+
+PairState = Literal["never", "joined", "meets", "undecided", "allowed", "watched"]
+
+SAMPLES = 1024
+BOXES = 20_000
+BOXES_MORE = 500  # for the other bodies of two links that are known to meet
+GROWTH, GROWTHS = 1.25, 12  # of the region around a joint, until the rest comes apart
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """What was found of two bodies.
+
+    Attributes
+    ----------
+    bodies : pairs to be watched
+    witness : (n,), rad, a joint vector in which watched bodies overlap; None where none was found
+    least : m, a lower bound of the distance of bodies that never meet; NaN for others
+    left_out : m, radius of the region around the joint that is left out, 0 where there is none
+    boxes : how many boxes of joint vectors were looked at
+    """
+
+    state: PairState
+    bodies: tuple[tuple[Body, Body], ...] = ()
+    witness: Reals | None = None
+    least: float = np.nan
+    left_out: float = 0.0
+    boxes: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class MatrixRow:
+    """What holds of two links, or of a link and of what is carried; as :class:`Judged`, over all of their bodies."""
+
+    first: str
+    second: str
+    state: PairState
+    witness: Reals | None
+    least: float
+    left_out: float
+    boxes: int
+    reason: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class CollisionMatrix:
+    """The allowed collision matrix: a row for each pair of links, and the pairs of bodies that are watched.
+
+    ``joined`` says of each watched pair whether it is what is left of two bodies that a joint joins.
+    """
+
+    rows: tuple[MatrixRow, ...]
+    watched: tuple[tuple[Body, Body], ...] = field(repr=False)
+    joined: tuple[bool, ...] = field(repr=False)
+
+
+@derived
+def collision_matrix(robot: Robot) -> CollisionMatrix:
+    """The matrix of an arm without anything carried."""
+    return matrix_of(robot, list(combinations(arm_bodies(robot), 2)), robot.pair_rules)
+
+
+def matrix_of(
+    robot: Robot, pairs: Sequence[tuple[Body, Body]], rules: Sequence[PairRule], boxes: int = BOXES
+) -> CollisionMatrix:
+    """Judge pairs of bodies, of which those of one link are left out."""
+    by_names: dict[tuple[str, str], list[tuple[Body, Body]]] = {}
+    for first, second in pairs:
+        if first.link != second.link:
+            inner, outer = (first, second) if first.link < second.link else (second, first)
+            by_names.setdefault((inner.name, outer.name), []).append((inner, outer))
+    decided = {frozenset((rule.first, rule.second)): rule for rule in rules}
+    rows, watched = [], list[tuple[tuple[Body, Body], bool]]()
+    for names, bodies in by_names.items():
+        rule = decided.get(frozenset(names))
+        if rule:
+            found = [Judged("allowed")] if rule.rule == "allow" else [Judged("watched", tuple(bodies))]
+        else:
+            found = judged_pairs(robot, bodies, boxes)
+        rows.append(_row(*names, found, rule.reason if rule else ""))
+        watched += [(pair, each.state == "joined") for each in found for pair in each.bodies]
+    return CollisionMatrix(tuple(rows), tuple(pair for pair, _ in watched), tuple(joined for _, joined in watched))
+
+
+def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int = BOXES) -> list[Judged]:
+    """Judge pairs of bodies, the second on the link that is farther out."""
+    flat = [body for pair in pairs for body in pair]
+    layout = layout_of(robot, flat, [(2 * k, 2 * k + 1) for k in range(len(pairs))])
+    q, distance = _sampled(robot, layout)
+    box = np.stack([robot.lower, robot.upper])
+    meets = (distance.min(axis=0) < 0) & (distance.max(axis=0) >= 0)
+    if meets.any():
+        boxes = min(boxes, BOXES_MORE)
+    found = []
+    for k, pair in enumerate(pairs):
+        at, least = np.empty(len(robot.a)), distance[:, k]
+        overlapping = bool(least[0] < 0)
+        if meets[k]:
+            found.append(Judged("meets", (pair,), q[least.argmin()]))
+            continue
+        outcome, looked, bound = search_boxes(layout, k, box, overlapping, boxes, at)
+        if outcome == MEETS:
+            witness = q[least.argmin()] if overlapping else at
+            found.append(Judged("meets", (pair,), witness, boxes=looked))
+        elif outcome == FREE and overlapping:
+            found.append(_joined(robot, pair, q[least.argmax()], looked, boxes))
+        elif outcome == FREE:
+            found.append(Judged("never", least=bound, boxes=looked))
+        else:
+            found.append(Judged("undecided", (pair,), q[0] if overlapping else None, boxes=looked))
+    return found
+
+
+def _joined(robot: Robot, pair: tuple[Body, Body], farthest: Reals, looked: int, boxes: int) -> Judged:
+    """A pair that overlaps in every pose: without the region around the joint, judged again."""
+    centres = _nearest_points(robot, pair, farthest)
+    radius = sum(girth(body, centre) for body, centre in zip(pair, centres))
+    for _ in range(GROWTHS):
+        parts = [trimmed(body, centre, radius) for body, centre in zip(pair, centres)]
+        rest = [(first, second) for first in parts[0] for second in parts[1]]
+        found = _without_joining(robot, rest, boxes)
+        if found is not None:
+            watched = tuple(pair for each in found for pair in each.bodies)
+            witness = next((each.witness for each in found if each.witness is not None), None)
+            return Judged("joined", watched, witness, left_out=radius, boxes=looked + sum(each.boxes for each in found))
+        radius *= GROWTH
+    return Judged("joined", left_out=radius, boxes=looked)
+
+
+def _without_joining(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int) -> list[Judged] | None:
+    """Judgements of trimmed pairs; None if one of them still overlaps in every pose."""
+    if not pairs:
+        return []
+    layout = layout_of(
+        robot, [body for pair in pairs for body in pair], [(2 * k, 2 * k + 1) for k in range(len(pairs))]
+    )
+    _, distance = _sampled(robot, layout)
+    return None if (distance.max(axis=0) < 0).any() else judged_pairs(robot, pairs, boxes)
+
+
+def _sampled(robot: Robot, layout: Layout) -> tuple[Reals, Reals]:
+    """Joint vectors (SAMPLES, n) spread over the limits, and the distances (SAMPLES, K) of all pairs."""
+    q = quasi_random_points(robot.lower, robot.upper, SAMPLES)
+    found, none = np.empty((SAMPLES, len(layout.first))), np.empty(SAMPLES)
+    measure(layout, q, found, none, np.empty(SAMPLES, np.int64), np.empty(SAMPLES, bool))
+    return q, found
+
+
+def _nearest_points(robot: Robot, pair: tuple[Body, Body], q: Reals) -> list[Reals]:
+    """Where the two cores are nearest in an arm pose (n,), each (3,) in its own link's frame, m."""
+    layout = layout_of(robot, pair, [(0, 1)])
+    T, world, middle = np.empty((len(q) + 1, 4, 4)), np.empty(layout.points.shape), np.empty((2, 3))
+    place(layout, q, T, world, middle)
+    near, shape = np.zeros((2, 3)), (layout.start, layout.kind, layout.radius, layout.disc)
+    _, deep = pair_distance(world, shape, 0, 1, np.empty((ROOM, 3)), near)
+    if deep:  # cores overlap: about where both are
+        near[:] = middle.mean(axis=0)
+    frames = [T[body.link] for body in pair]
+    return [frame[:3, :3].T @ (point - frame[:3, 3]) for frame, point in zip(frames, near)]
+
+
+def _row(first: str, second: str, found: Sequence[Judged], reason: str) -> MatrixRow:
+    """One row over all pairs of bodies of two links; the gravest of what watched ones are."""
+    watched = [each for each in found if each.bodies]
+    grave = ("meets", "undecided", "joined", "watched", "allowed", "never")
+    state = min((each.state for each in watched or found), key=grave.index)
+    witness = next((each.witness for each in found if each.witness is not None), None)
+    bounds = [each.least for each in found if each.state == "never"]
+    return MatrixRow(
+        first,
+        second,
+        state,
+        witness,
+        min(bounds) if state == "never" else np.nan,
+        max(each.left_out for each in found),
+        sum(each.boxes for each in found),
+        reason,
+    )

@@ -1,0 +1,193 @@
+"""Closed meshes as convex pieces, and how far pieces and mesh stand out of each other.
+
+Pieces neither surely hold the mesh nor equal it. How far the mesh stands out of them is bounded: a triangle whose three
+corners are within a distance of one convex piece is so as a whole, and those that no one piece holds well are cut
+finer until bound and measurement agree. Taken larger by that distance, the pieces hold the mesh's surface, and nothing
+reaches the inside but through it. How far the pieces stand out of the mesh is measured at points of their surfaces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from er3a.collision.distance_kernels import distances_from_hull
+from er3a.errors import Er3aError
+from er3a.geometry.open3d_loader import load_open3d
+from er3a.geometry.sphere import fibonacci_sphere
+from er3a.numerics.arrays import Integers, Reals
+from er3a.robots.robot import Envelope
+
+CONVEX = 1e-6  # share of the volume by which a convex mesh may differ from its hull
+MOST_CORNERS = 64  # of a piece
+AGREE = 2e-5  # m, to which the bound of what stands out is brought down
+CUTS = 12
+FINEST = 4_000_000  # triangles looked at in all
+SURFACE_POINTS = 20_000
+ROUNDING = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class ConvexPieces:
+    """Convex pieces of a mesh.
+
+    Attributes
+    ----------
+    pieces : corners (k, 3), m, of each
+    uncovered : m, a bound of how far the mesh stands out of the pieces, which are to be taken larger by it
+    excess : m, how far the pieces stand out of the mesh, as measured
+    """
+
+    pieces: tuple[Reals, ...]
+    uncovered: float
+    excess: float
+
+
+def convex_pieces(vertices: Reals, faces: Integers, threshold: float, seed: int) -> ConvexPieces:
+    """Split a closed mesh into convex pieces; one that is convex stays one.
+
+    Parameters
+    ----------
+    vertices : (V, 3), m; faces : (F, 3), rows of vertices, outwards by the right-hand rule
+    threshold : concavity that is left, a share of the mesh's size (coacd's measure), 0.01 to 1
+
+    Raises
+    ------
+    Er3aError
+        if the mesh is not convex and coacd, which splits it, is not installed
+    """
+    hull = ConvexHull(vertices)
+    corners = vertices[faces]
+    volume = float(np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum()) / 6
+    if hull.volume - volume <= CONVEX * hull.volume:
+        return hull_of(vertices)
+    try:
+        import coacd
+    except ImportError:
+        problem = "this mesh is not convex, and coacd, which splits it, is not installed"
+        raise Er3aError(f"{problem}; install er3a[meshes]") from None
+    coacd.set_log_level("error")
+    middle, size = vertices.mean(axis=0), float(np.ptp(vertices, axis=0).max())
+    mesh = coacd.Mesh((vertices - middle) / size, faces)
+    parts = coacd.run_coacd(mesh, threshold=threshold, seed=seed, decimate=True, max_ch_vertex=MOST_CORNERS)
+    pieces = tuple(_corners(np.asarray(points) * size + middle) for points, _ in parts)
+    return ConvexPieces(pieces, uncovered(vertices, faces, pieces), _excess(vertices, faces, pieces, seed))
+
+
+def hull_of(points: Reals) -> ConvexPieces:
+    """The hull of points (n, 3), m, with at most ``MOST_CORNERS`` of its corners: those that lie farthest out.
+
+    What the corners left out stand out by is the margin; the excess is not that of a mesh, but 0: corners are points.
+    """
+    corners = points[ConvexHull(points).vertices]
+    if len(corners) <= MOST_CORNERS:
+        return ConvexPieces((corners,), 0.0, 0.0)
+    kept = _corners(corners[np.unique((fibonacci_sphere(MOST_CORNERS) @ corners.T).argmax(axis=1))])
+    away = np.empty(len(corners))
+    distances_from_hull(corners, kept, away)
+    return ConvexPieces((kept,), float(away.max()) + ROUNDING, 0.0)
+
+
+def uncovered(vertices: Reals, faces: Integers, pieces: Sequence[Reals]) -> float:
+    """A bound (m) of how far a mesh's surface stands out of the union of convex pieces."""
+    triangles, settled, looked = vertices[faces], 0.0, 0
+    for cut in range(CUTS + 1):
+        corners, where = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+        distance = np.empty((len(pieces), len(corners)))
+        for row, piece in zip(distance, pieces):
+            distances_from_hull(corners, piece, row)
+        measured = float(distance.min(axis=0).max(initial=0.0))
+        bound = distance[:, where.reshape(-1, 3)].max(axis=2).min(axis=0)
+        settled = max(settled, measured)
+        open_ = bound > settled + AGREE
+        looked += len(triangles)
+        if cut == CUTS or not open_.any() or looked + 4 * open_.sum() > FINEST:
+            return max(settled, float(bound.max(initial=0.0))) + ROUNDING
+        settled = max(settled, float(bound[~open_].max(initial=0.0)))
+        triangles = _quartered(triangles[open_])
+    raise AssertionError("unreachable")
+
+
+def _quartered(triangles: Reals) -> Reals:
+    """Each triangle (n, 3, 3) as four."""
+    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+    parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+    return np.concatenate([np.stack(part, axis=1) for part in parts])
+
+
+def _excess(vertices: Reals, faces: Integers, pieces: Sequence[Reals], seed: int) -> float:
+    """How far pieces stand out of a mesh (m), at random points of their faces and at their corners."""
+    library, random = load_open3d(), np.random.default_rng(seed)
+    scene = library.t.geometry.RaycastingScene()
+    scene.add_triangles(vertices.astype(np.float32), faces.astype(np.uint32))
+    points = []
+    for piece in pieces:
+        triangles = piece[ConvexHull(piece).simplices]
+        area = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
+        rows = random.choice(len(area), SURFACE_POINTS // len(pieces) + 1, p=area / area.sum())
+        weights = random.dirichlet(np.ones(3), len(rows))
+        points += [piece, np.einsum("ij,ijk->ik", weights, triangles[rows])]
+    outside = scene.compute_signed_distance(np.concatenate(points).astype(np.float32)).numpy()
+    return max(0.0, float(outside.max()))
+
+
+def _corners(points: Reals) -> Reals:
+    try:
+        corners: Reals = points[ConvexHull(points).vertices]
+    except QhullError:  # flat
+        return points
+    return corners
+
+
+def capsule_around(points: Reals, link: int) -> Envelope:
+    """A capsule that holds points (n, 3), m, and so their hull; along one of the cloud's principal axes.
+
+    Its radius is the greatest distance of a point from its line, so that it holds them by construction.
+    """
+    middle = points.mean(axis=0)
+    axes = np.linalg.svd(points - middle, full_matrices=False)[2]
+    best: Envelope | None = None
+    smallest = np.inf
+    for axis in axes:
+        along = (points - middle) @ axis
+        across = points - np.outer(along, axis)
+        centre = _round_centre(across)
+        away = np.linalg.norm(across - centre, axis=1)
+        cap = np.sqrt(np.maximum(away.max() ** 2 - away**2, 0.0))
+        low, high = float((along + cap).min()), float((along - cap).max())
+        if low > high:
+            low = high = (low + high) / 2
+        start, end = centre + low * axis, centre + high * axis
+        radius = float(_from_line(points, start, end).max()) * (1 + 1e-12) + ROUNDING
+        volume = np.pi * radius**2 * (high - low + 4 / 3 * radius)
+        if volume < smallest:
+            smallest = volume
+            best = Envelope(link, _triple(start), _triple(end), radius)
+    assert best is not None
+    return best
+
+
+def _round_centre(points: Reals) -> Reals:
+    """About the centre of the smallest ball around points (n, 3): steps towards the farthest (Badoiu and Clarkson)."""
+    centre: Reals = (points.min(axis=0) + points.max(axis=0)) / 2
+    for step in range(1, 500):
+        farthest = points[np.linalg.norm(points - centre, axis=1).argmax()]
+        centre = centre + (farthest - centre) / (step + 1)
+    return centre
+
+
+def _from_line(points: Reals, start: Reals, end: Reals) -> Reals:
+    """Distances (n,) of points from the line between two points."""
+    along = end - start
+    share = np.clip((points - start) @ along / max(float(along @ along), 1e-300), 0.0, 1.0)
+    distance: Reals = np.linalg.norm(points - start - share[:, None] * along, axis=1)
+    return distance
+
+
+def _triple(values: Reals) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z

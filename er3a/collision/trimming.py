@@ -1,0 +1,67 @@
+"""Bodies without the region around a joint in which they touch the next link by construction."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from er3a.collision.shapes import Body
+from er3a.numerics.arrays import Reals
+
+SHORTEST = 1e-6  # m
+
+
+def girth(body: Body, centre: Reals) -> float:
+    """How far a body stands out from the line that leads from ``centre`` (3,) through its middle, m."""
+    along = body.points.mean(axis=0) - centre
+    length = float(np.linalg.norm(along))
+    away = body.points - centre
+    if length > SHORTEST:
+        away = away - np.outer(away @ along, along) / length**2
+    return float(np.linalg.norm(away, axis=1).max()) + body.radius + body.disc
+
+
+def trimmed(body: Body, centre: Reals, radius: float) -> list[Body]:
+    """What is left of a body without the region around a joint.
+
+    Of a line the part outside the ball about ``centre`` (3,) with ``radius`` (m), of a hull the part that is farther
+    than that in the direction of its middle.
+    """
+    if len(body.points) > 2:
+        return _clipped(body, centre, radius)
+    start, end = body.points[0], body.points[-1]
+    along, away = end - start, start - centre
+    length = float(along @ along)
+    if length <= SHORTEST**2:
+        return [body] if np.linalg.norm(away) > radius else []
+    middle, half = -float(away @ along) / length, float((away @ along) ** 2 - length * (away @ away - radius**2))
+    if half <= 0:
+        return [body]
+    half = float(np.sqrt(half)) / length
+    parts = [(0.0, min(1.0, middle - half)), (max(0.0, middle + half), 1.0)]
+    return [
+        replace(body, points=np.array([start + low * along, start + high * along]))
+        for low, high in parts
+        if high > low and (high - low) ** 2 * length > SHORTEST**2
+    ]
+
+
+def _clipped(body: Body, centre: Reals, radius: float) -> list[Body]:
+    outward = body.points.mean(axis=0) - centre
+    outward /= max(float(np.linalg.norm(outward)), SHORTEST)
+    height = (body.points - centre) @ outward - radius
+    kept, cut = body.points[height >= 0], body.points[height < 0]
+    if not len(kept):
+        return []
+    if not len(cut):
+        return [body]
+    share = (height[height >= 0][:, None] / (height[height >= 0][:, None] - height[height < 0]))[..., None]
+    crossings = (kept[:, None] + share * (cut[None] - kept[:, None])).reshape(-1, 3)
+    points = np.concatenate([kept, crossings])
+    try:
+        points = points[ConvexHull(points).vertices]
+    except QhullError:  # a sliver
+        return []
+    return [replace(body, points=points)]

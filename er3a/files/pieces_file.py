@@ -1,0 +1,73 @@
+"""Files of convex pieces (:mod:`er3a.files.mesh_import`); studies need neither the mesh nor what reads it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from er3a.errors import InputError
+from er3a.files.robot_file import Text
+from er3a.files.units import Triple
+from er3a.files.yaml_file import StrictModel, parse
+from er3a.formats.text_file import read_text
+from er3a.numerics.arrays import Reals
+
+MOST_BYTES = 20_000_000
+
+
+class PiecesFile(StrictModel):
+    """Convex pieces of a mesh, in mm; ``sha256`` is of the pieces, ``source_sha256`` of the mesh's file.
+
+    ``uncovered_mm`` bounds how far the mesh stands out of the pieces, which are taken larger by it; ``excess_mm`` is
+    how far the pieces stand out of the mesh, as measured.
+    """
+
+    kind: Literal["pieces"]
+    source: Text
+    source_sha256: Text
+    unit: Literal["m", "mm"]
+    triangles: int
+    threshold: float
+    seed: int
+    uncovered_mm: Annotated[float, Field(ge=0)]
+    excess_mm: Annotated[float, Field(ge=0)]
+    sha256: Text
+    pieces_mm: Annotated[list[Annotated[list[Triple], Field(min_length=4)]], Field(min_length=1, max_length=1000)]
+
+    def pieces(self) -> tuple[Reals, ...]:
+        """Corners (k, 3), m, of each piece."""
+        return tuple(np.array(piece) / 1000 for piece in self.pieces_mm)
+
+
+def load_pieces(path: str | Path) -> PiecesFile:
+    """Read a file of pieces.
+
+    Raises
+    ------
+    InputError
+        if it is missing, no such file, or not as it was written
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".json":
+        remedy = f"Make one of the mesh: er3a mesh {path.name} --unit mm --output {path.stem}.json"
+        raise InputError(path, None, "is no file of convex pieces", remedy)
+    try:
+        data = json.loads(read_text(path, MOST_BYTES))
+    except (json.JSONDecodeError, RecursionError):
+        raise InputError(path, None, "not valid JSON", "Import the mesh again: er3a mesh") from None
+    if not isinstance(data, dict):
+        raise InputError(path, None, f"the top level is a {type(data).__name__}", "Import the mesh again: er3a mesh")
+    content = parse(PiecesFile, data, path)
+    if checksum_of(content.pieces_mm) != content.sha256:
+        raise InputError(path, "sha256", "the pieces are not as they were written", "Import the mesh again: er3a mesh")
+    return content
+
+
+def checksum_of(pieces: list[list[list[float]]]) -> str:
+    """Of pieces as they stand in the file."""
+    return hashlib.sha256(json.dumps(pieces).encode()).hexdigest()

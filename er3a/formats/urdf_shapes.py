@@ -1,0 +1,108 @@
+"""Collision geometry of a URDF's links as capsules and convex hulls.
+
+Boxes become hulls, cylinders prisms around them, spheres capsules without length. A mesh is taken as its hull, which
+holds it, or split into convex pieces if it is closed and that is asked for.
+"""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+
+from er3a.collision.meshes import ConvexPieces, convex_pieces, hull_of
+from er3a.collision.overlap_depth import cylinder_points
+from er3a.collision.shapes import CORNERS
+from er3a.errors import Er3aError, InputError
+from er3a.formats.mesh_file import read_mesh, read_vertices
+from er3a.geometry.transforms import transform
+from er3a.numerics.arrays import Reals
+from er3a.robots.robot import Envelope, Hull
+
+PRISM_SIDES = 24
+THRESHOLD, SEED = 0.05, 0
+
+
+def collision_shapes(
+    path: Path, collision: ElementTree.Element, place: tuple[Reals, int], notes: list[str], split: bool
+) -> list[Envelope | Hull]:
+    """Shapes of one ``<collision>``.
+
+    Parameters
+    ----------
+    place : (4, 4), from the URDF link's frame to that of our link, and the number of that link
+    notes : gets what was assumed or left out; split : whether meshes are split into convex pieces
+    """
+    T_link, link = place
+    origin, geometry = collision.find("origin"), collision.find("geometry")
+    where = f"collision of link {link}"
+    xyz, rpy = (numbers(path, where, origin, key, (0.0, 0.0, 0.0)) for key in ("xyz", "rpy"))
+    T = T_link @ transform(xyz, rpy)
+    shape = geometry[0] if geometry is not None and len(geometry) else None
+    match shape.tag if shape is not None else "":
+        case "box":
+            pieces = ConvexPieces((CORNERS * numbers(path, where, shape, "size", (1.0, 1.0, 1.0)),), 0.0, 0.0)
+        case "cylinder":
+            radius, half = (float(numbers(path, where, shape, key, None)[0]) for key in ("radius", "length"))
+            ends = np.array([[0, 0, -half / 2], [0, 0, half / 2]])
+            pieces = ConvexPieces((cylinder_points(ends, radius, PRISM_SIDES),), 0.0, 0.0)
+        case "sphere":
+            x, y, z = T[:3, 3].tolist()
+            return [Envelope(link, (x, y, z), (x, y, z), float(numbers(path, where, shape, "radius", None)[0]))]
+        case "mesh":
+            found = _mesh(path, where, shape, notes, split)
+            if found is None:
+                return []
+            pieces = found
+        case tag:
+            notes.append(f"{where}: <{tag}> is no shape that er3a reads; it is left out")
+            return []
+    placed = (piece @ T[:3, :3].T + T[:3, 3] for piece in pieces.pieces)
+    return [Hull(link, tuple((x, y, z) for x, y, z in piece.tolist()), pieces.uncovered) for piece in placed]
+
+
+def _mesh(
+    path: Path, where: str, shape: ElementTree.Element | None, notes: list[str], split: bool
+) -> ConvexPieces | None:
+    name = shape.get("filename", "") if shape is not None else ""
+    file = _found(path, name)
+    if file is None:
+        notes.append(f"{where}: the mesh {name} was not found; the link has no shape of it")
+        return None
+    scale = numbers(path, where, shape, "scale", (1.0, 1.0, 1.0))
+    if split:
+        try:
+            mesh = read_mesh(file, "m", scale)
+            return convex_pieces(mesh.vertices, mesh.faces, THRESHOLD, SEED)
+        except Er3aError as error:
+            notes.append(f"{where}: the hull of {file.name} is taken ({error})")
+    return hull_of(read_vertices(file) * scale)
+
+
+def _found(path: Path, name: str) -> Path | None:
+    """The file that a URDF names, beside it or in a package above it."""
+    package, _, rest = name.removeprefix("package://").partition("/")
+    places = [path.parent / name.removeprefix("file://")]
+    if name.startswith("package://"):
+        places = [place for parent in path.resolve().parents for place in (parent / package / rest, parent / rest)]
+    return next((place for place in places if place.is_file()), None)
+
+
+def numbers(
+    path: Path, where: str, element: ElementTree.Element | None, key: str, default: tuple[float, ...] | None
+) -> np.ndarray:
+    """Finite numbers of an attribute: three where there is a default, else one; :class:`InputError` otherwise."""
+    text = element.get(key) if element is not None else None
+    if text is None:
+        if default is None:
+            raise InputError(path, where, f"has no {key}", f"Add {key} to its <limit>")
+        return np.array(default)
+    try:
+        values = np.array([float(word) for word in text.split()])
+    except ValueError:
+        values = np.array([math.nan])
+    if len(values) != (3 if default else 1) or not np.isfinite(values).all():
+        raise InputError(path, f"{where}, {key}", f"'{text[:60]}' is not what stands there", "Write finite numbers")
+    return values

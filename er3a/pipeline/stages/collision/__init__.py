@@ -1,0 +1,1 @@
+"""Where an arm is free of collisions."""

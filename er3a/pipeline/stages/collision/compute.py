@@ -1,0 +1,180 @@
+"""Where an arm is free of collisions: the matrix, joint space, places, targets and paths."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from er3a.collision.bodies import Bodies
+from er3a.collision.free_space import (
+    DEPTH,
+    JointSpace,
+    Places,
+    Share,
+    find_places,
+    joined_to_home,
+    sample_joint_space,
+)
+from er3a.collision.mounting import base_contacts
+from er3a.collision.pairs import Pair
+from er3a.files.scene_file import load_scene
+from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.stages.collision.entry import CollisionSettings
+from er3a.pipeline.stages.collision.model import (
+    BaseInSolid,
+    CollisionResults,
+    CollisionSummary,
+    FreeShare,
+    FreeSpace,
+    HomeCollides,
+    MatrixRows,
+    Mounting,
+    NeverFree,
+    PairShares,
+    PlaceRows,
+    PlacesSummary,
+)
+from er3a.pipeline.stages.collision.nearest import path_clearances, target_clearances
+from er3a.pipeline.study import Study
+
+STAGE = "collision"
+SAMPLES_STREAM, PLACES_STREAM = 0, 1
+
+
+def compute(study: Study, name: str) -> CollisionResults:
+    """Work out where a robot of the study is free of collisions."""
+    robot, settings = study.robot(name), study.section(CollisionSettings)
+    scene_file = study.scene(name, STAGE)
+    scene = load_scene(scene_file) if scene_file else None
+    bodies = Bodies(robot, scene)
+    space = sample_joint_space(bodies, settings.samples, np.random.default_rng([study.seed, SAMPLES_STREAM]))
+    random = np.random.default_rng([study.seed, PLACES_STREAM])
+    places = find_places(bodies, space, settings.cells_across, settings.rounds, random)
+    home = np.clip(np.zeros(len(robot.a)), robot.lower, robot.upper)
+    least, nearest = bodies.least(home[None])
+    at_home = bodies.pairs[nearest[0]] if nearest[0] >= 0 and least[0] < 0 else None
+    if at_home is None:
+        places.joined[:] = joined_to_home(bodies, places, home, settings.neighbours)
+    targets, at_targets = target_clearances(robot, bodies, study.entry(name).targets)
+    tolerance = settings.penetration_tolerance_mm / 1000
+    paths, on_paths = path_clearances(robot, bodies, Path(study.entry(name).paths), tolerance)
+    pairs = _pair_shares(bodies, space)
+    mounting = tuple(
+        Mounting(contact.solid, contact.depth * 1000, contact.inside) for contact in base_contacts(robot, scene)
+    )
+    matrix = _matrix(bodies)
+    places_found = _places_summary(places)
+    undecided = int((matrix.state == "undecided").sum())
+    home_found = None if at_home is None else HomeCollides(at_home, float(-least[0] * 1000), space.whole.value)
+    return CollisionResults(
+        summary=CollisionSummary(
+            verdict=_verdict(pairs, mounting, home_found, _free_space(space, places_found, undecided)),
+            figures=_figures(space, places_found, matrix),
+            scene=scene.title if scene else None,
+            samples=settings.samples,
+            of_itself=_share(space.of_itself),
+            of_scene=_share(space.of_scene),
+            whole=_share(space.whole),
+            home_deg=None if at_home else tuple(np.degrees(home).tolist()),
+            proven_m=DEPTH,
+            penetration_tolerance_mm=settings.penetration_tolerance_mm,
+            places=places_found,
+            mounting=mounting,
+            closest=(*at_targets, *on_paths),
+        ),
+        matrix=matrix,
+        pairs=pairs,
+        places=PlaceRows(
+            middle_mm=places.middles * 1000,
+            tries=places.tries,
+            clear=places.clear,
+            joined=places.joined,
+            witness_deg=np.degrees(places.witness),
+        ),
+        targets=targets,
+        paths=paths,
+    )
+
+
+def _matrix(bodies: Bodies) -> MatrixRows:
+    unknown = np.full(len(bodies.robot.a), np.nan)
+    watched = {tuple(pair.label.split("/")) for pair, second in zip(bodies.pairs, bodies.second) if second >= 0}
+    return MatrixRows.of_rows(
+        (
+            row.first,
+            row.second,
+            row.state,
+            (row.first, row.second) in watched,
+            1000 * row.least,
+            1000 * row.left_out,
+            row.boxes,
+            unknown if row.witness is None else np.degrees(row.witness),
+            row.reason,
+        )
+        for row in bodies.matrix
+    )
+
+
+def _pair_shares(bodies: Bodies, space: JointSpace) -> PairShares:
+    """One row for what the results call a pair; it overlaps where any of its bodies do."""
+    numbers: dict[Pair, list[int]] = {}
+    for number, pair in enumerate(bodies.pairs):
+        numbers.setdefault(pair, []).append(number)
+    rows = []
+    for pair, own in numbers.items():
+        share = Share(space.count(own), len(space.q))
+        always = share.count == share.of and any(bodies.always_overlaps(number) for number in own)
+        rows.append((pair, bool(bodies.second[own[0]] >= 0), share.value, *share.interval, always))
+    return PairShares.of_rows(sorted(rows, key=lambda row: (-row[2], row[0].label)))
+
+
+def _share(share: Share) -> FreeShare:
+    return FreeShare(share.value, share.interval)
+
+
+def _places_summary(places: Places) -> PlacesSummary:
+    cell, clear = places.cell**3, int(places.clear.sum())
+    return PlacesSummary(
+        cell_m=places.cell,
+        reached=len(places.clear),
+        clear=clear,
+        joined=int(places.joined.sum()),
+        tries_in_lost=int(places.tries[~places.clear].sum()),
+        reached_m3=len(places.clear) * cell,
+        clear_m3=clear * cell,
+        lost_m3=(len(places.clear) - clear) * cell,
+    )
+
+
+def _free_space(space: JointSpace, places: PlacesSummary, undecided: int) -> FreeSpace:
+    return FreeSpace(space.whole.value, places.reached, places.clear, places.joined, undecided)
+
+
+def _verdict(
+    pairs: PairShares, mounting: tuple[Mounting, ...], home: HomeCollides | None, found: FreeSpace
+) -> Verdict[NeverFree | BaseInSolid | HomeCollides | FreeSpace]:
+    if pairs.always.any():
+        return Verdict("fail", NeverFree(tuple(pairs.between[pairs.always])))
+    if inside := tuple(contact.solid for contact in mounting if contact.inside):
+        return Verdict("fail", BaseInSolid(inside))
+    if home:
+        return Verdict("caution", home)
+    return Verdict("caution" if found.undecided or not found.clear else "pass", found)
+
+
+def _figures(space: JointSpace, places: PlacesSummary, matrix: MatrixRows) -> tuple[Figure, ...]:
+    def percent(name: str, share: Share) -> Figure:
+        low, high = share.interval
+        return Figure(name, 100 * share.value, "%", 50 * (high - low))
+
+    return (
+        percent("free_of_collisions", space.whole),
+        percent("free_of_itself", space.of_itself),
+        percent("free_of_scene", space.of_scene),
+        Figure("clear_places", places.clear, "", of=places.reached),
+        Figure("joined_places", places.joined, "", of=places.clear),
+        Figure("lost_volume", 1000 * places.lost_m3, "L"),
+        Figure("watched_pairs", int(matrix.watched.sum()), "", of=len(matrix)),
+        Figure("undecided_pairs", int((matrix.state == "undecided").sum()), ""),
+    )

@@ -1,0 +1,207 @@
+"""What the stage's results hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from er3a.collision.matrix import PairState
+from er3a.collision.pairs import Pair
+from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
+
+
+@dataclass(frozen=True)
+class NeverFree:
+    """Pairs that overlap in every joint vector within the limits, proven: the arm can't be used like this."""
+
+    pairs: tuple[Pair, ...]
+    code: Literal["collision.never_free"] = "collision.never_free"
+
+
+@dataclass(frozen=True)
+class BaseInSolid:
+    """The base stands inside solids, in every pose."""
+
+    solids: tuple[str, ...]
+    code: Literal["collision.base_in_solid"] = "collision.base_in_solid"
+
+
+@dataclass(frozen=True)
+class HomeCollides:
+    """At home, all joints at 0 or as near to it as the limits allow, something overlaps."""
+
+    pair: Pair
+    depth_mm: float
+    free_ratio: float
+    code: Literal["collision.home_collides"] = "collision.home_collides"
+
+
+@dataclass(frozen=True)
+class FreeSpace:
+    """How much of joint space and of the reached places is free.
+
+    Attributes
+    ----------
+    places, clear, joined : cells reached, with an arm free of overlap, and joined to home by a proven motion
+    undecided : pairs of links of which it is not known whether they can meet
+    """
+
+    free_ratio: float
+    places: int
+    clear: int
+    joined: int
+    undecided: int
+    code: Literal["collision.free_space"] = "collision.free_space"
+
+
+@dataclass(frozen=True)
+class FreeShare:
+    """A share of random joint vectors, with its 95 % interval (Wilson)."""
+
+    ratio: float
+    interval: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class PlacesSummary:
+    """Cells of space that the tool point was brought to, of edge ``cell_m``; volumes are those of whole cells."""
+
+    cell_m: float
+    reached: int
+    clear: int
+    joined: int
+    tries_in_lost: int
+    reached_m3: float
+    clear_m3: float
+    lost_m3: float
+
+
+@dataclass(frozen=True)
+class Mounting:
+    """A solid that the base overlaps, which is taken as what it is mounted on; ``inside``: the base's axis is in it."""
+
+    solid: str
+    depth_mm: float
+    inside: bool
+
+
+@dataclass(frozen=True)
+class Closest:
+    """Where a target's chosen solution or a path comes nearest to anything; points on the two bodies, in mm."""
+
+    name: str
+    kind: Literal["target", "path"]
+    clearance_mm: float
+    between: Pair
+    t_s: float | None
+    q_deg: tuple[float, ...]
+    from_mm: tuple[float, float, float]
+    to_mm: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class CollisionSummary(Summary):
+    """What the stage found.
+
+    Attributes
+    ----------
+    scene : title of the scene; None in open space
+    samples : random joint vectors tried
+    home_deg : where places are to be joined to; None where no home is free of overlap
+    proven_m : cells' witnesses are joined by moves that are proven free but for overlaps less deep than this
+    """
+
+    verdict: Verdict[NeverFree | BaseInSolid | HomeCollides | FreeSpace]
+    scene: str | None
+    samples: int
+    of_itself: FreeShare
+    of_scene: FreeShare
+    whole: FreeShare
+    home_deg: tuple[float, ...] | None
+    proven_m: float
+    penetration_tolerance_mm: float
+    places: PlacesSummary
+    mounting: tuple[Mounting, ...]
+    closest: tuple[Closest, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class MatrixRows(Table):
+    """The allowed collision matrix: one row for each pair of links, and of a link with what is carried."""
+
+    first: Texts = column("the body nearer to the base", dtype=object)
+    second: Texts = column("the body farther out", dtype=object)
+    state: Texts = column("never, joined, meets, undecided, allowed or watched", dtype=object)
+    watched: Flags = column("whether distances of the pair are measured", dtype=bool)
+    least_mm: Reals = column("of pairs that never meet, a proven lower bound of their distance", "mm")
+    left_out_mm: Reals = column("radius of the region around the joint that is left out; 0 where none is", "mm")
+    boxes: Integers = column("boxes of joint vectors looked at to prove it", dtype=np.int64)
+    witness_deg: Reals = per_joint("witness{}_deg", "a joint vector in which watched parts overlap; NaN: none", "deg")
+    reason: Texts = column("what the person who decided on the pair wrote", dtype=object)
+
+
+@dataclass(frozen=True, eq=False)
+class PairShares(Table):
+    """How often each pair overlaps among random joint vectors."""
+
+    between: Findings = findings("the two bodies", Pair)
+    of_itself: Flags = column("whether both belong to the arm or to what it carries", dtype=bool)
+    ratio: Reals = column("share of the joint vectors in which they overlap")
+    low: Reals = column("lower end of its 95 % interval")
+    high: Reals = column("upper end of its 95 % interval")
+    always: Flags = column("whether they overlap in every joint vector, proven", dtype=bool)
+
+
+@dataclass(frozen=True, eq=False)
+class PlaceRows(Table):
+    """Cells that the tool point was brought to."""
+
+    middle_mm: Reals = vector("{}_mm", "middle of the cell", "mm")
+    tries: Integers = column("arms tried with the tool in it", dtype=np.int64)
+    clear: Flags = column("whether one of them is free of overlap", dtype=bool)
+    joined: Flags = column("whether that one is joined to home by a proven motion", dtype=bool)
+    witness_deg: Reals = per_joint("witness{}_deg", "the first such arm; NaN where none was found", "deg")
+
+
+@dataclass(frozen=True, eq=False)
+class TargetClearances(Table):
+    """Clearance of each target's solutions within the limits."""
+
+    target: Texts = column("name of the target", dtype=object)
+    branch: Integers = column("number of the branch", dtype=np.int64)
+    label: Texts = column("code of the branch", dtype=object)
+    q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
+    clearance_mm: Reals = column("least distance; negative by the depth of overlap", "mm")
+    between: Texts = column("what is nearest to what", dtype=object)
+
+
+@dataclass(frozen=True, eq=False)
+class PathClearances(Table):
+    """Clearance over time of each path, with the points of both bodies that are nearest."""
+
+    path: Texts = column("name of the path", dtype=object)
+    t_s: Reals = column("time since the path's start", "s")
+    q_deg: Reals = per_joint("q{}_deg", "joint angle; NaN where the path can't be reached", "deg")
+    clearance_mm: Reals = column("least distance; negative by the depth of overlap", "mm")
+    between: Texts = column("what is nearest to what", dtype=object)
+    from_mm: Reals = vector("from_{}_mm", "the nearest point of the first body", "mm")
+    to_mm: Reals = vector("to_{}_mm", "the nearest point of the second body", "mm")
+
+
+@dataclass(frozen=True, eq=False)
+class CollisionResults(Results[CollisionSummary]):
+    """The stage's results."""
+
+    matrix: MatrixRows
+    pairs: PairShares
+    places: PlaceRows
+    targets: TargetClearances
+    paths: PathClearances
+
+
+RESULTS = CollisionResults
+STATES: tuple[PairState, ...] = ("meets", "undecided", "watched", "joined", "allowed", "never")

@@ -1,0 +1,122 @@
+"""The page of the collision stage."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from er3a.pipeline.messages.collision import FIGURES, body_word, state_word, why
+from er3a.pipeline.messages.kinematics import branch_word
+from er3a.pipeline.messages.language import tr
+from er3a.pipeline.messages.say import say
+from er3a.pipeline.results import Stored
+from er3a.pipeline.stages.collision.figures import by_pair, clearance_over_time, closest_pair, workspace
+from er3a.pipeline.stages.collision.model import (
+    STATES,
+    Closest,
+    CollisionResults,
+    MatrixRows,
+    PairShares,
+    TargetClearances,
+)
+from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.numbers import fixed
+from er3a.pipeline.viewing.page import head_of, render, run_command
+
+NO_BREAK_SPACE = "\u00a0"
+
+
+def report(study: Study, stored: Stored[CollisionResults], output: Path) -> None:
+    """Write the page from the stage's results."""
+    name, results, summary = stored.robot, stored.results, stored.results.summary
+    robot = study.robot(name)
+    nearest = min(summary.closest, key=lambda found: found.clearance_mm, default=None)
+    render(
+        Path(__file__).with_name("report.html.j2"),
+        output,
+        summary,
+        head=head_of(stored, FIGURES),
+        command=run_command(study, f"{name}/collision.html"),
+        robot=robot,
+        robot_pages=study.pages(name),
+        matrix=_matrix(results.matrix),
+        by_pair=by_pair(results.pairs),
+        pairs=_pairs(results.pairs),
+        workspace=workspace(results),
+        targets=_targets(results.targets),
+        clearance=clearance_over_time(results),
+        closest=[_closest(found) for found in sorted(summary.closest, key=lambda found: found.clearance_mm)],
+        nearest=closest_pair(robot, nearest) if nearest else None,
+        mounting=[_mounted(contact.solid, contact.depth_mm, contact.inside) for contact in summary.mounting],
+    )
+
+
+def _matrix(rows: MatrixRows) -> list[list[str]]:
+    order = sorted(range(len(rows)), key=lambda k: STATES.index(rows.state[k]))
+    return [
+        [
+            *(body_word(name).replace(" ", NO_BREAK_SPACE) for name in (rows.first[k], rows.second[k])),
+            state_word(rows.state[k]),
+            tr("yes") if rows.watched[k] else tr("no"),
+            why(
+                rows.state[k],
+                rows.least_mm[k],
+                rows.left_out_mm[k],
+                int(rows.boxes[k]),
+                _angles(rows.witness_deg[k]),
+                rows.reason[k],
+            ),
+        ]
+        for k in order
+    ]
+
+
+def _angles(values: np.ndarray) -> str:
+    return ", ".join(fixed(value, 0) for value in values) if np.isfinite(values).all() else ""
+
+
+def _pairs(rows: PairShares) -> list[list[str]]:
+    return [
+        [say(pair), fixed(100 * ratio, 2), tr("{low} to {high}", low=fixed(100 * low, 2), high=fixed(100 * high, 2))]
+        for pair, ratio, low, high in zip(rows.between, rows.ratio, rows.low, rows.high)
+    ]
+
+
+def _targets(rows: TargetClearances) -> list[list[str]]:
+    """One row for each target: solutions within limits, clear ones, the best clearance and its branch."""
+    found = []
+    for name in dict.fromkeys(rows.target):
+        own = rows.take(rows.target == name)
+        best = int(own.clearance_mm.argmax())
+        found.append(
+            [
+                str(name),
+                str(len(own)),
+                str(int((own.clearance_mm >= 0).sum())),
+                fixed(own.clearance_mm[best], 1),
+                branch_word(own.label[best], int(own.branch[best])),
+                _between(own.between[best]),
+            ]
+        )
+    return found
+
+
+def _between(label: str) -> str:
+    return tr(" and ").join(body_word(part) for part in label.split("/")) if label else tr("nothing")
+
+
+def _closest(found: Closest) -> list[str]:
+    kind = tr("chosen solution of a target") if found.kind == "target" else tr("path")
+    at = tr("t = {t} s", t=fixed(found.t_s, 2)) if found.t_s is not None else ""
+    return [found.name, kind, fixed(found.clearance_mm, 1), at, say(found.between)]
+
+
+def _mounted(solid: str, depth_mm: float, inside: bool) -> str:
+    if inside:
+        return tr("The base's axis lies in {own_name}.", own_name=solid)
+    return tr(
+        "The base overlaps {own_name} by {depth} mm in every pose, which is taken as its mounting.",
+        own_name=solid,
+        depth=fixed(depth_mm, 1),
+    )
