@@ -13,8 +13,7 @@ from er3a.files.robot_library import placement_transform
 from er3a.files.units import JointsDeg
 from er3a.files.yaml_file import StrictModel, load
 from er3a.numerics.arrays import Reals
-
-ProgramOutcome = Literal["pass", "caution", "fail"]
+from er3a.programs.program_outcomes import ProgramOutcome
 
 
 class ProgramEntry(StrictModel):

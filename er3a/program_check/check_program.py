@@ -277,11 +277,8 @@ def _verdicts(
 def _cycle(
     execution: Execution, motions: Mapping[int, CheckedMotion], main: Ending | None, way: tuple[int, ...]
 ) -> CycleTime:
-    again = main.repeats_from if main is not None and main.kind == "repeats" else None
-    part = [number for number in way if again is None or number >= again]
-    repeats = again is not None and again in way
-    if not repeats:
-        part = list(way)
+    again = None if main is None else execution.round_from(main)
+    part = way if again is None else way[way.index(again) :]
     stopping, saved, pauses, waits, complete = 0.0, 0.0, 0.0, 0, True
     for number in part:
         instruction = execution.steps[number].instruction
@@ -295,4 +292,4 @@ def _cycle(
                 continue
             stopping += motion.way.law.duration
             saved += motion.way.law.saved_by_blend * motion.blended_ends
-    return CycleTime(stopping - saved + pauses, stopping + pauses, pauses, waits, repeats, complete)
+    return CycleTime(stopping - saved + pauses, stopping + pauses, pauses, waits, again is not None, complete)
