@@ -113,7 +113,7 @@ def cycle_line(checked: CheckedFile) -> str:
     low, high = f"{cycle.blended_s:.2f}", f"{cycle.stopping_s:.2f}"
     time = f"{low} s" if low == high else f"{low} to {high} s"
     what = "one round of its loop" if cycle.repeats else "the program"
-    more = f", and {cycle.waits} waits for signals" if cycle.waits else ""
+    more = f", and {cycle.waits} wait{'s' if cycle.waits > 1 else ''} for signals" if cycle.waits else ""
     less = "" if cycle.complete else ", without the motions whose way is not known"
     return f"{shown(checked.file)}: {what} takes about {time}{more}{less}"
 

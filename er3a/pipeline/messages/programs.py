@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import er3a.pipeline.messages.program_check  # noqa: F401
 from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.messages.say import joined
+from er3a.pipeline.messages.say import counted, joined
 from er3a.pipeline.stages.programs.model import ProgramSummary
 from er3a.programs.syntax import Language
 
@@ -31,6 +31,10 @@ def cycle_text(program: ProgramSummary) -> str:
     low, high = f"{cycle.blended_s:.2f}", f"{cycle.stopping_s:.2f}"
     time = tr("{time} s", time=low) if low == high else tr("{low} to {high} s", low=low, high=high)
     what = tr("one round: {time}", time=time) if cycle.repeats else time
-    waits = tr("and {count} waits for signals", count=cycle.waits) if cycle.waits else ""
+    waits = (
+        counted("programs.waits", "and {count} wait for a signal", "and {count} waits for signals", cycle.waits)
+        if cycle.waits
+        else ""
+    )
     unknown = "" if cycle.complete else tr("without the motions whose way is not known")
     return joined([what, waits, unknown], ", ")

@@ -217,7 +217,8 @@ def _verdict(
 
 
 def _figures(programs: list[ProgramSummary]) -> tuple[Figure, ...]:
-    clear = [each.least_clearance_mm for each in programs if each.least_clearance_mm is not None]
+    asked = [each for each in programs if each.expect in (None, "pass")]
+    clear = [each.least_clearance_mm for each in asked if each.least_clearance_mm is not None]
     return (
         Figure("programs", len(programs), ""),
         Figure("instructions", sum(each.motions for each in programs), ""),

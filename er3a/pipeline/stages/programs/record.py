@@ -27,6 +27,8 @@ from er3a.program_check.program_check_findings import Level
 from er3a.robots.robot import Robot
 
 STAGE = "programs"
+SCENE_OF = "trajectory"  # the stage whose scene counts here too
+SCENE = f"/{SCENE_OF}/scene/**"
 PAUSE = 1.0  # s between two programs
 AROUND = 4  # lines of the listing before and behind the one that is carried out
 SKELETON_EVERY = 100
@@ -47,7 +49,7 @@ def record(study: Study, stored: Stored[ProgramsResults], output: Path) -> None:
     name, results = stored.robot, stored.results
     robot, motion = study.robot(name), results.motion
     with recording(output, name, STAGE, _layout(robot, motion)) as stream:
-        log_scene(stream, study, name, "trajectory")
+        log_scene(stream, study, name, SCENE_OF)
         log_arm(stream, robot, np.radians(motion.q_deg[0]) if len(motion) else np.zeros(len(robot.lower)))
         starts, start = [], 0.0
         for program in results.summary.programs:
@@ -94,7 +96,7 @@ def _view(robot: Robot, motion: ProgramMotion) -> rrb.Spatial3DView:
     eye = rrb.EyeControls3D(
         kind="Orbital", position=centre + distance * EYE_DIRECTION, look_target=centre, eye_up=[0, 0, 1]
     )
-    return rrb.Spatial3DView(origin="/", contents=[ARM, f"/{STAGE}/**"], name="Arm and tool", eye_controls=eye)
+    return rrb.Spatial3DView(origin="/", contents=[ARM, f"/{STAGE}/**", SCENE], name="Arm and tool", eye_controls=eye)
 
 
 def _announce(stream: rr.RecordingStream, program: ProgramSummary, start: float) -> None:
