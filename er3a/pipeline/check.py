@@ -9,7 +9,7 @@ from pydantic import BaseModel
 from er3a.errors import InputError
 from er3a.files.dh_table import read_dh_table
 from er3a.files.measurements import load_measurements
-from er3a.files.path_file import PathFile, TablePath, load_paths
+from er3a.files.path_file import PathFile, ProgramPath, TablePath, load_paths
 from er3a.files.path_table import read_path_table
 from er3a.files.program_file import ProgramsFile, load_programs
 from er3a.files.reference_documents import FILE as DOCUMENTS
@@ -103,6 +103,8 @@ def check_study(path: Path) -> Study:
         for planned in load_paths(entry.paths).paths:
             if isinstance(planned, TablePath):
                 read_path_table(planned.file)
+            elif isinstance(planned, ProgramPath):
+                read_program(planned.program)
         for program in load_programs(entry.programs).programs if entry.programs else ():
             read_program(program.file)
         for stage in ("inverse", "trajectory"):

@@ -27,7 +27,7 @@ from er3a.program_check.program_check_findings import (
     level_of,
     worst_of,
 )
-from er3a.program_check.step_checks import CheckedMotion, StepChecker, Surroundings, surroundings_of
+from er3a.program_check.step_checks import CheckedMotion, StepChecker, surroundings_of
 from er3a.program_check.ways import CheckRules
 from er3a.programs.execution import Ending, Execution, RunLimits
 from er3a.programs.instructions import ArmMotion, Decision, Pause, Place, Unknown
@@ -53,6 +53,7 @@ class CheckOptions:
     assumed_speed : (n,), rad/s, of joints whose speed no document gives
     acceleration_time : s, in which each joint is taken to reach its full speed
     penetration_tolerance : m; no overlap deeper than this goes unnoticed
+    measures : whether to look for collisions
     """
 
     start: Reals | None = None
@@ -62,6 +63,7 @@ class CheckOptions:
     assumed_speed: Reals | None = None
     acceleration_time: float = 0.25
     penetration_tolerance: float = 0.001
+    measures: bool = True
     assumed: AssumedRates = field(default_factory=AssumedRates)
     limits: RunLimits = field(default_factory=RunLimits)
 
@@ -162,14 +164,14 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
         np.full(count, np.radians(ASSUMED_SPEED_DEG_S)) if options.assumed_speed is None else options.assumed_speed
     )
     limits = joint_limits(robot, assumed, options.acceleration_time)
-    surroundings = surroundings_of(robot, options.scene, options.penetration_tolerance)
+    surroundings = surroundings_of(robot, options.scene, options.penetration_tolerance) if options.measures else None
     checker = StepChecker(robot, CheckRules(options.near, limits, options.assumed), surroundings, execution)
     checker.start = options.start
     for number in range(len(execution.steps)):
         checker.check(number)
     for ending in execution.endings:
         checker.close_loop(ending)
-    located = _located(execution, checker, surroundings)
+    located = _located(execution, checker, options.measures and surroundings is None)
     verdicts = _verdicts(program, execution, checker.motions, located)
     level: Level = worst_of(each.level for each in located)
     main = execution.main() if execution.endings else None
@@ -178,22 +180,26 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
     return ProgramCheck(execution, level, located, verdicts, checker.motions, way, cycle)
 
 
-def _located(
-    execution: Execution, checker: StepChecker, surroundings: Surroundings | None
-) -> tuple[LocatedFinding, ...]:
-    """All findings, like ones of an instruction grouped, in the order of the text."""
+def _located(execution: Execution, checker: StepChecker, blind: bool) -> tuple[LocatedFinding, ...]:
+    """All findings, like ones of an instruction grouped; ``blind`` if collisions could not be looked for."""
     program = execution.program
     top = Place(program.file, 1)
-    found = [LocatedFinding(level_of(each), each, _place_of(each, top)) for each in program.findings]
-    if surroundings is None:
+    moving = {step.place for step in execution.steps if isinstance(step.instruction, Unknown)}
+    found = [
+        LocatedFinding(level_of(each), each, _place_of(each, top))
+        for each in program.findings
+        if not (isinstance(each, NotUnderstood) and each.place in moving)
+    ]
+    if blind:
         found.append(LocatedFinding("caution", ClearanceNotMeasured(), top))
     for number, motion in checker.motions.items():
         step = execution.steps[number]
         found += [LocatedFinding(level_of(each), each, step.place, step.calls) for each in motion.findings]
     for step in execution.steps:
         what = step.instruction
-        if isinstance(what, Unknown) and what.may_move:
-            found.append(LocatedFinding("caution", MayMove(what.text), step.place, step.calls))
+        if isinstance(what, Unknown):
+            unknown = MayMove(what.text) if what.may_move else NotUnderstood(what.text, step.place)
+            found.append(LocatedFinding("caution", unknown, step.place, step.calls))
         elif isinstance(what, Decision) and what.taken:
             found.append(LocatedFinding("note", BothSidesChecked(what.condition), step.place, step.calls))
     for ending, joint, difference in checker.returns:

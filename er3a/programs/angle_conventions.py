@@ -58,6 +58,7 @@ def pose_of(numbers: Sequence[float], convention: Convention) -> Reals:
 def numbers_of(T: Reals, convention: Convention) -> tuple[float, ...]:
     """Six (ABB: seven) numbers of a transform (4, 4) in m."""
     xyz = T[:3, 3] if convention == "ur" else T[:3, 3] * MM
+    turned: Sequence[float] | Reals
     if convention in ("kuka", "efort"):
         turned = np.degrees(rpy_of(T))[::-1]
     elif convention == "ur":

@@ -89,7 +89,6 @@ class UrWords(Words):
         found: Expression = Listed(kind, tuple(each for each in placed if each is not None))
         return found
 
-
     def _numbers(self) -> tuple[int | float, ...] | None:
         """Numbers alone up to the closing bracket, which is passed; None, with nothing passed, for anything else."""
         kinds, texts, at = self.kinds, self.texts, self.at

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,6 +18,17 @@ from er3a.robots.robot import Robot
 if TYPE_CHECKING:
     from er3a.pipeline.program_reports import CheckedFile
     from er3a.program_check.check_program import CheckOptions
+
+
+class ProgramLanguage(StrEnum):
+    """A language that programs are written in."""
+
+    krl = "krl"
+    urscript = "urscript"
+    rpl = "rpl"
+    xpl = "xpl"
+    csv = "csv"
+
 
 RobotOption = Annotated[str, typer.Option("--robot", help="a robot's name or file")]
 SceneFile = Annotated[Path | None, typer.Option(help="a scene file: what the arm may not touch")]
@@ -54,10 +66,7 @@ def check_program(
     )
     checked = [_checked(file, arm, options) for file in files]
     if sarif is not None:
-        from er3a.files.kept_files import write_atomically
-
-        text = json.dumps(sarif_of(checked), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-        write_atomically(sarif, lambda path: path.write_text(text, encoding="utf-8"))
+        _write(sarif, json.dumps(sarif_of(checked), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     if as_json:
         print_json(json_of(checked))
     else:
@@ -72,6 +81,52 @@ def check_program(
         raise typer.Exit(2)
     if any(RANKS[each.level] >= RANKS[fail_on.value] for each in checked):
         raise typer.Exit(1)
+
+
+program_app = typer.Typer(help="Robot programs, written from paths.", no_args_is_help=True)
+app.add_typer(program_app, name="program", rich_help_panel=PROGRAMS)
+
+
+@program_app.command()
+def write(
+    paths: Annotated[Path, typer.Argument(help="a path file")],
+    robot: RobotOption,
+    language: Annotated[ProgramLanguage, typer.Option(help="the controller's language, or a table over time")],
+    output: Annotated[Path, typer.Option(help="the folder that the programs are written to")] = Path("programs"),
+    only: Annotated[list[str] | None, typer.Option(help="name of a path; all if absent")] = None,
+    scene: SceneFile = None,
+    unsafe: Annotated[
+        bool, typer.Option("--unsafe", help="write paths that are not safe too, and say so in the file")
+    ] = False,
+):
+    """Write the paths of a file as programs; paths that are not safe are refused."""
+    from er3a.files.robot_library import load_robot
+    from er3a.files.scene_file import load_scene
+    from er3a.pipeline.messages.expectations import outcome_word
+    from er3a.pipeline.messages.program_check import say
+    from er3a.pipeline.path_programs import programs_of
+
+    arm = load_robot(robot)
+    refused = 0
+    for made in programs_of(paths, arm, language.value, load_scene(scene) if scene else None, only, unsafe):
+        if made.files is None:
+            refused += 1
+            print_note(f"{made.name}: not written, because it is not safe: {outcome_word(made.verdict)}")
+            continue
+        for name, text in made.files.items():
+            file = output / name
+            _write(file, text)
+            print(f"{file}: written")
+        for finding in made.findings:
+            print_note(f"{made.name}: {say(finding)}")
+    if refused:
+        raise typer.Exit(1)
+
+
+def _write(file: Path, text: str) -> None:
+    from er3a.files.kept_files import write_atomically
+
+    write_atomically(file, lambda path: path.write_text(text, encoding="utf-8"))
 
 
 def _checked(file: Path, robot: Robot, options: CheckOptions) -> CheckedFile:

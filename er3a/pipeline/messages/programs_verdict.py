@@ -5,6 +5,7 @@ from __future__ import annotations
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.say import counted, joined, say, sentence
 from er3a.pipeline.stages.programs.model import NoPrograms, ProgramCounts
+from er3a.programs.program_outcomes import ProgramOutcome
 
 
 @say.register
@@ -16,17 +17,11 @@ def _(found: ProgramCounts) -> str:
         found.programs,
         passed=found.passed,
     )
-    others = [
-        sentence(
-            "programs.fault",
-            "{count} {word} ({names})",
-            count=len(names),
-            word=outcome_word(status),
-            names=", ".join(names),
-        )
-        for status, names in (("fail", found.failed), ("caution", found.caution))
-        if names
-    ]
+    unsound: dict[ProgramOutcome, tuple[str, ...]] = {"fail": found.failed, "caution": found.caution}
+    others = []
+    for outcome, names in unsound.items():
+        parts = {"count": len(names), "word": outcome_word(outcome), "names": ", ".join(names)}
+        others.append(sentence("programs.fault", "{count} {word} ({names})", **parts) if names else "")
     told = [passed if found.programs else "", joined(others, ", "), demonstrated(found.demonstrations)]
     return sentence("programs.verdict", "{finding}.", finding=joined(told))
 

@@ -10,9 +10,9 @@ from scipy.integrate import cumulative_simpson
 from scipy.interpolate import CubicHermiteSpline
 
 from er3a.errors import PoseError
-from er3a.files.path_file import PathEntry
 from er3a.kinematics.forward import forward, jacobian
 from er3a.numerics.arrays import Reals
+from er3a.pipeline.stages.trajectory.program_paths import PlannedEntry
 from er3a.planning.build import Built, build
 from er3a.planning.commands import CommandSource
 from er3a.planning.follow import follow
@@ -38,7 +38,7 @@ class Motion:
     followed : how a path of the tool is followed; None for one in joint space
     """
 
-    entry: PathEntry
+    entry: PlannedEntry
     built: Built
     samples: Reals
     checks: Reals
@@ -52,7 +52,7 @@ class Motion:
 
 
 def motion_of(
-    robot: Robot, entry: PathEntry, checks_per_sample: int, source: CommandSource, ends: Mapping[str, Reals]
+    robot: Robot, entry: PlannedEntry, checks_per_sample: int, source: CommandSource, ends: Mapping[str, Reals]
 ) -> Motion:
     """Plan a path, and follow it if it is one of the tool; ``ends`` as for :func:`er3a.planning.build.build`.
 
@@ -92,7 +92,7 @@ def motion_of(
 
 
 def _joint_motion(
-    robot: Robot, entry: PathEntry, built: Built, move: JointMove | JointSequence, samples: Reals, checks: Reals
+    robot: Robot, entry: PlannedEntry, built: Built, move: JointMove | JointSequence, samples: Reals, checks: Reals
 ) -> Motion:
     q, velocity, _ = move.joints(checks)
     speed = np.linalg.norm(np.einsum("nij,nj->ni", jacobian(robot, q)[:, :3], velocity), axis=1)
