@@ -19,6 +19,8 @@ def grades_in(file: Path) -> dict[str, list[str]] | dict[str, int]:
     """
     if file.suffix == ".csv":
         return dict(Counter(read_column(file, "grade")))
+    if file.suffix not in (".yaml", ".yml"):
+        return {}
     found: dict[str, list[str]] = {}
     for group, values in read_yaml(file).items():
         if isinstance(values, dict) and "grade" in values:

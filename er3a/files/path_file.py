@@ -326,6 +326,14 @@ class PlanPath(NamedPath):
         return PlanCommand(start, end, source=source)
 
 
+class ProgramPath(NamedPath):
+    """A robot program: a path for each stretch of joint moves, and each stretch of lines and arcs."""
+
+    kind: Literal["program"]
+    program: Text
+    start_deg: JointsDeg | None = None
+
+
 PathEntry = PlanPath | JointPath | JointSequencePath | LinePath | ArcPath | SequencePath | TablePath
 
 
@@ -333,7 +341,7 @@ class PathFile(StrictModel):
     """A list of named paths."""
 
     kind: Literal["paths"]
-    paths: Annotated[list[Annotated[PathEntry, Field(discriminator="kind")]], Field(min_length=1)]
+    paths: Annotated[list[Annotated[PathEntry | ProgramPath, Field(discriminator="kind")]], Field(min_length=1)]
 
     @model_validator(mode="after")
     def _names_differ(self) -> Self:
@@ -358,7 +366,7 @@ def load_paths(path: str | Path) -> PathFile:
     try:
         return load(PathFile, path)
     except InputError as error:
-        kinds = "joint_sequence|joint|line|arc|sequence|table|plan"
+        kinds = "joint_sequence|joint|line|arc|sequence|table|plan|program"
         field = error.field and re.sub(rf"((?:paths|segments)\[\d+\])\.(?:{kinds})\b", r"\1", error.field)
         raise InputError(error.file, field, error.problem, error.remedy) from None
 

@@ -9,8 +9,9 @@ from pydantic import BaseModel
 from er3a.errors import InputError
 from er3a.files.dh_table import read_dh_table
 from er3a.files.measurements import load_measurements
-from er3a.files.path_file import PathFile, TablePath, load_paths
+from er3a.files.path_file import PathFile, ProgramPath, TablePath, load_paths
 from er3a.files.path_table import read_path_table
+from er3a.files.program_file import ProgramsFile, load_programs
 from er3a.files.reference_documents import FILE as DOCUMENTS
 from er3a.files.reference_documents import load_documents
 from er3a.files.reference_rows import FORMATS
@@ -22,6 +23,7 @@ from er3a.files.target_file import TargetFile, read_targets
 from er3a.files.yaml_file import read_yaml
 from er3a.formats.text_file import read_text
 from er3a.pipeline.study import Study, load_study
+from er3a.programs.read_program import SUFFIXES, read_program
 
 SCHEMAS: dict[str, type[BaseModel]] = {
     "study": Study,
@@ -29,6 +31,7 @@ SCHEMAS: dict[str, type[BaseModel]] = {
     "targets": TargetFile,
     "paths": PathFile,
     "scene": SceneFile,
+    "programs": ProgramsFile,
 }
 
 _CHECKS = {
@@ -37,8 +40,16 @@ _CHECKS = {
     "targets": read_targets,
     "paths": load_paths,
     "scene": load_scene,
+    "programs": load_programs,
 }
-_WORDS = {"robot": "a robot", "study": "a study", "targets": "targets", "paths": "paths", "scene": "a scene"}
+_WORDS = {
+    "robot": "a robot",
+    "study": "a study",
+    "targets": "targets",
+    "paths": "paths",
+    "scene": "a scene",
+    "programs": "programs",
+}
 
 
 def check_file(path: Path) -> str:
@@ -54,6 +65,9 @@ def check_file(path: Path) -> str:
         return "documents of references"
     if path.suffix == ".csv":
         return _check_table(path)
+    if path.suffix.lower() in SUFFIXES and path.suffix != ".csv":
+        read_program(path)
+        return "a robot program"
     if path.suffix not in (".yaml", ".yml"):
         raise InputError(path, None, f"'{path.suffix}' files are none of er3a's inputs", "Give a .yaml or .csv file")
     kind = read_yaml(path).get("kind")
@@ -89,6 +103,10 @@ def check_study(path: Path) -> Study:
         for planned in load_paths(entry.paths).paths:
             if isinstance(planned, TablePath):
                 read_path_table(planned.file)
+            elif isinstance(planned, ProgramPath):
+                read_program(planned.program)
+        for program in load_programs(entry.programs).programs if entry.programs else ():
+            read_program(program.file)
         for stage in ("inverse", "trajectory"):
             if scene := study.scene(name, stage):
                 load_scene(scene)

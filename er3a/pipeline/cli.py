@@ -13,7 +13,12 @@ from importlib import import_module
 from er3a.errors import Er3aError
 from er3a.pipeline.commands.options import app, print_error, print_warning
 
-for _room in ("studies", "robot_files", "single_jobs"):  # in the order of --help; each registers its commands
+for _room in (
+    "studies",
+    "robot_files",
+    "programs",
+    "single_jobs",
+):  # in the order of --help; each registers its commands
     import_module(f"er3a.pipeline.commands.{_room}")
 
 

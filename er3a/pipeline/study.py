@@ -31,6 +31,7 @@ class RobotEntry(StrictModel):
     file: Text | None = None
     targets: Text
     paths: Text
+    programs: Text | None = None
     scene: Text | None = None
     base: Placement | None = None
     tool: Placement | None = None
@@ -110,7 +111,8 @@ class StudyBase(StrictModel):
     def stages(self, name: str) -> tuple[str, ...]:
         """The stages that a robot goes through."""
         variant = self.variants.get(name)
-        return STAGES if variant is None else tuple(self.sweeps[variant.sweep].stages)
+        asked = STAGES if variant is None else tuple(self.sweeps[variant.sweep].stages)
+        return tuple(stage for stage in asked if REGISTRY[stage].wanted(self, name))
 
     def pages(self, name: str) -> tuple[str, ...]:
         """The pages of a robot: its stages', and the teach panel of one that is no variant."""
@@ -176,7 +178,9 @@ class StudyBase(StrictModel):
 
     def settings(self, name: str, key: str) -> dict[str, Any]:
         """What of the study concerns one of its keys, for a robot; of a key without settings seed and robot alone."""
-        entry = self.entry(name).model_dump(exclude={"targets", "paths", "file", "scene", "expect"}, exclude_none=True)
+        entry = self.entry(name).model_dump(
+            exclude={"targets", "paths", "programs", "file", "scene", "expect"}, exclude_none=True
+        )
         if variant := self.variants.get(name):
             entry["varied"] = {variant.vary: variant.value}
         own = getattr(self, key, None)

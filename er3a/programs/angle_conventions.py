@@ -58,10 +58,11 @@ def pose_of(numbers: Sequence[float], convention: Convention) -> Reals:
 def numbers_of(T: Reals, convention: Convention) -> tuple[float, ...]:
     """Six (ABB: seven) numbers of a transform (4, 4) in m."""
     xyz = T[:3, 3] if convention == "ur" else T[:3, 3] * MM
+    turned: Sequence[float] | Reals
     if convention in ("kuka", "efort"):
         turned = np.degrees(rpy_of(T))[::-1]
     elif convention == "ur":
-        turned = Rotation.from_matrix(T[:3, :3]).as_rotvec()
+        turned = _rotation_vector(T[:3, :3].tolist())
     elif convention == "abb":
         turned = Rotation.from_matrix(T[:3, :3]).as_quat(canonical=True)[[3, 0, 1, 2]]
     else:
@@ -106,3 +107,25 @@ def _cos_sin(degrees: float) -> tuple[float, float]:
     angle = math.radians(degrees)
     c, s = math.cos(angle), math.sin(angle)
     return (0.0 if abs(c) < 1e-15 else c), (0.0 if abs(s) < 1e-15 else s)
+
+
+def _rotation_vector(R: list[list[float]]) -> tuple[float, float, float]:
+    """Rotation vector (rad) of a rotation matrix, by the quaternion whose greatest part is found first."""
+    (a, b, c), (d, e, f), (g, h, i) = R
+    squares = (1 + a + e + i, 1 + a - e - i, 1 - a + e - i, 1 - a - e + i)
+    greatest = squares.index(max(squares))
+    if greatest == 0:
+        w, x, y, z = squares[0], h - f, c - g, d - b
+    elif greatest == 1:
+        w, x, y, z = h - f, squares[1], b + d, c + g
+    elif greatest == 2:
+        w, x, y, z = c - g, b + d, squares[2], f + h
+    else:
+        w, x, y, z = d - b, c + g, f + h, squares[3]
+    if w < 0:
+        w, x, y, z = -w, -x, -y, -z
+    size = math.sqrt(x * x + y * y + z * z)
+    if size == 0:
+        return 0.0, 0.0, 0.0
+    angle = 2 * math.atan2(size, w)
+    return angle * x / size, angle * y / size, angle * z / size

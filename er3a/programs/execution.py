@@ -105,11 +105,16 @@ class Execution:
             moves[i] = moves[step.before] + isinstance(step.instruction, ArmMotion)
         return max(self.endings, key=lambda ending: moves[ending.step])
 
+    def round_from(self, ending: Ending) -> int | None:
+        """Number of the step from which a way repeats itself for ever; None if it does not."""
+        again = ending.repeats_from
+        return again if ending.kind in ("repeats", "joins") and again in self.way(ending) else None
+
     def listing(self, ending: Ending | None = None) -> Listing:
         """A way as a sequence without branches, to be written; by default :meth:`main`."""
         ending = ending or self.main()
         way = self.way(ending)
-        again = ending.repeats_from if ending.kind == "repeats" else None
+        again = self.round_from(ending)
         kept = [i for i in way if not isinstance(self.steps[i].instruction, Decision)]
         start = None if again is None else sum(i < again for i in kept)
         if start is not None and start >= len(kept):

@@ -87,11 +87,10 @@ def listing_of(
         case ToolSequenceCommand():
             making.segments(command.segments, command.duration, ends)
         case ToolTableCommand():
-            parts = tuple(
-                SegmentCommand(pose, blend=command.blend or 0.0 if i < len(command.poses) - 2 else 0.0)
-                for i, pose in enumerate(command.poses[1:])
-            )
-            sizes = making.sizes(parts)
+            sizes = making.sizes(tuple(map(SegmentCommand, command.poses[1:])))
+            halves = np.append(np.minimum(sizes[:-1], sizes[1:]) / 2, 0.0)  # as er3a.planning.build rounds corners
+            blends = halves if command.blend is None else np.minimum(halves, command.blend)
+            parts = tuple(SegmentCommand(pose, blend=float(blend)) for pose, blend in zip(command.poses[1:], blends))
             making.halts = _halts(command.timing, len(parts))
             making.segments(parts, _row_times(command.timing, sizes), ends)
         case _:

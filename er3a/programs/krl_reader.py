@@ -36,6 +36,11 @@ def read_krl(source: ProgramText) -> Program:
         findings.append(DataFileMissing(source.path.with_suffix(".dat").name))
     else:
         findings += reader.read_data(read_program_text(data_file))
+    shared = shared_data_of(source.path)
+    if shared is not None:
+        own, reader.data = reader.data, []
+        reader.read_data(read_program_text(shared))
+        reader.data += own
     routines = reader.read_routines()
     by_name, more = linked(routines)
     return Program(
@@ -56,6 +61,15 @@ def data_file_of(path: Path, suffix: str) -> Path | None:
         beside = path.with_name(name)
         if beside.is_file():
             return beside
+    return None
+
+
+def shared_data_of(path: Path) -> Path | None:
+    """The controller's own $config.dat, with its tools, bases and points: beside a program, or as in an archive."""
+    for folder in (path.parent, path.parent.parent / "System"):
+        for name in ("$config.dat", "$CONFIG.DAT", "$Config.dat"):
+            if (folder / name).is_file():
+                return folder / name
     return None
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from er3a.planning.path_verdicts import PathVerdict
 from er3a.programs.instructions import Place
 
 
@@ -134,6 +135,15 @@ class NotTranslated:
     code: Literal["written_not_translated"] = "written_not_translated"
 
 
+@dataclass(frozen=True)
+class WrittenUnsafe:
+    """The path is not safe as it is, and was written all the same because that was asked for."""
+
+    path: str
+    verdict: PathVerdict
+    code: Literal["written_unsafe"] = "written_unsafe"
+
+
 WriteFinding = (
     ArcsSplit
     | ZonesDropped
@@ -145,4 +155,5 @@ WriteFinding = (
     | ToolNotGiven
     | ValuesRounded
     | NotTranslated
+    | WrittenUnsafe
 )

@@ -10,7 +10,7 @@ from pathlib import Path
 from er3a.errors import InputError
 from er3a.programs.csv_program import read_csv_program
 from er3a.programs.instructions import ArmMotion
-from er3a.programs.krl_reader import read_krl
+from er3a.programs.krl_reader import data_file_of, read_krl, shared_data_of
 from er3a.programs.program_findings import NothingMoves
 from er3a.programs.program_text import ProgramText, read_program_text
 from er3a.programs.rpl_reader import read_rpl
@@ -65,6 +65,15 @@ def read_program(path: str | Path) -> Program:
     if not _moves(program) and not any(isinstance(each, NothingMoves) for each in program.findings):
         program = replace(program, findings=(*program.findings, NothingMoves()))
     return program
+
+
+def files_of(path: Path) -> tuple[Path, ...]:
+    """A program's file, and the files with its points and frames, where there are such."""
+    language = SUFFIXES.get(path.suffix.lower())
+    suffix = {"krl": ".dat", "rpl": ".var"}.get(language or "")
+    beside = data_file_of(path, suffix) if suffix else None
+    shared = shared_data_of(path) if language == "krl" else None
+    return tuple(file for file in (path, beside, shared) if file is not None)
 
 
 def language_of(source: ProgramText) -> Language:

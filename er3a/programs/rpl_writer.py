@@ -223,7 +223,7 @@ SHELL = """<?xml version="1.0" encoding="utf-8"?>
 <HostEnvironment>
 <Config>
 <FileId>{number}</FileId>
-<Target>Robox ArmMotion Control</Target>
+<Target>Robox Motion Control</Target>
 <XplType>RoboticProgramLanguage</XplType>
 </Config>
 </HostEnvironment>

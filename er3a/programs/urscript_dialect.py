@@ -124,6 +124,8 @@ class UrScriptDialect:
         if found is None:
             found = _of_poses(name, values, keywords)
         plain = numbers(tuple(values))
+        if found is None and name in ("norm", "normalize"):
+            found = _of_vector(name, values)
         if found is None and name in PLAIN and plain:
             try:
                 found = PLAIN[name](*plain)
@@ -245,7 +247,7 @@ def _of_position(memory: Memory, name: str, values: list[Value | None]) -> Value
     """Functions of where the arm stands, and of its table."""
     if name in ("get_actual_joint_positions", "get_target_joint_positions"):
         return None if memory.here.joints is None else tuple(map(float, memory.here.joints))
-    if name in ("get_actual_tcp_pose", "get_target_tcp_pose"):
+    if name in ("get_actual_tcp_pose", "get_target_tcp_pose", "get_target_waypoint"):
         seen = memory.here.seen(_tool(memory), ROBOT_BASE, memory.cell.flange)
         return None if seen is None else _record(seen)
     if name == "get_forward_kin" and memory.cell.flange is not None:
@@ -254,6 +256,16 @@ def _of_position(memory: Memory, name: str, values: list[Value | None]) -> Value
         if joints is not None and tool is not None:
             return _record(memory.cell.flange(joints) @ tool)
     return None
+
+
+def _of_vector(name: str, values: list[Value | None]) -> Value | None:
+    """The length of a list of numbers, and the list over its length."""
+    given = values[0] if len(values) == 1 else None
+    plain = numbers(given) if isinstance(given, tuple) else numbers((given,))
+    size = None if not plain else math.hypot(*plain)
+    if not plain or size is None or not math.isfinite(size):
+        return None
+    return size if name == "norm" else tuple(each / size for each in plain) if size > 0 else None
 
 
 def _of_poses(name: str, values: list[Value | None], keywords: dict[str, Value]) -> Value | None:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from er3a.errors import InputError
 from er3a.programs.code_builder import CodeBuilder, fault
 from er3a.programs.instructions import Place
-from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, Words
+from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, Words, as_number
 from er3a.programs.linking import linked
 from er3a.programs.program_text import ProgramText
 from er3a.programs.syntax import (
@@ -76,11 +76,37 @@ class UrWords(Words):
         elif self.next != "[" or self.kind == "text":
             return None
         self.take()
+        numbers = self._numbers()
+        if numbers is not None and not kind:
+            return Constant(numbers)
+        if numbers is not None and len(numbers) == len(POSE_KEYS):
+            return Constant(Record("p", tuple(zip(POSE_KEYS, numbers))))
+        if numbers is not None:
+            return Listed(kind, tuple(map(Constant, numbers)))
         placed, _ = self.arguments("]")
         if None in placed:
             raise MisreadError("an element is missing")
         found: Expression = Listed(kind, tuple(each for each in placed if each is not None))
         return found
+
+    def _numbers(self) -> tuple[int | float, ...] | None:
+        """Numbers alone up to the closing bracket, which is passed; None, with nothing passed, for anything else."""
+        kinds, texts, at = self.kinds, self.texts, self.at
+        found: list[int | float] = []
+        while True:
+            minus = texts[at] == "-"
+            at += minus
+            if kinds[at] != "number" or texts[at][:2] == "0x":
+                return None
+            value = as_number(texts[at])
+            found.append(-value if minus else value)
+            at += 1
+            if texts[at] == "]":
+                self.at = at + 1
+                return tuple(found)
+            if texts[at] != ",":
+                return None
+            at += 1
 
 
 def read_urscript(source: ProgramText) -> Program:

@@ -32,6 +32,7 @@ from er3a.programs.program_findings import (
     ToolNotGiven,
     ValuesRounded,
     WriteFinding,
+    WrittenUnsafe,
     ZonesDropped,
 )
 from er3a.programs.resolving import ReadyMotion, Resolver, with_default_frames
@@ -226,6 +227,8 @@ def head_line(finding: WriteFinding) -> str:
             return f"set this tool or base on the controller: {ascii_text(name)}"
         case ValuesRounded(values=count):
             return f"{count} speed(s) or zone(s) rounded down to the next that has a name"
+        case WrittenUnsafe(path=path, verdict=verdict):
+            return f"NOT SAFE: the path {ascii_text(path)} {ascii_text(verdict)}; written because it was asked for"
         case NotTranslated(instructions=count):
             return f"{count} instruction(s) of the other language as comments"
 

@@ -20,6 +20,7 @@ from er3a.programs.syntax import (
     Fixed,
     Invocation,
     Move,
+    Opaque,
     Program,
     Routine,
     RoutineParameter,
@@ -108,6 +109,8 @@ class _Pou:
                     builder.add(Fixed(place, Disabled(text_of(element))))
                 elif element.tag in ("while", "for"):
                     self._loop(builder, element, place, (*within, pou))
+                elif element.child("pouref") is not None:
+                    self._unknown_block(builder, element, place, (*within, pou))
                 else:
                     _element(builder, element, place)
 
@@ -127,6 +130,18 @@ class _Pou:
             builder.open_for(place, element.text_of("var"), first, last, step, told)
         self._body(builder, body, f"{place.element}/{name}", within)
         builder.close(element.tag, place)
+
+    def _unknown_block(self, builder: CodeBuilder, element: XmlNode, place: Place, within: tuple[XmlNode, ...]) -> None:
+        """An element that is not understood and has bodies: each may be carried out, or not."""
+        told = text_of(element)
+        builder.unknown(place, told, may_move=False)
+        for name in (each.text for each in element.all("pouref")):
+            body = self._named(name, within)
+            if body is None or body in within or len(within) > MOST_LOOPS:
+                raise fault(place, f"there is no <Pou> '{name}' for a body here", "Add it, or correct <pouref>")
+            builder.open_if(place, Opaque(told), told)
+            self._body(builder, body, f"{place.element}/{name}", within)
+            builder.close("if", place)
 
     def _named(self, name: str, within: tuple[XmlNode, ...]) -> XmlNode | None:
         """The body of a loop: the nearest around that has this name."""

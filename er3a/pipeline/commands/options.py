@@ -22,6 +22,7 @@ DEFAULT_REPORTS = Path("reports")
 
 FIRST = "A study, from start to end"
 ROBOT_FILES = "Robot files"
+PROGRAMS = "Robot programs"
 JOBS = "Single jobs, as the workflow calls them"
 
 _START = """\
@@ -32,6 +33,7 @@ er3a: can this kinematic model of a serial robot be trusted, and what can the ro
   er3a run                        carry out the study of this folder; then open reports/index.html
   er3a verdicts                   what came out, in the terminal
   er3a view                       the recordings, to move and to play
+  er3a check-program FILE ...     what a robot program would make an arm do (--robot er3_600)
 
 All commands: er3a --help. What one takes: er3a run --help."""
 

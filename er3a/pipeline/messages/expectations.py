@@ -18,6 +18,9 @@ OUTCOMES: dict[Outcome, str] = {
     "near-singular": N_("near-singular"),
     "safe": N_("safe"),
     "reached": N_("reached"),
+    "pass": N_("pass"),
+    "caution": N_("caution"),
+    "fail": N_("fail"),
 }
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
 from er3a.errors import Er3aError
-from er3a.files.path_file import PathEntry, PathFile
+from er3a.files.path_file import PathFile, ProgramPath
 from er3a.files.target_file import TargetEntry
 from er3a.files.yaml_file import parse
 from er3a.geometry.transforms import rpy_of
@@ -187,7 +187,8 @@ class TaskSearch:
 
     def _safe(self, written: dict[str, Any]) -> bool:
         """Whether the trajectory stage would call a path safe."""
-        entry: PathEntry = parse(PathFile, {"kind": "paths", "paths": [written]}, None).paths[0]
+        entry = parse(PathFile, {"kind": "paths", "paths": [written]}, None).paths[0]
+        assert not isinstance(entry, ProgramPath)
         wanted = Wanted(self.limits.rates, self.near)
         try:
             motion = motion_of(self.robot, entry, self.settings.checks_per_sample, CommandSource(None, ""), {}, wanted)

@@ -1,4 +1,4 @@
-"""What a target or a path is said to come to, against what it came to: findings of the stages that judge them."""
+"""What a target, a path or a program is said to come to, against what it came to: findings of those stages."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from typing import Literal, Protocol
 
 from er3a.kinematics.targets import TargetOutcome
 from er3a.planning.path_verdicts import PathVerdict
+from er3a.programs.program_outcomes import ProgramOutcome
 
-Outcome = TargetOutcome | PathVerdict
+Outcome = TargetOutcome | PathVerdict | ProgramOutcome
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from er3a.pipeline.stages.collision.entry import STAGE as COLLISION
 from er3a.pipeline.stages.inverse.entry import STAGE as INVERSE
+from er3a.pipeline.stages.programs.entry import STAGE as PROGRAMS
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.stages.trajectory.entry import STAGE as TRAJECTORY
 from er3a.pipeline.stages.validation.entry import STAGE as VALIDATION
 from er3a.pipeline.stages.workspace.entry import STAGE as WORKSPACE
 
-STAGES: dict[str, Stage] = {stage.name: stage for stage in (VALIDATION, WORKSPACE, COLLISION, INVERSE, TRAJECTORY)}
+STAGES: dict[str, Stage] = {stage.name: stage for stage in (VALIDATION, WORKSPACE, COLLISION, INVERSE, TRAJECTORY, PROGRAMS)}
 
 
 def all_messages() -> list[str]:

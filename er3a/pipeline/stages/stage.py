@@ -29,6 +29,11 @@ def no_files(study: Study, robot: str) -> list[Path]:
     return []
 
 
+def wanted_of_all(study: Study, robot: str) -> bool:
+    """For stages that every robot of a study goes through."""
+    return True
+
+
 class Compute(Protocol):
     """What a stage's ``compute.compute`` is: a robot's results from the study.
 
@@ -57,6 +62,7 @@ class Stage:
     title, question : marked with ``N_``: the page's title, and what it answers
     settings : per key of the study file the model of what stands there; the first is the stage's own
     inputs : the files that a robot's results rest on besides its own file
+    wanted : whether a robot of a study goes through the stage at all
     applies : why the stage can't be computed for a robot, a finding of one of ``absences``; None if it can
     views : ``record`` (a recording, with its preview) and ``report`` (a page), as far as the stage has them
     rests_on : names of the stages whose verdict its pages say first
@@ -68,6 +74,7 @@ class Stage:
     question: str
     settings: Mapping[str, type[StrictModel]]
     inputs: Callable[[Study, str], list[Path]] = no_files
+    wanted: Callable[[Study, str], bool] = wanted_of_all
     applies: Callable[[Robot], Finding | None] = applies_to_all
     absences: tuple[type[Finding], ...] = ()
     views: tuple[str, ...] = ("record", "report")

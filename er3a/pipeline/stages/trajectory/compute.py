@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,7 @@ from er3a.pipeline.stages.trajectory.model import (
     NoneSafe,
     PathChecks,
     PathSummary,
+    ProgramFiles,
     Samples,
     SomeUnsafe,
     TrajectoryResults,
@@ -35,6 +37,8 @@ from er3a.pipeline.stages.trajectory.model import (
 )
 from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
 from er3a.pipeline.stages.trajectory.path_summary import path_summary
+from er3a.pipeline.stages.trajectory.program_paths import PlannedEntry, planned_entries
+from er3a.pipeline.stages.trajectory.written_programs import program_files
 from er3a.pipeline.study import Study
 from er3a.planning.commands import CommandSource
 from er3a.planning.path_verdicts import PathVerdict
@@ -66,11 +70,11 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     strategies: list[AvoidanceRows] = []
     paths: list[PathSummary] = []
     ends: dict[str, Reals] = {}
-    for i, entry in enumerate(load_paths(file).paths):
-        source = CommandSource(file, f"paths[{i}]")
+    programs: list[ProgramFiles] = []
+    for listed, entry, source in _planned(robot, file):
         wanted = Wanted(limits.rates, near)
         motion = motion_of(robot, entry, settings.checks_per_sample, source, ends, wanted, planning)
-        ends[entry.name] = motion.q[-1]
+        ends[entry.name] = ends[listed] = motion.q[-1]
         found = judge(robot, motion, near, limits)
         along = measured(surroundings, motion) if surroundings else None
         avoided = avoidance.avoid(motion, found, along)
@@ -78,6 +82,7 @@ def compute(study: Study, name: str) -> TrajectoryResults:
         clearances.append(clearance_rows(entry.name, along))
         strategies.append(avoided.rows)
         paths.append(path_summary(robot, motion, found, along, avoided, limits))
+        programs.append(program_files(robot, motion, paths[-1].verdict, settings.programs, settings.write_unsafe))
     checks = PathChecks.stacked(tables)
     own = checks.take(checks.sample)
     length = characteristic_length(robot)
@@ -107,7 +112,16 @@ def compute(study: Study, name: str) -> TrajectoryResults:
         checks=checks,
         clearance=Clearances.stacked(clearances),
         avoidance=AvoidanceRows.stacked(strategies),
+        programs=ProgramFiles.stacked(programs),
     )
+
+
+def _planned(robot: Robot, file: Path) -> Iterator[tuple[str, PlannedEntry, CommandSource]]:
+    """The paths of a file, programs as their stretches: each with the name of its entry."""
+    for i, listed in enumerate(load_paths(file).paths):
+        source = CommandSource(file, f"paths[{i}]")
+        for entry in planned_entries(robot, listed, source):
+            yield listed.name, entry, source
 
 
 def _checks(robot: Robot, motion: Motion, found: Judgement, near: NearSingular, limits: JointLimits) -> PathChecks:

@@ -12,6 +12,8 @@ from er3a.files.yaml_file import StrictModel, read_yaml
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.stages.stage import Stage
 from er3a.planning.avoidance.strategy_names import StrategyName
+from er3a.programs.read_program import files_of
+from er3a.programs.syntax import Language
 
 if TYPE_CHECKING:
     from er3a.pipeline.study import Study
@@ -25,7 +27,8 @@ class TrajectorySettings(StrictModel):
     accelerations are given (``acceleration_deg_s2``, one for each joint). ``jerk_deg_s3`` bounds the jerk; left out,
     nothing does.
     ``scene`` holds the obstacles; no overlap with them deeper than ``penetration_tolerance_mm`` goes unnoticed between
-    points.
+    points. Safe paths are written as programs in the languages ``programs``; others only with ``write_unsafe``, with
+    the reason in the file.
     """
 
     checks_per_sample: Annotated[int, Field(ge=1, le=1000)]
@@ -41,6 +44,8 @@ class TrajectorySettings(StrictModel):
     jerk_deg_s3: Annotated[list[Annotated[float, Field(gt=0, le=1e9)]], Field(min_length=1)] | None = None
     scene: Text | None = None
     penetration_tolerance_mm: Annotated[float, Field(ge=0.05, le=100)] = 1.0
+    programs: list[Language] = ["krl", "urscript", "rpl", "xpl", "csv"]
+    write_unsafe: bool = False
 
 
 def _inputs(study: Study, robot: str) -> list[Path]:
@@ -49,10 +54,12 @@ def _inputs(study: Study, robot: str) -> list[Path]:
 
 
 def _tables_of(path_file: str) -> list[Path]:
-    """The CSV tables that a path file names; the file is checked elsewhere."""
+    """The CSV tables and programs that a path file names; the file is checked elsewhere."""
     paths = read_yaml(path_file).get("paths")
-    named = [path.get("file") for path in paths if isinstance(path, dict)] if isinstance(paths, list) else []
-    return [Path(file) for file in named if isinstance(file, str)]
+    listed = [path for path in paths if isinstance(path, dict)] if isinstance(paths, list) else []
+    tables = [Path(file) for path in listed if isinstance(file := path.get("file"), str)]
+    programs = [files_of(Path(file)) for path in listed if isinstance(file := path.get("program"), str)]
+    return [*tables, *(file for files in programs for file in files)]
 
 
 STAGE = Stage(

@@ -357,6 +357,16 @@ class AvoidanceRows(MotionRows):
 
 
 @dataclass(frozen=True, eq=False)
+class ProgramFiles(Table):
+    """Programs of the safe paths for controllers; of others only where the study asks for that."""
+
+    path: Texts = column("name of the path", dtype=object)
+    language: Texts = column("krl, urscript, rpl, xpl or csv", dtype=object)
+    file: Texts = column("name of the file", dtype=object)
+    text: Texts = column("what the file holds", dtype=object)
+
+
+@dataclass(frozen=True, eq=False)
 class TrajectoryResults(Results[TrajectorySummary]):
     """Summary and tables of the stage."""
 
@@ -364,6 +374,7 @@ class TrajectoryResults(Results[TrajectorySummary]):
     checks: PathChecks
     clearance: Clearances
     avoidance: AvoidanceRows
+    programs: ProgramFiles
 
 
 RESULTS = TrajectoryResults

@@ -11,10 +11,10 @@ from scipy.interpolate import CubicHermiteSpline
 
 from er3a.collision.along import RateBounds
 from er3a.errors import PoseError
-from er3a.files.path_file import PathEntry
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.inverse import inverse
 from er3a.numerics.arrays import Reals
+from er3a.pipeline.stages.trajectory.program_paths import PlannedEntry
 from er3a.planning.build import Built, build
 from er3a.planning.commands import CommandSource, PlanCommand
 from er3a.planning.followed import Followed
@@ -46,7 +46,7 @@ class Motion:
     no_way : why nothing was planned where a motion was to be; the motion is then the straight joint move
     """
 
-    entry: PathEntry
+    entry: PlannedEntry
     built: Built
     samples: Reals
     checks: Reals
@@ -71,7 +71,7 @@ class Motion:
 
 def motion_of(
     robot: Robot,
-    entry: PathEntry,
+    entry: PlannedEntry,
     checks_per_sample: int,
     source: CommandSource,
     ends: Mapping[str, Reals],
@@ -120,7 +120,7 @@ def motion_of(
     )
 
 
-def _planned(task: PlanningTask, entry: PathEntry, command: PlanCommand, checks_per_sample: int) -> Motion:
+def _planned(task: PlanningTask, entry: PlannedEntry, command: PlanCommand, checks_per_sample: int) -> Motion:
     """A planned motion; where none is found the straight joint move, with the reason."""
     robot = task.robot
     starts, ends = (joints_at(robot, end) for end in (command.start, command.end))
@@ -144,7 +144,7 @@ def joints_at(robot: Robot, end: Reals) -> Reals:
     return solved.q[solved.within_limits]
 
 
-def _times(entry: PathEntry, duration: float, checks_per_sample: int) -> tuple[Reals, Reals]:
+def _times(entry: PlannedEntry, duration: float, checks_per_sample: int) -> tuple[Reals, Reals]:
     """Samples, and the points checked."""
     samples = np.linspace(0.0, duration, entry.samples)
     checks = np.linspace(0.0, duration, (entry.samples - 1) * (checks_per_sample + 1) + 1)
@@ -154,7 +154,7 @@ def _times(entry: PathEntry, duration: float, checks_per_sample: int) -> tuple[R
 
 def _joint_motion(
     robot: Robot,
-    entry: PathEntry,
+    entry: PlannedEntry,
     built: Built,
     move: JointMove | JointSequence | PlannedMove,
     samples: Reals,

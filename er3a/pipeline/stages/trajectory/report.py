@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,7 @@ from er3a.pipeline.stages.trajectory.model import (
     NearThresholds,
     PathChecks,
     PathSummary,
+    ProgramFiles,
     Singularity,
     StrategyMotion,
     Stretch,
@@ -71,6 +73,14 @@ class PathDrawing:
 
 
 @dataclass(frozen=True)
+class ProgramLink:
+    """A program of a path, to save: its file's name, and the data address of its text."""
+
+    file: str
+    uri: str
+
+
+@dataclass(frozen=True)
 class PathSection:
     """A path on the page: the record, and what it says in the page's language."""
 
@@ -85,6 +95,7 @@ class PathSection:
     events: list[list[str]]
     faults: list[list[str]]
     strategies: list[list[str]]
+    programs: list[ProgramLink]
     figure: PathDrawing
 
 
@@ -96,7 +107,8 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
     figure, sections = PathFigure(), []
     for path in summary.paths:
         rows, own = checks.take(checks.path == path.name), motions.take(motions.path == path.name)
-        sections.append(_section(path, rows, _figure(figure, robot, path, rows, own, summary.near)))
+        links = _programs(results.programs.take(results.programs.path == path.name))
+        sections.append(_section(path, rows, _figure(figure, robot, path, rows, own, summary.near), links))
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
     render(
         Path(__file__).with_name("report.html.j2"),
@@ -129,7 +141,14 @@ def _events(path: PathSummary) -> list[PlayedEvent]:
     return passes + [PlayedEvent(s.t0_s, s.t1_s, word, "fail") for word, stretches in _kinds(path) for s in stretches]
 
 
-def _section(path: PathSummary, rows: PathChecks, figure: PathDrawing) -> PathSection:
+def _programs(rows: ProgramFiles) -> list[ProgramLink]:
+    texts = zip(rows.file.tolist(), rows.text.tolist())
+    return [
+        ProgramLink(file, f"data:text/plain;base64,{base64.b64encode(text.encode()).decode()}") for file, text in texts
+    ]
+
+
+def _section(path: PathSummary, rows: PathChecks, figure: PathDrawing, programs: list[ProgramLink]) -> PathSection:
     return PathSection(
         path=path,
         status=STATUS[path.verdict],
@@ -142,6 +161,7 @@ def _section(path: PathSummary, rows: PathChecks, figure: PathDrawing) -> PathSe
         events=[_event_row(path.name, event) for event in path.singularities],
         faults=_faults(path),
         strategies=_strategies(path),
+        programs=programs,
         figure=figure,
     )
 

@@ -1,0 +1,72 @@
+"""Program files (YAML): which programs a robot's cell has, and what their tools and bases stand for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from er3a.files.robot_file import Name, Placement, Text, check_placement
+from er3a.files.robot_library import placement_transform
+from er3a.files.units import JointsDeg
+from er3a.files.yaml_file import StrictModel, load
+from er3a.numerics.arrays import Reals
+from er3a.programs.program_outcomes import ProgramOutcome
+
+
+class ProgramEntry(StrictModel):
+    """A program; ``start_deg`` is where the arm stands before it, ``expect`` the verdict that is to come out."""
+
+    name: Name
+    title: Text
+    title_zh: Text | None = None
+    file: Text
+    start_deg: JointsDeg | None = None
+    expect: ProgramOutcome | None = None
+
+    def start(self) -> Reals | None:
+        """Joints (n,) in rad."""
+        return None if self.start_deg is None else np.radians(self.start_deg)
+
+
+class ProgramsFile(StrictModel):
+    """Programs and frames.
+
+    ``frames`` maps what programs call their tools and bases (``TOOL_DATA[3]``, ``tool1``) to where these are: a tool in
+    the flange's frame, a base in the robot's.
+    """
+
+    kind: Literal["programs"]
+    frames: dict[Annotated[str, Field(min_length=1, max_length=100)], Placement] = {}
+    programs: list[ProgramEntry] = []
+
+    @model_validator(mode="after")
+    def _names_differ(self) -> Self:
+        names = [entry.name for entry in self.programs]
+        for i, name in enumerate(names):
+            if name in names[:i]:
+                raise ValueError(f"programs[{i}].name: '{name}' names an earlier program too | Give each its own name")
+        return self
+
+    @model_validator(mode="after")
+    def _frames_plausible(self) -> Self:
+        for name, placement in self.frames.items():
+            check_placement(f"frames.{name}", placement)
+        return self
+
+    def transforms(self) -> dict[str, Reals]:
+        """The frames (4, 4) in m by name."""
+        return {name: placement_transform(placement) for name, placement in self.frames.items()}
+
+
+def load_programs(path: str | Path) -> ProgramsFile:
+    """Read and check a program file; the programs themselves are read by :func:`er3a.programs.read_program`.
+
+    Raises
+    ------
+    InputError
+        naming file, field and remedy
+    """
+    return load(ProgramsFile, path)

@@ -1,0 +1,157 @@
+"""Robot programs: checked like code, and written from paths."""
+
+from __future__ import annotations
+
+import json
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+
+from er3a.errors import Er3aError, InputError
+from er3a.numerics.arrays import Reals
+from er3a.pipeline.commands.options import PROGRAMS, AsJson, FailOn, app, print_json, print_note
+from er3a.robots.robot import Robot
+
+if TYPE_CHECKING:
+    from er3a.pipeline.program_reports import CheckedFile
+    from er3a.program_check.check_program import CheckOptions
+
+
+class ProgramLanguage(StrEnum):
+    """A language that programs are written in."""
+
+    krl = "krl"
+    urscript = "urscript"
+    rpl = "rpl"
+    xpl = "xpl"
+    csv = "csv"
+
+
+RobotOption = Annotated[str, typer.Option("--robot", help="a robot's name or file")]
+SceneFile = Annotated[Path | None, typer.Option(help="a scene file: what the arm may not touch")]
+
+
+@app.command(rich_help_panel=PROGRAMS)
+def check_program(
+    files: Annotated[list[Path], typer.Argument(help="programs: .src, .script, .pgm, .XPL, or .csv of joints")],
+    robot: RobotOption,
+    start: Annotated[str | None, typer.Option(help="joint angles before the program, deg: 0,-10,...")] = None,
+    frames: Annotated[
+        Path | None, typer.Option(help="a file of kind programs, whose frames TOOL_DATA[3] and the like stand for")
+    ] = None,
+    scene: SceneFile = None,
+    verdicts: Annotated[
+        bool, typer.Option("--verdicts", help="a line for each motion, also for those that pass")
+    ] = False,
+    sarif: Annotated[Path | None, typer.Option(help="write SARIF 2.1.0 to this file")] = None,
+    fail_on: Annotated[FailOn, typer.Option(help="exit code 1 for findings from this level on")] = FailOn.fail,
+    as_json: AsJson = False,
+):
+    """Check what programs make an arm do, motion by motion: file:line: level: message [code]."""
+    from er3a.files.program_file import load_programs
+    from er3a.files.robot_library import load_robot
+    from er3a.files.scene_file import load_scene
+    from er3a.pipeline.program_reports import cycle_line, json_of, lines_of, sarif_of, summary_line
+    from er3a.program_check.check_program import CheckOptions
+    from er3a.program_check.program_check_findings import RANKS
+
+    arm = load_robot(robot)
+    options = CheckOptions(
+        start=_joints(start, arm),
+        frames=load_programs(frames).transforms() if frames else {},
+        scene=load_scene(scene) if scene else None,
+    )
+    checked = [_checked(file, arm, options) for file in files]
+    if sarif is not None:
+        _write(sarif, json.dumps(sarif_of(checked), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    if as_json:
+        print_json(json_of(checked))
+    else:
+        for each in checked:
+            for line in lines_of(each, verdicts):
+                print(line)
+        for each in checked:
+            if line := cycle_line(each):
+                print_note(line)
+        print_note(summary_line(checked))
+    if any(each.check is None for each in checked):
+        raise typer.Exit(2)
+    if any(RANKS[each.level] >= RANKS[fail_on.value] for each in checked):
+        raise typer.Exit(1)
+
+
+program_app = typer.Typer(help="Robot programs, written from paths.", no_args_is_help=True)
+app.add_typer(program_app, name="program", rich_help_panel=PROGRAMS)
+
+
+@program_app.command()
+def write(
+    paths: Annotated[Path, typer.Argument(help="a path file")],
+    robot: RobotOption,
+    language: Annotated[ProgramLanguage, typer.Option(help="the controller's language, or a table over time")],
+    output: Annotated[Path, typer.Option(help="the folder that the programs are written to")] = Path("programs"),
+    only: Annotated[list[str] | None, typer.Option(help="name of a path; all if absent")] = None,
+    scene: SceneFile = None,
+    unsafe: Annotated[
+        bool, typer.Option("--unsafe", help="write paths that are not safe too, and say so in the file")
+    ] = False,
+):
+    """Write the paths of a file as programs; paths that are not safe are refused."""
+    from er3a.files.robot_library import load_robot
+    from er3a.files.scene_file import load_scene
+    from er3a.pipeline.messages.expectations import outcome_word
+    from er3a.pipeline.messages.program_check import say
+    from er3a.pipeline.path_programs import programs_of
+
+    arm = load_robot(robot)
+    refused = 0
+    for made in programs_of(paths, arm, language.value, load_scene(scene) if scene else None, only, unsafe):
+        if made.files is None:
+            refused += 1
+            print_note(f"{made.name}: not written, because it is not safe: {outcome_word(made.verdict)}")
+            continue
+        for name, text in made.files.items():
+            file = output / name
+            _write(file, text)
+            print(f"{file}: written")
+        for finding in made.findings:
+            print_note(f"{made.name}: {say(finding)}")
+    if refused:
+        raise typer.Exit(1)
+
+
+def _write(file: Path, text: str) -> None:
+    from er3a.files.kept_files import write_atomically
+
+    write_atomically(file, lambda path: path.write_text(text, encoding="utf-8"))
+
+
+def _checked(file: Path, robot: Robot, options: CheckOptions) -> CheckedFile:
+    from er3a.pipeline.program_reports import CheckedFile
+    from er3a.program_check.check_program import check_program as check
+    from er3a.programs.read_program import read_program
+
+    try:
+        program = read_program(file)
+    except InputError as error:
+        return CheckedFile(file, None, error)
+    return CheckedFile(file, check(program, robot, options))
+
+
+def _joints(text: str | None, robot: Robot) -> Reals | None:
+    """Joint angles (n,) in rad from a list in degrees."""
+    if text is None:
+        return None
+    try:
+        found = [float(part) for part in text.replace(",", " ").split()]
+    except ValueError:
+        found = []
+    if len(found) != len(robot.lower) or not np.isfinite(found).all():
+        count = len(robot.lower)
+        raise Er3aError(
+            f"--start is '{text}'; expected {count} joint angles in degrees, such as {','.join('0' * count)}"
+        )
+    return np.radians(found)

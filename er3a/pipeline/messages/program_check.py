@@ -1,0 +1,462 @@
+"""Sentences about programs: their text, what they make the arm do, and what was written of a sequence."""
+
+from __future__ import annotations
+
+import er3a.pipeline.messages.collision
+import er3a.pipeline.messages.planning  # noqa: F401
+from er3a.kinematics.singularity import SingularityType
+from er3a.pipeline.messages.expectations import outcome_word
+from er3a.pipeline.messages.kinematics import SINGULARITIES, branch_word
+from er3a.pipeline.messages.language import N_
+from er3a.pipeline.messages.say import counted, joined, listed, say, sentence, word
+from er3a.program_check import program_check_findings as found_in
+from er3a.program_check.program_check_findings import Level
+from er3a.programs import program_findings as text
+from er3a.programs.execution import EndKind
+from er3a.programs.instructions import Unresolved
+
+LEVELS: dict[Level, str] = {
+    "pass": N_("pass"),
+    "note": N_("note"),
+    "caution": N_("caution"),
+    "fail": N_("fail"),
+}
+REASONS: dict[Unresolved, str] = {
+    "undefined": N_("the program does not define it"),
+    "not_finite": N_("it is no finite number"),
+    "position_unknown": N_("it depends on where the arm stands, which is not known"),
+    "external_tool": N_("the workpiece is moved along a fixed tool, which is not supported"),
+    "not_understood": N_("it is not understood"),
+}
+ENDS: dict[EndKind, str] = {
+    "drifts": N_("the loop never comes back to a state that it was in; it was followed for a limited number of rounds"),
+    "limit": N_("the program was followed for a limited number of steps and branches"),
+    "recursion": N_("routines call themselves or each other without end"),
+}
+
+
+def level_word(level: Level) -> str:
+    """A level in the language in use."""
+    return word("program_level", LEVELS, level)
+
+
+def _type(kind: SingularityType) -> str:
+    return word("singularity", SINGULARITIES, kind)
+
+
+@say.register
+def _(found: text.DataFileMissing) -> str:
+    return sentence(found.code, "{file} is missing, which holds the program's points", file=found.file)
+
+
+@say.register
+def _(found: text.NameTwice) -> str:
+    return sentence(found.code, "{name} is declared twice; the later one counts", name=found.name)
+
+
+@say.register
+def _(found: text.NotUnderstood) -> str:
+    return sentence(found.code, "not understood: {text}", text=found.text)
+
+
+@say.register
+def _(found: text.OtherEncoding) -> str:
+    return sentence(found.code, "the file is not UTF-8; it was read as {encoding}", encoding=found.encoding)
+
+
+@say.register
+def _(found: text.NothingMoves) -> str:
+    return sentence(found.code, "no instruction moves the arm")
+
+
+@say.register
+def _(found: text.ArcsSplit) -> str:
+    return counted(
+        found.code,
+        "{count} arc written as {lines} lines that stay within {deviation:g} mm of it",
+        "{count} arcs written as {lines} lines that stay within {deviation:g} mm of them",
+        found.arcs,
+        lines=found.lines,
+        deviation=found.deviation_m * 1000,
+    )
+
+
+@say.register
+def _(found: text.ZonesDropped) -> str:
+    return counted(
+        found.code,
+        "{count} zone has no equal in this language: the arm stops there",
+        "{count} zones have no equal in this language: the arm stops there",
+        found.zones,
+    )
+
+
+@say.register
+def _(found: text.SplinesAsLines) -> str:
+    return counted(
+        found.code,
+        "{count} point of splines written as a straight line",
+        "{count} points of splines written as straight lines",
+        found.points,
+    )
+
+
+@say.register
+def _(found: text.SpeedsEstimated) -> str:
+    return counted(
+        found.code,
+        "{count} duration written as a speed: the controller's ramps decide the time",
+        "{count} durations written as speeds: the controller's ramps decide the time",
+        found.motions,
+    )
+
+
+@say.register
+def _(found: text.SpeedsCut) -> str:
+    return counted(
+        found.code,
+        "{count} speed above what the joints can do written as their greatest",
+        "{count} speeds above what the joints can do written as their greatest",
+        found.motions,
+    )
+
+
+@say.register
+def _(found: text.HalfTurnsSplit) -> str:
+    return counted(
+        found.code,
+        "{count} line that turns the tool by 180 deg written in two halves, which fixes the sense",
+        "{count} lines that turn the tool by 180 deg written in two halves, which fixes the sense",
+        found.lines,
+    )
+
+
+@say.register
+def _(found: text.TargetsLeftOut) -> str:
+    return counted(
+        found.code,
+        "{count} motion left out: its target is not known",
+        "{count} motions left out: their targets are not known",
+        found.motions,
+    )
+
+
+@say.register
+def _(found: text.ToolNotGiven) -> str:
+    return sentence(found.code, "set this tool or base on the controller: {name}", name=found.name)
+
+
+@say.register
+def _(found: text.ValuesRounded) -> str:
+    return counted(
+        found.code,
+        "{count} speed or zone rounded down to the next that has a name",
+        "{count} speeds or zones rounded down to the next that has a name",
+        found.values,
+    )
+
+
+@say.register
+def _(found: text.NotTranslated) -> str:
+    return counted(
+        found.code,
+        "{count} instruction of the other language kept as a comment",
+        "{count} instructions of the other language kept as comments",
+        found.instructions,
+    )
+
+
+@say.register
+def _(found: text.WrittenUnsafe) -> str:
+    return sentence(
+        found.code, "the path {name} is not safe: {verdict}", name=found.path, verdict=outcome_word(found.verdict)
+    )
+
+
+@say.register
+def _(found: found_in.TargetNotGiven) -> str:
+    reason = word("target_reason", REASONS, found.reason)
+    if not found.target:
+        return sentence(found.code, "the target is not known: {reason}", reason=reason)
+    return sentence(
+        "target_not_given.named", "the target {name} is not known: {reason}", name=found.target, reason=reason
+    )
+
+
+@say.register
+def _(found: found_in.FrameNotGiven) -> str:
+    if found.frame == "tool":
+        return sentence("frame_not_given.tool", "the tool {name} is not given; map it to a frame", name=found.name)
+    return sentence("frame_not_given.base", "the base {name} is not given; map it to a frame", name=found.name)
+
+
+@say.register
+def _(found: found_in.FrameTakenAsFlange) -> str:
+    return sentence(found.code, "{name} is not given; the flange was taken for it", name=found.name)
+
+
+@say.register
+def _(found: found_in.WayNotKnown) -> str:
+    return sentence(found.code, "where the arm comes from is not known; only the target was checked")
+
+
+@say.register
+def _(found: found_in.TargetOutOfReach) -> str:
+    return sentence(found.code, "the target is out of reach: {reasons}", reasons=joined(listed(found.reasons)))
+
+
+@say.register
+def _(found: found_in.WayOutOfReach) -> str:
+    reasons = joined(listed(found.reasons))
+    return sentence(found.code, "out of reach after {at:.1f} mm: {reasons}", at=found.at_mm, reasons=reasons)
+
+
+@say.register
+def _(found: found_in.ConfigurationEnds) -> str:
+    return sentence(
+        found.code,
+        "the configuration ends after {at:.1f} mm: J{joint} would have to jump by {angle:.1f} deg",
+        at=found.at_mm,
+        joint=found.joint,
+        angle=found.angle_deg,
+    )
+
+
+@say.register
+def _(found: found_in.MeetsSingularity) -> str:
+    parts = {"type": _type(found.type), "at": found.at_mm}
+    if found.bounded:
+        return sentence("meets_singularity.bounded", "meets the {type} singularity after {at:.1f} mm", **parts)
+    return sentence(
+        found.code, "meets the {type} singularity after {at:.1f} mm, where joint speeds have no bound", **parts
+    )
+
+
+@say.register
+def _(found: found_in.PassesSingularity) -> str:
+    parts = {"type": _type(found.type), "at": found.at_mm, "distance": found.distance}
+    if found.type == "shoulder":
+        return sentence(
+            "passes_singularity.mm", "passes the {type} singularity at {distance:.1f} mm, after {at:.1f} mm", **parts
+        )
+    return sentence(found.code, "passes the {type} singularity at {distance:.2f} deg, after {at:.1f} mm", **parts)
+
+
+@say.register
+def _(found: found_in.FasterThanAssumed) -> str:
+    return sentence(
+        found.code,
+        "J{joint} would need {needed:.0f} deg/s; {assumed:g} deg/s are assumed, since no document gives its speed",
+        joint=found.joint,
+        needed=found.needed_deg_s,
+        assumed=found.assumed_deg_s,
+    )
+
+
+@say.register
+def _(found: found_in.AcceleratesMoreThanAssumed) -> str:
+    return sentence(
+        found.code,
+        "J{joint} would need {needed:.0f} deg/s²; {assumed:g} deg/s² are assumed",
+        joint=found.joint,
+        needed=found.needed_deg_s2,
+        assumed=found.assumed_deg_s2,
+    )
+
+
+@say.register
+def _(found: found_in.MoreThanFullSpeed) -> str:
+    return sentence(found.code, "asks for {percent:g} % of the joints' speed or acceleration", percent=found.percent)
+
+
+@say.register
+def _(found: found_in.ConfigurationChanges) -> str:
+    return sentence(
+        found.code,
+        "the configuration changes from {before} to {after}",
+        before=branch_word(found.before),
+        after=branch_word(found.after),
+    )
+
+
+@say.register
+def _(found: found_in.JointJumps) -> str:
+    return sentence(
+        found.code,
+        "J{joint} turns by {angle:.1f} deg while the tool moves by {moved:.1f} mm",
+        joint=found.joint,
+        angle=found.angle_deg,
+        moved=found.moved_mm,
+    )
+
+
+@say.register
+def _(found: found_in.WholeTurn) -> str:
+    return sentence(
+        found.code,
+        "J{joint} turns by {angle:.1f} deg; its nearest equivalent is {nearest:.1f} deg away",
+        joint=found.joint,
+        angle=found.angle_deg,
+        nearest=found.nearest_deg,
+    )
+
+
+@say.register
+def _(found: found_in.ArrivesOtherwise) -> str:
+    return sentence(
+        found.code,
+        "the arm arrives in other joint angles than the target's: J{joint} differs by {difference:.2f} deg",
+        joint=found.joint,
+        difference=found.difference_deg,
+    )
+
+
+@say.register
+def _(found: found_in.TurnsAtStart) -> str:
+    return sentence(
+        found.code,
+        "the line starts at a singular pose: J{joint} first has to turn by {angle:.1f} deg with the tool at rest",
+        joint=found.joint,
+        angle=found.angle_deg,
+    )
+
+
+@say.register
+def _(found: found_in.TurnNotMet) -> str:
+    return sentence(
+        found.code,
+        "no solution within the limits has the signs that T {turn} asks for; the nearest was taken",
+        turn=found.turn,
+    )
+
+
+@say.register
+def _(found: found_in.ConfigurationNotRead) -> str:
+    return sentence(
+        found.code,
+        "the meaning of the configuration {text} is not known; the solution nearest to the joints before was taken",
+        text=found.text,
+    )
+
+
+@say.register
+def _(found: found_in.MotionCollides) -> str:
+    parts = {"pairs": joined(listed(found.pairs[:2])), "depth": found.depth_mm}
+    if found.at_mm is None:
+        return sentence("motion_collides.joint", "collision of {pairs}, {depth:.1f} mm deep", **parts)
+    return sentence(found.code, "collision after {at:.1f} mm of {pairs}, {depth:.1f} mm deep", at=found.at_mm, **parts)
+
+
+@say.register
+def _(found: found_in.ZoneCollides) -> str:
+    return sentence(
+        found.code,
+        "a way round the corner that the zone allows collides: {pair}, {depth:.1f} mm deep",
+        pair=say(found.pair),
+        depth=found.depth_mm,
+    )
+
+
+@say.register
+def _(found: found_in.ZoneNotSettled) -> str:
+    return sentence(
+        found.code,
+        "the ways round the corner that the zone allows pass within {least:.1f} mm of something; not all were measured",
+        least=found.least_mm,
+    )
+
+
+@say.register
+def _(found: found_in.ZoneTooLarge) -> str:
+    return sentence(
+        found.code,
+        "the zone of {zone:.1f} mm is larger than half of a motion of {motion:.1f} mm",
+        zone=found.zone_mm,
+        motion=found.motion_mm,
+    )
+
+
+@say.register
+def _(found: found_in.ZoneWithoutSize) -> str:
+    return sentence(
+        found.code, "the size of the zone {zone} is not known; half of each motion was taken", zone=found.zone
+    )
+
+
+@say.register
+def _(found: found_in.ArcHasNoCircle) -> str:
+    return sentence(found.code, "the arc's points fix no circle")
+
+
+@say.register
+def _(found: found_in.ArcGoesOn) -> str:
+    return sentence(
+        found.code,
+        "the arc has an angle of its own ({angle:g} deg) and does not end at its target; it was not checked",
+        angle=found.angle_deg,
+    )
+
+
+@say.register
+def _(found: found_in.SplineAsLine) -> str:
+    return sentence(found.code, "the spline was checked as a straight line from point to point")
+
+
+@say.register
+def _(found: found_in.ExternalAxesLeftOut) -> str:
+    return sentence(found.code, "external axes were taken to stand still: {axes}", axes=", ".join(found.axes))
+
+
+@say.register
+def _(found: found_in.LineNotChecked) -> str:
+    return sentence(
+        found.code, "the arm has no closed-form inverse: the line was not followed, only its target was checked"
+    )
+
+
+@say.register
+def _(found: found_in.SpeedNotGiven) -> str:
+    if found.unit == "share":
+        return sentence(
+            "speed_not_given.share",
+            "the program gives no speed; {percent:g} % were assumed for the duration",
+            percent=found.assumed * 100,
+        )
+    return sentence(
+        found.code, "the program gives no speed; {speed:g} m/s were assumed for the duration", speed=found.assumed
+    )
+
+
+@say.register
+def _(found: found_in.MayMove) -> str:
+    return sentence(found.code, "not understood, and may move the arm: {text}", text=found.text)
+
+
+@say.register
+def _(found: found_in.NeverReached) -> str:
+    return sentence(found.code, "no way through the program comes to this motion; it was not checked")
+
+
+@say.register
+def _(found: found_in.BothSidesChecked) -> str:
+    return sentence(found.code, "both sides were checked: {condition}", condition=found.condition)
+
+
+@say.register
+def _(found: found_in.NotFollowedToEnd) -> str:
+    return word("not_followed_to_end", ENDS, found.kind)
+
+
+@say.register
+def _(found: found_in.LoopComesBackOtherwise) -> str:
+    return sentence(
+        found.code,
+        "the loop begins again with J{joint} {difference:.2f} deg from where it was in the round that was checked",
+        joint=found.joint,
+        difference=found.difference_deg,
+    )
+
+
+@say.register
+def _(found: found_in.ClearanceNotMeasured) -> str:
+    return sentence(found.code, "collisions were not looked for: the Coal library is missing")

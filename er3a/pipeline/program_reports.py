@@ -1,0 +1,247 @@
+"""What a check of programs found, for terminals, other programs and code hosts: lines, JSON, SARIF.
+
+References
+----------
+.. [1] Static Analysis Results Interchange Format (SARIF) Version 2.1.0, OASIS Standard, 2020.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from er3a.errors import InputError
+from er3a.pipeline.messages.program_check import say
+from er3a.pipeline.results import plain
+from er3a.program_check.check_program import LocatedFinding, MotionVerdict, ProgramCheck
+from er3a.program_check.program_check_findings import Level
+from er3a.programs.instructions import Place
+from er3a.version import __version__
+
+SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
+WORDS: dict[Level, str] = {"fail": "error", "caution": "warning", "note": "note", "pass": "pass"}
+UNREADABLE = "unreadable"
+
+
+@dataclass(frozen=True, eq=False)
+class CheckedFile:
+    """A program file with its check, or with the error that it could not be read for."""
+
+    file: Path
+    check: ProgramCheck | None
+    error: InputError | None = None
+
+    @property
+    def level(self) -> Level:
+        """The worst of its findings; a program that can't be read fails."""
+        return "fail" if self.check is None else self.check.level
+
+
+def lines_of(checked: CheckedFile, verdicts: bool = False) -> list[str]:
+    """``file:line: level: message [code]``, one line to a finding, and on request one to each motion."""
+    if checked.check is None:
+        return [_error_line(checked)]
+    told = [(each.place, _finding_line(each)) for each in checked.check.findings]
+    if verdicts:
+        told += [(each.place, _verdict_line(each)) for each in checked.check.verdicts]
+        told.sort(key=lambda pair: (shown(pair[0].file), pair[0].line))
+    return [text for _, text in told]
+
+
+def _error_line(checked: CheckedFile) -> str:
+    error = checked.error
+    assert error is not None
+    line = _line_in(error)
+    where = f"{shown(checked.file)}:{line}" if line else shown(checked.file)
+    return f"{where}: error: {error.problem}. {error.remedy} [{UNREADABLE}]"
+
+
+def _line_in(error: InputError) -> int:
+    words = (error.field or "").replace(",", " ").split()
+    found = next((words[i + 1] for i, word in enumerate(words[:-1]) if word == "line"), "")
+    return int(found) if found.isdigit() else 0
+
+
+def _finding_line(each: LocatedFinding) -> str:
+    times = f" ({each.times} times)" if each.times > 1 else ""
+    return f"{_where(each.place)}: {WORDS[each.level]}: {say(each.finding)}{times} [{each.finding.code}]"
+
+
+def _verdict_line(verdict: MotionVerdict) -> str:
+    parts = [f"{verdict.text}"]
+    if verdict.duration_s is not None:
+        parts.append(f"{verdict.duration_s:.2f} s")
+    if verdict.least_clearance_mm is not None:
+        parts.append(f"clearance {verdict.least_clearance_mm:.1f} mm")
+    return f"{_where(verdict.place)}: {WORDS[verdict.level]}: {'; '.join(parts)} [motion]"
+
+
+def _where(place: Place) -> str:
+    element = f" ({place.element})" if place.element else ""
+    return f"{shown(place.file)}:{place.line}{element}"
+
+
+def shown(file: Path | None) -> str:
+    """A path as it is printed: from the folder that the command runs in, where it lies below it."""
+    if file is None:
+        return "program"
+    near = os.path.relpath(file)
+    return str(file) if near.startswith("..") else near
+
+
+def summary_line(checked: Sequence[CheckedFile]) -> str:
+    """How many motions there are by verdict, and how long the programs take."""
+    verdicts = [verdict for each in checked if each.check for verdict in each.check.verdicts]
+    count = {level: sum(verdict.level == level for verdict in verdicts) for level in WORDS}
+    parts = [f"{len(verdicts)} motion instructions: {count['pass'] + count['note']} pass"]
+    parts += [f"{count['caution']} caution", f"{count['fail']} fail"]
+    unread = sum(each.check is None for each in checked)
+    return ", ".join(parts) + (f"; {unread} of {len(checked)} files could not be read" if unread else "")
+
+
+def cycle_line(checked: CheckedFile) -> str:
+    """The cycle time of a program."""
+    if checked.check is None:
+        return ""
+    cycle = checked.check.cycle
+    low, high = f"{cycle.blended_s:.2f}", f"{cycle.stopping_s:.2f}"
+    time = f"{low} s" if low == high else f"{low} to {high} s"
+    what = "one round of its loop" if cycle.repeats else "the program"
+    more = f", and {cycle.waits} wait{'s' if cycle.waits > 1 else ''} for signals" if cycle.waits else ""
+    less = "" if cycle.complete else ", without the motions whose way is not known"
+    return f"{shown(checked.file)}: {what} takes about {time}{more}{less}"
+
+
+def json_of(checked: Iterable[CheckedFile]) -> list[dict[str, Any]]:
+    """Everything that was found, as plain data."""
+    found: list[dict[str, Any]] = []
+    for each in checked:
+        if each.check is None:
+            error = each.error
+            assert error is not None
+            problem = {"line": _line_in(error), "problem": error.problem, "remedy": error.remedy}
+            found.append({"file": _uri(each.file), "level": "fail", "error": problem})
+            continue
+        check = each.check
+        found.append(
+            {
+                "file": _uri(each.file),
+                "language": check.execution.program.language,
+                "level": check.level,
+                "complete": check.execution.complete,
+                "cycle": plain(check.cycle),
+                "findings": [_finding_record(one) for one in check.findings],
+                "motions": [_verdict_record(one) for one in check.verdicts],
+            }
+        )
+    return found
+
+
+def _place_record(place: Place) -> dict[str, Any]:
+    return {"file": _uri(place.file), "line": place.line, "element": place.element}
+
+
+def _finding_record(each: LocatedFinding) -> dict[str, Any]:
+    params = {key: finite(value) for key, value in plain(each.finding).items() if key not in ("place", "code")}
+    return {
+        **_place_record(each.place),
+        "level": each.level,
+        "code": each.finding.code,
+        "message": say(each.finding),
+        "times": each.times,
+        "called_from": [_place_record(place) for place in each.calls],
+        "params": params,
+    }
+
+
+def finite(value: Any) -> Any:
+    """Plain data with None for numbers that JSON does not have."""
+    if isinstance(value, dict):
+        return {key: finite(part) for key, part in value.items()}
+    if isinstance(value, list):
+        return [finite(part) for part in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _verdict_record(verdict: MotionVerdict) -> dict[str, Any]:
+    record = plain(verdict)
+    record.pop("place")
+    return {**_place_record(verdict.place), **record}
+
+
+def sarif_of(checked: Sequence[CheckedFile]) -> dict[str, Any]:
+    """A SARIF log [1]_: paths relative to the folder that the command runs in, fingerprints that lines leave alone."""
+    results, rules = [], {}
+    seen: dict[str, int] = {}
+    for each in checked:
+        if each.check is None:
+            error = each.error
+            assert error is not None
+            text = f"{error.problem}. {error.remedy}"
+            place = Place(each.file, max(_line_in(error), 1))
+            results.append(_result((UNREADABLE, "fail", text), place, each.file.name, seen))
+            rules[UNREADABLE] = "fail"
+            continue
+        lines = each.check.execution.program.lines
+        for one in each.check.findings:
+            rules.setdefault(one.finding.code, one.level)
+            told = (one.finding.code, one.level, _message(one))
+            results.append(_result(told, one.place, _line_text(one.place, each.file, lines), seen, one.calls))
+    driver = {
+        "name": "er3a check-program",
+        "version": __version__,
+        "rules": [{"id": code, "shortDescription": {"text": code.replace("_", " ")}} for code in sorted(rules)],
+    }
+    run = {"tool": {"driver": driver}, "columnKind": "unicodeCodePoints", "results": results}
+    return {"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}
+
+
+def _message(one: LocatedFinding) -> str:
+    return say(one.finding) + (f" ({one.times} times)" if one.times > 1 else "")
+
+
+def _result(
+    told: tuple[str, Level, str],
+    place: Place,
+    line_text: str,
+    seen: dict[str, int],
+    calls: tuple[Place, ...] = (),
+) -> dict[str, Any]:
+    code, level, text = told
+    print_of = hashlib.sha256("\n".join((code, _uri(place.file), place.element, line_text)).encode()).hexdigest()[:32]
+    number = seen[print_of] = seen.get(print_of, 0) + 1
+    found: dict[str, Any] = {
+        "ruleId": code,
+        "level": {"fail": "error", "caution": "warning"}.get(level, "note"),
+        "message": {"text": text},
+        "locations": [_location(place)],
+        "partialFingerprints": {"primaryLocationLineHash": f"{print_of}:{number}"},
+    }
+    if calls:
+        found["relatedLocations"] = [{**_location(call), "message": {"text": "called from here"}} for call in calls]
+    return found
+
+
+def _location(place: Place) -> dict[str, Any]:
+    physical = {"artifactLocation": {"uri": _uri(place.file)}, "region": {"startLine": max(place.line, 1)}}
+    if not place.element:
+        return {"physicalLocation": physical}
+    logical = [{"fullyQualifiedName": place.element, "kind": "element"}]
+    return {"physicalLocation": physical, "logicalLocations": logical}
+
+
+def _line_text(place: Place, file: Path, lines: tuple[str, ...]) -> str:
+    """The text that a fingerprint is made of: the line without its blanks, so that it may move."""
+    if place.file != file or not 0 < place.line <= len(lines) or place.element:
+        return ""
+    return "".join(lines[place.line - 1].split())
+
+
+def _uri(file: Path | None) -> str:
+    return quote(shown(file).replace(os.sep, "/"))

@@ -1,0 +1,229 @@
+"""Read, follow and check every program of a robot."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from er3a.files.program_file import ProgramEntry, ProgramsFile, load_programs
+from er3a.files.scene_file import load_scene
+from er3a.kinematics.forward import forward
+from er3a.kinematics.near_singular import NearSingular
+from er3a.numerics.arrays import Reals
+from er3a.pipeline.results import Figure, Status, Verdict
+from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
+from er3a.pipeline.stages.programs.entry import ProgramsSettings
+from er3a.pipeline.stages.programs.model import (
+    AllProgramsPass,
+    FindingAt,
+    Instructions,
+    Lines,
+    NoPrograms,
+    ProgramMotion,
+    ProgramsResults,
+    ProgramsSummary,
+    ProgramSummary,
+    SomeProgramsCaution,
+    SomeProgramsFail,
+)
+from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
+from er3a.pipeline.study import Study
+from er3a.program_check.check_program import CheckOptions, ProgramCheck, check_program
+from er3a.program_check.motion_laws import AssumedRates
+from er3a.program_check.program_check_findings import CheckFinding, Level
+from er3a.programs.execution import RunLimits
+from er3a.programs.instructions import Pause, Place
+from er3a.programs.program_findings import NameTwice, NotUnderstood
+from er3a.programs.program_outcomes import ProgramOutcome
+from er3a.programs.read_program import read_program
+
+OUTCOMES: dict[Level, ProgramOutcome] = {"pass": "pass", "note": "pass", "caution": "caution", "fail": "fail"}
+MOST_POINTS = 20_000  # of a program's motion that are kept
+
+
+def compute(study: Study, name: str) -> ProgramsResults:
+    """Compute the stage of programs of a robot."""
+    robot = study.robot(name)
+    file = study.entry(name).programs
+    listed = load_programs(file) if file else ProgramsFile(kind="programs")
+    scene_file = study.scene(name, "trajectory")
+    scene = load_scene(scene_file) if scene_file else None
+    options = replace(_options(study, listed), scene=scene)
+    summaries: list[ProgramSummary] = []
+    lines: list[Lines] = []
+    instructions: list[Instructions] = []
+    motions: list[ProgramMotion] = []
+    for entry in listed.programs:
+        check = check_program(read_program(entry.file), robot, replace(options, start=entry.start()))
+        summaries.append(_summary(entry, check))
+        lines.append(_lines(entry.name, check))
+        instructions.append(_instructions(entry.name, check, len(robot.lower)))
+        motions.append(_motion(entry.name, check, len(robot.lower)))
+    return ProgramsResults(
+        summary=ProgramsSummary(
+            verdict=_verdict(summaries),
+            figures=_figures(summaries),
+            scene=scene.title if scene else None,
+            assumed_speed=tuple(bool(value) for value in ~np.isfinite(robot.speed)),
+            programs=tuple(summaries),
+        ),
+        lines=Lines.stacked(lines) if lines else Lines.empty(),
+        instructions=Instructions.stacked(instructions) if instructions else Instructions.empty(),
+        motion=ProgramMotion.stacked(motions) if motions else ProgramMotion.empty(),
+    )
+
+
+def _options(study: Study, listed: ProgramsFile) -> CheckOptions:
+    paths, own = study.section(TrajectorySettings), study.section(ProgramsSettings)
+    return CheckOptions(
+        frames=listed.transforms(),
+        near=NearSingular(
+            float(np.radians(paths.near_wrist_deg)),
+            float(np.radians(paths.near_elbow_deg)),
+            paths.near_shoulder_mm / 1000,
+        ),
+        assumed_speed=np.radians(paths.assumed_speed_deg_s),
+        acceleration_time=paths.acceleration_time_s,
+        penetration_tolerance=paths.penetration_tolerance_mm / 1000,
+        assumed=AssumedRates(
+            own.tool_speed_mm_s / 1000, own.tool_acceleration_mm_s2 / 1000, own.joint_speed_percent / 100
+        ),
+        limits=RunLimits(own.most_steps, own.most_branches, own.loop_rounds),
+    )
+
+
+def _summary(entry: ProgramEntry, check: ProgramCheck) -> ProgramSummary:
+    levels = [OUTCOMES[verdict.level] for verdict in check.verdicts]
+    clear = [verdict.least_clearance_mm for verdict in check.verdicts if verdict.least_clearance_mm is not None]
+    return ProgramSummary(
+        name=entry.name,
+        title=entry.title,
+        file=entry.file,
+        language=check.execution.program.language,
+        outcome=OUTCOMES[check.level],
+        expect=entry.expect,
+        complete=check.execution.complete,
+        ways=len(check.execution.endings),
+        motions=len(levels),
+        passed=levels.count("pass"),
+        caution=levels.count("caution"),
+        failed=levels.count("fail"),
+        cycle=check.cycle,
+        least_clearance_mm=min(clear, default=None),
+        findings=tuple(
+            FindingAt(
+                each.place.file.name if each.place.file else "",
+                each.place.line,
+                each.place.element,
+                each.level,
+                each.times,
+                _without_path(each.finding),
+            )
+            for each in check.findings
+        ),
+    )
+
+
+def _without_path(finding: CheckFinding) -> CheckFinding:
+    """A finding whose own place names no folder of this machine."""
+    if isinstance(finding, (NameTwice, NotUnderstood)):
+        return replace(finding, place=Place(None, finding.place.line, finding.place.element))
+    return finding
+
+
+def _lines(name: str, check: ProgramCheck) -> Lines:
+    text = check.execution.program.lines
+    return Lines(np.full(len(text), name, object), np.arange(1, len(text) + 1), np.array([*text], object))
+
+
+def _instructions(name: str, check: ProgramCheck, joints: int) -> Instructions:
+    ends: dict[Place, Reals] = {}
+    for number, motion in check.motions.items():
+        if motion.end is not None:
+            ends.setdefault(check.execution.steps[number].place, motion.end)
+    unknown = np.full(joints, np.nan)
+    verdicts = check.verdicts
+
+    def reals(values: list[float | None]) -> Reals:
+        return np.array([np.nan if value is None else value for value in values], float)
+
+    return Instructions(
+        program=np.full(len(verdicts), name, object),
+        line=np.array([each.place.line for each in verdicts], int),
+        element=np.array([each.place.element for each in verdicts], object),
+        kind=np.array([each.kind for each in verdicts], object),
+        level=np.array([each.level for each in verdicts], object),
+        times=np.array([each.times for each in verdicts], int),
+        duration_s=reals([each.duration_s for each in verdicts]),
+        clearance_mm=reals([each.least_clearance_mm for each in verdicts]),
+        end_deg=np.degrees([ends.get(each.place, unknown) for each in verdicts]).reshape(len(verdicts), joints),
+    )
+
+
+def _motion(name: str, check: ProgramCheck, joints: int) -> ProgramMotion:
+    """The main way over time, with a stop at each target; what is not known is left out."""
+    levels = {each.place: each.level for each in check.verdicts}
+    times: list[Reals] = [np.empty(0)]
+    angles: list[Reals] = [np.empty((0, joints))]
+    points: list[Reals] = [np.empty((0, 3))]
+    lines: list[int] = []
+    told: list[str] = []
+    now = 0.0
+    for number in check.main:
+        step = check.execution.steps[number]
+        motion = check.motions.get(number)
+        if isinstance(step.instruction, Pause):
+            now += step.instruction.seconds or 0.0
+        if motion is None or (motion.way is None and motion.end is None):
+            continue
+        if motion.way is None:
+            assert motion.end is not None
+            t, q, arm = np.zeros(1), motion.end[None], motion.placed.arm
+        else:
+            known = np.isfinite(motion.way.q[:, 0])
+            t, q, arm = motion.way.t[known], motion.way.q[known], motion.way.arm
+        if not len(t) or len(lines) + len(t) > MOST_POINTS:
+            break
+        times.append(now + t)
+        angles.append(q)
+        points.append(forward(arm, q)[:, :3, 3])
+        lines += [step.place.line] * len(t)
+        told += [levels[step.place]] * len(t)
+        now += motion.way.law.duration if motion.way else 0.0
+    return ProgramMotion(
+        program=np.full(len(lines), name, object),
+        t_s=np.concatenate(times),
+        line=np.array(lines, int),
+        level=np.array(told, object),
+        q_deg=np.degrees(np.concatenate(angles)),
+        xyz_mm=np.concatenate(points) * 1000,
+    )
+
+
+def _verdict(
+    programs: list[ProgramSummary],
+) -> Verdict[AllProgramsPass | SomeProgramsCaution | SomeProgramsFail | NoPrograms | ExpectationsUnmet]:
+    if not programs:
+        return Verdict("no_reference", NoPrograms())
+    if unmet := unmet_expectations(programs):
+        return Verdict("fail", unmet)
+    asked = [each for each in programs if each.expect in (None, "pass")]
+    caution, failed = (tuple(each.name for each in asked if each.outcome == outcome) for outcome in ("caution", "fail"))
+    finding = SomeProgramsFail if failed else SomeProgramsCaution if caution else AllProgramsPass
+    status: Status = "fail" if failed else "caution" if caution else "pass"
+    passed = len(asked) - len(caution) - len(failed)
+    return Verdict(status, finding(len(asked), passed, caution, failed, demonstrations(programs, "pass")))
+
+
+def _figures(programs: list[ProgramSummary]) -> tuple[Figure, ...]:
+    asked = [each for each in programs if each.expect in (None, "pass")]
+    clear = [each.least_clearance_mm for each in asked if each.least_clearance_mm is not None]
+    return (
+        Figure("programs", len(programs), ""),
+        Figure("instructions", sum(each.motions for each in programs), ""),
+        Figure("instructions_passed", sum(each.passed for each in programs), ""),
+        Figure("instructions_caution", sum(each.caution for each in programs), ""),
+        Figure("instructions_failed", sum(each.failed for each in programs), ""),
+        Figure("least_clearance", min(clear, default=None), "mm"),
+    )

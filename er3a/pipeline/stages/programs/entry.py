@@ -1,0 +1,55 @@
+"""The stage in the registry, and what a study may set of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import Field
+
+from er3a.files.program_file import load_programs
+from er3a.files.yaml_file import StrictModel
+from er3a.pipeline.messages.language import N_
+from er3a.pipeline.stages.stage import Stage
+from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
+from er3a.programs.read_program import files_of
+
+if TYPE_CHECKING:
+    from er3a.pipeline.study import Study
+
+
+class ProgramsSettings(StrictModel):
+    """What is assumed where a program does not say, and how far a program is followed.
+
+    Thresholds, joint limits and the scene are those of the trajectory stage.
+    """
+
+    tool_speed_mm_s: Annotated[float, Field(gt=0, le=10_000)] = 250
+    tool_acceleration_mm_s2: Annotated[float, Field(gt=0, le=100_000)] = 2000
+    joint_speed_percent: Annotated[float, Field(gt=0, le=100)] = 10
+    most_steps: Annotated[int, Field(ge=100, le=100_000_000)] = 2_000_000
+    most_branches: Annotated[int, Field(ge=1, le=100_000)] = 2_000
+    loop_rounds: Annotated[int, Field(ge=1, le=1_000_000)] = 1_000
+
+
+def _inputs(study: Study, robot: str) -> list[Path]:
+    file = study.entry(robot).programs
+    if file is None:
+        return []
+    programs = [path for entry in load_programs(file).programs for path in files_of(Path(entry.file))]
+    return [Path(file), *programs, *study.scenes(robot, "trajectory")]
+
+
+def _wanted(study: Study, robot: str) -> bool:
+    return study.entry(robot).programs is not None
+
+
+STAGE = Stage(
+    name="programs",
+    title=N_("programs"),
+    question=N_("Can the robot carry out its programs?"),
+    settings={"programs": ProgramsSettings, "trajectory": TrajectorySettings},
+    inputs=_inputs,
+    wanted=_wanted,
+    rests_on=("validation",),
+)

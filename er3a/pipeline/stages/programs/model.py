@@ -1,0 +1,156 @@
+"""What the stage of programs computes. Angles are the manufacturer's, degrees."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from er3a.numerics.arrays import Integers, Reals
+from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
+from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
+from er3a.program_check.check_program import CycleTime
+from er3a.program_check.program_check_findings import CheckFinding, Level
+from er3a.programs.program_outcomes import ProgramOutcome
+from er3a.programs.syntax import Language
+
+
+@dataclass(frozen=True)
+class ProgramCounts:
+    """How many programs there are, how many pass, and the names of the others.
+
+    ``demonstrations``, programs that fail as they are meant to, count for none of these.
+    """
+
+    programs: int
+    passed: int
+    caution: tuple[str, ...]
+    failed: tuple[str, ...]
+    demonstrations: tuple[Demonstration, ...]
+
+
+@dataclass(frozen=True)
+class AllProgramsPass(ProgramCounts):
+    """Every program passes."""
+
+    code: Literal["programs.pass"] = "programs.pass"
+
+
+@dataclass(frozen=True)
+class SomeProgramsCaution(ProgramCounts):
+    """No program fails, but some are to be looked at."""
+
+    code: Literal["programs.caution"] = "programs.caution"
+
+
+@dataclass(frozen=True)
+class SomeProgramsFail(ProgramCounts):
+    """Some programs can't be carried out as they are written."""
+
+    code: Literal["programs.fail"] = "programs.fail"
+
+
+@dataclass(frozen=True)
+class NoPrograms:
+    """The robot's file of programs names none."""
+
+    code: Literal["programs.none"] = "programs.none"
+
+
+@dataclass(frozen=True)
+class FindingAt:
+    """A finding in the text of a program; ``file`` is the name of the file that holds the line."""
+
+    file: str
+    line: int
+    element: str
+    level: Level
+    times: int
+    finding: CheckFinding
+
+
+@dataclass(frozen=True)
+class ProgramSummary:
+    """What is known of a program.
+
+    Attributes
+    ----------
+    file : as the study names it; expect : the verdict that its file expects
+    complete : whether every way through it was followed to its end, or until it repeats
+    ways : through the program, by the sides of its branches
+    motions : instructions of the text; passed, caution, failed : of these
+    """
+
+    name: str
+    title: str
+    file: str
+    language: Language
+    outcome: ProgramOutcome
+    expect: ProgramOutcome | None
+    complete: bool
+    ways: int
+    motions: int
+    passed: int
+    caution: int
+    failed: int
+    cycle: CycleTime
+    least_clearance_mm: float | None
+    findings: tuple[FindingAt, ...]
+
+
+@dataclass(frozen=True)
+class ProgramsSummary(Summary):
+    """Head and programs; ``scene`` is its title, None where the study names none."""
+
+    verdict: Verdict[AllProgramsPass | SomeProgramsCaution | SomeProgramsFail | NoPrograms | ExpectationsUnmet]
+    scene: str | None
+    assumed_speed: tuple[bool, ...]
+    programs: tuple[ProgramSummary, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Lines(Table):
+    """The programs' text."""
+
+    program: Texts = column("name of the program", dtype=object)
+    line: Integers = column("number of the line, from 1", dtype="int64")
+    text: Texts = column("the line", dtype=object)
+
+
+@dataclass(frozen=True, eq=False)
+class Instructions(Table):
+    """Motion instructions of the programs with their verdicts."""
+
+    program: Texts = column("name of the program", dtype=object)
+    line: Integers = column("number of the line, from 1", dtype="int64")
+    element: Texts = column("XML element, empty in text", dtype=object)
+    kind: Texts = column("joint, line, arc or spline; empty if never reached", dtype=object)
+    level: Texts = column("verdict: pass, note, caution or fail", dtype=object)
+    times: Integers = column("how often it was carried out", dtype="int64")
+    duration_s: Reals = column("longest estimated duration; NaN where unknown", "s")
+    clearance_mm: Reals = column("least clearance, negative by an overlap; NaN where not measured", "mm")
+    end_deg: Reals = per_joint("q{}_deg", "joint angle at its first end; NaN where unknown", "deg")
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramMotion(Table):
+    """The arm along the way with the most motions through each program."""
+
+    program: Texts = column("name of the program", dtype=object)
+    t_s: Reals = column("estimated time since the program's start, with a stop at each target", "s")
+    line: Integers = column("line of the instruction", dtype="int64")
+    level: Texts = column("verdict of the instruction", dtype=object)
+    q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
+    xyz_mm: Reals = vector("{}_mm", "tool point in the base frame", "mm")
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramsResults(Results[ProgramsSummary]):
+    """Summary and tables of the stage."""
+
+    lines: Lines
+    instructions: Instructions
+    motion: ProgramMotion
+
+
+RESULTS = ProgramsResults

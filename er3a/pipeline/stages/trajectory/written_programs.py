@@ -1,0 +1,73 @@
+"""Programs of a path, for controllers: written where the path is safe, else refused with the reason."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from er3a.kinematics.forward import forward
+from er3a.numerics.arrays import Reals
+from er3a.pipeline.stages.trajectory.model import ProgramFiles
+from er3a.pipeline.stages.trajectory.motion import Motion
+from er3a.planning.commands import CommandSource, ToolMoveCommand
+from er3a.planning.path_verdicts import PathVerdict
+from er3a.programs.csv_program import write_csv
+from er3a.programs.from_commands import listing_of
+from er3a.programs.program_findings import WriteFinding, WrittenUnsafe
+from er3a.programs.syntax import Language
+from er3a.programs.write_program import write_program
+from er3a.programs.writing import HEAD, WriteOptions, ascii_text, head_line, program_name
+from er3a.robots.robot import Robot
+
+LONGEST_NAME = 24
+
+
+def written(
+    robot: Robot, motion: Motion, verdict: PathVerdict, language: Language
+) -> tuple[Mapping[str, str], tuple[WriteFinding, ...]]:
+    """The files of a path by suffix, and what is to be said of them.
+
+    Raises
+    ------
+    ValueError
+        for a path whose start can't be reached
+    """
+    start = motion.q[0]
+    if not np.isfinite(start).all():
+        raise ValueError(f"{motion.entry.name}: the start can't be reached")
+    unsafe: tuple[WriteFinding, ...] = () if verdict == "safe" else (WrittenUnsafe(motion.entry.name, verdict),)
+    head = (f"path {motion.entry.name} for {ascii_text(robot.title)}: {ascii_text(motion.entry.title)}",)
+    if language == "csv":
+        times = motion.samples
+        joints = motion.joints(times)
+        known = np.isfinite(joints[:, 0])
+        told = tuple(HEAD + line for line in (*head, *map(head_line, unsafe)))
+        poses = np.linalg.inv(robot.base) @ forward(robot, joints[known])
+        return {".csv": write_csv(times[known], joints[known], poses, told)}, unsafe
+    command = motion.entry.command(CommandSource())
+    ends: Reals | None = motion.q[-1:] if isinstance(command, ToolMoveCommand) else None
+    if ends is not None and not np.isfinite(ends).all():
+        ends = None
+    made = listing_of(command, robot, start, motion.entry.name, motion.entry.title, ends)
+    options = WriteOptions(robot, start, notes=(*unsafe, *made.findings), head=head)
+    program = write_program(made.listing, language, options)
+    return program.files, program.findings
+
+
+def program_files(
+    robot: Robot, motion: Motion, verdict: PathVerdict, languages: Sequence[Language], write_unsafe: bool
+) -> ProgramFiles:
+    """The path's programs as rows; none where they are refused."""
+    rows: list[tuple[str, str, str]] = []
+    allowed = verdict == "safe" or (write_unsafe and np.isfinite(motion.q[0]).all())
+    for language in languages if allowed else ():
+        files, _ = written(robot, motion, verdict, language)
+        name = program_name(motion.entry.name, LONGEST_NAME)
+        rows += [(language, name + suffix, text) for suffix, text in files.items()]
+    return ProgramFiles(
+        path=np.full(len(rows), motion.entry.name, object),
+        language=np.array([row[0] for row in rows], object),
+        file=np.array([row[1] for row in rows], object),
+        text=np.array([row[2] for row in rows], object),
+    )

@@ -1,0 +1,301 @@
+"""Checks what a program makes an arm do, motion by motion: :func:`check_program`."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from er3a.collision.scene import Scene
+from er3a.errors import ShapeError
+from er3a.kinematics.near_singular import NearSingular
+from er3a.numerics.arrays import Reals
+from er3a.planning.timing import joint_limits
+from er3a.program_check.motion_laws import AssumedRates
+from er3a.program_check.program_check_findings import (
+    RANKS,
+    BothSidesChecked,
+    CheckFinding,
+    ClearanceNotMeasured,
+    Level,
+    LoopComesBackOtherwise,
+    MayMove,
+    NeverReached,
+    NotFollowedToEnd,
+    level_of,
+    worst_of,
+)
+from er3a.program_check.step_checks import CheckedMotion, StepChecker, surroundings_of
+from er3a.program_check.ways import CheckRules
+from er3a.programs.execution import Ending, Execution, RunLimits
+from er3a.programs.instructions import ArmMotion, Decision, Pause, Place, Unknown
+from er3a.programs.program_findings import NameTwice, NotUnderstood
+from er3a.programs.run_program import execute
+from er3a.programs.syntax import Fixed, Move, Program
+from er3a.robots.robot import Robot
+
+ASSUMED_SPEED_DEG_S = 180.0
+NEAR = NearSingular(float(np.radians(5)), float(np.radians(5)), 0.03)
+
+
+@dataclass(frozen=True, eq=False)
+class CheckOptions:
+    """What a program is checked with.
+
+    Attributes
+    ----------
+    start : (n,), rad, where the arm is before; None if that is not known
+    frames : T_flange_tool of tools and T_robot_base of bases (4, 4) in m, by the program's names for them
+    scene : what the arm may not touch
+    near : distances below which a pose of a line counts as near-singular
+    assumed_speed : (n,), rad/s, of joints whose speed no document gives
+    acceleration_time : s, in which each joint is taken to reach its full speed
+    penetration_tolerance : m; no overlap deeper than this goes unnoticed
+    measures : whether to look for collisions
+    """
+
+    start: Reals | None = None
+    frames: Mapping[str, Reals] = field(default_factory=dict)
+    scene: Scene | None = None
+    near: NearSingular = NEAR
+    assumed_speed: Reals | None = None
+    acceleration_time: float = 0.25
+    penetration_tolerance: float = 0.001
+    measures: bool = True
+    assumed: AssumedRates = field(default_factory=AssumedRates)
+    limits: RunLimits = field(default_factory=RunLimits)
+
+
+@dataclass(frozen=True)
+class LocatedFinding:
+    """A finding and where it belongs.
+
+    Attributes
+    ----------
+    calls : where the routines were called, the outermost first, when it was found first
+    times : how often the instruction was carried out with it
+    """
+
+    level: Level
+    finding: CheckFinding
+    place: Place
+    calls: tuple[Place, ...] = ()
+    times: int = 1
+
+
+@dataclass(frozen=True)
+class MotionVerdict:
+    """A motion instruction of the text.
+
+    Attributes
+    ----------
+    text : as the program has it; kind : of its motion; empty if it is never reached
+    level : the worst of its findings
+    times : how often it was carried out, or that many different times in a loop without end
+    duration_s : of the longest; least_clearance_mm : of all; None where unknown
+    """
+
+    place: Place
+    text: str
+    kind: str
+    level: Level
+    times: int
+    duration_s: float | None
+    least_clearance_mm: float | None
+
+
+@dataclass(frozen=True)
+class CycleTime:
+    """How long the main way takes, or one round of it if it is repeated for ever: estimates.
+
+    Attributes
+    ----------
+    blended_s : with every corner rounded whose zone is not fine; stopping_s : with a stop at every target
+    pauses_s : waits of given length, which both hold
+    waits : for signals or the operator, which neither holds
+    complete : whether every motion on it has a duration
+    """
+
+    blended_s: float
+    stopping_s: float
+    pauses_s: float
+    waits: int
+    repeats: bool
+    complete: bool
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramCheck:
+    """What was found.
+
+    Attributes
+    ----------
+    findings : in the order of the text; like ones of one instruction grouped
+    verdicts : of each motion instruction
+    motions : as they were carried out, by the number of their step
+    main : numbers of the steps of the way with the most motions
+    """
+
+    execution: Execution
+    level: Level
+    findings: tuple[LocatedFinding, ...]
+    verdicts: tuple[MotionVerdict, ...]
+    motions: Mapping[int, CheckedMotion]
+    main: tuple[int, ...]
+    cycle: CycleTime
+
+
+def check_program(program: Program, robot: Robot, options: CheckOptions | None = None) -> ProgramCheck:
+    """Follow a program and check each of its motions.
+
+    Raises
+    ------
+    ShapeError
+        for a start that has not an angle for each joint
+    """
+    options = options or CheckOptions()
+    count = len(robot.lower)
+    if options.start is not None and np.shape(options.start) != (count,):
+        raise ShapeError("start", np.shape(options.start), f"({count},)")
+    execution = execute(program, robot, options.start, options.frames, options.limits)
+    assumed = (
+        np.full(count, np.radians(ASSUMED_SPEED_DEG_S)) if options.assumed_speed is None else options.assumed_speed
+    )
+    limits = joint_limits(robot, assumed, options.acceleration_time)
+    surroundings = surroundings_of(robot, options.scene, options.penetration_tolerance) if options.measures else None
+    checker = StepChecker(robot, CheckRules(options.near, limits, options.assumed), surroundings, execution)
+    checker.start = options.start
+    for number in range(len(execution.steps)):
+        checker.check(number)
+    for ending in execution.endings:
+        checker.close_loop(ending)
+    located = _located(execution, checker, options.measures and surroundings is None)
+    verdicts = _verdicts(program, execution, checker.motions, located)
+    level: Level = worst_of(each.level for each in located)
+    main = execution.main() if execution.endings else None
+    way = () if main is None else execution.way(main)
+    cycle = _cycle(execution, checker.motions, main, way)
+    return ProgramCheck(execution, level, located, verdicts, checker.motions, way, cycle)
+
+
+def _located(execution: Execution, checker: StepChecker, blind: bool) -> tuple[LocatedFinding, ...]:
+    """All findings, like ones of an instruction grouped; ``blind`` if collisions could not be looked for."""
+    program = execution.program
+    top = Place(program.file, 1)
+    moving = {step.place for step in execution.steps if isinstance(step.instruction, Unknown)}
+    found = [
+        LocatedFinding(level_of(each), each, _place_of(each, top))
+        for each in program.findings
+        if not (isinstance(each, NotUnderstood) and each.place in moving)
+    ]
+    if blind:
+        found.append(LocatedFinding("caution", ClearanceNotMeasured(), top))
+    for number, motion in checker.motions.items():
+        step = execution.steps[number]
+        found += [LocatedFinding(level_of(each), each, step.place, step.calls) for each in motion.findings]
+    for step in execution.steps:
+        what = step.instruction
+        if isinstance(what, Unknown):
+            unknown = MayMove(what.text) if what.may_move else NotUnderstood(what.text, step.place)
+            found.append(LocatedFinding("caution", unknown, step.place, step.calls))
+        elif isinstance(what, Decision) and what.taken:
+            found.append(LocatedFinding("note", BothSidesChecked(what.condition), step.place, step.calls))
+    for ending, joint, difference in checker.returns:
+        if joint:
+            other = LoopComesBackOtherwise(joint, difference)
+            found.append(LocatedFinding("caution", other, ending.place))
+    for ending in execution.endings:
+        if ending.kind not in ("end", "repeats", "joins"):
+            stopped = NotFollowedToEnd(ending.kind)
+            found.append(LocatedFinding(level_of(stopped), stopped, ending.place))
+    for place in _unreached(execution):
+        found.append(LocatedFinding("note", NeverReached(), place))
+    groups: dict[tuple[Place, str, str], list[LocatedFinding]] = defaultdict(list)
+    for each in found:
+        groups[each.place, each.finding.code, _which(each.finding)].append(each)
+    grouped = [
+        LocatedFinding(same[0].level, same[0].finding, same[0].place, same[0].calls, len(same))
+        for same in groups.values()
+    ]
+    order = {path: i for i, path in enumerate(dict.fromkeys(str(each.place.file) for each in grouped))}
+    return tuple(sorted(grouped, key=lambda each: (order[str(each.place.file)], each.place.line, -RANKS[each.level])))
+
+
+def _which(finding: CheckFinding) -> str:
+    """What tells findings of one code at one instruction apart."""
+    names = ("joint", "type", "name", "text", "condition", "kind")
+    return " ".join(f"{getattr(finding, name)}" for name in names if hasattr(finding, name))
+
+
+def _place_of(finding: CheckFinding, top: Place) -> Place:
+    return finding.place if isinstance(finding, (NameTwice, NotUnderstood)) else top
+
+
+def _unreached(execution: Execution) -> tuple[Place, ...]:
+    met = {step.place for step in execution.steps}
+    return tuple(place for place, _ in _motion_texts(execution.program) if place not in met)
+
+
+def _motion_texts(program: Program) -> list[tuple[Place, str]]:
+    """All motion instructions of the text."""
+    found: list[tuple[Place, str]] = []
+    for operation in program.operations():
+        if isinstance(operation, Move):
+            found.append((operation.place, operation.text))
+        elif isinstance(operation, Fixed) and isinstance(operation.instruction, ArmMotion):
+            found.append((operation.place, operation.instruction.form))
+    return list(dict.fromkeys(found))
+
+
+def _verdicts(
+    program: Program,
+    execution: Execution,
+    motions: Mapping[int, CheckedMotion],
+    located: tuple[LocatedFinding, ...],
+) -> tuple[MotionVerdict, ...]:
+    done: dict[Place, list[CheckedMotion]] = defaultdict(list)
+    for number, motion in motions.items():
+        done[execution.steps[number].place].append(motion)
+    worst: dict[Place, Level] = {}
+    for each in located:
+        worst[each.place] = worst_of((worst.get(each.place, "pass"), each.level))
+    found = []
+    for place, text in _motion_texts(program):
+        here = done[place]
+        durations = [each.way.law.duration for each in here if each.way is not None]
+        clear = [each.clearance for each in here if each.clearance is not None]
+        found.append(
+            MotionVerdict(
+                place,
+                " ".join(text.split()),
+                here[0].kind if here else "",
+                worst.get(place, "pass"),
+                len(here),
+                max(durations, default=None),
+                min(clear) * 1000 if clear else None,
+            )
+        )
+    return tuple(sorted(found, key=lambda each: each.place.line))
+
+
+def _cycle(
+    execution: Execution, motions: Mapping[int, CheckedMotion], main: Ending | None, way: tuple[int, ...]
+) -> CycleTime:
+    again = None if main is None else execution.round_from(main)
+    part = way if again is None else way[way.index(again) :]
+    stopping, saved, pauses, waits, complete = 0.0, 0.0, 0.0, 0, True
+    for number in part:
+        instruction = execution.steps[number].instruction
+        if isinstance(instruction, Pause):
+            pauses += instruction.seconds or 0.0
+            waits += instruction.seconds is None
+        elif number in motions:
+            motion = motions[number]
+            if motion.way is None:
+                complete = complete and motion.stays
+                continue
+            stopping += motion.way.law.duration
+            saved += motion.way.law.saved_by_blend * motion.blended_ends
+    return CycleTime(stopping - saved + pauses, stopping + pauses, pauses, waits, again is not None, complete)

@@ -1,0 +1,401 @@
+"""What a check of a program can find, beside what :mod:`er3a.planning.intervals` finds on a motion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+from er3a.collision.pairs import Pair
+from er3a.kinematics.configuration import BranchLabel
+from er3a.kinematics.singularity import SingularityType
+from er3a.kinematics.solutions import Unsolved
+from er3a.planning.intervals import AboveLimit, BelowLimit, TooFast
+from er3a.programs.execution import EndKind
+from er3a.programs.instructions import Unresolved
+from er3a.programs.program_findings import ProgramFinding
+
+Level = Literal["pass", "note", "caution", "fail"]
+RANKS: dict[Level, int] = {"pass": 0, "note": 1, "caution": 2, "fail": 3}
+
+
+@dataclass(frozen=True)
+class TargetNotGiven:
+    """The program's text does not fix the target."""
+
+    target: str
+    reason: Unresolved
+    code: Literal["target_not_given"] = "target_not_given"
+
+
+@dataclass(frozen=True)
+class FrameNotGiven:
+    """A tool or base is known by its name alone; ``needed`` if the motion can't be told without it."""
+
+    name: str
+    frame: Literal["tool", "base"]
+    needed: bool
+    code: Literal["frame_not_given"] = "frame_not_given"
+
+
+@dataclass(frozen=True)
+class FrameTakenAsFlange:
+    """A tool that is called tool0 and given nowhere was taken for the flange."""
+
+    name: str
+    code: Literal["frame_taken_as_flange"] = "frame_taken_as_flange"
+
+
+@dataclass(frozen=True)
+class WayNotKnown:
+    """Where the arm comes from is not known, so that only the target was checked."""
+
+    code: Literal["way_not_known"] = "way_not_known"
+
+
+@dataclass(frozen=True)
+class TargetOutOfReach:
+    """No solution of the arm brings the tool to the target."""
+
+    reasons: tuple[Unsolved, ...]
+    code: Literal["target_out_of_reach"] = "target_out_of_reach"
+
+
+@dataclass(frozen=True)
+class WayOutOfReach:
+    """The tool leaves the reach on its way to the target."""
+
+    at_mm: float
+    reasons: tuple[Unsolved, ...]
+    code: Literal["way_out_of_reach"] = "way_out_of_reach"
+
+
+@dataclass(frozen=True)
+class ConfigurationEnds:
+    """On the way the arm would have to go over to another configuration at once: a joint would have to jump."""
+
+    at_mm: float
+    joint: int
+    angle_deg: float
+    code: Literal["configuration_ends"] = "configuration_ends"
+
+
+@dataclass(frozen=True)
+class MeetsSingularity:
+    """The tool's way meets a singular pose; ``bounded`` if the joint speeds stay finite there."""
+
+    type: SingularityType
+    at_mm: float
+    bounded: bool
+    code: Literal["meets_singularity"] = "meets_singularity"
+
+
+@dataclass(frozen=True)
+class PassesSingularity:
+    """The tool's way passes by a singular pose at a distance (of wrist and elbow in deg, of the shoulder in mm)."""
+
+    type: SingularityType
+    at_mm: float
+    distance: float
+    code: Literal["passes_singularity"] = "passes_singularity"
+
+
+@dataclass(frozen=True)
+class FasterThanAssumed:
+    """A joint (from 1) would have to turn faster than is assumed of it; no document gives its speed."""
+
+    joint: int
+    needed_deg_s: float
+    assumed_deg_s: float
+    code: Literal["faster_than_assumed"] = "faster_than_assumed"
+
+
+@dataclass(frozen=True)
+class AcceleratesMoreThanAssumed:
+    """A joint (from 1) would have to accelerate more than is assumed of it."""
+
+    joint: int
+    needed_deg_s2: float
+    assumed_deg_s2: float
+    code: Literal["accelerates_more_than_assumed"] = "accelerates_more_than_assumed"
+
+
+@dataclass(frozen=True)
+class MoreThanFullSpeed:
+    """A joint move asks for more than 100 % of the joints' speed or acceleration."""
+
+    percent: float
+    code: Literal["more_than_full_speed"] = "more_than_full_speed"
+
+
+@dataclass(frozen=True)
+class ConfigurationChanges:
+    """A joint move goes over to another configuration of the arm."""
+
+    before: BranchLabel
+    after: BranchLabel
+    code: Literal["configuration_changes"] = "configuration_changes"
+
+
+@dataclass(frozen=True)
+class JointJumps:
+    """A joint turns far in a joint move that takes the tool hardly anywhere."""
+
+    joint: int
+    angle_deg: float
+    moved_mm: float
+    code: Literal["joint_jumps"] = "joint_jumps"
+
+
+@dataclass(frozen=True)
+class WholeTurn:
+    """A joint turns by more than half a turn, where its nearest equivalent within the limits is nearer."""
+
+    joint: int
+    angle_deg: float
+    nearest_deg: float
+    code: Literal["whole_turn"] = "whole_turn"
+
+
+@dataclass(frozen=True)
+class ArrivesOtherwise:
+    """A line or arc to joint angles ends at their tool pose, but in other joint angles."""
+
+    joint: int
+    difference_deg: float
+    code: Literal["arrives_otherwise"] = "arrives_otherwise"
+
+
+@dataclass(frozen=True)
+class TurnsAtStart:
+    """At the singular start of a line a joint has to turn with the tool at rest."""
+
+    joint: int
+    angle_deg: float
+    code: Literal["turns_at_start"] = "turns_at_start"
+
+
+@dataclass(frozen=True)
+class TurnNotMet:
+    """No solution within the limits has the signs of the joint angles that the target's Turn (T) asks for."""
+
+    turn: int
+    code: Literal["turn_not_met"] = "turn_not_met"
+
+
+@dataclass(frozen=True)
+class ConfigurationNotRead:
+    """What the target says of its configuration is not known; the solution nearest to the joints before was taken."""
+
+    text: str
+    code: Literal["configuration_not_read"] = "configuration_not_read"
+
+
+@dataclass(frozen=True)
+class MotionCollides:
+    """Bodies overlap on the way, the deepest first."""
+
+    pairs: tuple[Pair, ...]
+    depth_mm: float
+    at_mm: float | None
+    code: Literal["motion_collides"] = "motion_collides"
+
+
+@dataclass(frozen=True)
+class ZoneCollides:
+    """The arm is free on the programmed way, but not on each way round the corner that the zone allows."""
+
+    pair: Pair
+    depth_mm: float
+    code: Literal["zone_collides"] = "zone_collides"
+
+
+@dataclass(frozen=True)
+class ZoneNotSettled:
+    """So near to something that the ways round the corner could not all be measured."""
+
+    least_mm: float
+    code: Literal["zone_not_settled"] = "zone_not_settled"
+
+
+@dataclass(frozen=True)
+class ZoneTooLarge:
+    """A zone is larger than half of a motion that it lies on."""
+
+    zone_mm: float
+    motion_mm: float
+    code: Literal["zone_too_large"] = "zone_too_large"
+
+
+@dataclass(frozen=True)
+class ZoneWithoutSize:
+    """A zone whose size the program does not give; half of each motion was taken."""
+
+    zone: str
+    code: Literal["zone_without_size"] = "zone_without_size"
+
+
+@dataclass(frozen=True)
+class ArcHasNoCircle:
+    """The arc's points fix no circle, or one of them is not known."""
+
+    code: Literal["arc_has_no_circle"] = "arc_has_no_circle"
+
+
+@dataclass(frozen=True)
+class ArcGoesOn:
+    """The arc has an angle of its own (CA) and ends elsewhere than at its target; it is not checked."""
+
+    angle_deg: float
+    code: Literal["arc_goes_on"] = "arc_goes_on"
+
+
+@dataclass(frozen=True)
+class SplineAsLine:
+    """A spline was checked as a straight line between its points."""
+
+    code: Literal["spline_as_line"] = "spline_as_line"
+
+
+@dataclass(frozen=True)
+class ExternalAxesLeftOut:
+    """Axes beyond the arm's were taken to stand still."""
+
+    axes: tuple[str, ...]
+    code: Literal["external_axes_left_out"] = "external_axes_left_out"
+
+
+@dataclass(frozen=True)
+class LineNotChecked:
+    """The arm has no closed-form inverse, so that lines and arcs were not followed; only their targets were checked."""
+
+    code: Literal["line_not_checked"] = "line_not_checked"
+
+
+@dataclass(frozen=True)
+class SpeedNotGiven:
+    """The program does not give the speed; one was assumed (m/s, or a share of the joints')."""
+
+    assumed: float
+    unit: Literal["m/s", "share"]
+    code: Literal["speed_not_given"] = "speed_not_given"
+
+
+@dataclass(frozen=True)
+class MayMove:
+    """An instruction that is not understood and may move the arm."""
+
+    text: str
+    code: Literal["may_move"] = "may_move"
+
+
+@dataclass(frozen=True)
+class NeverReached:
+    """A motion that no way through the program comes to."""
+
+    code: Literal["never_reached"] = "never_reached"
+
+
+@dataclass(frozen=True)
+class BothSidesChecked:
+    """A condition that only the cell knows; both sides were followed."""
+
+    condition: str
+    code: Literal["both_sides_checked"] = "both_sides_checked"
+
+
+@dataclass(frozen=True)
+class NotFollowedToEnd:
+    """A way through the program was not followed to its end."""
+
+    kind: EndKind
+    code: Literal["not_followed_to_end"] = "not_followed_to_end"
+
+
+@dataclass(frozen=True)
+class LoopComesBackOtherwise:
+    """When the loop begins again, a joint has another angle than in the round that was checked."""
+
+    joint: int
+    difference_deg: float
+    code: Literal["loop_comes_back_otherwise"] = "loop_comes_back_otherwise"
+
+
+@dataclass(frozen=True)
+class ClearanceNotMeasured:
+    """No collision was looked for: the Coal library is missing."""
+
+    code: Literal["clearance_not_measured"] = "clearance_not_measured"
+
+
+CheckFinding = (
+    ProgramFinding
+    | AboveLimit
+    | BelowLimit
+    | TooFast
+    | TargetNotGiven
+    | FrameNotGiven
+    | FrameTakenAsFlange
+    | WayNotKnown
+    | TargetOutOfReach
+    | WayOutOfReach
+    | ConfigurationEnds
+    | MeetsSingularity
+    | PassesSingularity
+    | FasterThanAssumed
+    | AcceleratesMoreThanAssumed
+    | MoreThanFullSpeed
+    | ConfigurationChanges
+    | JointJumps
+    | WholeTurn
+    | ArrivesOtherwise
+    | TurnsAtStart
+    | TurnNotMet
+    | ConfigurationNotRead
+    | MotionCollides
+    | ZoneCollides
+    | ZoneNotSettled
+    | ZoneTooLarge
+    | ZoneWithoutSize
+    | ArcHasNoCircle
+    | ArcGoesOn
+    | SplineAsLine
+    | ExternalAxesLeftOut
+    | LineNotChecked
+    | SpeedNotGiven
+    | MayMove
+    | NeverReached
+    | BothSidesChecked
+    | NotFollowedToEnd
+    | LoopComesBackOtherwise
+    | ClearanceNotMeasured
+)
+
+FAILS = frozenset(
+    (
+        *("target_not_given", "target_out_of_reach", "way_out_of_reach", "configuration_ends"),
+        *("above_limit", "below_limit", "too_fast", "motion_collides", "arc_has_no_circle"),
+    )
+)
+NOTES = frozenset(
+    (
+        *("way_not_known", "frame_taken_as_flange", "configuration_not_read", "zone_without_size", "speed_not_given"),
+        *("never_reached", "both_sides_checked", "program_other_encoding", "spline_as_line"),
+    )
+)
+
+
+def level_of(finding: CheckFinding) -> Level:
+    """How much a finding weighs: ``fail`` where the program can't be carried out as it is written."""
+    if isinstance(finding, MeetsSingularity):
+        return "caution" if finding.bounded else "fail"
+    if isinstance(finding, NotFollowedToEnd) and finding.kind == "recursion":
+        return "fail"
+    if isinstance(finding, FrameNotGiven):
+        return "fail" if finding.needed else "caution"
+    return "fail" if finding.code in FAILS else "note" if finding.code in NOTES else "caution"
+
+
+def worst_of(levels: Iterable[Level]) -> Level:
+    """The level that weighs most; ``pass`` of none."""
+    return max(levels, key=RANKS.__getitem__, default="pass")

@@ -1,0 +1,279 @@
+"""The way that a motion takes, and what is wrong with it, collisions apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from er3a.errors import NotWristPartitionedError, PoseError
+from er3a.geometry.angles import wrap_to_pi
+from er3a.kinematics.configuration import branch_labels
+from er3a.kinematics.forward import forward
+from er3a.kinematics.near_singular import NearSingular
+from er3a.kinematics.singularity import determinant_factors
+from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.numerics.arrays import Reals
+from er3a.planning.arcs import arc
+from er3a.planning.follow import follow
+from er3a.planning.followed import Followed
+from er3a.planning.intervals import AboveLimit, BelowLimit, TooFast, out_of_limits, too_fast, unreachable
+from er3a.planning.moves import Segment, line
+from er3a.planning.sequences import TURN_LENGTH
+from er3a.planning.singular_events import singular_events
+from er3a.planning.timing import JointLimits
+from er3a.program_check.motion_laws import AssumedRates, MotionLaw, joint_law, progress, tool_law
+from er3a.program_check.program_check_findings import (
+    AcceleratesMoreThanAssumed,
+    ArcHasNoCircle,
+    ArrivesOtherwise,
+    CheckFinding,
+    ConfigurationChanges,
+    ConfigurationEnds,
+    FasterThanAssumed,
+    JointJumps,
+    LineNotChecked,
+    MeetsSingularity,
+    PassesSingularity,
+    TurnsAtStart,
+    WayOutOfReach,
+    WholeTurn,
+)
+from er3a.programs.instructions import ArmMotion
+from er3a.robots.joint_limits import LIMIT_TOLERANCE
+from er3a.robots.robot import Robot
+
+POINTS_APART_M, POINTS_APART_RAD = 0.01, np.radians(2.0)
+FEWEST_POINTS, MOST_POINTS = 21, 501
+NO_WAY = 1e-9  # m or rad
+SPEED_TOLERANCE = 1e-6  # relative
+FAR_TURN, NEAR_MOVE = np.radians(90.0), 0.05  # of a joint that jumps: it turns so far where the tool moves less
+SAME_ARRIVAL = 1e-4  # rad
+
+
+@dataclass(frozen=True, eq=False)
+class CheckRules:
+    """What ways are checked against.
+
+    Attributes
+    ----------
+    near : distances below which a pose of a line counts as near-singular
+    limits : of the joints, assumed where no document gives them
+    """
+
+    near: NearSingular
+    limits: JointLimits
+    assumed: AssumedRates
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """A motion's way.
+
+    Attributes
+    ----------
+    t : (N,), s, rising from 0; q : (N, n), rad, NaN where unreachable
+    joints : angles (..., n) at times (...,)
+    joints_at : angles (..., n) at shares of the way (...,)
+    length : m, of the tool point's way; for a joint move of the straight line between its ends
+    turned : rad, by which the tool turns, or for a joint move the joint that turns most
+    end : (n,), rad; None where the end is not reached
+    """
+
+    arm: Robot
+    law: MotionLaw
+    t: Reals
+    q: Reals
+    joints: Callable[[Reals], Reals]
+    joints_at: Callable[[Reals], Reals]
+    length: float
+    turned: float
+    end: Reals | None
+    findings: tuple[CheckFinding, ...]
+
+    def along_mm(self, t: float) -> float:
+        """How far (mm) the tool point of a line has come at a time."""
+        return round(1000 * self.length * float(progress(self.law, np.array(t))[0]), 3)
+
+
+def joint_way(arm: Robot, motion: ArmMotion, start: Reals, end: Reals, rules: CheckRules) -> Way | None:
+    """A joint move; None if no joint moves."""
+    step = end - start
+    if np.abs(step).max() < NO_WAY:
+        return None
+    law = joint_law(motion, step, rules.limits, rules.assumed)
+
+    def joints_at(share: Reals) -> Reals:
+        return start + np.asarray(share)[..., None] * step
+
+    def joints(t: Reals) -> Reals:
+        return joints_at(progress(law, np.asarray(t, float))[0])
+
+    tool = forward(arm, np.stack([start, end]))
+    moved = float(np.linalg.norm(tool[1, :3, 3] - tool[0, :3, 3]))
+    turn = tool[1, :3, :3] @ tool[0, :3, :3].T
+    turned = float(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1)))
+    times = np.linspace(0.0, law.duration, _points(0.0, float(np.abs(step).max())))
+    top = 1 / (1 - law.ramp) / law.duration
+    peaks = np.abs(step) * top, np.abs(step) * top / (law.ramp * law.duration)
+    findings = (
+        *limit_findings(arm, end),
+        *_rate_findings(arm, *peaks, rules.limits),
+        *_joint_jumps(arm, start, end, moved, turned),
+    )
+    lead = float(np.abs(step).max())
+    return Way(arm, law, times, joints(times), joints, joints_at, moved, lead, end, findings)
+
+
+def limit_findings(arm: Robot, q: Reals) -> tuple[AboveLimit | BelowLimit, ...]:
+    """Joints (n,) in rad that are beyond a limit."""
+    found: list[AboveLimit | BelowLimit] = []
+    for j, (angle, low, high) in enumerate(zip(q.tolist(), arm.lower.tolist(), arm.upper.tolist())):
+        if angle > high + LIMIT_TOLERANCE:
+            found.append(AboveLimit(j + 1, *np.degrees([angle, high]).tolist()))
+        if angle < low - LIMIT_TOLERANCE:
+            found.append(BelowLimit(j + 1, *np.degrees([angle, low]).tolist()))
+    return tuple(found)
+
+
+def tool_way(
+    arm: Robot, motion: ArmMotion, start: Reals, goal: tuple[Reals, Reals | None, Reals | None], rules: CheckRules
+) -> Way | CheckFinding | None:
+    """A line or arc from joints (n,) in rad; None if the tool does not move, a finding if it can't be followed.
+
+    Parameters
+    ----------
+    goal : T_world_tool (4, 4) at the end; joints (n,) there, where the program gives them; the arc's point (3,), m
+    """
+    end, given, via = goal
+    if closed_form_missing(arm) is not None:
+        return LineNotChecked()
+    T_start = forward(arm, start)
+    try:
+        shape = line(T_start, end, 1.0) if via is None else arc(T_start, via, end, 1.0)
+    except PoseError:
+        return ArcHasNoCircle()
+    size = max(shape.length, TURN_LENGTH * shape.turned)
+    if size < NO_WAY:
+        return None
+    law = tool_law(motion, size, rules.assumed)
+    path: Segment = (
+        line(T_start, end, law.duration, None, law.ramp)
+        if via is None
+        else arc(T_start, via, end, law.duration, None, law.ramp)
+    )
+    times = np.linspace(0.0, law.duration, _points(path.length, path.turned))
+    try:
+        followed = follow(arm, path, times, start)
+    except NotWristPartitionedError:
+        return LineNotChecked()
+    last = followed.q[-1]
+    end_joints = last if np.isfinite(last).all() else None
+    way = Way(
+        *(arm, law, followed.t, followed.q, followed.joints, followed.joints_at),
+        *(path.length, path.turned, end_joints, ()),
+    )
+    return replace(way, findings=(*_followed_findings(followed, way, rules), *_arrival_findings(followed, given)))
+
+
+def _followed_findings(followed: Followed, way: Way, rules: CheckRules) -> list[CheckFinding]:
+    """Reach, configuration, limits, singular poses, speeds."""
+    arm = way.arm
+    found: list[CheckFinding] = [
+        WayOutOfReach(way.along_mm(stretch.start), stretch.cause.reasons) for stretch in unreachable(followed)
+    ]
+    found += [
+        ConfigurationEnds(way.along_mm(jump.t), jump.joint, float(np.degrees(jump.angle))) for jump in followed.jumps
+    ]
+    ends = bool(found)
+    limits = {(type(each.cause), each.cause.joint): each.cause for each in out_of_limits(arm, way.t, way.q, way.joints)}
+    found += list(limits.values())
+    events = singular_events(arm, way.t, way.q, way.joints, rules.near)
+    at = np.unique(np.concatenate([way.t, [event.t for event in events]]))
+    q, velocity, acceleration = followed.rates(at)
+    bounded = not (np.isfinite(q[:, 0]) & np.isnan(velocity[:, 0])).any()
+    for event in events:
+        where = way.along_mm(event.t)
+        if not event.crossing:
+            scale = 1000.0 if event.type == "shoulder" else float(np.degrees(1.0))
+            found.append(PassesSingularity(event.type, where, event.distance * scale))
+        elif not ends:
+            found.append(MeetsSingularity(event.type, where, bounded))
+    if ends:  # towards the end of reach joint speeds grow without bound
+        return found
+    fastest: dict[int, TooFast] = {}
+    for stretch in too_fast(arm.replace(speed=rules.limits.speed), at, velocity, lambda t: followed.rates(t)[1]):
+        known = fastest.get(stretch.cause.joint)
+        if known is None or stretch.cause.needed_deg_s > known.needed_deg_s:
+            fastest[stretch.cause.joint] = stretch.cause
+    found += [
+        each if np.isfinite(arm.speed[joint - 1]) else FasterThanAssumed(joint, each.needed_deg_s, each.limit_deg_s)
+        for joint, each in sorted(fastest.items())
+    ]
+    return found + _acceleration_findings(np.nan_to_num(np.abs(acceleration)).max(axis=0), rules.limits)
+
+
+def _arrival_findings(followed: Followed, given: Reals | None) -> list[CheckFinding]:
+    """Turns at rest at the start, and whether the end has the joints that the program gives."""
+    found: list[CheckFinding] = []
+    turn, last = followed.start_turn, followed.q[-1]
+    joint = int(np.argmax(np.abs(turn)))
+    if abs(turn[joint]) > SAME_ARRIVAL:
+        found.append(TurnsAtStart(joint + 1, float(np.degrees(turn[joint]))))
+    if given is not None and np.isfinite(last).all() and np.abs(last - given).max() > SAME_ARRIVAL:
+        joint = int(np.argmax(np.abs(last - given)))
+        found.append(ArrivesOtherwise(joint + 1, float(np.degrees(last[joint] - given[joint]))))
+    return found
+
+
+def _points(length: float, turned: float) -> int:
+    wanted = max(length / POINTS_APART_M, turned / POINTS_APART_RAD)
+    return int(np.clip(np.ceil(wanted) + 1, FEWEST_POINTS, MOST_POINTS))
+
+
+def _rate_findings(arm: Robot, velocity: Reals, acceleration: Reals, limits: JointLimits) -> list[CheckFinding]:
+    """Of greatest speeds and accelerations (n,) of the joints."""
+    found: list[CheckFinding] = []
+    for j in np.flatnonzero(velocity > limits.speed * (1 + SPEED_TOLERANCE)).tolist():
+        needed, able = np.degrees([velocity[j], limits.speed[j]]).tolist()
+        known = bool(np.isfinite(arm.speed[j]))
+        found.append(TooFast(j + 1, needed, able) if known else FasterThanAssumed(j + 1, needed, able))
+    return found + _acceleration_findings(acceleration, limits)
+
+
+def _acceleration_findings(acceleration: Reals, limits: JointLimits) -> list[CheckFinding]:
+    """The joint that asks most of its acceleration, if that is too much."""
+    ratio = acceleration / limits.acceleration
+    worst = int(np.argmax(ratio))
+    if ratio[worst] <= 1 + SPEED_TOLERANCE:
+        return []
+    needed, able = np.degrees([acceleration[worst], limits.acceleration[worst]]).tolist()
+    return [AcceleratesMoreThanAssumed(worst + 1, needed, able)]
+
+
+def _joint_jumps(arm: Robot, start: Reals, end: Reals, moved: float, turned: float) -> list[CheckFinding]:
+    found: list[CheckFinding] = []
+    step = end - start
+    if closed_form_missing(arm) is None:
+        labels, first, last = branch_labels(arm), _slot(arm, start), _slot(arm, end)
+        if first is not None and last is not None and first != last:
+            found.append(ConfigurationChanges(labels[first], labels[last]))
+    lead = int(np.argmax(np.abs(step)))
+    if abs(step[lead]) > FAR_TURN and moved < NEAR_MOVE and turned < abs(step[lead]) / 2:
+        found.append(JointJumps(lead + 1, float(np.degrees(step[lead])), moved * 1000))
+    for j in np.flatnonzero(np.abs(step) > np.pi + NO_WAY).tolist():
+        nearer = float(wrap_to_pi(step[j]))
+        if arm.lower[j] <= start[j] + nearer <= arm.upper[j]:
+            found.append(WholeTurn(j + 1, *np.degrees([step[j], nearer]).tolist()))
+    return found
+
+
+def _slot(arm: Robot, q: Reals) -> int | None:
+    """The closed-form branch of joint angles; None on a singular pose, which belongs to two."""
+    found = determinant_factors(arm, q)
+    factors = np.array([found.shoulder, found.elbow, found.wrist])
+    if np.abs(factors).min() < NO_WAY:
+        return None
+    back, down, flip = (bool(factor) for factor in (factors[0] > 0, factors[1] < 0, factors[2] < 0))
+    return 4 * back + 2 * down + flip
