@@ -86,14 +86,48 @@ def arms(draw, orthogonal_wrist: bool = False) -> Robot:
 
 
 @st.composite
+def chains(draw, least: int = 1, most: int = 10, coupled: bool = True) -> Robot:
+    """Arms of any number of joints that turn or slide, some with a coupling, in both conventions."""
+    rows = draw(st.integers(least, most))
+    joints = draw(st.integers(max(least, rows - 1), rows)) if coupled else rows
+
+    def numbers(low: float, high: float, count: int = rows) -> np.ndarray:
+        return np.array(draw(st.lists(number(low, high), min_size=count, max_size=count)))
+
+    coupling = None
+    if joints < rows or (coupled and draw(st.booleans())):
+        coupling = np.eye(rows, joints) + np.tril(np.round(numbers(-1, 1, rows * joints).reshape(rows, joints)), -1)
+    sliding = np.array(draw(st.lists(st.booleans(), min_size=rows, max_size=rows)))
+    endless = np.array(draw(st.lists(st.booleans(), min_size=joints, max_size=joints)))
+    return Robot(
+        name="drawn",
+        title="drawn at random",
+        convention=draw(st.sampled_from(["standard", "modified"])),
+        a=np.append(0.1, numbers(-0.5, 0.5)[1:]),
+        alpha=numbers(-np.pi, np.pi),
+        d=numbers(-0.5, 0.5),
+        direction=draw(st.lists(st.sampled_from([-1.0, 1.0]), min_size=rows, max_size=rows)),
+        offset=numbers(-np.pi, np.pi),
+        lower=numbers(-3, -0.1, joints),
+        upper=numbers(0.1, 3, joints),
+        sliding=sliding,
+        coupling=coupling,
+        continuous=endless & ~sliding[:joints],
+        base=placement(numbers(-2, 2, 3), numbers(-3, 3, 3)),
+        tool=placement(numbers(-0.3, 0.3, 3), numbers(-3, 3, 3)),
+    )
+
+
+@st.composite
 def joints_within(draw, robot: Robot) -> np.ndarray:
-    """Joint angles (6,) within the robot's limits."""
-    return robot.lower + draw(six(0, 1)) * (robot.upper - robot.lower)
+    """Joint values (n,) within the robot's limits."""
+    unit = st.lists(number(0, 1), min_size=robot.joints, max_size=robot.joints)
+    return robot.lower + np.array(draw(unit)) * (robot.upper - robot.lower)
 
 
 def joints_at_random(robot: Robot, random: np.random.Generator, count: int) -> np.ndarray:
-    """Uniform joint angles (count, 6) within the robot's limits."""
-    return random.uniform(robot.lower, robot.upper, (count, 6))
+    """Uniform joint values (count, n) within the robot's limits."""
+    return random.uniform(robot.lower, robot.upper, (count, robot.joints))
 
 
 def margin(robot: Robot, q: np.ndarray) -> np.ndarray:
@@ -125,18 +159,20 @@ def frame_by_hand(robot: Robot, q: np.ndarray, frame: int) -> np.ndarray:
 
 
 class PinocchioArm:
-    """The same arm in Pinocchio: joints turn about +-z, all else of the table goes into their placements."""
+    """The same arm in Pinocchio: joints move about or along +-z, all else of the table goes into their placements."""
 
     def __init__(self, robot: Robot):
+        self.coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
         self.model = pin.Model()
         before = pin.SE3(robot.base[:3, :3], robot.base[:3, 3])
         parent = 0
-        for k in range(6):
+        for k in range(robot.rows):
             across = pin.SE3(pin.utils.rotate("x", robot.alpha[k]), np.array([robot.a[k], 0, 0]))
             along = pin.SE3(np.eye(3), np.array([0, 0, robot.d[k]]))
             offset = pin.SE3(pin.utils.rotate("z", robot.offset[k]), np.zeros(3))
             modified = robot.convention == "modified"
-            axis = pin.JointModelRevoluteUnaligned(np.array([0, 0, robot.direction[k]]))
+            kind = pin.JointModelPrismaticUnaligned if robot.sliding[k] else pin.JointModelRevoluteUnaligned
+            axis = kind(np.array([0, 0, robot.direction[k]]))
             parent = self.model.addJoint(parent, axis, before * across if modified else before, f"joint_{k + 1}")
             before = offset * along if modified else offset * along * across
         tool = before * pin.SE3(robot.tool[:3, :3], robot.tool[:3, 3])
@@ -147,15 +183,18 @@ class PinocchioArm:
     def forward(self, q: np.ndarray) -> np.ndarray:
         """Tool poses (N, 4, 4)."""
         poses = np.empty((len(q), 4, 4))
-        for pose, row in zip(poses, q):
+        for pose, row in zip(poses, q @ self.coupling.T):
             pin.forwardKinematics(self.model, self.data, row)
             pose[:] = pin.updateFramePlacement(self.model, self.data, self.tool).homogeneous
         return poses
 
     def jacobian(self, q: np.ndarray) -> np.ndarray:
-        """Jacobians (N, 6, 6) at the tool, in the base's orientation, linear rows first."""
+        """Jacobians (N, 6, n) at the tool, in the base's orientation, linear rows first."""
         reference = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        return np.array([pin.computeFrameJacobian(self.model, self.data, row, self.tool, reference) for row in q])
+        rows = [
+            pin.computeFrameJacobian(self.model, self.data, row, self.tool, reference) for row in q @ self.coupling.T
+        ]
+        return np.array(rows).reshape(len(q), 6, -1) @ self.coupling
 
 
 def pose_errors(A: np.ndarray, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from er3a.files.units import FARTHEST_MM, MOST_DEG, Triple
 from er3a.files.yaml_file import StrictModel
-from er3a.robots.robot import Grade
+from er3a.robots.robot import MOST_JOINTS, Grade
 
 NAME_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 SHORTEST_PLAIN_LENGTH_MM = 2.0
 LONGEST_LENGTH_MM = 20_000.0
+RESIDUE_MM = 1e-3
+"""A length as short as that is what a derivation leaves over, in mm or in metres."""
 FASTEST_DEG_S = 36_000.0
+FASTEST_MM_S = 100_000.0
+MOST_FACTOR = 100.0
 
 Text = Annotated[str, Field(min_length=1, max_length=2000)]
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
-JointNumber = Annotated[int, Field(ge=1, le=6)]
+JointNumber = Annotated[int, Field(ge=1, le=MOST_JOINTS)]
+JointType = Literal["revolute", "prismatic"]
 
 
 class Sourced(StrictModel):
@@ -37,12 +42,23 @@ class OfOneJoint(StrictModel):
 
 
 class DhRow(OfOneJoint):
-    """One row; ``beta_deg`` is Hayati's turn about y, in calibrated tables of arms with parallel axes."""
+    """One row; ``beta_deg`` is Hayati's turn about y, in calibrated tables of arms with parallel axes.
 
+    A prismatic row has its fixed ``theta_deg``, and in ``d_mm`` the length that it has where the joint is at 0.
+    """
+
+    type: JointType = "revolute"
     a_mm: float
     alpha_deg: float
     d_mm: float
     beta_deg: float | None = None
+    theta_deg: float | None = None
+
+    @model_validator(mode="after")
+    def _theta_fixed(self):
+        if self.type == "revolute" and self.theta_deg is not None:
+            raise ValueError("theta_deg: theta of a revolute joint is its variable | Write it as offset_deg in zero")
+        return self
 
 
 def _sign(value: int) -> int:
@@ -53,20 +69,57 @@ def _sign(value: int) -> int:
 
 
 class ZeroRow(OfOneJoint):
-    """``direction_origin``: the direction's document, if that is another one than the offset's."""
+    """``direction_origin``: the direction's document, if that is another one than the offset's.
+
+    Prismatic joints have no ``offset_deg``: where they are at 0 is the row's ``d_mm``.
+    """
 
     direction: Annotated[int, AfterValidator(_sign), Field(json_schema_extra={"enum": [1, -1]})]
-    offset_deg: float
+    offset_deg: float | None = None
     direction_origin: Name | None = None
 
 
 class JointLimitRow(OfOneJoint):
-    lower_deg: float
-    upper_deg: float
+    """Limits in degrees, in mm for prismatic joints, or ``continuous: true`` for a joint that turns without end."""
+
+    lower_deg: float | None = None
+    upper_deg: float | None = None
+    lower_mm: float | None = None
+    upper_mm: float | None = None
+    continuous: bool = False
 
 
 class JointSpeedRow(OfOneJoint):
-    speed_deg_s: Annotated[float, Field(gt=0, le=FASTEST_DEG_S)]
+    speed_deg_s: Annotated[float, Field(gt=0, le=FASTEST_DEG_S)] | None = None
+    speed_mm_s: Annotated[float, Field(gt=0, le=FASTEST_MM_S)] | None = None
+
+
+class WeightedJoints(StrictModel):
+    """A sum of joints: each of ``joints`` times its number in ``factors``."""
+
+    joints: Annotated[list[JointNumber], Field(min_length=1, max_length=MOST_JOINTS)]
+    factors: Annotated[list[Annotated[float, Field(ge=-MOST_FACTOR, le=MOST_FACTOR)]], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _a_factor_each(self):
+        if len(self.joints) != len(self.factors) or len(set(self.joints)) != len(self.joints):
+            raise ValueError("factors: not one for each joint | Name each joint once, with a factor in the same place")
+        return self
+
+
+class CombinedLimitRow(WeightedJoints):
+    """Limits of a sum of joints, such as J2 + J3; in mm if all of them are prismatic."""
+
+    lower_deg: float | None = None
+    upper_deg: float | None = None
+    lower_mm: float | None = None
+    upper_mm: float | None = None
+
+
+class CouplingRow(WeightedJoints):
+    """What a row of the table moves by: the sum of these joints, in place of its own joint."""
+
+    row: JointNumber
 
 
 class DhTable(Sourced):
@@ -85,10 +138,17 @@ class Zero(Sourced):
 
 class Limits(Sourced):
     rows: list[JointLimitRow]
+    combined: Annotated[list[CombinedLimitRow], Field(max_length=MOST_JOINTS)] = []
 
 
 class Speeds(Sourced):
     rows: list[JointSpeedRow]
+
+
+class Coupling(Sourced):
+    """Rows of the table that are moved by sums of joints; those not listed by the joint of their number."""
+
+    rows: Annotated[list[CouplingRow], Field(min_length=1, max_length=MOST_JOINTS)]
 
 
 class Placement(StrictModel):
@@ -105,7 +165,7 @@ class SourcedPlacement(Placement, Sourced):
 class Capsule(StrictModel):
     """All points within ``radius_mm`` of the line between two points, in the frame that turns with joint ``link``."""
 
-    link: Annotated[int, Field(ge=0, le=6)]
+    link: Annotated[int, Field(ge=0, le=MOST_JOINTS)]
     from_mm: Triple
     to_mm: Triple
     radius_mm: Annotated[float, Field(ge=SHORTEST_PLAIN_LENGTH_MM, le=LONGEST_LENGTH_MM)]
@@ -113,7 +173,7 @@ class Capsule(StrictModel):
     @field_validator("from_mm", "to_mm")
     @classmethod
     def _plain_lengths(cls, values):
-        if 0 < max(map(abs, values)) < SHORTEST_PLAIN_LENGTH_MM:
+        if RESIDUE_MM < max(map(abs, values)) < SHORTEST_PLAIN_LENGTH_MM:
             raise ValueError(f"{values} mm can only be metres | Multiply by 1000")
         if max(map(abs, values)) > LONGEST_LENGTH_MM:
             raise ValueError(f"{values} mm is longer than any robot's link | Write the point in mm")
@@ -139,33 +199,70 @@ class RobotFile(StrictModel):
     zero: Zero
     limits: Limits
     speeds: Speeds | None = None
+    coupling: Coupling | None = None
     base: SourcedPlacement | None = None
     tool: SourcedPlacement | None = None
     envelopes: Envelopes | None = None
 
-    @model_validator(mode="before")
-    @classmethod
-    def _a_six_joint_arm(cls, content: Any) -> Any:
-        groups = [content.get(group) for group in ("dh", "zero", "limits")] if isinstance(content, dict) else []
-        rows = [group["rows"] for group in groups if isinstance(group, dict) and isinstance(group.get("rows"), list)]
-        counts = {len(each) for each in rows}
-        if len(rows) == 3 and len(counts) == 1 and counts != {6}:
-            problem = f"dh.rows: a table of {counts.pop()} joints"
-            raise ValueError(f"{problem} | er3a models arms with exactly six revolute joints in series")
-        return content
+    @model_validator(mode="after")
+    def _rows_in_order(self):
+        rows, joints = len(self.dh.rows), len(self.limits.rows)
+        if not 1 <= rows <= MOST_JOINTS:
+            raise ValueError(f"dh.rows: a table of {rows} joints | er3a reads serial arms of 1 to {MOST_JOINTS} joints")
+        if self.coupling and not 1 <= joints <= rows:
+            raise ValueError(f"limits.rows: {joints} joints for {rows} rows of the table | A joint moves a row or more")
+        counts = {"dh": rows, "zero": rows, "limits": joints if self.coupling else rows, "speeds": joints}
+        for group, count in counts.items():
+            if (table := getattr(self, group)) is not None:
+                _check_numbers(group, [row.joint for row in table.rows], count)
+        return self
 
     @model_validator(mode="after")
-    def _six_joints_in_order(self):
-        for group in ("dh", "zero", "limits", "speeds"):
-            table = getattr(self, group)
-            if table is None:
-                continue
-            joints = [row.joint for row in table.rows]
-            if joints != [1, 2, 3, 4, 5, 6]:
-                missing = [joint for joint in range(1, 7) if joint not in joints]
-                what = f"joint {missing[0]} is missing" if missing else f"the joints come as {joints}"
-                raise ValueError(f"{group}.rows: {what} | Write one row for each joint, 1 to 6 in order")
+    def _types_agree(self):
+        for i, (row, zero) in enumerate(zip(self.dh.rows, self.zero.rows)):
+            wanted = row.type == "revolute"
+            if wanted != (zero.offset_deg is not None):
+                remedy = "Add offset_deg" if wanted else "Write the length at 0 as d_mm of its row in dh, and no offset"
+                raise ValueError(f"zero.rows[{i}]: joint {row.joint} is {row.type} | {remedy}")
+        slides = self.slides
+        for i, (limit, sliding) in enumerate(zip(self.limits.rows, slides)):
+            _check_limit(f"limits.rows[{i}]", limit, sliding)
+        for i, (speed, sliding) in enumerate(zip(self.speeds.rows if self.speeds else [], slides)):
+            if (speed.speed_mm_s is not None) != sliding or (speed.speed_deg_s is not None) == sliding:
+                key = "speed_mm_s" if sliding else "speed_deg_s"
+                raise ValueError(f"speeds.rows[{i}]: joint {speed.joint} is {_kind(sliding)} | Write {key} alone")
+        for i, combined in enumerate(self.limits.combined):
+            _check_listed(f"limits.combined[{i}]", combined.joints, len(slides))
+            _check_limit(f"limits.combined[{i}]", combined, all(slides[joint - 1] for joint in combined.joints))
         return self
+
+    @model_validator(mode="after")
+    def _coupling_complete(self):
+        if self.coupling is None:
+            return self
+        joints, coupled = len(self.limits.rows), [row.row for row in self.coupling.rows]
+        if len(set(coupled)) != len(coupled):
+            raise ValueError("coupling.rows: a row is named twice | Write one line for each row of the table")
+        for i, row in enumerate(self.coupling.rows):
+            _check_listed(f"coupling.rows[{i}]", row.joints, joints)
+            if row.row > len(self.dh.rows):
+                raise ValueError(f"coupling.rows[{i}].row: the table has no row {row.row} | Name one of dh.rows")
+        if missing := [row for row in range(joints + 1, len(self.dh.rows) + 1) if row not in coupled]:
+            raise ValueError(f"coupling.rows: nothing moves row {missing[0]} of the table | Add a line for it")
+        return self
+
+    @property
+    def slides(self) -> list[bool]:
+        """Whether each joint is a distance; see :attr:`er3a.robots.robot.Robot.slides`."""
+        prismatic = {row.joint for row in self.dh.rows if row.type == "prismatic"}
+        moved_by = {row.joint: {row.joint} for row in self.dh.rows}
+        for row in self.coupling.rows if self.coupling else ():
+            moved_by[row.row] = {joint for joint, factor in zip(row.joints, row.factors) if factor}
+        found = []
+        for joint in range(1, len(self.limits.rows) + 1):
+            rows = {joint} if joint in moved_by.get(joint, ()) else {row for row, by in moved_by.items() if joint in by}
+            found.append(bool(rows & prismatic))
+        return found
 
     @model_validator(mode="after")
     def _units_plausible(self):
@@ -177,11 +274,12 @@ class RobotFile(StrictModel):
             if row.beta_deg and not self.dh.calibrated:
                 problem = f"dh.rows[{i}].beta_deg: {row.beta_deg:g} deg in a table that is not calibrated"
                 raise ValueError(f"{problem} | Set dh.calibrated: true, or remove it")
-            _check_angle(f"zero.rows[{i}].offset_deg", self.zero.rows[i].offset_deg)
+            _check_angle(f"dh.rows[{i}].theta_deg", row.theta_deg or 0.0)
+            _check_angle(f"zero.rows[{i}].offset_deg", self.zero.rows[i].offset_deg or 0.0)
         check_placement("base", self.base)
         check_placement("tool", self.tool)
         longest = max(max(abs(row.a_mm), abs(row.d_mm)) for row in self.dh.rows)
-        if longest < 10:
+        if 0 < longest < 10 and not any(row.type == "prismatic" for row in self.dh.rows):
             raise ValueError(
                 f"dh.rows: the longest length is {longest:g} mm, which can only be metres | Multiply by 1000"
             )
@@ -189,27 +287,64 @@ class RobotFile(StrictModel):
 
     @model_validator(mode="after")
     def _limits_plausible(self):
-        for i, row in enumerate(self.limits.rows):
-            if row.lower_deg > row.upper_deg:
-                raise ValueError(
-                    f"limits.rows[{i}]: joint {row.joint} has lower_deg {row.lower_deg:g} above "
-                    f"upper_deg {row.upper_deg:g} | Swap them"
-                )
-            if max(abs(row.lower_deg), abs(row.upper_deg)) > MOST_DEG:
-                raise ValueError(f"limits.rows[{i}]: joint {row.joint} turns more than ten times | Check the value")
-        widest = max(max(abs(row.lower_deg), abs(row.upper_deg)) for row in self.limits.rows)
-        if 0 < widest <= 2.01 * math.pi:
+        spans = [
+            max(abs(row.lower_deg or 0), abs(row.upper_deg or 0))
+            for row in self.limits.rows
+            if row.lower_deg is not None
+        ]
+        if len(spans) > 1 and 0 < max(spans) <= 2.01 * math.pi:
             raise ValueError(
-                f"limits.rows: the widest limit is {widest:g} deg, which can only be radians | Convert them to degrees"
+                f"limits.rows: the widest limit is {max(spans):g} deg, which can only be radians | "
+                "Convert them to degrees"
             )
         return self
+
+
+def _check_numbers(group: str, joints: list[int], count: int) -> None:
+    wanted = list(range(1, count + 1))
+    if joints != wanted:
+        missing = [joint for joint in wanted if joint not in joints]
+        what = f"joint {missing[0]} is missing" if missing else f"the joints come as {joints}"
+        raise ValueError(f"{group}.rows: {what} | Write one row for each joint, 1 to {count} in order")
+
+
+def _check_listed(field: str, joints: list[int], count: int) -> None:
+    if max(joints) > count:
+        raise ValueError(f"{field}.joints: there is no joint {max(joints)} | limits.rows has {count}")
+
+
+def _kind(sliding: bool) -> str:
+    return "prismatic" if sliding else "revolute"
+
+
+def _check_limit(field: str, row: JointLimitRow | CombinedLimitRow, sliding: bool) -> None:
+    """Refuse limits in the unit of the other type of joint, half of them, crossed ones, and unlikely ones."""
+    named = f"joint {row.joint}" if isinstance(row, JointLimitRow) else "the sum"
+    degrees, millimetres = (row.lower_deg, row.upper_deg), (row.lower_mm, row.upper_mm)
+    own, other, unit = (millimetres, degrees, "mm") if sliding else (degrees, millimetres, "deg")
+    if isinstance(row, JointLimitRow) and row.continuous:
+        if sliding or any(value is not None for value in (*degrees, *millimetres)):
+            problem = f"{named} is {_kind(sliding)} and has limits" if not sliding else f"{named} is prismatic"
+            raise ValueError(f"{field}.continuous: {problem} | Write limits or continuous: true")
+        return
+    lower, upper = own
+    if lower is None or upper is None or any(value is not None for value in other):
+        raise ValueError(f"{field}: {named} is {_kind(sliding)} | Write lower_{unit} and upper_{unit}")
+    if lower > upper:
+        raise ValueError(f"{field}: {named} has lower_{unit} {lower:g} above upper_{unit} {upper:g} | Swap them")
+    if not sliding and max(abs(lower), abs(upper)) > MOST_DEG:
+        raise ValueError(f"{field}: {named} turns more than ten times | Check the value")
+    if sliding and max(abs(lower), abs(upper)) > FARTHEST_MM:
+        raise ValueError(f"{field}: {named} slides more than 100 m | Write mm, not micrometres")
+    if sliding and 0 < max(abs(lower), abs(upper)) < SHORTEST_PLAIN_LENGTH_MM:
+        raise ValueError(f"{field}: {lower:g} to {upper:g} mm can only be metres | Multiply by 1000")
 
 
 def check_placement(field: str, placement: Placement | None) -> None:
     """Refuse a placement that can only be in metres or radians: ``ValueError`` with ``field: problem | remedy``."""
     if placement is None:
         return
-    if 0 < max(abs(value) for value in placement.xyz_mm) < SHORTEST_PLAIN_LENGTH_MM:
+    if RESIDUE_MM < max(abs(value) for value in placement.xyz_mm) < SHORTEST_PLAIN_LENGTH_MM:
         raise ValueError(f"{field}.xyz_mm: {placement.xyz_mm} can only be metres | Multiply by 1000")
     if max(abs(value) for value in placement.xyz_mm) > FARTHEST_MM:
         raise ValueError(f"{field}.xyz_mm: {placement.xyz_mm} is more than 100 m | Write mm, not micrometres")
@@ -220,7 +355,7 @@ def check_placement(field: str, placement: Placement | None) -> None:
 def _check_length(field: str, value: float, calibrated: bool) -> None:
     if abs(value) > LONGEST_LENGTH_MM:
         raise ValueError(f"{field}: {value:g} mm is longer than any robot's link | Write the length in mm")
-    if 0 < abs(value) < SHORTEST_PLAIN_LENGTH_MM and not calibrated:
+    if RESIDUE_MM < abs(value) < SHORTEST_PLAIN_LENGTH_MM and not calibrated:
         raise ValueError(
             f"{field}: {value:g} mm looks like metres | Write {value * 1000:g}; if so short a length is meant "
             "(a calibrated table), set dh.calibrated: true"

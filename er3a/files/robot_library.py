@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from er3a.errors import InputError
-from er3a.files.robot_file import Envelopes, Placement, RobotFile
+from er3a.files.robot_file import CombinedLimitRow, Coupling, Envelopes, JointLimitRow, Placement, RobotFile
 from er3a.files.shipped import ROOT, names, own_or_shipped
 from er3a.files.yaml_file import load
 from er3a.geometry.transforms import transform
-from er3a.robots.robot import Envelope, Robot, Source
+from er3a.robots.robot import CombinedLimit, Envelope, Robot, Source
 
 ROBOTS = ROOT / "data" / "robots"
 REFERENCES = ROOT / "data" / "manual_refs"
@@ -53,9 +53,14 @@ def robot_path(name_or_path: str | Path) -> Path:
 
 def robot_of(content: RobotFile) -> Robot:
     """The model behind a checked file: metres and radians."""
-    groups = ("dh", "zero", "limits", "speeds", "base", "tool", "envelopes")
+    groups = ("dh", "zero", "limits", "speeds", "coupling", "base", "tool", "envelopes")
     present = {group: getattr(content, group) for group in groups if getattr(content, group) is not None}
-    speeds = [row.speed_deg_s for row in content.speeds.rows] if content.speeds else [np.nan] * 6
+    rows, joints = content.dh.rows, len(content.limits.rows)
+    sliding = [row.type == "prismatic" for row in rows]
+    offsets = [
+        row.theta_deg if slides else zero.offset_deg for row, zero, slides in zip(rows, content.zero.rows, sliding)
+    ]
+    limits = np.array([_limits(row) for row in content.limits.rows])
     return Robot(
         name=content.name,
         title=content.title,
@@ -65,10 +70,14 @@ def robot_of(content: RobotFile) -> Robot:
         d=np.array([row.d_mm for row in content.dh.rows]) / 1000,
         beta=np.radians([row.beta_deg or 0.0 for row in content.dh.rows]),
         direction=np.array([row.direction for row in content.zero.rows], dtype=float),
-        offset=np.radians([row.offset_deg for row in content.zero.rows]),
-        lower=np.radians([row.lower_deg for row in content.limits.rows]),
-        upper=np.radians([row.upper_deg for row in content.limits.rows]),
-        speed=np.radians(speeds),
+        offset=np.radians([offset or 0.0 for offset in offsets]),
+        lower=limits[:, 0],
+        upper=limits[:, 1],
+        speed=np.array([_si(row.speed_deg_s, row.speed_mm_s) for row in content.speeds.rows] if content.speeds else []),
+        sliding=np.array(sliding),
+        coupling=_coupling(content.coupling, len(rows), joints),
+        continuous=np.array([row.continuous for row in content.limits.rows]),
+        combined=tuple(_combined(row, joints) for row in content.limits.combined),
         base=placement_transform(content.base),
         tool=placement_transform(content.tool),
         zero_pose=content.zero_pose,
@@ -77,6 +86,34 @@ def robot_of(content: RobotFile) -> Robot:
         sources={group: Source(value.source, value.grade, value.origin or "") for group, value in present.items()},
         origins=_origins(content),
     )
+
+
+def _si(degrees: float | None, millimetres: float | None) -> float:
+    """The one that is given, in rad or m."""
+    return float(np.radians(degrees)) if degrees is not None else (millimetres or 0.0) / 1000
+
+
+def _limits(row: JointLimitRow | CombinedLimitRow) -> tuple[float, float]:
+    """Lower and upper limit, rad or m; a turn around zero of a continuous joint."""
+    if isinstance(row, JointLimitRow) and row.continuous:
+        return -np.pi, np.pi
+    return _si(row.lower_deg, row.lower_mm), _si(row.upper_deg, row.upper_mm)
+
+
+def _combined(row: CombinedLimitRow, joints: int) -> CombinedLimit:
+    factors = np.zeros(joints)
+    factors[np.array(row.joints) - 1] = row.factors
+    return CombinedLimit(tuple(factors.tolist()), *_limits(row))
+
+
+def _coupling(group: Coupling | None, rows: int, joints: int) -> np.ndarray | None:
+    if group is None:
+        return None
+    matrix = np.eye(rows, joints)
+    for row in group.rows:
+        matrix[row.row - 1] = 0.0
+        matrix[row.row - 1, np.array(row.joints) - 1] = row.factors
+    return matrix
 
 
 VALUES_OF_ROW = {

@@ -12,7 +12,7 @@ from er3a.files.kept_files import write_atomically
 from er3a.files.robot_file import SHORTEST_PLAIN_LENGTH_MM, RobotFile
 from er3a.files.robot_library import VALUES_OF_ROW
 from er3a.geometry.transforms import rpy_of
-from er3a.robots.robot import Robot, Source
+from er3a.robots.robot import CombinedLimit, Robot, Source
 
 _UNKNOWN = Source("not stated", "inferred")
 
@@ -37,17 +37,19 @@ def robot_file(robot: Robot) -> RobotFile:
                 **{key: _tidy(values[k]) for key, values in columns.items()},
                 **_origins(robot, group, k + 1),
             }
-            for k in range(6)
+            for k in range(len(next(iter(columns.values()))))
         ]
 
     a_mm, d_mm = robot.a * 1000, robot.d * 1000
     lengths = np.abs(np.concatenate([a_mm, d_mm]))
     zero_rows = rows("zero", offset_deg=np.degrees(robot.offset))
-    for row, direction in zip(zero_rows, robot.direction):
+    for row, direction, sliding in zip(zero_rows, robot.direction, robot.sliding):
         row["direction"] = int(direction)
+        row["offset_deg"] = None if sliding else row["offset_deg"]
     dh_rows = rows("dh", a_mm=a_mm, alpha_deg=np.degrees(robot.alpha), d_mm=d_mm)
-    for row, beta in zip(dh_rows, robot.beta):
+    for row, beta, sliding, offset in zip(dh_rows, robot.beta, robot.sliding, robot.offset):
         row["beta_deg"] = _tidy(np.degrees(beta)) or None
+        row |= {"type": "prismatic", "theta_deg": _tidy(np.degrees(offset))} if sliding else {}
     content = {
         "kind": "robot",
         "name": robot.name,
@@ -62,10 +64,17 @@ def robot_file(robot: Robot) -> RobotFile:
         },
         "zero": sourced("zero") | {"rows": zero_rows},
         "limits": sourced("limits")
-        | {"rows": rows("limits", lower_deg=np.degrees(robot.lower), upper_deg=np.degrees(robot.upper))},
+        | {"rows": _limit_rows(robot), "combined": [_combined_row(robot, limit) for limit in robot.combined]},
     }
     if np.isfinite(robot.speed).all():
-        content["speeds"] = sourced("speeds") | {"rows": rows("speeds", speed_deg_s=np.degrees(robot.speed))}
+        keys = np.where(robot.slides, "speed_mm_s", "speed_deg_s").tolist()
+        speeds = [
+            {"joint": k + 1, keys[k]: _tidy(value), **_origins(robot, "speeds", k + 1)}
+            for k, value in enumerate(_shown(robot, robot.speed))
+        ]
+        content["speeds"] = sourced("speeds") | {"rows": speeds}
+    if robot.coupling is not None:
+        content["coupling"] = sourced("coupling") | {"rows": _coupling_rows(robot.coupling)}
     if robot.envelopes:
         capsules = [
             {
@@ -85,9 +94,46 @@ def robot_file(robot: Robot) -> RobotFile:
     return RobotFile.model_validate(content)
 
 
+def _shown(robot: Robot, values: np.ndarray) -> np.ndarray:
+    """Values (n,) of the joints in degrees, or mm of those that slide."""
+    return np.where(robot.slides, 1000 * values, np.degrees(values))
+
+
+def _limit_rows(robot: Robot) -> list[dict]:
+    found = []
+    ends = zip(_shown(robot, robot.lower), _shown(robot, robot.upper), robot.slides, robot.continuous)
+    for k, (lower, upper, sliding, continuous) in enumerate(ends):
+        unit = "mm" if sliding else "deg"
+        limits = {"continuous": True} if continuous else {f"lower_{unit}": _tidy(lower), f"upper_{unit}": _tidy(upper)}
+        found.append({"joint": k + 1, **limits, **_origins(robot, "limits", k + 1)})
+    return found
+
+
+def _combined_row(robot: Robot, limit: CombinedLimit) -> dict:
+    joints = np.flatnonzero(limit.factors)
+    sliding = robot.slides[joints].all()
+    unit, scale = ("mm", 1000.0) if sliding else ("deg", np.degrees(1.0))
+    return _weighted(np.array(limit.factors)) | {
+        f"lower_{unit}": _tidy(scale * limit.lower),
+        f"upper_{unit}": _tidy(scale * limit.upper),
+    }
+
+
+def _coupling_rows(coupling: np.ndarray) -> list[dict]:
+    own = np.eye(*coupling.shape)
+    joints = coupling.shape[1]
+    changed = [k for k in range(len(coupling)) if k >= joints or not np.array_equal(coupling[k], own[k])]
+    return [{"row": k + 1, **_weighted(coupling[k])} for k in changed or [0]]
+
+
+def _weighted(factors: np.ndarray) -> dict:
+    joints = np.flatnonzero(factors) if factors.any() else np.array([0])
+    return {"joints": (joints + 1).tolist(), "factors": factors[joints].tolist()}
+
+
 def write_robot(robot: Robot, path: Path) -> None:
     """Write a robot file that :func:`er3a.load_robot` reads back to the same numbers, to 1e-12 m and rad."""
-    text = yaml_text(robot_file(robot).model_dump(exclude_none=True))
+    text = yaml_text(robot_file(robot).model_dump(exclude_none=True, exclude_defaults=True))
     write_atomically(path, lambda file: file.write_text(text, encoding="utf-8"))
 
 

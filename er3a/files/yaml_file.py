@@ -159,8 +159,8 @@ def _dotted(loc: tuple[int | str, ...]) -> str:
 def _explain(fault: ErrorDetails, model: type[BaseModel]) -> tuple[str, str]:
     kind, key = fault["type"], fault["loc"][-1] if fault["loc"] else ""
     if kind == "extra_forbidden":
-        if any(word in str(key) for word in ("coupl", "parallelogram", "mimic")):
-            return "coupled joints are not supported", "er3a needs six independent joints; remove the key"
+        if any(word in str(key) for word in ("parallelogram", "mimic")):
+            return f"unknown key {str(key)!r}", "Write coupled joints as `coupling:`; see docs/new-robot.md"
         if str(key) in RENAMED:
             return f"the key {str(key)!r} has another name now", f"Write '{RENAMED[str(key)]}'"
         known = _known_keys(model)

@@ -19,7 +19,7 @@ LONGEST_STEP = 0.5
 ENOUGH_M = 1e-9
 DISTANCE, SECTION_X, SECTION_Z = 0, 1, 2
 
-Columns = tuple[Reals, Reals, Reals, Reals, Reals, Reals]
+Columns = tuple[Reals, Reals, Reals, Reals, Reals, Reals, Flags]
 What = tuple[int, int, int, float]
 """Measure, axis, frame and sign."""
 
@@ -56,8 +56,8 @@ def climb_to_extreme(
 def _measure(base: Reals, columns: Columns, q: Reals, what: What, out: tuple[Reals, Reals]) -> None:
     """Fill frames and ``sign`` times the measure (P,) at joint vectors (P, n)."""
     frames, values = out
-    a, alpha, beta, d, direction, offset = columns
-    fill_frames(base, a, alpha, beta, d, direction, offset, q, frames)
+    a, alpha, beta, d, direction, offset, sliding = columns
+    fill_frames(base, a, alpha, beta, d, direction, offset, sliding, q, frames)
     kind, axis, frame, sign = what
     for p in range(q.shape[0]):
         T = frames[0, p]

@@ -46,7 +46,7 @@ def inverse_batch(
     T = np.ascontiguousarray(as_floats(T, "T"))
     if T.ndim != 3 or T.shape[1:] != (4, 4):
         raise ShapeError("T", T.shape, "(N, 4, 4)")
-    reference = _checked_reference(q_ref, len(T))
+    reference = _checked_reference(robot, q_ref, len(T))
     count = len(T)
     q = np.empty((count, SLOTS, 6))
     valid, inside = np.empty((count, SLOTS), dtype=bool), np.empty((count, SLOTS), dtype=bool)
@@ -71,9 +71,9 @@ def inverse_batch(
     return Solutions(robot, q, valid, inside, branch, turn_range=_turn_range(robot, q) if turns else None)
 
 
-def _checked_reference(q_ref: Reals | None, count: int) -> Reals:
+def _checked_reference(robot: Robot, q_ref: Reals | None, count: int) -> Reals:
     """Reference joints (1 or N, 6)."""
-    reference = checked_joints(np.zeros(6) if q_ref is None else q_ref, "q_ref")
+    reference = checked_joints(robot, np.zeros(6) if q_ref is None else q_ref, "q_ref")
     if reference.shape not in ((6,), (count, 6)):
         raise ShapeError("q_ref", reference.shape, f"(6,) or ({count}, 6)")
     reference = reference.reshape(-1, 6)

@@ -11,8 +11,8 @@ import numpy as np
 
 from er3a.errors import ArgumentError, ShapeError
 from er3a.geometry.transforms import as_floats
-from er3a.kinematics.chain import JOINTS, constant_links
-from er3a.numerics.arrays import Reals
+from er3a.kinematics.chain import constant_links, joint_starts, row_values
+from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.fast_math import LARGEST_ANGLE, cos_sin
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
@@ -24,12 +24,12 @@ _COS, _SIN = 12, 13  # rows of scratch memory behind the 3 x 4 entries of a bloc
 
 
 def forward(robot: Robot, q: Reals, frame: int | None = None, out: Reals | None = None) -> Reals:
-    """Pose of the tool point, or of a frame of the table, for joint angles.
+    """Pose of the tool point, or of a frame of the table, for joint values.
 
     Parameters
     ----------
-    q : (..., 6), rad, the manufacturer's joint angles; NaN in a row gives NaN in its pose
-    frame : None for the tool point (``T_base_tool``); 0..6 for the frame after that joint in the table's own
+    q : (..., n), rad (m where a joint slides), the manufacturer's joint values; NaN in a row gives NaN in its pose
+    frame : None for the tool point (``T_base_tool``); 0..m for the frame after that joint in the table's own
         convention, base included, tool not
     out : (..., 4, 4) writeable float64 C-contiguous array to fill and return
 
@@ -42,7 +42,7 @@ def forward(robot: Robot, q: Reals, frame: int | None = None, out: Reals | None 
     ShapeError
         if q or out has the wrong shape
     """
-    q = checked_joints(q)
+    q = checked_joints(robot, q)
     shape = (*q.shape[:-1], 4, 4)
     if out is None:
         out = np.empty(shape)
@@ -51,7 +51,7 @@ def forward(robot: Robot, q: Reals, frame: int | None = None, out: Reals | None 
     elif out.shape != shape or out.dtype != np.float64 or not out.flags.carray:
         raise ShapeError("out", out.shape, f"{shape}, float64, C-contiguous and writeable")
     links = constant_links(robot, frame)
-    _forward(q.reshape(-1, JOINTS), robot.direction, robot.offset, links, out.reshape(-1, 4, 4))
+    _forward(*_motion(robot, q), links, out.reshape(-1, 4, 4))
     return out
 
 
@@ -60,48 +60,62 @@ def frames(robot: Robot, q: Reals) -> Reals:
 
     Parameters
     ----------
-    q : (..., 6), rad, manufacturer's angles
+    q : (..., n), rad or m, manufacturer's joint values
 
     Returns
     -------
-    T : (..., 7, 4, 4); entry k < 6 has its z axis on the axis of joint k + 1 and turns with it; entry 6 is the tool
+    T : (..., m + 1, 4, 4); entry k < m has its z axis on the axis of row k + 1 and moves with it; entry m is the tool
     """
-    q = checked_joints(q)
-    out = np.empty((*q.shape[:-1], JOINTS + 1, 4, 4))
-    links = constant_links(robot)
-    _frames(q.reshape(-1, JOINTS), robot.direction, robot.offset, links, out.reshape(-1, JOINTS + 1, 4, 4))
+    q = checked_joints(robot, q)
+    out = np.empty((*q.shape[:-1], robot.rows + 1, 4, 4))
+    _frames(*_motion(robot, q), constant_links(robot), out.reshape(-1, robot.rows + 1, 4, 4))
     return out
 
 
 def jacobian(robot: Robot, q: Reals) -> Reals:
-    """Geometric Jacobian at the tool point, in the base frame, with respect to the manufacturer's angles [1]_.
+    """Geometric Jacobian at the tool point, in the base frame, with respect to the manufacturer's joint values [1]_.
 
     Parameters
     ----------
-    q : (..., 6), rad
+    q : (..., n), rad or m
 
     Returns
     -------
-    J : (..., 6, 6); rows 0-2 linear velocity (m/rad), rows 3-5 angular velocity (rad/rad)
+    J : (..., 6, n); rows 0-2 linear velocity (m/rad, or m/m for joints that slide), rows 3-5 angular velocity
     """
-    q = checked_joints(q)
-    out = np.empty((*q.shape[:-1], 6, JOINTS))
-    _jacobian(q.reshape(-1, JOINTS), robot.direction, robot.offset, constant_links(robot), out.reshape(-1, 6, JOINTS))
-    return out
+    q = checked_joints(robot, q)
+    out = np.empty((*q.shape[:-1], 6, robot.rows))
+    _jacobian(*_motion(robot, q), constant_links(robot), out.reshape(-1, 6, robot.rows))
+    if robot.coupling is None:
+        return out
+    coupled: Reals = out @ robot.coupling
+    return coupled
 
 
-def checked_joints(q: Reals, argument: str = "q") -> Reals:
-    """Return q as contiguous float array (..., 6), or raise :class:`ShapeError` or :class:`PoseError`."""
+def checked_joints(robot: Robot, q: Reals, argument: str = "q") -> Reals:
+    """Return q as contiguous float array (..., n), or raise :class:`ShapeError` or :class:`PoseError`."""
     q = np.ascontiguousarray(as_floats(q, argument))
-    if q.ndim == 0 or q.shape[-1] != JOINTS:
-        raise ShapeError(argument, q.shape, "(..., 6)")
+    if q.ndim == 0 or q.shape[-1] != robot.joints:
+        raise ShapeError(argument, q.shape, f"(..., {robot.joints})")
     return q
+
+
+def _motion(robot: Robot, q: Reals) -> tuple[Reals, Reals, Reals, Flags]:
+    """What kernels take: each row's motion u (N, m), its direction, what x begins with, and whether it slides."""
+    u = row_values(robot, q).reshape(-1, robot.rows)
+    return u, robot.direction, joint_starts(robot), robot.sliding
 
 
 @kernel
 def turn_row(row: Row, c: float, s: float) -> Row:
     """Row (4 floats) of T, after T is multiplied from the right by Rz, given its cosine and sine."""
     return row[0] * c + row[1] * s, row[1] * c - row[0] * s, row[2], row[3]
+
+
+@kernel
+def slide_row(row: Row, along: float) -> Row:
+    """Row (4 floats) of T, after T is multiplied from the right by a shift along z."""
+    return row[0], row[1], row[2], row[3] + along * row[2]
 
 
 @kernel
@@ -150,12 +164,31 @@ def _cos_sin_rows(q: Reals, direction: Reals, offset: Reals, start: int, k: int,
 
 
 @kernel
-def _forward(q: Reals, direction: Reals, offset: Reals, links: Reals, out: Reals) -> None:
+def _slide_rows(q: Reals, sign: float, start: int, k: int, rows: Reals) -> None:
+    """Shift a block of transforms along their z axes by joint ``k``, and leave no turn in rows 12 and 13."""
+    for i in range(BLOCK):
+        along = sign * q[min(start + i, q.shape[0] - 1), k]
+        for r in range(3):
+            rows[(4 * r + 3) * BLOCK + i] += along * rows[(4 * r + 2) * BLOCK + i]
+        rows[_COS * BLOCK + i], rows[_SIN * BLOCK + i] = 1.0, 0.0
+
+
+@kernel
+def _move_joint(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, start: int, k: int, rows: Reals) -> None:
+    """Shift by joint ``k`` if it slides; leave the cosine and sine of its turn in rows 12 and 13."""
+    if sliding[k]:
+        _slide_rows(q, direction[k], start, k, rows)
+    else:
+        _cos_sin_rows(q, direction, start_at, start, k, rows)
+
+
+@kernel
+def _forward(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: Reals, out: Reals) -> None:
     rows = np.empty((_SIN + 1) * BLOCK)
     for start in range(0, q.shape[0], BLOCK):
         _fill_start(rows, links[0])
         for k in range(links.shape[0] - 1):
-            _cos_sin_rows(q, direction, offset, start, k, rows)
+            _move_joint(q, direction, start_at, sliding, start, k, rows)
             _turn_and_step(rows, links[k + 1])
         for i in range(min(BLOCK, q.shape[0] - start)):
             for r in range(3):
@@ -185,33 +218,41 @@ def _turn_and_step(rows: Reals, link: Reals) -> None:
 
 
 @kernel
-def _frames(q: Reals, direction: Reals, offset: Reals, links: Reals, out: Reals) -> None:
+def _frames(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: Reals, out: Reals) -> None:
+    joints = q.shape[1]
     for n in range(q.shape[0]):
         x, y, z = rows_of(links[0])
-        for k in range(6):
-            angle, link = direction[k] * q[n, k] + offset[k], links[k + 1]
-            c, s = np.cos(angle), np.sin(angle)
-            x, y, z = turn_row(x, c, s), turn_row(y, c, s), turn_row(z, c, s)
+        for k in range(joints):
+            moved, link = direction[k] * q[n, k] + start_at[k], links[k + 1]
+            if sliding[k]:
+                x, y, z = slide_row(x, moved), slide_row(y, moved), slide_row(z, moved)
+            else:
+                c, s = np.cos(moved), np.sin(moved)
+                x, y, z = turn_row(x, c, s), turn_row(y, c, s), turn_row(z, c, s)
             write_rows(x, y, z, out[n, k])
             x, y, z = step_row(x, link), step_row(y, link), step_row(z, link)
-        write_rows(x, y, z, out[n, 6])
+        write_rows(x, y, z, out[n, joints])
 
 
 @kernel
-def _jacobian(q: Reals, direction: Reals, offset: Reals, links: Reals, out: Reals) -> None:
-    rows, columns = np.empty((_SIN + 1) * BLOCK), np.empty((6, 6 * BLOCK))
+def _jacobian(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: Reals, out: Reals) -> None:
+    joints = q.shape[1]
+    rows, columns = np.empty((_SIN + 1) * BLOCK), np.empty((joints, 6 * BLOCK))
     for start in range(0, q.shape[0], BLOCK):
         _fill_start(rows, links[0])
-        for k in range(6):
+        for k in range(joints):
             # Until the tool point is known, the linear rows hold a point on the axis.
             _keep_axis(rows, direction[k], columns[k])
-            _cos_sin_rows(q, direction, offset, start, k, rows)
+            _move_joint(q, direction, start_at, sliding, start, k, rows)
             _turn_and_step(rows, links[k + 1])
-        for k in range(6):
-            _lever(rows, columns[k])
+        for k in range(joints):
+            if sliding[k]:
+                _along(columns[k])
+            else:
+                _lever(rows, columns[k])
         for i in range(min(BLOCK, q.shape[0] - start)):
             for r in range(6):
-                for k in range(6):
+                for k in range(joints):
                     out[start + i, r, k] = columns[k, r * BLOCK + i]
 
 
@@ -229,6 +270,14 @@ def _keep_axis(rows: Reals, sign: float, column: Reals) -> None:
         for i in range(BLOCK):
             column[r * BLOCK + i] = rows[(4 * r + 3) * BLOCK + i]
             column[(3 + r) * BLOCK + i] = rows[(4 * r + 2) * BLOCK + i] * sign
+
+
+@kernel
+def _along(column: Reals) -> None:
+    """The tool point's velocity by a joint that slides: its axis, and no turn."""
+    for i in range(BLOCK):
+        for r in range(3):
+            column[r * BLOCK + i], column[(3 + r) * BLOCK + i] = column[(3 + r) * BLOCK + i], 0.0
 
 
 @kernel

@@ -55,7 +55,7 @@ def inverse(robot: Robot, T: Reals, q_ref: Reals | None = None) -> Solutions:
     T = check_poses(T)
     if T.shape != (4, 4):
         raise ShapeError("T", T.shape, "(4, 4)")
-    q_ref = checked_reference(q_ref)
+    q_ref = checked_reference(robot, q_ref)
     if lacking := closed_form_missing(robot):
         return _by_iteration(robot, T, q_ref, lacking)
     q, fault, gap = (batch[0] for batch in solve_slots(robot, T[None], q_ref[None], keep_folds=True, keep_free=True))
@@ -91,11 +91,11 @@ def _by_iteration(robot: Robot, T: Reals, q_ref: Reals, lacking: ClosedFormMissi
     return Solutions(robot, q, np.ones_like(inside), inside, branch, Iteration(STARTS, lacking), unsolved)
 
 
-def checked_reference(q_ref: Reals | None) -> Reals:
-    """Reference joint angles (6,), zeros for None; :class:`ShapeError` or :class:`PoseError` if they are none."""
-    q_ref = np.zeros(6) if q_ref is None else checked_joints(q_ref, "q_ref")
-    if q_ref.shape != (6,):
-        raise ShapeError("q_ref", q_ref.shape, "(6,)")
+def checked_reference(robot: Robot, q_ref: Reals | None) -> Reals:
+    """Reference joint values (n,), zeros for None; :class:`ShapeError` or :class:`PoseError` if they are none."""
+    q_ref = np.zeros(robot.joints) if q_ref is None else checked_joints(robot, q_ref, "q_ref")
+    if q_ref.ndim != 1:
+        raise ShapeError("q_ref", q_ref.shape, f"({robot.joints},)")
     if not np.isfinite(q_ref).all():
         raise PoseError("q_ref holds NaN or infinity")
     return q_ref

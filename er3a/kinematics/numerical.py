@@ -77,7 +77,7 @@ def solve(
     for name, tolerance in (("position_tolerance", position_tolerance), ("rotation_tolerance", rotation_tolerance)):
         if not (isinstance(tolerance, Real) and tolerance > 0):
             raise Er3aError(f"{name} is {tolerance!r}; expected a number above 0")
-    q0 = (robot.lower + robot.upper) / 2 if q0 is None else checked_joints(q0, "q0")
+    q0 = (robot.lower + robot.upper) / 2 if q0 is None else checked_joints(robot, q0, "q0")
     if q0.shape not in ((6,), (*shape, 6)):
         raise ShapeError("q0", q0.shape, f"(6,) or {(*shape, 6)}")
     if not np.isfinite(q0).all():

@@ -18,7 +18,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.geometry.vectors import Vector, cross, dot, subtract
-from er3a.kinematics.chain import JOINTS, arm_length, constant_links
+from er3a.kinematics.chain import arm_length, constant_links, row_values
 from er3a.kinematics.forward import checked_joints, jacobian, rows_of, step_row, turn_row
 from er3a.kinematics.wrist_partitioned import closed_form_missing, wrist_partitioned_arm
 from er3a.numerics.arrays import Reals
@@ -73,7 +73,10 @@ def characteristic_length(robot: Robot) -> float:
 
 
 def conditioning(robot: Robot, q: Reals, length: float) -> Conditioning:
-    """Manipulability, condition number and smallest singular value at joint angles (..., 6) in rad.
+    """Manipulability, condition number and smallest singular value at joint values (..., n) in rad or m.
+
+    Of an arm with fewer than six joints the singular values are those of its n columns. Columns of joints that slide
+    are multiplied by the length too, so that they compare with those of joints that turn.
 
     Parameters
     ----------
@@ -81,6 +84,8 @@ def conditioning(robot: Robot, q: Reals, length: float) -> Conditioning:
     """
     J = jacobian(robot, q)
     J[..., :3, :] /= length
+    if robot.sliding.any():
+        J *= np.where(robot.slides, length, 1.0)
     values = np.linalg.svd(J, compute_uv=False).astype(float)
     smallest = values[..., -1]
     regular = smallest > ROUNDING * values[..., 0]
@@ -97,10 +102,10 @@ def determinant_factors(robot: Robot, q: Reals) -> DeterminantFactors:
         if the arm's determinant does not factor this way
     """
     arm = wrist_partitioned_arm(robot)
-    q = checked_joints(q)
-    out = np.empty((q.size // JOINTS, 3))
+    q = checked_joints(robot, q)
+    out = np.empty((q.size // 6, 3))
     links = constant_links(robot)
-    _factors(q.reshape(-1, JOINTS), robot.direction, robot.offset, links, arm.wrist_in_tool, out)
+    _factors(row_values(robot, q).reshape(-1, 6), robot.direction, robot.offset, links, arm.wrist_in_tool, out)
     return DeterminantFactors(*(out[:, k].reshape(q.shape[:-1]) for k in range(3)))
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from er3a.kinematics.forward import rows_of, step_row, turn_row, write_rows
+from er3a.kinematics.forward import rows_of, slide_row, step_row, turn_row, write_rows
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
@@ -20,7 +20,8 @@ class Tables:
     Attributes
     ----------
     modified : (H,) bool, whether the rows are read as modified (Craig) ones
-    a, d : (H, 6), m; alpha, beta, offset, lower, upper : (H, 6), rad; direction : (H, 6), +1 or -1
+    a, d : (H, m), m; alpha, beta, offset, lower, upper : (H, m), rad (limits of joints that slide in m);
+        direction : (H, m), +1 or -1; sliding : (H, m) bool
     """
 
     modified: Flags
@@ -32,6 +33,7 @@ class Tables:
     offset: Reals
     lower: Reals
     upper: Reals
+    sliding: Flags
 
     def __len__(self) -> int:
         return len(self.modified)
@@ -66,16 +68,16 @@ def join(batches: Sequence[Tables]) -> Tables:
 
 
 def frames_of(tables: Tables, base: Reals, q: Reals) -> Reals:
-    """Frames (H, P, 7, 4, 4) of each table at joint angles (P, 6) in rad, as :func:`er3a.kinematics.forward.frames` has
-    them for one robot without tool; entry 6 is the flange."""
-    out = np.empty((len(tables), len(q), 7, 4, 4))
+    """Frames (H, P, m + 1, 4, 4) of each table at row values (P, m) in rad or m, as
+    :func:`er3a.kinematics.forward.frames` has them for one robot without tool; the last is the flange."""
+    out = np.empty((len(tables), len(q), tables.d.shape[1] + 1, 4, 4))
     fill_frames(np.ascontiguousarray(base), *kernel_columns(tables), q, out)
     return out
 
 
-def kernel_columns(tables: Tables) -> tuple[Reals, Reals, Reals, Reals, Reals, Reals]:
-    """What kernels take of tables: a, alpha, beta and d (H, 7) of the link behind each joint, the base's first, then
-    direction and offset (H, 6)."""
+def kernel_columns(tables: Tables) -> tuple[Reals, Reals, Reals, Reals, Reals, Reals, Flags]:
+    """What kernels take of tables: a, alpha, beta and d (H, m + 1) of the link behind each joint, the base's first,
+    then direction, offset and sliding (H, m)."""
     count, joints = tables.d.shape
     a, alpha, beta, d = np.zeros((4, count, joints + 1))
     d[:, 1:] = tables.d
@@ -86,17 +88,27 @@ def kernel_columns(tables: Tables) -> tuple[Reals, Reals, Reals, Reals, Reals, R
         rows = tables.modified
         for link, column in ((a, tables.a), (alpha, tables.alpha), (beta, tables.beta)):
             link[rows, :joints], link[rows, joints] = column[rows], 0.0
-    return a, alpha, beta, d, tables.direction, tables.offset
+    return a, alpha, beta, d, tables.direction, tables.offset, tables.sliding
 
 
 @kernel
 def fill_frames(
-    base: Reals, a: Reals, alpha: Reals, beta: Reals, d: Reals, direction: Reals, offset: Reals, q: Reals, out: Reals
+    base: Reals,
+    a: Reals,
+    alpha: Reals,
+    beta: Reals,
+    d: Reals,
+    direction: Reals,
+    offset: Reals,
+    sliding: Flags,
+    q: Reals,
+    out: Reals,
 ) -> None:
-    """Fill ``out`` (H, P, 7, 4, 4) with frames of tables (see ``kernel_columns``) at joint angles (P, 6)."""
-    links = np.zeros((7, 4, 4))
+    """Fill ``out`` (H, P, m + 1, 4, 4) with frames of tables (see ``kernel_columns``) at row values (P, m)."""
+    joints = q.shape[1]
+    links = np.zeros((joints + 1, 4, 4))
     for h in range(out.shape[0]):
-        for k in range(7):
+        for k in range(joints + 1):
             c, s = np.cos(alpha[h, k]), np.sin(alpha[h, k])
             cb, sb = np.cos(beta[h, k]), np.sin(beta[h, k])
             links[k, 0, 0], links[k, 0, 2], links[k, 0, 3] = cb, sb, a[h, k]
@@ -105,10 +117,16 @@ def fill_frames(
         start = rows_of(base)
         for p in range(q.shape[0]):
             x, y, z = step_row(start[0], links[0]), step_row(start[1], links[0]), step_row(start[2], links[0])
-            for k in range(6):
-                angle, link = direction[h, k] * q[p, k] + offset[h, k], links[k + 1]
+            for k in range(joints):
+                moved, angle, link = direction[h, k] * q[p, k], offset[h, k], links[k + 1]
+                if sliding[h, k]:
+                    x, y, z = slide_row(x, moved), slide_row(y, moved), slide_row(z, moved)
+                    write_rows(x, y, z, out[h, p, k])
+                else:
+                    angle = moved + angle
                 c, s = np.cos(angle), np.sin(angle)
                 x, y, z = turn_row(x, c, s), turn_row(y, c, s), turn_row(z, c, s)
-                write_rows(x, y, z, out[h, p, k])
+                if not sliding[h, k]:
+                    write_rows(x, y, z, out[h, p, k])
                 x, y, z = step_row(x, link), step_row(y, link), step_row(z, link)
-            write_rows(x, y, z, out[h, p, 6])
+            write_rows(x, y, z, out[h, p, joints])

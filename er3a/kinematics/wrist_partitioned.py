@@ -25,6 +25,15 @@ PARALLEL = 1e-9
 
 
 @dataclass(frozen=True)
+class NotSixTurning:
+    """The arm has another number of joints than six, or one of them slides."""
+
+    joints: int
+    sliding: int
+    code: Literal["not_six_turning_joints"] = "not_six_turning_joints"
+
+
+@dataclass(frozen=True)
 class ElbowAxesNotParallel:
     """Axes 2 and 3 are not parallel."""
 
@@ -55,7 +64,7 @@ class NoArmLength:
     code: Literal["upper_arm_or_forearm_without_length"] = "upper_arm_or_forearm_without_length"
 
 
-ClosedFormMissing = ElbowAxesNotParallel | NeighboursParallel | NoWristCentre | NoArmLength
+ClosedFormMissing = NotSixTurning | ElbowAxesNotParallel | NeighboursParallel | NoWristCentre | NoArmLength
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +128,8 @@ def closed_form_missing(robot: Robot) -> ClosedFormMissing | None:
 
 @derived
 def _recognised(robot: Robot) -> WristPartitionedArm | ClosedFormMissing:
+    if robot.rows != 6 or robot.joints != 6 or robot.sliding.any():
+        return NotSixTurning(robot.joints, int(robot.sliding.sum()))
     axes, points, T_base_tool = axes_at_zero_theta(robot)
     if np.linalg.norm(np.cross(axes[1], axes[2])) > PARALLEL:
         return ElbowAxesNotParallel()

@@ -27,59 +27,145 @@ class LimitExceeded:
 
 
 @dataclass(frozen=True)
-class LimitsExceeded:
-    """One or more joints stand outside their limits."""
+class SlideExceeded:
+    """A joint that slides is beyond its upper or below its lower limit, by the excess."""
 
-    joints: tuple[LimitExceeded, ...]
+    joint: int
+    side: Literal["above", "below"]
+    position_mm: float
+    excess_mm: float
+    limit_mm: float
+    code: Literal["slide_exceeded"] = "slide_exceeded"
+
+
+@dataclass(frozen=True)
+class CombinationExceeded:
+    """A sum of joints is above its upper or below its lower limit; values in deg (mm if all of them slide)."""
+
+    joints: tuple[int, ...]
+    factors: tuple[float, ...]
+    side: Literal["above", "below"]
+    value: float
+    excess: float
+    limit: float
+    sliding: bool
+    code: Literal["combination_exceeded"] = "combination_exceeded"
+
+
+Exceeded = LimitExceeded | SlideExceeded | CombinationExceeded
+
+
+@dataclass(frozen=True)
+class LimitsExceeded:
+    """One or more joints, or sums of joints, stand outside their limits."""
+
+    joints: tuple[Exceeded, ...]
     code: Literal["limits_exceeded"] = "limits_exceeded"
 
 
 def within(robot: Robot, q: Reals) -> Flags:
-    """Whether joint angles (..., 6) in rad lie within the limits, to 1e-9 rad; shape (...,)."""
+    """Whether joint values (..., n) in rad or m lie within all limits, to 1e-9 rad or m; shape (...,)."""
     outside = np.maximum(q - robot.upper, robot.lower - q)
+    if robot.continuous.any():
+        outside = np.where(robot.continuous, -np.inf, outside)
     fits: Flags = np.asarray((outside <= LIMIT_TOLERANCE).all(axis=-1))
+    for limit in robot.combined:
+        total = q @ np.array(limit.factors)
+        fits = fits & (total <= limit.upper + LIMIT_TOLERANCE) & (total >= limit.lower - LIMIT_TOLERANCE)
     return fits
 
 
 def theta_limits(robot: Robot) -> Reals:
-    """Ends (6, 2), rad, of the range of each of the table's angles theta, the lower first."""
-    ends = robot.direction[:, None] * np.stack([robot.lower, robot.upper], axis=1) + robot.offset[:, None]
+    """Ends (m, 2), rad (m of rows that slide), of the range of each row's theta or shift, the lower first.
+
+    With a coupling they are those of the sums of each row, each by itself.
+    """
+    ends = np.stack([robot.lower, robot.upper], axis=1)
+    if robot.coupling is not None:
+        parts = robot.coupling[:, :, None] * ends[None]
+        ends = np.stack([parts.min(axis=2).sum(axis=1), parts.max(axis=2).sum(axis=1)], axis=1)
+    ends = robot.direction[:, None] * ends + np.where(robot.sliding, 0.0, robot.offset)[:, None]
     ends.sort(axis=1)
     return ends
 
 
 def limit_margin(robot: Robot, q: Reals) -> Reals:
-    """Least distance (...,) in rad of any joint of (..., 6) from its limits; negative outside them."""
-    margin: Reals = np.minimum(q - robot.lower, robot.upper - q).min(axis=-1)
+    """Least distance (...,) of joints (..., n) from their limits, rad (m of joints that slide); negative outside.
+
+    Infinite where all joints are continuous. Limits of sums of joints count too.
+    """
+    each = np.minimum(q - robot.lower, robot.upper - q)
+    if robot.continuous.any():
+        each = np.where(robot.continuous, np.inf, each)
+    margin: Reals = each.min(axis=-1)
+    for limit in robot.combined:
+        total = q @ np.array(limit.factors)
+        margin = np.minimum(margin, np.minimum(total - limit.lower, limit.upper - total))
     return margin
 
 
 def nearest_equivalent(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
-    """The same arm poses (..., 6) by the turns nearest to q_ref within the limits, else by those nearest to them."""
-    near = q + TURN * np.round((q_ref - q) / TURN)
+    """The same arm poses (..., n) by the turns nearest to q_ref within the limits, else by those nearest to them.
+
+    Joints that slide stay where they are.
+    """
+    near = q + turn_of(robot) * np.round((q_ref - q) / TURN)
     low, high = turn_bounds(robot, near)
     inside = near + TURN * np.clip(0, low, np.maximum(low, high))
     below, above = near + TURN * (low - 1), near + TURN * low
     outside = np.where(robot.lower - below < above - robot.upper, below, above)
-    return np.where(low <= high, inside, outside)
+    found = np.where(low <= high, inside, outside)
+    return np.where(robot.slides, q, found) if robot.sliding.any() else found
+
+
+def turn_of(robot: Robot) -> Reals | float:
+    """What may be added to each joint with the arm as it was: a turn, and 0 to those that slide; (n,) or a number."""
+    return np.where(robot.slides, 0.0, TURN) if robot.sliding.any() else TURN
 
 
 def turn_bounds(robot: Robot, q: Reals) -> tuple[Reals, Reals]:
-    """Least and greatest number of turns to add so that each angle lies within its limits (least > greatest: none)."""
+    """Least and greatest number of turns to add so that each value lies within its limits (least > greatest: none).
+
+    Of a continuous joint the turn it has is given; of one that slides 0, or none if it is outside.
+    """
     low = np.ceil((robot.lower - LIMIT_TOLERANCE - q) / TURN)
     high = np.floor((robot.upper + LIMIT_TOLERANCE - q) / TURN)
+    if robot.continuous.any():
+        low, high = np.where(robot.continuous, 0.0, low), np.where(robot.continuous, 0.0, high)
+    if robot.sliding.any():
+        fits = (q >= robot.lower - LIMIT_TOLERANCE) & (q <= robot.upper + LIMIT_TOLERANCE)
+        low, high = np.where(robot.slides, 0.0, low), np.where(robot.slides, np.where(fits, 0.0, -1.0), high)
     return low, high
 
 
 def limits_exceeded(robot: Robot, q: Reals) -> LimitsExceeded | None:
-    """Which limits the angles (6,) in rad leave; None if none."""
-    found: list[LimitExceeded] = []
-    for j, angle in enumerate(q):
-        sides: tuple[tuple[Literal["above", "below"], float, float], ...] = (
-            ("above", angle - robot.upper[j], robot.upper[j]),
-            ("below", robot.lower[j] - angle, robot.lower[j]),
-        )
-        for side, excess, limit in sides:
-            if excess > LIMIT_TOLERANCE:
-                found.append(LimitExceeded(j + 1, side, *np.degrees([angle, excess, limit]).tolist()))
+    """Which limits the joint values (n,) in rad or m leave; None if none."""
+    found: list[Exceeded] = []
+    slides = robot.slides
+    for j, value in enumerate(q):
+        for side, excess, limit in _beyond(value, robot.lower[j], robot.upper[j]):
+            if robot.continuous[j]:
+                continue
+            if slides[j]:
+                found.append(SlideExceeded(j + 1, side, *(1000 * np.array([value, excess, limit])).tolist()))
+            else:
+                found.append(LimitExceeded(j + 1, side, *np.degrees([value, excess, limit]).tolist()))
+    for combined in robot.combined:
+        factors = np.array(combined.factors)
+        joints = np.flatnonzero(factors)
+        sliding = bool(slides[joints].all())
+        scale = 1000.0 if sliding else float(np.degrees(1.0))
+        for side, excess, limit in _beyond(float(factors @ q), combined.lower, combined.upper):
+            numbers = (joints + 1).tolist(), factors[joints].tolist()
+            shown = scale * float(factors @ q), scale * excess, scale * limit
+            found.append(CombinationExceeded(tuple(numbers[0]), tuple(numbers[1]), side, *shown, sliding))
     return LimitsExceeded(tuple(found)) if found else None
+
+
+def _beyond(value: float, lower: float, upper: float) -> list[tuple[Literal["above", "below"], float, float]]:
+    """The sides on which a value is beyond its limits, by how much, and the limit."""
+    sides: tuple[tuple[Literal["above", "below"], float, float], ...] = (
+        ("above", value - upper, upper),
+        ("below", lower - value, lower),
+    )
+    return [(side, excess, limit) for side, excess, limit in sides if excess > LIMIT_TOLERANCE]

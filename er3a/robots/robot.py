@@ -12,8 +12,9 @@ import numpy as np
 from er3a.display import Displayed, Sheet, shortly
 from er3a.errors import RobotError, ShapeError
 from er3a.geometry.transforms import as_floats, rpy_of
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Flags, Reals
 
+MOST_JOINTS = 10
 Convention = Literal["standard", "modified"]
 CONVENTIONS: tuple[Convention, ...] = get_args(Convention)
 Grade = Literal["official", "measured", "cad", "export", "claim", "inferred"]
@@ -36,7 +37,7 @@ class Envelope:
 
     Attributes
     ----------
-    link : 0 for the base, 1..6 for the link that joint 1..6 turns (the tool belongs to 6)
+    link : 0 for the base, 1..m for the link that the joint of that row moves (the tool belongs to the last)
     start, end : points (m) in the frame on that joint's axis that turns with it; for link 0 in the base's frame
     """
 
@@ -46,22 +47,43 @@ class Envelope:
     radius: float
 
 
+@dataclass(frozen=True)
+class CombinedLimit:
+    """Limits of a sum of joints: ``lower <= factors @ q <= upper``, such as J2 + J3 of arms with a parallelogram.
+
+    ``factors`` has one number for each of the n joints; lower and upper are in rad (m if all its joints slide).
+    """
+
+    factors: tuple[float, ...]
+    lower: float
+    upper: float
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Robot(Displayed):
-    """A six-revolute serial arm. SI units; angles are in rad, arrays are read-only.
+    """A serial arm of 1 to 10 joints. SI units; angles are in rad, arrays are read-only.
 
-    The D-H angle of joint i is ``theta_i = direction_i * q_i + offset_i``, where q is what the teach pendant shows.
+    With q what the teach pendant shows, joint i moves by ``u = coupling @ q`` (``u = q`` without a coupling). If it
+    turns, its D-H angle is ``theta_i = direction_i * u_i + offset_i``; if it slides, theta is ``offset_i`` and the
+    distance along its axis ``d_i + direction_i * u_i``.
+
+    n is the number of joints in q and m that of rows in the table; they differ only where a coupling moves more rows
+    than there are joints (linkages that keep a wrist level).
 
     Attributes
     ----------
     name, title : short name (file stem) and name for people
     convention : "standard" (row i follows joint i) or "modified" (Craig: a and alpha of row i precede joint i)
-    a, d : (6,), m
-    alpha, offset : (6,), rad
-    beta : (6,), rad, Hayati's turn about y behind Rx(alpha), for axes that are parallel but for an error; usually 0
-    direction : (6,), +1 or -1
-    lower, upper : (6,), rad, limits of q
-    speed : (6,), rad/s, greatest joint speed, NaN where unknown
+    a, d : (m,), m
+    alpha, offset : (m,), rad
+    beta : (m,), rad, Hayati's turn about y behind Rx(alpha), for axes that are parallel but for an error; usually 0
+    direction : (m,), +1 or -1
+    sliding : (m,) bool, rows of prismatic joints
+    coupling : (m, n), or None for the identity
+    lower, upper : (n,), rad or m, limits of q; of a continuous joint the turn that is sampled
+    speed : (n,), rad/s or m/s, greatest joint speed, NaN where unknown
+    continuous : (n,) bool, joints that turn without end
+    combined : limits of sums of joints, beside those of each
     base : (4, 4), T_world_base; tool : (4, 4), T_flange_tool
     zero_pose : what the arm looks like at q = 0, in words
     references : names of the reference sets (folders of data/manual_refs) that it is checked against
@@ -88,36 +110,78 @@ class Robot(Displayed):
     offset: Reals
     lower: Reals
     upper: Reals
-    speed: Reals = field(default_factory=lambda: np.full(6, np.nan))
-    beta: Reals = field(default_factory=lambda: np.zeros(6))
+    speed: Reals = field(default_factory=lambda: np.empty(0))
+    beta: Reals = field(default_factory=lambda: np.empty(0))
     base: Reals = field(default_factory=lambda: np.eye(4))
     tool: Reals = field(default_factory=lambda: np.eye(4))
     zero_pose: str = ""
     references: tuple[str, ...] = ()
     envelopes: tuple[Envelope, ...] = ()
+    sliding: Flags = field(default_factory=lambda: np.empty(0, dtype=bool))
+    coupling: Reals | None = None
+    continuous: Flags = field(default_factory=lambda: np.empty(0, dtype=bool))
+    combined: tuple[CombinedLimit, ...] = ()
     sources: Mapping[str, Source] = field(default_factory=dict)
     origins: Mapping[str, str] = field(default_factory=dict)
     derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        for key in ("a", "alpha", "d", "beta", "direction", "offset", "lower", "upper", "speed", "base", "tool"):
-            array = np.array(as_floats(getattr(self, key), key))
-            expected = (4, 4) if key in ("base", "tool") else (6,)
-            if array.shape != expected:
-                raise ShapeError(key, array.shape, str(expected))
-            array.setflags(write=False)
-            object.__setattr__(self, key, array)
+        rows, joints = np.size(self.direction), np.size(self.speed) or np.size(self.lower)
+        unset = {"speed": np.full(joints, np.nan), "beta": np.zeros(rows)}
+        for key in (*_OF_ROWS, *_OF_JOINTS, "base", "tool"):
+            given = getattr(self, key)
+            array = np.array(unset[key] if key in unset and np.size(given) == 0 else as_floats(given, key))
+            self._keep(key, array, (4, 4) if key in ("base", "tool") else ((rows if key in _OF_ROWS else joints),))
+        for key, count in (("sliding", rows), ("continuous", joints)):
+            given = getattr(self, key)
+            self._keep(key, np.array(given, dtype=bool) if np.size(given) else np.zeros(count, dtype=bool), (count,))
+        if self.coupling is not None:
+            self._keep("coupling", np.array(as_floats(self.coupling, "coupling")), (rows, joints))
+        if not (1 <= joints <= MOST_JOINTS and joints <= rows <= MOST_JOINTS):
+            raise ShapeError("lower", (joints,), f"(1,) to ({MOST_JOINTS},)")
+        if rows != joints and self.coupling is None:
+            raise ShapeError("lower", (joints,), f"({rows},), or a coupling ({rows}, {joints})")
         if self.convention not in CONVENTIONS:
             raise RobotError(self.name, f"the convention is {self.convention!r}; expected one of {CONVENTIONS}")
         wrong = np.flatnonzero(np.abs(self.direction) != 1)
         if wrong.size:
             value = self.direction[wrong[0]]
             raise RobotError(self.name, f"direction of joint {wrong[0] + 1} is {value:g}; expected 1 or -1")
+        if (endless := np.flatnonzero(self.continuous & self.slides)).size:
+            raise RobotError(self.name, f"joint {endless[0] + 1} slides and is continuous; give it limits")
+        for limit in self.combined:
+            if len(limit.factors) != joints:
+                raise ShapeError("combined", (len(limit.factors),), f"({joints},)")
         object.__setattr__(self, "sources", MappingProxyType(dict(self.sources)))
         object.__setattr__(self, "origins", MappingProxyType(dict(self.origins)))
 
+    def _keep(self, key: str, array: Reals | Flags, expected: tuple[int, ...]) -> None:
+        if array.shape != expected:
+            raise ShapeError(key, array.shape, str(expected))
+        array.setflags(write=False)
+        object.__setattr__(self, key, array)
+
+    @property
+    def joints(self) -> int:
+        """How many joints there are in q, n."""
+        return len(self.lower)
+
+    @property
+    def rows(self) -> int:
+        """How many rows the table has, m."""
+        return len(self.a)
+
+    @property
+    def slides(self) -> Flags:
+        """(n,) bool, joints of q that are distances: the row of their number slides, or (if they don't move it) another."""
+        if self.coupling is None:
+            return self.sliding
+        moved: Flags = (self.coupling[self.sliding] != 0).any(axis=0)
+        own = self.coupling.diagonal() != 0
+        return np.where(own, self.sliding[: self.joints], moved)
+
     def without_tool(self) -> Robot:
-        """The robot with its flange as tool: references speak of the flange, which is frame 6 of the table."""
+        """The robot with its flange as tool: references speak of the flange, which is the last frame of the table."""
         return self.replace(tool=np.eye(4))
 
     def replace(self, **changes: Any) -> Robot:
@@ -126,29 +190,35 @@ class Robot(Displayed):
 
     def sheet(self) -> Sheet:
         """The table in mm and degrees, and where tool and base are."""
-        columns = [
-            np.arange(1, 7),
-            *(
-                1000 * self.a,
-                np.degrees(self.alpha),
-                1000 * self.d,
-                *([np.degrees(self.beta)] if self.beta.any() else []),
-            ),
-            *(self.direction.astype(int), np.degrees(self.offset)),
-            *(np.degrees(self.lower), np.degrees(self.upper), np.degrees(self.speed)),
-        ]
-        names = ["joint", "a_mm", "alpha_deg", "d_mm", *(["beta_deg"] if self.beta.any() else [])]
-        names += ["direction", "offset_deg", "lower_deg", "upper_deg", "speed_deg_s"]
+        turning = not self.sliding.any()
+        columns = {
+            "row" if self.coupling is not None else "joint": np.arange(1, self.rows + 1),
+            **({} if turning else {"type": np.where(self.sliding, "prismatic", "revolute")}),
+            "a_mm": 1000 * self.a,
+            "alpha_deg": np.degrees(self.alpha),
+            "d_mm": 1000 * self.d,
+            **({"beta_deg": np.degrees(self.beta)} if self.beta.any() else {}),
+            "direction": self.direction.astype(int),
+            "offset_deg": np.degrees(self.offset),
+        }
+        unit, scale = ("deg", np.degrees(1.0)) if turning else ("deg_or_mm", np.where(self.slides, 1000, np.degrees(1)))
+        if self.rows == self.joints:
+            limits = {"lower": self.lower, "upper": self.upper, "speed": self.speed}
+            columns |= {f"{key}_{unit}{'_s' * (key == 'speed')}": scale * value for key, value in limits.items()}
         placed = [("base", self.base), ("tool", self.tool)]
         return Sheet(
             f"Robot {self.name}: {shortly(self.title)} ({self.convention} D-H)",
-            tuple(names),
-            tuple(tuple(shortly(value) for value in row) for row in zip(*columns)),
+            tuple(columns),
+            tuple(tuple(shortly(value) for value in row) for row in zip(*columns.values())),
             facts=(
                 *(f"{name}: {_placement(T)}" for name, T in placed if (np.eye(4) != T).any()),
                 *([f"references: {', '.join(self.references)}"] if self.references else []),
             ),
         )
+
+
+_OF_ROWS = "a", "alpha", "d", "beta", "direction", "offset"
+_OF_JOINTS = "lower", "upper", "speed"
 
 
 def _placement(T: Reals) -> str:

@@ -60,7 +60,11 @@ def no_arm(robot: Robot) -> str:
     slow = np.flatnonzero(robot.speed <= 0)
     if slow.size:
         value = robot.speed[slow[0]]
-        return f"speed of joint {slow[0] + 1} is {value:g}; expected rad/s above 0, or NaN where it is unknown"
+        return f"speed of joint {slow[0] + 1} is {value:g}; expected a number above 0, or NaN where it is unknown"
+    if robot.coupling is not None and not np.isfinite(robot.coupling).all():
+        return "the coupling holds NaN or infinity"
+    if robot.coupling is not None and np.linalg.matrix_rank(robot.coupling) < robot.joints:
+        return "the coupling leaves joints that move nothing by themselves; each joint must move the arm in its own way"
     for name in ("base", "tool"):
         try:
             check_poses(getattr(robot, name), name)
@@ -75,5 +79,6 @@ def limits_crossed(robot: Robot) -> str:
     crossed = np.flatnonzero(robot.lower > robot.upper)
     if not crossed.size:
         return ""
-    low, high = np.degrees([robot.lower[crossed[0]], robot.upper[crossed[0]]])
-    return f"limits of joint {crossed[0] + 1} are crossed: lower {low:g} deg, upper {high:g} deg; swap them"
+    scale, unit = (1000.0, "mm") if robot.slides[crossed[0]] else (np.degrees(1.0), "deg")
+    low, high = scale * robot.lower[crossed[0]], scale * robot.upper[crossed[0]]
+    return f"limits of joint {crossed[0] + 1} are crossed: lower {low:g} {unit}, upper {high:g} {unit}; swap them"

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from er3a.errors import InputError
-from er3a.kinematics.chain import JOINTS, constant_links
+from er3a.geometry.transforms import translation
+from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Integers, Reals
+from er3a.robots.joint_limits import theta_limits
 from er3a.robots.robot import Robot
 
 BYTES_PER_CELL = 64
@@ -77,11 +79,18 @@ def tool_bound(robot: Robot) -> Bound:
 
     The tool point is a chain of constant steps joined by rotations about z. The part of a step along its joint's z axis
     does not turn with that joint, so it may be added to the step before; this is done where it shortens the sum of
-    lengths (forearm and elbow offset become one lever). Joint 2 onwards then give a ball by the triangle inequality.
+    lengths (forearm and elbow offset become one lever). Joint 2 onwards then give a ball by the triangle inequality. A
+    joint that slides is taken at the middle of its range, and half the range is added to the radius.
     """
-    links = constant_links(robot)
+    links, half = constant_links(robot), 0.0
+    if robot.sliding.any():
+        links = links.copy()
+        for row in np.flatnonzero(robot.sliding):
+            low, high = theta_limits(robot)[row]
+            links[row + 1] = translation(0, 0, (low + high) / 2) @ links[row + 1]
+            half += float(high - low) / 2
     steps = links[:, :3, 3].copy()
-    for k in range(JOINTS, 1, -1):
+    for k in range(robot.rows, 1, -1):
         moved = steps[k - 1] + links[k - 1, :3, 2] * steps[k, 2]
         kept_length = np.linalg.norm(steps[k - 1]) + np.linalg.norm(steps[k])
         if np.linalg.norm(moved) + np.linalg.norm(steps[k, :2]) < kept_length:
@@ -91,7 +100,7 @@ def tool_bound(robot: Robot) -> Bound:
         axis=links[0, :3, 2],
         height=float(steps[1, 2]),
         offset=float(np.linalg.norm(steps[1, :2])),
-        radius=float(np.linalg.norm(steps[2:], axis=1).sum()),
+        radius=float(np.linalg.norm(steps[2:], axis=1).sum()) + half,
     )
 
 
@@ -125,7 +134,7 @@ def make_grid(robot: Robot, cells_across: int) -> Grid:
 
 def shoulder_of(robot: Robot, grid: Grid) -> Reals:
     """The point of axis 1 at the height of joint 2: (3,), m."""
-    joint_2 = forward(robot, np.zeros(JOINTS), frame=1)[:3, 3]
+    joint_2 = forward(robot, np.zeros(robot.joints), frame=1)[:3, 3]
     return grid.axis_point + ((joint_2 - grid.axis_point) @ grid.axis) * grid.axis
 
 

@@ -18,22 +18,22 @@ import numpy as np
 
 from er3a.geometry.transforms import translation
 from er3a.geometry.vectors import Vector
-from er3a.kinematics.chain import JOINTS, constant_links, moving_tip
+from er3a.kinematics.chain import constant_links, joint_starts, moving_tip
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
-from er3a.numerics.arrays import Reals, Singles
+from er3a.numerics.arrays import Flags, Reals, Singles
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
-from er3a.sampling.random_joints import CHUNK
+from er3a.sampling.random_joints import CHUNK, UNIT_ROWS
 
 _SMALL = 1e-12
-_HALF, _ONE = np.float32(0.5), np.float32(1)
+_HALF, _ONE, _NONE = np.float32(0.5), np.float32(1), np.float32(0)
 _S0, _S1, _S2, _S3 = (np.float32(c) for c in (2.2214414622, -0.9135303109, 0.1126848445, -0.0065084218))
 _C0, _C1, _C2, _C3, _C4 = (
     np.float32(c) for c in (1.4142135623, -1.7447160365, 0.3587424282, -0.0295005932, 0.0012779231)
 )
-X, Y, Z = JOINTS * CHUNK, (JOINTS + 1) * CHUNK, (JOINTS + 2) * CHUNK
-"""Where the rows of the points stand behind the six rows of random numbers."""
-ROWS = (JOINTS + 3) * CHUNK
+X, Y, Z = UNIT_ROWS * CHUNK, (UNIT_ROWS + 1) * CHUNK, (UNIT_ROWS + 2) * CHUNK
+"""Where the rows of the points stand behind the rows of random numbers."""
+ROWS = (UNIT_ROWS + 3) * CHUNK
 
 
 class PointChain(NamedTuple):
@@ -43,9 +43,13 @@ class PointChain(NamedTuple):
     ----------
     last : the outermost joint (from 0) that moves the point
     point : (3,), m, the point in the frame that turns with that joint
-    first, span : (6,), turns: angle about z at the lower limit, and the range
-    links : (6, 5), cosine and sine of the turn about x from each joint's frame to the one before, and the step, m
+    first, span : (m,), turns: angle about z at the lower limit, and the range
+    links : (m, 5), cosine and sine of the turn about x from each joint's frame to the one before, and the step, m
     base : (3, 4), from the frame before joint 1 to the base frame, of double precision
+    sliding : (m,) bool; slide : (m, 2), m, of rows that slide: the shift at the lower limit, and the range
+    mix : (m, n), from a sample's random numbers to the rows' own, of arms with a coupling; else without rows
+    sums : (c, n + 2), of each limit of a sum of joints: what a sample's random numbers are multiplied by, and between
+        which two numbers the sum must lie
     """
 
     last: int
@@ -54,14 +58,24 @@ class PointChain(NamedTuple):
     span: Singles
     links: Singles
     base: Reals
+    sliding: Flags
+    slide: Singles
+    mix: Singles
+    sums: Singles
 
 
 def point_chain(robot: Robot) -> PointChain:
     """The chain to the tool point."""
     links = constant_links(robot)
-    last, point = moving_tip(links)
-    first = robot.direction * robot.lower + robot.offset
-    steps = np.zeros((JOINTS, 5))
+    last, point = moving_tip(links, robot.sliding)
+    lower, reach = robot.lower, robot.upper - robot.lower
+    mix = np.empty((0, 0))
+    if robot.coupling is not None:
+        lower, mix, reach = robot.coupling @ lower, robot.coupling * reach, np.ones(robot.rows)
+    first, span = robot.direction * lower + joint_starts(robot), robot.direction * reach
+    slide = np.where(robot.sliding[:, None], np.stack([first, span], axis=1), 0.0)
+    first, span = np.where(robot.sliding, 0.0, first), np.where(robot.sliding, 0.0, span)
+    steps = np.zeros((robot.rows, 5))
     for k in range(1, last + 1):
         before, tilt, after = _z_x_z(links[k, :3, :3])
         first[k - 1] += before
@@ -70,12 +84,23 @@ def point_chain(robot: Robot) -> PointChain:
         x, y, z = links[k, :3, 3]
         steps[k] = np.cos(tilt), np.sin(tilt), c * x + s * y, c * y - s * x, z
     turn = 2 * np.pi
-    span = robot.direction * (robot.upper - robot.lower)
     # Near a turn around zero, single precision is finest.
     first, span = first / turn, span / turn
     first -= np.round(first + span / 2)
-    single = [np.array(part, dtype=np.float32) for part in (point, first, span, steps)]
-    return PointChain(last, single[0], single[1], single[2], single[3], links[0, :3].copy())
+    parts = point, first, span, steps, slide, mix, _sums(robot)
+    single = [np.array(part, dtype=np.float32) for part in parts]
+    point_, first_, span_, links_, slide_, mix_, sums = single
+    return PointChain(last, point_, first_, span_, links_, links[0, :3].copy(), robot.sliding, slide_, mix_, sums)
+
+
+def _sums(robot: Robot) -> Reals:
+    """Limits of sums of joints as limits of sums of random numbers; see :class:`PointChain`."""
+    rows = np.empty((len(robot.combined), robot.joints + 2))
+    for row, limit in zip(rows, robot.combined):
+        factors = np.array(limit.factors)
+        row[:-2] = factors * (robot.upper - robot.lower)
+        row[-2:] = np.array([limit.lower, limit.upper]) - factors @ robot.lower
+    return rows
 
 
 def plane_direction(robot: Robot) -> Reals:
@@ -138,10 +163,51 @@ def turn_joint(rows: Singles, k: int, first: np.float32, span: np.float32, link:
 @kernel
 def points_about_axis_1(chain: PointChain, rows: Singles) -> None:
     """Set the points of a chunk, from its random numbers, in the frame that turns with joint 1 (z along axis 1)."""
-    last, point, first, span, links, _ = chain
+    last, point, first, span, links, _, sliding, slide, mix, _ = chain
+    if mix.shape[0] > 0:
+        _mix_rows(mix, rows)
     rows[X : X + CHUNK], rows[Y : Y + CHUNK], rows[Z : Z + CHUNK] = point[0], point[1], point[2]
     for k in range(last, 0, -1):
+        if sliding[k]:
+            _slide_points(rows, k, slide[k])
         turn_joint(rows, k, first[k], span[k], links[k])
+    if sliding[0]:
+        _slide_points(rows, 0, slide[0])
+
+
+@kernel
+def _slide_points(rows: Singles, k: int, slide: Singles) -> None:
+    """Shift a chunk of points along the axis of joint k."""
+    start, span = slide[0], slide[1]
+    for i in range(CHUNK):
+        rows[Z + i] += start + rows[k * CHUNK + i] * span
+
+
+@kernel
+def _mix_rows(mix: Singles, rows: Singles) -> None:
+    """Take the random numbers of a chunk to those of the table's rows."""
+    own = np.empty(mix.shape[1], dtype=np.float32)
+    for i in range(CHUNK):
+        for j in range(mix.shape[1]):
+            own[j] = rows[j * CHUNK + i]
+        for k in range(mix.shape[0]):
+            total = _NONE
+            for j in range(mix.shape[1]):
+                total += mix[k, j] * own[j]
+            rows[k * CHUNK + i] = total
+
+
+@kernel
+def within_sums(sums: Singles, rows: Singles, inside: Flags) -> None:
+    """Set which samples of a chunk of random numbers keep the limits of sums of joints."""
+    joints = sums.shape[1] - 2
+    for i in range(CHUNK):
+        inside[i] = True
+        for row in range(sums.shape[0]):
+            total = _NONE
+            for j in range(joints):
+                total += sums[row, j] * rows[j * CHUNK + i]
+            inside[i] = inside[i] and total >= sums[row, joints] and total <= sums[row, joints + 1]
 
 
 @kernel

@@ -1,8 +1,9 @@
 """Joint vectors that can be drawn again one by one: Philox4x32-10, a counter-based generator [1]_, or Sobol' points.
 
-*uniform*: the counter is (sample within the block, block), the key is the seed, and the four words of one draw give
-six numbers of 21 bits (steps below 0.0002 deg for a full turn). So the joint vector of sample n of block b depends on
-nothing else: not on what was drawn before it, nor on which process draws which block.
+*uniform*: the counter is (sample within the block, block, draw), the key is the seed, and the four words of one draw
+give six numbers of 21 bits (steps below 0.0002 deg for a full turn); arms with more than six joints take a second draw.
+So the joint vector of sample n of block b depends on nothing else: not on what was drawn before it, nor on which
+process draws which block.
 
 *sobol*: the samples of all blocks, numbered through, are points of one Sobol' sequence (:mod:`.sobol`), shifted at
 random.
@@ -20,9 +21,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from er3a.kinematics.chain import JOINTS
 from er3a.numerics.arrays import Integers, Reals, Singles, Words
 from er3a.numerics.jit import kernel
+from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
 from er3a.sampling.sobol import fill_sobol, shifted_directions
 
@@ -32,6 +33,9 @@ Counter = tuple[np.uint64, np.uint64, np.uint64, np.uint64]
 
 CHUNK = 512
 """Samples that are worked on at a time, in rows of an array that stays in the processor's cache."""
+OF_A_DRAW = 6
+UNIT_ROWS = 2 * OF_A_DRAW
+"""Rows of random numbers that a chunk has place for."""
 ROUNDS = 10
 _LOW = np.uint64(0xFFFFFFFF)
 _32 = np.uint64(32)
@@ -66,15 +70,19 @@ class Draw:
         """Number within the run of the first sample of each block."""
         return blocks * (self.samples // self.blocks) + np.minimum(blocks, self.samples % self.blocks)
 
-    def directions(self) -> Words:
-        """Direction numbers and shift of the Sobol' sequence; without rows for uniform samples."""
-        return shifted_directions(self.seed) if self.sampling == "sobol" else np.empty((0, 0), dtype=np.uint64)
+    def directions(self, joints: int) -> Words:
+        """Direction numbers and shift of the Sobol' sequence of so many joints; without rows for uniform samples."""
+        return shifted_directions(self.seed, joints) if self.sampling == "sobol" else np.empty((0, 0), dtype=np.uint64)
 
     def opening_joints(self, robot: Robot, count: int) -> Reals:
-        """Draw the first samples of each block again: (n, 6), rad, about as many of each, ``count`` at most."""
+        """Draw the first samples of each block again: (N, n), about as many of each, ``count`` at most.
+
+        Those outside limits of sums of joints, which are not counted, are left out.
+        """
         wanted = Draw(self.seed, min(count, self.samples), self.blocks).sizes
         blocks = np.repeat(np.arange(self.blocks), wanted)
-        return self.joints(robot, blocks, np.concatenate([np.arange(size) for size in wanted]))
+        q = self.joints(robot, blocks, np.concatenate([np.arange(size) for size in wanted]))
+        return q[within(robot, q)] if robot.combined else q
 
     def joints(self, robot: Robot, blocks: ArrayLike, samples: ArrayLike) -> Reals:
         """Draw the joint vectors of some samples again.
@@ -85,11 +93,11 @@ class Draw:
 
         Returns
         -------
-        q : (N, 6), rad, within the joint limits; a joint of zero range stays where it is
+        q : (N, n), rad or m, within each joint's limits; a joint of zero range stays where it is
         """
         blocks, samples = np.asarray(blocks, dtype=np.int64), np.asarray(samples, dtype=np.int64)
-        out, first = np.empty((len(blocks), JOINTS)), self.first(blocks)
-        _again(np.uint64(self.seed), blocks, samples, first, self.directions(), out)
+        out, first = np.empty((len(blocks), robot.joints)), self.first(blocks)
+        _again(np.uint64(self.seed), blocks, samples, first, self.directions(robot.joints), out)
         return robot.lower + out * (robot.upper - robot.lower)
 
 
@@ -121,12 +129,12 @@ def _fifth(a: np.uint64, b: np.uint64) -> np.uint64:
 
 
 @kernel
-def fill_uniform(seed: np.uint64, block: np.uint64, first: np.uint64, rows: Singles) -> None:
-    """Set the six first rows of ``CHUNK`` numbers to those of the samples from ``first`` on, in (0, 1)."""
+def fill_uniform(seed: np.uint64, block: np.uint64, first: np.uint64, draw: int, rows: Singles) -> None:
+    """Set six rows of ``CHUNK`` numbers to those of the samples from ``first`` on, in (0, 1): the draw 0 or 1."""
     k0, k1 = seed & _LOW, seed >> _32
     for i in range(CHUNK):
         sample = first + np.uint64(i)
-        a, b, c, d = sample & _LOW, sample >> _32, block, np.uint64(0)
+        a, b, c, d = sample & _LOW, sample >> _32, block, np.uint64(draw)
         # Written out: a call that stays a call keeps the loop from becoming vector instructions.
         a, b, c, d = _round(a, b, c, d, k0, k1, 0)
         a, b, c, d = _round(a, b, c, d, k0, k1, 1)
@@ -150,15 +158,20 @@ def fill_uniform(seed: np.uint64, block: np.uint64, first: np.uint64, rows: Sing
 def _again(
     seed: np.uint64, blocks: Integers, samples: Integers, first: Integers, directions: Words, out: Reals
 ) -> None:
-    rows = np.empty(JOINTS * CHUNK, dtype=np.float32)
+    joints = out.shape[1]
+    rows = np.empty(UNIT_ROWS * CHUNK, dtype=np.float32)
     for n in range(blocks.shape[0]):
         if directions.shape[0] > 0:
             fill_sobol(directions, first[n] + samples[n], 1, CHUNK, rows)
-            for k in range(JOINTS):
+            for k in range(joints):
                 out[n, k] = rows[k * CHUNK]
             continue
         sample = np.uint64(samples[n])
         key = seed & _LOW, seed >> _32
-        a, b, c, d = philox4x32(sample & _LOW, sample >> _32, np.uint64(blocks[n]), np.uint64(0), key[0], key[1])
-        out[n, 0], out[n, 1], out[n, 2], out[n, 3] = _unit(a >> _11), _unit(b >> _11), _unit(c >> _11), _unit(d >> _11)
-        out[n, 4], out[n, 5] = _unit(_fifth(a, b)), _unit(_fifth(c, d))
+        for draw in range(2):
+            block, number = np.uint64(blocks[n]), np.uint64(draw)
+            a, b, c, d = philox4x32(sample & _LOW, sample >> _32, block, number, key[0], key[1])
+            words = (_unit(a >> _11), _unit(b >> _11), _unit(c >> _11), _unit(d >> _11))
+            six = (words[0], words[1], words[2], words[3], _unit(_fifth(a, b)), _unit(_fifth(c, d)))
+            for k in range(min(OF_A_DRAW, joints - draw * OF_A_DRAW)):
+                out[n, draw * OF_A_DRAW + k] = six[k]

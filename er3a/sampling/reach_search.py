@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize
+from scipy.optimize import LinearConstraint, minimize
 
 from er3a.kinematics.forward import forward, jacobian
 from er3a.numerics.arrays import Reals
+from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import Grid
 
@@ -31,7 +33,7 @@ def search_reach(robot: Robot, grid: Grid, q: Reals) -> ReachExtremes:
 
     Parameters
     ----------
-    q : (N, 6), rad, samples to start from
+    q : (N, n), rad or m, samples to start from
     """
     offset = forward(robot, q)[:, :3, 3] - grid.axis_point
     height = offset @ grid.axis
@@ -58,5 +60,20 @@ def _best(robot: Robot, grid: Grid, q: Reals, values: Reals, factors: tuple[floa
 
     bounds = list(zip(robot.lower, robot.upper))
     starts = q[np.argsort(values, kind="stable")[:_STARTS]]
+    if robot.combined:
+        sums_of = np.array([limit.factors for limit in robot.combined])
+        ends = np.array([(limit.lower, limit.upper) for limit in robot.combined]).T
+        sums, fine = LinearConstraint(sums_of, ends[0], ends[1]), {"ftol": 1e-15, "maxiter": 500}
+        ways: dict[str, Any] = {
+            "jac": True,
+            "method": "SLSQP",
+            "bounds": bounds,
+            "constraints": [sums],
+            "options": fine,
+        }
+        ended = [minimize(goal, start, **ways) for start in starts]
+        kept = [float(end.fun) for end in ended if within(robot, end.x)]
+        return float(min([*kept, *(goal(start)[0] for start in starts)]))
     tight = {"ftol": 1e-15, "gtol": 1e-12, "maxiter": 500}
-    return float(min(minimize(goal, x, jac=True, method="L-BFGS-B", bounds=bounds, options=tight).fun for x in starts))
+    found = [minimize(goal, q0, jac=True, method="L-BFGS-B", bounds=bounds, options=tight).fun for q0 in starts]
+    return float(min(found))

@@ -1,4 +1,4 @@
-"""Sobol' points in six dimensions: evenly spread where random ones clump, and each one computed from its number alone.
+"""Sobol' points in up to ten dimensions: evenly spread, each one computed from its number alone.
 
 Direction numbers are those of Joe and Kuo [1]_; a random digital shift, keyed by the seed, keeps every point uniformly
 distributed and the estimates unbiased (Owen [2]_).
@@ -19,16 +19,26 @@ from er3a.numerics.jit import kernel
 
 BITS = 40
 """Of the number of a point: more than the study allows samples. Of a coordinate, the first 21 are used."""
-# Degree, coefficients and first numbers of dimensions 2 to 6.
-_JOE_KUO = ((1, 0, (1,)), (2, 1, (1, 3)), (3, 1, (1, 3, 1)), (3, 2, (1, 1, 1)), (4, 1, (1, 1, 3, 3)))
+# Degree, coefficients and first numbers of dimensions 2 to 10.
+_JOE_KUO = (
+    (1, 0, (1,)),
+    (2, 1, (1, 3)),
+    (3, 1, (1, 3, 1)),
+    (3, 2, (1, 1, 1)),
+    (4, 1, (1, 1, 3, 3)),
+    (4, 4, (1, 3, 5, 13)),
+    (5, 2, (1, 1, 5, 5, 17)),
+    (5, 4, (1, 1, 5, 5, 5)),
+    (5, 7, (1, 1, 7, 11, 19)),
+)
 _CUT, _HALF, _STEP = np.uint64(BITS - 21), np.float32(0.5), np.float32(2.0**-21)
 _ONE = np.uint64(1)
 
 
-def direction_numbers() -> Words:
-    """Direction numbers (6, BITS), uint64: that of bit 0 of a point's number first."""
+def direction_numbers(dimensions: int) -> Words:
+    """Direction numbers (dimensions, BITS), uint64: that of bit 0 of a point's number first."""
     out = [[1 << (BITS - 1 - bit) for bit in range(BITS)]]
-    for degree, coefficients, start in _JOE_KUO:
+    for degree, coefficients, start in _JOE_KUO[: dimensions - 1]:
         row = [m << (BITS - 1 - bit) for bit, m in enumerate(start)]
         for bit in range(degree, BITS):
             value = row[bit - degree] ^ (row[bit - degree] >> degree)
@@ -40,16 +50,16 @@ def direction_numbers() -> Words:
     return np.array(out, dtype=np.uint64)
 
 
-def shifted_directions(seed: int) -> Words:
-    """Direction numbers and, as last column, the shift of each dimension: (6, BITS + 1)."""
+def shifted_directions(seed: int, dimensions: int) -> Words:
+    """Direction numbers and, as last column, the shift of each dimension: (dimensions, BITS + 1)."""
     random = np.random.Generator(np.random.Philox(key=seed))
-    shift = random.integers(0, 1 << BITS, size=(6, 1), dtype=np.uint64)
-    return np.concatenate([direction_numbers(), shift], axis=1)
+    shift = random.integers(0, 1 << BITS, size=(dimensions, 1), dtype=np.uint64)
+    return np.concatenate([direction_numbers(dimensions), shift], axis=1)
 
 
 @kernel
 def fill_sobol(directions: Words, first: int, count: int, chunk: int, rows: Singles) -> None:
-    """Set the six first rows (each ``chunk`` long) to the points numbered from ``first`` on, in (0, 1)."""
+    """Set a row (``chunk`` long) for each dimension to the points numbered from ``first`` on, in (0, 1)."""
     for k in range(directions.shape[0]):
         # Neighbours in number differ by the directions of the trailing ones (Gray code): one step, one exclusive or.
         value, number = directions[k, BITS], np.uint64(first)

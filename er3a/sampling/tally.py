@@ -25,12 +25,13 @@ from er3a.sampling.point_chain import (
     point_chain,
     point_in_base,
     points_about_axis_1,
+    within_sums,
 )
-from er3a.sampling.random_joints import CHUNK, Draw, fill_uniform
+from er3a.sampling.random_joints import CHUNK, OF_A_DRAW, Draw, fill_uniform
 from er3a.sampling.sobol import fill_sobol
 
 Tallies = NDArray[np.uint32]
-_Block = tuple[np.uint64, int, int, Words]
+_Block = tuple[np.uint64, int, int, int, Words]
 _Voxels = tuple[Reals, float, tuple[int, int, int], Tallies]
 _Section = tuple[np.float32, np.float32, np.int32, np.int32, Tallies]
 _Watch = tuple[Furthest, tuple[Reals, Reals, NearLists, Singles], Integers]
@@ -111,11 +112,12 @@ def tally_blocks(
     voxels = (grid.origin, grid.cell, grid.shape, fresh)
     lowest, per_length = np.float32(grid.section_origin[1]), np.float32(1 / grid.section_cell)
     section = (lowest, per_length, np.int32(n_rho), np.int32(n_z), fresh_side)
-    chain, sobol = point_chain(robot), draw.directions()
+    chain, sobol = point_chain(robot), draw.directions(robot.joints)
     for block, size, first in zip(blocks, draw.sizes[blocks], draw.first(blocks)):
         for start in range(0, size, PORTION):
             stop = min(size, start + PORTION)
-            _sample((np.uint64(draw.seed), block, first, sobol), start, stop, chain, voxels, section, watch)
+            drawn = (np.uint64(draw.seed), block, first, robot.joints, sobol)
+            _sample(drawn, start, stop, chain, voxels, section, watch)
             _flush(fresh, block, counts.ravel(), first_block.ravel(), fresh_side, side.ravel())
             if progress:
                 progress(stop - start)
@@ -163,31 +165,35 @@ def _voxel_of(
 def _sample(
     draw: _Block, start: int, stop: int, chain: PointChain, voxels: _Voxels, section: _Section, watch: _Watch
 ) -> None:
-    seed, block, first, sobol = draw
+    seed, block, first, joints, sobol = draw
     origin, cell, shape, counts = voxels
     lowest, per_length, n_rho, n_z, side = section
     furthest, (inner, patches, near, idle), state = watch
     directions, support, _, _ = furthest
     rows, cells = np.empty(ROWS, dtype=np.float32), np.empty(CHUNK, dtype=np.int32)
-    squared = np.empty(CHUNK, dtype=np.float32)
+    squared, inside = np.empty(CHUNK, dtype=np.float32), np.ones(CHUNK, dtype=np.bool_)
     for begin in range(start, stop, CHUNK):
         count = min(CHUNK, stop - begin)
         if sobol.shape[0] > 0:
             fill_sobol(sobol, first + begin, CHUNK, CHUNK, rows)
         else:
-            fill_uniform(seed, np.uint64(block), np.uint64(begin), rows)
+            for part in range((joints - 1) // OF_A_DRAW + 1):
+                fill_uniform(seed, np.uint64(block), np.uint64(begin), part, rows[part * OF_A_DRAW * CHUNK :])
+        limited = chain[9].shape[0] > 0
+        if limited:
+            within_sums(chain[9], rows, inside)
         points_about_axis_1(chain, rows)
         _side_cells(rows, lowest, per_length, n_rho, n_z, cells)
         for i in range(count):
-            side[cells[i]] += np.uint32(1)
+            side[cells[i]] += np.uint32(inside[i])
         if state[0] == 0:
             for i in range(count):
                 x, y, z = point_in_base(chain, rows, i)
                 inner[0], inner[1], inner[2] = inner[0] + x / count, inner[1] + y / count, inner[2] + z / count
         _voxel_of(rows, chain, voxels, inner, cells, squared)
         for i in range(count):
-            counts[cells[i]] += np.uint32(1)
-            if squared[i] >= idle[cells[i]]:
+            counts[cells[i]] += np.uint32(inside[i])
+            if squared[i] >= idle[cells[i]] and inside[i]:
                 take_point(point_in_base(chain, rows, i), block, begin + i, inner, near, furthest)
         state[0] += count
         if state[0] >= state[1] and directions.shape[0] > 0:

@@ -108,7 +108,7 @@ def select(
         for an unknown rule, a bad weight, or a rule that lacks its data
     """
     weights = checked_weights(rule)
-    q_ref = checked_reference(q_ref)
+    q_ref = checked_reference(robot, q_ref)
     if solutions.q.ndim != 2:
         raise ShapeError("solutions.q", solutions.q.shape, "(n, 6)")
     measured = {name: RULES[name].measure(robot, solutions.q, q_ref, scene) for name in weights}

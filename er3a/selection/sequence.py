@@ -77,7 +77,7 @@ def select_sequence(
     if not poses:
         raise Er3aError("the sequence is empty; give at least one pose")
     usable = [_usable(robot, solutions, scene, number) for number, solutions in enumerate(poses)]
-    q_ref = checked_reference(q_ref)
+    q_ref = checked_reference(robot, q_ref)
     sets = [solutions.q[rows] for solutions, rows in zip(poses, usable)]
     total = _move_costs(robot, q_ref[None], sets[0], rule)[0]
     came_from = []

@@ -57,9 +57,9 @@ def test_joints_are_uniform_independent_and_drawn_again_alone(robot):
 
 def test_sobol_points_are_those_of_scipy(robot):
     """Unshifted, and with a seed shifted by one exclusive or per dimension."""
-    ours = direction_numbers()[:, :30] >> np.uint64(10)
-    theirs = qmc.Sobol(6, scramble=False, bits=30)
-    number, point = np.arange(1, 65), np.zeros((64, 6), dtype=np.uint64)
+    ours = direction_numbers(10)[:, :30] >> np.uint64(10)
+    theirs = qmc.Sobol(10, scramble=False, bits=30)
+    number, point = np.arange(1, 65), np.zeros((64, 10), dtype=np.uint64)
     gray = number ^ (number >> 1)
     for bit in range(8):
         point[(gray >> bit) & 1 == 1] ^= ours[:, bit]

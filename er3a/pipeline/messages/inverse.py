@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from er3a.pipeline.messages.inverse_verdict import say
+from er3a.pipeline.messages.kinematics import sum_of_joints
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.say import joined, sentence
 from er3a.pipeline.stages.inverse.inverse_findings import (
@@ -14,7 +15,7 @@ from er3a.pipeline.stages.inverse.inverse_findings import (
     TurningDoesNotHelp,
     TurnTool,
 )
-from er3a.robots.joint_limits import LimitExceeded, LimitsExceeded
+from er3a.robots.joint_limits import CombinationExceeded, Exceeded, LimitsExceeded, SlideExceeded
 
 FIGURES = {
     "targets_solved": N_("targets solved"),
@@ -51,6 +52,8 @@ SHAPES = {
     "back_elbow_down_no_flip": N_("back, elbow down"),
     "back_elbow_down_flip": N_("back, elbow down"),
 }
+SUM_IN_SHORT = {"above": N_("{sum} {excess:.1f} above"), "below": N_("{sum} {excess:.1f} below")}
+SLIDE_IN_SHORT = {"above": N_("J{joint} {excess:.1f} mm above"), "below": N_("J{joint} {excess:.1f} mm below")}
 ORIENTATIONS = {"tool_down": N_("tool straight down"), "tool_level": N_("tool level, outward")}
 ORIENTATION_TITLES = {"tool_down": N_("Tool straight down"), "tool_level": N_("Tool level, outward")}
 
@@ -60,7 +63,12 @@ def limits_in_short(found: LimitsExceeded) -> str:
     return joined(map(_in_short, found.joints), ", ")
 
 
-def _in_short(found: LimitExceeded) -> str:
+def _in_short(found: Exceeded) -> str:
+    if isinstance(found, CombinationExceeded):
+        text = SUM_IN_SHORT[found.side]
+        return sentence(found.code, text, sum=sum_of_joints(found.joints, found.factors), excess=found.excess)
+    if isinstance(found, SlideExceeded):
+        return sentence(found.code, SLIDE_IN_SHORT[found.side], joint=found.joint, excess=found.excess_mm)
     if found.side == "above":
         return sentence(found.code, "J{joint} {excess:.1f} above", joint=found.joint, excess=found.excess_deg)
     return sentence(found.code, "J{joint} {excess:.1f} below", joint=found.joint, excess=found.excess_deg)

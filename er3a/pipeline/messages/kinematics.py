@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from er3a.kinematics.solutions import (
     BadGuess,
     Iteration,
@@ -17,10 +19,16 @@ from er3a.kinematics.solutions import (
     WristTooNear,
     WristTooNearAxis1,
 )
-from er3a.kinematics.wrist_partitioned import ElbowAxesNotParallel, NeighboursParallel, NoArmLength, NoWristCentre
+from er3a.kinematics.wrist_partitioned import (
+    ElbowAxesNotParallel,
+    NeighboursParallel,
+    NoArmLength,
+    NotSixTurning,
+    NoWristCentre,
+)
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.say import joined, listed, say, sentence, word
-from er3a.robots.joint_limits import LimitExceeded, LimitsExceeded
+from er3a.robots.joint_limits import CombinationExceeded, LimitExceeded, LimitsExceeded, SlideExceeded
 
 BRANCHES = {
     "front_elbow_up_no_flip": N_("front, elbow up, no flip"),
@@ -37,6 +45,14 @@ SINGULARITIES = {"wrist": N_("wrist"), "elbow": N_("elbow"), "shoulder": N_("sho
 LIMIT_SIDES = {
     "above": N_("J{joint} at {at:.1f} deg is {by:.3g} deg above its limit of {bound:g} deg"),
     "below": N_("J{joint} at {at:.1f} deg is {by:.3g} deg below its limit of {bound:g} deg"),
+}
+SLIDE_SIDES = {
+    "above": N_("J{joint} at {at:.1f} mm is {by:.3g} mm above its limit of {bound:g} mm"),
+    "below": N_("J{joint} at {at:.1f} mm is {by:.3g} mm below its limit of {bound:g} mm"),
+}
+SUM_SIDES = {
+    "above": N_("{sum} at {at:.1f} {unit} is {by:.3g} {unit} above its limit of {bound:g} {unit}"),
+    "below": N_("{sum} at {at:.1f} {unit} is {by:.3g} {unit} below its limit of {bound:g} {unit}"),
 }
 GUESSES = {
     "other_starts": N_("bad guess: from the start given {miss}; other starts solve it, so allow restarts"),
@@ -63,8 +79,38 @@ def _(found: LimitExceeded) -> str:
 
 
 @say.register
+def _(found: SlideExceeded) -> str:
+    at, by, bound = found.position_mm, found.excess_mm, found.limit_mm
+    return sentence(found.code, SLIDE_SIDES[found.side], joint=found.joint, at=at, by=by, bound=bound)
+
+
+@say.register
+def _(found: CombinationExceeded) -> str:
+    at, by, bound, unit = found.value, found.excess, found.limit, "mm" if found.sliding else "deg"
+    named = sum_of_joints(found.joints, found.factors)
+    return sentence(found.code, SUM_SIDES[found.side], sum=named, at=at, by=by, bound=bound, unit=unit)
+
+
+def sum_of_joints(joints: Sequence[int], factors: Sequence[float]) -> str:
+    """A sum of joints as it is written: ``J2 + J3``, ``J3 - 0.5 J2``."""
+    text = ""
+    for joint, factor in zip(joints, factors):
+        size = "" if abs(factor) == 1 else f"{abs(factor):g} "
+        sign = (" - " if factor < 0 else " + ") if text else ("-" if factor < 0 else "")
+        text += f"{sign}{size}J{joint}"
+    return text
+
+
+@say.register
 def _(found: LimitsExceeded) -> str:
     return joined(listed(found.joints))
+
+
+@say.register
+def _(found: NotSixTurning) -> str:
+    if found.sliding:
+        return sentence(found.code, "{count} of its joints slide", count=found.sliding)
+    return sentence(found.code, "it has {count} joints", count=found.joints)
 
 
 @say.register
