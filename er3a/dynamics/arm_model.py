@@ -21,7 +21,7 @@ import numpy as np
 from er3a.dynamics.library import pinocchio
 from er3a.errors import RobotError
 from er3a.kinematics.chain import constant_links, joint_starts, row_values
-from er3a.kinematics.forward import jacobian
+from er3a.kinematics.forward import forward, jacobian
 from er3a.numerics.arrays import Reals
 from er3a.robots.derived import derived
 from er3a.robots.masses import GRAVITY, Body, Drives, Load, moved, no_body
@@ -92,8 +92,6 @@ class ArmModel:
         load = self.load
         if load is None or not (any(load.force) or any(load.moment)):
             return np.zeros_like(q)
-        from er3a.kinematics.forward import forward
-
         R = forward(self.robot, q)[:, :3, :3]
         wrench = np.concatenate([R @ np.array(load.force), R @ np.array(load.moment)], axis=1)
         held: Reals = -np.einsum("Nwj,Nw->Nj", jacobian(self.robot, q), wrench)

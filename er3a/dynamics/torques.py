@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.dynamics.arm_model import ArmModel, arm_model, drives_of
-from er3a.errors import RobotError
+from er3a.errors import RobotError, ShapeError
 from er3a.kinematics.forward import checked_joints
 from er3a.numerics.arrays import Reals
-from er3a.robots.masses import GRAVITY, Drives, Load
+from er3a.robots.masses import Drives, Load
 from er3a.robots.robot import Robot
 
 SINGULAR = 1e-12
@@ -145,11 +145,7 @@ def _flat(robot: Robot, named: dict[str, Reals]) -> tuple[list[Reals], tuple[int
         together = np.broadcast_arrays(*arrays)
     except ValueError:
         name = next(name for name, each in zip(named, arrays) if each.shape != arrays[0].shape)
-        from er3a.errors import ShapeError
-
         raise ShapeError(name, np.shape(named[name]), f"{arrays[0].shape}, as q has") from None
     shape = together[0].shape
     return [np.ascontiguousarray(each).reshape(-1, robot.joints) for each in together], shape
 
-
-__all__ = ["GRAVITY", "accelerations", "gravity", "mass_matrix", "torques"]

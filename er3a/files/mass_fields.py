@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field, model_validator
 from er3a.files.units import FARTHEST_MM, Triple, check_degrees
 from er3a.files.yaml_file import StrictModel
 from er3a.geometry.transforms import transform
-from er3a.kinematics.forward import frames
+from er3a.kinematics.forward import forward, frames
 from er3a.robots.masses import Body, Drives, LinkMass, Masses, WristLoad, moved, no_body
 from er3a.robots.robot import MOST_JOINTS, Robot
 
@@ -217,10 +217,7 @@ def link_masses(robot: Robot, inertia: InertiaFields) -> tuple[LinkMass, ...]:
     at_zero = np.concatenate([np.eye(4)[None], frames(placed, np.zeros(robot.joints))[:-1]])
     stated = at_zero.copy()
     if inertia.frame == "dh":
-        for k in range(1, robot.rows + 1):
-            from er3a.kinematics.forward import forward
-
-            stated[k] = forward(placed, np.zeros(robot.joints), frame=k)
+        stated[1:] = [forward(placed, np.zeros(robot.joints), frame=k + 1) for k in range(robot.rows)]
     T = np.eye(4)
     for origin in inertia.origins:
         T = T @ transform(np.array(origin.xyz_mm) / 1000, np.radians(origin.rpy_deg))

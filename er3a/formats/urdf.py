@@ -18,6 +18,7 @@ from er3a.display import Displayed, Sheet, shortly
 from er3a.errors import InputError
 from er3a.formats.from_axes import table_from_axes
 from er3a.formats.text_file import read_text
+from er3a.formats.urdf_masses import masses_from_urdf, write_masses
 from er3a.geometry.transforms import rot_z, rpy_of, transform
 from er3a.kinematics.chain import JOINTS, constant_links
 from er3a.kinematics.forward import forward
@@ -63,7 +64,7 @@ class UrdfImport(Displayed):
 
 
 def import_urdf(path: str | Path, snap: bool = False) -> UrdfImport:
-    """Derive D-H table, directions, offsets, limits and speeds from a URDF's axes.
+    """Derive D-H table, directions, offsets, limits and speeds from a URDF's axes; take over the masses that it states.
 
     The flange is the end of the fixed joints behind joint 6, or joint 6's own link frame if they branch.
 
@@ -100,13 +101,20 @@ def import_urdf(path: str | Path, snap: bool = False) -> UrdfImport:
         sources=sources | {"limits": Source(source.source + limit_note, "export")},
         **vars(table),
     )
+    masses, mass_notes = masses_from_urdf(
+        ElementTree.fromstring(read_text(path)), robot, [joint.name for joint in moving]
+    )
+    stated = Source(f"As {path.name} states them", "export")
+    given = {"inertia": bool(masses.links), "drives": masses.drives is not None}
+    more = {group: stated for group, there in given.items() if there}
+    robot = robot.replace(masses=masses, sources={**robot.sources, **more})
     q = np.random.default_rng(0).uniform(-math.pi, math.pi, (MISFIT_POSES, JOINTS))
     misfit = np.linalg.norm((forward(robot, q) - _chain_forward(joints, q))[:, :3, 3], axis=1).max()
-    return UrdfImport(robot, tuple(notes), float(misfit))
+    return UrdfImport(robot, (*notes, *mass_notes), float(misfit))
 
 
 def export_urdf(robot: Robot) -> str:
-    """The arm as URDF text; the link ``tool`` is the tool frame. Unknown speeds are written as 0 (URDF demands one)."""
+    """The arm as URDF text, masses included; the link ``tool`` is the tool frame. Unknown speeds are written as 0 (URDF demands one)."""
     links = constant_links(robot)
     root = ElementTree.Element("robot", name=robot.name)
     names = ["base", *(f"link_{k + 1}" for k in range(JOINTS)), "tool"]
@@ -124,6 +132,7 @@ def export_urdf(robot: Robot) -> str:
             speed = 0.0 if math.isnan(robot.speed[k]) else robot.speed[k]
             limits = {"lower": robot.lower[k], "upper": robot.upper[k], "velocity": speed, "effort": 0.0}
             ElementTree.SubElement(joint, "limit", {key: repr(float(value)) for key, value in limits.items()})
+    write_masses(robot, names, root)
     ElementTree.indent(root)
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
