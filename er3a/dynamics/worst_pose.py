@@ -16,9 +16,9 @@ from er3a.numerics.quasi_random import quasi_random_points
 from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
 
-POSES = 2000
-CLIMBS = 6
-GRID = 25
+POSES = 1000
+CLIMBS = 4
+GRID = 21
 REFINEMENTS = 3
 MOST_ROUNDS = 12
 NO_BETTER = 1e-9

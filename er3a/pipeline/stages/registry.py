@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from er3a.pipeline.stages.dynamics.entry import STAGE as DYNAMICS
 from er3a.pipeline.stages.inverse.entry import STAGE as INVERSE
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.stages.trajectory.entry import STAGE as TRAJECTORY
 from er3a.pipeline.stages.validation.entry import STAGE as VALIDATION
 from er3a.pipeline.stages.workspace.entry import STAGE as WORKSPACE
 
-STAGES: dict[str, Stage] = {stage.name: stage for stage in (VALIDATION, WORKSPACE, INVERSE, TRAJECTORY)}
+STAGES: dict[str, Stage] = {stage.name: stage for stage in (VALIDATION, WORKSPACE, INVERSE, TRAJECTORY, DYNAMICS)}
 
 
 def all_messages() -> list[str]:
