@@ -7,6 +7,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from er3a.dynamics.torques import gravity as gravity
+    from er3a.dynamics.torques import mass_matrix as mass_matrix
+    from er3a.dynamics.torques import torques as torques
     from er3a.errors import Er3aError as Er3aError
     from er3a.files.by_name import calibrate as calibrate
     from er3a.files.by_name import diagnose as diagnose
@@ -25,6 +28,7 @@ if TYPE_CHECKING:
     from er3a.kinematics.numerical import solve as solve
     from er3a.robots.conventions import to_modified as to_modified
     from er3a.robots.conventions import to_standard as to_standard
+    from er3a.robots.masses import Load as Load
     from er3a.robots.robot import Robot as Robot
     from er3a.selection.select import select as select
     from er3a.selection.sequence import select_sequence as select_sequence
@@ -41,6 +45,10 @@ _PUBLIC = {
     "solve": "er3a.kinematics.numerical",
     "select": "er3a.selection.select",
     "select_sequence": "er3a.selection.sequence",
+    "torques": "er3a.dynamics.torques",
+    "mass_matrix": "er3a.dynamics.torques",
+    "gravity": "er3a.dynamics.torques",
+    "Load": "er3a.robots.masses",
     "load_scene": "er3a.files.scene_file",
     "load_targets": "er3a.files.target_file",
     "diagnose": "er3a.files.by_name",

@@ -10,6 +10,8 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from er3a.files.units import FARTHEST_MM, MOST_DEG, RADIANS_BELOW_DEG, Triple, look_like_radians, suspect
+from er3a.files.mass_fields import DriveFields, InertiaFields, WeightFields, WristLoadFields, check_masses
+from er3a.files.units import FARTHEST_MM, MOST_DEG, Triple
 from er3a.files.yaml_file import StrictModel
 from er3a.robots.robot import MOST_JOINTS, Grade, PairRule
 
@@ -259,6 +261,22 @@ class CollisionPairs(StrictModel):
                 seen.add(pair)
 
 
+class Inertia(InertiaFields, Sourced):
+    pass
+
+
+class DriveGroup(DriveFields, Sourced):
+    pass
+
+
+class WristLoadGroup(WristLoadFields, Sourced):
+    pass
+
+
+class Weight(WeightFields, Sourced):
+    pass
+
+
 class RobotFile(StrictModel):
     """A robot file: data/robots/NAME.yaml."""
 
@@ -277,6 +295,10 @@ class RobotFile(StrictModel):
     tool: SourcedPlacement | None = None
     envelopes: Envelopes | None = None
     collision: CollisionPairs | None = None
+    inertia: Inertia | None = None
+    drives: DriveGroup | None = None
+    wrist_load: WristLoadGroup | None = None
+    weight: Weight | None = None
 
     @model_validator(mode="after")
     def _rows_in_order(self):
@@ -308,6 +330,15 @@ class RobotFile(StrictModel):
         for i, combined in enumerate(self.limits.combined):
             _check_listed(f"limits.combined[{i}]", combined.joints, len(slides))
             _check_limit(f"limits.combined[{i}]", combined, all(slides[joint - 1] for joint in combined.joints))
+        return self
+
+    @model_validator(mode="after")
+    def _masses_of_this_arm(self):
+        check_masses(self.inertia, self.drives, self.wrist_load, self.slides)
+        if self.inertia and max(row.link for row in self.inertia.links) > len(self.dh.rows):
+            raise ValueError(f"inertia.links: the arm has {len(self.dh.rows)} links | Link 0 is the base")
+        if self.inertia and self.inertia.origins and len(self.inertia.origins) != len(self.dh.rows):
+            raise ValueError("inertia.origins: not one for each joint | Write the origin of each joint of the table")
         return self
 
     @model_validator(mode="after")

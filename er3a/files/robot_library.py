@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from er3a.errors import InputError
+from er3a.files.mass_fields import masses_of
 from er3a.files.pieces_file import load_pieces
 from er3a.files.robot_file import (
     CombinedLimitRow,
@@ -25,6 +26,7 @@ from er3a.robots.robot import CombinedLimit, Envelope, Hull, Robot, Source
 
 ROBOTS = ROOT / "data" / "robots"
 REFERENCES = ROOT / "data" / "manual_refs"
+MASS_GROUPS = ("inertia", "drives", "wrist_load", "weight")
 
 
 def load_robot(name_or_path: str | Path) -> Robot:
@@ -63,7 +65,7 @@ def robot_path(name_or_path: str | Path) -> Path:
 
 def robot_of(content: RobotFile) -> Robot:
     """The model behind a checked file: metres and radians."""
-    groups = ("dh", "zero", "limits", "speeds", "coupling", "base", "tool", "envelopes")
+    groups = ("dh", "zero", "limits", "speeds", "coupling", "base", "tool", "envelopes", *MASS_GROUPS)
     present = {group: getattr(content, group) for group in groups if getattr(content, group) is not None}
     rows, joints = content.dh.rows, len(content.limits.rows)
     sliding = [row.type == "prismatic" for row in rows]
@@ -71,7 +73,7 @@ def robot_of(content: RobotFile) -> Robot:
         row.theta_deg if slides else zero.offset_deg for row, zero, slides in zip(rows, content.zero.rows, sliding)
     ]
     limits = np.array([_limits(row) for row in content.limits.rows])
-    return Robot(
+    robot = Robot(
         name=content.name,
         title=content.title,
         convention=content.dh.convention,
@@ -98,6 +100,8 @@ def robot_of(content: RobotFile) -> Robot:
         sources={group: Source(value.source, value.grade, value.origin or "") for group, value in present.items()},
         origins=_origins(content),
     )
+    groups_of_masses = [getattr(content, group) for group in MASS_GROUPS]
+    return robot.replace(masses=masses_of(robot, *groups_of_masses)) if any(groups_of_masses) else robot
 
 
 def _si(degrees: float | None, millimetres: float | None) -> float:

@@ -11,6 +11,7 @@ import yaml
 
 from er3a.errors import InputWarning
 from er3a.files.kept_files import write_atomically
+from er3a.files.mass_writer import mass_groups
 from er3a.files.robot_file import SHORTEST_PLAIN_LENGTH_MM, RobotFile
 from er3a.files.robot_library import VALUES_OF_ROW
 from er3a.geometry.transforms import rpy_of
@@ -105,6 +106,8 @@ def robot_file(robot: Robot) -> RobotFile:
             ]
             for rule in ("allow", "watch")
         }
+    for group, fields in mass_groups(robot).items():
+        content[group] = sourced(group) | fields
     for key in ("base", "tool"):
         T = getattr(robot, key)
         if not np.array_equal(T, np.eye(4)):

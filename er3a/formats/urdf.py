@@ -19,6 +19,7 @@ from er3a.display import Displayed, Sheet, shortly
 from er3a.errors import Er3aError, InputError
 from er3a.formats.from_axes import table_from_axes
 from er3a.formats.text_file import read_text
+from er3a.formats.urdf_masses import LinkPlaces, masses_from_urdf, write_masses
 from er3a.formats.urdf_shapes import collision_shapes
 from er3a.formats.urdf_tree import MOST_BYTES, UrdfChain, UrdfJoint, read_chain
 from er3a.geometry.transforms import rot_z, rpy_of
@@ -58,7 +59,7 @@ class UrdfImport(Displayed):
 def import_urdf(
     path: str | Path, *, base: str | None = None, tip: str | None = None, snap: bool = False, split: bool = False
 ) -> UrdfImport:
-    """Derive D-H table, directions, offsets, limits and speeds from a URDF's axes.
+    """Derive D-H table, directions, offsets, limits and speeds from a URDF's axes; take over its shapes and masses.
 
     The flange is the end of the fixed joints behind the last joint, or that joint's own link frame if they branch.
     Joints in the chain that follow others (mimic) become a coupling; grippers, and linkages that only follow, are left
@@ -109,46 +110,66 @@ def import_urdf(
     q = np.random.default_rng(0).uniform(-math.pi, math.pi, (MISFIT_POSES, len(sources)))
     given = _chain_forward(found.joints, q @ coupling.T + shift)
     misfit = np.linalg.norm((forward(robot, q) - given)[:, :3, 3], axis=1).max()
-    envelopes, hulls, told = link_shapes(path, found, robot, shift, split)
-    if envelopes or hulls:
-        shapes = {"envelopes": Source(f"Collision geometry of {path.name}", "export")}
-        robot = robot.replace(envelopes=envelopes, hulls=hulls, sources={**robot.sources, **shapes})
+    root, placed = ElementTree.fromstring(read_text(path, MOST_BYTES)), link_places(found, shift)
+    envelopes, hulls, told = link_shapes(path, root, robot, placed, split)
+    masses, weighed = masses_from_urdf(root, robot, placed, [joint.name for joint in moving])
+    stated = {
+        "envelopes": bool(envelopes or hulls),
+        "inertia": bool(masses.links),
+        "drives": masses.drives is not None,
+    }
+    more = {group: Source(f"As {path.name} states it", "export") for group, there in stated.items() if there}
+    robot = robot.replace(envelopes=envelopes, hulls=hulls, masses=masses, sources={**robot.sources, **more})
     names = tuple(joint.name for joint in sources)
     first, last = found.joints[0].parent, found.joints[-1].child
-    return UrdfImport(robot, (*found.notes, *notes, *told), float(misfit), names, first, last)
+    return UrdfImport(robot, (*found.notes, *notes, *told, *weighed), float(misfit), names, first, last)
 
 
-def link_shapes(
-    path: Path, found: UrdfChain, robot: Robot, shift: Reals, split: bool
-) -> tuple[tuple[Envelope, ...], tuple[Hull, ...], tuple[str, ...]]:
-    """The collision geometry of a URDF, in the frames of the links of the robot made from it, and notes in words.
+def link_places(found: UrdfChain, shift: Reals) -> LinkPlaces:
+    """Where links stand that move with the chain, all joints of the robot at 0.
 
     Parameters
     ----------
     shift : (m,), rad or m, the values of the chain's moving joints at which the robot's joints are 0
+
+    Returns
+    -------
+    place : of a link's name its frame (4, 4) in that of the chain's base and the number of moving joints before it;
+        None for a link that does not move with the chain
     """
-    zero = np.concatenate([robot.base[None], frames(robot, np.zeros(len(robot.lower)))])
     above = {joint.child: joint for joint in found.all.values()}
     place = {found.joints[0].parent: (np.eye(4), 0)}
     for joint in found.joints:
-        T, turned = place[joint.parent]
+        T, number = place[joint.parent]
         T = T @ joint.T_parent_joint
         if joint.moves:
-            T, turned = T @ _motion(joint, shift[turned : turned + 1])[0], turned + 1
-        place[joint.child] = T, turned
-    envelopes, hulls, notes = list[Envelope](), list[Hull](), list[str]()
-    for link in ElementTree.fromstring(read_text(path, MOST_BYTES)).findall("link"):
-        shapes, name, behind = link.findall("collision"), link.get("name", "?"), np.eye(4)
+            T, number = T @ _motion(joint, shift[number : number + 1])[0], number + 1
+        place[joint.child] = T, number
+
+    def placed(name: str) -> tuple[Reals, int] | None:
+        behind = np.eye(4)
         while name not in place and name in above and not above[name].moves:
-            behind = above[name].T_parent_joint @ behind
-            name = above[name].parent
-        if name not in place:
+            behind, name = above[name].T_parent_joint @ behind, above[name].parent
+        return (place[name][0] @ behind, place[name][1]) if name in place else None
+
+    return placed
+
+
+def link_shapes(
+    path: Path, root: ElementTree.Element, robot: Robot, placed: LinkPlaces, split: bool
+) -> tuple[tuple[Envelope, ...], tuple[Hull, ...], tuple[str, ...]]:
+    """The collision geometry of a URDF, in the frames of the links of the robot made from it, and notes in words."""
+    zero = np.concatenate([robot.base[None], frames(robot, np.zeros(robot.joints))])
+    envelopes, hulls, notes = list[Envelope](), list[Hull](), list[str]()
+    for link in root.findall("link"):
+        shapes, place = link.findall("collision"), placed(link.get("name", "?"))
+        if place is None:
             if shapes:
                 notes.append(f"link {link.get('name')} does not move with the arm's chain; its shape is left out")
             continue
-        T, turned = place[name]
+        T, number = place
         for collision in shapes:
-            made = collision_shapes(path, collision, (np.linalg.inv(zero[turned]) @ T @ behind, turned), notes, split)
+            made = collision_shapes(path, collision, (np.linalg.inv(zero[number]) @ T, number), notes, split)
             envelopes += [shape for shape in made if isinstance(shape, Envelope)]
             hulls += [shape for shape in made if isinstance(shape, Hull)]
     return tuple(envelopes), tuple(hulls), tuple(notes)
@@ -241,6 +262,7 @@ def export_urdf(robot: Robot) -> str:
         joint.set("type", "fixed")
         if k < rows:
             _describe(robot, k, moved_by, joint)
+    write_masses(robot, names, root)
     ElementTree.indent(root)
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 

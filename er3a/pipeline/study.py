@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 from pydantic import Field, PrivateAttr, create_model, model_validator
 
 from er3a.errors import InputError
+from er3a.files.load_file import LoadFields
 from er3a.files.own_titles import translations_in
 from er3a.files.robot_file import NAME_PATTERN, Name, Placement, RobotFile, Text, check_placement
 from er3a.files.robot_library import placement_transform, read_robot, robot_of, robot_path
@@ -19,11 +20,14 @@ from er3a.robots.robot import Robot
 
 STAGES = tuple(REGISTRY)
 ExpectedStatus = Literal["pass", "caution", "fail", "no_reference"]
+LOADS = {"tool_load", "payload"}
 SettingsT = TypeVar("SettingsT", bound=StrictModel)
 
 
 class RobotEntry(StrictModel):
     """One robot of the study. ``base`` and ``tool`` replace those of its file, ``scene`` those of the stages.
+
+    ``tool_load`` and ``payload`` are the masses on its flange, which the stage dynamics alone looks at.
 
     ``expect`` says by stage what its verdict is to be: one that is as expected is no news, any other is a fault.
     """
@@ -35,6 +39,8 @@ class RobotEntry(StrictModel):
     scene: Text | None = None
     base: Placement | None = None
     tool: Placement | None = None
+    tool_load: LoadFields | None = None
+    payload: LoadFields | None = None
     expect: dict[Text, ExpectedStatus] = {}
 
     @model_validator(mode="after")
@@ -152,6 +158,11 @@ class StudyBase(StrictModel):
             tool = variant.tool(tool)
         return robot_of(content).replace(name=name, base=placement_transform(base), tool=placement_transform(tool))
 
+    def loads(self, name: str) -> list[LoadFields]:
+        """What hangs on the flange: the tool, then the payload, as far as the study says."""
+        entry = self.entry(name)
+        return [load for load in (entry.tool_load, entry.payload) if load]
+
     def references(self, name: str) -> list[str]:
         """The reference sets that a robot's file names."""
         return read_robot(self.robot_file(name)).references
@@ -178,9 +189,9 @@ class StudyBase(StrictModel):
 
     def settings(self, name: str, key: str) -> dict[str, Any]:
         """What of the study concerns one of its keys, for a robot; of a key without settings seed and robot alone."""
-        entry = self.entry(name).model_dump(
-            exclude={"targets", "paths", "programs", "file", "scene", "expect"}, exclude_none=True
-        )
+        files = {"targets", "paths", "programs", "file", "scene", "expect"}
+        left_out = files | (set() if key == "dynamics" else LOADS)
+        entry = self.entry(name).model_dump(exclude=left_out, exclude_none=True)
         if variant := self.variants.get(name):
             entry["varied"] = {variant.vary: variant.value}
         own = getattr(self, key, None)

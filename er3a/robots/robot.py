@@ -13,6 +13,7 @@ from er3a.display import Displayed, Sheet, shortly
 from er3a.errors import RobotError, ShapeError
 from er3a.geometry.transforms import as_floats, rpy_of
 from er3a.numerics.arrays import Flags, Reals
+from er3a.robots.masses import Masses
 
 MOST_JOINTS = 10
 Convention = Literal["standard", "modified"]
@@ -114,8 +115,10 @@ class Robot(Displayed):
     references : names of the reference sets (folders of data/manual_refs) that it is checked against
     envelopes, hulls : capsules around the links, and convex pieces of them; both empty where the file gives none
     pair_rules : which pairs of links a person decided on
+    masses : of links and what drives and wrist can do, as far as known
     derived : what :func:`er3a.robots.derived.derived` keeps of this robot
-    sources : per group of values ("dh", "zero", "limits", "speeds", "base", "tool", "envelopes") its source and grade
+    sources : per group of values ("dh", "zero", "limits", "speeds", "base", "tool", "envelopes", "inertia",
+        "drives", "wrist_load", "weight") its source and grade
     origins : documents of single entries ("d4", "direction2", "lower6") that have another one than their group
 
     Raises
@@ -149,6 +152,7 @@ class Robot(Displayed):
     combined: tuple[CombinedLimit, ...] = ()
     hulls: tuple[Hull, ...] = ()
     pair_rules: tuple[PairRule, ...] = ()
+    masses: Masses = Masses()
     sources: Mapping[str, Source] = field(default_factory=dict)
     origins: Mapping[str, str] = field(default_factory=dict)
     derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)

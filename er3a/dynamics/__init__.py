@@ -1,0 +1,1 @@
+"""What the motors feel: torques, powers and holding loads of an arm whose masses are known."""

@@ -1,0 +1,191 @@
+"""Whether masses can be right: what stands out of the data of links, entry by entry.
+
+Numbers that no body can have are refused where a file is read (:func:`er3a.robots.masses.no_body`); here stand those
+that a body may have but hardly this one. The shape of a link is that of its capsules, given or estimated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from er3a.collision.envelopes import envelopes_of
+from er3a.dynamics.arm_model import drives_of
+from er3a.dynamics.estimate import capsule_body
+from er3a.numerics.arrays import Reals
+from er3a.robots.masses import Body, NoBody, about, no_body, together
+from er3a.robots.robot import Envelope, Robot
+
+WATER = 1000.0
+LIGHTEST, HEAVIEST = 100.0, 12_000.0
+"""kg/m^3 of a link's capsules: thin shells, and more than solid steel."""
+BEYOND_SHAPE = 0.03
+"""m by which a centre may be outside the capsules, which leave out housings."""
+WIDEST_RATIO, NARROWEST_RATIO = 3.0, 0.1
+"""Radius of gyration against that of the filled capsules."""
+WEIGHT_RATIO = 0.15
+PARALLEL_RATIO = 2.0
+
+
+@dataclass(frozen=True)
+class ImpossibleInertia:
+    """Numbers that no rigid body can have."""
+
+    link: int
+    why: NoBody
+    code: Literal["impossible_inertia"] = "impossible_inertia"
+
+
+@dataclass(frozen=True)
+class MissingLink:
+    """A link that a joint moves has no mass; ``singular``: and its joint no rotor, so that accelerations are NaN."""
+
+    link: int
+    singular: bool
+    code: Literal["missing_link"] = "missing_link"
+
+
+@dataclass(frozen=True)
+class PointMass:
+    """A link has a mass and no inertia."""
+
+    link: int
+    code: Literal["point_mass"] = "point_mass"
+
+
+@dataclass(frozen=True)
+class CentreOutside:
+    """A centre of mass is outside the link's shape."""
+
+    link: int
+    outside_mm: float
+    code: Literal["centre_outside"] = "centre_outside"
+
+
+@dataclass(frozen=True)
+class UnlikelyDensity:
+    """A link's mass, filled into its shape, has a density that no link has: grams for kg, or the other way."""
+
+    link: int
+    mass_kg: float
+    density_kg_m3: float
+    code: Literal["unlikely_density"] = "unlikely_density"
+
+
+@dataclass(frozen=True)
+class UnlikelyInertia:
+    """A link's radius of gyration does not fit its shape's: kg mm^2 or mm^4 for kg m^2."""
+
+    link: int
+    gyration_mm: float
+    shape_mm: float
+    code: Literal["unlikely_inertia"] = "unlikely_inertia"
+
+
+@dataclass(frozen=True)
+class AboutOrigin:
+    """An inertia fits the link's shape far better as one about the frame's origin than about the centre of mass."""
+
+    link: int
+    given_kg_m2: float
+    about_centre_kg_m2: float
+    shape_kg_m2: float
+    code: Literal["about_origin"] = "about_origin"
+
+
+@dataclass(frozen=True)
+class SumOffWeight:
+    """The links' masses do not make the weight that the manufacturer states."""
+
+    sum_kg: float
+    weight_kg: float
+    complete: bool
+    code: Literal["sum_off_weight"] = "sum_off_weight"
+
+
+MassFinding = (
+    ImpossibleInertia
+    | MissingLink
+    | PointMass
+    | CentreOutside
+    | UnlikelyDensity
+    | UnlikelyInertia
+    | AboutOrigin
+    | SumOffWeight
+)
+
+
+def mass_findings(robot: Robot) -> tuple[MassFinding, ...]:
+    """What stands out of a robot's masses, link by link, then of their sum."""
+    shapes: dict[int, list[Envelope]] = {}
+    for capsule in envelopes_of(robot):
+        shapes.setdefault(capsule.link, []).append(capsule)
+    armature = drives_of(robot).armature
+    moved_by_one = robot.coupling is None
+    found: list[MassFinding] = []
+    for link in range(robot.rows + 1):
+        body = robot.masses.body(link)
+        if body is None or body.mass == 0:
+            rotor = moved_by_one and link > 0 and armature[link - 1] > 0
+            carries = any((robot.masses.body(k) or Body(0.0)).mass for k in range(link + 1, robot.rows + 1))
+            found += [MissingLink(link, not rotor and not carries)] if link else []
+        elif problem := no_body(body):
+            found.append(ImpossibleInertia(link, problem))
+        elif not any(body.inertia):
+            found.append(PointMass(link))
+        elif link in shapes:
+            found += _against_shape(link, body, shapes[link])
+    return (*found, *_against_weight(robot, any(isinstance(each, MissingLink) for each in found)))
+
+
+def _against_shape(link: int, body: Body, capsules: list[Envelope]) -> list[MassFinding]:
+    shape = together([capsule_body(capsule, WATER) for capsule in capsules])
+    found: list[MassFinding] = []
+    density = WATER * body.mass / shape.mass
+    if not LIGHTEST <= density <= HEAVIEST:
+        found.append(UnlikelyDensity(link, body.mass, density))
+    centre = np.array(body.centre)
+    outside = min(_distance(centre, capsule) - capsule.radius for capsule in capsules)
+    if outside > BEYOND_SHAPE:
+        found.append(CentreOutside(link, 1000 * outside))
+    own, expected = _gyration(body.inertia_matrix, body.mass), _gyration(shape.inertia_matrix, shape.mass)
+    less = body.inertia_matrix - body.mass * about(centre)
+    at_centre = Body(body.mass, body.centre, tuple(less[i, j] for i, j in _ENTRIES))  # type: ignore[arg-type]
+    expected_trace = float(np.trace(shape.inertia_matrix)) * body.mass / shape.mass
+    given, rest = float(np.trace(body.inertia_matrix)), float(np.trace(less))
+    if (
+        given > PARALLEL_RATIO * expected_trace
+        and no_body(at_centre) is None
+        and rest < PARALLEL_RATIO * expected_trace
+    ):
+        found.append(AboutOrigin(link, given / 2, rest / 2, expected_trace / 2))
+    elif not NARROWEST_RATIO <= own / expected <= WIDEST_RATIO:
+        found.append(UnlikelyInertia(link, 1000 * own, 1000 * expected))
+    return found
+
+
+def _against_weight(robot: Robot, incomplete: bool) -> list[MassFinding]:
+    weight, total = robot.masses.weight, sum(each.body.mass for each in robot.masses.links)
+    if not (np.isfinite(weight) and robot.masses.links):
+        return []
+    complete = not incomplete and robot.masses.body(0) is not None
+    off = total > weight * (1 + WEIGHT_RATIO) or (complete and total < weight * (1 - WEIGHT_RATIO))
+    return [SumOffWeight(total, weight, complete)] if off else []
+
+
+_ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+
+
+def _gyration(I: Reals, mass: float) -> float:
+    """Mean radius of gyration, m: half the trace is the second moment of the mass about the centre."""
+    return float(np.sqrt(np.trace(I) / 2 / mass))
+
+
+def _distance(point: Reals, capsule: Envelope) -> float:
+    """Distance (m) of a point from a capsule's line."""
+    start, end = np.array(capsule.start), np.array(capsule.end)
+    along = end - start
+    share = np.clip((point - start) @ along / max(float(along @ along), 1e-30), 0.0, 1.0)
+    return float(np.linalg.norm(point - start - share * along))

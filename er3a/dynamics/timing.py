@@ -1,0 +1,134 @@
+"""The fastest time law along a way in joint space under the drives' torques and the joints' speeds, by TOPP-RA [1]_.
+
+Along a way q(s) torques are ``a s'' + b s'^2 + c``; so peak torques bound s'' and s'^2 linearly. Viscous friction, which
+goes with s', counts with the greatest s' that the joints' speeds allow: the motion found keeps the limits, and is the
+fastest one if there is no viscous friction. Between nodes constraints are interpolated.
+
+References
+----------
+.. [1] H. Pham, Q.-C. Pham, "A new approach to time-optimal path parameterization based on reachability analysis",
+   IEEE Trans. Robotics 34(3), 2018, section II.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from er3a.dynamics.arm_model import ArmModel, drives_of
+from er3a.dynamics.torques import holding_torques, known, torque_parts
+from er3a.numerics.arrays import Reals
+from er3a.planning.timing import (
+    SAME_NODE,
+    STRAIGHT_NODES,
+    MustStandStill,
+    NoTimeLawFound,
+    Timed,
+    TimingError,
+    ToppraMissing,
+    standing,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class TimedTorques:
+    """A motion and the torques (N, n) that it takes; at rest friction acts as just after or before."""
+
+    timed: Timed
+    torques: Reals
+
+
+def fastest_under_torques(model: ArmModel, q: Reals, speed: Reals, peak: Reals) -> TimedTorques:
+    """Run along nodes (N, n) from rest to rest, as fast as torques and joint speeds allow.
+
+    Parameters
+    ----------
+    speed : (n,), greatest joint speeds, rad/s or m/s
+    peak : (n,), greatest torques, N m or N; NaN where unknown, which bounds nothing
+
+    Raises
+    ------
+    TimingError
+        if there is no such time law
+    """
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(q, axis=0) / speed).max(axis=1))])
+    kept = np.flatnonzero(np.concatenate([[True], np.diff(way) > SAME_NODE]))
+    if len(kept) < 2:
+        timed = standing(q[-1], 0.0)
+        return TimedTorques(timed, holding_torques(model, timed.q))
+    kept[-1] = len(way) - 1
+    q, way = q[kept], way[kept]
+    if len(way) == 2:
+        q, way = np.linspace(q[0], q[1], STRAIGHT_NODES), np.linspace(0.0, way[1], STRAIGHT_NODES)
+    spline = CubicSpline(way, q)
+    pace, pull = _toppra(way, spline, speed, torque_rows(model, way, spline, speed, peak))
+    between = (pace[:-1] + pace[1:]) / 2
+    if (between <= 0).any():
+        raise TimingError(MustStandStill())
+    t = np.concatenate([[0.0], np.cumsum(np.diff(way) / between)])
+    slope, bend, pull = spline(way, 1), spline(way, 2), np.append(pull, pull[-1])
+    timed = Timed(t, q, slope * pace[:, None], bend * pace[:, None] ** 2 + slope * pull[:, None])
+    dry = known(drives_of(model.robot).coulomb) * (np.sign(slope) - np.sign(timed.velocity))
+    return TimedTorques(timed, torque_parts(model, q, timed.velocity, timed.acceleration).total + dry)
+
+
+Rows = tuple[Reals, Reals, Reals, Reals, Reals]
+
+
+def torque_rows(model: ArmModel, way: Reals, spline: CubicSpline, speed: Reals, peak: Reals) -> Rows:
+    """Constraints ``F (a s'' + b s'^2 + c) <= g`` at the nodes: a, b, c (N, k), F (N, 2k, k), g (N, 2k).
+
+    k is the number of joints whose peak torque is known.
+    """
+    q, slope, bend = (np.ascontiguousarray(spline(way, order)) for order in range(3))
+    rest, bound, drives = np.zeros_like(q), np.isfinite(peak), drives_of(model.robot)
+    held = model.rigid_torques(q, rest, rest)
+    armature = known(drives.armature)
+    a = model.rigid_torques(q, rest, slope) - held + armature * slope
+    b = model.rigid_torques(q, slope, bend) - held + armature * bend
+    c = held + model.tool_torques(q) + known(drives.coulomb) * np.sign(slope)
+    with np.errstate(divide="ignore"):
+        most = (speed / np.abs(slope)).min(axis=1)[:, None]
+    viscous = known(drives.viscous) * slope * most
+    g = np.concatenate([peak - np.maximum(viscous, 0.0), peak - np.maximum(-viscous, 0.0)], axis=1)
+    k = int(bound.sum())
+    F = np.broadcast_to(np.concatenate([np.eye(k), -np.eye(k)]), (len(way), 2 * k, k)).copy()
+    return a[:, bound], b[:, bound], c[:, bound], F, g[:, np.tile(bound, 2)]
+
+
+def _toppra(way: Reals, spline: CubicSpline, speed: Reals, rows: Rows) -> tuple[Reals, Reals]:
+    """Speed along the way at its nodes (N,), and acceleration (N - 1,) between them."""
+    try:
+        with warnings.catch_warnings():  # of escapes in docstrings, when Python compiles the library
+            warnings.simplefilter("ignore")
+            from toppra.algorithm import TOPPRA
+            from toppra.constraint import JointVelocityConstraint, LinearConstraint
+            from toppra.constraint.linear_constraint import canlinear_colloc_to_interpolate
+            from toppra.interpolator import AbstractGeometricPath
+    except ModuleNotFoundError:
+        raise TimingError(ToppraMissing()) from None
+
+    class Way(AbstractGeometricPath):  # type: ignore[misc]
+        dof, waypoints = len(speed), None
+        path_interval = np.array([way[0], way[-1]])
+
+        def __call__(self, at: Reals, order: int = 0) -> Any:
+            return spline(at, order)
+
+    class PeakTorques(LinearConstraint):  # type: ignore[misc]
+        def get_dof(self) -> int:
+            return len(speed)
+
+        def compute_constraint_params(self, path: Any, gridpoints: Any) -> Any:
+            return canlinear_colloc_to_interpolate(*rows, None, None, gridpoints, identical=False)
+
+    constraints = [JointVelocityConstraint(np.stack([-speed, speed], axis=1)), PeakTorques()]
+    solver = TOPPRA(constraints, Way(), gridpoints=way, solver_wrapper="seidel")
+    pull, pace, _ = solver.compute_parameterization(0, 0)
+    if pace is None or not np.isfinite(pace).all():
+        raise TimingError(NoTimeLawFound())
+    return pace, pull

@@ -1,0 +1,150 @@
+"""Torques, mass matrices and gravity loads at the joints, in the manufacturer's signs.
+
+``tau = M(q) qdd + C(q, qd) qd + g(q) + armature qdd + viscous qd + coulomb sign(qd) - J(q).T wrench``: what the drives
+must give. N m for joints that turn, N for those that slide.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from er3a.dynamics.arm_model import ArmModel, arm_model, drives_of
+from er3a.errors import RobotError, ShapeError
+from er3a.kinematics.forward import checked_joints
+from er3a.numerics.arrays import Reals
+from er3a.robots.masses import Drives, Load
+from er3a.robots.robot import Robot
+
+SINGULAR = 1e-12
+"""A mass matrix whose smallest eigenvalue is less than that of its greatest has none that can be inverted."""
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueParts:
+    """Torques (N, n) by their cause; unknown friction and rotor inertia count nothing.
+
+    Attributes
+    ----------
+    inertia : of accelerations, rotors included
+    velocity : centrifugal and Coriolis
+    tool : against forces at the tool
+    """
+
+    gravity: Reals
+    inertia: Reals
+    velocity: Reals
+    friction: Reals
+    tool: Reals
+
+    @property
+    def total(self) -> Reals:
+        """Their sum: what the drives give."""
+        whole: Reals = self.gravity + self.inertia + self.velocity + self.friction + self.tool
+        return whole
+
+
+def torques(robot: Robot, q: Reals, qd: Reals, qdd: Reals, load: Load | None = None) -> Reals:
+    """Torques that the drives must give for a motion, friction and rotors included as far as the file knows them.
+
+    Links without mass in the file count as massless. Gravity is 9.81 m/s^2 along -z of the world, in which the robot's
+    base places the arm, so that a base turned to a wall or a ceiling turns gravity.
+
+    Parameters
+    ----------
+    q, qd, qdd : (..., n), rad, rad/s, rad/s^2 (m for joints that slide), in the manufacturer's signs
+    load : what hangs on the flange and what the surroundings do to the tool
+
+    Returns
+    -------
+    tau : (..., n), N m, or N for joints that slide
+
+    Raises
+    ------
+    ShapeError, PoseError
+        if an array has the wrong shape
+    RobotError
+        if the robot's links have no masses, or such as no body can have
+    """
+    (q, qd, qdd), shape = _flat(robot, {"q": q, "qd": qd, "qdd": qdd})
+    tau: Reals = torque_parts(arm_model(robot, load), q, qd, qdd).total.reshape(shape)
+    return tau
+
+
+def mass_matrix(robot: Robot, q: Reals, load: Load | None = None) -> Reals:
+    """Mass matrices (..., n, n) in kg m^2 (kg, kg m where joints slide), rotors included; errors as :func:`torques`."""
+    (q,), shape = _flat(robot, {"q": q})
+    M: Reals = arm_model(robot, load).mass_matrix(q) + np.diag(known(drives_of(robot).armature))
+    return M.reshape(*shape, robot.joints)
+
+
+def gravity(robot: Robot, q: Reals, load: Load | None = None) -> Reals:
+    """Torques (..., n) in N m (N) that hold the arm at rest, forces at the tool included; errors as :func:`torques`."""
+    (q,), shape = _flat(robot, {"q": q})
+    return holding_torques(arm_model(robot, load), q).reshape(shape)
+
+
+def accelerations(robot: Robot, q: Reals, qd: Reals, tau: Reals, load: Load | None = None) -> Reals:
+    """Accelerations (..., n) under drive torques (..., n): the forward dynamics, by the mass matrix.
+
+    Raises
+    ------
+    RobotError
+        if the mass matrix can't be inverted: the link of a joint has no inertia, so any torque would turn it endlessly
+    """
+    (q, qd, tau), shape = _flat(robot, {"q": q, "qd": qd, "tau": tau})
+    M = mass_matrix(robot, q, load)
+    values, vectors = np.linalg.eigh(M)
+    weak = values[:, 0] <= SINGULAR * values[:, -1]
+    if weak.any():
+        joint = int(np.abs(vectors[weak][0, :, 0]).argmax()) + 1
+        raise RobotError(robot.name, f"joint {joint} moves nothing that has inertia, so accelerations have no value")
+    rest = torque_parts(arm_model(robot, load), q, qd, np.zeros_like(q)).total
+    qdd: Reals = np.linalg.solve(M, (tau - rest)[..., None])[..., 0].reshape(shape)
+    return qdd
+
+
+def torque_parts(model: ArmModel, q: Reals, qd: Reals, qdd: Reals) -> TorqueParts:
+    """Torques by cause for joint values, velocities and accelerations (N, n)."""
+    rest, drives = np.zeros_like(q), drives_of(model.robot)
+    held = model.rigid_torques(q, rest, rest)
+    moving = model.rigid_torques(q, qd, rest)
+    whole = model.rigid_torques(q, qd, qdd)
+    return TorqueParts(
+        gravity=held,
+        inertia=whole - moving + known(drives.armature) * qdd,
+        velocity=moving - held,
+        friction=friction_torques(drives, qd),
+        tool=model.tool_torques(q),
+    )
+
+
+def holding_torques(model: ArmModel, q: Reals) -> Reals:
+    """Torques (N, n) at rest, without friction."""
+    rest = np.zeros_like(q)
+    held: Reals = model.rigid_torques(q, rest, rest) + model.tool_torques(q)
+    return held
+
+
+def friction_torques(drives: Drives, qd: Reals) -> Reals:
+    """Torques (N, n) against Coulomb's and viscous friction; unknown ones count nothing."""
+    against: Reals = known(drives.viscous) * qd + known(drives.coulomb) * np.sign(qd)
+    return against
+
+
+def known(values: Reals) -> Reals:
+    """The values, with 0 for unknown ones."""
+    return np.nan_to_num(values, nan=0.0)
+
+
+def _flat(robot: Robot, named: dict[str, Reals]) -> tuple[list[Reals], tuple[int, ...]]:
+    """Arrays (..., n) as (N, n), broadcast against one another, and the shape that they had."""
+    arrays = [checked_joints(robot, values, name) for name, values in named.items()]
+    try:
+        together = np.broadcast_arrays(*arrays)
+    except ValueError:
+        name = next(name for name, each in zip(named, arrays) if each.shape != arrays[0].shape)
+        raise ShapeError(name, np.shape(named[name]), f"{arrays[0].shape}, as q has") from None
+    shape = together[0].shape
+    return [np.ascontiguousarray(each).reshape(-1, robot.joints) for each in together], shape

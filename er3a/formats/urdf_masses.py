@@ -1,0 +1,124 @@
+"""The masses and drives that a URDF states: ``<inertial>`` of its links, ``<dynamics>`` and efforts of its joints.
+
+Links that are fixed to one another count as one. An effort of 0 means that it is unknown, as most files have it.
+
+Reference: the ROS URDF specification (an inertia is about the centre of mass, in the axes of the inertial's origin).
+"""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from er3a.geometry.transforms import transform
+from er3a.kinematics.forward import frames
+from er3a.numerics.arrays import Reals
+from er3a.robots.masses import Body, Drives, LinkMass, Masses, moved, no_body, together
+from er3a.robots.robot import Robot
+
+LinkPlaces = Callable[[str], tuple[Reals, int] | None]
+"""Of a link's name its frame in the base's and how many moving joints stand before it, as er3a.formats.urdf tells."""
+ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+WHY = {
+    "not_finite": "holds something that is no number",
+    "negative_mass": "has a mass below 0",
+    "negative_moment": "has a principal moment of inertia below 0",
+    "triangle": "has a principal moment of inertia above the sum of the other two",
+}
+
+
+def masses_from_urdf(
+    root: ElementTree.Element, robot: Robot, places: LinkPlaces, moving: Sequence[str]
+) -> tuple[Masses, tuple[str, ...]]:
+    """Bodies in the robot's frames, and what is known of its drives.
+
+    Parameters
+    ----------
+    robot : the arm with the table derived from the same URDF
+    moving : names of its moving joints, from the base on
+
+    Returns
+    -------
+    masses, notes : notes name links whose inertia no body can have; those are left out
+    """
+    at_zero = np.concatenate([robot.base[None], frames(robot, np.zeros(robot.joints))[:-1]])
+    found: dict[int, list[Body]] = {}
+    notes: list[str] = []
+    for link in root.findall("link"):
+        inertial = link.find("inertial")
+        if inertial is None:
+            continue
+        name = link.get("name", "?")
+        place = places(name)
+        if place is None:
+            notes.append(f"link {name} does not move with the arm's chain; its mass was left out")
+            continue
+        body, T = _body(inertial)
+        problem = no_body(body)
+        if problem:
+            notes.append(f"link {name} {WHY[problem]}; its mass was left out")
+        elif body.mass > 0:
+            placed, number = place
+            found.setdefault(number, []).append(moved(body, np.linalg.inv(at_zero[number]) @ placed @ T))
+    missing = [name for k, name in enumerate(moving) if k + 1 not in found]
+    if found and missing:
+        notes.append(f"no mass is given for what moves with {', '.join(missing)}")
+    links = tuple(LinkMass(number, together(bodies)) for number, bodies in sorted(found.items()))
+    return Masses(links=links, drives=_drives(root, robot, moving)), tuple(notes)
+
+
+def write_masses(robot: Robot, names: Sequence[str], root: ElementTree.Element) -> None:
+    """Add ``<inertial>`` to the links of a URDF whose link frames are those that move with the joints."""
+    elements = {link.get("name"): link for link in root.findall("link")}
+    for each in robot.masses.links:
+        body = moved(each.body, robot.base) if each.link == 0 else each.body
+        inertial = ElementTree.SubElement(elements[names[each.link]], "inertial")
+        ElementTree.SubElement(inertial, "origin", xyz=" ".join(map(repr, body.centre)), rpy="0 0 0")
+        ElementTree.SubElement(inertial, "mass", value=repr(body.mass))
+        ElementTree.SubElement(inertial, "inertia", {key: repr(value) for key, value in zip(ENTRIES, body.inertia)})
+
+
+def _body(inertial: ElementTree.Element) -> tuple[Body, Reals]:
+    """Mass and inertia about the centre, and the frame of the centre (4, 4) in the link's."""
+    origin, mass, inertia = (inertial.find(tag) for tag in ("origin", "mass", "inertia"))
+    moments = [_number(inertia, key) for key in ENTRIES]
+    xyz, rpy = (_triple(origin, key) for key in ("xyz", "rpy"))
+    xx, yy, zz, xy, xz, yz = moments
+    body = Body(_number(mass, "value"), (0.0, 0.0, 0.0), (xx, yy, zz, xy, xz, yz))
+    if not np.isfinite([*xyz, *rpy]).all():
+        return Body(math.nan), np.eye(4)
+    return body, transform(xyz, rpy)
+
+
+def _drives(root: ElementTree.Element, robot: Robot, moving: Sequence[str]) -> Drives | None:
+    joints = {joint.get("name", "?"): joint for joint in root.findall("joint")}
+    coulomb, viscous, effort = (
+        np.array([_number(joints[name].find(tag), key, math.nan) for name in moving])
+        for tag, key in (("dynamics", "friction"), ("dynamics", "damping"), ("limit", "effort"))
+    )
+    effort[~(effort > 0)] = np.nan
+    coulomb, viscous = (np.where(values >= 0, values, np.nan) for values in (coulomb, viscous))
+    if robot.joints != len(moving) or np.isnan([coulomb, viscous, effort]).all():
+        return None
+    unknown = np.full(robot.joints, np.nan)
+    return Drives(unknown, unknown, coulomb, viscous, rated=unknown, peak=effort)
+
+
+def _number(element: ElementTree.Element | None, key: str, default: float = 0.0) -> float:
+    text = element.get(key) if element is not None else None
+    try:
+        return default if text is None else float(text)
+    except ValueError:
+        return math.nan
+
+
+def _triple(origin: ElementTree.Element | None, key: str) -> Reals:
+    words = (origin.get(key) or "0 0 0").split() if origin is not None else ["0"] * 3
+    try:
+        values = np.array([float(word) for word in words])
+    except ValueError:
+        values = np.full(3, np.nan)
+    return values if values.shape == (3,) else np.full(3, np.nan)

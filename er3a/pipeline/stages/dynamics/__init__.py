@@ -1,0 +1,1 @@
+"""What the motors feel, and whether drives and wrist bear it."""

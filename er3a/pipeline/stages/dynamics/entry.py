@@ -1,0 +1,52 @@
+"""The stage in the registry, and what a study may set of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import Field
+
+from er3a.files.units import Triple
+from er3a.files.yaml_file import StrictModel
+from er3a.pipeline.messages.language import N_
+from er3a.pipeline.stages.stage import Stage
+from er3a.pipeline.stages.trajectory.entry import STAGE as TRAJECTORY
+from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
+
+if TYPE_CHECKING:
+    from er3a.pipeline.study import Study
+
+
+class DynamicsSettings(StrictModel):
+    """Torques along each path are computed at ``samples`` times.
+
+    The greatest payload is asked for one with its centre at ``payload_centre_mm`` in the flange's frame and the radius
+    of gyration ``payload_gyration_mm`` about each axis. ``capsule_density_kg_m3`` asks for a guess: links without mass
+    are filled evenly at this density, and all figures are graded ``inferred``.
+    """
+
+    gravity_m_s2: Annotated[float, Field(ge=0, le=30)] = 9.81
+    samples: Annotated[int, Field(ge=11, le=20_000)] = 401
+    payload_centre_mm: Triple = [0.0, 0.0, 50.0]
+    payload_gyration_mm: Annotated[float, Field(ge=0, le=1000)] = 30.0
+    capsule_density_kg_m3: Annotated[float, Field(ge=10, le=20_000)] | None = None
+
+
+def _inputs(study: Study, robot: str) -> list[Path]:
+    meshes = [file for load in study.loads(robot) for file in load.files]
+    return [
+        *(file for file in TRAJECTORY.inputs(study, robot) if file not in study.scenes(robot, "trajectory")),
+        *meshes,
+    ]
+
+
+STAGE = Stage(
+    name="dynamics",
+    title=N_("dynamics"),
+    question=N_("What do the motors feel, and do they bear it?"),
+    settings={"dynamics": DynamicsSettings, "trajectory": TrajectorySettings},
+    inputs=_inputs,
+    rests_on=("validation",),
+)
+"""Settings of the trajectory stage say how fast joints of unknown speed are taken to be."""

@@ -1,0 +1,108 @@
+"""Figures of the dynamics page: torques and powers over time, holding torques, the load diagram."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from er3a.pipeline.messages.language import tr
+from er3a.pipeline.stages.dynamics.model import DiagramRows, DynamicsSummary, PathLoad, TorqueRows
+from er3a.pipeline.viewing.figures import new_figure
+from er3a.pipeline.viewing.page import Picture, number
+from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED
+
+PARTS = ("gravity", "inertia", "velocity", "friction")
+
+
+def joint_colour(joint: int) -> str:
+    """The colour of a joint (from 0)."""
+    return JOINTS[joint % len(JOINTS)]
+
+
+def torque_figure(path: PathLoad, rows: TorqueRows) -> Picture:
+    """Torques of all joints with their intervals, the parts of the most loaded one, and powers."""
+    figure, (torque, parts, power) = new_figure(1, 3, width=13.0, height=3.4)
+    worst = max(range(len(path.joints)), key=lambda j: path.joints[j].peak)
+    for j in range(rows.torque.shape[1]):
+        colour = joint_colour(j)
+        low, high = rows.torque[:, j] - rows.tolerance[:, j], rows.torque[:, j] + rows.tolerance[:, j]
+        torque.fill_between(rows.t_s, low, high, color=colour, alpha=0.15, linewidth=0)
+        torque.plot(rows.t_s, rows.torque[:, j], color=colour, label=f"J{j + 1}")
+        power.plot(rows.t_s, rows.power_w[:, j], color=colour)
+    torque.legend(ncols=3, fontsize=8)
+    torque.set_ylabel(tr("torque of the drive (N m)"))
+    names = {"gravity": tr("gravity"), "inertia": tr("inertia"), "velocity": tr("velocity"), "friction": tr("friction")}
+    for part, style in zip(PARTS, ("-", "--", ":", "-.")):
+        parts.plot(rows.t_s, getattr(rows, part)[:, worst], color=INK, linestyle=style, label=names[part])
+    parts.legend(fontsize=8)
+    parts.set_ylabel(tr("parts at J{joint} (N m)", joint=worst + 1))
+    power.axhline(0.0, color=MUTED, linewidth=0.8)
+    power.set_ylabel(tr("power of the drive (W)"))
+    for ax in (torque, parts, power):
+        ax.set_xlabel(tr("time (s)"))
+    load = path.joints[worst]
+    greatest = {
+        "gravity": load.gravity,
+        "inertia": load.inertia,
+        "velocity": load.velocity,
+        "friction": load.friction,
+    }
+    most = max(greatest, key=lambda name: greatest[name])
+    caption = tr(
+        "J{joint} feels most: {peak} ± {tolerance} {unit} at {t:.2f} s, mainly {part}. Shaded: by how much torques may "
+        "be off by the tolerances of masses and centres. Power below 0 goes back into the drive.",
+        joint=load.joint,
+        peak=number(load.peak, 3),
+        tolerance=number(load.tolerance, 2),
+        unit=load.unit,
+        t=load.peak_at_s,
+        part=names[most],
+    )
+    alt = tr("Three panels over time for {path}: torques, their parts, powers.", path=path.name)
+    return Picture(figure, alt, caption)
+
+
+def holding_figure(summary: DynamicsSummary) -> Picture:
+    """Bars of the greatest holding torque at each joint."""
+    figure, ax = new_figure(1, 1, width=7.0, height=2.8)
+    joints = np.arange(len(summary.holding))
+    size = np.array([abs(held.torque) for held in summary.holding])
+    tolerance = np.array([held.tolerance for held in summary.holding])
+    ax.bar(joints, size, color=[joint_colour(j) for j in joints], width=0.6)
+    ax.errorbar(joints, size, yerr=tolerance, fmt="none", ecolor=INK, capsize=4)
+    ax.set_xticks(joints, [f"J{j + 1}" for j in joints])
+    ax.set_ylabel(tr("holding torque (N m)"))
+    ax.grid(visible=False, axis="x")
+    worst = summary.holding[int(size.argmax())]
+    where = ", ".join(f"{value:.0f}" for value in worst.q)
+    caption = tr(
+        "At rest J{joint} has to hold most: {torque} ± {tolerance} {unit}, with the joints at ({where}). These are the "
+        "greatest values that a search over the joint limits found.",
+        joint=worst.joint,
+        torque=number(abs(worst.torque), 3),
+        tolerance=number(worst.tolerance, 2),
+        unit=worst.unit,
+        where=where,
+    )
+    return Picture(figure, tr("Bars: the greatest holding torque at each joint, with its tolerance."), caption)
+
+
+def diagram_figure(summary: DynamicsSummary, rows: DiagramRows) -> Picture:
+    """The load diagram, with the load in it."""
+    figure, ax = new_figure(1, 1, width=7.0, height=4.2)
+    for i, mass in enumerate(np.unique(rows.mass_kg)):
+        own = rows.take(rows.mass_kg == mass)
+        ax.plot(own.along_mm, own.across_mm, color=joint_colour(i), label=tr("{mass:.3g} kg", mass=mass))
+    masses = summary.masses
+    if masses and masses.load_kg is not None:
+        x, y, z = masses.load_centre_mm
+        ax.plot([z], [np.hypot(x, y)], "o", color=HIGHLIGHT, label=tr("the load, {mass:.3g} kg", mass=masses.load_kg))
+    ax.set_xlim(left=0)
+    ax.set_ylim(bottom=0)
+    ax.set_xlabel(tr("from the flange along the last axis (mm)"))
+    ax.set_ylabel(tr("from the last axis (mm)"))
+    ax.legend()
+    caption = tr(
+        "A load whose centre lies below the curve of its mass is within the allowed moments and inertias of the wrist. "
+        "The curves take the load as a point; its own inertia counts in the comparison above."
+    )
+    return Picture(figure, tr("The load diagram: one curve for each mass."), caption)

@@ -1,0 +1,330 @@
+"""What the dynamics stage computes.
+
+Torques are those that the drives give, in the manufacturer's signs: N m for joints that turn, N for those that slide
+(``unit``). Times count from a path's start.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from er3a.dynamics.plausibility import MassFinding
+from er3a.dynamics.wrist import WristQuantity
+from er3a.numerics.arrays import Reals
+from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.tables import Table, Texts, column, per_joint
+from er3a.planning.timing import NoTimeLaw
+from er3a.robots.robot import Grade
+
+Unit = Literal["N m", "N"]
+Quantity = Literal["peak", "rms", "holding"] | WristQuantity
+Need = Literal["masses", "peak", "rated", "armature", "friction", "wrist_moment", "wrist_inertia", "payload", "load"]
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """Something that the files leave open, with the joints or links concerned; none: all."""
+
+    what: Need
+    numbers: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Use:
+    """What is asked for against what is allowed, in one unit.
+
+    Attributes
+    ----------
+    joint : from 1; None for the payload
+    path : None where it does not depend on one
+    upper : what is asked for at most, by the tolerances of masses
+    """
+
+    quantity: Quantity
+    joint: int | None
+    path: str | None
+    asked: float
+    upper: float
+    allowed: float
+    unit: str
+
+    @property
+    def ratio(self) -> float:
+        """Utilisation: above 1 is too much."""
+        return self.asked / self.allowed
+
+
+@dataclass(frozen=True)
+class NoData:
+    """Neither masses nor a load on a wrist with limits: nothing can be said."""
+
+    needs: tuple[Unknown, ...]
+    code: Literal["dynamics.no_data"] = "dynamics.no_data"
+
+
+@dataclass(frozen=True)
+class NoLimits:
+    """Torques are known, and no limit that they could be compared with: the greatest one.
+
+    Attributes
+    ----------
+    path : None where it is the holding torque
+    missing_links : without mass, which count as massless
+    doubts : findings on the masses besides
+    inferred : whether masses are guessed
+    """
+
+    paths: int
+    joint: int
+    torque: float
+    tolerance: float
+    unit: Unit
+    path: str | None
+    missing_links: tuple[int, ...]
+    doubts: int
+    inferred: bool
+    code: Literal["dynamics.no_limits"] = "dynamics.no_limits"
+
+
+@dataclass(frozen=True)
+class Compared:
+    """So much was compared with limits; ``tightest`` is what is nearest to its limit, or farthest beyond it."""
+
+    compared: int
+    beyond: int
+    tightest: Use
+    unlimited: tuple[Need, ...]
+    missing_links: tuple[int, ...]
+    doubts: int
+    inferred: bool
+
+
+@dataclass(frozen=True)
+class Fits(Compared):
+    """All is within its limits, tolerances included."""
+
+    code: Literal["dynamics.fits"] = "dynamics.fits"
+
+
+@dataclass(frozen=True)
+class Marginal(Compared):
+    """All is within its limits, but not with the tolerances of the masses, or the masses are doubtful."""
+
+    code: Literal["dynamics.marginal"] = "dynamics.marginal"
+
+
+@dataclass(frozen=True)
+class Overload(Compared):
+    """Something is beyond its limit."""
+
+    code: Literal["dynamics.overload"] = "dynamics.overload"
+
+
+@dataclass(frozen=True)
+class LinkEntry:
+    """The mass of a link as it was used; centre in the frame that moves with the link's joint. None: unknown."""
+
+    link: int
+    mass_kg: float | None
+    centre_mm: tuple[float, ...]
+    estimated: bool
+
+
+@dataclass(frozen=True)
+class TolerancesUsed:
+    """By how much masses and centres are taken to be off; ``assumed`` by the grade where the file says nothing."""
+
+    grade: Grade
+    mass_percent: float
+    centre_mm: float
+    assumed: bool
+
+
+@dataclass(frozen=True)
+class MassesUsed:
+    """Links, and what hangs on the flange (None: nothing); ``density_kg_m3`` of guessed ones."""
+
+    grade: Grade
+    source: str
+    density_kg_m3: float | None
+    links: tuple[LinkEntry, ...]
+    weight_kg: float | None
+    load_kg: float | None
+    load_centre_mm: tuple[float, ...]
+    load_grade: Grade | None
+    tolerances: TolerancesUsed
+
+
+@dataclass(frozen=True)
+class HoldingTorque:
+    """The greatest torque found that a joint holds at rest within the limits, and the pose where it does."""
+
+    joint: int
+    torque: float
+    tolerance: float
+    unit: Unit
+    q: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class JointLoad:
+    """What a path asks of a drive.
+
+    Attributes
+    ----------
+    tolerance : of the peak; rms_tolerance : of the effective torque
+    gravity, inertia, velocity, friction, tool : greatest of each part
+    power_w, braking_w : greatest given and taken back
+    """
+
+    joint: int
+    unit: Unit
+    peak: float
+    tolerance: float
+    peak_at_s: float
+    rms: float
+    rms_tolerance: float
+    gravity: float
+    inertia: float
+    velocity: float
+    friction: float
+    tool: float
+    power_w: float
+    braking_w: float
+    work_j: float
+    recovered_j: float
+
+
+@dataclass(frozen=True)
+class Bound:
+    """The greatest value under a limit; joint and time of what binds, None where nothing does."""
+
+    value: float | None
+    joint: int | None
+    t_s: float | None
+
+
+@dataclass(frozen=True)
+class WristMoment:
+    """The greatest moment that the load makes about a wrist axis along a path, accelerations included."""
+
+    joint: int
+    moment_n_m: float
+    t_s: float
+
+
+@dataclass(frozen=True)
+class PathLoad:
+    """A path's loads.
+
+    Attributes
+    ----------
+    complete : whether the arm can follow it all along; nothing else is known of one that it can't
+    payload, speed_scale : None where no torque limit is known
+    torque_timed_s : shortest time under peak torques and joint speeds; None without peak torques, or by ``no_law``
+    kinematic_s : shortest time under joint speeds and assumed accelerations
+    """
+
+    name: str
+    title: str
+    complete: bool
+    duration_s: float
+    joints: tuple[JointLoad, ...]
+    wrist: tuple[WristMoment, ...]
+    payload: Bound | None
+    speed_scale: Bound | None
+    torque_timed_s: float | None
+    kinematic_s: float | None
+    no_law: NoTimeLaw | None
+
+
+@dataclass(frozen=True)
+class MotorNeed:
+    """What each drive must give over all paths, and at rest in the worst pose.
+
+    Attributes
+    ----------
+    speed : deg/s, mm/s where the joint slides
+    inertia_low, inertia_high : of the load that the joint moves along the paths, kg m^2 (kg); without rotor
+    inertia_ratio : of the greatest to the rotor's at the joint
+    motor_rpm, motor_torque : at the motor, where the gear ratio is known
+    """
+
+    joint: int
+    unit: Unit
+    peak: float
+    rms: float
+    holding: float
+    speed: float
+    power_w: float
+    inertia_low: float
+    inertia_high: float
+    inertia_ratio: float | None
+    motor_rpm: float | None
+    motor_torque: float | None
+    peak_limit: float | None
+    rated_limit: float | None
+
+
+@dataclass(frozen=True)
+class DynamicsSummary(Summary):
+    """Head, masses, paths, drives and wrist.
+
+    Attributes
+    ----------
+    masses : None where there are none
+    payload_centre_mm, payload_gyration_mm : of the payload whose greatest mass is asked for
+    uses : all that was compared with a limit, the tightest first
+    power_imbalance : greatest difference of power and change of energy, of the greatest power; None without paths
+    """
+
+    verdict: Verdict[NoData | NoLimits | Fits | Marginal | Overload]
+    gravity_m_s2: float
+    masses: MassesUsed | None
+    findings: tuple[MassFinding, ...]
+    unknown: tuple[Unknown, ...]
+    payload_centre_mm: tuple[float, ...]
+    payload_gyration_mm: float
+    paths: tuple[PathLoad, ...]
+    holding: tuple[HoldingTorque, ...]
+    motors: tuple[MotorNeed, ...]
+    uses: tuple[Use, ...]
+    power_imbalance: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueRows(Table):
+    """Torques along the paths that the arm can follow, N m (N for joints that slide)."""
+
+    path: Texts = column("name of the path", dtype=object)
+    t_s: Reals = column("time since the path's start", "s")
+    q: Reals = per_joint("q{}", "joint value", "deg or mm")
+    torque: Reals = per_joint("torque{}", "torque of the drive", "N m or N")
+    tolerance: Reals = per_joint("tolerance{}", "by which it may be off", "N m or N")
+    gravity: Reals = per_joint("gravity{}", "part against gravity", "N m or N")
+    inertia: Reals = per_joint("inertia{}", "part of accelerations, rotors included", "N m or N")
+    velocity: Reals = per_joint("velocity{}", "centrifugal and Coriolis part", "N m or N")
+    friction: Reals = per_joint("friction{}", "part against friction, as far as known", "N m or N")
+    tool: Reals = per_joint("tool{}", "part against forces at the tool", "N m or N")
+    power_w: Reals = per_joint("power{}_w", "power of the drive", "W")
+
+
+@dataclass(frozen=True, eq=False)
+class DiagramRows(Table):
+    """The load diagram: how far from the last axis a point load's centre may be; NaN where it may nowhere."""
+
+    mass_kg: Reals = column("mass of the load", "kg")
+    along_mm: Reals = column("distance of its centre from the flange along the last axis", "mm")
+    across_mm: Reals = column("greatest distance of its centre from the last axis", "mm")
+
+
+@dataclass(frozen=True, eq=False)
+class DynamicsResults(Results[DynamicsSummary]):
+    """Summary and tables of the stage."""
+
+    torques: TorqueRows
+    diagram: DiagramRows
+
+
+RESULTS = DynamicsResults

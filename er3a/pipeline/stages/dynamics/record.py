@@ -1,0 +1,112 @@
+"""The dynamics recording: the arm runs along each path, its torques as arrows on the axes and as curves beside."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from er3a.kinematics.chain import ALONG_Z, link_parts
+from er3a.numerics.arrays import Reals
+from er3a.pipeline.messages.say import say
+from er3a.pipeline.results import Stored
+from er3a.pipeline.stages.dynamics.model import DynamicsResults, DynamicsSummary, TorqueRows
+from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.arm import arm_view, log_arm, send_motion, size_of
+from er3a.pipeline.viewing.palette import JOINTS, rgb
+from er3a.pipeline.viewing.recording import ARM, TIMELINE, escaped, log_note, note_view, recording, seconds, send_series
+from er3a.robots.robot import Robot
+
+STAGE = "dynamics"
+PAUSE = 1.0  # s between two paths
+LONGEST = 0.35  # of the arm's size, the arrow of the greatest torque
+WIDTH = 0.008  # of the arm's size
+CURVES = {"torque": "Torque of the drive (N m)", "gravity": "Part against gravity (N m)", "power": "Power (W)"}
+SHOWN_S = rr.TimeRange(
+    start=rr.TimeRangeBoundary.cursor_relative(seconds=-4), end=rr.TimeRangeBoundary.cursor_relative(seconds=12)
+)
+
+
+def record(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
+    """Write the dynamics recording of a robot."""
+    name, results = stored.robot, stored.results
+    robot, summary = study.robot(name), results.summary
+    with recording(output, name, STAGE, _layout(robot)) as stream:
+        log_note(stream, STAGE, _note(robot, summary))
+        runs = [(path, results.torques.take(results.torques.path == path.name)) for path in summary.paths]
+        runs = [(path, rows) for path, rows in runs if len(rows)]
+        log_arm(stream, robot, _joints(robot, runs[0][1])[0] if runs else np.zeros(robot.joints))
+        greatest = max((float(np.abs(rows.torque).max()) for _, rows in runs), default=1.0)
+        start = 0.0
+        for path, rows in runs:
+            stream.set_time(TIMELINE, duration=start)
+            text = f"## {path.name}\n{escaped(path.title)}"
+            stream.log(f"{STAGE}/now", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+            _run(stream, robot, rows, start, LONGEST * size_of(robot) / max(greatest, 1e-12))
+            start += path.duration_s + PAUSE
+
+
+def _layout(robot: Robot) -> rrb.Horizontal:
+    series = [
+        rrb.TimeSeriesView(
+            origin=f"/{STAGE}/curves/{curve}",
+            name=title,
+            axis_x=rrb.TimeAxis(view_range=SHOWN_S),
+            plot_legend=rrb.PlotLegend(visible=curve == "torque"),
+        )
+        for curve, title in CURVES.items()
+    ]
+    words = rrb.Vertical(
+        note_view(STAGE),
+        rrb.TextDocumentView(origin=f"/{STAGE}/now", name="This path"),
+        row_shares=[5, 2],
+        name="Words",
+    )
+    view = arm_view(robot, "Arm and torques", [ARM, f"/{STAGE}/**"])
+    return rrb.Horizontal(view, rrb.Vertical(*series, name="Curves"), words, column_shares=[2, 1.4, 1], name="Torques")
+
+
+def _run(stream: rr.RecordingStream, robot: Robot, rows: TorqueRows, start: float, scale: float) -> None:
+    """The arm, an arrow on each axis as long as its torque, and the curves."""
+    times = start + rows.t_s
+    send_motion(stream, robot, times, _joints(robot, rows))
+    parts = link_parts(robot)
+    for j in range(min(robot.joints, robot.rows)):
+        colour = rgb(JOINTS[j % len(JOINTS)])
+        origins = np.tile(parts[j + 1, ALONG_Z, :3, 3] / 2, (len(times), 1))
+        vectors = np.zeros((len(times), 3))
+        vectors[:, 2] = robot.direction[j] * rows.torque[:, j] * scale
+        arrows = rr.Arrows3D.columns(
+            origins=origins,
+            vectors=vectors,
+            radii=np.full(len(times), WIDTH * size_of(robot)),
+            colors=np.tile(colour, (len(times), 1)),
+        )
+        stream.send_columns(f"arm/link_{j + 1}/torque", [seconds(times)], arrows)
+    names = [f"J{j + 1}" for j in range(robot.joints)]
+    colours = [JOINTS[j % len(JOINTS)] for j in range(robot.joints)]
+    broken = np.append(times, times[-1] + 1e-3)
+    gap = np.full((1, robot.joints), np.nan)
+    for curve, values in (("torque", rows.torque), ("gravity", rows.gravity), ("power", rows.power_w)):
+        send_series(stream, f"{STAGE}/curves/{curve}", broken, np.concatenate([values, gap]), names, colours)
+
+
+def _joints(robot: Robot, rows: TorqueRows) -> Reals:
+    q: Reals = np.where(robot.slides, rows.q / 1000, np.radians(rows.q))
+    return q
+
+
+def _note(robot: Robot, summary: DynamicsSummary) -> str:
+    return "\n".join(
+        [
+            f"# {escaped(robot.title)}: torques",
+            say(summary.verdict.finding),
+            "",
+            "**Look first** at the arrow that is longest while the arm runs: that joint's drive feels most.",
+            "",
+            "- arrow on an axis: the drive's torque, along the axis by the right-hand rule; all to one scale",
+            "- power below 0: the drive brakes",
+        ]
+    )

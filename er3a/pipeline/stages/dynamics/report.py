@@ -1,0 +1,151 @@
+"""The dynamics page, rendered from the stage's results."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from er3a.pipeline.messages.dynamics import FIGURES
+from er3a.pipeline.messages.dynamics_verdict import quantity_word
+from er3a.pipeline.messages.language import tr
+from er3a.pipeline.messages.say import listed, say
+from er3a.pipeline.results import Stored
+from er3a.pipeline.stages.dynamics.load_figures import diagram_figure, holding_figure, torque_figure
+from er3a.pipeline.stages.dynamics.model import Bound, DynamicsResults, DynamicsSummary, MotorNeed, PathLoad, Use
+from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.figures import house_style
+from er3a.pipeline.viewing.page import fixed, head_of, number, render, run_command
+
+MOST_USES = 12
+NONE = "–"
+
+
+def report(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
+    """Write the dynamics page of a robot."""
+    robot, results = study.robot(stored.robot), stored.results
+    summary = results.summary
+    with house_style():
+        figures = [
+            (path, torque_figure(path, results.torques.take(results.torques.path == path.name)))
+            for path in summary.paths
+            if path.complete
+        ]
+        holding = holding_figure(summary) if summary.holding else None
+        diagram = diagram_figure(summary, results.diagram) if len(results.diagram) else None
+    render(
+        Path(__file__).with_name("report.html.j2"),
+        output,
+        summary,
+        head=head_of(stored, FIGURES),
+        command=run_command(study, f"{stored.robot}/dynamics.html"),
+        robot=robot,
+        robot_pages=study.pages(stored.robot),
+        findings=listed(summary.findings),
+        unknown=listed(summary.unknown),
+        links=_links(summary),
+        uses=[_use(use) for use in summary.uses[:MOST_USES]],
+        more_uses=max(0, len(summary.uses) - MOST_USES),
+        motors=[_motor(motor) for motor in summary.motors],
+        paths=[_path(path) for path in summary.paths],
+        figures=figures,
+        joints=[(path.name, _joints(path)) for path in summary.paths if path.complete],
+        wrist=_wrist(summary),
+        holding=holding,
+        diagram=diagram,
+    )
+
+
+def _links(summary: DynamicsSummary) -> list[list[str]]:
+    rows = []
+    for link in summary.masses.links if summary.masses else ():
+        name = tr("base") if link.link == 0 else str(link.link)
+        origin = tr("guessed") if link.estimated else tr("file") if link.mass_kg is not None else tr("unknown")
+        mass = number(link.mass_kg, 4) if link.mass_kg is not None else NONE
+        rows.append([name, mass, ", ".join(fixed(value, 1) for value in link.centre_mm) or NONE, origin])
+    return rows
+
+
+def _use(use: Use) -> list[str]:
+    return [
+        quantity_word(use.quantity),
+        f"J{use.joint}" if use.joint else NONE,
+        use.path or tr("at rest"),
+        number(use.asked, 3),
+        number(use.upper, 3),
+        number(use.allowed, 3),
+        use.unit,
+        fixed(100 * use.ratio, 0),
+    ]
+
+
+def _motor(motor: MotorNeed) -> list[str]:
+    inertia = f"{number(motor.inertia_low, 2)} – {number(motor.inertia_high, 2)}"
+    return [
+        f"J{motor.joint}",
+        *(number(value, 3) for value in (motor.peak, motor.rms, motor.holding, motor.speed, motor.power_w)),
+        inertia,
+        *(
+            NONE if value is None else number(value, 3)
+            for value in (
+                motor.inertia_ratio,
+                motor.motor_torque,
+                motor.motor_rpm,
+                motor.rated_limit,
+                motor.peak_limit,
+            )
+        ),
+    ]
+
+
+def _path(path: PathLoad) -> list[str]:
+    if not path.complete:
+        return [path.name, tr("not followed all along"), *[NONE] * 6]
+    worst = max(path.joints, key=lambda load: load.peak)
+    energy, back = sum(load.work_j for load in path.joints), sum(load.recovered_j for load in path.joints)
+    timed = NONE if path.torque_timed_s is None else fixed(path.torque_timed_s, 2)
+    if path.no_law:
+        timed = say(path.no_law)
+    return [
+        path.name,
+        f"{number(worst.peak, 3)} ± {number(worst.tolerance, 2)} (J{worst.joint})",
+        number(energy, 3),
+        number(back, 3),
+        _bound(path.payload),
+        _bound(path.speed_scale),
+        timed,
+        NONE if path.kinematic_s is None else fixed(path.kinematic_s, 2),
+    ]
+
+
+def _bound(bound: Bound | None) -> str:
+    if bound is None:
+        return NONE
+    value = tr("no bound") if bound.value is None else number(bound.value, 3)
+    return value if bound.joint is None else f"{value} (J{bound.joint})"
+
+
+def _joints(path: PathLoad) -> list[list[str]]:
+    return [
+        [
+            f"J{load.joint}",
+            f"{number(load.peak, 3)} ± {number(load.tolerance, 2)}",
+            fixed(load.peak_at_s, 2),
+            f"{number(load.rms, 3)} ± {number(load.rms_tolerance, 2)}",
+            *(number(_no_noise(value), 3) for value in (load.gravity, load.inertia, load.velocity, load.friction)),
+            *(number(_no_noise(value), 3) for value in (load.power_w, load.braking_w)),
+        ]
+        for load in path.joints
+    ]
+
+
+def _wrist(summary: DynamicsSummary) -> list[list[str]]:
+    return [
+        [path.name, f"J{moment.joint}", number(_no_noise(moment.moment_n_m), 3), fixed(moment.t_s, 2)]
+        for path in summary.paths
+        for moment in path.wrist
+    ]
+
+
+def _no_noise(value: float) -> float:
+    return 0.0 if abs(value) < 1e-9 or not np.isfinite(value) else value

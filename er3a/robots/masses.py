@@ -1,0 +1,193 @@
+"""Masses of links and loads, drives, and what the wrist may carry: what dynamics needs of a robot, in SI units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import Literal
+
+import numpy as np
+
+from er3a.errors import ShapeError
+from er3a.geometry.transforms import as_floats
+from er3a.numerics.arrays import Reals
+
+Three = tuple[float, float, float]
+SixMoments = tuple[float, float, float, float, float, float]
+
+GRAVITY = 9.81
+"""m/s^2, unless a caller says otherwise."""
+TRIANGLE_TOLERANCE = 0.01
+"""By how much of itself a principal moment may exceed the sum of the other two: printed digits are rounded."""
+
+NoBody = Literal["not_finite", "negative_mass", "negative_moment", "triangle"]
+
+
+@dataclass(frozen=True)
+class Body:
+    """Mass, centre of mass, and inertia about that centre; axes are those of the frame in which the centre is given.
+
+    Attributes
+    ----------
+    mass : kg
+    centre : m
+    inertia : ixx, iyy, izz, ixy, ixz, iyz in kg m^2; the products are the matrix's entries, as in a URDF
+    mass_tolerance, centre_tolerance : half-widths in kg and m; None: by the grade of the source
+    """
+
+    mass: float
+    centre: Three = (0.0, 0.0, 0.0)
+    inertia: SixMoments = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    mass_tolerance: float | None = None
+    centre_tolerance: float | None = None
+
+    @property
+    def inertia_matrix(self) -> Reals:
+        """(3, 3), kg m^2, about the centre."""
+        xx, yy, zz, xy, xz, yz = self.inertia
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+@dataclass(frozen=True)
+class LinkMass:
+    """The body of a link, in the frame on its joint's axis that moves with it, as for envelopes; link 0 is the base."""
+
+    link: int
+    body: Body
+
+
+@dataclass(frozen=True)
+class Load(Body):
+    """What hangs on the flange (centre and inertia in the flange's frame), and what the surroundings do to the tool.
+
+    Attributes
+    ----------
+    force, moment : of the surroundings on the tool at the tool point, in the tool's axes, N and N m
+    """
+
+    force: Three = (0.0, 0.0, 0.0)
+    moment: Three = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Drives:
+    """What is known of the joints' drives, at the joint: (n,) each, NaN where unknown; N for N m where a joint slides.
+
+    Attributes
+    ----------
+    armature : rotor inertia times the gear ratio squared, kg m^2
+    gear_ratio : turns of the motor for one of the joint
+    coulomb, viscous : friction, N m and N m s/rad
+    rated, peak : torque that a drive gives on and on, and for a moment, N m
+    """
+
+    armature: Reals
+    gear_ratio: Reals
+    coulomb: Reals
+    viscous: Reals
+    rated: Reals
+    peak: Reals
+
+    def __post_init__(self) -> None:
+        for part in fields(self):
+            array = np.array(as_floats(getattr(self, part.name), part.name))
+            if array.ndim != 1 or len(array) != len(np.atleast_1d(self.armature)):
+                raise ShapeError(part.name, array.shape, "one number for each joint")
+            array.setflags(write=False)
+            object.__setattr__(self, part.name, array)
+
+    @classmethod
+    def unknown(cls, joints: int) -> Drives:
+        """Drives of which nothing is known."""
+        return cls(*(np.full(joints, np.nan) for _ in fields(cls)))
+
+
+@dataclass(frozen=True)
+class WristLoad:
+    """What the manufacturer lets the wrist carry.
+
+    Attributes
+    ----------
+    payload : kg, NaN where unknown
+    moment, inertia : by joint (from 1) the allowed moment (N m) and inertia (kg m^2) about its axis
+    """
+
+    payload: float = np.nan
+    moment: tuple[tuple[int, float], ...] = ()
+    inertia: tuple[tuple[int, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Masses:
+    """Everything of a robot that dynamics rests on, beside its table.
+
+    Attributes
+    ----------
+    links : bodies of the links that are known
+    drives : None where nothing is known
+    wrist : None where nothing is known
+    weight : of the whole arm as its manufacturer states it, kg; NaN where unknown
+    """
+
+    links: tuple[LinkMass, ...] = ()
+    drives: Drives | None = field(default=None, compare=False)
+    wrist: WristLoad | None = None
+    weight: float = np.nan
+
+    def body(self, link: int) -> Body | None:
+        """The body of a link; None where it is unknown."""
+        return next((each.body for each in self.links if each.link == link), None)
+
+
+def no_body(body: Body) -> NoBody | None:
+    """Why no rigid body can have these numbers; None if one can [1]_.
+
+    The triangle inequality: no principal moment exceeds the sum of the other two.
+
+    References
+    ----------
+    .. [1] S. Traversaro et al., "Identification of fully physical consistent inertial parameters using optimization
+       on manifolds", IROS 2016, section III.
+    """
+    if not np.isfinite([body.mass, *body.centre, *body.inertia]).all():
+        return "not_finite"
+    if body.mass < 0:
+        return "negative_mass"
+    moments = np.linalg.eigvalsh(body.inertia_matrix)
+    if moments[0] < -TRIANGLE_TOLERANCE * moments[2] or moments[2] < 0:
+        return "negative_moment"
+    return "triangle" if moments[2] > (moments[0] + moments[1]) * (1 + TRIANGLE_TOLERANCE) else None
+
+
+def moved(body: Body, T: Reals) -> Body:
+    """A body as seen in another frame, where T (4, 4) takes coordinates of its own frame to those."""
+    R = T[:3, :3]
+    x, y, z = (R @ np.array(body.centre) + T[:3, 3]).tolist()
+    I = R @ body.inertia_matrix @ R.T
+    moments = (I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2])
+    xx, yy, zz, xy, xz, yz = (float(value) for value in moments)
+    return Body(body.mass, (x, y, z), (xx, yy, zz, xy, xz, yz), body.mass_tolerance, body.centre_tolerance)
+
+
+def together(bodies: list[Body]) -> Body:
+    """Several bodies of one frame as one, by the parallel axis theorem; tolerances of masses add."""
+    mass = sum(body.mass for body in bodies)
+    centres = np.array([body.centre for body in bodies]).reshape(-1, 3)
+    weights = np.array([body.mass for body in bodies])
+    centre = weights @ centres / mass if mass else centres.mean(axis=0)
+    I = sum((body.inertia_matrix + body.mass * about(centre - body.centre) for body in bodies), np.zeros((3, 3)))
+    x, y, z = centre.tolist()
+    known = [body.mass_tolerance for body in bodies if body.mass_tolerance is not None]
+    offsets = [body.centre_tolerance for body in bodies if body.centre_tolerance is not None]
+    return Body(
+        mass,
+        (x, y, z),
+        (float(I[0, 0]), float(I[1, 1]), float(I[2, 2]), float(I[0, 1]), float(I[0, 2]), float(I[1, 2])),
+        sum(known) if len(known) == len(bodies) else None,
+        max(offsets) if len(offsets) == len(bodies) else None,
+    )
+
+
+def about(offset: Reals) -> Reals:
+    """Inertia (3, 3) of a point of 1 kg at ``offset`` (3,), m: what the parallel axis theorem adds."""
+    shift: Reals = offset @ offset * np.eye(3) - np.outer(offset, offset)
+    return shift
