@@ -22,14 +22,17 @@ from scipy.interpolate import CubicSpline
 from er3a.dynamics.arm_model import ArmModel, drives_of
 from er3a.dynamics.torques import holding_torques, known, torque_parts
 from er3a.numerics.arrays import Reals
+from er3a.planning.piecewise import polynomial_motion
 from er3a.planning.timing import (
     SAME_NODE,
+    SPLINE_DEGREE,
     STRAIGHT_NODES,
     MustStandStill,
     NoTimeLawFound,
     Timed,
     TimingError,
     ToppraMissing,
+    run_along,
     standing,
 )
 
@@ -70,10 +73,9 @@ def fastest_under_torques(model: ArmModel, q: Reals, speed: Reals, peak: Reals) 
     if (between <= 0).any():
         raise TimingError(MustStandStill())
     t = np.concatenate([[0.0], np.cumsum(np.diff(way) / between)])
-    slope, bend, pull = spline(way, 1), spline(way, 2), np.append(pull, pull[-1])
-    timed = Timed(t, q, slope * pace[:, None], bend * pace[:, None] ** 2 + slope * pull[:, None])
-    dry = known(drives_of(model.robot).coulomb) * (np.sign(slope) - np.sign(timed.velocity))
-    return TimedTorques(timed, torque_parts(model, q, timed.velocity, timed.acceleration).total + dry)
+    timed = Timed(polynomial_motion(run_along(way, spline, pace, t), t, SPLINE_DEGREE))
+    dry = known(drives_of(model.robot).coulomb) * (np.sign(spline(way, 1)) - np.sign(timed.velocity))
+    return TimedTorques(timed, torque_parts(model, timed.q, timed.velocity, timed.acceleration).total + dry)
 
 
 Rows = tuple[Reals, Reals, Reals, Reals, Reals]

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from er3a.errors import InputError
-from er3a.files.mass_fields import HEAVIEST_PAYLOAD_KG, IMPOSSIBLE, BodyFields, Positive
+from er3a.files.mass_fields import HEAVIEST_PAYLOAD_KG, IMPOSSIBLE, BodyFields
 from er3a.files.units import Triple
 from er3a.files.yaml_file import StrictModel
 from er3a.geometry.transforms import transform

@@ -9,9 +9,8 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from er3a.files.units import FARTHEST_MM, MOST_DEG, RADIANS_BELOW_DEG, Triple, look_like_radians, suspect
 from er3a.files.mass_fields import DriveFields, InertiaFields, WeightFields, WristLoadFields, check_masses
-from er3a.files.units import FARTHEST_MM, MOST_DEG, Triple
+from er3a.files.units import FARTHEST_MM, MOST_DEG, RADIANS_BELOW_DEG, Triple, look_like_radians, suspect
 from er3a.files.yaml_file import StrictModel
 from er3a.robots.robot import MOST_JOINTS, Grade, PairRule
 

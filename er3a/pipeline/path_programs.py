@@ -8,19 +8,17 @@ from pathlib import Path
 
 import numpy as np
 
-from er3a.collision.bodies import Bodies, can_measure
+from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
 from er3a.errors import InputError
 from er3a.files.path_file import load_paths
-from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.trajectory.collisions import Surroundings, collisions, measured
 from er3a.pipeline.stages.trajectory.judgement import judge
-from er3a.pipeline.stages.trajectory.motion import motion_of
-from er3a.pipeline.stages.trajectory.program_paths import planned_entries
+from er3a.pipeline.stages.trajectory.listed_motions import listed_motions
 from er3a.pipeline.stages.trajectory.written_programs import LONGEST_NAME, written
-from er3a.planning.commands import CommandSource
 from er3a.planning.path_verdicts import PATH_VERDICTS, PathVerdict
-from er3a.program_check.check_program import NEAR
+from er3a.planning.way_around import PlanningTask
+from er3a.program_check.check_program import NEAR, CheckOptions, assumed_limits
 from er3a.programs.program_findings import WriteFinding
 from er3a.programs.syntax import Language
 from er3a.programs.writing import program_name
@@ -28,6 +26,7 @@ from er3a.robots.robot import Robot
 
 CHECKS_PER_SAMPLE = 5
 TOLERANCE = 0.001  # m
+SEED = 0  # of the planner
 
 
 @dataclass(frozen=True)
@@ -55,25 +54,21 @@ def programs_of(
     InputError
         for a path file that can't be used, and a name that it does not have
     """
-    surroundings = Surroundings(Bodies(robot, scene), TOLERANCE) if can_measure() else None
+    surroundings = Surroundings(Bodies(robot, scene), TOLERANCE)
+    task = PlanningTask(robot, surroundings.bodies, TOLERANCE, assumed_limits(robot, CheckOptions()), SEED)
     listed = load_paths(file).paths
     missing = next((name for name in only or () if name not in {entry.name for entry in listed}), None)
     if missing is not None:
         raise InputError(file, "paths", f"there is no path '{missing}'", f"Known: {', '.join(e.name for e in listed)}")
-    ends: dict[str, Reals] = {}
-    for i, entry in enumerate(listed):
-        source = CommandSource(file, f"paths[{i}]")
-        for part in planned_entries(robot, entry, source):
-            motion = motion_of(robot, part, CHECKS_PER_SAMPLE, source, ends)
-            ends[part.name] = ends[entry.name] = motion.q[-1]
-            if only and entry.name not in only:
-                continue
-            verdict = judge(robot, motion, NEAR).verdict
-            if surroundings is not None and collisions(measured(surroundings, motion)):
-                verdict = min((verdict, "collides"), key=PATH_VERDICTS.index)
-            if (verdict != "safe" and not unsafe) or not np.isfinite(motion.q[0]).all():
-                yield PathProgram(part.name, verdict, None)
-                continue
-            files, findings = written(robot, motion, verdict, language)
-            name = program_name(part.name, LONGEST_NAME)
-            yield PathProgram(part.name, verdict, {name + suffix: text for suffix, text in files.items()}, findings)
+    for each in listed_motions(file, task, NEAR, CHECKS_PER_SAMPLE):
+        if only and each.listed not in only:
+            continue
+        verdict = judge(robot, each.motion, NEAR, task.limits).verdict
+        if collisions(measured(surroundings, each.motion)):
+            verdict = min((verdict, "collides"), key=PATH_VERDICTS.index)
+        if (verdict != "safe" and not unsafe) or not np.isfinite(each.motion.q[0]).all():
+            yield PathProgram(each.name, verdict, None)
+            continue
+        files, findings = written(robot, each.motion, verdict, language)
+        name = program_name(each.name, LONGEST_NAME)
+        yield PathProgram(each.name, verdict, {name + suffix: text for suffix, text in files.items()}, findings)

@@ -172,7 +172,7 @@ def joint_limits(
     return JointLimits(speed, acceleration, jerk, ~known, acceleration_assumed=False)
 
 
-def nodes_along(joints: Callable[[Reals], Reals], t: Reals, q: Reals, limits: JointLimits) -> tuple[Reals, Reals]:
+def nodesrun_along(joints: Callable[[Reals], Reals], t: Reals, q: Reals, limits: JointLimits) -> tuple[Reals, Reals]:
     """Times and joints along a motion, on a grid that is refined until its bends in joint space are resolved.
 
     Parameters
@@ -229,7 +229,7 @@ def fastest(q: Reals, limits: JointLimits, programmed: Reals | None = None) -> T
     if (pace <= 0).any():
         raise TimingError(MustStandStill())
     t = np.concatenate([[0.0], np.cumsum(np.diff(way) / pace)])
-    return within_limits(polynomial_motion(_along(way, spline, speed, t), t, SPLINE_DEGREE), limits, elapsed)
+    return within_limits(polynomial_motion(run_along(way, spline, speed, t), t, SPLINE_DEGREE), limits, elapsed)
 
 
 def within_limits(curve: PiecewiseMotion, limits: JointLimits, least: float = 0.0) -> Timed:
@@ -240,7 +240,7 @@ def within_limits(curve: PiecewiseMotion, limits: JointLimits, least: float = 0.
     return motion if factor <= 1 else Timed(curve.scaled(factor))
 
 
-def _along(way: Reals, spline: CubicSpline, speed: Reals, t: Reals) -> Callable[[Reals], Rates]:
+def run_along(way: Reals, spline: CubicSpline, speed: Reals, t: Reals) -> Callable[[Reals], Rates]:
     """The way run at speeds (N,) at its nodes at times (N,), evenly accelerated between them."""
     pull = np.diff(speed**2) / (2 * np.diff(way))
 

@@ -12,7 +12,7 @@ from er3a.collision.scene import Scene
 from er3a.errors import ShapeError
 from er3a.kinematics.near_singular import NearSingular
 from er3a.numerics.arrays import Reals
-from er3a.planning.timing import joint_limits
+from er3a.planning.timing import JointLimits, joint_limits
 from er3a.program_check.motion_laws import AssumedRates
 from er3a.program_check.program_check_findings import (
     RANKS,
@@ -147,6 +147,13 @@ class ProgramCheck:
     cycle: CycleTime
 
 
+def assumed_limits(robot: Robot, options: CheckOptions) -> JointLimits:
+    """Limits of the joints, with what is assumed where no document gives them."""
+    speed = options.assumed_speed
+    assumed = np.full(robot.joints, np.radians(ASSUMED_SPEED_DEG_S)) if speed is None else speed
+    return joint_limits(robot, assumed, options.acceleration_time)
+
+
 def check_program(program: Program, robot: Robot, options: CheckOptions | None = None) -> ProgramCheck:
     """Follow a program and check each of its motions.
 
@@ -160,10 +167,7 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
     if options.start is not None and np.shape(options.start) != (count,):
         raise ShapeError("start", np.shape(options.start), f"({count},)")
     execution = execute(program, robot, options.start, options.frames, options.limits)
-    assumed = (
-        np.full(count, np.radians(ASSUMED_SPEED_DEG_S)) if options.assumed_speed is None else options.assumed_speed
-    )
-    limits = joint_limits(robot, assumed, options.acceleration_time)
+    limits = assumed_limits(robot, options)
     surroundings = surroundings_of(robot, options.scene, options.penetration_tolerance) if options.measures else None
     checker = StepChecker(robot, CheckRules(options.near, limits, options.assumed), surroundings, execution)
     checker.start = options.start

@@ -31,6 +31,12 @@ class MotionLaw:
     ramp: float
 
     @property
+    def breaks(self) -> Reals:
+        """Times (s) at which the acceleration steps."""
+        ramp = self.ramp * self.duration
+        return np.unique([0.0, ramp, self.duration - ramp, self.duration])
+
+    @property
     def saved_by_blend(self) -> float:
         """Time (s) that is saved where the arm does not stop at one end."""
         return self.duration * self.ramp / 2

@@ -11,6 +11,7 @@ from er3a.kinematics.configuration import BranchLabel
 from er3a.kinematics.singularity import SingularityType
 from er3a.kinematics.solutions import Unsolved
 from er3a.planning.intervals import AboveLimit, BelowLimit, TooFast
+from er3a.planning.tool_proof import Undecided
 from er3a.programs.execution import EndKind
 from er3a.programs.instructions import Unresolved
 from er3a.programs.program_findings import ProgramFinding
@@ -344,6 +345,7 @@ CheckFinding = (
     | PassesSingularity
     | FasterThanAssumed
     | AcceleratesMoreThanAssumed
+    | Undecided
     | MoreThanFullSpeed
     | ConfigurationChanges
     | JointJumps

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from er3a.collision.along import clearance_along
-from er3a.collision.bodies import Bodies, can_measure
+from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
@@ -62,7 +62,7 @@ class Surroundings:
 
 def surroundings_of(robot: Robot, scene: Scene | None, tolerance: float) -> Surroundings | None:
     """Surroundings, or None where clearance can't be measured."""
-    return Surroundings(scene, tolerance, {id(robot): Bodies(robot, scene)}) if can_measure() else None
+    return Surroundings(scene, tolerance, {id(robot): Bodies(robot, scene)})
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,7 +211,7 @@ class StepChecker:
             return motion
         bodies = self.surroundings.of(way.arm)
         ends = way.t[[0, -1]]
-        along = clearance_along(bodies, way.joints, way.t, ends, self.surroundings.tolerance)
+        along = clearance_along(bodies, way.joints, way.rates, way.t, ends, self.surroundings.tolerance)
         least = float(along.distance[along.least]) if along.least >= 0 else None
         hits = [
             MotionCollides(

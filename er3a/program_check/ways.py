@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from er3a.collision.along import RateBounds
 from er3a.errors import NotWristPartitionedError, PoseError
 from er3a.geometry.angles import wrap_to_pi
 from er3a.kinematics.configuration import branch_labels
@@ -16,13 +17,25 @@ from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Reals
 from er3a.planning.arcs import arc
-from er3a.planning.follow import follow
 from er3a.planning.followed import Followed
-from er3a.planning.intervals import AboveLimit, BelowLimit, TooFast, out_of_limits, too_fast, unreachable
+from er3a.planning.intervals import (
+    AboveLimit,
+    AccelerationTooGreat,
+    AccelerationTooGreatIfAssumed,
+    BelowLimit,
+    RateCause,
+    TooFast,
+    TooFastIfAssumed,
+    out_of_limits,
+    rates_exceeded,
+    unreachable,
+)
 from er3a.planning.moves import Segment, line
+from er3a.planning.piecewise import polynomial_motion
 from er3a.planning.sequences import TURN_LENGTH
 from er3a.planning.singular_events import singular_events
 from er3a.planning.timing import JointLimits
+from er3a.planning.tool_proof import ToolProof, Wanted, follow_and_prove
 from er3a.program_check.motion_laws import AssumedRates, MotionLaw, joint_law, progress, tool_law
 from er3a.program_check.program_check_findings import (
     AcceleratesMoreThanAssumed,
@@ -76,6 +89,7 @@ class Way:
     t : (N,), s, rising from 0; q : (N, n), rad, NaN where unreachable
     joints : angles (..., n) at times (...,)
     joints_at : angles (..., n) at shares of the way (...,)
+    rates : bounds of speeds and accelerations between times
     length : m, of the tool point's way; for a joint move of the straight line between its ends
     turned : rad, by which the tool turns, or for a joint move the joint that turns most
     end : (n,), rad; None where the end is not reached
@@ -87,6 +101,7 @@ class Way:
     q: Reals
     joints: Callable[[Reals], Reals]
     joints_at: Callable[[Reals], Reals]
+    rates: RateBounds
     length: float
     turned: float
     end: Reals | None
@@ -123,7 +138,13 @@ def joint_way(arm: Robot, motion: ArmMotion, start: Reals, end: Reals, rules: Ch
         *_joint_jumps(arm, start, end, moved, turned),
     )
     lead = float(np.abs(step).max())
-    return Way(arm, law, times, joints(times), joints, joints_at, moved, lead, end, findings)
+    rates = polynomial_motion(lambda t: _scaled(progress(law, t), start, step), law.breaks, 2).rate_bounds
+    return Way(arm, law, times, joints(times), joints, joints_at, rates, moved, lead, end, findings)
+
+
+def _scaled(shares: tuple[Reals, Reals, Reals], start: Reals, step: Reals) -> tuple[Reals, Reals, Reals]:
+    share, speed, acceleration = (each[..., None] * step for each in shares)
+    return start + share, speed, acceleration
 
 
 def limit_findings(arm: Robot, q: Reals) -> tuple[AboveLimit | BelowLimit, ...]:
@@ -165,19 +186,21 @@ def tool_way(
     )
     times = np.linspace(0.0, law.duration, _points(path.length, path.turned))
     try:
-        followed = follow(arm, path, times, start)
+        followed, proof = follow_and_prove(arm, path, times, Wanted(rules.limits.rates, rules.near), start)
     except NotWristPartitionedError:
         return LineNotChecked()
     last = followed.q[-1]
     end_joints = last if np.isfinite(last).all() else None
     way = Way(
-        *(arm, law, followed.t, followed.q, followed.joints, followed.joints_at),
+        *(arm, law, followed.t, followed.q, followed.joints, followed.joints_at, proof.rate_bounds),
         *(path.length, path.turned, end_joints, ()),
     )
-    return replace(way, findings=(*_followed_findings(followed, way, rules), *_arrival_findings(followed, given)))
+    return replace(
+        way, findings=(*_followed_findings(followed, proof, way, rules), *_arrival_findings(followed, given))
+    )
 
 
-def _followed_findings(followed: Followed, way: Way, rules: CheckRules) -> list[CheckFinding]:
+def _followed_findings(followed: Followed, proof: ToolProof, way: Way, rules: CheckRules) -> list[CheckFinding]:
     """Reach, configuration, limits, singular poses, speeds."""
     arm = way.arm
     found: list[CheckFinding] = [
@@ -187,10 +210,12 @@ def _followed_findings(followed: Followed, way: Way, rules: CheckRules) -> list[
         ConfigurationEnds(way.along_mm(jump.t), jump.joint, float(np.degrees(jump.angle))) for jump in followed.jumps
     ]
     ends = bool(found)
-    limits = {(type(each.cause), each.cause.joint): each.cause for each in out_of_limits(arm, way.t, way.q, way.joints)}
+    t, kept = np.unique(np.concatenate([way.t, proof.t]), return_index=True)
+    solved = np.concatenate([way.q, proof.q])[kept]
+    limits = {(type(each.cause), each.cause.joint): each.cause for each in out_of_limits(arm, t, solved, way.joints)}
     found += list(limits.values())
-    events = singular_events(arm, way.t, way.q, way.joints, rules.near)
-    at = np.unique(np.concatenate([way.t, [event.t for event in events]]))
+    events = singular_events(arm, t, solved, way.joints, rules.near)
+    at = np.unique(np.concatenate([t, [event.t for event in events]]))
     q, velocity, acceleration = followed.rates(at)
     bounded = not (np.isfinite(q[:, 0]) & np.isnan(velocity[:, 0])).any()
     for event in events:
@@ -202,16 +227,25 @@ def _followed_findings(followed: Followed, way: Way, rules: CheckRules) -> list[
             found.append(MeetsSingularity(event.type, where, bounded))
     if ends:  # towards the end of reach joint speeds grow without bound
         return found
-    fastest: dict[int, TooFast] = {}
-    for stretch in too_fast(arm.replace(speed=rules.limits.speed), at, velocity, lambda t: followed.rates(t)[1]):
-        known = fastest.get(stretch.cause.joint)
-        if known is None or stretch.cause.needed_deg_s > known.needed_deg_s:
-            fastest[stretch.cause.joint] = stretch.cause
-    found += [
-        each if np.isfinite(arm.speed[joint - 1]) else FasterThanAssumed(joint, each.needed_deg_s, each.limit_deg_s)
-        for joint, each in sorted(fastest.items())
-    ]
-    return found + _acceleration_findings(np.nan_to_num(np.abs(acceleration)).max(axis=0), rules.limits)
+    causes: list[RateCause] = []
+    for limit in rules.limits.rates[:2]:
+        values = velocity if limit.order == 1 else acceleration
+        stretches = rates_exceeded(at, values, limit, lambda t, order=limit.order: followed.rates(t)[order])  # type: ignore[misc]
+        causes += [stretch.cause for stretch in stretches]
+    worst: dict[tuple[type, int], RateCause] = {}
+    for cause in sorted(causes, key=lambda cause: cause.ratio):
+        worst[type(cause), cause.joint] = cause
+    found += [_as_checked(cause) for _, cause in sorted(worst.items(), key=lambda item: item[0][1])]
+    return found + list(dict.fromkeys(part.cause for part in proof.undecided))
+
+
+def _as_checked(cause: RateCause) -> CheckFinding:
+    if isinstance(cause, TooFastIfAssumed):
+        return FasterThanAssumed(cause.joint, cause.needed_deg_s, cause.limit_deg_s)
+    if isinstance(cause, TooFast):
+        return cause
+    assert isinstance(cause, AccelerationTooGreatIfAssumed | AccelerationTooGreat)
+    return AcceleratesMoreThanAssumed(cause.joint, cause.needed_deg_s2, cause.limit_deg_s2)
 
 
 def _arrival_findings(followed: Followed, given: Reals | None) -> list[CheckFinding]:

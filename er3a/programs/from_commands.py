@@ -12,11 +12,12 @@ from scipy.spatial.transform import Rotation
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.planning.commands import (
-    Command,
+    JointCommand,
     JointMoveCommand,
     JointSequenceCommand,
     JointTableCommand,
     SegmentCommand,
+    ToolCommand,
     ToolMoveCommand,
     ToolSequenceCommand,
     ToolTableCommand,
@@ -58,7 +59,12 @@ class PathListing:
 
 
 def listing_of(
-    command: Command, robot: Robot, start: Reals, name: str = "path", title: str = "", ends: Reals | None = None
+    command: JointCommand | ToolCommand,
+    robot: Robot,
+    start: Reals,
+    name: str = "path",
+    title: str = "",
+    ends: Reals | None = None,
 ) -> PathListing:
     """A path's command as a sequence that begins with a joint motion to its start.
 

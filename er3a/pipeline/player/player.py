@@ -10,10 +10,11 @@ from typing import Any
 
 import jinja2
 import numpy as np
+import trimesh
 from markupsafe import Markup
 from scipy.spatial.transform import Rotation
 
-from er3a.collision.scene import Box, Cylinder, Plane, Scene, Sphere
+from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import N_, tr
@@ -136,13 +137,19 @@ def _data(robot: Robot, motions: Sequence[PlayedMotion], scene: Scene | None, wo
     }
 
 
-def _solid(solid: Box | Cylinder | Sphere) -> dict[str, Any]:
+def _solid(solid: Box | Cylinder | Sphere | Mesh) -> dict[str, Any]:
     """An obstacle as the drawing code takes it."""
     common = {"T": np.asarray(solid.T).tolist(), "colour": SCENE_COLOUR}
     if isinstance(solid, Box):
         return {"kind": "box", "size": np.asarray(solid.size).tolist(), **common}
     if isinstance(solid, Cylinder):
         return {"kind": "cylinder", "radius": solid.radius, "length": solid.length, **common}
+    if isinstance(solid, Mesh):
+        hulls = [trimesh.convex.convex_hull(piece) for piece in solid.pieces]
+        points = np.concatenate([hull.vertices for hull in hulls]) if hulls else np.empty((0, 3))
+        starts = np.cumsum([0, *(len(hull.vertices) for hull in hulls)])
+        faces = [(hull.faces + start).tolist() for hull, start in zip(hulls, starts)]
+        return {"kind": "mesh", "points": points.tolist(), "faces": sum(faces, []), **common}
     return {"kind": "sphere", "radius": solid.radius, **common}
 
 

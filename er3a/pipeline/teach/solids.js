@@ -91,9 +91,9 @@ const BOX_CORNERS = [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2,
 const PIECES = 6; // of a box's edge, so that its faces sort well by distance
 const BELTS = 10; // of a ball, from pole to pole
 
-/** What stands around an arm: `{kind, T, size | radius, length, colour}`, m; all in frame 0. */
+/** What stands around an arm: `{kind, T, size | radius, length | points, faces, colour}`, m; all in frame 0. */
 export function sceneSolids(things) {
-  const made = { box, cylinder, sphere };
+  const made = { box, cylinder, sphere, mesh };
   return things.map((thing) => placed(made[thing.kind](thing), thing.T));
 }
 
@@ -120,6 +120,10 @@ function box({ size, colour }) {
     }
   }
   return { before: 0, points, faces };
+}
+
+function mesh({ points, faces, colour }) {
+  return { before: 0, points, faces: faces.map((corners) => ({ corners, colour })) };
 }
 
 function cylinder({ radius, length, colour }) {

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
 from er3a.collision.bodies import Bodies
@@ -36,9 +34,11 @@ from er3a.pipeline.stages.collision.model import (
     PlacesSummary,
 )
 from er3a.pipeline.stages.collision.nearest import path_clearances, target_clearances
+from er3a.pipeline.stages.trajectory.listed_motions import study_motions
 from er3a.pipeline.study import Study
 
 STAGE = "collision"
+CHECKS = 1  # points of a path checked between its samples to begin with; clearance adds what it needs
 SAMPLES_STREAM, PLACES_STREAM = 0, 1
 
 
@@ -58,7 +58,7 @@ def compute(study: Study, name: str) -> CollisionResults:
         places.joined[:] = joined_to_home(bodies, places, home, settings.neighbours)
     targets, at_targets = target_clearances(robot, bodies, study.entry(name).targets)
     tolerance = settings.penetration_tolerance_mm / 1000
-    paths, on_paths = path_clearances(robot, bodies, Path(study.entry(name).paths), tolerance)
+    paths, on_paths = path_clearances(study_motions(study, name, CHECKS), bodies, tolerance)
     pairs = _pair_shares(bodies, space)
     mounting = tuple(
         Mounting(contact.solid, contact.depth * 1000, contact.inside) for contact in base_contacts(robot, scene)

@@ -11,6 +11,8 @@ from er3a.files.robot_file import Text
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.stages.stage import Stage
+from er3a.pipeline.stages.trajectory.entry import STAGE as TRAJECTORY
+from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 
 if TYPE_CHECKING:
     from er3a.pipeline.study import Study
@@ -33,15 +35,15 @@ class CollisionSettings(StrictModel):
 
 
 def _inputs(study: Study, robot: str) -> list[Path]:
-    entry = study.entry(robot)
-    return [Path(entry.targets), Path(entry.paths), *study.scenes(robot, STAGE.name)]
+    named = [Path(study.entry(robot).targets), *TRAJECTORY.inputs(study, robot), *study.scenes(robot, STAGE.name)]
+    return list(dict.fromkeys(named))
 
 
 STAGE = Stage(
     name="collision",
     title=N_("collision"),
     question=N_("Where is it free of collisions?"),
-    settings={"collision": CollisionSettings},
+    settings={"collision": CollisionSettings, "trajectory": TrajectorySettings},
     inputs=_inputs,
     rests_on=("validation",),
 )

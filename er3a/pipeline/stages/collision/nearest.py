@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterable
 
 import numpy as np
 
 from er3a.collision.bodies import Bodies
-from er3a.files.path_file import load_paths
 from er3a.files.target_file import load_targets
 from er3a.kinematics.inverse import inverse
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.collision.model import Closest, PathClearances, TargetClearances
 from er3a.pipeline.stages.trajectory.collisions import Surroundings, measured
-from er3a.pipeline.stages.trajectory.motion import motion_of
-from er3a.planning.commands import CommandSource
+from er3a.pipeline.stages.trajectory.listed_motions import ListedMotion
 from er3a.robots.robot import Robot
 from er3a.selection.nearest import nearest
 from er3a.selection.select import refusals_of
-
-CHECKS = 1  # points of a path checked between its samples to begin with; clearance adds what it needs
 
 
 def target_clearances(robot: Robot, bodies: Bodies, file: str) -> tuple[TargetClearances, list[Closest]]:
@@ -52,13 +48,13 @@ def target_clearances(robot: Robot, bodies: Bodies, file: str) -> tuple[TargetCl
     return TargetClearances.stacked(tables), closest
 
 
-def path_clearances(robot: Robot, bodies: Bodies, file: Path, tolerance: float) -> tuple[PathClearances, list[Closest]]:
-    """Clearance over time of each path of a file, and where each is nearest to anything."""
+def path_clearances(
+    motions: Iterable[ListedMotion], bodies: Bodies, tolerance: float
+) -> tuple[PathClearances, list[Closest]]:
+    """Clearance over time of each path, and where each is nearest to anything."""
     tables, closest = [], []
-    ends: dict[str, Reals] = {}
-    for i, entry in enumerate(load_paths(file).paths):
-        motion = motion_of(robot, entry, CHECKS, CommandSource(file, f"paths[{i}]"), ends)
-        ends[entry.name] = motion.q[-1]
+    for entry in motions:
+        motion = entry.motion
         along = measured(Surroundings(bodies, tolerance), motion)
         q = motion.joints(along.t)
         known = np.isfinite(along.distance)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
 from er3a.dynamics.arm_model import drives_of
@@ -12,8 +10,6 @@ from er3a.dynamics.holding import worst_holding
 from er3a.dynamics.plausibility import mass_findings
 from er3a.dynamics.uncertainty import ASSUMED
 from er3a.files.load_file import load_of
-from er3a.files.path_file import load_paths
-from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure
 from er3a.pipeline.stages.dynamics.entry import DynamicsSettings
 from er3a.pipeline.stages.dynamics.judgement import drive_uses, unknowns, verdict_of
@@ -30,10 +26,9 @@ from er3a.pipeline.stages.dynamics.model import (
 from er3a.pipeline.stages.dynamics.path_loads import LoadedArm, PathTorques, path_torques
 from er3a.pipeline.stages.dynamics.wrist_check import diagram_rows, wrist_uses
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
-from er3a.pipeline.stages.trajectory.motion import motion_of
+from er3a.pipeline.stages.trajectory.limits import limits_of
+from er3a.pipeline.stages.trajectory.listed_motions import study_motions
 from er3a.pipeline.study import Study
-from er3a.planning.commands import CommandSource
-from er3a.planning.timing import joint_limits
 from er3a.robots.masses import Body, LinkMass, Load, Masses
 from er3a.robots.robot import Grade, Robot
 
@@ -119,21 +114,15 @@ def _loaded_arm(
         gravity=settings.gravity_m_s2,
         links_grade=grades[0],
         load_grade=grades[1],
-        limits=joint_limits(robot, np.radians(trajectory.assumed_speed_deg_s), trajectory.acceleration_time_s),
+        limits=limits_of(robot, trajectory),
     )
 
 
 def _paths(study: Study, name: str, arm: LoadedArm, settings: DynamicsSettings) -> list[PathTorques]:
-    file = Path(study.entry(name).paths)
-    ends: dict[str, Reals] = {}
-    found = []
     joints = arm.robot.joints
     wrist = tuple(range(max(1, joints - WRIST_JOINTS + 1), joints + 1))
-    for i, entry in enumerate(load_paths(file).paths):
-        motion = motion_of(arm.robot, entry, CHECKS_PER_SAMPLE, CommandSource(file, f"paths[{i}]"), ends)
-        ends[entry.name] = motion.q[-1]
-        found.append(path_torques(arm, motion, settings.samples, wrist))
-    return found
+    motions = study_motions(study, name, CHECKS_PER_SAMPLE)
+    return [path_torques(arm, each.motion, settings.samples, wrist) for each in motions]
 
 
 def _holding(arm: LoadedArm) -> tuple[HoldingTorque, ...]:

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
-from er3a.collision.bodies import Bodies
-from er3a.files.path_file import load_paths
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.near_singular import NearSingular
 from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
@@ -19,7 +16,7 @@ from er3a.pipeline.stages.trajectory.avoidance_results import AvoidanceTask, spe
 from er3a.pipeline.stages.trajectory.collisions import Surroundings, clearance_rows, measured
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.stages.trajectory.judgement import Judgement, judge
-from er3a.pipeline.stages.trajectory.limits import limits_of
+from er3a.pipeline.stages.trajectory.listed_motions import listed_motions, near_singular, planning_task
 from er3a.pipeline.stages.trajectory.model import (
     AllSafe,
     AvoidanceRows,
@@ -35,16 +32,12 @@ from er3a.pipeline.stages.trajectory.model import (
     TrajectoryResults,
     TrajectorySummary,
 )
-from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
+from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.pipeline.stages.trajectory.path_summary import path_summary
-from er3a.pipeline.stages.trajectory.program_paths import PlannedEntry, planned_entries
 from er3a.pipeline.stages.trajectory.written_programs import program_files
 from er3a.pipeline.study import Study
-from er3a.planning.commands import CommandSource
 from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.timing import JointLimits
-from er3a.planning.tool_proof import Wanted
-from er3a.planning.way_around import PlanningTask
 from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
 
@@ -54,32 +47,25 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     robot, settings = study.robot(name), study.section(TrajectorySettings)
     file = Path(study.entry(name).paths)
     thresholds = NearThresholds(settings.near_wrist_deg, settings.near_elbow_deg, settings.near_shoulder_mm)
-    near = NearSingular(
-        float(np.radians(thresholds.wrist_deg)), float(np.radians(thresholds.elbow_deg)), thresholds.shoulder_mm / 1000
-    )
-    limits = limits_of(robot, settings)
-    scene_file = study.scene(name, "trajectory")
+    near, planning = near_singular(settings), planning_task(study, name)
+    limits, scene_file = planning.limits, study.scene(name, "trajectory")
     scene = load_scene(scene_file) if scene_file else None
-    surroundings = Surroundings(Bodies(robot, scene), settings.penetration_tolerance_mm / 1000)
+    assert planning.bodies is not None
+    surroundings = Surroundings(planning.bodies, planning.tolerance)
     only = None if settings.avoidance == "compare" else settings.avoidance
-    bodies, tolerance = surroundings.bodies if surroundings else None, settings.penetration_tolerance_mm / 1000
-    planning = PlanningTask(robot, bodies, tolerance, limits, study.seed)
     avoidance = AvoidanceTask(robot, near, limits, only, surroundings, planning)
     tables: list[PathChecks] = []
     clearances: list[Clearances] = []
     strategies: list[AvoidanceRows] = []
     paths: list[PathSummary] = []
-    ends: dict[str, Reals] = {}
     programs: list[ProgramFiles] = []
-    for listed, entry, source in _planned(robot, file):
-        wanted = Wanted(limits.rates, near)
-        motion = motion_of(robot, entry, settings.checks_per_sample, source, ends, wanted, planning)
-        ends[entry.name] = ends[listed] = motion.q[-1]
+    for each in listed_motions(file, planning, near, settings.checks_per_sample):
+        motion = each.motion
         found = judge(robot, motion, near, limits)
-        along = measured(surroundings, motion) if surroundings else None
+        along = measured(surroundings, motion)
         avoided = avoidance.avoid(motion, found, along)
         tables.append(_checks(robot, motion, found, near, limits))
-        clearances.append(clearance_rows(entry.name, along))
+        clearances.append(clearance_rows(each.name, along))
         strategies.append(avoided.rows)
         paths.append(path_summary(robot, motion, found, along, avoided, limits))
         programs.append(program_files(robot, motion, paths[-1].verdict, settings.programs, settings.write_unsafe))
@@ -114,14 +100,6 @@ def compute(study: Study, name: str) -> TrajectoryResults:
         avoidance=AvoidanceRows.stacked(strategies),
         programs=ProgramFiles.stacked(programs),
     )
-
-
-def _planned(robot: Robot, file: Path) -> Iterator[tuple[str, PlannedEntry, CommandSource]]:
-    """The paths of a file, programs as their stretches: each with the name of its entry."""
-    for i, listed in enumerate(load_paths(file).paths):
-        source = CommandSource(file, f"paths[{i}]")
-        for entry in planned_entries(robot, listed, source):
-            yield listed.name, entry, source
 
 
 def _checks(robot: Robot, motion: Motion, found: Judgement, near: NearSingular, limits: JointLimits) -> PathChecks:

@@ -88,7 +88,7 @@ class PathFigure:
     def panels(self) -> list[list[float]]:
         """Where the curves over time stand, for the player's cursor: left, bottom, right, top in parts of the image,
         and the times (s) at both sides."""
-        shown = ((ax.get_position().extents.tolist(), ax.get_xlim()) for ax in (*self.joints, *self.measures))
+        shown = ((ax.get_position().extents, ax.get_xlim()) for ax in (*self.joints, *self.measures))
         return [[round(float(value), 5) for value in (*extents, *ends)] for extents, ends in shown]
 
     def _axes(self, column: int, row: int) -> Axes:

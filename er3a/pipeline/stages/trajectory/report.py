@@ -122,7 +122,7 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
         clearance=clearance_section(results),
         assumed=assumed,
         turning=turning_figure(robot, results),
-        player=player(robot, _motions(summary, checks), scene and load_scene(scene)),
+        player=player(robot, _motions(summary, checks), load_scene(scene) if scene else None),
         player_style=player_style(),
     )
 

@@ -1,0 +1,79 @@
+"""The motions of a path file, one after another, as every stage that looks at paths takes them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from er3a.collision.bodies import Bodies
+from er3a.files.path_file import load_paths
+from er3a.files.scene_file import load_scene
+from er3a.kinematics.near_singular import NearSingular
+from er3a.numerics.arrays import Reals
+from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
+from er3a.pipeline.stages.trajectory.limits import limits_of
+from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
+from er3a.pipeline.stages.trajectory.program_paths import planned_entries
+from er3a.pipeline.study import Study
+from er3a.planning.commands import CommandSource
+from er3a.planning.tool_proof import Wanted
+from er3a.planning.way_around import PlanningTask
+
+
+@dataclass(frozen=True, eq=False)
+class ListedMotion:
+    """A motion, the entry that it belongs to, and its name (a program's stretches have names of their own)."""
+
+    listed: str
+    name: str
+    motion: Motion
+
+
+def near_singular(settings: TrajectorySettings) -> NearSingular:
+    """The distances below which the study counts a pass as near-singular."""
+    wrist, elbow = np.radians([settings.near_wrist_deg, settings.near_elbow_deg]).tolist()
+    return NearSingular(wrist, elbow, settings.near_shoulder_mm / 1000)
+
+
+def planning_task(study: Study, name: str) -> PlanningTask:
+    """An arm, what its paths must not meet, and its limits, as the study has them."""
+    robot, settings = study.robot(name), study.section(TrajectorySettings)
+    scene = study.scene(name, "trajectory")
+    bodies = Bodies(robot, load_scene(scene) if scene else None)
+    tolerance = settings.penetration_tolerance_mm / 1000
+    return PlanningTask(robot, bodies, tolerance, limits_of(robot, settings), study.seed)
+
+
+def study_motions(study: Study, name: str, checks_per_sample: int) -> Iterator[ListedMotion]:
+    """The motions of a robot of the study; see :func:`listed_motions`."""
+    near = near_singular(study.section(TrajectorySettings))
+    return listed_motions(Path(study.entry(name).paths), planning_task(study, name), near, checks_per_sample)
+
+
+def listed_motions(
+    file: Path, task: PlanningTask, near: NearSingular, checks_per_sample: int
+) -> Iterator[ListedMotion]:
+    """Plan the paths of a file.
+
+    Parameters
+    ----------
+    task : the arm, what it must not meet and its limits, for motions that are to be planned
+    near : distances below which a pass counts as near-singular
+    checks_per_sample : points checked between two samples to begin with
+
+    Raises
+    ------
+    InputError
+        for what can't be planned
+    """
+    ends: dict[str, Reals] = {}
+    wanted = Wanted(task.limits.rates, near)
+    for i, listed in enumerate(load_paths(file).paths):
+        source = CommandSource(file, f"paths[{i}]")
+        for entry in planned_entries(task.robot, listed, source):
+            motion = motion_of(task.robot, entry, checks_per_sample, source, ends, wanted, task)
+            ends[entry.name] = ends[listed.name] = motion.q[-1]
+            yield ListedMotion(listed.name, entry.name, motion)
