@@ -172,7 +172,7 @@ def joint_limits(
     return JointLimits(speed, acceleration, jerk, ~known, acceleration_assumed=False)
 
 
-def nodesrun_along(joints: Callable[[Reals], Reals], t: Reals, q: Reals, limits: JointLimits) -> tuple[Reals, Reals]:
+def nodes_along(joints: Callable[[Reals], Reals], t: Reals, q: Reals, limits: JointLimits) -> tuple[Reals, Reals]:
     """Times and joints along a motion, on a grid that is refined until its bends in joint space are resolved.
 
     Parameters

@@ -12,6 +12,7 @@ from er3a.pipeline.stages.trajectory.model import ProgramFiles
 from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning.commands import CommandSource, JointTableCommand, PlanCommand, ToolMoveCommand
 from er3a.planning.path_verdicts import PathVerdict
+from er3a.planning.profiles import Times
 from er3a.programs.csv_program import write_csv
 from er3a.programs.from_commands import listing_of
 from er3a.programs.program_findings import WriteFinding, WrittenUnsafe
@@ -47,7 +48,8 @@ def written(
         return {".csv": write_csv(times[known], joints[known], poses, told)}, unsafe
     command = motion.entry.command(CommandSource())
     if isinstance(command, PlanCommand):  # a planned motion is written as the points that its samples are
-        command = JointTableCommand(motion.joints(motion.samples), motion.samples)
+        times = Times(motion.samples, np.arange(len(motion.samples)))
+        command = JointTableCommand(motion.joints(motion.samples), times)
     ends: Reals | None = motion.q[-1:] if isinstance(command, ToolMoveCommand) else None
     if ends is not None and not np.isfinite(ends).all():
         ends = None
