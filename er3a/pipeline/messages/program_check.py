@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import er3a.pipeline.messages.collision
+import er3a.pipeline.messages.pairs
 import er3a.pipeline.messages.planning  # noqa: F401
 from er3a.kinematics.singularity import SingularityType
 from er3a.pipeline.messages.expectations import outcome_word
