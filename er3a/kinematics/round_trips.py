@@ -9,16 +9,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from er3a.geometry.angles import wrap_to_pi
 from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.batch import inverse_batch
-from er3a.kinematics.closed_form import SLOTS
+from er3a.kinematics.by_class import arm_solver, task_mask
 from er3a.kinematics.forward import forward
 from er3a.kinematics.near_singular import NearSingular
 from er3a.kinematics.singularity import determinant_factors
-from er3a.kinematics.wrist_partitioned import solve_slots
-from er3a.numerics.arrays import Flags, Integers
+from er3a.kinematics.wrist_partitioned import closed_form_missing, solve_slots
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot
 
 SAME_JOINTS_RAD = 1e-6
@@ -26,6 +27,7 @@ NEAR_WRIST_DEG = NEAR_ELBOW_DEG = 0.5
 NEAR_SHOULDER_MM = 1.0
 NEAR = NearSingular(np.radians(NEAR_WRIST_DEG), np.radians(NEAR_ELBOW_DEG), NEAR_SHOULDER_MM / 1000)
 BLOCK = 20_000
+MOST_BY_CLASS = 500
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,14 +74,23 @@ class SlotRoundTrips:
 
 
 def batch_round_trips(robot: Robot, random: np.random.Generator, poses: int) -> BatchRoundTrips:
-    """Send that many joint vectors, uniform within the limits, to poses and back."""
-    own = random.uniform(robot.lower, robot.upper, size=(poses, 6))
+    """Send that many joint vectors, uniform within the limits, to poses and back.
+
+    Arms with more than six joints are asked at their own redundancy parameter; arms with fewer for what
+    :func:`er3a.kinematics.by_class.task_mask` tells.
+    """
+    own = random.uniform(robot.lower, robot.upper, size=(poses, robot.joints))
     T = forward(robot, own)
-    solved = inverse_batch(robot, T)
+    plain = closed_form_missing(robot) is None and robot.coupling is None
+    solved = inverse_batch(robot, T) if plain else inverse_batch(robot, T, own)
     q, valid = solved.q, solved.solved
     back = forward(robot, q[valid])
     asked = np.repeat(T, valid.sum(axis=1), axis=0)
-    difference = np.abs(wrap_to_pi(q - own[:, None])).max(axis=2)
+    mask = task_mask(robot)
+    if not mask.all():
+        back = _as_far_as_asked(back, asked, mask)
+    away = q - own[:, None]
+    difference = np.abs(np.where(robot.slides, away, wrap_to_pi(away))).max(axis=2)
     difference = np.where(valid, difference, np.inf).min(axis=1)
     return BatchRoundTrips(
         poses=poses,
@@ -88,8 +99,24 @@ def batch_round_trips(robot: Robot, random: np.random.Generator, poses: int) -> 
         worst_orientation=float(rotation_angle(back[:, :3, :3], asked[:, :3, :3]).max(initial=0.0)),
         own_found=int((difference < SAME_JOINTS_RAD).sum()),
         worst_own=float(difference.max()),
-        counts_within_limits=np.bincount(solved.within_limits.sum(axis=1), minlength=SLOTS + 1),
+        counts_within_limits=np.bincount(solved.within_limits.sum(axis=1), minlength=valid.shape[1] + 1),
     )
+
+
+def has_class(robot: Robot) -> bool:
+    """Whether a class's solver, not random starts, solves the arm."""
+    return arm_solver(robot).chain.code != "unsolved"
+
+
+def _as_far_as_asked(back: Reals, asked: Reals, mask: Reals) -> Reals:
+    """Poses (N, 4, 4) with those degrees of freedom set right that a mask (6,) in the tool's frame leaves out."""
+    R = asked[:, :3, :3]
+    shift = np.einsum("nji,nj->ni", R, back[:, :3, 3] - asked[:, :3, 3]) * mask[:3]
+    turn = Rotation.from_matrix(np.swapaxes(R, 1, 2) @ back[:, :3, :3]).as_rotvec() * mask[3:]
+    T = asked.copy()
+    T[:, :3, 3] += np.einsum("nij,nj->ni", R, shift)
+    T[:, :3, :3] = R @ Rotation.from_rotvec(turn).as_matrix()
+    return T
 
 
 def slot_round_trips(robot: Robot, poses: int, seed: int) -> SlotRoundTrips:
