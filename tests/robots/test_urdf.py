@@ -87,6 +87,7 @@ def test_snapping_gives_the_real_arm_and_says_what_it_changed(tmp_path):
     np.testing.assert_allclose(got.alpha, real.alpha, atol=1e-12)
     assert "joint j2: angle 1.5708 rad taken as 90 deg" in imported.notes
     assert any("continuous" in note for note in imported.notes)
+    assert got.continuous.tolist() == [False] * 5 + [True]
     path = tmp_path / "arm.yaml"
     write_robot(got, path)
     q = np.random.default_rng(1).uniform(-3, 3, (100, 6))
@@ -132,12 +133,11 @@ def test_fixed_joints_are_merged_and_side_frames_ignored(tmp_path, random):
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        (urdf(REAL_ARM[:5]), "5 revolute joints"),
-        (urdf([*REAL_ARM, REAL_ARM[0]]), "7 revolute joints"),
-        (urdf([("prismatic", *REAL_ARM[0][1:]), *REAL_ARM[1:]]), "type 'prismatic'"),
-        (urdf(limit=""), "has no lower"),
+        (urdf([REAL_ARM[0]] * 11), "11 moving joints"),
+        (urdf([("planar", *REAL_ARM[0][1:]), *REAL_ARM[1:]]), "type 'planar'"),
+        (urdf([("prismatic", *REAL_ARM[0][1:]), *REAL_ARM[1:]], limit=""), "has no lower"),
         (urdf(limit='<limit lower="2" upper="-2" velocity="1"/>'), "lower limit 2 above upper -2"),
-        (urdf(limit='<mimic joint="j1"/><limit lower="-2" upper="2"/>'), "coupled joints"),
+        (urdf(limit='<mimic joint="j1"/><limit lower="-2" upper="2"/>'), "follows 'j1', which is no joint"),
         (urdf([("revolute", "0 0 nan", "0 0 0", "0 0 1"), *REAL_ARM[1:]]), "'0 0 nan'"),
         (urdf([("revolute", "0 0 1", "0 0 0", "0 0 0"), *REAL_ARM[1:]]), "no length"),
         (urdf().replace("<robot", "<sdf").replace("</robot", "</sdf"), "<sdf>"),
