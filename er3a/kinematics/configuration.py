@@ -18,7 +18,7 @@ from er3a.kinematics.by_class import arm_solver, to_rows
 from er3a.kinematics.classes.chain_solvers import SlotName
 from er3a.kinematics.closed_form import BOUNDARY_M, SLOTS
 from er3a.kinematics.singularity import determinant_factors
-from er3a.kinematics.wrist_partitioned import closed_form_missing, wrist_partitioned_arm
+from er3a.kinematics.wrist_partitioned import closed_form_missing, parallel_axes_arm, wrist_partitioned_arm
 from er3a.robots.derived import derived
 from er3a.robots.robot import Robot
 
@@ -38,7 +38,7 @@ LABELS: tuple[BranchLabel, ...] = get_args(BranchLabel)
 
 @derived
 def branch_labels(robot: Robot) -> tuple[BranchLabel, ...]:
-    """The codes of the eight slots.
+    """The codes of the eight slots, of arms with a spherical wrist or with parallel axes 2, 3 and 4.
 
     *front*: the wrist centre is on the side of axis 1 where it is in the manufacturer's zero pose (if it is on axis 1
     there, the side of the cross product of axes 1 and 2); *back*: reached over the head. *up*: with the arm stretched
@@ -49,6 +49,9 @@ def branch_labels(robot: Robot) -> tuple[BranchLabel, ...]:
     ------
     NotWristPartitionedError
     """
+    if parallel_axes_arm(robot) is not None:
+        names = arm_solver(robot).chain.names(to_rows(robot, np.zeros(6)))
+        return tuple(LABELS[LABELS.index(name)] for name in names)  # type: ignore[arg-type]
     arm = wrist_partitioned_arm(robot)
     w1, w2 = arm.axes[0], arm.axes[1]
     labels = []

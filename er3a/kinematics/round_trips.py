@@ -9,17 +9,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from er3a.geometry.angles import wrap_to_pi
 from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.batch import inverse_batch
-from er3a.kinematics.by_class import arm_solver, task_mask
+from er3a.kinematics.by_class import arm_solver, parameters_of, task_mask
 from er3a.kinematics.forward import forward
 from er3a.kinematics.near_singular import NearSingular
 from er3a.kinematics.singularity import determinant_factors
-from er3a.kinematics.wrist_partitioned import closed_form_missing, solve_slots
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.numerics.arrays import Flags, Integers
 from er3a.robots.robot import Robot
 
 SAME_JOINTS_RAD = 1e-6
@@ -27,7 +26,7 @@ NEAR_WRIST_DEG = NEAR_ELBOW_DEG = 0.5
 NEAR_SHOULDER_MM = 1.0
 NEAR = NearSingular(np.radians(NEAR_WRIST_DEG), np.radians(NEAR_ELBOW_DEG), NEAR_SHOULDER_MM / 1000)
 BLOCK = 20_000
-MOST_BY_CLASS = 500
+MOST_BY_CLASS = 500  # poses that arms without a spherical wrist are asked for in validation
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +40,7 @@ class BatchRoundTrips:
     worst_position : m; worst_orientation : rad, of any solution put back through forward kinematics
     own_found : number of poses whose own joint angles are among the solutions (to 1e-6 rad, turns apart)
     worst_own : rad, greatest joint difference between any pose's own angles and the nearest solution
-    counts_within_limits : (9,) int, number of poses with 0 .. 8 solutions within the limits
+    counts_within_limits : (S + 1,) int, number of poses with 0 .. S solutions within the limits, S slots of the class
     """
 
     poses: int
@@ -76,47 +75,34 @@ class SlotRoundTrips:
 def batch_round_trips(robot: Robot, random: np.random.Generator, poses: int) -> BatchRoundTrips:
     """Send that many joint vectors, uniform within the limits, to poses and back.
 
-    Arms with more than six joints are asked at their own redundancy parameter; arms with fewer for what
-    :func:`er3a.kinematics.by_class.task_mask` tells.
+    Arms with more than six joints are asked for solutions at the redundancy parameter of the joints drawn.
     """
     own = random.uniform(robot.lower, robot.upper, size=(poses, robot.joints))
     T = forward(robot, own)
-    plain = closed_form_missing(robot) is None and robot.coupling is None
-    solved = inverse_batch(robot, T) if plain else inverse_batch(robot, T, own)
+    solved = inverse_batch(robot, T, own if parameters_of(robot) else None)
     q, valid = solved.q, solved.solved
     back = forward(robot, q[valid])
     asked = np.repeat(T, valid.sum(axis=1), axis=0)
-    mask = task_mask(robot)
-    if not mask.all():
-        back = _as_far_as_asked(back, asked, mask)
     away = q - own[:, None]
     difference = np.abs(np.where(robot.slides, away, wrap_to_pi(away))).max(axis=2)
     difference = np.where(valid, difference, np.inf).min(axis=1)
+    turned = rotation_angle(back[:, :3, :3], asked[:, :3, :3])
+    if not task_mask(robot).all():  # the arm's task leaves orientation open
+        turned = np.zeros(1)
     return BatchRoundTrips(
         poses=poses,
         solutions=int(valid.sum()),
         worst_position=float(np.linalg.norm(back[:, :3, 3] - asked[:, :3, 3], axis=1).max(initial=0.0)),
-        worst_orientation=float(rotation_angle(back[:, :3, :3], asked[:, :3, :3]).max(initial=0.0)),
+        worst_orientation=float(turned.max(initial=0.0)),
         own_found=int((difference < SAME_JOINTS_RAD).sum()),
         worst_own=float(difference.max()),
-        counts_within_limits=np.bincount(solved.within_limits.sum(axis=1), minlength=valid.shape[1] + 1),
+        counts_within_limits=np.bincount(solved.within_limits.sum(axis=1), minlength=q.shape[1] + 1),
     )
 
 
 def has_class(robot: Robot) -> bool:
     """Whether a class's solver, not random starts, solves the arm."""
     return arm_solver(robot).chain.code != "unsolved"
-
-
-def _as_far_as_asked(back: Reals, asked: Reals, mask: Reals) -> Reals:
-    """Poses (N, 4, 4) with those degrees of freedom set right that a mask (6,) in the tool's frame leaves out."""
-    R = asked[:, :3, :3]
-    shift = np.einsum("nji,nj->ni", R, back[:, :3, 3] - asked[:, :3, 3]) * mask[:3]
-    turn = Rotation.from_matrix(np.swapaxes(R, 1, 2) @ back[:, :3, :3]).as_rotvec() * mask[3:]
-    T = asked.copy()
-    T[:, :3, 3] += np.einsum("nij,nj->ni", R, shift)
-    T[:, :3, :3] = R @ Rotation.from_rotvec(turn).as_matrix()
-    return T
 
 
 def slot_round_trips(robot: Robot, poses: int, seed: int) -> SlotRoundTrips:

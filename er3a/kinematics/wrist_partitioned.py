@@ -16,8 +16,19 @@ from er3a.errors import NotWristPartitionedError
 from er3a.geometry.angles import wrap_to_pi
 from er3a.geometry.vectors import Vector, signed_angle, unsigned_angle
 from er3a.kinematics.block_constants import BlockConstants, block_constants
-from er3a.kinematics.chain import axes_at_zero_theta, row_values
-from er3a.kinematics.closed_form import BOUNDARY_M, BOUNDARY_RAD, FOLD_OFFSET, SLOTS, ArmConstants, solve
+from er3a.kinematics.chain import axes_at_zero_theta, constant_links, row_values
+from er3a.kinematics.classes.four_bar import solve_near_reference
+from er3a.kinematics.classes.parallel_axes import ThreeParallel, three_parallel
+from er3a.kinematics.closed_form import (
+    BOUNDARY_M,
+    BOUNDARY_RAD,
+    FOLD_OFFSET,
+    REACHED,
+    SLOTS,
+    TOO_FAR,
+    ArmConstants,
+    solve,
+)
 from er3a.numerics.arrays import Reals
 from er3a.robots.derived import derived
 from er3a.robots.robot import Robot
@@ -250,10 +261,33 @@ def constants_for_blocks(robot: Robot) -> BlockConstants:
     return block_constants(arm.axes, arm.points, arm.wrist, arm.tool_rotation, arm.wrist_in_tool, arm.elbow_sign)
 
 
+@derived
+def parallel_axes_arm(robot: Robot) -> ThreeParallel | None:
+    """The solver of an arm with axes 2, 3 and 4 parallel and 5 and 6 meeting (UR and its like); None for others."""
+    six = robot.rows == robot.joints == 6 and robot.coupling is None and not robot.sliding.any()
+    if not six or closed_form_missing(robot) is None:
+        return None
+    return three_parallel(constant_links(robot))
+
+
+def has_branches(robot: Robot) -> bool:
+    """Whether the arm has the eight branches of :mod:`er3a.kinematics.configuration`, told by signs of three factors."""
+    return closed_form_missing(robot) is None or parallel_axes_arm(robot) is not None
+
+
+def _slots_of_parallel_axes(
+    robot: Robot, arm: ThreeParallel, T: Reals, q_ref: Reals
+) -> tuple[Reals, NDArray[np.int8], Reals]:
+    x, gap = solve_near_reference(arm, T, robot.direction * q_ref + robot.offset)
+    q = wrap_to_pi(robot.direction * (x - robot.offset))
+    fault = np.where(np.isnan(q[..., 0]), TOO_FAR, REACHED).astype(np.int8)
+    return q, fault, gap
+
+
 def solve_slots(
     robot: Robot, T: Reals, q_ref: Reals, keep_folds: bool = False, keep_free: bool = False
 ) -> tuple[Reals, NDArray[np.int8], Reals]:
-    """All branches for a batch of poses.
+    """All branches for a batch of poses of a wrist-partitioned arm, or of one with parallel axes 2, 3 and 4.
 
     Parameters
     ----------
@@ -265,9 +299,11 @@ def solve_slots(
     Returns
     -------
     q : (N, 8, 6), rad, manufacturer's angles within half a turn of 0 (-pi..pi]; NaN where the slot has no solution
-    fault : (N, 8), int8: REACHED, TOO_FAR, TOO_NEAR, OFF_AXIS or ORIENTATION
+    fault : (N, 8), int8: REACHED, TOO_FAR, TOO_NEAR, OFF_AXIS or ORIENTATION (with parallel axes REACHED or TOO_FAR)
     gap : (N, 8): by how much, in m (rad for ORIENTATION)
     """
+    if (parallel := parallel_axes_arm(robot)) is not None:
+        return _slots_of_parallel_axes(robot, parallel, T, q_ref)
     shape = T.shape[0], SLOTS
     q, fault, gap = np.full((*shape, 6), np.nan), np.zeros(shape, dtype=np.int8), np.zeros(shape)
     T, q_ref = np.ascontiguousarray(T), np.ascontiguousarray(row_values(robot, q_ref))

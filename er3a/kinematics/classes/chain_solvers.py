@@ -145,7 +145,7 @@ class SphericalWrist(_Fixed):
         T = poses_of(self.links, x)
         W = T[:3, 3] + T[:3, :3] @ np.array(k.wrist_in_tool) - np.array(k.point_1)
         side = float(np.cross(w1, w2) @ _turned_back(W, w1, x[0]))
-        return _three_signs(w1, w2, side if abs(side) > BOUNDARY_M else 1.0, wrist_last=True)
+        return _three_signs(w1, w2, side if abs(side) > BOUNDARY_M else 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +174,7 @@ class ParallelAxes(_Fixed):
         T = poses_of(self.arm.links, x)
         W = T[:3, 3] + T[:3, :3] @ np.array(self.arm.constants.wrist_in_tool) - points[0]
         side = float(np.cross(axes[0], axes[1]) @ _turned_back(W, axes[0], x[0]))
-        return _three_signs(axes[0], axes[1], side if abs(side) > BOUNDARY_M else 1.0, wrist_last=False)
+        return _three_signs(axes[0], axes[1], side if abs(side) > BOUNDARY_M else 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -352,8 +352,8 @@ def _turned_back(v: Reals, axis: Reals, angle: float) -> Reals:
     return np.asarray(c * v - s * np.cross(axis, v) + (1 - c) * (axis @ v) * axis)
 
 
-def _three_signs(w1: Reals, w2: Reals, zero_side: float, wrist_last: bool) -> tuple[SlotName, ...]:
-    """Names of the slots ``4 shoulder + 2 elbow + wrist``, or with wrist and elbow exchanged.
+def _three_signs(w1: Reals, w2: Reals, zero_side: float) -> tuple[SlotName, ...]:
+    """Names of the slots ``4 shoulder + 2 elbow + wrist``.
 
     As :func:`er3a.kinematics.configuration.branch_labels`: *front* is where the wrist is in the zero pose; *up*: with
     the arm stretched out level on that side the elbow is above the line from shoulder to wrist.
@@ -361,8 +361,6 @@ def _three_signs(w1: Reals, w2: Reals, zero_side: float, wrist_last: bool) -> tu
     names = []
     for slot in range(8):
         shoulder, elbow, wrist = slot // 4, slot // 2 % 2, slot % 2
-        if not wrist_last:
-            elbow, wrist = wrist, elbow
         outward = (-1.0 if shoulder == 0 else 1.0) * np.cross(w1, w2)
         back = (outward @ np.cross(w1, w2)) * zero_side < 0
         down = (1.0 if elbow == 0 else -1.0) * (np.cross(w2, outward) @ w1) >= 0

@@ -69,9 +69,7 @@ def _angles(k: SphericalConstants, turn: Reals, angles: Reals, least: Reals) -> 
         R = turn[n]
         for slot in range(SLOTS):
             sign = 1.0 - 2.0 * slot
-            a, b, c, valid, near = three_angles(
-                k, R[0, 2], R[1, 2], R[2, 2], R[0, 0], R[1, 0], R[2, 0], sign
-            )
+            a, b, c, valid, near = three_angles(k, R[0, 2], R[1, 2], R[2, 2], R[0, 0], R[1, 0], R[2, 0], sign)
             one = 1.0 if valid > 0.0 else np.nan
             angles[n, slot, 0], angles[n, slot, 1], angles[n, slot, 2] = a * one, b * one, c * one
             least[n] = near
