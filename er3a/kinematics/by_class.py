@@ -29,7 +29,7 @@ from er3a.robots.robot import Robot
 
 SAME_ROW = 1e-6  # rad or parts of the arm's size
 SOLVES = 1e-9
-STARTS = {CONTINUUM: 240, 1: 60}
+STARTS = 240
 SMALLEST_PART = 64
 SCANNED = 16  # values of a redundancy parameter from which self-motions are collected
 
@@ -144,8 +144,8 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
     found = [to_rows(robot, rows), solver.chain.seeds(T, values)]
     if chain.error(to_rows(robot, q_ref)) < 1e-11:
         found.insert(0, to_rows(robot, q_ref)[None])
-    if certainty != CERTAIN and not solver.chain.parameters:
-        found.append(chain.roots(_starts(robot, STARTS[certainty])))
+    if certainty == CONTINUUM and solver.chain.code in ("general_six", "six_one_prismatic"):
+        found.append(chain.roots(_starts(robot, STARTS)))
     candidates = np.concatenate(found)
     curves, alone = [], []
     for x in candidates:

@@ -16,8 +16,8 @@ from er3a.robots.joint_limits import limit_margin, nearest_equivalent, within
 from er3a.robots.robot import Robot
 
 LAPS = 6  # a curve that turns a joint is followed over so many of its laps at most
-HALVINGS = 40
-NARROWINGS = 24
+SPLIT, SPLITS = 16, 11
+NARROWINGS = 10
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -168,10 +168,10 @@ def _least(cost, lengths: Reals, best: int, closed: bool) -> float:  # type: ign
         low = lengths[-2] - lengths[-1]
     at = float(lengths[best])
     for _ in range(NARROWINGS):
-        t = np.append(np.linspace(low, high, 7), at)
+        t = np.append(np.linspace(low, high, 13), at)
         costs = cost(t)
         at = float(t[int(costs.argmin())])
-        half = (high - low) / 6
+        half = (high - low) / 12
         low, high = max(at - half, low), min(at + half, high)
     return at
 
@@ -200,11 +200,9 @@ def _range(motion: SelfMotionCurve) -> Reals:
             continue
         first = int(ok.argmin())
         good, bad = (reach[first - 1] if first else 0.0), reach[first]
-        for _ in range(HALVINGS):
-            middle = 0.5 * (good + bad)
-            if within(robot, motion.members(np.array([side * middle])))[0]:
-                good = middle
-            else:
-                bad = middle
+        for _ in range(SPLITS):
+            parts = np.linspace(good, bad, SPLIT + 1)
+            last = int(np.append(within(robot, motion.members(side * parts[1:-1])), False).argmin())
+            good, bad = parts[last], parts[last + 1]
         ends.append(side * good)
     return np.array(ends)

@@ -21,13 +21,19 @@ import numpy as np
 from er3a.geometry.vectors import Vector, cross, dot, subtract
 from er3a.kinematics.chain import arm_length, constant_links, row_values
 from er3a.kinematics.forward import checked_joints, jacobian, rows_of, step_row, turn_row
-from er3a.kinematics.wrist_partitioned import closed_form_missing, parallel_axes_arm, wrist_partitioned_arm
+from er3a.kinematics.wrist_partitioned import (
+    closed_form_missing,
+    has_branches,
+    parallel_axes_arm,
+    wrist_partitioned_arm,
+)
 from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.derived import derived
 from er3a.robots.robot import Robot
 
 SingularityType = Literal["wrist", "elbow", "shoulder"]
+EventType = SingularityType | Literal["dependent_axes"]
 TYPES: tuple[SingularityType, ...] = ("wrist", "elbow", "shoulder")
 ROUNDING = 6 * np.finfo(float).eps
 
@@ -111,6 +117,14 @@ def determinant_factors(robot: Robot, q: Reals) -> DeterminantFactors:
     links = constant_links(robot)
     _factors(row_values(robot, q).reshape(-1, 6), robot.direction, robot.offset, links, wrist_in_tool, to_axis_4, out)
     return DeterminantFactors(*(out[:, k].reshape(q.shape[:-1]) for k in range(3)))
+
+
+def factors_where_defined(robot: Robot, q: Reals) -> DeterminantFactors:
+    """The same; NaN for arms whose determinant does not factor this way (see :mod:`er3a.kinematics.rank_loss`)."""
+    if has_branches(robot):
+        return determinant_factors(robot, q)
+    nothing = np.full(np.shape(q)[:-1], np.nan)
+    return DeterminantFactors(nothing, nothing, nothing)
 
 
 @kernel

@@ -333,7 +333,7 @@ def polish_rows(links: Reals, size: float, T: Reals, q: Reals, apart: bool) -> N
             for j in range(6):
                 row[j] -= TURN * np.ceil((row[j] - np.pi) / TURN)
             for other in range(slot if apart else 0):
-                distance = 0.0
+                distance = np.inf if np.isnan(q[n, other, 0]) else 0.0
                 for j in range(6):
                     away = row[j] - q[n, other, j]
                     distance = max(distance, abs(away - TURN * np.round(away / TURN)))

@@ -1,8 +1,8 @@
 """Curves of joint values that keep the tool at rest: traced by steps along the Jacobian's null space.
 
 A step goes along the direction of the null space that is nearest to the last one, so the curve runs on through points
-where two curves cross; Newton's steps of least length, blind to directions without a clear singular value, bring it back
-[1]_. Lengths are in units of the chain's size.
+where two curves cross; Newton's steps of least length, blind to directions without a clear singular value, bring it
+back [1]_. Lengths are in units of the chain's size.
 
 References
 ----------
@@ -23,6 +23,7 @@ from er3a.numerics.jit import kernel
 
 STEP = np.radians(2.0)  # greatest joint move between two points of a curve
 MOST_POINTS = 4000
+REGULAR = 1e-6  # pivots of J J^T above this part of the largest diagonal entry
 TRUNCATED = 1e-5  # singular values below this part of the largest are no directions
 SOLVES = 1e-11
 ON_CURVE = 1e-9
@@ -33,7 +34,7 @@ LOST, CLOSED, OPEN = 0, 1, 2
 
 @kernel
 def error_and_jacobian(links: Reals, sliding: Flags, T: Reals, x: Reals, e: Reals, J: Reals) -> float:
-    """Fill the pose error ``e`` (6,) and ``J`` (6, n); returns the error's largest component (at least 1 beyond 90 deg)."""
+    """Fill the pose error ``e`` (6,) and ``J`` (6, n); returns the error's largest component, at least 1 beyond 90 deg."""
     n = x.shape[0]
     frame, other = links[0].copy(), np.empty((4, 4))
     for k in range(n):
@@ -69,9 +70,58 @@ def error_and_jacobian(links: Reals, sliding: Flags, T: Reals, x: Reals, e: Real
 
 
 @kernel
+def least_step(J: Reals, e: Reals, out: Reals) -> bool:
+    """``out`` (n,) = the shortest x with ``J x = e`` by Cholesky factors of ``J J^T``; False if J is nearly dependent."""
+    n = J.shape[1]
+    M, y = np.empty((6, 6)), np.empty(6)
+    most = 0.0
+    for r in range(6):
+        for c in range(r + 1):
+            total = 0.0
+            for k in range(n):
+                total += J[r, k] * J[c, k]
+            M[r, c] = total
+        most = max(most, M[r, r])
+    for c in range(6):
+        for k in range(c):
+            M[c, c] -= M[c, k] * M[c, k]
+        if not M[c, c] > REGULAR * most:
+            return False
+        M[c, c] = np.sqrt(M[c, c])
+        for r in range(c + 1, 6):
+            for k in range(c):
+                M[r, c] -= M[r, k] * M[c, k]
+            M[r, c] /= M[c, c]
+    for r in range(6):
+        y[r] = e[r]
+        for k in range(r):
+            y[r] -= M[r, k] * y[k]
+        y[r] /= M[r, r]
+    for r in range(5, -1, -1):
+        for k in range(r + 1, 6):
+            y[r] -= M[k, r] * y[k]
+        y[r] /= M[r, r]
+    for k in range(n):
+        out[k] = 0.0
+        for r in range(6):
+            out[k] += J[r, k] * y[r]
+    return True
+
+
+@kernel
 def null_share(J: Reals, v: Reals, out: Reals) -> int:
     """``out`` (n,) = the part of v in the null space of J (6, n); returns the null space's dimension."""
-    U, s, Vt = np.linalg.svd(J, False)
+    n = J.shape[1]
+    if n > 6:
+        moved = np.zeros(6)
+        for r in range(6):
+            for k in range(n):
+                moved[r] += J[r, k] * v[k]
+        if least_step(J, moved, out):
+            for k in range(n):
+                out[k] = v[k] - out[k]
+            return n - 6
+    _, s, Vt = np.linalg.svd(J, False)
     out[:] = v
     dimension = J.shape[1]
     for r in range(s.shape[0]):
@@ -88,7 +138,7 @@ def null_share(J: Reals, v: Reals, out: Reals) -> int:
 @kernel
 def onto_curve(links: Reals, sliding: Flags, T: Reals, x: Reals, e: Reals, J: Reals) -> float:
     """Newton's steps of least length; returns the error that is left."""
-    least = np.inf
+    least, step = np.inf, np.empty(x.shape[0])
     for _ in range(25):
         error = error_and_jacobian(links, sliding, T, x, e, J)
         if error < 1e-15 or (error < SOLVES and error >= 0.5 * least):
@@ -96,6 +146,10 @@ def onto_curve(links: Reals, sliding: Flags, T: Reals, x: Reals, e: Reals, J: Re
         if error > 0.5:
             return error
         least = min(least, error)
+        if x.shape[0] > 6 and least_step(J, e, step):
+            for k in range(x.shape[0]):
+                x[k] += step[k]
+            continue
         U, s, Vt = np.linalg.svd(J, False)
         for r in range(s.shape[0]):
             if s[r] > TRUNCATED * s[0]:
@@ -117,7 +171,7 @@ def free_direction(links: Reals, sliding: Flags, T: Reals, x: Reals, v: Reals) -
     n = x.shape[0]
     e, J, y = np.empty(6), np.empty((6, n)), np.empty(n)
     error_and_jacobian(links, sliding, T, x, e, J)
-    U, s, Vt = np.linalg.svd(J, True)
+    _, s, Vt = np.linalg.svd(J, True)
     dimension = n
     for r in range(s.shape[0]):
         if s[r] > TRUNCATED * s[0]:
@@ -211,7 +265,10 @@ def between(links: Reals, sliding: Flags, T: Reals, points: Reals, at: Reals, ou
 
 @kernel
 def roots_from_starts(links: Reals, sliding: Flags, T: Reals, starts: Reals, out: Reals) -> int:
-    """Fill ``out`` (k, n) with joint values that solve the pose, one for each start (k, n) that leads to one; how many."""
+    """Fill ``out`` (k, n) with joint values that solve the pose, one for each start (k, n) that leads to one.
+
+    Returns how many.
+    """
     n = starts.shape[1]
     e, J, y = np.empty(6), np.empty((6, n)), np.empty(n)
     count = 0

@@ -71,7 +71,12 @@ ARM_CLASSES = {
     "unsolved": N_("no class"),
 }
 SIDES = {"front": N_("front"), "back": N_("back")}
-SINGULARITIES = {"wrist": N_("wrist"), "elbow": N_("elbow"), "shoulder": N_("shoulder")}
+SINGULARITIES = {
+    "wrist": N_("wrist"),
+    "elbow": N_("elbow"),
+    "shoulder": N_("shoulder"),
+    "dependent_axes": N_("rank loss"),
+}
 LIMIT_SIDES = {
     "above": N_("J{joint} at {at:.1f} deg is {by:.3g} deg above its limit of {bound:g} deg"),
     "below": N_("J{joint} at {at:.1f} deg is {by:.3g} deg below its limit of {bound:g} deg"),

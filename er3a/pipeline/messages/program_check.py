@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import er3a.pipeline.messages.collision
 import er3a.pipeline.messages.pairs
 import er3a.pipeline.messages.planning  # noqa: F401
 from er3a.kinematics.singularity import SingularityType

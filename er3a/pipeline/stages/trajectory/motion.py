@@ -87,7 +87,7 @@ def motion_of(
     InputError
         for what :func:`er3a.planning.build.build` refuses, and a start branch that has no solution at the start
     """
-    command = entry.command(source)
+    command = entry.command(source, robot)
     if isinstance(command, PlanCommand) and task is not None:
         return _planned(task, entry, command, checks_per_sample)
     built = build(robot, command, ends)

@@ -32,7 +32,7 @@ class PartOfProgram:
         """What kind of path it is."""
         return self.part.kind
 
-    def command(self, source: CommandSource) -> Command:
+    def command(self, source: CommandSource, robot: Robot) -> Command:
         """The path in SI units."""
         return self.part.command(source)
 

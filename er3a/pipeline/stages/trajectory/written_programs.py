@@ -46,7 +46,7 @@ def written(
         told = tuple(HEAD + line for line in (*head, *map(head_line, unsafe)))
         poses = np.linalg.inv(robot.base) @ forward(robot, joints[known])
         return {".csv": write_csv(times[known], joints[known], poses, told)}, unsafe
-    command = motion.entry.command(CommandSource())
+    command = motion.entry.command(CommandSource(), robot)
     if isinstance(command, PlanCommand):  # a planned motion is written as the points that its samples are
         times = Times(motion.samples, np.arange(len(motion.samples)))
         command = JointTableCommand(motion.joints(motion.samples), times)
