@@ -151,7 +151,7 @@ def _started_any(a, alpha, d, sliding, T, starts, found):
     z, p = np.empty((n, 3)), np.empty((n, 3))
     for start in range(starts.shape[0]):
         q = starts[start].copy()
-        for turn in range(60):
+        for _ in range(60):
             A = np.eye(4)
             for k in range(n):
                 z[k], p[k] = A[:3, 2], A[:3, 3]
@@ -193,9 +193,16 @@ def special_rows(random: np.random.Generator) -> str:
     arms, poses, lost, more, roots, wrong, unsure, worst = 0, 100, 0, 0, 0, 0, 0, 0.0
     missed = np.empty((32, 6))
     while arms < SPECIAL_ARMS:
-        alpha = [random.choice([0, H, -H, np.pi, random.uniform(-3, 3)], p=[0.15, 0.25, 0.25, 0.05, 0.3]) for _ in "6 rows"]
+        alpha = [
+            random.choice([0, H, -H, np.pi, random.uniform(-3, 3)], p=[0.15, 0.25, 0.25, 0.05, 0.3]) for _ in "6 rows"
+        ]
         a, d = (
-            np.array([random.choice([0, 0.1, 0.3, 0.5, random.uniform(-1, 1)], p=[0.45, 0.1, 0.1, 0.05, 0.3]) for _ in "6 rows"])
+            np.array(
+                [
+                    random.choice([0, 0.1, 0.3, 0.5, random.uniform(-1, 1)], p=[0.45, 0.1, 0.1, 0.05, 0.3])
+                    for _ in "6 rows"
+                ]
+            )
             for _ in range(2)
         )
         alpha = np.array(alpha)
@@ -246,7 +253,8 @@ def singular_row(name: str, robot: Robot, joints: np.ndarray, random: np.random.
         count = _started_any(robot.a, robot.alpha, robot.d, robot.sliding, T, starts, found)
         roots += count
         missed += sum(int(not _told(robot, far, row)) for row in found[:count])
-    return f"| {name} | {poses} | {lost} | {lost_far} | {missed} of {roots} | {invented} | {differ} | {motions / poses:.1f} |"
+    told = f"{lost} | {lost_far} | {missed} of {roots} | {invented} | {differ}"
+    return f"| {name} | {poses} | {told} | {motions / poses:.1f} |"
 
 
 def _told(robot: Robot, solutions, q: np.ndarray) -> bool:
@@ -272,8 +280,14 @@ def singular_rows(random: np.random.Generator):
         for joint, value in fixed.items():
             q[:, joint] = value
         yield singular_row(name, robot, q if len(fixed) < 6 else q[:1], random)
-    for name, robot in (("iiwa", arm_of(IIWA)), ("Panda", arm_of(PANDA)), ("Puma on a track", arm_of(TRACK, [1] + [0] * 6))):
-        yield singular_row(name, robot, random.uniform(-2.8, 2.8, (SINGULAR, 7)) * np.where(robot.sliding, 0.3, 1), random)
+    for name, robot in (
+        ("iiwa", arm_of(IIWA)),
+        ("Panda", arm_of(PANDA)),
+        ("Puma on a track", arm_of(TRACK, [1] + [0] * 6)),
+    ):
+        yield singular_row(
+            name, robot, random.uniform(-2.8, 2.8, (SINGULAR, 7)) * np.where(robot.sliding, 0.3, 1), random
+        )
 
 
 def other_rows(random: np.random.Generator):
@@ -359,6 +373,8 @@ def table() -> str:
         [
             "# Other classes of arms",
             "",
+            "Written by `make campaigns ARGS=classes`.",
+            "",
             f"{POSES:,} poses for each arm, of random joint angles. *Lost*: poses whose own joint angles are not among",
             f"the rows; *by starts*: roots that starts from everywhere found on {STARTED:,} of the poses, and how many",
             "of them are not among the rows; *twice*: poses with two rows within 1e-6 rad; *invented*: rows that miss",
@@ -371,8 +387,8 @@ def table() -> str:
             "",
             "## Singular poses, and more than six joints",
             "",
-            "By `inverse`, each with its own joints as the reference and with none. *Own lost*: the own joints are not a",
-            "row (own reference); *untold*: they are neither a row nor on a self-motion (no reference); *missed*: of what",
+            "By `inverse`, with the own joints as the reference and with none. *Own lost*: the own joints are no row",
+            "(own reference); *untold*: they are neither a row nor on a self-motion (no reference); *missed*: of what",
             "120 starts found, what is neither; *invented*: rows that miss the pose by more than 1e-8; *differ*: rows of",
             "`inverse_batch` that `inverse` does not give; self-motions a pose.",
             "",

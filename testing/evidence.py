@@ -23,6 +23,7 @@ ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 PAGES = (
     "kinematics",
+    "classes",
     "singularities",
     "speed",
     "diagnosis",

@@ -18,7 +18,7 @@ from er3a.geometry.transforms import as_floats
 from er3a.kinematics.chain import constant_links, joint_starts, row_values
 from er3a.kinematics.classes.chain_solvers import ArmClassCode, ChainSolver, Redundancy, Unsolved, chain_solver
 from er3a.kinematics.classes.links import size_of
-from er3a.kinematics.classes.self_motion import PoseChain
+from er3a.kinematics.classes.self_motion import Curve, PoseChain
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM
 from er3a.kinematics.self_motions import SelfMotionCurve, self_motion_of
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -82,7 +82,7 @@ def arm_solver(robot: Robot) -> ArmSolver:
     if robot.coupling is not None:
         if robot.rows != robot.joints or abs(np.linalg.det(robot.coupling)) < 1e-9:
             return ArmSolver(Unsolved(robot.joints), links, sliding, size_of(links))
-        uncouple = np.linalg.inv(robot.coupling)
+        uncouple = np.asarray(np.linalg.inv(robot.coupling), dtype=float)
     return ArmSolver(chain_solver(links, sliding), links, sliding, size_of(links), uncouple)
 
 
@@ -149,7 +149,8 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
     if certainty == CONTINUUM and solver.chain.code in ("general_six", "six_one_prismatic"):
         found.append(chain.roots(_starts(robot, STARTS)))
     candidates = np.concatenate(found)
-    curves, alone = [], []
+    curves: list[Curve] = []
+    alone: list[Reals] = []
     for x in candidates:
         if any(chain.holds(curve, x) for curve in curves):
             continue
@@ -216,7 +217,7 @@ def _away(robot: Robot, rows: Reals, other: Reals) -> Reals:
 def slots_of_class(
     robot: Robot, T: Reals, q_ref: Reals, values: Reals, threads: int = 1
 ) -> tuple[Reals, Integers, dict[int, Settled]]:
-    """All slots for poses (N, 4, 4): joint values (N, S, n) by the turns nearest to the reference (N, n); certainty (N,).
+    """All slots for poses (N, 4, 4): joint values (N, S, n), the turns nearest to the reference (N, n), and certainty.
 
     Poses at which branches meet, or that left a doubt, are settled one by one; those are told by their number.
     """

@@ -35,7 +35,7 @@ LOST, CLOSED, OPEN = 0, 1, 2
 
 @kernel
 def error_and_jacobian(links: Reals, sliding: Flags, T: Reals, x: Reals, e: Reals, J: Reals) -> float:
-    """Fill the pose error ``e`` (6,) and ``J`` (6, n); returns the error's largest component, at least 1 beyond 90 deg."""
+    """Fill the pose error ``e`` (6,) and ``J`` (6, n); returns its largest component, at least 1 beyond 90 deg."""
     n = x.shape[0]
     frame, other = links[0].copy(), np.empty((4, 4))
     for k in range(n):
@@ -72,7 +72,7 @@ def error_and_jacobian(links: Reals, sliding: Flags, T: Reals, x: Reals, e: Real
 
 @kernel
 def least_step(J: Reals, e: Reals, out: Reals) -> bool:
-    """``out`` (n,) = the shortest x with ``J x = e`` by Cholesky factors of ``J J^T``; False if J is nearly dependent."""
+    """``out`` (n,) = the shortest x with ``J x = e`` by factors of ``J J^T``; False if J is nearly dependent."""
     n = J.shape[1]
     M, y = np.empty((6, 6)), np.empty(6)
     most = 0.0
@@ -112,7 +112,7 @@ def least_step(J: Reals, e: Reals, out: Reals) -> bool:
 @kernel
 def null_share(J: Reals, v: Reals, out: Reals) -> int:
     """``out`` (n,) = the part of v in the null space of J (6, n); returns the null space's dimension."""
-    n = J.shape[1]
+    n: int = J.shape[1]
     if n > 6:
         moved = np.zeros(6)
         for r in range(6):
@@ -124,7 +124,7 @@ def null_share(J: Reals, v: Reals, out: Reals) -> int:
             return n - 6
     _, s, Vt = np.linalg.svd(J, False)
     out[:] = v
-    dimension = J.shape[1]
+    dimension: int = J.shape[1]
     for r in range(s.shape[0]):
         if s[r] > TRUNCATED * s[0]:
             dimension -= 1
@@ -169,7 +169,7 @@ def free_direction(links: Reals, sliding: Flags, T: Reals, x: Reals, v: Reals) -
 
     Returns the null space's dimension there, 0 if no step in any of its directions stays on the pose.
     """
-    n = x.shape[0]
+    n: int = x.shape[0]
     e, J, y = np.empty(6), np.empty((6, n)), np.empty(n)
     error_and_jacobian(links, sliding, T, x, e, J)
     _, s, Vt = np.linalg.svd(J, True)
