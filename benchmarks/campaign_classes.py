@@ -1,7 +1,7 @@
 """Solvers of further classes of arms: completeness against starts from everywhere, and times beside the peers'.
 
-*Own arm*: each pose is made of random joint angles, which must be among the rows. *Starts*: a damped Newton's method of
-this file's own, from random joint angles until 60 successes in a row bring nothing new, on some of the poses.
+*Own arm*: each pose is made of random joint values, which must be among the rows. *Starts*: a damped Newton's method of
+this file's own, from random joint values until 60 successes in a row bring nothing new, on some of the poses.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ import numba
 import numpy as np
 from eaik.IK_DH import DhRobot
 
-from er3a import forward, inverse_batch, load_robot
+from er3a import Robot, forward, inverse, inverse_batch, jacobian, load_robot
+from er3a.kinematics.by_class import task_mask
 from er3a.kinematics.classes.arm_angle import arm_angle_arm, solve_at_arm_angle
 from er3a.kinematics.classes.four_bar import solve_three_parallel
 from er3a.kinematics.classes.links import links_of_rows, poses_of
@@ -23,6 +24,7 @@ from er3a.kinematics.classes.six_revolute import prepared, solve_six_revolute
 
 POSES = int(os.environ.get("CLASSES_POSES", "10000"))
 STARTED, SEED, ROUNDS = POSES // 20, 20261121, 5
+SPECIAL_ARMS, SINGULAR = POSES // 50, POSES // 400
 H = np.pi / 2
 UR5 = ([0, -0.425, -0.39225, 0, 0, 0], [H, 0, 0, H, -H, 0], [0.089159, 0, 0, 0.10915, 0.09465, 0.0823])
 CRX = ([0, 0.71, 0, 0, 0, 0], [-H, np.pi, -H, H, -H, np.pi], [0, 0, 0, -0.54, 0.15, -0.16])
@@ -30,6 +32,11 @@ PUMA = ([0, 0.4318, 0.0203, 0, 0, 0], [H, 0, -H, H, -H, 0], [0, 0, 0.15005, 0.43
 MANSEUR_DOTY = ([0.3, 1, 0, 1.5, 0, 0], [H, np.radians(1), H, np.radians(1), H, np.radians(1)], [0, 0, 0.2, 0, 0, 0])
 JACO = ([0, 0.41, 0, 0, 0, 0], [H, np.pi, H, 1.0472, 1.0472, np.pi], [0.2755, 0, -0.0098, -0.2501, -0.0856, -0.2228])
 IIWA = ([0] * 7, [-H, H, H, -H, -H, H, 0], [0.34, 0, 0.4, 0, 0.4, 0, 0.126])
+PANDA = ([0, 0, 0.0825, -0.0825, 0, 0.088, 0], [-H, H, H, -H, H, H, 0], [0.333, 0, 0.316, 0, 0.384, 0, 0.107])
+TRACK = ([0, *PUMA[0]], [H, *PUMA[1]], [0, *PUMA[2]])
+STANFORD = ([0] * 6, [-H, H, 0, -H, H, 0], [0.412, 0.154, 0, 0, 0, 0.263])
+SCARA = ([0.325, 0.225, 0, 0], [0, np.pi, 0, 0], [0.4, 0, 0.1, 0.05])
+VERTICAL_5 = ([0, 0.3, 0.25, 0, 0], [H, 0, 0, H, 0], [0.3, 0, 0, 0, 0.1])
 NEAR = (1e-6, 1e-4, 1e-2)
 
 
@@ -136,6 +143,184 @@ def arms(random: np.random.Generator):
             yield f"{name}, all entries off by up to {size:g}", near
 
 
+@numba.njit(error_model="numpy")
+def _started_any(a, alpha, d, sliding, T, starts, found):
+    """Joint values (k, n) to which starts (k, n) lead, into ``found``; how many."""
+    n, count = a.shape[0], 0
+    J, e = np.empty((6, n)), np.empty(6)
+    z, p = np.empty((n, 3)), np.empty((n, 3))
+    for start in range(starts.shape[0]):
+        q = starts[start].copy()
+        for _ in range(60):
+            A = np.eye(4)
+            for k in range(n):
+                z[k], p[k] = A[:3, 2], A[:3, 3]
+                angle, shift = (0.0, d[k] + q[k]) if sliding[k] else (q[k], d[k])
+                c, s, ca, sa = np.cos(angle), np.sin(angle), np.cos(alpha[k]), np.sin(alpha[k])
+                B = np.eye(4)
+                B[0, 0], B[0, 1], B[0, 2], B[0, 3] = c, -s * ca, s * sa, a[k] * c
+                B[1, 0], B[1, 1], B[1, 2], B[1, 3] = s, c * ca, -c * sa, a[k] * s
+                B[2, 1], B[2, 2], B[2, 3] = sa, ca, shift
+                A = A @ B
+            R = T[:3, :3] @ A[:3, :3].T
+            e[:3] = T[:3, 3] - A[:3, 3]
+            e[3], e[4], e[5] = 0.5 * (R[2, 1] - R[1, 2]), 0.5 * (R[0, 2] - R[2, 0]), 0.5 * (R[1, 0] - R[0, 1])
+            if np.abs(e).max() < 1e-12 and R[0, 0] + R[1, 1] + R[2, 2] > 2.0:
+                found[count] = q
+                count += 1
+                break
+            for k in range(n):
+                J[:3, k] = z[k] if sliding[k] else np.cross(z[k], A[:3, 3] - p[k])
+                J[3:, k] = 0.0 * z[k] if sliding[k] else z[k]
+            M = J.T @ J
+            for k in range(n):
+                M[k, k] += 1e-2 * np.sum(e * e) + 1e-14
+            q += np.linalg.solve(M, J.T @ e)
+    return count
+
+
+def arm_of(rows, sliding=None, most: float = 2 * np.pi) -> Robot:
+    """A robot of D-H rows, with limits of that many rad, or 1 m, either way."""
+    a, alpha, d = (np.array(column, float) for column in rows)
+    slides = np.zeros(len(a), bool) if sliding is None else np.array(sliding, bool)
+    limit = np.where(slides, 1.0, most)
+    ones = np.ones(len(a))
+    return Robot("made", "made", "standard", a, alpha, d, ones, 0 * ones, -limit, limit, sliding=slides)
+
+
+def special_rows(random: np.random.Generator) -> str:
+    """Arms whose lengths and angles are often 0, 90 deg or equal, that have full rank: one line for all."""
+    arms, poses, lost, more, roots, wrong, unsure, worst = 0, 100, 0, 0, 0, 0, 0, 0.0
+    missed = np.empty((32, 6))
+    while arms < SPECIAL_ARMS:
+        alpha = [
+            random.choice([0, H, -H, np.pi, random.uniform(-3, 3)], p=[0.15, 0.25, 0.25, 0.05, 0.3]) for _ in "6 rows"
+        ]
+        a, d = (
+            np.array(
+                [
+                    random.choice([0, 0.1, 0.3, 0.5, random.uniform(-1, 1)], p=[0.45, 0.1, 0.1, 0.05, 0.3])
+                    for _ in "6 rows"
+                ]
+            )
+            for _ in range(2)
+        )
+        alpha = np.array(alpha)
+        q = random.uniform(-np.pi, np.pi, (poses, 6))
+        robot = arm_of((a, alpha, d))
+        if np.linalg.svd(jacobian(robot, q[0]), compute_uv=False)[-1] < 1e-6:
+            continue
+        arms += 1
+        T = forward(robot, q)
+        found = inverse_batch(robot, T)
+        own = np.abs(turned(found.q - q[:, None])).max(axis=2)
+        lost += int((np.nanmin(np.where(np.isnan(own), 9, own), axis=1) > 1e-4).sum())
+        back = np.abs(forward(robot, np.nan_to_num(found.q)) - T[:, None]).max(axis=(2, 3))[found.solved]
+        wrong, worst = wrong + int((back > 1e-9).sum()), max(worst, float(back.max()))
+        unsure += 0 if found.certain is None else int((~found.certain).sum())
+        for n in range(3):
+            count = _started(a, alpha, d, T[n], n, missed)
+            roots += count
+            each = found.q[n][found.solved[n]]
+            more += sum(int(np.abs(turned(each - row)).max(axis=1).min(initial=9) > 1e-3) for row in missed[:count])
+    return (
+        f"| {arms} arms of special geometry, {poses} poses each | {lost} | {more} of {roots} | - "
+        f"| {wrong} ({worst:.0e}) | {unsure} | - | - |"
+    )
+
+
+def held(motion, q: np.ndarray) -> bool:
+    """Whether joint values lie on a self-motion, by the points of its curve."""
+    return motion.chain.holds(motion.curve, q)
+
+
+def singular_row(name: str, robot: Robot, joints: np.ndarray, random: np.random.Generator) -> str:
+    """Singular poses by ``inverse``: the own arm, and what starts find, among rows and self-motions."""
+    poses = len(joints)
+    lost, lost_far, missed, roots, invented, differ, motions = 0, 0, 0, 0, 0, 0, 0
+    found = np.empty((120, robot.joints))
+    for q in joints:
+        T = forward(robot, q)
+        single, far = inverse(robot, T, q), inverse(robot, T)
+        batch = inverse_batch(robot, T[None], q)
+        lost += int(np.abs(single.q - q).max(axis=1).min(initial=9) > 1e-6)
+        lost_far += int(not _told(robot, far, q))
+        motions += len(single.families)
+        invented += int((np.abs(forward(robot, single.q) - T).max(axis=(1, 2)) > 1e-8).sum())
+        rows = batch.q[0][batch.solved[0]]
+        differ += sum(int(np.abs(single.q - row).max(axis=1).min(initial=9) > 1e-8) for row in rows)
+        starts = random.uniform(-1, 1, found.shape) * np.where(robot.sliding, 1.0, np.pi)
+        count = _started_any(robot.a, robot.alpha, robot.d, robot.sliding, T, starts, found)
+        roots += count
+        missed += sum(int(not _told(robot, far, row)) for row in found[:count])
+    told = f"{lost} | {lost_far} | {missed} of {roots} | {invented} | {differ}"
+    return f"| {name} | {poses} | {told} | {motions / poses:.1f} |"
+
+
+def _told(robot: Robot, solutions, q: np.ndarray) -> bool:
+    """Whether joint values are a row, turns aside, or lie on a self-motion (limits aside)."""
+    away = solutions.q - q
+    away = np.abs(np.where(robot.slides, away, turned(away))).max(axis=1).min(initial=9)
+    return away < 2e-4 or any(held(motion, q) for motion in solutions.families)
+
+
+def singular_rows(random: np.random.Generator):
+    """Lines of singular poses and of arms with more than six joints."""
+    ur, crx = arm_of(UR5), arm_of(CRX)
+    for name, robot, fixed in (
+        ("UR5, q5 = 0", ur, {4: 0.0}),
+        ("UR5, q5 = 180 deg", ur, {4: np.pi}),
+        ("UR5, arm stretched", ur, {2: 0.0}),
+        ("UR5, stretched, q5 = 0", ur, {2: 0.0, 4: 0.0}),
+        ("CRX, q5 = 0", crx, {4: 0.0}),
+        ("CRX, q3 = q5 = 0", crx, {2: 0.0, 4: 0.0}),
+        ("CRX, all at 0", crx, dict.fromkeys(range(6), 0.0)),
+    ):
+        q = random.uniform(-3, 3, (SINGULAR, 6))
+        for joint, value in fixed.items():
+            q[:, joint] = value
+        yield singular_row(name, robot, q if len(fixed) < 6 else q[:1], random)
+    for name, robot in (
+        ("iiwa", arm_of(IIWA)),
+        ("Panda", arm_of(PANDA)),
+        ("Puma on a track", arm_of(TRACK, [1] + [0] * 6)),
+    ):
+        yield singular_row(
+            name, robot, random.uniform(-2.8, 2.8, (SINGULAR, 7)) * np.where(robot.sliding, 0.3, 1), random
+        )
+
+
+def other_rows(random: np.random.Generator):
+    """Lines of arms with sliding joints, and with fewer than six."""
+    short = tuple(column[:5] for column in UR5)
+    for name, robot in (
+        ("Stanford (RRP, spherical wrist)", arm_of(STANFORD, [0, 0, 1, 0, 0, 0])),
+        ("SCARA", arm_of(SCARA, [0, 0, 1, 0])),
+        ("five axes, vertical", arm_of(VERTICAL_5)),
+        ("UR5 without joint 6", arm_of(short)),
+        ("Puma on a track", arm_of(TRACK, [1] + [0] * 6)),
+        ("iiwa", arm_of(IIWA)),
+        ("Panda", arm_of(PANDA)),
+    ):
+        poses = POSES if robot.joints != 6 else POSES // 10
+        q = random.uniform(robot.lower, robot.upper, (poses, robot.joints))
+        T = forward(robot, q)
+        begin = time.process_time()
+        found = inverse_batch(robot, T, q)
+        took = (time.process_time() - begin) / poses * 1e6
+        away = found.q - q[:, None]
+        own = np.abs(np.where(robot.slides, away, turned(away))).max(axis=2)
+        lost = int((np.nanmin(np.where(np.isnan(own), 9, own), axis=1) > 1e-6).sum())
+        task = task_mask(robot)
+        back = np.abs(forward(robot, np.nan_to_num(found.q)) - T[:, None])
+        wrong = back[..., :3, 3].max(axis=2) if not task.all() else back.max(axis=(2, 3))
+        code, slots = found.method.arm_class, found.q.shape[1]
+        yield (
+            f"| {name} | {code} | {slots} | {poses:,} | {lost} | {wrong[found.solved].max():.0e} "
+            f"| {found.solved.sum(axis=1).mean():.1f} | {took:.1f} |"
+        )
+
+
 def least(*runs: Callable[[], object]) -> list[float]:
     """Least processor time of each, all in turn."""
     best = [np.inf] * len(runs)
@@ -188,6 +373,8 @@ def table() -> str:
         [
             "# Other classes of arms",
             "",
+            "Written by `make campaigns ARGS=classes`.",
+            "",
             f"{POSES:,} poses for each arm, of random joint angles. *Lost*: poses whose own joint angles are not among",
             f"the rows; *by starts*: roots that starts from everywhere found on {STARTED:,} of the poses, and how many",
             "of them are not among the rows; *twice*: poses with two rows within 1e-6 rad; *invented*: rows that miss",
@@ -196,6 +383,24 @@ def table() -> str:
             "| arm | lost | missed by starts | twice | invented | unsure | us a pose | poses by number of solutions |",
             "|---|---|---|---|---|---|---|---|",
             *(general_row(name, rows, random) for name, rows in arms(random)),
+            special_rows(random),
+            "",
+            "## Singular poses, and more than six joints",
+            "",
+            "By `inverse`, with the own joints as the reference and with none. *Own lost*: the own joints are no row",
+            "(own reference); *untold*: they are neither a row nor on a self-motion (no reference); *missed*: of what",
+            "120 starts found, what is neither; *invented*: rows that miss the pose by more than 1e-8; *differ*: rows of",
+            "`inverse_batch` that `inverse` does not give; self-motions a pose.",
+            "",
+            "| poses of | poses | own lost | untold | missed | invented | differ | self-motions |",
+            "|---|---|---|---|---|---|---|---|",
+            *singular_rows(random),
+            "",
+            "## Sliding joints, fewer than six, more than six at the own redundancy parameter",
+            "",
+            "| arm | class | slots | poses | own lost | worst miss (m or 1) | rows a pose | us a pose |",
+            "|---|---|---|---|---|---|---|---|",
+            *other_rows(random),
             "",
             "## Times",
             "",

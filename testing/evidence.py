@@ -22,6 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 PAGES = (
     "kinematics",
+    "classes",
     "singularities",
     "speed",
     "diagnosis",

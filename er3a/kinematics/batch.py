@@ -39,7 +39,8 @@ def inverse_batch(
 
     At a singularity of a wrist-partitioned arm both branches that meet keep their slots: a free joint has its value of
     ``q_ref`` in one and half a turn more in the other. Of other arms a self-motion has the member nearest to ``q_ref``
-    in a slot, and chains for which no class knows all solutions have what iteration finds. The numbers do not depend on the number of threads, nor on a pose's place in the batch.
+    in a slot, and chains for which no class knows all solutions have what iteration finds. The numbers do not depend on
+    the number of threads, nor on a pose's place in the batch.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ from er3a.geometry.transforms import as_floats
 from er3a.kinematics.chain import constant_links, joint_starts, row_values
 from er3a.kinematics.classes.chain_solvers import ArmClassCode, ChainSolver, Redundancy, Unsolved, chain_solver
 from er3a.kinematics.classes.links import size_of
-from er3a.kinematics.classes.self_motion import PoseChain
+from er3a.kinematics.classes.self_motion import Curve, PoseChain
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM
 from er3a.kinematics.self_motions import SelfMotionCurve, self_motion_of
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -29,6 +29,8 @@ from er3a.robots.robot import Robot
 
 SAME_ROW = 1e-6  # rad or parts of the arm's size
 SOLVES = 1e-9
+MAYBE_SAME = 1e-2  # rad
+SPREAD = 1e-11
 STARTS = 240
 SMALLEST_PART = 64
 SCANNED = 16  # values of a redundancy parameter from which self-motions are collected
@@ -80,7 +82,7 @@ def arm_solver(robot: Robot) -> ArmSolver:
     if robot.coupling is not None:
         if robot.rows != robot.joints or abs(np.linalg.det(robot.coupling)) < 1e-9:
             return ArmSolver(Unsolved(robot.joints), links, sliding, size_of(links))
-        uncouple = np.linalg.inv(robot.coupling)
+        uncouple = np.asarray(np.linalg.inv(robot.coupling), dtype=float)
     return ArmSolver(chain_solver(links, sliding), links, sliding, size_of(links), uncouple)
 
 
@@ -147,7 +149,8 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
     if certainty == CONTINUUM and solver.chain.code in ("general_six", "six_one_prismatic"):
         found.append(chain.roots(_starts(robot, STARTS)))
     candidates = np.concatenate(found)
-    curves, alone = [], []
+    curves: list[Curve] = []
+    alone: list[Reals] = []
     for x in candidates:
         if any(chain.holds(curve, x) for curve in curves):
             continue
@@ -160,7 +163,7 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
     single = single.reshape(-1, len(solver.sliding))
     motions = [each for curve in curves for each in self_motion_of(robot, T, chain, curve, q_ref)]
     motions.sort(key=lambda motion: (not motion.within_limits, float(np.linalg.norm(motion.q0 - q_ref))))
-    return Settled(_apart(robot, to_joints(robot, single)), tuple(motions))
+    return Settled(_apart(robot, to_joints(robot, single), chain), tuple(motions))
 
 
 def all_motions(robot: Robot, T: Reals, q_ref: Reals, values: Reals) -> Settled:
@@ -174,7 +177,9 @@ def all_motions(robot: Robot, T: Reals, q_ref: Reals, values: Reals) -> Settled:
         span = robot.direction[j] * span + joint_starts(robot)[j]
     grid = np.concatenate([values, span[:, None]])
     q = class_rows(robot, np.broadcast_to(T, (len(grid), 4, 4)), grid).q.reshape(-1, robot.joints)
-    return settle(robot, T, q[np.isfinite(q[:, 0])], q_ref, values, CERTAIN)
+    solver = arm_solver(robot)
+    more = to_joints(robot, solver.poses_at(T).roots(_starts(robot, STARTS)))  # curves between the values scanned
+    return settle(robot, T, np.concatenate([q[np.isfinite(q[:, 0])], more]), q_ref, values, CERTAIN)
 
 
 def _starts(robot: Robot, count: int) -> Reals:
@@ -183,21 +188,36 @@ def _starts(robot: Robot, count: int) -> Reals:
     return random.uniform(-1, 1, (count, len(solver.sliding))) * np.where(solver.sliding, 1.5, np.pi)
 
 
-def _apart(robot: Robot, rows: Reals) -> Reals:
-    """Rows (k, n) without those that stand twice, in order of their joints."""
+def _apart(robot: Robot, rows: Reals, chain: PoseChain | None = None) -> Reals:
+    """Rows (k, n) without those that stand twice.
+
+    Newton's method leaves a root of higher order spread: with ``chain``, rows that are nearer than what an error of
+    ``SPREAD`` makes of them there are one.
+    """
     kept: list[Reals] = []
     for row in rows:
-        away = [row - other for other in kept]
-        away = [np.where(robot.slides, step, step - TURN * np.round(step / TURN)) for step in away]
-        if all(np.abs(step).max() > SAME_ROW for step in away):
+        for other in kept:
+            away = _away(robot, row, other)
+            apart = float(np.abs(away).max())
+            if apart < SAME_ROW:
+                break
+            if chain is not None and apart < MAYBE_SAME and apart * chain.smallest(to_rows(robot, row)) < SPREAD:
+                break
+        else:
             kept.append(row)
     return np.array(kept).reshape(-1, robot.joints)
+
+
+def _away(robot: Robot, rows: Reals, other: Reals) -> Reals:
+    """Rows less others, angles by the shorter way."""
+    away = rows - other
+    return np.where(robot.slides, away, away - TURN * np.round(away / TURN))
 
 
 def slots_of_class(
     robot: Robot, T: Reals, q_ref: Reals, values: Reals, threads: int = 1
 ) -> tuple[Reals, Integers, dict[int, Settled]]:
-    """All slots for poses (N, 4, 4): joint values (N, S, n) by the turns nearest to the reference (N, n); certainty (N,).
+    """All slots for poses (N, 4, 4): joint values (N, S, n), the turns nearest to the reference (N, n), and certainty.
 
     Poses at which branches meet, or that left a doubt, are settled one by one; those are told by their number.
     """
@@ -222,7 +242,7 @@ def _in_slots(robot: Robot, rows: Reals, settled: Settled) -> Reals:
     reference, and what was found besides takes free slots."""
     kept, left = np.full_like(rows, np.nan), []
     for row in settled.alone:
-        away = np.where(robot.slides, rows - row, rows - row - TURN * np.round((rows - row) / TURN))
+        away = _away(robot, rows, row)
         far = np.where(np.isnan(rows[:, 0]), np.inf, np.abs(away).max(axis=1))
         slot = int(far.argmin())
         if far[slot] < SAME_ROW and np.isnan(kept[slot, 0]):
@@ -242,7 +262,7 @@ def slot_of(robot: Robot, T: Reals, q: Reals) -> int:
     """The slot of joint values (n,) that solve a pose (4, 4); 0 if they are none of its class's rows."""
     values = checked_parameters(robot, None, q[None], 1)
     rows = class_rows(robot, T[None], values).q[0]
-    away = np.where(robot.slides, rows - q, rows - q - TURN * np.round((rows - q) / TURN))
+    away = _away(robot, rows, q)
     far = np.where(np.isnan(rows[:, 0]), np.inf, np.abs(away).max(axis=1))
     return int(far.argmin()) if far.min() < SAME_ROW else 0
 

@@ -129,7 +129,8 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None) ->
         if bool(near.solved) and not solver.parameters:  # the class missed it
             branches, rows, certain = [0], [_rows_of_branch(robot, near.q, q_ref)], False
         else:
-            miss = NearestMiss(float(near.position_error) * 1000, float(np.degrees(near.rotation_error)))
+            position, rotation = (float(np.asarray(error)) for error in (near.position_error, near.rotation_error))
+            miss = NearestMiss(position * 1000, float(np.degrees(rotation)))
             unsolved = (PoseUnsolved(0, NoSolutionOfClass(miss)),)
     q, branch = _stacked(branches, rows, robot.joints)
     inside = within(robot, q)

@@ -26,7 +26,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
 
 AnyArm = tuple[Reals, Reals, Reals, Flags, Reals, Reals]
-"""Direction (m,), start (m,), links (m + 1, 4, 4), sliding (m,), coupling (m, n), and each joint's unit (n,), 1 or m."""
+"""Direction (m,), start (m,), links (m + 1, 4, 4), sliding (m,), coupling (m, n), each joint's unit (n,), 1 or m."""
 
 
 @kernel
@@ -139,7 +139,8 @@ def _evaluate(arm: AnyArm, T: Reals, mask: Reals, length: float, x: Reals, e: Re
         e[3 + i] *= mask[3 + i]
         for j in range(n):
             J[i, j], J[3 + i, j] = linear[i, j] * units[j] * mask[i] / length, angular[i, j] * units[j] * mask[3 + i]
-    position, rotation = np.sqrt(e[:3] @ e[:3]), np.sqrt(e[3:] @ e[3:])
+    position: float = np.sqrt(e[0] ** 2 + e[1] ** 2 + e[2] ** 2)
+    rotation: float = np.sqrt(e[3] ** 2 + e[4] ** 2 + e[5] ** 2)
     e[:3] /= length
     return position, rotation
 

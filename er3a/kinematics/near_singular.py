@@ -50,7 +50,7 @@ class NearSingular:
         """Least of the ratios (N,) at joint angles (N, 6) in rad; -1 where they are NaN, for unreachable poses."""
         if not has_branches(robot):
             smallest = np.linalg.svd(scaled_jacobian(robot, q), compute_uv=False)[..., -1]
-            return np.nan_to_num(smallest / self.smallest, nan=-1.0)
+            return np.asarray(np.nan_to_num(smallest / self.smallest, nan=-1.0))
         ratios = self.ratios(determinant_factors(robot, q))
         return np.where(np.isnan(ratios[0]), -1.0, ratios.min(axis=0))
 

@@ -2,9 +2,9 @@
 
 Columns of joints that slide, and linear rows, are scaled by the arm's length. With six joints the determinant changes
 sign where the motion crosses the singular set. With more, or fewer, rank loss is told by the smallest singular value.
-Between two samples nothing is missed: turning joint j by d changes the scaled Jacobian by at most ``B_j d`` in norm, and
-no singular value by more [1]_, so an interval whose middle has a larger one than its joints' travel allows to lose
-is clear; others are halved. Axes are named by the smallest set of columns that are dependent there.
+Between two samples nothing is missed: turning joint j by d changes the scaled Jacobian by at most ``B_j d`` in norm,
+and no singular value by more [1]_, so an interval whose ends have larger ones than its joints' travel can take away is
+clear; others are halved. Axes are named by the smallest set of columns that are dependent there.
 
 References
 ----------
@@ -111,8 +111,8 @@ def rank_losses(
 
 def _smallest_and_sign(robot: Robot, q: Reals) -> tuple[Reals, Reals]:
     J = scaled_jacobian(robot, q)
-    smallest = np.linalg.svd(J, compute_uv=False)[..., -1]
-    sign = np.sign(np.linalg.det(J)) if robot.joints == 6 else np.ones(len(q))
+    smallest = np.asarray(np.linalg.svd(J, compute_uv=False)[..., -1], dtype=float)
+    sign = np.asarray(np.sign(np.linalg.det(J))) if robot.joints == 6 else np.ones(len(q))
     return smallest, sign
 
 

@@ -80,7 +80,7 @@ def _place_of(lengths: Reals, t: Reals, closed: bool) -> Reals:
     """Places counted in points of the curve, for lengths along it."""
     lap, last = lengths[-1], len(lengths) - 1
     laps = np.floor(t / lap) if closed else np.zeros_like(t)
-    return np.interp(t - laps * lap, lengths, np.arange(len(lengths))) + laps * last
+    return np.asarray(np.interp(t - laps * lap, lengths, np.arange(len(lengths))) + laps * last)
 
 
 def self_motion_of(robot: Robot, T: Reals, chain: PoseChain, curve: Curve, q_ref: Reals) -> list[SelfMotionCurve]:

@@ -159,7 +159,7 @@ class SideUnsolved:
 
 @dataclass(frozen=True)
 class PoseUnsolved:
-    """Why a pose has no solution by its class, or why iteration found none, which is numbered as the poses lie in memory."""
+    """Why a pose has no solution by the arm's class, or iteration found none; numbered as the poses lie in memory."""
 
     pose: int
     why: NotFound
@@ -178,7 +178,7 @@ class Solutions(Displayed):
 
     Attributes
     ----------
-    q : (..., n), rad or m, the manufacturer's values; NaN in empty slots. ``inverse`` gives each branch once per turn that
+    q : (..., n), rad or m, manufacturer's values; NaN in empty slots. ``inverse`` gives each branch once per turn that
         the limits allow, or once if it leaves them; ``inverse_batch`` of the turns within the limits the nearest to the
         reference, else the nearest to the limits; ``solve`` the nearest arm found where it solves nothing
     solved : (...,) bool, whether this is a solution

@@ -93,9 +93,14 @@ class ChainSolver(Protocol):
     separate the solutions.
     """
 
-    code: ArmClassCode
-    slots: int
-    parameters: tuple[Redundancy, ...]
+    @property
+    def code(self) -> ArmClassCode: ...
+
+    @property
+    def slots(self) -> int: ...
+
+    @property
+    def parameters(self) -> tuple[Redundancy, ...]: ...
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]: ...
 
@@ -305,7 +310,7 @@ class LockedJoint:
             for value in np.unique(own):
                 at = own == value
                 rest = chain_solver(*held(self.links, self.sliding, self.joint, float(value)))
-                q[np.ix_(at, np.arange(rest.slots), others)], certainty[at] = rest.rows(T[at], values[at, 1:])
+                q[np.ix_(at, np.arange(rest.slots), np.array(others))], certainty[at] = rest.rows(T[at], values[at, 1:])
         q[:, :, self.joint] = np.where(np.isnan(q[:, :, others[0]]), np.nan, own[:, None])
         return q, certainty
 

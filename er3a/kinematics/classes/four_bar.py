@@ -133,7 +133,7 @@ def solve_near_reference(arm: ThreeParallel, T: Reals, x_ref: Reals) -> tuple[Re
         for family in found:
             phi = turn_of_three(arm, x_ref[n])
             for elbow in (0, 1):
-                member = family.members(np.array(family.nearest(phi)), elbow)
+                member = family.members(np.array(family.nearest(float(phi))), elbow)
                 for shoulder in family.shoulders:
                     q[n, 4 * shoulder + 2 * elbow : 4 * shoulder + 2 * elbow + 2] = member
     return q, _gaps(arm, T, q)

@@ -27,6 +27,7 @@ REGULAR = 1e-6  # pivots of J J^T above this part of the largest diagonal entry
 TRUNCATED = 1e-5  # singular values below this part of the largest are no directions
 SOLVES = 1e-11
 ON_CURVE = 1e-9
+SOLVES_AS_ROOT = 1e-12
 FEW_HALVINGS = 6
 PROBE = 2e-3
 LOST, CLOSED, OPEN = 0, 1, 2
@@ -34,7 +35,7 @@ LOST, CLOSED, OPEN = 0, 1, 2
 
 @kernel
 def error_and_jacobian(links: Reals, sliding: Flags, T: Reals, x: Reals, e: Reals, J: Reals) -> float:
-    """Fill the pose error ``e`` (6,) and ``J`` (6, n); returns the error's largest component, at least 1 beyond 90 deg."""
+    """Fill the pose error ``e`` (6,) and ``J`` (6, n); returns its largest component, at least 1 beyond 90 deg."""
     n = x.shape[0]
     frame, other = links[0].copy(), np.empty((4, 4))
     for k in range(n):
@@ -71,7 +72,7 @@ def error_and_jacobian(links: Reals, sliding: Flags, T: Reals, x: Reals, e: Real
 
 @kernel
 def least_step(J: Reals, e: Reals, out: Reals) -> bool:
-    """``out`` (n,) = the shortest x with ``J x = e`` by Cholesky factors of ``J J^T``; False if J is nearly dependent."""
+    """``out`` (n,) = the shortest x with ``J x = e`` by factors of ``J J^T``; False if J is nearly dependent."""
     n = J.shape[1]
     M, y = np.empty((6, 6)), np.empty(6)
     most = 0.0
@@ -111,7 +112,7 @@ def least_step(J: Reals, e: Reals, out: Reals) -> bool:
 @kernel
 def null_share(J: Reals, v: Reals, out: Reals) -> int:
     """``out`` (n,) = the part of v in the null space of J (6, n); returns the null space's dimension."""
-    n = J.shape[1]
+    n: int = J.shape[1]
     if n > 6:
         moved = np.zeros(6)
         for r in range(6):
@@ -123,7 +124,7 @@ def null_share(J: Reals, v: Reals, out: Reals) -> int:
             return n - 6
     _, s, Vt = np.linalg.svd(J, False)
     out[:] = v
-    dimension = J.shape[1]
+    dimension: int = J.shape[1]
     for r in range(s.shape[0]):
         if s[r] > TRUNCATED * s[0]:
             dimension -= 1
@@ -168,7 +169,7 @@ def free_direction(links: Reals, sliding: Flags, T: Reals, x: Reals, v: Reals) -
 
     Returns the null space's dimension there, 0 if no step in any of its directions stays on the pose.
     """
-    n = x.shape[0]
+    n: int = x.shape[0]
     e, J, y = np.empty(6), np.empty((6, n)), np.empty(n)
     error_and_jacobian(links, sliding, T, x, e, J)
     _, s, Vt = np.linalg.svd(J, True)
@@ -264,6 +265,31 @@ def between(links: Reals, sliding: Flags, T: Reals, points: Reals, at: Reals, ou
 
 
 @kernel
+def _to_rounding(links: Reals, sliding: Flags, T: Reals, x: Reals, e: Reals, J: Reals) -> float:
+    """Onto a curve, or to a root where the Jacobian is nearly singular: there each step halves what is missing."""
+    error = onto_curve(links, sliding, T, x, e, J)
+    best, least = x.copy(), error
+    for _ in range(40):
+        if least < SOLVES_AS_ROOT * 1e-2:
+            break
+        U, s, Vt = np.linalg.svd(J, False)
+        for r in range(s.shape[0]):
+            if s[r] > 1e-12 * s[0]:
+                along = 0.0
+                for i in range(6):
+                    along += U[i, r] * e[i]
+                along = max(min(along / s[r], 1e-2), -1e-2)
+                for k in range(x.shape[0]):
+                    x[k] += along * Vt[r, k]
+        error = error_and_jacobian(links, sliding, T, x, e, J)
+        if error < least:
+            best[:] = x
+            least = error
+    x[:] = best
+    return least
+
+
+@kernel
 def roots_from_starts(links: Reals, sliding: Flags, T: Reals, starts: Reals, out: Reals) -> int:
     """Fill ``out`` (k, n) with joint values that solve the pose, one for each start (k, n) that leads to one.
 
@@ -286,7 +312,7 @@ def roots_from_starts(links: Reals, sliding: Flags, T: Reals, starts: Reals, out
                 M[i, i] += damping
             step = np.linalg.solve(M, J.T @ e)
             y += step
-        if solved and onto_curve(links, sliding, T, y, e, J) < ON_CURVE:
+        if solved and _to_rounding(links, sliding, T, y, e, J) < SOLVES_AS_ROOT:
             for i in range(n):
                 if not sliding[i]:
                     y[i] -= TURN * np.ceil((y[i] - np.pi) / TURN)
@@ -338,6 +364,12 @@ class PoseChain:
         """Largest component of the pose error, rad and parts of the size, at joint values (n,)."""
         n = len(self.sliding)
         return error_and_jacobian(self.links, self.sliding, self.T, self._scaled(x), np.empty(6), np.empty((6, n)))
+
+    def smallest(self, x: Reals) -> float:
+        """Smallest singular value of the scaled Jacobian at joint values (n,)."""
+        J = np.empty((6, len(self.sliding)))
+        error_and_jacobian(self.links, self.sliding, self.T, self._scaled(x), np.empty(6), J)
+        return float(np.linalg.svd(J, compute_uv=False)[-1])
 
     def roots(self, starts: Reals) -> Reals:
         """Solutions (k, n) that starts (many, n), rad and parts of the size, lead to; members of curves among them."""

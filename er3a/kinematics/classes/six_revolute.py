@@ -25,6 +25,7 @@ from er3a.numerics.jit import kernel
 SLOTS = 16
 SAME_ZERO = 1e-9  # rad: zeros of two intervals that overlap
 SAME = 1e-6  # rad: nearer rows are one
+SPREAD = 1e-11  # rad
 MAYBE_SAME = 1e-2  # rad: rows nearer than this are one if what lies midway solves the pose too
 DARK = 200.0  # noise is taken as so many times what it was measured to be
 LOUD = 1e-7
@@ -188,13 +189,13 @@ def _by_reading(
                     away = m.candidate[reading.joint[2]] * reading.sense - m.zeros[z, 0]
                     away -= 2 * np.pi * np.round(away / (2 * np.pi))
                     solved = solved or abs(away) < 1e-2
-                    rows = _add(links, pose, m, m.candidate, q, rows)
+                    rows = _add(links, pose, m, m.candidate, pivot, q, rows)
                     if pivot < 1e-3 and twin_start(
                         links, m.sliding, pose, m.candidate, m.start, m.frames, m.J, m.columns
                     ):
-                        residual, _ = newton(links, m.sliding, pose, m.start, 12, m.frames, m.J, m.dq, m.columns)
+                        residual, pivot = newton(links, m.sliding, pose, m.start, 12, m.frames, m.J, m.dq, m.columns)
                         if residual < SOLVES:
-                            rows = _add(links, pose, m, m.start, q, rows)
+                            rows = _add(links, pose, m, m.start, pivot, q, rows)
         if m.zeros[z, 2] == 0.0 or not solved:
             verdict = UNCERTAIN
     # Complex zeros come in pairs, and each zero tells a solution of its own.
@@ -204,8 +205,12 @@ def _by_reading(
 
 
 @kernel
-def _add(links: Reals, pose: Reals, m: LoopMemory, found: Reals, q: Reals, rows: int) -> int:
-    """Add a row unless it stands there."""
+def _add(links: Reals, pose: Reals, m: LoopMemory, found: Reals, pivot: float, q: Reals, rows: int) -> int:
+    """Add a row unless it stands there.
+
+    Where the Jacobian's last pivot is small, rows are known to ``SPREAD / pivot`` only: a root of higher order comes
+    spread by as much.
+    """
     for k in range(6):
         if not m.sliding[k]:
             found[k] -= 2 * np.pi * np.ceil((found[k] - np.pi) / (2 * np.pi))
@@ -218,7 +223,7 @@ def _add(links: Reals, pose: Reals, m: LoopMemory, found: Reals, q: Reals, rows:
                 away -= 2 * np.pi * np.round(away / (2 * np.pi))
             apart = max(apart, abs(away))
             middle[k] = q[r, k] + 0.5 * away
-        if apart < SAME:
+        if apart < SAME or (apart < MAYBE_SAME and pivot * apart < SPREAD):
             return rows
         if apart < MAYBE_SAME and residual_and_jacobian(links, m.sliding, pose, middle, m.frames, m.J) < SOLVES:
             return rows
