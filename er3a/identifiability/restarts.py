@@ -63,7 +63,9 @@ def _nearest_open(found: Tables, table: Tables, asked: Asked) -> Tables:
     for _, chosen in zip(range(MOST_TOGETHER), sets_of(flips)):
         for start in range(0, len(chosen), CHUNK):
             tables = changed(found, flips, chosen[start : start + CHUNK])
-            met = (asked.plain_violation(tables) <= MET).all(axis=1) if asked.plain else np.ones(len(tables), dtype=bool)
+            met = (
+                (asked.plain_violation(tables) <= MET).all(axis=1) if asked.plain else np.ones(len(tables), dtype=bool)
+            )
             every.append(tables[np.flatnonzero(met)])
     tables = join(every)
     for i in _by_distance(tables, table).tolist():
