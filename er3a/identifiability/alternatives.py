@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.identifiability.entries import entries_of
 from er3a.identifiability.feasible import MET
 from er3a.identifiability.flips import Flip, changed, flips_of, sets_of
 from er3a.identifiability.requirements import Asked
@@ -18,6 +19,7 @@ from er3a.identifiability.tool_motion import ToolOff, ToolRange
 from er3a.kinematics.table_batch import Tables
 from er3a.numerics.arrays import Flags, Reals
 from er3a.references.seen import TableEntry
+from er3a.robots.robot import Robot
 
 CHUNK = 1024
 NO_WORSE = 1e-6
@@ -60,6 +62,16 @@ def gauge_flips(tool: ToolRange, flips: Sequence[Flip], most: int = 3) -> list[t
             same = np.abs(_signatures(tool, tool.table, flips, sets) - own).max(axis=1) < SAME_TOOL
             found += [each for each, equal in zip(sets, same) if equal]
     return [tuple(name for i in each for name in flips[i].entries) for each in found]
+
+
+def with_readings(table: Tables, robot: Robot, readings: Sequence[Alternative]) -> Tables:
+    """A table (a batch of one) with the entries of several alternatives."""
+    by_name = {entry.name: entry for entry in entries_of(robot)}
+    for name, value in (pair for each in readings for pair in each.entries):
+        if name in by_name:
+            entry = by_name[name]
+            table = table.with_column(entry.column, [entry.joint - 1], np.full((1, 1), value / entry.in_unit))
+    return table
 
 
 def alternatives_to(table: Tables, asked: Asked, tool: ToolRange) -> list[Alternative]:

@@ -93,14 +93,15 @@ class Extents:
         if not self.met:
             return Extent(np.nan, np.nan, NOT_OFF, bool(self._blamed(factors)))
         toward = factors[self.speaking]
-        high, above = self.region.extent(self.start, toward)
-        low, below = self.region.extent(self.start, -toward)
-        low = -low
+        above, below = self.region.extent(self.start, toward), self.region.extent(self.start, -toward)
+        high, low = above.value, -below.value
         excluded = not low - ALREADY <= 0 <= high + ALREADY and not self._could_stay(toward)
         if not excluded:
             low, high = min(low, 0.0), max(high, 0.0)
         off = self._off(factors, low).worse(self._off(factors, high))
-        return Extent(value + low * factor, value + high * factor, off, excluded, not (above and below))
+        return Extent(
+            value + low * factor, value + high * factor, off, excluded, not (above.finished and below.finished)
+        )
 
     def _values(self) -> list[float]:
         return [float(getattr(self.table, e.column)[0, e.joint - 1] * e.in_unit) for e in self.entries]

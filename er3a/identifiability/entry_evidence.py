@@ -9,6 +9,7 @@ from typing import Literal
 from er3a.identifiability.alternatives import Alternative
 from er3a.identifiability.entries import EntryUnit
 from er3a.identifiability.tool_motion import NOT_OFF, ToolOff
+from er3a.kinematics.table_batch import Tables
 from er3a.references.reference import Reference
 from er3a.robots.robot import Robot
 
@@ -77,6 +78,15 @@ class EntryEvidence:
 
 
 @dataclass(frozen=True, eq=False)
+class OtherTable:
+    """Another table (a batch of one): the one that evidence describes where it excludes the robot's, or one that it
+    can't tell from the robot's, with all that is open at once."""
+
+    table: Tables
+    code: Literal["described", "allowed"]
+
+
+@dataclass(frozen=True, eq=False)
 class Evidence:
     """What references say about a table.
 
@@ -89,6 +99,7 @@ class Evidence:
     allowed : those that all trusted references allow
     unmet : documents without any table near this one that meets all that they say
     table_meets : whether the table as it is meets all independent references
+    other : None where no other table was found
     """
 
     robot: Robot
@@ -100,6 +111,7 @@ class Evidence:
     allowed: tuple[Alternative, ...]
     unmet: tuple[str, ...]
     table_meets: bool
+    other: OtherTable | None
 
     def __getitem__(self, entry: str) -> EntryEvidence:
         return self._by_name[entry]

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import cached_property
 from math import isnan
 
-from er3a.identifiability.alternatives import Alternative, alternatives_to, gauge_flips
+from er3a.identifiability.alternatives import Alternative, alternatives_to, gauge_flips, with_readings
 from er3a.identifiability.continuous import Extent, Extents
 from er3a.identifiability.entries import (
     TableNumber,
@@ -15,7 +15,7 @@ from er3a.identifiability.entries import (
     document_of,
     entries_of,
 )
-from er3a.identifiability.entry_evidence import EntryEvidence, Evidence, OtherReading, Status, Tolerance
+from er3a.identifiability.entry_evidence import EntryEvidence, Evidence, OtherReading, OtherTable, Status, Tolerance
 from er3a.identifiability.feasible import MET
 from er3a.identifiability.flips import flips_of
 from er3a.identifiability.gauge import Gauge, gauge_of
@@ -95,7 +95,20 @@ class _Judge:
             allowed=tuple(self._alternatives_of(self.trusted)),
             unmet=self._unmet(),
             table_meets=all(each.table_meets for each in self._extents.values()),
+            other=self._other(),
         )
+
+    def _other(self) -> OtherTable | None:
+        extents, asked = self._extents_of(self.trusted), self._asked_of(self._geometric(self.trusted))
+        if not extents.table_meets:
+            return OtherTable(extents.met_by, "described") if extents.met else None
+        table, taken = self.table, list[Alternative]()
+        for each in self._alternatives_of(self.trusted):
+            changed = with_readings(table, self.robot, [each])
+            apart = not {name for other in taken for name in other.names} & set(each.names)
+            if apart and (not len(asked) or asked.violation(asked.off(changed, afresh=True)).max() <= MET):
+                table, taken = changed, [*taken, each]
+        return OtherTable(table, "allowed") if taken else None
 
     def _unmet(self) -> tuple[str, ...]:
         without = [own for own, each in self._extents.items() if not each.met]

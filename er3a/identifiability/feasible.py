@@ -69,6 +69,15 @@ class OpenTable:
         return self.excess <= MET
 
 
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """How far a search came: a value, whether it came to its end, and the amounts (k,) of an open table there."""
+
+    value: float
+    finished: bool
+    amounts: Reals
+
+
 def farthest(table: Tables) -> float:
     """How far in mm a length is looked for from the table's: all its lengths together, a metre at least."""
     return max(float(np.abs(table.a).sum() + np.abs(table.d).sum()) * 1000.0, LEAST_MM)
@@ -174,19 +183,19 @@ class Region:
                 break
         return amounts, off
 
-    def extent(self, start: OpenTable, toward: Reals) -> tuple[float, bool]:
-        """How far the set extends from a start along ``toward`` (k,), and whether the search came to its end."""
+    def extent(self, start: OpenTable, toward: Reals) -> Reached:
+        """How far the set extends from a start along ``toward`` (k,)."""
         kinks = self._kinks(start) & (toward == 0)
         ways = [self.gauge] + ([np.concatenate([self.gauge, np.eye(len(toward))[kinks]])] if kinks.any() else [])
         found = [Region(self.asked, self.table, self.entries, held)._followed(start, toward) for held in ways]
-        return max(found)
+        return max(found, key=lambda reached: (reached.value, reached.finished))
 
     def _kinks(self, start: OpenTable) -> Flags:
         if self._kinked is None:
             self._kinked = self.asked.kinked(self.at(start.amounts), self.entries)
         return self._kinked
 
-    def _followed(self, start: OpenTable, toward: Reals) -> tuple[float, bool]:
+    def _followed(self, start: OpenTable, toward: Reals) -> Reached:
         """The extent along one way, as far as it goes."""
         amounts, off, slope = start.amounts, start.off, start.slope
         places, trust, finished = start.places, FIRST_TRUST, False
@@ -214,7 +223,7 @@ class Region:
         while len(passed) > 1 and self.excess(self.off(passed[-1], afresh=True)) > FOLLOWED:
             passed.pop()
             finished = False
-        return float(toward @ passed[-1]), finished
+        return Reached(float(toward @ passed[-1]), finished, passed[-1])
 
     def _allowed(self, off: Reals, chi2: float) -> bool:
         likely = (off[self.asked.likely] ** 2).sum()

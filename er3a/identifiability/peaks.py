@@ -44,7 +44,7 @@ def peak(function: Function, lower: Reals, upper: Reals, points: Reals | None = 
     """
     points = box_points(lower, upper) if points is None else points
     values = function(points)
-    starts = points[_best_apart(points, values)]
+    starts = points[best_apart(points, values, STARTS)]
     ends = [climb(function, start, lower, upper) for start in starts]
     return max(ends, key=lambda end: end[1])
 
@@ -72,13 +72,14 @@ def climb(function: Function, q: Reals, lower: Reals, upper: Reals) -> tuple[Rea
     return q, here
 
 
-def _best_apart(points: Reals, values: Reals) -> list[int]:
+def best_apart(points: Reals, values: Reals, count: int) -> list[int]:
+    """Places of up to ``count`` points (P, d) with the greatest values (P,), none near a better one."""
     order = np.argsort(-values, kind="stable")
     chosen: list[int] = []
-    for i in order[: 8 * STARTS]:
+    for i in order:
         if all(np.abs(points[i] - points[k]).max() > LONGEST_STEP for k in chosen):
             chosen.append(int(i))
-        if len(chosen) == STARTS:
+        if len(chosen) == count:
             break
     return chosen
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from er3a.identifiability.entries import TableNumber, shifted
 from er3a.identifiability.extreme_climb import climb_to_extreme, measure_code
-from er3a.identifiability.peaks import box_points, climb, peak
+from er3a.identifiability.peaks import best_apart, box_points, climb, peak
 from er3a.kinematics.table_batch import Tables, frames_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.references.predict import state_of_tables
@@ -27,7 +27,7 @@ LIKELY = 4.0  # standard deviations, beyond which a discrete alternative is excl
 SLIGHT = 1e-3  # of a half-width
 SLOPE_STEP = 1e-3  # of an entry's scale
 SCANNED, WATCHED, OVERTAKEN_M = 512, 48, 1e-9
-ACROSS, OVERTAKINGS = np.linspace(0.0, 1.0, 9), 4
+ACROSS, OVERTAKINGS, CLIMBS = np.linspace(0.0, 1.0, 9), 4, 6
 KINK_STEP, KINK = 1.0, 1.0  # of an entry's scale, and of a half-width
 
 
@@ -109,13 +109,12 @@ class FollowedExtreme:
         """The extreme in mm of a table (a batch of one)."""
         if self.code is not None:
             lower, upper = table.lower[0], table.upper[0]
-            q = self.q if self.known else np.zeros(self.count)
-            shares = self.watched if self.known else self.scanned
-            points = np.zeros((1 + len(shares), self.count))
-            points[0] = np.clip(q, np.minimum(lower, upper), np.maximum(lower, upper))
-            points[1:, self.joints] = lower[self.joints] + shares * (upper - lower)[self.joints]
-            points[0, 0] = 0.0
-            joints, value, last = np.array(self.joints), -np.inf, points
+            if not self.known:
+                self.q = self._scanned(table, self.code)
+            q = np.clip(self.q, np.minimum(lower, upper), np.maximum(lower, upper))
+            q[0] = 0.0
+            joints, value = np.array(self.joints), -np.inf
+            last = np.concatenate([q[None], self._over_box(table, self.watched)])
             for _ in range(OVERTAKINGS):
                 self.q, now = climb_to_extreme(table, self.base, self.code, self.sign, last, joints)
                 if now <= value + OVERTAKEN_M:
@@ -141,8 +140,24 @@ class FollowedExtreme:
         self.q, self.known = self._whole(q), True
         return self.sign * value * MM
 
+    def _over_box(self, table: Tables, shares: Reals) -> Reals:
+        """Joint vectors (P, n) at shares (P, d) of the joint ranges."""
+        lower, upper = table.lower[0, self.joints], table.upper[0, self.joints]
+        return self._whole(lower + shares * (upper - lower))
+
+    def _scanned(self, table: Tables, code: tuple[int, int, int]) -> Reals:
+        """Where the best climb ends of those that begin at the best places all over the joint ranges, far apart."""
+        points = self._over_box(table, self.scanned)
+        values = self.sign * self._measure(table, points)[0]
+        ends = [
+            climb_to_extreme(table, self.base, code, self.sign, points[[i]], np.array(self.joints))
+            for i in best_apart(points, values, CLIMBS)
+        ]
+        best: Reals = max(ends, key=lambda end: end[1])[0]
+        return best
+
     def _across(self, table: Tables, q: Reals) -> Reals:
-        """Joint vectors (P, n) with one joint elsewhere than in q (n,): where a climb that ended on a saddle goes on."""
+        """Joint vectors (P, n), one joint elsewhere than in q (n,): there a climb that ended on a saddle goes on."""
         lower, upper = table.lower[0], table.upper[0]
         found = np.repeat(q[None], len(ACROSS) * len(self.joints), axis=0)
         for place, joint in enumerate(self.joints):
@@ -239,8 +254,8 @@ class Asked:
         return slope
 
     def kinked(self, table: Tables, entries: Sequence[TableNumber]) -> Flags:
-        """Which entries (k,) make an extreme have a kink at a table: it is attained in several places at once there, and
-        they take it in different directions."""
+        """Which entries (k,) make an extreme have a kink at a table: it is attained in several places at once there,
+        and they take it in different directions."""
         here = self.off(table, afresh=True)
         found = np.zeros(len(entries), dtype=bool)
         for k, entry in enumerate(entries if self.extreme else ()):

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.diagnosis.ranking import rank
-from er3a.identifiability.entries import TableNumber, document_of, entries_of, shifted
+from er3a.identifiability.entries import TableNumber, continuous_of, document_of, entries_of, shifted
 from er3a.identifiability.feasible import MET
 from er3a.identifiability.requirements import Asked, requirements_of
 from er3a.kinematics.table_batch import Tables, tables_of
@@ -82,18 +82,18 @@ def not_the_robot_described(robot: Robot, references: ReferenceSet) -> NotTheRob
     allowed = max((reference.uncertainty for reference in stated), default=0.0)
     if left.min() <= allowed * np.sqrt(3):
         return None
-    named = dict.fromkeys(_title(reference, references.documents) for reference in ranking.references)
+    named = dict.fromkeys(title_of(reference.document, references.documents) for reference in ranking.references)
     return NotTheRobotDescribed(tuple(named), float(before), float(left.min()), int(few.sum()))
 
 
 def inconsistent_with_own_text(robot: Robot, references: ReferenceSet) -> InconsistentWithOwnText | None:
-    """Whether a table misses what its own publisher says in other words; None if it doesn't, or nothing is said."""
+    """Whether a table misses what its own publisher claims in other words; None if it doesn't, or nothing is."""
     stated = references.checkable
     contested = {i for pair in conflicts(stated) for i in pair}
     own = [
         reference
         for i, reference in enumerate(stated)
-        if i not in contested and _own_text(robot, reference, references.documents)
+        if i not in contested and not reference.authoritative and _own_text(robot, reference, references.documents)
     ]
     asked = Asked(robot, requirements_of(own))
     if not len(asked):
@@ -101,7 +101,7 @@ def inconsistent_with_own_text(robot: Robot, references: ReferenceSet) -> Incons
     missed = int((asked.violation(asked.off(tables_of(robot), afresh=True)) > MET).sum())
     if not missed:
         return None
-    named = tuple(dict.fromkeys(_title(reference, references.documents) for reference in own))
+    named = tuple(dict.fromkeys(title_of(reference.document, references.documents) for reference in own))
     entry, table = _one_change(robot, asked)
     if entry is None or table is None:
         return InconsistentWithOwnText(None, None, None, "", named, missed)
@@ -128,21 +128,26 @@ def _one_change(robot: Robot, asked: Asked) -> tuple[TableNumber | None, Tables 
 
 
 def _documents_of(robot: Robot) -> Sequence[str]:
-    geometry = [entry for entry in entries_of(robot) if entry.column not in ("lower", "upper", "speed")]
-    return tuple(dict.fromkeys(document_of(robot, entry) for entry in geometry))
+    """Those that lengths, twists and offsets were taken from."""
+    return tuple(dict.fromkeys(document_of(robot, entry) for entry in continuous_of(robot)))
 
 
 def _foreign(robot: Robot, reference: Reference, documents: Documents) -> bool:
-    return all(documents.independent(reference.document, own) for own in _documents_of(robot))
+    return not made_from_table(robot, reference.document, documents)
 
 
 def _own_text(robot: Robot, reference: Reference, documents: Documents) -> bool:
     """Whether a reference is of the table's publisher, and made neither from the table nor with it."""
     tables = _documents_of(robot)
     related = any(documents.same_publisher(reference.document, own) for own in tables)
-    return related and all(documents.independent(reference.document, own) for own in tables)
+    return related and not made_from_table(robot, reference.document, documents)
 
 
-def _title(reference: Reference, documents: Documents) -> str:
-    known = documents.by_name.get(reference.document)
-    return known.title if known else reference.source
+def title_of(document: str, documents: Documents) -> str:
+    """A document's title, or if none is known its name."""
+    return documents.by_name[document].title if document in documents.by_name else document
+
+
+def made_from_table(robot: Robot, document: str, documents: Documents) -> bool:
+    """Whether a document is one that a table's geometry was taken from, or that was made from one of these."""
+    return not all(documents.independent(document, own) for own in _documents_of(robot))

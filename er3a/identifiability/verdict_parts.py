@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
-from er3a.identifiability.alternatives import Alternative
-from er3a.identifiability.entries import GROUP_OF, entries_of, shifted
+from er3a.identifiability.alternatives import Alternative, with_readings
+from er3a.identifiability.entries import GROUP_OF, entries_of
 from er3a.identifiability.entry_evidence import EntryEvidence, Evidence, Status
 from er3a.identifiability.tool_motion import NOT_OFF, ToolOff, ToolRange
-from er3a.kinematics.table_batch import Tables, tables_of
+from er3a.kinematics.table_batch import tables_of
 
 PartName = Literal["geometry", "zero_and_directions", "limits", "speeds"]
 PartStatus = Literal["settled", "consistent", "weak", "open", "contradicted", "absent"]
@@ -79,20 +77,8 @@ def together(evidence: Evidence, names: list[str]) -> ToolOff:
         combined += [(*own, each) for own in free][: MOST_COMBINED - len(combined)]
     off = NOT_OFF
     for own in combined[1:]:
-        off = off.worse(tool.off(_with(evidence, own)))
+        off = off.worse(tool.off(with_readings(tool.table, evidence.robot, own)))
     return off
-
-
-def _with(evidence: Evidence, readings: tuple[Alternative, ...]) -> Tables:
-    """The table with the entries of several readings."""
-    by_name = {entry.name: entry for entry in entries_of(evidence.robot)}
-    table = tables_of(evidence.robot)
-    for name, value in (pair for each in readings for pair in each.entries):
-        if name in by_name:
-            entry = by_name[name]
-            change = (value - entry.value(evidence.robot)) / entry.in_unit
-            table = shifted(table, [entry], np.array([[change]]))
-    return table
 
 
 def _part(each: EntryEvidence, columns: dict[str, PartName]) -> PartName | None:

@@ -113,7 +113,7 @@ def _(found: MeasureLength) -> str:
 def _(found: NotTheRobotDescribed) -> str:
     return sentence(
         found.code,
-        "This is not the robot that these describe: {own_documents}. Positions differ by {mismatch:.0f} mm, "
+        "This is not the robot that these describe: {own_documents}. Positions differ by up to {mismatch:.0f} mm, "
         "and none of {tried} corrections at one or two places leaves less than {left:.1f} mm.",
         own_documents=joined(found.against),
         mismatch=found.mismatch_mm,

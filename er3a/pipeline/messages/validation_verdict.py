@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import er3a.pipeline.messages.diagnosis  # noqa: F401
-from er3a.identifiability.reactions import CheckTally
+from er3a.identifiability.reactions import CheckCounts
 from er3a.pipeline.messages.evidence import PART_WORDS
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.references import quoted
@@ -16,6 +16,7 @@ from er3a.pipeline.stages.validation.validation_findings import (
     Confirmed,
     Contradicted,
     Contradiction,
+    Judged,
     LeftOpen,
     ModelUnsound,
     NothingToCompare,
@@ -49,20 +50,40 @@ def _(found: SelfCheck) -> str:
 def _(found: Confirmed) -> str:
     text = sentence(
         found.code,
-        "Independent documents settle all that moves the tool: {passed} of {total} independent checks against {grades} "
-        "data pass.",
-        passed=found.counts.independent.passed,
-        total=found.counts.independent.total,
+        "Independent documents settle all that moves the tool: {checks} ({grades} data).",
+        checks=counted_checks(found.counts),
         grades=_grades(found.grades),
     )
-    return joined([text, *_contradiction(found.contradiction), *map(say, found.claims)], " ")
+    return joined([text, *_contradiction(found.contradiction), *_of_claims(found)], " ")
+
+
+def counted_checks(counts: CheckCounts) -> str:
+    """How many checks pass, by what they rest on: the one scheme of counts of all pages."""
+    own, same = counts.independent, counts.consistency
+    if not same.total:
+        text = N_("{passed} of {total} independent checks pass")
+    elif not own.total:
+        text = N_("{same_passed} of {same_total} consistency checks pass, and none is independent")
+    else:
+        text = N_("{passed} of {total} independent and {same_passed} of {same_total} consistency checks pass")
+    return sentence(
+        "counted_checks",
+        text,
+        passed=own.passed,
+        total=own.total,
+        same_passed=same.passed,
+        same_total=same.total,
+    )
+
+
+def _of_claims(found: Judged) -> list[str]:
+    return [*map(say, found.claims), *map(say, found.own_text)]
 
 
 @say.register
 def _(found: LeftOpen) -> str:
-    own = found.counts.independent
     parts = [say(part) for part in found.parts if part.status != "settled"]
-    told = [_what_speaks(own), sentence(found.code, "{parts}.", parts=joined(parts)) if parts else ""]
+    told = [_what_speaks(found.counts), sentence(found.code, "{parts}.", parts=joined(parts)) if parts else ""]
     if found.off.moves:
         told.append(
             sentence(
@@ -74,18 +95,15 @@ def _(found: LeftOpen) -> str:
         )
     if found.next_measurement:
         told.append(sentence(found.code, "To settle most: {measurement}.", measurement=say(found.next_measurement)))
-    return joined([*told, *_contradiction(found.contradiction), *map(say, found.claims)], " ")
+    return joined([*told, *_contradiction(found.contradiction), *_of_claims(found)], " ")
 
 
-def _what_speaks(own: CheckTally) -> str:
-    if not own.total:
-        return sentence("validation.left_open", "No independent document speaks of this table.")
-    return sentence(
-        "validation.left_open",
-        "Nothing independent contradicts the table ({passed} of {total} independent checks pass), but:",
-        passed=own.passed,
-        total=own.total,
-    )
+def _what_speaks(counts: CheckCounts) -> str:
+    if not counts.independent.total:
+        text = N_("No independent document speaks of this table ({checks}).")
+    else:
+        text = N_("Nothing independent contradicts the table ({checks}), but:")
+    return sentence("validation.left_open", text, checks=counted_checks(counts))
 
 
 @say.register
@@ -120,7 +138,7 @@ def _contradiction(found: Contradiction | None) -> list[str]:
 @say.register
 def _(found: NothingToCompare) -> str:
     text = sentence(found.code, "There is no official, CAD or exported data to hold this model against.")
-    return joined([text, *map(say, found.claims)], " ")
+    return joined([text, *_of_claims(found)], " ")
 
 
 @say.register
@@ -133,29 +151,34 @@ def _(found: ModelUnsound) -> str:
 
 @say.register
 def _(found: Contradicted) -> str:
-    return _missed(
-        found,
-        N_(
-            "The model contradicts the {grades} data in {own_set}: {failed} of {checks} checks fail; the {quantity} is "
-            "{measured}, not {expected}."
-        ),
+    text = N_(
+        "The model contradicts the {grades} data in {own_set}: the {quantity} is {measured}, not {expected}; {checks}."
     )
+    return joined([_missed(found, text), say(found.diagnosis) if found.diagnosis else "", *_of_claims(found)], " ")
 
 
 @say.register
 def _(found: AnotherArm) -> str:
-    return _missed(
-        found,
-        N_(
-            "This is not the arm that the {grades} data in {own_set} describe: {failed} of {checks} checks fail; the "
-            "{quantity} is {measured}, not {expected}."
-        ),
-    )
+    if found.described:
+        text = N_("Against the {grades} data in {own_set} the {quantity} is {measured}, not {expected}; {checks}.")
+    else:
+        text = N_(
+            "This is not the arm that the {grades} data in {own_set} describe: the {quantity} is {measured}, not "
+            "{expected}; {checks}."
+        )
+    excluded = sentence(found.code, "They exclude {names}.", names=shortened(found.contradicted))
+    told = [
+        say(found.described) if found.described else "",
+        _missed(found, text),
+        excluded if found.contradicted else "",
+        *_of_claims(found),
+    ]
+    return joined(told, " ")
 
 
 @say.register
 def _(found: Claims) -> str:
-    text = counted(
+    return counted(
         found.code,
         "Of the {claims} claims in {own_set}, {count} doesn't hold.",
         "Of the {claims} claims in {own_set}, {count} don't hold.",
@@ -163,7 +186,6 @@ def _(found: Claims) -> str:
         claims=found.claims,
         own_set=found.reference_set,
     )
-    return joined([text, say(found.diagnosis) if found.diagnosis else ""], " ")
 
 
 @say.register
@@ -189,18 +211,16 @@ def _(found: Contradiction) -> str:
 
 
 def _missed(found: Contradicted | AnotherArm, template: str) -> str:
-    text = sentence(
+    return sentence(
         found.code,
         template,
         grades=_grades(found.grades),
         own_set=found.reference_set,
-        failed=found.failed,
-        checks=found.checks,
+        checks=counted_checks(found.counts),
         quantity=quoted(found.check),
         measured=_value(found.measured, found.unit),
         expected=_value(found.expected, found.unit),
     )
-    return joined([text, say(found.diagnosis) if found.diagnosis else "", *map(say, found.claims)], " ")
 
 
 def _grades(grades: Sequence[Grade]) -> str:

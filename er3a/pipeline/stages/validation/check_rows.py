@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from er3a.pipeline.messages.evidence import CHECK_KINDS
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import say, sentence, word
 from er3a.pipeline.messages.validation import GRADE_NAMES, GROUPS
@@ -43,6 +44,16 @@ def by_set(checks: Iterable[Judged]) -> dict[str, list[Judged]]:
     found: dict[str, list[Judged]] = {}
     for check in checks:
         found.setdefault(check.reference_set or tr("the model itself"), []).append(check)
+    return found
+
+
+def by_kind(checks: Iterable[Judged]) -> dict[str, list[Judged]]:
+    """Checks by their set and what they rest on, as the page names both."""
+    found: dict[str, list[Judged]] = {}
+    for title, own in by_set(checks).items():
+        for check in own:
+            kind = check.kind and word("check_kind", CHECK_KINDS, check.kind)
+            found.setdefault(tr("{set}, {kind}", set=title, kind=kind) if kind else title, []).append(check)
     return found
 
 

@@ -8,17 +8,19 @@ from er3a.files.reference_sets import load_references
 from er3a.identifiability.evidence import evidence_of
 from er3a.identifiability.proposals import proposals_of
 from er3a.identifiability.reactions import bases_of
+from er3a.kinematics.table_batch import robot_of
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.pipeline.stages.validation.check_model import Check, Conflict, Unjudged
 from er3a.pipeline.stages.validation.checks import checks_of_set
 from er3a.pipeline.stages.validation.corrections import calibrate_from_sets
-from er3a.pipeline.stages.validation.diagnoses import diagnose_sets
+from er3a.pipeline.stages.validation.diagnoses import diagnose_sets, table_record
 from er3a.pipeline.stages.validation.entry import ValidationSettings
 from er3a.pipeline.stages.validation.geometry_tables import axes_table, key_poses_table, section_table
 from er3a.pipeline.stages.validation.model import (
     Checks,
     Circles,
     Section,
+    OtherTableFound,
     TableEvidence,
     TableFacts,
     ValidationResults,
@@ -82,7 +84,7 @@ def compute(study: Study, name: str) -> ValidationResults:
     diagnoses, residuals = diagnose_sets(robot, sets if plain else [])
     calibrations, corrections = calibrate_from_sets(robot, sets if plain else [])
     found = {each.reference_set: each for each in diagnoses}
-    summaries = set_summaries(sets, checks, poses, found)
+    summaries = set_summaries(robot, sets, checks, poses, found)
     reaches = {"wrist_centre_reach": WRIST_REACH, "flange_reach": FLANGE_REACH}
     reach = {name: values[quantity] for name, quantity in reaches.items() if quantity in values}
     evidence = evidence_of_table(robot, sets) if plain else None
@@ -127,6 +129,9 @@ def evidence_of_table(robot: Robot, sets: Sequence[ReferenceSet]) -> TableEviden
         parts=parts_found(found),
         proposals=tuple(proposals_of(found).values()),
         table_meets=found.table_meets,
+        other=OtherTableFound(table_record(robot_of(found.other.table, 0, robot)), found.other.code)
+        if found.other
+        else None,
     )
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.diagnosis.diagnose import Diagnosis, Hypothesis, diagnosis_of, residuals
-from er3a.diagnosis.ranking import Ranking
+from er3a.diagnosis.ranking import Ranking, usable
+from er3a.identifiability.statements import made_from_table, title_of
 from er3a.kinematics.table_batch import COLUMNS
 from er3a.pipeline.stages.validation.diagnosis_model import (
     CorrectedTable,
@@ -21,17 +22,22 @@ def diagnose_sets(robot: Robot, sets: list[ReferenceSet]) -> tuple[tuple[SetDiag
     """Diagnose a table against each reference set."""
     found = [(references.name, diagnosis_of(robot, references)) for references in sets]
     tables = [_residuals(name, diagnosis.ranking) for name, diagnosis in found if diagnosis.ranking]
-    return tuple(_record(name, diagnosis) for name, diagnosis in found), Residuals.stacked(tables)
+    records = [_record(robot, references, diagnosis) for references, (_, diagnosis) in zip(sets, found)]
+    return tuple(records), Residuals.stacked(tables)
 
 
-def _record(reference_set: str, diagnosis: Diagnosis) -> SetDiagnosis:
+def _record(robot: Robot, references: ReferenceSet, diagnosis: Diagnosis) -> SetDiagnosis:
+    documents = dict.fromkeys(reference.document for reference in usable(references))
+    own = [name for name in documents if made_from_table(robot, name, references.documents)]
     return SetDiagnosis(
-        reference_set=reference_set,
+        reference_set=references.name,
         conclusion=diagnosis.conclusion,
+        against=tuple(title_of(name, references.documents) for name in documents),
+        from_table=tuple(title_of(name, references.documents) for name in own),
         references=diagnosis.references,
         hypotheses_tried=diagnosis.tried,
         hypotheses=tuple(map(_ranked, diagnosis.hypotheses)),
-        corrected=_table_of(diagnosis.hypotheses[0].corrected) if diagnosis.names_fault else None,
+        corrected=table_record(diagnosis.hypotheses[0].corrected) if diagnosis.names_fault else None,
     )
 
 
@@ -49,7 +55,8 @@ def _ranked(hypothesis: Hypothesis) -> RankedHypothesis:
     )
 
 
-def _table_of(robot: Robot) -> CorrectedTable:
+def table_record(robot: Robot) -> CorrectedTable:
+    """A robot's table as the results hold it."""
     return CorrectedTable(robot.convention, **{name: tuple(getattr(robot, name).tolist()) for name in COLUMNS})
 
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from er3a.diagnosis.conclusions import MainFault, MostLikelyFault, TooSmallToTell
 from er3a.pipeline.messages.calibration import level
 from er3a.pipeline.messages.diagnosis import both
-from er3a.pipeline.messages.language import tr
+from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import joined, say, sentence
 from er3a.pipeline.stages.validation.diagnosis_model import (
     Calibrated,
@@ -37,6 +37,7 @@ class DiagnosisStory:
 
     reference_set: str
     text: str
+    against: str
     to_decide: str
     others_title: str
     others: list[list[str]]
@@ -75,12 +76,33 @@ def _diagnosis_story(diagnosis: SetDiagnosis, residuals: Residuals) -> Diagnosis
     return DiagnosisStory(
         reference_set=diagnosis.reference_set,
         text=typographic(say(diagnosis.conclusion)),
+        against=_measured_against(diagnosis),
         to_decide=typographic(say(best.to_decide)) if best and best.to_decide else "",
         others_title=tr("Next-best hypotheses") if named else tr("The best hypotheses, none of which will do"),
         others=[_hypothesis_row(each) for each in diagnosis.hypotheses[1 if named else 0 : SHOWN_HYPOTHESES]],
         hypotheses_tried=diagnosis.hypotheses_tried,
         picture=_residual_picture(residuals.take(residuals.reference_set == diagnosis.reference_set), diagnosis),
     )
+
+
+def _measured_against(diagnosis: SetDiagnosis) -> str:
+    """What residuals are measured against, and what of that is no evidence."""
+    own = [title for title in diagnosis.against if title in diagnosis.from_table]
+    others = [title for title in diagnosis.against if title not in own]
+    told = tr("Residuals are measured against: {documents}.", documents=joined(others)) if others else ""
+    if own:
+        template = (
+            N_(
+                "Besides against {documents}: taken from the table or the other way round, so no evidence for its numbers."
+            )
+            if others
+            else N_(
+                "Residuals are measured against {documents}: the table was taken from it or it from the table, so "
+                "they are no evidence for its numbers."
+            )
+        )
+        told = joined([told, tr(template, documents=joined(own))], " ")
+    return told
 
 
 def _calibration_story(calibration: SetCalibration, corrections: Corrections) -> CalibrationStory:

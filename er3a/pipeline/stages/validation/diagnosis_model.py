@@ -54,12 +54,16 @@ class SetDiagnosis:
     Attributes
     ----------
     references : how many it rests on; hypotheses_tried : how many were evaluated
+    against : titles of the documents that residuals are measured against; from_table : of those among them that the
+        table was taken from, or that were made from it, which are no evidence for its numbers
     hypotheses : best first
     corrected : where the conclusion names a fault
     """
 
     reference_set: str
     conclusion: Conclusion
+    against: tuple[str, ...]
+    from_table: tuple[str, ...]
     references: int
     hypotheses_tried: int
     hypotheses: tuple[RankedHypothesis, ...]

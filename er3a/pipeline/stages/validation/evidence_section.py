@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from math import pi
 
 from er3a.identifiability.entry_evidence import EntryEvidence, OtherReading, Status
 from er3a.pipeline.messages.evidence import STATUS_MEANINGS, STATUS_WORDS
@@ -11,6 +12,8 @@ from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.stages.validation.model import TableEvidence
 from er3a.pipeline.viewing.numbers import fixed, number
+from er3a.references.quantities import MM
+from er3a.robots.robot import Robot
 
 MARKS: Mapping[Status, str] = {
     "settled": "✓",
@@ -45,10 +48,27 @@ DETAIL_COLUMNS = (
 )
 
 
+OTHER_COLUMNS = ("a", "alpha", "d", "beta", "offset", "direction")
+DIFFERS = 2e-3
+IN_UNIT = {"a": MM, "d": MM, "direction": 1.0} | dict.fromkeys(("alpha", "beta", "offset"), 180 / pi)
+OTHER_TITLES = {
+    "described": N_("The table that independent documents describe"),
+    "allowed": N_("A table that no document tells from it"),
+}
+OTHER_TEXTS = {
+    "described": N_(
+        "Of all tables that meet the independent documents this is the nearest that was found; what differs is marked. "
+        "Values are one choice within what the documents leave open."
+    ),
+    "allowed": N_("It meets every document as well: all that is open is changed at once; what differs is marked."),
+}
+
+
 @dataclass(frozen=True)
 class EntryCell:
-    """An entry in the table: its value, a mark and a class for its status, and what to tell of it."""
+    """An entry in the table: its name, its value, a mark and a class for its status, and what to tell of it."""
 
+    entry: str
     value: str
     status: Status
     mark: str
@@ -56,8 +76,21 @@ class EntryCell:
 
 
 @dataclass(frozen=True)
+class OtherSection:
+    """Another table: its title, a text, columns, and by joint its values and whether they differ from the robot's."""
+
+    title: str
+    text: str
+    columns: list[str]
+    rows: list[tuple[int, list[tuple[str, bool]]]]
+
+
+@dataclass(frozen=True)
 class EvidenceSection:
-    """The table by rows (a cell is None where the table has no such entry), its legend, and the entries in words."""
+    """The table by rows (a cell is None where the table has no such entry), its legend, and the entries in words.
+
+    Rows of entries begin with the entry's name, which is its address on the page.
+    """
 
     columns: list[str]
     rows: list[tuple[int, list[EntryCell | None]]]
@@ -67,6 +100,8 @@ class EvidenceSection:
     settled_columns: list[str]
     settled_rows: list[list[str]]
     tolerance: str
+    unmet: bool
+    other: OtherSection | None
 
 
 def evidence_section(evidence: TableEvidence | None) -> EvidenceSection | None:
@@ -93,17 +128,42 @@ def evidence_section(evidence: TableEvidence | None) -> EvidenceSection | None:
         settled_columns=[tr(column) for column in DETAIL_COLUMNS[:-1]],
         open_rows=[[*_row(each), proposals.get(each.entry, "–")] for each in left],
         settled_rows=[_row(each) for each in numbers if each.status in ("settled", "gauge")],
+        unmet=not evidence.table_meets and evidence.other is None,
+        other=_other(evidence) if evidence.other else None,
         tolerance=tr(
             "{mm} mm and {deg} deg", mm=number(evidence.tolerance.mm, 2), deg=number(evidence.tolerance.deg, 2)
         ),
     )
 
 
+def _other(evidence: TableEvidence) -> OtherSection | None:
+    found = evidence.other
+    if found is None:
+        return None
+    by_name = {each.entry: each.value for each in evidence.entries}
+    kinds = [kind for kind in OTHER_COLUMNS if f"{kind}1" in by_name]
+    rows = []
+    for joint in range(1, len(found.table.a) + 1):
+        cells = []
+        for kind in kinds:
+            value = round(getattr(found.table, kind)[joint - 1] * IN_UNIT[kind], 3)
+            given = by_name[f"{kind}{joint}"] or 0.0
+            cells.append((_plain(value), abs(value - given) > DIFFERS))
+        rows.append((joint, cells))
+    title, text = (word(found.code, words, found.code) for words in (OTHER_TITLES, OTHER_TEXTS))
+    return OtherSection(title, text, [tr(COLUMNS[kind]) for kind in kinds], rows)
+
+
+def other_robot(robot: Robot, evidence: TableEvidence | None) -> Robot | None:
+    """The robot with the other table, if there is one."""
+    return robot.replace(**asdict(evidence.other.table)) if evidence and evidence.other else None
+
+
 def _cell(each: EntryEvidence | None) -> EntryCell | None:
     if each is None or each.value is None:
         return None
     told = tr("{entry}: {status}", entry=each.entry, status=_status(each.status))
-    return EntryCell(_value(each), each.status, MARKS[each.status], told)
+    return EntryCell(each.entry, _value(each), each.status, MARKS[each.status], told)
 
 
 def _status(status: Status) -> str:
@@ -125,10 +185,19 @@ def _row(each: EntryEvidence) -> list[str]:
         _value(each) + unit,
         f"{MARKS[each.status]} {_status(each.status)}",
         _interval(each) if each.interval and each.status != "gauge" else "–",
-        tr("no bound") if each.status == "consistent" else _off(each.off.mm, each.off.deg) if each.off.moves else "–",
+        _tool_off(each),
         joined(each.by, ", ") or "–",
         joined([_reading(reading) for reading in each.alternatives[:SHOWN_READINGS]]) or "–",
     ]
+
+
+def _tool_off(each: EntryEvidence) -> str:
+    if each.status == "consistent":
+        return tr("no bound")
+    if not each.off.moves:
+        return "–"
+    off = _off(each.off.mm, each.off.deg)
+    return tr("at least {off}", off=off) if each.at_least else off
 
 
 def _interval(each: EntryEvidence) -> str:
@@ -139,6 +208,8 @@ def _interval(each: EntryEvidence) -> str:
         return tr("{low} or {high}", low=low, high=high) if low != high else low
     if each.status in ("consistent", "open"):
         return tr("anything")
+    if each.at_least:
+        return tr("at least {low} to {high} {unit}", low=low, high=high, unit=each.unit)
     return tr("{low} to {high} {unit}", low=low, high=high, unit=each.unit)
 
 

@@ -4,19 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Self
+from typing import Literal, Self
 
 import numpy as np
 
 from er3a.identifiability.entry_evidence import EntryEvidence, Tolerance
 from er3a.identifiability.proposals import Proposal
 from er3a.identifiability.reactions import CheckCounts
+from er3a.identifiability.statements import InconsistentWithOwnText, NotTheRobotDescribed
 from er3a.kinematics.round_trips import SlotRoundTrips
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.validation.check_model import Check, Conflict
-from er3a.pipeline.stages.validation.diagnosis_model import Corrections, Residuals, SetCalibration, SetDiagnosis
+from er3a.pipeline.stages.validation.diagnosis_model import (
+    CorrectedTable,
+    Corrections,
+    Residuals,
+    SetCalibration,
+    SetDiagnosis,
+)
 from er3a.pipeline.stages.validation.validation_findings import (
     CheckSubject,
     KeyPose,
@@ -29,33 +36,35 @@ from er3a.robots.robot import Grade
 
 
 @dataclass(frozen=True)
-class Counts:
-    """Checks by their status; ``total`` leaves out those without a reference."""
-
-    total: int
-    passed: int
-    failed: int
-    conflicting: int
-    without_reference: int
-
-
-@dataclass(frozen=True)
 class SetSummary:
     """What was found against one reference set.
 
     Attributes
     ----------
-    authoritative : checks that the verdict rests on; claims : the others
-    another_arm : most of the authoritative ones fail, and no one or two faults explain that
+    counts : of its checks, by what they rest on
+    another_arm : most of those that the verdict rests on fail, and no one or two faults explain that
+    described : what no one or two corrections remove of the mismatch, if that is said of the set's arm
+    own_text : what it says against the table, if its author is the table's
     zero_pose_flange_off_mm : None where the set does not say where the flange is
     """
 
     name: str
     grades: tuple[Grade, ...]
-    authoritative: Counts
+    counts: CheckCounts
     another_arm: bool
-    claims: Counts
+    described: NotTheRobotDescribed | None
+    own_text: InconsistentWithOwnText | None
     zero_pose_flange_off_mm: float | None
+
+    @property
+    def is_authoritative(self) -> bool:
+        """Whether a verdict rests on any of its checks."""
+        return self.counts.independent.total + self.counts.consistency.total > 0
+
+    @property
+    def failed(self) -> int:
+        """Checks that the verdict rests on and that fail."""
+        return self.counts.independent.failed + self.counts.consistency.failed
 
 
 @dataclass(frozen=True)
@@ -92,6 +101,14 @@ class RoundTripErrors(SlotRoundTrips):
 
 
 @dataclass(frozen=True)
+class OtherTableFound:
+    """Another table; see :class:`er3a.identifiability.entry_evidence.OtherTable`."""
+
+    table: CorrectedTable
+    code: Literal["described", "allowed"]
+
+
+@dataclass(frozen=True)
 class TableEvidence:
     """What independent documents settle of the table, entry by entry (``er3a.identifiability``).
 
@@ -101,6 +118,7 @@ class TableEvidence:
     combinations : what of entries that are gauge is determined together
     proposals : the cheapest measurement for each entry that isn't settled, as far as one settles it
     table_meets : whether the table as it is meets all independent references
+    other : another table, and whether evidence describes it instead of the robot's or can't tell the two apart
     """
 
     tolerance: Tolerance
@@ -109,6 +127,7 @@ class TableEvidence:
     parts: tuple[PartFound, ...]
     proposals: tuple[Proposal, ...]
     table_meets: bool
+    other: OtherTableFound | None
 
 
 @dataclass(frozen=True)

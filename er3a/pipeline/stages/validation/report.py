@@ -11,16 +11,17 @@ import numpy as np
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import counted, joined, say, word
 from er3a.pipeline.messages.validation import CONVENTIONS, FIGURES, GRADE_NAMES, GRADES, GROUPS
+from er3a.pipeline.messages.validation_verdict import counted_checks
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation.axis_figures import axis_deviation, side_view, workspace_drawing
 from er3a.pipeline.stages.validation.check_model import ReferenceCheck, Unjudged
-from er3a.pipeline.stages.validation.check_rows import COLUMNS, Judged, blank_row, by_set, check_row, group_rows
+from er3a.pipeline.stages.validation.check_rows import COLUMNS, Judged, blank_row, by_kind, check_row, group_rows
 from er3a.pipeline.stages.validation.corrected import corrected_robot
 from er3a.pipeline.stages.validation.diagnosis_figures import correction_stories, diagnosis_stories
-from er3a.pipeline.stages.validation.evidence_section import evidence_section
+from er3a.pipeline.stages.validation.evidence_section import OTHER_TITLES, evidence_section, other_robot
+from er3a.pipeline.stages.validation.frames_figure import link_frames
 from er3a.pipeline.stages.validation.model import (
     Axes,
-    Counts,
     KeyPoses,
     Section,
     SetSummary,
@@ -28,6 +29,7 @@ from er3a.pipeline.stages.validation.model import (
     ValidationSummary,
 )
 from er3a.pipeline.stages.validation.subject import model_of
+from er3a.pipeline.stages.validation.wording import typographic
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import Picture, fixed, head_of, render, run_command
 from er3a.references.subjects import SegmentInclination
@@ -43,11 +45,13 @@ SEGMENTS = {
 
 @dataclass(frozen=True)
 class SetStory:
-    """What the page says about one reference set; groups, segments and points in words."""
+    """What the page says about one reference set; counts, groups, segments, points and statements in words."""
 
     found: SetSummary
-    counted: Counts
+    counted: str
     is_authoritative: bool
+    conflicting: int
+    statements: list[str]
     telling: list[list[str]]
     failed_groups: str
     held_groups: str
@@ -76,6 +80,7 @@ def report(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
         robot=robot,
         robot_pages=study.pages(name),
         table_evidence=evidence_section(summary.evidence),
+        frames=_frames_picture(robot, summary),
         sets=[_set_story(found, judged, results.key_poses) for found in summary.sets],
         diagnoses=diagnosis_stories(summary, results.residuals),
         corrections=correction_stories(summary, results.corrections),
@@ -84,7 +89,7 @@ def report(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
         more_failed=[check_row(check) for check in failed[SHOWN_FAILURES:]],
         passed={
             title: [check_row(check) for check in own if check.status == "pass"]
-            for title, own in by_set(judged).items()
+            for title, own in by_kind(judged).items()
         },
         columns=[tr(label) for label in COLUMNS],
         conflicts=[(say(conflict.subject), conflict) for conflict in summary.conflicts],
@@ -106,11 +111,15 @@ def _set_story(found: SetSummary, checks: Iterable[Judged], poses: KeyPoses) -> 
     segments = [(check.subject, check) for check in own if isinstance(check.subject, SegmentInclination)]
     at_zero = (poses.reference_set == found.name) & (poses.group == "zero_pose") & (poses.point == "flange")
     zero = poses.take(np.flatnonzero(at_zero)[:1])
-    is_authoritative = found.authoritative.total > 0
+    claims, weighing = found.counts.claims, (found.counts.independent, found.counts.consistency)
     return SetStory(
         found=found,
-        counted=found.authoritative if is_authoritative else found.claims,
-        is_authoritative=is_authoritative,
+        counted=counted_checks(found.counts)
+        if found.is_authoritative
+        else tr("{passed} of {total} claims hold", passed=claims.passed, total=claims.total),
+        is_authoritative=found.is_authoritative,
+        conflicting=sum(each.conflicting for each in weighing),
+        statements=[typographic(say(each)) for each in (found.described, found.own_text) if each],
         telling=[check_row(check) for check in _telling(own)],
         failed_groups=_group_words(failed),
         held_groups=_group_words(held),
@@ -150,6 +159,19 @@ def _drawn_axes(axes: Axes) -> Axes:
     """Axes to draw: those from authoritative sources, or else the claims."""
     authoritative = np.isin(axes.grade, AUTHORITATIVE_GRADES)
     return axes.take(authoritative) if authoritative.any() else axes
+
+
+def _frames_picture(robot: Robot, summary: ValidationSummary) -> Picture:
+    other = other_robot(robot, summary.evidence)
+    code = summary.evidence.other.code if summary.evidence and summary.evidence.other else ""
+    label = word(code, OTHER_TITLES, code) if code == "described" else ""
+    caption = tr(
+        "All joints at 0. Frame 0 is the base, frame k the one that row k of the table leads to, frame 6 the flange."
+    )
+    if code == "described":
+        caption = joined([caption, tr("Dashed: the arm that independent documents describe.")], " ")
+    alt = tr("The arm in its zero pose, seen from a corner, with its link frames.")
+    return Picture(link_frames(robot, other if label else None, label), alt, caption)
 
 
 def _side_picture(robot: Robot, drawn: Axes, summary: ValidationSummary) -> Picture:

@@ -8,6 +8,7 @@ from typing import Literal
 from er3a.diagnosis.conclusions import MainFault, MostLikelyFault, TooSmallToTell
 from er3a.identifiability.proposals import Proposal
 from er3a.identifiability.reactions import CheckCounts
+from er3a.identifiability.statements import InconsistentWithOwnText, NotTheRobotDescribed
 from er3a.identifiability.tool_motion import ToolOff
 from er3a.identifiability.verdict_parts import PartName, PartStatus
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
@@ -143,38 +144,37 @@ class Contradiction:
 
 @dataclass(frozen=True)
 class Claims:
-    """How many of a set's claims fail, and the likely fault, if there is one."""
+    """How many of a set's claims fail."""
 
     reference_set: str
     claims: int
     failed: int
-    diagnosis: LikelyFault | None
     code: Literal["claims"] = "claims"
 
 
 @dataclass(frozen=True)
-class _Judged:
+class Judged:
     """What every verdict holds.
 
     Attributes
     ----------
-    checks, failed : against authoritative documents; conflicts : numbers that references contradict each other about
+    counts : of the checks against references; conflicts : numbers that references contradict each other about
     sets : names of the reference sets
     claims : of the sets that hold nothing but claims
+    own_text : what the table's own author says against it
     """
 
-    checks: int
-    failed: int
+    counts: CheckCounts
     conflicts: int
     sets: tuple[str, ...]
     claims: tuple[Claims, ...]
+    own_text: tuple[InconsistentWithOwnText, ...]
 
 
 @dataclass(frozen=True)
-class Confirmed(_Judged):
+class Confirmed(Judged):
     """The model meets all that it can, and independent documents settle all that moves the tool."""
 
-    counts: CheckCounts
     grades: tuple[Grade, ...]
     contradiction: Contradiction | None
     code: Literal["validation.confirmed"] = "validation.confirmed"
@@ -203,18 +203,16 @@ class PartFound:
 
 
 @dataclass(frozen=True)
-class LeftOpen(_Judged):
+class LeftOpen(Judged):
     """Nothing contradicts the table, but independent documents don't settle all that moves the tool.
 
     Attributes
     ----------
-    counts : of the checks against references
     parts : of the table
     off : how far the tool could be off for what is left open, all over the joint ranges
     next_measurement : the one that settles the entry for which it could be off farthest
     """
 
-    counts: CheckCounts
     parts: tuple[PartFound, ...]
     off: ToolOff
     next_measurement: Proposal | None
@@ -223,14 +221,14 @@ class LeftOpen(_Judged):
 
 
 @dataclass(frozen=True)
-class NothingToCompare(_Judged):
+class NothingToCompare(Judged):
     """No authoritative document speaks about the model."""
 
     code: Literal["validation.no_reference"] = "validation.no_reference"
 
 
 @dataclass(frozen=True)
-class ModelUnsound(_Judged):
+class ModelUnsound(Judged):
     """The model fails a check that needs no document."""
 
     check: SelfCheck
@@ -240,13 +238,14 @@ class ModelUnsound(_Judged):
 
 
 @dataclass(frozen=True)
-class _Missed(_Judged):
+class _Missed(Judged):
     """The model fails checks against documents; ``check`` is the one to quote.
 
     Attributes
     ----------
     grades : of all authoritative checks
     diagnosis : the likely fault, if there is one
+    contradicted : entries that move the tool and whose values independent documents exclude
     """
 
     reference_set: str
@@ -256,6 +255,7 @@ class _Missed(_Judged):
     unit: str
     grades: tuple[Grade, ...]
     diagnosis: LikelyFault | None
+    contradicted: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -267,8 +267,9 @@ class Contradicted(_Missed):
 
 @dataclass(frozen=True)
 class AnotherArm(_Missed):
-    """The documents describe another arm."""
+    """The documents describe another arm; ``described``: what no one or two corrections remove."""
 
+    described: NotTheRobotDescribed | None
     code: Literal["validation.another_arm"] = "validation.another_arm"
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Mapping
 from functools import reduce
 from typing import Any
@@ -12,11 +11,12 @@ import numpy as np
 from er3a.diagnosis.conclusions import NoFaultStandsOut, NoFewFaultsExplain
 from er3a.identifiability.proposals import Proposal
 from er3a.identifiability.reactions import CheckCounts, count_checks
+from er3a.identifiability.statements import inconsistent_with_own_text, not_the_robot_described
 from er3a.identifiability.tool_motion import NOT_OFF, ToolOff
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.validation.check_model import Check, Conflict, ModelCheck, ReferenceCheck
 from er3a.pipeline.stages.validation.diagnosis_model import SetDiagnosis
-from er3a.pipeline.stages.validation.model import Axes, Counts, KeyPoses, RoundTripErrors, SetSummary, TableEvidence
+from er3a.pipeline.stages.validation.model import Axes, KeyPoses, RoundTripErrors, SetSummary, TableEvidence
 from er3a.pipeline.stages.validation.parts_found import OF_THE_TOOL
 from er3a.pipeline.stages.validation.validation_findings import (
     AnotherArm,
@@ -32,29 +32,30 @@ from er3a.pipeline.stages.validation.validation_findings import (
 )
 from er3a.references.reference import ReferenceSet
 from er3a.references.rows import GROUPS
-from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade
+from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade, Robot
 
 TELLING_SHARE = 0.25
 SHOWN_DECIMALS = 9
 
 
 def set_summaries(
-    sets: list[ReferenceSet], checks: list[Check], poses: KeyPoses, diagnoses: Mapping[str, SetDiagnosis]
+    robot: Robot, sets: list[ReferenceSet], checks: list[Check], poses: KeyPoses, diagnoses: Mapping[str, SetDiagnosis]
 ) -> tuple[SetSummary, ...]:
     """What was found against each reference set; diagnoses by its name."""
     found = []
     for references in sets:
-        own = [check for check in checks if check.reference_set == references.name]
-        authoritative = _counts(check for check in own if check.is_authoritative)
-        most_fail = authoritative.failed > authoritative.total / 2
+        counts = counts_of(check for check in checks if check.reference_set == references.name)
+        weighing = counts.independent, counts.consistency
+        most_fail = sum(each.failed for each in weighing) > sum(each.total for each in weighing) / 2
+        unexplained = isinstance(diagnoses[references.name].conclusion, NoFaultStandsOut | NoFewFaultsExplain)
         found.append(
             SetSummary(
                 name=references.name,
                 grades=tuple(sorted({reference.grade for reference in references.references})),
-                authoritative=authoritative,
-                another_arm=most_fail
-                and isinstance(diagnoses[references.name].conclusion, NoFaultStandsOut | NoFewFaultsExplain),
-                claims=_counts(check for check in own if check.grade and not check.is_authoritative),
+                counts=counts,
+                another_arm=most_fail and unexplained,
+                described=not_the_robot_described(robot, references) if unexplained else None,
+                own_text=inconsistent_with_own_text(robot, references),
                 zero_pose_flange_off_mm=_zero_pose_error(poses, references.name),
             )
         )
@@ -77,22 +78,25 @@ def verdict_of(
         if isinstance(diagnosis.conclusion, LikelyFault)
     }
     common: dict[str, Any] = {
-        "checks": len(documented),
-        "failed": len(failed),
+        "counts": counts_of(checks),
         "conflicts": len(conflicts),
         "sets": tuple(each.name for each in sets),
-        "claims": _claims(sets, named),
+        "claims": _claims(sets),
+        "own_text": tuple(each.own_text for each in sets if each.own_text),
     }
     for check in checks:
         if isinstance(check, ModelCheck) and check.status == "fail":
             found = ModelUnsound(**common, check=check.subject, measured=check.measured, unit=check.unit)
             return Verdict("fail", found)
     if failed:
-        return Verdict("fail", _missed(common, failed, documented, sets, named))
+        every = evidence.entries if evidence else ()
+        excluded = [each for each in every if each.status == "contradicted" and each.moves_tool]
+        common |= {"grades": _grades(documented), "contradicted": tuple(each.entry for each in excluded)}
+        return Verdict("fail", _missed(common, failed, sets, named))
     if not documented:
         return Verdict("no_reference", NothingToCompare(**common))
     contradiction = _contradiction(conflicts) if conflicts else None
-    common |= {"counts": counts_of(checks), "contradiction": contradiction}
+    common |= {"contradiction": contradiction}
     parts = evidence.parts if evidence else ()
     moving = [part for part in parts if part.part in OF_THE_TOOL]
     if not moving or any(part.status != "settled" for part in moving):
@@ -146,7 +150,7 @@ def key_figures(
         if tally.total
     ]
     errors = [
-        (each.authoritative.total > 0, each.zero_pose_flange_off_mm)
+        (each.is_authoritative, each.zero_pose_flange_off_mm)
         for each in sets
         if each.zero_pose_flange_off_mm is not None
     ]
@@ -174,28 +178,20 @@ def _figure(name: str, value: float, unit: str = "mm") -> Figure:
 def _missed(
     common: dict[str, Any],
     failed: list[ReferenceCheck],
-    documented: list[ReferenceCheck],
     sets: tuple[SetSummary, ...],
     named: Mapping[str, LikelyFault],
 ) -> Contradicted | AnotherArm:
     quoted = most_telling(failed)
-    other = any(each.another_arm for each in sets if each.name == quoted.reference_set)
-    return (AnotherArm if other else Contradicted)(
-        **common,
-        reference_set=quoted.reference_set,
-        check=quoted.subject,
-        measured=quoted.measured,
-        expected=quoted.expected,
-        unit=quoted.unit,
-        grades=_grades(documented),
-        diagnosis=named.get(quoted.reference_set),
-    )
-
-
-def _counts(checks: Iterable[Check]) -> Counts:
-    counted = Counter(check.status for check in checks)
-    passed, failed, conflicting = counted["pass"], counted["fail"], counted["conflict"]
-    return Counts(passed + failed + conflicting, passed, failed, conflicting, counted["no_reference"])
+    common |= {
+        "reference_set": quoted.reference_set,
+        "check": quoted.subject,
+        "measured": quoted.measured,
+        "expected": quoted.expected,
+        "unit": quoted.unit,
+        "diagnosis": named.get(quoted.reference_set),
+    }
+    own = next(each for each in sets if each.name == quoted.reference_set)
+    return AnotherArm(**common, described=own.described) if own.another_arm else Contradicted(**common)
 
 
 def _zero_pose_error(poses: KeyPoses, set_name: str) -> float | None:
@@ -204,12 +200,9 @@ def _zero_pose_error(poses: KeyPoses, set_name: str) -> float | None:
     return float(poses.deviation_mm[own].max()) if own.any() else None
 
 
-def _claims(sets: tuple[SetSummary, ...], named: Mapping[str, LikelyFault]) -> tuple[Claims, ...]:
-    return tuple(
-        Claims(each.name, each.claims.total, each.claims.failed, named.get(each.name))
-        for each in sets
-        if each.claims.total and not each.authoritative.total
-    )
+def _claims(sets: tuple[SetSummary, ...]) -> tuple[Claims, ...]:
+    found = [(each.name, each.counts.claims) for each in sets if not each.is_authoritative]
+    return tuple(Claims(name, claims.total, claims.failed) for name, claims in found if claims.total)
 
 
 def _contradiction(conflicts: list[Conflict]) -> Contradiction:
