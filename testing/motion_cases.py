@@ -19,7 +19,7 @@ from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
 from er3a.planning.commands import CommandSource
 from er3a.planning.timing import joint_limits
 from er3a.planning.tool_proof import Wanted
-from testing.motion_oracle import GRAZING, TOUCH, arm_of, factors, joint_path, truth
+from testing.motion_oracle import GRAZING, TOUCH, Truth, arm_of, factors, joint_path, truth
 
 NEAR = NearSingular(float(np.radians(5)), float(np.radians(5)), 0.03)
 ASSUMED = np.radians([180, 180, 180, 360, 360, 360])
@@ -131,11 +131,16 @@ def judged(robot, written, samples) -> tuple[Motion, Judgement]:
     return motion, judge(robot, motion, NEAR, limits)
 
 
-def compare(robot, spec, written, samples, tally: Tally) -> list[str]:
+def looked_at(robot, spec, points: int) -> Truth:
+    """What the oracle sees of a path at so many points."""
+    limits = joint_limits(robot, ASSUMED, 0.25)
+    return truth(spec, arm_of(table_of(robot)), (limits.speed, limits.acceleration), spec.get("q_start"), points)
+
+
+def compare(robot, spec, written, samples, tally: Tally, seen: Truth) -> list[str]:
     """Add a path to the tally; what is missed or invented, in words."""
     limits = joint_limits(robot, ASSUMED, 0.25)
     arm = arm_of(table_of(robot))
-    seen = truth(spec, arm, (limits.speed, limits.acceleration), spec.get("q_start"))
     motion, found = judged(robot, written, samples)
     wrong: list[str] = []
     tally.paths += 1
