@@ -8,6 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from er3a.collision.bodies import self_pairs
+from er3a.collision.envelopes import envelopes_of
+from er3a.collision.scene import Box, Cylinder, Plane, Sphere
 from er3a.files.path_file import PathFile
 from er3a.files.yaml_file import parse
 from er3a.geometry.transforms import rpy_of
@@ -19,6 +22,7 @@ from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
 from er3a.planning.commands import CommandSource
 from er3a.planning.timing import joint_limits
 from er3a.planning.tool_proof import Wanted
+from testing.dense_contacts import Contacts
 from testing.motion_oracle import GRAZING, TOUCH, Truth, arm_of, factors, joint_path, truth
 
 NEAR = NearSingular(float(np.radians(5)), float(np.radians(5)), 0.03)
@@ -209,3 +213,20 @@ def _crossings(arm, spec, seen, found, tally, wrong):
             if size > TOUCH:
                 tally.invented_crossings += 1
                 wrong.append(f"invented {name} crossing at {start:.9f}, distance {size:.2e}")
+
+
+def contacts_of(robot, scene) -> Contacts:
+    """An arm in a scene, for distances that rest on nothing of er3a but what the arm and the scene are."""
+    capsules = [(part.link, part.start, part.end, part.radius) for part in envelopes_of(robot)]
+    solids = []
+    for solid in scene.solids:
+        match solid:
+            case Box():
+                solids.append(("box", tuple(solid.size), solid.T))
+            case Cylinder():
+                solids.append(("cylinder", (solid.radius, solid.length), solid.T))
+            case Sphere():
+                solids.append(("sphere", (solid.radius,), solid.T))
+            case Plane():
+                solids.append(("plane", (solid.normal, solid.offset), None))
+    return Contacts(table_of(robot), capsules, self_pairs(robot), solids)

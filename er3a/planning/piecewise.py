@@ -129,11 +129,12 @@ class PiecewiseMotion:
 
     @cached_property
     def steps(self) -> Reals:
-        """(m - 1, n), rad/s^2, by which the acceleration steps between pieces; and from and to rest, (m + 1, n)."""
+        """(m + 1, n), rad/s^2, by which the acceleration steps between pieces, and from and to rest."""
         signs = np.where(np.arange(self.acceleration.shape[1]) % 2, -1.0, 1.0)[:, None]
         first, last = (self.acceleration * signs).sum(axis=1), self.acceleration.sum(axis=1)
         rest = np.zeros((1, first.shape[1]))
-        return np.abs(np.concatenate([first, rest]) - np.concatenate([rest, last]))
+        steps: Reals = np.abs(np.concatenate([first, rest]) - np.concatenate([rest, last]))
+        return steps
 
     def rates(self, t: Reals) -> Rates:
         """Angles, velocities and accelerations at times (...,), each (..., n)."""

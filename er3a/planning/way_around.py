@@ -307,7 +307,8 @@ def _shortened(moves: _Moves, corners: Reals, random: np.random.Generator) -> Re
         kept.append(next(j for j in ahead if j == kept[-1] + 1 or moves.free(corners[kept[-1]], corners[j])))
     shortened = corners[kept]
     steps = np.abs(np.diff(shortened, axis=0)).max(axis=1)
-    return shortened[np.concatenate([[True], steps > STILL])]
+    kept_apart: Reals = shortened[np.concatenate([[True], steps > STILL])]
+    return kept_apart
 
 
 def _between(corners: Reals, lengths: Reals, at: float) -> Reals:

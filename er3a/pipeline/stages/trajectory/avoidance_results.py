@@ -186,7 +186,6 @@ class AvoidanceTask:
             smallest_singular_value=measures.smallest_singular_value,
         )
 
-
     def _fastest_time(self, timed: Timed) -> float:
         """When a joint comes nearest to its greatest speed."""
         curve = timed.curve

@@ -18,7 +18,7 @@ from er3a.pipeline.stages.trajectory.avoidance_results import AvoidanceTask, spe
 from er3a.pipeline.stages.trajectory.collisions import Surroundings, clearance_rows, measured
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.stages.trajectory.judgement import Judgement, judge
-from er3a.pipeline.stages.trajectory.limits import limits_of
+from er3a.pipeline.stages.trajectory.limits import limits_of, planning_of, wanted_of
 from er3a.pipeline.stages.trajectory.model import (
     AllSafe,
     AvoidanceRows,
@@ -39,8 +39,6 @@ from er3a.pipeline.study import Study
 from er3a.planning.commands import CommandSource
 from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.timing import JointLimits
-from er3a.planning.tool_proof import Wanted
-from er3a.planning.way_around import PlanningTask
 from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
 
@@ -50,18 +48,15 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     robot, settings = study.robot(name), study.section(TrajectorySettings)
     file = Path(study.entry(name).paths)
     thresholds = NearThresholds(settings.near_wrist_deg, settings.near_elbow_deg, settings.near_shoulder_mm)
-    near = NearSingular(
-        float(np.radians(thresholds.wrist_deg)), float(np.radians(thresholds.elbow_deg)), thresholds.shoulder_mm / 1000
-    )
-    limits = limits_of(robot, settings)
+    wanted, limits = wanted_of(robot, settings), limits_of(robot, settings)
+    near = wanted.near
     scene_file = study.scene(name, "trajectory")
     scene = load_scene(scene_file) if scene_file else None
     surroundings = (
         Surroundings(Bodies(robot, scene), settings.penetration_tolerance_mm / 1000) if can_measure() else None
     )
     only = None if settings.avoidance == "compare" else settings.avoidance
-    bodies, tolerance = surroundings.bodies if surroundings else None, settings.penetration_tolerance_mm / 1000
-    planning = PlanningTask(robot, bodies, tolerance, limits, study.seed)
+    planning = planning_of(robot, settings, surroundings.bodies if surroundings else None, study.seed)
     avoidance = AvoidanceTask(robot, near, limits, only, surroundings, planning)
     tables: list[PathChecks] = []
     clearances: list[Clearances] = []
@@ -70,7 +65,6 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     ends: dict[str, Reals] = {}
     for i, entry in enumerate(load_paths(file).paths):
         source = CommandSource(file, f"paths[{i}]")
-        wanted = Wanted(limits.rates, near)
         motion = motion_of(robot, entry, settings.checks_per_sample, source, ends, wanted, planning)
         ends[entry.name] = motion.q[-1]
         found = judge(robot, motion, near, limits)

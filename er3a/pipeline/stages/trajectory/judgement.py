@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
+from typing import Literal
 
 import numpy as np
 
@@ -153,8 +155,7 @@ def _tool_faults(robot: Robot, motion: Motion, near: NearSingular, limits: Joint
         if limit.order == 3:
             fast += jerk_intervals(proof, limit)
             continue
-        part = limit.order
-        fast += rates_exceeded(at, rates[:, part - 1], limit, lambda t, part=part: motion.rates(t)[part])
+        fast += rates_exceeded(at, rates[:, limit.order - 1], limit, partial(_rate, motion, limit.order))
     known = rates[np.isfinite(rates).all(axis=(1, 2))]
     greatest = np.abs(known).max(axis=0) if len(known) else None
     return _Found(
@@ -164,6 +165,11 @@ def _tool_faults(robot: Robot, motion: Motion, near: NearSingular, limits: Joint
         undecided=list(proof.undecided),
         greatest=None if greatest is None else (greatest[0], greatest[1]),
     )
+
+
+def _rate(motion: Motion, order: Literal[1, 2], t: Reals) -> Reals:
+    """Speeds or accelerations (n, joints) at times (n,)."""
+    return motion.rates(t)[order]
 
 
 def _velocity_check(motion: Motion) -> float:
