@@ -6,20 +6,38 @@ was tried: millimetres and degrees, rounded before they are solved.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import islice
+from typing import Any
 
 import numpy as np
 
+from er3a.collision.bodies import Bodies, can_measure
 from er3a.collision.scene import Scene
+from er3a.errors import Er3aError
+from er3a.files.path_file import PathEntry, PathFile
+from er3a.files.target_file import TargetEntry
+from er3a.files.yaml_file import parse
+from er3a.geometry.transforms import rpy_of
+from er3a.kinematics.inverse import inverse
 from er3a.kinematics.near_singular import NearSingular
+from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.new_study.surroundings import SampledReach
+from er3a.pipeline.stages.trajectory.collisions import Surroundings, measured
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
+from er3a.pipeline.stages.trajectory.judgement import judge
 from er3a.pipeline.stages.trajectory.limits import limits_of, wanted_of
+from er3a.pipeline.stages.trajectory.motion import motion_of
+from er3a.planning.commands import CommandSource
+from er3a.planning.polynomial_checks import limit_intervals, rate_intervals
 from er3a.planning.timing import JointLimits
 from er3a.planning.tool_proof import Wanted
+from er3a.robots.joint_limits import limit_margin
 from er3a.robots.robot import Robot
+from er3a.selection.select import refusals
 
 MOST_TARGETS, LEAST_TARGETS, CHOICE = 5, 2, 30
 APART = 0.1  # of the reach
@@ -72,3 +90,149 @@ class TaskSearch:
         self.closed_form = closed_form_missing(self.robot) is None
         self.limits, self.wanted = limits_of(self.robot, self.settings), wanted_of(self.robot, self.settings)
         self.near = self.wanted.near
+
+    def spots(self) -> list[Spot]:
+        """Poses far from one another: at most ``MOST_TARGETS``, fewer where the arm reaches no more of those tried."""
+        tries = TRIES_CLOSED_FORM if self.closed_form else TRIES_ITERATION
+        tried = (self._spot(*candidate) for candidate in islice(self._candidates(), tries))
+        choice = list(islice(filter(None, tried), CHOICE))
+        found = choice[:1]
+        while choice and len(found) < MOST_TARGETS:
+            away = [min(_distance(spot, other) for other in found) for spot in choice]
+            if max(away) < APART * self.reach.radius * 1000:
+                break
+            found.append(choice[int(np.argmax(away))])
+        return found
+
+    def paths(self, spots: list[Spot]) -> list[dict[str, Any]]:
+        """Entries of a path file, each safe: a joint move and, where the arm has a closed form, a line and an arc."""
+        found = [self._first_safe(self._joint_moves(spots))]
+        if self.closed_form:
+            found += [self._first_safe(self._lines(spots)), self._first_safe(self._arcs(spots))]
+        return [entry for entry in found if entry]
+
+    def _candidates(self) -> Iterator[tuple[tuple[float, float, float], tuple[float, float, float]]]:
+        """Poses to try: above the ground on the side where the arm works, tool down; then those of drawn joints."""
+        base = self.robot.base
+        if self.reach.stands:
+            turn = np.radians(self.reach.side_deg)
+            out, aside = np.array([np.cos(turn), np.sin(turn), 0]), np.array([-np.sin(turn), np.cos(turn), 0])
+            for height in HEIGHTS:
+                for distance in DISTANCES:
+                    for share in ASIDE:
+                        point = base[:3, 3] + self.reach.radius * (distance * out + share * aside + [0, 0, height])
+                        yield _millimetres(point), (180.0, 0.0, 0.0)
+        for pose in self.reach.poses:
+            roll, pitch, yaw = np.round(np.degrees(rpy_of(pose))).tolist()
+            yield _millimetres(pose[:3, 3]), (roll, pitch, yaw)
+
+    def _spot(self, xyz_mm: tuple[float, float, float], rpy_deg: tuple[float, float, float]) -> Spot | None:
+        """The pose with its best solution: within the limits, clear of everything, far from singular."""
+        written = {"name": "spot", "xyz_mm": list(xyz_mm), "rpy_deg": list(rpy_deg)}
+        try:
+            target = parse(TargetEntry, written, None).target(self.robot)
+            solutions = inverse(self.robot, target.T, target.q_ref)
+        except Er3aError:
+            return None
+        scene = self.scene if can_measure() else None
+        free = np.array([why is None for why in refusals(self.robot, solutions, scene)], dtype=bool)
+        margin = limit_margin(self.robot, solutions.q)
+        rows = np.flatnonzero(free & solutions.solved & (margin > LIMIT_MARGIN_RAD))
+        rows = rows[self._regular(solutions.q[rows])]
+        if not rows.size:
+            return None
+        best = int(rows[margin[rows].argmax()])
+        return Spot(xyz_mm, rpy_deg, solutions.q[best], str(solutions.label[best]))
+
+    def _regular(self, q: Reals) -> Any:
+        if self.closed_form:
+            return self.near.margin(self.robot, q) > SINGULAR_MARGIN
+        smallest = conditioning(self.robot, q, characteristic_length(self.robot)).smallest_singular_value
+        return smallest > LEAST_SINGULAR_VALUE
+
+    def _joint_moves(self, spots: list[Spot]) -> Iterator[dict[str, Any]]:
+        for first, start in enumerate(spots):
+            for end in spots[first + 1 :]:
+                degrees = [np.round(np.degrees(spot.q)).tolist() for spot in (start, end)]
+                for duration in DURATIONS_S:
+                    yield {
+                        "name": "joint_move",
+                        "kind": "joint",
+                        "title": "All joints together, from one target to another",
+                        "title_zh": "各关节同时运动，从一个目标到另一个",
+                        "start_deg": degrees[0],
+                        "end_deg": degrees[1],
+                        "duration_s": duration,
+                        "samples": SAMPLES,
+                    }
+
+    def _lines(self, spots: list[Spot]) -> Iterator[dict[str, Any]]:
+        for length in LENGTHS:
+            for spot in spots:
+                for step in STEPS:
+                    end = _shifted(spot, length * self.reach.radius * np.array(step))
+                    titles = {"title": "A straight line, the tool held as it is", "title_zh": "直线，工具姿态不变"}
+                    yield from _moves("line", titles, spot, {"end": end})
+
+    def _arcs(self, spots: list[Spot]) -> Iterator[dict[str, Any]]:
+        titles = {"title": "Half a circle, the tool held as it is", "title_zh": "半圆，工具姿态不变"}
+        for length in LENGTHS:
+            for spot in spots:
+                for step, side in zip(STEPS, (*STEPS[2:], *STEPS[:2])):
+                    way, bulge = (length * self.reach.radius * np.array(each) for each in (step, side))
+                    via = _shifted(spot, way / 2 + bulge / 2)["xyz_mm"]
+                    yield from _moves("arc", titles, spot, {"via_mm": via, "end": _shifted(spot, way)})
+
+    def _first_safe(self, entries: Iterator[dict[str, Any]]) -> dict[str, Any] | None:
+        return next((entry for entry in entries if self._safe(entry)), None)
+
+    def _safe(self, written: dict[str, Any]) -> bool:
+        """Whether the trajectory stage would call a path safe."""
+        entry: PathEntry = parse(PathFile, {"kind": "paths", "paths": [written]}, None).paths[0]
+        try:
+            motion = motion_of(
+                self.robot, entry, self.settings.checks_per_sample, CommandSource(None, ""), {}, self.wanted
+            )
+        except Er3aError:
+            return False
+        if self.closed_form:
+            if judge(self.robot, motion, self.near, self.limits).verdict != "safe":
+                return False
+        elif (
+            (curve := motion.polynomials) is None
+            or limit_intervals(self.robot, curve)
+            or any(rate_intervals(curve, limit) for limit in self.limits.rates)
+        ):
+            return False
+        if not can_measure():
+            return True
+        around = Surroundings(Bodies(self.robot, self.scene), self.settings.penetration_tolerance_mm / 1000)
+        return not measured(around, motion).contacts
+
+
+def _moves(kind: str, titles: dict[str, str], spot: Spot, rest: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    branch = spot.label.replace("_elbow", ", elbow").replace("_no_flip", ", no flip").replace("_flip", ", flip")
+    for duration in DURATIONS_S:
+        yield {
+            "name": kind,
+            "kind": kind,
+            **titles,
+            "start": spot.pose,
+            "start_branch": branch.replace("_", " "),
+            **rest,
+            "duration_s": duration,
+            "samples": SAMPLES,
+        }
+
+
+def _distance(spot: Spot, other: Spot) -> float:
+    return float(np.linalg.norm(np.subtract(spot.xyz_mm, other.xyz_mm)))
+
+
+def _millimetres(point: Reals) -> tuple[float, float, float]:
+    x, y, z = (np.round(point * 200) * 5 + 0.0).tolist()  # to 5 mm
+    return x, y, z
+
+
+def _shifted(spot: Spot, way: Reals) -> dict[str, list[float]]:
+    return {"xyz_mm": list(_millimetres(np.array(spot.xyz_mm) / 1000 + way)), "rpy_deg": list(spot.rpy_deg)}
