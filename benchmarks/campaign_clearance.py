@@ -36,7 +36,9 @@ def judged(robot, random) -> tuple[int, int, int, float, float, int]:
         bodies = Bodies(robot, scene)
         every = np.arange(len(bodies.pairs))
         dense = np.array([bodies.distances(ends, every).min() for ends in bodies.ends(move.joints(times)[0])])
-        found = clearance_along(bodies, lambda t, move=move: move.joints(t)[0], ENDS, ENDS, DEPTH)
+        found = clearance_along(
+            bodies, lambda t, move=move: move.joints(t)[0], move.polynomials().rate_bounds, ENDS, ENDS, DEPTH
+        )
         inside = np.zeros(DENSE, bool)
         for contact in found.contacts:
             inside |= (times >= contact.start) & (times <= contact.end)

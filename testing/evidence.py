@@ -30,6 +30,7 @@ PAGES = (
     "workspace",
     "paths",
     "clearance",
+    "motion",
     "capability",
     "teach",
     "pages",

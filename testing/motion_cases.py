@@ -8,6 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from er3a.collision.bodies import self_pairs
+from er3a.collision.envelopes import envelopes_of
+from er3a.collision.scene import Box, Cylinder, Plane, Sphere
 from er3a.files.path_file import PathFile
 from er3a.files.yaml_file import parse
 from er3a.geometry.transforms import rpy_of
@@ -19,7 +22,8 @@ from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
 from er3a.planning.commands import CommandSource
 from er3a.planning.timing import joint_limits
 from er3a.planning.tool_proof import Wanted
-from testing.motion_oracle import GRAZING, TOUCH, arm_of, factors, joint_path, truth
+from testing.dense_contacts import Contacts
+from testing.motion_oracle import GRAZING, TOUCH, Truth, arm_of, factors, joint_path, truth
 
 NEAR = NearSingular(float(np.radians(5)), float(np.radians(5)), 0.03)
 ASSUMED = np.radians([180, 180, 180, 360, 360, 360])
@@ -131,11 +135,16 @@ def judged(robot, written, samples) -> tuple[Motion, Judgement]:
     return motion, judge(robot, motion, NEAR, limits)
 
 
-def compare(robot, spec, written, samples, tally: Tally) -> list[str]:
+def looked_at(robot, spec, points: int) -> Truth:
+    """What the oracle sees of a path at so many points."""
+    limits = joint_limits(robot, ASSUMED, 0.25)
+    return truth(spec, arm_of(table_of(robot)), (limits.speed, limits.acceleration), spec.get("q_start"), points)
+
+
+def compare(robot, spec, written, samples, tally: Tally, seen: Truth) -> list[str]:
     """Add a path to the tally; what is missed or invented, in words."""
     limits = joint_limits(robot, ASSUMED, 0.25)
     arm = arm_of(table_of(robot))
-    seen = truth(spec, arm, (limits.speed, limits.acceleration), spec.get("q_start"))
     motion, found = judged(robot, written, samples)
     wrong: list[str] = []
     tally.paths += 1
@@ -204,3 +213,20 @@ def _crossings(arm, spec, seen, found, tally, wrong):
             if size > TOUCH:
                 tally.invented_crossings += 1
                 wrong.append(f"invented {name} crossing at {start:.9f}, distance {size:.2e}")
+
+
+def contacts_of(robot, scene) -> Contacts:
+    """An arm in a scene, for distances that rest on nothing of er3a but what the arm and the scene are."""
+    capsules = [(part.link, part.start, part.end, part.radius) for part in envelopes_of(robot)]
+    solids = []
+    for solid in scene.solids:
+        match solid:
+            case Box():
+                solids.append(("box", tuple(solid.size), solid.T))
+            case Cylinder():
+                solids.append(("cylinder", (solid.radius, solid.length), solid.T))
+            case Sphere():
+                solids.append(("sphere", (solid.radius,), solid.T))
+            case Plane():
+                solids.append(("plane", (solid.normal, solid.offset), None))
+    return Contacts(table_of(robot), capsules, self_pairs(robot), solids)

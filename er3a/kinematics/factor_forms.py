@@ -71,4 +71,4 @@ def factor_forms(robot: Robot) -> FactorForms:
     both = q[:, 1] + sense * q[:, 2]
     columns = np.stack([np.ones(25), np.cos(q[:, 1]), np.sin(q[:, 1]), np.cos(both), np.sin(both)], axis=1)
     shoulder = np.linalg.lstsq(columns, determinant_factors(robot, q).shoulder, rcond=None)[0]
-    return FactorForms(*phases, sense=sense, shoulder=shoulder)
+    return FactorForms(phases[0], phases[1], sense, shoulder)

@@ -17,6 +17,7 @@ from er3a.pipeline.stages.trajectory.judgement import judge
 from er3a.pipeline.stages.trajectory.listed_motions import listed_motions
 from er3a.pipeline.stages.trajectory.written_programs import LONGEST_NAME, written
 from er3a.planning.path_verdicts import PATH_VERDICTS, PathVerdict
+from er3a.planning.tool_proof import Wanted
 from er3a.planning.way_around import PlanningTask
 from er3a.program_check.check_program import NEAR, CheckOptions, assumed_limits
 from er3a.programs.program_findings import WriteFinding
@@ -60,7 +61,7 @@ def programs_of(
     missing = next((name for name in only or () if name not in {entry.name for entry in listed}), None)
     if missing is not None:
         raise InputError(file, "paths", f"there is no path '{missing}'", f"Known: {', '.join(e.name for e in listed)}")
-    for each in listed_motions(file, task, NEAR, CHECKS_PER_SAMPLE):
+    for each in listed_motions(file, task, Wanted(task.limits.rates, NEAR), CHECKS_PER_SAMPLE):
         if only and each.listed not in only:
             continue
         verdict = judge(robot, each.motion, NEAR, task.limits).verdict

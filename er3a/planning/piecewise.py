@@ -86,12 +86,20 @@ class Pieces:
                 found.append((start, end, most))
         return found
 
+    def peak(self) -> tuple[float, float]:
+        """The greatest value, and a time at which it is met."""
+        ends = np.stack([chebyshev.chebval(x, self.series.T) for x in (-1.0, 1.0)])
+        side, piece = np.unravel_index(int(ends.argmax()), ends.shape)
+        most, at = float(ends.max()), float(self.times[piece + side])
+        for i in np.flatnonzero(self.range[1] > most).tolist():
+            t, values = self.nodes(i)
+            if values.max() > most:
+                most, at = float(values.max()), float(t[values.argmax()])
+        return most, at
+
     def greatest(self) -> float:
         """The greatest value."""
-        ends = np.max([chebyshev.chebval(x, self.series.T) for x in (-1.0, 0.0, 1.0)])
-        for i in np.flatnonzero(self.range[1] > ends).tolist():
-            ends = max(ends, self.nodes(i)[1].max())
-        return float(ends)
+        return self.peak()[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,17 +129,19 @@ class PiecewiseMotion:
 
     @cached_property
     def steps(self) -> Reals:
-        """(m - 1, n), rad/s^2, by which the acceleration steps between pieces; and from and to rest, (m + 1, n)."""
+        """(m + 1, n), rad/s^2, by which the acceleration steps between pieces, and from and to rest."""
         signs = np.where(np.arange(self.acceleration.shape[1]) % 2, -1.0, 1.0)[:, None]
         first, last = (self.acceleration * signs).sum(axis=1), self.acceleration.sum(axis=1)
         rest = np.zeros((1, first.shape[1]))
-        return np.abs(np.concatenate([first, rest]) - np.concatenate([rest, last]))
+        steps: Reals = np.abs(np.concatenate([first, rest]) - np.concatenate([rest, last]))
+        return steps
 
     def rates(self, t: Reals) -> Rates:
         """Angles, velocities and accelerations at times (...,), each (..., n)."""
         t = np.asarray(t, float)
         i = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.times) - 2)
-        x = 2 * (t - self.times[i]) / (self.times[i + 1] - self.times[i]) - 1
+        span = self.times[i + 1] - self.times[i]
+        x = np.divide(2 * (t - self.times[i]), span, out=np.zeros_like(t), where=span > 0) - 1
         q, velocity, acceleration = (
             _evaluated(series[i], x) for series in (self.angle, self.velocity, self.acceleration)
         )

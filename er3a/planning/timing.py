@@ -303,7 +303,7 @@ def _toppra(way: Reals, spline: CubicSpline, limits: JointLimits, cap: Reals | N
     except ModuleNotFoundError:
         raise TimingError(ToppraMissing()) from None
 
-    count = spline.c.shape[-1]
+    count: int = spline.c.shape[-1]
 
     class Way(AbstractGeometricPath):  # type: ignore[misc]
         dof, waypoints = count, None

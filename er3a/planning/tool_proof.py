@@ -243,7 +243,8 @@ def _distance(points: Reals, start: Reals, end: Reals) -> Reals:
     after = np.searchsorted(points, start)
     ahead = np.append(points, np.inf)[after] - end
     behind = start - np.append(-np.inf, points)[after]
-    return np.maximum(np.minimum(ahead, behind), 0.0)
+    distance: Reals = np.maximum(np.minimum(ahead, behind), 0.0)
+    return distance
 
 
 def _proof(followed: Followed, done: list[_Settled], singular: Reals) -> ToolProof:
@@ -294,12 +295,12 @@ def _settle(followed: Followed, wanted: Wanted, progress: PiecewiseMotion, start
     velocity, acceleration = dq * speed[:, None], ddq * speed[:, None] ** 2 + dq * pull[:, None]
     rates, highest = _rate_bounds(bounds, velocity, acceleration, progress, (start, end), (speed, pull, half))
     unreached = np.isnan(np.stack([q_start, q, q_end])[..., 0])
-    open_, broken = np.zeros((2, count, len(QUANTITIES)), bool)
+    open_, broken = (np.zeros((count, len(QUANTITIES)), bool) for _ in range(2))
     known = bounds.proven
     open_[:, 0] = ~known & ~unreached.all(axis=0)
     outside = _outside(robot, np.stack([q_start, q, q_end])).any(axis=0)
     sure = ~_outside(robot, np.stack([q - bounds.change, q + bounds.change])).any(axis=0)
-    open_[:, 1], broken[:, 1] = known & ~(sure | outside).all(axis=1), outside.any(axis=1)
+    open_[:, 1], broken[:, 1] = known & ~np.all(sure | outside, axis=1), np.any(outside, axis=1)
     asks_jerk = any(limit.order == 3 for limit in wanted.rates)
     jerk = _mean_jerk(followed, start, end) if asks_jerk else np.zeros_like(q)
     for limit in wanted.rates:

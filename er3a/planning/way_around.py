@@ -3,7 +3,8 @@
 RRT-Connect [1]_ of OMPL [2]_ joins the ends by straight moves in joint space. A move is tried by conservative
 advancement: from an arm that is d clear no body can be met before the joints' turns, each times the longest lever that
 it swings, add up to d. Random short cuts follow, then corners are rounded as far as they stay clear, and the rounded
-way is timed. What is handed out is proven as it is run (:mod:`er3a.collision.along`): on the timed curve itself.
+way is timed. What is handed out is proven as it is run: on the timed curve itself, along which the least clearance is
+found to within a depth (:mod:`er3a.collision.along`) and exceeds that depth, so that nothing touches at any time.
 
 The search ends after a number of rounds, not of seconds, and draws from its own seed alone: equal tasks, equal motions.
 
@@ -48,6 +49,7 @@ ROUNDINGS = (1.0, 0.5, 0.2, 0.0)  # of half of the shorter side
 NODES = 240
 SHOWN = 101
 STILL = 1e-9  # rad
+SPARE = 0.25  # of the clearance at the ends, to within which that of the motion is found
 STREAM = 17
 MOST_PAIRS = 4
 
@@ -127,7 +129,7 @@ class PlanningTask:
 
     Attributes
     ----------
-    tolerance : m, no deeper overlap goes unnoticed; planned motions have none at all where they are measured
+    tolerance : m, to within which clearances are found, or better where the ends are nearer to something
     """
 
     robot: Robot
@@ -150,8 +152,9 @@ def way_around(task: PlanningTask, start: Reals, end: Reals) -> WayAround | NoWa
     for (name, _), distance, pair in zip(ends, clear, pairs):
         if distance <= 0:
             return EndOverlaps(name, PairOverlaps(task.bodies.pairs[pair], -float(distance) * 1000))
+    depth = min(task.tolerance, SPARE * float(clear.min()))
     if np.abs(end - start).max() < STILL:
-        return _proven(task, np.stack([start, end]), standing(start, 0.0)) or NoneFound(0)
+        return _proven(task, np.stack([start, end]), standing(start, 1.0), depth) or NoneFound(0)
     rounds = 0
     for attempt, margin in enumerate(MARGINS):
         moves = _Moves(task.robot, task.bodies, min(task.tolerance + margin, 0.5 * float(clear.min())))
@@ -168,7 +171,7 @@ def way_around(task: PlanningTask, start: Reals, end: Reals) -> WayAround | NoWa
         for motion in _timed(task, corners):
             if isinstance(motion, ToppraMissing):
                 return motion
-            if found := _proven(task, corners, motion):
+            if found := _proven(task, corners, motion, depth):
                 return found
     return NoneFound(rounds)
 
@@ -307,7 +310,8 @@ def _shortened(moves: _Moves, corners: Reals, random: np.random.Generator) -> Re
         kept.append(next(j for j in ahead if j == kept[-1] + 1 or moves.free(corners[kept[-1]], corners[j])))
     shortened = corners[kept]
     steps = np.abs(np.diff(shortened, axis=0)).max(axis=1)
-    return shortened[np.concatenate([[True], steps > STILL])]
+    kept_apart: Reals = shortened[np.concatenate([[True], steps > STILL])]
+    return kept_apart
 
 
 def _between(corners: Reals, lengths: Reals, at: float) -> Reals:
@@ -355,14 +359,13 @@ def _with_jerk(way: JointSequence, limits: JointLimits) -> Timed:
     return Timed(curve.scaled(max(speed, np.sqrt(acceleration), np.cbrt(jerk))))
 
 
-def _proven(task: PlanningTask, corners: Reals, motion: Timed) -> WayAround | None:
-    """The motion with its clearance, if it meets nothing and keeps its limits."""
+def _proven(task: PlanningTask, corners: Reals, motion: Timed, depth: float) -> WayAround | None:
+    """The motion with its clearance, if it touches nothing and keeps its limits."""
     assert task.bodies is not None
     curve = motion.curve
-    if curve.duration == 0:
-        curve = standing(corners[0], 1.0).curve
     if limit_intervals(task.robot, curve):
         return None
     grid = np.linspace(0.0, curve.duration, SHOWN)
-    along = clearance_along(task.bodies, curve.joints, curve.rate_bounds, grid, grid, task.tolerance)
-    return None if along.contacts else WayAround(corners, motion, along)
+    along = clearance_along(task.bodies, curve.joints, curve.rate_bounds, grid, grid, depth)
+    nearest = np.inf if along.least < 0 else float(along.distance[along.least])
+    return WayAround(corners, motion, along) if nearest > depth else None

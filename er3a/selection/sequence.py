@@ -129,5 +129,7 @@ def _usable(robot: Robot, solutions: Solutions, scene: Scene | None, number: int
 def _move_costs(robot: Robot, before: Reals, after: Reals, rule: MoveRule, acceleration: Reals | None) -> Reals:
     """Cost (n, m) of each move from joint angles (n, 6) to (m, 6)."""
     if rule == "time" and acceleration is not None:
-        return rest_to_rest(np.abs(after[None] - before[:, None]), robot.speed, acceleration).max(axis=-1, initial=0.0)
+        times = rest_to_rest(np.abs(after[None] - before[:, None]), robot.speed, acceleration)
+        slowest: Reals = times.max(axis=-1, initial=0.0)
+        return slowest
     return RULES[rule].measure(robot, after[None], before[:, None], None)

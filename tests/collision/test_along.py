@@ -14,10 +14,12 @@ from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import SceneFile
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
-from er3a.planning.follow import follow
+from er3a.kinematics.near_singular import NearSingular
 from er3a.planning.moves import JointMove, line
+from er3a.planning.tool_proof import Wanted, follow_and_prove
 
 DEPTH = 1e-3
+WANTED = Wanted((), NearSingular(0.1, 0.1, 0.03))
 ENDS = np.array([0.0, 1.0])
 
 
@@ -33,7 +35,9 @@ def swing(robot):
 
 
 def along(robot, scene, move, shown=ENDS):
-    return clearance_along(Bodies(robot, scene), lambda t: move.joints(t)[0], shown, shown, DEPTH)
+    return clearance_along(
+        Bodies(robot, scene), lambda t: move.joints(t)[0], move.polynomials().rate_bounds, shown, shown, DEPTH
+    )
 
 
 @pytest.mark.parametrize(
@@ -101,8 +105,8 @@ def test_arm_that_folds_into_itself_is_found():
     robot = load_robot("er3a_c60")
     path = line(transform([0.3, 0, 0.25], [np.pi, 0, 0]), transform([0.12, 0, 0.25], [np.pi, 0, 0]), 4.0)
     t = np.linspace(0, 4, 50)
-    followed = follow(robot, path, t)
-    found = clearance_along(Bodies(robot, None), followed.joints, followed.t, t, DEPTH)
+    followed, proof = follow_and_prove(robot, path, t, WANTED)
+    found = clearance_along(Bodies(robot, None), followed.joints, proof.rate_bounds, followed.t, t, DEPTH)
     (contact,) = found.contacts
     assert all(isinstance(pair, LinkPair) for pair in contact.pairs)
     edge = clearance(robot, followed.joints(np.array([contact.start])), None).distance
@@ -115,8 +119,8 @@ def test_stretch_out_of_reach_has_no_clearance():
     end = start.copy()
     end[0, 3] += 1.0
     t = np.linspace(0, 1, 30)
-    followed = follow(robot, line(start, end, 1.0), t)
-    found = clearance_along(Bodies(robot, None), followed.joints, followed.t, t, DEPTH)
+    followed, proof = follow_and_prove(robot, line(start, end, 1.0), t, WANTED)
+    found = clearance_along(Bodies(robot, None), followed.joints, proof.rate_bounds, followed.t, t, DEPTH)
     reached = np.isfinite(followed.joints(found.t)[:, 0])
     np.testing.assert_array_equal(np.isfinite(found.distance), reached)
     assert 0 < reached.sum() < len(reached)

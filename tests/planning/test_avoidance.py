@@ -224,7 +224,7 @@ def test_start_inside_the_region_is_left_by_a_joint_move():
 
 
 def test_every_strategy_has_a_name_and_words():
-    assert tuple(STRATEGIES) == get_args(StrategyName) == tuple(messages.STRATEGIES)
+    assert (*STRATEGIES, "planned") == get_args(StrategyName) == tuple(messages.STRATEGIES)
 
 
 def test_deviation_is_the_distance_across_and_the_angle(random):

@@ -15,10 +15,11 @@ from er3a.kinematics.singularity import TYPES, determinant_factors
 from er3a.kinematics.solutions import WristTooFar
 from er3a.planning.arcs import arc
 from er3a.planning.follow import follow
-from er3a.planning.intervals import BelowLimit, out_of_limits, too_fast, unreachable
+from er3a.planning.intervals import BelowLimit, out_of_limits, rates_exceeded, unreachable
 from er3a.planning.moves import JointMove, line
 from er3a.planning.sequences import segment_path
 from er3a.planning.singular_events import singular_events
+from er3a.planning.timing import joint_limits
 from er3a.robots.joint_limits import nearest_equivalent, within
 
 NEAR = NearSingular(float(np.radians(5)), float(np.radians(5)), 0.03)
@@ -208,10 +209,11 @@ def test_speed_limits_are_named():
     robot = load_robot("er3_600")
     way = line(transform([0.02, -0.2, 0.85], [0, 0, 0]), transform([0.02, 0.2, 0.85], [0, 0, 0]), 4.0)
     followed = follow(robot, way, np.linspace(0, 4, 400))
-    found = too_fast(robot, followed.t, followed.rates(followed.t)[1], lambda t: followed.rates(t)[1])
+    limit = joint_limits(robot, np.ones(6), 1.0).rates[0]
+    found = rates_exceeded(followed.t, followed.rates(followed.t)[1], limit, lambda t: followed.rates(t)[1])
     assert [part.cause.joint for part in found] == [1]
     at = np.array([found[0].start, found[0].end])
-    np.testing.assert_allclose(np.abs(followed.rates(at)[1][:, 0]), robot.speed[0], rtol=1e-6)
+    np.testing.assert_allclose(np.abs(followed.rates(at)[1][:, 0]), limit.allowed[0], rtol=1e-6)
 
 
 def test_start_on_a_singularity_that_has_to_turn_first():

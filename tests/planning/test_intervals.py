@@ -11,10 +11,16 @@ from er3a.kinematics.solutions import WristTooFar
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.planning.arcs import arc
 from er3a.planning.follow import follow
-from er3a.planning.intervals import AboveLimit, TooFast, out_of_limits, too_fast, unreachable
+from er3a.planning.intervals import AboveLimit, TooFast, out_of_limits, rates_exceeded, unreachable
 from er3a.planning.moves import JointMove
+from er3a.planning.polynomial_checks import rate_intervals
+from er3a.planning.timing import joint_limits
 
 GRID = np.linspace(0, 1, 21)
+
+
+def speed_limit(robot):
+    return joint_limits(robot, np.ones(6), 1.0).rates[0]
 
 
 def test_limit_that_is_left_between_two_check_points_only():
@@ -39,8 +45,12 @@ def test_speed_that_is_passed_between_two_check_points_only():
     even = np.linspace(0, 1, 20)  # the quintic is fastest half way
     velocity = move.joints(even)[1]
     assert (np.abs(velocity) < robot.speed).all()
-    (interval,) = too_fast(robot, even, velocity, lambda t: move.joints(t)[1])
-    np.testing.assert_allclose(move.joints(np.array([interval.start, interval.end]))[1][:, 5], robot.speed[5])
+    limit = speed_limit(robot)
+    (interval,) = rates_exceeded(even, velocity, limit, lambda t: move.joints(t)[1])
+    np.testing.assert_allclose(move.joints(np.array([interval.start, interval.end]))[1][:, 5], limit.allowed[5])
+    (exact,) = rate_intervals(move.polynomials(), limit)
+    assert (exact.start, exact.end) == pytest.approx((interval.start, interval.end), abs=1e-9)
+    assert exact.cause.needed_deg_s == pytest.approx(interval.cause.needed_deg_s, rel=1e-9)
     assert interval.cause == TooFast(6, pytest.approx(840.2, abs=0.1), pytest.approx(840))
 
 
@@ -48,7 +58,8 @@ def test_motion_that_stays_below_has_no_interval():
     robot = load_robot("er3_600")
     move = JointMove(np.zeros(6), np.radians([0, 0, 0, 0, 0, 839.9 / 15 * 8]), 1.0)
     even = np.linspace(0, 1, 20)
-    assert too_fast(robot, even, move.joints(even)[1], lambda t: move.joints(t)[1]) == []
+    assert rates_exceeded(even, move.joints(even)[1], speed_limit(robot), lambda t: move.joints(t)[1]) == []
+    assert rate_intervals(move.polynomials(), speed_limit(robot)) == []
 
 
 def test_short_stretch_out_of_reach_between_check_points_is_found():

@@ -54,6 +54,7 @@ STRATEGIES: dict[StrategyName, str] = {
 MOST_PAIRS = 3
 NO_DEVIATION = 0.005  # mm or deg
 NO_TIME = 0.005  # s
+WHOLE = 10.0  # from which on numbers are rounded to whole ones
 
 
 def kind_word(kind: PathKind) -> str:
@@ -211,11 +212,15 @@ def _leaves(far_mm: float, turned_deg: float) -> str:
     if far_mm < NO_DEVIATION and turned_deg < NO_DEVIATION:
         return sentence("advice.tool", "the tool stays on the path")
     if turned_deg < NO_DEVIATION:
-        return sentence("advice.tool", "the tool leaves the path by {far:.2g} mm", far=far_mm)
+        return sentence("advice.tool", "the tool leaves the path by {far} mm", far=_shortly(far_mm))
     if far_mm < NO_DEVIATION:
-        return sentence("advice.tool", "the tool leaves the path by {turned:.2g} deg", turned=turned_deg)
-    both = {"far": far_mm, "turned": turned_deg}
-    return sentence("advice.tool", "the tool leaves the path by {far:.2g} mm and {turned:.2g} deg", **both)
+        return sentence("advice.tool", "the tool leaves the path by {turned} deg", turned=_shortly(turned_deg))
+    both = {"far": _shortly(far_mm), "turned": _shortly(turned_deg)}
+    return sentence("advice.tool", "the tool leaves the path by {far} mm and {turned} deg", **both)
+
+
+def _shortly(value: float) -> str:
+    return f"{value:.2g}" if value < WHOLE else f"{value:.0f}"
 
 
 def _takes(longer_s: float) -> str:

@@ -29,7 +29,7 @@ from er3a.pipeline.new_study.surroundings import SampledReach
 from er3a.pipeline.stages.trajectory.collisions import Surroundings, measured
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.stages.trajectory.judgement import judge
-from er3a.pipeline.stages.trajectory.limits import limits_of
+from er3a.pipeline.stages.trajectory.limits import limits_of, wanted_of
 from er3a.pipeline.stages.trajectory.motion import motion_of
 from er3a.planning.commands import CommandSource
 from er3a.planning.polynomial_checks import limit_intervals, rate_intervals
@@ -84,12 +84,12 @@ class TaskSearch:
     closed_form: bool = field(init=False)
     near: NearSingular = field(init=False)
     limits: JointLimits = field(init=False)
+    wanted: Wanted = field(init=False)
 
     def __post_init__(self) -> None:
         self.closed_form = has_branches(self.robot)
-        wrist, elbow = np.radians([self.settings.near_wrist_deg, self.settings.near_elbow_deg])
-        self.limits = limits_of(self.robot, self.settings)
-        self.near = NearSingular(float(wrist), float(elbow), self.settings.near_shoulder_mm / 1000)
+        self.limits, self.wanted = limits_of(self.robot, self.settings), wanted_of(self.robot, self.settings)
+        self.near = self.wanted.near
 
     def spots(self) -> list[Spot]:
         """Poses far from one another: at most ``MOST_TARGETS``, fewer where the arm reaches no more of those tried."""
@@ -189,9 +189,10 @@ class TaskSearch:
         """Whether the trajectory stage would call a path safe."""
         entry = parse(PathFile, {"kind": "paths", "paths": [written]}, None).paths[0]
         assert not isinstance(entry, ProgramPath)
-        wanted = Wanted(self.limits.rates, self.near)
         try:
-            motion = motion_of(self.robot, entry, self.settings.checks_per_sample, CommandSource(None, ""), {}, wanted)
+            motion = motion_of(
+                self.robot, entry, self.settings.checks_per_sample, CommandSource(None, ""), {}, self.wanted
+            )
         except Er3aError:
             return False
         if self.closed_form:

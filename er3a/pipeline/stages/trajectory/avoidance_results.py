@@ -166,25 +166,31 @@ class AvoidanceTask:
     def _rows(self, path: str, strategy: str, timed: Timed, deviations: tuple[Reals, Reals] | None) -> AvoidanceRows:
         """At most ROWS rows of a motion, and those of its greatest speed and deviation."""
         kept = np.unique(np.linspace(0, len(timed.t) - 1, min(ROWS, len(timed.t))).round().astype(int))
-        ratio = speed_ratio(timed.velocity, self.limits)
-        kept = np.union1d(kept, [np.argmax(ratio)] + ([] if deviations is None else [np.argmax(deviations[0])]))
-        q = timed.q[kept]
-        distance, angle = deviations or (np.zeros(len(timed.t)),) * 2
+        kept = kept if deviations is None else np.union1d(kept, [np.argmax(deviations[0])])
+        times = np.union1d(timed.t[kept], [self._fastest_time(timed)])
+        q, velocity, acceleration = timed.curve.rates(times)
+        distance, angle = (np.interp(times, timed.t, part) for part in deviations or (np.zeros(len(timed.t)),) * 2)
         measures = conditioning(self.robot, q, characteristic_length(self.robot))
         return AvoidanceRows(
-            path=np.full(len(kept), path, object),
-            strategy=np.full(len(kept), strategy, object),
-            t_s=timed.t[kept],
+            path=np.full(len(times), path, object),
+            strategy=np.full(len(times), strategy, object),
+            t_s=times,
             q_deg=np.degrees(q),
-            q_deg_s=np.degrees(timed.velocity[kept]),
-            q_deg_s2=np.degrees(timed.acceleration[kept]),
+            q_deg_s=np.degrees(velocity),
+            q_deg_s2=np.degrees(acceleration),
             xyz_mm=forward(self.robot, q)[:, :3, 3] * 1000,
-            deviation_mm=distance[kept] * 1000,
-            deviation_deg=np.degrees(angle[kept]),
-            speed_ratio=ratio[kept],
+            deviation_mm=distance * 1000,
+            deviation_deg=np.degrees(angle),
+            speed_ratio=speed_ratio(velocity, self.limits),
             condition_number=measures.condition_number,
             smallest_singular_value=measures.smallest_singular_value,
         )
+
+    def _fastest_time(self, timed: Timed) -> float:
+        """When a joint comes nearest to its greatest speed."""
+        curve = timed.curve
+        j = int(np.argmax(timed.greatest[0] / self.limits.speed))
+        return max(curve.of_joint(curve.velocity, j, sign).peak() for sign in (1.0, -1.0))[1]
 
 
 @dataclass(frozen=True, eq=False)

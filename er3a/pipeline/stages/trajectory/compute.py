@@ -17,7 +17,8 @@ from er3a.pipeline.stages.trajectory.avoidance_results import AvoidanceTask, spe
 from er3a.pipeline.stages.trajectory.collisions import Surroundings, clearance_rows, measured
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.stages.trajectory.judgement import Judgement, judge
-from er3a.pipeline.stages.trajectory.listed_motions import listed_motions, near_singular, planning_task
+from er3a.pipeline.stages.trajectory.limits import limits_of, planning_of, wanted_of
+from er3a.pipeline.stages.trajectory.listed_motions import listed_motions
 from er3a.pipeline.stages.trajectory.model import (
     AllSafe,
     AvoidanceRows,
@@ -48,19 +49,19 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     robot, settings = study.robot(name), study.section(TrajectorySettings)
     file = Path(study.entry(name).paths)
     thresholds = NearThresholds(settings.near_wrist_deg, settings.near_elbow_deg, settings.near_shoulder_mm)
-    near, planning = near_singular(settings), planning_task(study, name)
-    limits, scene_file = planning.limits, study.scene(name, "trajectory")
+    wanted, limits = wanted_of(robot, settings), limits_of(robot, settings)
+    near, scene_file = wanted.near, study.scene(name, "trajectory")
     scene = load_scene(scene_file) if scene_file else None
-    assert planning.bodies is not None
-    surroundings = Surroundings(planning.bodies, planning.tolerance)
+    surroundings = Surroundings(Bodies(robot, scene), settings.penetration_tolerance_mm / 1000)
     only = None if settings.avoidance == "compare" else settings.avoidance
+    planning = planning_of(robot, settings, surroundings.bodies, study.seed)
     avoidance = AvoidanceTask(robot, near, limits, only, surroundings, planning)
     tables: list[PathChecks] = []
     clearances: list[Clearances] = []
     strategies: list[AvoidanceRows] = []
     paths: list[PathSummary] = []
     programs: list[ProgramFiles] = []
-    for each in listed_motions(file, planning, near, settings.checks_per_sample):
+    for each in listed_motions(file, planning, wanted, settings.checks_per_sample):
         motion = each.motion
         found = judge(robot, motion, near, limits)
         along = measured(surroundings, motion)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
+from typing import Literal
 
 import numpy as np
 
@@ -65,13 +67,13 @@ class Judgement:
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """Faults of a motion, and its greatest speeds and accelerations (n,)."""
+    """Faults of a motion, and its greatest speeds and accelerations (n,), if any are known."""
 
     events: list[SingularEvent]
     limits: list[Interval[AboveLimit | BelowLimit]]
     fast: list[Interval[RateCause]]
     undecided: list[Interval[Undecided]]
-    greatest: tuple[Reals, Reals]
+    greatest: tuple[Reals, Reals] | None
 
 
 def judge(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits) -> Judgement:
@@ -104,8 +106,8 @@ def judge(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits)
         q=q,
         velocity=velocity,
         acceleration=acceleration,
-        greatest_speed=found.greatest[0] if bounded else None,
-        greatest_acceleration=found.greatest[1] if bounded else None,
+        greatest_speed=found.greatest[0] if bounded and found.greatest else None,
+        greatest_acceleration=found.greatest[1] if bounded and found.greatest else None,
         speed_bounded=bool(bounded),
         velocity_check=_velocity_check(motion),
     )
@@ -153,17 +155,21 @@ def _tool_faults(robot: Robot, motion: Motion, near: NearSingular, limits: Joint
         if limit.order == 3:
             fast += jerk_intervals(proof, limit)
             continue
-        part = limit.order
-        fast += rates_exceeded(at, rates[:, part - 1], limit, lambda t, part=part: motion.rates(t)[part])
-    unknown = np.full(2, np.nan)
-    greatest = np.nanmax(np.abs(rates), axis=0) if np.isfinite(rates).any() else np.tile(unknown[:, None], q.shape[1])
+        fast += rates_exceeded(at, rates[:, limit.order - 1], limit, partial(_rate, motion, limit.order))
+    known = rates[np.isfinite(rates).all(axis=(1, 2))]
+    greatest = np.abs(known).max(axis=0) if len(known) else None
     return _Found(
         events=events,
         limits=out_of_limits(robot, t, q, motion.joints),
         fast=fast,
         undecided=list(proof.undecided),
-        greatest=(greatest[0], greatest[1]),
+        greatest=None if greatest is None else (greatest[0], greatest[1]),
     )
+
+
+def _rate(motion: Motion, order: Literal[1, 2], t: Reals) -> Reals:
+    """Speeds or accelerations (n, joints) at times (n,)."""
+    return motion.rates(t)[order]
 
 
 def _velocity_check(motion: Motion) -> float:

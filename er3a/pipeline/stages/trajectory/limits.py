@@ -1,14 +1,31 @@
-"""The limits of joint rates that a study gives or assumes."""
+"""What a study asks of all motions of a robot: limits of joint rates, distances from singular poses, planning."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from er3a.collision.bodies import Bodies
 from er3a.errors import InputError
+from er3a.kinematics.near_singular import NearSingular
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.planning.timing import JointLimits, joint_limits
+from er3a.planning.tool_proof import Wanted
+from er3a.planning.way_around import PlanningTask
 from er3a.robots.robot import Robot
+
+
+def wanted_of(robot: Robot, settings: TrajectorySettings) -> Wanted:
+    """What is to be settled of paths of the tool."""
+    wrist, elbow = np.radians([settings.near_wrist_deg, settings.near_elbow_deg])
+    near = NearSingular(float(wrist), float(elbow), settings.near_shoulder_mm / 1000)
+    return Wanted(limits_of(robot, settings).rates, near)
+
+
+def planning_of(robot: Robot, settings: TrajectorySettings, bodies: Bodies | None, seed: int) -> PlanningTask:
+    """How motions are planned; ``bodies`` are what they must not meet, None where nothing can be measured."""
+    tolerance = settings.penetration_tolerance_mm / 1000
+    return PlanningTask(robot, bodies, tolerance, limits_of(robot, settings), seed)
 
 
 def limits_of(robot: Robot, settings: TrajectorySettings) -> JointLimits:

@@ -6,15 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from er3a.collision.bodies import Bodies
 from er3a.files.path_file import load_paths
 from er3a.files.scene_file import load_scene
-from er3a.kinematics.near_singular import NearSingular
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
-from er3a.pipeline.stages.trajectory.limits import limits_of
+from er3a.pipeline.stages.trajectory.limits import planning_of, wanted_of
 from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
 from er3a.pipeline.stages.trajectory.program_paths import planned_entries
 from er3a.pipeline.study import Study
@@ -32,36 +29,21 @@ class ListedMotion:
     motion: Motion
 
 
-def near_singular(settings: TrajectorySettings) -> NearSingular:
-    """The distances below which the study counts a pass as near-singular."""
-    wrist, elbow = np.radians([settings.near_wrist_deg, settings.near_elbow_deg]).tolist()
-    return NearSingular(wrist, elbow, settings.near_shoulder_mm / 1000)
-
-
-def planning_task(study: Study, name: str) -> PlanningTask:
-    """An arm, what its paths must not meet, and its limits, as the study has them."""
-    robot, settings = study.robot(name), study.section(TrajectorySettings)
-    scene = study.scene(name, "trajectory")
-    bodies = Bodies(robot, load_scene(scene) if scene else None)
-    tolerance = settings.penetration_tolerance_mm / 1000
-    return PlanningTask(robot, bodies, tolerance, limits_of(robot, settings), study.seed)
-
-
 def study_motions(study: Study, name: str, checks_per_sample: int) -> Iterator[ListedMotion]:
-    """The motions of a robot of the study; see :func:`listed_motions`."""
-    near = near_singular(study.section(TrajectorySettings))
-    return listed_motions(Path(study.entry(name).paths), planning_task(study, name), near, checks_per_sample)
+    """The motions of a robot of the study, in the scene of its trajectory stage; see :func:`listed_motions`."""
+    robot, settings, scene = study.robot(name), study.section(TrajectorySettings), study.scene(name, "trajectory")
+    bodies = Bodies(robot, load_scene(scene) if scene else None)
+    task = planning_of(robot, settings, bodies, study.seed)
+    return listed_motions(Path(study.entry(name).paths), task, wanted_of(robot, settings), checks_per_sample)
 
 
-def listed_motions(
-    file: Path, task: PlanningTask, near: NearSingular, checks_per_sample: int
-) -> Iterator[ListedMotion]:
+def listed_motions(file: Path, task: PlanningTask, wanted: Wanted, checks_per_sample: int) -> Iterator[ListedMotion]:
     """Plan the paths of a file.
 
     Parameters
     ----------
     task : the arm, what it must not meet and its limits, for motions that are to be planned
-    near : distances below which a pass counts as near-singular
+    wanted : what is to be settled of paths of the tool
     checks_per_sample : points checked between two samples to begin with
 
     Raises
@@ -70,7 +52,6 @@ def listed_motions(
         for what can't be planned
     """
     ends: dict[str, Reals] = {}
-    wanted = Wanted(task.limits.rates, near)
     for i, listed in enumerate(load_paths(file).paths):
         source = CommandSource(file, f"paths[{i}]")
         for entry in planned_entries(task.robot, listed, source):

@@ -19,8 +19,8 @@ from er3a.pipeline.stages.validation.geometry_tables import axes_table, key_pose
 from er3a.pipeline.stages.validation.model import (
     Checks,
     Circles,
-    Section,
     OtherTableFound,
+    Section,
     TableEvidence,
     TableFacts,
     ValidationResults,

@@ -1,0 +1,37 @@
+"""Verdicts of motions against an oracle that imports nothing of er3a; more of it in the campaign on motions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from er3a.files.robot_library import load_robot
+from testing.motion_cases import JOINT_KINDS, TOOL_KINDS, Tally, compare, looked_at, random_spec
+from testing.motion_oracle import Truth
+
+POINTS = 60_001
+
+
+@pytest.mark.parametrize("kind", [*JOINT_KINDS, *TOOL_KINDS])
+@pytest.mark.parametrize("name", ["er3_600", "er3a_c60"])
+def test_nothing_is_missed_or_invented_whatever_the_samples(name, kind, tmp_path):
+    robot, random = load_robot(name), np.random.default_rng([7, len(kind)])
+    tallies = {2: Tally(), 500: Tally()}
+    for _ in range(3):
+        spec, written = random_spec(robot, kind, random, tmp_path)
+        seen = looked_at(robot, spec, POINTS)
+        for samples, tally in tallies.items():
+            assert compare(robot, spec, written, samples, tally, seen) == []
+    few, many = tallies[2], tallies[500]
+    assert (few.safe, few.undecided, few.unreachable) == (many.safe, many.undecided, many.unreachable)
+
+
+def test_the_comparison_can_fail(tmp_path):
+    """A crossing and a stretch that the oracle adds are called missed."""
+    robot, random = load_robot("er3_600"), np.random.default_rng(1)
+    spec, written = random_spec(robot, "joint moves", random, tmp_path)
+    seen = looked_at(robot, spec, POINTS)
+    more = Truth(seen.t, [*seen.crossings, (0, 0.123)], [*seen.stretches, (1, 3, 0.1, 0.2)], False)
+    wrong = compare(robot, spec, written, 2, Tally(), more)
+    assert any("missed wrist" in text for text in wrong)
+    assert any("missed order 1 J4" in text for text in wrong)
