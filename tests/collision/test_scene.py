@@ -27,19 +27,15 @@ def write(folder: Path, **shapes) -> Path:
 
 def test_shipped_scene_holds_one_of_each():
     scene = load_scene(SHIPPED)
-    assert [scene.boxes[0].name, scene.cylinders[0].name, scene.spheres[0].name, scene.planes[0].name] == [
-        "table",
-        "post",
-        "lamp",
-        "floor",
-    ]
-    np.testing.assert_array_equal(scene.boxes[0].T, translation(0.5, 0, 0.08))
+    assert [solid.name for solid in scene.solids] == ["table", "post", "lamp", "floor"]
+    np.testing.assert_array_equal(scene.solids[0].T, translation(0.5, 0, 0.08))
 
 
 def test_normal_comes_at_unit_length(tmp_path):
     scene = load_scene(write(tmp_path, planes=[PLANE]))
-    np.testing.assert_array_equal(scene.planes[0].normal, [0, 0, 1])
-    assert scene.planes[0].offset == -0.0025
+    (plane,) = scene.solids
+    np.testing.assert_array_equal(plane.normal, [0, 0, 1])
+    assert plane.offset == -0.0025
 
 
 BAD = {
@@ -60,6 +56,22 @@ BAD = {
     "radians": ({"boxes": [BOX | {"rpy_deg": [0, 0, 1.5708]}]}, "boxes[0].rpy_deg", "can only be radians"),
     "NaN": ({"planes": [PLANE | {"offset_mm": float("nan")}]}, "planes[0].offset_mm", "refused"),
     "no direction": ({"planes": [PLANE | {"normal": [0, 0, 0]}]}, "planes[0].normal", "no direction"),
+    "two of one name, one carried": (
+        {"boxes": [BOX], "carried": {"spheres": [SPHERE | {"name": "table"}]}},
+        "carried.spheres[0]",
+        "that of boxes[0]",
+    ),
+    "name of a link": ({"boxes": [BOX | {"name": "link_3"}]}, "boxes[0]", "a part of the arm"),
+    "mesh outside the study": (
+        {"meshes": [{"name": "jig", "xyz_mm": [500, 0, 0], "pieces": "../jig.json"}]},
+        "meshes[0].pieces",
+        "outside the study",
+    ),
+    "allowed pair of what there is not": (
+        {"boxes": [BOX], "collision": {"allow": [{"pair": ["link_6", "tabel"], "reason": "x"}]}},
+        "collision.allow[0].pair",
+        "there is no 'tabel'",
+    ),
     "bad name": ({"planes": [PLANE | {"name": "the floor"}]}, "planes[0].name", "refused"),
 }
 
