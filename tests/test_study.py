@@ -135,7 +135,7 @@ def test_settings_are_plain_and_hold_just_what_the_stage_depends_on(study_with, 
 
 def test_a_robot_s_own_scene_replaces_those_of_the_stages(study_with):
     study = study_with(lambda content: content["robots"]["er3_600"].update(scene="other.yaml"))
-    for stage in ("inverse", "trajectory"):
+    for stage in ("collision", "inverse", "trajectory"):
         assert study.settings("er3_600", stage)[stage]["scene"] == "other.yaml"
         assert study.settings("er3a_c60", stage)[stage]["scene"] == "data/scenes/table_and_post.yaml"
     assert "other.yaml" not in str(study.settings("er3_600", "workspace"))

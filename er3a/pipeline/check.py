@@ -89,7 +89,7 @@ def check_study(path: Path) -> Study:
         for planned in load_paths(entry.paths).paths:
             if isinstance(planned, TablePath):
                 read_path_table(planned.file)
-        for stage in ("inverse", "trajectory"):
+        for stage in ("collision", "inverse", "trajectory"):
             if scene := study.scene(name, stage):
                 load_scene(scene)
     return study

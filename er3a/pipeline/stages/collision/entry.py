@@ -11,6 +11,7 @@ from er3a.files.robot_file import Text
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.stages.stage import Stage
+from er3a.pipeline.stages.trajectory.entry import STAGE as TRAJECTORY
 
 if TYPE_CHECKING:
     from er3a.pipeline.study import Study
@@ -34,7 +35,8 @@ class CollisionSettings(StrictModel):
 
 def _inputs(study: Study, robot: str) -> list[Path]:
     entry = study.entry(robot)
-    return [Path(entry.targets), Path(entry.paths), *study.scenes(robot, STAGE.name)]
+    tables = [path for path in TRAJECTORY.inputs(study, robot) if path.suffix == ".csv"]
+    return [Path(entry.targets), Path(entry.paths), *tables, *study.scenes(robot, STAGE.name)]
 
 
 STAGE = Stage(
