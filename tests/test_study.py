@@ -144,8 +144,8 @@ def test_a_robot_s_own_scene_replaces_those_of_the_stages(study_with):
 def test_each_stage_s_inputs_exist_and_are_its_own(study, monkeypatch):
     monkeypatch.chdir(ROOT)
     robot = Path("data/robots/er3a_c60_article.yaml")
-    assert study.inputs("er3a_c60_article", "workspace") == [robot]
     scene, low_floor = Path("data/scenes/table_and_post.yaml"), Path("data/scenes/wall_and_low_floor.yaml")
+    assert study.inputs("er3a_c60_article", "workspace") == [robot, low_floor]
     targets = Path("data/targets/er3a_c60_article.yaml")
     assert study.inputs("er3a_c60_article", "inverse") == [robot, targets, low_floor]
     article = [robot, Path("data/paths/er3a_c60_article.yaml"), low_floor]

@@ -484,7 +484,9 @@ def free_between(layout: Layout, start: Reals, end: Reals, depth: float, most: i
 
 
 @kernel
-def search_boxes(layout: Layout, k: int, box: Reals, overlapping: bool, goal: float, most: int, at: Reals) -> tuple[int, int, float]:
+def search_boxes(
+    layout: Layout, k: int, box: Reals, overlapping: bool, goal: float, most: int, at: Reals
+) -> tuple[int, int, float]:
     """Whether a pair is apart (or, if ``overlapping``, overlaps) in all joint vectors of a box (2, n), by halving it.
 
     By more than ``goal`` (m), 0 or more; what comes to less is not decided.
