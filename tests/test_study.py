@@ -125,7 +125,7 @@ def test_settings_are_plain_and_hold_just_what_the_stage_depends_on(study_with, 
 
 def test_a_robot_s_own_scene_replaces_those_of_the_stages(study_with):
     study = study_with(lambda content: content["robots"]["er3_600"].update(scene="other.yaml"))
-    for stage in ("inverse", "trajectory"):
+    for stage in ("collision", "inverse", "trajectory"):
         assert study.settings("er3_600", stage)[stage]["scene"] == "other.yaml"
         assert study.settings("er3a_c60", stage)[stage]["scene"] == "data/scenes/table_and_post.yaml"
     assert "other.yaml" not in str(study.settings("er3_600", "workspace"))
@@ -134,8 +134,8 @@ def test_a_robot_s_own_scene_replaces_those_of_the_stages(study_with):
 def test_each_stage_s_inputs_exist_and_are_its_own(study, monkeypatch):
     monkeypatch.chdir(ROOT)
     robot = Path("data/robots/er3a_c60_article.yaml")
-    assert study.inputs("er3a_c60_article", "workspace") == [robot]
     scene, low_floor = Path("data/scenes/table_and_post.yaml"), Path("data/scenes/wall_and_low_floor.yaml")
+    assert study.inputs("er3a_c60_article", "workspace") == [robot, low_floor]
     targets = Path("data/targets/er3a_c60_article.yaml")
     assert study.inputs("er3a_c60_article", "inverse") == [robot, targets, low_floor]
     article = [robot, Path("data/paths/er3a_c60_article.yaml"), low_floor]

@@ -135,7 +135,7 @@ class Bodies:
     def always_overlaps(self, pair: int, boxes: int = BOXES) -> bool:
         """Whether a pair overlaps in all arms within the limits, proven."""
         box = np.stack([self.robot.lower, self.robot.upper])
-        return search_boxes(self.layout, pair, box, True, boxes, np.empty(box.shape[1]))[0] == FREE
+        return search_boxes(self.layout, pair, box, True, 0.0, boxes, np.empty(box.shape[1]))[0] == FREE
 
     def _depth(self, world: Reals, pair: int) -> float:
         cores = []

@@ -484,8 +484,12 @@ def free_between(layout: Layout, start: Reals, end: Reals, depth: float, most: i
 
 
 @kernel
-def search_boxes(layout: Layout, k: int, box: Reals, overlapping: bool, most: int, at: Reals) -> tuple[int, int, float]:
+def search_boxes(
+    layout: Layout, k: int, box: Reals, overlapping: bool, goal: float, most: int, at: Reals
+) -> tuple[int, int, float]:
     """Whether a pair is apart (or, if ``overlapping``, overlaps) in all joint vectors of a box (2, n), by halving it.
+
+    By more than ``goal`` (m), 0 or more; what comes to less is not decided.
 
     Returns
     -------
@@ -515,7 +519,7 @@ def search_boxes(layout: Layout, k: int, box: Reals, overlapping: bool, most: in
             at[:] = (low + high) / 2
             return MEETS, looked, distance
         moved = _pair_motion(layout, T, w, k, half)
-        if distance > moved:
+        if distance - moved > goal:
             least = min(least, distance - moved)
             continue
         widest, cut = -1.0, 0

@@ -43,8 +43,9 @@ from er3a.robots.robot import PairRule, Robot
 PairState = Literal["never", "joined", "meets", "undecided", "allowed", "watched"]
 
 SAMPLES = 1024
-BOXES = 20_000
+BOXES = 50_000
 BOXES_MORE = 500  # for the other bodies of two links that are known to meet
+GOAL = 0.5  # of the least distance sampled, to be proven at first
 GROWTH, GROWTHS = 1.25, 12  # of the region around a joint, until the rest comes apart
 
 
@@ -139,7 +140,11 @@ def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int = 
         if meets[k]:
             found.append(Judged("meets", (pair,), q[least.argmin()]))
             continue
-        outcome, looked, bound = search_boxes(layout, k, box, overlapping, boxes, at)
+        goal = 0.0 if overlapping else GOAL * float(least.min())
+        outcome, looked, bound = search_boxes(layout, k, box, overlapping, goal, boxes // 2, at)
+        if outcome not in (FREE, MEETS):
+            outcome, more, bound = search_boxes(layout, k, box, overlapping, 0.0, boxes, at)
+            looked += more
         if outcome == MEETS:
             witness = q[least.argmin()] if overlapping else at
             found.append(Judged("meets", (pair,), witness, boxes=looked))

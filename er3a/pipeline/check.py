@@ -107,7 +107,7 @@ def check_study(path: Path) -> Study:
                 read_program(planned.program)
         for program in load_programs(entry.programs).programs if entry.programs else ():
             read_program(program.file)
-        for stage in ("inverse", "trajectory"):
+        for stage in ("collision", "inverse", "trajectory"):
             if scene := study.scene(name, stage):
                 load_scene(scene)
     return study

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
@@ -13,7 +14,7 @@ from er3a.files.load_file import LoadFields
 from er3a.files.own_titles import translations_in
 from er3a.files.robot_file import NAME_PATTERN, Name, Placement, RobotFile, Text, check_placement
 from er3a.files.robot_library import placement_transform, read_robot, robot_of, robot_path
-from er3a.files.yaml_file import StrictModel, load
+from er3a.files.yaml_file import StrictModel, load, read_yaml
 from er3a.pipeline.stages.registry import STAGES as REGISTRY
 from er3a.pipeline.sweeps import Sweep, Variant
 from er3a.robots.robot import Robot
@@ -170,7 +171,8 @@ class StudyBase(StrictModel):
     def inputs(self, name: str, stage: str) -> list[Path]:
         """The files that a stage, or the teach panel, reads for a robot."""
         more = REGISTRY[stage].inputs(self, name) if stage in REGISTRY else []
-        return [self.robot_file(name), *more]
+        robot = self.robot_file(name)
+        return [robot, *pieces_named_in(robot), *more]
 
     def section(self, kind: type[SettingsT]) -> SettingsT:
         """The resolved settings of one kind, such as ``InverseSettings``."""
@@ -207,14 +209,29 @@ class StudyBase(StrictModel):
         return translations_in(sorted(files), self.report.language)
 
     def scenes(self, name: str, stage: str) -> list[Path]:
-        """The file of :meth:`scene` as a list, empty in open space."""
+        """The file of :meth:`scene`, and those of convex pieces that it names; empty in open space."""
         scene = self.scene(name, stage)
-        return [scene] if scene else []
+        return [scene, *pieces_named_in(scene)] if scene else []
 
     def scene(self, name: str, stage: str) -> Path | None:
         """The file of the solids that a robot may not touch in a stage; None for open space."""
         scene = self.entry(name).scene or getattr(self, stage).scene
         return Path(scene) if scene else None
+
+
+def pieces_named_in(path: Path) -> list[Path]:
+    """Files of convex pieces that a robot or scene file names; the file itself is checked elsewhere."""
+
+    def named(part: Any) -> Iterator[str]:
+        if isinstance(part, dict) and isinstance(part.get("pieces"), str):
+            yield part["pieces"]
+        for inner in part.values() if isinstance(part, dict) else part if isinstance(part, list) else ():
+            yield from named(inner)
+
+    try:
+        return [Path(file) for file in dict.fromkeys(named(read_yaml(path)))]
+    except InputError:
+        return []
 
 
 def _sections() -> dict[str, Any]:

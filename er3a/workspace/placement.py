@@ -10,6 +10,7 @@ distance is a demand of its own too: the task narrows the limits.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -30,6 +31,9 @@ NO = -1.0
 MIXED = -1
 """The branch of a box that no single branch serves."""
 _POSES = 50_000
+
+Free = Callable[[Reals], Flags]
+"""Which arms (N, n), rad, are free of collisions, (N,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,13 +112,14 @@ def lattice_spacing(box: Reals, coarsest: float) -> Reals:
     return np.maximum(sides / np.maximum(1, np.round(sides / coarsest)), coarsest / 2)
 
 
-def survey(robot: Robot, task: Task, roll: Roll, coarsest: float) -> Field:
+def survey(robot: Robot, task: Task, roll: Roll, coarsest: float, free: Free | None = None) -> Field:
     """Ask a lattice over the arm's reach.
 
     Parameters
     ----------
     robot : with the limits that hold, see :func:`narrowed`
     coarsest : m, about the spacing
+    free : which arms count; all, unless told otherwise
 
     Raises
     ------
@@ -140,18 +145,21 @@ def survey(robot: Robot, task: Task, roll: Roll, coarsest: float) -> Field:
     least, least_any = np.full((len(points), SLOTS), NO), np.full(len(points), NO)
     limit_margin = np.zeros((len(points), SLOTS))
     rotations = tool_rotations(cone_directions(task.axis, task.half_angle), roll)
-    least[asked], least_any[asked], limit_margin[asked] = serve(robot, points[asked], rotations, roll)
+    least[asked], least_any[asked], limit_margin[asked] = serve(robot, points[asked], rotations, roll, free)
     return Field(
         start, spacing, least.reshape(*shape, SLOTS), least_any.reshape(shape), limit_margin.reshape(*shape, SLOTS)
     )
 
 
-def serve(robot: Robot, points: Reals, rotations: Reals, roll: Roll) -> tuple[Reals, Reals, Reals]:
+def serve(
+    robot: Robot, points: Reals, rotations: Reals, roll: Roll, free: Free | None = None
+) -> tuple[Reals, Reals, Reals]:
     """How each branch serves points over all directions.
 
     Parameters
     ----------
     points : (n, 3), m; rotations : (k, rolls, 3, 3), see ``directions.tool_rotations``
+    free : which arms count; all, unless told otherwise
 
     Returns
     -------
@@ -168,15 +176,19 @@ def serve(robot: Robot, points: Reals, rotations: Reals, roll: Roll) -> tuple[Re
         for part in np.array_split(alive, max(1, len(alive) * len(direction) // _POSES)):
             found = inverse_batch(asked, poses(points[part][:, None], direction).reshape(-1, 4, 4))
             value = manipulability(arm, robot.direction * found.q + robot.offset)
-            value = np.where(found.within_limits, value, NO).reshape(len(part), -1, SLOTS)
+            counts = found.within_limits
+            if free is not None:
+                counts = counts.copy()
+                counts[counts] = free(found.q[counts])
+            value = np.where(counts, value, NO).reshape(len(part), -1, SLOTS)
             q = found.q[..., limited]
-            free = np.minimum(q - asked.lower[limited], asked.upper[limited] - q).min(axis=-1, initial=np.inf)
+            inside = np.minimum(q - asked.lower[limited], asked.upper[limited] - q).min(axis=-1, initial=np.inf)
             rolled = value.argmax(axis=1)[:, None]
             value = np.take_along_axis(value, rolled, axis=1)[:, 0]
-            free = np.take_along_axis(free.reshape(len(part), -1, SLOTS), rolled, axis=1)[:, 0]
+            inside = np.take_along_axis(inside.reshape(len(part), -1, SLOTS), rolled, axis=1)[:, 0]
             least[part] = np.minimum(least[part], value)
             least_any[part] = np.minimum(least_any[part], value.max(axis=1))
-            limit_margin[part] = np.fmin(limit_margin[part], free)
+            limit_margin[part] = np.fmin(limit_margin[part], inside)
         alive = np.flatnonzero(least_any > NO)
     return least, least_any, np.where(least > NO, limit_margin, 0.0)
 

@@ -19,7 +19,7 @@ from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 from er3a.workspace.directions import Roll, across, left_to_roll, point_tool
 from er3a.workspace.interval_inverse import GOOD, NEVER, States, branches, holds, misses, theta_ranges
-from er3a.workspace.placement import MIXED, NO, Field, Places, Task, fitting_places, narrowed, survey
+from er3a.workspace.placement import MIXED, NO, Field, Free, Places, Task, fitting_places, narrowed, survey
 from er3a.workspace.section_arm import section_frame
 
 Answer = Literal["proven", "refuted", "undecided"]
@@ -70,20 +70,23 @@ class BoxPlacement:
         return self.places.rows(np.sort(first))
 
 
-def find_places(robot: Robot, task: Task, roll: Roll, coarsest: float, count: int, most_poses: int) -> BoxPlacement:
+def find_places(
+    robot: Robot, task: Task, roll: Roll, grid: float, count: int, most_poses: int, *, free: Free | None = None
+) -> BoxPlacement:
     """Survey where the box can stand and put the best places to the proof.
 
     Parameters
     ----------
-    robot : with its own limits; coarsest : m, about the lattice's spacing
+    robot : with its own limits; grid : m, about the lattice's spacing
     count : how many places to choose; most_poses : how many neighbourhoods of poses their proofs may look at
+    free : which arms count at the lattice's points; the proofs, of reach alone, look at none
 
     Raises
     ------
     NotWristPartitionedError
     """
     robot = narrowed(robot, task.margin)
-    field = survey(robot, task, roll, coarsest)
+    field = survey(robot, task, roll, grid, free)
     places = fitting_places(field, proven_bricks(robot, task, field, roll), task.box)
     chosen = choose_places(robot, task, places, roll, count, most_poses)
     proven = places.proven.copy()

@@ -61,6 +61,22 @@ BAD = {
     "position in metres": ({"boxes": [BOX | {"xyz_mm": [0.5, 0, 0.08]}]}, "boxes[0].xyz_mm", "can only be metres"),
     "NaN": ({"planes": [PLANE | {"offset_mm": float("nan")}]}, "planes[0].offset_mm", "refused"),
     "no direction": ({"planes": [PLANE | {"normal": [0, 0, 0]}]}, "planes[0].normal", "no direction"),
+    "two of one name, one carried": (
+        {"boxes": [BOX], "carried": {"spheres": [SPHERE | {"name": "table"}]}},
+        "carried.spheres[0]",
+        "that of boxes[0]",
+    ),
+    "name of a link": ({"boxes": [BOX | {"name": "link_3"}]}, "boxes[0]", "a part of the arm"),
+    "mesh outside the study": (
+        {"meshes": [{"name": "jig", "xyz_mm": [500, 0, 0], "pieces": "../jig.json"}]},
+        "meshes[0].pieces",
+        "outside the study",
+    ),
+    "allowed pair of what there is not": (
+        {"boxes": [BOX], "collision": {"allow": [{"pair": ["link_6", "tabel"], "reason": "x"}]}},
+        "collision.allow[0].pair",
+        "there is no 'tabel'",
+    ),
     "bad name": ({"planes": [PLANE | {"name": "the floor"}]}, "planes[0].name", "refused"),
 }
 

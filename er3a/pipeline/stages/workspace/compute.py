@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import Figure
@@ -89,7 +90,9 @@ def compute(study: Study, name: str, parts: Sequence[Path] | None = None) -> Wor
     voids = proven_voids(robot, proven, hull, shoulder)
     if proven.arm is None:
         voids += sampled_only(in_cloud, grid, shoulder, voids)
-    tool = tool_capability(robot, study.section(CapabilitySettings), grid.cell)
+    scene_file = study.scene(name, "capability")
+    scene = load_scene(scene_file) if scene_file else None
+    tool = tool_capability(robot, study.section(CapabilitySettings), grid.cell, scene)
     vertices, triangles = table_rows.void_surfaces(voids)
     return WorkspaceResults(
         summary=_summary(study, robot, samples, proven, voids, tool),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field, field_validator, model_validator
 
 from er3a.files.reference_sets import reference_folder
+from er3a.files.robot_file import Text
 from er3a.files.units import FARTHEST_MM, Triple, check_millimetres
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
@@ -85,17 +86,19 @@ class CapabilitySettings(StrictModel):
 
     ``directions`` are spread over the sphere, with ``rolls`` about each where the roll matters (a tool beside axis 6,
     which takes as many times longer). The proofs of the dexterous core and of the listed places may look at
-    ``proof_poses`` neighbourhoods of poses each.
+    ``proof_poses`` neighbourhoods of poses each. ``scene`` holds what the arm may not touch where it serves the box.
     """
 
     directions: Annotated[int, Field(ge=12, le=10_000)] = 300
     rolls: Annotated[int, Field(ge=1, le=360)] = 8
     proof_poses: Annotated[int, Field(ge=1, le=1_000_000_000)] = 100_000
+    scene: Text | None = None
     placement: BoxTask = BoxTask()
 
 
 def _inputs(study: Study, robot: str) -> list[Path]:
-    return [file for name in study.references(robot) if (file := reference_folder(name) / "envelope.csv").is_file()]
+    drawings = [reference_folder(name) / "envelope.csv" for name in study.references(robot)]
+    return [*(file for file in drawings if file.is_file()), *study.scenes(robot, "capability")]
 
 
 STAGE = Stage(

@@ -207,8 +207,12 @@ class PlaceSummary:
 
 @dataclass(frozen=True)
 class PlacementSummary:
-    """Where the box can stand: numbers of lattice points and positions, and the best places."""
+    """Where the box can stand: numbers of lattice points and positions, and the best places.
 
+    ``scene`` is the title of what the arm may not touch there; None in open space. Nor may it touch itself.
+    """
+
+    scene: str | None
     task: TaskSummary
     spacing_m: Triple
     directions: int

@@ -7,6 +7,8 @@ from typing import Literal
 
 import numpy as np
 
+from er3a.collision.bodies import Bodies
+from er3a.collision.scene import Scene
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.pipeline.stages.workspace import table_rows
@@ -26,7 +28,7 @@ from er3a.robots.robot import Robot
 from er3a.workspace.capability import map_capability, overall, rings
 from er3a.workspace.dexterous import dexterous_core
 from er3a.workspace.directions import cone_directions, roll_of
-from er3a.workspace.placement import MIXED, NO, Task
+from er3a.workspace.placement import MIXED, NO, Task, narrowed
 from er3a.workspace.placement_proof import BoxPlacement, find_places
 from er3a.workspace.section_arm import section_arm, section_frame
 
@@ -44,12 +46,15 @@ class ToolCapability:
     places: BoxPlaces
 
 
-def tool_capability(robot: Robot, settings: CapabilitySettings, cell: float) -> ToolCapability:
+def tool_capability(
+    robot: Robot, settings: CapabilitySettings, cell: float, scene: Scene | None = None
+) -> ToolCapability:
     """Work out what the tool can do.
 
     Parameters
     ----------
     cell : m, edge of the workspace's cells; taken coarser where more than ``MOST_ACROSS`` would span the reach
+    scene : what the arm may not touch where it serves the box; nor may it touch itself
     """
     if lacks := closed_form_missing(robot):
         return ToolCapability(NeedsClosedForm(lacks), None, CapabilityCells.empty(), BoxPlaces.empty())
@@ -69,10 +74,13 @@ def tool_capability(robot: Robot, settings: CapabilitySettings, cell: float) -> 
         core_m3=dexterous_core(robot, cells, settings.directions, roll, settings.proof_poses),
     )
     task = _task(settings.placement)
-    placement = find_places(robot, task, roll, cell, LISTED, settings.proof_poses)
+    bodies = Bodies(narrowed(robot, task.margin), scene)
+    placement = find_places(
+        robot, task, roll, cell, LISTED, settings.proof_poses, free=lambda q: ~bodies.overlaps(q).any(axis=1)
+    )
     return ToolCapability(
         summary,
-        _placement_summary(robot, settings.placement, task, placement, float(found.manipulability.max())),
+        _placement_summary(robot, settings.placement, task, placement, float(found.manipulability.max()), scene),
         table_rows.capability(middles, found),
         table_rows.places(placement.best_turns),
     )
@@ -90,11 +98,12 @@ def _task(asked: BoxTask) -> Task:
 
 
 def _placement_summary(
-    robot: Robot, asked: BoxTask, task: Task, placement: BoxPlacement, best: float
+    robot: Robot, asked: BoxTask, task: Task, placement: BoxPlacement, best: float, scene: Scene | None
 ) -> PlacementSummary:
     """The placement as the summary has it; ``best`` is the arm's greatest manipulability, m^3."""
     places = placement.places
     return PlacementSummary(
+        scene=scene.title if scene else None,
         task=TaskSummary(
             triple(asked.box_mm),
             triple(asked.tool_direction),

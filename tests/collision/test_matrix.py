@@ -1,0 +1,213 @@
+"""The allowed collision matrix: what it proves, against dense sampling by Coal; and the known faults of MoveIt's."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import coal
+import numpy as np
+import pytest
+
+from er3a.collision.bodies import Bodies
+from er3a.collision.clearance import clearance
+from er3a.collision.envelopes import envelopes_of
+from er3a.collision.matrix import collision_matrix
+from er3a.collision.pairs import CarriedAndLink, CarriedAndSolid, LinkPair
+from er3a.collision.scene import Scene
+from er3a.files.robot_library import ROBOTS, load_robot
+from er3a.files.robot_writer import write_robot
+from er3a.files.scene_file import SceneFile
+from er3a.robots.robot import Envelope, PairRule, Robot
+from testing.arms import make_arm
+
+SAMPLES = 500
+BENT = ((0.0, 0.0, 0.1), (0.16, 0.0, 0.1), (0.16, 0.0, -0.12))  # m, in the frame of link 6
+
+
+def bent_tool(robot: Robot) -> Robot:
+    """The arm with a tool that leads back over the flange: capsules of 15 mm."""
+    tool = tuple(Envelope(6, start, end, 0.015) for start, end in pairwise(BENT))
+    return robot.replace(envelopes=(*envelopes_of(robot), *tool))
+
+
+def rows_of(robot: Robot):
+    return {(row.first, row.second): row for row in collision_matrix(robot).rows}
+
+
+def link_poses(robot: Robot, q: np.ndarray) -> list[np.ndarray]:
+    """Frames of base and links by the table alone: those that turn with each joint (standard D-H)."""
+    assert robot.convention == "standard"
+    assert (robot.beta == 0).all()
+    T = [robot.base]
+    before = robot.base
+    for k in range(6):
+        c, s = np.cos(robot.direction[k] * q[k] + robot.offset[k]), np.sin(robot.direction[k] * q[k] + robot.offset[k])
+        turned = before @ [[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+        T.append(turned)
+        ca, sa = np.cos(robot.alpha[k]), np.sin(robot.alpha[k])
+        before = turned @ [[1, 0, 0, robot.a[k]], [0, ca, -sa, 0], [0, sa, ca, robot.d[k]], [0, 0, 0, 1]]
+    return T
+
+
+def coal_distance(robot: Robot, q: np.ndarray, first: str, second: str) -> float:
+    """Least distance of two links' capsules by Coal."""
+    T, least = link_poses(robot, q), np.inf
+    placed: dict[str, list] = {first: [], second: []}
+    for capsule in envelopes_of(robot):
+        name = f"link_{capsule.link}" if capsule.link else "base"
+        if name in placed:
+            start, end = (T[capsule.link][:3, :3] @ p + T[capsule.link][:3, 3] for p in (capsule.start, capsule.end))
+            along = end - start
+            length = np.linalg.norm(along)
+            axis = along / length if length else np.array([0.0, 0, 1])
+            R = np.linalg.svd(axis[None])[2].T[:, [1, 2, 0]]
+            R[:, 2] = axis
+            R[:, 0] = np.cross(R[:, 1], R[:, 2])
+            placed[name].append((coal.Capsule(capsule.radius, length), coal.Transform3s(R, (start + end) / 2)))
+    for one, at in placed[first]:
+        for other, there in placed[second]:
+            found = coal.distance(one, at, other, there, coal.DistanceRequest(), coal.DistanceResult())
+            least = min(least, found)
+    return least
+
+
+def test_every_pair_of_links_stands_in_it_with_what_dense_sampling_finds(robot, random):
+    """No pair that is said never to meet does, and witnesses overlap; by Coal on frames worked out apart."""
+    robot = bent_tool(robot)
+    rows = rows_of(robot)
+    links = sorted({capsule.link for capsule in envelopes_of(robot)})
+    assert len(rows) == len(links) * (len(links) - 1) / 2
+    watched = {(a.name, b.name) for a, b in collision_matrix(robot).watched}
+    q = random.uniform(robot.lower, robot.upper, (SAMPLES, 6))
+    for (first, second), row in rows.items():
+        distances = np.array([coal_distance(robot, each, first, second) for each in q])
+        if row.state == "never":
+            assert 0 < row.least <= distances.min() + 1e-9
+        elif row.state == "joined":
+            assert distances.max() < 0
+        elif row.state == "meets":
+            assert coal_distance(robot, row.witness, first, second) < 0
+        else:
+            assert row.state == "undecided"
+            assert (first, second) in watched
+            assert 0 < distances.min() < 0.02  # the bounds need more boxes only where it is narrow
+
+
+def test_bent_tool_that_enters_the_forearm_is_found():
+    """59 mm deep, at J5 of up to 105 deg, where links at most two apart used to be left out."""
+    robot = bent_tool(load_robot("er3a_c60"))
+    q = np.zeros((43, 6))
+    q[:, 4] = np.radians(np.linspace(0, 105, 43))
+    clear = clearance(robot, q, None)
+    assert clear.distance.min() == pytest.approx(-0.059, abs=1e-3)
+    assert clear.pair[int(clear.distance.argmin())] == LinkPair(4, 6)
+    tool = tuple(c for c in robot.envelopes if c.link == 4 or c.radius == 0.015)
+    deepest = min(coal_distance(robot.replace(envelopes=tool), each, "link_4", "link_6") for each in q)
+    assert clear.distance.min() == pytest.approx(deepest, abs=1e-6)
+
+
+def test_forearm_that_folds_onto_the_upper_arm_is_seen():
+    robot = load_robot("er3_600")
+    row = rows_of(robot)["link_2", "link_4"]
+    assert row.state == "joined"
+    folded, straight = np.radians([[0, 0, -65, 0, 0, 0], [0, 0, 85, 0, 0, 0]])
+    clear = clearance(robot, np.array([folded, straight]), None)
+    assert clear.distance[0] < 0 < clear.distance[1]
+    assert clear.pair[0] == LinkPair(2, 4)
+
+
+def test_overlap_in_the_region_of_the_joint_is_all_that_is_left_out():
+    """Beyond the region of the joint, distances are those of capsules cut there."""
+    robot = load_robot("er3_600")
+    row = rows_of(robot)["link_2", "link_4"]
+    radius = row.left_out
+    upper, forearm = (next(c for c in envelopes_of(robot) if c.link == k) for k in (2, 4))
+    assert radius == pytest.approx(upper.radius + forearm.radius)
+    bodies = Bodies(robot, None)
+    cut = {body.link: body.points for pair in collision_matrix(robot).watched for body in pair if body.link in (2, 4)}
+    assert len(bodies.pairs) >= 6
+    assert np.linalg.norm(cut[2] - upper.end, axis=1).min() <= radius + 1e-9 or np.ptp(cut[2], axis=0).max() > 0.2
+
+
+class TestFaultsOfOthers:
+    """What goes wrong in the setup assistant of MoveIt, by the numbers of its issues."""
+
+    def test_pair_that_collides_at_the_default_pose_stays_watched(self):
+        """moveit2#2772: off because it collides in the default state."""
+        robot = load_robot("er3a_c60")
+        folded = Envelope(6, (0.0, 0.0, -0.3), (0.0, 0.0, -0.2), 0.05)  # lies in the forearm at J5 = 0
+        robot = robot.replace(envelopes=(*envelopes_of(robot), folded))
+        assert coal_distance(robot, np.zeros(6), "link_4", "link_6") < 0
+        assert clearance(robot, np.zeros((1, 6)), None).distance[0] < 0
+
+    def test_pair_that_always_overlaps_is_proven_so(self):
+        """moveit2#2915: "always" missed. Each joint's own two links, whatever the poses drawn."""
+        for name in ("er3_600", "er3a_c60", "er3a_c60_article"):
+            rows = rows_of(load_robot(name))
+            assert rows["base", "link_2"].state == rows["link_2", "link_4"].state == "joined"
+
+    def test_matrix_survives_writing_and_reading_of_the_robot(self, tmp_path):
+        """moveit#3073: lost on update."""
+        rules = (
+            PairRule("link_2", "link_4", "allow", "seen on the real arm"),
+            PairRule("base", "link_3", "watch", "a cable hangs there"),
+        )
+        robot = load_robot("er3_600").replace(name="arm", pair_rules=rules)
+        write_robot(robot, tmp_path / "arm.yaml")
+        again = load_robot(tmp_path / "arm.yaml")
+        assert again.pair_rules == rules
+        rows = rows_of(again)
+        assert (rows["link_2", "link_4"].state, rows["link_2", "link_4"].reason) == ("allowed", rules[0].reason)
+        assert rows["base", "link_3"].state == "watched"
+        assert LinkPair(0, 3) in Bodies(again, None).pairs
+        assert LinkPair(2, 4) not in Bodies(again, None).pairs
+
+    def test_arm_without_shapes_has_a_matrix(self):
+        """moveit#3351: empty without collision geometry."""
+        robot = load_robot("er3_600").replace(envelopes=(), hulls=())
+        rows = rows_of(robot)
+        assert rows
+        assert any(row.state == "meets" for row in rows.values())
+
+    def test_pair_that_random_poses_miss_is_watched(self, random):
+        """moveit2_tutorials#647: too few samples. A thin pin that meets the base in one pose of tens of thousands."""
+        robot = make_arm(
+            envelopes=(
+                Envelope(0, (0.48, 0.0, 0.3), (0.48, 0.0, 0.3), 0.001),
+                Envelope(2, (0.38, 0.0, 0.0), (0.38, 0.0, 0.0), 0.001),
+            )
+        )
+        q = random.uniform(robot.lower, robot.upper, (10_000, 6))
+        assert not Bodies(robot.replace(pair_rules=(PairRule("base", "link_2", "watch", ""),)), None).overlaps(q).any()
+        row = rows_of(robot)["base", "link_2"]
+        assert row.state == "meets"
+        assert coal_distance(robot, row.witness, "base", "link_2") < 0
+
+
+def test_what_the_tool_carries_is_looked_at_and_may_touch_what_is_allowed():
+    robot = load_robot("er3_600")
+    scene = {
+        "kind": "scene",
+        "title": "made",
+        "boxes": [{"name": "table", "size_mm": [500, 800, 40], "xyz_mm": [500, 0, 80]}],
+        "carried": {"boxes": [{"name": "part", "size_mm": [400, 40, 40], "xyz_mm": [0, 0, 20]}]},
+    }
+
+    def made(**more) -> Scene:
+        return SceneFile.model_validate(scene | more).scene()
+
+    bodies = Bodies(robot, made())
+    assert CarriedAndSolid("part", "table") in bodies.pairs
+    assert CarriedAndLink("part", 2) in bodies.pairs
+    assert not any("link_6/part" in pair.label for pair in bodies.pairs)  # a gripper's own
+    allowed = {"allow": [{"pair": ["part", "table"], "reason": "it is picked up there"}]}
+    assert CarriedAndSolid("part", "table") not in Bodies(robot, made(collision=allowed)).pairs
+    q = np.radians([[0, -60, -30, 0, 60, 0]])
+    assert clearance(robot, q, made()).distance[0] <= clearance(robot, q, made(carried={})).distance[0]
+
+
+def test_files_decide_only_on_what_there_is():
+    assert (ROBOTS / "er3_600.yaml").is_file()
+    rules = (PairRule("base", "link_9", "allow", "x"),)
+    with pytest.raises(ValueError, match="there is no 'link_9'"):
+        write_robot(load_robot("er3_600").replace(pair_rules=rules), ROBOTS / "never_written.yaml")
