@@ -68,7 +68,7 @@ class CheckRules:
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
+class MotionWay:
     """A motion's way.
 
     Attributes
@@ -97,7 +97,7 @@ class Way:
         return round(1000 * self.length * float(progress(self.law, np.array(t))[0]), 3)
 
 
-def joint_way(arm: Robot, motion: ArmMotion, start: Reals, end: Reals, rules: CheckRules) -> Way | None:
+def joint_way(arm: Robot, motion: ArmMotion, start: Reals, end: Reals, rules: CheckRules) -> MotionWay | None:
     """A joint move; None if no joint moves."""
     step = end - start
     if np.abs(step).max() < NO_WAY:
@@ -123,7 +123,7 @@ def joint_way(arm: Robot, motion: ArmMotion, start: Reals, end: Reals, rules: Ch
         *_joint_jumps(arm, start, end, moved, turned),
     )
     lead = float(np.abs(step).max())
-    return Way(arm, law, times, joints(times), joints, joints_at, moved, lead, end, findings)
+    return MotionWay(arm, law, times, joints(times), joints, joints_at, moved, lead, end, findings)
 
 
 def limit_findings(arm: Robot, q: Reals) -> tuple[AboveLimit | BelowLimit, ...]:
@@ -139,7 +139,7 @@ def limit_findings(arm: Robot, q: Reals) -> tuple[AboveLimit | BelowLimit, ...]:
 
 def tool_way(
     arm: Robot, motion: ArmMotion, start: Reals, goal: tuple[Reals, Reals | None, Reals | None], rules: CheckRules
-) -> Way | CheckFinding | None:
+) -> MotionWay | CheckFinding | None:
     """A line or arc from joints (n,) in rad; None if the tool does not move, a finding if it can't be followed.
 
     Parameters
@@ -170,14 +170,14 @@ def tool_way(
         return LineNotChecked()
     last = followed.q[-1]
     end_joints = last if np.isfinite(last).all() else None
-    way = Way(
+    way = MotionWay(
         *(arm, law, followed.t, followed.q, followed.joints, followed.joints_at),
         *(path.length, path.turned, end_joints, ()),
     )
     return replace(way, findings=(*_followed_findings(followed, way, rules), *_arrival_findings(followed, given)))
 
 
-def _followed_findings(followed: Followed, way: Way, rules: CheckRules) -> list[CheckFinding]:
+def _followed_findings(followed: Followed, way: MotionWay, rules: CheckRules) -> list[CheckFinding]:
     """Reach, configuration, limits, singular poses, speeds."""
     arm = way.arm
     found: list[CheckFinding] = [

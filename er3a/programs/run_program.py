@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from er3a.errors import ShapeError
 from er3a.geometry.transforms import check_poses
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
@@ -42,7 +43,14 @@ def execute(
     robot : the arm, for what the text gives by where the arm stands: partial and relative targets
     start : (6,), rad, joints where the program starts
     frames : T_flange_tool of tools and T_robot_base of bases (4, 4) in m, by the program's names for them
+
+    Raises
+    ------
+    ShapeError, PoseError
+        for a start that has not an angle for each joint, and a frame that is no rigid transform
     """
+    if robot is not None and start is not None and np.shape(start) != robot.lower.shape:
+        raise ShapeError("start", np.shape(start), f"({len(robot.lower)},)")
     flange = None
     if robot is not None:
         bare = robot.without_tool().replace(base=np.eye(4))
