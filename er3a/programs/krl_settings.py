@@ -22,7 +22,7 @@ def base_of(memory: ProgramMemory) -> NamedFrame:
 def _frame(memory: ProgramMemory, variable: str) -> NamedFrame:
     value = memory.read(variable)
     if value is None:
-        return NamedFrame()
+        return NamedFrame("", memory.cell.tool if variable == "$TOOL" else memory.cell.base)
     said = memory.read(variable + "%name")
     name = said.upper() if isinstance(said, str) and said[:1] not in ("{", "") else ""
     pose = record_pose(value) if is_frame(value) else None

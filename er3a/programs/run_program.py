@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -60,4 +61,6 @@ def execute(
 
     known = {name: check_poses(pose, name) for name, pose in (frames or {}).items()}
     cell = Cell(flange, start, known)
+    if robot is not None:
+        cell = replace(cell, tool=robot.tool, base=np.eye(4))
     return Machine(program, DIALECTS[program.language](), cell, limits or RunLimits()).run()

@@ -189,7 +189,7 @@ class UrScriptDialect:
 def _tool(memory: ProgramMemory) -> NamedFrame:
     value = memory.shared.get("%tcp")
     if value is None:
-        return NamedFrame()
+        return NamedFrame("", memory.cell.tool)
     pose = _pose(value)
     return NamedFrame(value.text if isinstance(value, Unclear) else "", pose)
 
