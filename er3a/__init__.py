@@ -26,6 +26,12 @@ if TYPE_CHECKING:
     from er3a.kinematics.forward import jacobian as jacobian
     from er3a.kinematics.inverse import inverse as inverse
     from er3a.kinematics.numerical import solve as solve
+    from er3a.program_check.check_program import CheckOptions as CheckOptions
+    from er3a.program_check.check_program import check_program as check_program
+    from er3a.programs.read_program import read_program as read_program
+    from er3a.programs.run_program import execute as execute
+    from er3a.programs.write_program import write_program as write_program
+    from er3a.programs.writing import WriteOptions as WriteOptions
     from er3a.robots.conventions import to_modified as to_modified
     from er3a.robots.conventions import to_standard as to_standard
     from er3a.robots.masses import Load as Load
@@ -60,6 +66,12 @@ _PUBLIC = {
     "to_standard": "er3a.robots.conventions",
     "import_urdf": "er3a.formats.urdf",
     "export_urdf": "er3a.formats.urdf",
+    "read_program": "er3a.programs.read_program",
+    "execute": "er3a.programs.run_program",
+    "check_program": "er3a.program_check.check_program",
+    "CheckOptions": "er3a.program_check.check_program",
+    "write_program": "er3a.programs.write_program",
+    "WriteOptions": "er3a.programs.writing",
     "Er3aError": "er3a.errors",
 }
 

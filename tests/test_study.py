@@ -119,7 +119,7 @@ def test_settings_are_plain_and_hold_just_what_the_stage_depends_on(study_with, 
         assert settings["robot"] == {"tool": {"xyz_mm": [0, 0, 120.0], "rpy_deg": [0, 0, 0]}}
         assert set(settings) == {"seed", "robot", stage}
         if own:
-            assert settings[stage] == own
+            assert settings[stage].items() >= own.items()
         assert study.settings("er3a_c60", stage)["robot"] == {}
 
 

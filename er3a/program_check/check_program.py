@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from er3a.collision.scene import Scene
-from er3a.errors import ShapeError
 from er3a.kinematics.near_singular import NearSingular
 from er3a.numerics.arrays import Reals
 from er3a.planning.timing import JointLimits, joint_limits
@@ -27,7 +26,7 @@ from er3a.program_check.program_check_findings import (
     level_of,
     worst_of,
 )
-from er3a.program_check.step_checks import CheckedMotion, StepChecker, surroundings_of
+from er3a.program_check.step_checks import CheckedMotion, StepChecker, obstacles_of
 from er3a.program_check.ways import CheckRules
 from er3a.programs.execution import Ending, Execution, RunLimits
 from er3a.programs.instructions import ArmMotion, Decision, Pause, Place, Unknown
@@ -159,23 +158,21 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
 
     Raises
     ------
-    ShapeError
-        for a start that has not an angle for each joint
+    ShapeError, PoseError
+        for a start that has not an angle for each joint, and a frame that is no rigid transform
     """
     options = options or CheckOptions()
     count = len(robot.lower)
-    if options.start is not None and np.shape(options.start) != (count,):
-        raise ShapeError("start", np.shape(options.start), f"({count},)")
     execution = execute(program, robot, options.start, options.frames, options.limits)
     limits = assumed_limits(robot, options)
-    surroundings = surroundings_of(robot, options.scene, options.penetration_tolerance) if options.measures else None
-    checker = StepChecker(robot, CheckRules(options.near, limits, options.assumed), surroundings, execution)
+    obstacles = obstacles_of(robot, options.scene, options.penetration_tolerance) if options.measures else None
+    checker = StepChecker(robot, CheckRules(options.near, limits, options.assumed), obstacles, execution)
     checker.start = options.start
     for number in range(len(execution.steps)):
         checker.check(number)
     for ending in execution.endings:
         checker.close_loop(ending)
-    located = _located(execution, checker, options.measures and surroundings is None)
+    located = _located(execution, checker, options.measures and obstacles is None)
     verdicts = _verdicts(program, execution, checker.motions, located)
     level: Level = worst_of(each.level for each in located)
     main = execution.main() if execution.endings else None

@@ -22,7 +22,7 @@ from er3a.planning.commands import (
 from er3a.program_check.check_program import ProgramCheck
 from er3a.program_check.motion_laws import RAMP_OF_A_DURATION
 from er3a.program_check.step_checks import CheckedMotion
-from er3a.program_check.ways import Way
+from er3a.program_check.ways import MotionWay
 from er3a.programs.instructions import PoseTarget
 from er3a.robots.robot import Robot
 
@@ -94,7 +94,7 @@ def _part(group: list[tuple[int, CheckedMotion]]) -> ProgramPart:
     return ProgramPart("sequence", lines, command)
 
 
-def _blend(motion: CheckedMotion, way: Way, after: Way) -> float:
+def _blend(motion: CheckedMotion, way: MotionWay, after: MotionWay) -> float:
     zone = motion.placed.motion.zone
     if zone.kind != "distance":
         return 0.0

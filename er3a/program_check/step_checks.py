@@ -29,7 +29,7 @@ from er3a.program_check.program_check_findings import (
     ZoneWithoutSize,
 )
 from er3a.program_check.target_joints import Arms, Goal, PlacedMotion, goal_of
-from er3a.program_check.ways import CheckRules, Way, joint_way, limit_findings, tool_way
+from er3a.program_check.ways import CheckRules, MotionWay, joint_way, limit_findings, tool_way
 from er3a.program_check.zone_clearance import zone_clearance
 from er3a.programs.execution import Ending, Execution
 from er3a.programs.instructions import ArmMotion, JointTarget, Pause, PoseTarget, Target
@@ -41,7 +41,7 @@ SAME_JOINTS = 1e-4  # rad
 
 
 @dataclass(frozen=True, eq=False)
-class Surroundings:
+class Obstacles:
     """What the arm may not touch.
 
     Attributes
@@ -60,9 +60,9 @@ class Surroundings:
         return self.bodies[id(arm)]
 
 
-def surroundings_of(robot: Robot, scene: Scene | None, tolerance: float) -> Surroundings | None:
-    """Surroundings, or None where clearance can't be measured."""
-    return Surroundings(scene, tolerance, {id(robot): Bodies(robot, scene)})
+def obstacles_of(robot: Robot, scene: Scene | None, tolerance: float) -> Obstacles | None:
+    """Obstacles, or None where clearance can't be measured."""
+    return Obstacles(scene, tolerance, {id(robot): Bodies(robot, scene)})
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +81,7 @@ class CheckedMotion:
     kind: str
     placed: PlacedMotion
     start: Reals | None
-    way: Way | None
+    way: MotionWay | None
     end: Reals | None
     findings: tuple[CheckFinding, ...]
     clearance: float | None = None
@@ -92,8 +92,8 @@ class CheckedMotion:
 class StepChecker:
     """Checks steps in their order."""
 
-    def __init__(self, robot: Robot, rules: CheckRules, surroundings: Surroundings | None, execution: Execution):
-        self.arms, self.rules, self.surroundings, self.execution = Arms(robot), rules, surroundings, execution
+    def __init__(self, robot: Robot, rules: CheckRules, obstacles: Obstacles | None, execution: Execution):
+        self.arms, self.rules, self.obstacles, self.execution = Arms(robot), rules, obstacles, execution
         self.start: Reals | None = None
         self.motions: dict[int, CheckedMotion] = {}
         self.returns: list[tuple[Ending, int, float]] = []
@@ -188,7 +188,7 @@ class StepChecker:
         way = tool_way(placed.arm, placed.motion, before, (end, given, via), self.rules)
         if way is None:
             return CheckedMotion(kind, placed, before, None, before, tuple(findings), stays=True)
-        if not isinstance(way, Way):
+        if not isinstance(way, MotionWay):
             return CheckedMotion(kind, placed, before, None, goal.joints, (*findings, way))
         if any(isinstance(each, WayOutOfReach) for each in way.findings):
             findings = [each for each in findings if not isinstance(each, TargetOutOfReach)]
@@ -207,11 +207,11 @@ class StepChecker:
     def _measured(self, motion: CheckedMotion) -> CheckedMotion:
         """With its clearance and what it collides with."""
         way = motion.way
-        if self.surroundings is None or way is None or not np.isfinite(way.q).any():
+        if self.obstacles is None or way is None or not np.isfinite(way.q).any():
             return motion
-        bodies = self.surroundings.of(way.arm)
+        bodies = self.obstacles.of(way.arm)
         ends = way.t[[0, -1]]
-        along = clearance_along(bodies, way.joints, way.rates, way.t, ends, self.surroundings.tolerance)
+        along = clearance_along(bodies, way.joints, way.rates, way.t, ends, self.obstacles.tolerance)
         least = float(along.distance[along.least]) if along.least >= 0 else None
         hits = [
             MotionCollides(
@@ -243,32 +243,32 @@ class StepChecker:
         )
         self.motions[second] = replace(self.motions[second], blended_ends=min(self.motions[second].blended_ends + 1, 2))
 
-    def _rounded(self, way: Way, after: Way, motion: CheckedMotion) -> tuple[CheckFinding, ...]:
+    def _rounded(self, way: MotionWay, after: MotionWay, motion: CheckedMotion) -> tuple[CheckFinding, ...]:
         key = (id(way), id(after))
         if key not in self._corners:
             self._corners[key] = self._zone_findings(way, after, motion)
         return self._corners[key]
 
-    def _zone_findings(self, way: Way, after: Way, motion: CheckedMotion) -> tuple[CheckFinding, ...]:
+    def _zone_findings(self, way: MotionWay, after: MotionWay, motion: CheckedMotion) -> tuple[CheckFinding, ...]:
         shares = [_zone_share(motion.placed.motion, part) for part in (way, after)]
         found: list[CheckFinding] = []
         zone = motion.placed.motion.zone
         if zone.kind == "distance" and max(shares) > MOST_OF_A_MOTION + TOLERANCE:
             found.append(ZoneTooLarge(zone.value * 1000, min(way.length, after.length) * 1000))
-        if self.surroundings is None or motion.clearance is None or motion.clearance < 0:
+        if self.obstacles is None or motion.clearance is None or motion.clearance < 0:
             return tuple(found)
         before, behind = (min(share, MOST_OF_A_MOTION) for share in shares)
         corners = np.stack(
             [way.joints_at(np.array(1 - before)), way.joints_at(np.array(1.0)), after.joints_at(np.array(behind))]
         )
         if np.isfinite(corners).all():
-            hit = zone_clearance(self.surroundings.of(way.arm), corners, self.surroundings.tolerance)
+            hit = zone_clearance(self.obstacles.of(way.arm), corners, self.obstacles.tolerance)
             if hit is not None:
                 found.append(hit)
         return tuple(found)
 
 
-def _zone_share(motion: ArmMotion, way: Way) -> float:
+def _zone_share(motion: ArmMotion, way: MotionWay) -> float:
     """The share of a way that its zone may take; over one half where the zone is larger than that."""
     zone = motion.zone
     match zone.kind:

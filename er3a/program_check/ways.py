@@ -81,7 +81,7 @@ class CheckRules:
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
+class MotionWay:
     """A motion's way.
 
     Attributes
@@ -112,7 +112,7 @@ class Way:
         return round(1000 * self.length * float(progress(self.law, np.array(t))[0]), 3)
 
 
-def joint_way(arm: Robot, motion: ArmMotion, start: Reals, end: Reals, rules: CheckRules) -> Way | None:
+def joint_way(arm: Robot, motion: ArmMotion, start: Reals, end: Reals, rules: CheckRules) -> MotionWay | None:
     """A joint move; None if no joint moves."""
     step = end - start
     if np.abs(step).max() < NO_WAY:
@@ -139,7 +139,7 @@ def joint_way(arm: Robot, motion: ArmMotion, start: Reals, end: Reals, rules: Ch
     )
     lead = float(np.abs(step).max())
     rates = polynomial_motion(lambda t: _scaled(progress(law, t), start, step), law.breaks, 2).rate_bounds
-    return Way(arm, law, times, joints(times), joints, joints_at, rates, moved, lead, end, findings)
+    return MotionWay(arm, law, times, joints(times), joints, joints_at, rates, moved, lead, end, findings)
 
 
 def _scaled(shares: tuple[Reals, Reals, Reals], start: Reals, step: Reals) -> tuple[Reals, Reals, Reals]:
@@ -160,7 +160,7 @@ def limit_findings(arm: Robot, q: Reals) -> tuple[AboveLimit | BelowLimit, ...]:
 
 def tool_way(
     arm: Robot, motion: ArmMotion, start: Reals, goal: tuple[Reals, Reals | None, Reals | None], rules: CheckRules
-) -> Way | CheckFinding | None:
+) -> MotionWay | CheckFinding | None:
     """A line or arc from joints (n,) in rad; None if the tool does not move, a finding if it can't be followed.
 
     Parameters
@@ -191,7 +191,7 @@ def tool_way(
         return LineNotChecked()
     last = followed.q[-1]
     end_joints = last if np.isfinite(last).all() else None
-    way = Way(
+    way = MotionWay(
         *(arm, law, followed.t, followed.q, followed.joints, followed.joints_at, proof.rate_bounds),
         *(path.length, path.turned, end_joints, ()),
     )
@@ -200,7 +200,7 @@ def tool_way(
     )
 
 
-def _followed_findings(followed: Followed, proof: ToolProof, way: Way, rules: CheckRules) -> list[CheckFinding]:
+def _followed_findings(followed: Followed, proof: ToolProof, way: MotionWay, rules: CheckRules) -> list[CheckFinding]:
     """Reach, configuration, limits, singular poses, speeds."""
     arm = way.arm
     found: list[CheckFinding] = [

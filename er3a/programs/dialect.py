@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from er3a.programs.evaluation import Functions, Memory
+from er3a.programs.evaluation import Functions, ProgramMemory
 from er3a.programs.instructions import ArmMotion, Instruction
 from er3a.programs.syntax import Doing, Move
 
@@ -21,16 +21,16 @@ class Dialect(Functions, Protocol):
     modal: frozenset[str]
     local_by_default: bool
 
-    def begin(self, memory: Memory) -> None:
+    def begin(self, memory: ProgramMemory) -> None:
         """Variables that are there from the start."""
 
     def is_signal(self, name: str) -> bool:
         """Whether an assignment to this name sets an output."""
 
-    def motion(self, memory: Memory, move: Move) -> ArmMotion:
+    def motion(self, memory: ProgramMemory, move: Move) -> ArmMotion:
         """The motion, from where the arm stands."""
 
-    def carry_out(self, memory: Memory, doing: Doing) -> Instruction | None:
+    def carry_out(self, memory: ProgramMemory, doing: Doing) -> Instruction | None:
         """A call of a function that is not in the program; None if it only sets variables."""
 
     def named(self, name: str) -> bool:

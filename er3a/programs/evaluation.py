@@ -61,7 +61,7 @@ class Functions(Protocol):
     whole_division: bool
     first_index: int
 
-    def function(self, memory: Memory, name: str, given: Invocation) -> Value:
+    def function(self, memory: ProgramMemory, name: str, given: Invocation) -> Value:
         """The value of a function that is not in the program."""
 
     def listed(self, kind: str, values: tuple[Value, ...]) -> Value:
@@ -70,11 +70,11 @@ class Functions(Protocol):
     def product(self, left: Value, right: Value) -> Value:
         """``left : right``, of two positions."""
 
-    def constant(self, memory: Memory, name: str) -> Value | None:
+    def constant(self, memory: ProgramMemory, name: str) -> Value | None:
         """The value of a name that the language itself gives, if it does: a frame, where the arm stands."""
 
 
-class Memory:
+class ProgramMemory:
     """Variables: those of the program, and those of the routine that runs.
 
     Attributes
@@ -96,9 +96,9 @@ class Memory:
         self.kept: dict[object, object] = {}
         self.beside: frozenset[str] = frozenset()
 
-    def copy(self) -> Memory:
+    def copy(self) -> ProgramMemory:
         """Another that goes its own way from here."""
-        other = Memory(self.functions, self.cell)
+        other = ProgramMemory(self.functions, self.cell)
         other.here = self.here
         other.shared, other.local, other.types = dict(self.shared), dict(self.local), self.types
         other.beside = self.beside

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from er3a.programs.angle_conventions import pose_of
-from er3a.programs.evaluation import IN_DEGREES, Memory
+from er3a.programs.evaluation import IN_DEGREES, ProgramMemory
 from er3a.programs.instructions import (
     FINE,
     ArmMotion,
@@ -69,7 +69,7 @@ class KrlDialect:
     whole_division = True
     first_index = 1
 
-    def begin(self, memory: Memory) -> None:
+    def begin(self, memory: ProgramMemory) -> None:
         """No variable is there from the start."""
 
     def is_signal(self, name: str) -> bool:
@@ -80,7 +80,7 @@ class KrlDialect:
         """Tool and base keep the name of what they are set to."""
         return name in ("$TOOL", "$BASE")
 
-    def constant(self, memory: Memory, name: str) -> Value | None:
+    def constant(self, memory: ProgramMemory, name: str) -> Value | None:
         """Frames of the controller, and where the arm stands."""
         if name in ("$NULLFRAME", "$WORLD", "$ROBROOT"):
             return frame_record(pose_of((0.0,) * 6, "kuka"))
@@ -96,7 +96,7 @@ class KrlDialect:
         """KRL has no lists."""
         return values
 
-    def function(self, memory: Memory, name: str, given: Invocation) -> Value:
+    def function(self, memory: ProgramMemory, name: str, given: Invocation) -> Value:
         """Mathematics in degrees, and inverse frames."""
         values = tuple(None if each is None else memory.value(each) for each in given.arguments)
         if name == "INV_POS" and values and is_frame(values[0]):
@@ -128,7 +128,7 @@ class KrlDialect:
         rest = [(key, value) for key, value in right.items if key not in FRAME_KEYS]
         return Record(found.kind, (*found.items, *rest))
 
-    def motion(self, memory: Memory, move: Move) -> ArmMotion:
+    def motion(self, memory: ProgramMemory, move: Move) -> ArmMotion:
         """PTP, LIN, CIRC and their relatives and splines."""
         kept = {name: memory.shared.get(name) for name in memory.shared if name in _SET} if move.settings else {}
         angle = None
@@ -146,7 +146,7 @@ class KrlDialect:
             memory.kept.clear()
         return found
 
-    def _motion(self, memory: Memory, move: Move, angle: float | None) -> ArmMotion:
+    def _motion(self, memory: ProgramMemory, move: Move, angle: float | None) -> ArmMotion:
         plain = move.form.removesuffix("_REL")
         kind = KINDS[plain.removeprefix("S") if plain != "SPL" else plain]
         tool, base, speed, acceleration, zone = _settings(memory, kind, move)
@@ -170,7 +170,7 @@ class KrlDialect:
             block if isinstance(block, int) and block else None,
         )
 
-    def carry_out(self, memory: Memory, doing: Doing) -> Instruction | None:
+    def carry_out(self, memory: ProgramMemory, doing: Doing) -> Instruction | None:
         """Settings by BAS, ends of splines, signals by PULSE; the rest is unknown."""
         call = doing.what
         assert isinstance(call, Invocation)
@@ -193,7 +193,7 @@ _SET = frozenset(
 )
 
 
-def _settings(memory: Memory, kind: MotionKind, move: Move) -> Settings:
+def _settings(memory: ProgramMemory, kind: MotionKind, move: Move) -> Settings:
     """What is set for a motion; it is kept, because most motions follow one whose settings are the same."""
     key = (kind, move.words)
     found = memory.kept.get(key)
@@ -209,14 +209,14 @@ def _settings(memory: Memory, kind: MotionKind, move: Move) -> Settings:
     return found
 
 
-def _speed(memory: Memory, kind: MotionKind) -> Rate | None:
+def _speed(memory: ProgramMemory, kind: MotionKind) -> Rate | None:
     if kind == "joint":
         return _axis_share(memory, "$VEL_AXIS")
     speed = number(memory.read("$VEL.CP"))
     return None if speed is None else Rate(speed, "m/s")
 
 
-def _acceleration(memory: Memory, kind: MotionKind) -> Rate | None:
+def _acceleration(memory: ProgramMemory, kind: MotionKind) -> Rate | None:
     if kind == "joint":
         return _axis_share(memory, "$ACC_AXIS")
     value = memory.read("$ACC.CP")
@@ -227,13 +227,13 @@ def _acceleration(memory: Memory, kind: MotionKind) -> Rate | None:
     return None if found is None else Rate(found, "m/s2")
 
 
-def _axis_share(memory: Memory, name: str) -> Rate | None:
+def _axis_share(memory: ProgramMemory, name: str) -> Rate | None:
     given = [number(memory.read(f"{name}[{axis}]")) for axis in range(1, 7)]
     least = min((each for each in given if each is not None), default=None)
     return None if least is None else Rate(least / 100, "share")
 
 
-def _zone(memory: Memory, words: tuple[str, ...]) -> Zone:
+def _zone(memory: ProgramMemory, words: tuple[str, ...]) -> Zone:
     word = next((word for word in words if word.startswith("C_")), None)
     if word is None:
         return FINE

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-from er3a.programs.evaluation import Memory
+from er3a.programs.evaluation import ProgramMemory
 from er3a.programs.instructions import NamedFrame
 from er3a.programs.krl_targets import is_frame, record_pose
 from er3a.programs.syntax import Expression, Invocation
 from er3a.programs.values import Record, Unclear, Value, number
 
 
-def tool_of(memory: Memory) -> NamedFrame:
+def tool_of(memory: ProgramMemory) -> NamedFrame:
     """The tool that is set."""
     return _frame(memory, "$TOOL")
 
 
-def base_of(memory: Memory) -> NamedFrame:
+def base_of(memory: ProgramMemory) -> NamedFrame:
     """The base that is set."""
     return _frame(memory, "$BASE")
 
 
-def _frame(memory: Memory, variable: str) -> NamedFrame:
+def _frame(memory: ProgramMemory, variable: str) -> NamedFrame:
     value = memory.read(variable)
     if value is None:
-        return NamedFrame()
+        return NamedFrame("", memory.cell.tool if variable == "$TOOL" else memory.cell.base)
     said = memory.read(variable + "%name")
     name = said.upper() if isinstance(said, str) and said[:1] not in ("{", "") else ""
     pose = record_pose(value) if is_frame(value) else None
@@ -31,7 +31,7 @@ def _frame(memory: Memory, variable: str) -> NamedFrame:
     return NamedFrame(name, memory.cell.frames.get(name) if pose is None else pose)
 
 
-def set_by_bas(memory: Memory, call: Invocation) -> bool:
+def set_by_bas(memory: ProgramMemory, call: Invocation) -> bool:
     """Carry ``BAS(#COMMAND, value)`` out; False if the command is none that sets anything."""
     values = [memory.value(each) for each in call.arguments if each is not None]
     command = values[0] if values else ""
@@ -68,7 +68,7 @@ def set_by_bas(memory: Memory, call: Invocation) -> bool:
     return True
 
 
-def keep_setting(memory: Memory, name: str, expression: Expression) -> None:
+def keep_setting(memory: ProgramMemory, name: str, expression: Expression) -> None:
     """One item of a WITH."""
     if not isinstance(expression, Invocation):
         value = memory.value(expression)
@@ -105,12 +105,12 @@ def keep_setting(memory: Memory, name: str, expression: Expression) -> None:
                 memory.shared.pop(name + "%name", None)
 
 
-def _all_axes(memory: Memory, name: str, value: Value) -> None:
+def _all_axes(memory: ProgramMemory, name: str, value: Value) -> None:
     for axis in range(1, 7):
         memory.write(f"{name}[{axis}]", value)
 
 
-def _number(memory: Memory, variable: str, array: str, given: Value) -> None:
+def _number(memory: ProgramMemory, variable: str, array: str, given: Value) -> None:
     """Set tool or base by its number; 0 is the null frame."""
     plain = number(given)
     memory.shared.pop(variable + "%name", None)
@@ -122,12 +122,12 @@ def _number(memory: Memory, variable: str, array: str, given: Value) -> None:
     memory.write(variable + "%name", name)
 
 
-def _tool_data(memory: Memory, data: Record) -> None:
+def _tool_data(memory: ProgramMemory, data: Record) -> None:
     _number(memory, "$TOOL", "TOOL_DATA", data.get("TOOL_NO") or 0)
     memory.write("$IPO_MODE", data.get("IPO_FRAME") or "#BASE")
 
 
-def _frames(memory: Memory) -> None:
+def _frames(memory: ProgramMemory) -> None:
     data = memory.read("FDAT_ACT")
     if isinstance(data, Record):
         _tool_data(memory, data)
@@ -138,25 +138,25 @@ def _frames(memory: Memory) -> None:
             memory.shared.pop(variable + "%name", None)
 
 
-def _joint_data(memory: Memory, data: Value | None) -> None:
+def _joint_data(memory: ProgramMemory, data: Value | None) -> None:
     if isinstance(data, Record):
         _all_axes(memory, "$ACC_AXIS", data.get("ACC") or Unclear("ACC"))
         _zone_data(memory, data, "#CPTP")
 
 
-def _line_data(memory: Memory, data: Value | None) -> None:
+def _line_data(memory: ProgramMemory, data: Value | None) -> None:
     if isinstance(data, Record):
         _share(memory, data)
         _zone_data(memory, data, "#CDIS")
 
 
-def _share(memory: Memory, data: Value) -> None:
+def _share(memory: ProgramMemory, data: Value) -> None:
     percent = number(data.get("ACC")) if isinstance(data, Record) else None
     if percent is not None:
         memory.write("$ACC.CP", Record("", (("share", percent / 100),)))
 
 
-def _zone_data(memory: Memory, data: Value, usual: str) -> None:
+def _zone_data(memory: ProgramMemory, data: Value, usual: str) -> None:
     """``APO_DIST`` of motion data: mm, or percent of a joint motion."""
     distance = number(data.get("APO_DIST")) if isinstance(data, Record) else None
     if not isinstance(data, Record) or distance is None:

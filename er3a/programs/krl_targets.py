@@ -8,7 +8,7 @@ import numpy as np
 
 from er3a.numerics.arrays import Reals
 from er3a.programs.angle_conventions import numbers_of, pose_of
-from er3a.programs.evaluation import Memory
+from er3a.programs.evaluation import ProgramMemory
 from er3a.programs.instructions import JointTarget, NamedFrame, PoseTarget, Target, UnresolvedTarget
 from er3a.programs.values import Record, Unclear, Value, finite, number
 
@@ -42,7 +42,7 @@ def frame_record(pose: Reals, kind: str = "FRAME") -> Record:
     return Record(kind, tuple(zip(FRAME_KEYS, numbers_of(pose, "kuka"))))
 
 
-def target(memory: Memory, value: Value, frames: Frames, said: tuple[str, bool]) -> Target:
+def target(memory: ProgramMemory, value: Value, frames: Frames, said: tuple[str, bool]) -> Target:
     """What a position in a motion means; ``said`` is the line, and whether a relative position is meant by the tool."""
     text = said[0]
     if isinstance(value, Unclear):
@@ -56,7 +56,7 @@ def target(memory: Memory, value: Value, frames: Frames, said: tuple[str, bool])
     return _pose(memory, value, frames, text)
 
 
-def relative(memory: Memory, value: Value, frames: Frames, said: tuple[str, bool]) -> Target:
+def relative(memory: ProgramMemory, value: Value, frames: Frames, said: tuple[str, bool]) -> Target:
     """A target given by its difference from where the arm stands."""
     text, in_tool = said
     if isinstance(value, Unclear) or not isinstance(value, Record):
@@ -105,7 +105,7 @@ def _external(value: Record) -> tuple[tuple[str, float], ...]:
     return tuple((key, part) for key, part in given if part)
 
 
-def _joints(memory: Memory, value: Record, text: str, missing: float | None = None) -> Target:
+def _joints(memory: ProgramMemory, value: Record, text: str, missing: float | None = None) -> Target:
     degrees = _components(value, AXIS_KEYS, text)
     if isinstance(degrees, UnresolvedTarget):
         return degrees
@@ -117,7 +117,7 @@ def _joints(memory: Memory, value: Record, text: str, missing: float | None = No
     return JointTarget(np.array(joints), _external(value))
 
 
-def _pose(memory: Memory, value: Record, frames: Frames, text: str) -> Target:
+def _pose(memory: ProgramMemory, value: Record, frames: Frames, text: str) -> Target:
     given = _components(value, FRAME_KEYS, text)
     if isinstance(given, UnresolvedTarget):
         return given

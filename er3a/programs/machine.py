@@ -11,7 +11,7 @@ from collections.abc import Hashable
 from dataclasses import dataclass, field
 
 from er3a.programs.dialect import Dialect
-from er3a.programs.evaluation import Memory, root
+from er3a.programs.evaluation import ProgramMemory, root
 from er3a.programs.execution import Ending, EndKind, Execution, RunLimits, Step
 from er3a.programs.instructions import ArmMotion, Decision, Instruction, Output, Pause, Place, Unknown
 from er3a.programs.position import Cell, Position
@@ -59,7 +59,7 @@ class RunWay:
     """A way through the program: everything that it depends on from here."""
 
     frames: list[Frame]
-    memory: Memory
+    memory: ProgramMemory
     step: int = -1
     number: int = 0
     rounds: dict[tuple[str, int], int] = field(default_factory=dict)
@@ -92,7 +92,7 @@ class Machine:
 
     def run(self) -> Execution:
         """Follow all ways."""
-        memory = Memory(self.dialect, self.cell)
+        memory = ProgramMemory(self.dialect, self.cell)
         memory.beside = changed_by_threads(self.program)
         self.dialect.begin(memory)
         for each in self.program.data:
@@ -180,7 +180,7 @@ class Machine:
         follows = None if behind is None else self.first_behind.get(behind)
         self.endings.append(Ending(kind, way.step, place, follows))
 
-    def _assign(self, memory: Memory, each: Assign) -> Output | None:
+    def _assign(self, memory: ProgramMemory, each: Assign) -> Output | None:
         if each.type_name and isinstance(each.target, Variable):
             memory.types[each.target.name] = each.type_name
         if each.value is None:
@@ -199,11 +199,11 @@ class Machine:
             memory.write(name + "%name", each.text.partition("=")[2].strip())
         return None
 
-    def _is_new(self, memory: Memory, name: str) -> bool:
+    def _is_new(self, memory: ProgramMemory, name: str) -> bool:
         start = root(name)
         return start not in memory.shared and start not in memory.local and memory.local.get("%inside") is True
 
-    def _pause(self, memory: Memory, waiting: Waiting) -> Pause:
+    def _pause(self, memory: ProgramMemory, waiting: Waiting) -> Pause:
         if waiting.kind == "operator":
             return Pause()
         if waiting.kind == "condition" or waiting.of is None:

@@ -25,11 +25,14 @@ class Cell:
     flange : forward kinematics of the arm; None if no arm is given
     start : (6,), rad, joints where the program starts
     frames : poses (4, 4) of tools and bases by the program's names for them
+    tool, base : (4, 4), for motions whose program sets none; None if no arm is given
     """
 
     flange: Flange | None = None
     start: Reals | None = None
     frames: Mapping[str, Reals] = field(default_factory=dict)
+    tool: Reals | None = None
+    base: Reals | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from er3a.programs.angle_conventions import pose_of
-from er3a.programs.evaluation import IN_DEGREES, Memory
+from er3a.programs.evaluation import IN_DEGREES, ProgramMemory
 from er3a.programs.instructions import (
     FINE,
     ArmMotion,
@@ -40,7 +40,7 @@ class RplDialect:
     whole_division = True
     first_index = 1
 
-    def begin(self, memory: Memory) -> None:
+    def begin(self, memory: ProgramMemory) -> None:
         """No variable is there from the start."""
 
     def is_signal(self, name: str) -> bool:
@@ -51,7 +51,7 @@ class RplDialect:
         """Tools are named in each motion."""
         return False
 
-    def constant(self, memory: Memory, name: str) -> Value | None:
+    def constant(self, memory: ProgramMemory, name: str) -> Value | None:
         """There is none."""
         return None
 
@@ -63,7 +63,7 @@ class RplDialect:
         """RPL has no lists."""
         return values
 
-    def function(self, memory: Memory, name: str, given: Invocation) -> Value:
+    def function(self, memory: ProgramMemory, name: str, given: Invocation) -> Value:
         """Points, OFFSET, some mathematics."""
         values = [None if each is None else memory.value(each) for each in given.arguments]
         if name in FIELDS:
@@ -78,7 +78,7 @@ class RplDialect:
                 pass
         return Unclear(f"{name}({', '.join('' if each is None else shown(each) for each in values)})")
 
-    def motion(self, memory: Memory, move: Move) -> ArmMotion:
+    def motion(self, memory: ProgramMemory, move: Move) -> ArmMotion:
         """MJOINT and MLIN: target, speed, zone, tool, reference frame."""
         given = list(move.arguments)[:5]
         given += [None] * (5 - len(given))
@@ -98,14 +98,14 @@ class RplDialect:
             base=NamedFrame(base or NO_BASE, base_pose),
         )
 
-    def carry_out(self, memory: Memory, doing: Doing) -> Instruction | None:
+    def carry_out(self, memory: ProgramMemory, doing: Doing) -> Instruction | None:
         """Functions of libraries move nothing; others are unknown."""
         call = doing.what
         assert isinstance(call, Invocation)
         return Aside(doing.text) if call.function.startswith(LIBRARIES) else Unknown(doing.text)
 
 
-def _word(memory: Memory, expression: Expression | None) -> str:
+def _word(memory: ProgramMemory, expression: Expression | None) -> str:
     """The name of a speed, zone or tool, also where a variable of the program holds it."""
     return "" if expression is None else shown(memory.value(expression))
 

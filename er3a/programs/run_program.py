@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
+from er3a.errors import ShapeError
 from er3a.geometry.transforms import check_poses
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
@@ -42,7 +44,14 @@ def execute(
     robot : the arm, for what the text gives by where the arm stands: partial and relative targets
     start : (6,), rad, joints where the program starts
     frames : T_flange_tool of tools and T_robot_base of bases (4, 4) in m, by the program's names for them
+
+    Raises
+    ------
+    ShapeError, PoseError
+        for a start that has not an angle for each joint, and a frame that is no rigid transform
     """
+    if robot is not None and start is not None and np.shape(start) != robot.lower.shape:
+        raise ShapeError("start", np.shape(start), f"({len(robot.lower)},)")
     flange = None
     if robot is not None:
         bare = robot.without_tool().replace(base=np.eye(4))
@@ -52,4 +61,6 @@ def execute(
 
     known = {name: check_poses(pose, name) for name, pose in (frames or {}).items()}
     cell = Cell(flange, start, known)
+    if robot is not None:
+        cell = replace(cell, tool=robot.tool, base=np.eye(4))
     return Machine(program, DIALECTS[program.language](), cell, limits or RunLimits()).run()

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from er3a.geometry.transforms import rpy_of, transform
 from er3a.numerics.arrays import Reals
 from er3a.programs.angle_conventions import numbers_of, pose_of
-from er3a.programs.evaluation import Memory
+from er3a.programs.evaluation import ProgramMemory
 from er3a.programs.instructions import (
     FINE,
     ArmMotion,
@@ -86,7 +86,7 @@ class UrScriptDialect:
     whole_division = False
     first_index = 0
 
-    def begin(self, memory: Memory) -> None:
+    def begin(self, memory: ProgramMemory) -> None:
         """No variable is there from the start."""
 
     def is_signal(self, name: str) -> bool:
@@ -97,7 +97,7 @@ class UrScriptDialect:
         """Tools have no names."""
         return False
 
-    def constant(self, memory: Memory, name: str) -> Value | None:
+    def constant(self, memory: ProgramMemory, name: str) -> Value | None:
         """Numbers of the language."""
         return math.pi if name == "MATH_PI" else None
 
@@ -113,7 +113,7 @@ class UrScriptDialect:
             return Unclear(f"p[{', '.join(map(shown, values))}]")
         return Record("p", tuple(zip(POSE_KEYS, values)))
 
-    def function(self, memory: Memory, name: str, given: Invocation) -> Value:
+    def function(self, memory: ProgramMemory, name: str, given: Invocation) -> Value:
         """Mathematics, poses, where the arm stands; what is not known is unclear."""
         values = [None if each is None else memory.value(each) for each in given.arguments]
         keywords = {key: memory.value(each) for key, each in given.keywords}
@@ -144,7 +144,7 @@ class UrScriptDialect:
             else found
         )
 
-    def motion(self, memory: Memory, move: Move) -> ArmMotion:
+    def motion(self, memory: ProgramMemory, move: Move) -> ArmMotion:
         """movej, movel, movep, movec."""
         given = dict(zip(PARAMETERS[move.form], move.arguments))
         given |= dict(move.settings)
@@ -172,7 +172,7 @@ class UrScriptDialect:
             ROBOT_BASE,
         )
 
-    def carry_out(self, memory: Memory, doing: Doing) -> Instruction | None:
+    def carry_out(self, memory: ProgramMemory, doing: Doing) -> Instruction | None:
         """The tool, outputs, what is harmless; the rest is unknown."""
         call = doing.what
         assert isinstance(call, Invocation)
@@ -186,10 +186,10 @@ class UrScriptDialect:
         return Aside(doing.text) if call.function.startswith(HARMLESS) else Unknown(doing.text)
 
 
-def _tool(memory: Memory) -> NamedFrame:
+def _tool(memory: ProgramMemory) -> NamedFrame:
     value = memory.shared.get("%tcp")
     if value is None:
-        return NamedFrame()
+        return NamedFrame("", memory.cell.tool)
     pose = _pose(value)
     return NamedFrame(value.text if isinstance(value, Unclear) else "", pose)
 
@@ -243,7 +243,7 @@ def _joints(value: Value) -> Reals | None:
     return np.array(plain) if plain is not None and len(plain) == 6 and finite(plain) else None
 
 
-def _of_position(memory: Memory, name: str, values: list[Value | None]) -> Value | None:
+def _of_position(memory: ProgramMemory, name: str, values: list[Value | None]) -> Value | None:
     """Functions of where the arm stands, and of its table."""
     if name in ("get_actual_joint_positions", "get_target_joint_positions"):
         return None if memory.here.joints is None else tuple(map(float, memory.here.joints))

@@ -33,7 +33,6 @@ er3a: can this kinematic model of a serial robot be trusted, and what can the ro
   er3a run                        carry out the study of this folder; then open reports/index.html
   er3a verdicts                   what came out, in the terminal
   er3a view                       the recordings, to move and to play
-  er3a check-program FILE ...     what a robot program would make an arm do (--robot er3_600)
 
 All commands: er3a --help. What one takes: er3a run --help."""
 

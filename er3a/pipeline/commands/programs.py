@@ -37,6 +37,7 @@ SceneFile = Annotated[Path | None, typer.Option(help="a scene file: what the arm
 @app.command(rich_help_panel=PROGRAMS)
 def check_program(
     files: Annotated[list[Path], typer.Argument(help="programs: .src, .script, .pgm, .XPL, or .csv of joints")],
+    *,
     robot: RobotOption,
     start: Annotated[str | None, typer.Option(help="joint angles before the program, deg: 0,-10,...")] = None,
     frames: Annotated[
@@ -90,6 +91,7 @@ app.add_typer(program_app, name="program", rich_help_panel=PROGRAMS)
 @program_app.command()
 def write(
     paths: Annotated[Path, typer.Argument(help="a path file")],
+    *,
     robot: RobotOption,
     language: Annotated[ProgramLanguage, typer.Option(help="the controller's language, or a table over time")],
     output: Annotated[Path, typer.Option(help="the folder that the programs are written to")] = Path("programs"),

@@ -148,8 +148,8 @@ def _solid(solid: Box | Cylinder | Sphere | Mesh) -> dict[str, Any]:
         hulls = [trimesh.convex.convex_hull(piece) for piece in solid.pieces]
         points = np.concatenate([hull.vertices for hull in hulls]) if hulls else np.empty((0, 3))
         starts = np.cumsum([0, *(len(hull.vertices) for hull in hulls)])
-        faces = [(hull.faces + start).tolist() for hull, start in zip(hulls, starts)]
-        return {"kind": "mesh", "points": points.tolist(), "faces": sum(faces, []), **common}
+        faces = [face for hull, start in zip(hulls, starts) for face in (hull.faces + start).tolist()]
+        return {"kind": "mesh", "points": points.tolist(), "faces": faces, **common}
     return {"kind": "sphere", "radius": solid.radius, **common}
 
 

@@ -1,0 +1,216 @@
+"""What a check of programs finds, and what it does not: each fault's program, and programs written to be sound."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from er3a.collision.envelopes import envelopes_of
+from er3a.collision.scene import Plane, Scene, Sphere
+from er3a.errors import ShapeError
+from er3a.files.program_file import load_programs
+from er3a.files.robot_library import load_robot
+from er3a.files.scene_file import load_scene
+from er3a.kinematics.configuration import branch_labels
+from er3a.kinematics.forward import forward
+from er3a.kinematics.inverse import inverse
+from er3a.program_check.check_program import CheckOptions, check_program
+from er3a.program_check.ways import _slot
+from er3a.programs.angle_conventions import numbers_of
+from er3a.programs.read_program import read_program
+
+ROOT = Path(__file__).resolve().parents[2]
+FAULTS = ROOT / "data/programs/faults"
+ROBOT = load_robot("er3a_c60")
+HOME = np.radians([0.0, -10.0, -10.0, 0.0, -70.0, 0.0])
+FOUND = {
+    "collision_with_table": {"motion_collides"},
+    "drifting_loop": {"not_followed_to_end", "way_out_of_reach"},
+    "joint_jump": {"joint_jumps", "configuration_changes"},
+    "no_motion": {"program_nothing_moves"},
+    "out_of_reach": {"way_out_of_reach"},
+    "outside_limits": {"above_limit"},
+    "singular_line": {"passes_singularity", "faster_than_assumed"},
+    "too_fast": {"faster_than_assumed"},
+    "unknown_tool": {"frame_not_given"},
+    "zone_larger_than_segment": {"zone_too_large"},
+}
+TABLE = Scene("table", (Plane("table", np.array([0.0, 0.0, 1.0]), 0.0),))
+
+
+def checked(text: str, tmp_path: Path, name: str = "a.src", **options):
+    """The check of a KRL program's body, from the home position."""
+    head = "DEF a( )\nBAS(#INITMOV,0)\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nBAS(#VEL_PTP,30)\n$VEL.CP=0.1\n"
+    (tmp_path / name).write_text(f"{head}{text}\nEND\n", encoding="utf-8")
+    (tmp_path / name).with_suffix(".dat").write_text("DEFDAT a\nENDDAT\n", encoding="utf-8")
+    given = {"start": HOME} | options
+    return check_program(read_program(tmp_path / name), ROBOT, CheckOptions(**given))
+
+
+def codes(check) -> set[str]:
+    """Codes of all findings."""
+    return {each.finding.code for each in check.findings}
+
+
+def axes(q) -> str:
+    """Joint angles in rad as a KRL axis position."""
+    return "{" + ", ".join(f"A{i + 1} {np.degrees(angle):.6f}" for i, angle in enumerate(q)) + "}"
+
+
+def frame(T) -> str:
+    """A pose (4, 4) in m as a KRL frame."""
+    x, y, z, a, b, c = numbers_of(T, "kuka")
+    return f"{{X {x:.6f}, Y {y:.6f}, Z {z:.6f}, A {a:.6f}, B {b:.6f}, C {c:.6f}}}"
+
+
+def test_every_faulty_program_has_its_faults_here():
+    assert {path.stem for path in FAULTS.glob("*.src")} == set(FOUND)
+
+
+@pytest.mark.parametrize("name", FOUND)
+def test_each_fault_is_found(name):
+    check = check_program(read_program(FAULTS / f"{name}.src"), ROBOT, CheckOptions(start=HOME, scene=TABLE))
+    assert codes(check) >= FOUND[name]
+    listed = load_programs(ROOT / "data/programs/er3a_c60.yaml").programs
+    assert check.level == next(entry.expect for entry in listed if entry.name == name)
+
+
+@pytest.mark.parametrize("suffix", [".src", ".script", ".pgm"])
+def test_the_examples_pass_and_their_times_agree_over_languages(suffix):
+    scene = load_scene(ROOT / "data/scenes/table_and_post.yaml")
+    options = CheckOptions(start=HOME, scene=scene)
+    check = check_program(read_program(ROOT / f"data/programs/weld_seam{suffix}"), ROBOT, options)
+    assert [each for each in check.findings if each.level in ("caution", "fail")] == []
+    assert all(verdict.times for verdict in check.verdicts)
+    assert 25 < check.cycle.blended_s <= check.cycle.stopping_s < 30
+
+
+def test_limits_reach_and_speeds_by_what_is_written(tmp_path):
+    low, high = np.degrees(ROBOT.lower[2]), np.degrees(ROBOT.upper[2])
+    inside = checked(f"PTP {{A3 {high - 0.01:.3f}}}", tmp_path)
+    assert "above_limit" not in codes(inside)
+    assert "above_limit" in codes(checked(f"PTP {{A3 {high + 0.01:.3f}}}", tmp_path))
+    assert "below_limit" in codes(checked(f"PTP {{A3 {low - 0.01:.3f}}}", tmp_path))
+    fast = ROBOT.replace(speed=np.full(6, np.radians(100.0)))
+    program = read_program(tmp_path / "a.src")
+    assert "too_fast" not in codes(check_program(program, fast, CheckOptions(start=HOME)))
+    (tmp_path / "b.script").write_text("def b():\n  movej([1,-0.17,-0.17,0,-1.22,0], a=5, v=2.0)\nend\n")
+    over = check_program(read_program(tmp_path / "b.script"), fast, CheckOptions(start=HOME))
+    assert {each.finding.code for each in over.findings if each.level == "fail"} == {"too_fast"}
+
+
+def test_a_line_is_timed_by_speed_and_acceleration(tmp_path):
+    (tmp_path / "a.script").write_text(
+        "def a():\n  movel(pose_trans(get_actual_tcp_pose(), p[0,0,0.1,0,0,0]), a=0.5, v=0.1)\nend\n"
+    )
+    arm = ROBOT
+    check = check_program(read_program(tmp_path / "a.script"), arm, CheckOptions(start=HOME))
+    assert check.cycle.stopping_s == pytest.approx(0.1 / 0.1 + 0.1 / 0.5, rel=1e-6)
+    assert check.cycle.complete
+
+
+def test_a_line_keeps_the_tool_on_its_way(tmp_path):
+    T = forward(ROBOT, HOME)
+    end = T.copy()
+    end[:3, 3] += [0.05, 0.1, -0.05]
+    check = checked(f"LIN {{X {1000 * end[0, 3]:.6f}, Y {1000 * end[1, 3]:.6f}, Z {1000 * end[2, 3]:.6f}}}", tmp_path)
+    (motion,) = check.motions.values()
+    points = forward(ROBOT, motion.way.q)[:, :3, 3]
+    along = (points - T[:3, 3]) @ (end[:3, 3] - T[:3, 3]) / np.sum((end[:3, 3] - T[:3, 3]) ** 2)
+    assert np.abs(T[:3, 3] + along[:, None] * (end[:3, 3] - T[:3, 3]) - points).max() < 1e-8
+    assert along[0] == pytest.approx(0, abs=1e-8)
+    assert along[-1] == pytest.approx(1, abs=1e-6)
+
+
+def test_the_branch_of_joint_angles_is_that_of_the_inverse():
+    rng = np.random.default_rng(4)
+    for q in rng.uniform(ROBOT.lower, ROBOT.upper, (50, 6)):
+        found = inverse(ROBOT, forward(ROBOT, q), q)
+        nearest = int(np.abs(found.q - q).max(axis=1).argmin())
+        assert _slot(ROBOT, q) == found.branch[nearest]
+    assert len(set(branch_labels(ROBOT))) == 8
+
+
+def test_turn_chooses_among_the_solutions_of_a_pose(tmp_path):
+    T = forward(ROBOT, np.radians([10.0, -20.0, -15.0, 20.0, -60.0, 30.0]))
+    inside = [q for q in inverse(ROBOT, T).q if ((q >= ROBOT.lower) & (q <= ROBOT.upper)).all()]
+    turns = {sum(1 << i for i in range(6) if q[i] < 0) for q in inside}
+    assert len(turns) > 1
+    for turn in range(64):
+        check = checked(f"PTP {frame(T)}".replace("}", f", S 0, T {turn}}}"), tmp_path)
+        (motion,) = check.motions.values()
+        assert ("turn_not_met" in codes(check)) == (turn not in turns)
+        if turn in turns:
+            assert sum(1 << i for i in range(6) if motion.end[i] < 0) == turn
+
+
+def test_whole_turns_and_configuration_changes_are_said(tmp_path):
+    far = HOME.copy()
+    far[5] = np.radians(190.0)
+    near = HOME.copy()
+    near[5] = np.radians(-10.0)
+    check = checked(f"PTP {axes(near)}\nPTP {axes(far)}", tmp_path)
+    turn = next(each.finding for each in check.findings if each.finding.code == "whole_turn")
+    assert (turn.joint, round(turn.angle_deg), round(turn.nearest_deg)) == (6, 200, -160)
+
+
+def test_a_zone_that_allows_a_collision_is_a_caution(tmp_path):
+    T = forward(ROBOT, HOME)
+    first, second = T.copy(), T.copy()
+    first[:3, 3] += [0.0, 0.15, 0.0]
+    second[:3, 3] += [-0.15, 0.15, 0.0]
+    words = [", ".join(f"{k} {1000 * v:.3f}" for k, v in zip("XYZ", end[:3, 3])) for end in (first, second)]
+    body = f"$APO.CDIS=70\nLIN {{{words[0]}}} C_DIS\nLIN {{{words[1]}}}"
+    free = checked(body, tmp_path)
+    assert "zone_collides" not in codes(free)
+    assert min(motion.clearance for motion in free.motions.values()) > 0.05
+    # The capsule of the last link meets a ball inside the corner, but not on the lines.
+    cut = first[:3, 3] + 0.25 * (T[:3, 3] + second[:3, 3] - 2 * first[:3, 3])
+    radius = max(each.radius for each in envelopes_of(ROBOT) if each.link == 6)
+    place = np.eye(4)
+    place[:3, 3] = cut - [0.0, 0.0, radius + 0.012]
+    scene = Scene("ball", (Sphere("ball", place, 0.015),))
+    check = checked(body, tmp_path, scene=scene)
+    assert "motion_collides" not in codes(check)
+    assert "zone_collides" in codes(check)
+    assert check.level == "caution"
+    stop = checked(body.replace(" C_DIS", ""), tmp_path, scene=scene)
+    assert "zone_collides" not in codes(stop)
+
+
+def test_frames_make_targets_of_a_named_tool_and_base_known(tmp_path):
+    body = "$TOOL=TOOL_DATA[3]\n$BASE=BASE_DATA[2]\nLIN {X 300, Y 50, Z 200, A 0, B 0, C 180}"
+    assert {each.finding.code for each in checked(body, tmp_path).findings if each.level == "fail"} == {
+        "frame_not_given"
+    }
+    tool, base = np.eye(4), np.eye(4)
+    tool[2, 3], base[2, 3] = 0.05, 0.1
+    (motion,) = checked(body, tmp_path, frames={"TOOL_DATA[3]": tool, "BASE_DATA[2]": base}).motions.values()
+    flange = forward(ROBOT, motion.end)
+    np.testing.assert_allclose(flange[:3, 3], [0.3, 0.05, 0.3 + 0.05], atol=1e-6)
+
+
+def test_what_no_way_comes_to_and_what_may_move_is_said(tmp_path):
+    check = checked("PTP {A1 10}\nMYMOVE(3)\nRETURN\nPTP {A1 20}", tmp_path)
+    assert {"never_reached", "may_move"} <= codes(check)
+    assert [verdict.times for verdict in check.verdicts] == [1, 0]
+
+
+def test_a_loop_whose_wrist_winds_up_is_said(tmp_path):
+    T = forward(ROBOT, HOME)
+    turns = []
+    for third in (1, 2, 3):
+        turned = T.copy()
+        turned[:3, :3] = T[:3, :3] @ Rotation.from_rotvec([0, 0, third * 2 * np.pi / 3]).as_matrix()
+        turns.append(f"LIN {frame(turned)}")
+    check = checked("LOOP\n" + "\n".join(turns) + "\nENDLOOP", tmp_path)
+    found = next(each.finding for each in check.findings if each.finding.code == "loop_comes_back_otherwise")
+    assert (found.joint, round(abs(found.difference_deg))) == (6, 360)
+
+
+def test_a_start_of_another_length_is_refused(tmp_path):
+    with pytest.raises(ShapeError):
+        checked("PTP {A1 10}", tmp_path, start=np.zeros(5))
