@@ -10,6 +10,7 @@ from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.page import Picture, number
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED
 
+DRAWN = 161
 PARTS = ("gravity", "inertia", "velocity", "friction")
 
 
@@ -20,6 +21,7 @@ def joint_colour(joint: int) -> str:
 
 def torque_figure(path: PathLoad, rows: TorqueRows) -> Picture:
     """Torques of all joints with their intervals, the parts of the most loaded one, and powers."""
+    rows = rows.take(np.unique(np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round().astype(int)))
     figure, (torque, parts, power) = new_figure(1, 3, width=13.0, height=3.4)
     worst = max(range(len(path.joints)), key=lambda j: path.joints[j].peak)
     for j in range(rows.torque.shape[1]):
