@@ -25,9 +25,7 @@ def capsule_body(capsule: Envelope, density: float) -> Body:
     start, end, r = np.array(capsule.start), np.array(capsule.end), capsule.radius
     length = float(np.linalg.norm(end - start))
     cylinder, ball = density * np.pi * r**2 * length, density * 4 / 3 * np.pi * r**3
-    across = cylinder * (length**2 / 12 + r**2 / 4) + ball * (
-        0.4 * r**2 + length**2 / 4 + 0.375 * length * r
-    )
+    across = cylinder * (length**2 / 12 + r**2 / 4) + ball * (0.4 * r**2 + length**2 / 4 + 0.375 * length * r)
     round_ = cylinder * r**2 / 2 + 0.4 * ball * r**2
     body = Body(cylinder + ball, (0.0, 0.0, 0.0), (across, across, round_, 0.0, 0.0, 0.0))
     T = np.eye(4)

@@ -1,8 +1,8 @@
 """The fastest time law along a way in joint space under the drives' torques and the joints' speeds, by TOPP-RA [1]_.
 
-Along a way q(s) torques are ``a s'' + b s'^2 + c``; so peak torques bound s'' and s'^2 linearly. Viscous friction, which
-goes with s', counts with the greatest s' that the joints' speeds allow: the motion found keeps the limits, and is the
-fastest one if there is no viscous friction. Between nodes constraints are interpolated.
+Along a way q(s) torques are ``a s'' + b s'^2 + c``; so peak torques bound s'' and s'^2 linearly. Viscous friction
+goes with s' and counts with the greatest s' that the joints' speeds allow: the motion found keeps the limits, and is
+the fastest one if there is no viscous friction. Between nodes constraints are interpolated.
 
 References
 ----------
@@ -20,7 +20,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from er3a.dynamics.arm_model import ArmModel, drives_of
-from er3a.dynamics.torques import holding_torques, known, torque_parts
+from er3a.dynamics.torques import direction_of, holding_torques, known, torque_parts
 from er3a.numerics.arrays import Reals
 from er3a.planning.timing import (
     SAME_NODE,
@@ -72,7 +72,7 @@ def fastest_under_torques(model: ArmModel, q: Reals, speed: Reals, peak: Reals) 
     t = np.concatenate([[0.0], np.cumsum(np.diff(way) / between)])
     slope, bend, pull = spline(way, 1), spline(way, 2), np.append(pull, pull[-1])
     timed = Timed(t, q, slope * pace[:, None], bend * pace[:, None] ** 2 + slope * pull[:, None])
-    dry = known(drives_of(model.robot).coulomb) * (np.sign(slope) - np.sign(timed.velocity))
+    dry = known(drives_of(model.robot).coulomb) * (direction_of(slope) - direction_of(timed.velocity))
     return TimedTorques(timed, torque_parts(model, q, timed.velocity, timed.acceleration).total + dry)
 
 
@@ -90,7 +90,7 @@ def torque_rows(model: ArmModel, way: Reals, spline: CubicSpline, speed: Reals, 
     armature = known(drives.armature)
     a = model.rigid_torques(q, rest, slope) - held + armature * slope
     b = model.rigid_torques(q, slope, bend) - held + armature * bend
-    c = held + model.tool_torques(q) + known(drives.coulomb) * np.sign(slope)
+    c = held + model.tool_torques(q) + known(drives.coulomb) * direction_of(slope)
     with np.errstate(divide="ignore"):
         most = (speed / np.abs(slope)).min(axis=1)[:, None]
     viscous = known(drives.viscous) * slope * most

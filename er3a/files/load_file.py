@@ -9,11 +9,11 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from er3a.errors import InputError
-from er3a.files.mass_fields import HEAVIEST_PAYLOAD_KG, IMPOSSIBLE, BodyFields, Positive
+from er3a.files.mass_fields import HEAVIEST_PAYLOAD_KG, IMPOSSIBLE, BodyFields
 from er3a.files.units import Triple
 from er3a.files.yaml_file import StrictModel
 from er3a.geometry.transforms import transform
-from er3a.robots.masses import Body, Load, moved, no_body, together
+from er3a.robots.masses import Body, Load, moved, no_body, six_moments, together
 from er3a.robots.robot import Grade
 
 THREE_ZEROS = [0.0, 0.0, 0.0]
@@ -93,16 +93,17 @@ def mesh_body(given: MeshMass) -> Body:
     try:
         mesh = trimesh.load_mesh(given.file)
     except Exception as error:  # whatever a reader of a format raises
-        raise InputError(given.file, None, f"can't be read as a mesh ({error})", "Give an STL, OBJ or PLY file") from None
+        raise InputError(
+            given.file, None, f"can't be read as a mesh ({error})", "Give an STL, OBJ or PLY file"
+        ) from None
     if not (mesh.is_watertight and mesh.is_winding_consistent and abs(mesh.volume) > 0):
         raise InputError(given.file, None, "is no closed mesh, so it has no volume", "Close its holes, or state a body")
     if mesh.volume < 0:
         mesh.invert()
     mesh.apply_scale(given.unit_mm / 1000)
     mesh.density = given.density_kg_m3
-    I, (x, y, z) = mesh.moment_inertia, mesh.center_mass.tolist()
-    xx, yy, zz, xy, xz, yz = (float(I[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
-    body = Body(float(mesh.mass), (x, y, z), (xx, yy, zz, xy, xz, yz))
+    x, y, z = mesh.center_mass.tolist()
+    body = Body(float(mesh.mass), (x, y, z), six_moments(mesh.moment_inertia))
     if problem := no_body(body):
         raise InputError(given.file, None, IMPOSSIBLE[problem], "Check the mesh")
     if body.mass > HEAVIEST_PAYLOAD_KG:

@@ -114,7 +114,7 @@ def import_urdf(path: str | Path, snap: bool = False) -> UrdfImport:
 
 
 def export_urdf(robot: Robot) -> str:
-    """The arm as URDF text, masses included; the link ``tool`` is the tool frame. Unknown speeds are written as 0 (URDF demands one)."""
+    """The arm as URDF text, masses included; the link ``tool`` is the tool frame. Unknown speeds are written as 0."""
     links = constant_links(robot)
     root = ElementTree.Element("robot", name=robot.name)
     names = ["base", *(f"link_{k + 1}" for k in range(JOINTS)), "tool"]

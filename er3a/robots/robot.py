@@ -124,7 +124,7 @@ class Robot(Displayed):
     coupling: Reals | None = None
     continuous: Flags = field(default_factory=lambda: np.empty(0, dtype=bool))
     combined: tuple[CombinedLimit, ...] = ()
-    masses: Masses = Masses()
+    masses: Masses = field(default_factory=Masses)
     sources: Mapping[str, Source] = field(default_factory=dict)
     origins: Mapping[str, str] = field(default_factory=dict)
     derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)

@@ -96,7 +96,9 @@ def test_an_arm_that_cannot_stand_has_no_margin_and_unknown_limits_none(arm):
 
 def test_the_worst_holding_pose_of_two_links_is_stretched_out():
     g, a = 9.81, 0.5
-    rods = tuple(LinkMass(k, Body(m, (c, 0.0, 0.0), (0.01, 0.01, 0.01, 0, 0, 0))) for k, m, c in ((1, 3, 0.2), (2, 2, 0.3)))
+    rods = tuple(
+        LinkMass(k, Body(m, (c, 0.0, 0.0), (0.01, 0.01, 0.01, 0, 0, 0))) for k, m, c in ((1, 3, 0.2), (2, 2, 0.3))
+    )
     tilt = np.eye(4)
     tilt[:3, :3] = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
     arm = Robot(

@@ -52,8 +52,8 @@ def scaled(factor: float):
 
 
 def about_origin(body: Body) -> Body:
-    I = body.inertia_matrix + body.mass * about(np.array(body.centre))
-    return replace(body, inertia=(I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]))
+    tensor = body.inertia_matrix + body.mass * about(np.array(body.centre))
+    return replace(body, inertia=(tensor[0, 0], tensor[1, 1], tensor[2, 2], tensor[0, 1], tensor[0, 2], tensor[1, 2]))
 
 
 @pytest.mark.parametrize(
@@ -122,11 +122,11 @@ def test_bodies_together_and_moved():
     dust = [Body(m, tuple(p)) for p, m in zip(points.tolist(), masses.tolist())]
     halves = together([together(dust[:2]), together(dust[2:])])
     centre = masses @ points / masses.sum()
-    I = sum(m * about(p - centre) for m, p in zip(masses, points))
-    np.testing.assert_allclose(halves.inertia_matrix, I, atol=1e-12)
+    tensor = sum(m * about(p - centre) for m, p in zip(masses, points))
+    np.testing.assert_allclose(halves.inertia_matrix, tensor, atol=1e-12)
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = np.linalg.qr(rng.normal(size=(3, 3)))[0], (1, 2, 3)
-    np.testing.assert_allclose(moved(halves, T).inertia_matrix, T[:3, :3] @ I @ T[:3, :3].T, atol=1e-12)
+    np.testing.assert_allclose(moved(halves, T).inertia_matrix, T[:3, :3] @ tensor @ T[:3, :3].T, atol=1e-12)
     np.testing.assert_allclose(moved(halves, T).centre, T[:3, :3] @ centre + T[:3, 3], atol=1e-12)
 
 
@@ -197,7 +197,9 @@ def test_frames_of_a_file_give_equal_torques(arm, tmp_path, frame):
             T[:3, 3] = turn @ [-arm.a[row], 0, -arm.d[row]]
         body = moved(each.body, T)
         centre = [1000 * value for value in body.centre]
-        fields.append({"link": each.link, "mass_kg": body.mass, "centre_mm": centre, "inertia_kg_m2": list(body.inertia)})
+        fields.append(
+            {"link": each.link, "mass_kg": body.mass, "centre_mm": centre, "inertia_kg_m2": list(body.inertia)}
+        )
 
     def change(content):
         content["inertia"] |= {"frame": frame, "links": fields}
@@ -256,7 +258,12 @@ BAD_URDF = """<inertial><origin xyz="0 0 0.1" rpy="0.3 0.2 0.1"/><mass value="{m
 
 @pytest.mark.parametrize(
     ("mass", "xx", "note"),
-    [("-1", "0.1", "has a mass below 0"), ("1", "0.5", "above the sum"), ("x", "0.1", "holds something"), ("1", "0.1", "")],
+    [
+        ("-1", "0.1", "has a mass below 0"),
+        ("1", "0.5", "above the sum"),
+        ("x", "0.1", "holds something"),
+        ("1", "0.1", ""),
+    ],
 )
 def test_inertials_of_a_urdf_that_no_body_has_are_noted(arm, tmp_path, mass, xx, note):
     text = export_urdf(arm.replace(masses=Masses()))

@@ -29,10 +29,10 @@ def random_body(random: np.random.Generator) -> Body:
     points, masses = random.normal(scale=0.1, size=(3, 3)), random.uniform(0.2, 2.0, 3)
     centre = masses @ points / masses.sum()
     off = points - centre
-    I = np.einsum("k,kij->ij", masses, (off**2).sum(1)[:, None, None] * np.eye(3) - off[:, :, None] * off[:, None])
-    I += 1e-3 * np.eye(3)
+    tensor = np.einsum("k,kij->ij", masses, (off**2).sum(1)[:, None, None] * np.eye(3) - off[:, :, None] * off[:, None])
+    tensor += 1e-3 * np.eye(3)
     x, y, z = centre.tolist()
-    xx, yy, zz, xy, xz, yz = (float(I[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
+    xx, yy, zz, xy, xz, yz = (float(tensor[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
     return Body(float(masses.sum()), (x, y, z), (xx, yy, zz, xy, xz, yz))
 
 
@@ -138,14 +138,14 @@ def mass_and_potential(robot: Robot, q: np.ndarray, bodies: dict[int, Body]) -> 
     M, V = np.zeros((len(q), len(q)), complex), 0j
     for link, body in bodies.items():
         T, dT = frames[link - 1], steps[link - 1]
-        centre, I = np.append(body.centre, 1.0), body.inertia_matrix
-        spread = np.trace(I) / 2 * np.eye(3) - I
+        centre, tensor = np.append(body.centre, 1.0), body.inertia_matrix
+        second = np.trace(tensor) / 2 * np.eye(3) - tensor
         V += body.mass * G * (T @ centre)[2]
         moves = [d @ centre for d in dT]
         for i in range(len(q)):
             for j in range(len(q)):
                 M[i, j] += body.mass * moves[i][:3] @ moves[j][:3]
-                M[i, j] += np.trace(dT[i][:3, :3] @ spread @ dT[j][:3, :3].T)
+                M[i, j] += np.trace(dT[i][:3, :3] @ second @ dT[j][:3, :3].T)
     return M, V
 
 
@@ -238,11 +238,11 @@ def toolbox_arm(arm: Robot):
         back = np.linalg.inv(frame)
         R = back[:3, :3]
         centre = R @ np.array(body.centre) + back[:3, 3]
-        I = R @ body.inertia_matrix @ R.T
+        tensor = R @ body.inertia_matrix @ R.T
         rotor = {} if drives is None else {"Jm": drives.armature[k], "G": 1.0, "B": drives.viscous[k]}
         if drives is not None:
             rotor["Tc"] = [drives.coulomb[k], -drives.coulomb[k]]
-        links.append(RevoluteDH(d=arm.d[k], a=arm.a[k], alpha=arm.alpha[k], m=body.mass, r=centre, I=I, **rotor))
+        links.append(RevoluteDH(d=arm.d[k], a=arm.a[k], alpha=arm.alpha[k], m=body.mass, r=centre, I=tensor, **rotor))
     return DHRobot(links, gravity=[0, 0, -G])
 
 
@@ -255,9 +255,10 @@ def test_torques_are_the_robotics_toolboxs(driven):
     other = toolbox_arm(arm)
     q, qd, qdd = motions(arm)
     theta = arm.direction * q + arm.offset
-    expected = np.array(
-        [other.rne_python(*row) for row in zip(theta, arm.direction * qd, arm.direction * qdd)]
-    ) * arm.direction
+    expected = (
+        np.array([other.rne_python(*row) for row in zip(theta, arm.direction * qd, arm.direction * qdd)])
+        * arm.direction
+    )
     found = er3a.torques(arm, q, qd, qdd)
     assert np.abs(found - expected).max() < RELATIVE * np.abs(expected).max()
 
@@ -386,3 +387,13 @@ def test_the_regressor_gives_the_torques_and_the_tolerance_bounds_them():
         other = arm.replace(masses=Masses(tuple(links)))
         off = np.abs(er3a.torques(other, q, qd, qdd, load) - tau)
         assert (off <= 1.25 * half + 1e-3).all()
+
+
+def test_friction_of_a_joint_that_only_rounding_moves():
+    arm = er3a.load_robot("er3a_c60")
+    drives = replace(Drives.unknown(6), coulomb=np.full(6, 2.0))
+    arm = arm.replace(masses=replace(arm.masses, drives=drives))
+    q, rest = np.zeros(6), np.zeros(6)
+    noise = np.array([1e-15, -1e-15, 1e-9, 1e-4, -1e-4, 0.0])
+    friction = er3a.torques(arm, q, noise, rest) - er3a.gravity(arm, q)
+    np.testing.assert_allclose(friction, [0, 0, 0, 2, -2, 0], atol=1e-6)

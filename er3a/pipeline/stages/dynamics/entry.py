@@ -35,7 +35,10 @@ class DynamicsSettings(StrictModel):
 
 def _inputs(study: Study, robot: str) -> list[Path]:
     meshes = [file for load in study.loads(robot) for file in load.files]
-    return [*(file for file in TRAJECTORY.inputs(study, robot) if file not in study.scenes(robot, "trajectory")), *meshes]
+    return [
+        *(file for file in TRAJECTORY.inputs(study, robot) if file not in study.scenes(robot, "trajectory")),
+        *meshes,
+    ]
 
 
 STAGE = Stage(

@@ -116,6 +116,4 @@ def _no_limits(
         peak, tolerance, joint, unit, name = max(torques, key=lambda each: each[0])
         return NoLimits(complete, joint, peak, tolerance, unit, name, missing, doubts, inferred)
     held = max(holding, key=lambda each: abs(each.torque))
-    return NoLimits(
-        complete, held.joint, abs(held.torque), held.tolerance, held.unit, None, missing, doubts, inferred
-    )
+    return NoLimits(complete, held.joint, abs(held.torque), held.tolerance, held.unit, None, missing, doubts, inferred)

@@ -69,7 +69,7 @@ def holding_figure(summary: DynamicsSummary) -> Picture:
     joints = np.arange(len(summary.holding))
     size = np.array([abs(held.torque) for held in summary.holding])
     tolerance = np.array([held.tolerance for held in summary.holding])
-    ax.bar(joints, size, color=[joint_colour(j) for j in joints], width=0.6)
+    ax.bar(joints, size, color=[joint_colour(int(j)) for j in joints], width=0.6)
     ax.errorbar(joints, size, yerr=tolerance, fmt="none", ecolor=INK, capsize=4)
     ax.set_xticks(joints, [f"J{j + 1}" for j in joints])
     ax.set_ylabel(tr("holding torque (N m)"))

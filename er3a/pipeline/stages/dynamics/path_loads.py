@@ -117,9 +117,7 @@ def path_torques(arm: LoadedArm, motion: Motion, samples: int, wrist: tuple[int,
 PARTS = ("gravity", "inertia", "velocity", "friction", "tool")
 
 
-def _joint_loads(
-    robot: Robot, t: Reals, parts: TorqueParts, tolerance: Reals, asked: Demand
-) -> tuple[JointLoad, ...]:
+def _joint_loads(robot: Robot, t: Reals, parts: TorqueParts, tolerance: Reals, asked: Demand) -> tuple[JointLoad, ...]:
     found = []
     for j, slides in enumerate(robot.slides):
         at = int(asked.peak_at[j])

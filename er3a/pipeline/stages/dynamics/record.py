@@ -59,12 +59,13 @@ def _layout(robot: Robot) -> rrb.Horizontal:
         for curve, title in CURVES.items()
     ]
     words = rrb.Vertical(
-        note_view(STAGE), rrb.TextDocumentView(origin=f"/{STAGE}/now", name="This path"), row_shares=[5, 2], name="Words"
+        note_view(STAGE),
+        rrb.TextDocumentView(origin=f"/{STAGE}/now", name="This path"),
+        row_shares=[5, 2],
+        name="Words",
     )
     view = arm_view(robot, "Arm and torques", [ARM, f"/{STAGE}/**"])
-    return rrb.Horizontal(
-        view, rrb.Vertical(*series, name="Curves"), words, column_shares=[2, 1.4, 1], name="Torques"
-    )
+    return rrb.Horizontal(view, rrb.Vertical(*series, name="Curves"), words, column_shares=[2, 1.4, 1], name="Torques")
 
 
 def _run(stream: rr.RecordingStream, robot: Robot, rows: TorqueRows, start: float, scale: float) -> None:
