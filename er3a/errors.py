@@ -36,6 +36,10 @@ class InputError(Er3aError):
         super().__init__(f"{where}: {told}" if where else told)
 
 
+class InputWarning(UserWarning):
+    """Something in a file that can be meant as it is written, and looks like a slip."""
+
+
 class ArgumentError(Er3aError, TypeError):
     """An argument in Python is of a kind that can't be used."""
 

@@ -64,16 +64,6 @@ def test_the_studies_that_ship_load(name):
         (lambda c: c["workspace"].update(samples=4, blocks=5), "workspace", "4 samples can't fill 5 blocks. Lower"),
         (lambda c: c["workspace"].update(samples=1e6), "workspace.samples", "1000000.0 is refused. Write a whole"),
         (lambda c: c["trajectory"].update(near_wrist_deg=float("nan")), "trajectory.near_wrist_deg", "not a finite"),
-        (
-            lambda c: c["robots"]["er3_600"].update(tool={"xyz_mm": [0, 0, 0.15]}),
-            "robots.er3_600.tool.xyz_mm",
-            "can only be metres",
-        ),
-        (
-            lambda c: c["robots"]["er3_600"].update(base={"rpy_deg": [0, 0, 1.5708]}),
-            "robots.er3_600.base.rpy_deg[2]",
-            "looks like radians",
-        ),
         (lambda c: c.update(kind="robot"), "kind", "'robot' is refused"),
     ],
 )

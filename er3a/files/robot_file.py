@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from er3a.files.mass_fields import DriveFields, InertiaFields, WeightFields, WristLoadFields, check_masses
-from er3a.files.units import FARTHEST_MM, MOST_DEG, Triple
+from er3a.files.units import FARTHEST_MM, MOST_DEG, RADIANS_BELOW_DEG, Triple, look_like_radians, suspect
 from er3a.files.yaml_file import StrictModel
 from er3a.robots.robot import MOST_JOINTS, Grade
 
@@ -299,13 +299,16 @@ class RobotFile(StrictModel):
         for i, row in enumerate(self.dh.rows):
             for key in ("a_mm", "d_mm"):
                 _check_length(f"dh.rows[{i}].{key}", getattr(row, key), self.dh.calibrated)
-            _check_angle(f"dh.rows[{i}].alpha_deg", row.alpha_deg)
-            _check_angle(f"dh.rows[{i}].beta_deg", row.beta_deg or 0.0)
+            for key in ("alpha_deg", "beta_deg", "theta_deg"):
+                _check_angle(f"dh.rows[{i}].{key}", getattr(row, key) or 0.0)
             if row.beta_deg and not self.dh.calibrated:
                 problem = f"dh.rows[{i}].beta_deg: {row.beta_deg:g} deg in a table that is not calibrated"
                 raise ValueError(f"{problem} | Set dh.calibrated: true, or remove it")
-            _check_angle(f"dh.rows[{i}].theta_deg", row.theta_deg or 0.0)
             _check_angle(f"zero.rows[{i}].offset_deg", self.zero.rows[i].offset_deg or 0.0)
+        angles = [row.alpha_deg for row in self.dh.rows] + [row.offset_deg or 0.0 for row in self.zero.rows]
+        if look_like_radians(angles):
+            small = ", ".join(f"{angle:g}" for angle in angles if 0 < abs(angle) < RADIANS_BELOW_DEG)
+            suspect(f"dh.rows, zero.rows: {small} deg may be radians")
         check_placement("base", self.base)
         check_placement("tool", self.tool)
         longest = max(max(abs(row.a_mm), abs(row.d_mm)) for row in self.dh.rows)
@@ -323,10 +326,7 @@ class RobotFile(StrictModel):
             if row.lower_deg is not None
         ]
         if len(spans) > 1 and 0 < max(spans) <= 2.01 * math.pi:
-            raise ValueError(
-                f"limits.rows: the widest limit is {max(spans):g} deg, which can only be radians | "
-                "Convert them to degrees"
-            )
+            suspect(f"limits.rows: the widest limit is {max(spans):g} deg; they may be radians")
         return self
 
 
@@ -371,11 +371,13 @@ def _check_limit(field: str, row: JointLimitRow | CombinedLimitRow, sliding: boo
 
 
 def check_placement(field: str, placement: Placement | None) -> None:
-    """Refuse a placement that can only be in metres or radians: ``ValueError`` with ``field: problem | remedy``."""
+    """Refuse a placement that is too far away, as ``ValueError`` with ``field: problem | remedy``; warn of units."""
     if placement is None:
         return
     if RESIDUE_MM < max(abs(value) for value in placement.xyz_mm) < SHORTEST_PLAIN_LENGTH_MM:
-        raise ValueError(f"{field}.xyz_mm: {placement.xyz_mm} can only be metres | Multiply by 1000")
+        suspect(f"{field}.xyz_mm: {placement.xyz_mm} mm may be metres")
+    if look_like_radians(placement.rpy_deg):
+        suspect(f"{field}.rpy_deg: {placement.rpy_deg} deg may be radians")
     if max(abs(value) for value in placement.xyz_mm) > FARTHEST_MM:
         raise ValueError(f"{field}.xyz_mm: {placement.xyz_mm} is more than 100 m | Write mm, not micrometres")
     for i, value in enumerate(placement.rpy_deg):
@@ -395,6 +397,3 @@ def _check_length(field: str, value: float, calibrated: bool) -> None:
 def _check_angle(field: str, value: float) -> None:
     if abs(value) > MOST_DEG:
         raise ValueError(f"{field}: {value:g} deg is more than ten turns | Write degrees within +-{MOST_DEG:g}")
-    quarter = value / (math.pi / 2)
-    if 0 < abs(value) < 6.3 and round(quarter) and abs(value - round(quarter) * math.pi / 2) < 2e-3:
-        raise ValueError(f"{field}: {value:g} deg looks like radians | Write {round(quarter) * 90:g}")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
 
+from er3a.errors import InputWarning
 from er3a.files.kept_files import write_atomically
 from er3a.files.mass_writer import mass_groups
 from er3a.files.robot_file import SHORTEST_PLAIN_LENGTH_MM, RobotFile
@@ -94,7 +96,8 @@ def robot_file(robot: Robot) -> RobotFile:
         if not np.array_equal(T, np.eye(4)):
             placement = {"xyz_mm": map(_tidy, T[:3, 3] * 1000), "rpy_deg": map(_tidy, np.degrees(rpy_of(T)))}
             content[key] = sourced(key) | {name: list(values) for name, values in placement.items()}
-    return RobotFile.model_validate(content)
+    with warnings.catch_warnings(action="ignore", category=InputWarning):  # for those who write numbers by hand
+        return RobotFile.model_validate(content)
 
 
 def _shown(robot: Robot, values: np.ndarray) -> np.ndarray:

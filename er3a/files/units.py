@@ -1,15 +1,23 @@
 """Types and checks of file fields that catch metres or radians where mm and degrees are asked for.
 
-A check raises ``ValueError`` with a text ``problem | remedy``, which the YAML reader turns into an InputError.
+A check raises ``ValueError`` with a text ``problem | remedy``, which the YAML reader turns into an InputError. Degrees
+below a full turn's radians are legal everywhere: several that look like radians are worth a warning, no more.
 """
 
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 from typing import Annotated
 
+import numpy as np
 from pydantic import AfterValidator, Field
+
+from er3a.errors import InputError, InputWarning
+from er3a.numerics.arrays import Reals
+from er3a.robots.robot import MOST_JOINTS, Robot
+from er3a.robots.shown import meant
 
 METRES_BELOW_MM = 5.0
 FARTHEST_MM = 100_000.0
@@ -19,7 +27,7 @@ LEAST_SPAN_MM = 10.0
 """A table whose lengths are all below is in metres."""
 WIDEST_IN_RADIANS = 2.01 * math.pi
 """A table whose angles (deg) are all below is in radians."""
-WHOLE_DEGREES = "round them to whole degrees"
+WHOLE_DEGREES = "nothing is to be done"
 
 
 def check_millimetres(values: Sequence[float]) -> None:
@@ -33,9 +41,9 @@ def check_millimetres(values: Sequence[float]) -> None:
 
 
 def check_degrees(values: Sequence[float], otherwise: str) -> None:
-    """Refuse angles that can only be radians, and more than ten turns.
+    """Refuse angles of more than ten turns; warn of those that look like radians.
 
-    All within +-6.3, they count as radians if two are not whole numbers, or one is a multiple of pi/12.
+    All within +-6.3, they look so if two are not whole numbers.
 
     Parameters
     ----------
@@ -46,15 +54,20 @@ def check_degrees(values: Sequence[float], otherwise: str) -> None:
     if largest > MOST_DEG:
         raise ValueError(f"{shown} deg is more than ten turns | Write degrees within +-{MOST_DEG:g}")
     broken = sum(value != round(value) for value in values)
-    if largest < RADIANS_BELOW_DEG and (broken >= 2 or any(map(_is_part_of_pi, values))):
+    if largest < RADIANS_BELOW_DEG and broken >= 2:
         converted = ", ".join(f"{math.degrees(value):.4g}" for value in values)
-        raise ValueError(f"{shown} deg can only be radians | Write {converted}; if degrees are meant, {otherwise}")
+        suspect(f"{shown} deg may be radians: those would be {converted}; if degrees are meant, {otherwise}")
 
 
-def _is_part_of_pi(value: float) -> bool:
-    parts = round(value / (math.pi / 12))
-    tolerance = 2e-3 if parts % 6 == 0 else 5e-4
-    return parts != 0 and value != round(value) and abs(value - parts * math.pi / 12) < tolerance
+def suspect(text: str) -> None:
+    """Warn of something that can be meant as it is written, and looks like a slip."""
+    warnings.warn(text, InputWarning, stacklevel=3)
+
+
+def look_like_radians(values: Sequence[float]) -> bool:
+    """Whether two or more angles (deg) are within 0.002 of multiples of pi/2, and below 6.3."""
+    quarters = [value / (math.pi / 2) for value in values if 0 < abs(value) < RADIANS_BELOW_DEG]
+    return sum(round(each) != 0 and abs(each - round(each)) * math.pi / 2 < 2e-3 for each in quarters) >= 2
 
 
 def as_degrees(otherwise: str) -> AfterValidator:
@@ -67,13 +80,23 @@ def as_degrees(otherwise: str) -> AfterValidator:
     return AfterValidator(checked)
 
 
+def joint_values(robot: Robot, values: Sequence[float], field: str) -> Reals:
+    """Written joint values as rad or m (..., n); :class:`InputError` if they are not as many as the robot's joints."""
+    given = np.array(values, float)
+    if given.shape[-1] != robot.joints:
+        problem = f"{given.shape[-1]} joint values for {robot.name}, which has {robot.joints} joints"
+        raise InputError(None, field, problem, f"Give {robot.joints}")
+    return meant(robot, given)
+
+
 def _as_millimetres(values: list[float]) -> list[float]:
     check_millimetres(values)
     return values
 
 
 Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
-Six = Annotated[list[float], Field(min_length=6, max_length=6)]
+Joints = Annotated[list[float], Field(min_length=1, max_length=MOST_JOINTS)]
+"""One value for each joint: degrees, or mm of those that slide."""
 PositionMm = Annotated[Triple, AfterValidator(_as_millimetres)]
 RpyDeg = Annotated[Triple, as_degrees(WHOLE_DEGREES)]
-JointsDeg = Annotated[Six, as_degrees(WHOLE_DEGREES)]
+JointsDeg = Annotated[Joints, as_degrees(WHOLE_DEGREES)]

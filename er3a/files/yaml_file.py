@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
+import warnings
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -11,7 +12,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
 
-from er3a.errors import InputError
+from er3a.errors import InputError, InputWarning
 from er3a.formats.text_file import read_text
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -126,9 +127,18 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
 
 
 def parse(model: type[Model], data: dict[str, Any], path: str | Path | None) -> Model:
-    """Validate ``data`` as ``model``; the first fault found is raised as :class:`InputError`."""
+    """Validate ``data`` as ``model``; the first fault found is raised as :class:`InputError`.
+
+    What only looks like a slip is told as an :class:`InputWarning` that names the file.
+    """
     try:
-        return model.model_validate(data)
+        with warnings.catch_warnings(record=True) as seen:
+            warnings.simplefilter("always")
+            valid = model.model_validate(data)
+        for told in seen:
+            text = f"{path}: {told.message}" if path and told.category is InputWarning else told.message
+            warnings.warn(text, told.category, stacklevel=3)
+        return valid
     except ValidationError as error:
         faults = error.errors()
         first = min(faults, key=lambda fault: (fault["loc"] != ("kind",), fault["type"] != "extra_forbidden"))

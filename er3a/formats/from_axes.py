@@ -1,9 +1,16 @@
-"""A standard D-H table from six joint axes, as a URDF or a measurement gives them.
+"""A standard D-H table from joint axes, as a URDF or a measurement gives them.
 
 Frames are placed by the common normals of neighbouring axes (Denavit and Hartenberg 1955; Siciliano et al., *Robotics:
 Modelling, Planning and Control*, section 2.8.2). What the rule leaves open is chosen so that usual arms get their
 usual table: z axes along the base frame's positive axes or along a positive d, parallel axes with equal sense and
 d = 0, x axes turned as little as possible from one joint to the next.
+
+Axes that are parallel but for an error have a common normal kilometres away. Between them d is 0 and the table takes
+Hayati's turn beta about y [1]_, which needs no normal.
+
+References
+----------
+.. [1] S. A. Hayati, "Robot arm geometric link parameter estimation", 22nd IEEE Conf. on Decision and Control (1983).
 """
 
 from __future__ import annotations
@@ -12,10 +19,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.geometry.transforms import rot_y
 from er3a.numerics.arrays import Reals
 
-JOINTS = 6
 PARALLEL = 1e-12
+NEARLY_PARALLEL = 1e-3  # rad
 SAME_POINT_M = 1e-12
 
 
@@ -23,14 +31,17 @@ SAME_POINT_M = 1e-12
 class AxisTable:
     """A standard table with ``theta = direction * q + offset`` and what stands before and behind it.
 
+    For a joint that slides the same table holds with theta at ``offset`` and ``d + direction * q``.
+
     Attributes
     ----------
-    a, alpha, d, direction, offset : (6,), m and rad
-    base : (4, 4), base frame to frame 0; tool : (4, 4), frame 6 to flange
+    a, alpha, beta, d, direction, offset : (n,), m and rad
+    base : (4, 4), base frame to frame 0; tool : (4, 4), frame n to flange
     """
 
     a: Reals
     alpha: Reals
+    beta: Reals
     d: Reals
     direction: Reals
     offset: Reals
@@ -43,48 +54,68 @@ def table_from_axes(directions: Reals, points: Reals, T_base_flange: Reals) -> A
 
     Parameters
     ----------
-    directions : (6, 3), unit vectors; positive rotation is right-handed about them
-    points : (6, 3), m, a point on each axis
+    directions : (n, 3), unit vectors; positive rotation is right-handed about them
+    points : (n, 3), m, a point on each axis
     T_base_flange : (4, 4), the flange in the zero pose
     """
     incoming, outgoing = _feet(directions, points, T_base_flange[:3, 3])
     z = _senses(directions, incoming, outgoing)
-    frames = np.tile(np.eye(4), (JOINTS + 1, 1, 1))
+    joints = len(z)
+    frames, beta = np.tile(np.eye(4), (joints + 1, 1, 1)), np.zeros(joints)
     x = _across(np.array([1.0, 0.0, 0.0]), z[0], np.array([0.0, 1.0, 0.0]))
     frames[0] = _frame(x, z[0], incoming[0])
-    for i in range(1, JOINTS):
-        x = _next_x(x, z[i - 1], z[i], outgoing[i - 1], incoming[i])
+    for i in range(1, joints):
+        if _nearly_parallel(z[i - 1], z[i]):
+            before = z[i - 1]
+            x = _across(incoming[i] - frames[i - 1, :3, 3], before, x)
+            beta[i - 1] = np.arcsin(z[i] @ x)
+            x = _across(x, z[i], x)
+        else:
+            x = _next_x(x, z[i - 1], z[i], outgoing[i - 1], incoming[i])
         frames[i] = _frame(x, z[i], incoming[i])
-    x = _across(T_base_flange[:3, 0], z[5], x)
-    frames[6] = _frame(x, z[5], outgoing[5])
+    x = _across(T_base_flange[:3, 0], z[-1], x)
+    frames[joints] = _frame(x, z[-1], outgoing[-1])
 
-    steps = np.linalg.inv(frames[:-1]) @ frames[1:]
+    ahead = frames[1:].copy()
+    ahead[:, :3, :3] = frames[1:, :3, :3] @ np.stack([rot_y(-turn)[:3, :3] for turn in beta])
+    steps = np.linalg.inv(frames[:-1]) @ ahead
     return AxisTable(
-        a=np.einsum("ij,ij->i", frames[1:, :3, 0], np.diff(frames[:, :3, 3], axis=0)),
+        a=np.einsum("ij,ij->i", ahead[:, :3, 0], np.diff(frames[:, :3, 3], axis=0)),
         alpha=np.arctan2(steps[:, 2, 1], steps[:, 2, 2]),
+        beta=beta,
         d=steps[:, 2, 3],
         direction=np.sign(np.einsum("ij,ij->i", z, directions)),
         offset=np.arctan2(steps[:, 1, 0], steps[:, 0, 0]),
         base=frames[0],
-        tool=np.linalg.inv(frames[6]) @ T_base_flange,
+        tool=np.linalg.inv(frames[joints]) @ T_base_flange,
     )
 
 
 def _feet(directions: Reals, points: Reals, flange: Reals) -> tuple[Reals, Reals]:
-    """Feet of the common normals on each axis: from the axis before (6, 3), and to the axis behind (6, 3)."""
-    incoming, outgoing = np.empty((JOINTS, 3)), np.empty((JOINTS, 3))
+    """Feet of the common normals on each axis: from the axis before (n, 3), and to the axis behind (n, 3)."""
+    joints = len(directions)
+    incoming, outgoing = np.empty((joints, 3)), np.empty((joints, 3))
     incoming[0] = _foot(np.zeros(3), directions[0], points[0])
-    for i in range(JOINTS - 1):
+    for i in range(joints - 1):
         w, v = directions[i], directions[i + 1]
         normal = np.cross(w, v)
         square = normal @ normal
         if square < PARALLEL**2:
             outgoing[i] = incoming[i]
+        elif _nearly_parallel(w, v):
+            outgoing[i] = incoming[i]  # and the next frame stands where its axis crosses the plane across this one
+            incoming[i + 1] = points[i + 1] + v * ((incoming[i] - points[i + 1]) @ w / (v @ w))
+            continue
         else:
             outgoing[i] = points[i] + w * (np.cross(points[i + 1] - points[i], v) @ normal) / square
         incoming[i + 1] = _foot(outgoing[i], v, points[i + 1])
-    outgoing[5] = _foot(flange, directions[5], points[5])
+    outgoing[-1] = _foot(flange, directions[-1], points[-1])
     return incoming, outgoing
+
+
+def _nearly_parallel(z: Reals, other: Reals) -> bool:
+    """Whether two axes are parallel but for an error."""
+    return bool(PARALLEL <= np.linalg.norm(np.cross(z, other)) < NEARLY_PARALLEL)
 
 
 def _foot(point: Reals, axis: Reals, on_axis: Reals) -> Reals:
@@ -94,11 +125,11 @@ def _foot(point: Reals, axis: Reals, on_axis: Reals) -> Reals:
 
 
 def _senses(directions: Reals, incoming: Reals, outgoing: Reals) -> Reals:
-    """The z axes (6, 3): each axis with its sense chosen."""
+    """The z axes (n, 3): each axis with its sense chosen."""
     z = directions.copy()
-    for i in range(JOINTS):
+    for i in range(len(z)):
         along = directions[i] @ (outgoing[i] - incoming[i])
-        if i and np.linalg.norm(np.cross(z[i - 1], z[i])) < PARALLEL:
+        if i and np.linalg.norm(np.cross(z[i - 1], z[i])) < NEARLY_PARALLEL:
             flip = z[i - 1] @ z[i] < 0
         elif abs(along) > SAME_POINT_M:
             flip = along < 0

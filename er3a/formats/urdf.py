@@ -1,13 +1,14 @@
-"""URDF in and out: six-revolute serial chains.
+"""URDF in and out: serial chains of joints that turn or slide.
 
-Reference: the ROS URDF specification (joint origin, axis, limit; rpy is fixed-axis roll-pitch-yaw, the same matrix as
-R = Rz(yaw) Ry(pitch) Rx(roll)).
+Reference: the ROS URDF specification (joint origin, axis, limit, mimic; rpy is fixed-axis roll-pitch-yaw, the same
+matrix as R = Rz(yaw) Ry(pitch) Rx(roll)).
 """
 
 from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,32 +16,19 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from er3a.display import Displayed, Sheet, shortly
-from er3a.errors import InputError
+from er3a.errors import Er3aError, InputError
 from er3a.formats.from_axes import table_from_axes
 from er3a.formats.text_file import read_text
 from er3a.formats.urdf_masses import masses_from_urdf, write_masses
-from er3a.geometry.transforms import rot_z, rpy_of, transform
-from er3a.kinematics.chain import JOINTS, constant_links
+from er3a.formats.urdf_tree import MOST_BYTES, UrdfChain, UrdfJoint, read_chain
+from er3a.geometry.transforms import rot_z, rpy_of
+from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward
-from er3a.robots.robot import Robot, Source
+from er3a.numerics.arrays import Reals
+from er3a.robots.robot import MOST_JOINTS, Robot, Source
 
-MOVING = ("revolute", "continuous")
-SNAP_RAD = 1e-4
-CONTINUOUS_TURN = 2 * math.pi
 MISFIT_POSES = 1000
-
-
-@dataclass(frozen=True, eq=False)
-class UrdfJoint:
-    """One joint of the chain: where it stands in its parent link's frame, and how it moves."""
-
-    name: str
-    type: str
-    T_parent_joint: np.ndarray
-    axis: np.ndarray
-    lower: float
-    upper: float
-    speed: float
+NO_RANGE = math.pi
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,12 +38,16 @@ class UrdfImport(Displayed):
     Attributes
     ----------
     notes : what was assumed or changed on the way, in words
-    misfit_m : greatest distance between the table's flange and the URDF's over random joint angles, m
+    misfit_m : greatest distance between the table's flange and the URDF's over random joint values, m
+    joints : names in the URDF of the joints in q; base, tip : its links at the ends of the chain
     """
 
     robot: Robot
     notes: tuple[str, ...]
     misfit_m: float
+    joints: tuple[str, ...] = ()
+    base: str = ""
+    tip: str = ""
 
     def sheet(self) -> Sheet:
         """The robot, how well it fits, and the notes."""
@@ -63,93 +55,209 @@ class UrdfImport(Displayed):
         return replace(self.robot.sheet(), facts=(fits, *self.robot.sheet().facts, *self.notes))
 
 
-def import_urdf(path: str | Path, snap: bool = False) -> UrdfImport:
-    """Derive D-H table, directions, offsets, limits and speeds from a URDF's axes; take over the masses that it states.
+def import_urdf(path: str | Path, *, base: str | None = None, tip: str | None = None, snap: bool = False) -> UrdfImport:
+    """Derive D-H table, directions, offsets, limits and speeds from a URDF's axes; masses are taken over.
 
-    The flange is the end of the fixed joints behind joint 6, or joint 6's own link frame if they branch.
+    The flange is the end of the fixed joints behind the last joint, or that joint's own link frame if they branch.
+    Joints in the chain that follow others (mimic) become a coupling; grippers, and linkages that only follow, are left
+    out with a note.
 
     Parameters
     ----------
+    path : a URDF, or expanded xacro
+    base, tip : links at which the arm begins and ends; None where the file leaves no choice
     snap : take angles within 1e-4 rad of a multiple of 90 deg for that multiple; each such change is noted
 
     Raises
     ------
     InputError
-        if the file is no URDF, or its chain is not six independent revolute joints in series
+        if the file is no URDF, has several arms (candidates are named), or none of 1 to 10 joints
     """
     path = Path(path)
-    joints, notes = _chain(path, snap)
-    directions, points, T = [], [], np.eye(4)
-    for joint in joints:
-        T = T @ joint.T_parent_joint
-        if joint.type in MOVING:
-            directions.append(T[:3, :3] @ joint.axis)
-            points.append(T[:3, 3])
-    table = table_from_axes(np.array(directions), np.array(points), T)
-    moving = [joint for joint in joints if joint.type in MOVING]
+    found = read_chain(path, base, tip, snap)
+    moving = [joint for joint in found.joints if joint.moves]
+    if not 1 <= len(moving) <= MOST_JOINTS:
+        ends = f"from {found.joints[0].parent} to {found.joints[-1].child}" if found.joints else "of no joints"
+        problem = f"the chain {ends} has {len(moving)} moving joints"
+        raise InputError(path, "joint", problem, f"er3a reads 1 to {MOST_JOINTS} in series; name --base and --tip")
+    sources, coupling, shift = _coupling(path, found, moving)
+    directions, points, T = _axes_at_zero(found.joints, shift)
+    sliding = np.array([joint.type == "prismatic" for joint in moving])
+    table = table_from_axes(directions, points, T)
+    plain = np.array_equal(coupling, np.eye(*coupling.shape))
+    limits, notes = _limits(path, sources)
     source = Source(f"Derived from the joint axes of {path.name}", "export")
-    sources = dict.fromkeys(("dh", "zero", "limits", "speeds", "base", "tool"), source)
-    limit_note = "; +-360 deg assumed for joints without a limit" if any(j.type == "continuous" for j in moving) else ""
+    groups = ("dh", "zero", "limits", "speeds", "base", "tool", *(() if plain else ("coupling",)))
+    named = sources[0].name, path.stem[:200]
     robot = Robot(
         name=robot_name(path),
-        title=path.stem[:200],
+        title=named[1] or named[0],
         convention="standard",
-        lower=np.array([joint.lower for joint in moving]),
-        upper=np.array([joint.upper for joint in moving]),
-        speed=np.array([joint.speed for joint in moving]),
+        lower=limits[:, 0],
+        upper=limits[:, 1],
+        speed=np.array([joint.speed for joint in sources]),
         zero_pose="As the URDF has it with all joints at 0.",
-        sources=sources | {"limits": Source(source.source + limit_note, "export")},
+        sources=dict.fromkeys(groups, source),
+        sliding=sliding,
+        coupling=None if plain else coupling,
+        continuous=np.array([joint.type == "continuous" for joint in sources]),
         **vars(table),
     )
-    masses, mass_notes = masses_from_urdf(
-        ElementTree.fromstring(read_text(path)), robot, [joint.name for joint in moving]
-    )
+    at_zero = {joint.name: _motion(joint, shift[k : k + 1])[0] for k, joint in enumerate(moving)}
+    names = tuple(joint.name for joint in sources)
+    robot, mass_notes = _with_masses(path, robot, found, at_zero, names)
+    q = np.random.default_rng(0).uniform(-math.pi, math.pi, (MISFIT_POSES, len(sources)))
+    given = _chain_forward(found.joints, q @ coupling.T + shift)
+    misfit = np.linalg.norm((forward(robot, q) - given)[:, :3, 3], axis=1).max()
+    first, last = found.joints[0].parent, found.joints[-1].child
+    return UrdfImport(robot, (*found.notes, *notes, *mass_notes), float(misfit), names, first, last)
+
+
+def _with_masses(
+    path: Path, robot: Robot, found: UrdfChain, at_zero: dict[str, Reals], names: tuple[str, ...]
+) -> tuple[Robot, tuple[str, ...]]:
+    """The robot with what the URDF states of masses and drives, and what was noted."""
+    masses, notes = masses_from_urdf(ElementTree.fromstring(read_text(path, MOST_BYTES)), robot, found, at_zero, names)
     stated = Source(f"As {path.name} states them", "export")
     given = {"inertia": bool(masses.links), "drives": masses.drives is not None}
     more = {group: stated for group, there in given.items() if there}
-    robot = robot.replace(masses=masses, sources={**robot.sources, **more})
-    q = np.random.default_rng(0).uniform(-math.pi, math.pi, (MISFIT_POSES, JOINTS))
-    misfit = np.linalg.norm((forward(robot, q) - _chain_forward(joints, q))[:, :3, 3], axis=1).max()
-    return UrdfImport(robot, (*notes, *mass_notes), float(misfit))
+    return robot.replace(masses=masses, sources={**robot.sources, **more}), notes
+
+
+def _coupling(path: Path, found: UrdfChain, moving: list[UrdfJoint]) -> tuple[list[UrdfJoint], Reals, Reals]:
+    """The independent joints behind the chain's, what each of the chain's is made of (m, n), and its constant (m,)."""
+    sources: list[UrdfJoint] = []
+    rows = []
+    for joint in moving:
+        factor, offset, seen = 1.0, 0.0, {joint.name}
+        while joint.mimic is not None:
+            follows = found.all.get(joint.mimic.source)
+            if follows is None or follows.name in seen or not follows.moves:
+                problem = f"follows '{joint.mimic.source}', which is no joint that moves by itself"
+                raise InputError(path, f"joint {joint.name}", problem, "Correct its <mimic>")
+            factor, offset = factor * joint.mimic.multiplier, offset + factor * joint.mimic.offset
+            joint = follows
+            seen.add(joint.name)
+        if joint not in sources:
+            sources.append(joint)
+        rows.append((sources.index(joint), factor, offset))
+    coupling = np.zeros((len(rows), len(sources)))
+    for row, (column, factor, _) in zip(coupling, rows):
+        row[column] = factor
+    return sources, coupling, np.array([offset for _, _, offset in rows])
+
+
+def _axes_at_zero(joints: Sequence[UrdfJoint], shift: Reals) -> tuple[Reals, Reals, Reals]:
+    """Directions and points (m, 3) of the moving axes and the flange (4, 4) with all independent joints at 0."""
+    directions, points, T = [], [], np.eye(4)
+    for joint in joints:
+        T = T @ joint.T_parent_joint
+        if joint.moves:
+            directions.append(T[:3, :3] @ joint.axis)
+            points.append(T[:3, 3])
+            T = T @ _motion(joint, shift[len(points) - 1 : len(points)])[0]
+    return np.array(directions), np.array(points), T
+
+
+def _motion(joint: UrdfJoint, values: Reals) -> Reals:
+    """A joint's motions (N, 4, 4) by values (N,), rad or m."""
+    T = np.tile(np.eye(4), (len(values), 1, 1))
+    if joint.type == "prismatic":
+        T[:, :3, 3] = values[:, None] * joint.axis
+    else:
+        T[:, :3, :3] = Rotation.from_rotvec(values[:, None] * joint.axis).as_matrix()
+    return T
+
+
+def _limits(path: Path, sources: list[UrdfJoint]) -> tuple[Reals, list[str]]:
+    """Limits (n, 2), rad or m, and what was assumed of them."""
+    rows, notes = [], []
+    for joint in sources:
+        lower, upper = joint.lower, joint.upper
+        if joint.type == "continuous":
+            notes.append(f"joint {joint.name} is continuous: it has no limits, and one turn is sampled")
+            lower, upper = -math.pi, math.pi
+        elif joint.type == "revolute" and (lower == upper == 0 or (math.isnan(lower) and math.isnan(upper))):
+            has = "no limits" if math.isnan(lower) else "the limits 0 and 0"
+            notes.append(f"joint {joint.name} has {has}: +-180 deg were assumed")
+            lower, upper = -NO_RANGE, NO_RANGE
+        if math.isnan(lower) or math.isnan(upper):
+            missing = "lower" if math.isnan(lower) else "upper"
+            raise InputError(path, f"joint {joint.name}", f"has no {missing}", f"Add {missing} to its <limit>")
+        rows.append((lower, upper))
+    return np.array(rows), notes
 
 
 def export_urdf(robot: Robot) -> str:
-    """The arm as URDF text, masses included; the link ``tool`` is the tool frame. Unknown speeds are written as 0."""
-    links = constant_links(robot)
+    """The arm as URDF text, masses included; the link ``tool`` is the tool frame. Unknown speeds are written as 0 (URDF demands one).
+
+    Raises
+    ------
+    Er3aError
+        for an arm with a row that is moved by a sum of joints, which URDF can't say
+    """
+    links, rows = constant_links(robot), robot.rows
+    moved_by = _moved_by(robot)
     root = ElementTree.Element("robot", name=robot.name)
-    names = ["base", *(f"link_{k + 1}" for k in range(JOINTS)), "tool"]
+    names = ["base", *(f"link_{k + 1}" for k in range(rows)), "tool"]
     for name in names:
         ElementTree.SubElement(root, "link", name=name)
-    for k in range(JOINTS + 1):
-        T = links[k] @ rot_z(robot.offset[k]) if k < JOINTS else links[k]
-        kind = "revolute" if k < JOINTS else "fixed"
-        joint = ElementTree.SubElement(root, "joint", name=f"joint_{k + 1}" if k < JOINTS else "flange", type=kind)
+    for k in range(rows + 1):
+        T = links[k] @ rot_z(0.0 if k == rows or robot.sliding[k] else robot.offset[k])
+        joint = ElementTree.SubElement(root, "joint", name=f"joint_{k + 1}" if k < rows else "flange")
         ElementTree.SubElement(joint, "parent", link=names[k])
         ElementTree.SubElement(joint, "child", link=names[k + 1])
         ElementTree.SubElement(joint, "origin", xyz=_words(T[:3, 3]), rpy=_words(rpy_of(T)))
-        if k < JOINTS:
-            ElementTree.SubElement(joint, "axis", xyz=f"0 0 {robot.direction[k]:g}")
-            speed = 0.0 if math.isnan(robot.speed[k]) else robot.speed[k]
-            limits = {"lower": robot.lower[k], "upper": robot.upper[k], "velocity": speed, "effort": 0.0}
-            ElementTree.SubElement(joint, "limit", {key: repr(float(value)) for key, value in limits.items()})
+        joint.set("type", "fixed")
+        if k < rows:
+            _describe(robot, k, moved_by, joint)
     write_masses(robot, names, root)
     ElementTree.indent(root)
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-def _chain_forward(joints: list[UrdfJoint], q: np.ndarray) -> np.ndarray:
-    """The flange (N, 4, 4) by the URDF's own transforms, for joint angles (N, 6) in rad."""
+def _moved_by(robot: Robot) -> list[tuple[int, float]]:
+    """The joint that moves each row, and how far per unit."""
+    if robot.coupling is None:
+        return [(k, 1.0) for k in range(robot.rows)]
+    found = []
+    for k, row in enumerate(robot.coupling):
+        joints = np.flatnonzero(row)
+        if len(joints) != 1:
+            raise Er3aError(f"{robot.name}: row {k + 1} is moved by {len(joints)} joints, which a URDF can't say")
+        found.append((int(joints[0]), float(row[joints[0]])))
+    if missing := [j for j in range(robot.joints) if (j, 1.0) not in found]:
+        raise Er3aError(f"{robot.name}: no row moves by joint {missing[0] + 1} alone, which a URDF needs")
+    return found
+
+
+def _describe(robot: Robot, k: int, moved_by: list[tuple[int, float]], joint: ElementTree.Element) -> None:
+    """Type, axis, limits and whom it follows, of one joint."""
+    j, factor = moved_by[k]
+    endless = bool(robot.continuous[j])
+    kind = "prismatic" if robot.sliding[k] else "continuous" if endless else "revolute"
+    joint.set("type", kind)
+    ElementTree.SubElement(joint, "axis", xyz=f"0 0 {robot.direction[k]:g}")
+    speed = 0.0 if math.isnan(robot.speed[j]) else robot.speed[j]
+    limits = {} if endless else {"lower": robot.lower[j], "upper": robot.upper[j]}
+    limits |= {"velocity": speed, "effort": 0.0}
+    ElementTree.SubElement(joint, "limit", {key: repr(float(value)) for key, value in limits.items()})
+    driver = moved_by.index((j, 1.0))
+    if driver != k:
+        ElementTree.SubElement(joint, "mimic", joint=f"joint_{driver + 1}", multiplier=repr(factor), offset="0.0")
+
+
+def _chain_forward(joints: Sequence[UrdfJoint], values: Reals) -> Reals:
+    """The flange (N, 4, 4) by the URDF's own transforms, for values (N, m) of the moving joints in rad or m."""
     T, moved = np.eye(4), 0
     for joint in joints:
         T = T @ joint.T_parent_joint
-        if joint.type in MOVING:
-            turn = np.tile(np.eye(4), (len(q), 1, 1))
-            turn[:, :3, :3] = Rotation.from_rotvec(q[:, moved, None] * joint.axis).as_matrix()
-            T, moved = T @ turn, moved + 1
+        if joint.moves:
+            T, moved = T @ _motion(joint, values[:, moved]), moved + 1
     return T
 
 
-def _words(values: np.ndarray) -> str:
+def _words(values: Reals) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
@@ -157,129 +265,3 @@ def robot_name(path: Path) -> str:
     """A name for the robot in a file, from the file's: small letters, digits and underscores, 64 at most."""
     name = "".join(c if c.isalnum() and c.isascii() else "_" for c in path.stem.lower()).strip("_")[:64]
     return name or "imported"
-
-
-def _chain(path: Path, snap: bool) -> tuple[list[UrdfJoint], list[str]]:
-    """The joints from the root link to the flange, in order."""
-    elements = _joint_elements(path)
-    by_parent: dict[str, list[ElementTree.Element]] = {}
-    for element in elements:
-        by_parent.setdefault(_link(path, element, "parent"), []).append(element)
-    children = {_link(path, element, "child") for element in elements}
-    roots = sorted(set(by_parent) - children)
-    if len(roots) != 1:
-        problem = f"{len(roots)} root links ({', '.join(roots[:4]) or 'a closed loop'})"
-        raise InputError(path, "joint", problem, "A serial chain has exactly one")
-    notes: list[str] = []
-    chain: list[UrdfJoint] = []
-    link = roots[0]
-    while link in by_parent:
-        ways = [element for element in by_parent[link] if _moves(element, by_parent)]
-        if len(ways) > 1:
-            names = ", ".join(element.get("name", "?") for element in ways)
-            raise InputError(path, f"link {link}", f"branches into moving joints {names}", "er3a reads serial chains")
-        if not ways and len(by_parent[link]) > 1:
-            notes.append(f"several fixed frames stand behind {link}; it was taken as the flange")
-            break
-        element = ways[0] if ways else by_parent[link][0]
-        chain.append(_joint(path, element, snap, notes))
-        link = _link(path, element, "child")
-    moving = sum(joint.type in MOVING for joint in chain)
-    if moving != JOINTS:
-        problem = f"the chain has {moving} revolute joints"
-        raise InputError(path, "joint", problem, "er3a needs exactly six in series")
-    return chain, notes
-
-
-def _joint_elements(path: Path) -> list[ElementTree.Element]:
-    text = read_text(path)
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise InputError(path, None, "holds a document type or entities", "Remove them; a URDF needs none")
-    try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        raise InputError(path, None, f"not valid XML ({error})", "Correct the file") from None
-    if root.tag != "robot":
-        raise InputError(path, None, f"the top element is <{root.tag}>", "A URDF has <robot> (expand xacro first)")
-    elements = root.findall("joint")
-    if not elements:
-        raise InputError(path, "robot", "holds no joints", "Give a URDF of a six-axis arm")
-    return elements
-
-
-def _moves(element: ElementTree.Element, by_parent: dict[str, list[ElementTree.Element]]) -> bool:
-    """Whether this joint or one behind it moves."""
-    todo, seen = [element], set[str]()
-    while todo:
-        current = todo.pop()
-        if current.get("type") != "fixed":
-            return True
-        named = current.find("child")
-        child = named.get("link") if named is not None else None
-        if child is not None and child not in seen:
-            seen.add(child)
-            todo += by_parent.get(child, [])
-    return False
-
-
-def _link(path: Path, element: ElementTree.Element, role: str) -> str:
-    found = element.find(role)
-    name = found.get("link") if found is not None else None
-    if not name:
-        raise InputError(path, f"joint {element.get('name', '?')}", f"names no {role} link", f"Add <{role} link=...>")
-    return name
-
-
-def _joint(path: Path, element: ElementTree.Element, snap: bool, notes: list[str]) -> UrdfJoint:
-    name, kind = element.get("name", "?"), element.get("type", "")
-    where = f"joint {name}"
-    if element.find("mimic") is not None:
-        raise InputError(path, where, "coupled joints are not supported", "er3a needs six independent joints")
-    if kind not in (*MOVING, "fixed"):
-        raise InputError(path, where, f"type '{kind}' is not supported", "er3a reads revolute and fixed joints")
-    origin, axis, limit = (element.find(tag) for tag in ("origin", "axis", "limit"))
-    xyz = _numbers(path, where, origin, "xyz", (0.0, 0.0, 0.0))
-    rpy = _numbers(path, where, origin, "rpy", (0.0, 0.0, 0.0))
-    if snap:
-        rpy = _snapped(rpy, where, notes)
-    direction = _numbers(path, where, axis, "xyz", (1.0, 0.0, 0.0))
-    length = np.linalg.norm(direction)
-    if kind != "fixed" and length < 1e-9:
-        raise InputError(path, where, "the axis has no length", 'Write for example <axis xyz="0 0 1"/>')
-    lower, upper, speed = -CONTINUOUS_TURN, CONTINUOUS_TURN, math.nan
-    if kind == "revolute":
-        lower, upper = (_numbers(path, where, limit, key, None)[0] for key in ("lower", "upper"))
-        if lower > upper:
-            raise InputError(path, where, f"lower limit {lower:g} above upper {upper:g}", "Swap them")
-    elif kind == "continuous":
-        notes.append(f"{where} is continuous: +-360 deg were assumed as its limits")
-    if limit is not None and limit.get("velocity"):
-        speed = _numbers(path, where, limit, "velocity", None)[0] or math.nan
-        if speed < 0:
-            raise InputError(path, where, f"velocity {speed:g} is below 0", "Write the greatest speed, or 0 if unknown")
-    return UrdfJoint(name, kind, transform(xyz, rpy), direction / (length or 1.0), lower, upper, speed)
-
-
-def _numbers(
-    path: Path, where: str, element: ElementTree.Element | None, key: str, default: tuple[float, ...] | None
-) -> np.ndarray:
-    text = element.get(key) if element is not None else None
-    if text is None:
-        if default is None:
-            raise InputError(path, where, f"has no {key}", f"Add {key} to its <limit>")
-        return np.array(default)
-    try:
-        values = np.array([float(word) for word in text.split()])
-    except ValueError:
-        values = np.array([math.nan])
-    if len(values) != (3 if default else 1) or not np.isfinite(values).all():
-        raise InputError(path, f"{where}, {key}", f"'{text[:60]}' is not what stands there", "Write finite numbers")
-    return values
-
-
-def _snapped(rpy: np.ndarray, where: str, notes: list[str]) -> np.ndarray:
-    right = np.round(rpy / (math.pi / 2)) * (math.pi / 2)
-    near = (np.abs(rpy - right) <= SNAP_RAD) & (rpy != right)
-    for given, taken in zip(rpy[near], right[near]):
-        notes.append(f"{where}: angle {given:.10g} rad taken as {np.degrees(taken):g} deg")
-    return np.where(near, right, rpy)

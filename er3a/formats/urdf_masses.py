@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from er3a.formats.urdf_tree import UrdfChain
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Reals
@@ -28,39 +29,68 @@ WHY = {
 }
 
 
-def masses_from_urdf(root: ElementTree.Element, robot: Robot, moving: Sequence[str]) -> tuple[Masses, tuple[str, ...]]:
+def masses_from_urdf(
+    root: ElementTree.Element, robot: Robot, chain: UrdfChain, at_zero: Mapping[str, Reals], names: Sequence[str]
+) -> tuple[Masses, tuple[str, ...]]:
     """Bodies in the robot's frames, and what is known of its drives.
 
     Parameters
     ----------
     robot : the arm with the table derived from the same URDF
-    moving : names of its moving joints, from the base on
+    at_zero : motion (4, 4) of each of its moving joints with the robot's joints at 0, by name, from the base on
+    names : of the joints that the robot's joint values are of
 
     Returns
     -------
     masses, notes : notes name links whose inertia no body can have; those are left out
     """
-    joint_to = {_named(joint, "child"): joint for joint in root.findall("joint")}
-    at_zero = np.concatenate([robot.base[None], frames(robot, np.zeros(robot.joints))[:-1]])
+    frames_at_zero = np.concatenate([robot.base[None], frames(robot, np.zeros(robot.joints))[:-1]])
+    placed = _Placed(chain, at_zero)
     found: dict[int, list[Body]] = {}
     notes: list[str] = []
     for link in root.findall("link"):
-        inertial = link.find("inertial")
-        if inertial is None:
+        inertial, name = link.find("inertial"), link.get("name", "?")
+        where = placed.link(name)
+        if inertial is None or where is None:
             continue
-        name = link.get("name", "?")
         body, T = _body(inertial)
         problem = no_body(body)
         if problem:
             notes.append(f"link {name} {WHY[problem]}; its mass was left out")
         elif body.mass > 0:
-            number, placed = _placed(name, joint_to, moving)
-            found.setdefault(number, []).append(moved(body, np.linalg.inv(at_zero[number]) @ placed @ T))
-    missing = [name for k, name in enumerate(moving) if k + 1 not in found]
+            number, T_base_link = where
+            found.setdefault(number, []).append(moved(body, np.linalg.inv(frames_at_zero[number]) @ T_base_link @ T))
+    missing = [name for k, name in enumerate(at_zero) if k + 1 not in found]
     if found and missing:
         notes.append(f"no mass is given for what moves with {', '.join(missing)}")
     links = tuple(LinkMass(number, together(bodies)) for number, bodies in sorted(found.items()))
-    return Masses(links=links, drives=_drives(root, robot, moving)), tuple(notes)
+    return Masses(links=links, drives=_drives(root, names)), tuple(notes)
+
+
+class _Placed:
+    """Where links are with the robot's joints at 0, and which row of the table moves them."""
+
+    def __init__(self, chain: UrdfChain, at_zero: Mapping[str, Reals]):
+        self.base, self.at_zero, self.rows = chain.joints[0].parent, at_zero, list(at_zero)
+        self.joint_to = {joint.child: joint for joint in chain.all.values()}
+
+    def link(self, name: str) -> tuple[int, Reals] | None:
+        """The row (0: the base) and the pose (4, 4) in the base's link; None for what is not of the arm.
+
+        What moves by itself behind the arm, such as fingers, counts as fixed where it is at 0.
+        """
+        number, others, T = 0, False, np.eye(4)
+        while name != self.base:
+            joint = self.joint_to.get(name)
+            if joint is None:
+                return None
+            own = self.at_zero.get(joint.name)
+            T = joint.T_parent_joint @ (np.eye(4) if own is None else own) @ T
+            if not number and own is not None:
+                number = self.rows.index(joint.name) + 1
+            others = others or (not number and joint.moves)
+            name = joint.parent
+        return None if others and not number else (number, T)
 
 
 def write_masses(robot: Robot, names: Sequence[str], root: ElementTree.Element) -> None:
@@ -86,39 +116,18 @@ def _body(inertial: ElementTree.Element) -> tuple[Body, Reals]:
     return body, transform(xyz, rpy)
 
 
-def _placed(link: str, joint_to: dict[str, ElementTree.Element], moving: Sequence[str]) -> tuple[int, Reals]:
-    """The number of the last moving joint before a link, and the link's frame (4, 4) with all joints at 0."""
-    number, T = 0, np.eye(4)
-    for _ in range(len(joint_to)):
-        joint = joint_to.get(link)
-        if joint is None:
-            break
-        origin = joint.find("origin")
-        T = transform(_triple(origin, "xyz"), _triple(origin, "rpy")) @ T
-        name = joint.get("name", "?")
-        if not number and name in moving:
-            number = moving.index(name) + 1
-        link = _named(joint, "parent")
-    return number, T
-
-
-def _drives(root: ElementTree.Element, robot: Robot, moving: Sequence[str]) -> Drives | None:
+def _drives(root: ElementTree.Element, names: Sequence[str]) -> Drives | None:
     joints = {joint.get("name", "?"): joint for joint in root.findall("joint")}
     coulomb, viscous, effort = (
-        np.array([_number(joints[name].find(tag), key, math.nan) for name in moving])
+        np.array([_number(joints[name].find(tag), key, math.nan) for name in names])
         for tag, key in (("dynamics", "friction"), ("dynamics", "damping"), ("limit", "effort"))
     )
     effort[~(effort > 0)] = np.nan
     coulomb, viscous = (np.where(values >= 0, values, np.nan) for values in (coulomb, viscous))
-    if robot.joints != len(moving) or np.isnan([coulomb, viscous, effort]).all():
+    if np.isnan([coulomb, viscous, effort]).all():
         return None
-    unknown = np.full(robot.joints, np.nan)
+    unknown = np.full(len(names), np.nan)
     return Drives(unknown, unknown, coulomb, viscous, rated=unknown, peak=effort)
-
-
-def _named(joint: ElementTree.Element, role: str) -> str:
-    found = joint.find(role)
-    return "" if found is None else found.get("link", "")
 
 
 def _number(element: ElementTree.Element | None, key: str, default: float = 0.0) -> float:

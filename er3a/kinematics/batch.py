@@ -8,46 +8,59 @@ from numpy.typing import NDArray
 from er3a.errors import PoseError, ShapeError
 from er3a.geometry.transforms import as_floats, check_poses
 from er3a.kinematics.block_inverse import BLOCK, count_turns, solve_blocks
+from er3a.kinematics.by_class import arm_solver, checked_parameters, slots_of_class
+from er3a.kinematics.classes.chain_solvers import Unsolved
+from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.closed_form import REACHED, SLOTS
+from er3a.kinematics.configuration import slot_labels
 from er3a.kinematics.forward import checked_joints
-from er3a.kinematics.solutions import Solutions
-from er3a.kinematics.wrist_partitioned import constants_for_blocks, solve_slots
-from er3a.numerics.arrays import Reals
+from er3a.kinematics.inverse import BY_ELIMINATION, STARTS
+from er3a.kinematics.numerical import all_found
+from er3a.kinematics.solutions import ByClass, Iteration, Method, Solutions
+from er3a.kinematics.wrist_partitioned import closed_form_missing, constants_for_blocks, solve_slots
+from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.threads import parallel_for
-from er3a.robots.joint_limits import nearest_equivalent, within
+from er3a.robots.joint_limits import nearest_equivalent, turn_bounds, within
 from er3a.robots.robot import Robot
 
 SMALLEST_PART = 8 * BLOCK
+SLOTS_BY_STARTS = 16
 
 
 def inverse_batch(
-    robot: Robot, T: Reals, q_ref: Reals | None = None, turns: bool = False, threads: int = 1
+    robot: Robot,
+    T: Reals,
+    q_ref: Reals | None = None,
+    turns: bool = False,
+    threads: int = 1,
+    redundancy: Reals | None = None,
 ) -> Solutions:
-    """All closed-form solutions of a wrist-partitioned arm for many poses of the tool.
+    """All solutions for many poses of the tool, in as many slots as the class of the arm's geometry has.
 
-    At a singularity both branches that meet keep their slots: a free joint has its value of ``q_ref`` in one and half a
-    turn more in the other. The numbers do not depend on the number of threads, nor on a pose's place in the batch.
+    At a singularity of a wrist-partitioned arm both branches that meet keep their slots: a free joint has its value of
+    ``q_ref`` in one and half a turn more in the other. Of other arms a self-motion has the member nearest to ``q_ref``
+    in a slot, and chains for which no class knows all solutions have what iteration finds. The numbers do not depend on the number of threads, nor on a pose's place in the batch.
 
     Parameters
     ----------
     T : (N, 4, 4), T_base_tool, m
-    q_ref : (6,) or (N, 6), rad, what turns and free joints are chosen by; None means zeros
+    q_ref : (n,) or (N, n), rad or m, what turns and free joints are chosen by; None means zeros
     turns : also tell in how many turns each joint can stand
     threads : how many to use
+    redundancy : (k,) or (N, k), for arms with more than six joints, as :func:`er3a.kinematics.inverse.inverse` takes it
 
     Raises
     ------
     ShapeError, PoseError, Er3aError
         naming the first pose that is no rigid transform, the wrong shape, or the argument that can't be used
-    NotWristPartitionedError
-        if the arm has no closed form here
     """
-    arm = constants_for_blocks(robot)
     T = np.ascontiguousarray(as_floats(T, "T"))
     if T.ndim != 3 or T.shape[1:] != (4, 4):
         raise ShapeError("T", T.shape, "(N, 4, 4)")
     reference = _checked_reference(robot, q_ref, len(T))
-    count = len(T)
+    if closed_form_missing(robot) or robot.coupling is not None:
+        return _by_class(robot, T, reference, turns, threads, redundancy)
+    arm, count = constants_for_blocks(robot), len(T)
     q = np.empty((count, SLOTS, 6))
     valid, inside = np.empty((count, SLOTS), dtype=bool), np.empty((count, SLOTS), dtype=bool)
     rigid, marked = np.empty(count, dtype=bool), np.empty(count, dtype=bool)
@@ -60,7 +73,8 @@ def inverse_batch(
     parallel_for(count, threads, SMALLEST_PART, solve)
     if not rigid.all():
         check_poses(T)
-    left = np.flatnonzero(marked)
+    plain = not robot.combined and not robot.continuous.any()  # what the kernel knows of limits
+    left = np.flatnonzero(marked) if plain else np.arange(count)
     if left.size:
         own = np.broadcast_to(reference, (count, 6))[left]
         found, fault, _ = solve_slots(robot, T[left], own, keep_folds=True, keep_free=True)
@@ -71,12 +85,44 @@ def inverse_batch(
     return Solutions(robot, q, valid, inside, branch, turn_range=_turn_range(robot, q) if turns else None)
 
 
+def _by_class(
+    robot: Robot, T: Reals, reference: Reals, turns: bool, threads: int, redundancy: Reals | None
+) -> Solutions:
+    check_poses(T)
+    count, solver = len(T), arm_solver(robot).chain
+    own = np.ascontiguousarray(np.broadcast_to(reference, (count, robot.joints)))
+    certain: Flags | None = None
+    method: Method
+    if isinstance(solver, Unsolved):
+        q = _found_by_starts(robot, T, own)
+        method = Iteration(STARTS, closed_form_missing(robot))
+    else:
+        values = checked_parameters(robot, redundancy, reference, count)
+        q, certainty, _ = slots_of_class(robot, T, own, values, threads)
+        certain = (certainty == CERTAIN) | (solver.code not in BY_ELIMINATION)
+        method = ByClass(solver.code, bool(certain.all()), bool(slot_labels(robot)))
+    valid, inside = np.isfinite(q[..., 0]), within(robot, q)
+    branch = np.broadcast_to(np.arange(q.shape[1]), valid.shape)
+    told = _turn_range(robot, q) if turns else None
+    return Solutions(robot, q, valid, inside, branch, method, turn_range=told, certain=certain)
+
+
+def _found_by_starts(robot: Robot, T: Reals, q_ref: Reals) -> Reals:
+    """Slots (N, S, n) with what random starts find, for chains of no class."""
+    q = np.full((len(T), SLOTS_BY_STARTS, robot.joints), np.nan)
+    for n, pose in enumerate(T):
+        rows = all_found(robot, pose, STARTS)[:SLOTS_BY_STARTS]
+        q[n, : len(rows)] = nearest_equivalent(robot, rows, q_ref[n])
+    return q
+
+
 def _checked_reference(robot: Robot, q_ref: Reals | None, count: int) -> Reals:
-    """Reference joints (1 or N, 6)."""
-    reference = checked_joints(robot, np.zeros(6) if q_ref is None else q_ref, "q_ref")
-    if reference.shape not in ((6,), (count, 6)):
-        raise ShapeError("q_ref", reference.shape, f"(6,) or ({count}, 6)")
-    reference = reference.reshape(-1, 6)
+    """Reference joints (1 or N, n)."""
+    n = robot.joints
+    reference = checked_joints(robot, np.zeros(n) if q_ref is None else q_ref, "q_ref")
+    if reference.shape not in ((n,), (count, n)):
+        raise ShapeError("q_ref", reference.shape, f"({n},) or ({count}, {n})")
+    reference = reference.reshape(-1, n)
     bad = np.flatnonzero(~np.isfinite(reference).all(axis=1))
     if bad.size:
         raise PoseError(f"q_ref{f'[{bad[0]}]' if len(reference) > 1 else ''} holds NaN or infinity")
@@ -85,5 +131,9 @@ def _checked_reference(robot: Robot, q_ref: Reals | None, count: int) -> Reals:
 
 def _turn_range(robot: Robot, q: Reals) -> NDArray[np.int8]:
     turns = np.empty((*q.shape, 2), dtype=np.int8)
-    count_turns(q.reshape(-1, 6), robot.lower, robot.upper, turns.reshape(-1, 6, 2))
+    if robot.joints == 6 and not robot.sliding.any():
+        count_turns(q.reshape(-1, 6), robot.lower, robot.upper, turns.reshape(-1, 6, 2))
+        return turns
+    low, high = turn_bounds(robot, q)
+    turns[..., 0], turns[..., 1] = np.nan_to_num(low), np.nan_to_num(high, nan=-1.0)
     return turns

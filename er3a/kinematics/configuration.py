@@ -14,9 +14,11 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from er3a.kinematics.by_class import arm_solver, to_rows
+from er3a.kinematics.classes.chain_solvers import SlotName
 from er3a.kinematics.closed_form import BOUNDARY_M, SLOTS
 from er3a.kinematics.singularity import determinant_factors
-from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
+from er3a.kinematics.wrist_partitioned import closed_form_missing, parallel_axes_arm, wrist_partitioned_arm
 from er3a.robots.derived import derived
 from er3a.robots.robot import Robot
 
@@ -36,7 +38,7 @@ LABELS: tuple[BranchLabel, ...] = get_args(BranchLabel)
 
 @derived
 def branch_labels(robot: Robot) -> tuple[BranchLabel, ...]:
-    """The codes of the eight slots.
+    """The codes of the eight slots, of arms with a spherical wrist or with parallel axes 2, 3 and 4.
 
     *front*: the wrist centre is on the side of axis 1 where it is in the manufacturer's zero pose (if it is on axis 1
     there, the side of the cross product of axes 1 and 2); *back*: reached over the head. *up*: with the arm stretched
@@ -47,6 +49,9 @@ def branch_labels(robot: Robot) -> tuple[BranchLabel, ...]:
     ------
     NotWristPartitionedError
     """
+    if parallel_axes_arm(robot) is not None:
+        names = arm_solver(robot).chain.names(to_rows(robot, np.zeros(6)))
+        return tuple(LABELS[LABELS.index(name)] for name in names)  # type: ignore[arg-type]
     arm = wrist_partitioned_arm(robot)
     w1, w2 = arm.axes[0], arm.axes[1]
     labels = []
@@ -56,6 +61,14 @@ def branch_labels(robot: Robot) -> tuple[BranchLabel, ...]:
         down = bend * (np.cross(w2, outward) @ w1) >= 0
         labels.append(LABELS[4 * (side_of(robot, slot) == "back") + 2 * int(down) + slot % 2])
     return tuple(labels)
+
+
+@derived
+def slot_labels(robot: Robot) -> tuple[BranchLabel | SlotName, ...]:
+    """The codes of the slots of the arm's class; empty where no signs separate its solutions, which are numbered."""
+    if not closed_form_missing(robot):
+        return branch_labels(robot)
+    return arm_solver(robot).chain.names(to_rows(robot, np.zeros(robot.joints)))
 
 
 @derived

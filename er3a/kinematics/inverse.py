@@ -8,23 +8,39 @@ from numpy.typing import NDArray
 from er3a.errors import Er3aError, PoseError, ShapeError
 from er3a.geometry.angles import TURN, greatest_move, wrap_to_pi
 from er3a.geometry.transforms import check_poses
+from er3a.kinematics.by_class import (
+    all_motions,
+    arm_solver,
+    checked_parameters,
+    slot_of,
+    slots_of_class,
+    task_mask,
+)
+from er3a.kinematics.classes.chain_solvers import ArmClassCode
+from er3a.kinematics.classes.chain_solvers import Unsolved as UnsolvedChain
+from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.closed_form import FREE, OFF_AXIS, ORIENTATION, REACHED, TOO_FAR
-from er3a.kinematics.configuration import side_of
+from er3a.kinematics.configuration import side_of, slot_labels
 from er3a.kinematics.families import Family, families
 from er3a.kinematics.forward import checked_joints
-from er3a.kinematics.numerical import all_found
+from er3a.kinematics.numerical import all_found, solve
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.solutions import (
+    ByClass,
     Iteration,
+    NearestMiss,
+    NoSolutionOfClass,
     OutOfReach,
+    PoseUnsolved,
     SideUnsolved,
     Solutions,
+    Unsolved,
     WristTiltsTooLittle,
     WristTooFar,
     WristTooNear,
     WristTooNearAxis1,
 )
-from er3a.kinematics.wrist_partitioned import ClosedFormMissing, closed_form_missing, solve_slots, wrist_partitioned_arm
+from er3a.kinematics.wrist_partitioned import closed_form_missing, solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.joint_limits import nearest_equivalent, turn_bounds, within
 from er3a.robots.robot import Robot
@@ -33,31 +49,37 @@ SAME_JOINTS = 1e-9
 SAME_MEMBER = 1e-6
 MOST_ROWS = 10_000
 STARTS = 400
+MISS_RESTARTS = 20
+BY_ELIMINATION: tuple[ArmClassCode, ...] = ("general_six", "six_one_prismatic", "redundant", "free_roll", "position")
 
 
-def inverse(robot: Robot, T: Reals, q_ref: Reals | None = None) -> Solutions:
-    """All joint solutions of one pose of the tool: in closed form for a wrist-partitioned arm, else by iteration.
+def inverse(robot: Robot, T: Reals, q_ref: Reals | None = None, redundancy: Reals | None = None) -> Solutions:
+    """All joint solutions of one pose of the tool, by the class of the arm's geometry.
 
     Where a joint is free, the member of each family within the limits that is nearest to ``q_ref`` is among the rows,
-    and for the branch that meets there the one half a turn further.
+    and for the branch that meets there (spherical wrist) the one half a turn further. Arms with more than six joints
+    have rows at the given value of their redundancy parameter, and of each self-motion the member nearest to ``q_ref``
+    and the one farthest from the limits. Arms with fewer meet what :func:`er3a.kinematics.by_class.task_mask` tells.
 
     Parameters
     ----------
     T : (4, 4), T_base_tool, m
     q_ref : (6,), rad, what members of families and turns are chosen by: rows of a branch come nearest turn first. None
         means zeros.
+    redundancy : (k,), values of what the pose leaves open (``parameters_of``): an arm angle in rad, or a joint's value;
+        None means those of ``q_ref``
 
     Raises
     ------
     ShapeError, PoseError
-        if T is no rigid transform, or q_ref no six finite numbers
+        if T is no rigid transform, or q_ref not as many finite numbers as the arm has joints
     """
     T = check_poses(T)
     if T.shape != (4, 4):
         raise ShapeError("T", T.shape, "(4, 4)")
     q_ref = checked_reference(robot, q_ref)
-    if lacking := closed_form_missing(robot):
-        return _by_iteration(robot, T, q_ref, lacking)
+    if closed_form_missing(robot) or robot.coupling is not None:
+        return _by_class(robot, T, q_ref, redundancy)
     q, fault, gap = (batch[0] for batch in solve_slots(robot, T[None], q_ref[None], keep_folds=True, keep_free=True))
     continua = families(robot, T, q, q_ref)
     q = _free_joints_near(robot, T, q, q_ref, continua)
@@ -71,24 +93,57 @@ def inverse(robot: Robot, T: Reals, q_ref: Reals | None = None) -> Solutions:
         if family.within_limits and greatest_move(np.concatenate(rows), family.q0).min() > SAME_MEMBER:
             slots.append(family.branches[0])
             rows.append(family.q0[None])
-    q, branch = _stacked(slots, rows)
+    q, branch = _stacked(slots, rows, 6)
     inside = within(robot, q)
     unsolved = _unsolved(robot, fault, gap)
     return Solutions(robot, q, np.ones_like(inside), inside, branch, unsolved=unsolved, families=continua)
 
 
-def _stacked(branches: list[int], rows: list[Reals]) -> tuple[Reals, Integers]:
-    """The rows (n, 6) of all branches, and each row's branch (n,)."""
-    q = np.concatenate([np.empty((0, 6)), *rows])
+def _stacked(branches: list[int], rows: list[Reals], joints: int) -> tuple[Reals, Integers]:
+    """The rows (k, n) of all branches, and each row's branch (k,)."""
+    q = np.concatenate([np.empty((0, joints)), *rows])
     return q, np.repeat(np.array(branches, dtype=int), [len(turns) for turns in rows])
 
 
-def _by_iteration(robot: Robot, T: Reals, q_ref: Reals, lacking: ClosedFormMissing) -> Solutions:
-    arms, first = all_found(robot, T, STARTS)
-    q, branch = _stacked(list(range(len(arms))), [_rows_of_branch(robot, q, q_ref) for q in arms])
+def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None) -> Solutions:
+    solver = arm_solver(robot).chain
+    if isinstance(solver, UnsolvedChain):
+        return _by_iteration(robot, T, q_ref)
+    values = checked_parameters(robot, redundancy, q_ref[None], 1)
+    slots, certainty, settled = slots_of_class(robot, T[None], q_ref[None], values)
+    motions = settled[0].motions if settled else ()
+    if len(solver.parameters) == 1:
+        motions = all_motions(robot, T, q_ref, values).motions
+    branches: list[int] = np.flatnonzero(np.isfinite(slots[0, :, 0])).tolist()
+    rows = [_rows_of_branch(robot, slots[0, slot], q_ref) for slot in branches]
+    for motion in motions:
+        for member in (motion.q0, motion.roomiest) if solver.parameters else (motion.q0,):
+            listed = np.concatenate([np.empty((0, robot.joints)), *rows])
+            if motion.within_limits and greatest_move(listed, member).min(initial=np.inf) > SAME_MEMBER:
+                branches.append(slot_of(robot, T, member))
+                rows.append(member[None])
+    certain = certainty[0] == CERTAIN or solver.code not in BY_ELIMINATION
+    unsolved: tuple[Unsolved, ...] = ()
+    if not branches:
+        near = solve(robot, T, q_ref, mask=task_mask(robot), respect_limits=False, restarts=MISS_RESTARTS)
+        if bool(near.solved) and not solver.parameters:  # the class missed it
+            branches, rows, certain = [0], [_rows_of_branch(robot, near.q, q_ref)], False
+        else:
+            miss = NearestMiss(float(near.position_error) * 1000, float(np.degrees(near.rotation_error)))
+            unsolved = (PoseUnsolved(0, NoSolutionOfClass(miss)),)
+    q, branch = _stacked(branches, rows, robot.joints)
     inside = within(robot, q)
-    unsolved = () if len(arms) else first.unsolved
-    return Solutions(robot, q, np.ones_like(inside), inside, branch, Iteration(STARTS, lacking), unsolved)
+    method = ByClass(solver.code, bool(certain), bool(slot_labels(robot)))
+    return Solutions(robot, q, np.ones_like(inside), inside, branch, method, unsolved, motions)
+
+
+def _by_iteration(robot: Robot, T: Reals, q_ref: Reals) -> Solutions:
+    arms = all_found(robot, T, STARTS)
+    q, branch = _stacked(list(range(len(arms))), [_rows_of_branch(robot, q, q_ref) for q in arms], robot.joints)
+    inside = within(robot, q)
+    unsolved = () if len(arms) else solve(robot, T, respect_limits=False).unsolved
+    method = Iteration(STARTS, closed_form_missing(robot))
+    return Solutions(robot, q, np.ones_like(inside), inside, branch, method, unsolved)
 
 
 def checked_reference(robot: Robot, q_ref: Reals | None) -> Reals:
@@ -122,13 +177,14 @@ def _free_joints_near(robot: Robot, T: Reals, q: Reals, q_ref: Reals, continua: 
 
 
 def _rows_of_branch(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
+    q = np.where(robot.continuous, q + TURN * np.round((q_ref - q) / TURN), q)
     low, high = turn_bounds(robot, q)
     if (low > high).any():
         return nearest_equivalent(robot, q, q_ref)[None]
     if np.prod(high - low + 1) > MOST_ROWS:
         raise Er3aError(f"{robot.name}: the limits allow more than {MOST_ROWS} turns of one pose; narrow them")
-    choices = [q[j] + TURN * np.arange(low[j], high[j] + 1) for j in range(6)]
-    rows = np.stack(np.meshgrid(*choices, indexing="ij"), axis=-1).reshape(-1, 6)
+    choices = [q[j] + TURN * np.arange(low[j], high[j] + 1) for j in range(len(q))]
+    rows = np.stack(np.meshgrid(*choices, indexing="ij"), axis=-1).reshape(-1, len(q))
     return rows[np.argsort(greatest_move(rows, q_ref), kind="stable")]
 
 

@@ -7,18 +7,26 @@ from typing import Any
 
 import numpy as np
 
+from er3a.kinematics.rank_loss import scaled_jacobian
 from er3a.kinematics.singularity import TYPES, DeterminantFactors, SingularityType, determinant_factors
+from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
+
+LEAST_SINGULAR_VALUE = 0.02
 
 
 @dataclass(frozen=True)
 class NearSingular:
-    """Distance from each singular set below which a pose is near-singular."""
+    """Distance from each singular set below which a pose is near-singular.
+
+    ``smallest`` is the smallest singular value (:mod:`er3a.kinematics.rank_loss`) for arms without those sets.
+    """
 
     wrist_rad: float
     elbow_rad: float
     shoulder_m: float
+    smallest: float = LEAST_SINGULAR_VALUE
 
     def of(self, kind: SingularityType) -> float:
         """The threshold of one type, rad or m."""
@@ -40,6 +48,9 @@ class NearSingular:
 
     def margin(self, robot: Robot, q: Reals) -> Reals:
         """Least of the ratios (N,) at joint angles (N, 6) in rad; -1 where they are NaN, for unreachable poses."""
+        if not has_branches(robot):
+            smallest = np.linalg.svd(scaled_jacobian(robot, q), compute_uv=False)[..., -1]
+            return np.nan_to_num(smallest / self.smallest, nan=-1.0)
         ratios = self.ratios(determinant_factors(robot, q))
         return np.where(np.isnan(ratios[0]), -1.0, ratios.min(axis=0))
 

@@ -1,4 +1,4 @@
-"""The numerical inverse: any six-axis arm, from a start guess, with or without limits, for parts of a pose."""
+"""The numerical inverse: any arm, from a start guess, with or without limits, for parts of a pose."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ import numpy as np
 from er3a.errors import Er3aError, PoseError, ShapeError
 from er3a.geometry.angles import wrap_to_pi
 from er3a.geometry.transforms import as_floats, check_poses
-from er3a.kinematics.chain import JOINTS, arm_length, constant_links
+from er3a.kinematics.chain import arm_length, constant_links, joint_starts
 from er3a.kinematics.forward import checked_joints, jacobian
 from er3a.kinematics.iteration import solve_numerically
+from er3a.kinematics.iteration_any import solve_any
 from er3a.kinematics.solutions import (
     BadGuess,
     Iteration,
@@ -55,7 +56,7 @@ def solve(
     Parameters
     ----------
     T : (..., 4, 4), T_base_tool, m
-    q0 : (6,) or (..., 6), rad, where to start; None means the middle of the limits
+    q0 : (n,) or (..., n), rad or m, where to start; None means the middle of the limits
     mask : 6 of 1 or 0: which of x, y, z and the rotations about x, y, z of the target's tool frame must be met; None
         means all. ``[1, 1, 1, 1, 1, 0]`` leaves the rotation about the tool's axis free.
     respect_limits : keep to the joint limits inside the iteration; else angles come in (-pi, pi]
@@ -78,19 +79,20 @@ def solve(
         if not (isinstance(tolerance, Real) and tolerance > 0):
             raise Er3aError(f"{name} is {tolerance!r}; expected a number above 0")
     q0 = (robot.lower + robot.upper) / 2 if q0 is None else checked_joints(robot, q0, "q0")
-    if q0.shape not in ((6,), (*shape, 6)):
-        raise ShapeError("q0", q0.shape, f"(6,) or {(*shape, 6)}")
+    n = robot.joints
+    if q0.shape not in ((n,), (*shape, n)):
+        raise ShapeError("q0", q0.shape, f"({n},) or {(*shape, n)}")
     if not np.isfinite(q0).all():
         raise PoseError("q0 holds NaN or infinity")
     search = _Search(robot, mask, np.array([position_tolerance, rotation_tolerance]), seed)
     poses = T.reshape(-1, 4, 4)
-    starts_at = np.broadcast_to(q0, (*shape, 6)).reshape(-1, 6)
+    starts_at = np.broadcast_to(q0, (*shape, n)).reshape(-1, n)
     q, error, starts = search.run(poses, starts_at, respect_limits, restarts, threads)
     unsolved = tuple(
         PoseUnsolved(int(n), search.explain(poses[n], q[n], error[n], respect_limits, restarts))
         for n in np.flatnonzero(starts == 0)
     )
-    q = q.reshape(*shape, 6)
+    q = q.reshape(*shape, n)
     return Solutions(
         robot,
         q,
@@ -105,23 +107,20 @@ def solve(
     )
 
 
-def all_found(robot: Robot, T: Reals, starts: int, seed: int = 0) -> tuple[Reals, Solutions]:
-    """Different arms (n, 6), rad in (-pi, pi], found from that many random starts for one pose, and the first search.
+def all_found(robot: Robot, T: Reals, starts: int, seed: int = 0) -> Reals:
+    """Different joint solutions (k, n), angles in (-pi, pi], found from that many random starts for one pose (4, 4).
 
     There may be more: a search from random starts can't prove that it has found all.
     """
-    first = solve(robot, T, respect_limits=False, seed=seed)
-    if not first.solved:
-        return np.empty((0, 6)), first
-    search = _Search(robot, np.ones(6), np.array([1e-10, 1e-10]), seed + 1)
-    random = np.random.default_rng([seed, 2])
-    begin = random.uniform(-np.pi, np.pi, (starts, 6))
+    search = _Search(robot, np.ones(6), np.array([1e-12, 1e-12]), seed + 1)
+    low, high = search.without_limits()
+    begin = np.random.default_rng([seed, 2]).uniform(low, high, (starts, robot.joints))
     q, _, used = search.run(np.tile(T, (starts, 1, 1)), begin, False, 0, 1)
-    distinct = [wrap_to_pi(first.q)]
+    distinct: list[Reals] = []
     for row in q[used > 0]:
-        if min(np.abs(wrap_to_pi(row - other)).max() for other in distinct) > SAME_ARM:
+        if all(np.abs(wrap_to_pi(row - other)).max() > SAME_ARM for other in distinct):
             distinct.append(row)
-    return np.array(distinct), first
+    return np.array(distinct).reshape(-1, robot.joints)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,19 +131,34 @@ class _Search:
     seed: int
 
     def run(self, T: Reals, q0: Reals, respect: bool, restarts: int, threads: int) -> tuple[Reals, Reals, Integers]:
-        """Arms (N, 6), errors (N, 2) in m and rad, and starts (N,) for poses (N, 4, 4)."""
+        """Joint values (N, n), errors (N, 2) in m and rad, and starts (N,) for poses (N, 4, 4)."""
         robot, count = self.robot, len(T)
-        q, error, starts = np.empty((count, 6)), np.empty((count, 2)), np.empty(count, dtype=np.int64)
-        arm = robot.direction, robot.offset, constant_links(robot)
-        limits = (robot.lower, robot.upper, True) if respect else (np.full(6, -np.pi), np.full(6, np.pi), False)
+        q, error, starts = np.empty((count, robot.joints)), np.empty((count, 2)), np.empty(count, dtype=np.int64)
+        limits = (robot.lower, robot.upper, True) if respect else (*self.without_limits(), False)
         q0, length = np.ascontiguousarray(q0), arm_length(robot)
+        plain = robot.joints == robot.rows == 6 and robot.coupling is None and not robot.sliding.any()
+        lanes = robot.direction, robot.offset, constant_links(robot)
+        coupling = np.eye(robot.rows) if robot.coupling is None else np.ascontiguousarray(robot.coupling)
+        units = np.where(robot.slides, length, 1.0)
+        each = robot.direction, joint_starts(robot), constant_links(robot), robot.sliding, coupling, units
 
         def part(rows: slice) -> None:
             goal, draws = (self.mask, self.tolerances, length), (restarts, np.uint64(self.seed), rows.start)
-            solve_numerically(arm, limits, T[rows], q0[rows], goal, draws, (q[rows], error[rows], starts[rows]))
+            out = q[rows], error[rows], starts[rows]
+            if plain:
+                solve_numerically(lanes, limits, T[rows], q0[rows], goal, draws, out)
+            else:
+                solve_any(each, limits, T[rows], q0[rows], goal, draws, out)
 
         parallel_for(count, threads, SMALLEST_PART, part)
-        return (q if respect else wrap_to_pi(q)), error, starts
+        return (q if respect else np.where(robot.slides, q, wrap_to_pi(q))), error, starts
+
+    def without_limits(self) -> tuple[Reals, Reals]:
+        """From where to where joints (n,) start that need not keep to limits: a turn; slides twice as far as theirs."""
+        robot = self.robot
+        middle, half = (robot.lower + robot.upper) / 2, robot.upper - robot.lower
+        low, high = np.where(robot.slides, middle - half, -np.pi), np.where(robot.slides, middle + half, np.pi)
+        return low, high
 
     def explain(self, T: Reals, q: Reals, error: Reals, respect: bool, restarts: int) -> NotFound:
         """Why one pose was not solved: its nearest arm and a search without what may have hindered it."""
@@ -168,7 +182,7 @@ class _Search:
 
 
 def _checked_mask(mask: Reals | None) -> Reals:
-    values = np.ones(JOINTS) if mask is None else as_floats(mask, "mask")
+    values = np.ones(6) if mask is None else as_floats(mask, "mask")
     if values.shape != (6,):
         raise ShapeError("mask", values.shape, "(6,)")
     if not np.isin(values, (0.0, 1.0)).all() or not values.any():

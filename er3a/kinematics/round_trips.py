@@ -13,7 +13,7 @@ import numpy as np
 from er3a.geometry.angles import wrap_to_pi
 from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.batch import inverse_batch
-from er3a.kinematics.closed_form import SLOTS
+from er3a.kinematics.by_class import arm_solver, parameters_of, task_mask
 from er3a.kinematics.forward import forward
 from er3a.kinematics.near_singular import NearSingular
 from er3a.kinematics.singularity import determinant_factors
@@ -26,6 +26,7 @@ NEAR_WRIST_DEG = NEAR_ELBOW_DEG = 0.5
 NEAR_SHOULDER_MM = 1.0
 NEAR = NearSingular(np.radians(NEAR_WRIST_DEG), np.radians(NEAR_ELBOW_DEG), NEAR_SHOULDER_MM / 1000)
 BLOCK = 20_000
+MOST_BY_CLASS = 500  # poses that arms without a spherical wrist are asked for in validation
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +40,7 @@ class BatchRoundTrips:
     worst_position : m; worst_orientation : rad, of any solution put back through forward kinematics
     own_found : number of poses whose own joint angles are among the solutions (to 1e-6 rad, turns apart)
     worst_own : rad, greatest joint difference between any pose's own angles and the nearest solution
-    counts_within_limits : (9,) int, number of poses with 0 .. 8 solutions within the limits
+    counts_within_limits : (S + 1,) int, number of poses with 0 .. S solutions within the limits, S slots of the class
     """
 
     poses: int
@@ -72,24 +73,36 @@ class SlotRoundTrips:
 
 
 def batch_round_trips(robot: Robot, random: np.random.Generator, poses: int) -> BatchRoundTrips:
-    """Send that many joint vectors, uniform within the limits, to poses and back."""
-    own = random.uniform(robot.lower, robot.upper, size=(poses, 6))
+    """Send that many joint vectors, uniform within the limits, to poses and back.
+
+    Arms with more than six joints are asked for solutions at the redundancy parameter of the joints drawn.
+    """
+    own = random.uniform(robot.lower, robot.upper, size=(poses, robot.joints))
     T = forward(robot, own)
-    solved = inverse_batch(robot, T)
+    solved = inverse_batch(robot, T, own if parameters_of(robot) else None)
     q, valid = solved.q, solved.solved
     back = forward(robot, q[valid])
     asked = np.repeat(T, valid.sum(axis=1), axis=0)
-    difference = np.abs(wrap_to_pi(q - own[:, None])).max(axis=2)
+    away = q - own[:, None]
+    difference = np.abs(np.where(robot.slides, away, wrap_to_pi(away))).max(axis=2)
     difference = np.where(valid, difference, np.inf).min(axis=1)
+    turned = rotation_angle(back[:, :3, :3], asked[:, :3, :3])
+    if not task_mask(robot).all():  # the arm's task leaves orientation open
+        turned = np.zeros(1)
     return BatchRoundTrips(
         poses=poses,
         solutions=int(valid.sum()),
         worst_position=float(np.linalg.norm(back[:, :3, 3] - asked[:, :3, 3], axis=1).max(initial=0.0)),
-        worst_orientation=float(rotation_angle(back[:, :3, :3], asked[:, :3, :3]).max(initial=0.0)),
+        worst_orientation=float(turned.max(initial=0.0)),
         own_found=int((difference < SAME_JOINTS_RAD).sum()),
         worst_own=float(difference.max()),
-        counts_within_limits=np.bincount(solved.within_limits.sum(axis=1), minlength=SLOTS + 1),
+        counts_within_limits=np.bincount(solved.within_limits.sum(axis=1), minlength=q.shape[1] + 1),
     )
+
+
+def has_class(robot: Robot) -> bool:
+    """Whether a class's solver, not random starts, solves the arm."""
+    return arm_solver(robot).chain.code != "unsolved"
 
 
 def slot_round_trips(robot: Robot, poses: int, seed: int) -> SlotRoundTrips:

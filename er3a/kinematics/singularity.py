@@ -2,7 +2,8 @@
 
 The determinant of a wrist-partitioned arm's Jacobian is a product of three factors [1]_, each of which is zero on one
 type of singularity: *wrist* (axes 4 and 6 align), *elbow* (arm straight or folded), *shoulder* (the wrist centre lies
-in the plane of axis 1 and the direction of axis 2, where turning joint 1 can't move it).
+in the plane of axis 1 and the direction of axis 2, where turning joint 1 can't move it). So is that of an arm with
+parallel axes 2, 3 and 4: there the wrist centre is where axes 5 and 6 meet, and the forearm ends on axis 4.
 
 References
 ----------
@@ -20,13 +21,19 @@ import numpy as np
 from er3a.geometry.vectors import Vector, cross, dot, subtract
 from er3a.kinematics.chain import arm_length, constant_links, row_values
 from er3a.kinematics.forward import checked_joints, jacobian, rows_of, step_row, turn_row
-from er3a.kinematics.wrist_partitioned import closed_form_missing, wrist_partitioned_arm
+from er3a.kinematics.wrist_partitioned import (
+    closed_form_missing,
+    has_branches,
+    parallel_axes_arm,
+    wrist_partitioned_arm,
+)
 from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.derived import derived
 from er3a.robots.robot import Robot
 
 SingularityType = Literal["wrist", "elbow", "shoulder"]
+EventType = SingularityType | Literal["dependent_axes"]
 TYPES: tuple[SingularityType, ...] = ("wrist", "elbow", "shoulder")
 ROUNDING = 6 * np.finfo(float).eps
 
@@ -101,16 +108,29 @@ def determinant_factors(robot: Robot, q: Reals) -> DeterminantFactors:
     NotWristPartitionedError
         if the arm's determinant does not factor this way
     """
-    arm = wrist_partitioned_arm(robot)
+    if (parallel := parallel_axes_arm(robot)) is not None:
+        wrist_in_tool, to_axis_4 = np.array(parallel.constants.wrist_in_tool), True
+    else:
+        wrist_in_tool, to_axis_4 = wrist_partitioned_arm(robot).wrist_in_tool, False
     q = checked_joints(robot, q)
     out = np.empty((q.size // 6, 3))
     links = constant_links(robot)
-    _factors(row_values(robot, q).reshape(-1, 6), robot.direction, robot.offset, links, arm.wrist_in_tool, out)
+    _factors(row_values(robot, q).reshape(-1, 6), robot.direction, robot.offset, links, wrist_in_tool, to_axis_4, out)
     return DeterminantFactors(*(out[:, k].reshape(q.shape[:-1]) for k in range(3)))
 
 
+def factors_where_defined(robot: Robot, q: Reals) -> DeterminantFactors:
+    """The same; NaN for arms whose determinant does not factor this way (see :mod:`er3a.kinematics.rank_loss`)."""
+    if has_branches(robot):
+        return determinant_factors(robot, q)
+    nothing = np.full(np.shape(q)[:-1], np.nan)
+    return DeterminantFactors(nothing, nothing, nothing)
+
+
 @kernel
-def _factors(q: Reals, direction: Reals, offset: Reals, links: Reals, wrist_in_tool: Reals, out: Reals) -> None:
+def _factors(
+    q: Reals, direction: Reals, offset: Reals, links: Reals, wrist_in_tool: Reals, to_axis_4: bool, out: Reals
+) -> None:
     """Fill ``out`` (N, 3): wrist, elbow and shoulder at joint angles ``q`` (N, 6)."""
     w, p = np.empty((6, 3)), np.empty((6, 3))
     for n in range(q.shape[0]):
@@ -132,7 +152,8 @@ def _factors(q: Reals, direction: Reals, offset: Reals, links: Reals, wrist_in_t
         p2, p3 = (p[1, 0], p[1, 1], p[1, 2]), (p[2, 0], p[2, 1], p[2, 2])
         sideways = cross(w1, w2)
         out[n, 0] = _angle_short_of_line((w[3, 0], w[3, 1], w[3, 2]), (w[5, 0], w[5, 1], w[5, 2]), w5)
-        out[n, 1] = _angle_short_of_line(subtract(p3, p2), subtract(wrist, p3), w2)
+        forearm_end = (p[3, 0], p[3, 1], p[3, 2]) if to_axis_4 else wrist
+        out[n, 1] = _angle_short_of_line(subtract(p3, p2), subtract(forearm_end, p3), w2)
         from_axis = subtract(wrist, (p[0, 0], p[0, 1], p[0, 2]))
         out[n, 2] = dot(sideways, from_axis) / np.sqrt(dot(sideways, sideways))
 

@@ -11,20 +11,23 @@ from numpy.typing import NDArray
 
 from er3a.display import MOST_ROWS, Displayed, Sheet, first_rows, shortly
 from er3a.geometry.angles import TURN, wrap_to_pi
-from er3a.kinematics.configuration import BranchLabel, branch_labels
+from er3a.kinematics.classes.chain_solvers import ArmClassCode, SlotName
+from er3a.kinematics.configuration import BranchLabel, slot_labels
 from er3a.kinematics.families import Family
+from er3a.kinematics.self_motions import SelfMotionCurve
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.joint_limits import LimitsExceeded, limits_exceeded
 from er3a.robots.robot import Robot
 
-Label = BranchLabel | Literal["found_arm"]
+Label = BranchLabel | SlotName | Literal["found_arm"]
 
 
 @dataclass(frozen=True)
 class ClosedForm:
     """All solutions, by the closed form."""
 
+    arm_class: Literal["spherical_wrist"] = "spherical_wrist"
     code: Literal["closed_form"] = "closed_form"
 
 
@@ -37,7 +40,23 @@ class Iteration:
     code: Literal["iteration"] = "iteration"
 
 
-Method = ClosedForm | Iteration
+@dataclass(frozen=True)
+class ByClass:
+    """All solutions of an arm without spherical wrist, by the solver of its class.
+
+    Attributes
+    ----------
+    certain : whether the solver left no doubt that these are all
+    named : whether signs of factors separate the solutions, so that branches have names; else they are numbered
+    """
+
+    arm_class: ArmClassCode
+    certain: bool
+    named: bool
+    code: Literal["by_class"] = "by_class"
+
+
+Method = ClosedForm | ByClass | Iteration
 
 
 @dataclass(frozen=True)
@@ -117,8 +136,16 @@ class Unreachable:
     code: Literal["unreachable"] = "unreachable"
 
 
+@dataclass(frozen=True)
+class NoSolutionOfClass:
+    """The solver of the arm's class has no solution; the nearest arm that a search found misses by so much."""
+
+    miss: NearestMiss
+    code: Literal["no_solution_of_class"] = "no_solution_of_class"
+
+
 OutOfReach = WristTiltsTooLittle | WristTooNearAxis1 | WristTooFar | WristTooNear
-NotFound = BadGuess | LimitBound | SingularEnd | Unreachable
+NotFound = BadGuess | LimitBound | SingularEnd | Unreachable | NoSolutionOfClass
 
 
 @dataclass(frozen=True)
@@ -132,7 +159,7 @@ class SideUnsolved:
 
 @dataclass(frozen=True)
 class PoseUnsolved:
-    """Why iteration found no arm for a pose, which is numbered as the poses lie in memory."""
+    """Why a pose has no solution by its class, or why iteration found none, which is numbered as the poses lie in memory."""
 
     pose: int
     why: NotFound
@@ -146,19 +173,18 @@ Unsolved = SideUnsolved | PoseUnsolved
 class Solutions(Displayed):
     """Joint solutions of one pose (``inverse``) or of many (``inverse_batch``, ``solve``).
 
-    What is told of each solution has the leading axes of ``q``: (n,) from ``inverse``; (N, 8) from ``inverse_batch``,
-    one slot for each branch; those of the poses from ``solve``, one arm for each.
+    What is told of each solution has the leading axes of ``q``: (k,) from ``inverse``; (N, S) from ``inverse_batch``,
+    one slot for each branch, S by the arm's class; those of the poses from ``solve``, one arm for each.
 
     Attributes
     ----------
-    q : (..., 6), rad, the manufacturer's angles; NaN in empty slots. ``inverse`` gives each branch once per turn that
+    q : (..., n), rad or m, the manufacturer's values; NaN in empty slots. ``inverse`` gives each branch once per turn that
         the limits allow, or once if it leaves them; ``inverse_batch`` of the turns within the limits the nearest to the
         reference, else the nearest to the limits; ``solve`` the nearest arm found where it solves nothing
     solved : (...,) bool, whether this is a solution
     within_limits : (...,) bool
-    branch : (...,) int, slot ``4 * shoulder + 2 * elbow + wrist``; of ``inverse`` for arms without a closed form the
-        number of the arm found, of ``solve`` -1
-    method : closed form or iteration
+    branch : (...,) int, the slot, of arms with a spherical wrist ``4 * shoulder + 2 * elbow + wrist``; of ``solve`` -1
+    method : closed form, the solver of the arm's class, or iteration
     unsolved : ``inverse``: per shoulder side without solution, why (both sides: the pose can't be reached);
         ``solve``: per pose without solution, why
     families : of ``inverse``: continua of solutions, where a joint can turn with the tool at rest
@@ -166,6 +192,7 @@ class Solutions(Displayed):
         limits (least above greatest: none); None unless ``inverse_batch`` was asked for it
     position_error, rotation_error : (...,), m and rad, of the degrees of freedom that ``solve`` was asked for
     starts : (...,) int, starts that ``solve`` used; 0 where none succeeded
+    certain : of ``inverse_batch`` for other classes (N,): whether the solver left no doubt that these are all
     """
 
     robot: Robot
@@ -175,23 +202,27 @@ class Solutions(Displayed):
     branch: Integers
     method: Method = ClosedForm()
     unsolved: tuple[Unsolved, ...] = ()
-    families: tuple[Family, ...] = ()
+    families: tuple[Family | SelfMotionCurve, ...] = ()
     turn_range: NDArray[np.int8] | None = None
     position_error: Reals | None = None
     rotation_error: Reals | None = None
     starts: Integers | None = None
+    certain: Flags | None = None
 
     @cached_property
     def turn(self) -> Integers:
-        """(..., 6), full turns added to the angle in (-pi, pi]; 0 in empty slots."""
-        return np.nan_to_num(np.round((self.q - wrap_to_pi(self.q)) / TURN)).astype(int)
+        """(..., n), full turns added to the angle in (-pi, pi]; 0 in empty slots and of joints that slide."""
+        turns = np.nan_to_num(np.round((self.q - wrap_to_pi(self.q)) / TURN)).astype(int)
+        return np.where(self.robot.slides, 0, turns)
 
     @cached_property
     def label(self) -> NDArray[np.object_]:
-        """(...,), each branch's code (``configuration.BranchLabel``), or ``found_arm`` without a closed form."""
-        if isinstance(self.method, Iteration):
+        """(...,), each branch's code (``configuration.BranchLabel``), or ``found_arm`` where they are numbered."""
+        names = slot_labels(self.robot) if not isinstance(self.method, Iteration) else ()
+        if not names:
             return np.full(self.branch.shape, "found_arm", dtype=object)
-        named: NDArray[np.object_] = np.array(branch_labels(self.robot), dtype=object)[self.branch]
+        padded = [*names, *["found_arm"] * max(0, int(self.branch.max(initial=0)) + 1 - len(names))]
+        named: NDArray[np.object_] = np.array(padded, dtype=object)[self.branch]
         return named
 
     @cached_property
@@ -220,13 +251,13 @@ class Solutions(Displayed):
         rows = (
             (row, label, *angles, bool(inside), why)
             for row, label, angles, inside, why in zip(
-                range(len(self.q)), self.label, np.degrees(self.q), self.within_limits, self.reason
+                range(len(self.q)), self.label, _shown(self.robot, self.q), self.within_limits, self.reason
             )
         )
         shown, left_out = first_rows(rows, len(self.q))
         return Sheet(
             f"Solutions of one pose of {self.robot.name}: {self._counted()} ({self.method.code})",
-            ("row", "branch", *_ANGLES, "within", "reason"),
+            ("row", "branch", *_angles(self.robot), "within", "reason"),
             shown,
             left_out,
             facts=(
@@ -244,8 +275,8 @@ class Solutions(Displayed):
         )
 
     def _sheet_of_search(self) -> Sheet:
-        q, solved = self.q.reshape(-1, 6), self.solved.reshape(-1)
-        first = np.degrees(q[:MOST_ROWS])
+        q, solved = self.q.reshape(-1, self.robot.joints), self.solved.reshape(-1)
+        first = _shown(self.robot, q[:MOST_ROWS])
         errors = [np.asarray(error).reshape(-1) for error in (self.position_error, self.rotation_error)]
         rows = (
             (pose, bool(done), *angles, 1000 * position, turn)
@@ -256,11 +287,16 @@ class Solutions(Displayed):
         shown, left_out = first_rows(rows, len(q))
         return Sheet(
             f"Search for {len(q)} pose{'s' * (len(q) != 1)} of {self.robot.name}: {np.count_nonzero(solved)} solved",
-            ("pose", "solved", *_ANGLES, "off_mm", "off_deg"),
+            ("pose", "solved", *_angles(self.robot), "off_mm", "off_deg"),
             shown,
             left_out,
             facts=tuple(f"unsolved: {shortly(why)}" for why in self.unsolved[:MOST_ROWS]),
         )
 
 
-_ANGLES = tuple(f"q{joint}_deg" for joint in range(1, 7))
+def _angles(robot: Robot) -> tuple[str, ...]:
+    return tuple(f"q{joint + 1}_{'mm' if slides else 'deg'}" for joint, slides in enumerate(robot.slides))
+
+
+def _shown(robot: Robot, q: Reals) -> Reals:
+    return q * np.where(robot.slides, 1000.0, np.degrees(1.0))

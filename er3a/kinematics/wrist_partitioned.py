@@ -13,10 +13,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er3a.errors import NotWristPartitionedError
+from er3a.geometry.angles import wrap_to_pi
 from er3a.geometry.vectors import Vector, signed_angle, unsigned_angle
 from er3a.kinematics.block_constants import BlockConstants, block_constants
-from er3a.kinematics.chain import axes_at_zero_theta
-from er3a.kinematics.closed_form import BOUNDARY_M, BOUNDARY_RAD, FOLD_OFFSET, SLOTS, ArmConstants, solve
+from er3a.kinematics.chain import axes_at_zero_theta, constant_links, row_values
+from er3a.kinematics.classes.four_bar import solve_near_reference
+from er3a.kinematics.classes.parallel_axes import ThreeParallel, three_parallel
+from er3a.kinematics.closed_form import (
+    BOUNDARY_M,
+    BOUNDARY_RAD,
+    FOLD_OFFSET,
+    REACHED,
+    SLOTS,
+    TOO_FAR,
+    ArmConstants,
+    solve,
+)
 from er3a.numerics.arrays import Reals
 from er3a.robots.derived import derived
 from er3a.robots.robot import Robot
@@ -31,6 +43,13 @@ class NotSixTurning:
     joints: int
     sliding: int
     code: Literal["not_six_turning_joints"] = "not_six_turning_joints"
+
+
+@dataclass(frozen=True)
+class CoupledWrist:
+    """The coupling is none of whole turns among the first three joints."""
+
+    code: Literal["coupled_wrist"] = "coupled_wrist"
 
 
 @dataclass(frozen=True)
@@ -64,7 +83,9 @@ class NoArmLength:
     code: Literal["upper_arm_or_forearm_without_length"] = "upper_arm_or_forearm_without_length"
 
 
-ClosedFormMissing = NotSixTurning | ElbowAxesNotParallel | NeighboursParallel | NoWristCentre | NoArmLength
+ClosedFormMissing = (
+    NotSixTurning | CoupledWrist | ElbowAxesNotParallel | NeighboursParallel | NoWristCentre | NoArmLength
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +151,13 @@ def closed_form_missing(robot: Robot) -> ClosedFormMissing | None:
 def _recognised(robot: Robot) -> WristPartitionedArm | ClosedFormMissing:
     if robot.rows != 6 or robot.joints != 6 or robot.sliding.any():
         return NotSixTurning(robot.joints, int(robot.sliding.sum()))
-    axes, points, T_base_tool = axes_at_zero_theta(robot)
+    if robot.coupling is not None and not _couples_the_arm_alone(robot.coupling):
+        return CoupledWrist()
+    return recognised(*axes_at_zero_theta(robot))
+
+
+def recognised(axes: Reals, points: Reals, T_base_tool: Reals) -> WristPartitionedArm | ClosedFormMissing:
+    """The arm, or what it lacks, of six axes (directions (6, 3) and points (6, 3), m) and the tool's pose (4, 4)."""
     if np.linalg.norm(np.cross(axes[1], axes[2])) > PARALLEL:
         return ElbowAxesNotParallel()
     for i, j in ((0, 1), (3, 4), (4, 5)):
@@ -156,6 +183,14 @@ def _recognised(robot: Robot) -> WristPartitionedArm | ClosedFormMissing:
     )
 
 
+def _couples_the_arm_alone(coupling: Reals) -> bool:
+    """Whether a coupling (6, 6) leaves the wrist alone, and takes whole turns to whole turns both ways."""
+    rest = coupling.copy()
+    rest[:3, :3] = np.eye(3)
+    whole = np.array_equal(coupling, np.round(coupling)) and round(abs(float(np.linalg.det(coupling)))) == 1
+    return whole and np.array_equal(rest, np.eye(6))
+
+
 def _meeting_point(axes: Reals, points: Reals) -> tuple[Reals, float]:
     """Point nearest to all lines by least squares, and its greatest distance from a line (m)."""
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
@@ -167,7 +202,11 @@ def _meeting_point(axes: Reals, points: Reals) -> tuple[Reals, float]:
 
 @derived
 def _constants(robot: Robot) -> ArmConstants:
-    arm = wrist_partitioned_arm(robot)
+    return constants_of(wrist_partitioned_arm(robot))
+
+
+def constants_of(arm: WristPartitionedArm) -> ArmConstants:
+    """The arm as the kernel takes it."""
     w = [_vector(axis) for axis in arm.axes]
     beside_6 = np.cross(arm.axes[5], np.eye(3)[np.argmin(np.abs(arm.axes[5]))])
     beside_6 /= np.linalg.norm(beside_6)
@@ -222,10 +261,33 @@ def constants_for_blocks(robot: Robot) -> BlockConstants:
     return block_constants(arm.axes, arm.points, arm.wrist, arm.tool_rotation, arm.wrist_in_tool, arm.elbow_sign)
 
 
+@derived
+def parallel_axes_arm(robot: Robot) -> ThreeParallel | None:
+    """The solver of an arm with axes 2, 3 and 4 parallel and 5 and 6 meeting (UR and its like); None for others."""
+    six = robot.rows == robot.joints == 6 and robot.coupling is None and not robot.sliding.any()
+    if not six or closed_form_missing(robot) is None:
+        return None
+    return three_parallel(constant_links(robot))
+
+
+def has_branches(robot: Robot) -> bool:
+    """Whether the arm has the eight branches of :mod:`er3a.kinematics.configuration`, told by signs of three factors."""
+    return closed_form_missing(robot) is None or parallel_axes_arm(robot) is not None
+
+
+def _slots_of_parallel_axes(
+    robot: Robot, arm: ThreeParallel, T: Reals, q_ref: Reals
+) -> tuple[Reals, NDArray[np.int8], Reals]:
+    x, gap = solve_near_reference(arm, T, robot.direction * q_ref + robot.offset)
+    q = wrap_to_pi(robot.direction * (x - robot.offset))
+    fault = np.where(np.isnan(q[..., 0]), TOO_FAR, REACHED).astype(np.int8)
+    return q, fault, gap
+
+
 def solve_slots(
     robot: Robot, T: Reals, q_ref: Reals, keep_folds: bool = False, keep_free: bool = False
 ) -> tuple[Reals, NDArray[np.int8], Reals]:
-    """All branches for a batch of poses.
+    """All branches for a batch of poses of a wrist-partitioned arm, or of one with parallel axes 2, 3 and 4.
 
     Parameters
     ----------
@@ -237,11 +299,15 @@ def solve_slots(
     Returns
     -------
     q : (N, 8, 6), rad, manufacturer's angles within half a turn of 0 (-pi..pi]; NaN where the slot has no solution
-    fault : (N, 8), int8: REACHED, TOO_FAR, TOO_NEAR, OFF_AXIS or ORIENTATION
+    fault : (N, 8), int8: REACHED, TOO_FAR, TOO_NEAR, OFF_AXIS or ORIENTATION (with parallel axes REACHED or TOO_FAR)
     gap : (N, 8): by how much, in m (rad for ORIENTATION)
     """
+    if (parallel := parallel_axes_arm(robot)) is not None:
+        return _slots_of_parallel_axes(robot, parallel, T, q_ref)
     shape = T.shape[0], SLOTS
     q, fault, gap = np.full((*shape, 6), np.nan), np.zeros(shape, dtype=np.int8), np.zeros(shape)
-    T, q_ref = np.ascontiguousarray(T), np.ascontiguousarray(q_ref)
+    T, q_ref = np.ascontiguousarray(T), np.ascontiguousarray(row_values(robot, q_ref))
     solve(_constants(robot), (robot.direction, robot.offset), T, q_ref, keep_folds, keep_free, (q, fault, gap))
+    if robot.coupling is not None:
+        q = wrap_to_pi(q @ np.round(np.linalg.inv(robot.coupling)).T)
     return q, fault, gap

@@ -7,10 +7,11 @@ correct. Results go to standard output, notes and progress to standard error.
 from __future__ import annotations
 
 import sys
+import warnings
 from importlib import import_module
 
 from er3a.errors import Er3aError
-from er3a.pipeline.commands.options import app, print_error
+from er3a.pipeline.commands.options import app, print_error, print_warning
 
 for _room in ("studies", "robot_files", "single_jobs"):  # in the order of --help; each registers its commands
     import_module(f"er3a.pipeline.commands.{_room}")
@@ -18,6 +19,7 @@ for _room in ("studies", "robot_files", "single_jobs"):  # in the order of --hel
 
 def main() -> None:
     """Entry point: errors that a user can correct are one line on standard error and exit code 2."""
+    warnings.showwarning = print_warning
     try:
         app(standalone_mode=True)
     except Er3aError as error:

@@ -15,10 +15,11 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from er3a.geometry.angles import wrap_to_pi
+from er3a.kinematics.chain import arm_length
 from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.forward import frames
 from er3a.kinematics.singularity import determinant_factors
-from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
+from er3a.kinematics.wrist_partitioned import parallel_axes_arm, solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.planning.moves import ToolPath
 from er3a.robots.robot import Robot
@@ -38,9 +39,11 @@ class Branches:
     ----------
     t : (N,), s, rising; progress : (N,), share of the way
     q : (N, 8, 6), rad in (-pi, pi], NaN where a branch has no solution
-    free_wrist : (N, 8) bool, whether joints 4 and 6 can turn against each other with the tool at rest
+    free_wrist : (N, 8) bool, whether joints 4 and 6 can turn against each other with the tool at rest (of arms with
+        parallel axes 2, 3 and 4: those with joint 6)
     free_shoulder : (N, 8) bool, whether joint 1 can turn with the wrist centre at rest
     straight : (N, 8) bool, whether the arm is stretched or folded, so that both elbow branches are one
+    beside : (N, 8) bool, of arms with parallel axes 2, 3 and 4, whether both shoulder branches are one
     factors : (N, 8, 3), distances from the wrist, elbow and shoulder singularities (rad, rad, m)
     """
 
@@ -50,12 +53,13 @@ class Branches:
     free_wrist: Flags
     free_shoulder: Flags
     straight: Flags
+    beside: Flags
     factors: Reals
 
     @property
     def meeting(self) -> Integers:
         """(N, 8), bits of the branch number (:mod:`er3a.kinematics.configuration`) that differ in a branch met."""
-        bits: Integers = self.free_wrist + 2 * self.straight + 4 * self.free_shoulder
+        bits: Integers = self.free_wrist + 2 * self.straight + 4 * (self.free_shoulder | self.beside)
         return bits
 
     @property
@@ -70,14 +74,19 @@ def branches_along(robot: Robot, line: ToolPath, t: Reals) -> Branches:
     grid = _solve_at(robot, line, t)
     grid = _merge(grid, _solve_at(robot, line, _closest_passes(grid)))
     while True:
-        wide = _unclear(grid) & (np.diff(grid.t) > SHORTEST_INTERVAL * line.duration)
+        wide = _unclear(grid, wrist_joints(robot)) & (np.diff(grid.t) > SHORTEST_INTERVAL * line.duration)
         if not wide.any():
             break
         middle = (grid.t[:-1] + grid.t[1:])[wide] / 2
         grid = _merge(grid, _solve_at(robot, line, middle))
     _fill_free_shoulder(robot, line, grid)
-    _fill_free_wrist(robot, grid)
+    _fill_free_wrist(robot, line, grid)
     return grid
+
+
+def wrist_joints(robot: Robot) -> list[int]:
+    """Joints (from 0) that can turn with the tool at rest where the wrist is singular."""
+    return [3, 5] if parallel_axes_arm(robot) is None else [1, 2, 3, 5]
 
 
 def turned_difference(a: Reals, b: Reals) -> Reals:
@@ -112,11 +121,13 @@ def _solve_at(robot: Robot, line: ToolPath, t: Reals) -> Branches:
     return Branches(t, progress, q, *_free(robot, q))
 
 
-def _free(robot: Robot, q: Reals) -> tuple[Flags, Flags, Flags, Reals]:
+def _free(robot: Robot, q: Reals) -> tuple[Flags, Flags, Flags, Flags, Reals]:
     factors = determinant_factors(robot, q)
     wrist, elbow, shoulder = (np.abs(value) for value in (factors.wrist, factors.elbow, factors.shoulder))
     distances = np.stack([wrist, elbow, shoulder], axis=-1)
-    return wrist < FREE_WRIST, shoulder < FREE_SHOULDER, elbow < STRAIGHT_ELBOW, distances
+    parallel = parallel_axes_arm(robot) is not None
+    beside = shoulder < STRAIGHT_ELBOW * arm_length(robot) * parallel
+    return wrist < FREE_WRIST, shoulder < FREE_SHOULDER * (not parallel), elbow < STRAIGHT_ELBOW, beside, distances
 
 
 def _merge(a: Branches, b: Branches) -> Branches:
@@ -152,10 +163,10 @@ def vertex(x: Reals, y: Reals, i: Integers) -> Reals:
     return np.clip(lowest, x[i[curved] - 1], x[i[curved] + 1])
 
 
-def _unclear(grid: Branches) -> Flags:
+def _unclear(grid: Branches, turned_by_wrist: list[int]) -> Flags:
     """(N - 1,) bool: intervals where a branch begins or ends, or moves a joint that is not free by a wide step."""
     step = np.abs(turned_difference(grid.q[:-1], grid.q[1:]))
-    for free, joints in ((grid.free_wrist, [3, 5]), (grid.free_shoulder, [0, 3, 4, 5])):
+    for free, joints in ((grid.free_wrist, turned_by_wrist), (grid.free_shoulder, [0, 3, 4, 5])):
         either = free[:-1] | free[1:]
         for joint in joints:
             step[either, joint] = 0.0
@@ -176,10 +187,15 @@ def _fill_free_shoulder(robot: Robot, line: ToolPath, grid: Branches) -> None:
         grid.q[free, side] = q[:, side]
 
 
-def _fill_free_wrist(robot: Robot, grid: Branches) -> None:
+def _fill_free_wrist(robot: Robot, line: ToolPath, grid: Branches) -> None:
     for slot in range(SLOTS):
         free = grid.free_wrist[:, slot]
-        if free.any():
+        if free.any() and parallel_axes_arm(robot) is not None:
+            rows = np.arange(len(free), dtype=float)
+            q_ref = grid.q[_kept(rows, free | ~grid.reached[:, slot]).astype(int), slot]
+            q_ref = np.where(np.isnan(q_ref), 0.0, q_ref)
+            grid.q[free, slot] = solve_slots(robot, line.poses(grid.progress[free]), q_ref[free])[0][:, slot]
+        elif free.any():
             kept = _kept(grid.q[:, slot, 3], free | ~grid.reached[:, slot])
             grid.q[free, slot] = wrap_to_pi(align_wrist(robot, grid.q[free, slot], kept[free]))
 

@@ -26,7 +26,7 @@ from er3a.kinematics.closed_form import SLOTS
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
 from er3a.numerics.runs import runs
-from er3a.planning.branch_tracking import WIDE_STEP, Branches, branches_along, turned_difference
+from er3a.planning.branch_tracking import WIDE_STEP, Branches, branches_along, turned_difference, wrist_joints
 from er3a.planning.followed import BranchJump, Followed
 from er3a.planning.moves import ToolPath
 from er3a.robots.joint_limits import LIMIT_TOLERANCE, nearest_equivalent, within
@@ -73,7 +73,7 @@ def follow(
     for first, last in runs(np.any(grid.reached, axis=1)):
         starts = np.flatnonzero(grid.reached[first])
         if first == 0:
-            starts = _admitted(grid, starts, q_start, start_slot)
+            starts = _admitted(robot, grid, starts, q_start, start_slot)
         best = _best(robot, grid, slice(first, last), starts, before)
         q[first:last], slot[first:last] = best.q, best.slot
         jumps += [_jump(grid.t, q, first + i) for i in np.flatnonzero(best.jumps).tolist()]
@@ -83,7 +83,9 @@ def follow(
     return Followed(robot, line, grid.t, grid.progress, q, slot, turn, tuple(jumps))
 
 
-def _admitted(grid: Branches, starts: Integers, q_start: Reals | None, start_slot: int | None) -> Integers:
+def _admitted(
+    robot: Robot, grid: Branches, starts: Integers, q_start: Reals | None, start_slot: int | None
+) -> Integers:
     if start_slot is not None:
         if start_slot not in starts:
             raise PoseError(f"the start pose has no solution on branch {start_slot}")
@@ -91,7 +93,7 @@ def _admitted(grid: Branches, starts: Integers, q_start: Reals | None, start_slo
     if q_start is None:
         return starts
     distance = np.abs(turned_difference(grid.q[0], q_start))
-    distance[np.ix_(grid.free_wrist[0], [3, 5])] = 0.0
+    distance[np.ix_(grid.free_wrist[0], wrist_joints(robot))] = 0.0
     distance[np.ix_(grid.free_shoulder[0], [0, 3, 4, 5])] = 0.0
     worst = distance.max(axis=1)[starts]
     admitted: Integers = starts[worst <= max(SAME_JOINTS, worst.min())]

@@ -13,7 +13,7 @@ import numpy as np
 
 from er3a.kinematics.forward import jacobian
 from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
-from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.kinematics.wrist_partitioned import parallel_axes_arm, solve_slots
 from er3a.numerics.arrays import Integers, Reals
 from er3a.planning.branch_tracking import FREE_SHOULDER, FREE_WRIST, align_wrist, onto_axis_1, turned_difference
 from er3a.planning.moves import ToolPath
@@ -84,6 +84,8 @@ class Followed:
         T = self.line.poses(progress)
         q = self._nearest(solve_slots(robot, T, q_ref)[0], q_ref, self.slot[left], self.slot[right])
         q[~known] = np.nan
+        if parallel_axes_arm(robot) is not None:  # the reference has told what is free
+            return q
         factors = determinant_factors(robot, q)
         on_axis = np.abs(factors.shoulder) < FREE_SHOULDER
         if on_axis.any():

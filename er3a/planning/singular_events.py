@@ -20,7 +20,9 @@ from scipy.optimize import brentq
 from scipy.signal import find_peaks
 
 from er3a.kinematics.near_singular import NearSingular, factor_of
-from er3a.kinematics.singularity import TYPES, SingularityType, determinant_factors
+from er3a.kinematics.rank_loss import rank_losses
+from er3a.kinematics.singularity import TYPES, EventType, SingularityType, determinant_factors
+from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Reals
 from er3a.numerics.runs import runs
 from er3a.robots.robot import Robot
@@ -43,14 +45,17 @@ class SingularEvent:
     ----------
     t, until : s; they differ where the motion stays on the set
     crossing : whether the motion meets the set; else it passes by at ``distance``
-    distance : rad (wrist, elbow) or m (shoulder); 0 for a crossing
+    distance : rad (wrist, elbow) or m (shoulder), of arms without these sets the smallest singular value; 0 for a
+        crossing
+    axes : of arms without these sets, numbers of the axes that become dependent
     """
 
     t: float
     until: float
-    type: SingularityType
+    type: EventType
     crossing: bool
     distance: float
+    axes: tuple[int, ...] = ()
 
 
 def singular_events(robot: Robot, t: Reals, q: Reals, joints: Joints, near: NearSingular) -> list[SingularEvent]:
@@ -62,6 +67,11 @@ def singular_events(robot: Robot, t: Reals, q: Reals, joints: Joints, near: Near
     joints : joint angles (..., 6) at times (...,) within reach
     near : distances below which a pass is reported
     """
+    if not has_branches(robot):
+        return [
+            SingularEvent(loss.t, loss.until, "dependent_axes", loss.crossing, loss.smallest, loss.axes)
+            for loss in rank_losses(robot, t, q, joints, near.smallest)
+        ]
     events: list[SingularEvent] = []
     for kind in TYPES:
 
@@ -71,7 +81,7 @@ def singular_events(robot: Robot, t: Reals, q: Reals, joints: Joints, near: Near
         values = factor_of(determinant_factors(robot, q), kind)
         for stretch in runs(np.isfinite(values)):
             events += _in_stretch(kind, t, values, stretch, factor, near)
-    return sorted(events, key=lambda event: (event.t, TYPES.index(event.type)))
+    return sorted(events, key=lambda event: (event.t, [*TYPES, "dependent_axes"].index(event.type)))
 
 
 def _in_stretch(

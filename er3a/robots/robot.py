@@ -177,7 +177,7 @@ class Robot(Displayed):
 
     @property
     def slides(self) -> Flags:
-        """(n,) bool, joints of q that are distances: the row of their number slides, or (if they don't move it) another."""
+        """(n,) bool, joints of q that are distances: the row of their number slides, or else one that they move."""
         if self.coupling is None:
             return self.sliding
         moved: Flags = (self.coupling[self.sliding] != 0).any(axis=0)

@@ -59,7 +59,6 @@ BAD = {
     ),
     "sphere in metres": ({"spheres": [SPHERE | {"radius_mm": 0.06}]}, "spheres[0].radius_mm", "can only be metres"),
     "position in metres": ({"boxes": [BOX | {"xyz_mm": [0.5, 0, 0.08]}]}, "boxes[0].xyz_mm", "can only be metres"),
-    "radians": ({"boxes": [BOX | {"rpy_deg": [0, 0, 1.5708]}]}, "boxes[0].rpy_deg", "can only be radians"),
     "NaN": ({"planes": [PLANE | {"offset_mm": float("nan")}]}, "planes[0].offset_mm", "refused"),
     "no direction": ({"planes": [PLANE | {"normal": [0, 0, 0]}]}, "planes[0].normal", "no direction"),
     "bad name": ({"planes": [PLANE | {"name": "the floor"}]}, "planes[0].name", "refused"),

@@ -157,7 +157,6 @@ DRIVES = {"source": "made up", "grade": "claim"}
         (lambda c: c["inertia"]["links"].append({"link": 3, "mass_kg": 1}), "inertia.links", "named twice"),
         (lambda c: c["inertia"]["links"].append({"link": 9, "mass_kg": 1}), "inertia", "link"),
         (lambda c: c["inertia"]["origins"].pop(), "inertia.origins", "not one for each joint"),
-        (lambda c: c["inertia"]["origins"][1].update(rpy_deg=[1.5708, -1.5708, 0]), "inertia.origins[1]", "radians"),
         (lambda c: c["inertia"].update(frame="dh"), "inertia.origins", "belong to frame urdf"),
         (
             lambda c: c.update(drives=DRIVES | {"rows": [{"joint": 1, "peak_n_m": 0}]}),

@@ -9,8 +9,11 @@ from hypothesis import strategies as st
 
 from er3a.files.robot_library import load_robot
 from er3a.files.robot_writer import write_robot
+from er3a.geometry.angles import wrap_to_pi
 from er3a.geometry.sphere import fibonacci_sphere
+from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward, frames, jacobian
+from er3a.kinematics.inverse import inverse
 from er3a.kinematics.table_batch import frames_of, tables_of
 from er3a.robots.conventions import to_modified, to_standard
 from er3a.robots.joint_limits import limit_margin, limits_exceeded, nearest_equivalent, turn_bounds, within
@@ -154,3 +157,19 @@ def test_any_chain_is_written_and_read_back(robot, tmp_path_factory):
     assert len(again.combined) == 1
     q = joints_at_random(robot, np.random.default_rng(0), 20)
     np.testing.assert_allclose(forward(again, q), forward(robot, q), rtol=0, atol=1e-11)
+
+
+def test_a_coupled_arm_is_solved_in_the_angles_of_its_pendant():
+    """Fanuc's J2 and J3: the closed form gives pendant angles, and the limit of their sum refuses some."""
+    arm = make_arm(coupling=FANUC, combined=(CombinedLimit((0, 1, 1, 0, 0, 0), -1.5, 1.5),))
+    own = joints_at_random(arm, np.random.default_rng(2), 300)
+    T = forward(arm, own)
+    many = inverse_batch(arm, T)
+    back = forward(arm, many.q[many.solved])
+    np.testing.assert_allclose(back, np.repeat(T, many.solved.sum(axis=1), axis=0), rtol=0, atol=1e-9)
+    assert (np.abs(wrap_to_pi(many.q - own[:, None])).max(axis=2) < 1e-6).any(axis=1).all()
+    np.testing.assert_array_equal(many.within_limits, many.solved & within(arm, many.q))
+    one = inverse(arm, T[0])
+    assert len(one.q) >= many.solved[0].sum()
+    np.testing.assert_allclose(forward(arm, one.q), np.broadcast_to(T[0], (len(one.q), 4, 4)), rtol=0, atol=1e-9)
+    assert {"combination_exceeded"} <= {why.joints[-1].code for why in one.reason if why} or one.within_limits.all()

@@ -320,3 +320,20 @@ def test_regular_poses_of_a_general_arm_leave_no_doubt():
     chain = links_of_rows(random.uniform(-1, 1, 6), random.uniform(-3, 3, 6), random.uniform(-1, 1, 6))
     found = solve_six_revolute(prepared(chain), poses_of(chain, random.uniform(-3, 3, (100, 6))))
     assert (found.certainty == CERTAIN).mean() > 0.95
+
+
+def test_branches_beside_a_self_motion_are_kept():
+    """Where one root of joint 1 has a four-bar, those of the other stand alone."""
+    random = np.random.default_rng(0)
+    arm = three_parallel(links("ur5"))
+    for _ in range(60):
+        q = random.uniform(-2.5, 2.5, 6)
+        q[4] = 0.0
+        T = pose_by_hand(ROWS["ur5"], q)
+        rows = solve_three_parallel(arm, T[None])[0][0]
+        solved = rows[np.isfinite(rows[:, 0])]
+        alone = solved[np.abs(np.sin(solved[:, 4])) > 1e-6]
+        general = solve_six_revolute(prepared(links("ur5")), T[None]).q[0]
+        general = general[np.isfinite(general[:, 0])]
+        wanted = general[np.abs(np.sin(general[:, 4])) > 1e-6]
+        assert all(nearest(alone, row) < 1e-6 for row in wanted)

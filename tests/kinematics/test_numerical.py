@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 import er3a
 from er3a.errors import Er3aError, PoseError, ShapeError
+from er3a.geometry.angles import wrap_to_pi
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward, frames
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.iteration import _E, _Q, _ROWS, _TARGET, LANES, _evaluate, uniform
-from er3a.kinematics.numerical import solve
-from er3a.kinematics.solutions import Iteration
-from er3a.kinematics.wrist_partitioned import closed_form_missing, wrist_partitioned_arm
+from er3a.kinematics.numerical import all_found, solve
+from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
 from er3a.pipeline.messages.kinematics import say
 from er3a.robots.joint_limits import within
 from testing.arms import DEG, arms, joints_at_random, joints_within, make_arm, placement, pose_errors
@@ -160,20 +160,21 @@ def test_nearest_arm_of_an_unreachable_pose_is_near(robot):
     assert found.position_error == pytest.approx(50 - forward(robot, found.q)[2, 3], abs=1e-3)
 
 
-def test_arms_without_closed_form_are_solved_by_iteration(random):
+def test_iteration_finds_what_the_class_of_the_arm_knows(random):
     arm = make_arm(**UR5)
     for q in joints_at_random(arm, random, 5):
         T = forward(arm, q)
         solution = inverse(arm, T, q)
-        assert solution.method == Iteration(400, closed_form_missing(arm))
-        assert solution.method.lacking.code == "no_common_point_of_axes_4_5_6"
+        assert solution.method.arm_class == "three_parallel"
         assert max(part.max() for part in pose_errors(forward(arm, solution.q), T)) < 1e-9
         assert (np.abs(solution.q - q).max(axis=1) < 1e-6).any()
-        assert (solution.label[0], solution.branch[0]) == ("found_arm", 0)
+        found = all_found(arm, T, 400)
+        known = wrap_to_pi(solution.q)
+        assert all((np.abs(wrap_to_pi(known - row)).max(axis=1) < 1e-6).any() for row in found)
     T[:3, 3] += 9
     nothing = inverse(arm, T)
     assert len(nothing.q) == 0
-    assert nothing.unsolved[0].why.code == "unreachable"
+    assert nothing.unsolved[0].why.code == "no_solution_of_class"
 
 
 def test_bad_arguments_are_refused(robot):

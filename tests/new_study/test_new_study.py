@@ -119,7 +119,6 @@ def test_a_table_with_all_columns(tmp_path):
         ("6,0,0,99.6\n", "", "the joints are 1, 2, 3, 4, 5"),
         ("-425", "-0.425", "looks like metres"),
         ("-425", "nan", "row 3, column a_mm"),
-        ("1,0,90", "1,0,1.5708", "looks like radians"),
         ("d_mm\n", "d_mm,lower_deg\n", "fields where the header has"),
     ],
 )

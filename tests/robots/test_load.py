@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import yaml
 
-from er3a.errors import InputError, ShapeError
+from er3a.errors import InputError, InputWarning, ShapeError
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.robots.robot import GRADES
 from testing.arms import make_arm, placement
@@ -155,7 +155,11 @@ def test_the_three_files_hold_the_gathered_numbers(robot):
 def test_every_group_has_a_source_and_a_grade(robot):
     speeds = {"speeds"} if np.isfinite(robot.speed).all() else set()
     envelopes = {"envelopes"} if robot.envelopes else set()
-    assert set(robot.sources) == {"dh", "zero", "limits"} | speeds | envelopes
+    masses = robot.masses
+    known = {"inertia": masses.links, "drives": masses.drives, "wrist_load": masses.wrist}
+    known["weight"] = np.isfinite(masses.weight)
+    more = {group for group, there in known.items() if there}
+    assert set(robot.sources) == {"dh", "zero", "limits"} | speeds | envelopes | more
     for source in robot.sources.values():
         assert source.grade in GRADES
         assert len(source.source) > 10
@@ -257,11 +261,6 @@ def test_calibrated_tables_may_hold_short_lengths(write):
         (scale("dh", ("a_mm", "d_mm"), 1e-3), "dh.rows[0].d_mm", "looks like metres"),
         (do(scale("dh", ("a_mm", "d_mm"), 1e-3), set_in("dh", "calibrated", to=True)), "dh.rows", "only be metres"),
         (scale("dh", ("a_mm", "d_mm"), 1e3), "dh.rows[0].d_mm", "longer than any robot's link"),
-        (set_in("dh", "rows", 0, "alpha_deg", to=-1.5708), "dh.rows[0].alpha_deg", "looks like radians. Write -90"),
-        (set_in("zero", "rows", 1, "offset_deg", to=1.5707963), "zero.rows[1].offset_deg", "radians. Write 90"),
-        (scale("limits", ("lower_deg", "upper_deg"), np.pi / 180), "limits.rows", "only be radians"),
-        (with_tool(xyz_mm=[0, 0, 0.15]), "tool.xyz_mm", "can only be metres. Multiply by 1000"),
-        (with_tool(rpy_deg=[0, 1.5708, 0]), "tool.rpy_deg[1]", "looks like radians. Write 90"),
         (with_tool(xyz_mm=[0, 150]), "tool.xyz_mm", "at least 3 items"),
         (set_in("dh", "rows", 0, "d_mm", to="367.5"), "dh.rows[0].d_mm", "'367.5' is refused. Write a number"),
         (set_in("dh", "rows", 0, "d_mm", to="367,5"), "dh.rows[0].d_mm", "'367,5' is refused. Write a number"),
@@ -326,3 +325,34 @@ def test_numbers_may_be_written_in_the_usual_ways(write, text):
 def test_a_robot_can_t_be_a_missing_file(tmp_path):
     error = refusal(tmp_path / "arm.yaml")
     assert error.problem == "there is no such file"
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (scale("dh", ("alpha_deg",), np.pi / 180), "dh.rows, zero.rows: .* deg may be radians"),
+        (
+            scale("limits", ("lower_deg", "upper_deg"), np.pi / 180),
+            "limits.rows: the widest limit is .* may be radians",
+        ),
+        (with_tool(xyz_mm=[0, 0, 0.15]), r"tool.xyz_mm: \[0.0, 0.0, 0.15\] mm may be metres"),
+        (with_tool(rpy_deg=[3.1416, 1.5708, 0]), r"tool.rpy_deg: .* deg may be radians"),
+    ],
+)
+def test_what_looks_like_a_slip_is_a_warning(write, change, told):
+    path = write(change)
+    with pytest.warns(InputWarning, match=rf"arm\.yaml: {told}"):
+        load_robot(path)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        set_in("dh", "rows", 0, "alpha_deg", to=-1.5708),
+        set_in("zero", "rows", 1, "offset_deg", to=1.5707963),
+        with_tool(rpy_deg=[1.5, -2, 0.5]),
+        with_tool(xyz_mm=[0, 0, 0.0004]),
+    ],
+)
+def test_degrees_below_two_pi_are_legal(write, change):
+    load_robot(write(change))

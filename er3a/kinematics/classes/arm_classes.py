@@ -3,42 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
-from er3a.kinematics.classes.arm_angle import arm_angle_arm
+from er3a.kinematics.classes.chain_solvers import ArmClassCode, chain_solver
 from er3a.kinematics.classes.links import axes_of, size_of
-from er3a.kinematics.classes.parallel_axes import three_parallel
-from er3a.kinematics.classes.scara import scara
 from er3a.numerics.arrays import Flags, Reals
 
 PARALLEL = 1e-9  # rad
 MEETS_M = 1e-9
 NEARLY = 1e-3  # rad or parts of the arm's size: a property that the arm has nearly
-
-ArmClassCode = Literal[
-    "spherical_wrist",
-    "three_parallel",
-    "general_six",
-    "six_one_prismatic",
-    "arm_angle",
-    "redundant",
-    "scara",
-    "free_roll",
-    "unsolved",
-]
-SLOTS_OF: dict[ArmClassCode, int] = {
-    "spherical_wrist": 8,
-    "three_parallel": 8,
-    "general_six": 16,
-    "six_one_prismatic": 16,
-    "arm_angle": 8,
-    "redundant": 16,
-    "scara": 2,
-    "free_roll": 16,
-    "unsolved": 0,
-}
 
 
 @dataclass(frozen=True)
@@ -63,38 +37,21 @@ class ArmClass:
 def arm_class(links: Reals, sliding: Flags | None = None) -> ArmClass:
     """The class of a chain with constant links (n + 1, 4, 4); ``sliding`` (n,) tells prismatic joints.
 
-    - ``spherical_wrist``: six revolute joints, axes 4, 5, 6 meet to 1e-9 m, 2 and 3 are parallel to 1e-9 rad;
+    - ``spherical_wrist``: axes 2 and 3 parallel to 1e-9 rad, axes 4, 5, 6 meet to 1e-9 m;
     - ``three_parallel``: axes 2, 3, 4 parallel, 5 and 6 meet; ``general_six``: any other six revolute joints;
-    - ``six_one_prismatic``: six joints, one of them prismatic;
-    - ``arm_angle``: seven revolute joints, the first three axes meet, and the last three; ``redundant``: other seven;
-    - ``scara``: four joints with one direction, one of them prismatic; ``free_roll``: five revolute joints, solved with
-      a sixth about the tool's z axis, for tools that may turn about it;
+    - ``six_one_prismatic``: six joints, one of them (or two neighbours) prismatic;
+    - ``arm_angle``: seven revolute joints, the first three axes meet, and the last three; ``redundant``: others with
+      more than six joints;
+    - ``scara``: four joints with one direction, one of them prismatic; ``free_roll``: five joints, the turn about the
+      tool's z axis is left over; ``planar_wrist``: four or five joints, of which a turn across the last axes is left
+      over; ``position``: three joints, solved for the tool point;
     - ``unsolved``: none of these.
     """
     sliding = np.zeros(len(links) - 1, dtype=bool) if sliding is None else np.asarray(sliding, dtype=bool)
-    pairs = _neighbours(links)
-    size = size_of(links)
-    code = _code(links, sliding, pairs)
+    pairs, size, solver = _neighbours(links), size_of(links), chain_solver(links, sliding)
     parallel = tuple(pair for pair in pairs if PARALLEL < pair.angle < NEARLY)
     meeting = tuple(pair for pair in pairs if MEETS_M < pair.miss < NEARLY * size)
-    return ArmClass(code, SLOTS_OF[code], parallel, meeting)
-
-
-def _code(links: Reals, sliding: Flags, pairs: tuple[AxisPair, ...]) -> ArmClassCode:
-    n = len(sliding)
-    if n == 4:
-        return "scara" if scara(links, sliding) else "unsolved"
-    if n == 5 and not sliding.any():
-        return "free_roll"
-    if n == 6 and sliding.any():
-        return "six_one_prismatic" if sliding.sum() == 1 else "unsolved"
-    if n == 6:
-        if pairs[1].angle < PARALLEL and _meet(links, (3, 4, 5)):
-            return "spherical_wrist"
-        return "three_parallel" if three_parallel(links) else "general_six"
-    if n == 7 and not sliding.any():
-        return "arm_angle" if arm_angle_arm(links) else "redundant"
-    return "unsolved"
+    return ArmClass(solver.code, solver.slots, parallel, meeting)
 
 
 def _neighbours(links: Reals) -> tuple[AxisPair, ...]:
@@ -107,15 +64,6 @@ def _neighbours(links: Reals) -> tuple[AxisPair, ...]:
         miss = np.linalg.norm(np.cross(apart, axes[k])) if sine < PARALLEL else abs(apart @ across) / sine
         found.append(AxisPair(k + 1, float(np.arctan2(sine, abs(axes[k] @ axes[k + 1]))), float(miss)))
     return tuple(found)
-
-
-def _meet(links: Reals, numbers: tuple[int, ...]) -> bool:
-    axes, points = axes_of(links)
-    a, p = axes[list(numbers)], points[list(numbers)]
-    across = np.eye(3) - a[:, :, None] * a[:, None, :]
-    right = (across @ p[:, :, None]).reshape(-1)
-    place = np.linalg.lstsq(across.reshape(-1, 3), right, rcond=None)[0]
-    return bool(np.linalg.norm((across @ (place - p)[:, :, None])[..., 0], axis=1).max() < MEETS_M)
 
 
 def with_joint_fixed(links: Reals, joint: int, value: float) -> Reals:

@@ -37,6 +37,7 @@ class FourBar:
     theta_1, theta_5 : rad, the same in all members
     wrist : (2,), m, W in the plane; total : rad, constant sum (or difference) of phi and ``sense_6`` joint 6
     intervals : (k, 2), rad, ranges of phi that the arm reaches; both elbows meet at an end; a full turn has none
+    shoulders : roots of joint 1 (0, 1) that it belongs to
     """
 
     arm: ThreeParallel
@@ -46,6 +47,20 @@ class FourBar:
     total: float
     sense_6: float
     intervals: Reals
+    shoulders: tuple[int, ...]
+
+    def nearest(self, phi: float) -> float:
+        """The turn within the intervals that is nearest to phi, whole turns aside."""
+        best, at = np.inf, phi
+        for low, high in self.intervals:
+            middle = 0.5 * (low + high)
+            turned = middle + float(wrapped(np.array(phi - middle)))
+            inside = min(max(turned, low), high)
+            for each in (inside, low, high):
+                away = abs(float(wrapped(np.array(each - phi))))
+                if away < best:
+                    best, at = away, float(each)
+        return at
 
     def members(self, phi: Reals, elbow: int) -> Reals:
         """Joint angles (..., 6) in rad at turns phi (...,) with one elbow (0 or 1); NaN outside the intervals."""
@@ -89,11 +104,63 @@ def solve_three_parallel(arm: ThreeParallel, T: Reals) -> tuple[Reals, Flags]:
     if left.size:
         rows = np.empty((left.size, SLOTS, 6))
         solve_parallel_blocks(arm.constants, T[left], arm.constants.near_m, rows, np.empty(left.size, dtype=bool))
-        polish_rows(arm.links, size_of(arm.links), T[left], rows)
+        polish_rows(arm.links, size_of(arm.links), T[left], rows, True)
         for row, n in zip(rows, left):
             _put_members(row, four_bars(arm, T[n]))
         q[left] = rows
     return q, marked
+
+
+def solve_near_reference(arm: ThreeParallel, T: Reals, x_ref: Reals) -> tuple[Reals, Reals]:
+    """All slots for poses T (N, 4, 4) with the free turn of a four-bar where a reference (N, 6) has it.
+
+    Where joint 5's roots meet, so do the slots of both; each elbow has its member in them.
+
+    Returns
+    -------
+    q : (N, 8, 6), rad, in (-pi, pi]; NaN where a slot has none
+    gap : (N, 8), m, by how much W or axis 4 are out of reach in slots without solution, 0 in others
+    """
+    T = np.ascontiguousarray(T, dtype=float)
+    q, marked = np.empty((len(T), SLOTS, 6)), np.empty(len(T), dtype=bool)
+    solve_parallel_blocks(arm.constants, T, 0.0, q, marked)
+    for n in np.flatnonzero(marked):
+        found = four_bars(arm, T[n])
+        rows = np.empty((1, SLOTS, 6))
+        solve_parallel_blocks(arm.constants, T[n : n + 1], arm.constants.near_m, rows, np.empty(1, dtype=bool))
+        polish_rows(arm.links, size_of(arm.links), T[n : n + 1], rows, False)
+        q[n] = rows[0]
+        for family in found:
+            phi = turn_of_three(arm, x_ref[n])
+            for elbow in (0, 1):
+                member = family.members(np.array(family.nearest(phi)), elbow)
+                for shoulder in family.shoulders:
+                    q[n, 4 * shoulder + 2 * elbow : 4 * shoulder + 2 * elbow + 2] = member
+    return q, _gaps(arm, T, q)
+
+
+def turn_of_three(arm: ThreeParallel, x: Reals) -> Reals:
+    """The turn phi (...,) of joints 2, 3 and 4 together about their direction, at joint angles (..., 6)."""
+    k = arm.constants
+    return np.asarray(x[..., 1] + k.sense_3 * x[..., 2] + k.sense_4 * x[..., 3] + k.zero_sum)
+
+
+def _gaps(arm: ThreeParallel, T: Reals, q: Reals) -> Reals:
+    """By how much (N, 8), m, slots without solution are out of reach."""
+    k, gap = arm.constants, np.zeros(q.shape[:2])
+    for n in np.flatnonzero(np.isnan(q[..., 0]).any(axis=1)):
+        p = (T[n, :3, :3] @ np.array(k.wrist_in_tool) + T[n, :3, 3] - np.array(k.place)) @ np.array(k.turn).T
+        across, wanted = float(np.hypot(p[0], p[1])), (k.height - k.cos_lean * p[2]) / k.sin_lean
+        root = np.sqrt(max(across**2 - wanted**2, 0.0))
+        for shoulder, v in ((0, -root), (1, root)):
+            W = np.array([k.cos_lean * wanted - k.sin_lean * p[2], v])
+            away, slack = float(np.linalg.norm(W - k.axis_2)), float(np.hypot(*k.rest))
+            reach, least = k.upper_arm + k.forearm, abs(k.upper_arm - k.forearm)
+            # axis 4 is somewhere on a circle about W
+            most = max(abs(wanted) - across, away - reach - slack, least - slack - away, 1e-12)
+            part = slice(4 * shoulder, 4 * shoulder + 4)
+            gap[n, part] = np.where(np.isnan(q[n, part, 0]), most, 0.0)
+    return gap
 
 
 def _put_members(rows: Reals, families: tuple[FourBar, ...]) -> None:
@@ -119,7 +186,8 @@ def four_bars(arm: ThreeParallel, T: Reals) -> tuple[FourBar, ...]:
         return ()
     spread = np.arctan2(np.sqrt(max((across - wanted) * (across + wanted), 0.0)), wanted)
     found: list[FourBar] = []
-    for theta_1 in sorted({np.arctan2(p[1], p[0]) + spread, np.arctan2(p[1], p[0]) - spread}):
+    for shoulder, sign in ((0, 1.0), (1, -1.0)):
+        theta_1 = np.arctan2(p[1], p[0]) + sign * spread
         back = about_z(-theta_1)
         to_plane = np.array([[k.cos_lean, 0, -k.sin_lean], [0, 1, 0], [k.sin_lean, 0, k.cos_lean]]) @ back
         z, x, W = to_plane @ axis_6, to_plane @ beside, (to_plane @ p)[:2]
@@ -134,6 +202,7 @@ def four_bars(arm: ThreeParallel, T: Reals) -> tuple[FourBar, ...]:
         total = float(np.arctan2(x[1], x[0])) - phi_5
         intervals = _intervals(k, W)
         if len(intervals) and not any(abs(np.cos(theta_1 - other.theta_1) - 1) < 1e-12 for other in found):
+            shoulders = (shoulder,) if spread > 1e-6 else (0, 1)
             found.append(
                 FourBar(
                     arm,
@@ -143,6 +212,7 @@ def four_bars(arm: ThreeParallel, T: Reals) -> tuple[FourBar, ...]:
                     total,
                     up,
                     intervals,
+                    shoulders,
                 )
             )
     return tuple(found)

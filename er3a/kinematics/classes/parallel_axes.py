@@ -9,7 +9,7 @@ keeps its component along w [1]_:
 3. axis 4 then has its place in the plane, which joints 2 and 3 reach as a triangle with two roots.
 
 Angles come from half-angle tangents and no sine of a joint is evaluated (see :mod:`er3a.kinematics.block_inverse`). The
-slot is ``4 shoulder + 2 wrist + elbow``, each 0 for the positive root.
+slot is ``4 shoulder + 2 elbow + wrist``, each 0 for the positive root.
 
 Where axis 6 is parallel to w (q5 = 0 of a UR) the roots of step 2 meet and phi is free: see :mod:`four_bar`.
 
@@ -185,11 +185,11 @@ def solve_parallel_blocks(k: ParallelConstants, T: Reals, slack: float, q: Reals
             _first_joint(k, pose, side, 1.0 - 2.0 * shoulder, slack)
             for wrist in range(2):
                 _wrist_and_elbow(k, pose, side, 1.0 - 2.0 * wrist, slack, out)
-                slot = 4 * shoulder + 2 * wrist
+                slot = 4 * shoulder + wrist
                 for i in range(size):
                     for j in range(6):
                         q[start + i, slot, j] = out[j * BLOCK + i]
-                        q[start + i, slot + 1, j] = out[(6 + j) * BLOCK + i]
+                        q[start + i, slot + 2, j] = out[(6 + j) * BLOCK + i]
         for i in range(size):
             marked[start + i] = pose[_MARK * BLOCK + i] > 0.0
 
@@ -312,9 +312,9 @@ def _wrist_and_elbow(k: ParallelConstants, pose: Reals, side: Reals, sign: float
 
 
 @kernel
-def polish_rows(links: Reals, size: float, T: Reals, q: Reals) -> None:
-    """Newton's steps on rows (N, 8, 6) near singular poses; rows that do not solve the pose, and the second of two
-    that meet, become NaN."""
+def polish_rows(links: Reals, size: float, T: Reals, q: Reals, apart: bool) -> None:
+    """Newton's steps on rows (N, 8, 6) near singular poses; rows that do not solve the pose and, with ``apart``, the
+    second of two that meet, become NaN."""
     scaled, pose, w, J = links.copy(), np.empty((4, 4)), np.empty((8, 4, 4)), np.empty((6, 7))
     dq, columns, sliding = np.empty(12), np.zeros(6, np.int64), np.zeros(6, np.bool_)
     scaled[:, :3, 3] /= size
@@ -332,11 +332,11 @@ def polish_rows(links: Reals, size: float, T: Reals, q: Reals) -> None:
                 continue
             for j in range(6):
                 row[j] -= TURN * np.ceil((row[j] - np.pi) / TURN)
-            for other in range(slot):
-                apart = 0.0
+            for other in range(slot if apart else 0):
+                distance = np.inf if np.isnan(q[n, other, 0]) else 0.0
                 for j in range(6):
                     away = row[j] - q[n, other, j]
-                    apart = max(apart, abs(away - TURN * np.round(away / TURN)))
-                if apart < NEAR:
+                    distance = max(distance, abs(away - TURN * np.round(away / TURN)))
+                if distance < NEAR:
                     row[:] = np.nan
                     break

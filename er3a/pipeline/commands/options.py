@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import sys
+import warnings
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from er3a.errors import Er3aError
+from er3a.errors import Er3aError, InputWarning
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import load_study
 from er3a.version import __version__
@@ -24,7 +25,7 @@ ROBOT_FILES = "Robot files"
 JOBS = "Single jobs, as the workflow calls them"
 
 _START = """\
-er3a: can this kinematic model of a six-axis robot be trusted, and what can the robot do?
+er3a: can this kinematic model of a serial robot be trusted, and what can the robot do?
 
   er3a new cell --urdf arm.urdf   a study of your arm in the folder cell (or --dh table.csv, or --robot er3_600)
   er3a check FILE ...             what is wrong with a robot, study, target, path, scene or reference file
@@ -36,7 +37,7 @@ All commands: er3a --help. What one takes: er3a run --help."""
 
 app = typer.Typer(
     name="er3a",
-    help="Can this kinematic model of a six-axis robot be trusted, and what can the robot do?",
+    help="Can this kinematic model of a serial robot be trusted, and what can the robot do?",
     pretty_exceptions_enable=False,
 )
 
@@ -53,7 +54,7 @@ def start(
     context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Print the version and end.")] = False,
 ) -> None:
-    """Can this kinematic model of a six-axis robot be trusted, and what can the robot do?"""
+    """Can this kinematic model of a serial robot be trusted, and what can the robot do?"""
     if version:
         print(f"er3a {__version__}")
         raise typer.Exit
@@ -93,6 +94,17 @@ def print_json(content: Any) -> None:
 def print_note(text: str) -> None:
     """What is worth knowing besides the result."""
     print(f"note: {text}", file=sys.stderr)
+
+
+def print_warning(message: Warning | str, category: type[Warning], *rest: Any, **named: Any) -> None:
+    """What may be a slip in a file; other warnings as Python shows them."""
+    if issubclass(category, InputWarning):
+        print(f"warning: {message}", file=sys.stderr)
+    else:
+        _show_warning(message, category, *rest, **named)
+
+
+_show_warning = warnings.showwarning
 
 
 def print_error(error: Er3aError | str) -> None:

@@ -3,28 +3,35 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from er3a.errors import Er3aError
+from er3a.files.robot_file import NAME_PATTERN
 from er3a.pipeline.commands.options import ROBOT_FILES, AnyRobot, AsJson, app, print_json, print_note
 from er3a.pipeline.stages.registry import STAGES
 
 
 @app.command(rich_help_panel=ROBOT_FILES)
 def import_urdf(
-    file: Annotated[Path, typer.Argument(help="a URDF of a six-axis serial arm")],
+    file: Annotated[Path, typer.Argument(help="a URDF of a serial arm (expanded, if it is xacro)")],
     output: Annotated[Path, typer.Option(help="the robot file to write")],
+    base: Annotated[str | None, typer.Option(help="the link at which the arm begins; the root by default")] = None,
+    tip: Annotated[str | None, typer.Option(help="the link at which it ends, if the file leaves a choice")] = None,
     snap: Annotated[bool, typer.Option(help="take angles within 1e-4 rad of a right angle for it, and say so")] = False,
     as_json: AsJson = False,
 ):
     """Derive a robot file (D-H table, directions, offsets, limits) from a URDF's axes."""
     from er3a.files.robot_writer import write_robot
     from er3a.formats.urdf import import_urdf as read_urdf
+    from er3a.formats.urdf import robot_name
 
-    imported = read_urdf(file, snap=snap)
+    imported = read_urdf(file, base=base, tip=tip, snap=snap)
+    name = robot_name(output)
+    output = output.with_name(f"{name}.yaml") if re.fullmatch(NAME_PATTERN, output.stem) is None else output
     write_robot(imported.robot.replace(name=output.stem), output)
     for note in imported.notes:
         print_note(note)

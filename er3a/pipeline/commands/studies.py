@@ -37,6 +37,8 @@ from er3a.pipeline.verdicts import StageVerdict, read_verdicts
 def new(
     folder: Annotated[Path, typer.Argument(help="where the study is written; no file that is there is touched")],
     urdf: Annotated[Path | None, typer.Option(help="the arm, as URDF")] = None,
+    base: Annotated[str | None, typer.Option(help="the URDF's link at which the arm begins")] = None,
+    tip: Annotated[str | None, typer.Option(help="the URDF's link at which the arm ends")] = None,
     dh: Annotated[Path | None, typer.Option(help="the arm, as a CSV table: joint, a_mm, alpha_deg, d_mm ...")] = None,
     robot: Annotated[str | None, typer.Option(help="the arm, by the name or the file of a robot of er3a")] = None,
     name: Annotated[str | None, typer.Option(help="the robot's name in the study; by default that of its file")] = None,
@@ -46,7 +48,7 @@ def new(
     from er3a.pipeline.new_study.brought_arm import arm_of
     from er3a.pipeline.new_study.write import write_study
 
-    arm = arm_of(urdf, dh, robot, name=name, modified=modified)
+    arm = arm_of(urdf, dh, robot, name=name, modified=modified, ends=(base, tip))
     for note in arm.notes:
         print_note(note)
     for file in write_study(arm, folder):

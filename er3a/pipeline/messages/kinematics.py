@@ -6,10 +6,12 @@ from collections.abc import Sequence
 
 from er3a.kinematics.solutions import (
     BadGuess,
+    ByClass,
     Iteration,
     Label,
     LimitBound,
     NearestMiss,
+    NoSolutionOfClass,
     PoseUnsolved,
     SideUnsolved,
     SingularEnd,
@@ -20,6 +22,7 @@ from er3a.kinematics.solutions import (
     WristTooNearAxis1,
 )
 from er3a.kinematics.wrist_partitioned import (
+    CoupledWrist,
     ElbowAxesNotParallel,
     NeighboursParallel,
     NoArmLength,
@@ -39,9 +42,41 @@ BRANCHES = {
     "back_elbow_up_flip": N_("back, elbow up, flip"),
     "back_elbow_down_no_flip": N_("back, elbow down, no flip"),
     "back_elbow_down_flip": N_("back, elbow down, flip"),
+    "shoulder_plus_elbow_plus_wrist_plus": N_("shoulder +, elbow +, wrist +"),
+    "shoulder_plus_elbow_plus_wrist_minus": N_("shoulder +, elbow +, wrist -"),
+    "shoulder_plus_elbow_minus_wrist_plus": N_("shoulder +, elbow -, wrist +"),
+    "shoulder_plus_elbow_minus_wrist_minus": N_("shoulder +, elbow -, wrist -"),
+    "shoulder_minus_elbow_plus_wrist_plus": N_("shoulder -, elbow +, wrist +"),
+    "shoulder_minus_elbow_plus_wrist_minus": N_("shoulder -, elbow +, wrist -"),
+    "shoulder_minus_elbow_minus_wrist_plus": N_("shoulder -, elbow -, wrist +"),
+    "shoulder_minus_elbow_minus_wrist_minus": N_("shoulder -, elbow -, wrist -"),
+    "elbow_plus": N_("elbow +"),
+    "elbow_minus": N_("elbow -"),
+    "wrist_plus": N_("wrist +"),
+    "wrist_minus": N_("wrist -"),
+}
+ARM_CLASSES = {
+    "spherical_wrist": N_("spherical wrist, axes 2 and 3 parallel: up to 8 solutions in closed form"),
+    "three_parallel": N_("axes 2, 3 and 4 parallel: up to 8 solutions in closed form"),
+    "general_six": N_("six revolute joints without special geometry: up to 16 solutions by elimination"),
+    "six_one_prismatic": N_("six joints, one of them sliding: up to 16 solutions by elimination"),
+    "spherical_wrist_any": N_("spherical wrist on three joints of any kind: up to 8 solutions"),
+    "gantry": N_("three sliding joints and three that turn: two solutions in closed form"),
+    "arm_angle": N_("spherical shoulder and wrist: up to 8 solutions in closed form at each arm angle"),
+    "redundant": N_("more than six joints: solutions at given values of the redundant ones, and self-motions"),
+    "scara": N_("SCARA: two solutions for x, y, z and yaw in closed form"),
+    "free_roll": N_("five joints: solutions for the tool point and the tool's axis; the turn about it is left over"),
+    "planar_wrist": N_("fewer than six joints: solutions of those poses that they can take exactly"),
+    "position": N_("three joints: solutions for the tool point"),
+    "unsolved": N_("no class"),
 }
 SIDES = {"front": N_("front"), "back": N_("back")}
-SINGULARITIES = {"wrist": N_("wrist"), "elbow": N_("elbow"), "shoulder": N_("shoulder")}
+SINGULARITIES = {
+    "wrist": N_("wrist"),
+    "elbow": N_("elbow"),
+    "shoulder": N_("shoulder"),
+    "dependent_axes": N_("rank loss"),
+}
 LIMIT_SIDES = {
     "above": N_("J{joint} at {at:.1f} deg is {by:.3g} deg above its limit of {bound:g} deg"),
     "below": N_("J{joint} at {at:.1f} deg is {by:.3g} deg below its limit of {bound:g} deg"),
@@ -114,6 +149,11 @@ def _(found: NotSixTurning) -> str:
 
 
 @say.register
+def _(found: CoupledWrist) -> str:
+    return sentence(found.code, "its joints are coupled in another way than by whole turns among the first three")
+
+
+@say.register
 def _(found: ElbowAxesNotParallel) -> str:
     return sentence(found.code, "axes 2 and 3 are not parallel")
 
@@ -131,6 +171,23 @@ def _(found: NoWristCentre) -> str:
 @say.register
 def _(found: NoArmLength) -> str:
     return sentence(found.code, "the upper arm or the forearm has no length")
+
+
+@say.register
+def _(found: ByClass) -> str:
+    parts = {"arm_class": word("arm_class", ARM_CLASSES, found.arm_class)}
+    if not found.certain:
+        return sentence("by_class_in_doubt", "{arm_class}; rounding leaves a doubt whether these are all", **parts)
+    if not found.named:
+        return sentence(
+            "by_class_numbered", "{arm_class}; no signs separate its branches, so they are numbered", **parts
+        )
+    return sentence(found.code, "{arm_class}", **parts)
+
+
+@say.register
+def _(found: NoSolutionOfClass) -> str:
+    return sentence(found.code, "no joint values reach the pose; {miss}", miss=say(found.miss))
 
 
 @say.register

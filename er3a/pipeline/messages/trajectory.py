@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import er3a.pipeline.messages.collision  # noqa: F401
-from er3a.kinematics.singularity import SingularityType
+from er3a.kinematics.singularity import EventType
 from er3a.pipeline.messages.kinematics import SINGULARITIES
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
@@ -58,9 +58,27 @@ def kind_word(kind: PathKind) -> str:
     return word("trajectory.kind", KINDS, kind)
 
 
-def type_word(kind: SingularityType) -> str:
+def type_word(kind: EventType) -> str:
     """A type of singularity."""
     return word("singularity", SINGULARITIES, kind)
+
+
+def event_word(event: Singularity) -> str:
+    """A singularity's type, or the axes that become dependent where the field has no name for it."""
+    if event.type != "dependent_axes":
+        return type_word(event.type)
+    return sentence("dependent_axes", "axes {axes} dependent", axes=", ".join(map(str, event.axes)))
+
+
+def event_distance(event: Singularity) -> str:
+    """How far from the singular set a pass is, with its unit."""
+    if event.distance_deg is not None:
+        return f"{event.distance_deg:.3g} deg"
+    if event.distance_mm is not None:
+        return f"{event.distance_mm:.3g} mm"
+    return sentence(
+        "smallest_singular_value", "smallest singular value {value:.3g}", value=event.smallest_singular_value
+    )
 
 
 def strategy_word(name: StrategyName) -> str:
@@ -109,11 +127,10 @@ def _speeds(bounded: bool) -> str:
 @say.register
 def _(event: Singularity) -> str:
     when = f"{event.t_s:.4g}" if event.t_s == event.until_s else f"{event.t_s:.4g} – {event.until_s:.4g}"
-    kind = type_word(event.type)
+    kind = event_word(event)
     if event.crossing:
         return sentence("singularity.met", "{type} at t = {when} s", type=kind, when=when)
-    distance = f"{event.distance_deg:.3g} deg" if event.distance_mm is None else f"{event.distance_mm:.3g} mm"
-    passed = {"type": kind, "when": when, "distance": distance}
+    passed = {"type": kind, "when": when, "distance": event_distance(event)}
     return sentence("singularity.passed", "{type} at t = {when} s, at {distance}", **passed)
 
 

@@ -36,7 +36,13 @@ class Arm:
 
 
 def arm_of(
-    urdf: Path | None, dh: Path | None, robot: str | None, *, name: str | None = None, modified: bool = False
+    urdf: Path | None,
+    dh: Path | None,
+    robot: str | None,
+    *,
+    name: str | None = None,
+    modified: bool = False,
+    ends: tuple[str | None, str | None] = (None, None),
 ) -> Arm:
     """The arm that exactly one of a URDF, a D-H table and a robot's name or file describes.
 
@@ -44,6 +50,7 @@ def arm_of(
     ----------
     name : of the robot in the study; by default that of the file
     modified : whether the D-H table is modified (Craig)
+    ends : the URDF's links at which the arm begins and ends, where the file leaves a choice
 
     Raises
     ------
@@ -59,16 +66,18 @@ def arm_of(
         raise Er3aError(f"--name '{name}' can't be a robot's name: {told}")
     if modified and dh is None:
         raise Er3aError("--modified says how a table is meant; give it with --dh")
+    if urdf is None and ends != (None, None):
+        raise Er3aError("--base and --tip are links of a URDF; give them with --urdf")
     if urdf is not None:
-        return _from_urdf(urdf, name or robot_name(urdf))
+        return _from_urdf(urdf, name or robot_name(urdf), ends)
     if dh is not None:
         content, notes = read_dh_table(dh, name or robot_name(dh), "modified" if modified else "standard")
         return Arm(robot_of(content), _text(content), notes)
     return _known(str(robot), name)
 
 
-def _from_urdf(path: Path, name: str) -> Arm:
-    imported = import_urdf(path, snap=True)
+def _from_urdf(path: Path, name: str, ends: tuple[str | None, str | None]) -> Arm:
+    imported = import_urdf(path, base=ends[0], tip=ends[1], snap=True)
     robot = imported.robot.replace(name=name)
     try:
         content = robot_file(robot)
@@ -91,4 +100,4 @@ def _known(robot: str, name: str | None) -> Arm:
 
 
 def _text(content: RobotFile) -> str:
-    return SCHEMA_LINE + yaml_text(content.model_dump(exclude_none=True))
+    return SCHEMA_LINE + yaml_text(content.model_dump(exclude_none=True, exclude_defaults=True))

@@ -23,7 +23,7 @@ from er3a.geometry.transforms import rpy_of
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.near_singular import NearSingular
 from er3a.kinematics.singularity import characteristic_length, conditioning
-from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.new_study.surroundings import SampledReach
 from er3a.pipeline.stages.trajectory.collisions import Surroundings, measured
@@ -82,7 +82,7 @@ class TaskSearch:
     near: NearSingular = field(init=False)
 
     def __post_init__(self) -> None:
-        self.closed_form = closed_form_missing(self.robot) is None
+        self.closed_form = has_branches(self.robot)
         wrist, elbow = np.radians([self.settings.near_wrist_deg, self.settings.near_elbow_deg])
         self.near = NearSingular(float(wrist), float(elbow), self.settings.near_shoulder_mm / 1000)
 

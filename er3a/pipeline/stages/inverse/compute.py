@@ -8,8 +8,10 @@ import numpy as np
 
 from er3a.files.scene_file import load_scene
 from er3a.files.target_file import load_targets
+from er3a.kinematics.by_class import arm_solver
+from er3a.kinematics.classes.chain_solvers import Unsolved
 from er3a.kinematics.round_trips import SAME_JOINTS_RAD, BatchRoundTrips, batch_round_trips
-from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
 from er3a.pipeline.stages.inverse.entry import InverseSettings
@@ -54,9 +56,9 @@ def compute(study: Study, name: str) -> InverseResults:
     ranked = [rankings(robot, target, one, scene, settings.mix) for target, one in zip(targets, solved)]
     solutions = SolutionRows.stacked(one.rows for one in solved)
     results = tuple(one.result for one in solved)
-    closed = closed_form_missing(robot) is None
+    complete = not isinstance(arm_solver(robot).chain, Unsolved)
     random = np.random.default_rng([study.seed, ROUND_TRIP_STREAM])
-    trips = batch_round_trips(robot, random, settings.round_trips) if closed else None
+    trips = batch_round_trips(robot, random, settings.round_trips) if complete else None
     worst = _worst_residuals(solutions, trips)
     summary = InverseSummary(
         verdict=_verdict(results, worst, trips, scene is not None),
@@ -67,7 +69,7 @@ def compute(study: Study, name: str) -> InverseResults:
         sequence=sequence(robot, targets, solved, scene),
         round_trips=_round_trips(trips) if trips else None,
     )
-    number_of_solutions = solution_map(robot, settings.map_cells) if closed else MapRows.empty()
+    number_of_solutions = solution_map(robot, settings.map_cells) if has_branches(robot) else MapRows.empty()
     return InverseResults(summary, solutions, RankingRows.stacked(ranked), number_of_solutions)
 
 
@@ -109,7 +111,7 @@ def _of_random_poses(trips: BatchRoundTrips) -> tuple[Figure, ...]:
     mean = float(counts @ np.arange(len(counts)) / trips.poses)
     deviation = float(np.sqrt(counts @ (np.arange(len(counts)) - mean) ** 2 / max(trips.poses - 1, 1)))
     return (
-        Figure("solutions_of_random_pose", mean, "", 1.96 * deviation / trips.poses**0.5, of=8),
+        Figure("solutions_of_random_pose", mean, "", 1.96 * deviation / trips.poses**0.5, of=len(counts) - 1),
         Figure("random_poses_solved_back", 100.0 * trips.own_found / trips.poses, "%"),
     )
 

@@ -40,9 +40,12 @@ class NeighbourPoses:
 
 @dataclass(frozen=True)
 class SelfMotion:
-    """A continuum of solutions (``kinematics.families``); ``direction`` in deg per deg of the joint that is free."""
+    """A continuum of solutions (``kinematics.families``, ``kinematics.self_motions``).
 
-    kind: Literal["wrist", "shoulder", "elbow"]
+    ``direction`` is in deg per deg of the joint that is free; of kind curve in deg per deg of its length.
+    """
+
+    kind: Literal["wrist", "shoulder", "elbow", "curve"]
     q0_deg: tuple[float, ...]
     direction: tuple[float, ...]
     range_deg: tuple[float, float]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from er3a.kinematics.solutions import Iteration
+from er3a.kinematics.solutions import ClosedForm
 from er3a.pipeline.messages.inverse import FIGURES, FREE_AT, NEAREST_RULE, limits_in_short
 from er3a.pipeline.messages.kinematics import branch_word, singularity_word
 from er3a.pipeline.messages.language import tr
@@ -94,7 +94,7 @@ def _section(robot: Robot, target: TargetResult, results: InverseResults) -> Tar
         reference=_listed(target.q_ref_deg),
         reason=say(target.reason),
         advice=listed(target.advice),
-        method=say(target.method) if isinstance(target.method, Iteration) else "",
+        method="" if isinstance(target.method, ClosedForm) else say(target.method),
         families=[_self_motion(family) for family in target.families],
         unsolved=joined(listed(target.unsolved)),
         rows=_branch_rows(rows, branches),

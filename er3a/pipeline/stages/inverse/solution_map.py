@@ -6,7 +6,8 @@ import numpy as np
 
 from er3a.geometry.transforms import transform
 from er3a.kinematics.batch import inverse_batch
-from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
+from er3a.kinematics.chain import axes_at_zero_theta
+from er3a.kinematics.wrist_partitioned import closed_form_missing, wrist_partitioned_arm
 from er3a.pipeline.stages.inverse.model import MapRows, ToolOrientation
 from er3a.robots.robot import Robot
 
@@ -18,9 +19,13 @@ RPY_DEG: dict[ToolOrientation, tuple[float, float, float]] = {
 
 def solution_map(robot: Robot, cells: int) -> MapRows:
     """Number of branches, and of those within the limits, on a grid of ``cells`` by ``cells``."""
-    arm = wrist_partitioned_arm(robot)
-    reach = arm.wrist_reach + np.linalg.norm(arm.points[1] - arm.points[0]) + np.linalg.norm(arm.wrist_in_tool)
-    middle = (arm.points[1] - robot.base[:3, 3]) @ robot.base[:3, 2]
+    points, T_base_tool = axes_at_zero_theta(robot)[1:]
+    if closed_form_missing(robot) is None:
+        arm = wrist_partitioned_arm(robot)
+        reach = arm.wrist_reach + np.linalg.norm(points[1] - points[0]) + np.linalg.norm(arm.wrist_in_tool)
+    else:
+        reach = np.linalg.norm(np.diff(np.vstack([points, T_base_tool[:3, 3]]), axis=0), axis=1).sum()
+    middle = (points[1] - robot.base[:3, 3]) @ robot.base[:3, 2]
     ticks = (np.arange(cells) + 0.5) / cells * 2 - 1
     x, z = (part.ravel() for part in np.meshgrid(ticks * reach, middle + ticks * reach, indexing="ij"))
     position = np.stack([x, np.zeros_like(x), z], axis=1)

@@ -15,10 +15,11 @@ from er3a.kinematics.families import Family
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.neighbours import neighbours
+from er3a.kinematics.self_motions import SelfMotionCurve
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
-from er3a.kinematics.solutions import ClosedForm, Solutions
+from er3a.kinematics.solutions import Solutions
 from er3a.kinematics.targets import Target, TargetOutcome
-from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.kinematics.wrist_partitioned import has_branches, solve_slots
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.stages.inverse.inverse_findings import (
     Advice,
@@ -72,7 +73,7 @@ def solve_target(robot: Robot, target: Target, random: np.random.Generator, scen
         obstacle, advice = BranchesCollide(len(within)), (MoveObstacle(),)
     else:
         obstacle = _obstacle(robot, target, solutions, len(found))
-        if isinstance(solutions.method, ClosedForm):
+        if has_branches(robot):
             near = _neighbours(robot, target, random)
             advice = _what_would_help(near)
     x, y, z = (target.T[:3, 3] * 1000).tolist()
@@ -140,7 +141,7 @@ def _rows(
 def _singular(robot: Robot, solutions: Solutions) -> Flags:
     """Which of ``SINGULAR_PARTS`` each row is on, (n, 4); arms without closed form by the Jacobian's rank."""
     found = np.zeros((len(solutions.q), len(SINGULAR_PARTS)), dtype=bool)
-    if isinstance(solutions.method, ClosedForm):
+    if has_branches(robot):
         factors = determinant_factors(robot, solutions.q)
         for column, kind in enumerate(TYPES):
             found[:, column] = np.abs(getattr(factors, kind)) < SINGULAR
@@ -161,7 +162,7 @@ def _first_of_branch(branch: Integers, rank: Integers) -> Flags:
     return first
 
 
-def _self_motion(family: Family) -> SelfMotion:
+def _self_motion(family: Family | SelfMotionCurve) -> SelfMotion:
     low, high = np.degrees(family.range).tolist()
     return SelfMotion(
         kind=family.kind,
@@ -177,7 +178,7 @@ def _obstacle(robot: Robot, target: Target, solutions: Solutions, branches: int)
     """Why there is no solution within the limits: of the branch that misses the pose by least."""
     if branches:
         return BranchesLeaveLimits(branches)
-    if not isinstance(solutions.method, ClosedForm):
+    if not has_branches(robot):
         return NothingFound()
     _, fault, gap = (batch[0] for batch in solve_slots(robot, target.T[None], target.q_ref[None]))
     least = int(gap.argmin())

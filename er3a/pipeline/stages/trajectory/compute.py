@@ -10,7 +10,8 @@ from er3a.collision.bodies import Bodies, can_measure
 from er3a.files.path_file import load_paths
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.near_singular import NearSingular
-from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
+from er3a.kinematics.singularity import characteristic_length, conditioning, factors_where_defined
+from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, Status, Verdict
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
@@ -104,7 +105,10 @@ def _checks(robot: Robot, motion: Motion, found: Judgement, near: NearSingular, 
     measures = np.full((len(found.q), 3), np.nan)
     part = conditioning(robot, found.q[reached], characteristic_length(robot))
     measures[reached] = np.stack([part.manipulability, part.condition_number, part.smallest_singular_value], axis=1)
-    factors = determinant_factors(robot, found.q)
+    factors = factors_where_defined(robot, found.q)
+    near_singular = near.contains(factors)
+    if not has_branches(robot):
+        near_singular[reached] = near.margin(robot, found.q[reached]) < 1.0
     return PathChecks(
         path=np.full(len(found.times), motion.entry.name, object),
         t_s=found.times,
@@ -122,7 +126,7 @@ def _checks(robot: Robot, motion: Motion, found: Judgement, near: NearSingular, 
         shoulder_mm=factors.shoulder * 1000,
         reachable=reached,
         within_limits=within(robot, found.q) & reached,
-        near_singular=near.contains(factors),
+        near_singular=near_singular,
         sample=np.isin(found.times, motion.samples),
     )
 

@@ -11,7 +11,7 @@ from typing import Generic, Literal, TypeVar
 from er3a.collision.pairs import Pair, PairOverlaps
 from er3a.findings import Finding
 from er3a.kinematics.configuration import BranchLabel
-from er3a.kinematics.singularity import SingularityType
+from er3a.kinematics.singularity import EventType
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
@@ -114,10 +114,12 @@ class Singularity:
 
     t_s: float
     until_s: float
-    type: SingularityType
+    type: EventType
     crossing: bool
     distance_deg: float | None
     distance_mm: float | None
+    axes: tuple[int, ...] = ()
+    smallest_singular_value: float | None = None
 
 
 @dataclass(frozen=True)

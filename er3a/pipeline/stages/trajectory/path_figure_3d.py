@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.messages.trajectory import type_word
+from er3a.pipeline.messages.trajectory import event_word
 from er3a.pipeline.stages.trajectory.model import AvoidanceRows, PathChecks, PathSummary, TrajectoryResults
 from er3a.pipeline.viewing.figure_3d import turning_html
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, LINK, MODEL
@@ -83,7 +83,7 @@ def _add(figure: go.Figure, robot: Robot, path: PathSummary, rows: PathChecks, r
             _line(figure, skeleton(robot, q[i]) * 1000, name, {"color": shade, "width": 8})
     for event, i in list(zip(path.singularities, events))[:MOST_ARMS]:
         if reached[i]:
-            singular = tr("{type}, t = {t:.3f} s", type=type_word(event.type), t=event.t_s)
+            singular = tr("{type}, t = {t:.3f} s", type=event_word(event), t=event.t_s)
             name = singular if event.crossing else tr("near {singular}", singular=singular)
             _line(figure, skeleton(robot, q[i]) * 1000, name, {"color": HIGHLIGHT, "width": 4})
     return len(figure.data) - before

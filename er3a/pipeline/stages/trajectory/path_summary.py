@@ -8,6 +8,7 @@ import numpy as np
 
 from er3a.collision.along import ClearanceAlong
 from er3a.kinematics.configuration import branch_labels
+from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.trajectory.avoidance_results import Avoided
 from er3a.pipeline.stages.trajectory.collisions import collisions, least_clearance
@@ -38,7 +39,7 @@ def path_summary(
 ) -> PathSummary:
     """All that is known of a path; its verdict is the gravest of its own and "collides"."""
     followed, entry = motion.followed, motion.entry
-    labels = branch_labels(robot)
+    labels = branch_labels(robot) if has_branches(robot) else ()
     slots = [] if followed is None else [int(slot) for slot in dict.fromkeys(followed.slot) if slot >= 0]
     speed, acceleration = (_known(found, values) for values in (found.velocity, found.acceleration))
     contacts = collisions(along)
@@ -96,8 +97,10 @@ def _singularity(event: SingularEvent) -> Singularity:
         until_s=event.until,
         type=event.type,
         crossing=event.crossing,
-        distance_deg=None if shoulder else float(np.degrees(event.distance)),
+        distance_deg=None if shoulder or event.axes else float(np.degrees(event.distance)),
         distance_mm=event.distance * 1000 if shoulder else None,
+        axes=event.axes,
+        smallest_singular_value=event.distance if event.axes else None,
     )
 
 

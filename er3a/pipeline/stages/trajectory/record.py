@@ -14,7 +14,7 @@ from matplotlib.colors import LogNorm
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.say import say
-from er3a.pipeline.messages.trajectory import advice, path_text, type_word
+from er3a.pipeline.messages.trajectory import advice, event_word, path_text
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.trajectory.model import (
     MotionRows,
@@ -198,8 +198,7 @@ def _ghosts(stream: rr.RecordingStream, robot: Robot, path: PathSummary, rows: P
     """The arm as a line at each singular pose, and a point with its type at the tool; none left of the path before."""
     at = [int(np.argmin(np.abs(rows.t_s - event.t_s))) for event in path.singularities]
     labels = [
-        f"{'' if event.crossing else 'near '}{type_word(event.type)}, t = {event.t_s:.3f} s"
-        for event in path.singularities
+        f"{'' if event.crossing else 'near '}{event_word(event)}, t = {event.t_s:.3f} s" for event in path.singularities
     ]
     points = rows.xyz_mm[at] / 1000
     colours = [rgb(HIGHLIGHT)] * len(at)
@@ -225,7 +224,7 @@ def _events(stream: rr.RecordingStream, path: PathSummary, start: float) -> None
     for event in path.singularities:
         stream.set_time(TIMELINE, duration=start + event.t_s)
         how = "meets" if event.crossing else "passes near"
-        text = f"{how} the {type_word(event.type)} singularity"
+        text = f"{how} the {event_word(event)} singularity"
         stream.log(f"{STAGE}/events", rr.TextLog(text, level=rr.TextLogLevel.WARN))
     for stretches, word in (
         (path.unreachable, "not reachable"),

@@ -14,11 +14,12 @@ from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.trajectory import (
     FIGURES,
     advice,
+    event_distance,
+    event_word,
     kind_word,
     path_text,
     reasons,
     strategy_word,
-    type_word,
 )
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.trajectory.clearance_figures import clearance_section
@@ -245,6 +246,5 @@ def _event_row(event: Singularity) -> list[str]:
     if event.until_s > event.t_s:
         when += f" – {fixed(event.until_s, 6)}"
     if event.crossing:
-        return [type_word(event.type), when, tr("meets it"), "0"]
-    distance, unit = (event.distance_deg, "deg") if event.distance_mm is None else (event.distance_mm, "mm")
-    return [type_word(event.type), when, tr("passes by"), f"{number(distance, 3)} {unit}"]
+        return [event_word(event), when, tr("meets it"), "0"]
+    return [event_word(event), when, tr("passes by"), event_distance(event)]

@@ -1,0 +1,316 @@
+"""The serial chain in a URDF's tree: from a base link to a tip link, and what stands beside it.
+
+Reference: the ROS URDF specification (joint origin, axis, limit, mimic).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from er3a.errors import InputError
+from er3a.formats.text_file import read_text
+from er3a.geometry.transforms import transform
+from er3a.numerics.arrays import Reals
+
+MOVING = ("revolute", "continuous", "prismatic")
+SNAP_RAD = 1e-4
+MOST_BYTES = 20_000_000
+ARM_JOINTS = 4  # so many joints before a branching make what follows a hand rather than an arm
+FINGER_JOINTS = 4
+GRIPPER = re.compile("gripper|finger|jaw", re.IGNORECASE)
+SHOWN = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Mimic:
+    """A joint that follows another: ``multiplier`` times it plus ``offset`` (rad or m)."""
+
+    source: str
+    multiplier: float
+    offset: float
+
+
+@dataclass(frozen=True, eq=False)
+class UrdfJoint:
+    """One joint: where it stands in its parent link's frame, and how it moves.
+
+    ``lower``, ``upper``, ``speed`` are in rad or m, NaN where the file says nothing.
+    """
+
+    name: str
+    type: str
+    parent: str
+    child: str
+    T_parent_joint: Reals
+    axis: Reals
+    lower: float
+    upper: float
+    speed: float
+    mimic: Mimic | None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def moves(self) -> bool:
+        """Whether it moves at all."""
+        return self.type != "fixed"
+
+    @property
+    def independent(self) -> bool:
+        """Whether it moves by itself."""
+        return self.moves and self.mimic is None
+
+
+@dataclass(frozen=True, eq=False)
+class UrdfChain:
+    """The joints from base to tip, all joints of the file by name, and what was noted on the way."""
+
+    joints: tuple[UrdfJoint, ...]
+    all: dict[str, UrdfJoint]
+    notes: tuple[str, ...]
+
+
+class Tree:
+    """Joints of a URDF by the links that they connect."""
+
+    def __init__(self, path: Path, joints: list[UrdfJoint]):
+        self.path = path
+        self.by_name = {joint.name: joint for joint in joints}
+        self.by_child: dict[str, UrdfJoint] = {}
+        self.by_parent: dict[str, list[UrdfJoint]] = {}
+        for joint in joints:
+            if joint.child in self.by_child:
+                problem = f"two joints lead to it, {self.by_child[joint.child].name} and {joint.name}"
+                raise InputError(path, f"link {joint.child}", problem, "A URDF is a tree: one joint for each link")
+            self.by_child[joint.child] = joint
+            self.by_parent.setdefault(joint.parent, []).append(joint)
+        self.links = {*self.by_parent, *self.by_child}
+
+    def behind(self, joint: UrdfJoint) -> Iterator[UrdfJoint]:
+        """This joint and all behind it."""
+        todo, seen = [joint], {joint.child}
+        while todo:
+            current = todo.pop()
+            yield current
+            new = [each for each in self.by_parent.get(current.child, []) if each.child not in seen]
+            seen.update(each.child for each in new)
+            todo += new
+
+    def depth(self, joint: UrdfJoint) -> int:
+        """Most independent joints in a row from this one on."""
+        most = 0
+        todo = [(joint, 0)]
+        while todo:
+            current, count = todo.pop()
+            count += current.independent
+            most = max(most, count)
+            todo += [(each, count) for each in self.by_parent.get(current.child, []) if count <= len(self.by_name)]
+        return most
+
+    def up_from(self, link: str) -> list[UrdfJoint]:
+        """The joints from the root to a link."""
+        found: list[UrdfJoint] = []
+        while link in self.by_child:
+            if len(found) > len(self.by_child):
+                raise InputError(self.path, "joint", "the joints form a closed loop", "A URDF is a tree")
+            found.append(self.by_child[link])
+            link = found[-1].parent
+        return found[::-1]
+
+    def onward(self, link: str) -> tuple[list[UrdfJoint], list[UrdfJoint]]:
+        """The joints at a link behind which anything moves, and those behind which anything moves by itself."""
+        moving = [joint for joint in self.by_parent.get(link, []) if any(each.moves for each in self.behind(joint))]
+        return moving, [joint for joint in moving if self.depth(joint)]
+
+    def hand_begins(self, moving: list[UrdfJoint], count: int) -> bool:
+        """Whether what moves behind a link, after so many joints, is a gripper or a hand."""
+        if count < ARM_JOINTS or any(self.depth(joint) > FINGER_JOINTS for joint in moving):
+            return False
+        alone = [joint for joint in moving if self.depth(joint) == 1 and GRIPPER.search(f"{joint.name} {joint.child}")]
+        return len(moving) > 1 or len(alone) == 1
+
+    def ends(self, link: str, count: int = 0) -> list[str]:
+        """Links behind a link, which has so many moving joints before it, at which an arm may end."""
+        moving, active = self.onward(link)
+        if self.hand_begins(moving, count):
+            return [link]
+        if not active:
+            return [self._tail(link)] if count else []
+        return [end for joint in active for end in self.ends(joint.child, count + joint.independent)]
+
+    def _tail(self, link: str) -> str:
+        """The end of the fixed joints behind a link, or the link itself where they branch."""
+        while len(onward := self.by_parent.get(link, [])) == 1 and not onward[0].moves:
+            link = onward[0].child
+        return link
+
+
+def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> UrdfChain:
+    """The chain from ``base`` to ``tip``; None for those that the file leaves no choice about.
+
+    Where the chain branches into a hand, or beside it are linkages that only follow other joints, they are left out.
+
+    Raises
+    ------
+    InputError
+        if the file is no URDF, or names several arms (the candidates are named)
+    """
+    notes: list[str] = []
+    tree = Tree(path, [_joint(path, element, snap) for element in _joint_elements(path)])
+    for named, link in (("--base", base), ("--tip", tip)):
+        if link is not None and link not in tree.links:
+            raise InputError(path, named, f"there is no link '{link}'", f"Links: {_some(sorted(tree.links))}")
+    if tip is not None:
+        joints = tree.up_from(tip)
+        above = [joints[0].parent, *(joint.child for joint in joints)] if joints else [tip]
+        if base is not None and base not in above:
+            raise InputError(path, "--base", f"link '{base}' is not above '{tip}'", f"Give one of {_some(above)}")
+        first = above.index(base) if base is not None else 0
+        joints = joints[first:]
+    else:
+        joints = _downwards(tree, base or _root(tree), notes)
+    for joint in joints:
+        if joint.moves and joint.type not in MOVING:
+            candidates = _some([each.child for each in joints])
+            problem = f"type '{joint.type}' is no joint of a serial arm"
+            raise InputError(path, f"joint {joint.name}", problem, f"Name where the arm begins by --base: {candidates}")
+    taken = [note for joint in joints for note in joint.notes]
+    return UrdfChain(tuple(joints), tree.by_name, (*taken, *notes))
+
+
+def chain_ends(path: Path) -> list[str]:
+    """The links at which an arm may end, those that ``tip`` can name."""
+    tree = Tree(path, [_joint(path, element, False) for element in _joint_elements(path)])
+    return [end for root in sorted(set(tree.by_parent) - set(tree.by_child)) for end in tree.ends(root)]
+
+
+def _root(tree: Tree) -> str:
+    roots = sorted(set(tree.by_parent) - set(tree.by_child))
+    if len(roots) != 1:
+        problem = f"{len(roots)} root links ({_some(roots) or 'a closed loop'})"
+        raise InputError(tree.path, "joint", problem, "A serial chain has exactly one; name it by --base")
+    return roots[0]
+
+
+def _downwards(tree: Tree, link: str, notes: list[str]) -> list[UrdfJoint]:
+    """Joints from a link on, as long as there is only one way."""
+    chain: list[UrdfJoint] = []
+    while link in tree.by_parent:
+        onward = tree.by_parent[link]
+        moving, active = tree.onward(link)
+        count = sum(joint.independent for joint in chain)
+        if tree.hand_begins(moving, count):
+            notes.append(f"a gripper stands behind link {link} ({_some(_names(moving))}); it was left out")
+            break
+        if len(active) > 1:
+            ends = [end for joint in active for end in tree.ends(joint.child, count + joint.independent)]
+            problem = f"branches into moving joints {_some(_names(active))}"
+            raise InputError(tree.path, f"link {link}", problem, f"Name where the arm ends by --tip: {_some(ends)}")
+        if not active and len(moving) > 1:
+            break
+        if active and len(active) < len(moving):
+            passive = [joint for joint in moving if joint not in active]
+            notes.append(f"joints beside the chain that only follow others were left out: {_some(_names(passive))}")
+        if not moving and len(onward) > 1:
+            notes.append(f"several fixed frames stand behind {link}; it was taken as the flange")
+            break
+        chain.append((active or moving or onward)[0])
+        link = chain[-1].child
+    return chain
+
+
+def _names(joints: list[UrdfJoint]) -> list[str]:
+    return [joint.name for joint in joints]
+
+
+def _some(names: list[str]) -> str:
+    more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+    return ", ".join(names[:SHOWN]) + more
+
+
+def _joint_elements(path: Path) -> list[ElementTree.Element]:
+    text = read_text(path, MOST_BYTES)
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise InputError(path, None, "holds a document type or entities", "Remove them; a URDF needs none")
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise InputError(path, None, f"not valid XML ({error})", "Correct the file") from None
+    if root.tag != "robot":
+        raise InputError(path, None, f"the top element is <{root.tag}>", "A URDF has <robot> (expand xacro first)")
+    if any("xacro" in element.tag for element in root.iter()):
+        raise InputError(path, None, "holds xacro macros", "Expand it first: xacro FILE > arm.urdf")
+    elements = root.findall("joint")
+    if not elements:
+        raise InputError(path, "robot", "holds no joints", "Give a URDF of a serial arm")
+    return elements
+
+
+def _link(path: Path, element: ElementTree.Element, role: str) -> str:
+    found = element.find(role)
+    name = found.get("link") if found is not None else None
+    if not name:
+        raise InputError(path, f"joint {element.get('name', '?')}", f"names no {role} link", f"Add <{role} link=...>")
+    return name
+
+
+def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
+    name, kind = element.get("name", "?"), element.get("type", "")
+    where = f"joint {name}"
+    origin, axis, limit, mimic = (element.find(tag) for tag in ("origin", "axis", "limit", "mimic"))
+    xyz = _numbers(path, where, origin, "xyz", (0.0, 0.0, 0.0))
+    rpy = _numbers(path, where, origin, "rpy", (0.0, 0.0, 0.0))
+    notes: list[str] = []
+    if snap:
+        rpy = _snapped(rpy, where, notes)
+    direction = _numbers(path, where, axis, "xyz", (1.0, 0.0, 0.0))
+    length = np.linalg.norm(direction)
+    if kind in MOVING and length < 1e-9:
+        raise InputError(path, where, "the axis has no length", 'Write for example <axis xyz="0 0 1"/>')
+    lower, upper, speed = math.nan, math.nan, math.nan
+    if kind in ("revolute", "prismatic") and limit is not None:
+        lower, upper = (_numbers(path, where, limit, key, (math.nan,))[0] for key in ("lower", "upper"))
+        if lower > upper:
+            raise InputError(path, where, f"lower limit {lower:g} above upper {upper:g}", "Swap them")
+    if kind in MOVING and limit is not None and limit.get("velocity"):
+        speed = _numbers(path, where, limit, "velocity", (0.0,))[0] or math.nan
+        if speed < 0:
+            raise InputError(path, where, f"velocity {speed:g} is below 0", "Write the greatest speed, or 0 if unknown")
+    follows = None
+    if mimic is not None:
+        if not mimic.get("joint"):
+            raise InputError(path, where, "its <mimic> names no joint", "Add joint=... to it")
+        told = (_numbers(path, where, mimic, key, (value,))[0] for key, value in (("multiplier", 1.0), ("offset", 0.0)))
+        follows = Mimic(mimic.get("joint", ""), *told)
+    parent, child = _link(path, element, "parent"), _link(path, element, "child")
+    placed, axis_of = transform(xyz, rpy), direction / (length or 1.0)
+    return UrdfJoint(name, kind, parent, child, placed, axis_of, lower, upper, speed, follows, tuple(notes))
+
+
+def _numbers(
+    path: Path, where: str, element: ElementTree.Element | None, key: str, default: tuple[float, ...]
+) -> Reals:
+    text = element.get(key) if element is not None else None
+    if text is None:
+        return np.array(default)
+    try:
+        values = np.array([float(word) for word in text.split()])
+    except ValueError:
+        values = np.array([math.nan])
+    if len(values) != len(default) or not np.isfinite(values).all():
+        raise InputError(path, f"{where}, {key}", f"'{text[:60]}' is not what stands there", "Write finite numbers")
+    return values
+
+
+def _snapped(rpy: Reals, where: str, notes: list[str]) -> Reals:
+    right = np.round(rpy / (math.pi / 2)) * (math.pi / 2)
+    near = (np.abs(rpy - right) <= SNAP_RAD) & (rpy != right)
+    for given, taken in zip(rpy[near], right[near]):
+        notes.append(f"{where}: angle {given:.10g} rad taken as {np.degrees(taken):g} deg")
+    return np.where(near, right, rpy)

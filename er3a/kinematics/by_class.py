@@ -1,0 +1,266 @@
+"""All joint solutions of any arm, by the class of its geometry, from blocks of poses to self-motions.
+
+The chain's solver (:mod:`er3a.kinematics.classes.chain_solvers`) speaks of rotations and shifts of the table's rows;
+here direction, offset and coupling are put on and off. Poses at which branches meet, a joint is free, or the solver
+leaves a doubt are looked at one by one: rows that can move with the tool at rest are members of a self-motion, which
+is traced and stands with its member nearest to the reference; starts from everywhere look for what is left.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from er3a.errors import ShapeError
+from er3a.geometry.angles import TURN, wrap_to_pi
+from er3a.geometry.transforms import as_floats
+from er3a.kinematics.chain import constant_links, joint_starts, row_values
+from er3a.kinematics.classes.chain_solvers import ArmClassCode, ChainSolver, Redundancy, Unsolved, chain_solver
+from er3a.kinematics.classes.links import size_of
+from er3a.kinematics.classes.self_motion import PoseChain
+from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM
+from er3a.kinematics.self_motions import SelfMotionCurve, self_motion_of
+from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.threads import parallel_for
+from er3a.robots.derived import derived
+from er3a.robots.joint_limits import nearest_equivalent
+from er3a.robots.robot import Robot
+
+SAME_ROW = 1e-6  # rad or parts of the arm's size
+SOLVES = 1e-9
+STARTS = 240
+SMALLEST_PART = 64
+SCANNED = 16  # values of a redundancy parameter from which self-motions are collected
+
+
+@dataclass(frozen=True, eq=False)
+class ArmSolver:
+    """An arm's chain as its solver takes it; ``uncouple`` (n, n) undoes the coupling, None where there is none."""
+
+    chain: ChainSolver
+    links: Reals
+    sliding: Flags
+    size: float
+    uncouple: Reals | None = None
+
+    def poses_at(self, T: Reals) -> PoseChain:
+        """The chain with one pose (4, 4)."""
+        return PoseChain.of(self.links, self.sliding, T, self.size)
+
+
+@dataclass(frozen=True, eq=False)
+class ClassRows:
+    """Solutions of a block of poses.
+
+    Attributes
+    ----------
+    q : (N, slots, n), manufacturer's values, angles in (-pi, pi]; NaN in empty slots
+    certainty : (N,), CERTAIN, UNCERTAIN or CONTINUUM
+    """
+
+    q: Reals
+    certainty: Integers
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """Solutions of one pose: those that stand alone, and self-motions, nearest to the reference first."""
+
+    alone: Reals
+    motions: tuple[SelfMotionCurve, ...] = field(default=())
+
+
+@derived
+def arm_solver(robot: Robot) -> ArmSolver:
+    """The solver that the robot's geometry asks for."""
+    links = constant_links(robot)
+    sliding = np.ascontiguousarray(robot.sliding)
+    uncouple = None
+    if robot.coupling is not None:
+        if robot.rows != robot.joints or abs(np.linalg.det(robot.coupling)) < 1e-9:
+            return ArmSolver(Unsolved(robot.joints), links, sliding, size_of(links))
+        uncouple = np.linalg.inv(robot.coupling)
+    return ArmSolver(chain_solver(links, sliding), links, sliding, size_of(links), uncouple)
+
+
+def to_rows(robot: Robot, q: Reals) -> Reals:
+    """What the table's rows turn or shift by, offsets included, for joints (..., n)."""
+    return np.asarray(robot.direction * row_values(robot, q) + joint_starts(robot))
+
+
+def to_joints(robot: Robot, x: Reals) -> Reals:
+    """The manufacturer's values (..., n) of what the rows turn or shift by; angles in (-pi, pi]."""
+    uncouple = arm_solver(robot).uncouple
+    u = robot.direction * (x - joint_starts(robot))
+    q = u if uncouple is None else u @ uncouple.T
+    return np.where(robot.slides, q, wrap_to_pi(q))
+
+
+def parameters_of(robot: Robot) -> tuple[Redundancy, ...]:
+    """What a pose leaves open: empty for arms of up to six joints."""
+    return arm_solver(robot).chain.parameters
+
+
+def checked_parameters(robot: Robot, redundancy: Reals | None, q_ref: Reals, count: int) -> Reals:
+    """Values (N, k) of the redundancy parameters: as given, or those of the reference (1 or N, n).
+
+    A locked joint is given as the manufacturer's value, an arm angle in rad.
+    """
+    parameters = parameters_of(robot)
+    if redundancy is None:
+        values = arm_solver(robot).chain.values_of(to_rows(robot, q_ref))
+        return np.ascontiguousarray(np.broadcast_to(values, (count, len(parameters))))
+    given = np.atleast_1d(as_floats(redundancy, "redundancy"))
+    if given.shape[-1] != len(parameters) or given.ndim > 2 or (given.ndim == 2 and len(given) != count):
+        raise ShapeError("redundancy", given.shape, f"({len(parameters)},) or ({count}, {len(parameters)})")
+    values = np.array(np.broadcast_to(given, (count, len(parameters))))
+    for k, parameter in enumerate(parameters):
+        if parameter.joint >= 0:
+            j = parameter.joint
+            values[:, k] = robot.direction[j] * values[:, k] + joint_starts(robot)[j]
+    return values
+
+
+def class_rows(robot: Robot, T: Reals, values: Reals) -> ClassRows:
+    """All rows for poses (N, 4, 4), m, at values (N, k) of the redundancy parameters."""
+    x, certainty = arm_solver(robot).chain.rows(T, values)
+    return ClassRows(to_joints(robot, x), certainty)
+
+
+def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, certainty: int) -> Settled:
+    """Solutions of one pose (4, 4) told apart into those alone and self-motions.
+
+    Parameters
+    ----------
+    rows : (k, n), what the class found, without NaN; q_ref : (n,), rad or m
+    values : (1, k), of the redundancy parameters; certainty : of the class at this pose
+    """
+    solver = arm_solver(robot)
+    chain = solver.poses_at(T)
+    full_pose = solver.chain.code not in ("free_roll", "position", "scara")
+    if not full_pose or isinstance(solver.chain, Unsolved):
+        return Settled(_apart(robot, rows))
+    found = [to_rows(robot, rows), solver.chain.seeds(T, values)]
+    if chain.error(to_rows(robot, q_ref)) < 1e-11:
+        found.insert(0, to_rows(robot, q_ref)[None])
+    if certainty == CONTINUUM and solver.chain.code in ("general_six", "six_one_prismatic"):
+        found.append(chain.roots(_starts(robot, STARTS)))
+    candidates = np.concatenate(found)
+    curves, alone = [], []
+    for x in candidates:
+        if any(chain.holds(curve, x) for curve in curves):
+            continue
+        curve = chain.curve(x)
+        if curve is not None:
+            curves.append(curve)
+        elif chain.error(x) < SOLVES:
+            alone.append(x)
+    single = np.array([x for x in alone if not any(chain.holds(curve, x) for curve in curves)])
+    single = single.reshape(-1, len(solver.sliding))
+    motions = [each for curve in curves for each in self_motion_of(robot, T, chain, curve, q_ref)]
+    motions.sort(key=lambda motion: (not motion.within_limits, float(np.linalg.norm(motion.q0 - q_ref))))
+    return Settled(_apart(robot, to_joints(robot, single)), tuple(motions))
+
+
+def all_motions(robot: Robot, T: Reals, q_ref: Reals, values: Reals) -> Settled:
+    """Self-motions of a pose (4, 4) of an arm with one redundancy parameter, from rows at values all over its range."""
+    span = np.linspace(-np.pi, np.pi, SCANNED, endpoint=False)
+    parameter = parameters_of(robot)[0]
+    if parameter.joint >= 0:
+        j = parameter.joint
+        if robot.slides[j]:
+            span = np.linspace(robot.lower[j], robot.upper[j], SCANNED)
+        span = robot.direction[j] * span + joint_starts(robot)[j]
+    grid = np.concatenate([values, span[:, None]])
+    q = class_rows(robot, np.broadcast_to(T, (len(grid), 4, 4)), grid).q.reshape(-1, robot.joints)
+    return settle(robot, T, q[np.isfinite(q[:, 0])], q_ref, values, CERTAIN)
+
+
+def _starts(robot: Robot, count: int) -> Reals:
+    solver = arm_solver(robot)
+    random = np.random.default_rng([20261121, count])
+    return random.uniform(-1, 1, (count, len(solver.sliding))) * np.where(solver.sliding, 1.5, np.pi)
+
+
+def _apart(robot: Robot, rows: Reals) -> Reals:
+    """Rows (k, n) without those that stand twice, in order of their joints."""
+    kept: list[Reals] = []
+    for row in rows:
+        away = [row - other for other in kept]
+        away = [np.where(robot.slides, step, step - TURN * np.round(step / TURN)) for step in away]
+        if all(np.abs(step).max() > SAME_ROW for step in away):
+            kept.append(row)
+    return np.array(kept).reshape(-1, robot.joints)
+
+
+def slots_of_class(
+    robot: Robot, T: Reals, q_ref: Reals, values: Reals, threads: int = 1
+) -> tuple[Reals, Integers, dict[int, Settled]]:
+    """All slots for poses (N, 4, 4): joint values (N, S, n) by the turns nearest to the reference (N, n); certainty (N,).
+
+    Poses at which branches meet, or that left a doubt, are settled one by one; those are told by their number.
+    """
+    count, slots = len(T), arm_solver(robot).chain.slots
+    q, certainty = np.empty((count, slots, robot.joints)), np.empty(count, dtype=np.int64)
+
+    def part(rows: slice) -> None:
+        found = class_rows(robot, T[rows], values[rows])
+        q[rows], certainty[rows] = found.q, found.certainty
+
+    parallel_for(count, threads, SMALLEST_PART, part)
+    settled = {}
+    for n in np.flatnonzero(certainty != CERTAIN).tolist():
+        solved = q[n][np.isfinite(q[n, :, 0])]
+        settled[n] = settle(robot, T[n], solved, q_ref[n], values[n : n + 1], int(certainty[n]))
+        q[n] = _in_slots(robot, q[n], settled[n])
+    return nearest_equivalent(robot, q, q_ref[:, None]), certainty, settled
+
+
+def _in_slots(robot: Robot, rows: Reals, settled: Settled) -> Reals:
+    """Rows (S, n) that stand alone in their slots; those on a self-motion give way to its member nearest to the
+    reference, and what was found besides takes free slots."""
+    kept, left = np.full_like(rows, np.nan), []
+    for row in settled.alone:
+        away = np.where(robot.slides, rows - row, rows - row - TURN * np.round((rows - row) / TURN))
+        far = np.where(np.isnan(rows[:, 0]), np.inf, np.abs(away).max(axis=1))
+        slot = int(far.argmin())
+        if far[slot] < SAME_ROW and np.isnan(kept[slot, 0]):
+            kept[slot] = row
+        else:
+            left.append(row)
+    left += [motion.q0 for motion in settled.motions]
+    free = np.flatnonzero(np.isnan(kept[:, 0]))
+    taken = np.flatnonzero(np.isnan(kept[:, 0]) & np.isfinite(rows[:, 0]))
+    order = [*taken, *(slot for slot in free if slot not in set(taken.tolist()))]
+    for slot, row in zip(order, left):
+        kept[slot] = row
+    return kept
+
+
+def slot_of(robot: Robot, T: Reals, q: Reals) -> int:
+    """The slot of joint values (n,) that solve a pose (4, 4); 0 if they are none of its class's rows."""
+    values = checked_parameters(robot, None, q[None], 1)
+    rows = class_rows(robot, T[None], values).q[0]
+    away = np.where(robot.slides, rows - q, rows - q - TURN * np.round((rows - q) / TURN))
+    far = np.where(np.isnan(rows[:, 0]), np.inf, np.abs(away).max(axis=1))
+    return int(far.argmin()) if far.min() < SAME_ROW else 0
+
+
+TASKS: dict[ArmClassCode, tuple[int, ...]] = {
+    "free_roll": (1, 1, 1, 1, 1, 0),
+    "position": (1, 1, 1, 0, 0, 0),
+    "scara": (1, 1, 1, 0, 0, 1),
+}
+
+
+@derived
+def task_mask(robot: Robot) -> Reals:
+    """Which of x, y, z and the rotations about x, y, z of the tool's frame the arm's solutions meet, six of 1 or 0.
+
+    All, but for arms with fewer than six joints: five leave the turn about the tool's axis (if they can't do it
+    themselves), a SCARA the tool's tilt, three joints the orientation.
+    """
+    mask = np.array(TASKS.get(arm_solver(robot).chain.code, (1,) * 6), dtype=float)
+    mask.setflags(write=False)
+    return mask

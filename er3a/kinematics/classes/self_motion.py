@@ -1,0 +1,387 @@
+"""Curves of joint values that keep the tool at rest: traced by steps along the Jacobian's null space.
+
+A step goes along the direction of the null space that is nearest to the last one, so the curve runs on through points
+where two curves cross; Newton's steps of least length, blind to directions without a clear singular value, bring it
+back [1]_. Lengths are in units of the chain's size.
+
+References
+----------
+.. [1] J. W. Burdick, "On the inverse kinematics of redundant manipulators: characterization of the self-motion
+   manifolds", IEEE Int. Conf. Robotics and Automation (1989).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from er3a.geometry.angles import TURN
+from er3a.kinematics.classes.links import multiply_rigid, turn_behind
+from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.jit import kernel
+
+STEP = np.radians(2.0)  # greatest joint move between two points of a curve
+MOST_POINTS = 4000
+REGULAR = 1e-6  # pivots of J J^T above this part of the largest diagonal entry
+TRUNCATED = 1e-5  # singular values below this part of the largest are no directions
+SOLVES = 1e-11
+ON_CURVE = 1e-9
+FEW_HALVINGS = 6
+PROBE = 2e-3
+LOST, CLOSED, OPEN = 0, 1, 2
+
+
+@kernel
+def error_and_jacobian(links: Reals, sliding: Flags, T: Reals, x: Reals, e: Reals, J: Reals) -> float:
+    """Fill the pose error ``e`` (6,) and ``J`` (6, n); returns the error's largest component, at least 1 beyond 90 deg."""
+    n = x.shape[0]
+    frame, other = links[0].copy(), np.empty((4, 4))
+    for k in range(n):
+        for i in range(3):
+            J[3 + i, k] = frame[i, 2]
+            J[i, k] = frame[i, 3]
+        if sliding[k]:
+            for i in range(3):
+                frame[i, 3] += frame[i, 2] * x[k]
+        else:
+            turn_behind(frame, np.cos(x[k]), np.sin(x[k]))
+        multiply_rigid(frame, links[k + 1], other)
+        frame, other = other, frame
+    for k in range(n):
+        z0, z1, z2 = J[3, k], J[4, k], J[5, k]
+        if sliding[k]:
+            J[0, k], J[1, k], J[2, k] = z0, z1, z2
+            J[3, k], J[4, k], J[5, k] = 0.0, 0.0, 0.0
+        else:
+            r0, r1, r2 = frame[0, 3] - J[0, k], frame[1, 3] - J[1, k], frame[2, 3] - J[2, k]
+            J[0, k], J[1, k], J[2, k] = z1 * r2 - z2 * r1, z2 * r0 - z0 * r2, z0 * r1 - z1 * r0
+    largest, trace = 0.0, 0.0
+    for i in range(3):
+        a, b = (i + 1) % 3, (i + 2) % 3
+        turn = 0.0
+        for j in range(3):
+            turn += frame[a, j] * T[b, j] - frame[b, j] * T[a, j]
+            trace += frame[i, j] * T[i, j]
+        e[i] = T[i, 3] - frame[i, 3]
+        e[3 + i] = 0.5 * turn
+        largest = max(largest, max(abs(e[i]), abs(e[3 + i])))
+    return max(largest, 1.0) if trace < 0.0 else largest
+
+
+@kernel
+def least_step(J: Reals, e: Reals, out: Reals) -> bool:
+    """``out`` (n,) = the shortest x with ``J x = e`` by Cholesky factors of ``J J^T``; False if J is nearly dependent."""
+    n = J.shape[1]
+    M, y = np.empty((6, 6)), np.empty(6)
+    most = 0.0
+    for r in range(6):
+        for c in range(r + 1):
+            total = 0.0
+            for k in range(n):
+                total += J[r, k] * J[c, k]
+            M[r, c] = total
+        most = max(most, M[r, r])
+    for c in range(6):
+        for k in range(c):
+            M[c, c] -= M[c, k] * M[c, k]
+        if not M[c, c] > REGULAR * most:
+            return False
+        M[c, c] = np.sqrt(M[c, c])
+        for r in range(c + 1, 6):
+            for k in range(c):
+                M[r, c] -= M[r, k] * M[c, k]
+            M[r, c] /= M[c, c]
+    for r in range(6):
+        y[r] = e[r]
+        for k in range(r):
+            y[r] -= M[r, k] * y[k]
+        y[r] /= M[r, r]
+    for r in range(5, -1, -1):
+        for k in range(r + 1, 6):
+            y[r] -= M[k, r] * y[k]
+        y[r] /= M[r, r]
+    for k in range(n):
+        out[k] = 0.0
+        for r in range(6):
+            out[k] += J[r, k] * y[r]
+    return True
+
+
+@kernel
+def null_share(J: Reals, v: Reals, out: Reals) -> int:
+    """``out`` (n,) = the part of v in the null space of J (6, n); returns the null space's dimension."""
+    n = J.shape[1]
+    if n > 6:
+        moved = np.zeros(6)
+        for r in range(6):
+            for k in range(n):
+                moved[r] += J[r, k] * v[k]
+        if least_step(J, moved, out):
+            for k in range(n):
+                out[k] = v[k] - out[k]
+            return n - 6
+    _, s, Vt = np.linalg.svd(J, False)
+    out[:] = v
+    dimension = J.shape[1]
+    for r in range(s.shape[0]):
+        if s[r] > TRUNCATED * s[0]:
+            dimension -= 1
+            along = 0.0
+            for k in range(v.shape[0]):
+                along += Vt[r, k] * v[k]
+            for k in range(v.shape[0]):
+                out[k] -= along * Vt[r, k]
+    return dimension
+
+
+@kernel
+def onto_curve(links: Reals, sliding: Flags, T: Reals, x: Reals, e: Reals, J: Reals) -> float:
+    """Newton's steps of least length; returns the error that is left."""
+    least, step = np.inf, np.empty(x.shape[0])
+    for _ in range(25):
+        error = error_and_jacobian(links, sliding, T, x, e, J)
+        if error < 1e-15 or (error < SOLVES and error >= 0.5 * least):
+            return error
+        if error > 0.5:
+            return error
+        least = min(least, error)
+        if x.shape[0] > 6 and least_step(J, e, step):
+            for k in range(x.shape[0]):
+                x[k] += step[k]
+            continue
+        U, s, Vt = np.linalg.svd(J, False)
+        for r in range(s.shape[0]):
+            if s[r] > TRUNCATED * s[0]:
+                along = 0.0
+                for i in range(6):
+                    along += U[i, r] * e[i]
+                along /= s[r]
+                for k in range(x.shape[0]):
+                    x[k] += along * Vt[r, k]
+    return error_and_jacobian(links, sliding, T, x, e, J)
+
+
+@kernel
+def free_direction(links: Reals, sliding: Flags, T: Reals, x: Reals, v: Reals) -> int:
+    """Fill v (n,) with a direction, of greatest component 1, in which x can move with the tool at rest.
+
+    Returns the null space's dimension there, 0 if no step in any of its directions stays on the pose.
+    """
+    n = x.shape[0]
+    e, J, y = np.empty(6), np.empty((6, n)), np.empty(n)
+    error_and_jacobian(links, sliding, T, x, e, J)
+    _, s, Vt = np.linalg.svd(J, True)
+    dimension = n
+    for r in range(s.shape[0]):
+        if s[r] > TRUNCATED * s[0]:
+            dimension -= 1
+    for r in range(n - dimension, n):
+        largest = np.abs(Vt[r]).max()
+        for sign in range(2):
+            step = PROBE / largest * (1.0 - 2.0 * sign)
+            y[:] = x + step * Vt[r]
+            if onto_curve(links, sliding, T, y, e, J) < ON_CURVE:
+                moved = 0.0
+                for k in range(n):
+                    moved += (y[k] - x[k]) * Vt[r, k]
+                if moved * np.sign(step) > 0.5 * abs(step):
+                    v[:] = Vt[r] / largest * np.sign(step)
+                    return dimension
+    return 0
+
+
+@kernel
+def trace(links: Reals, sliding: Flags, T: Reals, x: Reals, v: Reals, points: Reals) -> tuple[int, int]:
+    """Fill ``points`` (k, n) with joint values along the curve from x in the sense of v, not wrapped.
+
+    Returns how many, and how it ended: CLOSED (back at the start but for whole turns, the last point), OPEN (``points``
+    is full), LOST (no further step solves the pose).
+    """
+    n = x.shape[0]
+    e, J, y, along, last = np.empty(6), np.empty((6, n)), np.empty(n), np.empty(n), v.copy()
+    points[0] = x
+    count = 1
+    while count < points.shape[0]:
+        here = points[count - 1]
+        error_and_jacobian(links, sliding, T, here, e, J)
+        null_share(J, last, along)
+        largest = np.abs(along).max()
+        if largest < 1e-9:
+            return count, LOST
+        along /= largest
+        step, ahead = STEP, False
+        for _ in range(FEW_HALVINGS):
+            y[:] = here + step * along
+            if onto_curve(links, sliding, T, y, e, J) < ON_CURVE:
+                away, forward = np.abs(y - here).max(), ((y - here) * along).sum()
+                if away < 1.5 * step and forward > 0.2 * step:
+                    ahead = True
+                    break
+            step *= 0.5
+        if not ahead:
+            return count, LOST
+        length = np.abs(y - here).max()
+        last[:] = (y - here) / length
+        points[count] = y
+        count += 1
+        if count > 4:
+            # the start, but for whole turns, between the last two points?
+            apart, at, squared = 0.0, 0.0, 0.0
+            for k in range(n):
+                away = points[0, k] - here[k]
+                if not sliding[k]:
+                    away -= TURN * np.round(away / TURN)
+                at += away * (y[k] - here[k])
+                squared += (y[k] - here[k]) ** 2
+            share = at / squared
+            for k in range(n):
+                away = points[0, k] - here[k]
+                if not sliding[k]:
+                    away -= TURN * np.round(away / TURN)
+                apart = max(apart, abs(away - share * (y[k] - here[k])))
+            if -0.01 < share <= 1.01 and apart < 0.2 * length:
+                for k in range(n):
+                    away = points[0, k] - y[k]
+                    if not sliding[k]:
+                        away -= TURN * np.round(away / TURN)
+                    points[count - 1, k] += away
+                return count, CLOSED
+    return count, OPEN
+
+
+@kernel
+def between(links: Reals, sliding: Flags, T: Reals, points: Reals, at: Reals, out: Reals) -> None:
+    """Fill ``out`` (k, n) with the curve's points at ``at`` (k,), counted in points of the polyline; NaN if lost."""
+    n = points.shape[1]
+    e, J = np.empty(6), np.empty((6, n))
+    for i in range(at.shape[0]):
+        low = min(max(int(np.floor(at[i])), 0), points.shape[0] - 2)
+        share = at[i] - low
+        out[i] = (1.0 - share) * points[low] + share * points[low + 1]
+        if not onto_curve(links, sliding, T, out[i], e, J) < ON_CURVE:
+            out[i] = np.nan
+
+
+@kernel
+def roots_from_starts(links: Reals, sliding: Flags, T: Reals, starts: Reals, out: Reals) -> int:
+    """Fill ``out`` (k, n) with joint values that solve the pose, one for each start (k, n) that leads to one.
+
+    Returns how many.
+    """
+    n = starts.shape[1]
+    e, J, y = np.empty(6), np.empty((6, n)), np.empty(n)
+    count = 0
+    for k in range(starts.shape[0]):
+        y[:] = starts[k]
+        solved = False
+        for _ in range(40):
+            error = error_and_jacobian(links, sliding, T, y, e, J)
+            if error < 1e-9:
+                solved = True
+                break
+            M = J.T @ J
+            damping = 1e-2 * (e @ e) + 1e-15
+            for i in range(n):
+                M[i, i] += damping
+            step = np.linalg.solve(M, J.T @ e)
+            y += step
+        if solved and onto_curve(links, sliding, T, y, e, J) < ON_CURVE:
+            for i in range(n):
+                if not sliding[i]:
+                    y[i] -= TURN * np.ceil((y[i] - np.pi) / TURN)
+            out[count] = y
+            count += 1
+    return count
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A traced curve of self-motion.
+
+    Attributes
+    ----------
+    points : (k, n), rad and m, not wrapped; of a closed curve the last is the first but for whole turns
+    closed : whether it comes back to its start
+    dimension : of the Jacobian's null space at most points; above 1 the curve is one of many on a surface
+    """
+
+    points: Reals
+    closed: bool
+    dimension: int
+
+
+@dataclass(frozen=True, eq=False)
+class PoseChain:
+    """A chain with a pose, scaled to the chain's size, whose curves are traced."""
+
+    links: Reals
+    sliding: Flags
+    T: Reals
+    size: float
+
+    @staticmethod
+    def of(links: Reals, sliding: Flags, T: Reals, size: float) -> PoseChain:
+        """From links (n + 1, 4, 4) and a pose (4, 4) in m."""
+        scaled, pose = np.array(links, float), np.array(T, float)
+        scaled[:, :3, 3] /= size
+        pose[:3, 3] /= size
+        return PoseChain(scaled, np.ascontiguousarray(sliding), pose, size)
+
+    def _scaled(self, x: Reals) -> Reals:
+        return np.ascontiguousarray(np.where(self.sliding, np.asarray(x, float) / self.size, x))
+
+    def _in_m(self, x: Reals) -> Reals:
+        return np.where(self.sliding, x * self.size, x)
+
+    def error(self, x: Reals) -> float:
+        """Largest component of the pose error, rad and parts of the size, at joint values (n,)."""
+        n = len(self.sliding)
+        return error_and_jacobian(self.links, self.sliding, self.T, self._scaled(x), np.empty(6), np.empty((6, n)))
+
+    def roots(self, starts: Reals) -> Reals:
+        """Solutions (k, n) that starts (many, n), rad and parts of the size, lead to; members of curves among them."""
+        out = np.empty_like(starts)
+        count = roots_from_starts(self.links, self.sliding, self.T, starts, out)
+        return self._in_m(out[:count])
+
+    def curve(self, x: Reals) -> Curve | None:
+        """The curve through joint values (n,) that solve the pose; None if they can't move with the tool at rest."""
+        start, v = self._scaled(x), np.empty(len(x))
+        dimension = free_direction(self.links, self.sliding, self.T, start, v)
+        if dimension == 0:
+            return None
+        points = np.empty((MOST_POINTS, len(x)))
+        count, end = trace(self.links, self.sliding, self.T, start, v, points)
+        path = points[:count].copy()
+        if end != CLOSED:
+            count, _ = trace(self.links, self.sliding, self.T, start, -v, points)
+            path = np.concatenate([points[:count][::-1], path[1:]])
+        if len(path) < 3:
+            return None
+        return Curve(self._in_m(path), end == CLOSED, self._dimension(path))
+
+    def _dimension(self, path: Reals) -> int:
+        n = len(self.sliding)
+        e, J, out = np.empty(6), np.empty((6, n)), np.empty(n)
+        found = []
+        for at in np.linspace(0, len(path) - 1, 7).astype(int):
+            error_and_jacobian(self.links, self.sliding, self.T, path[at], e, J)
+            found.append(null_share(J, np.zeros(n), out))
+        return int(np.median(found))
+
+    def members(self, curve: Curve, at: Reals) -> Reals:
+        """Joint values (k, n) at places (k,) counted in the curve's points; of closed curves also beyond its ends."""
+        last = len(curve.points) - 1
+        laps = np.floor(at / last) if curve.closed else np.zeros_like(at)
+        inside = np.clip(at - laps * last, 0, last)
+        out = np.empty((len(at), len(self.sliding)))
+        between(self.links, self.sliding, self.T, self._scaled(curve.points), np.ascontiguousarray(inside), out)
+        lap = np.where(self.sliding, 0.0, curve.points[-1] - curve.points[0])
+        return self._in_m(out) + laps[:, None] * lap
+
+    def holds(self, curve: Curve, x: Reals) -> bool:
+        """Whether joint values (n,) lie on a traced curve: beside its polyline."""
+        away = self._scaled(x) - self._scaled(curve.points)
+        away = np.where(self.sliding, away, away - TURN * np.round(away / TURN))
+        return bool(np.abs(away).max(axis=1).min() < STEP)

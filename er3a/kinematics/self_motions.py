@@ -1,0 +1,208 @@
+"""Self-motions of any arm, as parts of traced curves that lie within the joint limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from er3a.display import Displayed, Sheet, shortly
+from er3a.geometry.angles import wrap_to_pi
+from er3a.kinematics.chain import joint_starts, row_values
+from er3a.kinematics.classes.self_motion import Curve, PoseChain
+from er3a.numerics.arrays import Flags, Reals
+from er3a.robots.joint_limits import limit_margin, nearest_equivalent, within
+from er3a.robots.robot import Robot
+
+LAPS = 6  # a curve that turns a joint is followed over so many of its laps at most
+SPLIT, SPLITS = 16, 11
+NARROWINGS = 10
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SelfMotionCurve(Displayed):
+    """A part of a curve of solutions of one pose: joints move with the tool at rest.
+
+    Its members are told by a parameter t (rad), which is the summed length of the joint moves from q0 on.
+
+    Attributes
+    ----------
+    q0 : (n,), rad or m, the member nearest to the reference (least root of summed squares), within the limits if
+        ``within_limits``
+    direction : (n,), rad or m per rad of t, at q0
+    range : (2,), least and greatest t up to which all members from q0 on are within the limits; of a curve of which
+        none is, one lap
+    roomiest : (n,), the member found farthest from all joint limits; roomiest_margin : its distance from them
+    dimension : 1; above it, this curve is one of many on a surface of solutions
+    branches : numbers of the solutions that lie on it
+    """
+
+    kind: Literal["curve"]
+    q0: Reals
+    direction: Reals
+    range: Reals
+    within_limits: bool
+    roomiest: Reals
+    roomiest_margin: float
+    dimension: int
+    branches: tuple[int, ...]
+    robot: Robot
+    T: Reals
+    chain: PoseChain = field(repr=False)
+    curve: Curve = field(repr=False)
+    lengths: Reals = field(repr=False)
+    start: float = 0.0
+    shift: Reals = field(default_factory=lambda: np.zeros(0))
+
+    def members(self, t: Reals) -> Reals:
+        """Joint values (..., n) at parameters (...,)."""
+        t = np.asarray(t, float)
+        at = _place_of(self.lengths, self.start + t.reshape(-1), self.curve.closed)
+        q = _joints(self.robot, self.chain.members(self.curve, at)) + self.shift
+        return np.asarray(q.reshape(*t.shape, self.robot.joints))
+
+    def sheet(self) -> Sheet:
+        """A line: range and the nearest member."""
+        low, high = np.degrees(self.range).tolist()
+        within = "within the limits" if self.within_limits else "outside the limits"
+        q0 = shortly(tuple(np.degrees(self.q0).tolist()))
+        return Sheet(f"Self-motion, t from {shortly(low)} to {shortly(high)} deg, {within}, q0_deg {q0}")
+
+
+def _joints(robot: Robot, x: Reals) -> Reals:
+    """The manufacturer's values (..., n), not wrapped."""
+    u = robot.direction * (x - joint_starts(robot))
+    return u if robot.coupling is None else np.asarray(u @ np.linalg.inv(robot.coupling).T)
+
+
+def _place_of(lengths: Reals, t: Reals, closed: bool) -> Reals:
+    """Places counted in points of the curve, for lengths along it."""
+    lap, last = lengths[-1], len(lengths) - 1
+    laps = np.floor(t / lap) if closed else np.zeros_like(t)
+    return np.interp(t - laps * lap, lengths, np.arange(len(lengths))) + laps * last
+
+
+def self_motion_of(robot: Robot, T: Reals, chain: PoseChain, curve: Curve, q_ref: Reals) -> list[SelfMotionCurve]:
+    """One for each part of a curve that lies within the joint limits; one for the whole of it if none does."""
+    q = _joints(robot, curve.points)
+    steps = np.diff(np.where(robot.slides, q / chain.size, q), axis=0)
+    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))])
+    near = nearest_equivalent(robot, np.where(robot.slides, q, wrap_to_pi(q)), q_ref)
+    inside = within(robot, near)
+    made = []
+    for part in _parts(inside, curve.closed) if inside.any() else [np.arange(len(q))]:
+        best = int(part[np.linalg.norm(near[part] - q_ref, axis=1).argmin()])
+        roomiest = int(part[limit_margin(robot, near[part]).argmax()])
+        made.append(_part(robot, T, chain, curve, lengths, q_ref, bool(inside.any()), best, roomiest))
+    return made
+
+
+def _parts(inside: Flags, closed: bool) -> list[np.ndarray]:
+    """Runs of points within the limits; the last point of a closed curve is its first."""
+    count = len(inside) - int(closed)
+    flags = inside[:count]
+    if flags.all():
+        return [np.arange(count)]
+    first = int(np.argmin(flags)) if closed else 0
+    order = (np.arange(count) + first) % count
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags[order], [False]]).astype(int)))
+    return [order[a:b] for a, b in zip(edges[::2], edges[1::2])]
+
+
+def _part(
+    robot: Robot,
+    T: Reals,
+    chain: PoseChain,
+    curve: Curve,
+    lengths: Reals,
+    q_ref: Reals,
+    any_inside: bool,
+    best: int,
+    roomiest: int,
+) -> SelfMotionCurve:
+    def at(t: Reals) -> Reals:
+        return _joints(robot, chain.members(curve, _place_of(lengths, np.atleast_1d(t), curve.closed)))
+
+    def near(t: Reals) -> Reals:
+        q = at(t)
+        return nearest_equivalent(robot, np.where(robot.slides, q, wrap_to_pi(q)), q_ref)
+
+    def distance(t: Reals) -> Reals:
+        q = near(t)
+        cost = np.linalg.norm(q - q_ref, axis=1)
+        return np.where(within(robot, q) | ~np.bool_(any_inside), cost, np.inf)
+
+    def narrowness(t: Reals) -> Reals:
+        return -limit_margin(robot, near(t))
+
+    start = _least(distance, lengths, best, curve.closed)
+    q0 = near(np.array([start]))[0]
+    own = q_ref
+    if np.abs(own - q0).max() < 1e-5 and chain.error(_rows(robot, own)) < 1e-11:
+        q0 = np.array(own)
+    shift = q0 - at(np.array([start]))[0]
+    step = 1e-4
+    direction = (at(np.array([start + step])) - at(np.array([start - step])))[0] / (2 * step)
+    widest = _least(narrowness, lengths, roomiest, curve.closed)
+    room = near(np.array([widest]))[0]
+    span = np.array([-0.5, 0.5]) * lengths[-1] if curve.closed else np.array([0.0, lengths[-1]]) - start
+    motion = SelfMotionCurve(
+        "curve", q0, direction, span, any_inside, room, float(limit_margin(robot, room)), curve.dimension, (), robot, T,
+        chain, curve, lengths, start, shift,
+    )  # fmt: skip
+    if not any_inside:
+        return motion
+    object.__setattr__(motion, "range", _range(motion))
+    return motion
+
+
+def _rows(robot: Robot, q: Reals) -> Reals:
+    return np.asarray(robot.direction * row_values(robot, q) + joint_starts(robot))
+
+
+def _least(cost, lengths: Reals, best: int, closed: bool) -> float:  # type: ignore[no-untyped-def]
+    """Where the cost is least between the points beside the best one, by narrowing."""
+    low, high = lengths[max(best - 1, 0)], lengths[min(best + 1, len(lengths) - 1)]
+    if closed and best == 0:
+        low = lengths[-2] - lengths[-1]
+    at = float(lengths[best])
+    for _ in range(NARROWINGS):
+        t = np.append(np.linspace(low, high, 13), at)
+        costs = cost(t)
+        at = float(t[int(costs.argmin())])
+        half = (high - low) / 12
+        low, high = max(at - half, low), min(at + half, high)
+    return at
+
+
+def _range(motion: SelfMotionCurve) -> Reals:
+    """How far members from q0 on stay within the limits: at the curve's points, then by halving."""
+    robot, lengths, closed = motion.robot, motion.lengths, motion.curve.closed
+    lap = lengths[-1]
+    turns = np.abs(motion.members(np.array([lap])) - motion.members(np.array([0.0]))).max() > 1e-6 if closed else False
+    ends = []
+    for side in (-1.0, 1.0):
+        if closed and not turns:
+            reach = np.concatenate([lengths - motion.start, lengths - motion.start + lap, lengths - motion.start - lap])
+            reach = np.abs(reach[(reach * side > 0) & (np.abs(reach) <= 0.5 * lap)])
+            reach = np.append(reach, 0.5 * lap)
+        elif closed:
+            laps = np.arange(-LAPS, LAPS + 1)[:, None] * lap
+            reach = (laps + lengths[None, :-1] - motion.start).reshape(-1)
+            reach = np.abs(reach[reach * side > 0])
+        else:
+            reach = np.abs((lengths - motion.start)[(lengths - motion.start) * side > 0])
+        reach = np.sort(reach)
+        ok = within(robot, motion.members(side * reach)) if len(reach) else np.zeros(0, dtype=bool)
+        if ok.all():
+            ends.append(side * (reach[-1] if len(reach) else 0.0))
+            continue
+        first = int(ok.argmin())
+        good, bad = (reach[first - 1] if first else 0.0), reach[first]
+        for _ in range(SPLITS):
+            parts = np.linspace(good, bad, SPLIT + 1)
+            last = int(np.append(within(robot, motion.members(side * parts[1:-1])), False).argmin())
+            good, bad = parts[last], parts[last + 1]
+        ends.append(side * good)
+    return np.array(ends)

@@ -1,0 +1,183 @@
+"""URDFs with more than one chain, followers, grippers, joints that slide; and the fleet that packages bring."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio
+import pytest
+
+from er3a.errors import Er3aError, InputError, InputWarning
+from er3a.files.robot_library import load_robot
+from er3a.files.robot_writer import write_robot
+from er3a.formats.from_axes import table_from_axes
+from er3a.formats.urdf import export_urdf, import_urdf
+from er3a.kinematics.forward import forward, frames
+from testing.arms import make_arm
+from testing.fleet import DhModel, dh_models
+
+LIMIT = '<limit lower="-1.5" upper="1.5" velocity="2" effort="0"/>'
+
+
+def joint(name, kind, parent, child, *, xyz="0 0 0.2", rpy="0 0 0", axis="0 0 1", more=LIMIT) -> str:
+    return (
+        f'<link name="{child}"/><joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="{axis}"/>{more}</joint>'
+    )
+
+
+def follows(source, multiplier=1.0, offset=0.0) -> str:
+    return f'{LIMIT}<mimic joint="{source}" multiplier="{multiplier}" offset="{offset}"/>'
+
+
+def row(count, first=0, start="base", axis="0 1 0") -> str:
+    """So many joints in series, turning about z and y by turns."""
+    text, parent = "", start
+    for k in range(first, first + count):
+        text += joint(f"j{k}", "revolute", parent, f"l{k}", axis="0 0 1" if k % 2 else axis)
+        parent = f"l{k}"
+    return text
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(*parts, name="arm.urdf"):
+        path = tmp_path / name
+        path.write_text(f'<robot name="r"><link name="base"/>{"".join(parts)}</robot>')
+        return path
+
+    return write
+
+
+def peer_poses(path, names, q, frame):
+    """Flange poses by Pinocchio, which knows joints by their names and followers by their <mimic>."""
+    model = pinocchio.buildModelFromUrdf(str(path), mimic=True)
+    data, poses = model.createData(), []
+    for values in q:
+        full = pinocchio.neutral(model)
+        for name, value in zip(names, values):
+            at = model.joints[model.getJointId(name)]
+            full[at.idx_q : at.idx_q + at.nq] = value if at.nq == 1 else [np.cos(value), np.sin(value)]
+        pinocchio.framesForwardKinematics(model, data, full)
+        poses.append(data.oMf[model.getFrameId(frame)].homogeneous.copy())
+    return np.array(poses)
+
+
+def test_two_arms_are_asked_for_by_name(written):
+    path = written(row(5), row(4, 10), row(3, 20, "l1"))
+    with pytest.raises(InputError, match=r"branches into moving joints j0, j10.*by --tip: l4, l22, l13"):
+        import_urdf(path)
+    first, second = import_urdf(path, tip="l4"), import_urdf(path, tip="l13", base="base")
+    assert (first.robot.joints, second.robot.joints) == (5, 4)
+    assert first.joints == ("j0", "j1", "j2", "j3", "j4")
+    part = import_urdf(path, base="l10", tip="l13")
+    assert (part.robot.joints, part.base, part.tip) == (3, "l10", "l13")
+    with pytest.raises(InputError, match="there is no link 'nose'"):
+        import_urdf(path, tip="nose")
+    with pytest.raises(InputError, match="'l10' is not above 'l4'"):
+        import_urdf(path, base="l10", tip="l4")
+
+
+def test_grippers_and_linkages_that_only_follow_are_left_out(written):
+    linkage = joint("p1", "revolute", "l0", "p1", more=follows("j1")) + joint(
+        "p2", "revolute", "p1", "p2", more=follows("j2")
+    )
+    fingers = joint("f1", "prismatic", "hand", "f1") + joint("f2", "prismatic", "hand", "f2", more=follows("f1"))
+    hand = joint("h", "fixed", "l5", "hand", more="")
+    imported = import_urdf(written(row(6), linkage, hand, fingers))
+    assert imported.robot.joints == 6
+    assert imported.tip == "hand"
+    assert any("only follow" in note and "p1" in note for note in imported.notes)
+    assert any("gripper" in note and "f1, f2" in note for note in imported.notes)
+    alone = import_urdf(written(row(6), joint("gripper_joint", "revolute", "l5", "jaw")))
+    assert alone.robot.joints == 6
+    assert any("gripper_joint" in note for note in alone.notes)
+
+
+def test_followers_in_the_chain_become_coupling(written, random, tmp_path):
+    """A wrist kept level by a linkage: one row more than joints; a follower of a joint beside the chain."""
+    chain = (
+        joint("j0", "revolute", "base", "l0")
+        + joint("j1", "revolute", "l0", "l1", axis="0 1 0")
+        + joint("j2", "prismatic", "l1", "l2", axis="1 0 0")
+        + joint("level", "revolute", "l2", "l3", axis="0 1 0", more=follows("j1", -1.0, 0.3))
+        + joint("twice", "revolute", "l3", "l4", axis="0 0 1", more=follows("driver", 2.0))
+        + joint("driver", "revolute", "l0", "side")
+    )
+    path = written(chain)
+    imported = import_urdf(path, tip="l4")
+    robot = imported.robot
+    assert (robot.joints, robot.rows) == (4, 5)
+    assert imported.joints == ("j0", "j1", "j2", "driver")
+    q = random.uniform(-1, 1, (50, 4))
+    np.testing.assert_allclose(forward(robot, q), peer_poses(path, imported.joints, q, "l4"), atol=1e-12)
+    write_robot(robot, tmp_path / "arm.yaml")
+    np.testing.assert_allclose(forward(load_robot(tmp_path / "arm.yaml"), q), forward(robot, q), atol=1e-11)
+
+
+def test_sliding_endless_and_coupled_joints_go_out_and_come_in(tmp_path, random):
+    arm = make_arm(
+        sliding=np.arange(6) == 2,
+        offset=[0, 0, 0.4, 0, 0.2, 0],
+        direction=[1, -1, -1, 1, 1, -1],
+        lower=[-1, -1, 0.1, -1, -1, -np.pi],
+        upper=[1, 1, 0.8, 1, 1, np.pi],
+        continuous=np.arange(6) == 5,
+        speed=np.ones(6),
+    )
+    path = tmp_path / "arm.urdf"
+    path.write_text(export_urdf(arm))
+    back = import_urdf(path)
+    q = random.uniform(arm.lower, arm.upper, (100, 6))
+    np.testing.assert_allclose(forward(back.robot, q), forward(arm, q), atol=1e-12)
+    np.testing.assert_allclose(
+        peer_poses(path, [f"joint_{k}" for k in range(1, 7)], q, "tool"), forward(arm, q), atol=1e-12
+    )
+    np.testing.assert_array_equal(back.robot.sliding, arm.sliding)
+    np.testing.assert_array_equal(back.robot.continuous, arm.continuous)
+    np.testing.assert_allclose(back.robot.lower, arm.lower)
+    level = np.vstack([np.eye(5), [0, -1.0, 0, 0, 0]])
+    follower = arm.replace(coupling=level, lower=arm.lower[:5], upper=arm.upper[:5], speed=np.ones(5), continuous=[])
+    path.write_text(export_urdf(follower))
+    np.testing.assert_allclose(forward(import_urdf(path).robot, q[:, :5]), forward(follower, q[:, :5]), atol=1e-12)
+    summed = np.eye(6) + np.eye(6, k=-1)
+    with pytest.raises(Er3aError, match="row 2 is moved by 2 joints"):
+        export_urdf(arm.replace(coupling=summed))
+
+
+def test_axes_parallel_but_for_an_error_make_a_table_that_can_be_written(tmp_path, random):
+    """Angles to five digits put common normals kilometres away; Hayati's beta needs none."""
+    for tilt in (3.7e-6, -2e-9, 4e-4):
+        arm = make_arm(alpha=np.array([-np.pi / 2, tilt, -np.pi / 2, np.pi / 2, -np.pi / 2, 0]))
+        T = frames(arm, np.zeros(6))
+        table = table_from_axes(T[:6, :3, 2], T[:6, :3, 3], T[6])
+        derived = arm.replace(**vars(table))
+        q = random.uniform(-3, 3, (50, 6))
+        np.testing.assert_allclose(forward(derived, q), forward(arm, q), atol=1e-12)
+        assert np.abs([derived.a, derived.d]).max() < 1
+        write_robot(derived, tmp_path / "made.yaml")
+        np.testing.assert_allclose(forward(load_robot(tmp_path / "made.yaml"), q), forward(arm, q), atol=1e-11)
+
+
+def test_residues_of_a_derivation_are_no_metres(tmp_path):
+    tool, base = np.eye(4), np.eye(4)
+    tool[:3, 3], base[:3, 3] = (0, 0, 0.000239), (-1.2e-9, 0, 0)
+    arm = make_arm(tool=tool, base=base)
+    write_robot(arm, tmp_path / "made.yaml")
+    with pytest.warns(InputWarning, match="0.239"):
+        again = load_robot(tmp_path / "made.yaml")
+    np.testing.assert_allclose(again.tool, tool, atol=1e-12)
+    np.testing.assert_allclose(again.base, base, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "model", [each for each in dh_models() if isinstance(each, DhModel)], ids=lambda each: each.name
+)
+def test_models_of_robotics_toolbox_have_its_poses(model, random, tmp_path):
+    robot = model.robot
+    q = random.uniform(robot.lower, robot.upper, (20, robot.joints))
+    np.testing.assert_allclose(forward(robot, q), model.poses(q), atol=1e-12)
+    path = tmp_path / f"{robot.name}.urdf"
+    path.write_text(export_urdf(robot))
+    back = import_urdf(path).robot
+    write_robot(back, tmp_path / f"{robot.name}.yaml")
+    np.testing.assert_allclose(forward(load_robot(tmp_path / f"{robot.name}.yaml"), q), model.poses(q), atol=1e-10)
