@@ -55,7 +55,7 @@ class ArmModel:
     bodies: tuple[tuple[int | None, Body], ...]
 
     def rigid_torques(self, q: Reals, qd: Reals, qdd: Reals) -> Reals:
-        """Torques (N, n) of gravity and of the masses' motion (RNEA), without rotors, friction and forces at the tool."""
+        """Torques (N, n) of gravity and of the masses' motion (RNEA); no rotors, no friction, no forces at the tool."""
         if not len(q):
             return np.empty_like(q)
         pin = pinocchio()
@@ -140,7 +140,8 @@ def arm_model(robot: Robot, load: Load | None = None, gravity: float = GRAVITY) 
 
 def flange_in_last_link(robot: Robot) -> Reals:
     """The flange (4, 4) in the frame that moves with the last joint."""
-    return constant_links(robot.without_tool())[-1]
+    last: Reals = constant_links(robot.without_tool())[-1]
+    return last
 
 
 def drives_of(robot: Robot) -> Drives:

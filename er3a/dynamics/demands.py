@@ -68,7 +68,8 @@ def power_imbalance(model: ArmModel, parts: TorqueParts, q: Reals, qd: Reals, qd
     def energy(step: float) -> Reals:
         at, velocity = q + step * qd + step**2 / 2 * qdd, qd + step * qdd
         kinetic = 0.5 * np.einsum("Ni,Nij,Nj->N", velocity, model.mass_matrix(at), velocity)
-        return kinetic + model.potential_energy(at)
+        whole: Reals = kinetic + model.potential_energy(at)
+        return whole
 
     change = (energy(h) - energy(-h)) / (2 * h)
     power = (model.rigid_torques(q, qd, qdd) * qd).sum(axis=1)

@@ -1,7 +1,7 @@
 """How much more a motion could carry, and how much faster it could be, under the drives' torques.
 
-Torques are linear in the mass of a payload whose centre and radii of gyration stay, and quadratic in a scale of time:
-gravity and Coulomb friction stay, viscous friction goes with the scale, inertia and velocity terms with its square [1]_.
+Torques are linear in the mass of a payload whose centre and radii of gyration stay, and quadratic in a scale of speed:
+gravity and Coulomb friction stay, viscous friction goes with it, inertia and velocity terms with its square [1]_.
 
 References
 ----------

@@ -15,7 +15,7 @@ from er3a.collision.envelopes import envelopes_of
 from er3a.dynamics.arm_model import drives_of
 from er3a.dynamics.estimate import capsule_body
 from er3a.numerics.arrays import Reals
-from er3a.robots.masses import Body, NoBody, about, no_body, together
+from er3a.robots.masses import Body, NoBody, about, no_body, six_moments, together
 from er3a.robots.robot import Envelope, Robot
 
 WATER = 1000.0
@@ -152,7 +152,7 @@ def _against_shape(link: int, body: Body, capsules: list[Envelope]) -> list[Mass
         found.append(CentreOutside(link, 1000 * outside))
     own, expected = _gyration(body.inertia_matrix, body.mass), _gyration(shape.inertia_matrix, shape.mass)
     less = body.inertia_matrix - body.mass * about(centre)
-    at_centre = Body(body.mass, body.centre, tuple(less[i, j] for i, j in _ENTRIES))  # type: ignore[arg-type]
+    at_centre = Body(body.mass, body.centre, six_moments(less))
     expected_trace = float(np.trace(shape.inertia_matrix)) * body.mass / shape.mass
     given, rest = float(np.trace(body.inertia_matrix)), float(np.trace(less))
     if (
@@ -175,12 +175,9 @@ def _against_weight(robot: Robot, incomplete: bool) -> list[MassFinding]:
     return [SumOffWeight(total, weight, complete)] if off else []
 
 
-_ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-
-
-def _gyration(I: Reals, mass: float) -> float:
+def _gyration(tensor: Reals, mass: float) -> float:
     """Mean radius of gyration, m: half the trace is the second moment of the mass about the centre."""
-    return float(np.sqrt(np.trace(I) / 2 / mass))
+    return float(np.sqrt(np.trace(tensor) / 2 / mass))
 
 
 def _distance(point: Reals, capsule: Envelope) -> float:

@@ -1,8 +1,8 @@
 """The fastest time law along a way in joint space under the drives' torques and the joints' speeds, by TOPP-RA [1]_.
 
-Along a way q(s) torques are ``a s'' + b s'^2 + c``; so peak torques bound s'' and s'^2 linearly. Viscous friction, which
-goes with s', counts with the greatest s' that the joints' speeds allow: the motion found keeps the limits, and is the
-fastest one if there is no viscous friction. Between nodes constraints are interpolated.
+Along a way q(s) torques are ``a s'' + b s'^2 + c``; so peak torques bound s'' and s'^2 linearly. Viscous friction
+goes with s' and counts with the greatest s' that the joints' speeds allow: the motion found keeps the limits, and is
+the fastest one if there is no viscous friction. Between nodes constraints are interpolated.
 
 References
 ----------
@@ -20,7 +20,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from er3a.dynamics.arm_model import ArmModel, drives_of
-from er3a.dynamics.torques import holding_torques, known, torque_parts
+from er3a.dynamics.torques import direction_of, holding_torques, known, torque_parts
 from er3a.numerics.arrays import Reals
 from er3a.planning.piecewise import polynomial_motion
 from er3a.planning.timing import (
@@ -68,13 +68,13 @@ def fastest_under_torques(model: ArmModel, q: Reals, speed: Reals, peak: Reals) 
     if len(way) == 2:
         q, way = np.linspace(q[0], q[1], STRAIGHT_NODES), np.linspace(0.0, way[1], STRAIGHT_NODES)
     spline = CubicSpline(way, q)
-    pace, pull = _toppra(way, spline, speed, torque_rows(model, way, spline, speed, peak))
+    pace = _toppra(way, spline, speed, torque_rows(model, way, spline, speed, peak))
     between = (pace[:-1] + pace[1:]) / 2
     if (between <= 0).any():
         raise TimingError(MustStandStill())
     t = np.concatenate([[0.0], np.cumsum(np.diff(way) / between)])
     timed = Timed(polynomial_motion(run_along(way, spline, pace, t), t, SPLINE_DEGREE))
-    dry = known(drives_of(model.robot).coulomb) * (np.sign(spline(way, 1)) - np.sign(timed.velocity))
+    dry = known(drives_of(model.robot).coulomb) * (direction_of(spline(way, 1)) - direction_of(timed.velocity))
     return TimedTorques(timed, torque_parts(model, timed.q, timed.velocity, timed.acceleration).total + dry)
 
 
@@ -92,7 +92,7 @@ def torque_rows(model: ArmModel, way: Reals, spline: CubicSpline, speed: Reals, 
     armature = known(drives.armature)
     a = model.rigid_torques(q, rest, slope) - held + armature * slope
     b = model.rigid_torques(q, slope, bend) - held + armature * bend
-    c = held + model.tool_torques(q) + known(drives.coulomb) * np.sign(slope)
+    c = held + model.tool_torques(q) + known(drives.coulomb) * direction_of(slope)
     with np.errstate(divide="ignore"):
         most = (speed / np.abs(slope)).min(axis=1)[:, None]
     viscous = known(drives.viscous) * slope * most
@@ -102,7 +102,7 @@ def torque_rows(model: ArmModel, way: Reals, spline: CubicSpline, speed: Reals, 
     return a[:, bound], b[:, bound], c[:, bound], F, g[:, np.tile(bound, 2)]
 
 
-def _toppra(way: Reals, spline: CubicSpline, speed: Reals, rows: Rows) -> tuple[Reals, Reals]:
+def _toppra(way: Reals, spline: CubicSpline, speed: Reals, rows: Rows) -> Reals:
     """Speed along the way at its nodes (N,), and acceleration (N - 1,) between them."""
     try:
         with warnings.catch_warnings():  # of escapes in docstrings, when Python compiles the library
@@ -130,7 +130,7 @@ def _toppra(way: Reals, spline: CubicSpline, speed: Reals, rows: Rows) -> tuple[
 
     constraints = [JointVelocityConstraint(np.stack([-speed, speed], axis=1)), PeakTorques()]
     solver = TOPPRA(constraints, Way(), gridpoints=way, solver_wrapper="seidel")
-    pull, pace, _ = solver.compute_parameterization(0, 0)
+    _, pace, _ = solver.compute_parameterization(0, 0)
     if pace is None or not np.isfinite(pace).all():
         raise TimingError(NoTimeLawFound())
-    return pace, pull
+    return pace

@@ -20,6 +20,9 @@ from er3a.robots.robot import Robot
 SINGULAR = 1e-12
 """A mass matrix whose smallest eigenvalue is less than that of its greatest has none that can be inverted."""
 
+AT_REST = 1e-5
+"""rad/s or m/s: joints slower than that are at rest but for rounding."""
+
 
 @dataclass(frozen=True, eq=False)
 class TorqueParts:
@@ -75,8 +78,9 @@ def torques(robot: Robot, q: Reals, qd: Reals, qdd: Reals, load: Load | None = N
 def mass_matrix(robot: Robot, q: Reals, load: Load | None = None) -> Reals:
     """Mass matrices (..., n, n) in kg m^2 (kg, kg m where joints slide), rotors included; errors as :func:`torques`."""
     (q,), shape = _flat(robot, {"q": q})
-    M: Reals = arm_model(robot, load).mass_matrix(q) + np.diag(known(drives_of(robot).armature))
-    return M.reshape(*shape, robot.joints)
+    M = arm_model(robot, load).mass_matrix(q) + np.diag(known(drives_of(robot).armature))
+    matrices: Reals = M.reshape(*shape, robot.joints)
+    return matrices
 
 
 def gravity(robot: Robot, q: Reals, load: Load | None = None) -> Reals:
@@ -101,8 +105,8 @@ def accelerations(robot: Robot, q: Reals, qd: Reals, tau: Reals, load: Load | No
         joint = int(np.abs(vectors[weak][0, :, 0]).argmax()) + 1
         raise RobotError(robot.name, f"joint {joint} moves nothing that has inertia, so accelerations have no value")
     rest = torque_parts(arm_model(robot, load), q, qd, np.zeros_like(q)).total
-    qdd: Reals = np.linalg.solve(M, (tau - rest)[..., None])[..., 0].reshape(shape)
-    return qdd
+    found: Reals = np.asarray(np.linalg.solve(M, (tau - rest)[..., None])[..., 0], dtype=float).reshape(shape)
+    return found
 
 
 def torque_parts(model: ArmModel, q: Reals, qd: Reals, qdd: Reals) -> TorqueParts:
@@ -128,9 +132,18 @@ def holding_torques(model: ArmModel, q: Reals) -> Reals:
 
 
 def friction_torques(drives: Drives, qd: Reals) -> Reals:
-    """Torques (N, n) against Coulomb's and viscous friction; unknown ones count nothing."""
-    against: Reals = known(drives.viscous) * qd + known(drives.coulomb) * np.sign(qd)
+    """Torques (N, n) against Coulomb's and viscous friction; unknown ones count nothing.
+
+    A joint slower than :data:`AT_REST` is at rest, because rounding has no direction.
+    """
+    against: Reals = known(drives.viscous) * qd + known(drives.coulomb) * direction_of(qd)
     return against
+
+
+def direction_of(qd: Reals) -> Reals:
+    """-1, 0 or 1 of velocities, 0 for joints at rest."""
+    moving: Reals = np.where(np.abs(qd) > AT_REST, np.sign(qd), 0.0)
+    return moving
 
 
 def known(values: Reals) -> Reals:

@@ -45,8 +45,8 @@ ASSUMED: dict[Grade, Tolerance] = {
 def parameters(body: Body) -> Reals:
     """(10,): m, m c, and the inertia about the frame's origin as xx, xy, yy, xz, yz, zz."""
     c = np.array(body.centre)
-    I = body.inertia_matrix + body.mass * about(c)
-    return np.array([body.mass, *(body.mass * c), *(I[entry] for entry in UPPER)])
+    tensor = body.inertia_matrix + body.mass * about(c)
+    return np.array([body.mass, *(body.mass * c), *(tensor[entry] for entry in UPPER)])
 
 
 def centre_directions(body: Body) -> Reals:
@@ -54,8 +54,8 @@ def centre_directions(body: Body) -> Reals:
     c, found = np.array(body.centre), np.zeros((3, PARAMETERS))
     for axis in range(3):
         e = AXES[axis]
-        I = 2 * c[axis] * np.eye(3) - np.outer(e, c) - np.outer(c, e)
-        found[axis] = [0.0, *e, *(I[entry] for entry in UPPER)]
+        tensor = 2 * c[axis] * np.eye(3) - np.outer(e, c) - np.outer(c, e)
+        found[axis] = [0.0, *e, *(tensor[entry] for entry in UPPER)]
     return body.mass * found
 
 

@@ -75,11 +75,11 @@ def wrist_use(robot: Robot, wrist: WristLoad, load: Load, gravity: float = GRAVI
 
 def _own(robot: Robot, load: Load, joint: int) -> float:
     """The load's own inertia about an axis through its centre, kg m^2."""
-    I = load.inertia_matrix
+    tensor = load.inertia_matrix
     if joint == robot.rows:
         axis = last_axis(robot)[1]
-        return float(axis @ I @ axis)
-    return float(np.linalg.eigvalsh(I)[-1])
+        return float(axis @ tensor @ axis)
+    return float(np.linalg.eigvalsh(tensor)[-1])
 
 
 def last_axis(robot: Robot) -> tuple[Reals, Reals]:
@@ -131,7 +131,7 @@ def load_diagram(
 
 
 def wrist_to_flange(robot: Robot) -> float | None:
-    """Distance (m) along the last axis from the point where the last three axes meet to the flange; None if they don't."""
+    """Distance (m) along the last axis from where the last three axes meet to the flange; None if they don't meet."""
     if robot.rows < 3 or robot.sliding[-3:].any():
         return None
     T = frames(robot.without_tool(), np.zeros(robot.joints))

@@ -13,7 +13,7 @@ from er3a.files.mass_fields import HEAVIEST_PAYLOAD_KG, IMPOSSIBLE, BodyFields
 from er3a.files.units import Triple
 from er3a.files.yaml_file import StrictModel
 from er3a.geometry.transforms import transform
-from er3a.robots.masses import Body, Load, moved, no_body, together
+from er3a.robots.masses import Body, Load, moved, no_body, six_moments, together
 from er3a.robots.robot import Grade
 
 THREE_ZEROS = [0.0, 0.0, 0.0]
@@ -102,9 +102,8 @@ def mesh_body(given: MeshMass) -> Body:
         mesh.invert()
     mesh.apply_scale(given.unit_mm / 1000)
     mesh.density = given.density_kg_m3
-    I, (x, y, z) = mesh.moment_inertia, mesh.center_mass.tolist()
-    xx, yy, zz, xy, xz, yz = (float(I[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
-    body = Body(float(mesh.mass), (x, y, z), (xx, yy, zz, xy, xz, yz))
+    x, y, z = mesh.center_mass.tolist()
+    body = Body(float(mesh.mass), (x, y, z), six_moments(mesh.moment_inertia))
     if problem := no_body(body):
         raise InputError(given.file, None, IMPOSSIBLE[problem], "Check the mesh")
     if body.mass > HEAVIEST_PAYLOAD_KG:

@@ -118,7 +118,9 @@ class InertiaFields(StrictModel):
         if (self.frame == "urdf") != bool(self.origins):
             raise ValueError("origins: they belong to frame urdf, and it to them | Give both or neither")
         joints = [origin.joint for origin in self.origins]
-        if self.frame == "urdf" and (joints != list(range(1, len(joints) + 1)) or max(numbers) > len(joints)):
+        if self.frame == "urdf" and max(numbers) > len(joints):
+            raise ValueError(f"links: there is no origin for link {max(numbers)} | Give that of each link's joint")
+        if self.frame == "urdf" and joints != list(range(1, len(joints) + 1)):
             raise ValueError("origins: not one for each joint in order | Write the origins of joints 1, 2, 3 ...")
         return self
 

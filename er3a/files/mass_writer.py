@@ -12,19 +12,20 @@ from er3a.robots.robot import Robot
 
 def mass_groups(robot: Robot) -> dict[str, dict[str, Any]]:
     """The groups of which something is known; bodies in the frames that move with the joints."""
-    masses, found = robot.masses, {}
+    masses = robot.masses
+    found: dict[str, dict[str, Any]] = {}
     if masses.links:
         found["inertia"] = {"frame": "joint", "links": [_link(each.link, each.body) for each in masses.links]}
     if masses.drives:
         rows = [{"joint": k + 1, **_drive(robot, k)} for k in range(robot.joints)]
         found["drives"] = {"rows": [row for row in rows if len(row) > 1] or rows[:1]}
     if masses.wrist:
-        rows = {}
+        by_joint: dict[int, dict[str, Any]] = {}
         for key, values in (("moment_n_m", masses.wrist.moment), ("inertia_kg_m2", masses.wrist.inertia)):
             for joint, value in values:
-                rows.setdefault(joint, {"joint": joint})[key] = value
+                by_joint.setdefault(joint, {"joint": joint})[key] = value
         payload = {"payload_kg": masses.wrist.payload} if np.isfinite(masses.wrist.payload) else {}
-        found["wrist_load"] = payload | {"rows": [rows[joint] for joint in sorted(rows)]}
+        found["wrist_load"] = payload | {"rows": [by_joint[joint] for joint in sorted(by_joint)]}
     if np.isfinite(masses.weight):
         found["weight"] = {"kg": masses.weight}
     return found

@@ -112,7 +112,8 @@ def import_urdf(
     misfit = np.linalg.norm((forward(robot, q) - given)[:, :3, 3], axis=1).max()
     root, placed = ElementTree.fromstring(read_text(path, MOST_BYTES)), link_places(found, shift)
     envelopes, hulls, told = link_shapes(path, root, robot, placed, split)
-    masses, weighed = masses_from_urdf(root, robot, placed, [joint.name for joint in moving])
+    names = tuple(joint.name for joint in sources)
+    masses, weighed = masses_from_urdf(root, robot, placed, [joint.name for joint in moving], names)
     stated = {
         "envelopes": bool(envelopes or hulls),
         "inertia": bool(masses.links),
@@ -120,7 +121,6 @@ def import_urdf(
     }
     more = {group: Source(f"As {path.name} states it", "export") for group, there in stated.items() if there}
     robot = robot.replace(envelopes=envelopes, hulls=hulls, masses=masses, sources={**robot.sources, **more})
-    names = tuple(joint.name for joint in sources)
     first, last = found.joints[0].parent, found.joints[-1].child
     return UrdfImport(robot, (*found.notes, *notes, *told, *weighed), float(misfit), names, first, last)
 
@@ -135,7 +135,8 @@ def link_places(found: UrdfChain, shift: Reals) -> LinkPlaces:
     Returns
     -------
     place : of a link's name its frame (4, 4) in that of the chain's base and the number of moving joints before it;
-        None for a link that does not move with the chain
+        None for a link that does not move with the chain. With ``carried`` what moves by itself on a link that moves,
+        such as fingers, counts as fixed where it is at 0
     """
     above = {joint.child: joint for joint in found.all.values()}
     place = {found.joints[0].parent: (np.eye(4), 0)}
@@ -146,11 +147,14 @@ def link_places(found: UrdfChain, shift: Reals) -> LinkPlaces:
             T, number = T @ _motion(joint, shift[number : number + 1])[0], number + 1
         place[joint.child] = T, number
 
-    def placed(name: str) -> tuple[Reals, int] | None:
-        behind = np.eye(4)
-        while name not in place and name in above and not above[name].moves:
+    def placed(name: str, carried: bool = False) -> tuple[Reals, int] | None:
+        behind, fixed = np.eye(4), True
+        while name not in place and name in above and (carried or not above[name].moves):
+            fixed &= not above[name].moves
             behind, name = above[name].T_parent_joint @ behind, above[name].parent
-        return (place[name][0] @ behind, place[name][1]) if name in place else None
+        if name not in place or not (fixed or place[name][1]):
+            return None
+        return place[name][0] @ behind, place[name][1]
 
     return placed
 

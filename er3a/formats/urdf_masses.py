@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 
@@ -19,8 +20,13 @@ from er3a.numerics.arrays import Reals
 from er3a.robots.masses import Body, Drives, LinkMass, Masses, moved, no_body, together
 from er3a.robots.robot import Robot
 
-LinkPlaces = Callable[[str], tuple[Reals, int] | None]
-"""Of a link's name its frame in the base's and how many moving joints stand before it, as er3a.formats.urdf tells."""
+
+class LinkPlaces(Protocol):
+    """Where links stand, as :func:`er3a.formats.urdf.link_places` tells."""
+
+    def __call__(self, name: str, carried: bool = False, /) -> tuple[Reals, int] | None: ...
+
+
 ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 WHY = {
     "not_finite": "holds something that is no number",
@@ -31,14 +37,15 @@ WHY = {
 
 
 def masses_from_urdf(
-    root: ElementTree.Element, robot: Robot, places: LinkPlaces, moving: Sequence[str]
+    root: ElementTree.Element, robot: Robot, places: LinkPlaces, moving: Sequence[str], names: Sequence[str]
 ) -> tuple[Masses, tuple[str, ...]]:
     """Bodies in the robot's frames, and what is known of its drives.
 
     Parameters
     ----------
     robot : the arm with the table derived from the same URDF
-    moving : names of its moving joints, from the base on
+    places : of the links of that URDF
+    moving : names of the chain's moving joints; names : of those that the robot's joint values are of
 
     Returns
     -------
@@ -52,7 +59,7 @@ def masses_from_urdf(
         if inertial is None:
             continue
         name = link.get("name", "?")
-        place = places(name)
+        place = places(name, True)
         if place is None:
             notes.append(f"link {name} does not move with the arm's chain; its mass was left out")
             continue
@@ -67,7 +74,7 @@ def masses_from_urdf(
     if found and missing:
         notes.append(f"no mass is given for what moves with {', '.join(missing)}")
     links = tuple(LinkMass(number, together(bodies)) for number, bodies in sorted(found.items()))
-    return Masses(links=links, drives=_drives(root, robot, moving)), tuple(notes)
+    return Masses(links=links, drives=_drives(root, names)), tuple(notes)
 
 
 def write_masses(robot: Robot, names: Sequence[str], root: ElementTree.Element) -> None:
@@ -93,17 +100,17 @@ def _body(inertial: ElementTree.Element) -> tuple[Body, Reals]:
     return body, transform(xyz, rpy)
 
 
-def _drives(root: ElementTree.Element, robot: Robot, moving: Sequence[str]) -> Drives | None:
+def _drives(root: ElementTree.Element, names: Sequence[str]) -> Drives | None:
     joints = {joint.get("name", "?"): joint for joint in root.findall("joint")}
     coulomb, viscous, effort = (
-        np.array([_number(joints[name].find(tag), key, math.nan) for name in moving])
+        np.array([_number(joints[name].find(tag), key, math.nan) for name in names])
         for tag, key in (("dynamics", "friction"), ("dynamics", "damping"), ("limit", "effort"))
     )
     effort[~(effort > 0)] = np.nan
     coulomb, viscous = (np.where(values >= 0, values, np.nan) for values in (coulomb, viscous))
-    if robot.joints != len(moving) or np.isnan([coulomb, viscous, effort]).all():
+    if np.isnan([coulomb, viscous, effort]).all():
         return None
-    unknown = np.full(robot.joints, np.nan)
+    unknown = np.full(len(names), np.nan)
     return Drives(unknown, unknown, coulomb, viscous, rated=unknown, peak=effort)
 
 

@@ -162,10 +162,8 @@ def moved(body: Body, T: Reals) -> Body:
     """A body as seen in another frame, where T (4, 4) takes coordinates of its own frame to those."""
     R = T[:3, :3]
     x, y, z = (R @ np.array(body.centre) + T[:3, 3]).tolist()
-    I = R @ body.inertia_matrix @ R.T
-    moments = (I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2])
-    xx, yy, zz, xy, xz, yz = (float(value) for value in moments)
-    return Body(body.mass, (x, y, z), (xx, yy, zz, xy, xz, yz), body.mass_tolerance, body.centre_tolerance)
+    moments = six_moments(R @ body.inertia_matrix @ R.T)
+    return Body(body.mass, (x, y, z), moments, body.mass_tolerance, body.centre_tolerance)
 
 
 def together(bodies: list[Body]) -> Body:
@@ -174,17 +172,23 @@ def together(bodies: list[Body]) -> Body:
     centres = np.array([body.centre for body in bodies]).reshape(-1, 3)
     weights = np.array([body.mass for body in bodies])
     centre = weights @ centres / mass if mass else centres.mean(axis=0)
-    I = sum((body.inertia_matrix + body.mass * about(centre - body.centre) for body in bodies), np.zeros((3, 3)))
+    tensor = sum((body.inertia_matrix + body.mass * about(centre - body.centre) for body in bodies), np.zeros((3, 3)))
     x, y, z = centre.tolist()
     known = [body.mass_tolerance for body in bodies if body.mass_tolerance is not None]
     offsets = [body.centre_tolerance for body in bodies if body.centre_tolerance is not None]
     return Body(
         mass,
         (x, y, z),
-        (float(I[0, 0]), float(I[1, 1]), float(I[2, 2]), float(I[0, 1]), float(I[0, 2]), float(I[1, 2])),
+        six_moments(tensor),
         sum(known) if len(known) == len(bodies) else None,
         max(offsets) if len(offsets) == len(bodies) else None,
     )
+
+
+def six_moments(tensor: Reals) -> SixMoments:
+    """ixx, iyy, izz, ixy, ixz, iyz of an inertia (3, 3)."""
+    xx, yy, zz, xy, xz, yz = tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]].tolist()
+    return xx, yy, zz, xy, xz, yz
 
 
 def about(offset: Reals) -> Reals:

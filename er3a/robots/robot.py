@@ -152,7 +152,7 @@ class Robot(Displayed):
     combined: tuple[CombinedLimit, ...] = ()
     hulls: tuple[Hull, ...] = ()
     pair_rules: tuple[PairRule, ...] = ()
-    masses: Masses = Masses()
+    masses: Masses = field(default_factory=Masses)
     sources: Mapping[str, Source] = field(default_factory=dict)
     origins: Mapping[str, str] = field(default_factory=dict)
     derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)

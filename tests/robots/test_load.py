@@ -155,7 +155,11 @@ def test_the_three_files_hold_the_gathered_numbers(robot):
 def test_every_group_has_a_source_and_a_grade(robot):
     speeds = {"speeds"} if np.isfinite(robot.speed).all() else set()
     envelopes = {"envelopes"} if robot.envelopes else set()
-    assert set(robot.sources) == {"dh", "zero", "limits"} | speeds | envelopes
+    masses = robot.masses
+    known = {"inertia": masses.links, "drives": masses.drives, "wrist_load": masses.wrist}
+    known["weight"] = np.isfinite(masses.weight)
+    more = {group for group, there in known.items() if there}
+    assert set(robot.sources) == {"dh", "zero", "limits"} | speeds | envelopes | more
     for source in robot.sources.values():
         assert source.grade in GRADES
         assert len(source.source) > 10

@@ -43,7 +43,7 @@ def compute(study: Study, name: str) -> DynamicsResults:
     robot = with_estimates(given, settings.capsule_density_kg_m3)
     loads = study.loads(name)
     load, load_grade = load_of(loads), _worst_grade([each.grade for each in loads])
-    grade = _worst_grade([_links_grade(given), *(["inferred"] if robot is not given else [])])
+    grade = "inferred" if robot is not given else _links_grade(given)
     moving = any(each.link > 0 for each in robot.masses.links)
     arm = _loaded_arm(study, robot, load, (grade, load_grade), settings)
     paths = _paths(study, name, arm, settings) if moving else []

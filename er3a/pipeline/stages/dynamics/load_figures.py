@@ -10,6 +10,7 @@ from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.page import Picture, number
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED
 
+DRAWN = 161
 PARTS = ("gravity", "inertia", "velocity", "friction")
 
 
@@ -20,6 +21,7 @@ def joint_colour(joint: int) -> str:
 
 def torque_figure(path: PathLoad, rows: TorqueRows) -> Picture:
     """Torques of all joints with their intervals, the parts of the most loaded one, and powers."""
+    rows = rows.take(np.unique(np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round().astype(int)))
     figure, (torque, parts, power) = new_figure(1, 3, width=13.0, height=3.4)
     worst = max(range(len(path.joints)), key=lambda j: path.joints[j].peak)
     for j in range(rows.torque.shape[1]):
@@ -67,7 +69,7 @@ def holding_figure(summary: DynamicsSummary) -> Picture:
     joints = np.arange(len(summary.holding))
     size = np.array([abs(held.torque) for held in summary.holding])
     tolerance = np.array([held.tolerance for held in summary.holding])
-    ax.bar(joints, size, color=[joint_colour(j) for j in joints], width=0.6)
+    ax.bar(joints, size, color=[joint_colour(int(j)) for j in joints], width=0.6)
     ax.errorbar(joints, size, yerr=tolerance, fmt="none", ecolor=INK, capsize=4)
     ax.set_xticks(joints, [f"J{j + 1}" for j in joints])
     ax.set_ylabel(tr("holding torque (N m)"))

@@ -28,6 +28,7 @@ class Unknown:
 
     what: Need
     numbers: tuple[int, ...] = ()
+    code: Literal["dynamics.unknown"] = "dynamics.unknown"
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,216 @@
+"""What a motion leaves room for, the worst poses, wrist loads, and times under torques."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import er3a
+from er3a.dynamics.arm_model import arm_model
+from er3a.dynamics.demands import demand
+from er3a.dynamics.holding import worst_holding
+from er3a.dynamics.margins import greatest_payload, greatest_speed_scale
+from er3a.dynamics.timing import fastest_under_torques
+from er3a.dynamics.torques import holding_torques, known, torque_parts
+from er3a.dynamics.wrist import levers, load_diagram, worst_levers, wrist_to_flange, wrist_use
+from er3a.robots.masses import Body, Drives, LinkMass, Load, Masses, WristLoad
+from er3a.robots.robot import Robot
+from testing.arms import make_arm
+
+PEAK = np.array([30.0, 45.0, 25.0, 8.0, 5.0, 3.0])
+
+
+@pytest.fixture(scope="module")
+def arm() -> Robot:
+    robot = er3a.load_robot("er3a_c60")
+    drives = replace(
+        Drives.unknown(6),
+        coulomb=np.full(6, 0.4),
+        viscous=np.full(6, 0.2),
+        armature=np.full(6, 0.02),
+        peak=PEAK,
+    )
+    return robot.replace(masses=replace(robot.masses, drives=drives), speed=np.full(6, 4.0))
+
+
+def path(count: int = 301) -> np.ndarray:
+    share = np.linspace(0, 1, count)[:, None]
+    start, end = np.array([0, -0.3, 0.2, 0, 0.3, 0]), np.array([1.2, 0.5, -0.4, 0.8, -0.5, 1])
+    return start + share * (end - start) + 0.1 * np.sin(6 * share + np.arange(6))
+
+
+def swing(count: int = 401) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    t, phase = np.linspace(0, 3, count)[:, None], np.arange(6)
+    return 0.4 * np.sin(2 * t + phase), 0.8 * np.cos(2 * t + phase), -1.6 * np.sin(2 * t + phase)
+
+
+def test_the_greatest_payload_brings_one_drive_to_its_peak(arm):
+    q, qd, qdd = swing()
+    centre, moments = (0.02, 0.0, 0.08), (0.002, 0.002, 0.001, 0.0, 0.0, 0.0)
+    without = er3a.torques(arm, q, qd, qdd)
+    found = greatest_payload(without, er3a.torques(arm, q, qd, qdd, Load(1.0, centre, moments)) - without, PEAK)
+
+    def utilisation(mass: float) -> np.ndarray:
+        load = Load(mass, centre, tuple(mass * value for value in moments))
+        return np.abs(er3a.torques(arm, q, qd, qdd, load)) / PEAK
+
+    assert 0.1 < found.value < 50
+    ratios = utilisation(found.value)
+    assert ratios.max() == pytest.approx(1.0, rel=1e-9)
+    assert np.unravel_index(ratios.argmax(), ratios.shape) == (found.sample, found.joint)
+    assert utilisation(0.999 * found.value).max() < 1 < utilisation(1.001 * found.value).max()
+
+
+def test_the_greatest_speed_scale_brings_one_drive_to_its_peak(arm):
+    q, qd, qdd = swing()
+    parts, drives = torque_parts(arm_model(arm), q, qd, qdd), arm.masses.drives
+    viscous = drives.viscous * qd
+    at_rest = parts.gravity + parts.friction - viscous
+    args = (at_rest, viscous, parts.inertia + parts.velocity, PEAK, qd)
+    found = greatest_speed_scale(*args, np.full(6, np.nan))
+
+    def utilisation(scale: float) -> float:
+        return float((np.abs(er3a.torques(arm, q, scale * qd, scale**2 * qdd)) / PEAK).max())
+
+    assert utilisation(found.value) == pytest.approx(1.0, rel=1e-9)
+    assert all(utilisation(share * found.value) <= 1 + 1e-9 for share in np.linspace(0.01, 1, 50))
+    # Joint speeds may bind first.
+    slow = greatest_speed_scale(*args, np.full(6, 0.8))
+    assert slow.value == pytest.approx(1.0, rel=1e-4)
+
+
+def test_an_arm_that_cannot_stand_has_no_margin_and_unknown_limits_none(arm):
+    q, qd, qdd = swing()
+    parts, unknown = torque_parts(arm_model(arm), q, qd, qdd), np.full(6, np.nan)
+    weak = np.where(np.arange(6) == 1, 0.5, np.nan)
+    zero = np.zeros_like(q)
+    assert greatest_payload(parts.total, np.ones_like(q), weak).value == 0.0
+    assert greatest_speed_scale(parts.gravity, zero, parts.inertia, weak, qd, unknown).value == 0.0
+    assert greatest_payload(parts.total, np.ones_like(q), unknown) is None
+    assert greatest_speed_scale(parts.gravity, zero, parts.inertia, unknown, qd, unknown) is None
+    assert greatest_speed_scale(zero, zero, zero, PEAK, zero, unknown).value == np.inf
+
+
+def test_the_worst_holding_pose_of_two_links_is_stretched_out():
+    g, a = 9.81, 0.5
+    rods = tuple(
+        LinkMass(k, Body(m, (c, 0.0, 0.0), (0.01, 0.01, 0.01, 0, 0, 0))) for k, m, c in ((1, 3, 0.2), (2, 2, 0.3))
+    )
+    tilt = np.eye(4)
+    tilt[:3, :3] = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
+    arm = Robot(
+        name="planar", title="planar", convention="standard", a=[a, 0.4], alpha=[0.0, 0.0], d=[0.0, 0.0],
+        direction=[1.0, 1.0], offset=[0.0, 0.0], lower=[-3.0, -2.5], upper=[3.0, 2.5], base=tilt, masses=Masses(rods),
+    )  # fmt: skip
+    found = worst_holding(arm_model(arm))
+    np.testing.assert_allclose(np.abs(found.values), [g * (3 * 0.2 + 2 * (a + 0.3)), g * 2 * 0.3], rtol=1e-5)
+
+
+def test_no_pose_needs_more_holding_torque_than_the_worst_found(arm):
+    model = arm_model(arm)
+    found = worst_holding(model)
+    q = np.random.default_rng(5).uniform(arm.lower, arm.upper, (20_000, 6))
+    assert (np.abs(holding_torques(model, q)).max(axis=0) <= np.abs(found.values) + 1e-9).all()
+    assert ((found.q >= arm.lower) & (found.q <= arm.upper)).all()
+
+
+def test_the_worked_example_of_a_manual():
+    """Epson's N6 manual: 3 kg at 120 + 100 mm make 6.468 N m of 15.2 and 0.1452 kg m^2 of 0.42 (g = 9.8)."""
+    arm = make_arm(d=[0.3, 0, 0, 0.35, 0, 0.12])
+    wrist = WristLoad(6.0, ((4, 15.2), (5, 15.2)), ((4, 0.42), (5, 0.42)))
+    payload, *uses = wrist_use(arm, wrist, Load(3.0, (0.0, 0.0, 0.1)), gravity=9.8)
+    assert (payload.asked, payload.allowed, payload.ratio) == (3.0, 6.0, 0.5)
+    for use in uses:
+        asked, allowed = {"moment": (6.468, 15.2), "inertia": (0.1452, 0.42)}[use.quantity]
+        assert use.asked == pytest.approx(asked, rel=1e-6)
+        assert use.ratio == pytest.approx(asked / allowed, rel=1e-6)
+
+
+def test_levers_are_distances_of_the_load_from_the_axes(arm):
+    point, q = np.array([0.03, -0.02, 0.1]), np.random.default_rng(2).uniform(arm.lower, arm.upper, (3000, 6))
+    far = worst_levers(arm, point)
+    seen = levers(arm, q, point)
+    assert (seen <= far + 1e-9).all()
+    # Of a wrist whose axes meet: the distance from their point for joints 4 and 5, that from its own axis for 6.
+    whole = np.hypot(np.hypot(0.03, 0.02), 0.1 + 0.0785)
+    np.testing.assert_allclose(far[3:], [whole, whole, np.hypot(0.03, 0.02)], atol=1e-6)
+    assert wrist_to_flange(arm) == pytest.approx(0.0785)
+    # Against the cross product of joint 5's column of the Jacobian: a point moves by its distance for each radian.
+    tool = np.eye(4)
+    tool[:3, 3] = point
+    J = er3a.jacobian(arm.replace(tool=tool), q)
+    np.testing.assert_allclose(seen, np.linalg.norm(J[:, :3], axis=1), atol=1e-12)
+
+
+def test_the_load_diagram_is_where_the_comparison_reaches_its_limit(arm):
+    wrist = WristLoad(3.0, ((4, 5.0), (5, 5.0), (6, 2.0)), ((5, 0.15), (6, 0.02)))
+    mass, along = np.array([1.0, 2.0, 3.0, 4.0]), np.array([0.0, 0.05, 0.1])
+    diagram = load_diagram(arm, wrist, mass, along)
+    assert np.isnan(diagram.across[3]).all()  # more than the payload
+    for i in range(3):
+        for j, z in enumerate(along):
+            radius = diagram.across[i, j]
+            if np.isnan(radius):
+                use = wrist_use(arm, wrist, Load(mass[i], (0.0, 0.0, z)))
+                assert max(each.ratio for each in use if each.quantity != "payload") > 1
+                continue
+            use = wrist_use(arm, wrist, Load(mass[i], (radius, 0.0, z)))
+            assert max(each.ratio for each in use if each.quantity != "payload") == pytest.approx(1.0, abs=1e-5)
+    assert (np.diff(diagram.across[0]) <= 0).all()
+    assert load_diagram(make_arm(a=[0.1, 0.4, 0.05, 0, 0.1, 0]), wrist, mass, along) is None
+    assert load_diagram(arm, WristLoad(3.0), mass, along) is None
+
+
+@pytest.mark.parametrize("viscous", [0.0, 0.3])
+def test_times_under_torques_keep_the_limits_and_use_them(arm, viscous):
+    drives = replace(arm.masses.drives, viscous=np.full(6, viscous))
+    model = arm_model(arm.replace(masses=replace(arm.masses, drives=drives)))
+    found = fastest_under_torques(model, path(), np.full(6, 4.0), PEAK)
+    timed = found.timed
+    by_torque = np.abs(found.torques) / PEAK
+    by_speed = np.abs(timed.velocity) / 4.0
+    assert by_torque.max() <= 1 + 1e-3
+    assert by_speed.max() <= 1 + 1e-6
+    np.testing.assert_allclose(timed.q[[0, -1]], path()[[0, -1]], atol=1e-12)
+    if not viscous:
+        used = np.maximum(by_torque.max(axis=1), by_speed.max(axis=1))
+        assert np.mean(used > 0.99) > 0.9
+    # Velocities are those of the joints over time.
+    speed = np.diff(timed.q, axis=0) / np.diff(timed.t)[:, None]
+    between = (timed.velocity[1:] + timed.velocity[:-1]) / 2
+    assert np.abs(speed - between)[5:-5].max() < 0.02
+
+
+def test_times_under_torques_are_those_of_toppras_own_constraint(arm):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from toppra import SplineInterpolator
+        from toppra.algorithm import TOPPRA
+        from toppra.constraint import JointTorqueConstraint, JointVelocityConstraint
+    drives = replace(arm.masses.drives, viscous=np.zeros(6))
+    arm = arm.replace(masses=replace(arm.masses, drives=drives))
+    bare = arm.replace(masses=replace(arm.masses, drives=replace(drives, coulomb=np.zeros(6))))
+    nodes = path()
+    torque = JointTorqueConstraint(
+        lambda *row: er3a.torques(bare, *row), np.stack([-PEAK, PEAK], axis=1), known(drives.coulomb)
+    )
+    torque.set_discretization_type(1)
+    speed = JointVelocityConstraint(np.array([[-4.0, 4.0]] * 6))
+    way = np.linspace(0, 1, len(nodes))
+    solver = TOPPRA([torque, speed], SplineInterpolator(way, nodes), gridpoints=way, solver_wrapper="seidel")
+    other = solver.compute_trajectory(0, 0).duration
+    found = fastest_under_torques(arm_model(arm), nodes, np.full(6, 4.0), PEAK).timed.duration
+    assert found == pytest.approx(other, rel=2e-3)
+
+
+def test_demands_of_a_drive_in_closed_form():
+    t = np.linspace(0, 2 * np.pi, 20_001)
+    found = demand(t, np.cos(t)[:, None], 3 * np.cos(t)[:, None] + 4 * np.sin(t)[:, None])
+    assert found.peak[0] == pytest.approx(5.0, rel=1e-6)
+    assert found.rms[0] == pytest.approx(5 / np.sqrt(2), rel=1e-6)
+    assert found.work[0] - found.recovered[0] == pytest.approx(3 * np.pi, rel=1e-6)
+    assert found.power[0] == pytest.approx(4.0, rel=1e-6)  # 3 cos^2 + 4 sin cos is at most (3 + 5) / 2
+    assert found.braking[0] == pytest.approx(1.0, rel=1e-6)

@@ -1,0 +1,334 @@
+"""What files may say of masses, what stands out of them, guesses from capsules, and URDF."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+import yaml
+
+import er3a
+from er3a.dynamics.estimate import capsule_body, estimated_links
+from er3a.dynamics.plausibility import (
+    AboutOrigin,
+    CentreOutside,
+    ImpossibleInertia,
+    MissingLink,
+    PointMass,
+    SumOffWeight,
+    UnlikelyDensity,
+    UnlikelyInertia,
+    mass_findings,
+)
+from er3a.errors import InputError
+from er3a.files.load_file import LoadFields, load_of
+from er3a.files.robot_writer import write_robot
+from er3a.formats.urdf import export_urdf, import_urdf
+from er3a.robots.masses import Body, Drives, LinkMass, Masses, WristLoad, about, moved, no_body, together
+from er3a.robots.robot import Envelope, Robot
+
+
+@pytest.fixture(scope="module")
+def arm() -> Robot:
+    return er3a.load_robot("er3a_c60")
+
+
+def with_body(arm: Robot, link: int, change) -> Robot:
+    links = tuple(LinkMass(e.link, change(e.body) if e.link == link else e.body) for e in arm.masses.links)
+    return arm.replace(masses=replace(arm.masses, links=links))
+
+
+def test_the_real_arm_lacks_link_6_and_nothing_else_stands_out(arm):
+    assert mass_findings(arm) == (MissingLink(6, singular=True),)
+    rotor = replace(Drives.unknown(6), armature=np.full(6, 0.01))
+    assert mass_findings(arm.replace(masses=replace(arm.masses, drives=rotor))) == (MissingLink(6, singular=False),)
+
+
+def scaled(factor: float):
+    return lambda body: replace(body, inertia=tuple(factor * value for value in body.inertia))
+
+
+def about_origin(body: Body) -> Body:
+    tensor = body.inertia_matrix + body.mass * about(np.array(body.centre))
+    return replace(body, inertia=(tensor[0, 0], tensor[1, 1], tensor[2, 2], tensor[0, 1], tensor[0, 2], tensor[1, 2]))
+
+
+@pytest.mark.parametrize(
+    ("change", "kind", "link"),
+    [
+        (lambda body: replace(body, mass=1000 * body.mass, inertia=scaled(1000)(body).inertia), UnlikelyDensity, 2),
+        (lambda body: replace(body, centre=tuple(1000 * value for value in body.centre)), CentreOutside, 2),
+        (scaled(1e6), UnlikelyInertia, 2),
+        (scaled(1e-3), UnlikelyInertia, 2),
+        (lambda body: replace(body, inertia=(0.0,) * 6), PointMass, 3),
+        (lambda body: replace(body, inertia=(1.0, 0.1, 0.1, 0, 0, 0)), ImpossibleInertia, 3),
+        (lambda body: replace(body, mass=-1.0), ImpossibleInertia, 3),
+        (about_origin, AboutOrigin, 4),
+    ],
+)
+def test_faults_of_masses_are_named_with_their_link(arm, change, kind, link):
+    found = [each for each in mass_findings(with_body(arm, link, change)) if not isinstance(each, MissingLink)]
+    assert [type(each) for each in found] == [kind]
+    assert found[0].link == link
+
+
+def test_the_sum_against_the_manufacturers_weight(arm):
+    def findings(weight):
+        found = mass_findings(arm.replace(masses=replace(arm.masses, weight=weight)))
+        return [each for each in found if isinstance(each, SumOffWeight)]
+
+    assert findings(21.0) == []
+    assert findings(27.0) == []  # link 6 is missing, so less is no fault
+    (off,) = findings(15.0)
+    assert (off.sum_kg, off.weight_kg, off.complete) == (pytest.approx(20.06), 15.0, False)
+
+
+def test_what_no_body_can_be():
+    assert no_body(Body(1.0, inertia=(1, 1, 1, 0, 0, 0))) is None
+    assert no_body(Body(1.0, inertia=(1, 1, 2, 0, 0, 0))) is None  # a disc
+    assert no_body(Body(1.0, inertia=(1, 1, 2.1, 0, 0, 0))) == "triangle"
+    assert no_body(Body(1.0, inertia=(1, 1, 1, 2, 0, 0))) == "negative_moment"
+    assert no_body(Body(-1.0)) == "negative_mass"
+    assert no_body(Body(np.nan)) == "not_finite"
+
+
+def test_capsules_are_solid_capsules():
+    capsule = Envelope(1, (0.1, 0.0, 0.2), (0.1, 0.3, 0.4), 0.05)
+    body = capsule_body(capsule, 2700.0)
+    length = np.hypot(0.3, 0.2)
+    mesh = trimesh.creation.capsule(height=length, radius=0.05, count=[256, 256])
+    mesh.density = 2700.0
+    assert body.mass == pytest.approx(mesh.mass, rel=1e-3)
+    assert body.centre == pytest.approx((0.1, 0.15, 0.3))
+    np.testing.assert_allclose(
+        np.linalg.eigvalsh(body.inertia_matrix), np.sort(np.diagonal(mesh.moment_inertia)), rtol=2e-3
+    )
+    along = np.array([0.0, 0.3, 0.2]) / length
+    assert along @ body.inertia_matrix @ along == pytest.approx(np.linalg.eigvalsh(body.inertia_matrix)[0])
+
+
+def test_guessed_masses_stand_out_of_nothing(arm):
+    guessed = arm.replace(masses=Masses(estimated_links(arm, 2700.0)))
+    assert {type(each) for each in mass_findings(guessed)} == {MissingLink}  # link 5 has no capsule
+    assert {each.link for each in mass_findings(guessed)} == {5}
+
+
+def test_bodies_together_and_moved():
+    rng = np.random.default_rng(0)
+    points, masses = rng.normal(size=(6, 3)), rng.uniform(1, 2, 6)
+    dust = [Body(m, tuple(p)) for p, m in zip(points.tolist(), masses.tolist())]
+    halves = together([together(dust[:2]), together(dust[2:])])
+    centre = masses @ points / masses.sum()
+    tensor = sum(m * about(p - centre) for m, p in zip(masses, points))
+    np.testing.assert_allclose(halves.inertia_matrix, tensor, atol=1e-12)
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = np.linalg.qr(rng.normal(size=(3, 3)))[0], (1, 2, 3)
+    np.testing.assert_allclose(moved(halves, T).inertia_matrix, T[:3, :3] @ tensor @ T[:3, :3].T, atol=1e-12)
+    np.testing.assert_allclose(moved(halves, T).centre, T[:3, :3] @ centre + T[:3, 3], atol=1e-12)
+
+
+# Files
+
+
+def changed_file(tmp_path, change):
+    content = yaml.safe_load(Path("data/robots/er3a_c60.yaml").read_text(encoding="utf-8"))
+    change(content)
+    path = tmp_path / "er3a_c60.yaml"
+    path.write_text(yaml.safe_dump(content))
+    return path
+
+
+DRIVES = {"source": "made up", "grade": "claim"}
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "problem"),
+    [
+        (lambda c: c["inertia"]["links"][2].update(mass_kg=-5.664), "inertia.links[2].mass_kg", "below 0"),
+        (lambda c: c["inertia"]["links"][2].update(mass_kg=5664e3), "inertia.links[2].mass_kg", "in grams"),
+        (
+            lambda c: c["inertia"]["links"][2].update(inertia_kg_m2=[1, 0.1, 0.1, 0, 0, 0]),
+            "inertia.links[2].inertia_kg_m2",
+            "no body can have",
+        ),
+        (lambda c: c["inertia"]["links"].append({"link": 3, "mass_kg": 1}), "inertia.links", "named twice"),
+        (lambda c: c["inertia"]["links"].append({"link": 9, "mass_kg": 1}), "inertia", "link"),
+        (lambda c: c["inertia"]["origins"].pop(), "inertia.origins", "not one for each joint"),
+        (lambda c: c["inertia"].update(frame="dh"), "inertia.origins", "belong to frame urdf"),
+        (
+            lambda c: c.update(drives=DRIVES | {"rows": [{"joint": 1, "peak_n_m": 0}]}),
+            "drives.rows[0].peak_n_m",
+            "leave it out if it is unknown",
+        ),
+        (
+            lambda c: c.update(drives=DRIVES | {"rows": [{"joint": 1, "peak_n_m": 1, "rated_n_m": 2}]}),
+            "drives.rows[0]",
+            "below the rated",
+        ),
+        (lambda c: c.update(drives=DRIVES | {"rows": [{"joint": 1, "peak_n": 5}]}), "drives.rows[0].peak_n", "turns"),
+        (lambda c: c.update(drives=DRIVES | {"rows": [{"joint": 7}]}), "drives.rows", "the joints come as"),
+        (lambda c: c.update(wrist_load=DRIVES | {"payload_kg": 0}), "wrist_load.payload_kg", "unknown"),
+        (lambda c: c.update(weight=DRIVES | {"kg": -27}), "weight.kg", "above 0"),
+    ],
+)
+def test_each_fault_of_a_file_is_one_error(tmp_path, change, field, problem):
+    with pytest.raises(InputError) as caught:
+        er3a.load_robot(changed_file(tmp_path, change))
+    assert caught.value.field.startswith(field)
+    assert problem in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("frame", ["joint", "dh"])
+def test_frames_of_a_file_give_equal_torques(arm, tmp_path, frame):
+    """The same bodies, written in the frames of the joints and of the D-H rows."""
+    fields = []
+    for each in arm.masses.links:
+        T = np.eye(4)
+        if frame == "dh" and each.link:
+            row = each.link - 1
+            c, s = np.cos(-arm.alpha[row]), np.sin(-arm.alpha[row])
+            turn = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+            T[:3, :3] = turn
+            T[:3, 3] = turn @ [-arm.a[row], 0, -arm.d[row]]
+        body = moved(each.body, T)
+        centre = [1000 * value for value in body.centre]
+        fields.append(
+            {"link": each.link, "mass_kg": body.mass, "centre_mm": centre, "inertia_kg_m2": list(body.inertia)}
+        )
+
+    def change(content):
+        content["inertia"] |= {"frame": frame, "links": fields}
+        del content["inertia"]["origins"]
+
+    other = er3a.load_robot(changed_file(tmp_path, change))
+    q, qd, qdd = np.random.default_rng(0).normal(size=(3, 50, 6))
+    np.testing.assert_allclose(er3a.torques(other, q, qd, qdd), er3a.torques(arm, q, qd, qdd), atol=1e-11)
+
+
+def everything(arm: Robot) -> Robot:
+    drives = Drives(*(np.linspace(1, 2, 6) * k for k in (0.1, 100, 0.3, 0.4, 5, 9)))
+    wrist = WristLoad(3.0, ((5, 10.0), (6, 3.0)), ((6, 0.03),))
+    return arm.replace(masses=replace(arm.masses, drives=drives, wrist=wrist, weight=27.0))
+
+
+def test_a_written_file_reads_back(arm, tmp_path):
+    full = everything(arm)
+    write_robot(full, tmp_path / "er3a_c60.yaml")
+    back = er3a.load_robot(tmp_path / "er3a_c60.yaml").masses
+    assert (back.wrist, back.weight) == (full.masses.wrist, 27.0)
+    for name in ("armature", "gear_ratio", "coulomb", "viscous", "rated", "peak"):
+        np.testing.assert_array_equal(getattr(back.drives, name), getattr(full.masses.drives, name))
+    for one, other in zip(back.links, full.masses.links):
+        np.testing.assert_allclose(one.body.inertia, other.body.inertia, atol=1e-15)
+        np.testing.assert_allclose(one.body.centre, other.body.centre, atol=1e-13)
+
+
+# URDF
+
+
+def test_urdf_out_and_in_keeps_the_torques(arm, tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(export_urdf(arm))
+    found = import_urdf(path)
+    assert "no mass is given for what moves with joint_6" in found.notes
+    q, qd, qdd = np.random.default_rng(0).normal(size=(3, 50, 6))
+    np.testing.assert_allclose(er3a.torques(found.robot, q, qd, qdd), er3a.torques(arm, q, qd, qdd), atol=1e-9)
+    assert found.robot.sources["inertia"].grade == "export"
+
+
+def test_urdf_is_what_pinocchio_makes_of_it(arm, tmp_path):
+    pinocchio = pytest.importorskip("pinocchio")
+    path = tmp_path / "arm.urdf"
+    path.write_text(export_urdf(arm))
+    model = pinocchio.buildModelFromUrdf(str(path))
+    data = model.createData()
+    q, qd, qdd = np.random.default_rng(0).normal(size=(3, 50, 6))
+    expected = [pinocchio.rnea(model, data, *row) for row in zip(q, qd, qdd)]
+    np.testing.assert_allclose(er3a.torques(arm, q, qd, qdd), expected, atol=1e-10)
+
+
+BAD_URDF = """<inertial><origin xyz="0 0 0.1" rpy="0.3 0.2 0.1"/><mass value="{mass}"/>
+<inertia ixx="{xx}" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>"""
+
+
+@pytest.mark.parametrize(
+    ("mass", "xx", "note"),
+    [
+        ("-1", "0.1", "has a mass below 0"),
+        ("1", "0.5", "above the sum"),
+        ("x", "0.1", "holds something"),
+        ("1", "0.1", ""),
+    ],
+)
+def test_inertials_of_a_urdf_that_no_body_has_are_noted(arm, tmp_path, mass, xx, note):
+    text = export_urdf(arm.replace(masses=Masses()))
+    text = text.replace('<link name="link_3" />', f'<link name="link_3">{BAD_URDF.format(mass=mass, xx=xx)}</link>')
+    text = text.replace('effort="0.0"', 'effort="0"')
+    path = tmp_path / "arm.urdf"
+    path.write_text(text)
+    found = import_urdf(path)
+    assert found.robot.masses.drives is None  # an effort of 0 is an unknown one
+    assert [each.link for each in found.robot.masses.links] == ([] if note else [3])
+    assert any(note in text and "link_3" in text for text in found.notes) == bool(note)
+
+
+def test_links_fixed_to_one_another_count_as_one(arm, tmp_path):
+    text = export_urdf(arm)
+    extra = '<link name="box"><inertial><mass value="2"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" '
+    extra += 'iyz="0"/></inertial></link><joint name="glue" type="fixed"><parent link="link_3"/><child link="box"/>'
+    extra += '<origin xyz="0.1 0.2 0.3" rpy="0 0 0"/></joint></robot>'
+    path = tmp_path / "arm.urdf"
+    path.write_text(text.replace("</robot>", extra))
+    pinocchio = pytest.importorskip("pinocchio")
+    model = pinocchio.buildModelFromUrdf(str(path))
+    q = np.random.default_rng(0).normal(size=(10, 6))
+    expected = [pinocchio.computeGeneralizedGravity(model, model.createData(), row) for row in q]
+    np.testing.assert_allclose(er3a.gravity(import_urdf(path).robot, q), expected, atol=1e-10)
+
+
+# Loads of a study
+
+SOURCE = {"source": "weighed", "grade": "measured"}
+
+
+def load_fields(**content) -> LoadFields:
+    return LoadFields.model_validate(SOURCE | content)
+
+
+def test_a_load_from_a_mesh_and_a_density(tmp_path):
+    box = trimesh.creation.box((40, 60, 100))
+    box.apply_translation((0, 0, 50))
+    box.export(tmp_path / "box.stl")
+    mesh = {"file": str(tmp_path / "box.stl"), "density_kg_m3": 2700.0, "xyz_mm": [0.0, 0.0, 10.0]}
+    load = load_of([load_fields(mesh=mesh)])
+    mass = 2700 * 0.04 * 0.06 * 0.1
+    assert load.mass == pytest.approx(mass)
+    assert load.centre == pytest.approx((0, 0, 0.06), abs=1e-9)
+    assert load.inertia[0] == pytest.approx(mass / 12 * (0.06**2 + 0.1**2))
+    both = load_of([load_fields(mesh=mesh), load_fields(body={"mass_kg": mass, "centre_mm": [0.0, 0.0, -60.0]})])
+    assert both.centre == pytest.approx((0, 0, 0), abs=1e-9)
+    assert load_of([]) is None
+    box.faces = box.faces[:-1]
+    box.export(tmp_path / "box.stl")
+    with pytest.raises(InputError, match="no closed mesh"):
+        load_of([load_fields(mesh=mesh)])
+    with pytest.raises(InputError, match="can't be read"):
+        load_of([load_fields(mesh=mesh | {"file": str(tmp_path / "absent.stl")})])
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        ({"body": {"mass_kg": 3000.0}}, "Write 3 if it is g"),
+        ({"body": {"mass_kg": -3.0}}, "below 0"),
+        ({"body": {"mass_kg": 3.0, "inertia_kg_m2": [1.0, 0.1, 0.1, 0.0, 0.0, 0.0]}}, "no body can have"),
+        ({}, "a body or a mesh"),
+    ],
+)
+def test_a_bad_load_is_refused(content, problem):
+    with pytest.raises(ValueError, match=problem):
+        load_fields(**content)
