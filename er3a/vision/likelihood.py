@@ -121,7 +121,7 @@ def refine(seen: Observations, X: Reals, Y: Reals) -> Refined:
     batch = (*seen.F.shape[:-2], 6)
     deviations = np.broadcast_to(np.array(START_DEVIATIONS), (*X.shape[:-2], 2)).copy()
     converged = np.ones(X.shape[:-2], dtype=bool)
-    for _ in range(VARIANCE_ROUNDS if known is None else (WEIGHT_ROUNDS if _moves(seen) else 1)):
+    for _ in range(VARIANCE_ROUNDS if known is None else (1 if _flange_covariance(seen) is None else WEIGHT_ROUNDS)):
         sigma = np.broadcast_to(np.repeat(deviations, 3, axis=-1)[..., None, :], batch)
         W = _whitening(seen, sigma, X, Y)
         X, Y, converged = _steps(seen, W, X, Y)
@@ -151,8 +151,10 @@ def refine(seen: Observations, X: Reals, Y: Reals) -> Refined:
     return Refined(X, Y, covariance, white, raw, leverage, freedom, scatter, deviations, converged)
 
 
-def _moves(seen: Observations) -> bool:
-    return seen.flange_covariance is not None and bool(np.any(seen.flange_covariance))
+def _flange_covariance(seen: Observations) -> Reals | None:
+    """The flange's covariance, if it has one that is not zero."""
+    own = seen.flange_covariance
+    return own if own is not None and np.any(own) else None
 
 
 def _whitening(seen: Observations, sigma: Reals, X: Reals, Y: Reals) -> Reals:
@@ -161,9 +163,9 @@ def _whitening(seen: Observations, sigma: Reals, X: Reals, Y: Reals) -> Reals:
         S = sigma[..., :, None] ** 2 * np.eye(6)
     else:
         S = np.broadcast_to(seen.camera_covariance, (*sigma.shape, 6))
-    if _moves(seen):
+    if (own := _flange_covariance(seen)) is not None:
         G = flange_to_camera(seen.setup, seen.F, X, Y)
-        S = S + G @ seen.flange_covariance @ transposed(G)
+        S = S + G @ own @ transposed(G)
     W: Reals = np.linalg.inv(np.linalg.cholesky(S))
     return W
 
@@ -176,7 +178,7 @@ def _steps(seen: Observations, W: Reals, X: Reals, Y: Reals) -> tuple[Reals, Rea
     for _ in range(MOST_STEPS):
         size = np.diagonal(H, axis1=-2, axis2=-1)
         damped = H + (damping[..., None] * size)[..., None] * np.eye(UNKNOWNS)
-        step = -np.linalg.solve(damped, g[..., None])[..., 0]
+        step: Reals = -np.linalg.solve(damped, g[..., None])[..., 0]
         X_new, Y_new = moved(X, step[..., :6]), moved(Y, step[..., 6:])
         cost_new, H_new, g_new = _normal(seen, W, X_new, Y_new)
         better = (cost_new <= cost) & ~done

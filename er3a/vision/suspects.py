@@ -111,13 +111,15 @@ def _agreeing(conflict: Flags) -> Flags:
 
 
 def _mending_turn(target: Reals, turned: Reals, i: int, used: Flags, tolerance: float) -> SuspectKind:
-    best: tuple[float, SuspectKind] = (tolerance, "rotation")
+    best = tolerance
+    mending: SuspectKind = "rotation"
     for kind in MEND_KINDS:
         for R in _mended(target[i], kind):
             angle = rotation_angle(transposed(R)[None], transposed(target[used, :3, :3]))
             off = float(np.median(np.abs(angle - turned[i, used])))
-            best = min(best, (off, kind), key=lambda each: each[0])
-    return best[1]
+            if off < best:
+                best, mending = off, kind
+    return mending
 
 
 def _mended(T: Reals, kind: SuspectKind) -> list[Reals]:
