@@ -17,7 +17,7 @@ from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.files.shipped import ROOT
 from er3a.kinematics.forward import forward
-from er3a.vision.next_view import View, board_visible
+from er3a.vision.next_view import FieldOfView, board_visible
 from er3a.vision.tangent import inverted, moved, posed
 
 SEED = 20261120
@@ -47,7 +47,7 @@ class Cell:
     setup: str
     X: np.ndarray
     Y: np.ndarray
-    view: View
+    view: FieldOfView
 
 
 FIXED = Cell(
@@ -55,14 +55,14 @@ FIXED = Cell(
     "eye_to_hand",
     looking((1.15, 0.05, 0.85), (0.35, 0.0, 0.25)),
     posed(Rotation.from_euler("xyz", [184, -3, 40], degrees=True).as_matrix(), np.array([-0.05, -0.06, 0.012])),
-    View((np.radians(35), np.radians(28)), 0.3, 1.6, (BOARD_MM[0] / 1000, BOARD_MM[1] / 1000)),
+    FieldOfView((np.radians(35), np.radians(28)), 0.3, 1.6, (BOARD_MM[0] / 1000, BOARD_MM[1] / 1000)),
 )
 CARRIED = Cell(
     "er3_600",
     "eye_in_hand",
     posed(Rotation.from_euler("xyz", [2, -4, 88], degrees=True).as_matrix(), np.array([0.06, 0.01, 0.03])),
     posed(Rotation.from_euler("xyz", [180, 0, 25], degrees=True).as_matrix(), np.array([0.38, 0.02, 0.1])),
-    View((np.radians(35), np.radians(28)), 0.15, 1.0, (BOARD_MM[0] / 1000, BOARD_MM[1] / 1000)),
+    FieldOfView((np.radians(35), np.radians(28)), 0.15, 1.0, (BOARD_MM[0] / 1000, BOARD_MM[1] / 1000)),
 )
 
 

@@ -18,7 +18,7 @@ from er3a.geometry.transforms import transform
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 from er3a.vision.grasping import DetectedObject, Grasp
-from er3a.vision.next_view import View
+from er3a.vision.next_view import FieldOfView
 from er3a.vision.point_error import ArmAccuracy
 from scipy.spatial.transform import Rotation
 
@@ -42,11 +42,11 @@ class ViewEntry(StrictModel):
             raise ValueError("nearest_mm: is not nearer than farthest_mm | Exchange them")
         return self
 
-    def view(self, board_mm: list[float]) -> View:
+    def view(self, board_mm: list[float]) -> FieldOfView:
         """With a board's edges; in the units of the library."""
         half = np.radians([self.horizontal_deg, self.vertical_deg]) / 2
         x, y = board_mm
-        return View((half[0], half[1]), self.nearest_mm / 1000, self.farthest_mm / 1000, (x / 1000, y / 1000))
+        return FieldOfView((half[0], half[1]), self.nearest_mm / 1000, self.farthest_mm / 1000, (x / 1000, y / 1000))
 
 
 class ArmAccuracyEntry(StrictModel):

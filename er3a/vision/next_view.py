@@ -24,7 +24,7 @@ LIMIT_SHARE = 0.02  # of each joint's range, kept from both its ends
 
 
 @dataclass(frozen=True)
-class View:
+class FieldOfView:
     """What the camera sees, and the board.
 
     Attributes
@@ -61,7 +61,7 @@ class NextView:
     in_view: int
 
 
-def board_visible(view: View, T_camera_board: Reals, facing: float = 1.0) -> Flags:
+def board_visible(view: FieldOfView, T_camera_board: Reals, facing: float = 1.0) -> Flags:
     """Whether all corners (...,) of the board are in the picture, and its printed side is turned to the camera.
 
     Parameters
@@ -83,7 +83,7 @@ def board_visible(view: View, T_camera_board: Reals, facing: float = 1.0) -> Fla
 
 
 def next_view(
-    robot: Robot, found: HandEye, view: View, point: Reals, scene: Scene | None, seed: int
+    robot: Robot, found: HandEye, view: FieldOfView, point: Reals, scene: Scene | None, seed: int
 ) -> NextView | None:
     """The next pose to record; None if no pose drawn sees the board, within the limits and clear of everything.
 
