@@ -1,7 +1,7 @@
 """Calibration sets and detections with known truth, for the default study and for tests.
 
-``python -m testing.camera_cells`` writes ``data/vision`` again. All numbers are simulated: poses of an arm by its table,
-a camera and a board whose places are set here, and normal errors from one seed. No camera took a picture.
+``python -m testing.camera_cells`` writes ``data/vision`` again. All numbers are simulated: poses of an arm by its
+table, a camera and a board whose places are set here, and normal errors from one seed. No camera took a picture.
 """
 
 from __future__ import annotations
@@ -113,8 +113,12 @@ def write_set(cell: Cell, name: str, count: int, folder: Path, random: np.random
     fixed = cell.setup == "eye_to_hand"
     base = random.uniform([0.3, -0.2, 0.1], [0.5, 0.2, 0.25], (TOUCHES, 3))
     if not fixed:
-        base = (cell.Y @ np.concatenate([random.uniform(0, 0.12, (TOUCHES, 2)), np.zeros((TOUCHES, 1)),
-                                         np.ones((TOUCHES, 1))], axis=1).T).T[:, :3]
+        base = (
+            cell.Y
+            @ np.concatenate(
+                [random.uniform(0, 0.12, (TOUCHES, 2)), np.zeros((TOUCHES, 1)), np.ones((TOUCHES, 1))], axis=1
+            ).T
+        ).T[:, :3]
     seen = (inverted(cell.X if fixed else cell.Y) @ np.concatenate([base, np.ones((TOUCHES, 1))], axis=1).T).T[:, :3]
     if fixed:
         seen = seen + random.normal(size=seen.shape) * np.array(POSITION_MM) / 1000

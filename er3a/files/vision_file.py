@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
+from scipy.spatial.transform import Rotation
 
 from er3a.errors import InputError
 from er3a.files.hand_eye_file import Positive, StandardDeviations, calibration_files
@@ -20,10 +21,9 @@ from er3a.robots.robot import Robot
 from er3a.vision.grasping import DetectedObject, Grasp
 from er3a.vision.next_view import FieldOfView
 from er3a.vision.point_error import ArmAccuracy
-from scipy.spatial.transform import Rotation
+from er3a.vision.vision_findings import GraspOutcome
 
 MOST_OBJECTS = 30
-GraspOutcome = Literal["grasped", "not_grasped"]
 Angle = Annotated[float, Field(gt=0, lt=180)]
 Tolerances = Annotated[list[Positive], Field(min_length=3, max_length=3)]
 
@@ -134,7 +134,7 @@ class ObjectEntry(StrictModel):
 class VisionFile(StrictModel):
     """data/vision/NAME.yaml. ``calibration``: a calibration set beside it.
 
-    ``home_deg``: joints that the arm comes from; ``picture_deg``: those at which a camera on the flange took the picture.
+    ``home_deg``: joints that the arm comes from; ``picture_deg``: those at which a camera on the flange saw the objects.
     """
 
     kind: Literal["vision"]
@@ -153,7 +153,9 @@ class VisionFile(StrictModel):
         names = [each.name for each in self.objects]
         for i, name in enumerate(names):
             if name in names[:i]:
-                raise ValueError(f"objects[{i}].name: '{name}' is also that of objects[{names.index(name)}] | Rename it")
+                raise ValueError(
+                    f"objects[{i}].name: '{name}' is also that of objects[{names.index(name)}] | Rename it"
+                )
         return self
 
 

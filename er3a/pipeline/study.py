@@ -23,7 +23,9 @@ SettingsT = TypeVar("SettingsT", bound=StrictModel)
 
 
 class RobotEntry(StrictModel):
-    """One robot of the study. ``base`` and ``tool`` replace those of its file, ``scene`` those of the stages.
+    """One robot of the study; ``vision``: the file of what its camera sees, if it has one.
+
+    ``base`` and ``tool`` replace those of its file, ``scene`` those of the stages.
 
     ``expect`` says by stage what its verdict is to be: one that is as expected is no news, any other is a fault.
     """
@@ -31,6 +33,7 @@ class RobotEntry(StrictModel):
     file: Text | None = None
     targets: Text
     paths: Text
+    vision: Text | None = None
     scene: Text | None = None
     base: Placement | None = None
     tool: Placement | None = None
@@ -176,7 +179,9 @@ class StudyBase(StrictModel):
 
     def settings(self, name: str, key: str) -> dict[str, Any]:
         """What of the study concerns one of its keys, for a robot; of a key without settings seed and robot alone."""
-        entry = self.entry(name).model_dump(exclude={"targets", "paths", "file", "scene", "expect"}, exclude_none=True)
+        entry = self.entry(name).model_dump(
+            exclude={"targets", "paths", "vision", "file", "scene", "expect"}, exclude_none=True
+        )
         if variant := self.variants.get(name):
             entry["varied"] = {variant.vary: variant.value}
         own = getattr(self, key, None)

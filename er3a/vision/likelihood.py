@@ -36,7 +36,7 @@ LEAST_DEVIATION = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Observations:
+class PoseObservations:
     """Samples (..., N, 4, 4) of any number of sets; see :class:`er3a.vision.calibration_set.CalibrationSet`."""
 
     setup: Setup
@@ -109,7 +109,7 @@ def flange_to_camera(setup: Setup, F: Reals, X: Reals, Y: Reals) -> Reals:
     return G
 
 
-def refine(seen: Observations, X: Reals, Y: Reals) -> Refined:
+def refine(seen: PoseObservations, X: Reals, Y: Reals) -> Refined:
     """The likeliest poses from starts X, Y (..., 4, 4).
 
     Raises
@@ -151,13 +151,13 @@ def refine(seen: Observations, X: Reals, Y: Reals) -> Refined:
     return Refined(X, Y, covariance, white, raw, leverage, freedom, scatter, deviations, converged)
 
 
-def _flange_covariance(seen: Observations) -> Reals | None:
+def _flange_covariance(seen: PoseObservations) -> Reals | None:
     """The flange's covariance, if it has one that is not zero."""
     own = seen.flange_covariance
     return own if own is not None and np.any(own) else None
 
 
-def _whitening(seen: Observations, sigma: Reals, X: Reals, Y: Reals) -> Reals:
+def _whitening(seen: PoseObservations, sigma: Reals, X: Reals, Y: Reals) -> Reals:
     """Matrices (..., N, 6, 6) that give residuals unit covariance."""
     if seen.camera_covariance is None:
         S = sigma[..., :, None] ** 2 * np.eye(6)
@@ -170,7 +170,7 @@ def _whitening(seen: Observations, sigma: Reals, X: Reals, Y: Reals) -> Reals:
     return W
 
 
-def _steps(seen: Observations, W: Reals, X: Reals, Y: Reals) -> tuple[Reals, Reals, Reals]:
+def _steps(seen: PoseObservations, W: Reals, X: Reals, Y: Reals) -> tuple[Reals, Reals, Reals]:
     """Levenberg and Marquardt's steps, each set with a damping of its own."""
     damping = np.full(X.shape[:-2], 1e-6)
     done = np.zeros(X.shape[:-2], dtype=bool)
@@ -193,7 +193,7 @@ def _steps(seen: Observations, W: Reals, X: Reals, Y: Reals) -> tuple[Reals, Rea
     return X, Y, done
 
 
-def _normal(seen: Observations, W: Reals, X: Reals, Y: Reals) -> tuple[Reals, Reals, Reals]:
+def _normal(seen: PoseObservations, W: Reals, X: Reals, Y: Reals) -> tuple[Reals, Reals, Reals]:
     raw, derivative = residuals(seen.F, seen.B, X, Y)
     white, J = (W @ raw[..., None])[..., 0], W @ derivative
     H, g = np.einsum("...nki,...nkj->...ij", J, J), np.einsum("...nki,...nk->...i", J, white)

@@ -61,6 +61,15 @@ class NextView:
     in_view: int
 
 
+def in_sight(view: FieldOfView, points: Reals) -> Flags:
+    """Whether points (..., 3), m, by the camera's axes are in the picture (...,), near and far enough."""
+    depth = points[..., 2]
+    seen: Flags = (depth > view.nearest) & (depth < view.farthest)
+    for k, half in enumerate(view.half_angles):
+        seen = seen & (np.abs(points[..., k]) < np.tan(half) * np.abs(depth))
+    return seen
+
+
 def board_visible(view: FieldOfView, T_camera_board: Reals, facing: float = 1.0) -> Flags:
     """Whether all corners (...,) of the board are in the picture, and its printed side is turned to the camera.
 
@@ -71,14 +80,10 @@ def board_visible(view: FieldOfView, T_camera_board: Reals, facing: float = 1.0)
     x, y = view.board
     corners = np.array([[0, 0, 0, 1], [x, 0, 0, 1], [0, y, 0, 1], [x, y, 0, 1]], dtype=float)
     seen = np.einsum("...ij,cj->...ci", T_camera_board, corners)[..., :3]
-    depth = seen[..., 2]
-    ahead = (depth > view.nearest) & (depth < view.farthest)
-    safe = np.where(depth > 0, depth, 1.0)
-    inside = [np.abs(seen[..., k]) < np.tan(half) * safe for k, half in enumerate(view.half_angles)]
     sight = seen.mean(axis=-2)
     sight = sight / np.linalg.norm(sight, axis=-1, keepdims=True)
     tilted = facing * (sight * T_camera_board[..., :3, 2]).sum(axis=-1)
-    visible: Flags = (ahead & inside[0] & inside[1]).all(axis=-1) & (tilted > np.cos(MOST_TILT))
+    visible: Flags = in_sight(view, seen).all(axis=-1) & (tilted > np.cos(MOST_TILT))
     return visible
 
 

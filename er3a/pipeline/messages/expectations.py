@@ -15,6 +15,8 @@ OUTCOMES: dict[Outcome, str] = {
     "near-singular": N_("near-singular"),
     "safe": N_("safe"),
     "reached": N_("reached"),
+    "grasped": N_("grasped"),
+    "not graspable": N_("not graspable"),
 }
 
 

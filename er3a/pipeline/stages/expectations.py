@@ -1,4 +1,4 @@
-"""What a target or a path is said to come to, against what it came to: findings of the stages that judge them."""
+"""What targets, paths and objects are said to come to, against what they came to: findings of stages that judge."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from typing import Literal, Protocol
 
 from er3a.kinematics.targets import TargetOutcome
 from er3a.planning.path_verdicts import PathVerdict
+from er3a.vision.vision_findings import GraspOutcome
 
-Outcome = TargetOutcome | PathVerdict
+Outcome = TargetOutcome | PathVerdict | GraspOutcome
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,7 @@ class UnmetExpectation:
 
 @dataclass(frozen=True)
 class Demonstration:
-    """A target or a path that fails as it is meant to."""
+    """A target, a path or an object that fails as it is meant to."""
 
     name: str
     found: Outcome
@@ -41,7 +42,7 @@ class ExpectationsUnmet:
 
 
 class Judged(Protocol):
-    """A target or a path with what it came to, and what it is said to come to."""
+    """A target, a path or an object with what it came to, and what it is said to come to."""
 
     @property
     def name(self) -> str: ...

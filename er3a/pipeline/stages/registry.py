@@ -6,9 +6,10 @@ from er3a.pipeline.stages.inverse.entry import STAGE as INVERSE
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.stages.trajectory.entry import STAGE as TRAJECTORY
 from er3a.pipeline.stages.validation.entry import STAGE as VALIDATION
+from er3a.pipeline.stages.vision.entry import STAGE as VISION
 from er3a.pipeline.stages.workspace.entry import STAGE as WORKSPACE
 
-STAGES: dict[str, Stage] = {stage.name: stage for stage in (VALIDATION, WORKSPACE, INVERSE, TRAJECTORY)}
+STAGES: dict[str, Stage] = {stage.name: stage for stage in (VALIDATION, WORKSPACE, INVERSE, TRAJECTORY, VISION)}
 
 
 def all_messages() -> list[str]:
