@@ -134,7 +134,7 @@ class ObjectEntry(StrictModel):
 class VisionFile(StrictModel):
     """data/vision/NAME.yaml. ``calibration``: a calibration set beside it.
 
-    ``home_deg``: joints that the arm comes from; ``picture_deg``: those at which a camera on the flange saw the objects.
+    ``home_deg``: joints that the arm comes from; ``picture_deg``: where a camera on the flange saw the objects.
     """
 
     kind: Literal["vision"]

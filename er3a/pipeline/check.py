@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from pydantic import BaseModel
 
 from er3a.errors import InputError
 from er3a.files.dh_table import read_dh_table
+from er3a.files.hand_eye_file import HandEyeFile, load_hand_eye
 from er3a.files.measurements import load_measurements
 from er3a.files.path_file import PathFile, TablePath, load_paths
 from er3a.files.path_table import read_path_table
@@ -19,7 +22,8 @@ from er3a.files.robot_file import RobotFile
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import SceneFile, load_scene
 from er3a.files.target_file import TargetFile, read_targets
-from er3a.files.yaml_file import read_yaml
+from er3a.files.vision_file import VisionFile, load_vision
+from er3a.files.yaml_file import load, read_yaml
 from er3a.formats.text_file import read_text
 from er3a.pipeline.study import Study, load_study
 
@@ -29,16 +33,28 @@ SCHEMAS: dict[str, type[BaseModel]] = {
     "targets": TargetFile,
     "paths": PathFile,
     "scene": SceneFile,
+    "hand_eye": HandEyeFile,
+    "vision": VisionFile,
 }
 
-_CHECKS = {
+_CHECKS: dict[str, Callable[..., object]] = {
     "study": load_study,
     "robot": load_robot,
     "targets": read_targets,
     "paths": load_paths,
     "scene": load_scene,
+    "hand_eye": partial(load, HandEyeFile),
+    "vision": load_vision,
 }
-_WORDS = {"robot": "a robot", "study": "a study", "targets": "targets", "paths": "paths", "scene": "a scene"}
+_WORDS = {
+    "robot": "a robot",
+    "study": "a study",
+    "targets": "targets",
+    "paths": "paths",
+    "scene": "a scene",
+    "hand_eye": "a calibration set",
+    "vision": "objects before a camera",
+}
 
 
 def check_file(path: Path) -> str:
@@ -89,7 +105,10 @@ def check_study(path: Path) -> Study:
         for planned in load_paths(entry.paths).paths:
             if isinstance(planned, TablePath):
                 read_path_table(planned.file)
-        for stage in ("inverse", "trajectory"):
+        if entry.vision:
+            own = load_vision(entry.vision, robot)
+            load_hand_eye(Path(entry.vision).parent / own.calibration, robot)
+        for stage in ("inverse", "trajectory", "vision"):
             if scene := study.scene(name, stage):
                 load_scene(scene)
     return study

@@ -126,7 +126,7 @@ def _mended(T: Reals, kind: SuspectKind) -> list[Reals]:
     """The rotations (3, 3) that a detection may have been mistaken for."""
     R = T[:3, :3]
     if kind == "mirrored_tilt":
-        sight = T[:3, 3] / max(np.linalg.norm(T[:3, 3]), 1e-12)
+        sight = T[:3, 3] / max(float(np.linalg.norm(T[:3, 3])), 1e-12)
         away = np.eye(3) - 2 * np.outer(sight, sight)
         return [away @ R @ np.diag([1.0, 1.0, -1.0])]
     axis = kind[-1]

@@ -142,6 +142,13 @@ def _(found: GraspSingular) -> str:
 
 @say.register
 def _(found: GraspCollides) -> str:
+    if found.clearance_mm < 0:
+        return sentence(
+            found.code,
+            "at the grasp {pair} overlap by {depth:.1f} mm at best",
+            pair=say(found.pair),
+            depth=-found.clearance_mm,
+        )
     return sentence(
         found.code,
         "at the grasp {pair} are {clear:.1f} mm apart at best; {needed:g} mm are asked for",
@@ -163,6 +170,14 @@ def _(found: LineLeaves) -> str:
 
 @say.register
 def _(found: WayCollides) -> str:
+    if found.clearance_mm < 0:
+        return sentence(
+            found.code,
+            "on the {part} {pair} overlap by {depth:.1f} mm",
+            part=word("vision.part", PARTS, found.part),
+            pair=say(found.pair),
+            depth=-found.clearance_mm,
+        )
     return sentence(
         found.code,
         "on the {part} {pair} are {clear:.1f} mm apart; {needed:g} mm are asked for",

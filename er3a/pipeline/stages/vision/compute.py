@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -178,9 +179,13 @@ def _planned(
     for entry in task_file.objects:
         target = entry.detected()
         error_at = partial(_error_at, found, target, accuracy, (robot, picture))
-        plan = plan_grasp(task, target, camera @ target.T_camera_object, lambda q, at=error_at: at(q).whole)
+        plan = plan_grasp(task, target, camera @ target.T_camera_object, partial(_covariance_at, error_at))
         rows.append((entry, plan, error_at(plan.chosen.q) if plan.chosen else None))
     return rows
+
+
+def _covariance_at(error_at: Callable[[Reals], SeenPoseError], q: Reals) -> Reals:
+    return error_at(q).whole
 
 
 def _error_at(

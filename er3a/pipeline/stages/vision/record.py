@@ -50,7 +50,7 @@ def record(study: Study, stored: Stored[VisionResults], output: Path) -> None:
     robot = study.robot(name)
     task = load_vision(str(study.entry(name).vision))
     words = rrb.Vertical(note_view(STAGE), rrb.TextDocumentView(origin=f"/{STAGE}/now", name="Now"), name="Words")
-    view = arm_view(robot, "Camera and grasps", [ARM, f"/{STAGE}/**"], reach=1.3 * size_of(robot))
+    view = arm_view(robot, "Camera and grasps", [ARM, f"/{STAGE}/**"], reach=_sight(robot, summary))
     layout = rrb.Horizontal(view, words, column_shares=[2, 1], name="Vision")
     with recording(output, name, STAGE, layout) as stream:
         log_note(stream, STAGE, NOTE)
@@ -63,6 +63,14 @@ def record(study: Study, stored: Stored[VisionResults], output: Path) -> None:
         for each in summary.objects:
             _log_object(stream, each, size_of(robot))
         _play(stream, robot, results, home)
+
+
+def _sight(robot: Robot, summary: VisionSummary) -> float:
+    """Radius (m) that shows the arm and a fixed camera."""
+    found = summary.calibration
+    fixed = found is not None and found.setup == "eye_to_hand"
+    away = np.linalg.norm(found.hand_eye.xyz_mm) / 1000 if found is not None and fixed else 0.0
+    return float(np.clip(1.3 * away, 1.2 * size_of(robot), 3 * size_of(robot)))
 
 
 def _placed(pose: PoseEstimate) -> Reals:

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.messages.say import listed, say, word
+from er3a.pipeline.messages.say import joined, listed, say, word
 from er3a.pipeline.messages.vision import FIGURES, METHODS, direction_word, pose_words
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.vision.model import (
@@ -21,6 +21,7 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import head_of, render, run_command
 
+NEARLY_HALF_TURN = 170.0
 AXES = ("x", "y", "z")
 PARTS = {
     "camera": N_("camera's noise in one reading"),
@@ -103,12 +104,21 @@ def _disagreement(found: CalibrationResult) -> str:
         return tr(
             "All closed forms lie within the 95 % intervals of the likeliest pose: which one is taken hardly matters."
         )
-    return tr(
+    why = (
+        tr(
+            "Some motions turn by nearly 180 deg, where quaternions and axes change their sign for a trifle: Tsai, "
+            "Horaud and Daniilidis suffer from that most."
+        )
+        if found.greatest_turn_deg > NEARLY_HALF_TURN
+        else ""
+    )
+    weights = tr(
         "Outside the 95 % intervals lie: {names}. Closed forms weigh all samples and all coordinates alike, and most "
         "solve for the rotation first, so that its error goes into the position; the likeliest pose weighs each "
         "coordinate by its deviation.",
         names=", ".join(off),
     )
+    return joined([weights, why], " ")
 
 
 def _directions(found: CalibrationResult) -> list[list[str]]:

@@ -6,11 +6,12 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 from er3a.pipeline.messages.language import tr
+from er3a.pipeline.messages.say import joined
 from er3a.pipeline.stages.vision.model import CalibrationResult, ErrorMapRows, ObjectResult, SampleRows
 from er3a.pipeline.viewing.figures import equal_scale, house_style, new_figure
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.page import Picture
-from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL, MUTED
+from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL
 
 
 def residual_picture(rows: SampleRows, found: CalibrationResult) -> Picture:
@@ -55,12 +56,14 @@ def map_picture(rows: ErrorMapRows, objects: tuple[ObjectResult, ...]) -> Pictur
             figure.colorbar(mesh, ax=ax, label=tr("95 % of errors below (mm)"), shrink=0.85)
             for each in objects:
                 ax.plot(each.xyz_mm[0], each.xyz_mm[1], "o", color="white", markeredgecolor=INK)
-                ax.annotate(each.name, each.xyz_mm[:2], xytext=(4, 4), textcoords="offset points", fontsize=8)
+                ax.annotate(
+                    each.name, each.xyz_mm[:2], xytext=(4, 4), textcoords="offset points", fontsize=8, color="white"
+                )
             ax.set_title(title)
+            ax.grid(False)
             equal_scale(ax, "x (mm)", "y (mm)")
-        axes[0].plot([], [], "s", color=MUTED, label=tr("blank: out of the camera's view"))
-        axes[0].legend(loc="lower left")
     seen = rows.in_view
+    blank = "" if seen.all() else tr("Blank cells are out of the camera's view.")
     caption = tr(
         "Errors of a point that the camera places at the objects' mean height, seen from above. The calibration's own "
         "part goes from {least} to {most} mm where the camera sees; one reading with the camera's noise from {low} to "
@@ -70,4 +73,5 @@ def map_picture(rows: ErrorMapRows, objects: tuple[ObjectResult, ...]) -> Pictur
         low=fixed(rows.together_mm[seen].min(initial=np.inf), 2),
         high=fixed(rows.together_mm[seen].max(initial=0), 2),
     )
+    caption = joined([caption, blank], " ")
     return Picture(figure, tr("Two maps of the error around the objects, from above"), caption)
