@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from er3a.files.by_name import calibrate as calibrate
     from er3a.files.by_name import diagnose as diagnose
     from er3a.files.by_name import evidence as evidence
+    from er3a.files.hand_eye_file import load_hand_eye as load_hand_eye
     from er3a.files.measurements import load_measurements as load_measurements
     from er3a.files.reference_sets import load_references as load_references
     from er3a.files.robot_library import load_robot as load_robot
@@ -38,6 +39,8 @@ if TYPE_CHECKING:
     from er3a.robots.robot import Robot as Robot
     from er3a.selection.select import select as select
     from er3a.selection.sequence import select_sequence as select_sequence
+    from er3a.vision.calibration_set import CalibrationSet as CalibrationSet
+    from er3a.vision.hand_eye import calibrate_hand_eye as calibrate_hand_eye
 
 from er3a.version import __version__ as __version__
 
@@ -62,6 +65,9 @@ _PUBLIC = {
     "calibrate": "er3a.files.by_name",
     "load_measurements": "er3a.files.measurements",
     "load_references": "er3a.files.reference_sets",
+    "load_hand_eye": "er3a.files.hand_eye_file",
+    "CalibrationSet": "er3a.vision.calibration_set",
+    "calibrate_hand_eye": "er3a.vision.hand_eye",
     "to_modified": "er3a.robots.conventions",
     "to_standard": "er3a.robots.conventions",
     "import_urdf": "er3a.formats.urdf",

@@ -103,7 +103,7 @@ def torque_rows(model: ArmModel, way: Reals, spline: CubicSpline, speed: Reals, 
 
 
 def _toppra(way: Reals, spline: CubicSpline, speed: Reals, rows: Rows) -> Reals:
-    """Speed along the way at its nodes (N,), and acceleration (N - 1,) between them."""
+    """Speed along the way at its nodes (N,)."""
     try:
         with warnings.catch_warnings():  # of escapes in docstrings, when Python compiles the library
             warnings.simplefilter("ignore")

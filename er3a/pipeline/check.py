@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from pydantic import BaseModel
 
 from er3a.errors import InputError
 from er3a.files.dh_table import read_dh_table
+from er3a.files.hand_eye_file import HandEyeFile, load_hand_eye
 from er3a.files.measurements import load_measurements
 from er3a.files.path_file import PathFile, ProgramPath, TablePath, load_paths
 from er3a.files.path_table import read_path_table
@@ -20,7 +23,8 @@ from er3a.files.robot_file import RobotFile
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import SceneFile, load_scene
 from er3a.files.target_file import TargetFile, read_targets
-from er3a.files.yaml_file import read_yaml
+from er3a.files.vision_file import VisionFile, load_vision
+from er3a.files.yaml_file import load, read_yaml
 from er3a.formats.text_file import read_text
 from er3a.pipeline.study import Study, load_study
 from er3a.programs.read_program import SUFFIXES, read_program
@@ -32,15 +36,19 @@ SCHEMAS: dict[str, type[BaseModel]] = {
     "paths": PathFile,
     "scene": SceneFile,
     "programs": ProgramsFile,
+    "hand_eye": HandEyeFile,
+    "vision": VisionFile,
 }
 
-_CHECKS = {
+_CHECKS: dict[str, Callable[..., object]] = {
     "study": load_study,
     "robot": load_robot,
     "targets": read_targets,
     "paths": load_paths,
     "scene": load_scene,
     "programs": load_programs,
+    "hand_eye": partial(load, HandEyeFile),
+    "vision": load_vision,
 }
 _WORDS = {
     "robot": "a robot",
@@ -49,6 +57,8 @@ _WORDS = {
     "paths": "paths",
     "scene": "a scene",
     "programs": "programs",
+    "hand_eye": "a calibration set",
+    "vision": "objects before a camera",
 }
 
 
@@ -107,7 +117,10 @@ def check_study(path: Path) -> Study:
                 read_program(planned.program)
         for program in load_programs(entry.programs).programs if entry.programs else ():
             read_program(program.file)
-        for stage in ("collision", "inverse", "trajectory"):
+        if entry.vision:
+            own = load_vision(entry.vision, robot)
+            load_hand_eye(Path(entry.vision).parent / own.calibration, robot)
+        for stage in ("collision", "inverse", "trajectory", "vision"):
             if scene := study.scene(name, stage):
                 load_scene(scene)
     return study

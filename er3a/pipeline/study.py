@@ -26,7 +26,9 @@ SettingsT = TypeVar("SettingsT", bound=StrictModel)
 
 
 class RobotEntry(StrictModel):
-    """One robot of the study. ``base`` and ``tool`` replace those of its file, ``scene`` those of the stages.
+    """One robot of the study; ``vision``: the file of what its camera sees, if it has one.
+
+    ``base`` and ``tool`` replace those of its file, ``scene`` those of the stages.
 
     ``tool_load`` and ``payload`` are the masses on its flange, which the stage dynamics alone looks at.
 
@@ -37,6 +39,7 @@ class RobotEntry(StrictModel):
     targets: Text
     paths: Text
     programs: Text | None = None
+    vision: Text | None = None
     scene: Text | None = None
     base: Placement | None = None
     tool: Placement | None = None
@@ -191,7 +194,7 @@ class StudyBase(StrictModel):
 
     def settings(self, name: str, key: str) -> dict[str, Any]:
         """What of the study concerns one of its keys, for a robot; of a key without settings seed and robot alone."""
-        files = {"targets", "paths", "programs", "file", "scene", "expect"}
+        files = {"targets", "paths", "programs", "vision", "file", "scene", "expect"}
         left_out = files | (set() if key == "dynamics" else LOADS)
         entry = self.entry(name).model_dump(exclude=left_out, exclude_none=True)
         if variant := self.variants.get(name):

@@ -7,7 +7,8 @@ F_j^-1 F_i X = X B_j B_i^-1; Shah and Li take the samples themselves.
 
 References
 ----------
-.. [1] F. C. Park, B. J. Martin, "Robot sensor calibration: solving AX=XB on the Euclidean group", IEEE T-RA 10(5), 1994.
+.. [1] F. C. Park, B. J. Martin, "Robot sensor calibration: solving AX=XB on the Euclidean group", IEEE T-RA
+   10(5), 1994.
 .. [2] R. Horaud, F. Dornaika, "Hand-eye calibration", Int. J. Robotics Research 14(3), 1995.
 .. [3] R. Y. Tsai, R. K. Lenz, "A new technique for fully autonomous and efficient 3D robotics hand/eye calibration",
    IEEE T-RA 5(3), 1989.

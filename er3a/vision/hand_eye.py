@@ -12,7 +12,7 @@ from scipy.stats import t as student
 from er3a.numerics.arrays import Flags, Reals
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.classic_methods import METHOD_NAMES, MethodName, mean_pose, solved_by
-from er3a.vision.likelihood import Observations, Refined, refine, residuals
+from er3a.vision.likelihood import PoseObservations, Refined, refine, residuals
 from er3a.vision.suspects import angles_between, check_angles, repeated_poses, worst_sample
 from er3a.vision.tangent import inverted, log_rotation, moved, skew, step_between, transposed
 from er3a.vision.vision_findings import (
@@ -192,7 +192,7 @@ def start(F: Reals, B: Reals, deviations: Reals) -> tuple[Reals, Reals]:
 
 
 def _fitted(samples: CalibrationSet) -> Refined:
-    seen = Observations(
+    seen = PoseObservations(
         samples.setup, samples.hand, samples.target, samples.camera_covariance, samples.flange_covariance
     )
     try:
@@ -322,7 +322,7 @@ _PARTS = (slice(3), slice(3, 6))
 def _residuals_of(F: Reals, B: Reals, sigma: Reals) -> Reals | None:
     covariance = np.broadcast_to(np.diag(np.repeat(sigma, 3) ** 2), (len(F), 6, 6))
     try:
-        found = refine(Observations("eye_in_hand", F, B, covariance), *start(F, B, sigma))
+        found = refine(PoseObservations("eye_in_hand", F, B, covariance), *start(F, B, sigma))
     except (np.linalg.LinAlgError, HandEyeError):
         return None
     return found.residual

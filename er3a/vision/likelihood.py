@@ -36,7 +36,7 @@ LEAST_DEVIATION = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Observations:
+class PoseObservations:
     """Samples (..., N, 4, 4) of any number of sets; see :class:`er3a.vision.calibration_set.CalibrationSet`."""
 
     setup: Setup
@@ -109,7 +109,7 @@ def flange_to_camera(setup: Setup, F: Reals, X: Reals, Y: Reals) -> Reals:
     return G
 
 
-def refine(seen: Observations, X: Reals, Y: Reals) -> Refined:
+def refine(seen: PoseObservations, X: Reals, Y: Reals) -> Refined:
     """The likeliest poses from starts X, Y (..., 4, 4).
 
     Raises
@@ -121,7 +121,7 @@ def refine(seen: Observations, X: Reals, Y: Reals) -> Refined:
     batch = (*seen.F.shape[:-2], 6)
     deviations = np.broadcast_to(np.array(START_DEVIATIONS), (*X.shape[:-2], 2)).copy()
     converged = np.ones(X.shape[:-2], dtype=bool)
-    for _ in range(VARIANCE_ROUNDS if known is None else (WEIGHT_ROUNDS if _moves(seen) else 1)):
+    for _ in range(VARIANCE_ROUNDS if known is None else (1 if _flange_covariance(seen) is None else WEIGHT_ROUNDS)):
         sigma = np.broadcast_to(np.repeat(deviations, 3, axis=-1)[..., None, :], batch)
         W = _whitening(seen, sigma, X, Y)
         X, Y, converged = _steps(seen, W, X, Y)
@@ -151,24 +151,26 @@ def refine(seen: Observations, X: Reals, Y: Reals) -> Refined:
     return Refined(X, Y, covariance, white, raw, leverage, freedom, scatter, deviations, converged)
 
 
-def _moves(seen: Observations) -> bool:
-    return seen.flange_covariance is not None and bool(np.any(seen.flange_covariance))
+def _flange_covariance(seen: PoseObservations) -> Reals | None:
+    """The flange's covariance, if it has one that is not zero."""
+    own = seen.flange_covariance
+    return own if own is not None and np.any(own) else None
 
 
-def _whitening(seen: Observations, sigma: Reals, X: Reals, Y: Reals) -> Reals:
+def _whitening(seen: PoseObservations, sigma: Reals, X: Reals, Y: Reals) -> Reals:
     """Matrices (..., N, 6, 6) that give residuals unit covariance."""
     if seen.camera_covariance is None:
         S = sigma[..., :, None] ** 2 * np.eye(6)
     else:
         S = np.broadcast_to(seen.camera_covariance, (*sigma.shape, 6))
-    if _moves(seen):
+    if (own := _flange_covariance(seen)) is not None:
         G = flange_to_camera(seen.setup, seen.F, X, Y)
-        S = S + G @ seen.flange_covariance @ transposed(G)
+        S = S + G @ own @ transposed(G)
     W: Reals = np.linalg.inv(np.linalg.cholesky(S))
     return W
 
 
-def _steps(seen: Observations, W: Reals, X: Reals, Y: Reals) -> tuple[Reals, Reals, Reals]:
+def _steps(seen: PoseObservations, W: Reals, X: Reals, Y: Reals) -> tuple[Reals, Reals, Reals]:
     """Levenberg and Marquardt's steps, each set with a damping of its own."""
     damping = np.full(X.shape[:-2], 1e-6)
     done = np.zeros(X.shape[:-2], dtype=bool)
@@ -176,7 +178,7 @@ def _steps(seen: Observations, W: Reals, X: Reals, Y: Reals) -> tuple[Reals, Rea
     for _ in range(MOST_STEPS):
         size = np.diagonal(H, axis1=-2, axis2=-1)
         damped = H + (damping[..., None] * size)[..., None] * np.eye(UNKNOWNS)
-        step = -np.linalg.solve(damped, g[..., None])[..., 0]
+        step: Reals = np.linalg.solve(damped, -g[..., None])[..., 0]
         X_new, Y_new = moved(X, step[..., :6]), moved(Y, step[..., 6:])
         cost_new, H_new, g_new = _normal(seen, W, X_new, Y_new)
         better = (cost_new <= cost) & ~done
@@ -191,7 +193,7 @@ def _steps(seen: Observations, W: Reals, X: Reals, Y: Reals) -> tuple[Reals, Rea
     return X, Y, done
 
 
-def _normal(seen: Observations, W: Reals, X: Reals, Y: Reals) -> tuple[Reals, Reals, Reals]:
+def _normal(seen: PoseObservations, W: Reals, X: Reals, Y: Reals) -> tuple[Reals, Reals, Reals]:
     raw, derivative = residuals(seen.F, seen.B, X, Y)
     white, J = (W @ raw[..., None])[..., 0], W @ derivative
     H, g = np.einsum("...nki,...nkj->...ij", J, J), np.einsum("...nki,...nk->...i", J, white)

@@ -111,20 +111,22 @@ def _agreeing(conflict: Flags) -> Flags:
 
 
 def _mending_turn(target: Reals, turned: Reals, i: int, used: Flags, tolerance: float) -> SuspectKind:
-    best: tuple[float, SuspectKind] = (tolerance, "rotation")
+    best = tolerance
+    mending: SuspectKind = "rotation"
     for kind in MEND_KINDS:
         for R in _mended(target[i], kind):
             angle = rotation_angle(transposed(R)[None], transposed(target[used, :3, :3]))
             off = float(np.median(np.abs(angle - turned[i, used])))
-            best = min(best, (off, kind), key=lambda each: each[0])
-    return best[1]
+            if off < best:
+                best, mending = off, kind
+    return mending
 
 
 def _mended(T: Reals, kind: SuspectKind) -> list[Reals]:
     """The rotations (3, 3) that a detection may have been mistaken for."""
     R = T[:3, :3]
     if kind == "mirrored_tilt":
-        sight = T[:3, 3] / max(np.linalg.norm(T[:3, 3]), 1e-12)
+        sight = T[:3, 3] / max(float(np.linalg.norm(T[:3, 3])), 1e-12)
         away = np.eye(3) - 2 * np.outer(sight, sight)
         return [away @ R @ np.diag([1.0, 1.0, -1.0])]
     axis = kind[-1]

@@ -75,3 +75,10 @@ def step_between(T_from: Reals, T_to: Reals) -> Reals:
     """The steps (..., 6) by which :func:`moved` takes one transform (..., 4, 4) to the other."""
     turn = log_rotation(T_to[..., :3, :3] @ transposed(T_from[..., :3, :3]))
     return np.concatenate([T_to[..., :3, 3] - T_from[..., :3, 3], turn], axis=-1)
+
+
+def quaternion_of(T: Reals) -> Reals:
+    """Unit quaternions (..., 4), real part first and not negative, of transforms (..., 4, 4)."""
+    R = T[..., :3, :3]
+    q: Reals = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat(canonical=True, scalar_first=True)
+    return q.reshape(*R.shape[:-2], 4)

@@ -149,6 +149,7 @@ class HandEyeError(Er3aError):
         super().__init__(f"no hand-eye calibration ({finding.code.replace('_', ' ')})")
 
 
+GraspOutcome = Literal["grasped", "not graspable"]
 DirectionStatus = Literal["best", "same_problem", "excluded", "open"]
 
 

@@ -111,6 +111,31 @@ def calibrate(
 
 
 @app.command(rich_help_panel=ROBOT_FILES)
+def hand_eye(
+    file: Annotated[Path, typer.Argument(help="a calibration set (YAML, kind: hand_eye)")],
+    robot: Annotated[str | None, typer.Option(help="whose table turns joint angles into poses: a name or file")] = None,
+    as_json: AsJson = False,
+):
+    """Estimate where a camera is, with 95 % intervals, and name the samples and conventions that can't be right."""
+    from er3a.files.hand_eye_file import read_calibration
+    from er3a.files.robot_library import load_robot
+    from er3a.pipeline.messages.hand_eye import hand_eye_lines, hand_eye_record
+    from er3a.pipeline.messages.say import say
+    from er3a.vision.hand_eye import calibrate_hand_eye
+    from er3a.vision.vision_findings import HandEyeError
+
+    samples, offset = read_calibration(file, load_robot(robot) if robot else None)
+    try:
+        found = calibrate_hand_eye(samples)
+    except HandEyeError as error:
+        raise Er3aError(f"{file}: {say(error.finding)}") from None
+    if as_json:
+        print_json(hand_eye_record(found, offset))
+        return
+    print(hand_eye_lines(found, offset))
+
+
+@app.command(rich_help_panel=ROBOT_FILES)
 def schema(
     folder: Annotated[Path, typer.Option(help="where the schemas of input files go")] = Path("config"),
     docs: Annotated[Path, typer.Option(help="where the documents about results go")] = Path("docs/results"),

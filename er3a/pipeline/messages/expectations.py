@@ -21,6 +21,8 @@ OUTCOMES: dict[Outcome, str] = {
     "pass": N_("pass"),
     "caution": N_("caution"),
     "fail": N_("fail"),
+    "grasped": N_("grasped"),
+    "not graspable": N_("not graspable"),
 }
 
 

@@ -1,4 +1,4 @@
-"""What a target, a path or a program is said to come to, against what it came to: findings of those stages."""
+"""What a target, a path, a program or an object is said to come to, against what it came to: findings of those stages."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from typing import Literal, Protocol
 from er3a.kinematics.targets import TargetOutcome
 from er3a.planning.path_verdicts import PathVerdict
 from er3a.programs.program_outcomes import ProgramOutcome
+from er3a.vision.vision_findings import GraspOutcome
 
-Outcome = TargetOutcome | PathVerdict | ProgramOutcome
+Outcome = TargetOutcome | PathVerdict | ProgramOutcome | GraspOutcome
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class UnmetExpectation:
 
 @dataclass(frozen=True)
 class Demonstration:
-    """A target or a path that fails as it is meant to."""
+    """A target, a path or an object that fails as it is meant to."""
 
     name: str
     found: Outcome
@@ -42,7 +43,7 @@ class ExpectationsUnmet:
 
 
 class Judged(Protocol):
-    """A target or a path with what it came to, and what it is said to come to."""
+    """A target, a path or an object with what it came to, and what it is said to come to."""
 
     @property
     def name(self) -> str: ...

@@ -1,0 +1,299 @@
+"""Calibration sets of cameras: a YAML file that says what was recorded, and CSV tables beside it with the samples.
+
+A table of samples has one row for each: where the flange was, as joint angles (``q1_deg`` ..) or as a pose
+(``flange_x_mm`` ..), and where the camera saw the board (``target_x_mm`` ..) or in which ``image``. Orientations are
+``_qw`` .. ``_qz``, ``_roll_deg``, ``_pitch_deg``, ``_yaw_deg`` (R = Rz(yaw) Ry(pitch) Rx(roll)), or ``_r11`` ..
+``_r33`` by rows. ``name`` is optional.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from pydantic import Field, model_validator
+
+from er3a.errors import InputError
+from er3a.files.csv_file import CsvColumn, read_csv, read_header
+from er3a.files.pose_columns import ROWS_TO_JUDGE_UNITS, pose_columns, pose_form, poses_of
+from er3a.files.robot_file import Text
+from er3a.files.units import WIDEST_IN_RADIANS
+from er3a.files.yaml_file import StrictModel, load
+from er3a.kinematics.forward import forward
+from er3a.numerics.arrays import Reals
+from er3a.robots.robot import Robot
+from er3a.vision.boards import Board, BoardNotFoundError, BoardViews, Camera, board_views
+from er3a.vision.calibration_set import CalibrationSet
+from er3a.vision.time_offset import Stream, TimeOffset, paired, time_offset
+
+STREAM_SAMPLES = 60
+MOST_SAMPLES = 2000
+POINTS = {f"{part}_{c}_mm": CsvColumn() for part in ("seen", "touched") for c in "xyz"}
+
+Positive = Annotated[float, Field(gt=0, le=1e5)]
+
+
+class StandardDeviations(StrictModel):
+    """Of a pose: by the axes of the frame that it is given in, alike for all or for x, y and z."""
+
+    position_mm: Positive | Annotated[list[Positive], Field(min_length=3, max_length=3)]
+    rotation_deg: Positive | Annotated[list[Positive], Field(min_length=3, max_length=3)]
+
+    def covariance(self) -> Reals:
+        """(6, 6), m and rad."""
+        position = np.broadcast_to(np.array(self.position_mm) / 1000, 3)
+        return np.diag(np.concatenate([position, np.broadcast_to(np.radians(self.rotation_deg), 3)]) ** 2)
+
+
+class BoardEntry(StrictModel):
+    """A printed board. ``squares``: along x and y; ``marker_mm`` and ``dictionary``: of boards with markers."""
+
+    pattern: Literal["chessboard", "charuco", "apriltag"]
+    squares: Annotated[list[Annotated[int, Field(ge=2, le=100)]], Field(min_length=2, max_length=2)]
+    square_mm: Positive
+    marker_mm: Positive | None = None
+    dictionary: Text = "DICT_4X4_50"
+
+    @model_validator(mode="after")
+    def _markers_fit(self) -> Self:
+        if self.pattern == "chessboard":
+            return self
+        if self.marker_mm is None:
+            raise ValueError("marker_mm: the markers' size is missing | Add it, as printed")
+        if self.marker_mm >= self.square_mm:
+            raise ValueError("marker_mm: markers as large as the squares touch each other | Measure both again")
+        return self
+
+    def board(self) -> Board:
+        """In the units of the library."""
+        x, y = self.squares
+        marker = None if self.marker_mm is None else self.marker_mm / 1000
+        return Board(self.pattern, (x, y), self.square_mm / 1000, marker, self.dictionary)
+
+
+class Intrinsics(StrictModel):
+    """A camera's focal lengths and principal point in pixels, and distortion k1, k2, p1, p2, k3 as OpenCV has them."""
+
+    fx: Positive
+    fy: Positive
+    cx: float
+    cy: float
+    distortion: Annotated[list[float], Field(max_length=8)] = []
+
+
+class ImageEntry(StrictModel):
+    """How to read boards from images. ``intrinsics``: estimated from the images themselves if left out."""
+
+    board: BoardEntry
+    intrinsics: Intrinsics | None = None
+    pixel_standard_deviation: Annotated[float, Field(gt=0, le=100)] = 0.3
+
+
+class StreamsEntry(StrictModel):
+    """Two tables with clocks of their own (``t_s``); the offset between them is estimated within +-``widest_s``."""
+
+    flange: Text
+    target: Text
+    widest_s: Annotated[float, Field(gt=0, le=3600)] = 2.0
+
+
+class HandEyeFile(StrictModel):
+    """A calibration set.
+
+    ``camera_standard_deviation`` is that of T_camera_board by the camera's axes; without it, it is estimated.
+    ``board_mm``: the board's edges along its x and y, for views. ``touched``: a table of points that the camera placed
+    (``seen_x_mm``; with the camera on the flange: that lie on the board) and the robot touched (``touched_x_mm``).
+    """
+
+    kind: Literal["hand_eye"]
+    title: Text
+    title_zh: Text | None = None
+    source: Text
+    setup: Literal["eye_in_hand", "eye_to_hand"]
+    samples: Text | None = None
+    streams: StreamsEntry | None = None
+    images: ImageEntry | None = None
+    camera_standard_deviation: StandardDeviations | None = None
+    flange_standard_deviation: StandardDeviations | None = None
+    board_mm: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = None
+    touched: Text | None = None
+    touch_standard_deviation_mm: Positive = 0.1
+
+    @model_validator(mode="after")
+    def _one_source_of_samples(self) -> Self:
+        if (self.samples is None) == (self.streams is None):
+            raise ValueError("samples and streams: one of the two says where the poses are | Give one")
+        if self.flange_standard_deviation and not (self.camera_standard_deviation or self.images):
+            raise ValueError(
+                "flange_standard_deviation: is of no use while the camera's is estimated from the same residuals | "
+                "State camera_standard_deviation too, or remove it"
+            )
+        return self
+
+
+def load_hand_eye(path: str | Path, robot: Robot | None = None) -> CalibrationSet:
+    """Read a calibration set; the robot turns joint angles into poses.
+
+    Raises
+    ------
+    InputError
+        naming file, row and column
+    """
+    return read_calibration(path, robot)[0]
+
+
+def read_calibration(path: str | Path, robot: Robot | None) -> tuple[CalibrationSet, TimeOffset | None]:
+    """A calibration set, and the offset between its streams' clocks, if they have two."""
+    path = Path(path)
+    head = load(HandEyeFile, path)
+    offset: TimeOffset | None = None
+    covariance = head.camera_standard_deviation
+    per_sample: Reals | None = None
+    if head.streams is not None:
+        hand = _stream(path.parent / head.streams.flange, "flange", robot)
+        eye = _stream(path.parent / head.streams.target, "target", robot)
+        offset = time_offset(hand, eye, head.streams.widest_s)
+        flange, target, times = paired(hand, eye, offset.offset, STREAM_SAMPLES)
+        names, q = tuple(f"{t:.3f} s" for t in times), None
+    else:
+        table = path.parent / str(head.samples)
+        rows, header = _rows(table)
+        flange, q = _flange(table, rows, header, robot)
+        names = tuple(str(row.get("name") or f"row {row['row']}") for row in rows)
+        if head.images is not None:
+            views = _targets_of_images(table, rows, head.images, table.parent)
+            target, per_sample = views.target, views.covariance
+        else:
+            target = poses_of(table, rows, "target", _form(table, header, "target"))
+    if covariance is not None:
+        per_sample = np.broadcast_to(covariance.covariance(), (len(flange), 6, 6))
+    samples = CalibrationSet(
+        setup=head.setup,
+        flange=flange,
+        target=target,
+        names=names,
+        camera_covariance=per_sample,
+        flange_covariance=head.flange_standard_deviation.covariance() if head.flange_standard_deviation else None,
+        q=q,
+        touched=_touched(path.parent / head.touched) if head.touched else None,
+        touch_deviation=head.touch_standard_deviation_mm / 1000,
+    )
+    return samples, offset
+
+
+def calibration_files(path: str | Path) -> list[Path]:
+    """A calibration set's own file and the tables and images that it names."""
+    path = Path(path)
+    head = load(HandEyeFile, path)
+    names = [head.samples, head.touched, *((head.streams.flange, head.streams.target) if head.streams else ())]
+    files = [path, *(path.parent / name for name in names if name)]
+    if head.images is not None and head.samples:
+        table = path.parent / head.samples
+        files += [table.parent / row["image"] for row in _rows(table)[0] if row.get("image")]
+    return files
+
+
+def _rows(table: Path) -> tuple[list[dict[str, Any]], list[str]]:
+    header = read_header(table)
+    columns: dict[str, CsvColumn] = {}
+    for name in ("name", "image"):
+        if name in header:
+            columns[name] = CsvColumn(str, optional=name == "name")
+    if "t_s" in header:
+        columns["t_s"] = CsvColumn()
+    joints = sum(1 for name in header if name.startswith("q") and name.endswith("_deg") and name[1:-4].isdigit())
+    columns |= {f"q{joint + 1}_deg": CsvColumn() for joint in range(joints)}
+    for stream in ("flange", "target"):
+        if form := pose_form(table, header, stream):
+            columns |= pose_columns(stream, form)
+    rows = read_csv(table, columns)
+    if not rows:
+        raise InputError(table, None, "the table has a header but no samples", "Add a row for each sample")
+    return rows, header
+
+
+def _form(table: Path, header: list[str], stream: str) -> str:
+    form = pose_form(table, header, stream)
+    if form is None:
+        remedy = f"Add {stream}_x_mm, {stream}_y_mm, {stream}_z_mm and {stream}_qw to {stream}_qz, or another form"
+        raise InputError(table, "header", f"nothing says where the {stream} was", remedy)
+    return form
+
+
+def _flange(
+    table: Path, rows: list[dict[str, Any]], header: list[str], robot: Robot | None
+) -> tuple[Reals, Reals | None]:
+    """T_base_flange (N, 4, 4), from joint angles by the robot's table where they are given."""
+    if "q1_deg" not in header:
+        return poses_of(table, rows, "flange", _form(table, header, "flange")), None
+    if pose_form(table, header, "flange"):
+        raise InputError(table, "header", "joint angles and flange poses both say where the arm was", "Keep one")
+    if robot is None:
+        raise InputError(table, "columns q1_deg ...", "joint angles need a robot's table", "Name the robot")
+    joints = sum(1 for name in header if name[:1] == "q" and name[1:-4].isdigit())
+    if joints != len(robot.lower):
+        problem = f"{joints} joint angles, and the robot {robot.name} has {len(robot.lower)} joints"
+        raise InputError(table, "columns q1_deg ...", problem, "Give one column for each joint")
+    q = np.array([[row[f"q{joint + 1}_deg"] for joint in range(joints)] for row in rows], dtype=float)
+    widest = float(np.abs(q).max())
+    if len(rows) >= ROWS_TO_JUDGE_UNITS and 0 < widest <= WIDEST_IN_RADIANS:
+        problem = f"the widest angle is {widest:g} deg, which can only be radians"
+        raise InputError(table, f"columns q1_deg to q{joints}_deg", problem, "Convert to degrees")
+    return forward(robot.without_tool(), np.radians(q)), np.radians(q)
+
+
+def _stream(table: Path, name: str, robot: Robot | None) -> Stream:
+    rows, header = _rows(table)
+    if "t_s" not in header:
+        raise InputError(table, "header", "the column t_s is missing", "Add the time of each row in seconds")
+    t = np.array([row["t_s"] for row in rows], dtype=float)
+    falls = np.flatnonzero(np.diff(t) <= 0)
+    if falls.size:
+        where = f"row {rows[int(falls[0]) + 1]['row']}, column t_s"
+        raise InputError(
+            table, where, "time does not rise from the row before", "Sort the rows; keep one of equal ones"
+        )
+    flange = name == "flange"
+    T = _flange(table, rows, header, robot)[0] if flange else poses_of(table, rows, name, _form(table, header, name))
+    return Stream(t, T)
+
+
+def _touched(table: Path) -> Reals:
+    rows = read_csv(table, POINTS)
+    found = np.array([[row[name] for name in POINTS] for row in rows], dtype=float).reshape(-1, 2, 3) / 1000
+    if not len(found):
+        raise InputError(table, None, "the table has a header but no points", "Add a row for each point touched")
+    return found
+
+
+def _targets_of_images(table: Path, rows: list[dict[str, Any]], entry: ImageEntry, folder: Path) -> BoardViews:
+    for row in rows:
+        if not row.get("image"):
+            raise InputError(table, f"row {row['row']}, column image", "no image is named", "Name its file")
+    camera = None
+    if entry.intrinsics is not None:
+        own = entry.intrinsics
+        K = np.array([[own.fx, 0, own.cx], [0, own.fy, own.cy], [0, 0, 1.0]])
+        camera = Camera(K, np.array(own.distortion))
+    files = [folder / row["image"] for row in rows]
+    images = [_grey(file) for file in files]
+    try:
+        return board_views(images, entry.board.board(), camera, entry.pixel_standard_deviation)
+    except BoardNotFoundError as error:
+        x, y = entry.board.squares
+        problem = f"{error.corners} corners of a {entry.board.pattern} board of {x} x {y} found"
+        remedy = "Check squares, dictionary and the image; or remove the sample"
+        where = f"sample {rows[error.image].get('name') or error.image + 1}"
+        raise InputError(files[error.image], where, problem, remedy) from None
+
+
+def _grey(file: Path) -> NDArray[np.uint8]:
+    try:
+        with Image.open(file) as image:
+            return np.asarray(image.convert("L"))
+    except (OSError, ValueError) as error:
+        reason = "there is no such file" if isinstance(error, FileNotFoundError) else "is no image that can be read"
+        raise InputError(file, None, reason, "Correct the name, or save it as PNG or JPEG") from None

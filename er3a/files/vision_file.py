@@ -1,0 +1,182 @@
+"""What a robot with a camera is to grasp: the calibration, the camera's view, detected objects and their grasps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+from scipy.spatial.transform import Rotation
+
+from er3a.errors import InputError
+from er3a.files.hand_eye_file import Positive, StandardDeviations, calibration_files
+from er3a.files.robot_file import Name, Text
+from er3a.files.target_file import UNIT_LENGTH_TOLERANCE, Line
+from er3a.files.units import PositionMm, RpyDeg, Triple
+from er3a.files.yaml_file import StrictModel, load
+from er3a.geometry.transforms import transform
+from er3a.numerics.arrays import Reals
+from er3a.robots.robot import Robot
+from er3a.vision.grasping import DetectedObject, Grasp
+from er3a.vision.next_view import FieldOfView
+from er3a.vision.point_error import ArmAccuracy
+from er3a.vision.vision_findings import GraspOutcome
+
+MOST_OBJECTS = 30
+Angle = Annotated[float, Field(gt=0, lt=180)]
+Tolerances = Annotated[list[Positive], Field(min_length=3, max_length=3)]
+
+
+class ViewEntry(StrictModel):
+    """What the camera sees: whole angles of view, and distances along its axis of sight."""
+
+    horizontal_deg: Angle
+    vertical_deg: Angle
+    nearest_mm: Positive
+    farthest_mm: Positive
+
+    @model_validator(mode="after")
+    def _near_before_far(self) -> Self:
+        if self.nearest_mm >= self.farthest_mm:
+            raise ValueError("nearest_mm: is not nearer than farthest_mm | Exchange them")
+        return self
+
+    def view(self, board_mm: list[float]) -> FieldOfView:
+        """With a board's edges; in the units of the library."""
+        half = np.radians([self.horizontal_deg, self.vertical_deg]) / 2
+        x, y = board_mm
+        return FieldOfView((half[0], half[1]), self.nearest_mm / 1000, self.farthest_mm / 1000, (x / 1000, y / 1000))
+
+
+class ArmAccuracyEntry(StrictModel):
+    """What is stated of the arm: RP of ISO 9283, and standard deviations of its table's lengths and angles."""
+
+    source: Text
+    repeatability_mm: Annotated[float, Field(ge=0, le=100)] = 0.0
+    table_length_standard_deviation_mm: Annotated[float, Field(ge=0, le=100)] = 0.0
+    table_angle_standard_deviation_deg: Annotated[float, Field(ge=0, le=10)] = 0.0
+
+    def accuracy(self) -> ArmAccuracy:
+        """In the units of the library."""
+        return ArmAccuracy(
+            self.repeatability_mm / 1000,
+            self.table_length_standard_deviation_mm / 1000,
+            float(np.radians(self.table_angle_standard_deviation_deg)),
+        )
+
+
+class GripperEntry(StrictModel):
+    """Errors that the gripper forgives, along and about the tool's x, y and z."""
+
+    source: Text
+    tolerance_mm: Tolerances
+    tolerance_deg: Tolerances
+
+
+class GraspEntry(StrictModel):
+    """The tool in the object's frame; its z axis is the direction of approach."""
+
+    name: Name
+    xyz_mm: Triple
+    rpy_deg: RpyDeg
+
+    def grasp(self) -> Grasp:
+        """In the units of the library."""
+        return Grasp(self.name, transform(np.array(self.xyz_mm) / 1000, np.radians(self.rpy_deg)))
+
+
+class ObjectEntry(StrictModel):
+    """A detected object: its pose in the camera's frame, the detector's standard deviations by the camera's axes.
+
+    ``symmetry_turns``: turns about its z axis in which it looks alike; 0 for any.
+    """
+
+    name: Name
+    note: Line | None = None
+    note_zh: Line | None = None
+    xyz_mm: PositionMm
+    quaternion_wxyz: Annotated[list[float], Field(min_length=4, max_length=4)]
+    standard_deviation: StandardDeviations
+    symmetry_turns: Annotated[int, Field(ge=0, le=12)] = 1
+    grasps: Annotated[list[GraspEntry], Field(min_length=1, max_length=20)]
+    approach_mm: Annotated[float, Field(ge=1, le=1000)]
+    retreat_mm: Annotated[float, Field(ge=1, le=1000)]
+    expect: GraspOutcome | None = None
+
+    @model_validator(mode="after")
+    def _unit_length(self) -> Self:
+        length = float(np.linalg.norm(self.quaternion_wxyz))
+        if abs(length - 1) > UNIT_LENGTH_TOLERANCE:
+            raise ValueError(f"quaternion_wxyz: its length is {length:.9g}, not 1 | Divide w, x, y and z by it")
+        return self
+
+    def pose(self) -> Reals:
+        """T_camera_object (4, 4), m."""
+        T = np.eye(4)
+        T[:3, :3] = Rotation.from_quat(self.quaternion_wxyz, scalar_first=True).as_matrix()
+        T[:3, 3] = np.array(self.xyz_mm) / 1000
+        return T
+
+    def detected(self) -> DetectedObject:
+        """In the units of the library."""
+        return DetectedObject(
+            name=self.name,
+            T_camera_object=self.pose(),
+            covariance=self.standard_deviation.covariance(),
+            turns=self.symmetry_turns,
+            grasps=tuple(entry.grasp() for entry in self.grasps),
+            approach=self.approach_mm / 1000,
+            retreat=self.retreat_mm / 1000,
+        )
+
+
+class VisionFile(StrictModel):
+    """data/vision/NAME.yaml. ``calibration``: a calibration set beside it.
+
+    ``home_deg``: joints that the arm comes from; ``picture_deg``: where a camera on the flange saw the objects.
+    """
+
+    kind: Literal["vision"]
+    title: Text
+    title_zh: Text | None = None
+    calibration: Text
+    view: ViewEntry
+    arm: ArmAccuracyEntry
+    gripper: GripperEntry
+    home_deg: Annotated[list[float], Field(min_length=1, max_length=16)]
+    picture_deg: Annotated[list[float], Field(min_length=1, max_length=16)] | None = None
+    objects: Annotated[list[ObjectEntry], Field(min_length=1, max_length=MOST_OBJECTS)]
+
+    @model_validator(mode="after")
+    def _own_names(self) -> Self:
+        names = [each.name for each in self.objects]
+        for i, name in enumerate(names):
+            if name in names[:i]:
+                raise ValueError(
+                    f"objects[{i}].name: '{name}' is also that of objects[{names.index(name)}] | Rename it"
+                )
+        return self
+
+
+def load_vision(path: str | Path, robot: Robot | None = None) -> VisionFile:
+    """Read a vision file; with a robot, also whether its joint angles are as many as that has joints.
+
+    Raises
+    ------
+    InputError
+        naming file, field and remedy
+    """
+    found = load(VisionFile, path)
+    for key in ("home_deg", "picture_deg") if robot is not None else ():
+        angles = getattr(found, key)
+        if angles is not None and robot is not None and len(angles) != len(robot.lower):
+            problem = f"{len(angles)} angles, and the robot {robot.name} has {len(robot.lower)} joints"
+            raise InputError(path, key, problem, "Give one for each joint")
+    return found
+
+
+def vision_files(path: str | Path) -> list[Path]:
+    """A vision file, its calibration set, and the tables and images of that."""
+    own = Path(path)
+    return [own, *calibration_files(own.parent / load(VisionFile, own).calibration)]

@@ -1,0 +1,305 @@
+"""Sentences about hand-eye calibrations, and a calibration as lines for a terminal and as plain data."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from er3a.geometry.transforms import rpy_of
+from er3a.pipeline.messages.language import N_
+from er3a.pipeline.messages.say import say, sentence, word
+from er3a.vision.hand_eye import HandEye, spread_of
+from er3a.vision.tangent import quaternion_of
+from er3a.vision.time_offset import TimeOffset
+from er3a.vision.vision_findings import (
+    AllSamplesEqual,
+    BoardScale,
+    DirectionTried,
+    FarFromFit,
+    LittleMotion,
+    MoreScatter,
+    NoMajority,
+    NoRotation,
+    NothingFits,
+    ParallelAxes,
+    QuaternionOrder,
+    RepeatedPose,
+    RotationMismatch,
+    TooFewSamples,
+)
+
+MENDING = {
+    "half_turn_x": N_("the board is detected turned by 180 deg about its x axis"),
+    "half_turn_y": N_("the board is detected turned by 180 deg about its y axis"),
+    "half_turn_z": N_("the board is detected turned by 180 deg in its plane"),
+    "quarter_turn_z": N_("the board is detected turned by 90 deg in its plane"),
+    "mirrored_tilt": N_("the board's tilt is mirrored, as of a flat board seen from far or head-on"),
+    "rotation": N_("no turn that detectors mistake explains it"),
+}
+STREAMS = {"flange": N_("flange"), "target": N_("board")}
+POSES = {
+    "eye_in_hand": (N_("camera on the flange (T_flange_camera)"), N_("board in the base (T_base_board)")),
+    "eye_to_hand": (N_("camera in the base (T_base_camera)"), N_("board on the flange (T_flange_board)")),
+}
+DIRECTION_WORDS = {
+    (False, False): N_("both streams as given"),
+    (True, True): N_("both inverted"),
+    (True, False): N_("flange inverted"),
+    (False, True): N_("board inverted"),
+}
+STATUS_WORDS = {
+    "best": N_("supported: the smallest residuals"),
+    "same_problem": N_("the same equations with the two unknowns swapped; poses alone can't tell it apart"),
+    "excluded": N_("excluded by the residuals"),
+    "open": N_("can't be told"),
+}
+METHODS = {
+    "park": "Park",
+    "horaud": "Horaud",
+    "tsai": "Tsai",
+    "andreff": "Andreff",
+    "daniilidis": "Daniilidis",
+    "shah": "Shah",
+    "li": "Li",
+}
+
+
+@say.register
+def _(found: RotationMismatch) -> str:
+    return sentence(
+        found.code,
+        "{own_name}: hand and board turn by different angles to the other samples, {off:.1f} deg in the median; {kind}",
+        own_name=found.sample,
+        off=found.off_deg,
+        kind=word("vision.mending", MENDING, found.kind),
+    )
+
+
+@say.register
+def _(found: FarFromFit) -> str:
+    return sentence(
+        found.code,
+        "{own_name}: {mm:.3g} mm and {deg:.2g} deg from what the other samples predict (probability {p:.1g})",
+        own_name=found.sample,
+        mm=found.off_mm,
+        deg=found.off_deg,
+        p=found.probability,
+    )
+
+
+@say.register
+def _(found: RepeatedPose) -> str:
+    return sentence(
+        found.code,
+        "{own_name}: the arm stands as in {first}, and the board is seen {mm:.2g} mm and {deg:.2g} deg apart; a sample "
+        "elsewhere would tell more",
+        own_name=found.sample,
+        first=found.first,
+        mm=found.apart_mm,
+        deg=found.apart_deg,
+    )
+
+
+@say.register
+def _(found: NoMajority) -> str:
+    return sentence(
+        found.code,
+        "hand and board turn by different angles in {pairs} of {of} pairs of samples ({median:.3g} deg in the median): "
+        "the robot's table, the order of the samples, or the orientations of one stream are wrong",
+        pairs=found.pairs,
+        of=found.of,
+        median=found.median_deg,
+    )
+
+
+@say.register
+def _(found: QuaternionOrder) -> str:
+    return sentence(
+        found.code,
+        "the quaternions of the {stream} have their real part at the other end: read so, the turning angles differ by "
+        "{after:.2g} deg in the median, and by {before:.3g} deg as given",
+        stream=word("vision.stream", STREAMS, found.stream),
+        after=found.median_after_deg,
+        before=found.median_before_deg,
+    )
+
+
+@say.register
+def _(found: BoardScale) -> str:
+    return sentence(
+        found.code,
+        "the samples fit a board {factor:.4g} ± {half:.1g} times as large: check the stated size of its squares, the "
+        "units, or the camera's focal length",
+        factor=found.factor,
+        half=found.half_width,
+    )
+
+
+@say.register
+def _(found: LittleMotion) -> str:
+    return sentence(
+        found.code,
+        "the samples turn by {turn:.3g} deg at most, about axes {apart:.2g} deg off one direction: add poses turned by "
+        "30 deg and more about a second axis",
+        turn=found.greatest_turn_deg,
+        apart=found.axes_apart_deg,
+    )
+
+
+@say.register
+def _(found: MoreScatter) -> str:
+    return sentence(
+        found.code,
+        "the residuals are {scatter:.3g} times the stated standard deviations, where chance leaves {largest:.2f} at "
+        "most: the arm's table, its repeatability or the camera is worse than stated",
+        scatter=found.scatter,
+        largest=found.largest,
+    )
+
+
+@say.register
+def _(found: TooFewSamples) -> str:
+    return sentence(
+        found.code,
+        "{count} samples; {needed} are needed, and ten or more advised",
+        count=found.samples,
+        needed=found.needed,
+    )
+
+
+@say.register
+def _(found: AllSamplesEqual) -> str:
+    if found.stream == "flange":
+        return sentence(found.code, "the flange stands in the same pose in all samples: move the arm between them")
+    return sentence(found.code, "the board is seen in the same pose in all samples: check what was recorded")
+
+
+@say.register
+def _(found: ParallelAxes) -> str:
+    return sentence(
+        found.code,
+        "all motions turn about one direction ({x:.2f}, {y:.2f}, {z:.2f}) within {spread:.2g} deg, so that the shift "
+        "along it is open: add poses turned about another axis by 30 deg and more",
+        x=found.axis[0],
+        y=found.axis[1],
+        z=found.axis[2],
+        spread=found.spread_deg,
+    )
+
+
+@say.register
+def _(found: NoRotation) -> str:
+    return sentence(
+        found.code,
+        "the flange turns by {turn:.2g} deg at most, so that the camera's position is open: turn it by 30 deg and more",
+        turn=found.greatest_turn_deg,
+    )
+
+
+@say.register
+def _(found: NothingFits) -> str:
+    return sentence(found.code, "no poses of camera and board fit the samples: the two streams don't belong together")
+
+
+@say.register
+def _(found: DirectionTried) -> str:
+    return sentence(
+        found.code,
+        "{direction}: {status}",
+        direction=direction_word(found),
+        status=word("vision.direction_status", STATUS_WORDS, found.status),
+    )
+
+
+def direction_word(found: DirectionTried) -> str:
+    """Which streams are inverted, in words."""
+    text = DIRECTION_WORDS[found.flange_inverted, found.target_inverted]
+    return word("vision.direction", {"direction": text}, "direction")
+
+
+def pose_words(setup: str) -> tuple[str, str]:
+    """What the two unknown poses of a setup are, in words."""
+    first, second = POSES[setup]
+    return word("vision.pose", {"pose": first}, "pose"), word("vision.pose", {"pose": second}, "pose")
+
+
+def hand_eye_lines(found: HandEye, offset: TimeOffset | None) -> str:
+    """A calibration as lines of text for a terminal."""
+    spread, turned = spread_of(found)
+    lines = [
+        f"{int(found.used.sum())} of {len(found.samples)} samples used; turned by up to "
+        f"{np.degrees(found.greatest_turn):.0f} deg, axes {np.degrees(found.axes_apart):.0f} deg off one direction",
+        f"camera's standard deviation by axis {1000 * found.deviations[0]:.3g} mm, "
+        f"{np.degrees(found.deviations[1]):.3g} deg "
+        + (
+            "(estimated)" if found.samples.camera_covariance is None else f"(stated; scatter {found.scatter:.2f} of it)"
+        ),
+        f"spread of the board's place {1000 * spread:.3g} mm, {np.degrees(turned):.2g} deg (root mean square)",
+    ]
+    if offset:
+        lines.append(f"the camera's clock plus {offset.offset:.4f} ± {offset.half_width:.2g} s is the arm's")
+    for name, T, half in zip(pose_words(found.samples.setup), (found.X, found.Y), found.half_width.reshape(2, 6)):
+        qw, qx, qy, qz = quaternion_of(T)
+        lines.append(f"{name}, with 95 % intervals; turns are about the parent frame's axes:")
+        for axis, value, h in zip("xyz", 1000 * T[:3, 3], 1000 * half[:3]):
+            lines.append(f"  {axis:<6}{value:>12.3f} ± {h:.3f} mm")
+        for axis, value, h in zip(("roll", "pitch", "yaw"), np.degrees(rpy_of(T)), np.degrees(half[3:])):
+            lines.append(
+                f"  {axis:<6}{value:>12.4f} deg; about {'xyz'[('roll', 'pitch', 'yaw').index(axis)]} ± {h:.4f} deg"
+            )
+        lines.append(f"  quaternion (w, x, y, z) {qw:.6f} {qx:.6f} {qy:.6f} {qz:.6f}")
+    lines.append(f"{'method':<12}{'apart mm':>10}{'deg':>9}{'/ interval':>12}{'rms mm':>9}")
+    for each in found.methods:
+        values = f"{each.apart_mm:>10.3f}{each.apart_deg:>9.4f}{each.beyond:>12.2f}{each.rms_mm:>9.3f}"
+        lines.append(f"{METHODS[each.name]:<12}" + (values if each.X is not None else "      fails"))
+    lines += [f"direction: {say(each)}" for each in found.directions]
+    if found.touch:
+        far = 1000 * np.linalg.norm(found.touch.difference, axis=1).max()
+        lines.append(f"touched points: {far:.2g} mm apart at most, probability {found.touch.probability:.2g}")
+    lines += [f"sample {say(each)}" for each in found.suspects]
+    if found.without_suspects is not None:
+        mm, deg = 1000 * found.without_suspects[0], np.degrees(found.without_suspects[1])
+        lines.append(f"left in, they would move the camera by {mm:.3g} mm and {deg:.2g} deg")
+    lines += [f"warning: {say(each)}" for each in found.warnings]
+    return "\n".join(lines)
+
+
+def hand_eye_record(found: HandEye, offset: TimeOffset | None) -> dict[str, object]:
+    """A calibration as plain data, for another program; half widths of 95 % intervals in mm and deg."""
+
+    def pose(T: np.ndarray, half: np.ndarray) -> dict[str, object]:
+        return {
+            "matrix": T.tolist(),
+            "xyz_mm": (1000 * T[:3, 3]).tolist(),
+            "quaternion_wxyz": quaternion_of(T).tolist(),
+            "half_width_mm": (1000 * half[:3]).tolist(),
+            "half_width_deg": np.degrees(half[3:]).tolist(),
+        }
+
+    return {
+        "setup": found.samples.setup,
+        "samples": len(found.samples),
+        "used": [name for name, used in zip(found.samples.names, found.used) if used],
+        "hand_eye": pose(found.X, found.half_width[:6]),
+        "board": pose(found.Y, found.half_width[6:]),
+        "scatter": found.scatter,
+        "camera_mm": float(1000 * found.deviations[0]),
+        "camera_deg": float(np.degrees(found.deviations[1])),
+        "methods": [
+            {"name": each.name, "apart_mm": each.apart_mm, "apart_deg": each.apart_deg}
+            for each in found.methods
+            if each.X is not None
+        ],
+        "directions": [
+            {
+                "flange_inverted": each.flange_inverted,
+                "target_inverted": each.target_inverted,
+                "status": each.status,
+                "rms_mm": each.rms_mm,
+            }
+            for each in found.directions
+        ],
+        "suspects": [{"code": each.code, "sample": each.sample, "text": say(each)} for each in found.suspects],
+        "warnings": [{"code": each.code, "text": say(each)} for each in found.warnings],
+        "time_offset_s": offset.offset if offset else None,
+        "touch_probability": found.touch.probability if found.touch else None,
+    }

@@ -1,0 +1,55 @@
+"""The stage in the registry, and what a study may set of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import Field
+
+from er3a.files.robot_file import Text
+from er3a.files.yaml_file import StrictModel
+from er3a.pipeline.messages.language import N_
+from er3a.pipeline.stages.stage import Stage
+from er3a.pipeline.stages.vision.no_camera import NoCamera
+
+if TYPE_CHECKING:
+    from er3a.pipeline.study import Study
+
+
+class VisionSettings(StrictModel):
+    """What is asked of grasps. ``scene``: the obstacles that the arm may not come nearer to than the clearance.
+
+    ``least_singular_value`` : of the Jacobian with lengths divided by the wrist's reach. ``least_success`` : the
+    probability below which a grasp counts as unsure. ``map_cells`` : cells across the map of errors.
+    """
+
+    scene: Text | None = None
+    least_clearance_mm: Annotated[float, Field(ge=0, le=1000)] = 5.0
+    least_limit_margin_deg: Annotated[float, Field(ge=0, le=90)] = 2.0
+    least_singular_value: Annotated[float, Field(ge=0, le=1)] = 0.02
+    least_success: Annotated[float, Field(ge=0, le=1)] = 0.95
+    map_cells: Annotated[int, Field(ge=4, le=200)] = 30
+
+
+def _inputs(study: Study, robot: str) -> list[Path]:
+    from er3a.files.vision_file import vision_files  # with all of the room behind it, which a study does without
+
+    file = study.entry(robot).vision
+    return [*vision_files(file), *study.scenes(robot, STAGE.name)] if file else []
+
+
+def _missing(study: Study, robot: str) -> NoCamera | None:
+    return None if study.entry(robot).vision else NoCamera()
+
+
+STAGE = Stage(
+    name="vision",
+    title=N_("vision"),
+    question=N_("Is the camera calibrated well enough, and which objects can be grasped?"),
+    settings={"vision": VisionSettings},
+    inputs=_inputs,
+    missing=_missing,
+    absences=(NoCamera,),
+    rests_on=("validation",),
+)

@@ -1,0 +1,264 @@
+"""What the stage's results hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from er3a.collision.pairs import Pair
+from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.stages.expectations import ExpectationsUnmet
+from er3a.pipeline.stages.vision.vision_verdicts import (
+    CalibrationDoubtful,
+    CalibrationImpossible,
+    DirectionContradicted,
+    GraspCounts,
+    TouchContradicts,
+)
+from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
+from er3a.vision.calibration_set import Setup
+from er3a.vision.classic_methods import MethodName
+from er3a.vision.grasping import GraspRefusal
+from er3a.vision.vision_findings import CalibrationWarning, DirectionTried, GraspOutcome, Suspect
+
+Three = tuple[float, float, float]
+ROTATIONS = ("rx", "ry", "rz")
+
+
+@dataclass(frozen=True)
+class PoseEstimate:
+    """A pose with half its 95 % intervals: of the position, and of small turns, by the axes of the parent frame."""
+
+    xyz_mm: Three
+    rpy_deg: Three
+    quaternion_wxyz: tuple[float, float, float, float]
+    half_width_mm: Three
+    half_width_deg: Three
+
+
+@dataclass(frozen=True)
+class MethodResult:
+    """A closed form's hand-eye pose against the likeliest one; None where it fails.
+
+    Attributes
+    ----------
+    beyond : the greatest difference of its six numbers, in half widths of the 95 % interval
+    """
+
+    method: MethodName
+    apart_mm: float | None
+    apart_deg: float | None
+    beyond: float | None
+    rms_mm: float | None
+    rms_deg: float | None
+
+
+@dataclass(frozen=True)
+class TouchedPoint:
+    """A point touched with the robot: its distance from where the camera puts it, and the half widths by axis."""
+
+    difference_mm: Three
+    half_width_mm: Three
+
+
+@dataclass(frozen=True)
+class TouchResult:
+    """All touched points together; ``probability``: of such differences if calibration and intervals are right."""
+
+    points: tuple[TouchedPoint, ...]
+    probability: float
+
+
+@dataclass(frozen=True)
+class ViewToAdd:
+    """The pose to record next; errors that 95 % of calibrations stay below, where the objects are."""
+
+    q_deg: tuple[float, ...]
+    clearance_mm: float | None
+    error_before_mm: float
+    error_after_mm: float
+    tried: int
+    in_view: int
+
+
+@dataclass(frozen=True)
+class OffsetResult:
+    """The camera's clock plus this is the arm's, with half its 95 % interval."""
+
+    offset_s: float
+    half_width_s: float
+    rms_deg: float
+
+
+@dataclass(frozen=True)
+class CalibrationResult:
+    """The calibration.
+
+    Attributes
+    ----------
+    hand_eye : T_flange_camera (camera on the flange) or T_base_camera (fixed); board : T_base_board or T_flange_board
+    stated : whether the camera's standard deviations are stated; else they are estimated
+    scatter : root mean square of the residuals in stated standard deviations
+    camera_mm, camera_deg : the camera's standard deviation by axis, root mean square of the three
+    spread_mm, spread_deg : root mean square distance of the board's places, by sample, from their mean
+    moved_mm, moved_deg : how far the hand-eye pose would be off with the samples that were left out; None without any
+    """
+
+    title: str
+    source: str
+    setup: Setup
+    samples: int
+    used: int
+    stated: bool
+    hand_eye: PoseEstimate
+    board: PoseEstimate
+    scatter: float
+    camera_mm: float
+    camera_deg: float
+    spread_mm: float
+    spread_deg: float
+    greatest_turn_deg: float
+    axes_apart_deg: float
+    suspects: tuple[Suspect, ...]
+    warnings: tuple[CalibrationWarning, ...]
+    moved_mm: float | None
+    moved_deg: float | None
+    methods: tuple[MethodResult, ...]
+    directions: tuple[DirectionTried, ...]
+    touch: TouchResult | None
+    next_view: ViewToAdd | None
+    time_offset: OffsetResult | None
+
+
+@dataclass(frozen=True)
+class ErrorParts:
+    """What 95 % of errors stay below, by cause alone and together."""
+
+    camera: float
+    calibration: float
+    repeatability: float
+    table: float
+    together: float
+
+
+@dataclass(frozen=True)
+class GraspResult:
+    """The grasp taken.
+
+    Attributes
+    ----------
+    turn_deg : about the object's z axis
+    clearance_mm, nearest : least along move, approach and retreat, and what is nearest there
+    limit_margin_deg, singular_value : least along approach and retreat
+    probability, deviation : that the gripper's tolerance is kept, and that figure's standard deviation from its draws
+    """
+
+    grasp: str
+    turn_deg: float
+    tool_xyz_mm: Three
+    tool_rpy_deg: Three
+    q_before_deg: tuple[float, ...]
+    q_deg: tuple[float, ...]
+    q_after_deg: tuple[float, ...]
+    clearance_mm: float | None
+    nearest: Pair | None
+    limit_margin_deg: float
+    singular_value: float
+    probability: float
+    deviation: float
+
+
+@dataclass(frozen=True)
+class ObjectResult:
+    """A detected object, where it is in the base's frame, and what comes of it.
+
+    Attributes
+    ----------
+    error_mm, error_deg : None where nothing is grasped
+    poses, solutions, followed : grasps in all turns, their joint solutions, and those followed along both lines
+    """
+
+    name: str
+    note: str | None
+    xyz_mm: Three
+    rpy_deg: Three
+    quaternion_wxyz: tuple[float, float, float, float]
+    outcome: GraspOutcome
+    expect: GraspOutcome | None
+    error_mm: ErrorParts | None
+    error_deg: ErrorParts | None
+    grasp: GraspResult | None
+    refusal: GraspRefusal | None
+    poses: int
+    solutions: int
+    followed: int
+
+
+@dataclass(frozen=True)
+class VisionSummary(Summary):
+    """What the stage found; ``calibration`` is None where the samples determine none."""
+
+    verdict: Verdict[
+        CalibrationImpossible
+        | CalibrationDoubtful
+        | DirectionContradicted
+        | TouchContradicts
+        | GraspCounts
+        | ExpectationsUnmet
+    ]
+    title: str
+    scene: str | None
+    calibration: CalibrationResult | None
+    objects: tuple[ObjectResult, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class SampleRows(Table):
+    """One row for each sample of the calibration."""
+
+    sample: Texts = column("name of the sample", dtype=object)
+    used: Flags = column("whether the calibration rests on it", dtype=bool)
+    residual_mm: Reals = vector("residual_{}_mm", "board's position seen less predicted, by the camera's axes", "mm")
+    residual_deg: Reals = vector(
+        "residual_{}_deg", "turn from the board predicted to the one seen, by the camera's axes", "deg", parts=ROTATIONS
+    )
+    mismatch_deg: Reals = column("median difference of how far hand and board turn to the other samples", "deg")
+    flange_mm: Reals = vector("flange_{}_mm", "flange in the base's frame", "mm")
+    seen_mm: Reals = vector("seen_{}_mm", "board in the base's frame, by the camera", "mm")
+    predicted_mm: Reals = vector("predicted_{}_mm", "board in the base's frame, by the arm", "mm")
+    q_deg: Reals = per_joint("q{}_deg", "joint angle; NaN where poses were recorded", "deg")
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorMapRows(Table):
+    """Errors of a point seen, at the mean height of the objects, from camera and calibration."""
+
+    x_mm: Reals = column("position in the base's frame", "mm")
+    y_mm: Reals = column("position in the base's frame", "mm")
+    in_view: Flags = column("whether the camera sees it", dtype=bool)
+    calibration_mm: Reals = column("distance that 95 % of errors of the calibration stay below", "mm")
+    together_mm: Reals = column("the same with the camera's noise in one reading", "mm")
+
+
+@dataclass(frozen=True, eq=False)
+class WayRows(Table):
+    """Joint angles along the way to each object grasped, and away from it."""
+
+    target: Texts = column("name of the object", dtype=object)
+    part: Texts = column("move, approach or retreat", dtype=object)
+    step: Integers = column("number of the point in its part", dtype=np.int64)
+    q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
+
+
+@dataclass(frozen=True, eq=False)
+class VisionResults(Results[VisionSummary]):
+    """The stage's results; without a calibration the tables are empty."""
+
+    samples: SampleRows
+    error_map: ErrorMapRows
+    ways: WayRows
+
+
+RESULTS = VisionResults

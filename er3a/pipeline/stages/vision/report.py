@@ -1,0 +1,173 @@
+"""The page of the vision stage."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.say import joined, listed, say, word
+from er3a.pipeline.messages.vision import FIGURES, METHODS, direction_word, pose_words
+from er3a.pipeline.results import Stored
+from er3a.pipeline.stages.vision.model import (
+    CalibrationResult,
+    ObjectResult,
+    PoseEstimate,
+    TouchResult,
+    VisionResults,
+)
+from er3a.pipeline.stages.vision.vision_figures import map_picture, residual_picture
+from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.numbers import fixed, number
+from er3a.pipeline.viewing.page import head_of, render, run_command
+
+NEARLY_HALF_TURN = 170.0
+AXES = ("x", "y", "z")
+PARTS = {
+    "camera": N_("camera's noise in one reading"),
+    "calibration": N_("calibration"),
+    "repeatability": N_("arm's repeatability"),
+    "table": N_("arm's table"),
+    "together": N_("together"),
+}
+
+
+def report(study: Study, stored: Stored[VisionResults], output: Path) -> None:
+    """Write the page from the stage's results."""
+    name, results, summary = stored.robot, stored.results, stored.results.summary
+    found = summary.calibration
+    render(
+        Path(__file__).with_name("report.html.j2"),
+        output,
+        summary,
+        head=head_of(stored, FIGURES),
+        command=run_command(study, f"{name}/vision.html"),
+        robot=study.robot(name),
+        robot_pages=study.pages(name),
+        found=found,
+        poses=_poses(found) if found else [],
+        suspects=listed(found.suspects) if found else [],
+        warnings=listed(found.warnings) if found else [],
+        methods=_methods(found) if found else [],
+        disagreement=_disagreement(found) if found else "",
+        directions=_directions(found) if found else [],
+        touched=_touched(found.touch) if found and found.touch else [],
+        residuals=residual_picture(results.samples, found) if found else None,
+        map=map_picture(results.error_map, summary.objects) if len(results.error_map) else None,
+        overview=[_overview(each) for each in summary.objects],
+        grasps=[_grasp(each) for each in summary.objects if each.grasp],
+        errors=[_errors(each) for each in summary.objects if each.error_mm],
+        error_columns=[tr("Object"), *(f"{word('vision.part_of_error', PARTS, part)}>" for part in PARTS)],
+        next_pose=_listed(found.next_view.q_deg) if found and found.next_view else "",
+    )
+
+
+def _listed(values: Iterable[float], digits: int = 1) -> str:
+    return ",\u00a0".join(fixed(value, digits) for value in values)
+
+
+def _poses(found: CalibrationResult) -> list[tuple[str, str, list[list[str]]]]:
+    """Title, quaternion and rows of both poses with intervals."""
+    both = zip(pose_words(found.setup), (found.hand_eye, found.board))
+    return [(title, _listed(pose.quaternion_wxyz, 6), _pose_rows(pose)) for title, pose in both]
+
+
+def _pose_rows(pose: PoseEstimate) -> list[list[str]]:
+    shifts = [
+        [f"{axis} (mm)", fixed(value, 3), f"± {fixed(half, 3)}"]
+        for axis, value, half in zip(AXES, pose.xyz_mm, pose.half_width_mm)
+    ]
+    names = (tr("roll"), tr("pitch"), tr("yaw"))
+    turns = [
+        [f"{name} (°)", fixed(value, 4), tr("± {half} about {axis}", half=fixed(half, 4), axis=axis)]
+        for name, value, half, axis in zip(names, pose.rpy_deg, pose.half_width_deg, AXES)
+    ]
+    return [*shifts, *turns]
+
+
+def _methods(found: CalibrationResult) -> list[list[str]]:
+    rows = [[tr("likeliest"), "", "", "", fixed(_rms(found), 3)]]
+    for each in found.methods:
+        numbers = (each.apart_mm, each.apart_deg, each.beyond, each.rms_mm)
+        cells = [tr("fails") if value is None else fixed(value, 3) for value in numbers]
+        rows.append([METHODS[each.method], *cells])
+    return rows
+
+
+def _rms(found: CalibrationResult) -> float:
+    return found.directions[0].rms_mm or 0.0
+
+
+def _disagreement(found: CalibrationResult) -> str:
+    off = [METHODS[each.method] for each in found.methods if each.beyond is not None and each.beyond > 1]
+    if not off:
+        return tr(
+            "All closed forms lie within the 95 % intervals of the likeliest pose: which one is taken hardly matters."
+        )
+    why = (
+        tr(
+            "Some motions turn by nearly 180 deg, where quaternions and axes change their sign for a trifle: Tsai, "
+            "Horaud and Daniilidis suffer from that most."
+        )
+        if found.greatest_turn_deg > NEARLY_HALF_TURN
+        else ""
+    )
+    weights = tr(
+        "Outside the 95 % intervals lie: {names}. Closed forms weigh all samples and all coordinates alike, and most "
+        "solve for the rotation first, so that its error goes into the position; the likeliest pose weighs each "
+        "coordinate by its deviation.",
+        names=", ".join(off),
+    )
+    return joined([weights, why], " ")
+
+
+def _directions(found: CalibrationResult) -> list[list[str]]:
+    return [
+        [
+            direction_word(each),
+            tr("fails") if each.rms_mm is None else number(each.rms_mm, 3),
+            tr("fails") if each.rms_deg is None else number(each.rms_deg, 3),
+            say(each).partition(": ")[2],
+        ]
+        for each in found.directions
+    ]
+
+
+def _touched(found: TouchResult) -> list[list[str]]:
+    return [
+        [str(k + 1), *(f"{fixed(d, 2)} ± {fixed(h, 2)}" for d, h in zip(point.difference_mm, point.half_width_mm))]
+        for k, point in enumerate(found.points)
+    ]
+
+
+def _overview(each: ObjectResult) -> list[str]:
+    if each.grasp:
+        parts = {"grasp": each.grasp.grasp, "turn": fixed(each.grasp.turn_deg, 0)}
+        outcome = tr("{grasp}, turned by {turn} deg", **parts)
+        success = f"{100 * each.grasp.probability:.1f} ± {196 * each.grasp.deviation:.1f} %"
+    else:
+        outcome, success = say(each.refusal), tr("none")
+    counts = tr("{poses} poses, {solutions} solutions", poses=each.poses, solutions=each.solutions)
+    return [each.name, _listed(each.xyz_mm), outcome, success, counts]
+
+
+def _grasp(each: ObjectResult) -> list[str]:
+    grasp = each.grasp
+    assert grasp is not None
+    near = tr("none") if grasp.clearance_mm is None else fixed(grasp.clearance_mm, 0)
+    return [
+        each.name,
+        _listed(grasp.tool_xyz_mm),
+        _listed(grasp.q_before_deg),
+        _listed(grasp.q_deg),
+        f"{near} ({say(grasp.nearest)})" if grasp.nearest else near,
+        fixed(grasp.limit_margin_deg, 0),
+        fixed(grasp.singular_value, 2),
+    ]
+
+
+def _errors(each: ObjectResult) -> list[str]:
+    mm, deg = each.error_mm, each.error_deg
+    assert mm is not None
+    assert deg is not None
+    return [each.name, *(f"{fixed(getattr(mm, part), 2)} mm, {fixed(getattr(deg, part), 2)}°" for part in PARTS)]

@@ -1,0 +1,228 @@
+"""Boards in images: corners found by OpenCV, a pose with its covariance from each image.
+
+Corners scatter by a stated standard deviation in pixels. With J the derivatives of the projected corners by the pose,
+the pose's covariance is that deviation squared times (J^T J)^-1; the refinement over all poses with these covariances
+has, to first order, the same maximum as one over all pixels. Where the camera's intrinsics are estimated from the same
+images, their standard deviations are carried into each pose; that all images share that error is left out of account.
+
+Frames as OpenCV has them: the camera looks along z, x to the right and y down; the board's z axis leaves x and y by
+the right hand, from the first inner corner (chessboard, ChArUco) or the first tag's first corner (grid of tags).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from er3a.errors import Er3aError
+from er3a.numerics.arrays import Reals
+from er3a.vision.opencv import opencv
+from er3a.vision.tangent import exp_rotation, inverse_right_jacobian, posed
+
+Pattern = Literal["chessboard", "charuco", "apriltag"]
+LEAST_CORNERS = 6
+LEAST_IMAGES = 5
+
+Image = NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Board:
+    """A printed board.
+
+    Attributes
+    ----------
+    squares : along x and y; tags, for a grid of tags
+    square : m, from one to the next; marker : m, edge of a marker or tag; dictionary : OpenCV's name of the markers
+    """
+
+    pattern: Pattern
+    squares: tuple[int, int]
+    square: float
+    marker: float | None = None
+    dictionary: str = "DICT_4X4_50"
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """Intrinsics: matrix (3, 3) in pixels, distortion (k,) as OpenCV has it, and their standard deviations.
+
+    ``deviations`` : (4 + k,), of fx, fy, cx, cy and the distortion; zeros where they are given
+    """
+
+    matrix: Reals
+    distortion: Reals
+    deviations: Reals | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class BoardViews:
+    """What was found in images.
+
+    Attributes
+    ----------
+    target : (N, 4, 4), T_camera_board; covariance : (N, 6, 6), m and rad by the camera's axes
+    corners, reprojected : N arrays (k, 2), pixels; points : N arrays (k, 3), m, on the board
+    ambiguous : (N,), the ratio of the reprojection errors of the other pose of a flat board to this one's
+    camera : with the intrinsics used
+    """
+
+    target: Reals
+    covariance: Reals
+    points: tuple[Reals, ...]
+    corners: tuple[Reals, ...]
+    reprojected: tuple[Reals, ...]
+    ambiguous: Reals
+    camera: Camera
+
+
+class BoardNotFoundError(Er3aError):
+    """An image (by number, from 0) shows no such board."""
+
+    def __init__(self, image: int, corners: int):
+        self.image, self.corners = image, corners
+        super().__init__(f"image {image + 1} shows {corners} corners of the board; {LEAST_CORNERS} are needed")
+
+
+def board_views(
+    images: Sequence[Image], board: Board, camera: Camera | None = None, pixel_deviation: float = 0.3
+) -> BoardViews:
+    """Poses of a board in grey images (h, w).
+
+    Parameters
+    ----------
+    camera : intrinsics; None to estimate them from these images
+
+    Raises
+    ------
+    BoardNotFoundError
+        for the first image without the board
+    Er3aError
+        if OpenCV is missing, or too few images are to give intrinsics too
+    """
+    find = _detector(board)
+    points, corners = [], []
+    for number, image in enumerate(images):
+        on_board, in_image = find(image)
+        if len(in_image) < LEAST_CORNERS:
+            raise BoardNotFoundError(number, len(in_image))
+        points.append(on_board)
+        corners.append(in_image)
+    if camera is None:
+        camera = estimated_camera(points, corners, (images[0].shape[1], images[0].shape[0]))
+    found = [_pose(P, c, camera, pixel_deviation) for P, c in zip(points, corners)]
+    return BoardViews(
+        target=np.array([each[0] for each in found]),
+        covariance=np.array([each[1] for each in found]),
+        points=tuple(points),
+        corners=tuple(corners),
+        reprojected=tuple(each[2] for each in found),
+        ambiguous=np.array([each[3] for each in found]),
+        camera=camera,
+    )
+
+
+def estimated_camera(points: Sequence[Reals], corners: Sequence[Reals], size: tuple[int, int]) -> Camera:
+    """Intrinsics with standard deviations, after Zhang, from corners of at least five images of (width, height)."""
+    if len(points) < LEAST_IMAGES:
+        raise Er3aError(
+            f"{len(points)} images can't give the camera's intrinsics too; take {LEAST_IMAGES}, or give them"
+        )
+    cv2 = opencv()
+    on_board, in_image = ([part.astype(np.float32) for part in parts] for parts in (points, corners))
+    found = cv2.calibrateCameraExtended(on_board, in_image, size, None, None)
+    distortion = found[2].ravel()
+    return Camera(found[1], distortion, found[5].ravel()[: 4 + len(distortion)])
+
+
+def board_points(board: Board) -> Reals:
+    """The corners (k, 3), m, that detectors find on a chessboard or ChArUco board: its inner ones."""
+    x, y = board.squares
+    grid = np.stack(np.meshgrid(np.arange(x - 1), np.arange(y - 1)), axis=-1).reshape(-1, 2)
+    return np.column_stack([grid * board.square, np.zeros(len(grid))])
+
+
+def board_drawing(board: Board) -> Any:
+    """OpenCV's own board, which can draw itself; chessboards have none."""
+    cv2 = opencv()
+    dictionary = cv2.aruco.getPredefinedDictionary(_dictionary(board.dictionary))
+    marker = float(board.marker or board.square / 2)
+    if board.pattern == "apriltag":
+        return cv2.aruco.GridBoard(board.squares, marker, board.square - marker, dictionary)
+    return cv2.aruco.CharucoBoard(board.squares, board.square, marker, dictionary)
+
+
+def _dictionary(name: str) -> int:
+    aruco = opencv().aruco
+    if not (name.startswith("DICT_") and hasattr(aruco, name)):
+        known = ", ".join(each for each in dir(aruco) if each.startswith("DICT_"))
+        raise Er3aError(f"OpenCV has no dictionary of markers '{name}'; known: {known}")
+    return int(getattr(aruco, name))
+
+
+def _detector(board: Board) -> Any:
+    """A function from an image to corners on the board (k, 3) in m and in the image (k, 2) in pixels."""
+    cv2 = opencv()
+    if board.pattern == "chessboard":
+        inner = (board.squares[0] - 1, board.squares[1] - 1)
+
+        def chessboard(image: Image) -> tuple[Reals, Reals]:
+            found, corners = cv2.findChessboardCornersSB(image, inner, flags=cv2.CALIB_CB_ACCURACY)
+            return (board_points(board), corners.reshape(-1, 2).astype(float)) if found else _NOTHING
+
+        return chessboard
+    drawing = board_drawing(board)
+    if board.pattern == "charuco":
+        detector = cv2.aruco.CharucoDetector(drawing)
+        origin = np.array([board.square, board.square, 0.0])
+
+        def charuco(image: Image) -> tuple[Reals, Reals]:
+            corners, numbers, _, _ = detector.detectBoard(image)
+            if numbers is None:
+                return _NOTHING
+            points = np.asarray(drawing.getChessboardCorners(), float)[numbers.ravel()]
+            return points - origin, corners.reshape(-1, 2).astype(float)
+
+        return charuco
+    parameters = cv2.aruco.DetectorParameters()
+    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+    tags = cv2.aruco.ArucoDetector(drawing.getDictionary(), parameters)
+
+    def apriltag(image: Image) -> tuple[Reals, Reals]:
+        corners, numbers, _ = tags.detectMarkers(image)
+        if numbers is None:
+            return _NOTHING
+        points, pixels = drawing.matchImagePoints(corners, numbers)
+        if points is None:
+            return _NOTHING
+        return points.reshape(-1, 3).astype(float), pixels.reshape(-1, 2).astype(float)
+
+    return apriltag
+
+
+_NOTHING: tuple[Reals, Reals] = (np.empty((0, 3)), np.empty((0, 2)))
+
+
+def _pose(points: Reals, corners: Reals, camera: Camera, deviation: float) -> tuple[Reals, Reals, Reals, float]:
+    """Pose (4, 4), its covariance (6, 6), the corners reprojected (k, 2), and how much worse the other pose fits."""
+    cv2 = opencv()
+    K, distortion = camera.matrix, camera.distortion
+    _, turns, shifts, errors = cv2.solvePnPGeneric(points, corners, K, distortion, flags=cv2.SOLVEPNP_IPPE)
+    errors = np.ravel(errors)
+    ratio = float(errors[1] / max(errors[0], 1e-9)) if len(errors) > 1 else np.inf
+    turn, shift = cv2.solvePnPRefineLM(points, corners, K, distortion, turns[0], shifts[0])
+    pixels, J = cv2.projectPoints(points, turn, shift, K, distortion)
+    inverse = np.linalg.inv(J[:, :6].T @ J[:, :6])
+    covariance = deviation**2 * inverse
+    if camera.deviations is not None:
+        by_camera = inverse @ J[:, :6].T @ J[:, 6 : 6 + len(camera.deviations)]
+        covariance = covariance + (by_camera * camera.deviations**2) @ by_camera.T
+    left = np.linalg.inv(inverse_right_jacobian(-turn.ravel()))
+    carry = np.zeros((6, 6))  # from rotation vector and position to position and turns about the camera's axes
+    carry[:3, 3:], carry[3:, :3] = np.eye(3), left
+    T = posed(exp_rotation(turn.ravel()), shift.ravel())
+    return T, carry @ covariance @ carry.T, pixels.reshape(-1, 2), ratio

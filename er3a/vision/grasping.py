@@ -1,0 +1,383 @@
+"""From a detected object to a grasp: which of its grasps the arm can carry out, how well, and how likely it holds.
+
+A grasp is reached along a straight line of the tool and left along another, straight up. Every grasp, in every turn
+that the object's symmetry allows, with every joint solution, is judged at the grasp first: limits, singularity,
+clearance. The best of them are then followed along both lines and along the joint move that leads there. Of those that
+pass, the one is taken whose smallest margin, each divided by what is asked of it, is greatest.
+
+The object and what is held are no bodies of the scene; the arm, its tool's capsule if it has one, and the scene are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from er3a.collision.along import clearance_along
+from er3a.collision.bodies import Bodies
+from er3a.collision.clearance import clearance
+from er3a.collision.pairs import Pair
+from er3a.collision.scene import Scene
+from er3a.geometry.transforms import rot_z, translation
+from er3a.kinematics.inverse import inverse
+from er3a.kinematics.numerical import solve
+from er3a.kinematics.singularity import characteristic_length, conditioning
+from er3a.numerics.arrays import Reals
+from er3a.planning.moves import JointMove, line
+from er3a.robots.joint_limits import limit_margin
+from er3a.robots.robot import Robot
+from er3a.vision.point_error import draws
+from er3a.vision.tangent import skew
+
+ANY_TURN = 12  # turns tried of an object that looks alike from all sides
+WAYPOINTS = 13
+FOLLOWED = 6  # candidates that are followed along the lines
+WIDEST_STEP = 0.35  # rad between waypoints of an approach; more is a jump
+LOWEST_DEPTH = 1e-3  # m of overlap that may go unnoticed between points
+UNIT_S = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Grasp:
+    """A way to hold an object: T_object_tool (4, 4), the tool's z axis being its direction of approach."""
+
+    name: str
+    T_object_tool: Reals
+
+
+@dataclass(frozen=True, eq=False)
+class DetectedObject:
+    """What a camera reports.
+
+    Attributes
+    ----------
+    T_camera_object : (4, 4); covariance : (6, 6), m and rad by the camera's axes
+    turns : turns about its z axis in which it looks alike; 0 for any
+    approach, retreat : m, along the tool's z axis towards the grasp, and along the base's z axis from it
+    """
+
+    name: str
+    T_camera_object: Reals
+    covariance: Reals
+    turns: int
+    grasps: tuple[Grasp, ...]
+    approach: float
+    retreat: float
+
+
+@dataclass(frozen=True)
+class GraspNeeds:
+    """What is asked of a grasp.
+
+    Attributes
+    ----------
+    clearance : m; limit_margin : rad; singular_value : least singular value of the scaled Jacobian
+    tolerance : errors that the gripper forgives, m along and rad about the tool's x, y and z
+    """
+
+    clearance: float
+    limit_margin: float
+    singular_value: float
+    tolerance: tuple[float, float, float, float, float, float]
+
+
+@dataclass(frozen=True)
+class GraspOutOfReach:
+    """No joint solution for any of the poses."""
+
+    poses: int
+    code: Literal["grasp_out_of_reach"] = "grasp_out_of_reach"
+
+
+@dataclass(frozen=True)
+class GraspNearLimits:
+    """Every solution is nearer to a joint's limits than asked, or beyond them; the best of them by this much."""
+
+    solutions: int
+    margin_deg: float
+    needed_deg: float
+    code: Literal["grasp_near_limits"] = "grasp_near_limits"
+
+
+@dataclass(frozen=True)
+class GraspSingular:
+    """Every solution left is nearer to a singularity than asked."""
+
+    solutions: int
+    singular_value: float
+    needed: float
+    code: Literal["grasp_singular"] = "grasp_singular"
+
+
+@dataclass(frozen=True)
+class GraspCollides:
+    """Every solution left comes nearer to something than asked, at the grasp; the best of them to this."""
+
+    solutions: int
+    pair: Pair
+    clearance_mm: float
+    needed_mm: float
+    code: Literal["grasp_collides"] = "grasp_collides"
+
+
+@dataclass(frozen=True)
+class LineLeaves:
+    """The straight line there or away can't be followed to its end within limits and away from singularities."""
+
+    part: Literal["approach", "retreat"]
+    after_mm: float
+    code: Literal["line_leaves"] = "line_leaves"
+
+
+@dataclass(frozen=True)
+class WayCollides:
+    """Something is nearer than asked on the way."""
+
+    part: Literal["move", "approach", "retreat"]
+    pair: Pair
+    clearance_mm: float
+    needed_mm: float
+    code: Literal["way_collides"] = "way_collides"
+
+
+GraspRefusal = GraspOutOfReach | GraspNearLimits | GraspSingular | GraspCollides | LineLeaves | WayCollides
+_FAR: tuple[type, ...] = (GraspOutOfReach, GraspNearLimits, GraspSingular, GraspCollides, LineLeaves, WayCollides)
+
+
+@dataclass(frozen=True, eq=False)
+class ChosenGrasp:
+    """A grasp that the arm can carry out.
+
+    Attributes
+    ----------
+    grasp : its name; turn : rad, about the object's z
+    T_base_tool : (4, 4); q_before, q, q_after : (n,), rad, at the beginning of the approach, the grasp, and away
+    move, approach, retreat : (K, n), rad, joint angles along the way, in order
+    clearance : m, least along all of it; None where it can't be measured
+    limit_margin : rad; singular_value : least along both lines
+    margin : smallest of the three, each divided by what is asked
+    probability : that the error stays within the gripper's tolerance; deviation : of that figure, from its draws
+    """
+
+    grasp: str
+    turn: float
+    T_base_tool: Reals
+    q_before: Reals
+    q: Reals
+    q_after: Reals
+    move: Reals
+    approach: Reals
+    retreat: Reals
+    clearance: float | None
+    nearest: Pair | None
+    limit_margin: float
+    singular_value: float
+    margin: float
+    probability: float
+    deviation: float
+
+
+@dataclass(frozen=True, eq=False)
+class GraspPlan:
+    """What becomes of an object: a grasp, or why none; counts of poses, solutions, and those followed."""
+
+    chosen: ChosenGrasp | None
+    refusal: GraspRefusal | None
+    poses: int
+    solutions: int
+    followed: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Candidate:
+    grasp: str
+    turn: float
+    T: Reals
+    q: Reals
+
+
+@dataclass(frozen=True, eq=False)
+class GraspTask:
+    """What all objects share: arm, surroundings, where the arm waits, needs."""
+
+    robot: Robot
+    scene: Scene | None
+    bodies: Bodies | None
+    home: Reals
+    needs: GraspNeeds
+
+
+def plan_grasp(
+    task: GraspTask,
+    target: DetectedObject,
+    T_base_object: Reals,
+    covariance_at: Callable[[Reals], Reals],
+) -> GraspPlan:
+    """Choose a grasp of one object.
+
+    Parameters
+    ----------
+    T_base_object : (4, 4)
+    covariance_at : from joint angles (n,) of a grasp to the covariance (6, 6) of the object's pose as the tool meets it
+    """
+    poses = _poses(target, T_base_object)
+    candidates = [_Candidate(name, turn, T, q) for name, turn, T in poses for q in inverse(task.robot, T, task.home).q]
+    left, refusal = _judged(task, candidates, len(poses))
+    followed = left[:FOLLOWED]
+    plans = [_followed(task, each, target) for each in followed]
+    good = [plan for plan in plans if isinstance(plan, ChosenGrasp)]
+    if good:
+        best = max(good, key=lambda plan: plan.margin)
+        probability = success_probability(best, target, T_base_object, covariance_at(best.q), task.needs)
+        deviation = float(np.sqrt(probability * (1 - probability) / len(draws(np.eye(6)))))
+        best = replace(best, probability=probability, deviation=deviation)
+        return GraspPlan(best, None, len(poses), len(candidates), len(followed))
+    refusals = [plan for plan in plans if not isinstance(plan, ChosenGrasp)]
+    if refusals:
+        refusal = max(refusals, key=lambda why: _FAR.index(type(why)))
+    return GraspPlan(None, refusal, len(poses), len(candidates), len(followed))
+
+
+def _poses(target: DetectedObject, T_base_object: Reals) -> list[tuple[str, float, Reals]]:
+    count = target.turns or ANY_TURN
+    return [
+        (grasp.name, float(turn), T_base_object @ rot_z(turn) @ grasp.T_object_tool)
+        for grasp in target.grasps
+        for turn in 2 * np.pi * np.arange(count) / count
+    ]
+
+
+def _judged(task: GraspTask, candidates: list[_Candidate], poses: int) -> tuple[list[_Candidate], GraspRefusal | None]:
+    """Candidates that pass at the grasp, the one with the greatest margin first; else what the best of them lacks."""
+    needs, robot = task.needs, task.robot
+    if not candidates:
+        return [], GraspOutOfReach(poses)
+    q = np.array([each.q for each in candidates])
+    limit = limit_margin(robot, q)
+    inside = np.flatnonzero(limit >= needs.limit_margin)
+    if not inside.size:
+        most = float(np.degrees(limit.max()))
+        return [], GraspNearLimits(len(q), most, float(np.degrees(needs.limit_margin)))
+    value = conditioning(robot, q[inside], characteristic_length(robot)).smallest_singular_value
+    regular = inside[value >= needs.singular_value]
+    if not regular.size:
+        return [], GraspSingular(len(inside), float(value.max()), needs.singular_value)
+    value = value[value >= needs.singular_value]
+    margins = np.minimum(_ratio(limit[regular], needs.limit_margin), _ratio(value, needs.singular_value))
+    if task.bodies is not None:
+        clear = clearance(robot, q[regular], task.scene)
+        margins = np.minimum(margins, _ratio(clear.distance, needs.clearance))
+        free = clear.distance >= needs.clearance
+        if not free.any():
+            best = int(clear.distance.argmax())
+            pair = clear.pair[best]
+            if pair is not None:
+                wanted = 1000 * needs.clearance
+                return [], GraspCollides(len(regular), pair, float(1000 * clear.distance[best]), wanted)
+        regular, margins = regular[free], margins[free]
+    order = np.lexsort([np.abs(q[regular] - task.home).max(axis=1), -np.minimum(margins, 3.0).round(6)])
+    return [candidates[regular[k]] for k in order], None
+
+
+def _ratio(value: Reals, needed: float) -> Reals:
+    """How many times a margin is what is asked; infinite where nothing is."""
+    return np.asarray(value) / needed if needed > 0 else np.full(np.shape(value), np.inf)
+
+
+def _followed(task: GraspTask, candidate: _Candidate, target: DetectedObject) -> ChosenGrasp | GraspRefusal:
+    T = candidate.T
+    before = T @ translation(0, 0, -target.approach)
+    after = translation(0, 0, target.retreat) @ T
+    parts: dict[Literal["approach", "retreat"], Reals] = {}
+    for part, end, length in (("approach", before, target.approach), ("retreat", after, target.retreat)):
+        found = _along(task, T, end, candidate.q)
+        if len(found) < WAYPOINTS:
+            return LineLeaves(part, 1000 * length * max(len(found) - 1, 0) / (WAYPOINTS - 1))  # type: ignore[arg-type]
+        parts[part] = found  # type: ignore[index]
+    approach, retreat = parts["approach"][::-1], parts["retreat"]
+    q = np.concatenate([approach, retreat])
+    limit = float(limit_margin(task.robot, q).min())
+    value = conditioning(task.robot, q, characteristic_length(task.robot)).smallest_singular_value
+    move = JointMove(task.home, approach[0], UNIT_S)
+    times = np.linspace(0.0, UNIT_S, WAYPOINTS)
+    ways: dict[Literal["move", "approach", "retreat"], Callable[[Reals], Reals]] = {
+        "approach": CubicSpline(times, approach),
+        "retreat": CubicSpline(times, retreat),
+        "move": lambda t: move.joints(t)[0],
+    }
+    least: tuple[float, Pair | None] = (np.inf, None)
+    for name, joints in ways.items():
+        if task.bodies is None:
+            break
+        along = clearance_along(task.bodies, joints, times, times, LOWEST_DEPTH)
+        pair = along.pair[along.least] if along.least >= 0 else None
+        if pair is not None:
+            distance = float(along.distance[along.least])
+            needed = 0.0 if name == "move" else task.needs.clearance
+            if distance < needed or along.contacts:
+                return WayCollides(name, pair, 1000 * distance, 1000 * needed)
+            least = min(least, (distance, pair), key=lambda each: each[0])
+    margin = min(
+        float(_ratio(np.array(limit), task.needs.limit_margin)),
+        float(_ratio(value.min(), task.needs.singular_value)),
+        float(_ratio(np.array(least[0]), task.needs.clearance)),
+    )
+    return ChosenGrasp(
+        grasp=candidate.grasp,
+        turn=candidate.turn,
+        T_base_tool=T,
+        q_before=approach[0],
+        q=candidate.q,
+        q_after=retreat[-1],
+        move=ways["move"](times),
+        approach=approach,
+        retreat=retreat,
+        clearance=least[0] if least[1] is not None else None,
+        nearest=least[1],
+        limit_margin=limit,
+        singular_value=float(value.min()),
+        margin=margin,
+        probability=np.nan,
+        deviation=np.nan,
+    )
+
+
+def _along(task: GraspTask, T_from: Reals, T_to: Reals, q: Reals) -> Reals:
+    """Joint angles (k, n) at equal steps of a line, from ``q`` on; ends before the first that can't be had."""
+    robot = task.robot
+    path = line(T_from, T_to, UNIT_S)
+    rows = [q]
+    for T in path.poses(np.linspace(0.0, 1.0, WAYPOINTS))[1:]:
+        found = solve(robot, T, rows[-1], restarts=0)
+        step = np.abs(found.q - rows[-1]).max()
+        if not found.solved or step > WIDEST_STEP or limit_margin(robot, found.q) < 0:
+            break
+        value = conditioning(robot, found.q, characteristic_length(robot)).smallest_singular_value
+        if value < task.needs.singular_value:
+            break
+        rows.append(found.q)
+    return np.array(rows)
+
+
+def success_probability(
+    chosen: ChosenGrasp, target: DetectedObject, T_base_object: Reals, covariance: Reals, needs: GraspNeeds
+) -> float:
+    """That the tool meets the object within the gripper's tolerance, in each of its six directions.
+
+    A turn about the z axis of an object that looks alike in all of them is no error.
+    """
+    T = chosen.T_base_tool
+    lever = T[:3, 3] - T_base_object[:3, 3]
+    carried = np.eye(6)
+    carried[:3, 3:] = -skew(lever)
+    errors = draws(covariance)
+    if target.turns == 0:
+        axis = T_base_object[:3, 2]
+        errors[:, 3:] -= np.outer(errors[:, 3:] @ axis, axis)
+    errors = errors @ carried.T
+    errors = np.concatenate([errors[:, :3] @ T[:3, :3], errors[:, 3:] @ T[:3, :3]], axis=1)
+    return float((np.abs(errors) <= np.array(needs.tolerance)).all(axis=1).mean())

@@ -1,0 +1,163 @@
+"""How far off a pose is that a calibrated camera reports, and the tool that goes there; first order throughout.
+
+Four independent parts are carried to the base frame: the camera's noise in this one reading; the calibration; the arm's
+repeatability; and its table. With the camera on the flange the arm's errors come in where the picture is taken, with
+any setup where the tool goes. That a table's error has already bent the calibration is left out of account.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from er3a.kinematics.chain import JOINTS
+from er3a.kinematics.forward import forward
+from er3a.numerics.arrays import Reals
+from er3a.robots.robot import Robot
+from er3a.vision.hand_eye import HandEye
+from er3a.vision.tangent import skew, step_between
+
+DRAWS = 4000
+DRAW_SEED = 9283
+ISO_DEVIATIONS = 3.0  # ISO 9283: RP is the mean distance from the mean place plus three standard deviations of it
+TABLE_STEP = 1e-6
+
+
+@dataclass(frozen=True)
+class ArmAccuracy:
+    """What is stated of an arm.
+
+    Attributes
+    ----------
+    repeatability : m, pose repeatability RP of position after ISO 9283
+    length_deviation, angle_deviation : m, rad, standard deviations of each length and each angle of its table
+    """
+
+    repeatability: float = 0.0
+    length_deviation: float = 0.0
+    angle_deviation: float = 0.0
+
+    @property
+    def position_deviation(self) -> float:
+        """Standard deviation (m) by axis that has this repeatability, if it is normal and equal in all directions.
+
+        The distance from the mean of such a position has the mean 1.596 and the standard deviation 0.673 of it.
+        """
+        return self.repeatability / float(2 * np.sqrt(2 / np.pi) + ISO_DEVIATIONS * np.sqrt(3 - 8 / np.pi))
+
+
+@dataclass(frozen=True, eq=False)
+class SeenPoseError:
+    """Covariances (..., 6, 6) of a pose in the base frame, position (m) and rotation (rad), by cause and in all."""
+
+    camera: Reals
+    calibration: Reals
+    repeatability: Reals
+    table: Reals
+
+    @property
+    def whole(self) -> Reals:
+        """All parts together."""
+        return self.camera + self.calibration + self.repeatability + self.table
+
+
+def table_covariance(robot: Robot, q: Reals, accuracy: ArmAccuracy) -> Reals:
+    """Covariance (..., 6, 6) of T_base_tool at joint angles (..., n) from independent errors of the table's entries."""
+    at = forward(robot, q)
+    out = np.zeros((*at.shape[:-2], 6, 6))
+    for name, deviation in (
+        ("a", accuracy.length_deviation),
+        ("d", accuracy.length_deviation),
+        ("alpha", accuracy.angle_deviation),
+        ("offset", accuracy.angle_deviation),
+    ):
+        for joint in range(JOINTS if deviation else 0):
+            entries = np.array(getattr(robot, name))
+            entries[joint] += TABLE_STEP
+            step = step_between(at, forward(robot.replace(**{name: entries}), q)) / TABLE_STEP
+            out += deviation**2 * step[..., :, None] * step[..., None, :]
+    return out
+
+
+def repeatability_covariance(accuracy: ArmAccuracy) -> Reals:
+    """Covariance (6, 6) of the position that comes back; ISO 9283 states RP of position, so rotation has none here."""
+    return np.diag([accuracy.position_deviation**2] * 3 + [0.0] * 3)
+
+
+def seen_pose(found: HandEye, T_camera_object: Reals, T_base_flange: Reals | None = None) -> Reals:
+    """T_base_object (..., 4, 4); where the picture is taken from is needed with the camera on the flange."""
+    placed: Reals = found.X @ T_camera_object
+    return placed if T_base_flange is None else T_base_flange @ placed
+
+
+def seen_pose_error(
+    found: HandEye,
+    T_camera_object: Reals,
+    camera_covariance: Reals,
+    accuracy: ArmAccuracy,
+    arm: tuple[Robot, Reals, Reals | None],
+) -> SeenPoseError:
+    """Errors of T_base_object (..., 4, 4) as the tool meets them that goes there.
+
+    Parameters
+    ----------
+    T_camera_object : (..., 4, 4); camera_covariance : (..., 6, 6) of it by the camera's axes
+    arm : the robot, the joint angles (..., n) at which its tool is on the object, and those (n,) at which a camera on
+        the flange takes the picture (None for a fixed one)
+    """
+    robot, q_there, q_picture = arm
+    X = found.X
+    p = (X[:3, :3] @ T_camera_object[..., :3, 3, None])[..., 0]
+    by_calibration = _stacked(np.broadcast_to(np.eye(3), (*p.shape, 3)), -skew(p))
+    by_camera = _stacked(X[:3, :3], np.zeros((3, 3)), corner=X[:3, :3])
+    calibration = _carried(by_calibration, found.covariance[:6, :6])
+    camera = _carried(by_camera, camera_covariance)
+    shape = calibration.shape
+    repeat, table = (
+        np.broadcast_to(repeatability_covariance(accuracy), shape),
+        table_covariance(robot, q_there, accuracy),
+    )
+    if q_picture is not None:
+        A = forward(robot.without_tool(), q_picture)
+        turn = _stacked(A[:3, :3], np.zeros((3, 3)), corner=A[:3, :3])
+        calibration, camera = _carried(turn, calibration), _carried(turn, camera)
+        lever = (A[:3, :3] @ (p + X[:3, 3])[..., None])[..., 0]
+        by_arm = _stacked(np.broadcast_to(np.eye(3), (*p.shape, 3)), -skew(lever))
+        repeat = repeat + _carried(by_arm, repeatability_covariance(accuracy))
+        table = table + _carried(by_arm, table_covariance(robot.without_tool(), q_picture, accuracy))
+    return SeenPoseError(camera, calibration, repeat, np.broadcast_to(table, shape))
+
+
+def _stacked(left: Reals, right: Reals, corner: Reals | None = None) -> Reals:
+    """[[left, right], [0, corner]] (..., 6, 6), the corner 1 unless told otherwise."""
+    shape = np.broadcast_shapes(left.shape[:-2], right.shape[:-2])
+    out = np.zeros((*shape, 6, 6))
+    out[..., :3, :3], out[..., :3, 3:], out[..., 3:, 3:] = left, right, np.eye(3) if corner is None else corner
+    return out
+
+
+def _carried(J: Reals, covariance: Reals) -> Reals:
+    out: Reals = J @ covariance @ np.swapaxes(J, -1, -2)
+    return out
+
+
+@lru_cache(maxsize=1)
+def _normals() -> Reals:
+    return np.random.default_rng(DRAW_SEED).standard_normal((DRAWS, 6))
+
+
+def draws(covariance: Reals) -> Reals:
+    """Normal errors (4000, ..., 6) of covariances (..., 6, 6); from the same numbers always, for equal bytes."""
+    values, vectors = np.linalg.eigh(covariance)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :]
+    found: Reals = np.einsum("...ij,kj->k...i", root, _normals())
+    return found
+
+
+def error_sizes(covariance: Reals) -> tuple[Reals, Reals]:
+    """Distances (m) and angles (rad), each (...,), below which 95 % of errors of a covariance (..., 6, 6) stay."""
+    drawn = draws(covariance)
+    distance, angle = (np.linalg.norm(drawn[..., part], axis=-1) for part in (slice(3), slice(3, 6)))
+    return np.quantile(distance, 0.95, axis=0), np.quantile(angle, 0.95, axis=0)

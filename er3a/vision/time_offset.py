@@ -1,0 +1,99 @@
+"""Two streams of poses with clocks of their own: by how much one clock is ahead, and which poses belong together.
+
+Hand and eye turn by equal angles over equal times. The offset is the one at which the angles that the board turned by
+over short times agree best with the arm's over the same times; it is searched on a grid and then refined.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+from scipy.spatial.transform import Rotation, Slerp
+
+from er3a.numerics.arrays import Reals
+from er3a.vision.tangent import posed
+
+GRID_S = 0.02
+SPAN_S = 0.4  # over which turns are compared
+INLIER = 3.0
+MOST_PAIRS = 2000
+
+
+@dataclass(frozen=True, eq=False)
+class Stream:
+    """Poses T (N, 4, 4), m, at rising times t (N,), s."""
+
+    t: Reals
+    T: Reals
+
+
+@dataclass(frozen=True)
+class TimeOffset:
+    """The camera's time plus ``offset`` is the arm's, s, with half its 95 % interval; angles differ by ``rms``, rad."""
+
+    offset: float
+    half_width: float
+    rms: float
+    pairs: int
+
+
+def time_offset(hand: Stream, eye: Stream, widest: float) -> TimeOffset:
+    """Estimate the offset within +-``widest`` s.
+
+    Robust: a half of the compared turns may be wrong.
+    """
+    arm = Slerp(hand.t, Rotation.from_matrix(hand.T[:, :3, :3]))
+    later = np.searchsorted(eye.t, eye.t + SPAN_S)
+    first = np.flatnonzero(later < len(eye.t))
+    first = first[eye.t[later[first]] - eye.t[first] < 2 * SPAN_S]
+    first = first[:: max(1, len(first) // MOST_PAIRS)]
+    last = later[first]
+    R = Rotation.from_matrix(eye.T[:, :3, :3])
+    turned = (R[last] * R[first].inv()).magnitude()
+    low, high = eye.t[first] - widest > hand.t[0], eye.t[last] + widest < hand.t[-1]
+    kept = low & high
+    first, last, turned = first[kept], last[kept], turned[kept]
+
+    def off(offset: float) -> Reals:
+        there = arm(eye.t[last] + offset) * arm(eye.t[first] + offset).inv()
+        difference: Reals = there.magnitude() - turned
+        return difference
+
+    grid = np.arange(-widest, widest + GRID_S / 2, GRID_S)
+    best = float(grid[int(np.argmin([np.median(np.abs(off(offset))) for offset in grid]))])
+    scale = max(float(np.median(np.abs(off(best)))) / 0.674, 1e-9)
+
+    def cost(offset: float) -> float:
+        return float(np.sum(np.minimum((off(offset) / scale) ** 2, INLIER**2)))
+
+    found = float(minimize_scalar(cost, bounds=(best - GRID_S, best + GRID_S), method="bounded").x)
+    rest, slope = off(found), (off(found + 1e-3) - off(found - 1e-3)) / 2e-3
+    inlier = np.abs(rest) < INLIER * scale
+    deviation = np.sqrt((rest[inlier] ** 2).mean() / max((slope[inlier] ** 2).sum(), 1e-300))
+    return TimeOffset(found, float(1.96 * deviation), float(np.sqrt((rest[inlier] ** 2).mean())), int(inlier.sum()))
+
+
+def paired(hand: Stream, eye: Stream, offset: float, count: int) -> tuple[Reals, Reals, Reals]:
+    """So many poses (count, 4, 4) of hand and eye at equal times (count,), spread over rotations, the arm's between.
+
+    Chosen one after another, each the farthest in angle from those chosen before; of the half of all times at which
+    the arm moves least, so that what is left of the offset matters least.
+    """
+    inside = np.flatnonzero((eye.t + offset > hand.t[0]) & (eye.t + offset < hand.t[-1]))
+    t = eye.t[inside] + offset
+    arm = Slerp(hand.t, Rotation.from_matrix(hand.T[:, :3, :3]))
+    near = np.clip(t, hand.t[0] + 0.05, hand.t[-1] - 0.05)
+    speed = (arm(near + 0.05) * arm(near - 0.05).inv()).magnitude()
+    slow = np.argsort(speed, kind="stable")[: max(count, len(t) // 2)]
+    inside, t = inside[np.sort(slow)], t[np.sort(slow)]
+    R = arm(t)
+    chosen = [0]
+    distance = (R * R[0].inv()).magnitude()
+    while len(chosen) < min(count, len(t)):
+        chosen.append(int(distance.argmax()))
+        distance = np.minimum(distance, (R * R[chosen[-1]].inv()).magnitude())
+    rows = np.sort(chosen)
+    position = np.stack([np.interp(t[rows], hand.t, hand.T[:, k, 3]) for k in range(3)], axis=1)
+    return posed(R[rows].as_matrix(), position), eye.T[inside[rows]], t[rows]
