@@ -162,7 +162,6 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
         for a start that has not an angle for each joint, and a frame that is no rigid transform
     """
     options = options or CheckOptions()
-    count = len(robot.lower)
     execution = execute(program, robot, options.start, options.frames, options.limits)
     limits = assumed_limits(robot, options)
     obstacles = obstacles_of(robot, options.scene, options.penetration_tolerance) if options.measures else None

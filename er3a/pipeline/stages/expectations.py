@@ -1,4 +1,4 @@
-"""What a target, a path, a program or an object is said to come to, against what it came to: findings of those stages."""
+"""What targets, paths, programs and objects are said to come to, against what they came to: findings of stages."""
 
 from __future__ import annotations
 

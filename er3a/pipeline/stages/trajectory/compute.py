@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from er3a.collision.bodies import Bodies
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.near_singular import NearSingular
 from er3a.kinematics.singularity import characteristic_length, conditioning, factors_where_defined

@@ -190,7 +190,7 @@ def _drawn(path: PathSummary, rows: PathChecks) -> PathChecks:
 
 
 def _singular(event: Singularity) -> str:
-    word = type_word(event.type)
+    word = event_word(event)
     return tr("singular: {type}", type=word) if event.crossing else tr("near-singular: {type}", type=word)
 
 

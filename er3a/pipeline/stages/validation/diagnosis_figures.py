@@ -93,7 +93,8 @@ def _measured_against(diagnosis: SetDiagnosis) -> str:
     if own:
         template = (
             N_(
-                "Besides against {documents}: taken from the table or the other way round, so no evidence for its numbers."
+                "Besides against {documents}: taken from the table or the other way round, "
+                "so no evidence for its numbers."
             )
             if others
             else N_(
