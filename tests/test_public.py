@@ -53,7 +53,6 @@ CALLS: dict[str, Callable[[Any, np.ndarray], Any]] = {
     "to_modified": lambda robot, T: er3a.to_modified(robot),
     "to_standard": lambda robot, T: er3a.to_standard(robot),
     "export_urdf": lambda robot, T: er3a.export_urdf(robot),
-    "evidence": lambda robot, T: er3a.evidence(robot, "er3_600"),
     "check_program": lambda robot, T: er3a.check_program(er3a.read_program("data/programs/weld_seam.src"), robot),
 }
 

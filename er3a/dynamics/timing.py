@@ -133,4 +133,4 @@ def _toppra(way: Reals, spline: CubicSpline, speed: Reals, rows: Rows) -> Reals:
     _, pace, _ = solver.compute_parameterization(0, 0)
     if pace is None or not np.isfinite(pace).all():
         raise TimingError(NoTimeLawFound())
-    return pace
+    return np.asarray(pace, float)

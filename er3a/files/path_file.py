@@ -147,8 +147,9 @@ class JointSequencePath(Profiled):
 
     def command(self, source: CommandSource, robot: Robot) -> Command:
         """The path in SI units."""
-        points, blend = joint_values(robot, self.points_deg, "points_deg"), float(np.radians(self.blend_deg))
-        return JointSequenceCommand(points, blend, self.duration_s, self.ramp, source=source)
+        points = [joint_values(robot, row, f"points_deg[{i}]") for i, row in enumerate(self.points_deg)]
+        blend = float(np.radians(self.blend_deg))
+        return JointSequenceCommand(np.array(points), blend, self.duration_s, self.ramp, source=source)
 
 
 class ToolStart(Profiled):

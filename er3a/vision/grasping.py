@@ -28,6 +28,7 @@ from er3a.kinematics.numerical import solve
 from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.numerics.arrays import Reals
 from er3a.planning.moves import JointMove, line
+from er3a.planning.piecewise import PiecewiseMotion, polynomial_motion
 from er3a.robots.joint_limits import limit_margin
 from er3a.robots.robot import Robot
 from er3a.vision.point_error import draws
@@ -39,6 +40,7 @@ FOLLOWED = 6  # candidates that are followed along the lines
 WIDEST_STEP = 0.35  # rad between waypoints of an approach; more is a jump
 LOWEST_DEPTH = 1e-3  # m of overlap that may go unnoticed between points
 UNIT_S = 1.0
+CUBIC, QUINTIC = 3, 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,6 +290,12 @@ def _ratio(value: Reals, needed: float) -> Reals:
     return np.asarray(value) / needed if needed > 0 else np.full(np.shape(value), np.inf)
 
 
+def _smooth(times: Reals, q: Reals) -> PiecewiseMotion:
+    """The cubic spline through joint values (N, n) at times (N,) in s."""
+    spline = CubicSpline(times, q)
+    return polynomial_motion(lambda t: (spline(t), spline(t, 1), spline(t, 2)), times, CUBIC)
+
+
 def _followed(task: GraspTask, candidate: _Candidate, target: DetectedObject) -> ChosenGrasp | GraspRefusal:
     T = candidate.T
     before = T @ translation(0, 0, -target.approach)
@@ -304,16 +312,16 @@ def _followed(task: GraspTask, candidate: _Candidate, target: DetectedObject) ->
     value = conditioning(task.robot, q, characteristic_length(task.robot)).smallest_singular_value
     move = JointMove(task.home, approach[0], UNIT_S)
     times = np.linspace(0.0, UNIT_S, WAYPOINTS)
-    ways: dict[Literal["move", "approach", "retreat"], Callable[[Reals], Reals]] = {
-        "approach": CubicSpline(times, approach),
-        "retreat": CubicSpline(times, retreat),
-        "move": lambda t: move.joints(t)[0],
+    ways: dict[Literal["move", "approach", "retreat"], PiecewiseMotion] = {
+        "approach": _smooth(times, approach),
+        "retreat": _smooth(times, retreat),
+        "move": polynomial_motion(move.joints, times[[0, -1]], QUINTIC),
     }
     least: tuple[float, Pair | None] = (np.inf, None)
-    for name, joints in ways.items():
+    for name, way in ways.items():
         if task.bodies is None:
             break
-        along = clearance_along(task.bodies, joints, times, times, LOWEST_DEPTH)
+        along = clearance_along(task.bodies, way.joints, way.rate_bounds, times, times, LOWEST_DEPTH)
         pair = along.pair[along.least] if along.least >= 0 else None
         if pair is not None:
             distance = float(along.distance[along.least])

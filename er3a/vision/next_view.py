@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.collision.bodies import can_measure
 from er3a.collision.clearance import clearance
 from er3a.collision.scene import Scene
 from er3a.kinematics.forward import forward
@@ -107,17 +106,14 @@ def next_view(
     q, F, B = q[seen], F[seen], B[seen]
     before, after = _point_covariances(found, F, B, point)
     order = np.argsort(np.trace(after, axis1=1, axis2=2), kind="stable")
-    space: list[float | None] = [None]
-    best = int(order[0])
-    if can_measure():
-        order = order[:MEASURED_FOR_CLEARANCE]
-        clear = clearance(robot, q[order], scene).distance
-        free = np.flatnonzero(clear > 0)
-        if not free.size:
-            return None
-        best, space = int(order[free[0]]), [float(clear[free[0]])]
+    order = order[:MEASURED_FOR_CLEARANCE]
+    clear = clearance(robot, q[order], scene).distance
+    free = np.flatnonzero(clear > 0)
+    if not free.size:
+        return None
+    best, space = int(order[free[0]]), float(clear[free[0]])
     sizes = error_sizes(np.stack([_padded(before), _padded(after[best])]))[0]
-    return NextView(q[best], B[best], float(sizes[0]), float(sizes[1]), space[0], CANDIDATES, len(seen))
+    return NextView(q[best], B[best], float(sizes[0]), float(sizes[1]), space, CANDIDATES, len(seen))
 
 
 def _drawn(robot: Robot, found: HandEye, seed: int) -> Reals:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import er3a.pipeline.messages.pairs
 import er3a.pipeline.messages.planning  # noqa: F401
-from er3a.kinematics.singularity import SingularityType
+from er3a.kinematics.singularity import EventType
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.kinematics import SINGULARITIES, branch_word
 from er3a.pipeline.messages.language import N_
@@ -40,7 +40,7 @@ def level_word(level: Level) -> str:
     return word("program_level", LEVELS, level)
 
 
-def _type(kind: SingularityType) -> str:
+def _type(kind: EventType) -> str:
     return word("singularity", SINGULARITIES, kind)
 
 

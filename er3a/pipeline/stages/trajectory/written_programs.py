@@ -48,8 +48,8 @@ def written(
         return {".csv": write_csv(times[known], joints[known], poses, told)}, unsafe
     command = motion.entry.command(CommandSource(), robot)
     if isinstance(command, PlanCommand):  # a planned motion is written as the points that its samples are
-        times = Times(motion.samples, np.arange(len(motion.samples)))
-        command = JointTableCommand(motion.joints(motion.samples), times)
+        timing = Times(motion.samples, np.arange(len(motion.samples)))
+        command = JointTableCommand(motion.joints(motion.samples), timing)
     ends: Reals | None = motion.q[-1:] if isinstance(command, ToolMoveCommand) else None
     if ends is not None and not np.isfinite(ends).all():
         ends = None

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from er3a.collision.bodies import Bodies, can_measure
+from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
 from er3a.errors import InputError
 from er3a.files.hand_eye_file import HandEyeFile, read_calibration
@@ -171,7 +171,7 @@ def _planned(
         settings.least_singular_value,
         tuple(map(float, tolerance)),  # type: ignore[arg-type]
     )
-    bodies = Bodies(robot, scene) if can_measure() else None
+    bodies = Bodies(robot, scene)
     task = GraspTask(robot, scene, bodies, np.radians(task_file.home_deg), needs)
     accuracy = task_file.arm.accuracy()
     camera = _camera_at(robot, found, picture)

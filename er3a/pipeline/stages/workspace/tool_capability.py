@@ -11,6 +11,7 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.stages.workspace import table_rows
 from er3a.pipeline.stages.workspace.entry import BoxTask, CapabilitySettings
 from er3a.pipeline.stages.workspace.model import (
@@ -75,9 +76,11 @@ def tool_capability(
     )
     task = _task(settings.placement)
     bodies = Bodies(narrowed(robot, task.margin), scene)
-    placement = find_places(
-        robot, task, roll, cell, LISTED, settings.proof_poses, free=lambda q: ~bodies.overlaps(q).any(axis=1)
-    )
+
+    def free(q: Reals) -> Flags:
+        return np.asarray(~bodies.overlaps(q).any(axis=1))
+
+    placement = find_places(robot, task, roll, cell, LISTED, settings.proof_poses, free=free)
     return ToolCapability(
         summary,
         _placement_summary(robot, settings.placement, task, placement, float(found.manipulability.max()), scene),
