@@ -341,7 +341,7 @@ def _followed(task: GraspTask, candidate: _Candidate, target: DetectedObject) ->
         q_before=approach[0],
         q=candidate.q,
         q_after=retreat[-1],
-        move=ways["move"](times),
+        move=ways["move"].joints(times),
         approach=approach,
         retreat=retreat,
         clearance=least[0] if least[1] is not None else None,

@@ -96,10 +96,10 @@ def _(found: NoLimits) -> str:
 def _(found: Compared) -> str:
     tightest = use_text(found.tightest)
     if isinstance(found, Fits):
-        told = sentence(found.code, "Fits: all that has a limit is within it; tightest: {use}.", use=tightest)
+        told = sentence("dynamics.fits", "Fits: all that has a limit is within it; tightest: {use}.", use=tightest)
     elif isinstance(found, Marginal):
         told = sentence(
-            found.code,
+            "dynamics.marginal",
             "Marginal: within the limits, but masses are too uncertain or doubtful to rely on it; tightest: {use}.",
             use=tightest,
         )
