@@ -115,7 +115,7 @@ def _set(column: str, joint: int, value: float) -> Change:
 def _differs(left: Tables, right: Tables) -> bool:
     if left.modified[0] != right.modified[0]:
         return True
-    return any(np.abs(getattr(left, name) - getattr(right, name)).max() > SAME for name in COLUMNS)
+    return any(np.abs(getattr(left, name) - getattr(right, name).astype(float)).max() > SAME for name in COLUMNS)
 
 
 _LENGTHS: tuple[tuple[Entries, tuple[str, ...]], ...] = (("a", ("a",)), ("d", ("d",)), ("lengths", ("a", "d")))

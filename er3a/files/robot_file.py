@@ -368,9 +368,10 @@ class RobotFile(StrictModel):
             found.append(bool(rows & prismatic))
         return found
 
+    @model_validator(mode="after")
     def _links_there_are(self):
         count = len(self.dh.rows)
-        for key in ("meshes", "hulls"):
+        for key in ("capsules", "meshes", "hulls"):
             for i, shape in enumerate(getattr(self.envelopes, key) if self.envelopes else []):
                 if shape.link > count:
                     raise ValueError(f"envelopes.{key}[{i}].link: the arm has no link {shape.link} | 0 to {count}")
