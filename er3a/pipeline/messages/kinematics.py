@@ -178,6 +178,12 @@ def _(found: ByClass) -> str:
     parts = {"arm_class": word("arm_class", ARM_CLASSES, found.arm_class)}
     if not found.certain:
         return sentence("by_class_in_doubt", "{arm_class}; rounding leaves a doubt whether these are all", **parts)
+    if found.cuspidal:
+        return sentence(
+            "by_class_cuspidal",
+            "{arm_class}; cuspidal: joint moves without a singularity join its branches, so they are numbered",
+            **parts,
+        )
     if not found.named:
         return sentence(
             "by_class_numbered", "{arm_class}; no signs separate its branches, so they are numbered", **parts

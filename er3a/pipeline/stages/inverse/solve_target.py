@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -11,13 +11,14 @@ from er3a.collision.pairs import PairOverlaps
 from er3a.collision.scene import Scene
 from er3a.geometry.transforms import rotation_angle, rpy_of
 from er3a.kinematics.closed_form import ORIENTATION
+from er3a.kinematics.cuspidal import cuspidal_move
 from er3a.kinematics.families import Family
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.neighbours import neighbours
 from er3a.kinematics.self_motions import SelfMotionCurve
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
-from er3a.kinematics.solutions import Solutions
+from er3a.kinematics.solutions import ByClass, Method, Solutions
 from er3a.kinematics.targets import Target, TargetOutcome
 from er3a.kinematics.wrist_partitioned import has_branches, solve_slots
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -96,7 +97,7 @@ def solve_target(robot: Robot, target: Target, random: np.random.Generator, scen
         outcome=_outcome(obstacle),
         expect=target.expect,
         unsolved=solutions.unsolved,
-        method=solutions.method,
+        method=_method(robot, solutions.method),
         families=tuple(map(_self_motion, solutions.families)),
         neighbours=near,
         advice=advice,
@@ -172,6 +173,13 @@ def _self_motion(family: Family | SelfMotionCurve) -> SelfMotion:
         within_limits=family.within_limits,
         branches=family.branches,
     )
+
+
+def _method(robot: Robot, method: Method) -> Method:
+    """The method, with what is known of numbered branches."""
+    if isinstance(method, ByClass) and not method.named and method.arm_class == "general_six":
+        return replace(method, cuspidal=cuspidal_move(robot) is not None)
+    return method
 
 
 def _obstacle(robot: Robot, target: Target, solutions: Solutions, branches: int) -> Obstacle:
