@@ -22,7 +22,7 @@ from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.closed_form import FREE, OFF_AXIS, ORIENTATION, REACHED, TOO_FAR
 from er3a.kinematics.configuration import side_of, slot_labels
 from er3a.kinematics.families import Family, families
-from er3a.kinematics.forward import checked_joints
+from er3a.kinematics.forward import checked_joints, forward
 from er3a.kinematics.numerical import all_found, solve
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.solutions import (
@@ -47,6 +47,7 @@ from er3a.robots.robot import Robot
 
 SAME_JOINTS = 1e-9
 SAME_MEMBER = 1e-6
+SOLVES = 1e-12  # m and parts of 1
 MOST_ROWS = 10_000
 STARTS = 400
 MISS_RESTARTS = 20
@@ -93,10 +94,28 @@ def inverse(robot: Robot, T: Reals, q_ref: Reals | None = None, redundancy: Real
         if family.within_limits and greatest_move(np.concatenate(rows), family.q0).min() > SAME_MEMBER:
             slots.append(family.branches[0])
             rows.append(family.q0[None])
+    _with_own(robot, T, q_ref, q, slots, rows)
     q, branch = _stacked(slots, rows, 6)
     inside = within(robot, q)
     unsolved = _unsolved(robot, fault, gap)
     return Solutions(robot, q, np.ones_like(inside), inside, branch, unsolved=unsolved, families=continua)
+
+
+def _with_own(robot: Robot, T: Reals, q_ref: Reals, q: Reals, slots: list[int], rows: list[Reals]) -> None:
+    """Add the reference to the rows if it solves the pose to rounding and is none of them.
+
+    Next to two singularities roots are known to 1e-8 rad only, so the arm's own row can lie beyond a limit that its
+    joints keep.
+    """
+    if not slots or not within(robot, q_ref) or np.abs(forward(robot, q_ref) - T).max() > SOLVES:
+        return
+    listed = np.concatenate(rows)
+    near = greatest_move(listed, q_ref)
+    if (within(robot, listed) & (near < SAME_MEMBER)).any():
+        return
+    away = np.abs(wrap_to_pi(q - q_ref)).max(axis=1)
+    slots.append(int(np.nanargmin(away)))
+    rows.append(q_ref[None])
 
 
 def _stacked(branches: list[int], rows: list[Reals], joints: int) -> tuple[Reals, Integers]:

@@ -172,6 +172,7 @@ def _self_motion(family: Family | SelfMotionCurve) -> SelfMotion:
         range_deg=(low, high),
         within_limits=family.within_limits,
         branches=family.branches,
+        dimension=family.dimension,
     )
 
 
