@@ -94,7 +94,7 @@ class Bodies:
 def self_pairs(robot: Robot) -> tuple[tuple[int, int], ...]:
     """Pairs of capsules (by number) that can come apart, so that their distance means something."""
     capsules = envelopes_of(robot)
-    lengths = {link: 0.0 for link in range(7)}
+    lengths = {link: 0.0 for link in range(robot.rows + 1)}
     for capsule in capsules:
         lengths[capsule.link] += float(np.linalg.norm(np.subtract(capsule.end, capsule.start)))
     pairs = []

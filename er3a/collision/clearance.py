@@ -39,7 +39,7 @@ def clearance(robot: Robot, q: Reals, scene: Scene | None) -> Clearance:
     every = np.arange(len(bodies.pairs))
     distances: list[float] = []
     pairs: list[Pair | None] = []
-    for ends in bodies.ends(np.asarray(q, float).reshape(-1, 6)):
+    for ends in bodies.ends(np.asarray(q, float).reshape(-1, robot.joints)):
         found = bodies.distances(ends, every)
         least = int(np.argmin(found)) if found.size else -1
         distances.append(found[least] if found.size else np.inf)

@@ -13,9 +13,9 @@ from pydantic import Field, model_validator
 from er3a.errors import InputError
 from er3a.files.path_table import read_path_table
 from er3a.files.robot_file import Name, Text
-from er3a.files.units import JointsDeg, PositionMm, RpyDeg, Triple
+from er3a.files.target_file import Orientation
+from er3a.files.units import JointsDeg, PositionMm, Triple, joint_values
 from er3a.files.yaml_file import StrictModel, load
-from er3a.geometry.transforms import transform
 from er3a.kinematics.configuration import BranchLabel
 from er3a.numerics.arrays import Reals
 from er3a.planning.commands import (
@@ -32,24 +32,30 @@ from er3a.planning.commands import (
 )
 from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.profiles import Times
+from er3a.robots.robot import MOST_JOINTS, Robot
+from er3a.robots.shown import joint_columns
 
 TRAPEZOID_RAMP = 1 / 3  # of a motion's time, on the way up and on the way down
 
 Duration = Annotated[float, Field(gt=0, le=3600)]
 Samples = Annotated[int, Field(ge=2, le=100_000)]
-Rates = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=6, max_length=6)]
+Rates = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=1, max_length=MOST_JOINTS)]
 Blend = Annotated[float, Field(ge=0, le=10_000)]
 
 
-class PoseEntry(StrictModel):
-    """A pose of the tool in the base frame; R = Rz(yaw) Ry(pitch) Rx(roll)."""
+class PoseEntry(Orientation):
+    """A pose of the tool in the base frame: position, and one of the forms of orientation."""
 
     xyz_mm: PositionMm
-    rpy_deg: RpyDeg
+
+    @model_validator(mode="after")
+    def _one_orientation(self) -> Self:
+        self.check_one_form()
+        return self
 
     def pose(self) -> Reals:
         """T_base_tool (4, 4), m."""
-        return transform(np.array(self.xyz_mm) / 1000, np.radians(self.rpy_deg))
+        return self.transform_at(np.array(self.xyz_mm) / 1000)
 
 
 class NamedPath(StrictModel):
@@ -107,19 +113,23 @@ class JointPath(NamedPath):
     @model_validator(mode="after")
     def _one_start(self) -> Self:
         if (self.start_deg is None) == (self.after is None):
-            raise ValueError(
-                "give either start_deg (six joint angles) or after (an earlier path) | Keep one of the two"
-            )
+            raise ValueError("give either start_deg (joint values) or after (an earlier path) | Keep one of the two")
         return self
 
-    def command(self, source: CommandSource) -> Command:
+    def command(self, source: CommandSource, robot: Robot) -> Command:
         """The path in SI units."""
         return JointMoveCommand(
-            Start(joints=_radians(self.start_deg), after=self.after),
-            np.radians(self.end_deg),
+            Start(joints=_joints(robot, self.start_deg, "start_deg"), after=self.after),
+            joint_values(robot, self.end_deg, "end_deg"),
             self.duration_s,
-            (_rates(self.start_velocity_deg_s), _rates(self.end_velocity_deg_s)),
-            (_rates(self.start_acceleration_deg_s2), _rates(self.end_acceleration_deg_s2)),
+            (
+                _rates(robot, self.start_velocity_deg_s, "start_velocity_deg_s"),
+                _rates(robot, self.end_velocity_deg_s, "end_velocity_deg_s"),
+            ),
+            (
+                _rates(robot, self.start_acceleration_deg_s2, "start_acceleration_deg_s2"),
+                _rates(robot, self.end_acceleration_deg_s2, "end_acceleration_deg_s2"),
+            ),
             source=source,
         )
 
@@ -134,9 +144,9 @@ class JointSequencePath(Profiled):
     points_deg: Annotated[list[JointsDeg], Field(min_length=2)]
     blend_deg: Blend = 0.0
 
-    def command(self, source: CommandSource) -> Command:
+    def command(self, source: CommandSource, robot: Robot) -> Command:
         """The path in SI units."""
-        points, blend = np.radians(self.points_deg), float(np.radians(self.blend_deg))
+        points, blend = np.array([joint_values(robot, point, "points_deg") for point in self.points_deg]), float(np.radians(self.blend_deg))
         return JointSequenceCommand(points, blend, self.duration_s, self.ramp, source=source)
 
 
@@ -154,17 +164,17 @@ class ToolStart(Profiled):
     @model_validator(mode="after")
     def _one_start(self) -> Self:
         if [self.start, self.start_deg, self.after].count(None) != 2:
-            ways = "start_deg (six joint angles) or start (a pose) or after (an earlier path)"
+            ways = "start_deg (joint values) or start (a pose) or after (an earlier path)"
             raise ValueError(f"give either {ways} | Keep one of them")
         if self.start_branch is not None and self.start is None:
             what = "after" if self.after else "start_deg"
             raise ValueError(f"start_branch: {what} already fixes the branch | Remove start_branch")
         return self
 
-    def start_command(self) -> Start:
+    def start_command(self, robot: Robot) -> Start:
         """The start in SI units."""
         pose = self.start.pose() if self.start else None
-        return Start(_radians(self.start_deg), pose, self.after, _branch(self.start_branch))
+        return Start(_joints(robot, self.start_deg, "start_deg"), pose, self.after, _branch(self.start_branch))
 
 
 class LineTo(StrictModel):
@@ -193,9 +203,9 @@ class LinePath(ToolStart, LineTo):
 
     kind: Literal["line"]
 
-    def command(self, source: CommandSource) -> Command:
+    def command(self, source: CommandSource, robot: Robot) -> Command:
         """The path in SI units."""
-        return ToolMoveCommand(self.start_command(), self.segment(), self.duration_s, self.ramp, source=source)
+        return ToolMoveCommand(self.start_command(robot), self.segment(), self.duration_s, self.ramp, source=source)
 
 
 class ArcPath(ToolStart, ArcTo):
@@ -203,9 +213,9 @@ class ArcPath(ToolStart, ArcTo):
 
     kind: Literal["arc"]
 
-    def command(self, source: CommandSource) -> Command:
+    def command(self, source: CommandSource, robot: Robot) -> Command:
         """The path in SI units."""
-        return ToolMoveCommand(self.start_command(), self.segment(), self.duration_s, self.ramp, source=source)
+        return ToolMoveCommand(self.start_command(robot), self.segment(), self.duration_s, self.ramp, source=source)
 
 
 class LineSegment(LineTo):
@@ -237,10 +247,10 @@ class SequencePath(ToolStart):
             raise ValueError(f"segments[{last}].blend_mm: the last segment has no corner at its end | Remove it")
         return self
 
-    def command(self, source: CommandSource) -> Command:
+    def command(self, source: CommandSource, robot: Robot) -> Command:
         """The path in SI units."""
         segments = tuple(replace(part.segment(), blend=part.blend_mm / 1000) for part in self.segments)
-        return ToolSequenceCommand(self.start_command(), segments, self.duration_s, self.ramp, source=source)
+        return ToolSequenceCommand(self.start_command(robot), segments, self.duration_s, self.ramp, source=source)
 
 
 class TablePath(NamedPath):
@@ -258,7 +268,7 @@ class TablePath(NamedPath):
     start_branch: Text | None = None
     half_turn_axis: Triple | None = None
 
-    def command(self, source: CommandSource) -> Command:
+    def command(self, source: CommandSource, robot: Robot) -> Command:
         """The table's points in SI units, without those that repeat the point before.
 
         Raises
@@ -280,6 +290,9 @@ class TablePath(NamedPath):
             raise source.error("duration_s", "the table's t_s gives it too", "Remove one of the two")
         repeated = tuple(table.rows[table.repeated].tolist())
         if table.joints is not None:
+            if table.sliding != tuple(robot.slides.tolist()):
+                columns = ", ".join(joint_columns(robot))
+                raise source.error("file", f"its joints are not those of {robot.name}", f"Give the columns {columns}")
             if self.blend_mm is not None:
                 raise source.error("blend_mm", "the table holds joint angles", "Write blend_deg")
             blend = None if self.blend_deg is None else float(self.blend_deg * np.radians(1.0))
@@ -336,8 +349,8 @@ def load_paths(path: str | Path) -> PathFile:
         raise InputError(error.file, field, error.problem, error.remedy) from None
 
 
-def _radians(degrees: list[float] | None) -> Reals | None:
-    return None if degrees is None else np.radians(degrees)
+def _joints(robot: Robot, values: list[float] | None, field: str) -> Reals | None:
+    return None if values is None else joint_values(robot, values, field)
 
 
 def _axis(axis: list[float] | None) -> Reals | None:
@@ -350,5 +363,5 @@ def _branch(words: str | None) -> str | None:
     return code if code in get_args(BranchLabel) else words
 
 
-def _rates(degrees: list[float] | None) -> Reals | float:
-    return 0.0 if degrees is None else np.radians(degrees)
+def _rates(robot: Robot, values: list[float] | None, field: str) -> Reals | float:
+    return 0.0 if values is None else joint_values(robot, values, field)

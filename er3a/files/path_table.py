@@ -1,12 +1,14 @@
 """Paths as CSV tables, one point per row: of the tool, or of the joints; with or without times.
 
 Columns of the tool: ``x_mm``, ``y_mm``, ``z_mm`` and those of one form of orientation
-(:data:`er3a.files.target_table.FORMS`). Columns of the joints: ``q1_deg`` .. ``q6_deg``. Either with ``t_s``, which
+(:data:`er3a.files.target_table.FORMS`). Columns of the joints: ``q1_deg`` .. ``qn_deg``, of those that
+slide ``q3_mm``. Either with ``t_s``, which
 starts at 0 and rises. A row that repeats the point before is a halt if the table has times, else it is left out.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,10 +24,10 @@ from er3a.files.units import check_degrees, check_millimetres
 from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, transform
 from er3a.numerics.arrays import Flags, Integers, Reals
 
-JOINT_COLUMNS = tuple(f"q{joint}_deg" for joint in range(1, 7))
+JOINT_COLUMN = re.compile(r"q([1-9]\d?)_(deg|mm)")
 UNIT_LENGTH_TOLERANCE = 1e-6
 LONGEST_S = 3600.0
-MOST_ROWS = 20_000
+MOST_ROWS = 200_000
 SAME_POINT = 1e-9  # m or rad
 
 
@@ -38,7 +40,8 @@ class PathTable:
     rows : (n,) int, lines of the file
     times : (n,), s, rising from 0; None for a table without
     poses : (n, 4, 4), T_base_tool; None for a table of joints
-    joints : (n, 6), rad; None for a table of the tool
+    joints : (n, joints), rad or m; None for a table of the tool
+    sliding : of a table of joints, which of them it gives in mm
     repeated : (n,) bool, whether a row repeats the point before
     """
 
@@ -48,6 +51,7 @@ class PathTable:
     poses: Reals | None
     joints: Reals | None
     repeated: Flags
+    sliding: tuple[bool, ...] = ()
 
 
 def read_path_table(path: str | Path) -> PathTable:
@@ -62,7 +66,8 @@ def read_path_table(path: str | Path) -> PathTable:
     path = Path(path)
     header = set(read_header(path))
     forms = [form for form, columns in FORMS.items() if header & set(columns)]
-    of_joints = bool(header & set(JOINT_COLUMNS))
+    own = _joint_columns(path, header)
+    of_joints = bool(own)
     if of_joints and (forms or header & set(POSITION)):
         raise InputError(path, "header", "the table has both joint angles and poses", "Keep one of the two")
     if len(forms) > 1:
@@ -74,9 +79,9 @@ def read_path_table(path: str | Path) -> PathTable:
             ", ".join(columns[:4]) + (" ..." if len(columns) > 4 else "") for columns in FORMS.values()
         )
         problem = "no orientation" if header & set(POSITION) else "neither joint angles nor poses"
-        remedy = f"Give the columns x_mm, y_mm, z_mm with {known}; or q1_deg .. q6_deg"
+        remedy = f"Give the columns x_mm, y_mm, z_mm with {known}; or q1_deg .. qn_deg"
         raise InputError(path, "header", f"the table has {problem}", remedy)
-    columns = JOINT_COLUMNS if of_joints else (*POSITION, *FORMS[forms[0]])
+    columns = own if of_joints else (*POSITION, *FORMS[forms[0]])
     timed = {"t_s": CsvColumn()} if "t_s" in header else {}
     rows = read_csv(path, timed | {name: CsvColumn() for name in columns})
     if len(rows) < 2:
@@ -86,7 +91,7 @@ def read_path_table(path: str | Path) -> PathTable:
     lines = np.array([row["row"] for row in rows])
     times = _times(path, lines, rows) if timed else None
     if of_joints:
-        joints = np.radians(_block(path, rows, JOINT_COLUMNS, "give the path as poses of the tool"))
+        joints = _joints(path, rows, own)
         size, poses = np.abs(np.diff(joints, axis=0)).max(axis=1), None
     else:
         poses, joints = _poses(path, lines, rows, forms[0]), None
@@ -95,7 +100,27 @@ def read_path_table(path: str | Path) -> PathTable:
     repeated = np.concatenate([[False], size < SAME_POINT])
     if repeated[1:].all():
         raise InputError(path, None, f"all {len(rows)} points are the same", "Give points that differ")
-    return PathTable(path, lines, times, poses, joints, repeated)
+    return PathTable(path, lines, times, poses, joints, repeated, tuple(name.endswith("_mm") for name in own))
+
+
+def _joint_columns(path: Path, header: set[str]) -> tuple[str, ...]:
+    """The columns of the joints, in order; :class:`InputError` if one is missing or stands there twice."""
+    found = {name: int(match[1]) for name in header if (match := JOINT_COLUMN.fullmatch(name))}
+    numbers = sorted(found.values())
+    if numbers != list(range(1, len(numbers) + 1)):
+        missing = next((k for k in range(1, max(numbers) + 1) if k not in numbers), numbers[0])
+        raise InputError(path, "header", f"joint {missing} has no column, or two", "Give q1_deg, q2_deg ... once each")
+    return tuple(sorted(found, key=found.__getitem__))
+
+
+def _joints(path: Path, rows: list[dict[str, Any]], names: tuple[str, ...]) -> Reals:
+    """Joint values (n, joints) in rad, or m of columns in mm."""
+    turning = [name for name in names if name.endswith("_deg")]
+    values = np.array([[row[name] for name in names] for row in rows])
+    if turning:
+        _block(path, rows, turning, "give the path as poses of the tool")
+    q: Reals = np.where([name.endswith("_mm") for name in names], values / 1000, np.radians(values))
+    return q
 
 
 def _times(path: Path, lines: Integers, rows: list[dict[str, Any]]) -> Reals:

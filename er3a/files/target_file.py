@@ -15,14 +15,14 @@ from scipy.spatial.transform import Rotation
 from er3a.errors import InputError
 from er3a.files.robot_file import Name
 from er3a.files.target_table import FORMS, POSITION, REFERENCE, read_target_table
-from er3a.files.units import JointsDeg, PositionMm, Six, Triple, as_degrees
+from er3a.files.units import JointsDeg, PositionMm, Triple, as_degrees, joint_values
 from er3a.files.yaml_file import StrictModel, load, parse
 from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.targets import Target, TargetOutcome
 from er3a.robots.robot import Robot
 
-MOST_TARGETS = 50
+MOST_TARGETS = 20_000
 UNIT_LENGTH_TOLERANCE = 1e-6
 EULER_KEY = re.compile(r"euler\w*|[xyz]{3}(_(deg|rad))?", re.IGNORECASE)
 ORIENTATION_FORMS = ("rpy_deg", "zyz_deg", "quaternion_wxyz", "matrix")
@@ -31,10 +31,8 @@ Angles = Annotated[Triple, as_degrees("give the orientation as a quaternion or a
 Line = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\r\n]*$")]
 
 
-class TargetEntry(StrictModel):
-    """One pose of the tool, in the frame that the robot's base is placed in.
-
-    Either ``xyz_mm`` and one orientation form, or ``q_deg`` (the pose at these joint angles).
+class Orientation(StrictModel):
+    """The orientation of a pose, in one of four forms.
 
     Attributes
     ----------
@@ -42,21 +40,12 @@ class TargetEntry(StrictModel):
     zyz_deg : R = Rz(a) Ry(b) Rz(c)
     quaternion_wxyz : of unit length to 1e-6
     matrix : rotation matrix by rows, orthonormal to 1e-6; the nearest exact rotation is used
-    q_ref_deg : the joint angles that the arm comes from
-    expect : what is to come out; anything else then counts as a fault, and this does not
     """
 
-    name: Name
-    note: Line | None = None
-    note_zh: Line | None = None
-    xyz_mm: PositionMm | None = None
     rpy_deg: Angles | None = None
     zyz_deg: Angles | None = None
     quaternion_wxyz: Annotated[list[float], Field(min_length=4, max_length=4)] | None = None
     matrix: Annotated[list[Triple], Field(min_length=3, max_length=3)] | None = None
-    q_deg: Annotated[Six, as_degrees("give the pose by xyz_mm and an orientation")] | None = None
-    q_ref_deg: JointsDeg = [0.0] * 6
-    expect: TargetOutcome | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -94,37 +83,24 @@ class TargetEntry(StrictModel):
             raise ValueError("the matrix mirrors (its determinant is -1) | Turn the sign of one axis")
         return rows
 
-    @model_validator(mode="after")
-    def _one_pose(self):
-        forms = [key for key in ORIENTATION_FORMS if getattr(self, key) is not None]
-        if self.q_deg is not None:
-            if self.xyz_mm is not None or forms:
-                extra = "xyz_mm" if self.xyz_mm is not None else forms[0]
-                raise ValueError(f"q_deg and {extra} both give a pose | Keep one of the two")
-            return self
-        if self.xyz_mm is None:
-            raise ValueError("the position is missing | Add xyz_mm and an orientation, or q_deg alone")
+    def forms(self) -> list[str]:
+        """The forms that are given."""
+        return [key for key in ORIENTATION_FORMS if getattr(self, key) is not None]
+
+    def check_one_form(self) -> None:
+        """``ValueError`` if there is none, or more than one."""
+        forms = self.forms()
         if not forms:
             raise ValueError(f"the orientation is missing | Add one of {', '.join(ORIENTATION_FORMS)}")
         if len(forms) > 1:
             raise ValueError(f"the orientation stands here twice, as {' and '.join(forms)} | Keep one")
-        return self
 
-    def target(self, robot: Robot) -> Target:
-        """The target for a robot, which is needed where the pose is given by joint angles."""
-        return Target(self.name, self._pose(robot), self.note, tuple(self.q_ref_deg), self.expect)
-
-    def _pose(self, robot: Robot) -> NDArray[np.float64]:
-        """T_base_tool (4, 4), m, read-only."""
-        if self.q_deg is not None:
-            T = forward(robot, np.radians(self.q_deg))
-        elif self.rpy_deg is not None:
-            T = transform(np.array(self.xyz_mm) / 1000, np.radians(self.rpy_deg))
-        else:
-            T = np.eye(4)
-            T[:3, 3] = np.array(self.xyz_mm) / 1000
-            T[:3, :3] = self._rotation_matrix()
-        T.setflags(write=False)
+    def transform_at(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The pose (4, 4) with this orientation at a position (3,) in m."""
+        if self.rpy_deg is not None:
+            return transform(position, np.radians(self.rpy_deg))
+        T = np.eye(4)
+        T[:3, 3], T[:3, :3] = position, self._rotation_matrix()
         return T
 
     def _rotation_matrix(self) -> NDArray[np.float64]:
@@ -135,6 +111,54 @@ class TargetEntry(StrictModel):
             return Rotation.from_quat(self.quaternion_wxyz, scalar_first=True).as_matrix()
         u, _, vt = np.linalg.svd(np.array(self.matrix))
         return u @ vt
+
+
+class TargetEntry(Orientation):
+    """One pose of the tool, in the frame that the robot's base is placed in.
+
+    Either ``xyz_mm`` and one orientation form, or ``q_deg`` (the pose at these joint angles).
+
+    Attributes
+    ----------
+    q_deg, q_ref_deg : joint values in degrees, of joints that slide in mm; the latter those that the arm comes from
+    expect : what is to come out; anything else then counts as a fault, and this does not
+    """
+
+    name: Name
+    note: Line | None = None
+    note_zh: Line | None = None
+    xyz_mm: PositionMm | None = None
+    q_deg: JointsDeg | None = None
+    q_ref_deg: JointsDeg | None = None
+    expect: TargetOutcome | None = None
+
+    @model_validator(mode="after")
+    def _one_pose(self):
+        forms = self.forms()
+        if self.q_deg is not None:
+            if self.xyz_mm is not None or forms:
+                extra = "xyz_mm" if self.xyz_mm is not None else forms[0]
+                raise ValueError(f"q_deg and {extra} both give a pose | Keep one of the two")
+            return self
+        if self.xyz_mm is None:
+            raise ValueError("the position is missing | Add xyz_mm and an orientation, or q_deg alone")
+        self.check_one_form()
+        return self
+
+    def target(self, robot: Robot) -> Target:
+        """The target for a robot, which is needed where the pose is given by joint angles."""
+        reference = tuple(self.q_ref_deg or (0.0,) * robot.joints)
+        q_ref = joint_values(robot, reference, f"target {self.name}: q_ref_deg")
+        return Target(self.name, self._pose(robot), self.note, reference, self.expect, q_ref)
+
+    def _pose(self, robot: Robot) -> NDArray[np.float64]:
+        """T_base_tool (4, 4), m, read-only."""
+        if self.q_deg is not None:
+            T = forward(robot, joint_values(robot, self.q_deg, f"target {self.name}: q_deg"))
+        else:
+            T = self.transform_at(np.array(self.xyz_mm) / 1000)
+        T.setflags(write=False)
+        return T
 
 
 class TargetFile(StrictModel):
@@ -149,7 +173,7 @@ class TargetFile(StrictModel):
         if not targets:
             raise ValueError("the list is empty | Add a target, or take the robot out of the study")
         if len(targets) > MOST_TARGETS:
-            raise ValueError(f"{len(targets)} targets don't fit on a page | Split the file; {MOST_TARGETS} at most")
+            raise ValueError(f"{len(targets)} targets are too many | Split the file; {MOST_TARGETS} at most")
         return targets
 
     @model_validator(mode="after")

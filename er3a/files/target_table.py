@@ -1,7 +1,7 @@
 """Targets as a CSV table: one row each, position in mm and the orientation in one of the four named forms.
 
 Columns: ``name``, ``x_mm``, ``y_mm``, ``z_mm``; the columns of one form (``FORMS``); optionally ``note``,
-``expect`` (may stay empty) and ``q1_ref_deg`` .. ``q6_ref_deg``.
+``expect`` (may stay empty) and ``q1_ref_deg`` .. ``qn_ref_deg`` (of joints that slide in mm).
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from typing import Any
 
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
+from er3a.robots.robot import MOST_JOINTS
 
 POSITION = ("x_mm", "y_mm", "z_mm")
 FORMS: dict[str, tuple[str, ...]] = {
@@ -20,7 +21,7 @@ FORMS: dict[str, tuple[str, ...]] = {
     "matrix": tuple(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)),
 }
 TEXTS = ("note", "expect")
-REFERENCE = tuple(f"q{joint}_ref_deg" for joint in range(1, 7))
+REFERENCE = tuple(f"q{joint}_ref_deg" for joint in range(1, MOST_JOINTS + 1))
 
 
 def read_target_table(path: str | Path) -> list[dict[str, Any]]:
@@ -43,9 +44,9 @@ def read_target_table(path: str | Path) -> list[dict[str, Any]]:
     form = forms[0]
     columns = {"name": CsvColumn(str)} | {name: CsvColumn() for name in (*POSITION, *FORMS[form])}
     columns |= {name: CsvColumn(str, optional=True) for name in TEXTS if name in present}
-    if present & set(REFERENCE):
-        columns |= {name: CsvColumn() for name in REFERENCE}
-    return [_target(row, form) for row in read_csv(path, columns)]
+    last = max((number for number, name in enumerate(REFERENCE, 1) if name in present), default=0)
+    columns |= {name: CsvColumn() for name in REFERENCE[:last]}
+    return [_target(row, form, REFERENCE[:last]) for row in read_csv(path, columns)]
 
 
 def _without_one_form(header: list[str], forms: list[str]) -> str:
@@ -59,11 +60,11 @@ def _without_one_form(header: list[str], forms: list[str]) -> str:
     return "the table has no orientation" + (f" that is known, but {', '.join(strange)}" if strange else "")
 
 
-def _target(row: dict[str, Any], form: str) -> dict[str, Any]:
+def _target(row: dict[str, Any], form: str, reference: tuple[str, ...]) -> dict[str, Any]:
     values = [row[name] for name in FORMS[form]]
     target = {"row": row["row"], "name": row["name"], "xyz_mm": [row[name] for name in POSITION]}
     target[form] = [values[0:3], values[3:6], values[6:9]] if form == "matrix" else values
     target |= {name: row[name] for name in TEXTS if row.get(name)}
-    if REFERENCE[0] in row:
-        target["q_ref_deg"] = [row[name] for name in REFERENCE]
+    if reference:
+        target["q_ref_deg"] = [row[name] for name in reference]
     return target

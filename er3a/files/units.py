@@ -11,9 +11,13 @@ import warnings
 from collections.abc import Sequence
 from typing import Annotated
 
+import numpy as np
 from pydantic import AfterValidator, Field
 
-from er3a.errors import InputWarning
+from er3a.errors import InputError, InputWarning
+from er3a.numerics.arrays import Reals
+from er3a.robots.robot import MOST_JOINTS, Robot
+from er3a.robots.shown import meant
 
 METRES_BELOW_MM = 5.0
 FARTHEST_MM = 100_000.0
@@ -76,13 +80,23 @@ def as_degrees(otherwise: str) -> AfterValidator:
     return AfterValidator(checked)
 
 
+def joint_values(robot: Robot, values: Sequence[float], field: str) -> Reals:
+    """Written joint values as rad or m (..., n); :class:`InputError` if they are not as many as the robot's joints."""
+    given = np.array(values, float)
+    if given.shape[-1] != robot.joints:
+        problem = f"{given.shape[-1]} joint values for {robot.name}, which has {robot.joints} joints"
+        raise InputError(None, field, problem, f"Give {robot.joints}")
+    return meant(robot, given)
+
+
 def _as_millimetres(values: list[float]) -> list[float]:
     check_millimetres(values)
     return values
 
 
 Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
-Six = Annotated[list[float], Field(min_length=6, max_length=6)]
+Joints = Annotated[list[float], Field(min_length=1, max_length=MOST_JOINTS)]
+"""One value for each joint: degrees, or mm of those that slide."""
 PositionMm = Annotated[Triple, AfterValidator(_as_millimetres)]
 RpyDeg = Annotated[Triple, as_degrees(WHOLE_DEGREES)]
-JointsDeg = Annotated[Six, as_degrees(WHOLE_DEGREES)]
+JointsDeg = Annotated[Joints, as_degrees(WHOLE_DEGREES)]

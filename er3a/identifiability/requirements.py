@@ -94,7 +94,7 @@ class FollowedExtreme:
     def __init__(self, quantity: Extreme, robot: Robot):
         self.quantity, self.base = quantity, robot.base
         self.count = len(robot.a)
-        moving = FRAME_OF_POINT[quantity.point]
+        moving = FRAME_OF_POINT[quantity.point] % (self.count + 1)
         self.joints = list(range(1, min(moving, self.count)))  # none of the measures changes with joint 1
         self.sign = 1.0 if quantity.extreme == "greatest" else -1.0
         self.q = np.zeros(self.count)

@@ -13,7 +13,7 @@ import numpy as np
 from er3a.geometry.angles import wrap_to_pi
 from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.batch import inverse_batch
-from er3a.kinematics.by_class import parameters_of, task_mask
+from er3a.kinematics.by_class import arm_solver, parameters_of, task_mask
 from er3a.kinematics.forward import forward
 from er3a.kinematics.near_singular import NearSingular
 from er3a.kinematics.singularity import determinant_factors
@@ -26,6 +26,7 @@ NEAR_WRIST_DEG = NEAR_ELBOW_DEG = 0.5
 NEAR_SHOULDER_MM = 1.0
 NEAR = NearSingular(np.radians(NEAR_WRIST_DEG), np.radians(NEAR_ELBOW_DEG), NEAR_SHOULDER_MM / 1000)
 BLOCK = 20_000
+MOST_BY_CLASS = 500  # poses that arms without a spherical wrist are asked for in validation
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +98,11 @@ def batch_round_trips(robot: Robot, random: np.random.Generator, poses: int) -> 
         worst_own=float(difference.max()),
         counts_within_limits=np.bincount(solved.within_limits.sum(axis=1), minlength=q.shape[1] + 1),
     )
+
+
+def has_class(robot: Robot) -> bool:
+    """Whether a class's solver, not random starts, solves the arm."""
+    return arm_solver(robot).chain.code != "unsolved"
 
 
 def slot_round_trips(robot: Robot, poses: int, seed: int) -> SlotRoundTrips:

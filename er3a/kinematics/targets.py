@@ -22,7 +22,8 @@ class Target(Displayed):
     Attributes
     ----------
     T : (4, 4), T_base_tool, m, in the frame that the robot's base is placed in
-    q_ref_deg : 6, the joint angles that the arm comes from, as they are written
+    q_ref_deg : n, the joint values that the arm comes from, as they are written (mm of joints that slide)
+    joints_before : (n,), the same in rad or m; None where all joints turn
     expect : what is to come out, where the target says so
     """
 
@@ -31,11 +32,12 @@ class Target(Displayed):
     note: str | None = None
     q_ref_deg: tuple[float, ...] = (0.0,) * 6
     expect: TargetOutcome | None = None
+    joints_before: Reals | None = None
 
     @property
     def q_ref(self) -> Reals:
-        """``q_ref_deg`` in rad, (6,)."""
-        return np.radians(self.q_ref_deg)
+        """``q_ref_deg`` in rad, or m of joints that slide, (n,)."""
+        return np.radians(self.q_ref_deg) if self.joints_before is None else self.joints_before
 
     def sheet(self) -> Sheet:
         """A line: name, position and roll, pitch, yaw."""

@@ -179,7 +179,7 @@ def straight(start: Reals, end: Reals, limits: JointLimits) -> Timed:
 def standing(q: Reals, duration: float) -> Timed:
     """Rest at joint angles (6,)."""
     t = np.array([0.0, duration])
-    return Timed(t, np.stack([q, q]), np.zeros((2, 6)), np.zeros((2, 6)))
+    return Timed(t, np.stack([q, q]), np.zeros((2, len(q))), np.zeros((2, len(q))))
 
 
 def joined(parts: list[Timed]) -> Timed:
@@ -205,7 +205,7 @@ def _toppra(way: Reals, spline: CubicSpline, limits: JointLimits, cap: Reals | N
         raise TimingError(ToppraMissing()) from None
 
     class Way(AbstractGeometricPath):  # type: ignore[misc]
-        dof, waypoints = 6, None
+        dof, waypoints = len(limits.speed), None
         path_interval = np.array([way[0], way[-1]])
 
         def __call__(self, at: Reals, order: int = 0) -> Any:
@@ -217,7 +217,7 @@ def _toppra(way: Reals, spline: CubicSpline, limits: JointLimits, cap: Reals | N
         """The programme's speed along the way as an upper bound."""
 
         def get_dof(self) -> int:
-            return 6
+            return len(limits.speed)
 
         def compute_constraint_params(self, path: Any, gridpoints: Any) -> tuple[Reals | None, ...]:
             return None, None, None, None, None, None, np.stack([np.zeros_like(most), most], axis=1)

@@ -24,6 +24,7 @@ OFF_EVERY_AXIS_MM = 100.0
 TRIED_OFFSETS_MM = (200.0, 400.0, 800.0, 1600.0)
 STATIONS = 25
 LEAST_TURN, MOST_TURN = np.pi / 2, 2 * np.pi
+LEAST_SLIDE = 0.1  # m
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +34,8 @@ class CirclePoints:
     Attributes
     ----------
     axes : direction of positive rotation and the circle's centre, per joint
-    radius_mm : (6,), of the circles
-    roundness_mm : (6,), greatest distance of a track's point from its circle
+    radius_mm : (n,), of the circles; 0 of joints that slide, whose track is a line
+    roundness_mm : (n,), greatest distance of a track's point from its circle, or line
     offset_mm : (3,), the carried point in the flange's frame
     """
 
@@ -47,19 +48,20 @@ class CirclePoints:
 def circle_points(robot: Robot) -> CirclePoints:
     """Turn each joint through its limits (a quarter turn at least, a full one at most), the others at 0."""
     offset = carried_point(robot)
-    fits = [fit_circle(_track(robot, joint, offset)) for joint in range(6)]
+    tracks = [_track(robot, joint, offset) for joint in range(robot.joints)]
+    fits = [fit_line(track) if slides else fit_circle(track) for track, slides in zip(tracks, robot.slides)]
     direction, centre, radius, roundness = (np.array(part) for part in zip(*fits))
     return CirclePoints(AxisLines(direction, centre), radius, roundness, offset)
 
 
 def carried_point(robot: Robot) -> Reals:
     """A point (3,) in mm in the flange's frame that is at least 100 mm off every axis in the zero pose."""
-    T = frames(robot.without_tool(), np.zeros(6))
+    T = frames(robot.without_tool(), np.zeros(robot.joints))
     toward = np.array([each for each in product((-1.0, 0.0, 1.0), repeat=3) if any(each)])
     toward /= np.linalg.norm(toward, axis=1, keepdims=True)
     offsets = np.concatenate([toward * length for length in TRIED_OFFSETS_MM])
-    points = T[6, :3, 3] + (offsets / MM) @ T[6, :3, :3].T
-    across = np.cross(T[:6, None, :3, 2], points - T[:6, None, :3, 3])
+    points = T[-1, :3, 3] + (offsets / MM) @ T[-1, :3, :3].T
+    across = np.cross(T[:-1, None, :3, 2], points - T[:-1, None, :3, 3])
     least = np.linalg.norm(across, axis=-1).min(axis=0) * MM
     by_length = least.reshape(len(TRIED_OFFSETS_MM), -1)
     length = int(np.argmax(by_length.max(axis=1) >= OFF_EVERY_AXIS_MM))
@@ -96,11 +98,22 @@ def fit_circle(track: Reals) -> tuple[Reals, Reals, float, float]:
     return normal, centre, radius, float(np.hypot(height, across - radius).max())
 
 
+def fit_line(track: Reals) -> tuple[Reals, Reals, float, float]:
+    """Direction of a track (N, 3) of a joint that slides, its middle, 0, and the greatest distance from the line."""
+    middle = track.mean(axis=0)
+    direction = np.linalg.svd(track - middle)[2][0]
+    direction = -direction if (track[-1] - track[0]) @ direction < 0 else direction
+    off = track - middle - ((track - middle) @ direction)[:, None] * direction
+    return direction, middle, 0.0, float(np.linalg.norm(off, axis=1).max())
+
+
 def _track(robot: Robot, joint: int, offset_mm: Reals) -> Reals:
     """The carried point's positions (N, 3) in mm while one joint turns from its lower to its upper limit."""
     lower, upper = sorted((robot.lower[joint], robot.upper[joint]))
     middle, turn = (lower + upper) / 2, np.clip(upper - lower, LEAST_TURN, MOST_TURN)
-    q = np.zeros((STATIONS, 6))
+    if robot.slides[joint]:
+        turn = max(upper - lower, LEAST_SLIDE)
+    q = np.zeros((STATIONS, robot.joints))
     q[:, joint] = middle + np.linspace(-turn / 2, turn / 2, STATIONS)
     T = forward(robot.without_tool(), q)
     return T[:, :3, 3] * MM + T[:, :3, :3] @ offset_mm

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import frames
 from er3a.kinematics.table_batch import Tables, frames_of
 from er3a.numerics.arrays import Reals
@@ -13,6 +14,7 @@ from er3a.references.quantities import ZERO_POSE, AxisLines, Extreme, ModelState
 from er3a.references.reach import search
 from er3a.references.reference import Reference, quantities_of
 from er3a.robots.robot import Robot
+from er3a.robots.shown import meant
 
 REACH_STARTS = 32
 CHUNK = 2048
@@ -56,7 +58,7 @@ def state_of(
         wanted = dict.fromkeys(quantity for quantity in quantities if isinstance(quantity, Extreme))
         extremes = {quantity: search(robot, quantity, starts)[0] for quantity in wanted}
     return ModelState(
-        frames=frames(robot, np.radians(poses)),
+        frames=frames(robot, joints_of(robot, poses)),
         index=_places(poses),
         direction=robot.direction,
         lower=robot.lower,
@@ -91,7 +93,7 @@ def state_of_tables(tables: Tables, robot: Robot, quantities: Sequence[Quantity]
     """The state of many tables, for quantities none of which is an extreme over the limits."""
     poses = _poses_of(quantities)
     return ModelState(
-        frames=frames_of(tables, robot.base, np.radians(poses)),
+        frames=frames_of(tables, robot.base, row_values(robot, joints_of(robot, poses))),
         index=_places(poses),
         direction=tables.direction,
         lower=tables.lower,
@@ -101,6 +103,15 @@ def state_of_tables(tables: Tables, robot: Robot, quantities: Sequence[Quantity]
         columns={name: getattr(tables, name) for name in TABLE_COLUMNS}
         | {"twist": np.where(tables.modified[:, None], tables.alpha[:, 1:], tables.alpha[:, :-1])},
     )
+
+
+def joints_of(robot: Robot, poses: Sequence[Pose]) -> Reals:
+    """Poses as they are written (six values) as joint values (P, n) in rad or m; further joints are at 0."""
+    written = np.array(poses, float).reshape(-1, len(ZERO_POSE))
+    q = np.zeros((len(written), robot.joints))
+    count = min(robot.joints, written.shape[1])
+    q[:, :count] = written[:, :count]
+    return meant(robot, q)
 
 
 def _poses_of(quantities: Sequence[Quantity]) -> tuple[Pose, ...]:

@@ -32,7 +32,7 @@ ZERO_POSE: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 MM = 1000.0
 SECTION_AXES: tuple[SectionAxis, ...] = ("x", "z")
 COORDINATES: tuple[Coordinate, ...] = ("x", "y", "z")
-FRAME_OF_POINT: Mapping[Point, int] = {"wrist_centre": 4, "flange": 6}
+FRAME_OF_POINT: Mapping[Point, int] = {"wrist_centre": 4, "flange": -1}
 
 
 @dataclass(frozen=True, eq=False)

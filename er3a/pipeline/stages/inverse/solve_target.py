@@ -41,6 +41,7 @@ from er3a.pipeline.stages.inverse.inverse_findings import (
 from er3a.pipeline.stages.inverse.model import SINGULAR_PARTS, NeighbourPoses, SelfMotion, SolutionRows, TargetResult
 from er3a.robots.joint_limits import limit_margin
 from er3a.robots.robot import Robot
+from er3a.robots.shown import shown
 from er3a.selection.nearest import AllCollide, Choice, Refusal, nearest
 from er3a.selection.select import refusals
 
@@ -123,7 +124,7 @@ def _rows(
         target=np.full(count, target.name, dtype=object),
         branch=solutions.branch,
         label=solutions.label,
-        q_deg=np.degrees(q) + 0.0,
+        q_deg=shown(robot, q) + 0.0,
         turn=solutions.turn,
         within_limits=solutions.within_limits,
         refusal=why,
@@ -167,7 +168,7 @@ def _self_motion(family: Family | SelfMotionCurve) -> SelfMotion:
     low, high = np.degrees(family.range).tolist()
     return SelfMotion(
         kind=family.kind,
-        q0_deg=tuple(np.degrees(family.q0).tolist()),
+        q0_deg=tuple(shown(family.robot, family.q0).tolist()),
         direction=tuple(family.direction.tolist()),
         range_deg=(low, high),
         within_limits=family.within_limits,

@@ -22,6 +22,7 @@ from er3a.planning.avoidance.strategies import StrategyCost, StrategyResult, bes
 from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
 from er3a.robots.robot import Robot
+from er3a.robots.shown import shown
 
 ROWS = 250  # of each motion in the table
 CLEARANCE_TIMES = 41
@@ -106,7 +107,7 @@ class AvoidanceTask:
         t, q = cost.motion.t, cost.motion.q
 
         def joints(at: Reals) -> Reals:
-            return np.stack([np.interp(at, t, q[:, j]) for j in range(6)], axis=-1)
+            return np.stack([np.interp(at, t, q[:, j]) for j in range(q.shape[1])], axis=-1)
 
         grid = np.linspace(0.0, t[-1], CLEARANCE_TIMES)
         along = clearance_along(self.surroundings.bodies, joints, grid, grid, self.surroundings.tolerance)
@@ -135,9 +136,9 @@ class AvoidanceTask:
             path=np.full(len(kept), path, object),
             strategy=np.full(len(kept), strategy, object),
             t_s=timed.t[kept],
-            q_deg=np.degrees(q),
-            q_deg_s=np.degrees(timed.velocity[kept]),
-            q_deg_s2=np.degrees(timed.acceleration[kept]),
+            q_deg=shown(self.robot, q),
+            q_deg_s=shown(self.robot, timed.velocity[kept]),
+            q_deg_s2=shown(self.robot, timed.acceleration[kept]),
             xyz_mm=forward(self.robot, q)[:, :3, 3] * 1000,
             deviation_mm=distance[kept] * 1000,
             deviation_deg=np.degrees(angle[kept]),

@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from er3a.collision.bodies import Bodies, can_measure
+from er3a.errors import NotWristPartitionedError
 from er3a.files.path_file import load_paths
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.near_singular import NearSingular
 from er3a.kinematics.singularity import characteristic_length, conditioning, factors_where_defined
-from er3a.kinematics.wrist_partitioned import has_branches
+from er3a.kinematics.wrist_partitioned import closed_form_missing, has_branches
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, Status, Verdict
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
@@ -27,6 +28,7 @@ from er3a.pipeline.stages.trajectory.model import (
     NearThresholds,
     NoneSafe,
     PathChecks,
+    PathNotFollowed,
     PathSummary,
     Samples,
     SomeUnsafe,
@@ -41,6 +43,7 @@ from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.timing import JointLimits, joint_limits
 from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
+from er3a.robots.shown import shown
 
 
 def compute(study: Study, name: str) -> TrajectoryResults:
@@ -51,7 +54,7 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     near = NearSingular(
         float(np.radians(thresholds.wrist_deg)), float(np.radians(thresholds.elbow_deg)), thresholds.shoulder_mm / 1000
     )
-    limits = joint_limits(robot, np.radians(settings.assumed_speed_deg_s), settings.acceleration_time_s)
+    limits = joint_limits(robot, _assumed_speed(robot, settings), settings.acceleration_time_s)
     scene_file = study.scene(name, "trajectory")
     scene = load_scene(scene_file) if scene_file else None
     surroundings = (
@@ -64,8 +67,14 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     strategies: list[AvoidanceRows] = []
     paths: list[PathSummary] = []
     ends: dict[str, Reals] = {}
+    skipped: list[PathNotFollowed] = []
     for i, entry in enumerate(load_paths(file).paths):
-        motion = motion_of(robot, entry, settings.checks_per_sample, CommandSource(file, f"paths[{i}]"), ends)
+        try:
+            motion = motion_of(robot, entry, settings.checks_per_sample, CommandSource(file, f"paths[{i}]"), ends)
+        except NotWristPartitionedError:
+            skipped.append(PathNotFollowed(entry.name, entry.title, closed_form_missing(robot)))
+            ends[entry.name] = np.full(robot.joints, np.nan)
+            continue
         ends[entry.name] = motion.q[-1]
         found = judge(robot, motion, near)
         avoided = avoidance.avoid(motion, found)
@@ -74,13 +83,14 @@ def compute(study: Study, name: str) -> TrajectoryResults:
         clearances.append(clearance_rows(entry.name, along))
         strategies.append(avoided.rows)
         paths.append(path_summary(robot, motion, found, along, avoided, limits))
-    checks = PathChecks.stacked(tables)
+    checks = PathChecks.stacked(tables).of_joints(robot.slides)
     own = checks.take(checks.sample)
     length = characteristic_length(robot)
     assumed = tuple(bool(value) for value in ~np.isfinite(robot.speed))
-    used = LimitsUsed(_degrees(limits.speed), assumed, _degrees(limits.acceleration), settings.acceleration_time_s)
+    speed, acceleration = (tuple(shown(robot, values).tolist()) for values in (limits.speed, limits.acceleration))
+    used = LimitsUsed(speed, assumed, acceleration, settings.acceleration_time_s)
     summary = TrajectorySummary(
-        verdict=_verdict(paths),
+        verdict=_verdict(paths, skipped),
         figures=_figures(paths, length, surroundings is not None, used),
         characteristic_length_m=length,
         near=thresholds,
@@ -89,13 +99,14 @@ def compute(study: Study, name: str) -> TrajectoryResults:
         clearance_measured=surroundings is not None,
         penetration_tolerance_mm=settings.penetration_tolerance_mm,
         paths=tuple(paths),
+        not_followed=tuple(skipped),
     )
     return TrajectoryResults(
         summary=summary,
-        samples=Samples(**{name: getattr(own, name) for name in Samples.columns()}),
+        samples=Samples(**{name: getattr(own, name) for name in Samples.columns()}).of_joints(robot.slides),
         checks=checks,
         clearance=Clearances.stacked(clearances),
-        avoidance=AvoidanceRows.stacked(strategies),
+        avoidance=AvoidanceRows.stacked(strategies).of_joints(robot.slides),
     )
 
 
@@ -113,9 +124,9 @@ def _checks(robot: Robot, motion: Motion, found: Judgement, near: NearSingular, 
         path=np.full(len(found.times), motion.entry.name, object),
         t_s=found.times,
         s_m=motion.way(found.times),
-        q_deg=np.degrees(found.q),
-        q_deg_s=np.degrees(found.velocity),
-        q_deg_s2=np.degrees(found.acceleration),
+        q_deg=shown(robot, found.q),
+        q_deg_s=shown(robot, found.velocity),
+        q_deg_s2=shown(robot, found.acceleration),
         xyz_mm=motion.tool(found.times)[:, :3, 3] * 1000,
         speed_ratio=speed_ratio(found.velocity, limits),
         manipulability=measures[:, 0],
@@ -131,7 +142,9 @@ def _checks(robot: Robot, motion: Motion, found: Judgement, near: NearSingular, 
     )
 
 
-def _verdict(paths: list[PathSummary]) -> Verdict[AllSafe | SomeUnsafe | NoneSafe | ExpectationsUnmet]:
+def _verdict(
+    paths: list[PathSummary], skipped: list[PathNotFollowed]
+) -> Verdict[AllSafe | SomeUnsafe | NoneSafe | ExpectationsUnmet]:
     if unmet := unmet_expectations(paths):
         return Verdict("fail", unmet)
     asked = [path for path in paths if path.expect in (None, "safe")]
@@ -139,11 +152,11 @@ def _verdict(paths: list[PathSummary]) -> Verdict[AllSafe | SomeUnsafe | NoneSaf
     def named(verdict: PathVerdict) -> tuple[str, ...]:
         return tuple(path.name for path in asked if path.verdict == verdict)
 
-    safe = len(named("safe"))
-    finding = AllSafe if safe == len(asked) else SomeUnsafe if safe else NoneSafe
-    status: Status = "pass" if safe == len(asked) else "caution" if safe else "fail"
+    safe, count = len(named("safe")), len(asked) + len(skipped)
+    finding = AllSafe if safe == count else SomeUnsafe if safe else NoneSafe
+    status: Status = "pass" if safe == count else "caution" if safe else "fail"
     counts = finding(
-        paths=len(asked),
+        paths=count,
         safe=safe,
         unreachable=named("unreachable"),
         leaves_limits=named("leaves limits"),
@@ -152,6 +165,7 @@ def _verdict(paths: list[PathSummary]) -> Verdict[AllSafe | SomeUnsafe | NoneSaf
         singular=named("singular"),
         near_singular=named("near-singular"),
         demonstrations=demonstrations(paths, "safe"),
+        not_followed=tuple(path.name for path in skipped),
     )
     return Verdict(status, counts)
 
@@ -180,5 +194,8 @@ def _figures(paths: list[PathSummary], length: float, measured: bool, limits: Li
     )
 
 
-def _degrees(values: Reals) -> tuple[float, ...]:
-    return tuple(float(value) for value in np.degrees(values))
+def _assumed_speed(robot: Robot, settings: TrajectorySettings) -> Reals:
+    """Speeds (n,) in rad/s or m/s that stand in for unknown ones."""
+    given = settings.assumed_speed_deg_s
+    turning = np.radians([given[min(k, len(given) - 1)] for k in range(robot.joints)])
+    return np.where(robot.slides, settings.assumed_speed_mm_s / 1000, turning)

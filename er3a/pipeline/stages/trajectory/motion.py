@@ -61,7 +61,7 @@ def motion_of(
     InputError
         for what :func:`er3a.planning.build.build` refuses, and a start branch that has no solution at the start
     """
-    built = build(robot, entry.command(source), ends)
+    built = build(robot, entry.command(source, robot), ends)
     samples = np.linspace(0.0, built.duration, entry.samples)
     checks = np.linspace(0.0, built.duration, (entry.samples - 1) * (checks_per_sample + 1) + 1)
     checks[:: checks_per_sample + 1] = samples

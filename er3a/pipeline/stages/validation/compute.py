@@ -18,6 +18,7 @@ from er3a.pipeline.stages.validation.geometry_tables import axes_table, key_pose
 from er3a.pipeline.stages.validation.model import (
     Checks,
     Circles,
+    Section,
     TableEvidence,
     TableFacts,
     ValidationResults,
@@ -38,6 +39,7 @@ from er3a.references.reference import ReferenceSet, quantities_of
 from er3a.references.subjects import Reach
 from er3a.robots.robot import Robot
 
+SIX = 6
 WRIST_REACH = AxisDistance("wrist_centre", "greatest", 1)
 FLANGE_REACH = AxisDistance("flange", "greatest", 1)
 ALWAYS_SEARCHED = (
@@ -56,8 +58,10 @@ def compute(study: Study, name: str) -> ValidationResults:
     settings = study.section(ValidationSettings)
     sets = [load_references(reference) for reference in robot.references]
 
+    plain = is_six_turning(robot)
     stated = [quantity for references in sets for quantity in quantities_of(references.checkable)]
-    wanted = dict.fromkeys([*ALWAYS_SEARCHED, *(quantity for quantity in stated if isinstance(quantity, Extreme))])
+    sought = [quantity for quantity in stated if isinstance(quantity, Extreme)]
+    wanted = dict.fromkeys([*always_searched(robot), *sought])
     extremes = {quantity: search(robot, quantity, settings.reach_starts) for quantity in wanted}
     values: dict[Quantity, float] = {quantity: value for quantity, (value, _) in extremes.items()}
 
@@ -66,21 +70,22 @@ def compute(study: Study, name: str) -> ValidationResults:
     for references in sets:
         quantities = quantities_of(references.checkable)
         state = state_of(robot, quantities, extremes=values, axes=circles.axes)
-        bases = bases_of(robot, references.checkable, references.documents)
+        bases = bases_of(robot, references.checkable, references.documents) if plain else ()
         judged, contradictions = checks_of_set(references, read(quantities, state), bases)
         checks += judged
         conflicts += contradictions
-    checks += _without_reference(values, checks)
+    checks += _without_reference(robot, values, checks)
     trip_checks, trips = round_trip_checks(robot, settings.round_trips, study.seed)
     checks += trip_checks
 
     axes, poses = axes_table(circles, sets), key_poses_table(robot, sets, extremes)
-    diagnoses, residuals = diagnose_sets(robot, sets)
-    calibrations, corrections = calibrate_from_sets(robot, sets)
+    diagnoses, residuals = diagnose_sets(robot, sets if plain else [])
+    calibrations, corrections = calibrate_from_sets(robot, sets if plain else [])
     found = {each.reference_set: each for each in diagnoses}
     summaries = set_summaries(sets, checks, poses, found)
-    reach = {"wrist_centre_reach": values[WRIST_REACH], "flange_reach": values[FLANGE_REACH]}
-    evidence = evidence_of_table(robot, sets)
+    reaches = {"wrist_centre_reach": WRIST_REACH, "flange_reach": FLANGE_REACH}
+    reach = {name: values[quantity] for name, quantity in reaches.items() if quantity in values}
+    evidence = evidence_of_table(robot, sets) if plain else None
     counts = counts_of(checks)
     summary = ValidationSummary(
         verdict=verdict_of(checks, conflicts, summaries, found, evidence),
@@ -102,7 +107,7 @@ def compute(study: Study, name: str) -> ValidationResults:
         checks=Checks.of_records(checks),
         axes=axes,
         key_poses=poses,
-        section=section_table(robot, extremes),
+        section=section_table(robot, extremes) if plain else Section.empty(),
         residuals=residuals,
         corrections=corrections,
     )
@@ -125,10 +130,21 @@ def evidence_of_table(robot: Robot, sets: Sequence[ReferenceSet]) -> TableEviden
     )
 
 
-def _without_reference(values: dict[Quantity, float], checks: list[Check]) -> list[Unjudged]:
+def is_six_turning(robot: Robot) -> bool:
+    """Whether the arm is one of those that diagnosis, calibration and evidence are made for."""
+    return robot.rows == robot.joints == SIX and not robot.sliding.any() and robot.coupling is None
+
+
+def always_searched(robot: Robot) -> tuple[AxisDistance, ...]:
+    """The reaches that are searched for whatever the references say; an arm with other joints has no wrist centre."""
+    six = robot.rows == SIX and not robot.sliding.any()
+    return ALWAYS_SEARCHED if six else tuple(each for each in ALWAYS_SEARCHED if each.point == "flange")
+
+
+def _without_reference(robot: Robot, values: dict[Quantity, float], checks: list[Check]) -> list[Unjudged]:
     """Reach that no reference gives, as measured."""
     stated = {check.subject for check in checks}
-    subjects = {Reach(distance.extreme, distance.point, distance.axis): distance for distance in ALWAYS_SEARCHED}
+    subjects = {Reach(distance.extreme, distance.point, distance.axis): distance for distance in always_searched(robot)}
     return [
         Unjudged(subject, "reach", "mm", InNoSet(), measured=values[distance])
         for subject, distance in subjects.items()
