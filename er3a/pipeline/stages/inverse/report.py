@@ -46,6 +46,7 @@ class TargetSection:
     reference: str
     reason: str
     advice: list[str]
+    joints: list[str]
     method: str
     families: list[str]
     unsolved: str
@@ -94,6 +95,7 @@ def _section(robot: Robot, target: TargetResult, results: InverseResults) -> Tar
         reference=_listed(target.q_ref_deg),
         reason=say(target.reason),
         advice=listed(target.advice),
+        joints=[f"J{k + 1} ({'mm' if slides else '°'})>" for k, slides in enumerate(robot.slides)],
         method="" if isinstance(target.method, ClosedForm) else say(target.method),
         families=[_self_motion(family) for family in target.families],
         unsolved=joined(listed(target.unsolved)),
