@@ -146,7 +146,10 @@ class JointSequencePath(Profiled):
 
     def command(self, source: CommandSource, robot: Robot) -> Command:
         """The path in SI units."""
-        points, blend = np.array([joint_values(robot, point, "points_deg") for point in self.points_deg]), float(np.radians(self.blend_deg))
+        points, blend = (
+            np.array([joint_values(robot, point, "points_deg") for point in self.points_deg]),
+            float(np.radians(self.blend_deg)),
+        )
         return JointSequenceCommand(points, blend, self.duration_s, self.ramp, source=source)
 
 
