@@ -105,18 +105,20 @@ def _by_class(
 ) -> Solutions:
     check_poses(T)
     count, solver = len(T), arm_solver(robot).chain
-    own = np.ascontiguousarray(np.broadcast_to(reference, (count, robot.joints)))
     certain: Flags | None = None
     method: Method
     if isinstance(solver, Unsolved):
+        own = np.broadcast_to(reference, (count, robot.joints))
         q = _found_by_starts(robot, T, own)
+        inside = within(robot, q)
         method = Iteration(STARTS, closed_form_missing(robot))
     else:
         values = checked_parameters(robot, redundancy, reference, count)
-        q, certainty, _ = slots_of_class(robot, T, own, values, threads)
-        certain = (certainty == CERTAIN) | (solver.code not in BY_ELIMINATION)
+        found = slots_of_class(robot, T, reference, values, threads)
+        q, inside = found.q, found.inside
+        certain = (found.certainty == CERTAIN) | (solver.code not in BY_ELIMINATION)
         method = ByClass(solver.code, bool(certain.all()), bool(slot_labels(robot)))
-    valid, inside = np.isfinite(q[..., 0]), within(robot, q)
+    valid = np.isfinite(q[..., 0])
     branch = np.broadcast_to(np.arange(q.shape[1]), valid.shape)
     told = _turn_range(robot, q) if turns else None
     return Solutions(robot, q, valid, inside, branch, method, turn_range=told, certain=certain)

@@ -129,8 +129,8 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None) ->
     if isinstance(solver, UnsolvedChain):
         return _by_iteration(robot, T, q_ref)
     values = checked_parameters(robot, redundancy, q_ref[None], 1)
-    slots, certainty, settled = slots_of_class(robot, T[None], q_ref[None], values)
-    motions = settled[0].motions if settled else ()
+    found = slots_of_class(robot, T[None], q_ref[None], values)
+    slots, motions = found.q, found.settled[0].motions if found.settled else ()
     if len(solver.parameters) == 1:
         motions = all_motions(robot, T, q_ref, values).motions
     branches: list[int] = np.flatnonzero(np.isfinite(slots[0, :, 0])).tolist()
@@ -141,7 +141,7 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None) ->
             if motion.within_limits and greatest_move(listed, member).min(initial=np.inf) > SAME_MEMBER:
                 branches.append(slot_of(robot, T, member))
                 rows.append(member[None])
-    certain = certainty[0] == CERTAIN or solver.code not in BY_ELIMINATION
+    certain = found.certainty[0] == CERTAIN or solver.code not in BY_ELIMINATION
     unsolved: tuple[Unsolved, ...] = ()
     if not branches:
         near = solve(robot, T, q_ref, mask=task_mask(robot), respect_limits=False, restarts=MISS_RESTARTS)

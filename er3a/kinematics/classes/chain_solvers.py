@@ -20,6 +20,7 @@ from er3a.kinematics.classes.gantry import Gantry, gantry, solve_gantry
 from er3a.kinematics.classes.links import axes_of, inverse_rigid, poses_of, size_of
 from er3a.kinematics.classes.parallel_axes import ThreeParallel, three_parallel
 from er3a.kinematics.classes.scara import Scara, scara, solve_scara
+from er3a.kinematics.classes.self_motion import PoseChain
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, SixRevolute, prepared, solve_six_revolute
 from er3a.kinematics.classes.spherical_joints import about_x, about_z, frame_along
 from er3a.kinematics.closed_form import BOUNDARY_M, REACHED, ArmConstants, solve
@@ -65,6 +66,7 @@ SlotName = Literal[
 ]
 SLOT_NAMES: tuple[SlotName, ...] = get_args(SlotName)
 LEFT_OVER = 1e-6  # rad by which a pose may miss those that fewer than six joints can take
+RANK_LOST = 1e-6  # smallest singular value below which a joint may be free
 NEAR_SINGULAR = 1e-7  # rad or parts of the reach: a closed form's row so near to its singular sets is looked at again
 PREFERENCE: tuple[ArmClassCode, ...] = (
     "spherical_wrist",
@@ -162,8 +164,13 @@ class ParallelAxes(_Fixed):
     slots: int = 8
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
-        q, singular = solve_three_parallel(self.arm, T)
-        return q, np.where(singular, CONTINUUM, CERTAIN)
+        q, marked = solve_three_parallel(self.arm, T)
+        certainty = np.full(len(T), CERTAIN)
+        for n in np.flatnonzero(marked):
+            chain = PoseChain.of(self.arm.links, np.zeros(6, dtype=bool), T[n], size_of(self.arm.links))
+            solved = q[n][np.isfinite(q[n, :, 0])]
+            certainty[n] = CONTINUUM if any(chain.smallest(x) < RANK_LOST for x in solved) else CERTAIN
+        return q, certainty
 
     def seeds(self, T: Reals, values: Reals) -> Reals:
         found = [
