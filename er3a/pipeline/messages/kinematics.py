@@ -22,6 +22,7 @@ from er3a.kinematics.solutions import (
     WristTooNearAxis1,
 )
 from er3a.kinematics.wrist_partitioned import (
+    CoupledJoints,
     CoupledWrist,
     ElbowAxesNotParallel,
     NeighboursParallel,
@@ -151,6 +152,11 @@ def _(found: NotSixTurning) -> str:
 @say.register
 def _(found: CoupledWrist) -> str:
     return sentence(found.code, "its joints are coupled in another way than by whole turns among the first three")
+
+
+@say.register
+def _(found: CoupledJoints) -> str:
+    return sentence(found.code, "its joints are coupled, or sums of them have limits")
 
 
 @say.register

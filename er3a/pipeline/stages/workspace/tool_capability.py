@@ -8,7 +8,6 @@ from typing import Literal
 import numpy as np
 
 from er3a.kinematics.configuration import branch_labels
-from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.pipeline.stages.workspace import table_rows
 from er3a.pipeline.stages.workspace.entry import BoxTask, CapabilitySettings
 from er3a.pipeline.stages.workspace.model import (
@@ -28,6 +27,7 @@ from er3a.workspace.dexterous import dexterous_core
 from er3a.workspace.directions import cone_directions, roll_of
 from er3a.workspace.placement import MIXED, NO, Task
 from er3a.workspace.placement_proof import BoxPlacement, find_places
+from er3a.workspace.proven import lacking_for_proof
 from er3a.workspace.section_arm import section_arm, section_frame
 
 MOST_ACROSS = 64
@@ -51,7 +51,7 @@ def tool_capability(robot: Robot, settings: CapabilitySettings, cell: float) -> 
     ----------
     cell : m, edge of the workspace's cells; taken coarser where more than ``MOST_ACROSS`` would span the reach
     """
-    if lacks := closed_form_missing(robot):
+    if lacks := lacking_for_proof(robot):
         return ToolCapability(NeedsClosedForm(lacks), None, CapabilityCells.empty(), BoxPlaces.empty())
     arm, roll = section_arm(robot), roll_of(robot, settings.rolls)
     cell = max(cell, 2 * (arm.upper_length + arm.forearm_length + arm.d) / MOST_ACROSS)
