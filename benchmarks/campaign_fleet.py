@@ -27,7 +27,7 @@ from er3a.pipeline.check import check_file
 from er3a.robots.robot import Robot
 from testing.fleet import DhModel, UrdfFile, chains_of, dh_models, urdf_files
 
-POSES, INVERSE_POSES = 100, 3
+POSES, INVERSE_POSES = 100, 2
 EXACT = 1e-9  # m, rad, m/rad
 SAME_JOINTS = 1e-6
 
@@ -134,9 +134,9 @@ def _of_chain(name: str, file: UrdfFile, found: UrdfImport, folder: Path) -> Out
 
 def _pinocchio(path: Path, found: UrdfImport, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Flange poses and Jacobians in the base link's frame, by Pinocchio's own reading of the file."""
-    model = pin.buildModelFromUrdf(str(path), mimic=True)
+    model = pin.buildModelFromUrdf(str(path), mimic=found.robot.coupling is not None)
     data = model.createData()
-    base, tip = (model.getFrameId(name) for name in (found.base, found.tip))
+    base, tip = (model.getFrameId(name, pin.FrameType.BODY) for name in (found.base, found.tip))
     joints = [model.joints[model.getJointId(name)] for name in found.joints]
     columns = [joint.idx_v for joint in joints]
     T, J = np.empty((len(q), 4, 4)), np.empty((len(q), 6, len(joints)))
@@ -178,13 +178,15 @@ def _common(robot: Robot, outcome: Outcome, folder: Path) -> None:
 
 def _round_trips(robot: Robot, outcome: Outcome) -> str:
     """How many poses give back the joints that made them, each asked at its own redundancy parameter."""
+    if outcome.arm_class == "unsolved":
+        return "by random starts"
     own = _joints(robot, INVERSE_POSES)
     found = 0
     for q, T in zip(own, forward(robot, own)):
         rows = inverse(robot, T, q if parameters_of(robot) else None).q
         away = np.where(robot.slides, rows - q, np.mod(rows - q + np.pi, 2 * np.pi) - np.pi)
         found += bool(len(rows)) and bool((np.abs(away).max(axis=1) < SAME_JOINTS).any())
-    if found < len(own) and outcome.arm_class != "unsolved":
+    if found < len(own):
         outcome.failed.append("inverse")
     return f"{found} of {len(own)}"
 
