@@ -32,6 +32,7 @@ SAME_ROW = 1e-6  # rad or parts of the arm's size
 SOLVES = 1e-9
 MAYBE_SAME = 1e-2  # rad
 SPREAD = 1e-11
+MOST_CURVES, MOST_ON_SURFACE = 24, 4
 STARTS = 240
 SMALLEST_PART = 64
 SCANNED = 16  # values of a redundancy parameter from which self-motions are collected
@@ -155,6 +156,11 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
     for x in candidates:
         if any(chain.holds(curve, x) for curve in curves):
             continue
+        surface = sum(curve.dimension > 1 for curve in curves)
+        if len(curves) >= MOST_CURVES or surface >= MOST_ON_SURFACE:
+            if not chain.moves(x) and chain.error(x) < SOLVES:
+                alone.append(x)
+            continue
         curve = chain.curve(x)
         if curve is not None:
             curves.append(curve)
@@ -262,6 +268,13 @@ def slots_of_class(robot: Robot, T: Reals, q_ref: Reals, values: Reals, threads:
         settled[n] = settle(robot, T[n], rows[np.isfinite(rows[:, 0])], own, values[n : n + 1], int(certainty[n]))
         q[n] = nearest_equivalent(robot, _in_slots(robot, rows, settled[n]), own)
         inside[n] = within(robot, q[n])
+    for n in np.flatnonzero(certainty != CERTAIN).tolist() if not alone else ():
+        own = q_ref[0 if len(q_ref) == 1 else n]
+        if solver.poses_at(T[n]).error(to_rows(robot, own)) < 1e-11:
+            far = np.abs(q[n] - own).max(axis=1)
+            slot = int(np.argmin(np.where(np.isnan(far), 1e3, far)))
+            if not far[slot] < SAME_ROW:
+                q[n, slot], inside[n, slot] = own, within(robot, own)
     return ClassSlots(q, inside, certainty, settled)
 
 

@@ -207,16 +207,23 @@ class ArmAngle:
     """Seven joints with a spherical shoulder and wrist."""
 
     arm: ArmAngleArm
+    spare: ArmAngleArm  # with another reference
     code: ArmClassCode = "arm_angle"
     slots: int = 8
     parameters: tuple[Redundancy, ...] = (Redundancy(-1, "arm_angle"),)
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
         q, singular = solve_at_arm_angle(self.arm, T, values[:, 0])
+        lost = np.flatnonzero(singular & np.isnan(q).all(axis=(1, 2)))
+        if lost.size:  # shoulder and wrist may be in line with the reference
+            q[lost] = solve_at_arm_angle(self.spare, T[lost], np.nan_to_num(values[lost, 0]))[0]
         return q, np.where(singular, CONTINUUM, CERTAIN)
 
     def values_of(self, x: Reals) -> Reals:
-        return arm_angles_of(self.arm, x)[..., None]
+        angles = arm_angles_of(self.arm, x)
+        if np.isnan(angles).any():
+            angles = np.where(np.isnan(angles), arm_angles_of(self.spare, x), angles)
+        return angles[..., None]
 
     def seeds(self, T: Reals, values: Reals) -> Reals:
         return np.empty((0, 7))
@@ -401,9 +408,9 @@ def chain_solver(links: Reals, sliding: Flags) -> ChainSolver:
     if n == 6:
         return _of_six(links, sliding)
     if n == 7 and not sliding.any():
-        arm = arm_angle_arm(links)
-        if arm is not None:
-            return ArmAngle(arm)
+        arm, spare = arm_angle_arm(links), arm_angle_arm(links, frame_along(axes_of(links)[0][0])[0])
+        if arm is not None and spare is not None:
+            return ArmAngle(arm, spare)
     if n > 6:
         return _locked(links, sliding)
     if n == 4 and (planar := scara(links, sliding)) is not None:
