@@ -35,6 +35,7 @@ PAGES = (
     "teach",
     "pages",
     "estimate",
+    "fleet",
 )
 PARTS = {"fuzz": "reliability.md", "faults": "reliability.md", "kills": "reliability.md", "slurm": "cluster.md"}
 CAMPAIGNS = (*PAGES, *PARTS)

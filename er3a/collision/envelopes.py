@@ -10,12 +10,11 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.collision.pairs import BASE
-from er3a.kinematics.chain import ALONG_Z, JOINTS, TO_NEXT_AXIS, link_parts
+from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, link_parts
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Envelope, Robot
 
-TOOL_LINK = 6
 RADIUS_RATIOS = (0.055, 0.055, 0.05, 0.045, 0.04, 0.035, 0.03)
 SHORTEST = 1e-6
 
@@ -29,21 +28,22 @@ def default_envelopes(robot: Robot) -> tuple[Envelope, ...]:
     """Capsules along the table's link lengths (see the module's text)."""
     size = float(np.abs(robot.a).sum() + np.abs(robot.d).sum())
     parts, found = link_parts(robot), []
-    for k in range(JOINTS):
+    last = robot.rows
+    for k in range(last):
         along = parts[k + 1, ALONG_Z, :3, 3]
         across = along + parts[k + 1, TO_NEXT_AXIS, :3, 3]
         if k == 0:
-            found += _pieces(BASE, size, [(np.zeros(3), along)])
-            found += _pieces(1, size, [(along, across)])
+            found += _pieces(robot, BASE, size, [(np.zeros(3), along)])
+            found += _pieces(robot, 1, size, [(along, across)])
         else:
-            found += _pieces(k + 1, size, [(np.zeros(3), along), (along, across)])
-    tool = np.linalg.inv(frames(robot, np.zeros(6))[5]) @ frames(robot, np.zeros(6))[6]
-    found += _pieces(TOOL_LINK, size, [(across, tool[:3, 3])])
+            found += _pieces(robot, k + 1, size, [(np.zeros(3), along), (along, across)])
+    T = frames(robot, np.zeros(robot.joints))
+    found += _pieces(robot, last, size, [(across, (np.linalg.inv(T[last - 1]) @ T[last])[:3, 3])])
     return tuple(found)
 
 
 def capsule_poses(robot: Robot, capsules: tuple[Envelope, ...], q: Reals) -> Reals:
-    """End points (..., n, 2, 3) of the capsules' lines in the base's surroundings, m, at joint angles (..., 6)."""
+    """End points (..., n, 2, 3) of the capsules' lines in the base's surroundings, m, at joint values (..., n)."""
     T = link_frames(robot, q)[..., [c.link for c in capsules], :, :]
     ends = np.array([(c.start, c.end) for c in capsules])
     placed: Reals = np.einsum("...nij,nkj->...nki", T[..., :3, :3], ends) + T[..., None, :3, 3]
@@ -51,15 +51,15 @@ def capsule_poses(robot: Robot, capsules: tuple[Envelope, ...], q: Reals) -> Rea
 
 
 def link_frames(robot: Robot, q: Reals) -> Reals:
-    """Frames (..., 7, 4, 4) of the base and the six links at joint angles (..., 6)."""
+    """Frames (..., m + 1, 4, 4) of the base and the links at joint values (..., n)."""
     T = frames(robot, q)
     base = np.broadcast_to(robot.base, (*T.shape[:-3], 1, 4, 4))
     return np.concatenate([base, T[..., :-1, :, :]], axis=-3)
 
 
-def _pieces(link: int, size: float, lines: list[tuple[Reals, Reals]]) -> list[Envelope]:
+def _pieces(robot: Robot, link: int, size: float, lines: list[tuple[Reals, Reals]]) -> list[Envelope]:
     return [
-        Envelope(link, tuple(start.tolist()), tuple(end.tolist()), RADIUS_RATIOS[link] * size)
+        Envelope(link, tuple(start.tolist()), tuple(end.tolist()), RADIUS_RATIOS[round(link * 6 / robot.rows)] * size)
         for start, end in lines
         if np.linalg.norm(end - start) > SHORTEST
     ]

@@ -30,6 +30,8 @@ from er3a.robots.robot import MOST_JOINTS, Envelope, Hull, Robot, Source
 
 MISFIT_POSES = 1000
 NO_RANGE = math.pi
+MOST_TURNED = 20 * math.pi
+FASTEST = 100.0  # rad/s or m/s; what URDFs give above stands for a speed that no one knows
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -99,7 +101,7 @@ def import_urdf(
         convention="standard",
         lower=limits[:, 0],
         upper=limits[:, 1],
-        speed=np.array([joint.speed for joint in sources]),
+        speed=np.array([joint.speed if joint.speed < FASTEST else math.nan for joint in sources]),
         zero_pose="As the URDF has it with all joints at 0.",
         sources=dict.fromkeys(groups, source),
         sliding=sliding,
@@ -235,6 +237,9 @@ def _limits(path: Path, sources: list[UrdfJoint]) -> tuple[Reals, list[str]]:
         elif joint.type == "revolute" and (lower == upper == 0 or (math.isnan(lower) and math.isnan(upper))):
             has = "no limits" if math.isnan(lower) else "the limits 0 and 0"
             notes.append(f"joint {joint.name} has {has}: +-180 deg were assumed")
+            lower, upper = -NO_RANGE, NO_RANGE
+        elif joint.type == "revolute" and max(abs(lower), abs(upper)) > MOST_TURNED:
+            notes.append(f"joint {joint.name} has limits beyond ten turns: +-180 deg were assumed")
             lower, upper = -NO_RANGE, NO_RANGE
         if math.isnan(lower) or math.isnan(upper):
             missing = "lower" if math.isnan(lower) else "upper"

@@ -13,18 +13,19 @@ from er3a.kinematics.classes.chain_solvers import Unsolved
 from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.closed_form import REACHED, SLOTS
 from er3a.kinematics.configuration import slot_labels
-from er3a.kinematics.forward import checked_joints
-from er3a.kinematics.inverse import BY_ELIMINATION, STARTS
+from er3a.kinematics.forward import checked_joints, forward
+from er3a.kinematics.inverse import BY_ELIMINATION, SAME_MEMBER, SOLVES, STARTS
 from er3a.kinematics.numerical import all_found
 from er3a.kinematics.solutions import ByClass, Iteration, Method, Solutions
 from er3a.kinematics.wrist_partitioned import closed_form_missing, constants_for_blocks, solve_slots
-from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.threads import parallel_for
 from er3a.robots.joint_limits import nearest_equivalent, turn_bounds, within
 from er3a.robots.robot import Robot
 
 SMALLEST_PART = 8 * BLOCK
 SLOTS_BY_STARTS = 16
+NEARLY_OWN = 1e-5  # rad
 
 
 def inverse_batch(
@@ -81,9 +82,22 @@ def inverse_batch(
         found, fault, _ = solve_slots(robot, T[left], own, keep_folds=True, keep_free=True)
         q[left] = nearest_equivalent(robot, found, own[:, None])
         valid[left] = fault == REACHED
+        _put_own(robot, T[left], own, left, q)
         inside[left] = within(robot, q[left])
     branch = np.broadcast_to(np.arange(SLOTS), valid.shape)
     return Solutions(robot, q, valid, inside, branch, turn_range=_turn_range(robot, q) if turns else None)
+
+
+def _put_own(robot: Robot, T: Reals, own: Reals, left: Integers, q: Reals) -> None:
+    """Put references (k, 6) that solve their poses to rounding in the slots that are them but for rounding, if those
+    leave the limits or miss them."""
+    solved = np.flatnonzero((np.abs(forward(robot, own) - T).max(axis=(1, 2)) < SOLVES) & within(robot, own))
+    away = np.abs(q[left[solved]] - own[solved, None]).max(axis=2)
+    away = np.where(np.isnan(away), np.inf, away)
+    slot = away.argmin(axis=1)
+    distance, beyond = away[np.arange(len(solved)), slot], ~within(robot, q[left[solved], slot])
+    near = (distance < NEARLY_OWN) & (beyond | (distance > SAME_MEMBER))
+    q[left[solved[near]], slot[near]] = own[solved[near]]
 
 
 def _by_class(
@@ -91,18 +105,20 @@ def _by_class(
 ) -> Solutions:
     check_poses(T)
     count, solver = len(T), arm_solver(robot).chain
-    own = np.ascontiguousarray(np.broadcast_to(reference, (count, robot.joints)))
     certain: Flags | None = None
     method: Method
     if isinstance(solver, Unsolved):
+        own = np.broadcast_to(reference, (count, robot.joints))
         q = _found_by_starts(robot, T, own)
+        inside = within(robot, q)
         method = Iteration(STARTS, closed_form_missing(robot))
     else:
         values = checked_parameters(robot, redundancy, reference, count)
-        q, certainty, _ = slots_of_class(robot, T, own, values, threads)
-        certain = (certainty == CERTAIN) | (solver.code not in BY_ELIMINATION)
+        found = slots_of_class(robot, T, reference, values, threads)
+        q, inside = found.q, found.inside
+        certain = (found.certainty == CERTAIN) | (solver.code not in BY_ELIMINATION)
         method = ByClass(solver.code, bool(certain.all()), bool(slot_labels(robot)))
-    valid, inside = np.isfinite(q[..., 0]), within(robot, q)
+    valid = np.isfinite(q[..., 0])
     branch = np.broadcast_to(np.arange(q.shape[1]), valid.shape)
     told = _turn_range(robot, q) if turns else None
     return Solutions(robot, q, valid, inside, branch, method, turn_range=told, certain=certain)

@@ -22,15 +22,17 @@ from er3a.kinematics.classes.self_motion import Curve, PoseChain
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM
 from er3a.kinematics.self_motions import SelfMotionCurve, self_motion_of
 from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.jit import kernel
 from er3a.numerics.threads import parallel_for
 from er3a.robots.derived import derived
-from er3a.robots.joint_limits import nearest_equivalent
+from er3a.robots.joint_limits import LIMIT_TOLERANCE, nearest_equivalent, within
 from er3a.robots.robot import Robot
 
 SAME_ROW = 1e-6  # rad or parts of the arm's size
 SOLVES = 1e-9
 MAYBE_SAME = 1e-2  # rad
 SPREAD = 1e-11
+MOST_CURVES, MOST_ON_SURFACE = 24, 4
 STARTS = 240
 SMALLEST_PART = 64
 SCANNED = 16  # values of a redundancy parameter from which self-motions are collected
@@ -154,6 +156,11 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
     for x in candidates:
         if any(chain.holds(curve, x) for curve in curves):
             continue
+        surface = sum(curve.dimension > 1 for curve in curves)
+        if len(curves) >= MOST_CURVES or surface >= MOST_ON_SURFACE:
+            if not chain.moves(x) and chain.error(x) < SOLVES:
+                alone.append(x)
+            continue
         curve = chain.curve(x)
         if curve is not None:
             curves.append(curve)
@@ -214,27 +221,90 @@ def _away(robot: Robot, rows: Reals, other: Reals) -> Reals:
     return np.where(robot.slides, away, away - TURN * np.round(away / TURN))
 
 
-def slots_of_class(
-    robot: Robot, T: Reals, q_ref: Reals, values: Reals, threads: int = 1
-) -> tuple[Reals, Integers, dict[int, Settled]]:
-    """All slots for poses (N, 4, 4): joint values (N, S, n), the turns nearest to the reference (N, n), and certainty.
+@dataclass(frozen=True, eq=False)
+class ClassSlots:
+    """All slots of a block of poses.
 
-    Poses at which branches meet, or that left a doubt, are settled one by one; those are told by their number.
+    Attributes
+    ----------
+    q : (N, S, n), by the turns nearest to the reference; inside : (N, S), whether within the limits
+    certainty : (N,); settled : what was looked at one by one, by the pose's number
     """
-    count, slots = len(T), arm_solver(robot).chain.slots
+
+    q: Reals
+    inside: Flags
+    certainty: Integers
+    settled: dict[int, Settled]
+
+
+def slots_of_class(robot: Robot, T: Reals, q_ref: Reals, values: Reals, threads: int = 1) -> ClassSlots:
+    """All slots for poses (N, 4, 4), with references (1 or N, n) and values (N, k) of the redundancy parameters.
+
+    Poses at which a joint may be free, or that left a doubt, are settled one by one, if the arm has no more than six
+    joints.
+    """
+    solver = arm_solver(robot)
+    count, slots = len(T), solver.chain.slots
     q, certainty = np.empty((count, slots, robot.joints)), np.empty(count, dtype=np.int64)
+    inside = np.empty((count, slots), dtype=bool)
+    plain = robot.coupling is None and not robot.combined and not robot.continuous.any()
+    pendant = robot.direction, joint_starts(robot), robot.sliding, robot.lower, robot.upper
 
     def part(rows: slice) -> None:
-        found = class_rows(robot, T[rows], values[rows])
-        q[rows], certainty[rows] = found.q, found.certainty
+        x, certainty[rows] = solver.chain.rows(T[rows], values[rows])
+        own = q_ref if len(q_ref) == 1 else q_ref[rows]
+        if plain:
+            to_pendant(pendant, np.ascontiguousarray(x), own, q[rows], inside[rows])
+        else:
+            q[rows] = nearest_equivalent(robot, to_joints(robot, x), own[:, None])
+            inside[rows] = within(robot, q[rows])
 
     parallel_for(count, threads, SMALLEST_PART, part)
     settled = {}
-    for n in np.flatnonzero(certainty != CERTAIN).tolist():
-        solved = q[n][np.isfinite(q[n, :, 0])]
-        settled[n] = settle(robot, T[n], solved, q_ref[n], values[n : n + 1], int(certainty[n]))
-        q[n] = _in_slots(robot, q[n], settled[n])
-    return nearest_equivalent(robot, q, q_ref[:, None]), certainty, settled
+    alone = not solver.chain.parameters  # self-motions of redundant arms are told by `all_motions`
+    for n in np.flatnonzero(certainty != CERTAIN).tolist() if alone else ():
+        own = q_ref[0 if len(q_ref) == 1 else n]
+        rows = np.where(robot.slides, q[n], wrap_to_pi(q[n]))
+        settled[n] = settle(robot, T[n], rows[np.isfinite(rows[:, 0])], own, values[n : n + 1], int(certainty[n]))
+        q[n] = nearest_equivalent(robot, _in_slots(robot, rows, settled[n]), own)
+        inside[n] = within(robot, q[n])
+    for n in np.flatnonzero(certainty != CERTAIN).tolist() if not alone else ():
+        own = q_ref[0 if len(q_ref) == 1 else n]
+        if solver.poses_at(T[n]).error(to_rows(robot, own)) < 1e-11:
+            far = np.abs(q[n] - own).max(axis=1)
+            slot = int(np.argmin(np.where(np.isnan(far), 1e3, far)))
+            if not far[slot] < SAME_ROW:
+                q[n, slot], inside[n, slot] = own, within(robot, own)
+    return ClassSlots(q, inside, certainty, settled)
+
+
+Pendant = tuple[Reals, Reals, Flags, Reals, Reals]
+
+
+@kernel
+def to_pendant(pendant: Pendant, x: Reals, q_ref: Reals, q: Reals, inside: Flags) -> None:
+    """Fill ``q`` (N, S, n) with the manufacturer's values of rows x (N, S, n), in the turns that
+    :func:`er3a.robots.joint_limits.nearest_equivalent` takes, and ``inside`` (N, S)."""
+    direction, start, sliding, lower, upper = pendant
+    slots, n, per_turn = x.shape[1], x.shape[2], 1.0 / TURN
+    for i in range(x.shape[0]):
+        ref = q_ref[i if q_ref.shape[0] > 1 else 0]
+        for slot in range(slots):
+            inside[i, slot] = not np.isnan(x[i, slot, 0])
+        for j in range(n):
+            least, most = lower[j] - LIMIT_TOLERANCE, upper[j] + LIMIT_TOLERANCE
+            for slot in range(slots):
+                value = direction[j] * (x[i, slot, j] - start[j])
+                if not sliding[j]:
+                    value += TURN * np.rint((ref[j] - value) * per_turn)
+                    low, high = np.ceil((least - value) * per_turn), np.floor((most - value) * per_turn)
+                    if low <= high:
+                        value += TURN * min(max(0.0, low), high)
+                    else:
+                        below, above = value + TURN * (low - 1.0), value + TURN * low
+                        value = below if lower[j] - below < above - upper[j] else above
+                q[i, slot, j] = value
+                inside[i, slot] &= (value <= most) & (value >= least)
 
 
 def _in_slots(robot: Robot, rows: Reals, settled: Settled) -> Reals:

@@ -10,11 +10,12 @@ Three kinds exist for a wrist-partitioned arm, each a line or curve of solutions
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from er3a.display import Displayed, Sheet, shortly
-from er3a.geometry.angles import TURN, wrap_to_pi
+from er3a.geometry.angles import TURN, greatest_move, wrap_to_pi
 from er3a.kinematics.aligned_wrist import (
     SOLVES_M,
     SOLVES_RAD,
@@ -24,6 +25,7 @@ from er3a.kinematics.aligned_wrist import (
     wrist_centre_on_axis,
     wrist_line,
 )
+from er3a.kinematics.chain import arm_length
 from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.forward import frames, jacobian
 from er3a.kinematics.singularity import SingularityType
@@ -35,6 +37,8 @@ from er3a.robots.robot import Robot
 GRID = np.radians(2.0)
 SPLIT, ROUNDS = 16, 10  # an interval is cut into so many parts, so often
 SAME_FAMILY = 1e-8
+SAME_CURVE = 1e-7  # rad
+FREE_MOTION = 1e-7  # singular value below which joints move with the tool at rest
 CURVES: tuple[tuple[SingularityType, int, int], ...] = (("shoulder", 4, 0), ("elbow", 2, 1))  # slots apart, joint
 FREE_JOINT: dict[SingularityType, int] = {"shoulder": 0, "elbow": 1}
 
@@ -66,6 +70,24 @@ class Family(Displayed):
     branches: tuple[int, ...]
     robot: Robot
     T: Reals
+
+    @cached_property
+    def dimension(self) -> int:
+        """In how many ways the joints can move at most members with the tool at rest; 2 on a surface of solutions.
+
+        A surface is given by its curves through q0 alone.
+        """
+        J = jacobian(self.robot, self.members(np.linspace(float(self.range[0]), float(self.range[1]), 5)))
+        J[:, :3] /= arm_length(self.robot)
+        values = np.linalg.svd(J, compute_uv=False)
+        return int(np.median((values < FREE_MOTION).sum(axis=1)))
+
+    def holds(self, q: Reals) -> bool:
+        """Whether joint values (6,) are a member of a curve, turns aside; False for the lines of a wrist."""
+        if self.kind == "wrist":
+            return False
+        joint = FREE_JOINT[self.kind]
+        return bool(np.abs(wrap_to_pi(self.members(q[joint] - self.q0[joint]) - q)).max() < SAME_CURVE)
 
     def members(self, t: Reals) -> Reals:
         """Joint angles (..., 6) in rad at parameters (...,)."""
@@ -109,7 +131,11 @@ def _add(found: list[Family], new: list[Family]) -> None:
     for family in new:
         for k, known in enumerate(found):
             same = known.kind == family.kind and np.abs(known.q0 - family.q0).max() < SAME_FAMILY
-            if same and np.abs(known.direction - family.direction).max() < SAME_FAMILY:
+            if known.kind == family.kind and known.holds(family.q0) and greatest_move(known.q0, family.q0) < TURN / 2:
+                same = True
+            elif same:
+                same = bool(np.abs(known.direction - family.direction).max() < SAME_FAMILY)
+            if same:
                 both = tuple(sorted({*known.branches, *family.branches}))
                 found[k] = replace(known, branches=both)
                 break

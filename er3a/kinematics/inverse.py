@@ -22,7 +22,7 @@ from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.closed_form import FREE, OFF_AXIS, ORIENTATION, REACHED, TOO_FAR
 from er3a.kinematics.configuration import side_of, slot_labels
 from er3a.kinematics.families import Family, families
-from er3a.kinematics.forward import checked_joints
+from er3a.kinematics.forward import checked_joints, forward
 from er3a.kinematics.numerical import all_found, solve
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.solutions import (
@@ -47,6 +47,7 @@ from er3a.robots.robot import Robot
 
 SAME_JOINTS = 1e-9
 SAME_MEMBER = 1e-6
+SOLVES = 1e-12  # m and parts of 1
 MOST_ROWS = 10_000
 STARTS = 400
 MISS_RESTARTS = 20
@@ -93,10 +94,28 @@ def inverse(robot: Robot, T: Reals, q_ref: Reals | None = None, redundancy: Real
         if family.within_limits and greatest_move(np.concatenate(rows), family.q0).min() > SAME_MEMBER:
             slots.append(family.branches[0])
             rows.append(family.q0[None])
+    _with_own(robot, T, q_ref, q, slots, rows)
     q, branch = _stacked(slots, rows, 6)
     inside = within(robot, q)
     unsolved = _unsolved(robot, fault, gap)
     return Solutions(robot, q, np.ones_like(inside), inside, branch, unsolved=unsolved, families=continua)
+
+
+def _with_own(robot: Robot, T: Reals, q_ref: Reals, q: Reals, slots: list[int], rows: list[Reals]) -> None:
+    """Add the reference to the rows if it solves the pose to rounding and is none of them.
+
+    Next to two singularities roots are known to 1e-8 rad only, so the arm's own row can lie beyond a limit that its
+    joints keep.
+    """
+    if not slots or not within(robot, q_ref) or np.abs(forward(robot, q_ref) - T).max() > SOLVES:
+        return
+    listed = np.concatenate(rows)
+    near = greatest_move(listed, q_ref)
+    if (within(robot, listed) & (near < SAME_MEMBER)).any():
+        return
+    away = np.abs(wrap_to_pi(q - q_ref)).max(axis=1)
+    slots.append(int(np.nanargmin(away)))
+    rows.append(q_ref[None])
 
 
 def _stacked(branches: list[int], rows: list[Reals], joints: int) -> tuple[Reals, Integers]:
@@ -110,8 +129,8 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None) ->
     if isinstance(solver, UnsolvedChain):
         return _by_iteration(robot, T, q_ref)
     values = checked_parameters(robot, redundancy, q_ref[None], 1)
-    slots, certainty, settled = slots_of_class(robot, T[None], q_ref[None], values)
-    motions = settled[0].motions if settled else ()
+    found = slots_of_class(robot, T[None], q_ref[None], values)
+    slots, motions = found.q, found.settled[0].motions if found.settled else ()
     if len(solver.parameters) == 1:
         motions = all_motions(robot, T, q_ref, values).motions
     branches: list[int] = np.flatnonzero(np.isfinite(slots[0, :, 0])).tolist()
@@ -122,7 +141,7 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None) ->
             if motion.within_limits and greatest_move(listed, member).min(initial=np.inf) > SAME_MEMBER:
                 branches.append(slot_of(robot, T, member))
                 rows.append(member[None])
-    certain = certainty[0] == CERTAIN or solver.code not in BY_ELIMINATION
+    certain = found.certainty[0] == CERTAIN or solver.code not in BY_ELIMINATION
     unsolved: tuple[Unsolved, ...] = ()
     if not branches:
         near = solve(robot, T, q_ref, mask=task_mask(robot), respect_limits=False, restarts=MISS_RESTARTS)

@@ -48,11 +48,13 @@ class ByClass:
     ----------
     certain : whether the solver left no doubt that these are all
     named : whether signs of factors separate the solutions, so that branches have names; else they are numbered
+    cuspidal : whether :mod:`er3a.kinematics.cuspidal` was asked and joined two solutions without a singularity
     """
 
     arm_class: ArmClassCode
     certain: bool
     named: bool
+    cuspidal: bool = False
     code: Literal["by_class"] = "by_class"
 
 

@@ -53,6 +53,13 @@ class CoupledWrist:
 
 
 @dataclass(frozen=True)
+class CoupledJoints:
+    """Joints depend on one another: they are coupled, or sums of them are limited."""
+
+    code: Literal["coupled_joints"] = "coupled_joints"
+
+
+@dataclass(frozen=True)
 class ElbowAxesNotParallel:
     """Axes 2 and 3 are not parallel."""
 
@@ -84,7 +91,13 @@ class NoArmLength:
 
 
 ClosedFormMissing = (
-    NotSixTurning | CoupledWrist | ElbowAxesNotParallel | NeighboursParallel | NoWristCentre | NoArmLength
+    NotSixTurning
+    | CoupledWrist
+    | CoupledJoints
+    | ElbowAxesNotParallel
+    | NeighboursParallel
+    | NoWristCentre
+    | NoArmLength
 )
 
 

@@ -9,8 +9,9 @@ A table is a frozen dataclass of equally long arrays::
         q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
         point_mm: Reals = vector("{}_mm", "tool point in the base frame", "mm")
 
-``q_deg`` is (rows, n) and written as ``q1_deg ... qn_deg``, ``point_mm`` (rows, 3) as ``x_mm, y_mm, z_mm``. Unit and
-meaning go into the file. A column of findings is written as JSON texts, with each finding's code and parameters.
+``q_deg`` is (rows, n) and written as ``q1_deg ... qn_deg`` (of joints that slide ``q3_mm``, in mm), ``point_mm``
+(rows, 3) as ``x_mm, y_mm, z_mm``. Unit and meaning go into the file. A column of findings is written as JSON texts,
+with each finding's code and parameters.
 """
 
 from __future__ import annotations
@@ -69,18 +70,26 @@ class Column:
         """Whether the array has two dimensions and each column of it a name of its own."""
         return "{}" in self.pattern
 
-    def names(self, width: int) -> list[str]:
-        """Names in the file, of a group with so many columns."""
+    def names(self, width: int, slides: tuple[bool, ...] = ()) -> list[str]:
+        """Names in the file, of a group with so many columns; ``slides`` tells which joints are distances."""
         if not self.is_group:
             return [self.pattern]
-        return [self.pattern.format(part) for part in self.parts or range(1, width + 1)]
+        if self.parts or not any(slides):
+            return [self.pattern.format(part) for part in self.parts or range(1, width + 1)]
+        return [(self.in_mm if slides[k] else self.pattern).format(k + 1) for k in range(width)]
+
+    @property
+    def in_mm(self) -> str:
+        """The name's pattern where the joint is a distance."""
+        return self.pattern.replace("_deg", "_mm")
 
     def found_in(self, names: Iterable[str]) -> list[str]:
         """Those names of a file that belong to this column, in order."""
         present = set(names)
         if not self.is_group or self.parts:
             return [name for name in self.names(0) if name in present]
-        pattern = re.compile(re.escape(self.pattern).replace(r"\{\}", r"(\d+)"))
+        both = "|".join(re.escape(each).replace(r"\{\}", r"\d+") for each in (self.pattern, self.in_mm))
+        pattern = re.compile(rf"(?=\D*(\d+))(?:{both})")
         numbered = {int(match[1]): name for name in present if (match := pattern.fullmatch(name))}
         return [numbered[number] for number in sorted(numbered)]
 
@@ -120,6 +129,8 @@ class Table:
 
     joints: ClassVar[int] = 6
     """Columns of a group that counts joints, in a table without rows."""
+    slides: ClassVar[tuple[bool, ...]] = ()
+    """Which joints are distances, whose columns are in mm; of a table of its own by :meth:`of_joints`."""
 
     def __post_init__(self) -> None:
         lengths = {}
@@ -131,6 +142,19 @@ class Table:
             lengths[name] = len(array)
         if len(set(lengths.values())) > 1:
             raise ValueError(f"{type(self).__name__}: columns of different lengths: {lengths}")
+
+    def of_joints(self, slides: Iterable[bool]) -> Self:
+        """The same table, of an arm whose joints slide where ``slides`` (n,) tells; one without rows gets n columns."""
+        flags = tuple(bool(each) for each in slides)
+        groups = {name for name, spec in self.columns().items() if spec.is_group and not spec.parts}
+        if len(self) or not groups:
+            found = replace(self)
+        else:
+            empty = {name: np.empty((0, len(flags)), self.columns()[name].dtype) for name in groups}
+            found = replace(self, **empty)
+        if any(flags):
+            object.__setattr__(found, "slides", flags)
+        return found
 
     @classmethod
     def columns(cls) -> dict[str, Column]:
@@ -172,7 +196,10 @@ class Table:
 
     def take(self, rows: NDArray[Any]) -> Self:
         """The chosen rows: a mask (rows,) or row numbers."""
-        return type(self)(**{name: getattr(self, name)[rows] for name in self.columns()})
+        taken = type(self)(**{name: getattr(self, name)[rows] for name in self.columns()})
+        if self.slides:
+            object.__setattr__(taken, "slides", self.slides)
+        return taken
 
     def frame(self) -> pd.DataFrame:
         """The table for pandas, with the names and the values of the file."""
@@ -182,14 +209,15 @@ class Table:
         for name, spec in self.columns().items():
             array = getattr(self, name)
             parts = array.T if spec.is_group else [array]
-            for part_name, part in zip(spec.names(len(parts)), parts):
+            for part_name, part in zip(spec.names(len(parts), self.slides), parts):
                 yield part_name, np.array([_coded(each) for each in part], object) if spec.kind else part, spec
 
     def write(self, file: Path) -> None:
         """Write a Parquet file; equal tables give equal bytes."""
         schema, arrays = [], []
         for name, values, spec in self._flat():
-            schema.append(pa.field(name, spec.arrow_type, metadata={"unit": spec.unit, "meaning": spec.meaning}))
+            unit = spec.unit.replace("deg", "mm") if self.slides and name not in spec.names(len(name)) else spec.unit
+            schema.append(pa.field(name, spec.arrow_type, metadata={"unit": unit, "meaning": spec.meaning}))
             arrays.append(pa.array(np.ascontiguousarray(values), spec.arrow_type))
         pq.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(schema)), file, compression="zstd")
 
@@ -197,16 +225,22 @@ class Table:
     def read(cls, content: bytes) -> Self:
         """Read what :meth:`write` wrote; ``KeyError`` naming a column that is missing."""
         stored = pq.read_table(pa.BufferReader(content))
-        arrays = {}
+        arrays: dict[str, Any] = {}
+        slides: tuple[bool, ...] = ()
         for name, spec in cls.columns().items():
             names = spec.found_in(stored.column_names)
+            if spec.is_group and not spec.parts and any("_mm" in each for each in names):
+                slides = tuple("_mm" in each for each in names)
             if not names or (spec.parts and len(names) != len(spec.parts)):
                 raise KeyError(spec.pattern)
             parts = [stored[part].to_numpy() for part in names]
             arrays[name] = np.stack(parts, axis=1).astype(spec.dtype) if spec.is_group else parts[0]
             if spec.kind:
                 arrays[name] = _array(tuple(_decoded(spec.kind, text) for text in parts[0]), spec)
-        return cls(**arrays)
+        found = cls(**arrays)
+        if slides:
+            object.__setattr__(found, "slides", slides)
+        return found
 
 
 def _array(values: tuple[Any, ...], spec: Column) -> NDArray[Any]:

@@ -183,10 +183,10 @@ def out_of_limits(robot: Robot, t: Reals, q: Reals, joints: Joints) -> list[Inte
 
     Parameters
     ----------
-    t : (N,), s; q : (N, 6), rad, NaN where unreachable; joints : angles (..., 6) at times (...,)
+    t : (N,), s; q : (N, n), rad or m, NaN where unreachable; joints : values (..., n) at times (...,)
     """
     found: list[Interval[AboveLimit | BelowLimit]] = []
-    for j in range(q.shape[-1]):
+    for j in np.flatnonzero(~robot.continuous).tolist():
         for sign, limit, finding in ((1.0, robot.upper[j], AboveLimit), (-1.0, robot.lower[j], BelowLimit)):
 
             def beyond(at: float, j: int = j, sign: float = sign, limit: float = limit) -> float:
@@ -194,7 +194,8 @@ def out_of_limits(robot: Robot, t: Reals, q: Reals, joints: Joints) -> list[Inte
 
             values = sign * (q[:, j] - limit) - LIMIT_TOLERANCE
             for start, end, most in _where_positive(t, values, beyond):
-                reached, bound = np.degrees([limit + sign * most, limit]).tolist()
+                scale = 1000.0 if robot.slides[j] else float(np.degrees(1.0))
+                reached, bound = scale * (limit + sign * most), scale * float(limit)
                 found.append(Interval(start, end, finding(j + 1, reached, bound)))
     return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
 

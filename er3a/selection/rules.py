@@ -46,12 +46,15 @@ class Rule:
 
 
 def joint_weights(robot: Robot) -> Reals:
-    """Weights (6,) of joint moves: the greatest lever (m) at which each joint swings the tool, the longest being 1.
+    """Weights (n,) of joint moves: the greatest lever (m) at which each joint swings the tool, the longest being 1.
 
-    A joint near the base moves more of the arm; a joint with no lever still counts a tenth.
+    A joint near the base moves more of the arm; a joint with no lever still counts a tenth. A joint that slides moves
+    the tool by as much as itself.
     """
     lengths = np.abs(robot.a) + np.abs(robot.d)
-    outward = np.array([lengths[k:].sum() for k in range(6)]) + np.linalg.norm(robot.tool[:3, 3])
+    outward = np.array([lengths[k:].sum() for k in range(robot.joints)]) + np.linalg.norm(robot.tool[:3, 3])
+    if robot.sliding.any():
+        outward = np.where(robot.slides, 1.0, outward)
     weights: Reals = np.maximum(outward / outward.max(), 0.1)
     return weights
 
@@ -104,6 +107,8 @@ def mixed_cost(weights: Mapping[RuleName, float], costs: Mapping[RuleName, Reals
     total = np.zeros(len(allowed))
     for name, weight in weights.items():
         least, most = (costs[name][allowed].min(), costs[name][allowed].max()) if allowed.any() else (0.0, 1.0)
+        if not np.isfinite(least):  # nothing can meet: the rule tells no rows apart
+            continue
         total += weight * (costs[name] - least) / (most - least if most > least else 1.0)
     return total
 

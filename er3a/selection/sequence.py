@@ -53,7 +53,7 @@ class SequenceChoice(Displayed):
         rows = ((pose, row, *angles) for pose, row, angles in zip(range(len(self.q)), self.rows, np.degrees(self.q)))
         shown, left_out = first_rows(rows, len(self.q))
         heading = f"Sequence of {len(self.q)} poses: cost {self.cost:.6g}; nearest each time: {self.greedy_cost:.6g}"
-        return Sheet(heading, ("pose", "row", *(f"q{joint}_deg" for joint in range(1, 7))), shown, left_out)
+        return Sheet(heading, ("pose", "row", *(f"q{k + 1}_deg" for k in range(self.q.shape[1]))), shown, left_out)
 
 
 def select_sequence(

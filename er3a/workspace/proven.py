@@ -7,9 +7,12 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.kinematics.wrist_partitioned import ClosedFormMissing, closed_form_missing
+from er3a.kinematics.chain import constant_links
+from er3a.kinematics.wrist_partitioned import ClosedFormMissing, CoupledJoints, closed_form_missing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
+from er3a.sampling.grid import tool_bound
+from er3a.workspace.azimuths import MOST_ARCS, TURN
 from er3a.workspace.cavities import cavities, rim
 from er3a.workspace.general import prove_general
 from er3a.workspace.general_arm import general_arm
@@ -21,6 +24,7 @@ from er3a.workspace.witness import lies_in_cell, reach_points, witness_joints
 
 CellState = Literal["filled", "touched", "empty", "undecided", "partly_filled"]
 
+SIX = 6
 TARGET = 0.002
 VOID_RATIO = 0.25
 GENERAL_CELLS, GENERAL_SAMPLES, GENERAL_BOXES = 4, 250, 1000
@@ -92,7 +96,9 @@ class Proven:
 
 def prove_robot(robot: Robot, most_cells: int, points: int, seed: int) -> Proven:
     """Run the proof and the estimate that rests on it; bounds by lengths alone where the arm's build gives no more."""
-    if lacks := closed_form_missing(robot):
+    if lacks := lacking_for_proof(robot):
+        if robot.joints != SIX or robot.sliding.any() or robot.coupling is not None or robot.combined:
+            return _bounded_by_lengths(robot, points, seed, lacks)
         return _prove_general(robot, most_cells, points, seed, lacks)
     arm = section_arm(robot)
     section = SectionMap(prove(arm, TARGET, int((1 - VOID_RATIO) * most_cells)))
@@ -100,6 +106,33 @@ def prove_robot(robot: Robot, most_cells: int, points: int, seed: int) -> Proven
     estimate = estimate_volume(arm, section, arm.reach, arm.heights, points, seed)
     witness = witness_joints(robot, arm, section.proof)
     return Proven(arm, section.proof, section, *section_frame(robot), witness, estimate, SphericalWrist())
+
+
+def lacking_for_proof(robot: Robot) -> ClosedFormMissing | None:
+    """Why the method for spherical wrists does not apply, which takes each joint's range by itself; None if it does."""
+    if robot.coupling is not None or robot.combined:
+        return CoupledJoints()
+    return closed_form_missing(robot)
+
+
+def _bounded_by_lengths(robot: Robot, points: int, seed: int, lacks: ClosedFormMissing) -> Proven:
+    """One ring that the tool point can't leave, of arms with other joints, or with some that depend on one another."""
+    bound = tool_bound(robot)
+    low, high = bound.height - bound.radius, bound.height + bound.radius
+    unfilled, empty = np.full((2, 1, MOST_ARCS, 2), np.nan)
+    unfilled[0, 0] = 0.0, TURN
+    cells, none = np.array([[0.0, bound.reach, low, high]]), np.zeros((1, 4))
+    proof = Proof(cells, unfilled, empty, np.zeros(1, dtype=np.int64), none, 0)
+    section = SectionMap(proof)
+    estimate = estimate_volume(_nothing_found, section, bound.reach, (low, high), points, seed)
+    R = constant_links(robot)[0, :3, :3].T
+    witness = np.full((1, robot.joints), np.nan)
+    return Proven(None, proof, section, R, bound.axis_point, witness, estimate, GeneralMethod(lacks))
+
+
+def _nothing_found(local: Reals) -> Flags:
+    """A search that leaves every point undecided."""
+    return np.zeros(len(local), dtype=bool)
 
 
 def _prove_general(robot: Robot, most_cells: int, points: int, seed: int, lacks: ClosedFormMissing) -> Proven:

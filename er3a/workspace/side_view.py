@@ -70,7 +70,7 @@ def side_views(robot: Robot, tally: Tally, grid: Grid, draw: Draw) -> list[SideV
     """Side views of the tool point and, with fewer samples, of the wrist centre, if there is one."""
     front = _front(robot, plane_direction(robot))
     found = [_side_view("tool_point", grid, tally, front)]
-    if closed_form_missing(robot):
+    if closed_form_missing(robot) or robot.coupling is not None:
         return found
     bare = at_wrist_centre(robot)
     wrist_grid = make_grid(bare, max(grid.shape))
@@ -87,7 +87,7 @@ def _side_view(point: Literal["tool_point", "wrist_centre"], grid: Grid, tally: 
 
 def border_lines(robot: Robot) -> list[BorderLine]:
     """Exact borders of tool point, flange and wrist centre; none without a spherical wrist."""
-    if closed_form_missing(robot):
+    if closed_form_missing(robot) or robot.coupling is not None or robot.combined:
         return []
     front, elbow = _front(robot, section_frame(robot)[0][0]), wrist_partitioned_arm(robot).elbow_sign
     arms: dict[BorderPoint, SectionArm] = {

@@ -20,6 +20,7 @@ from er3a.kinematics.classes.gantry import Gantry, gantry, solve_gantry
 from er3a.kinematics.classes.links import axes_of, inverse_rigid, poses_of, size_of
 from er3a.kinematics.classes.parallel_axes import ThreeParallel, three_parallel
 from er3a.kinematics.classes.scara import Scara, scara, solve_scara
+from er3a.kinematics.classes.self_motion import PoseChain
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, SixRevolute, prepared, solve_six_revolute
 from er3a.kinematics.classes.spherical_joints import about_x, about_z, frame_along
 from er3a.kinematics.closed_form import BOUNDARY_M, REACHED, ArmConstants, solve
@@ -65,6 +66,7 @@ SlotName = Literal[
 ]
 SLOT_NAMES: tuple[SlotName, ...] = get_args(SlotName)
 LEFT_OVER = 1e-6  # rad by which a pose may miss those that fewer than six joints can take
+RANK_LOST = 1e-6  # smallest singular value below which a joint may be free
 NEAR_SINGULAR = 1e-7  # rad or parts of the reach: a closed form's row so near to its singular sets is looked at again
 PREFERENCE: tuple[ArmClassCode, ...] = (
     "spherical_wrist",
@@ -162,8 +164,13 @@ class ParallelAxes(_Fixed):
     slots: int = 8
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
-        q, singular = solve_three_parallel(self.arm, T)
-        return q, np.where(singular, CONTINUUM, CERTAIN)
+        q, marked = solve_three_parallel(self.arm, T)
+        certainty = np.full(len(T), CERTAIN)
+        for n in np.flatnonzero(marked):
+            chain = PoseChain.of(self.arm.links, np.zeros(6, dtype=bool), T[n], size_of(self.arm.links))
+            solved = q[n][np.isfinite(q[n, :, 0])]
+            certainty[n] = CONTINUUM if any(chain.smallest(x) < RANK_LOST for x in solved) else CERTAIN
+        return q, certainty
 
     def seeds(self, T: Reals, values: Reals) -> Reals:
         found = [
@@ -200,16 +207,23 @@ class ArmAngle:
     """Seven joints with a spherical shoulder and wrist."""
 
     arm: ArmAngleArm
+    spare: ArmAngleArm  # with another reference
     code: ArmClassCode = "arm_angle"
     slots: int = 8
     parameters: tuple[Redundancy, ...] = (Redundancy(-1, "arm_angle"),)
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
         q, singular = solve_at_arm_angle(self.arm, T, values[:, 0])
+        lost = np.flatnonzero(singular & np.isnan(q).all(axis=(1, 2)))
+        if lost.size:  # shoulder and wrist may be in line with the reference
+            q[lost] = solve_at_arm_angle(self.spare, T[lost], np.nan_to_num(values[lost, 0]))[0]
         return q, np.where(singular, CONTINUUM, CERTAIN)
 
     def values_of(self, x: Reals) -> Reals:
-        return arm_angles_of(self.arm, x)[..., None]
+        angles = arm_angles_of(self.arm, x)
+        if np.isnan(angles).any():
+            angles = np.where(np.isnan(angles), arm_angles_of(self.spare, x), angles)
+        return angles[..., None]
 
     def seeds(self, T: Reals, values: Reals) -> Reals:
         return np.empty((0, 7))
@@ -394,9 +408,9 @@ def chain_solver(links: Reals, sliding: Flags) -> ChainSolver:
     if n == 6:
         return _of_six(links, sliding)
     if n == 7 and not sliding.any():
-        arm = arm_angle_arm(links)
-        if arm is not None:
-            return ArmAngle(arm)
+        arm, spare = arm_angle_arm(links), arm_angle_arm(links, frame_along(axes_of(links)[0][0])[0])
+        if arm is not None and spare is not None:
+            return ArmAngle(arm, spare)
     if n > 6:
         return _locked(links, sliding)
     if n == 4 and (planar := scara(links, sliding)) is not None:

@@ -377,6 +377,10 @@ class PoseChain:
         count = roots_from_starts(self.links, self.sliding, self.T, starts, out)
         return self._in_m(out[:count])
 
+    def moves(self, x: Reals) -> bool:
+        """Whether joint values (n,) that solve the pose can move with the tool at rest."""
+        return free_direction(self.links, self.sliding, self.T, self._scaled(x), np.empty(len(x))) > 0
+
     def curve(self, x: Reals) -> Curve | None:
         """The curve through joint values (n,) that solve the pose; None if they can't move with the tool at rest."""
         start, v = self._scaled(x), np.empty(len(x))

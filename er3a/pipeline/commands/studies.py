@@ -62,7 +62,8 @@ def check(
     as_json: AsJson = False,
 ):
     """Check input files and say of each what it is, or what is wrong with it."""
-    from er3a.pipeline.check import check_file
+    from er3a.files.robot_library import load_robot
+    from er3a.pipeline.check import check_file, stage_forms
 
     found: list[dict[str, object]] = []
     for file in files:
@@ -73,9 +74,12 @@ def check(
             parts = {key: getattr(error, key, None) for key in ("field", "problem", "remedy")}
             found.append({"file": str(file), "in_order": False, **parts})
             continue
-        found.append({"file": str(file), "in_order": True, "kind": kind})
+        forms = stage_forms(load_robot(file)) if kind == "a robot" else {}
+        found.append({"file": str(file), "in_order": True, "kind": kind} | ({"stages": forms} if forms else {}))
         if not as_json:
             print(f"{file}: {kind}, in order")
+            for stage, form in forms.items():
+                print(f"  {stage}: {form}")
     if as_json:
         print_json(found)
     if not all(each["in_order"] for each in found):

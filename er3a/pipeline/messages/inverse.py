@@ -33,7 +33,7 @@ FREE_AT = {
     "wrist": N_("axes 4 and 6 in line"),
     "shoulder": N_("wrist centre on axis 1"),
     "elbow": N_("arm folded onto itself"),
-    "curve": N_("dependent axes"),
+    "curve": N_("self-motion"),
 }
 AT = {
     "wrist": N_(

@@ -22,6 +22,7 @@ from er3a.kinematics.solutions import (
     WristTooNearAxis1,
 )
 from er3a.kinematics.wrist_partitioned import (
+    CoupledJoints,
     CoupledWrist,
     ElbowAxesNotParallel,
     NeighboursParallel,
@@ -154,6 +155,11 @@ def _(found: CoupledWrist) -> str:
 
 
 @say.register
+def _(found: CoupledJoints) -> str:
+    return sentence(found.code, "its joints are coupled, or sums of them have limits")
+
+
+@say.register
 def _(found: ElbowAxesNotParallel) -> str:
     return sentence(found.code, "axes 2 and 3 are not parallel")
 
@@ -178,6 +184,12 @@ def _(found: ByClass) -> str:
     parts = {"arm_class": word("arm_class", ARM_CLASSES, found.arm_class)}
     if not found.certain:
         return sentence("by_class_in_doubt", "{arm_class}; rounding leaves a doubt whether these are all", **parts)
+    if found.cuspidal:
+        return sentence(
+            "by_class_cuspidal",
+            "{arm_class}; cuspidal: joint moves without a singularity join its branches, so they are numbered",
+            **parts,
+        )
     if not found.named:
         return sentence(
             "by_class_numbered", "{arm_class}; no signs separate its branches, so they are numbered", **parts

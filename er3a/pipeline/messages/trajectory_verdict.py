@@ -32,5 +32,10 @@ def _(found: PathCounts) -> str:
         found.paths,
         safe=found.safe,
     )
+    if found.not_followed:
+        parts = {"count": len(found.not_followed), "names": ", ".join(found.not_followed)}
+        faults.append(
+            sentence("trajectory.not_followed", "{count} not followed for want of branches ({names})", **parts)
+        )
     told = [safe if found.paths else "", joined(faults, ", "), demonstrated(found.demonstrations)]
     return sentence("trajectory.verdict", "{finding}.", finding=joined(told))

@@ -20,7 +20,7 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.teach.scripts import import_map
 from er3a.pipeline.teach.words import WORDS
 from er3a.pipeline.viewing.page import render, run_command
-from er3a.pipeline.viewing.palette import BODY, INK, JOINT_NAMES, JOINTS, LINK
+from er3a.pipeline.viewing.palette import BODY, INK, JOINT_NAMES, LINK, SIX_JOINTS
 from er3a.robots.robot import Robot
 
 _HERE = Path(__file__).parent
@@ -44,8 +44,8 @@ def write_teach_page(study: Study, name: str, output: Path) -> None:
         output,
         robot=robot,
         robot_pages=study.pages(name),
-        joint_names=JOINT_NAMES,
-        joint_colours=JOINTS,
+        joint_names=JOINT_NAMES[:6],
+        joint_colours=SIX_JOINTS,
         degrees=float(np.degrees(1.0)),
         words=panel["words"],
         panel=panel,
@@ -75,8 +75,8 @@ def panel_data(robot: Robot, near: dict[str, float]) -> dict[str, Any]:
         "no_closed_form": say(missing) if missing else None,
         "branch_labels": labels,
         "near": {**near, "limit": NEAR_LIMIT, "value": NEAR_SINGULAR},
-        "joint_names": JOINT_NAMES,
-        "colours": {"joints": JOINTS, "link": LINK, "body": BODY, "mark": INK},
+        "joint_names": JOINT_NAMES[:6],
+        "colours": {"joints": SIX_JOINTS, "link": LINK, "body": BODY, "mark": INK},
         "words": _translated(WORDS),
     }
 

@@ -10,7 +10,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from er3a.kinematics.chain import ALONG_Z, JOINTS, TO_NEXT_AXIS, link_parts
+from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, link_parts
 from er3a.kinematics.forward import frames
 from er3a.pipeline.viewing.palette import BODY, JOINT_NAMES, LINK, rgb
 from er3a.pipeline.viewing.palette import JOINTS as JOINT_COLOURS
@@ -58,9 +58,9 @@ def log_arm(stream: rr.RecordingStream, robot: Robot, q: np.ndarray, entity: str
     radius = 0.028 * size_of(robot)
     parts = link_parts(robot)
     _log_base(stream, robot, entity, radius, ghost)
-    for k in range(JOINTS):
+    for k in range(robot.rows):
         path = f"{entity}/link_{k + 1}"
-        size = radius * _TAPER[k]
+        size = radius * _TAPER[min(k, len(_TAPER) - 1)]
         along = parts[k + 1, ALONG_Z, :3, 3]
         across = along + parts[k + 1, TO_NEXT_AXIS, :3, 3]
         _log_segments(stream, f"{path}/body", [(np.zeros(3), along), (along, across)], size * 0.75, ghost)
@@ -90,7 +90,7 @@ def log_arm(stream: rr.RecordingStream, robot: Robot, q: np.ndarray, entity: str
 
 def log_pose(stream: rr.RecordingStream, robot: Robot, q: np.ndarray, entity: str = "arm") -> None:
     """Set the arm's pose for all times: joint angles (6,) in rad."""
-    for path, T in zip(_moving_entities(entity), frames(robot, q)):
+    for path, T in zip(_moving_entities(robot, entity), frames(robot, q)):
         stream.log(path, rr.Transform3D(translation=T[:3, 3], mat3x3=T[:3, :3]), static=True)
 
 
@@ -99,14 +99,14 @@ def send_motion(
 ) -> None:
     """Animate the arm: times (N,) in s, joint angles (N, 6) in rad without NaN."""
     poses = frames(robot, q)
-    for k, path in enumerate(_moving_entities(entity)):
+    for k, path in enumerate(_moving_entities(robot, entity)):
         T = poses[:, k]
         columns = rr.Transform3D.columns(translation=T[:, :3, 3], mat3x3=T[:, :3, :3])
         stream.send_columns(path, [seconds(times)], columns)
 
 
-def _moving_entities(entity: str) -> list[str]:
-    return [*(f"{entity}/link_{k + 1}" for k in range(JOINTS)), f"{entity}/tool"]
+def _moving_entities(robot: Robot, entity: str) -> list[str]:
+    return [*(f"{entity}/link_{k + 1}" for k in range(robot.rows)), f"{entity}/tool"]
 
 
 def _log_base(stream: rr.RecordingStream, robot: Robot, entity: str, radius: float, ghost: bool) -> None:

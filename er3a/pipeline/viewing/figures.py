@@ -15,7 +15,7 @@ from matplotlib.rcsetup import cycler
 from matplotlib.text import Text
 
 from er3a.pipeline.messages import language
-from er3a.pipeline.viewing.palette import GRID, INK, JOINTS, MUTED
+from er3a.pipeline.viewing.palette import GRID, INK, MUTED, SIX_JOINTS
 
 if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
@@ -35,7 +35,7 @@ STYLE: dict[RcKeyType, Any] = {
     "axes.edgecolor": MUTED,
     "axes.grid": True,
     "axes.labelcolor": INK,
-    "axes.prop_cycle": cycler(color=JOINTS),
+    "axes.prop_cycle": cycler(color=SIX_JOINTS),
     "axes.spines.right": False,
     "axes.spines.top": False,
     "axes.titlelocation": "left",

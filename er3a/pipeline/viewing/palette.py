@@ -1,10 +1,11 @@
-"""Colours used the same way in figures and recordings; the joints' six are safe for colour-blind readers.
+"""Colours used the same way in figures and recordings; those of six joints are safe for colour-blind readers.
 
 The joint colours are the qualitative set of M. Okabe and K. Ito, "Color Universal Design", 2008.
 """
 
-JOINTS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9")
-JOINT_NAMES = ("J1", "J2", "J3", "J4", "J5", "J6")
+SIX_JOINTS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9")
+JOINTS = (*SIX_JOINTS, "#7b4fa3", "#4d4d4d", "#a05a2c", "#80b918")
+JOINT_NAMES = tuple(f"J{k}" for k in range(1, len(JOINTS) + 1))
 
 INK = "#1f2933"
 MUTED = "#7b8794"

@@ -55,6 +55,8 @@ def path_clearances(
     tables, closest = [], []
     for entry in motions:
         motion = entry.motion
+        if motion is None:
+            continue
         along = measured(Surroundings(bodies, tolerance), motion)
         q = motion.joints(along.t)
         known = np.isfinite(along.distance)

@@ -122,7 +122,7 @@ def _paths(study: Study, name: str, arm: LoadedArm, settings: DynamicsSettings) 
     joints = arm.robot.joints
     wrist = tuple(range(max(1, joints - WRIST_JOINTS + 1), joints + 1))
     motions = study_motions(study, name, CHECKS_PER_SAMPLE)
-    return [path_torques(arm, each.motion, settings.samples, wrist) for each in motions]
+    return [path_torques(arm, each.motion, settings.samples, wrist) for each in motions if each.motion]
 
 
 def _holding(arm: LoadedArm) -> tuple[HoldingTorque, ...]:

@@ -10,7 +10,7 @@ from er3a.files.scene_file import load_scene
 from er3a.files.target_file import load_targets
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.classes.chain_solvers import Unsolved
-from er3a.kinematics.round_trips import SAME_JOINTS_RAD, BatchRoundTrips, batch_round_trips
+from er3a.kinematics.round_trips import MOST_BY_CLASS, SAME_JOINTS_RAD, BatchRoundTrips, batch_round_trips
 from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
@@ -56,11 +56,12 @@ def compute(study: Study, name: str) -> InverseResults:
         for number, target in enumerate(targets)
     ]
     ranked = [rankings(robot, target, one, scene, settings.mix) for target, one in zip(targets, solved)]
-    solutions = SolutionRows.stacked(one.rows for one in solved)
+    solutions = SolutionRows.stacked(one.rows for one in solved).of_joints(robot.slides)
     results = tuple(one.result for one in solved)
     complete = not isinstance(arm_solver(robot).chain, Unsolved)
     random = np.random.default_rng([study.seed, ROUND_TRIP_STREAM])
-    trips = batch_round_trips(robot, random, settings.round_trips) if complete else None
+    wanted = settings.round_trips if has_branches(robot) else min(settings.round_trips, MOST_BY_CLASS)
+    trips = batch_round_trips(robot, random, wanted) if complete else None
     worst = _worst_residuals(solutions, trips)
     summary = InverseSummary(
         verdict=_verdict(results, worst, trips, scene is not None),

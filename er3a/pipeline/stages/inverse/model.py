@@ -42,6 +42,7 @@ class NeighbourPoses:
 class SelfMotion:
     """A continuum of solutions (``kinematics.families``, ``kinematics.self_motions``).
 
+    Above a ``dimension`` of 1 it is one curve of many on a surface of solutions.
     ``direction`` is in deg per deg of the joint that is free; of kind curve in deg per deg of its length.
     """
 
@@ -51,6 +52,7 @@ class SelfMotion:
     range_deg: tuple[float, float]
     within_limits: bool
     branches: tuple[int, ...]
+    dimension: int
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.stages.inverse.model import RankingRows, Sequence, Stop
 from er3a.pipeline.stages.inverse.solve_target import SolvedTarget, collides
 from er3a.robots.robot import Robot
+from er3a.robots.shown import shown
 from er3a.selection.rules import RULES, RuleName, available_rules, mixed_cost
 from er3a.selection.sequence import MoveRule, select_sequence
 
@@ -71,7 +72,7 @@ def sequence(
             target=one.result.name,
             branch=int(one.solutions.branch[row]),
             label=one.solutions.label[row],
-            q_deg=tuple(np.degrees(q).tolist()),
+            q_deg=tuple(shown(robot, q).tolist()),
             greedy_branch=int(one.solutions.branch[greedy]),
             greedy_label=one.solutions.label[greedy],
         )

@@ -23,6 +23,7 @@ from er3a.pipeline.viewing.scene_entities import log_scene
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import LimitsExceeded
 from er3a.robots.robot import Robot
+from er3a.robots.shown import meant
 
 STAGE = "inverse"
 AXES = ((255, 80, 80), (80, 200, 80), (110, 130, 255))
@@ -54,7 +55,7 @@ def record(study: Study, stored: Stored[InverseResults], output: Path) -> None:
     with recording(output, name, STAGE, layout) as stream:
         log_note(stream, STAGE, NOTE)
         log_scene(stream, study, name, STAGE)
-        shown = np.radians([target.chosen_deg or target.q_ref_deg for target in targets])
+        shown = meant(robot, np.array([target.chosen_deg or target.q_ref_deg for target in targets]))
         log_arm(stream, robot, shown[0])
         send_motion(stream, robot, np.arange(len(targets)), shown)
         for second, target in enumerate(targets):
@@ -83,7 +84,7 @@ def _log_target(stream: rr.RecordingStream, robot: Robot, target: TargetResult, 
     stream.log(f"{root}/point", ball)
     stream.log(f"{STAGE}/now", rr.TextDocument(_about(target, branches), media_type=rr.MediaType.MARKDOWN))
     for k, branch in enumerate(branches.branch):
-        points = skeleton(robot, np.radians(branches.q_deg[k]))
+        points = skeleton(robot, meant(robot, branches.q_deg[k]))
         entity = f"{root}/branch_{branch}"
         if not branches.rank[k]:
             stream.log(entity, rr.LineStrips3D([points], radii=0.003 * size, colors=rgb(MUTED)))

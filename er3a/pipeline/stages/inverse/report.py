@@ -35,6 +35,9 @@ from er3a.selection.rules import RULES
 NO_BREAK_SPACE = "\u00a0"
 
 
+MOST_SELF_MOTIONS = 6
+
+
 @dataclass(frozen=True)
 class TargetSection:
     """What the page says about a target, in words; the worst residuals are None where nothing solves it."""
@@ -46,6 +49,7 @@ class TargetSection:
     reference: str
     reason: str
     advice: list[str]
+    joints: list[str]
     method: str
     families: list[str]
     unsolved: str
@@ -94,8 +98,9 @@ def _section(robot: Robot, target: TargetResult, results: InverseResults) -> Tar
         reference=_listed(target.q_ref_deg),
         reason=say(target.reason),
         advice=listed(target.advice),
+        joints=[f"J{k + 1} ({'mm' if slides else '°'})>" for k, slides in enumerate(robot.slides)],
         method="" if isinstance(target.method, ClosedForm) else say(target.method),
-        families=[_self_motion(family) for family in target.families],
+        families=_self_motions(target.families),
         unsolved=joined(listed(target.unsolved)),
         rows=_branch_rows(rows, branches),
         rules=_rule_rows(results.rankings.take(results.rankings.target == target.name)),
@@ -135,6 +140,14 @@ def _rule_rows(ranked: RankingRows) -> list[list[str]]:
 def _no_noise(measure: float) -> float:
     """0 for what is nothing but rounding."""
     return 0.0 if abs(measure) < 1e-9 else float(measure)
+
+
+def _self_motions(families: tuple[SelfMotion, ...]) -> list[str]:
+    """The nearest self-motions, and how many more there are."""
+    told = [_self_motion(family) for family in families[:MOST_SELF_MOTIONS]]
+    if len(families) > MOST_SELF_MOTIONS:
+        told.append(tr("{count} more in summary.json", count=len(families) - MOST_SELF_MOTIONS))
+    return told
 
 
 def _self_motion(family: SelfMotion) -> str:

@@ -21,6 +21,7 @@ from er3a.pipeline.viewing.page import Picture
 from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, JOINT_NAMES, MODEL, MUTED
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot
+from er3a.robots.shown import meant, shown
 
 TITLE: dict[str, Any] = {"loc": "left", "fontsize": 11, "fontweight": "bold"}
 
@@ -158,14 +159,14 @@ def _draw_arms(side: Axes, top: Axes, robot: Robot, target: TargetResult, branch
             style |= {"linewidth": 5, "markersize": 7, "zorder": 6}
         if not allowed:
             style = {"color": MUTED, "linewidth": 1.3, "linestyle": "--", "markersize": 3, "zorder": 3}
-        draw(in_base(skeleton(robot, np.radians(rows.q_deg[0]))), **style)
+        draw(in_base(skeleton(robot, meant(robot, rows.q_deg[0]))), **style)
         if allowed:
             label = _shape_word(rows.label[0], int(rows.branch[0]))
             label = tr("{shape} (chosen)", shape=label) if chosen else label
             handles.append(Line2D([], [], label=label, **style))
     if not len(branches):
         style = {"color": MUTED, "linewidth": 3, "markersize": 5}
-        draw(in_base(skeleton(robot, np.radians(target.q_ref_deg))), **style)
+        draw(in_base(skeleton(robot, meant(robot, np.array(target.q_ref_deg)))), **style)
         handles.append(Line2D([], [], label=tr("arm at the reference"), **style))
     elif not (branches.rank > 0).all():
         style = {"color": MUTED, "linewidth": 1.3, "linestyle": "--", "marker": "o", "markersize": 3}
@@ -192,9 +193,9 @@ def _mark(side: Axes, top: Axes, point: np.ndarray, level: np.ndarray, label: st
 
 
 def _draw_joints(axes: Axes, robot: Robot, target: TargetResult, branches: SolutionRows) -> list[Line2D]:
-    lower, upper = np.degrees(robot.lower), np.degrees(robot.upper)
+    lower, upper = shown(robot, robot.lower), shown(robot, robot.upper)
     angles = branches.q_deg
-    for joint in range(6):
+    for joint in range(robot.joints):
         axes.barh(joint, upper[joint] - lower[joint], 0.86, left=lower[joint], color=GRID, zorder=1)
         reference = target.q_ref_deg[joint]
         axes.plot([reference, reference], [joint - 0.43, joint + 0.43], color=INK, linewidth=0.9, zorder=2)
@@ -211,13 +212,16 @@ def _draw_joints(axes: Axes, robot: Robot, target: TargetResult, branches: Solut
             elif not rank:
                 style |= {"markerfacecolor": "none"}
             axes.plot([x], [y], linestyle="none", zorder=5 if rank == 1 else 4, **style)
-    axes.set_yticks(range(6), JOINT_NAMES)
+    axes.set_yticks(range(robot.joints), JOINT_NAMES[: robot.joints])
     axes.invert_yaxis()
     axes.grid(visible=False, axis="y")
     axes.set_xticks(np.arange(-360, 361, 90))
     widest = max(np.abs([lower, upper]).max(), np.abs(angles).max()) + 15
     axes.set_xlim(-widest, widest)
-    axes.set_xlabel(tr("joint angle (deg); grey: allowed range, line: reference"))
+    what = tr("joint angle (deg); grey: allowed range, line: reference")
+    if robot.sliding.any():
+        what = tr("joint angle (deg), or mm where a joint slides; grey: allowed range, line: reference")
+    axes.set_xlabel(what)
     axes.set_title(tr("Joint angles, one mark a branch"), **TITLE)
     handles = []
     if not branches.within_limits.all():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -11,13 +11,14 @@ from er3a.collision.pairs import PairOverlaps
 from er3a.collision.scene import Scene
 from er3a.geometry.transforms import rotation_angle, rpy_of
 from er3a.kinematics.closed_form import ORIENTATION
+from er3a.kinematics.cuspidal import cuspidal_move
 from er3a.kinematics.families import Family
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.neighbours import neighbours
 from er3a.kinematics.self_motions import SelfMotionCurve
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
-from er3a.kinematics.solutions import Solutions
+from er3a.kinematics.solutions import ByClass, Method, Solutions
 from er3a.kinematics.targets import Target, TargetOutcome
 from er3a.kinematics.wrist_partitioned import has_branches, solve_slots
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -40,6 +41,7 @@ from er3a.pipeline.stages.inverse.inverse_findings import (
 from er3a.pipeline.stages.inverse.model import SINGULAR_PARTS, NeighbourPoses, SelfMotion, SolutionRows, TargetResult
 from er3a.robots.joint_limits import limit_margin
 from er3a.robots.robot import Robot
+from er3a.robots.shown import shown
 from er3a.selection.nearest import AllCollide, Choice, Refusal, nearest
 from er3a.selection.select import refusals
 
@@ -96,7 +98,7 @@ def solve_target(robot: Robot, target: Target, random: np.random.Generator, scen
         outcome=_outcome(obstacle),
         expect=target.expect,
         unsolved=solutions.unsolved,
-        method=solutions.method,
+        method=_method(robot, solutions.method),
         families=tuple(map(_self_motion, solutions.families)),
         neighbours=near,
         advice=advice,
@@ -122,7 +124,7 @@ def _rows(
         target=np.full(count, target.name, dtype=object),
         branch=solutions.branch,
         label=solutions.label,
-        q_deg=np.degrees(q) + 0.0,
+        q_deg=shown(robot, q) + 0.0,
         turn=solutions.turn,
         within_limits=solutions.within_limits,
         refusal=why,
@@ -166,12 +168,20 @@ def _self_motion(family: Family | SelfMotionCurve) -> SelfMotion:
     low, high = np.degrees(family.range).tolist()
     return SelfMotion(
         kind=family.kind,
-        q0_deg=tuple(np.degrees(family.q0).tolist()),
+        q0_deg=tuple(shown(family.robot, family.q0).tolist()),
         direction=tuple(family.direction.tolist()),
         range_deg=(low, high),
         within_limits=family.within_limits,
         branches=family.branches,
+        dimension=family.dimension,
     )
+
+
+def _method(robot: Robot, method: Method) -> Method:
+    """The method, with what is known of numbered branches."""
+    if isinstance(method, ByClass) and not method.named and method.arm_class == "general_six":
+        return replace(method, cuspidal=cuspidal_move(robot) is not None)
+    return method
 
 
 def _obstacle(robot: Robot, target: Target, solutions: Solutions, branches: int) -> Obstacle:

@@ -26,6 +26,7 @@ from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes
 from er3a.planning.way_around import PlanningTask, WayAround, way_between
 from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
+from er3a.robots.shown import shown
 
 LEAST_RATIO = 1e-3  # of the limits, below which a path counts as standing still
 ROWS = 250  # of each motion in the table
@@ -175,9 +176,9 @@ class AvoidanceTask:
             path=np.full(len(times), path, object),
             strategy=np.full(len(times), strategy, object),
             t_s=times,
-            q_deg=np.degrees(q),
-            q_deg_s=np.degrees(velocity),
-            q_deg_s2=np.degrees(acceleration),
+            q_deg=shown(self.robot, q),
+            q_deg_s=shown(self.robot, velocity),
+            q_deg_s2=shown(self.robot, acceleration),
             xyz_mm=forward(self.robot, q)[:, :3, 3] * 1000,
             deviation_mm=distance * 1000,
             deviation_deg=np.degrees(angle),

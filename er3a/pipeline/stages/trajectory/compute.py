@@ -10,8 +10,7 @@ from er3a.collision.bodies import Bodies
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.near_singular import NearSingular
 from er3a.kinematics.singularity import characteristic_length, conditioning, factors_where_defined
-from er3a.kinematics.wrist_partitioned import has_branches
-from er3a.numerics.arrays import Reals
+from er3a.kinematics.wrist_partitioned import closed_form_missing, has_branches
 from er3a.pipeline.results import Figure, Status, Verdict
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
 from er3a.pipeline.stages.trajectory.avoidance_results import AvoidanceTask, speed_ratio
@@ -28,6 +27,7 @@ from er3a.pipeline.stages.trajectory.model import (
     NearThresholds,
     NoneSafe,
     PathChecks,
+    PathNotFollowed,
     PathSummary,
     ProgramFiles,
     Samples,
@@ -43,6 +43,7 @@ from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.timing import JointLimits
 from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
+from er3a.robots.shown import shown
 
 
 def compute(study: Study, name: str) -> TrajectoryResults:
@@ -62,8 +63,12 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     strategies: list[AvoidanceRows] = []
     paths: list[PathSummary] = []
     programs: list[ProgramFiles] = []
+    skipped: list[PathNotFollowed] = []
     for each in listed_motions(file, planning, wanted, settings.checks_per_sample):
         motion = each.motion
+        if motion is None:
+            skipped.append(PathNotFollowed(each.name, each.title, closed_form_missing(robot)))
+            continue
         found = judge(robot, motion, near, limits)
         along = measured(surroundings, motion)
         avoided = avoidance.avoid(motion, found, along)
@@ -72,20 +77,20 @@ def compute(study: Study, name: str) -> TrajectoryResults:
         strategies.append(avoided.rows)
         paths.append(path_summary(robot, motion, found, along, avoided, limits))
         programs.append(program_files(robot, motion, paths[-1].verdict, settings.programs, settings.write_unsafe))
-    checks = PathChecks.stacked(tables)
+    checks = PathChecks.stacked(tables).of_joints(robot.slides)
     own = checks.take(checks.sample)
     length = characteristic_length(robot)
     assumed = tuple(bool(value) for value in ~np.isfinite(robot.speed))
     used = LimitsUsed(
-        speed_deg_s=_degrees(limits.speed),
+        speed_deg_s=_shown(robot, limits.speed),
         speed_assumed=assumed,
-        acceleration_deg_s2=_degrees(limits.acceleration),
+        acceleration_deg_s2=_shown(robot, limits.acceleration),
         acceleration_assumed=limits.acceleration_assumed,
         acceleration_time_s=settings.acceleration_time_s,
-        jerk_deg_s3=None if limits.jerk is None else _degrees(limits.jerk),
+        jerk_deg_s3=None if limits.jerk is None else _shown(robot, limits.jerk),
     )
     summary = TrajectorySummary(
-        verdict=_verdict(paths),
+        verdict=_verdict(paths, skipped),
         figures=_figures(paths, length, surroundings is not None, used),
         characteristic_length_m=length,
         near=thresholds,
@@ -94,13 +99,14 @@ def compute(study: Study, name: str) -> TrajectoryResults:
         clearance_measured=surroundings is not None,
         penetration_tolerance_mm=settings.penetration_tolerance_mm,
         paths=tuple(paths),
+        not_followed=tuple(skipped),
     )
     return TrajectoryResults(
         summary=summary,
-        samples=Samples(**{name: getattr(own, name) for name in Samples.columns()}),
+        samples=Samples(**{name: getattr(own, name) for name in Samples.columns()}).of_joints(robot.slides),
         checks=checks,
         clearance=Clearances.stacked(clearances),
-        avoidance=AvoidanceRows.stacked(strategies),
+        avoidance=AvoidanceRows.stacked(strategies).of_joints(robot.slides),
         programs=ProgramFiles.stacked(programs),
     )
 
@@ -119,9 +125,9 @@ def _checks(robot: Robot, motion: Motion, found: Judgement, near: NearSingular, 
         path=np.full(len(found.times), motion.entry.name, object),
         t_s=found.times,
         s_m=motion.way(found.times),
-        q_deg=np.degrees(found.q),
-        q_deg_s=np.degrees(found.velocity),
-        q_deg_s2=np.degrees(found.acceleration),
+        q_deg=shown(robot, found.q),
+        q_deg_s=shown(robot, found.velocity),
+        q_deg_s2=shown(robot, found.acceleration),
         xyz_mm=motion.tool(found.times)[:, :3, 3] * 1000,
         speed_ratio=speed_ratio(found.velocity, limits),
         manipulability=measures[:, 0],
@@ -137,7 +143,9 @@ def _checks(robot: Robot, motion: Motion, found: Judgement, near: NearSingular, 
     )
 
 
-def _verdict(paths: list[PathSummary]) -> Verdict[AllSafe | SomeUnsafe | NoneSafe | ExpectationsUnmet]:
+def _verdict(
+    paths: list[PathSummary], skipped: list[PathNotFollowed]
+) -> Verdict[AllSafe | SomeUnsafe | NoneSafe | ExpectationsUnmet]:
     if unmet := unmet_expectations(paths):
         return Verdict("fail", unmet)
     asked = [path for path in paths if path.expect in (None, "safe")]
@@ -145,11 +153,11 @@ def _verdict(paths: list[PathSummary]) -> Verdict[AllSafe | SomeUnsafe | NoneSaf
     def named(verdict: PathVerdict) -> tuple[str, ...]:
         return tuple(path.name for path in asked if path.verdict == verdict)
 
-    safe = len(named("safe"))
-    finding = AllSafe if safe == len(asked) else SomeUnsafe if safe else NoneSafe
-    status: Status = "pass" if safe == len(asked) else "caution" if safe else "fail"
+    safe, count = len(named("safe")), len(asked) + len(skipped)
+    finding = AllSafe if safe == count else SomeUnsafe if safe else NoneSafe
+    status: Status = "pass" if safe == count else "caution" if safe else "fail"
     counts = finding(
-        paths=len(asked),
+        paths=count,
         safe=safe,
         unreachable=named("unreachable"),
         none_found=named("none found"),
@@ -161,6 +169,7 @@ def _verdict(paths: list[PathSummary]) -> Verdict[AllSafe | SomeUnsafe | NoneSaf
         undecided=named("undecided"),
         near_singular=named("near-singular"),
         demonstrations=demonstrations(paths, "safe"),
+        not_followed=tuple(path.name for path in skipped),
     )
     return Verdict(status, counts)
 
@@ -187,7 +196,3 @@ def _figures(paths: list[PathSummary], length: float, measured: bool, limits: Li
         Figure("velocity_check", agreement, "µdeg/s"),
         Figure("characteristic_length", length * 1000, "mm"),
     )
-
-
-def _degrees(values: Reals) -> tuple[float, ...]:
-    return tuple(float(value) for value in np.degrees(values))

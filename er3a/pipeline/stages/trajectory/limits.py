@@ -37,7 +37,10 @@ def limits_of(robot: Robot, settings: TrajectorySettings) -> JointLimits:
         for accelerations or jerks of another number of joints
     """
     count = len(robot.lower)
-    assumed = np.pad(settings.assumed_speed_deg_s, (0, max(0, count - 6)), mode="edge")[:count]
+    turning = np.radians(
+        [settings.assumed_speed_deg_s[min(k, len(settings.assumed_speed_deg_s) - 1)] for k in range(count)]
+    )
+    assumed = np.where(robot.slides, settings.assumed_speed_mm_s / 1000, turning)
     given: list[Reals | None] = []
     for name in ("acceleration_deg_s2", "jerk_deg_s3"):
         values = getattr(settings, name)
@@ -45,4 +48,4 @@ def limits_of(robot: Robot, settings: TrajectorySettings) -> JointLimits:
             problem = f"{len(values)} values for the {count} joints of {robot.name}"
             raise InputError(None, f"trajectory.{name}", problem, "Give one for each joint")
         given.append(None if values is None else np.radians(values))
-    return joint_limits(robot, np.radians(assumed), settings.acceleration_time_s, *given)
+    return joint_limits(robot, assumed, settings.acceleration_time_s, *given)

@@ -6,7 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from er3a.collision.bodies import Bodies
+from er3a.errors import NotWristPartitionedError
 from er3a.files.path_file import load_paths
 from er3a.files.scene_file import load_scene
 from er3a.numerics.arrays import Reals
@@ -22,11 +25,15 @@ from er3a.planning.way_around import PlanningTask
 
 @dataclass(frozen=True, eq=False)
 class ListedMotion:
-    """A motion, the entry that it belongs to, and its name (a program's stretches have names of their own)."""
+    """A motion, the entry that it belongs to, and its name (a program's stretches have names of their own).
+
+    ``motion`` is None for a path of the tool that an arm of its class can't be made to follow.
+    """
 
     listed: str
     name: str
-    motion: Motion
+    title: str
+    motion: Motion | None
 
 
 def study_motions(study: Study, name: str, checks_per_sample: int) -> Iterator[ListedMotion]:
@@ -55,6 +62,10 @@ def listed_motions(file: Path, task: PlanningTask, wanted: Wanted, checks_per_sa
     for i, listed in enumerate(load_paths(file).paths):
         source = CommandSource(file, f"paths[{i}]")
         for entry in planned_entries(task.robot, listed, source):
-            motion = motion_of(task.robot, entry, checks_per_sample, source, ends, wanted, task)
-            ends[entry.name] = ends[listed.name] = motion.q[-1]
-            yield ListedMotion(listed.name, entry.name, motion)
+            try:
+                motion = motion_of(task.robot, entry, checks_per_sample, source, ends, wanted, task)
+            except NotWristPartitionedError:
+                motion = None
+            end = np.full(task.robot.joints, np.nan) if motion is None else motion.q[-1]
+            ends[entry.name] = ends[listed.name] = end
+            yield ListedMotion(listed.name, entry.name, entry.title, motion)

@@ -12,6 +12,7 @@ from er3a.collision.pairs import Pair, PairOverlaps
 from er3a.findings import Finding
 from er3a.kinematics.configuration import BranchLabel
 from er3a.kinematics.singularity import EventType
+from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
@@ -52,6 +53,7 @@ class PathCounts:
     undecided: tuple[str, ...]
     near_singular: tuple[str, ...]
     demonstrations: tuple[Demonstration, ...]
+    not_followed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -283,6 +285,15 @@ class PathSummary:
 
 
 @dataclass(frozen=True)
+class PathNotFollowed:
+    """A path of the tool that could not be followed, because the arm's class has no branches; and what it lacks."""
+
+    name: str
+    title: str
+    lacking: ClosedFormMissing | None
+
+
+@dataclass(frozen=True)
 class TrajectorySummary(Summary):
     """Head, limits and paths.
 
@@ -301,6 +312,7 @@ class TrajectorySummary(Summary):
     clearance_measured: bool
     penetration_tolerance_mm: float
     paths: tuple[PathSummary, ...]
+    not_followed: tuple[PathNotFollowed, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,6 +13,7 @@ from er3a.pipeline.stages.trajectory.model import AvoidanceRows, PathChecks, Pat
 from er3a.pipeline.viewing.palette import BODY, GRID, HIGHLIGHT, INK, LINK, MODEL, MUTED
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot
+from er3a.robots.shown import meant
 
 CONDITION_SCALE = LogNorm(3, 300)
 COLOURS = "viridis_r"
@@ -30,7 +31,7 @@ def draw_path(ax: Axes, robot: Robot, path: PathSummary, rows: PathChecks, repai
     at_events = [i for i in nearest if i in reached][:MOST_ARMS]
     arms = [(i, LINK, "-") for i in reached[:1]] + [(i, LINK, "--") for i in reached[-1:]]
     for i, colour, style in arms + [(i, HIGHLIGHT, "-") for i in at_events]:
-        links = project(skeleton(robot, np.radians(rows.q_deg[i])) * 1000)
+        links = project(skeleton(robot, meant(robot, rows.q_deg[i])) * 1000)
         width, alpha = (1.6, 0.5) if colour == HIGHLIGHT else (3.5, 1.0)
         ax.plot(*links.T, color=colour, linewidth=width, alpha=alpha, linestyle=style, solid_capstyle="round", zorder=2)
     _floor(ax, points)

@@ -16,6 +16,7 @@ from er3a.pipeline.viewing.figure_3d import turning_html
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, LINK, MODEL
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot
+from er3a.robots.shown import meant
 
 POINTS = 250
 LOG_RANGE = (0.5, 2.5)  # of the condition number
@@ -75,7 +76,7 @@ def _add(figure: go.Figure, robot: Robot, path: PathSummary, rows: PathChecks, r
         _line(figure, out, tr("not reachable"), {"color": "#888888", "width": 10})
     if len(repaired):
         _line(figure, np.round(repaired.xyz_mm, 1), tr("repaired"), {"color": MODEL, "width": 4})
-    q = np.radians(rows.q_deg)
+    q = meant(robot, rows.q_deg)
     index = np.flatnonzero(reached)
     last = tr("arm at the end") if reached.all() else tr("arm at the last point reached")
     for k, name, shade in ((index[:1], tr("arm at the start"), INK), (index[-1:], last, LINK)):

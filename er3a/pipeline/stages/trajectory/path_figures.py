@@ -31,8 +31,9 @@ from er3a.pipeline.viewing.figures import svg_data_uri
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINT_NAMES, MODEL, MUTED, REFERENCE, VERDICTS
 from er3a.pipeline.viewing.palette import JOINTS as COLOURS
 from er3a.robots.robot import Robot
+from er3a.robots.shown import shown
 
-WIDTHS = (3.2, 2.8, 2.4, 2.0, 1.6, 1.2)  # so that curves that coincide all show
+WIDTHS = (3.2, 2.8, 2.4, 2.0, 1.6, 1.2, 1.0, 0.9, 0.8, 0.7)  # so that curves that coincide all show
 NEAR_LIMIT_DEG = 20.0
 EVENT_STYLES: dict[bool, Literal["-", ":"]] = {True: "-", False: ":"}
 TYPE_COLOURS = {"wrist": COLOURS[4], "elbow": COLOURS[2], "shoulder": COLOURS[3]}
@@ -119,7 +120,7 @@ def _joint_curves(axes: list[Axes], robot: Robot, path: PathSummary, rows: PathC
         (rows.q_deg_s2, N_("acceleration (deg/s²)")),
     )
     for ax, (values, label) in zip(axes, curves):
-        for j in range(6):
+        for j in range(values.shape[1]):
             ax.plot(rows.t_s, values[:, j], color=COLOURS[j], linewidth=WIDTHS[j])
         ax.set_ylabel(tr(label), fontsize=FONT)
         if values is rows.q_deg:
@@ -199,8 +200,8 @@ def _limits(ax: Axes, robot: Robot, q_deg: Reals) -> None:
     if np.isnan(q_deg).all():
         return
     low, high = np.nanmin(q_deg, axis=0), np.nanmax(q_deg, axis=0)
-    lower, upper = np.degrees(robot.lower), np.degrees(robot.upper)
-    for j in range(6):
+    lower, upper = shown(robot, robot.lower), shown(robot, robot.upper)
+    for j in np.flatnonzero(~robot.continuous):
         for limit, gap, side in ((lower[j], low[j] - lower[j], "top"), (upper[j], upper[j] - high[j], "bottom")):
             if gap < NEAR_LIMIT_DEG:
                 ax.axhline(limit, color=COLOURS[j], linestyle="--", linewidth=1)
@@ -240,7 +241,8 @@ def _mark(ax: Axes, path: PathSummary) -> None:
 
 def _legend(path: PathSummary) -> list[Line2D | Patch]:
     handles: list[Line2D | Patch] = [
-        Line2D([], [], color=COLOURS[j], linewidth=WIDTHS[j], label=JOINT_NAMES[j]) for j in range(6)
+        Line2D([], [], color=COLOURS[j], linewidth=WIDTHS[j], label=JOINT_NAMES[j])
+        for j in range(len(path.max_joint_speed_deg_s or JOINT_NAMES[:6]))
     ]
     for crossing, label in ((True, tr("singular")), (False, tr("near-singular"))):
         if any(event.crossing == crossing for event in path.singularities):

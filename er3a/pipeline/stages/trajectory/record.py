@@ -31,6 +31,7 @@ from er3a.pipeline.viewing.scene_entities import log_scene
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.planning.path_verdicts import PathVerdict
 from er3a.robots.robot import Robot
+from er3a.robots.shown import meant
 
 STAGE = "trajectory"
 PAUSE = 1.0  # s between two paths
@@ -72,7 +73,7 @@ def record(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
         log_note(stream, STAGE, _note(robot, results.summary))
         log_scene(stream, study, name, STAGE)
         first = checks.q_deg[checks.reachable]
-        log_arm(stream, robot, np.radians(first[0]) if len(first) else np.zeros(6))
+        log_arm(stream, robot, meant(robot, first[0]) if len(first) else np.zeros(robot.joints))
         for path, start, repaired in _timetable(results.summary):
             if repaired:
                 rows: MotionRows = motions.take((motions.path == path.name) & (motions.strategy == path.strategy))
@@ -129,7 +130,7 @@ def _timetable(summary: TrajectorySummary) -> list[tuple[PathSummary, float, boo
 def _view(robot: Robot, checks: PathChecks) -> rrb.Spatial3DView:
     """A view that holds the arm all along the paths."""
     reached = checks.q_deg[checks.reachable][::SKELETON_EVERY]
-    points = np.concatenate([checks.xyz_mm / 1000, *(skeleton(robot, np.radians(q)) for q in reached)])
+    points = np.concatenate([checks.xyz_mm / 1000, *(skeleton(robot, meant(robot, q)) for q in reached)])
     centre = (points.min(axis=0) + points.max(axis=0)) / 2
     distance = 0.85 * max(float(np.linalg.norm(np.ptp(points, axis=0))), 2 * size_of(robot))
     eye = rrb.EyeControls3D(
@@ -172,7 +173,7 @@ def _run(stream: rr.RecordingStream, robot: Robot, rows: MotionRows, start: floa
     times, points = start + rows.t_s, rows.xyz_mm / 1000
     reached = np.isfinite(rows.q_deg[:, 0])
     if reached.any():
-        send_motion(stream, robot, times[reached], np.radians(rows.q_deg[reached]))
+        send_motion(stream, robot, times[reached], meant(robot, rows.q_deg[reached]))
     _trail(stream, times, points, reached, colour)
     broken = np.append(times, times[-1] + 1e-3)
 
@@ -180,8 +181,9 @@ def _run(stream: rr.RecordingStream, robot: Robot, rows: MotionRows, start: floa
         gap = np.full((1, values.shape[1]), np.nan)
         send_series(stream, f"{STAGE}/curves/{entity}", broken, np.concatenate([values, gap]), names, colours)
 
-    send("angle", rows.q_deg, list(JOINT_NAMES), list(JOINTS))
-    send("velocity", rows.q_deg_s, list(JOINT_NAMES), list(JOINTS))
+    joints = robot.joints
+    send("angle", rows.q_deg, list(JOINT_NAMES[:joints]), list(JOINTS[:joints]))
+    send("velocity", rows.q_deg_s, list(JOINT_NAMES[:joints]), list(JOINTS[:joints]))
     condition = np.where(np.isinf(rows.condition_number), np.nan, rows.condition_number)
     send("condition", np.log10(condition)[:, None], ["condition number"], [MODEL])
     send("smallest", rows.smallest_singular_value[:, None], ["smallest singular value"], [REFERENCE])
@@ -206,7 +208,7 @@ def _ghosts(stream: rr.RecordingStream, robot: Robot, path: PathSummary, rows: P
     points = rows.xyz_mm[at] / 1000
     colours = [rgb(HIGHLIGHT)] * len(at)
     stream.log(f"{STAGE}/marks", rr.Points3D(points, radii=0.012, colors=colours, labels=labels))
-    q = np.radians(rows.q_deg[at])
+    q = meant(robot, rows.q_deg[at])
     strips = [skeleton(robot, joints) for joints in q if np.isfinite(joints).all()]
     ghost = [(*rgb(HIGHLIGHT), GHOST_ALPHA)] * len(strips)
     stream.log(f"{STAGE}/ghosts", rr.LineStrips3D(strips, colors=ghost, radii=GHOST_WIDTH * size_of(robot)))

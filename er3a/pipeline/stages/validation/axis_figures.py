@@ -25,13 +25,16 @@ REGION = "#dcebf5"
 HAIR = 0.9
 
 
+SIX = 6
+
+
 def side_view(robot: Robot, stated: Axes, corrected: Robot | None, corrected_label: str) -> Figure:
     """The arm in its zero pose from the side, to scale, with its joint axes over those that the references state."""
     figure, axes = new_figure(width=7, height=7.4)
-    corners = skeleton(robot, np.zeros(6)) * 1000
+    corners = skeleton(robot, np.zeros(robot.joints)) * 1000
     drawn = [corners]
     if corrected is not None:
-        dashed = skeleton(corrected, np.zeros(6)) * 1000
+        dashed = skeleton(corrected, np.zeros(corrected.joints)) * 1000
         axes.plot(dashed[:, 0], dashed[:, 2], "--", color=MUTED, linewidth=2, label=corrected_label)
         drawn.append(dashed)
     size = float(np.ptp(np.vstack([*drawn, stated.point_mm]), axis=0).max())
@@ -73,7 +76,8 @@ def axis_deviation(stated: Axes) -> Figure:
             axes.bar(at, value[own], width * 0.9, color=REFERENCE_COLOURS[k % len(REFERENCE_COLOURS)])
             axes.bar(at, bound[own], width * 0.9, facecolor="none", edgecolor=INK, linewidth=0.8)
         axes.set_ylabel(label)
-        axes.set_xticks(range(1, 7), [f"J{joint}" for joint in range(1, 7)])
+        last = int(max(6, stated.joint.max()))
+        axes.set_xticks(range(1, last + 1), [f"J{joint}" for joint in range(1, last + 1)])
         axes.set_ylim(0, 1.15 * max(value.max(), bound.max()))
         axes.grid(axis="x", visible=False)
         axes.set_axisbelow(True)
@@ -142,7 +146,9 @@ def _axes_of(
 
 def _model_axes(robot: Robot) -> list[tuple[int, np.ndarray, np.ndarray]]:
     """Joint, direction and a point (mm) of each axis in the zero pose; axis 4 at the wrist centre."""
-    T = frames(robot, np.zeros(6))
+    T = frames(robot, np.zeros(robot.joints))
+    if robot.rows != SIX:
+        return [(k + 1, T[k, :3, 2], T[k, :3, 3] * 1000) for k in range(robot.rows)]
     points = [*T[:3, :3, 3] * 1000, nearest_on_axis(T, 4, point_of(T, "wrist_centre")), *T[4:6, :3, 3] * 1000]
     return [(k + 1, T[k, :3, 2], points[k]) for k in range(6)]
 

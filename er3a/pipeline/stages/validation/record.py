@@ -22,6 +22,7 @@ from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, REFERENCE, rgb
 from er3a.pipeline.viewing.recording import ARM, TIMELINE, escaped, log_note, note_view, recording, send_series
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Robot
+from er3a.robots.shown import meant
 
 STAGE = "validation"
 HOLD_S, MOVE_S, STEPS = 2.0, 1.0, 30
@@ -45,7 +46,7 @@ def record(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
     """Write the recording from the stage's results."""
     name, results = stored.robot, stored.results
     robot, axes, poses = model_of(study, name), results.axes, results.key_poses
-    stations = _stations(poses)
+    stations = _stations(robot, poses)
     starts = STATION_S * np.arange(len(stations))
     corrected, fault = corrected_robot(robot, results.summary.diagnoses)
     curve_view = rrb.TimeSeriesView(origin=f"/{STAGE}/curves/deviation", name="Largest deviation (mm)")
@@ -63,11 +64,11 @@ def record(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
         note += f"- see-through arm: the same table, {fault}\n" if corrected is not None else ""
         log_note(stream, STAGE, note)
         _log_axes(stream, axes, size_of(robot), end=starts[1] - MOVE_S if len(starts) > 1 else None)
-        log_arm(stream, robot, np.zeros(6))
-        times, q = _motion(stations, starts)
+        log_arm(stream, robot, np.zeros(robot.joints))
+        times, q = _motion(robot, stations, starts)
         send_motion(stream, robot, times, q)
         if corrected is not None:
-            log_arm(stream, corrected, np.zeros(6), entity=f"{STAGE}/corrected", ghost=True)
+            log_arm(stream, corrected, np.zeros(corrected.joints), entity=f"{STAGE}/corrected", ghost=True)
             send_motion(stream, corrected, times, q, entity=f"{STAGE}/corrected")
         for start, rows in zip(starts, stations):
             _log_station(stream, float(start), rows, 0.012 * size_of(robot))
@@ -80,18 +81,22 @@ def record(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
         send_series(stream, f"{STAGE}/curves/deviation", at, curve[:, None], ["largest deviation"], [REFERENCE])
 
 
-def _stations(poses: KeyPoses) -> list[KeyPoses]:
+def _stations(robot: Robot, poses: KeyPoses) -> list[KeyPoses]:
     """Rows of equal joint angles together, in the order of the table; the zero pose if there are none."""
     if not len(poses):
         nowhere = (np.nan,) * 3
-        return [KeyPoses.of_rows([("", "", "", "", NamedPose("zero pose"), "", (0.0,) * 6, nowhere, nowhere, np.nan)])]
+        return [
+            KeyPoses.of_rows(
+                [("", "", "", "", NamedPose("zero pose"), "", (0.0,) * robot.joints, nowhere, nowhere, np.nan)]
+            )
+        ]
     rounded = poses.q_deg.round(6)
     return [poses.take((rounded == pose).all(axis=1)) for pose in dict.fromkeys(map(tuple, rounded))]
 
 
-def _motion(stations: list[KeyPoses], starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _motion(robot: Robot, stations: list[KeyPoses], starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Times (N,) and joints (N, 6): hold at each station, then move smoothly to the next."""
-    corners = np.radians([rows.q_deg[0] for rows in stations])
+    corners = meant(robot, np.array([rows.q_deg[0] for rows in stations]))
     share = np.linspace(0, 1, STEPS + 1)
     smooth = share**2 * (3 - 2 * share)
     times, q = [np.array([0.0])], [corners[:1]]
@@ -159,7 +164,7 @@ def _colours(grades: Texts) -> list[tuple[int, int, int]]:
 def _view(robot: Robot, poses: KeyPoses, axes: Axes) -> rrb.Spatial3DView:
     """A 3-D view that opens with all stated and model points in sight."""
     points = np.vstack([poses.point_mm, poses.model_point_mm, axes.point_mm]) / 1000
-    points = np.vstack([points[np.isfinite(points).all(axis=1)], skeleton(robot, np.zeros(6))])
+    points = np.vstack([points[np.isfinite(points).all(axis=1)], skeleton(robot, np.zeros(robot.joints))])
     low, high = points.min(axis=0), points.max(axis=0)
     centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
     eye = rrb.EyeControls3D(

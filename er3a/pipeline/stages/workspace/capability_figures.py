@@ -90,7 +90,9 @@ def placement_views(
         sure = np.ma.masked_where(~proven, value)
         mesh = panel.pcolormesh(*extent, sure.T, cmap=SHADES, vmin=0, vmax=top, rasterized=True)
         _draw_boxes(panel, placement.places, shown)
-        panel.plot(*skeleton(robot, np.zeros(6)).T[shown] * 1000, color=INK, linewidth=2.2, marker="o", markersize=3)
+        panel.plot(
+            *skeleton(robot, np.zeros(robot.joints)).T[shown] * 1000, color=INK, linewidth=2.2, marker="o", markersize=3
+        )
         equal_scale(panel, f"{across} (mm)", f"{up} (mm)")
         panel.set_title(title)
         panel.grid(False)
@@ -116,7 +118,7 @@ def _quantiles(cells: CapabilityCells) -> Reals:
 
 
 def _draw_arm(axes: Axes, robot: Robot, frame: SectionFrame) -> None:
-    local = (skeleton(robot, np.zeros(6)) - frame.origin_m) @ np.array(frame.axes).T * 1000
+    local = (skeleton(robot, np.zeros(robot.joints)) - frame.origin_m) @ np.array(frame.axes).T * 1000
     axes.plot(local[:, 0], local[:, 2], color="white", linewidth=3.6, solid_capstyle="round")
     axes.plot(local[:, 0], local[:, 2], color=INK, linewidth=2.0, marker="o", markersize=3, solid_capstyle="round")
 

@@ -48,7 +48,7 @@ def turning_figure(robot: Robot, results: WorkspaceResults) -> Markup:
             name=tr(name, number=number),
             showlegend=True,
         )
-    x, y, z = (skeleton(robot, np.zeros(6)) * 1000).T
+    x, y, z = (skeleton(robot, np.zeros(robot.joints)) * 1000).T
     line = {"color": INK, "width": 9}
     figure.add_scatter3d(
         x=x, y=y, z=z, mode="lines+markers", line=line, marker={"size": 4, "color": INK}, name=tr("arm at 0")

@@ -25,7 +25,11 @@ FORMAT = "er3a workspace part 3"
 
 def identity(study: Study, robot: Robot) -> dict[str, Any]:
     """What all part files of one run share: settings, seed, and digests of the robot's numbers and of the code."""
-    arrays = (constant_links(robot), robot.direction, robot.offset, robot.lower, robot.upper)
+    arrays: tuple[Any, ...] = (constant_links(robot), robot.direction, robot.offset, robot.lower, robot.upper)
+    if robot.coupling is not None:
+        arrays = (*arrays, robot.coupling)
+    sums = [(*limit.factors, limit.lower, limit.upper) for limit in robot.combined]
+    arrays = (*arrays, robot.sliding, np.array(sums))
     settings = study.section(WorkspaceSettings).model_dump(exclude={"cloud_points"})
     return {
         "format": FORMAT,

@@ -121,7 +121,7 @@ def draw_labels(axes: Axes, drawing: Drawing, across_m: Reals) -> None:
 
 
 def _draw_arm(axes: Axes, robot: Robot, axis: AxisSummary) -> None:
-    offset = skeleton(robot, np.zeros(6)) - axis.point_m
+    offset = skeleton(robot, np.zeros(robot.joints)) - axis.point_m
     height = offset @ axis.direction
     away = np.sqrt(np.maximum(0, (offset**2).sum(axis=1) - height**2))
     axes.plot(away * 1000, height * 1000, color=INK, linewidth=2.4, marker="o", markersize=4, solid_capstyle="round")

@@ -31,7 +31,7 @@ _COLOURS = {"enclosed": HIGHLIGHT, "open": REFERENCE}
 def record(study: Study, stored: Stored[WorkspaceResults], output: Path) -> None:
     """Write the workspace recording of a robot from its results."""
     robot, results = study.robot(stored.robot), stored.results
-    points = np.vstack([results.cloud.point_m, skeleton(robot, np.zeros(6))])
+    points = np.vstack([results.cloud.point_m, skeleton(robot, np.zeros(robot.joints))])
     centre, reach = (points.min(axis=0) + points.max(axis=0)) / 2, np.ptp(points, axis=0).max() / 2
 
     def view(title: str, *entities: str) -> rrb.Spatial3DView:
@@ -52,7 +52,7 @@ def record(study: Study, stored: Stored[WorkspaceResults], output: Path) -> None
         name="Workspace",
     )
     with recording(output, stored.robot, STAGE, layout) as stream:
-        log_arm(stream, robot, np.zeros(6))
+        log_arm(stream, robot, np.zeros(robot.joints))
         _log_cloud(stream, results.cloud, results.summary.axis.point_m[1], reach)
         _log_hull(stream, results)
         _log_voids(stream, results)

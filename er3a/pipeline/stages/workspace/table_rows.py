@@ -25,6 +25,7 @@ from er3a.pipeline.stages.workspace.workspace_tables import (
 )
 from er3a.pipeline.tables import Texts
 from er3a.robots.robot import Robot
+from er3a.robots.shown import shown
 from er3a.sampling import touched_cells
 from er3a.sampling.tally import UNTOUCHED, Tally
 from er3a.workspace.capability import Capability
@@ -68,13 +69,17 @@ def curve(growth: Sequence[touched_cells.Growth]) -> GrowthCurve:
 
 
 def cloud(robot: Robot, q: Reals) -> Cloud:
-    """Tool points of samples (n, 6), rad."""
-    return Cloud(forward(robot, q)[:, :3, 3], np.abs(np.linalg.det(jacobian(robot, q))))
+    """Tool points of samples (n, joints), rad or m, and their manipulability: of arms with other than six joints the
+    product of the singular values."""
+    J = jacobian(robot, q)
+    square = robot.joints == J.shape[-2]
+    measure = np.abs(np.linalg.det(J)) if square else np.linalg.svd(J, compute_uv=False).prod(axis=-1)
+    return Cloud(forward(robot, q)[:, :3, 3], measure)
 
 
-def hull_vertices(hull: Hull, q_extreme: Reals) -> HullVertices:
+def hull_vertices(robot: Robot, hull: Hull, q_extreme: Reals) -> HullVertices:
     """The hull's corners with the joint angles that reach them."""
-    return HullVertices(hull.vertices, np.degrees(q_extreme[hull.of]))
+    return HullVertices(hull.vertices, shown(robot, q_extreme[hull.of])).of_joints(robot.slides)
 
 
 def proof(proven: Proven) -> ProofCells:

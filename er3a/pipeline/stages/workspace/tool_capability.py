@@ -10,7 +10,6 @@ import numpy as np
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
 from er3a.kinematics.configuration import branch_labels
-from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.stages.workspace import table_rows
 from er3a.pipeline.stages.workspace.entry import BoxTask, CapabilitySettings
@@ -31,6 +30,7 @@ from er3a.workspace.dexterous import dexterous_core
 from er3a.workspace.directions import cone_directions, roll_of
 from er3a.workspace.placement import MIXED, NO, Task, narrowed
 from er3a.workspace.placement_proof import BoxPlacement, find_places
+from er3a.workspace.proven import lacking_for_proof
 from er3a.workspace.section_arm import section_arm, section_frame
 
 MOST_ACROSS = 64
@@ -57,7 +57,7 @@ def tool_capability(
     cell : m, edge of the workspace's cells; taken coarser where more than ``MOST_ACROSS`` would span the reach
     scene : what the arm may not touch where it serves the box; nor may it touch itself
     """
-    if lacks := closed_form_missing(robot):
+    if lacks := lacking_for_proof(robot):
         return ToolCapability(NeedsClosedForm(lacks), None, CapabilityCells.empty(), BoxPlaces.empty())
     arm, roll = section_arm(robot), roll_of(robot, settings.rolls)
     cell = max(cell, 2 * (arm.upper_length + arm.forearm_length + arm.d) / MOST_ACROSS)

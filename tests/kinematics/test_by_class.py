@@ -1,0 +1,185 @@
+"""inverse, inverse_batch and what they rest on for arms of every class."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from er3a.geometry.angles import wrap_to_pi
+from er3a.kinematics.batch import inverse_batch
+from er3a.kinematics.by_class import checked_parameters, parameters_of, task_mask
+from er3a.kinematics.cuspidal import cuspidal_move
+from er3a.kinematics.forward import forward
+from er3a.kinematics.inverse import inverse
+from er3a.kinematics.numerical import solve
+from er3a.kinematics.rank_loss import dependent_axes, rank_losses, scaled_jacobian
+from er3a.robots.robot import Robot
+
+H = np.pi / 2
+UR5 = ([0, -0.425, -0.39225, 0, 0, 0], [H, 0, 0, H, -H, 0], [0.089159, 0, 0, 0.10915, 0.09465, 0.0823])
+CRX = ([0, 0.71, 0, 0, 0, 0], [-H, np.pi, -H, H, -H, np.pi], [0, 0, 0, -0.54, 0.15, -0.16])
+PUMA = ([0, 0.4318, 0.0203, 0, 0, 0], [H, 0, -H, H, -H, 0], [0, 0, 0.15005, 0.4318, 0, 0.1])
+IIWA = ([0] * 7, [-H, H, H, -H, -H, H, 0], [0.34, 0, 0.4, 0, 0.4, 0, 0.126])
+PANDA = ([0, 0, 0.0825, -0.0825, 0, 0.088, 0], [-H, H, H, -H, H, H, 0], [0.333, 0, 0.316, 0, 0.384, 0, 0.107])
+STANFORD = ([0] * 6, [-H, H, 0, -H, H, 0], [0.412, 0.154, 0, 0, 0, 0.263])
+SCARA = ([0.325, 0.225, 0, 0], [0, np.pi, 0, 0], [0.4, 0, 0.1, 0.05])
+VERTICAL = ([0, 0.3, 0.25, 0, 0], [H, 0, 0, H, 0], [0.3, 0, 0, 0, 0.1])
+COUPLED = np.eye(6)
+COUPLED[2, 1] = 1.0
+
+
+def arm(rows, sliding=None, most=3.0, **more):
+    a, alpha, d = (np.array(column, float) for column in rows)
+    slides = np.zeros(len(a), bool) if sliding is None else np.array(sliding, bool)
+    limit, ones = np.where(slides, 1.0, most), np.ones(len(a))
+    return Robot("made", "made", "standard", a, alpha, d, ones, 0 * ones, -limit, limit, sliding=slides, **more)
+
+
+ARMS = {
+    "three_parallel": (arm(UR5), 8),
+    "general_six": (arm(CRX), 16),
+    "six_one_prismatic": (arm(STANFORD, [0, 0, 1, 0, 0, 0]), 16),
+    "spherical_wrist": (arm(PUMA, coupling=COUPLED), 8),
+    "arm_angle": (arm(IIWA), 8),
+    "redundant": (arm(PANDA), 16),
+    "scara": (arm(SCARA, [0, 0, 1, 0]), 2),
+    "planar_wrist": (arm(VERTICAL), 8),
+    "free_roll": (arm(tuple(column[:5] for column in UR5)), 8),
+    "position": (arm(([0, 0.3, 0.25], [H, 0, 0], [0.3, 0, 0])), 8),
+}
+
+
+@pytest.mark.parametrize("code", [code for code in ARMS if code != "spherical_wrist"])
+def test_the_own_joints_are_found_and_all_rows_meet_the_task(code, random):
+    robot, slots = ARMS[code]
+    q = random.uniform(robot.lower, robot.upper, (30, robot.joints))
+    T = forward(robot, q)
+    found = inverse_batch(robot, T, q)
+    assert found.method.arm_class == code
+    assert found.q.shape == (30, slots, robot.joints)
+    own = np.abs(found.q - q[:, None]).max(axis=2)
+    assert np.nanmin(np.where(np.isnan(own), np.inf, own), axis=1).max() < 1e-6
+    miss = np.abs(forward(robot, np.nan_to_num(found.q)) - T[:, None])[found.solved]
+    assert miss[:, :3, 3].max() < 1e-9
+    if task_mask(robot).all():
+        assert miss.max() < 1e-9
+    np.testing.assert_array_equal(found.solved, np.isfinite(found.q[..., 0]))
+    assert (found.turn[~found.solved] == 0).all()
+    for n in range(3):
+        single = inverse(robot, T[n], q[n])
+        for row in found.q[n][found.solved[n]]:
+            assert np.abs(single.q - row).max(axis=1).min() < 1e-9
+        assert single.label.shape == single.branch.shape
+        assert str(single)
+
+
+def test_coupled_joints_of_a_spherical_wrist(random):
+    robot, _ = ARMS["spherical_wrist"]
+    q = random.uniform(robot.lower, robot.upper, (50, 6))
+    found = inverse_batch(robot, forward(robot, q), q)
+    assert np.nanmin(np.abs(found.q - q[:, None]).max(axis=2), axis=1).max() < 1e-6
+
+
+@pytest.mark.parametrize("joints", [{4: 0.0}, {4: np.pi}, {2: 0.0, 4: 0.0}])
+def test_singular_poses_of_a_ur_have_self_motions_and_the_own_arm(joints, random):
+    robot, _ = ARMS["three_parallel"]
+    robot = robot.replace(lower=np.full(6, -6.28), upper=np.full(6, 6.28))
+    q = random.uniform(-2.5, 2.5, 6)
+    for joint, value in joints.items():
+        q[joint] = value
+    T = forward(robot, q)
+    near, far = inverse(robot, T, q), inverse(robot, T)
+    assert np.abs(near.q - q).max(axis=1).min() < 1e-6
+    assert len(near.q) < 64 * 9
+    assert near.families
+    assert any(motion.chain.holds(motion.curve, q) for motion in far.families)
+    for motion in near.families:
+        t = np.linspace(*motion.range, 25)
+        members = motion.members(t)
+        assert np.abs(forward(robot, members) - T).max() < 1e-9
+        assert (np.abs(members) <= 6.28 + 1e-6).all()
+        assert np.abs(motion.members(np.array(0.0)) - motion.q0).max() < 1e-9
+
+
+def test_a_redundant_arm_has_the_member_with_most_margin(random):
+    robot = arm(IIWA, most=2.6)
+    q = random.uniform(-2, 2, 7)
+    T = forward(robot, q)
+    found = inverse(robot, T, q)
+    best = max(motion.roomiest_margin for motion in found.families)
+    grid = np.linspace(-np.pi, np.pi, 400)
+    rows = inverse_batch(robot, np.broadcast_to(T, (400, 4, 4)), redundancy=grid[:, None]).q
+    on_grid = np.nanmax(np.minimum(rows - robot.lower, robot.upper - rows).min(axis=2))
+    assert best >= on_grid - 1e-6
+    margins = np.minimum(found.q - robot.lower, robot.upper - found.q).min(axis=1)
+    assert margins.max() == pytest.approx(best, abs=1e-9)
+
+
+def test_parameters_of_redundant_arms(random):
+    assert [each.code for each in parameters_of(ARMS["arm_angle"][0])] == ["arm_angle"]
+    panda, _ = ARMS["redundant"]
+    assert [(each.code, each.joint) for each in parameters_of(panda)] == [("locked_joint", 6)]
+    q = random.uniform(-2, 2, 7)
+    values = checked_parameters(panda, None, q[None], 1)
+    found = inverse_batch(panda, forward(panda, q)[None], redundancy=values)
+    assert np.nanmin(np.abs(wrap_to_pi(found.q[0] - q)).max(axis=1)) < 1e-6
+
+
+@pytest.mark.parametrize("code", ["general_six", "arm_angle", "scara", "position"])
+def test_what_is_out_of_reach_is_told(code):
+    robot, _ = ARMS[code]
+    T = np.eye(4)
+    T[:3, 3] = [9.0, 0, 0]
+    found = inverse(robot, T)
+    assert len(found.q) == 0
+    assert found.unsolved[0].why.code == "no_solution_of_class"
+    assert found.unsolved[0].why.miss.position_mm > 5000
+
+
+@pytest.mark.parametrize("code", ["arm_angle", "scara", "six_one_prismatic", "spherical_wrist"])
+def test_iteration_solves_arms_of_any_kind(code, random):
+    robot, _ = ARMS[code]
+    T = forward(robot, random.uniform(robot.lower, robot.upper, (20, robot.joints)))
+    found = solve(robot, T, restarts=60)
+    assert found.solved.all()
+    assert np.abs(forward(robot, found.q) - T).max() < 1e-9
+    assert found.within_limits.all()
+
+
+@pytest.mark.parametrize("code", ["three_parallel", "general_six", "six_one_prismatic"])
+def test_no_zero_of_the_determinant_is_missed(code, random):
+    robot, _ = ARMS[code]
+    dense = np.linspace(0, 1, 40001)
+    for _ in range(4):
+        a, b = random.uniform(robot.lower, robot.upper, (2, 6))
+
+        def joints(t, a=a, b=b):
+            return a + np.asarray(t)[..., None] * (b - a)
+
+        t = np.linspace(0, 1, 9)
+        losses = rank_losses(robot, t, joints(t), joints, 1e-3, np.abs(b - a))
+        determinant = np.linalg.det(scaled_jacobian(robot, joints(dense)))
+        zeros = dense[:-1][determinant[:-1] * determinant[1:] < 0]
+        crossings = np.array([loss.at for loss in losses if loss.crossing])
+        assert all(np.abs(crossings - zero).min() < 1e-3 for zero in zeros)
+        for loss in losses:
+            assert np.linalg.svd(scaled_jacobian(robot, joints(loss.at)), compute_uv=False)[-1] < 2e-3
+
+
+def test_axes_that_become_dependent_are_named():
+    q = np.array([0.3, 0.5, -0.8, 0.4, 0.0, 0.2])
+    assert dependent_axes(arm(PUMA), q) == (4, 6)
+    straight = np.array([0.3, 0.5, 0.0, 0.4, 1.0, 0.2])
+    assert dependent_axes(arm(UR5), straight) == (2, 3, 4)
+    assert dependent_axes(arm(IIWA), np.array([0.3, 0.5, 0.2, 0.9, 0.4, 0.0, 0.7])) == (5, 7)
+
+
+def test_the_crx_is_cuspidal_and_the_ur_is_not_found_to_be():
+    robot, _ = ARMS["general_six"]
+    move = cuspidal_move(robot)
+    assert np.abs(forward(robot, move.start) - forward(robot, move.end)).max() < 1e-9
+    assert np.abs(wrap_to_pi(move.end - move.start)).max() > 0.1
+    share = np.linspace(0, 1, 2001)[:, None]
+    along = np.linalg.det(scaled_jacobian(robot, move.start + share * (move.end - move.start)))
+    assert (np.sign(along) == np.sign(along[0])).all()
+    assert cuspidal_move(ARMS["three_parallel"][0]) is None
