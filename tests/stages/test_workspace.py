@@ -100,7 +100,7 @@ def test_the_border_that_is_compared_has_no_chords(found, tmp_path):
 
 @pytest.mark.parametrize(("name", "drawn"), [("er3_600", True), ("er3a_c60", False)])
 def test_no_page_speaks_of_a_drawing_that_there_is_not(found, name, drawn, tmp_path):
-    study = make_study()
+    study = make_study({name: ROBOTS / f"{name}.yaml"})
     results = found if name == "er3_600" else compute(study, name)
     write_results(tmp_path / "results", study, name, STAGES["workspace"], results, say)
     report(study, read_stage(tmp_path / "results", STAGES["workspace"]), tmp_path / "page.html")
