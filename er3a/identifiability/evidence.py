@@ -389,7 +389,7 @@ class _Judge:
         self._found.append(found)
         joints = list(range(found.direction.shape[1]))
         table = self.table.with_column("direction", joints, found.direction)
-        return Extents(asked, table, self.free, near.speaking, self.gauge, self.tool, found)
+        return Extents(asked, table, self.free, near.speaking, self.gauge, self.tool, found=found)
 
 
 def _sum_of(factors: Sequence[tuple[TableNumber, float]]) -> str:
