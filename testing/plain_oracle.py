@@ -128,20 +128,38 @@ def _extreme(
         one = {name: each[[h]] for name, each in rows.items()}
         least, most = one["lower"][0, 1:joints], one["upper"][0, 1:joints]
         moving = joints > 4 or bool(one["a"][0, 3])
-        low, high, best = least, most, -np.inf
         counts = [GRID, GRID, 9 if moving else 1, 9][: joints - 1]
-        for _ in range(CLOSER):
-            grid = np.stack(np.meshgrid(*map(np.linspace, low, high, counts), indexing="ij"), -1)
-            q = np.zeros((grid[..., 0].size, 6))
-            q[:, 1:joints] = grid.reshape(-1, joints - 1)
-            seen = sign * measure(frames(one, q, joints))[0]
-            if seen.max() > best:
-                best, place = float(seen.max()), q[seen.argmax()]
-            near, wide = q[seen.argmax(), 1:joints], (high - low) / np.maximum(np.array(counts) - 1, 1) * 1.5
-            low, high = np.maximum(least, near - wide), np.minimum(most, near + wide)
-            counts = [9, 9, 5 if moving else 1, 5][: joints - 1]
+        q, seen = _on_grid(one, measure, sign, (least, most), counts)
+        best = -np.inf
+        for turn in np.unique(q[:, 3]):  # the best place of each angle of joint 4 is closed in on
+            own = q[:, 3] == turn
+            near, wide = (
+                q[own][seen[own].argmax(), 1:joints],
+                1.5 * (most - least) / np.maximum(np.array(counts) - 1, 1),
+            )
+            for _ in range(CLOSER):
+                low, high = np.maximum(least, near - wide), np.minimum(most, near + wide)
+                closer = [9, 9, 5 if moving else 1, 5][: joints - 1]
+                points, values_there = _on_grid(one, measure, sign, (low, high), closer)
+                near, wide = points[values_there.argmax(), 1:joints], wide / 2.7
+                if values_there.max() > best:
+                    best, place = float(values_there.max()), points[values_there.argmax()]
         values.append([sign * best])
     return np.array(values), place
+
+
+def _on_grid(
+    one: Rows,
+    measure: Callable[[np.ndarray], np.ndarray],
+    sign: float,
+    box: tuple[np.ndarray, np.ndarray],
+    counts: list[int],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Joint vectors (P, 6) on a grid over joints 2 and further, and ``sign`` times the measure (P,) there."""
+    grid = np.stack(np.meshgrid(*map(np.linspace, *box, counts), indexing="ij"), -1)
+    q = np.zeros((grid[..., 0].size, 6))
+    q[:, 1 : 1 + len(counts)] = grid.reshape(len(q), -1)
+    return q, sign * measure(frames(one, q, 1 + len(counts)))[0]
 
 
 def components(rows: Rows, said: Statement, at: np.ndarray | None = None) -> list[np.ndarray]:

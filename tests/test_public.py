@@ -48,7 +48,7 @@ CALLS: dict[str, Callable[[Any, np.ndarray], Any]] = {
     "select_sequence": lambda robot, T: er3a.select_sequence(robot, [er3a.inverse(er3a.load_robot("er3_600"), T)], Q),
     "load_targets": lambda robot, T: er3a.load_targets("data/targets/er3_600.yaml", robot),
     "diagnose": lambda robot, T: er3a.diagnose(robot, "er3_600"),
-    "evidence": lambda robot, T: er3a.evidence(robot, "er3_600"),
+    "evidence": lambda robot, T: er3a.evidence(robot, load_references("er3_600").references[:1]),
     "calibrate": lambda robot, T: er3a.calibrate(robot, load_references("er3_600")),
     "to_modified": lambda robot, T: er3a.to_modified(robot),
     "to_standard": lambda robot, T: er3a.to_standard(robot),

@@ -55,6 +55,7 @@ class Extents:
         speaking: Sequence[int],
         gauge: Gauge,
         tool: ToolRange,
+        *,
         found: Tables | None = None,
     ):
         self.asked, self.table, self.entries, self.tool = asked, table, tuple(entries), tool

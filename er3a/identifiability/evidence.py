@@ -344,8 +344,9 @@ class _Judge:
         """What else evidence allows: alternatives to the table, or to one near it that meets the evidence."""
         own = self._geometric(own)
         if own not in self._alternatives:
-            table = self._extents_of(own).met_by
-            self._alternatives[own] = alternatives_to(table, self._asked_of(own), self.tool)
+            extents = self._extents_of(own)
+            tool = self.tool if extents.table_meets else ToolRange(self.robot, extents.met_by)
+            self._alternatives[own] = alternatives_to(extents.met_by, self._asked_of(own), tool)
         return self._alternatives[own]
 
     def _repairs_of(self, own: tuple[int, ...]) -> list[Alternative]:
@@ -389,7 +390,7 @@ class _Judge:
         self._found.append(found)
         joints = list(range(found.direction.shape[1]))
         table = self.table.with_column("direction", joints, found.direction)
-        return Extents(asked, table, self.free, near.speaking, self.gauge, self.tool, found)
+        return Extents(asked, table, self.free, near.speaking, self.gauge, self.tool, found=found)
 
 
 def _sum_of(factors: Sequence[tuple[TableNumber, float]]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from functools import cache
 
 import numpy as np
@@ -13,7 +14,15 @@ from er3a.files.robot_library import load_robot
 from er3a.identifiability.entries import continuous_of, entries_of
 from er3a.identifiability.entry_evidence import Evidence, Tolerance
 from er3a.identifiability.evidence import evidence_of
-from er3a.identifiability.proposals import measured, proposals_of
+from er3a.identifiability.proposals import (
+    LookAtMotion,
+    MeasureAngle,
+    Proposal,
+    ReadLimit,
+    TimeJoint,
+    measured,
+    proposals_of,
+)
 from er3a.identifiability.verdict_parts import parts_of, settles_tool
 from er3a.references.documents import Document, Documents
 from er3a.references.quantities import CarriedCoordinate, PointCoordinate
@@ -165,6 +174,55 @@ def test_every_proposed_measurement_settles_its_entry(name):
     assert set(proposals) == {e.entry for e in (*found.entries, *found.combinations) if e.status not in settled}
     for entry, proposal in proposals.items():
         assert about(robot, entry, extra=(measured(proposal, robot),))[entry].status == "settled", entry
+
+
+def as_rows(proposal: Proposal, robot: Robot) -> tuple[str, str]:
+    """The file that a person enters a measurement in, and its line, as read off the robot."""
+    j = proposal.joint
+    if isinstance(proposal, LookAtMotion):
+        pose = ",".join(f"{angle:g}" for angle in proposal.pose_deg)
+        return "observations.csv", f"{pose},{j},{proposal.point},{proposal.seen},,seen on the arm,measured,measured"
+    if isinstance(proposal, ReadLimit):
+        value = np.degrees(getattr(robot, proposal.side)[j - 1])
+        both = f"{value},," if proposal.side == "lower" else f",{value},"
+        return "limits.csv", f"{j},{both}{proposal.half_width_deg},read off,measured,measured"
+    if isinstance(proposal, TimeJoint):
+        value = np.degrees(robot.speed[j - 1])
+        return "speeds.csv", f"{j},{value},{proposal.half_width_deg_s},timed,measured,measured"
+    if isinstance(proposal, MeasureAngle):
+        value = np.degrees(getattr(robot, proposal.column)[j - 1])
+        return "angles.csv", f"{j},{proposal.column},{value},{proposal.half_width_deg},measured,measured,measured"
+    value = 1000 * getattr(robot, proposal.column)[j - 1]
+    return "lengths.csv", f"{j},{proposal.column},{value},{proposal.half_width_mm},measured,measured,measured"
+
+
+HEADS = {
+    "observations.csv": "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,joint,point,seen,uncertainty_deg,source,grade,"
+    "origin",
+    "angles.csv": "joint,angle,value_deg,uncertainty_deg,source,grade,origin",
+    "lengths.csv": "joint,length,value_mm,uncertainty_mm,source,grade,origin",
+}
+
+
+def test_all_that_is_proposed_entered_in_files_settles_every_entry(tmp_path):
+    """A reference set with a line for each proposal: nothing is left open of the ER3-600."""
+    robot, proposals = load_robot("er3_600"), proposals_of(evidence("er3_600")).values()
+    folder = tmp_path / "measured"
+    shutil.copytree("data/manual_refs/er3_600", folder)
+    with (folder / "documents.csv").open("a", encoding="utf-8") as file:
+        file.write("measured,Measurements on the arm,its owner,\n")
+    for proposal in proposals:
+        name, line = as_rows(proposal, robot)
+        path = folder / name
+        if not path.exists():
+            path.write_text(HEADS[name] + "\n", encoding="utf-8")
+        with path.open("a", encoding="utf-8") as file:
+            file.write(line + "\n")
+    found = er3a.evidence(robot, folder)
+    left = {each.entry: each.status for each in (*found.entries, *found.combinations)}
+    assert {entry: status for entry, status in left.items() if status not in ("settled", "gauge", "given")} == {}
+    assert settles_tool(found)
+    assert {part.status for part in parts_of(found)} == {"settled"}
 
 
 def test_all_measurements_together_settle_the_tool():

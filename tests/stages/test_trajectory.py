@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +16,18 @@ from er3a.errors import InputError
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import characteristic_length, conditioning
-from er3a.pipeline.messages.trajectory import advice, path_text
-from er3a.pipeline.results import Stored, read_results
+from er3a.pipeline.messages.trajectory import FIGURES, advice, path_text
+from er3a.pipeline.results import (
+    AbsentResults,
+    NotComputed,
+    Stored,
+    Summary,
+    Verdict,
+    read_results,
+    write_results,
+)
 from er3a.pipeline.stages import run
+from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.compute import compute
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.stages.trajectory.model import (
@@ -31,6 +42,7 @@ from er3a.pipeline.stages.trajectory.model import (
 from er3a.pipeline.stages.trajectory.record import record
 from er3a.pipeline.stages.trajectory.report import report
 from er3a.pipeline.study import Study, load_study
+from er3a.pipeline.viewing.index import write_index
 from er3a.planning.avoidance.strategies import STRATEGIES
 from er3a.planning.intervals import AboveLimit
 
@@ -238,6 +250,31 @@ def test_speeds_are_judged_where_they_are_known(results):
     assert paths["line_clean"].max_joint_speed_ratio < 1
 
 
+def test_equal_speeds_are_the_first_joint_s(results):
+    """A rounding tie once made J6 the fastest on the ER3-600's line past the shoulder, where J1 is."""
+    path = by_name(results["er3_600"])["line_shoulder"]
+    assert path.fastest_joint == 0
+    least = replace(path, max_joint_speed_deg_s=(90.0, 1.0, 1.0, 1.0, 1.0, 90.0 * (1 + 1e-12)))
+    assert least.fastest_joint == 0
+    assert replace(path, max_joint_speed_deg_s=(90.0, 1.0, 1.0, 1.0, 1.0, 91.0)).fastest_joint == 5
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_tiles_beside_each_other_tell_of_one_path_and_of_different_counts(results, name):
+    """Speed and share are of one joint on one path; paths that collide are counted whatever else is wrong, and the
+    tile says so, because the verdict counts those of which nothing graver is known."""
+    summary = results[name].summary
+    tiles = {figure.name: figure.value for figure in summary.figures}
+    ratio = next(tiles[key] for key in ("speed_ratio", "assumed_speed_ratio") if key in tiles)
+    limits = summary.joint_limits.speed_deg_s
+    pairs = [pair for path in summary.paths for pair in zip(path.max_joint_speed_deg_s or (), limits)]
+    speed, limit = max(pairs, key=lambda pair: pair[0] / pair[1])
+    assert tiles["max_joint_speed"] == speed
+    assert ratio == pytest.approx(speed / limit)
+    assert tiles["colliding"] == sum(bool(path.collisions) for path in summary.paths)
+    assert FIGURES["colliding"] == "Paths with a collision, whatever else is wrong"
+
+
 def test_articles_moves_are_those_of_robotics_toolbox(study, results):
     """jtraj and ctraj at the article's 50 samples of 5 s, ctraj on our law of time."""
     rtb, sm = pytest.importorskip("roboticstoolbox"), pytest.importorskip("spatialmath")
@@ -271,6 +308,34 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
     assert "article_line" in html
     assert html.count('<img src="data:image/svg+xml') == len(found.results.summary.paths) + 1
     assert (tmp_path / "trajectory.rrd").stat().st_size > 100_000
+
+
+@pytest.mark.parametrize(
+    ("status", "told"), [("fail", "Validation contradicts"), ("caution", "Validation leaves part"), ("pass", None)]
+)
+def test_the_page_says_first_what_validation_came_to(study, stored, tmp_path, status, told):
+    report(study, replace(stored["er3_600"], rests_on={"validation": status}), tmp_path / "page.html")
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    body = page[page.index("<body") :]
+    assert ("Validation" in body[: body.index('class="verdict')]) == bool(told)
+    if told:
+        assert body.index(told) < body.index('class="verdict') < body.index("safe")
+
+
+def test_cells_of_the_index_say_first_what_validation_came_to(study, folders, tmp_path):
+    one = study.model_copy(update={"robots": {"er3_600": study.robots["er3_600"]}})
+    for stage in ("validation", "workspace", "inverse"):
+        absent = AbsentResults(Summary(Verdict("not_computed", NotComputed("made up")), ()))
+        write_results(tmp_path / "results/er3_600" / stage, one, "er3_600", STAGES[stage], absent, lambda found: "-")
+    shutil.copytree(folders["er3_600"], tmp_path / "results/er3_600/trajectory")
+    write_index(one, tmp_path / "results", tmp_path)
+    index = (tmp_path / "index.html").read_text(encoding="utf-8")
+    cells = index.split("<td data-label=")[1:]
+    assert len(cells) == 4
+    assert "This table was not validated" not in cells[0]
+    for cell in cells[1:]:
+        assert 0 < cell.index("This table was not validated") < cell.rindex("</p>")
+    assert cells[3].index("This table was not validated") < cells[3].index("safe")
 
 
 def own_paths(*names):

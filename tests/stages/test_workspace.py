@@ -22,9 +22,11 @@ from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.workspace.compute import compute
 from er3a.pipeline.stages.workspace.model import WorkspaceResults
+from er3a.pipeline.stages.workspace.report import report
 from er3a.pipeline.stages.workspace.sample import sample
 from er3a.pipeline.stages.workspace.workspace_findings import VoidUnexpected
 from er3a.pipeline.study import load_study
+from er3a.pipeline.viewing.comparison import border_mm
 from tests.stages.workspace_arms import locked_file, make_study, skew_file, tally_of
 
 # --- the stage ---
@@ -84,6 +86,27 @@ def test_tables_agree_with_the_summary(found):
     reached = forward(make_study().robot("er3_600"), np.radians(hull.q_deg))[:, :3, 3]
     assert np.abs(reached - hull.point_m).max() < 1e-12
     assert 0 < summary.hull.volume_m3 < 1.26
+
+
+def test_the_border_that_is_compared_has_no_chords(found, tmp_path):
+    """Points of different views once were joined, by lines of up to 2.4 m."""
+    write_results(tmp_path / "workspace", make_study(), "er3_600", STAGES["workspace"], found, say)
+    arcs = [np.array(arc) for arc in border_mm(tmp_path)]
+    assert len(arcs) > 2
+    assert max(np.linalg.norm(np.diff(arc, axis=0), axis=1).max() for arc in arcs) < 30
+    views = found.border.take(found.border.point == "tool_point").view
+    assert len(set(views)) > 1  # others stand in the table, and are left out
+
+
+@pytest.mark.parametrize(("name", "drawn"), [("er3_600", True), ("er3a_c60", False)])
+def test_no_page_speaks_of_a_drawing_that_there_is_not(found, name, drawn, tmp_path):
+    study = make_study({name: ROBOTS / f"{name}.yaml"})
+    results = found if name == "er3_600" else compute(study, name)
+    write_results(tmp_path / "results", study, name, STAGES["workspace"], results, say)
+    report(study, read_stage(tmp_path / "results", STAGES["workspace"]), tmp_path / "page.html")
+    page = html.unescape((tmp_path / "page.html").read_text(encoding="utf-8"))
+    assert ("Against the manufacturer's drawing" in page) == drawn
+    assert ("The arm's plane from the side" in page) != drawn
 
 
 def test_what_is_read_is_what_was_computed(found, tmp_path):

@@ -130,6 +130,19 @@ def test_harder_tasks_are_never_easier():
     assert large.least.max() <= small.least.max()
 
 
+def test_no_place_that_is_chosen_is_another_turned_about_axis_1():
+    """A box under a tool that points down is the same task wherever joint 1 stands."""
+    robot, roll = narrowed(load_robot("er3_600"), TRAY.margin), roll_of(load_robot("er3_600"), 1)
+    places = places_of(load_robot("er3_600"), TRAY)
+    chosen = choose_places(robot, TRAY, places, roll, 3, 20_000)
+    centres = places.centre[chosen.row]
+    assert len(centres) > 1
+    for i, one in enumerate(centres):
+        for other in centres[:i]:
+            apart = abs(np.hypot(*one[:2]) - np.hypot(*other[:2])), abs(one[2] - other[2])
+            assert apart[0] >= TRAY.box[:2].min() - 1e-6 or apart[1] >= TRAY.box[2] - 1e-6
+
+
 def test_a_turned_base_turns_the_places():
     task = replace(TRAY, half_angle=np.radians(10))
     robot = load_robot("er3_600")

@@ -16,7 +16,7 @@ from er3a.pipeline.stages.validation.validation_findings import (
     Confirmed,
     Contradicted,
     Contradiction,
-    Judged,
+    JudgedTable,
     LeftOpen,
     ModelUnsound,
     NothingToCompare,
@@ -76,7 +76,7 @@ def counted_checks(counts: CheckCounts) -> str:
     )
 
 
-def _of_claims(found: Judged) -> list[str]:
+def _of_claims(found: JudgedTable) -> list[str]:
     return [*map(say, found.claims), *map(say, found.own_text)]
 
 

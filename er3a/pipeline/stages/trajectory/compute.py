@@ -196,3 +196,7 @@ def _figures(paths: list[PathSummary], length: float, measured: bool, limits: Li
         Figure("velocity_check", agreement, "µdeg/s"),
         Figure("characteristic_length", length * 1000, "mm"),
     )
+
+
+def _shown(robot: Robot, values: Reals) -> tuple[float, ...]:
+    return tuple(shown(robot, values).tolist())

@@ -92,10 +92,7 @@ def _measured_against(diagnosis: SetDiagnosis) -> str:
     told = tr("Residuals are measured against: {documents}.", documents=joined(others)) if others else ""
     if own:
         template = (
-            N_(
-                "Besides against {documents}: taken from the table or the other way round, "
-                "so no evidence for its numbers."
-            )
+            N_("Besides against {documents}: taken from the table or the other way round, so no evidence for it.")
             if others
             else N_(
                 "Residuals are measured against {documents}: the table was taken from it or it from the table, so "

@@ -153,7 +153,7 @@ class Claims:
 
 
 @dataclass(frozen=True)
-class Judged:
+class JudgedTable:
     """What every verdict holds.
 
     Attributes
@@ -172,7 +172,7 @@ class Judged:
 
 
 @dataclass(frozen=True)
-class Confirmed(Judged):
+class Confirmed(JudgedTable):
     """The model meets all that it can, and independent documents settle all that moves the tool."""
 
     grades: tuple[Grade, ...]
@@ -203,7 +203,7 @@ class PartFound:
 
 
 @dataclass(frozen=True)
-class LeftOpen(Judged):
+class LeftOpen(JudgedTable):
     """Nothing contradicts the table, but independent documents don't settle all that moves the tool.
 
     Attributes
@@ -221,14 +221,14 @@ class LeftOpen(Judged):
 
 
 @dataclass(frozen=True)
-class NothingToCompare(Judged):
+class NothingToCompare(JudgedTable):
     """No authoritative document speaks about the model."""
 
     code: Literal["validation.no_reference"] = "validation.no_reference"
 
 
 @dataclass(frozen=True)
-class ModelUnsound(Judged):
+class ModelUnsound(JudgedTable):
     """The model fails a check that needs no document."""
 
     check: SelfCheck
@@ -238,7 +238,7 @@ class ModelUnsound(Judged):
 
 
 @dataclass(frozen=True)
-class _Missed(Judged):
+class _Missed(JudgedTable):
     """The model fails checks against documents; ``check`` is the one to quote.
 
     Attributes
