@@ -378,7 +378,7 @@ def truth(spec, arm: Arm, limits, q_start=None, points=POINTS) -> Truth:
 
     t = np.linspace(0, duration, points)
     q = joints(t)
-    missing = np.isnan(q[:, 0])
+    missing = np.isnan(q).any(axis=1)
     h = t[1] - t[0]
     speed = np.gradient(q, h, axis=0, edge_order=2)
     pull = np.full_like(q, np.nan)

@@ -127,8 +127,8 @@ def _stay(t: Reals, f: Reals, a: int, b: int, duration: float) -> tuple[float, f
     """When nodes a to b - 1, which lie on the set to rounding, meet it: a span only if it is a long one."""
     if t[b - 1] - t[a] > LONG_STAY * duration:
         return t[a], t[b - 1]
-    at = t[a + int(np.argmin(np.abs(f[a:b])))]
-    return at, at
+    at = 0 if a == 0 else len(t) - 1 if b == len(t) else a + int(np.argmin(np.abs(f[a:b])))
+    return t[at], t[at]
 
 
 def _passes(size: Reals, crossed: Flags, near: float) -> Iterator[int]:

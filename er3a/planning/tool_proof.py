@@ -44,7 +44,7 @@ from er3a.robots.robot import Robot
 SHORTEST = 1e-9  # share of the duration
 SETTLED_ELSEWHERE = 1e-5  # share of the duration: shortest interval for what another interval breaks already
 BESIDE_EVENT = 2e-3, 1e-4  # shares of the duration: so near to a known singular pose no interval is made shorter
-MOST_INTERVALS = 60_000
+MOST_INTERVALS = 240_000
 FIRST_INTERVALS = 64
 GROWN = 0.5  # b sqrt(n) C h V up to which a motion is continued
 ATTEMPTS = 3

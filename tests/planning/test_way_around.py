@@ -107,7 +107,7 @@ def test_a_wall_through_the_arms_middle_has_no_way_around():
     random = np.random.default_rng(1)
     ends = []
     for side in (1, -1):
-        q = random.uniform(-0.5, 0.5, (300, 6)) + [side * np.pi / 2, 0.6, 0, 0, 0.8, 0]
+        q = random.uniform(-0.5, 0.5, (300, 6)) + np.array([side * np.pi / 2, 0.6, 0, 0, 0.8, 0])
         ends.append(next(arm for arm in q if one.bodies.least(arm[None])[0][0] > 5e-3))
     assert way_around(one, *ends) == NoneFound(60 * 3)
 

@@ -189,6 +189,8 @@ def advice(path: PathSummary) -> str | None:
         why = joined(dict.fromkeys(causes))
     if len(path.avoidance) == 1:
         (only,) = path.avoidance
+        if only.name == "planned":
+            return sentence("advice.no_way", "There is no way around: {reason}", reason=reasons(only))
         parts = {"way": word("advice", ADVICE, only.name), "reason": reasons(only)}
         return sentence("advice.only", "{way}, as the study asks for, does not repair it: {reason}", **parts)
     return sentence("advice.none", "No avoidance strategy completes this path: {why}", why=why)
