@@ -166,7 +166,7 @@ def _try_poses(
     q = solved.q[pose, slot]
     cells = where[rows][pose]
     np.add.at(tries, cells, 1)
-    free = ~bodies.overlaps(q).any(axis=1)
+    free = bodies.free(q)
     witness[cells[free][::-1]] = q[free][::-1]
 
 

@@ -141,9 +141,9 @@ def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int = 
             found.append(Judged("meets", (pair,), q[least.argmin()]))
             continue
         goal = 0.0 if overlapping else GOAL * float(least.min())
-        outcome, looked, bound = search_boxes(layout, k, box, overlapping, goal, boxes // 2, at)
+        outcome, looked, bound = search_boxes(layout, k, box, (overlapping, goal), boxes // 2, at)
         if outcome not in (FREE, MEETS):
-            outcome, more, bound = search_boxes(layout, k, box, overlapping, 0.0, boxes, at)
+            outcome, more, bound = search_boxes(layout, k, box, (overlapping, 0.0), boxes, at)
             looked += more
         if outcome == MEETS:
             witness = q[least.argmin()] if overlapping else at

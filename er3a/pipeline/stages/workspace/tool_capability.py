@@ -75,9 +75,7 @@ def tool_capability(
     )
     task = _task(settings.placement)
     bodies = Bodies(narrowed(robot, task.margin), scene)
-    placement = find_places(
-        robot, task, roll, cell, LISTED, settings.proof_poses, free=lambda q: ~bodies.overlaps(q).any(axis=1)
-    )
+    placement = find_places(robot, task, roll, cell, LISTED, settings.proof_poses, free=bodies.free)
     return ToolCapability(
         summary,
         _placement_summary(robot, settings.placement, task, placement, float(found.manipulability.max()), scene),
