@@ -86,7 +86,7 @@ def own_distance(first: Body, second: Body) -> tuple[float, bool]:
 
 
 def distances(kind: str, random: np.random.Generator) -> tuple[float, float, float, int]:
-    """Greatest differences (m) from Coal where apart or shallow, and where deep; from FCL where apart; how many deep."""
+    """Greatest differences (m) from Coal, apart or shallow, and deep; from FCL where apart; how many are deep."""
     apart, deep, of_fcl, count = 0.0, 0.0, 0.0, 0
     for number in range(PAIRS):
         a, b = Outsider(kind, random), Outsider(SHAPES[number % len(SHAPES)], random)
@@ -212,7 +212,7 @@ def table() -> str:
     lines = [
         "# Collisions against outsiders",
         "",
-        f"Distances of {PAIRS} random pairs for each kind of body (the other of any kind) against Coal's and FCL's own,",
+        f"Distances of {PAIRS} random pairs for each kind of body (the other of any kind) against Coal's and FCL's,",
         "greatest differences. *Deep*: where cores, of a capsule its line, overlap, so that the depth is compared.",
         "",
         "| body | apart or shallow, Coal (µm) | deep, Coal (µm) | deep pairs | apart, FCL (µm) |",
@@ -224,8 +224,8 @@ def table() -> str:
         lines.append(f"| {kind} | {apart * 1e6:.2g} | {deep * 1e6:.2g} | {count} | {of_fcl * 1e6:.2g} |")
     lines += [
         "",
-        f"Straight joint moves ({MOTIONS} a robot, up to 34 deg per joint) in the default scenes, judged between their",
-        f"ends, no overlap deeper than {DEPTH * 1e3:g} mm to be missed; Pinocchio's loop over 400 points of each is the",
+        f"Straight joint moves ({MOTIONS} a robot, up to 34 deg per joint) in the default scenes, judged between",
+        f"their ends, no overlap deeper than {DEPTH * 1e3:g} mm to be missed; Pinocchio's loop over 400 points is the",
         "check. *Wrong*: proven free, with a contact. *Speed*: a path of 10 000 arms, all pairs, in µs per arm:",
         "Pinocchio's C++ loop called for each arm; ours; ours with all moves between them proven besides.",
         "",
