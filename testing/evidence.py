@@ -30,6 +30,7 @@ PAGES = (
     "workspace",
     "paths",
     "clearance",
+    "collision",
     "capability",
     "teach",
     "pages",
