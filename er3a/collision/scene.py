@@ -154,10 +154,6 @@ class Scene(Displayed):
         return Sheet(f"Scene: {shortly(self.title)}", ("name", "solid", "measures"), shown, left_out)
 
 
-OPEN_SPACE = Scene("", ())
-"""Nothing around the arm, which may still not touch itself."""
-
-
 def _check(name: str, T: Reals, *sizes: float) -> None:
     """Refuse a solid that has no place or no size."""
     check_poses(T, f"the place of '{name}'")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -67,39 +68,40 @@ def robot_file(robot: Robot) -> RobotFile:
     if np.isfinite(robot.speed).all():
         content["speeds"] = sourced("speeds") | {"rows": rows("speeds", speed_deg_s=np.degrees(robot.speed))}
     if robot.envelopes or robot.hulls:
-        capsules = [
-            {
-                "link": envelope.link,
-                "from_mm": [_tidy(value * 1000) for value in envelope.start],
-                "to_mm": [_tidy(value * 1000) for value in envelope.end],
-                "radius_mm": _tidy(envelope.radius * 1000),
-            }
-            for envelope in robot.envelopes
-        ]
-        hulls = [
-            {
-                "link": hull.link,
-                "margin_mm": _tidy(hull.margin * 1000),
-                "points_mm": [[_tidy(value * 1000) for value in point] for point in hull.points],
-            }
-            for hull in robot.hulls
-        ]
-        content["envelopes"] = sourced("envelopes") | {"capsules": capsules, "hulls": hulls}
+        content["envelopes"] = sourced("envelopes") | _shapes(robot)
     if robot.pair_rules:
-        content["collision"] = {
-            rule: [
-                {"pair": [each.first, each.second], "reason": each.reason}
-                for each in robot.pair_rules
-                if each.rule == rule
-            ]
-            for rule in ("allow", "watch")
-        }
+        content["collision"] = {rule: _decided(robot, rule) for rule in ("allow", "watch")}
     for key in ("base", "tool"):
         T = getattr(robot, key)
         if not np.array_equal(T, np.eye(4)):
             placement = {"xyz_mm": map(_tidy, T[:3, 3] * 1000), "rpy_deg": map(_tidy, np.degrees(rpy_of(T)))}
             content[key] = sourced(key) | {name: list(values) for name, values in placement.items()}
     return RobotFile.model_validate(content)
+
+
+def _shapes(robot: Robot) -> dict[str, Any]:
+    """Capsules and hulls as the file has them."""
+
+    def point(values: Iterable[float]) -> list[float]:
+        return [_tidy(value * 1000) for value in values]
+
+    return {
+        "capsules": [
+            {"link": c.link, "from_mm": point(c.start), "to_mm": point(c.end), "radius_mm": _tidy(c.radius * 1000)}
+            for c in robot.envelopes
+        ],
+        "hulls": [
+            {"link": h.link, "margin_mm": _tidy(h.margin * 1000), "points_mm": [point(p) for p in h.points]}
+            for h in robot.hulls
+        ],
+    }
+
+
+def _decided(robot: Robot, rule: str) -> list[dict[str, Any]]:
+    """The pairs that a person decided on by one rule."""
+    return [
+        {"pair": [each.first, each.second], "reason": each.reason} for each in robot.pair_rules if each.rule == rule
+    ]
 
 
 def write_robot(robot: Robot, path: Path) -> None:

@@ -22,7 +22,7 @@ from er3a.formats.urdf_shapes import collision_shapes, numbers
 from er3a.geometry.transforms import rot_z, rpy_of, transform
 from er3a.kinematics.chain import JOINTS, constant_links
 from er3a.kinematics.forward import forward, frames
-from er3a.robots.robot import Envelope, Hull, Robot, Source
+from er3a.robots.robot import ConvexPiece, Envelope, Robot, Source
 
 MOVING = ("revolute", "continuous")
 SNAP_RAD = 1e-4
@@ -114,12 +114,12 @@ def import_urdf(path: str | Path, snap: bool = False, split: bool = False) -> Ur
 
 def link_shapes(
     path: Path, robot: Robot, split: bool
-) -> tuple[tuple[Envelope, ...], tuple[Hull, ...], tuple[str, ...]]:
+) -> tuple[tuple[Envelope, ...], tuple[ConvexPiece, ...], tuple[str, ...]]:
     """The collision geometry of a URDF, in the frames of the links of the robot made from it, and notes in words."""
     chain = {joint.name for joint in _chain(path, False)[0]}
     zero = np.concatenate([robot.base[None], frames(robot, np.zeros(len(robot.a)))])
     joints = {_link(path, element, "child"): element for element in _joint_elements(path)}
-    envelopes, hulls, notes = list[Envelope](), list[Hull](), list[str]()
+    envelopes, hulls, notes = list[Envelope](), list[ConvexPiece](), list[str]()
     for link in ElementTree.fromstring(read_text(path)).findall("link"):
         T, turned, name = np.eye(4), 0, link.get("name", "?")
         while name in joints:
@@ -136,7 +136,7 @@ def link_shapes(
         for collision in link.findall("collision"):
             found = collision_shapes(path, collision, (placed, turned), notes, split)
             envelopes += [shape for shape in found if isinstance(shape, Envelope)]
-            hulls += [shape for shape in found if isinstance(shape, Hull)]
+            hulls += [shape for shape in found if isinstance(shape, ConvexPiece)]
     return tuple(envelopes), tuple(hulls), tuple(notes)
 
 

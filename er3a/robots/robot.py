@@ -47,7 +47,7 @@ class Envelope:
 
 
 @dataclass(frozen=True)
-class Hull:
+class ConvexPiece:
     """A convex piece of a link: all points within ``margin`` (m) of the hull of ``points`` (m, frame as of Envelope).
 
     The margin is by how far the mesh that the piece is part of may stand out of its pieces.
@@ -121,7 +121,7 @@ class Robot(Displayed):
     zero_pose: str = ""
     references: tuple[str, ...] = ()
     envelopes: tuple[Envelope, ...] = ()
-    hulls: tuple[Hull, ...] = ()
+    hulls: tuple[ConvexPiece, ...] = ()
     pair_rules: tuple[PairRule, ...] = ()
     sources: Mapping[str, Source] = field(default_factory=dict)
     origins: Mapping[str, str] = field(default_factory=dict)

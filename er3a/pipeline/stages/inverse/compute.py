@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from er3a.collision.scene import OPEN_SPACE
 from er3a.files.scene_file import load_scene
 from er3a.files.target_file import load_targets
 from er3a.kinematics.round_trips import SAME_JOINTS_RAD, BatchRoundTrips, batch_round_trips
@@ -47,7 +46,7 @@ def compute(study: Study, name: str) -> InverseResults:
     targets = load_targets(study.entry(name).targets, robot)
     settings = study.section(InverseSettings)
     scene_file = study.scene(name, STAGE)
-    scene = load_scene(scene_file) if scene_file else OPEN_SPACE
+    scene = load_scene(scene_file) if scene_file else None
     solved = [
         solve_target(robot, target, np.random.default_rng([study.seed, ADVICE_STREAM, number]), scene)
         for number, target in enumerate(targets)
@@ -60,10 +59,10 @@ def compute(study: Study, name: str) -> InverseResults:
     trips = batch_round_trips(robot, random, settings.round_trips) if closed else None
     worst = _worst_residuals(solutions, trips)
     summary = InverseSummary(
-        verdict=_verdict(results, worst, trips, scene_file is not None),
+        verdict=_verdict(results, worst, trips, scene is not None),
         figures=_figures(results, worst, trips),
         mix=settings.mix,
-        scene=scene.title if scene_file else None,
+        scene=scene.title if scene else None,
         targets=results,
         sequence=sequence(robot, targets, solved, scene),
         round_trips=_round_trips(trips) if trips else None,
