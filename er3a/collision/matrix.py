@@ -72,7 +72,7 @@ class JudgedPair:
 
 @dataclass(frozen=True, eq=False)
 class MatrixRow:
-    """What holds of two links, or of a link and of what is carried; as :class:`JudgedPair`, over all of their bodies."""
+    """What holds of two links, or of a link and what is carried; as :class:`JudgedPair`, over all of their bodies."""
 
     first: str
     second: str
