@@ -31,6 +31,7 @@ PAGES = (
     "paths",
     "clearance",
     "motion",
+    "collision",
     "capability",
     "teach",
     "pages",

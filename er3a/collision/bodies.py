@@ -122,6 +122,13 @@ class Bodies:
         which_overlap(self.layout, q, found)
         return found
 
+    def free(self, q: Reals) -> Flags:
+        """Whether nothing overlaps, (N,), in arms (N, n)."""
+        q = np.ascontiguousarray(q, float)
+        found = np.zeros((len(q), 1), bool)
+        which_overlap(self.layout, q, found)
+        return np.asarray(~found[:, 0])
+
     def surface_points(self, q: Reals, pair: int) -> Reals:
         """The points (2, 3), m, on the surfaces of a pair's bodies that are nearest, for an arm (n,)."""
         near = self.nearest(self.ends(q), np.array([pair]))[1][0]
@@ -135,7 +142,7 @@ class Bodies:
     def always_overlaps(self, pair: int, boxes: int = BOXES) -> bool:
         """Whether a pair overlaps in all arms within the limits, proven."""
         box = np.stack([self.robot.lower, self.robot.upper])
-        return search_boxes(self.layout, pair, box, True, 0.0, boxes, np.empty(box.shape[1]))[0] == FREE
+        return search_boxes(self.layout, pair, box, (True, 0.0), boxes, np.empty(box.shape[1]))[0] == FREE
 
     def _depth(self, world: Reals, pair: int) -> float:
         cores = []

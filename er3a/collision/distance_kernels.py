@@ -438,6 +438,31 @@ def _pair_motion(layout: Layout, T: Reals, w: Reals, k: int, half: Reals) -> flo
 
 
 @kernel
+def _box_state(
+    layout: Layout, q: Reals, half: Reals, placed: tuple[Reals, Reals, Reals], room: Reals, near: Reals
+) -> tuple[int, float]:
+    """Of the joint vectors within ``half`` (n,) of one: FREE, MEETS if something overlaps in the one itself, UNDECIDED.
+
+    Besides, how far the bodies of a pair that is not proven apart move at most, m. ``placed`` is scratch.
+    """
+    T, w, middle = placed
+    reach, first, second = layout.reach, layout.first, layout.second
+    shape = (layout.start, layout.kind, layout.radius, layout.disc)
+    place(layout, q, T, w, middle)
+    state, widest = FREE, 0.0
+    for k in range(len(first)):
+        moved = _pair_motion(layout, T, w, k, half)
+        if _apart(middle, reach, first[k], second[k]) > moved:
+            continue
+        distance = pair_distance(w, shape, first[k], second[k], room, near)[0]
+        if distance < 0:
+            return MEETS, moved
+        if distance <= moved:
+            state, widest = UNDECIDED, max(widest, moved)
+    return state, widest
+
+
+@kernel
 def free_between(layout: Layout, start: Reals, end: Reals, depth: float, most: int) -> tuple[int, int]:
     """Whether a straight move of the joints is free of overlap, proven, with the number of arms looked at.
 
@@ -447,35 +472,24 @@ def free_between(layout: Layout, start: Reals, end: Reals, depth: float, most: i
     may hold no overlap deeper than ``depth`` (m)
     """
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))
-    T, w = np.empty((start.shape[0] + 1, 4, 4)), np.empty(layout.points.shape)
-    middle, reach, first, second = np.empty(layout.centre.shape), layout.reach, layout.first, layout.second
-    shape = (layout.start, layout.kind, layout.radius, layout.disc)
-    stack = np.empty((64, 2))
+    placed = (np.empty((start.shape[0] + 1, 4, 4)), np.empty(layout.points.shape), np.empty(layout.centre.shape))
+    stack = np.empty((DEEPEST, 2))
     stack[0, 0], stack[0, 1] = 0.0, 1.0
     height, looked, result = 1, 0, FREE
     while height:
         height -= 1
         low, high = stack[height, 0], stack[height, 1]
         half = np.abs(end - start) * (high - low) / 2
-        place(layout, start + (end - start) * (low + high) / 2, T, w, middle)
+        state, widest = _box_state(layout, start + (end - start) * (low + high) / 2, half, placed, room, near)
         looked += 1
-        proven, widest = True, 0.0
-        for k in range(len(first)):
-            apart = _apart(middle, reach, first[k], second[k])
-            moved = _pair_motion(layout, T, w, k, half)
-            if apart > moved:
-                continue
-            distance = pair_distance(w, shape, first[k], second[k], room, near)[0]
-            if distance < 0:
-                return MEETS, looked
-            if distance <= moved:
-                proven, widest = False, max(widest, moved)
-        if proven:
+        if state == MEETS:
+            return MEETS, looked
+        if state == FREE:
             continue
-        if widest <= depth or looked >= most:
+        if looked >= most:
+            return UNDECIDED, looked
+        if widest <= depth:
             result = UNDECIDED
-            if looked >= most:
-                return result, looked
             continue
         stack[height, 0], stack[height, 1] = (low + high) / 2, high
         stack[height + 1, 0], stack[height + 1, 1] = low, (low + high) / 2
@@ -484,12 +498,48 @@ def free_between(layout: Layout, start: Reals, end: Reals, depth: float, most: i
 
 
 @kernel
-def search_boxes(
-    layout: Layout, k: int, box: Reals, overlapping: bool, goal: float, most: int, at: Reals
-) -> tuple[int, int, float]:
-    """Whether a pair is apart (or, if ``overlapping``, overlaps) in all joint vectors of a box (2, n), by halving it.
+def judge_polyline(layout: Layout, q: Reals, depth: float, states: Integers) -> int:
+    """Whether each straight move (N - 1,) between neighbours of joint vectors (N, n) is FREE, MEETS or UNDECIDED.
 
-    By more than ``goal`` (m), 0 or more; what comes to less is not decided.
+    A stretch of many moves is proven at once where the box about its middle that holds it is. ``depth`` is as for
+    :func:`free_between`; how many arms were looked at is returned.
+    """
+    room, near = np.empty((ROOM, 3)), np.empty((2, 3))
+    n = q.shape[1]
+    placed = (np.empty((n + 1, 4, 4)), np.empty(layout.points.shape), np.empty(layout.centre.shape))
+    stack, half = np.empty((DEEPEST, 2), np.int64), np.empty(n)
+    stack[0, 0], stack[0, 1] = 0, len(q) - 1
+    height, looked = 1, 0
+    while height:
+        height -= 1
+        low, high = stack[height, 0], stack[height, 1]
+        if high - low == 1:
+            states[low], more = free_between(layout, q[low], q[high], depth, 10_000)
+            looked += more
+            continue
+        at = (low + high) // 2
+        half[:] = 0.0
+        for i in range(low, high + 1):
+            for j in range(n):
+                half[j] = max(half[j], abs(q[i, j] - q[at, j]))
+        state, _ = _box_state(layout, q[at], half, placed, room, near)
+        looked += 1
+        if state == FREE:
+            states[low:high] = FREE
+            continue
+        stack[height, 0], stack[height, 1] = at, high
+        stack[height + 1, 0], stack[height + 1, 1] = low, at
+        height += 2
+    return looked
+
+
+@kernel
+def search_boxes(
+    layout: Layout, k: int, box: Reals, aim: tuple[bool, float], most: int, at: Reals
+) -> tuple[int, int, float]:
+    """Whether a pair is apart (or, by ``aim``, overlaps) in all joint vectors of a box (2, n), by halving it.
+
+    ``aim`` says whether overlap is to be shown, and of how much (m, 0 or more); what comes to less is not decided.
 
     Returns
     -------
@@ -500,6 +550,7 @@ def search_boxes(
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))
     n = box.shape[1]
     T, w, middle = np.empty((n + 1, 4, 4)), np.empty(layout.points.shape), np.empty(layout.centre.shape)
+    overlapping, goal = aim
     shape, a, b = (layout.start, layout.kind, layout.radius, layout.disc), layout.first[k], layout.second[k]
     last, sign = layout.link[a if layout.link[b] == WORLD else b], -1.0 if overlapping else 1.0
     stack, value = np.empty((DEEPEST, 2, n)), np.empty(2)

@@ -79,7 +79,7 @@ class JointSpace:
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
+class ClearPlaces:
     """Cells of space that the tool point was brought to.
 
     Attributes
@@ -116,7 +116,9 @@ def sample_joint_space(bodies: Bodies, samples: int, random: np.random.Generator
     return JointSpace(q, free, of_itself, of_scene, whole, hit)
 
 
-def find_places(bodies: Bodies, space: JointSpace, across: int, rounds: int, random: np.random.Generator) -> Places:
+def find_places(
+    bodies: Bodies, space: JointSpace, across: int, rounds: int, random: np.random.Generator
+) -> ClearPlaces:
     """Cells that the samples reach, and whether an arm free of overlap reaches each.
 
     Parameters
@@ -145,7 +147,7 @@ def find_places(bodies: Bodies, space: JointSpace, across: int, rounds: int, ran
                 rows = np.concatenate([random.choice(own, POSES_A_ROUND) for own in samples])
                 _try_poses(bodies, T, rows, where, (witness, tries), random)
     clear = np.isfinite(witness[:, 0])
-    return Places(corner, cell, index, tries, clear, witness, np.zeros(len(index), bool))
+    return ClearPlaces(corner, cell, index, tries, clear, witness, np.zeros(len(index), bool))
 
 
 def _try_poses(
@@ -166,11 +168,11 @@ def _try_poses(
     q = solved.q[pose, slot]
     cells = where[rows][pose]
     np.add.at(tries, cells, 1)
-    free = ~bodies.overlaps(q).any(axis=1)
+    free = bodies.free(q)
     witness[cells[free][::-1]] = q[free][::-1]
 
 
-def joined_to_home(bodies: Bodies, places: Places, home: Reals, neighbours: int) -> Flags:
+def joined_to_home(bodies: Bodies, places: ClearPlaces, home: Reals, neighbours: int) -> Flags:
     """Which clear places (M,) can be joined to home (n,), an arm free of overlap, by moves that are proven free.
 
     Parameters

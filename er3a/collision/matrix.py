@@ -50,7 +50,7 @@ GROWTH, GROWTHS = 1.25, 12  # of the region around a joint, until the rest comes
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class JudgedPair:
     """What was found of two bodies.
 
     Attributes
@@ -72,7 +72,7 @@ class Judged:
 
 @dataclass(frozen=True, eq=False)
 class MatrixRow:
-    """What holds of two links, or of a link and of what is carried; as :class:`Judged`, over all of their bodies."""
+    """What holds of two links, or of a link and what is carried; as :class:`JudgedPair`, over all of their bodies."""
 
     first: str
     second: str
@@ -116,7 +116,7 @@ def matrix_of(
     for names, bodies in by_names.items():
         rule = decided.get(frozenset(names))
         if rule:
-            found = [Judged("allowed")] if rule.rule == "allow" else [Judged("watched", tuple(bodies))]
+            found = [JudgedPair("allowed")] if rule.rule == "allow" else [JudgedPair("watched", tuple(bodies))]
         else:
             found = judged_pairs(robot, bodies, boxes)
         rows.append(_row(*names, found, rule.reason if rule else ""))
@@ -124,7 +124,7 @@ def matrix_of(
     return CollisionMatrix(tuple(rows), tuple(pair for pair, _ in watched), tuple(joined for _, joined in watched))
 
 
-def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int = BOXES) -> list[Judged]:
+def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int = BOXES) -> list[JudgedPair]:
     """Judge pairs of bodies, the second on the link that is farther out."""
     flat = [body for pair in pairs for body in pair]
     layout = layout_of(robot, flat, [(2 * k, 2 * k + 1) for k in range(len(pairs))])
@@ -138,26 +138,26 @@ def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int = 
         at, least = np.empty(len(robot.a)), distance[:, k]
         overlapping = bool(least[0] < 0)
         if meets[k]:
-            found.append(Judged("meets", (pair,), q[least.argmin()]))
+            found.append(JudgedPair("meets", (pair,), q[least.argmin()]))
             continue
         goal = 0.0 if overlapping else GOAL * float(least.min())
-        outcome, looked, bound = search_boxes(layout, k, box, overlapping, goal, boxes // 2, at)
+        outcome, looked, bound = search_boxes(layout, k, box, (overlapping, goal), boxes // 2, at)
         if outcome not in (FREE, MEETS):
-            outcome, more, bound = search_boxes(layout, k, box, overlapping, 0.0, boxes, at)
+            outcome, more, bound = search_boxes(layout, k, box, (overlapping, 0.0), boxes, at)
             looked += more
         if outcome == MEETS:
             witness = q[least.argmin()] if overlapping else at
-            found.append(Judged("meets", (pair,), witness, boxes=looked))
+            found.append(JudgedPair("meets", (pair,), witness, boxes=looked))
         elif outcome == FREE and overlapping:
             found.append(_joined(robot, pair, q[least.argmax()], looked, boxes))
         elif outcome == FREE:
-            found.append(Judged("never", least=bound, boxes=looked))
+            found.append(JudgedPair("never", least=bound, boxes=looked))
         else:
-            found.append(Judged("undecided", (pair,), q[0] if overlapping else None, boxes=looked))
+            found.append(JudgedPair("undecided", (pair,), q[0] if overlapping else None, boxes=looked))
     return found
 
 
-def _joined(robot: Robot, pair: tuple[Body, Body], farthest: Reals, looked: int, boxes: int) -> Judged:
+def _joined(robot: Robot, pair: tuple[Body, Body], farthest: Reals, looked: int, boxes: int) -> JudgedPair:
     """A pair that overlaps in every pose: without the region around the joint, judged again."""
     centres = _nearest_points(robot, pair, farthest)
     radius = sum(girth(body, centre) for body, centre in zip(pair, centres))
@@ -168,12 +168,14 @@ def _joined(robot: Robot, pair: tuple[Body, Body], farthest: Reals, looked: int,
         if found is not None:
             watched = tuple(pair for each in found for pair in each.bodies)
             witness = next((each.witness for each in found if each.witness is not None), None)
-            return Judged("joined", watched, witness, left_out=radius, boxes=looked + sum(each.boxes for each in found))
+            return JudgedPair(
+                "joined", watched, witness, left_out=radius, boxes=looked + sum(each.boxes for each in found)
+            )
         radius *= GROWTH
-    return Judged("joined", left_out=radius, boxes=looked)
+    return JudgedPair("joined", left_out=radius, boxes=looked)
 
 
-def _without_joining(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int) -> list[Judged] | None:
+def _without_joining(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int) -> list[JudgedPair] | None:
     """Judgements of trimmed pairs; None if one of them still overlaps in every pose."""
     if not pairs:
         return []
@@ -205,7 +207,7 @@ def _nearest_points(robot: Robot, pair: tuple[Body, Body], q: Reals) -> list[Rea
     return [frame[:3, :3].T @ (point - frame[:3, 3]) for frame, point in zip(frames, near)]
 
 
-def _row(first: str, second: str, found: Sequence[Judged], reason: str) -> MatrixRow:
+def _row(first: str, second: str, found: Sequence[JudgedPair], reason: str) -> MatrixRow:
     """One row over all pairs of bodies of two links; the gravest of what watched ones are."""
     watched = [each for each in found if each.bodies]
     grave = ("meets", "undecided", "joined", "watched", "allowed", "never")

@@ -22,7 +22,7 @@ from er3a.files.shipped import ROOT, names, own_or_shipped
 from er3a.files.yaml_file import load
 from er3a.geometry.transforms import transform
 from er3a.numerics.arrays import Reals
-from er3a.robots.robot import CombinedLimit, Envelope, Hull, Robot, Source
+from er3a.robots.robot import CombinedLimit, ConvexPiece, Envelope, Robot, Source
 
 ROBOTS = ROOT / "data" / "robots"
 REFERENCES = ROOT / "data" / "manual_refs"
@@ -163,9 +163,9 @@ def _envelopes(group: Envelopes | None) -> tuple[Envelope, ...]:
     return tuple(Envelope(c.link, metres(c.from_mm), metres(c.to_mm), c.radius_mm / 1000) for c in capsules)
 
 
-def _hulls(group: Envelopes | None) -> tuple[Hull, ...]:
+def _hulls(group: Envelopes | None) -> tuple[ConvexPiece, ...]:
     """Hulls that are written in the file, and those of files of convex pieces."""
-    found: list[Hull] = []
+    found: list[ConvexPiece] = []
     for mesh in group.meshes if group else ():
         content, T = load_pieces(own_or_shipped(mesh.pieces)), placement_transform(Placement(**_place(mesh)))
         found += [_hull(mesh.link, p @ T[:3, :3].T + T[:3, 3], content.uncovered_mm / 1000) for p in content.pieces()]
@@ -174,8 +174,8 @@ def _hulls(group: Envelopes | None) -> tuple[Hull, ...]:
     return tuple(found)
 
 
-def _hull(link: int, points: Reals, margin: float) -> Hull:
-    return Hull(link, tuple((float(x), float(y), float(z)) for x, y, z in points), margin)
+def _hull(link: int, points: Reals, margin: float) -> ConvexPiece:
+    return ConvexPiece(link, tuple((float(x), float(y), float(z)) for x, y, z in points), margin)
 
 
 def _place(mesh: LinkPieces) -> dict[str, list[float]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -79,33 +80,9 @@ def robot_file(robot: Robot) -> RobotFile:
     if robot.coupling is not None:
         content["coupling"] = sourced("coupling") | {"rows": _coupling_rows(robot.coupling)}
     if robot.envelopes or robot.hulls:
-        capsules = [
-            {
-                "link": envelope.link,
-                "from_mm": [_tidy(value * 1000) for value in envelope.start],
-                "to_mm": [_tidy(value * 1000) for value in envelope.end],
-                "radius_mm": _tidy(envelope.radius * 1000),
-            }
-            for envelope in robot.envelopes
-        ]
-        hulls = [
-            {
-                "link": hull.link,
-                "margin_mm": _tidy(hull.margin * 1000),
-                "points_mm": [[_tidy(value * 1000) for value in point] for point in hull.points],
-            }
-            for hull in robot.hulls
-        ]
-        content["envelopes"] = sourced("envelopes") | {"capsules": capsules, "hulls": hulls}
+        content["envelopes"] = sourced("envelopes") | _shapes(robot)
     if robot.pair_rules:
-        content["collision"] = {
-            rule: [
-                {"pair": [each.first, each.second], "reason": each.reason}
-                for each in robot.pair_rules
-                if each.rule == rule
-            ]
-            for rule in ("allow", "watch")
-        }
+        content["collision"] = {rule: _decided(robot, rule) for rule in ("allow", "watch")}
     for group, fields in mass_groups(robot).items():
         content[group] = sourced(group) | fields
     for key in ("base", "tool"):
@@ -152,6 +129,31 @@ def _coupling_rows(coupling: np.ndarray) -> list[dict]:
 def _weighted(factors: np.ndarray) -> dict:
     joints = np.flatnonzero(factors) if factors.any() else np.array([0])
     return {"joints": (joints + 1).tolist(), "factors": factors[joints].tolist()}
+
+
+def _shapes(robot: Robot) -> dict[str, Any]:
+    """Capsules and hulls as the file has them."""
+
+    def point(values: Iterable[float]) -> list[float]:
+        return [_tidy(value * 1000) for value in values]
+
+    return {
+        "capsules": [
+            {"link": c.link, "from_mm": point(c.start), "to_mm": point(c.end), "radius_mm": _tidy(c.radius * 1000)}
+            for c in robot.envelopes
+        ],
+        "hulls": [
+            {"link": h.link, "margin_mm": _tidy(h.margin * 1000), "points_mm": [point(p) for p in h.points]}
+            for h in robot.hulls
+        ],
+    }
+
+
+def _decided(robot: Robot, rule: str) -> list[dict[str, Any]]:
+    """The pairs that a person decided on by one rule."""
+    return [
+        {"pair": [each.first, each.second], "reason": each.reason} for each in robot.pair_rules if each.rule == rule
+    ]
 
 
 def write_robot(robot: Robot, path: Path) -> None:

@@ -26,7 +26,7 @@ from er3a.geometry.transforms import rot_z, rpy_of
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward, frames
 from er3a.numerics.arrays import Reals
-from er3a.robots.robot import MOST_JOINTS, Envelope, Hull, Robot, Source
+from er3a.robots.robot import MOST_JOINTS, ConvexPiece, Envelope, Robot, Source
 
 MISFIT_POSES = 1000
 NO_RANGE = math.pi
@@ -163,10 +163,10 @@ def link_places(found: UrdfChain, shift: Reals) -> LinkPlaces:
 
 def link_shapes(
     path: Path, root: ElementTree.Element, robot: Robot, placed: LinkPlaces, split: bool
-) -> tuple[tuple[Envelope, ...], tuple[Hull, ...], tuple[str, ...]]:
+) -> tuple[tuple[Envelope, ...], tuple[ConvexPiece, ...], tuple[str, ...]]:
     """The collision geometry of a URDF, in the frames of the links of the robot made from it, and notes in words."""
     zero = np.concatenate([robot.base[None], frames(robot, np.zeros(robot.joints))])
-    envelopes, hulls, notes = list[Envelope](), list[Hull](), list[str]()
+    envelopes, hulls, notes = list[Envelope](), list[ConvexPiece](), list[str]()
     for link in root.findall("link"):
         shapes, place = link.findall("collision"), placed(link.get("name", "?"))
         if place is None:
@@ -177,7 +177,7 @@ def link_shapes(
         for collision in shapes:
             made = collision_shapes(path, collision, (np.linalg.inv(zero[number]) @ T, number), notes, split)
             envelopes += [shape for shape in made if isinstance(shape, Envelope)]
-            hulls += [shape for shape in made if isinstance(shape, Hull)]
+            hulls += [shape for shape in made if isinstance(shape, ConvexPiece)]
     return tuple(envelopes), tuple(hulls), tuple(notes)
 
 

@@ -19,7 +19,7 @@ from er3a.errors import Er3aError, InputError
 from er3a.formats.mesh_file import read_mesh, read_vertices
 from er3a.geometry.transforms import transform
 from er3a.numerics.arrays import Reals
-from er3a.robots.robot import Envelope, Hull
+from er3a.robots.robot import ConvexPiece, Envelope
 
 PRISM_SIDES = 24
 THRESHOLD, SEED = 0.05, 0
@@ -27,7 +27,7 @@ THRESHOLD, SEED = 0.05, 0
 
 def collision_shapes(
     path: Path, collision: ElementTree.Element, place: tuple[Reals, int], notes: list[str], split: bool
-) -> list[Envelope | Hull]:
+) -> list[Envelope | ConvexPiece]:
     """Shapes of one ``<collision>``.
 
     Parameters
@@ -60,7 +60,7 @@ def collision_shapes(
             notes.append(f"{where}: <{tag}> is no shape that er3a reads; it is left out")
             return []
     placed = (piece @ T[:3, :3].T + T[:3, 3] for piece in pieces.pieces)
-    return [Hull(link, tuple((x, y, z) for x, y, z in piece.tolist()), pieces.uncovered) for piece in placed]
+    return [ConvexPiece(link, tuple((x, y, z) for x, y, z in piece.tolist()), pieces.uncovered) for piece in placed]
 
 
 def _mesh(

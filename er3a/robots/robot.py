@@ -61,7 +61,7 @@ class CombinedLimit:
 
 
 @dataclass(frozen=True)
-class Hull:
+class ConvexPiece:
     """A convex piece of a link: all points within ``margin`` (m) of the hull of ``points`` (m, frame as of Envelope).
 
     The margin is by how far the mesh that the piece is part of may stand out of its pieces.
@@ -150,7 +150,7 @@ class Robot(Displayed):
     coupling: Reals | None = None
     continuous: Flags = field(default_factory=lambda: np.empty(0, dtype=bool))
     combined: tuple[CombinedLimit, ...] = ()
-    hulls: tuple[Hull, ...] = ()
+    hulls: tuple[ConvexPiece, ...] = ()
     pair_rules: tuple[PairRule, ...] = ()
     masses: Masses = field(default_factory=Masses)
     sources: Mapping[str, Source] = field(default_factory=dict)

@@ -7,8 +7,8 @@ import numpy as np
 from er3a.collision.bodies import Bodies
 from er3a.collision.free_space import (
     DEPTH,
+    ClearPlaces,
     JointSpace,
-    Places,
     Share,
     find_places,
     joined_to_home,
@@ -18,6 +18,7 @@ from er3a.collision.mounting import base_contacts
 from er3a.collision.pairs import Pair
 from er3a.files.scene_file import load_scene
 from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.stages.collision.clearances import path_clearances, target_clearances
 from er3a.pipeline.stages.collision.entry import CollisionSettings
 from er3a.pipeline.stages.collision.model import (
     BaseInSolid,
@@ -33,7 +34,6 @@ from er3a.pipeline.stages.collision.model import (
     PlaceRows,
     PlacesSummary,
 )
-from er3a.pipeline.stages.collision.nearest import path_clearances, target_clearances
 from er3a.pipeline.stages.trajectory.listed_motions import study_motions
 from er3a.pipeline.study import Study
 
@@ -133,7 +133,7 @@ def _share(share: Share) -> FreeShare:
     return FreeShare(share.value, share.interval)
 
 
-def _places_summary(places: Places) -> PlacesSummary:
+def _places_summary(places: ClearPlaces) -> PlacesSummary:
     cell, clear = places.cell**3, int(places.clear.sum())
     return PlacesSummary(
         cell_m=places.cell,

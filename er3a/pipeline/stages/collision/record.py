@@ -71,7 +71,7 @@ def _shape(body: Body, colour: tuple[int, ...]) -> rr.Capsules3D | rr.Ellipsoids
 
 
 def _places(stream: rr.RecordingStream, results: CollisionResults) -> None:
-    rows, radius = results.places, results.summary.places.cell_m / 8
+    rows, radius = results.places, results.summary.places.cell_m / 14
     groups = {
         "joined": (rows.joined, VERDICTS["pass"]),
         "clear": (rows.clear & ~rows.joined, JOINTS[5]),

@@ -11,7 +11,7 @@ from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.collision.figures import by_pair, clearance_over_time, closest_pair, workspace
+from er3a.pipeline.stages.collision.collision_figures import by_pair, clearance_over_time, closest_pair, workspace
 from er3a.pipeline.stages.collision.model import (
     STATES,
     Closest,

@@ -10,7 +10,6 @@ import numpy as np
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
 from er3a.kinematics.configuration import branch_labels
-from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.stages.workspace import table_rows
 from er3a.pipeline.stages.workspace.entry import BoxTask, CapabilitySettings
 from er3a.pipeline.stages.workspace.model import (
@@ -76,11 +75,7 @@ def tool_capability(
     )
     task = _task(settings.placement)
     bodies = Bodies(narrowed(robot, task.margin), scene)
-
-    def free(q: Reals) -> Flags:
-        return np.asarray(~bodies.overlaps(q).any(axis=1))
-
-    placement = find_places(robot, task, roll, cell, LISTED, settings.proof_poses, free=free)
+    placement = find_places(robot, task, roll, cell, LISTED, settings.proof_poses, free=bodies.free)
     return ToolCapability(
         summary,
         _placement_summary(robot, settings.placement, task, placement, float(found.manipulability.max()), scene),

@@ -1,0 +1,198 @@
+"""Meshes as convex pieces: what holds them, what they stand out by, and every way to bring a bad one."""
+
+from __future__ import annotations
+
+import json
+import struct
+
+import numpy as np
+import pytest
+import trimesh
+import yaml
+
+from er3a.collision.bodies import Bodies
+from er3a.collision.clearance import clearance
+from er3a.collision.meshes import capsule_around, hull_of, uncovered
+from er3a.errors import InputError
+from er3a.files.mesh_import import import_mesh
+from er3a.files.pieces_file import load_pieces
+from er3a.files.robot_library import ROBOTS, load_robot
+from er3a.files.scene_file import load_scene
+from er3a.formats.mesh_file import read_mesh
+from er3a.formats.urdf import import_urdf
+
+
+def angle_iron() -> trimesh.Trimesh:
+    """Two plates at a right angle, closed, not convex; 200 mm, in mm."""
+    outline = np.array([[0, 0], [200, 0], [200, 20], [20, 20], [20, 200], [0, 200]], float)
+    faces = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]])
+    side = [[k, (k + 1) % 6, (k + 1) % 6 + 6] for k in range(6)] + [[k, (k + 1) % 6 + 6, k + 6] for k in range(6)]
+    vertices = np.concatenate([np.c_[outline, np.zeros(6)], np.c_[outline, np.full(6, 100.0)]])
+    return trimesh.Trimesh(vertices, np.concatenate([faces[:, ::-1], faces + 6, side]), process=False)
+
+
+@pytest.mark.parametrize("suffix", ["stl", "obj", "dae", "glb"])
+def test_formats_give_the_same_mesh(tmp_path, suffix):
+    mesh = angle_iron()
+    assert mesh.is_watertight
+    mesh.export(tmp_path / f"iron.{suffix}")
+    found = read_mesh(tmp_path / f"iron.{suffix}", "mm")
+    np.testing.assert_allclose(np.ptp(found.vertices, axis=0), [0.2, 0.2, 0.1], atol=1e-6)
+    assert len(found.faces) == 20
+
+
+def test_pieces_with_their_margin_hold_the_mesh_and_come_again(tmp_path):
+    angle_iron().export(tmp_path / "iron.stl")
+    made = [import_mesh(tmp_path / "iron.stl", tmp_path / f"{k}.json", "mm", 0.05, 0) for k in range(2)]
+    assert (tmp_path / "0.json").read_bytes() == (tmp_path / "1.json").read_bytes()
+    content = load_pieces(tmp_path / "0.json")
+    assert content == made[0]
+    assert len(content.pieces_mm) > 1
+    points = trimesh.sample.sample_surface(angle_iron(), 3000, seed=1)[0]
+    away = np.full(len(points), np.inf)
+    for piece in content.pieces_mm:
+        hull = trimesh.convex.convex_hull(np.array(piece))
+        nearest = trimesh.proximity.closest_point_naive(hull, points)[1]
+        heights = points @ hull.face_normals.T - np.einsum("ij,ij->i", hull.face_normals, hull.triangles_center)
+        inside = (heights <= 1e-9).all(axis=1)
+        away = np.minimum(away, np.where(inside, 0.0, nearest))
+    assert away.max() <= content.uncovered_mm + 1e-6
+    assert content.excess_mm < 20
+
+
+def test_what_stands_out_is_bounded_from_above_and_not_by_much():
+    """A box of which the pieces hold all but a slice of 3 mm."""
+    box = trimesh.creation.box((0.2, 0.1, 0.1))
+    corners = box.vertices.copy()
+    corners[corners[:, 0] > 0, 0] -= 0.003
+    found = uncovered(np.array(box.vertices), np.array(box.faces), [corners])
+    assert 0.003 <= found < 0.0031
+
+
+def test_hulls_of_many_corners_get_a_margin_that_holds_the_rest(random):
+    points = random.normal(size=(2000, 3)) * 0.1
+    (piece,), margin = hull_of(points).pieces, hull_of(points).uncovered
+    assert len(piece) <= 64
+    hull = trimesh.convex.convex_hull(piece)
+    heights = points @ hull.face_normals.T - np.einsum("ij,ij->i", hull.face_normals, hull.triangles_center)
+    outside = points[(heights > 0).any(axis=1)]
+    assert len(outside)
+    assert trimesh.proximity.closest_point_naive(hull, outside)[1].max() <= margin + 1e-9
+
+
+def test_capsule_around_a_mesh_holds_it():
+    for mesh in (angle_iron(), trimesh.creation.torus(100, 30), trimesh.creation.cylinder(20, 300)):
+        capsule = capsule_around(np.array(mesh.vertices) / 1000, 2)
+        start, end = np.array(capsule.start), np.array(capsule.end)
+        points = trimesh.sample.sample_surface(mesh, 5000, seed=1)[0] / 1000
+        share = np.clip((points - start) @ (end - start) / max((end - start) @ (end - start), 1e-30), 0, 1)
+        away = np.linalg.norm(points - start - share[:, None] * (end - start), axis=1)
+        assert away.max() <= capsule.radius
+    assert capsule.radius < 0.024
+
+
+def test_robot_and_scene_take_pieces_from_files(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    box = trimesh.creation.box((100.0, 100.0, 100.0))
+    box.export("cube.stl")
+    import_mesh(tmp_path / "cube.stl", tmp_path / "cube.json", "mm", 0.05, 0)
+    scene = {
+        "kind": "scene",
+        "title": "made",
+        "meshes": [{"name": "cube", "xyz_mm": [500, 0, 0], "pieces": "cube.json"}],
+    }
+    (tmp_path / "scene.yaml").write_text(yaml.safe_dump(scene), encoding="utf-8")
+    plain = {"kind": "scene", "title": "made", "boxes": [{"name": "cube", "size_mm": [100] * 3, "xyz_mm": [500, 0, 0]}]}
+    (tmp_path / "plain.yaml").write_text(yaml.safe_dump(plain), encoding="utf-8")
+    robot, q = load_robot("er3_600"), np.radians([[0, -60, 0, 0, 40, 0], [30, -30, 0, 0, 0, 0]])
+    found, expected = (clearance(robot, q, load_scene(f"{name}.yaml")).distance for name in ("scene", "plain"))
+    np.testing.assert_allclose(found, expected, atol=1e-7)
+
+    content = yaml.safe_load((ROBOTS / "er3_600.yaml").read_text(encoding="utf-8")) | {"name": "arm"}
+    content["envelopes"]["meshes"] = [{"link": 6, "pieces": "cube.json", "xyz_mm": [0, 0, 128.5]}]
+    (tmp_path / "arm.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    arm = load_robot(tmp_path / "arm.yaml")
+    assert len(arm.hulls) == 1
+    assert (clearance(arm, q, load_scene("plain.yaml")).distance <= expected + 1e-12).all()
+    # A gripper's own bodies are one link's: no pair.
+    assert all(pair.first != pair.second for pair in Bodies(arm, None).pairs)
+
+
+def write_stl_head(path, triangles: int) -> None:
+    with path.open("wb") as file:
+        file.write(b"\0" * 80 + struct.pack("<I", triangles))
+        file.truncate(84 + 50 * triangles)
+
+
+BAD = {
+    "not closed": ("is not closed: 3 edges", "Close its holes"),
+    "in metres": ("can only be metres", "--unit m"),
+    "ten million triangles": ("has 10000000 triangles", "Simplify"),
+    "no format": ("is no format of meshes", "Save it as"),
+    "empty": ("holds no triangles", "as triangles"),
+    "nowhere": ("there is no such file", "Check"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_mesh_is_refused_in_one_line(case, tmp_path):
+    path = tmp_path / "mesh.stl"
+    mesh = trimesh.creation.box((100.0, 100.0, 100.0))
+    match case:
+        case "not closed":
+            mesh.update_faces(np.arange(12) > 0)
+            mesh.export(path)
+        case "in metres":
+            mesh.apply_scale(1e-3)
+            mesh.export(path)
+        case "ten million triangles":
+            write_stl_head(path, 10_000_000)
+        case "no format":
+            path = tmp_path / "mesh.step"
+            path.write_text("x", encoding="utf-8")
+        case "empty":
+            path.write_bytes(b"")
+    with pytest.raises(InputError) as caught:
+        read_mesh(path, "mm")
+    for words in BAD[case]:
+        assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_pieces_that_were_edited_are_refused(tmp_path):
+    trimesh.creation.box((100.0, 100.0, 100.0)).export(tmp_path / "cube.stl")
+    import_mesh(tmp_path / "cube.stl", tmp_path / "cube.json", "mm", 0.05, 0)
+    content = json.loads((tmp_path / "cube.json").read_text(encoding="utf-8"))
+    content["pieces_mm"][0][0][0] += 1.0
+    (tmp_path / "cube.json").write_text(json.dumps(content), encoding="utf-8")
+    with pytest.raises(InputError, match="not as they were written"):
+        load_pieces(tmp_path / "cube.json")
+    with pytest.raises(InputError, match="no file of convex pieces"):
+        load_pieces(tmp_path / "cube.stl")
+
+
+def test_collision_geometry_of_a_urdf_is_taken_over(tmp_path):
+    """Boxes, cylinders, spheres and meshes where the URDF has them: distances are those of its own geometry."""
+    from er3a.formats.urdf import export_urdf
+
+    robot = load_robot("er3_600")
+    trimesh.creation.icosphere(radius=0.05).export(tmp_path / "ball.stl")
+    text = export_urdf(robot)
+    shapes = {
+        "link_2": '<origin xyz="0.1 0 0" rpy="0 0 0.3"/><geometry><box size="0.2 0.1 0.1"/></geometry>',
+        "link_4": '<origin xyz="0 0 0.1"/><geometry><cylinder radius="0.04" length="0.2"/></geometry>',
+        "link_6": '<geometry><mesh filename="ball.stl"/></geometry>',
+        "tool": '<geometry><sphere radius="0.03"/></geometry>',
+        "base": '<geometry><mesh filename="package://nowhere/base.stl"/></geometry>',
+    }
+    for name, inside in shapes.items():
+        text = text.replace(f'<link name="{name}" />', f'<link name="{name}"><collision>{inside}</collision></link>')
+    (tmp_path / "arm.urdf").write_text(text, encoding="utf-8")
+    found = import_urdf(tmp_path / "arm.urdf")
+    assert sorted(hull.link for hull in found.robot.hulls) == [2, 4, 6]
+    (ball,) = found.robot.envelopes
+    assert (ball.link, ball.radius) == (6, 0.03)
+    assert any("was not found" in note for note in found.notes)
+    box = next(np.array(hull.points) for hull in found.robot.hulls if hull.link == 2)
+    assert np.ptp(box, axis=0).max() < 0.26
+    np.testing.assert_allclose(np.linalg.norm(box.mean(axis=0)), 0.1, atol=1e-9)  # 100 mm from axis 2's origin
