@@ -17,6 +17,7 @@ import pytest
 import typer
 import yaml
 
+from er3a.files.program_file import ProgramsFile
 from er3a.files.robot_file import RobotFile
 from er3a.files.yaml_file import parse, read_yaml
 from er3a.pipeline.cli import app
@@ -97,6 +98,9 @@ def merged(into: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
 @pytest.mark.parametrize("block", all_blocks("yaml"))
 def test_yaml_in_documents_is_accepted(block):
     settings = yaml.safe_load(block)
+    if settings.get("kind") == "programs":
+        parse(ProgramsFile, settings, None)
+        return
     if set(settings) <= set(Study.model_fields):
         model, base = Study, "config/small.yaml"
     else:
@@ -183,7 +187,10 @@ def test_commands_of_documents_exist(page):
             assert_make_words(verb, words)
             continue
         assert verb in known.commands or verb.startswith("-"), command
-        parameters = known.commands[verb].params if verb in known.commands else known.params
+        asked = known.commands.get(verb, known)
+        if words and words[0] in getattr(asked, "commands", {}):
+            asked = asked.commands[words[0]]
+        parameters = asked.params
         options = {option for each in parameters for option in each.opts}
         assert [word for word in words if word.startswith("--") and word.split("=")[0] not in options] == [], command
 

@@ -180,7 +180,7 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
 def _located(execution: Execution, checker: StepChecker, blind: bool) -> tuple[LocatedFinding, ...]:
     """All findings, like ones of an instruction grouped; ``blind`` if collisions could not be looked for."""
     program = execution.program
-    top = Place(program.file, 1)
+    top = Place(program.file)
     moving = {step.place for step in execution.steps if isinstance(step.instruction, Unknown)}
     found = [
         LocatedFinding(level_of(each), each, _place_of(each, top))
