@@ -27,6 +27,9 @@ from er3a.programs.syntax import (
 )
 from er3a.programs.values import Record, Unclear, Value, number
 
+WITH_FIELDS = ("$VEL", "$ACC", "$APO")
+"""Variables of KRL whose fields are read by their whole names, however they were set."""
+
 LONGEST_TEXT = 10_000
 LARGEST_WHOLE = 2**62
 
@@ -116,6 +119,8 @@ class ProgramMemory:
     def write(self, name: str, value: Value, local: bool = False) -> None:
         """Give a whole name a value."""
         self.kept.clear()
+        if name in WITH_FIELDS and isinstance(value, Record):
+            self.shared.update({f"{name}.{field}": part for field, part in value.items})
         if local or (self.local and root(name) in self.local):
             self.local[name] = value
         else:
