@@ -17,6 +17,7 @@ import pytest
 import typer
 import yaml
 
+from er3a.files.program_file import ProgramsFile
 from er3a.files.robot_file import RobotFile
 from er3a.files.yaml_file import parse, read_yaml
 from er3a.pipeline.cli import app
@@ -97,6 +98,9 @@ def merged(into: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
 @pytest.mark.parametrize("block", all_blocks("yaml"))
 def test_yaml_in_documents_is_accepted(block):
     settings = yaml.safe_load(block)
+    if settings.get("kind") == "programs":
+        parse(ProgramsFile, settings, None)
+        return
     if set(settings) <= set(Study.model_fields):
         model, base = Study, "config/small.yaml"
     else:
@@ -184,6 +188,8 @@ def test_commands_of_documents_exist(page):
             continue
         assert verb in known.commands or verb.startswith("-"), command
         own = known.commands.get(verb, known)
+        if words and words[0] in getattr(own, "commands", {}):
+            own = own.commands[words[0]]
         if own.context_settings.get("ignore_unknown_options"):  # those of Snakemake
             continue
         options = {option for each in own.params for option in each.opts} | {"--help"}

@@ -84,7 +84,7 @@ def _verdict_line(verdict: MotionVerdict) -> str:
 
 def _where(place: Place) -> str:
     element = f" ({place.element})" if place.element else ""
-    return f"{shown(place.file)}:{place.line}{element}"
+    return f"{shown(place.file)}:{place.line}{element}" if place.line else shown(place.file)
 
 
 def shown(file: Path | None) -> str:

@@ -23,6 +23,7 @@ from er3a.program_check.program_check_findings import (
     MayMove,
     NeverReached,
     NotFollowedToEnd,
+    RestNotChecked,
     level_of,
     worst_of,
 )
@@ -53,6 +54,7 @@ class CheckOptions:
     acceleration_time : s, in which each joint is taken to reach its full speed
     penetration_tolerance : m; no overlap deeper than this goes unnoticed
     measures : whether to look for collisions
+    most_motions : that are carried out and differ or not; those behind them are not checked, which is said
     """
 
     start: Reals | None = None
@@ -63,6 +65,7 @@ class CheckOptions:
     acceleration_time: float = 0.25
     penetration_tolerance: float = 0.001
     measures: bool = True
+    most_motions: int = 20_000
     assumed: AssumedRates = field(default_factory=AssumedRates)
     limits: RunLimits = field(default_factory=RunLimits)
 
@@ -167,11 +170,13 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
     obstacles = obstacles_of(robot, options.scene, options.penetration_tolerance) if options.measures else None
     checker = StepChecker(robot, CheckRules(options.near, limits, options.assumed), obstacles, execution)
     checker.start = options.start
-    for number in range(len(execution.steps)):
+    end = next(iter(execution.motions[options.most_motions : options.most_motions + 1]), len(execution.steps))
+    for number in range(end):
         checker.check(number)
     for ending in execution.endings:
-        checker.close_loop(ending)
-    located = _located(execution, checker, options.measures and obstacles is None)
+        if end == len(execution.steps):
+            checker.close_loop(ending)
+    located = _located(execution, checker, options.measures and obstacles is None, end)
     verdicts = _verdicts(program, execution, checker.motions, located)
     level: Level = worst_of(each.level for each in located)
     main = execution.main() if execution.endings else None
@@ -180,10 +185,13 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
     return ProgramCheck(execution, level, located, verdicts, checker.motions, way, cycle)
 
 
-def _located(execution: Execution, checker: StepChecker, blind: bool) -> tuple[LocatedFinding, ...]:
-    """All findings, like ones of an instruction grouped; ``blind`` if collisions could not be looked for."""
+def _located(execution: Execution, checker: StepChecker, blind: bool, end: int) -> tuple[LocatedFinding, ...]:
+    """All findings, like ones of an instruction grouped; ``blind`` if collisions could not be looked for.
+
+    ``end``: number of the first step that was not checked.
+    """
     program = execution.program
-    top = Place(program.file, 1)
+    top = Place(program.file)
     moving = {step.place for step in execution.steps if isinstance(step.instruction, Unknown)}
     found = [
         LocatedFinding(level_of(each), each, _place_of(each, top))
@@ -192,6 +200,8 @@ def _located(execution: Execution, checker: StepChecker, blind: bool) -> tuple[L
     ]
     if blind:
         found.append(LocatedFinding("caution", ClearanceNotMeasured(), top))
+    if end < len(execution.steps):
+        found.append(LocatedFinding("caution", RestNotChecked(len(checker.motions)), execution.steps[end].place))
     for number, motion in checker.motions.items():
         step = execution.steps[number]
         found += [LocatedFinding(level_of(each), each, step.place, step.calls) for each in motion.findings]
@@ -261,9 +271,12 @@ def _verdicts(
     worst: dict[Place, Level] = {}
     for each in located:
         worst[each.place] = worst_of((worst.get(each.place, "pass"), each.level))
+    met = {step.place for step in execution.steps}
     found = []
     for place, text in _motion_texts(program):
         here = done[place]
+        if not here and place in met:
+            worst[place] = worst_of((worst.get(place, "pass"), "caution"))
         durations = [each.way.law.duration for each in here if each.way is not None]
         clear = [each.clearance for each in here if each.clearance is not None]
         found.append(

@@ -298,6 +298,14 @@ class NeverReached:
 
 
 @dataclass(frozen=True)
+class RestNotChecked:
+    """The program has more motions than are checked; those from here on are not."""
+
+    checked: int
+    code: Literal["rest_not_checked"] = "rest_not_checked"
+
+
+@dataclass(frozen=True)
 class BothSidesChecked:
     """A condition that only the cell knows; both sides were followed."""
 
@@ -367,6 +375,7 @@ CheckFinding = (
     | SpeedNotGiven
     | MayMove
     | NeverReached
+    | RestNotChecked
     | BothSidesChecked
     | NotFollowedToEnd
     | LoopComesBackOtherwise

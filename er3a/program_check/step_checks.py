@@ -10,6 +10,7 @@ import numpy as np
 from er3a.collision.along import clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
+from er3a.geometry.angles import TURN
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.program_check.motion_laws import is_given
@@ -167,7 +168,11 @@ class StepChecker:
         way = joint_way(placed.arm, placed.motion, before, goal.joints, self.rules)
         if way is None:
             return CheckedMotion("joint", placed, before, None, goal.joints, tuple(findings), stays=True)
-        return self._measured(CheckedMotion("joint", placed, before, way, way.end, (*findings, *way.findings)))
+        found = (*findings, *way.findings)
+        beyond = np.maximum(goal.joints - placed.arm.upper, placed.arm.lower - goal.joints).max()
+        if beyond > TURN:  # no arm gets there, and nothing goes on from there
+            return CheckedMotion("joint", placed, before, None, None, found)
+        return self._measured(CheckedMotion("joint", placed, before, way, way.end, found))
 
     def _tool_move(
         self, placed: PlacedMotion, goal: Goal, before: Reals, findings: list[CheckFinding]

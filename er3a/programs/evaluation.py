@@ -25,7 +25,10 @@ from er3a.programs.syntax import (
     Unary,
     Variable,
 )
-from er3a.programs.values import Record, Unclear, Value, number
+from er3a.programs.values import Record, Solved, Unclear, Value, number
+
+WITH_FIELDS = ("$VEL", "$ACC", "$APO")
+"""Variables of KRL whose fields are read by their whole names, however they were set."""
 
 LONGEST_TEXT = 10_000
 LARGEST_WHOLE = 2**62
@@ -116,6 +119,8 @@ class ProgramMemory:
     def write(self, name: str, value: Value, local: bool = False) -> None:
         """Give a whole name a value."""
         self.kept.clear()
+        if name in WITH_FIELDS and isinstance(value, Record):
+            self.shared.update({f"{name}.{field}": part for field, part in value.items})
         if local or (self.local and root(name) in self.local):
             self.local[name] = value
         else:
@@ -133,6 +138,19 @@ class ProgramMemory:
         key = self.key(target)
         if key is not None:
             self.write(key, self._typed(key, value), local)
+        else:
+            self._forget(target)
+
+    def _forget(self, target: Expression) -> None:
+        """An element changes, but which one is not known: none of its list is known from here."""
+        while isinstance(target, (Member, Element)):
+            target = target.of
+        if not isinstance(target, Variable):
+            return
+        self.kept.clear()
+        for values in (self.local, self.shared):
+            for name in [each for each in values if root(each) == target.name]:
+                values[name] = Unclear(name)
 
     def _set_field(self, target: Member, value: Value) -> bool:
         """Give a field of a kept value a value; False if the field is kept under its whole name."""
@@ -204,9 +222,13 @@ class ProgramMemory:
     def _with_element(self, target: Element, value: Value) -> Value | None:
         """The list or record that an element belongs to, with that element changed; None if it belongs to none."""
         of = self.value(target.of)
+        if isinstance(of, Solved):  # which only the arm's table gives
+            return Unclear("a changed solution of get_inverse_kin")
         at = number(self.value(target.indices[0])) if len(target.indices) == 1 else None
-        if not isinstance(of, (tuple, Record)) or at is None:
+        if not isinstance(of, (tuple, Record)):
             return None
+        if at is None:
+            return Unclear("a list with a changed element")
         place = int(at) - self.functions.first_index
         values = of.values() if isinstance(of, Record) else of
         if not 0 <= place < len(values):

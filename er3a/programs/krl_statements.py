@@ -259,7 +259,7 @@ def _interrupt(reading: _Statement) -> None:
     if reading.words.accept("DECL") and " DO " in reading.text.upper():
         routine = re.split(r"(?i)\bDO\b", reading.text)[-1]
         if "IR_STOPM" not in routine.upper() and "(" in routine:
-            reading.builder.unknown(reading.place, reading.text)
+            reading.builder.unknown(reading.place, reading.text, may_move=False)  # not here, but whenever it is met
             return
     reading.builder.aside(reading.place, reading.text)
 

@@ -31,7 +31,7 @@ KRL = Lexicon(
 )
 
 PLAIN = re.compile(
-    r"(?i)(PTP|LIN|SPTP|SLIN|SPL)\s*\{\s*(?:(E6POS|E6AXIS|POS|FRAME|AXIS)\s*:)?([^{}\"]*)\}\s*((?:C_\w+\s*)*)$"
+    r"(?i)(PTP|LIN|SPTP|SLIN|SPL)\s*\{\s*(?:(E6POS|E6AXIS|POS|FRAME|AXIS)\s*:)?([^{}\"]*)\}\s*((?:C_\w+(?:\s+|$))*)$"
 )
 PLAIN_DATA = re.compile(r"(?i)DECL\s+(?:GLOBAL\s+)?(\w+)\s+(\w+)\s*=\s*\{([^{}\"]*)\}$")
 

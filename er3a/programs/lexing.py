@@ -23,7 +23,7 @@ from er3a.programs.syntax import (
 
 DEEPEST = 40
 LONGEST = 200
-NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+NUMBER = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
 
 
 class MisreadError(Exception):

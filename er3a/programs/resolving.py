@@ -17,6 +17,7 @@ from er3a.programs.instructions import ArmMotion, Instruction, JointTarget, Name
 from er3a.robots.robot import Robot
 
 STEP_M, STEP_RAD = 0.02, 0.1
+MOST_STEPS = 10_000  # on a way that no arm can take
 SAME_NUMBERS = 1e-12
 
 
@@ -162,7 +163,7 @@ def _between(motion: ArmMotion, start: Reals, end: Reals) -> Iterator[Reals]:
     """Poses on the way, near enough to each other that the arm's branch is the same."""
     turn = Rotation.from_matrix(end[:3, :3] @ start[:3, :3].T).as_rotvec()
     way = float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
-    count = int(max(way / STEP_M, float(np.linalg.norm(turn)) / STEP_RAD, 1)) + 1
+    count = int(min(max(way / STEP_M, float(np.linalg.norm(turn)) / STEP_RAD, 1), MOST_STEPS)) + 1
     shares = np.arange(1, count) / count
     if motion.kind == "arc" and isinstance(motion.via, PoseTarget):
         poses = arc_poses(start, motion.via.pose, end, shares)

@@ -12,6 +12,8 @@ from bisect import bisect_right
 from dataclasses import dataclass
 from xml.sax.saxutils import escape
 
+import numpy as np
+
 from er3a.numerics.arrays import Reals
 from er3a.programs.angle_conventions import numbers_of
 from er3a.programs.circle import chords
@@ -190,7 +192,8 @@ class RplWriter(Writer):
         if self.own and name:
             return name
         pose = motion.tool.pose
-        if name or (pose is not None and abs(pose[:3, 3]).max() > 0):
+        flange = pose is not None and np.array_equal(pose, np.eye(4))
+        if not flange and (name or pose is not None):
             self.name_tool(name or f"the one with its point at ({_point(pose)}) mm of the flange")
         return "tool0"
 

@@ -58,7 +58,7 @@ LONGEST_STATEMENT = 500  # lines
 
 
 PLAIN = re.compile(
-    rf"(mov[ejlp]+)\((p?)\[((?:\s*[-+]?{NUMBER}\s*,?){{6}})\]((?:\s*,\s*[avtr]\s*=\s*[-+]?{NUMBER})*)\s*\)$"
+    rf"(mov[ejlp]+)\((p?)\[((?:\s*[-+]?{NUMBER}\s*,){{5}}\s*[-+]?{NUMBER}\s*)\]((?:\s*,\s*[avtr]\s*=\s*[-+]?{NUMBER})*)\s*\)$"
 )
 
 

@@ -214,3 +214,11 @@ def test_a_loop_whose_wrist_winds_up_is_said(tmp_path):
 def test_a_start_of_another_length_is_refused(tmp_path):
     with pytest.raises(ShapeError):
         checked("PTP {A1 10}", tmp_path, start=np.zeros(5))
+
+
+def test_motions_beyond_the_most_are_no_pass(tmp_path):
+    body = "\n".join(f"PTP {{A1 {angle}}}" for angle in range(1, 8))
+    check = checked(body, tmp_path, most_motions=4)
+    assert [verdict.level for verdict in check.verdicts] == ["pass"] * 4 + ["caution"] * 3
+    assert "rest_not_checked" in codes(check)
+    assert "rest_not_checked" not in codes(checked(body, tmp_path, most_motions=7))

@@ -184,3 +184,13 @@ def test_any_bytes_are_read_or_refused_clearly(content, suffix, tmp_path):
     path.write_bytes(content)
     error = refused(path)
     assert error is None or "\n" not in str(error)
+
+
+def test_numbers_of_many_digits_and_long_words_are_read_at_once(tmp_path):
+    text = "movep(p[" + "9" * 200 + ",0.18,0.3 - x*0.01,3.1416,0,0], a=1.2, v=0.1)\n"
+    (tmp_path / "a.script").write_text(text)
+    (tmp_path / "a.src").write_text("DEF a( )\nPTP {A1 1} " + "C_A" * 40 + "!\nEND\n")
+    start = time.process_time()
+    read_program(tmp_path / "a.script")
+    read_program(tmp_path / "a.src")
+    assert time.process_time() - start < 2

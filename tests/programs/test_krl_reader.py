@@ -252,3 +252,12 @@ def test_what_has_no_end_is_an_error_with_its_line(text, told, tmp_path):
     with pytest.raises(InputError, match="line") as caught:
         read_program(path)
     assert told in str(caught.value)
+
+
+def test_speeds_and_zones_set_as_a_whole_count_like_their_fields(tmp_path):
+    body = "$VEL.CP=0.1\n$VEL={CP 0.3,ORI1 200.0}\n$ACC={CP 2.0}\n$APO={CPTP 50,CDIS 20}\n"
+    body += "LIN {X 300,Y 0,Z 300,A 0,B 0,C 180} C_DIS\n$VEL.CP=0.2\nLIN {X 310,Y 0,Z 300,A 0,B 0,C 180}\n"
+    (tmp_path / "a.src").write_text(f"DEF a( )\n{body}END\n")
+    first, second = execute(read_program(tmp_path / "a.src")).listing().motions
+    assert (first.speed.value, first.acceleration.value, first.zone.value) == (0.3, 2.0, 0.02)
+    assert second.speed.value == 0.2

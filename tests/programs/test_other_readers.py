@@ -18,6 +18,7 @@ from er3a.programs.instructions import (
     Pause,
     PoseTarget,
     Unknown,
+    UnresolvedTarget,
 )
 from er3a.programs.read_program import read_program
 from er3a.programs.run_program import execute
@@ -204,3 +205,18 @@ def test_a_table_over_time_is_written_and_read(tmp_path):
     poses = np.array([line.split(",")[7:10] for line in text.splitlines()[2:]], float)
     np.testing.assert_allclose(poses, forward(ROBOT, joints)[:, :3, 3] * 1000, atol=0.51e-6)
     assert said(execution)[1].speed.value == pytest.approx(3 / 19, abs=1e-6)
+
+
+def test_a_changed_solution_or_element_is_not_taken_for_the_old_one(tmp_path):
+    text = "p1 = p[0.3,0,0.3,3.14,0,0]\nq = get_inverse_kin(p1)\nq[5] = q[5] + 0.5\nmovej(q)\n"
+    text += "l = [0,0,0,0,0,0]\nl[read_input_integer_register(0)] = 1\nmovej(l)\n"
+    text += "l = [1,0,0,0,0,0]\nl[1] = 2\nmovej(l)\n"
+    (tmp_path / "a.script").write_text(text)
+    solved, unclear, known = execute(read_program(tmp_path / "a.script")).listing().motions
+    assert isinstance(solved.target, UnresolvedTarget)
+    assert isinstance(unclear.target, UnresolvedTarget)
+    np.testing.assert_array_equal(known.target.joints, [1, 2, 0, 0, 0, 0])
+    body = "XP[1]={X 300,Y 0,Z 300,A 0,B 0,C 180}\nXP[$IN_NR]={X 400,Y 0,Z 300,A 0,B 0,C 180}\nLIN XP[1]\n"
+    (tmp_path / "a.src").write_text(f"DEF a( )\n{body}END\n")
+    (motion,) = execute(read_program(tmp_path / "a.src")).listing().motions
+    assert isinstance(motion.target, UnresolvedTarget)

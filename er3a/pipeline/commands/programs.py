@@ -48,6 +48,7 @@ def check_program(
         bool, typer.Option("--verdicts", help="a line for each motion, also for those that pass")
     ] = False,
     sarif: Annotated[Path | None, typer.Option(help="write SARIF 2.1.0 to this file")] = None,
+    most_motions: Annotated[int, typer.Option(help="how many motions are checked; the rest is named", min=1)] = 20_000,
     fail_on: Annotated[FailOn, typer.Option(help="exit code 1 for findings from this level on")] = FailOn.fail,
     as_json: AsJson = False,
 ):
@@ -64,6 +65,7 @@ def check_program(
         start=_joints(start, arm),
         frames=load_programs(frames).transforms() if frames else {},
         scene=load_scene(scene) if scene else None,
+        most_motions=most_motions,
     )
     checked = [_checked(file, arm, options) for file in files]
     if sarif is not None:

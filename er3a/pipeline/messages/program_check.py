@@ -438,6 +438,15 @@ def _(found: found_in.NeverReached) -> str:
 
 
 @say.register
+def _(found: found_in.RestNotChecked) -> str:
+    return sentence(
+        found.code,
+        "only the first {checked} motions that are carried out were checked, none from here on",
+        checked=found.checked,
+    )
+
+
+@say.register
 def _(found: found_in.BothSidesChecked) -> str:
     return sentence(found.code, "both sides were checked: {condition}", condition=found.condition)
 

@@ -90,10 +90,11 @@ def _section(results: ProgramsResults, program: ProgramSummary) -> ProgramSectio
     found: dict[int, list[FindingAt]] = defaultdict(list)
     elsewhere = []
     for each in program.findings:
-        if each.file == own:
+        if each.file == own and each.line:
             found[each.line].append(each)
         else:
-            elsewhere.append([each.file, str(each.line), level_word(each.level), say(each.finding)])
+            line = str(each.line) if each.line else "–"
+            elsewhere.append([each.file, line, level_word(each.level), say(each.finding)])
     text = results.lines.take(results.lines.program == program.name)
     rows = results.instructions.take(results.instructions.program == program.name)
     lines = _listing(program.name, text, rows, found)

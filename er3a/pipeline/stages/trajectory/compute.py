@@ -11,6 +11,7 @@ from er3a.files.scene_file import load_scene
 from er3a.kinematics.near_singular import NearSingular
 from er3a.kinematics.singularity import characteristic_length, conditioning, factors_where_defined
 from er3a.kinematics.wrist_partitioned import closed_form_missing, has_branches
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, Status, Verdict
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
 from er3a.pipeline.stages.trajectory.avoidance_results import AvoidanceTask, speed_ratio

@@ -1,0 +1,132 @@
+"""The commands about programs: lines, JSON, SARIF and exit codes of check-program; what program write refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from er3a.pipeline import cli  # noqa: F401
+from er3a.pipeline.commands.options import app
+from er3a.programs.read_program import read_program
+
+ROOT = Path(__file__).resolve().parents[2]
+FAULTS = "data/programs/faults"
+HOME = "0,-10,-10,0,-70,0"
+
+
+@pytest.fixture(autouse=True)
+def in_the_root(monkeypatch):
+    """Paths are those of the project."""
+    monkeypatch.chdir(ROOT)
+
+
+def run(*words: str):
+    """A call of the command line."""
+    return CliRunner().invoke(app, [*words])
+
+
+def check(*words: str):
+    """A call of check-program for the ER3A-C60."""
+    return run("check-program", *words, "--robot", "er3a_c60", "--start", HOME)
+
+
+def test_findings_are_lines_as_compilers_print_them():
+    done = check(f"{FAULTS}/outside_limits.src")
+    assert done.exit_code == 1
+    first = done.stdout.splitlines()[0]
+    assert (
+        first == f"{FAULTS}/outside_limits.src:9: error: J3 goes to 140.0 deg; its upper limit is 105 deg [above_limit]"
+    )
+
+
+def test_the_exit_code_follows_what_is_asked():
+    assert check("data/programs/weld_seam.src").exit_code == 0
+    assert check(f"{FAULTS}/joint_jump.src").exit_code == 0
+    assert check(f"{FAULTS}/joint_jump.src", "--fail-on", "caution").exit_code == 1
+    assert check("data/programs/weld_seam.dat").exit_code == 2
+
+
+def test_a_broken_program_names_its_line_and_others_are_checked(tmp_path):
+    broken = tmp_path / "a.src"
+    broken.write_text("DEF a( )\nLOOP\nEND\n")
+    done = check(str(broken), f"{FAULTS}/outside_limits.src")
+    assert done.exit_code == 2
+    assert "a.src:2: error:" in done.stdout
+    assert "[above_limit]" in done.stdout
+
+
+def test_each_motion_has_a_line_on_request():
+    done = check("data/programs/WELD_SEAM.XPL", "--verdicts")
+    moves = [line for line in done.stdout.splitlines() if line.endswith("[motion]")]
+    assert len(moves) == 26
+    assert "(Main/mlin[23])" in done.stdout
+
+
+def test_json_holds_verdicts_and_parameters():
+    found = json.loads(check(f"{FAULTS}/zone_larger_than_segment.src", "--json").stdout)[0]
+    assert found["level"] == "caution"
+    assert [each["params"]["zone_mm"] for each in found["findings"]] == pytest.approx([80, 80])
+    assert [each["line"] for each in found["motions"]] == [8, 9, 11, 12, 13]
+
+
+def test_sarif_has_rules_places_and_fingerprints_that_stay(tmp_path):
+    def log(file: Path) -> dict:
+        output = tmp_path / "found.sarif"
+        check(str(file), "--sarif", str(output))
+        return json.loads(output.read_text())
+
+    text = (ROOT / FAULTS / "outside_limits.src").read_text()
+    program = tmp_path / "a.src"
+    program.write_text(text)
+    first = log(program)
+    program.write_text(text.replace("DEF", "&ACCESS RVP\n&REL 2\nDEF", 1))
+    moved = log(program)
+    assert first["version"] == "2.1.0"
+    (run_of,) = first["runs"]
+    rules = {rule["id"] for rule in run_of["tool"]["driver"]["rules"]}
+    for result, other in zip(run_of["results"], moved["runs"][0]["results"], strict=True):
+        assert result["ruleId"] in rules
+        assert result["level"] in ("error", "warning", "note")
+        place, later = (each["locations"][0]["physicalLocation"]["region"]["startLine"] for each in (result, other))
+        assert later == place + 2 or place == 1
+        assert result["partialFingerprints"] == other["partialFingerprints"]
+    relative = tmp_path / "b.sarif"
+    check(f"{FAULTS}/outside_limits.src", "--sarif", str(relative))
+    results = json.loads(relative.read_text())["runs"][0]["results"]
+    uris = {each["locations"][0]["physicalLocation"]["artifactLocation"]["uri"] for each in results}
+    assert uris == {f"{FAULTS}/outside_limits.src"}
+
+
+def test_frames_and_start_are_checked():
+    assert "expected 6 joint angles" in str(
+        run("check-program", "x.src", "--robot", "er3a_c60", "--start", "1,2").exception
+    )
+
+
+def test_paths_are_written_and_unsafe_ones_refused(tmp_path):
+    words = ("program", "write", "data/paths/er3a_c60.yaml", "--robot", "er3a_c60", "--language", "krl")
+    done = run(*words, "--output", str(tmp_path), "--only", "line_clean", "--only", "line_limits")
+    assert done.exit_code == 1
+    assert {path.name for path in tmp_path.iterdir()} == {"line_clean.src", "line_clean.dat"}
+    assert "not safe" in done.stderr
+    assert run(*words, "--output", str(tmp_path), "--only", "line_limits", "--unsafe").exit_code == 0
+    text = (tmp_path / "line_limits.src").read_text()
+    assert "; er3a: NOT SAFE: the path line_limits leaves limits" in text
+    assert read_program(tmp_path / "line_clean.src").findings == ()
+
+
+def test_a_program_is_written_as_the_paths_of_its_stretches(tmp_path):
+    paths = tmp_path / "paths.yaml"
+    paths.write_text(
+        "kind: paths\npaths:\n  - {name: weld, title: Weld, kind: program, samples: 30, "
+        "start_deg: [0,-10,-10,0,-70,0], program: data/programs/weld_seam.src}\n"
+    )
+    words = ("program", "write", str(paths), "--robot", "er3a_c60", "--language", "urscript", "--output", str(tmp_path))
+    done = run(*words)
+    assert done.exit_code == 0, done.stderr
+    kinds = [(tmp_path / f"weld_{number}.script").read_text() for number in (1, 2, 3)]
+    assert "movec(" in kinds[1]
+    assert "movel(" not in kinds[0] + kinds[2]

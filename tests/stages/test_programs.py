@@ -1,0 +1,159 @@
+"""The stage of programs on the project's own examples, and programs as paths of the trajectory stage."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from er3a.errors import InputError
+from er3a.pipeline.results import Stored, read_results
+from er3a.pipeline.stages import run
+from er3a.pipeline.stages.programs.model import RESULTS, ProgramsResults, SomeProgramsFail
+from er3a.pipeline.stages.programs.record import record
+from er3a.pipeline.stages.programs.report import report
+from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.stages.trajectory.compute import compute as compute_paths
+from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
+from er3a.pipeline.study import Study, load_study
+
+ROBOTS = ("er3a_c60", "er3_600")
+
+
+@pytest.fixture(scope="module")
+def study() -> Study:
+    return load_study("config/small.yaml")
+
+
+@pytest.fixture(scope="module")
+def folders(study, tmp_path_factory) -> dict[str, Path]:
+    found = {name: tmp_path_factory.mktemp(name) for name in ROBOTS}
+    for name, folder in found.items():
+        run.compute("programs", study, name, folder)
+    return found
+
+
+@pytest.fixture(scope="module")
+def stored(folders) -> dict[str, Stored[ProgramsResults]]:
+    return {name: read_results(folder, RESULTS) for name, folder in folders.items()}
+
+
+def with_entry(study: Study, **changes) -> Study:
+    """The study with another entry of the ER3A-C60."""
+    entry = study.entry("er3a_c60").model_copy(update=changes)
+    return study.model_copy(update={"robots": {"er3a_c60": entry}})
+
+
+def test_only_robots_with_programs_go_through_the_stage(study):
+    assert "programs" in study.stages("er3a_c60")
+    assert "programs" not in study.stages("er3a_c60_article")
+    assert "programs" not in with_entry(study, programs=None).stages("er3a_c60")
+
+
+def test_examples_pass_and_faults_are_as_expected(stored):
+    for found in stored.values():
+        assert found.results.summary.verdict.status == "pass"
+        for program in found.results.summary.programs:
+            assert program.outcome == (program.expect or "pass"), program.name
+            assert program.motions == program.passed + program.caution + program.failed
+    names = {path.stem for path in Path("data/programs/faults").glob("*.src")}
+    assert names <= {program.name for program in stored["er3a_c60"].results.summary.programs}
+
+
+def test_the_motion_follows_the_listing(stored):
+    results = stored["er3_600"].results
+    rows = results.motion.take(results.motion.program == "palletise_krl")
+    assert (np.diff(rows.t_s) >= -1e-9).all()
+    assert set(rows.line.tolist()) == {13, 30, 31, 34, 39, 40, 43}
+    assert np.abs(np.diff(rows.q_deg, axis=0)).max() < 15
+    text = results.lines.take(results.lines.program == "palletise_krl")
+    assert text.text[30] == "   LIN {X 360.00, Y 150.00, Z 200.00, A 0.00, B 0.00, C 180.00}"
+
+
+def test_equal_inputs_give_equal_bytes(study, folders, tmp_path):
+    run.compute("programs", study, "er3_600", tmp_path)
+    for file in sorted(folders["er3_600"].iterdir()):
+        assert (tmp_path / file.name).read_bytes() == file.read_bytes()
+
+
+def test_an_unexpected_fault_fails_the_stage(study, tmp_path):
+    listed = tmp_path / "programs.yaml"
+    entry = {"name": "far", "title": "Far", "file": "data/programs/faults/out_of_reach.src"}
+    listed.write_text(json.dumps({"kind": "programs", "programs": [entry]}))
+    results = STAGES["programs"].module("compute").compute(with_entry(study, programs=str(listed)), "er3a_c60")
+    assert results.summary.verdict.status == "fail"
+    assert results.summary.verdict.finding == SomeProgramsFail(1, 0, (), ("far",), ())
+
+
+def test_page_and_recording_are_written(study, stored, tmp_path):
+    report(study, stored["er3a_c60"], tmp_path / "programs.html")
+    record(study, stored["er3a_c60"], tmp_path / "programs.rrd")
+    html = (tmp_path / "programs.html").read_text(encoding="utf-8")
+    assert 'data-arm="collision_with_table:10"' in html
+    assert html.count('<div class="listing"') == len(stored["er3a_c60"].results.summary.programs)
+    assert "the tool TOOL_DATA[7] is not given" in html
+    assert (tmp_path / "programs.rrd").stat().st_size > 100_000
+
+
+def test_a_file_without_programs_is_no_reference_and_has_a_page(study, tmp_path):
+    listed = tmp_path / "programs.yaml"
+    listed.write_text("kind: programs\n")
+    empty = with_entry(study, programs=str(listed))
+    run.compute("programs", empty, "er3a_c60", tmp_path / "found")
+    found = read_results(tmp_path / "found", RESULTS)
+    assert found.status == "no_reference"
+    report(empty, found, tmp_path / "programs.html")
+    record(empty, found, tmp_path / "programs.rrd")
+
+
+@pytest.mark.parametrize(
+    ("content", "field"),
+    [
+        ({"kind": "programs", "programs": [{"name": "a", "title": "A", "file": "a.src", "expect": "safe"}]}, "expect"),
+        ({"kind": "programs", "frames": {"T": {"xyz_mm": [0, 0]}}}, "frames.T"),
+        ({"kind": "programs", "programs": [{"name": "a", "title": "A", "file": "a.src"}] * 2}, "programs[1].name"),
+    ],
+)
+def test_program_files_are_refused_by_field(content, field, study, tmp_path):
+    from er3a.files.program_file import load_programs
+
+    (tmp_path / "programs.yaml").write_text(json.dumps(content))
+    with pytest.raises(InputError) as caught:
+        load_programs(tmp_path / "programs.yaml")
+    assert field in str(caught.value.field)
+
+
+def test_a_program_is_paths_and_safe_paths_are_programs(study, tmp_path):
+    entry = {
+        "name": "weld",
+        "title": "Weld",
+        "kind": "program",
+        "program": "data/programs/weld_seam.src",
+        "start_deg": [0, -10, -10, 0, -70, 0],
+        "samples": 30,
+    }
+    (tmp_path / "paths.yaml").write_text(json.dumps({"kind": "paths", "paths": [entry]}))
+    results = compute_paths(with_entry(study, paths=str(tmp_path / "paths.yaml")), "er3a_c60")
+    paths = results.summary.paths
+    assert [(path.name, path.kind) for path in paths] == [
+        ("weld_1", "joint_sequence"),
+        ("weld_2", "sequence"),
+        ("weld_3", "joint_sequence"),
+    ]
+    assert {path.verdict for path in paths} == {"safe"}
+    assert set(results.programs.path) == {path.name for path in paths}
+    assert {"weld_2.src", "weld_2.XPL", "weld_2.script", "weld_2.pgm", "weld_2.csv"} <= set(results.programs.file)
+
+
+def test_unsafe_paths_have_programs_only_where_that_is_asked(study):
+    def languages_of(name: str, **changes) -> set[str]:
+        settings = study.section(TrajectorySettings).model_copy(update={"avoidance": "stop", **changes})
+        results = compute_paths(study.model_copy(update={"trajectory": settings}), "er3a_c60")
+        texts = results.programs.take(results.programs.path == name)
+        assert all("NOT SAFE" in text for text, file in zip(texts.text, texts.file) if file[-4:] in (".src", ".csv"))
+        return set(texts.language)
+
+    assert languages_of("line_limits") == set()
+    assert languages_of("line_limits", write_unsafe=True, programs=["krl", "csv"]) == {"krl", "csv"}
