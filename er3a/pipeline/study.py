@@ -20,7 +20,6 @@ from er3a.robots.robot import Robot
 
 STAGES = tuple(REGISTRY)
 ExpectedStatus = Literal["pass", "caution", "fail", "no_reference"]
-LOADS = {"tool_load", "payload"}
 SettingsT = TypeVar("SettingsT", bound=StrictModel)
 
 
@@ -187,7 +186,7 @@ class StudyBase(StrictModel):
 
     def settings(self, name: str, key: str) -> dict[str, Any]:
         """What of the study concerns one of its keys, for a robot; of a key without settings seed and robot alone."""
-        left_out = {"targets", "paths", "file", "scene", "expect"} | (set() if key == "dynamics" else LOADS)
+        left_out = {"targets", "paths", "file", "scene", "expect", "tool_load", "payload"}
         entry = self.entry(name).model_dump(exclude=left_out, exclude_none=True)
         if variant := self.variants.get(name):
             entry["varied"] = {variant.vary: variant.value}
@@ -196,7 +195,8 @@ class StudyBase(StrictModel):
         if "scene" in settings:
             scene = self.scene(name, key)
             settings["scene"] = str(scene) if scene else None
-        return {"seed": self.seed, "robot": entry, key: settings}
+        loads = {"loads": [load.model_dump() for load in self.loads(name)]} if key == "dynamics" else {}
+        return {"seed": self.seed, "robot": entry, key: settings, **loads}
 
     def own_titles(self) -> dict[str, str]:
         """People's titles and notes in the language of the pages, by what they translate."""

@@ -219,7 +219,7 @@ def _figures(summaries, holding, uses, imbalances, masses) -> tuple[Figure, ...]
     held = max((each for each in holding if each.unit == "N m"), key=lambda each: abs(each.torque), default=None)
     energy = [sum(load.work_j for load in path.joints) for path in summaries if path.complete]
     total = sum(link.mass_kg or 0.0 for link in masses.links) if masses else None
-    return (
+    figures = (
         Figure("paths", sum(path.complete for path in summaries), "", of=len(summaries)),
         Figure("mass", total, "kg"),
         Figure("peak_torque", peak.peak if peak else None, "N m", peak.tolerance if peak else None),
@@ -228,3 +228,4 @@ def _figures(summaries, holding, uses, imbalances, masses) -> tuple[Figure, ...]
         Figure("utilisation", 100 * uses[0].ratio if uses else None, "%"),
         Figure("power_balance", max(imbalances) * 1e9 if imbalances else None, "ppb"),
     )
+    return tuple(figure for figure in figures if figure.value is not None and figure.of != 0)
