@@ -195,8 +195,9 @@ class StudyBase(StrictModel):
         if "scene" in settings:
             scene = self.scene(name, key)
             settings["scene"] = str(scene) if scene else None
-        loads = {"loads": [load.model_dump() for load in self.loads(name)]} if key == "dynamics" else {}
-        return {"seed": self.seed, "robot": entry, key: settings, **loads}
+        if key == "dynamics":
+            settings["loads"] = [load.model_dump() for load in self.loads(name)]
+        return {"seed": self.seed, "robot": entry, key: settings}
 
     def own_titles(self) -> dict[str, str]:
         """People's titles and notes in the language of the pages, by what they translate."""

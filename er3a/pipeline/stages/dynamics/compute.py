@@ -15,8 +15,8 @@ from er3a.files.load_file import load_of
 from er3a.files.path_file import load_paths
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure
+from er3a.pipeline.stages.dynamics.drive_verdict import drive_uses, unknowns, verdict_of
 from er3a.pipeline.stages.dynamics.entry import DynamicsSettings
-from er3a.pipeline.stages.dynamics.judgement import drive_uses, unknowns, verdict_of
 from er3a.pipeline.stages.dynamics.model import (
     DynamicsResults,
     DynamicsSummary,
