@@ -41,6 +41,9 @@ def pose(arm: Robot) -> np.ndarray:
 CALLS: dict[str, Callable[[Any, np.ndarray], Any]] = {
     "forward": lambda robot, T: er3a.forward(robot, Q),
     "jacobian": lambda robot, T: er3a.jacobian(robot, Q),
+    "torques": lambda robot, T: er3a.torques(robot, Q, Q, Q),
+    "mass_matrix": lambda robot, T: er3a.mass_matrix(robot, Q),
+    "gravity": lambda robot, T: er3a.gravity(robot, Q),
     "inverse": lambda robot, T: er3a.inverse(robot, T),
     "inverse_batch": lambda robot, T: er3a.inverse_batch(robot, T[None]),
     "solve": lambda robot, T: er3a.solve(robot, T, restarts=0),

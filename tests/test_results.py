@@ -71,7 +71,7 @@ def test_shape_of_a_summary(tmp_path, study):
             for path, grades in (
                 (
                     "data/robots/er3_600.yaml",
-                    {"official": ["dh", "limits", "speeds"], "inferred": ["zero", "envelopes"]},
+                    {"official": ["dh", "limits", "speeds", "wrist_load", "weight"], "inferred": ["zero", "envelopes"]},
                 ),
                 ("data/manual_refs/er3_600/envelope.csv", {"official": 9}),
             )

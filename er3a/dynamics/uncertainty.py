@@ -24,20 +24,20 @@ UPPER = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
 
 
 @dataclass(frozen=True)
-class Tolerance:
+class MassTolerance:
     """By how much a grade's masses (as a ratio) and centres of mass (m) are taken to be off at most."""
 
     mass_ratio: float
     centre: float
 
 
-ASSUMED: dict[Grade, Tolerance] = {
-    "official": Tolerance(0.05, 0.003),
-    "measured": Tolerance(0.01, 0.001),
-    "cad": Tolerance(0.10, 0.005),
-    "export": Tolerance(0.20, 0.010),
-    "claim": Tolerance(0.30, 0.020),
-    "inferred": Tolerance(0.50, 0.030),
+ASSUMED: dict[Grade, MassTolerance] = {
+    "official": MassTolerance(0.05, 0.003),
+    "measured": MassTolerance(0.01, 0.001),
+    "cad": MassTolerance(0.10, 0.005),
+    "export": MassTolerance(0.20, 0.010),
+    "claim": MassTolerance(0.30, 0.020),
+    "inferred": MassTolerance(0.50, 0.030),
 }
 """Assumptions, used where a file gives no tolerances: no source states such numbers."""
 

@@ -10,8 +10,8 @@ from pydantic import AfterValidator, Field, model_validator
 
 from er3a.files.units import FARTHEST_MM, Triple, check_degrees
 from er3a.files.yaml_file import StrictModel
-from er3a.geometry.transforms import transform
-from er3a.kinematics.forward import forward, frames
+from er3a.geometry.transforms import rot_z, transform
+from er3a.kinematics.chain import constant_links, joint_starts
 from er3a.robots.masses import Body, Drives, LinkMass, Masses, WristLoad, moved, no_body
 from er3a.robots.robot import MOST_JOINTS, Robot
 
@@ -216,16 +216,26 @@ def masses_of(
 def link_masses(robot: Robot, inertia: InertiaFields) -> tuple[LinkMass, ...]:
     """Bodies in the frames that move with the joints."""
     placed = robot.replace(base=np.eye(4), masses=Masses())
-    at_zero = np.concatenate([np.eye(4)[None], frames(placed, np.zeros(robot.joints))[:-1]])
+    at_zero = np.array([np.eye(4), *(_at_zero(placed, constant_links(placed)[: k + 1]) for k in range(robot.rows))])
     stated = at_zero.copy()
     if inertia.frame == "dh":
-        stated[1:] = [forward(placed, np.zeros(robot.joints), frame=k + 1) for k in range(robot.rows)]
+        for k in range(1, robot.rows + 1):
+            links = constant_links(placed, k)
+            stated[k] = _at_zero(placed, links[:-1]) @ links[-1]
     T = np.eye(4)
     for origin in inertia.origins:
         T = T @ transform(np.array(origin.xyz_mm) / 1000, np.radians(origin.rpy_deg))
         stated[origin.joint] = T
     own = np.linalg.inv(at_zero) @ stated
     return tuple(LinkMass(row.link, moved(row.body, own[row.link])) for row in inertia.links)
+
+
+def _at_zero(robot: Robot, links: np.ndarray) -> np.ndarray:
+    """The frame (4, 4) that moves with the last of some joints, with all of them at 0, behind as many links."""
+    T = np.eye(4)
+    for link, turn in zip(links, np.where(robot.sliding, 0.0, joint_starts(robot))):
+        T = T @ link @ rot_z(turn)
+    return T
 
 
 def _drives(robot: Robot, group: DriveFields) -> Drives:

@@ -249,7 +249,7 @@ def _limits(path: Path, sources: list[UrdfJoint]) -> tuple[Reals, list[str]]:
 
 
 def export_urdf(robot: Robot) -> str:
-    """The arm as URDF text; the link ``tool`` is the tool frame. Unknown speeds are written as 0 (URDF demands one).
+    """The arm as URDF text, masses included; the link ``tool`` is the tool frame. Unknown speeds are written as 0.
 
     Raises
     ------

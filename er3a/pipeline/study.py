@@ -21,7 +21,6 @@ from er3a.robots.robot import Robot
 
 STAGES = tuple(REGISTRY)
 ExpectedStatus = Literal["pass", "caution", "fail", "no_reference"]
-LOADS = {"tool_load", "payload"}
 SettingsT = TypeVar("SettingsT", bound=StrictModel)
 
 
@@ -194,8 +193,7 @@ class StudyBase(StrictModel):
 
     def settings(self, name: str, key: str) -> dict[str, Any]:
         """What of the study concerns one of its keys, for a robot; of a key without settings seed and robot alone."""
-        files = {"targets", "paths", "programs", "vision", "file", "scene", "expect"}
-        left_out = files | (set() if key == "dynamics" else LOADS)
+        left_out = {"targets", "paths", "programs", "vision", "file", "scene", "expect", "tool_load", "payload"}
         entry = self.entry(name).model_dump(exclude=left_out, exclude_none=True)
         if variant := self.variants.get(name):
             entry["varied"] = {variant.vary: variant.value}
@@ -204,6 +202,8 @@ class StudyBase(StrictModel):
         if "scene" in settings:
             scene = self.scene(name, key)
             settings["scene"] = str(scene) if scene else None
+        if key == "dynamics":
+            settings["loads"] = [load.model_dump() for load in self.loads(name)]
         return {"seed": self.seed, "robot": entry, key: settings}
 
     def own_titles(self) -> dict[str, str]:

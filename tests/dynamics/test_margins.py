@@ -13,7 +13,7 @@ from er3a.dynamics.arm_model import arm_model
 from er3a.dynamics.demands import demand
 from er3a.dynamics.holding import worst_holding
 from er3a.dynamics.margins import greatest_payload, greatest_speed_scale
-from er3a.dynamics.timing import fastest_under_torques
+from er3a.dynamics.torque_timing import fastest_under_torques
 from er3a.dynamics.torques import holding_torques, known, torque_parts
 from er3a.dynamics.wrist import levers, load_diagram, worst_levers, wrist_to_flange, wrist_use
 from er3a.robots.masses import Body, Drives, LinkMass, Load, Masses, WristLoad

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.say import counted, joined, say, sentence, word
-from er3a.pipeline.stages.dynamics.model import Compared, Fits, Marginal, Need, NoData, NoLimits, Quantity, Unknown, Use
+from er3a.pipeline.stages.dynamics.model import (
+    AllWithin,
+    Compared,
+    DataOpen,
+    Marginal,
+    Need,
+    NoData,
+    NoLimits,
+    Quantity,
+    Use,
+)
 
 QUANTITIES: dict[Quantity, str] = {
     "peak": N_("peak torque"),
@@ -95,7 +105,7 @@ def _(found: NoLimits) -> str:
 @say.register
 def _(found: Compared) -> str:
     tightest = use_text(found.tightest)
-    if isinstance(found, Fits):
+    if isinstance(found, AllWithin):
         told = sentence("dynamics.fits", "Fits: all that has a limit is within it; tightest: {use}.", use=tightest)
     elif isinstance(found, Marginal):
         told = sentence(
@@ -144,7 +154,7 @@ def _reservations(found: Compared | NoLimits) -> list[str]:
 
 
 @say.register
-def _(found: Unknown) -> str:
+def _(found: DataOpen) -> str:
     if not found.numbers:
         return need_word(found.what)
     parts = {"what": need_word(found.what), "numbers": ", ".join(map(str, found.numbers))}

@@ -11,8 +11,8 @@ from er3a.dynamics.plausibility import mass_findings
 from er3a.dynamics.uncertainty import ASSUMED
 from er3a.files.load_file import load_of
 from er3a.pipeline.results import Figure
+from er3a.pipeline.stages.dynamics.drive_verdict import drive_uses, unknowns, verdict_of
 from er3a.pipeline.stages.dynamics.entry import DynamicsSettings
-from er3a.pipeline.stages.dynamics.judgement import drive_uses, unknowns, verdict_of
 from er3a.pipeline.stages.dynamics.model import (
     DynamicsResults,
     DynamicsSummary,
@@ -208,7 +208,7 @@ def _figures(summaries, holding, uses, imbalances, masses) -> tuple[Figure, ...]
     held = max((each for each in holding if each.unit == "N m"), key=lambda each: abs(each.torque), default=None)
     energy = [sum(load.work_j for load in path.joints) for path in summaries if path.complete]
     total = sum(link.mass_kg or 0.0 for link in masses.links) if masses else None
-    return (
+    figures = (
         Figure("paths", sum(path.complete for path in summaries), "", of=len(summaries)),
         Figure("mass", total, "kg"),
         Figure("peak_torque", peak.peak if peak else None, "N m", peak.tolerance if peak else None),
@@ -217,3 +217,4 @@ def _figures(summaries, holding, uses, imbalances, masses) -> tuple[Figure, ...]
         Figure("utilisation", 100 * uses[0].ratio if uses else None, "%"),
         Figure("power_balance", max(imbalances) * 1e9 if imbalances else None, "ppb"),
     )
+    return tuple(figure for figure in figures if figure.value is not None and figure.of != 0)

@@ -102,7 +102,7 @@ def diagram_figure(summary: DynamicsSummary, rows: DiagramRows) -> Picture:
     ax.set_ylim(bottom=0)
     ax.set_xlabel(tr("from the flange along the last axis (mm)"))
     ax.set_ylabel(tr("from the last axis (mm)"))
-    ax.legend()
+    ax.legend(loc="upper right")
     caption = tr(
         "A load whose centre lies below the curve of its mass is within the allowed moments and inertias of the wrist. "
         "The curves take the load as a point; its own inertia counts in the comparison above."

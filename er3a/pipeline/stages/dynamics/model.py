@@ -23,7 +23,7 @@ Need = Literal["masses", "peak", "rated", "armature", "friction", "wrist_moment"
 
 
 @dataclass(frozen=True)
-class Unknown:
+class DataOpen:
     """Something that the files leave open, with the joints or links concerned; none: all."""
 
     what: Need
@@ -60,7 +60,7 @@ class Use:
 class NoData:
     """Neither masses nor a load on a wrist with limits: nothing can be said."""
 
-    needs: tuple[Unknown, ...]
+    needs: tuple[DataOpen, ...]
     code: Literal["dynamics.no_data"] = "dynamics.no_data"
 
 
@@ -102,7 +102,7 @@ class Compared:
 
 
 @dataclass(frozen=True)
-class Fits(Compared):
+class AllWithin(Compared):
     """All is within its limits, tolerances included."""
 
     code: Literal["dynamics.fits"] = "dynamics.fits"
@@ -198,7 +198,7 @@ class JointLoad:
 
 
 @dataclass(frozen=True)
-class Bound:
+class BindingLimit:
     """The greatest value under a limit; joint and time of what binds, None where nothing does."""
 
     value: float | None
@@ -233,8 +233,8 @@ class PathLoad:
     duration_s: float
     joints: tuple[JointLoad, ...]
     wrist: tuple[WristMoment, ...]
-    payload: Bound | None
-    speed_scale: Bound | None
+    payload: BindingLimit | None
+    speed_scale: BindingLimit | None
     torque_timed_s: float | None
     kinematic_s: float | None
     no_law: NoTimeLaw | None
@@ -280,11 +280,11 @@ class DynamicsSummary(Summary):
     power_imbalance : greatest difference of power and change of energy, of the greatest power; None without paths
     """
 
-    verdict: Verdict[NoData | NoLimits | Fits | Marginal | Overload]
+    verdict: Verdict[NoData | NoLimits | AllWithin | Marginal | Overload]
     gravity_m_s2: float
     masses: MassesUsed | None
     findings: tuple[MassFinding, ...]
-    unknown: tuple[Unknown, ...]
+    unknown: tuple[DataOpen, ...]
     payload_centre_mm: tuple[float, ...]
     payload_gyration_mm: float
     paths: tuple[PathLoad, ...]

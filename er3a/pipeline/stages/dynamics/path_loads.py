@@ -11,11 +11,11 @@ import numpy as np
 from er3a.dynamics.arm_model import ArmModel, arm_model, drives_of
 from er3a.dynamics.demands import Demand, demand, power_imbalance
 from er3a.dynamics.margins import Margin, greatest_payload, greatest_speed_scale
-from er3a.dynamics.timing import fastest_under_torques
+from er3a.dynamics.torque_timing import fastest_under_torques
 from er3a.dynamics.torques import TorqueParts, known, torque_parts
 from er3a.dynamics.uncertainty import torque_tolerance
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.stages.dynamics.model import Bound, JointLoad, PathLoad, TorqueRows, WristMoment
+from er3a.pipeline.stages.dynamics.model import BindingLimit, JointLoad, PathLoad, TorqueRows, WristMoment
 from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning.timing import JointLimits, NoTimeLaw, TimingError, fastest, nodes_along
 from er3a.robots.masses import Body, Load, together
@@ -180,10 +180,10 @@ def _wrist_moments(
     return tuple(WristMoment(j, float(by_load[at[j - 1], j - 1]), float(t[at[j - 1]])) for j in wrist)
 
 
-def _bound(margin: Margin | None, t: Reals) -> Bound | None:
+def _bound(margin: Margin | None, t: Reals) -> BindingLimit | None:
     if margin is None:
         return None
     value = margin.value if np.isfinite(margin.value) else None
     if margin.joint is None or margin.sample is None:
-        return Bound(value, None, None)
-    return Bound(value, margin.joint + 1, float(t[margin.sample]))
+        return BindingLimit(value, None, None)
+    return BindingLimit(value, margin.joint + 1, float(t[margin.sample]))

@@ -22,7 +22,8 @@ from er3a.robots.robot import Robot
 STAGE = "dynamics"
 PAUSE = 1.0  # s between two paths
 LONGEST = 0.35  # of the arm's size, the arrow of the greatest torque
-WIDTH = 0.008  # of the arm's size
+WIDTH = 0.012  # of the arm's size
+CLEAR = 0.037  # of the arm's size, from the middle of a joint's drum to outside it
 CURVES = {"torque": "Torque of the drive (N m)", "gravity": "Part against gravity (N m)", "power": "Power (W)"}
 SHOWN_S = rr.TimeRange(
     start=rr.TimeRangeBoundary.cursor_relative(seconds=-4), end=rr.TimeRangeBoundary.cursor_relative(seconds=12)
@@ -78,6 +79,7 @@ def _run(stream: rr.RecordingStream, robot: Robot, rows: TorqueRows, start: floa
         origins = np.tile(parts[j + 1, ALONG_Z, :3, 3] / 2, (len(times), 1))
         vectors = np.zeros((len(times), 3))
         vectors[:, 2] = robot.direction[j] * rows.torque[:, j] * scale
+        origins[:, 2] += CLEAR * size_of(robot) * np.sign(vectors[:, 2])
         arrows = rr.Arrows3D.columns(
             origins=origins,
             vectors=vectors,

@@ -12,7 +12,7 @@ from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import listed, say
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics.load_figures import diagram_figure, holding_figure, torque_figure
-from er3a.pipeline.stages.dynamics.model import Bound, DynamicsResults, DynamicsSummary, MotorNeed, PathLoad, Use
+from er3a.pipeline.stages.dynamics.model import BindingLimit, DynamicsResults, DynamicsSummary, MotorNeed, PathLoad, Use
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import house_style
 from er3a.pipeline.viewing.page import fixed, head_of, number, render, run_command
@@ -118,7 +118,7 @@ def _path(path: PathLoad) -> list[str]:
     ]
 
 
-def _bound(bound: Bound | None) -> str:
+def _bound(bound: BindingLimit | None) -> str:
     if bound is None:
         return NONE
     value = tr("no bound") if bound.value is None else number(bound.value, 3)

@@ -10,7 +10,7 @@ from er3a.pipeline.stages.dynamics.model import DiagramRows, PathLoad, Use
 from er3a.robots.masses import Load
 from er3a.robots.robot import Grade, Robot
 
-DIAGRAM_POINTS = 121
+DIAGRAM_POINTS = 501
 FARTHEST_M = 1.0
 PARTS_OF_PAYLOAD = (1 / 3, 2 / 3, 1.0)
 UNITS = {"payload": "kg", "moment": "N m", "inertia": "kg m²"}

@@ -114,7 +114,7 @@ def _toppra(way: Reals, spline: CubicSpline, speed: Reals, rows: Rows) -> Reals:
     except ModuleNotFoundError:
         raise TimingError(ToppraMissing()) from None
 
-    class Way(AbstractGeometricPath):  # type: ignore[misc]
+    class TorqueWay(AbstractGeometricPath):  # type: ignore[misc]
         dof, waypoints = len(speed), None
         path_interval = np.array([way[0], way[-1]])
 
@@ -129,7 +129,7 @@ def _toppra(way: Reals, spline: CubicSpline, speed: Reals, rows: Rows) -> Reals:
             return canlinear_colloc_to_interpolate(*rows, None, None, gridpoints, identical=False)
 
     constraints = [JointVelocityConstraint(np.stack([-speed, speed], axis=1)), PeakTorques()]
-    solver = TOPPRA(constraints, Way(), gridpoints=way, solver_wrapper="seidel")
+    solver = TOPPRA(constraints, TorqueWay(), gridpoints=way, solver_wrapper="seidel")
     _, pace, _ = solver.compute_parameterization(0, 0)
     if pace is None or not np.isfinite(pace).all():
         raise TimingError(NoTimeLawFound())

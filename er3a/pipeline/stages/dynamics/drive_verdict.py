@@ -8,7 +8,8 @@ from er3a.dynamics.arm_model import drives_of
 from er3a.dynamics.plausibility import MassFinding, MissingLink
 from er3a.pipeline.results import Status, Verdict
 from er3a.pipeline.stages.dynamics.model import (
-    Fits,
+    AllWithin,
+    DataOpen,
     HoldingTorque,
     Marginal,
     MassesUsed,
@@ -17,13 +18,12 @@ from er3a.pipeline.stages.dynamics.model import (
     NoLimits,
     Overload,
     PathLoad,
-    Unknown,
     Use,
 )
 from er3a.robots.masses import Load
 from er3a.robots.robot import Robot
 
-DynamicsVerdict = Verdict[NoData | NoLimits | Fits | Marginal | Overload]
+DynamicsVerdict = Verdict[NoData | NoLimits | AllWithin | Marginal | Overload]
 
 
 def drive_uses(robot: Robot, paths: tuple[PathLoad, ...], holding: tuple[HoldingTorque, ...]) -> tuple[Use, ...]:
@@ -46,7 +46,7 @@ def drive_uses(robot: Robot, paths: tuple[PathLoad, ...], holding: tuple[Holding
     return tuple(found)
 
 
-def unknowns(robot: Robot, load: Load | None) -> tuple[Unknown, ...]:
+def unknowns(robot: Robot, load: Load | None) -> tuple[DataOpen, ...]:
     """What the files leave open, with links or joints."""
     drives, wrist, joints = drives_of(robot), robot.masses.wrist, range(1, robot.joints + 1)
     links = tuple(link for link in range(1, robot.rows + 1) if robot.masses.body(link) is None)
@@ -58,19 +58,19 @@ def unknowns(robot: Robot, load: Load | None) -> tuple[Unknown, ...]:
         "friction": _open(drives.coulomb + drives.viscous),
     }
     found = [
-        Unknown(what, () if len(numbers) == (robot.rows if what == "masses" else robot.joints) else numbers)
+        DataOpen(what, () if len(numbers) == (robot.rows if what == "masses" else robot.joints) else numbers)
         for what, numbers in open_joints.items()
         if numbers
     ]
     last = set(joints[-3:])
     if wrist is None or not np.isfinite(wrist.payload):
-        found.append(Unknown("payload"))
+        found.append(DataOpen("payload"))
     asked: tuple[tuple[Need, set[int]], ...] = (
         ("wrist_moment", last - {joint for joint, _ in (wrist.moment if wrist else ())}),
         ("wrist_inertia", last - {joint for joint, _ in (wrist.inertia if wrist else ())}),
     )
-    found += [Unknown(what, tuple(sorted(missing))) for what, missing in asked if missing]
-    return (*found, Unknown("load")) if load is None else tuple(found)
+    found += [DataOpen(what, tuple(sorted(missing))) for what, missing in asked if missing]
+    return (*found, DataOpen("load")) if load is None else tuple(found)
 
 
 def _open(values: np.ndarray) -> tuple[int, ...]:
@@ -82,7 +82,7 @@ def verdict_of(
     holding: tuple[HoldingTorque, ...],
     uses: tuple[Use, ...],
     findings: tuple[MassFinding, ...],
-    unknown: tuple[Unknown, ...],
+    unknown: tuple[DataOpen, ...],
     masses: MassesUsed | None,
 ) -> DynamicsVerdict:
     """Fit, marginal, overload; no_reference where there is nothing to compare, or no limit to compare it with."""
@@ -98,7 +98,7 @@ def verdict_of(
         each.what for each in unknown if each.what in ("peak", "rated", "wrist_moment", "wrist_inertia", "payload")
     )
     at_limit = any(use.upper > use.allowed for use in uses)
-    kind = Overload if beyond else Marginal if at_limit or doubts else Fits
+    kind = Overload if beyond else Marginal if at_limit or doubts else AllWithin
     status: Status = "fail" if beyond else "caution" if at_limit or doubts else "pass"
     return Verdict(status, kind(len(uses), beyond, uses[0], unlimited, missing, doubts, inferred))
 

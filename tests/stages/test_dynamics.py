@@ -1,0 +1,266 @@
+"""The dynamics stage: robots without data, without limits, within and beyond them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+import er3a
+from er3a.dynamics.plausibility import MissingLink
+from er3a.errors import InputError
+from er3a.pipeline.messages import dynamics, dynamics_verdict
+from er3a.pipeline.messages.say import listed, say
+from er3a.pipeline.results import Stored, read_results
+from er3a.pipeline.stages import run
+from er3a.pipeline.stages.dynamics.model import (
+    RESULTS,
+    AllWithin,
+    DynamicsResults,
+    Marginal,
+    NoData,
+    NoLimits,
+    Overload,
+    Use,
+)
+from er3a.pipeline.stages.dynamics.record import record
+from er3a.pipeline.stages.dynamics.report import report
+from er3a.pipeline.study import Study, load_study
+
+CLAIM = {"source": "made up", "grade": "claim"}
+LOAD = {"mass_kg": 1.5, "centre_mm": [20.0, 0.0, 90.0], "inertia_kg_m2": [0.002, 0.002, 0.001, 0.0, 0.0, 0.0]}
+PEAKS = (70, 80, 40, 14, 11, 7)
+
+Change = Callable[[dict[str, Any]], None]
+
+
+def drives(factor: float = 1.0) -> dict[str, Any]:
+    rows = [
+        {"joint": j + 1, "armature_kg_m2": 0.05, "gear_ratio": 100.0, "coulomb_n_m": 0.5, "viscous_n_m_s_rad": 0.3}
+        | {"rated_n_m": factor * peak, "peak_n_m": 1.5 * factor * peak}
+        for j, peak in enumerate(PEAKS)
+    ]
+    return CLAIM | {"rows": rows}
+
+
+def wrist(factor: float = 1.0) -> dict[str, Any]:
+    rows = [{"joint": j, "moment_n_m": 6.0 * factor, "inertia_kg_m2": 0.2 * factor} for j in (4, 5, 6)]
+    return CLAIM | {"payload_kg": 3.0, "rows": rows}
+
+
+def a_study(folder: Path, robot: Change = lambda content: None, **changes: Any) -> Study:
+    """A study of the er3a_c60, with another file, entry or settings, and paths that need no long computation."""
+    content = yaml.safe_load(Path("data/robots/er3a_c60.yaml").read_text(encoding="utf-8"))
+    robot(content)
+    (folder / "er3a_c60.yaml").write_text(yaml.safe_dump(content))
+    paths = yaml.safe_load(Path("data/paths/er3a_c60.yaml").read_text(encoding="utf-8"))
+    kept = ("joint_move", "line_clean", "line_out")
+    paths["paths"] = [path for path in paths["paths"] if path["name"] in kept]
+    (folder / "paths.yaml").write_text(yaml.safe_dump(paths))
+    study = yaml.safe_load(Path("config/small.yaml").read_text(encoding="utf-8"))
+    entry = {"file": str(folder / "er3a_c60.yaml"), "targets": "data/targets/er3a_c60.yaml"}
+    entry |= {"paths": str(folder / "paths.yaml")} | changes.get("entry", {})
+    study |= {"robots": {"er3a_c60": entry}, "dynamics": {"samples": 101} | changes.get("settings", {})}
+    (folder / "study.yaml").write_text(yaml.safe_dump(study))
+    return load_study(folder / "study.yaml")
+
+
+def computed(folder: Path, study: Study, robot: str = "er3a_c60") -> Stored[DynamicsResults]:
+    """What is read of what was written."""
+    results = folder / robot / "dynamics"
+    results.mkdir(parents=True)
+    run.compute("dynamics", study, robot, results)
+    return read_results(results, RESULTS)
+
+
+def limited(factor: float) -> Change:
+    def change(content: dict[str, Any]) -> None:
+        content["drives"], content["wrist_load"] = drives(factor), wrist(factor)
+        content["inertia"]["links"].append(
+            {"link": 6, "mass_kg": 0.1, "centre_mm": [0, 0, 0], "inertia_kg_m2": [1e-4, 1e-4, 1e-4, 0, 0, 0]}
+        )
+
+    return change
+
+
+@pytest.fixture(scope="module")
+def bare(tmp_path_factory) -> Stored[DynamicsResults]:
+    folder = tmp_path_factory.mktemp("bare")
+    return computed(folder, a_study(folder))
+
+
+@pytest.fixture(scope="module")
+def full(tmp_path_factory) -> tuple[Study, Stored[DynamicsResults]]:
+    folder = tmp_path_factory.mktemp("full")
+    study = a_study(folder, limited(1.0), entry={"payload": CLAIM | {"body": LOAD}})
+    return study, computed(folder, study)
+
+
+def test_a_robot_without_masses_has_no_data(tmp_path):
+    study = load_study("config/small.yaml")
+    found = computed(tmp_path, study, "er3_600")
+    assert found.status == "no_reference"
+    verdict = found.results.summary.verdict.finding
+    assert isinstance(verdict, NoData)
+    assert say(verdict).startswith("No data")
+    assert "payload" not in {each.what for each in found.results.summary.unknown}  # the manual has it
+    assert len(found.results.torques) == 0
+    for view, name in ((report, "page.html"), (record, "recording.rrd")):
+        view(study, found, tmp_path / name)
+        assert (tmp_path / name).stat().st_size > 1000
+
+
+def test_without_limits_torques_are_told_and_nothing_is_judged(bare):
+    summary = bare.results.summary
+    verdict = summary.verdict.finding
+    assert (bare.status, type(verdict)) == ("no_reference", NoLimits)
+    assert verdict.missing_links == (6,)
+    assert not verdict.inferred
+    assert summary.findings == (MissingLink(6, singular=True),)
+    assert {each.what for each in summary.unknown} >= {"masses", "peak", "rated", "friction", "wrist_moment", "load"}
+    assert summary.uses == ()
+    assert all(path.payload is path.speed_scale is path.torque_timed_s is None for path in summary.paths)
+    assert summary.power_imbalance < 1e-6
+    assert [path.name for path in summary.paths if not path.complete] == ["line_out"]
+
+
+def test_the_tables_torques_are_those_of_the_public_function(bare):
+    rows = bare.results.torques
+    rows = rows.take(rows.path == "joint_move")
+    q, t = np.radians(rows.q), rows.t_s
+    assert len(rows) == 101
+    parts = rows.gravity + rows.inertia + rows.velocity + rows.friction + rows.tool
+    np.testing.assert_allclose(rows.torque, parts, atol=1e-12)
+    np.testing.assert_allclose(rows.gravity, er3a.gravity(er3a.load_robot("er3a_c60"), q), atol=1e-9)
+    # Velocities by differences of the table's own angles.
+    qd = np.gradient(q, t, axis=0)
+    assert np.abs(rows.power_w - rows.torque * qd)[5:-5].max() < 0.02 * np.abs(rows.power_w).max()
+
+
+def test_within_the_limits_it_fits(full):
+    found = full[1]
+    summary = found.results.summary
+    verdict = summary.verdict.finding
+    assert (found.status, type(verdict)) == ("pass", AllWithin), say(verdict)
+    assert verdict.tightest == summary.uses[0]
+    assert [use.ratio for use in summary.uses] == sorted((use.ratio for use in summary.uses), reverse=True)
+    assert {use.quantity for use in summary.uses} == {"peak", "rms", "holding", "payload", "moment", "inertia"}
+    path = next(path for path in summary.paths if path.name == "joint_move")
+    assert path.payload.value > 0.5
+    assert path.speed_scale.value > 1
+    assert 0 < path.torque_timed_s < path.duration_s
+    motor = summary.motors[1]
+    assert motor.peak == max(load.peak for path in summary.paths for load in path.joints if load.joint == 2)
+    assert motor.motor_torque == pytest.approx(motor.peak / 100)
+    assert motor.motor_rpm == pytest.approx(motor.speed / 360 * 60 * 100)
+    assert motor.inertia_ratio == pytest.approx(motor.inertia_high / 0.05)
+
+
+def test_the_wrist_is_compared_at_rest_and_along_the_paths(full):
+    uses = [use for use in full[1].results.summary.uses if use.quantity == "moment"]
+    at_rest = {use.joint: use.asked for use in uses if use.path is None}
+    lever = np.hypot(0.02, 0.09 + 0.0785)
+    assert at_rest == pytest.approx({4: 1.5 * 9.81 * lever, 5: 1.5 * 9.81 * lever, 6: 1.5 * 9.81 * 0.02}, rel=1e-6)
+    assert {use.path for use in uses} == {None, "joint_move", "line_clean"}
+    diagram = full[1].results.diagram
+    assert set(np.unique(diagram.mass_kg)) == {1.0, 1.5, 2.0, 3.0}
+    own = diagram.take((diagram.mass_kg == 3.0) & np.isfinite(diagram.across_mm))
+    lever_mm = min(1000 * 6.0 / (3 * 9.81), 1000 * np.sqrt(0.2 / 3))
+    np.testing.assert_allclose(np.hypot(own.across_mm, own.along_mm + 78.5)[-1], lever_mm, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("factor", "status", "kind"), [(0.3, "fail", Overload), (1.0, "pass", AllWithin)])
+def test_beyond_the_limits_it_is_an_overload(tmp_path, factor, status, kind):
+    study = a_study(tmp_path, limited(factor), entry={"payload": CLAIM | {"body": LOAD}})
+    found = computed(tmp_path, study)
+    verdict = found.results.summary.verdict.finding
+    assert (found.status, type(verdict)) == (status, kind)
+    assert verdict.beyond == sum(use.ratio > 1 for use in found.results.summary.uses)
+    assert ("Overload" in say(verdict)) == (kind is Overload)
+
+
+def test_what_only_the_tolerances_carry_beyond_a_limit_is_marginal(tmp_path, full):
+    scaled = [use for use in full[1].results.summary.uses if use.quantity != "payload"]
+    tightest, widest = (max(values) for values in zip(*((use.ratio, use.upper / use.allowed) for use in scaled)))
+    assert tightest < widest
+    study = a_study(tmp_path, limited((tightest + widest) / 2), entry={"payload": CLAIM | {"body": LOAD}})
+    found = computed(tmp_path, study)
+    assert (found.status, type(found.results.summary.verdict.finding)) == ("caution", Marginal)
+
+
+def test_doubtful_masses_are_no_pass(tmp_path):
+    def change(content: dict[str, Any]) -> None:
+        limited(20.0)(content)
+        content["inertia"]["links"][2]["centre_mm"] = [900, 0, 0]
+
+    found = computed(tmp_path, a_study(tmp_path, change))
+    verdict = found.results.summary.verdict.finding
+    assert (found.status, verdict.doubts) == ("caution", 1)
+    assert "outside the link's shape" in " ".join(listed(found.results.summary.findings))
+
+
+def test_a_guess_is_made_on_request_and_graded_inferred(tmp_path):
+    def change(content: dict[str, Any]) -> None:
+        del content["inertia"]
+
+    found = computed(tmp_path, a_study(tmp_path, change, settings={"capsule_density_kg_m3": 2000.0}))
+    summary = found.results.summary
+    assert summary.verdict.finding.inferred
+    assert summary.masses.grade == "inferred"
+    assert [link.link for link in summary.masses.links if link.estimated and link.mass_kg] == [0, 1, 2, 3, 4, 6]
+    assert summary.masses.tolerances.mass_percent == 50
+    assert "inferred" in say(summary.verdict.finding)
+
+
+def test_process_forces_and_gravity_reach_the_results(tmp_path, bare):
+    payload = CLAIM | {"body": {"mass_kg": 0.0}, "force_n": [0.0, 0.0, 100.0]}
+    found = computed(tmp_path, a_study(tmp_path, entry={"payload": payload}, settings={"gravity_m_s2": 0.0}))
+    rows = found.results.torques
+    assert np.abs(rows.gravity).max() == 0
+    assert np.abs(rows.tool).max() > 5
+    assert np.abs(bare.results.torques.tool).max() == 0
+
+
+def test_a_load_concerns_this_stage_alone(full):
+    study = full[0]
+    assert study.computed_from("er3a_c60", "dynamics")["dynamics"]["loads"][0]["body"]["mass_kg"] == 1.5
+    for stage in ("validation", "workspace", "inverse", "trajectory"):
+        assert "mass_kg" not in str(study.computed_from("er3a_c60", stage))
+
+
+def test_page_and_recording_say_what_was_found(full, tmp_path):
+    study, found = full
+    report(study, found, tmp_path / "page.html")
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    for heading in ("Against the limits", "What each motor must give", "The load on the wrist", "At rest"):
+        assert heading in page
+    body = re.sub(r"<(script|style).*?</\1>|data:[^\"']*", "", page, flags=re.DOTALL)
+    assert not re.search(r"\b(nan|NaN|inf|None)\b", body)
+    record(study, found, tmp_path / "recording.rrd")
+    assert (tmp_path / "recording.rrd").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("payload", "problem"),
+    [
+        ({"body": LOAD | {"mass_kg": 3000.0}}, "payload.body.mass_kg: 3000 kg is more than any robot carries"),
+        ({"body": LOAD | {"mass_kg": -3.0}}, "below 0"),
+        ({"body": LOAD | {"inertia_kg_m2": [1.0, 0.1, 0.1, 0.0, 0.0, 0.0]}}, "no body can have"),
+    ],
+)
+def test_a_bad_payload_is_one_error(tmp_path, payload, problem):
+    with pytest.raises(InputError, match=re.escape(problem)) as caught:
+        a_study(tmp_path, entry={"payload": CLAIM | payload})
+    assert "\n" not in str(caught.value)
+
+
+def test_every_word_of_a_comparison_is_there():
+    for quantity in dynamics_verdict.QUANTITIES:
+        use = Use(quantity, None if quantity == "payload" else 5, None, 1.0, 1.1, 2.0, "N m")
+        assert "50 %" in dynamics_verdict.use_text(use)
+    assert set(dynamics.WHY) == {"not_finite", "negative_mass", "negative_moment", "triangle"}
