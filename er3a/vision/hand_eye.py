@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 from scipy.stats import f as variance_ratio
 from scipy.stats import t as student
@@ -14,7 +16,7 @@ from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.classic_methods import METHOD_NAMES, MethodName, mean_pose, solved_by
 from er3a.vision.likelihood import PoseObservations, Refined, refine, residuals
 from er3a.vision.suspects import angles_between, check_angles, repeated_poses, worst_sample
-from er3a.vision.tangent import inverted, log_rotation, moved, skew, step_between, transposed
+from er3a.vision.tangent import inverted, log_rotation, moved, posed, quaternion_of, skew, step_between, transposed
 from er3a.vision.vision_findings import (
     AllSamplesEqual,
     BoardScale,
@@ -27,6 +29,7 @@ from er3a.vision.vision_findings import (
     NoRotation,
     NothingFits,
     ParallelAxes,
+    QuaternionOrder,
     Suspect,
     TooFewSamples,
 )
@@ -39,6 +42,7 @@ LITTLE_TURN, LITTLE_SPREAD = np.radians(15), np.radians(10)
 EXCLUDED = 1e-3
 SURE = 0.95
 SCALE_ROUNDS = 20
+MUCH_ROTATION, MUCH_BETTER = np.radians(3), 5
 LEAST_SCALE_ERROR = 2e-3
 DIRECTIONS = ((False, False), (True, True), (True, False), (False, True))
 
@@ -233,10 +237,35 @@ def _warnings(samples: CalibrationSet, refined: Refined, greatest: float, apart:
     largest = float(np.sqrt(chi2.ppf(1 - EXCLUDED, free) / free))
     if samples.camera_covariance is not None and refined.scatter > largest:
         found.append(MoreScatter(float(refined.scatter), largest))
+    if order := _other_order(samples, refined):
+        return [*found, order]
     factor, half_width = board_scale(samples, refined)
     if abs(factor - 1) > max(2 * half_width, LEAST_SCALE_ERROR):
         found.append(BoardScale(factor, half_width))
     return found
+
+
+def _other_order(samples: CalibrationSet, refined: Refined) -> QuaternionOrder | None:
+    """Whether a stream's quaternions were read in the wrong order.
+
+    That keeps all turning angles, for it moves quaternions as a rotation and a mirror of four dimensions does; so only
+    a fit can tell.
+    """
+    given = float(np.sqrt((refined.residual[:, 3:] ** 2).mean()))
+    if given < MUCH_ROTATION:
+        return None
+    best: tuple[float, QuaternionOrder] | None = None
+    streams: tuple[Literal["flange", "target"], ...] = ("flange", "target")
+    for stream in streams:
+        T = getattr(samples, stream)
+        for shift in (0, 2):  # x, y, z, w taken for w, x, y, z, and the other way round
+            R = Rotation.from_quat(np.roll(quaternion_of(T), shift, axis=1)).as_matrix()
+            again = replace(samples, **{stream: posed(R, T[:, :3, 3])})
+            raw = _residuals_of(again.hand, again.target, np.array([1e-3, 5e-3]))
+            other = np.inf if raw is None else float(np.sqrt((raw[:, 3:] ** 2).mean()))
+            if other < given / MUCH_BETTER and (best is None or other < best[0]):
+                best = other, QuaternionOrder(stream, float(np.degrees(given)), float(np.degrees(other)))
+    return best[1] if best else None
 
 
 def board_scale(samples: CalibrationSet, refined: Refined) -> tuple[float, float]:
