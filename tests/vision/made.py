@@ -21,7 +21,7 @@ X_TRUE, Y_TRUE = pose([170, 5, 30], [0.6, 0.2, 0.8]), pose([10, -5, 30], [0.02, 
 def flange_poses(random: np.random.Generator, count: int, turn: float = 0.5) -> np.ndarray:
     T = np.tile(np.eye(4), (count, 1, 1))
     T[:, :3, :3] = Rotation.from_rotvec(random.normal(0, turn, (count, 3))).as_matrix()
-    T[:, :3, 3] = random.normal(0, 0.2, (count, 3)) + [0.4, 0, 0.4]
+    T[:, :3, 3] = random.normal([0.4, 0, 0.4], 0.2, (count, 3))
     return T
 
 

@@ -1,4 +1,4 @@
-"""Hand-eye calibration against OpenCV, against scipy's own minimum, against known truth, and with what people do wrong."""
+"""Hand-eye calibration against OpenCV, scipy's own minimum and known truth, and with what people do wrong."""
 
 from __future__ import annotations
 
