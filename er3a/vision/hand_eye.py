@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -11,6 +11,8 @@ from scipy.stats import chi2
 from scipy.stats import f as variance_ratio
 from scipy.stats import t as student
 
+from er3a.display import Displayed, Sheet, first_rows, shortly
+from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.classic_methods import METHOD_NAMES, MethodName, mean_pose, solved_by
@@ -41,6 +43,7 @@ LEAST_SPREAD = np.radians(1.0)
 LITTLE_TURN, LITTLE_SPREAD = np.radians(15), np.radians(10)
 EXCLUDED = 1e-3
 SURE = 0.95
+MOST_FACTS = 10
 SCALE_ROUNDS = 20
 MUCH_ROTATION, MUCH_BETTER = np.radians(3), 5
 LEAST_SCALE_ERROR = 2e-3
@@ -83,8 +86,8 @@ class TouchCheck:
     probability: float
 
 
-@dataclass(frozen=True, eq=False)
-class HandEye:
+@dataclass(frozen=True, eq=False, repr=False)
+class HandEye(Displayed):
     """A calibration.
 
     Attributes
@@ -116,7 +119,23 @@ class HandEye:
     warnings: tuple[CalibrationWarning, ...]
     without_suspects: Reals | None
     touch: TouchCheck | None
-    mismatch: Reals = field(repr=False)
+    mismatch: Reals
+
+    def sheet(self) -> Sheet:
+        """The twelve numbers with half their 95 % intervals."""
+        in_hand = self.samples.setup == "eye_in_hand"
+        poses = ("T_flange_camera", "T_base_board") if in_hand else ("T_base_camera", "T_flange_board")
+        rows = [
+            (name, axis, 1000 * T[k, 3], 1000 * half[k], np.degrees(rpy_of(T)[k]), np.degrees(half[3 + k]))
+            for name, T, half in zip(poses, (self.X, self.Y), self.half_width.reshape(2, 6))
+            for k, axis in enumerate("xyz")
+        ]
+        shown, left_out = first_rows(rows, len(rows))
+        columns = ("pose", "axis", "mm", "half_width_mm", "rpy_deg", "half_width_deg")
+        found = [*self.suspects, *self.warnings]
+        facts = tuple(shortly(each) for each in found[:MOST_FACTS])
+        heading = f"Hand-eye calibration, {int(self.used.sum())} of {len(self.samples)} samples used"
+        return Sheet(heading, columns, shown, left_out, facts)
 
 
 def calibrate_hand_eye(samples: CalibrationSet) -> HandEye:
