@@ -132,7 +132,7 @@ def test_circular_imports_end(package):
 
 
 def test_sentences_of_a_page_count_to_its_views_and_those_of_a_verdict_to_its_numbers_too(package):
-    stages = ("validation", "workspace", "inverse", "trajectory")
+    stages = ("validation", "workspace", "inverse", "trajectory", "vision")
     ask = "from er3a.pipeline.stages.registry import STAGES\n"
     ask += f"for stage in {stages}: print(*map(STAGES[stage].digest, ('compute', 'report')))"
 
@@ -144,8 +144,8 @@ def test_sentences_of_a_page_count_to_its_views_and_those_of_a_verdict_to_its_nu
         after = package.run(ask).splitlines()
         return [tuple(a != b for a, b in zip(*map(str.split, pair))) for pair in zip(before, after, strict=True)]
 
-    assert changed(*(f"pipeline/messages/{stage}.py" for stage in stages)) == [(False, True)] * 4
-    for stage in ("inverse", "trajectory"):
+    assert changed(*(f"pipeline/messages/{stage}.py" for stage in stages)) == [(False, True)] * len(stages)
+    for stage in ("inverse", "trajectory", "vision"):
         expected = [(each == stage, each == stage) for each in stages]
         assert changed(f"pipeline/messages/{stage}_verdict.py") == expected
 

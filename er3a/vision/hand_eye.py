@@ -279,7 +279,8 @@ def _other_order(samples: CalibrationSet, refined: Refined) -> QuaternionOrder |
         T = getattr(samples, stream)
         for shift in (0, 2):  # x, y, z, w taken for w, x, y, z, and the other way round
             R = Rotation.from_quat(np.roll(quaternion_of(T), shift, axis=1)).as_matrix()
-            again = replace(samples, **{stream: posed(R, T[:, :3, 3])})
+            turned = posed(R, T[:, :3, 3])
+            again = replace(samples, flange=turned) if stream == "flange" else replace(samples, target=turned)
             raw = _residuals_of(again.hand, again.target, np.array([1e-3, 5e-3]))
             other = np.inf if raw is None else float(np.sqrt((raw[:, 3:] ** 2).mean()))
             if other < given / MUCH_BETTER and (best is None or other < best[0]):

@@ -178,7 +178,7 @@ def _steps(seen: PoseObservations, W: Reals, X: Reals, Y: Reals) -> tuple[Reals,
     for _ in range(MOST_STEPS):
         size = np.diagonal(H, axis1=-2, axis2=-1)
         damped = H + (damping[..., None] * size)[..., None] * np.eye(UNKNOWNS)
-        step: Reals = np.linalg.solve(damped, -g[..., None])[..., 0]
+        step: Reals = np.asarray(np.linalg.solve(damped, -g[..., None])[..., 0], float)
         X_new, Y_new = moved(X, step[..., :6]), moved(Y, step[..., 6:])
         cost_new, H_new, g_new = _normal(seen, W, X_new, Y_new)
         better = (cost_new <= cost) & ~done

@@ -95,7 +95,7 @@ def _tolerance(samples: CalibrationSet, mismatch: Reals) -> float:
         # A sample can be bad in so many pairs that the median is, too; what is stated then holds it down.
         deviation = min(deviation, 3 * float(np.sqrt(2 * stated)))
         deviation = max(deviation, float(np.sqrt(2 * stated)))
-    return max(DEVIATIONS * deviation, ROUNDING)
+    return float(max(DEVIATIONS * deviation, ROUNDING))
 
 
 def _agreeing(conflict: Flags) -> Flags:
