@@ -57,6 +57,8 @@ def _check_of(name: str, hint: Any, crossed_limits: bool) -> Check | None:
     """What checks an argument of this annotation; None for those that functions check themselves."""
     if hint is Robot:
         return lambda value: check_robot(value, crossed_limits)
+    if hint == Robot | None:
+        return lambda value: None if value is None else check_robot(value, crossed_limits)
     allowed = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
     if set(allowed) == {Robot, NoneType}:
         return lambda value: None if value is None else check_robot(value, crossed_limits)

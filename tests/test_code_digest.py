@@ -145,7 +145,7 @@ def test_sentences_of_a_page_count_to_its_views_and_those_of_a_verdict_to_its_nu
         return [tuple(a != b for a, b in zip(*map(str.split, pair))) for pair in zip(before, after, strict=True)]
 
     assert changed(*(f"pipeline/messages/{stage}.py" for stage in stages)) == [(False, True)] * len(stages)
-    for stage in ("inverse", "trajectory"):
+    for stage in ("inverse", "trajectory", "vision"):
         expected = [(each == stage, each == stage) for each in stages]
         assert changed(f"pipeline/messages/{stage}_verdict.py") == expected
 

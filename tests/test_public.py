@@ -274,6 +274,8 @@ def shown_objects(arm: Robot, pose: np.ndarray) -> dict[str, Any]:
         "calibration": er3a.calibrate(arm, load_references("er3_600")),
         "references": er3a.load_references("er3_600"),
         "scene": er3a.load_scene("data/scenes/table_and_post.yaml"),
+        "calibration set": er3a.load_hand_eye("data/vision/carried_camera.yaml", arm),
+        "hand-eye": er3a.calibrate_hand_eye(er3a.load_hand_eye("data/vision/carried_camera.yaml", arm)),
         "target": er3a.load_targets("data/targets/er3_600.yaml", arm)[0],
         "measurement": points[0],
         "empty scene": Scene("nothing", ()),

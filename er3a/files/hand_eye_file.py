@@ -134,15 +134,15 @@ class HandEyeFile(StrictModel):
         return self
 
 
-def load_hand_eye(path: str | Path, robot: Robot | None = None) -> CalibrationSet:
-    """Read a calibration set; the robot turns joint angles into poses.
+def load_hand_eye(path: str | Path, arm: Robot | None = None) -> CalibrationSet:
+    """Read a calibration set; the arm's table turns joint angles into poses.
 
     Raises
     ------
     InputError
         naming file, row and column
     """
-    return read_calibration(path, robot)[0]
+    return read_calibration(path, arm)[0]
 
 
 def read_calibration(path: str | Path, robot: Robot | None) -> tuple[CalibrationSet, TimeOffset | None]:
@@ -182,6 +182,24 @@ def read_calibration(path: str | Path, robot: Robot | None) -> tuple[Calibration
         touch_deviation=head.touch_standard_deviation_mm / 1000,
     )
     return samples, offset
+
+
+def check_samples(table: Path) -> str:
+    """Check a table of samples or of touched points by itself, and say which of the two it is.
+
+    Raises
+    ------
+    InputError
+        naming row and column
+    """
+    if "seen_x_mm" in read_header(table):
+        _touched(table)
+        return "touched points"
+    rows, header = _rows(table)
+    for stream in ("flange", "target"):
+        if form := pose_form(table, header, stream):
+            poses_of(table, rows, stream, form)
+    return "samples of a hand-eye calibration"
 
 
 def calibration_files(path: str | Path) -> list[Path]:

@@ -9,8 +9,9 @@ from pathlib import Path
 from pydantic import BaseModel
 
 from er3a.errors import InputError
+from er3a.files.csv_file import read_header
 from er3a.files.dh_table import read_dh_table
-from er3a.files.hand_eye_file import HandEyeFile, load_hand_eye
+from er3a.files.hand_eye_file import HandEyeFile, check_samples, load_hand_eye
 from er3a.files.measurements import load_measurements
 from er3a.files.path_file import PathFile, ProgramPath, TablePath, load_paths
 from er3a.files.path_table import read_path_table
@@ -110,6 +111,8 @@ def check_file(path: Path) -> str:
 
 
 def _check_table(path: Path) -> str:
+    if path.stem not in FORMATS and {"target_x_mm", "seen_x_mm"} & set(read_header(path)):
+        return check_samples(path)
     if path.stem not in FORMATS and "q1_deg" in read_text(path).partition("\n")[0]:
         load_measurements(path)
         return "measured positions"

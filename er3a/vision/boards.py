@@ -6,7 +6,8 @@ has, to first order, the same maximum as one over all pixels. Where the camera's
 images, their standard deviations are carried into each pose; that all images share that error is left out of account.
 
 Frames as OpenCV has them: the camera looks along z, x to the right and y down; the board's z axis leaves x and y by
-the right hand, from the first inner corner (chessboard, ChArUco) or the first tag's first corner (grid of tags).
+the right hand, from the first inner corner (chessboard, ChArUco) or the first tag's first corner (grid of tags). Which
+end of a chessboard is the first can't be told from a picture; samples turned so are found when they are calibrated.
 """
 
 from __future__ import annotations

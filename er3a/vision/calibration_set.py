@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from er3a.display import Displayed, Sheet, first_rows
 from er3a.errors import ShapeError
 from er3a.geometry.transforms import check_poses
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -15,8 +16,8 @@ from er3a.vision.tangent import inverted
 Setup = Literal["eye_in_hand", "eye_to_hand"]
 
 
-@dataclass(frozen=True, eq=False)
-class CalibrationSet:
+@dataclass(frozen=True, eq=False, repr=False)
+class CalibrationSet(Displayed):
     """Samples of one board seen by one camera. Lengths in m, angles in rad.
 
     Attributes
@@ -62,6 +63,13 @@ class CalibrationSet:
 
     def __len__(self) -> int:
         return len(self.flange)
+
+    def sheet(self) -> Sheet:
+        """Where flange and board were, in mm."""
+        rows = zip(self.names, *(1000 * self.flange[:, :3, 3].T), *(1000 * self.target[:, :3, 3].T))
+        shown, left_out = first_rows(rows, len(self))
+        columns = ("sample", *(f"{part}_{c}_mm" for part in ("flange", "board") for c in "xyz"))
+        return Sheet(f"{len(self)} samples, {self.setup.replace('_', ' ')}", columns, shown, left_out)
 
     @property
     def hand(self) -> Reals:

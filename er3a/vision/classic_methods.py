@@ -34,6 +34,7 @@ from er3a.vision.tangent import inverted, log_rotation, posed, skew
 MethodName = Literal["park", "horaud", "tsai", "andreff", "daniilidis", "shah", "li"]
 METHOD_NAMES: tuple[MethodName, ...] = get_args(MethodName)
 
+TSAI_LEAST = 0.3  # of twice the sine of half the turn: 17 deg
 Unknowns = tuple[Reals, Reals]
 
 
@@ -116,7 +117,11 @@ def _right_product(q: Reals) -> Reals:
 
 
 def _tsai(A: Reals, C: Reals) -> Reals:
-    a, c = 2 * _quaternions(A[:, :3, :3])[:, 1:], 2 * _quaternions(C[:, :3, :3])[:, 1:]
+    """From motions that turn far enough alone, as the authors advise and OpenCV does; from all if those are few."""
+    a, c = (2 * _quaternions(T[:, :3, :3])[:, 1:] for T in (A, C))
+    far = np.minimum(np.linalg.norm(a, axis=1), np.linalg.norm(c, axis=1)) > TSAI_LEAST
+    if far.sum() >= 2:
+        A, C, a, c = A[far], C[far], a[far], c[far]
     p = np.linalg.lstsq(skew(a + c).reshape(-1, 3), (c - a).ravel())[0]
     p = 2 * p / np.sqrt(1 + p @ p)
     R = (1 - p @ p / 2) * np.eye(3) + (np.outer(p, p) + np.sqrt(4 - p @ p) * skew(p)) / 2
@@ -148,7 +153,7 @@ def _daniilidis(A: Reals, C: Reals) -> Reals:
 
     top = np.concatenate([block(a, c), np.zeros((len(a), 3, 4))], axis=2)
     bottom = np.concatenate([block(a_dual, c_dual), block(a, c)], axis=2)
-    v7, v8 = np.linalg.svd(np.concatenate([top, bottom], axis=1).reshape(-1, 8))[2][-2:]
+    v7, v8 = np.linalg.svd(np.concatenate([top, bottom], axis=1).reshape(-1, 8), full_matrices=False)[2][-2:]
     u1, w1, u2, w2 = v7[:4], v7[4:], v8[:4], v8[4:]
     roots = np.roots([u1 @ w1, u1 @ w2 + u2 @ w1, u2 @ w2]) if abs(u1 @ w1) > 1e-15 else np.array([0.0])
     lengths = [float(abs(s**2 * (u1 @ u1) + 2 * s * (u1 @ u2) + u2 @ u2)) for s in roots.real]

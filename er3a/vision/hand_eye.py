@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 from scipy.stats import f as variance_ratio
 from scipy.stats import t as student
 
+from er3a.display import Displayed, Sheet, first_rows, shortly
+from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.classic_methods import METHOD_NAMES, MethodName, mean_pose, solved_by
 from er3a.vision.likelihood import PoseObservations, Refined, refine, residuals
 from er3a.vision.suspects import angles_between, check_angles, repeated_poses, worst_sample
-from er3a.vision.tangent import inverted, log_rotation, moved, skew, step_between, transposed
+from er3a.vision.tangent import inverted, log_rotation, moved, posed, quaternion_of, skew, step_between, transposed
 from er3a.vision.vision_findings import (
     AllSamplesEqual,
     BoardScale,
@@ -27,6 +31,7 @@ from er3a.vision.vision_findings import (
     NoRotation,
     NothingFits,
     ParallelAxes,
+    QuaternionOrder,
     Suspect,
     TooFewSamples,
 )
@@ -38,7 +43,9 @@ LEAST_SPREAD = np.radians(1.0)
 LITTLE_TURN, LITTLE_SPREAD = np.radians(15), np.radians(10)
 EXCLUDED = 1e-3
 SURE = 0.95
+MOST_FACTS = 10
 SCALE_ROUNDS = 20
+MUCH_ROTATION, MUCH_BETTER = np.radians(3), 5
 LEAST_SCALE_ERROR = 2e-3
 DIRECTIONS = ((False, False), (True, True), (True, False), (False, True))
 
@@ -79,8 +86,8 @@ class TouchCheck:
     probability: float
 
 
-@dataclass(frozen=True, eq=False)
-class HandEye:
+@dataclass(frozen=True, eq=False, repr=False)
+class HandEye(Displayed):
     """A calibration.
 
     Attributes
@@ -112,7 +119,23 @@ class HandEye:
     warnings: tuple[CalibrationWarning, ...]
     without_suspects: Reals | None
     touch: TouchCheck | None
-    mismatch: Reals = field(repr=False)
+    mismatch: Reals
+
+    def sheet(self) -> Sheet:
+        """The twelve numbers with half their 95 % intervals."""
+        in_hand = self.samples.setup == "eye_in_hand"
+        poses = ("T_flange_camera", "T_base_board") if in_hand else ("T_base_camera", "T_flange_board")
+        rows = [
+            (name, axis, 1000 * T[k, 3], 1000 * half[k], np.degrees(rpy_of(T)[k]), np.degrees(half[3 + k]))
+            for name, T, half in zip(poses, (self.X, self.Y), self.half_width.reshape(2, 6))
+            for k, axis in enumerate("xyz")
+        ]
+        shown, left_out = first_rows(rows, len(rows))
+        columns = ("pose", "axis", "mm", "half_width_mm", "rpy_deg", "half_width_deg")
+        found = [*self.suspects, *self.warnings]
+        facts = tuple(shortly(each) for each in found[:MOST_FACTS])
+        heading = f"Hand-eye calibration, {int(self.used.sum())} of {len(self.samples)} samples used"
+        return Sheet(heading, columns, shown, left_out, facts)
 
 
 def calibrate_hand_eye(samples: CalibrationSet) -> HandEye:
@@ -233,10 +256,36 @@ def _warnings(samples: CalibrationSet, refined: Refined, greatest: float, apart:
     largest = float(np.sqrt(chi2.ppf(1 - EXCLUDED, free) / free))
     if samples.camera_covariance is not None and refined.scatter > largest:
         found.append(MoreScatter(float(refined.scatter), largest))
+    if order := _other_order(samples, refined):
+        return [*found, order]
     factor, half_width = board_scale(samples, refined)
     if abs(factor - 1) > max(2 * half_width, LEAST_SCALE_ERROR):
         found.append(BoardScale(factor, half_width))
     return found
+
+
+def _other_order(samples: CalibrationSet, refined: Refined) -> QuaternionOrder | None:
+    """Whether a stream's quaternions were read in the wrong order.
+
+    That keeps all turning angles, for it moves quaternions as a rotation and a mirror of four dimensions does; so only
+    a fit can tell.
+    """
+    given = float(np.sqrt((refined.residual[:, 3:] ** 2).mean()))
+    if given < MUCH_ROTATION:
+        return None
+    best: tuple[float, QuaternionOrder] | None = None
+    streams: tuple[Literal["flange", "target"], ...] = ("flange", "target")
+    for stream in streams:
+        T = getattr(samples, stream)
+        for shift in (0, 2):  # x, y, z, w taken for w, x, y, z, and the other way round
+            R = Rotation.from_quat(np.roll(quaternion_of(T), shift, axis=1)).as_matrix()
+            turned = posed(R, T[:, :3, 3])
+            again = replace(samples, flange=turned) if stream == "flange" else replace(samples, target=turned)
+            raw = _residuals_of(again.hand, again.target, np.array([1e-3, 5e-3]))
+            other = np.inf if raw is None else float(np.sqrt((raw[:, 3:] ** 2).mean()))
+            if other < given / MUCH_BETTER and (best is None or other < best[0]):
+                best = other, QuaternionOrder(stream, float(np.degrees(given)), float(np.degrees(other)))
+    return best[1] if best else None
 
 
 def board_scale(samples: CalibrationSet, refined: Refined) -> tuple[float, float]:

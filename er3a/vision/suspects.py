@@ -26,13 +26,13 @@ from er3a.vision.tangent import step_between, transposed
 from er3a.vision.vision_findings import (
     FarFromFit,
     NoMajority,
-    QuaternionOrder,
     RepeatedPose,
     RotationMismatch,
     SuspectKind,
 )
 
 DEVIATIONS = 6.0  # of the angle between two samples; beyond, a pair is in conflict
+MOST_DEVIATION = np.radians(2.0)  # of a camera that is of any use
 ROUNDING = 1e-6  # rad
 SAME_POSITION_M, SAME_ROTATION_RAD = 5e-5, 2e-4
 FALSE_ALARMS = 0.01  # of sound sets in which a sample is called far from the fit
@@ -54,7 +54,7 @@ class AngleCheck:
     tolerance: float
     used: Flags
     found: tuple[RotationMismatch, ...]
-    warning: NoMajority | QuaternionOrder | None
+    warning: NoMajority | None
 
 
 def angles_between(R: Reals) -> Reals:
@@ -72,9 +72,7 @@ def check_angles(samples: CalibrationSet) -> AngleCheck:
     used = _agreeing(mismatch > tolerance)
     if used.sum() <= len(samples) / 2:
         conflict = mismatch[upper] > tolerance
-        warning = _other_order(hand, eye, mismatch[upper]) or NoMajority(
-            int(conflict.sum()), len(conflict), float(np.degrees(np.median(mismatch[upper])))
-        )
+        warning = NoMajority(int(conflict.sum()), len(conflict), float(np.degrees(np.median(mismatch[upper]))))
         return AngleCheck(mismatch, tolerance, np.ones(len(samples), bool), (), warning)
     found = tuple(
         RotationMismatch(
@@ -89,7 +87,7 @@ def check_angles(samples: CalibrationSet) -> AngleCheck:
 
 def _tolerance(samples: CalibrationSet, mismatch: Reals) -> float:
     """Half of the mismatches of sound pairs lie below 0.674 standard deviations."""
-    deviation = float(np.median(mismatch)) / 0.674
+    deviation = min(float(np.median(mismatch)) / 0.674, MOST_DEVIATION)
     if samples.camera_covariance is not None:
         stated = np.linalg.eigvalsh(samples.camera_covariance[:, 3:, 3:])[:, -1].mean()
         if samples.flange_covariance is not None:
@@ -97,7 +95,7 @@ def _tolerance(samples: CalibrationSet, mismatch: Reals) -> float:
         # A sample can be bad in so many pairs that the median is, too; what is stated then holds it down.
         deviation = min(deviation, 3 * float(np.sqrt(2 * stated)))
         deviation = max(deviation, float(np.sqrt(2 * stated)))
-    return max(DEVIATIONS * deviation, ROUNDING)
+    return float(max(DEVIATIONS * deviation, ROUNDING))
 
 
 def _agreeing(conflict: Flags) -> Flags:
@@ -132,22 +130,6 @@ def _mended(T: Reals, kind: SuspectKind) -> list[Reals]:
     axis = kind[-1]
     turns = (90.0, -90.0) if kind.startswith("quarter") else (180.0,)
     return [R @ Rotation.from_euler(axis, turn, degrees=True).as_matrix() for turn in turns]
-
-
-def _other_order(hand: Reals, eye: Reals, mismatch: Reals) -> QuaternionOrder | None:
-    """Whether the angles agree once a stream's quaternions are read with the real part at the other end."""
-    upper = np.triu_indices(len(hand), 1)
-    before = float(np.median(mismatch))
-    for stream, R, other in (("target", eye, hand), ("flange", hand, eye)):
-        q = Rotation.from_matrix(R).as_quat()
-        for shift in (1, -1):
-            again = Rotation.from_quat(np.roll(q, shift, axis=1)).as_matrix()
-            turned = angles_between(transposed(again) if stream == "target" else again)
-            still = angles_between(transposed(other) if stream == "flange" else other)
-            after = float(np.median(np.abs(turned - still)[upper]))
-            if after < before / 20:
-                return QuaternionOrder(stream, float(np.degrees(before)), float(np.degrees(after)))  # type: ignore[arg-type]
-    return None
 
 
 def worst_sample(samples: CalibrationSet, refined: Refined) -> tuple[int, FarFromFit] | None:

@@ -59,11 +59,11 @@ class NoMajority:
 
 @dataclass(frozen=True)
 class QuaternionOrder:
-    """Turning angles agree if quaternions of one stream are read in the other order."""
+    """The samples fit if the quaternions of one stream are read with their real part at the other end."""
 
     stream: Literal["flange", "target"]
-    median_before_deg: float
-    median_after_deg: float
+    rms_given_deg: float
+    rms_other_deg: float
     code: Literal["quaternion_order"] = "quaternion_order"
 
 

@@ -70,7 +70,7 @@ def test_each_documented_entity_is_logged(small_study):
     assert set(documented()) - found == set()
 
 
-@pytest.mark.parametrize("stage", ["inverse", "trajectory"])
+@pytest.mark.parametrize("stage", ["inverse", "trajectory", "vision"])
 def test_the_study_s_scene_is_drawn(small_study, stage):
     entities = logged(small_study.folder / f"reports/{ROBOT}/{stage}.rrd")
     scene = {"table", "post", "lamp", "floor"}

@@ -115,11 +115,11 @@ def _(found: NoMajority) -> str:
 def _(found: QuaternionOrder) -> str:
     return sentence(
         found.code,
-        "the quaternions of the {stream} have their real part at the other end: read so, the turning angles differ by "
-        "{after:.2g} deg in the median, and by {before:.3g} deg as given",
+        "the quaternions of the {stream} have their real part at the other end: read so, the residuals are {after:.2g} "
+        "deg, as given {before:.3g} deg",
         stream=word("vision.stream", STREAMS, found.stream),
-        after=found.median_after_deg,
-        before=found.median_before_deg,
+        after=found.rms_other_deg,
+        before=found.rms_given_deg,
     )
 
 

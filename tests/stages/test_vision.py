@@ -1,0 +1,84 @@
+"""The vision stage on the study's cells: verdict, tables, page and recording, and equal bytes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from er3a.pipeline.results import read_results, read_stage
+from er3a.pipeline.stages import run
+from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.stages.vision.model import VisionResults
+from er3a.pipeline.study import load_study
+
+STAGE = STAGES["vision"]
+
+
+@pytest.fixture(scope="module")
+def study():
+    return load_study(Path(__file__).resolve().parents[2] / "config" / "small.yaml")
+
+
+@pytest.fixture(scope="module")
+def folders(study, tmp_path_factory):
+    found = {name: tmp_path_factory.mktemp(name) for name in ("er3a_c60", "er3a_c60_article", "er3_600")}
+    for name, folder in found.items():
+        run.compute("vision", study, name, folder)
+    return found
+
+
+def test_objects_are_grasped_as_expected_and_the_turned_board_is_named(folders):
+    summary = read_results(folders["er3a_c60"], VisionResults).results.summary
+    assert summary.verdict.status == "pass"
+    assert summary.verdict.finding.left_out == ("pose_12",)
+    assert {each.name: each.outcome for each in summary.objects} == {
+        "can": "grasped",
+        "box": "grasped",
+        "box_by_the_post": "not graspable",
+        "box_far_off": "not graspable",
+    }
+    assert {each.refusal.code for each in summary.objects if each.refusal} == {"grasp_collides", "grasp_out_of_reach"}
+
+
+def test_a_wrong_table_shows_in_the_calibration(folders):
+    """The same recording, its joint angles turned into poses by the article's table."""
+    summary = read_results(folders["er3a_c60_article"], VisionResults).results.summary
+    assert summary.verdict.status == "fail"
+    assert "no_majority" in {each.code for each in summary.verdict.finding.warnings}
+    assert summary.objects == ()
+
+
+def test_tables_say_what_the_summary_says(folders):
+    results = read_results(folders["er3_600"], VisionResults).results
+    found = results.summary.calibration
+    assert results.samples.used.sum() == found.used
+    assert (results.error_map.together_mm >= results.error_map.calibration_mm).all()
+    for each in results.summary.objects:
+        last = results.ways.take((results.ways.target == each.name) & (results.ways.part == "approach")).q_deg[-1]
+        np.testing.assert_allclose(last, each.grasp.q_deg)
+        assert each.error_mm.together >= max(each.error_mm.camera, each.error_mm.calibration, each.error_mm.table)
+
+
+def test_equal_inputs_give_equal_bytes(study, folders, tmp_path):
+    run.compute("vision", study, "er3_600", tmp_path)
+    for file in folders["er3_600"].iterdir():
+        assert file.read_bytes() == (tmp_path / file.name).read_bytes(), file.name
+
+
+def test_a_robot_without_a_camera_says_so(study, tmp_path):
+    entry = study.robots["er3_600"].model_copy(update={"vision": None})
+    without = study.model_copy(update={"robots": {"er3_600": entry}})
+    told = run.compute("vision", without, "er3_600", tmp_path)
+    assert told == "The study names no vision file for this robot."
+    assert read_stage(tmp_path, STAGE).status == "not_computed"
+
+
+@pytest.mark.parametrize("name", ["er3a_c60", "er3a_c60_article", "er3_600"])
+def test_page_and_recording_are_written(study, folders, tmp_path, name):
+    for verb in ("record", "report"):
+        run.show(verb, "vision", study, name, folders[name], tmp_path / verb)
+    page = (tmp_path / "report").read_text(encoding="utf-8")
+    assert "T_flange_board" in page or "T_base_board" in page
+    assert (tmp_path / "record").stat().st_size > 10_000

@@ -1,0 +1,297 @@
+"""Hand-eye calibration against OpenCV, scipy's own minimum and known truth, and with what people do wrong."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+from scipy.stats import t as student
+
+from er3a.vision.calibration_set import CalibrationSet
+from er3a.vision.classic_methods import METHOD_NAMES, mean_pose, motions, park, solved_by
+from er3a.vision.hand_eye import calibrate_hand_eye
+from er3a.vision.likelihood import PoseObservations, flange_to_camera, refine, residuals
+from er3a.vision.tangent import moved
+from er3a.vision.vision_findings import (
+    AllSamplesEqual,
+    BoardScale,
+    FarFromFit,
+    HandEyeError,
+    LittleMotion,
+    MoreScatter,
+    NoRotation,
+    ParallelAxes,
+    QuaternionOrder,
+    RepeatedPose,
+    RotationMismatch,
+    TooFewSamples,
+)
+from tests.vision.made import X_TRUE, Y_TRUE, covariance, flange_poses, noisy, off, pose, seen
+
+SETUPS = ("eye_in_hand", "eye_to_hand")
+
+
+def a_set(setup: str, seed: int = 0, count: int = 15, **more) -> CalibrationSet:
+    random = np.random.default_rng(seed)
+    flange = flange_poses(random, count)
+    return CalibrationSet(setup, flange, noisy(seen(setup, flange), random), **more)
+
+
+def by_opencv(name: str, F: np.ndarray, B: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+    if name in ("shah", "li"):
+        G = np.linalg.inv(F)
+        method = getattr(cv2, f"CALIB_ROBOT_WORLD_HAND_EYE_{name.upper()}")
+        R_Y, t_Y, R_X, t_X = cv2.calibrateRobotWorldHandEye(
+            B[:, :3, :3], B[:, :3, 3], G[:, :3, :3], G[:, :3, 3], method=method
+        )
+        X, Y = np.eye(4), np.eye(4)
+        X[:3, :3], X[:3, 3], Y[:3, :3], Y[:3, 3] = R_X, t_X.ravel(), R_Y, t_Y.ravel()
+        return np.linalg.inv(X), np.linalg.inv(Y)
+    method = getattr(cv2, f"CALIB_HAND_EYE_{name.upper()}")
+    R, t = cv2.calibrateHandEye(F[:, :3, :3], F[:, :3, 3], B[:, :3, :3], B[:, :3, 3], method=method)
+    X = np.eye(4)
+    X[:3, :3], X[:3, 3] = R, t.ravel()
+    return X, None
+
+
+@pytest.mark.parametrize("setup", SETUPS)
+@pytest.mark.parametrize("name", METHOD_NAMES)
+def test_closed_forms_answer_as_opencv_does(name, setup):
+    random = np.random.default_rng(5)
+    flange = flange_poses(random, 12, turn=0.35)  # below 120 deg, where OpenCV's Tsai keeps its signs
+    B = noisy(seen(setup, flange), random)
+    F = flange if setup == "eye_in_hand" else np.linalg.inv(flange)
+    X, Y = solved_by(name, F, B)
+    X_cv, Y_cv = by_opencv(name, F, B)
+    assert np.abs(X - X_cv).max() < 1e-9
+    if Y_cv is not None:
+        assert np.abs(Y - Y_cv).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", METHOD_NAMES)
+def test_closed_forms_find_the_truth_without_noise(name):
+    flange = flange_poses(np.random.default_rng(6), 6)
+    X, Y = solved_by(name, flange, seen("eye_in_hand", flange))
+    assert np.abs(X - X_TRUE).max() < 1e-9
+    assert np.abs(Y - Y_TRUE).max() < 1e-9
+
+
+def test_derivatives_are_those_of_differences():
+    random = np.random.default_rng(2)
+    flange = flange_poses(random, 4)
+    B = noisy(seen("eye_in_hand", flange), random, 0.1, 0.4)
+    _, J = residuals(flange, B, X_TRUE, Y_TRUE)
+    for k in range(12):
+        step = np.zeros(12)
+        step[k] = 1e-6
+        ends = [residuals(flange, B, moved(X_TRUE, s * step[:6]), moved(Y_TRUE, s * step[6:]))[0] for s in (1, -1)]
+        np.testing.assert_allclose(J[..., k], (ends[0] - ends[1]) / 2e-6, atol=1e-8)
+
+
+@pytest.mark.parametrize("setup", SETUPS)
+def test_errors_of_the_flange_reach_the_camera(setup):
+    flange = flange_poses(np.random.default_rng(3), 4)
+    G = flange_to_camera(setup, flange if setup == "eye_in_hand" else np.linalg.inv(flange), X_TRUE, Y_TRUE)
+    for k in range(6):
+        step = np.zeros(6)
+        step[k] = 1e-6
+        ends = [seen(setup, moved(flange, s * step)) for s in (1, -1)]
+        found = np.stack([off(a, b) for a, b in zip(*ends)]) / 2e-6
+        np.testing.assert_allclose(G[..., k], found, atol=1e-8)
+
+
+def test_the_refinement_ends_where_scipy_finds_the_least_squares():
+    """An oracle with rotation vectors of its own, and no derivative of ours."""
+    samples = a_set("eye_in_hand", 8, camera_covariance=covariance(15))
+
+    def cost(p):
+        X, Y = pose([0, 0, 0], p[:3]), pose([0, 0, 0], p[6:9])
+        X[:3, :3], Y[:3, :3] = (Rotation.from_rotvec(v).as_matrix() for v in (p[3:6], p[9:]))
+        predicted = np.linalg.inv(samples.flange @ X) @ Y
+        turn = Rotation.from_matrix(samples.target[:, :3, :3] @ np.swapaxes(predicted[:, :3, :3], 1, 2)).as_rotvec()
+        return np.concatenate([(samples.target[:, :3, 3] - predicted[:, :3, 3]) / 5e-4, turn / 2e-3]).ravel()
+
+    found = calibrate_hand_eye(samples)
+    start = [np.r_[T[:3, 3], Rotation.from_matrix(T[:3, :3]).as_rotvec()] for T in (X_TRUE, Y_TRUE)]
+    least = least_squares(cost, np.concatenate(start), xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    assert found.used.all()
+    np.testing.assert_allclose(found.X[:3, 3], least.x[:3], atol=1e-7)
+    np.testing.assert_allclose(found.X[:3, :3], Rotation.from_rotvec(least.x[3:6]).as_matrix(), atol=1e-7)
+    np.testing.assert_allclose(found.scatter**2 * (6 * 15 - 12), 2 * least.cost, rtol=1e-9)
+
+
+def coverage(setup: str, stated: bool, runs: int, seed: int) -> np.ndarray:
+    """Share of runs (12,) whose 95 % intervals hold the truth."""
+    random = np.random.default_rng(seed)
+    flange = flange_poses(random, 14)
+    deviations = np.array([3e-4] * 3 + [1e-3] * 3) if stated else np.zeros(6)
+    true_flange = np.broadcast_to(flange, (runs, 14, 4, 4))
+    errors = random.normal(size=(runs, 14, 6)) * deviations
+    believed = moved(true_flange, errors)
+    B = noisy(np.broadcast_to(seen(setup, flange), (runs, 14, 4, 4)), random)
+    F = believed if setup == "eye_in_hand" else np.linalg.inv(believed)
+    X = park(*motions(F, B))
+    known = (covariance(14), np.diag(deviations**2)) if stated else (None, None)
+    found = refine(PoseObservations(setup, F, B, *known), X, mean_pose(F @ X[:, None] @ B))
+    half = student.ppf(0.975, found.freedom) * np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2))
+    error = np.concatenate([off(found.X, X_TRUE), off(found.Y, Y_TRUE)], axis=1)
+    return (np.abs(error) <= half).mean(axis=0)
+
+
+@pytest.mark.parametrize("stated", [True, False])
+@pytest.mark.parametrize("setup", SETUPS)
+def test_intervals_hold_the_truth_as_often_as_they_say(setup, stated):
+    """Of 600 runs with 12 numbers: three standard deviations of each share, and 94 to 96 % in all."""
+    held = coverage(setup, stated, 600, 17)
+    assert (np.abs(held - 0.95) < 3.5 * np.sqrt(0.95 * 0.05 / 600)).all()
+    assert 0.94 < held.mean() < 0.96
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("setup", SETUPS)
+def test_intervals_hold_the_truth_in_ten_thousand_runs(setup):
+    held = np.mean([coverage(setup, stated, 1250, 100 * k) for k in range(4) for stated in (True, False)], axis=0)
+    assert (held > 0.94).all()
+    assert (held < 0.96).all()
+
+
+@pytest.mark.parametrize("setup", SETUPS)
+def test_a_board_turned_by_half_is_named_and_left_out(setup):
+    samples = a_set(setup, 3)
+    samples.target[4] = samples.target[4] @ pose([0, 0, 180], [0.1, 0.08, 0])
+    found = calibrate_hand_eye(samples)
+    assert [(each.sample, each.kind) for each in found.suspects] == [("5", "half_turn_z")]
+    assert not found.used[4]
+    assert np.linalg.norm(off(found.X, X_TRUE)[:3]) < 2e-3
+    assert found.without_suspects is not None
+    assert found.without_suspects[0] > 0.01
+
+
+def test_a_mirrored_tilt_is_told_from_other_turns():
+    samples = a_set("eye_to_hand", 4)
+    T = samples.target[6]
+    sight = T[:3, 3] / np.linalg.norm(T[:3, 3])
+    T[:3, :3] = (np.eye(3) - 2 * np.outer(sight, sight)) @ T[:3, :3] @ np.diag([1.0, 1.0, -1.0])
+    (found,) = calibrate_hand_eye(samples).suspects
+    assert isinstance(found, RotationMismatch)
+    assert (found.sample, found.kind) == ("7", "mirrored_tilt")
+
+
+def test_a_shifted_board_is_named_though_no_angle_tells_it():
+    samples = a_set("eye_in_hand", 9)
+    samples.target[2, :3, 3] += [0.01, 0, 0]
+    (found,) = calibrate_hand_eye(samples).suspects
+    assert isinstance(found, FarFromFit)
+    assert found.sample == "3"
+    assert found.off_mm == pytest.approx(10, abs=2)
+
+
+def test_sound_sets_name_hardly_any_sample():
+    named = [len(calibrate_hand_eye(a_set("eye_in_hand", seed, 12)).suspects) for seed in range(60)]
+    assert sum(named) <= 4  # 0.6 to be expected at one false alarm in a hundred sets
+
+
+def test_repeated_poses_are_named():
+    samples = a_set("eye_in_hand", 10)
+    samples.flange[8], samples.target[8] = samples.flange[3], samples.target[3]
+    (found,) = calibrate_hand_eye(samples).suspects
+    assert isinstance(found, RepeatedPose)
+    assert (found.sample, found.first) == ("9", "4")
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("setup", SETUPS)
+def test_directions_say_what_is_excluded_and_what_can_not_be_told(setup, seed):
+    directions = calibrate_hand_eye(a_set(setup, seed)).directions
+    assert [each.status for each in directions] == ["best", "same_problem", "excluded", "excluded"]
+    samples = a_set(setup, seed)
+    inverted = CalibrationSet(setup, samples.flange, np.linalg.inv(samples.target))
+    by_inverse = {
+        (each.flange_inverted, each.target_inverted): each.status for each in calibrate_hand_eye(inverted).directions
+    }
+    assert by_inverse[False, False] == by_inverse[True, True] == "excluded"
+    assert {by_inverse[True, False], by_inverse[False, True]} == {"best", "same_problem"}
+
+
+def test_both_streams_inverted_is_the_same_problem_with_the_unknowns_swapped():
+    samples = a_set("eye_in_hand", 12)
+    F, B = samples.flange, samples.target
+    X, Y = solved_by("shah", F, B)
+    X_swapped, Y_swapped = solved_by("park", np.linalg.inv(F), np.linalg.inv(seen("eye_in_hand", F)))
+    assert np.abs(off(X_swapped, Y_TRUE)).max() < 1e-9
+    assert np.abs(off(Y_swapped, X_TRUE)).max() < 1e-9
+    assert np.abs(off(X, X_TRUE)).max() < 0.02
+    assert np.abs(off(Y, Y_TRUE)).max() < 0.02
+
+
+def test_a_board_of_another_size_is_named_with_the_factor():
+    samples = a_set("eye_to_hand", 13, 20)
+    samples.target[:, :3, 3] /= 1.05
+    scale = [each for each in calibrate_hand_eye(samples).warnings if isinstance(each, BoardScale)]
+    assert scale[0].factor == pytest.approx(1.05, abs=scale[0].half_width)
+
+
+@pytest.mark.parametrize("stream", ["flange", "target"])
+def test_a_quaternion_read_in_the_other_order_is_named(stream):
+    samples = a_set("eye_in_hand", 14)
+    T = getattr(samples, stream)
+    q = Rotation.from_matrix(T[:, :3, :3]).as_quat()
+    T[:, :3, :3] = Rotation.from_quat(np.roll(q, 1, axis=1)).as_matrix()
+    found = [each for each in calibrate_hand_eye(samples).warnings if isinstance(each, QuaternionOrder)]
+    assert found[0].stream == stream
+
+
+def test_residuals_beyond_what_is_stated_are_said():
+    good = a_set("eye_in_hand", 15, camera_covariance=covariance(15))
+    assert calibrate_hand_eye(good).warnings == ()
+    bad = a_set("eye_in_hand", 15, camera_covariance=covariance(15) / 9)
+    (found,) = calibrate_hand_eye(bad).warnings
+    assert isinstance(found, MoreScatter)
+    assert found.scatter == pytest.approx(3, abs=0.6)
+
+
+def test_little_motion_is_said():
+    random = np.random.default_rng(16)
+    flange = flange_poses(random, 12, turn=0.03)
+    samples = CalibrationSet("eye_in_hand", flange, noisy(seen("eye_in_hand", flange), random))
+    found = calibrate_hand_eye(samples)
+    assert any(isinstance(each, LittleMotion) for each in found.warnings)
+    assert found.half_width[:3].max() > 2e-3
+
+
+def refusal(flange: np.ndarray, target: np.ndarray | None = None) -> object:
+    target = seen("eye_in_hand", flange) if target is None else target
+    with pytest.raises(HandEyeError) as caught:
+        calibrate_hand_eye(CalibrationSet("eye_in_hand", flange, target))
+    return caught.value.finding
+
+
+def test_sets_that_determine_nothing_say_why():
+    random = np.random.default_rng(20)
+    flange = flange_poses(random, 10)
+    assert refusal(flange[:2]) == TooFewSamples(2, 3)
+    assert refusal(np.repeat(flange[:1], 5, axis=0)) == AllSamplesEqual("flange")
+    assert refusal(flange, np.repeat(seen("eye_in_hand", flange)[:1], 10, axis=0)) == AllSamplesEqual("target")
+    shifted = flange.copy()
+    shifted[:, :3, :3] = flange[0, :3, :3]
+    assert isinstance(refusal(shifted), NoRotation)
+    about_z = flange.copy()
+    about_z[:, :3, :3] = Rotation.from_euler("z", random.uniform(-60, 60, (10, 1)), degrees=True).as_matrix()
+    found = refusal(about_z)
+    assert isinstance(found, ParallelAxes)
+    assert abs(found.axis[2]) == pytest.approx(1)
+
+
+def test_touched_points_judge_the_calibration():
+    random = np.random.default_rng(21)
+    points = random.uniform([-0.2, -0.2, 0.6], [0.2, 0.2, 1.0], (6, 3))
+    base = points @ X_TRUE[:3, :3].T + X_TRUE[:3, 3] + random.normal(0, 1e-4, (6, 3))
+    touched = np.stack([points + random.normal(0, 5e-4, (6, 3)), base], axis=1)
+    good = calibrate_hand_eye(a_set("eye_to_hand", 21, touched=touched, touch_deviation=1e-4))
+    assert good.touch.probability > 0.001
+    touched[:, 1] += [0.01, 0, 0]
+    bad = calibrate_hand_eye(a_set("eye_to_hand", 21, touched=touched, touch_deviation=1e-4))
+    assert bad.touch.probability < 1e-6
+    assert bad.touch.difference[:, 0].mean() == pytest.approx(0.01, abs=2e-3)

@@ -1,0 +1,160 @@
+"""Calibration sets as files: what is wrong is said in one line, with the sample."""
+
+from __future__ import annotations
+
+import csv
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from er3a.errors import InputError
+from er3a.files.hand_eye_file import load_hand_eye, read_calibration
+from er3a.files.robot_library import load_robot
+from er3a.files.shipped import ROOT
+from er3a.files.vision_file import load_vision, vision_files
+from er3a.kinematics.forward import forward
+from testing import camera_cells
+from tests.vision.made import X_TRUE, Y_TRUE, flange_poses, noisy, off, seen
+
+POSITION = ("x_mm", "y_mm", "z_mm")
+HEAD = "kind: hand_eye\ntitle: made\nsource: a test\nsetup: {setup}\nsamples: samples.csv\n"
+
+
+def columns(T: np.ndarray, stream: str, form: str) -> dict[str, np.ndarray]:
+    found = {f"{stream}_{name}": 1000 * T[:, k, 3] for k, name in enumerate(POSITION)}
+    R = Rotation.from_matrix(T[:, :3, :3])
+    if form == "quaternion":
+        q = R.as_quat(scalar_first=True)
+        return found | {f"{stream}_q{c}": q[:, k] for k, c in enumerate("wxyz")}
+    if form == "rpy":
+        rpy = R.as_euler("xyz", degrees=True)
+        return found | {f"{stream}_{name}_deg": rpy[:, k] for k, name in enumerate(("roll", "pitch", "yaw"))}
+    return found | {f"{stream}_r{r + 1}{c + 1}": T[:, r, c] for r in range(3) for c in range(3)}
+
+
+def write(folder: Path, table: dict[str, np.ndarray], head: str = HEAD.format(setup="eye_in_hand")) -> Path:
+    with (folder / "samples.csv").open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(table)
+        writer.writerows(zip(*table.values()))
+    (folder / "set.yaml").write_text(head)
+    return folder / "set.yaml"
+
+
+@pytest.fixture
+def poses() -> tuple[np.ndarray, np.ndarray]:
+    random = np.random.default_rng(1)
+    flange = flange_poses(random, 8)
+    return flange, noisy(seen("eye_in_hand", flange), random)
+
+
+@pytest.mark.parametrize("form", ["quaternion", "rpy", "matrix"])
+def test_every_form_of_orientation_gives_the_poses(tmp_path, poses, form):
+    flange, target = poses
+    found = load_hand_eye(write(tmp_path, columns(flange, "flange", form) | columns(target, "target", form)))
+    np.testing.assert_allclose(found.flange, flange, atol=1e-9)
+    np.testing.assert_allclose(found.target, target, atol=1e-9)
+
+
+def test_joint_angles_become_poses_by_the_robots_own_table(tmp_path, poses):
+    robot = load_robot("er3a_c60")
+    q = np.random.default_rng(2).uniform(-40, 40, (8, 6))
+    table = {f"q{j + 1}_deg": q[:, j] for j in range(6)} | columns(poses[1], "target", "quaternion")
+    found = load_hand_eye(write(tmp_path, table), robot)
+    np.testing.assert_allclose(found.flange, forward(robot.without_tool(), np.radians(q)), atol=1e-12)
+    with pytest.raises(InputError, match="need a robot's table"):
+        load_hand_eye(tmp_path / "set.yaml")
+
+
+def spoiled(what: str, flange: np.ndarray, target: np.ndarray) -> dict[str, np.ndarray]:
+    table = columns(flange, "flange", "quaternion") | columns(target, "target", "matrix")
+    match what:
+        case "metres":
+            for name in POSITION:
+                table[f"target_{name}"] = table[f"target_{name}"] / 1000
+        case "mixed":
+            for name in POSITION:
+                table[f"target_{name}"][3] /= 1000
+        case "length":
+            table["flange_qw"][4] += 0.2
+        case "mirrored":
+            for row in "123":
+                table[f"target_r{row}3"][5] *= -1
+        case "skewed":
+            table["target_r11"][6] += 0.1
+        case "nan":
+            table["target_r11"][2] = np.nan
+    return table
+
+
+@pytest.mark.parametrize(
+    ("what", "where", "told"),
+    [
+        ("metres", "columns target_x_mm", "can only be metres"),
+        ("mixed", "row 5", "another unit"),
+        ("length", "row 6", "length is"),
+        ("mirrored", "row 7", "left-handed"),
+        ("skewed", "row 8", "no rotation"),
+        ("nan", "row 4", "not a finite number"),
+    ],
+)
+def test_bad_samples_are_named(tmp_path, poses, what, where, told):
+    with pytest.raises(InputError) as caught:
+        load_hand_eye(write(tmp_path, spoiled(what, *poses)))
+    assert where in str(caught.value.field)
+    assert told in caught.value.problem
+    assert "\n" not in str(caught.value)
+
+
+def test_radians_are_told_from_degrees(tmp_path, poses):
+    table = {f"q{j}_deg": np.linspace(-2, 2, 8) for j in range(1, 7)} | columns(poses[1], "target", "quaternion")
+    with pytest.raises(InputError, match="can only be radians"):
+        load_hand_eye(write(tmp_path, table), load_robot("er3a_c60"))
+
+
+def test_two_clocks_are_brought_together(tmp_path):
+    """Streams of an arm that swings, the camera's clock 0.137 s behind; one pose in ten is a wrong detection."""
+    random = np.random.default_rng(3)
+
+    def arm(t: np.ndarray) -> np.ndarray:
+        turns = np.stack([0.7 * np.sin(0.9 * t), 0.6 * np.sin(1.3 * t + 1), 0.8 * np.sin(0.7 * t + 2)], axis=1)
+        T = np.tile(np.eye(4), (len(t), 1, 1))
+        T[:, :3, :3] = Rotation.from_rotvec(turns).as_matrix()
+        T[:, :3, 3] = 0.2 * turns + [0.4, 0, 0.4]
+        return T
+
+    t_arm, t_eye = np.arange(0, 40, 0.01), np.arange(1, 38, 0.05)
+    target = noisy(seen("eye_in_hand", arm(t_eye + 0.137)), random, 3e-4, 1e-3)
+    wrong = random.choice(len(t_eye), len(t_eye) // 10, replace=False)
+    target[wrong, :3, :3] = Rotation.random(len(wrong), random_state=4).as_matrix()
+    head = HEAD.format(setup="eye_in_hand").replace(
+        "samples: samples.csv", "streams: {flange: hand.csv, target: samples.csv}"
+    )
+    write(tmp_path, {"t_s": t_arm} | columns(arm(t_arm), "flange", "quaternion"))
+    shutil.move(tmp_path / "samples.csv", tmp_path / "hand.csv")
+    path = write(tmp_path, {"t_s": t_eye} | columns(target, "target", "quaternion"), head)
+    samples, offset = read_calibration(path, None)
+    assert abs(offset.offset - 0.137) < max(offset.half_width, 1e-3)
+    assert offset.half_width < 5e-3
+    from er3a.vision.hand_eye import calibrate_hand_eye
+
+    found = calibrate_hand_eye(samples)
+    assert np.abs(off(found.X, X_TRUE)).max() < 2e-3
+    assert np.abs(off(found.Y, Y_TRUE)).max() < 2e-3
+
+
+def test_the_studys_sets_are_what_the_script_makes(tmp_path):
+    camera_cells.write(tmp_path)
+    for file in sorted(tmp_path.iterdir()):
+        assert file.read_text() == (camera_cells.FOLDER / file.name).read_text(), file.name
+
+
+@pytest.mark.parametrize("name", ["er3a_c60", "er3_600"])
+def test_vision_files_name_all_that_they_rest_on(name):
+    file = ROOT / "data" / "vision" / f"{name}.yaml"
+    load_vision(file, load_robot(name))
+    assert len(vision_files(file)) == 4
+    assert all(each.is_file() for each in vision_files(file))
