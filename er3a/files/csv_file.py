@@ -18,6 +18,8 @@ from er3a.formats.text_file import read_text
 LARGEST_DIGITS = 9
 LARGEST = 10.0**LARGEST_DIGITS
 
+MOST_BYTES = 50_000_000
+
 
 class Written(float):
     """A number that knows with how many decimals it was written."""
@@ -89,7 +91,7 @@ def read_column(path: str | Path, column: str) -> list[str]:
 
 def _lines(path: Path) -> list[tuple[int, list[str]]]:
     """Lines of a CSV file that aren't blank, with their numbers."""
-    reader = csv.reader(io.StringIO(read_text(path)), strict=True)
+    reader = csv.reader(io.StringIO(read_text(path, MOST_BYTES)), strict=True)
     try:
         return [(reader.line_num, line) for line in reader if any(field.strip() for field in line)]
     except csv.Error as error:

@@ -136,6 +136,7 @@ def test_the_sums_limit_is_named():
     assert limit_margin(arm, q) == pytest.approx(0.5 - np.radians(40))
 
 
+@pytest.mark.filterwarnings("ignore::er3a.errors.InputWarning")
 @settings(max_examples=60, deadline=None)
 @given(robot=chains())
 def test_any_chain_is_written_and_read_back(robot, tmp_path_factory):

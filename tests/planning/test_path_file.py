@@ -50,7 +50,6 @@ def test_files_of_the_project_are_in_order(name):
         (LINE, {"duration_s": -1}, r"paths\[0\]\.duration_s: -1 is refused"),
         (JOINT, {"samples": 1}, r"paths\[0\]\.samples: 1 is refused"),
         (JOINT, {"end_deg": [0, 0, float("nan"), 0, 0, 0]}, r"paths\[0\]\.end_deg\[2\]: nan is not a finite number"),
-        (JOINT, {"end_deg": [45, 30]}, r"paths\[0\]\.end_deg"),
         (JOINT, {"durations_s": 5}, r"paths\[0\]\.durations_s: unknown key .*Did you mean 'duration_s'"),
         (LINE, {"end": {"xyz_mm": [0.6, 0.3, 0.5], "rpy_deg": [0, 180, 0]}}, r"paths\[0\]\.end\.xyz_mm.*metres"),
         (LINE, {"start_deg": [0, 0, 0, 0, 0, 0]}, r"paths\[0\]: give either start_deg .* or start"),
