@@ -91,7 +91,10 @@ def self_motion_of(robot: Robot, T: Reals, chain: PoseChain, curve: Curve, q_ref
     near = nearest_equivalent(robot, np.where(robot.slides, q, wrap_to_pi(q)), q_ref)
     inside = within(robot, near)
     made = []
-    for part in _parts(inside, curve.closed) if inside.any() else [np.arange(len(q))]:
+    parts = _parts(inside, curve.closed) if inside.any() else [np.arange(len(q))]
+    if curve.dimension > 1:  # one curve of a surface: the part nearest to the reference stands for it
+        parts = [min(parts, key=lambda part: float(np.linalg.norm(near[part] - q_ref, axis=1).min()))]
+    for part in parts:
         best = int(part[np.linalg.norm(near[part] - q_ref, axis=1).argmin()])
         roomiest = int(part[limit_margin(robot, near[part]).argmax()])
         made.append(_part(robot, T, chain, curve, lengths, q_ref, bool(inside.any()), best, roomiest))

@@ -22,7 +22,7 @@ from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import kernel
 
 STEP = np.radians(2.0)  # greatest joint move between two points of a curve
-MOST_POINTS = 4000
+MOST_POINTS = 1200
 REGULAR = 1e-6  # pivots of J J^T above this part of the largest diagonal entry
 TRUNCATED = 1e-5  # singular values below this part of the largest are no directions
 SOLVES = 1e-11
