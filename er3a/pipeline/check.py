@@ -8,6 +8,7 @@ from pydantic import BaseModel
 
 from er3a.errors import InputError
 from er3a.files.dh_table import read_dh_table
+from er3a.files.load_file import load_of
 from er3a.files.measurements import load_measurements
 from er3a.files.path_file import PathFile, TablePath, load_paths
 from er3a.files.path_table import read_path_table
@@ -89,6 +90,7 @@ def check_study(path: Path) -> Study:
         for planned in load_paths(entry.paths).paths:
             if isinstance(planned, TablePath):
                 read_path_table(planned.file)
+        load_of(study.loads(name))
         for stage in ("inverse", "trajectory"):
             if scene := study.scene(name, stage):
                 load_scene(scene)
