@@ -12,6 +12,7 @@ from er3a.errors import InputError
 from er3a.files.csv_file import read_header
 from er3a.files.dh_table import read_dh_table
 from er3a.files.hand_eye_file import HandEyeFile, check_samples, load_hand_eye
+from er3a.files.load_file import load_of
 from er3a.files.measurements import load_measurements
 from er3a.files.path_file import PathFile, ProgramPath, TablePath, load_paths
 from er3a.files.path_table import read_path_table
@@ -144,6 +145,7 @@ def check_study(path: Path) -> Study:
         if entry.vision:
             own = load_vision(entry.vision, robot)
             load_hand_eye(Path(entry.vision).parent / own.calibration, robot)
+        load_of(study.loads(name))
         for stage in ("collision", "inverse", "trajectory", "vision"):
             if scene := study.scene(name, stage):
                 load_scene(scene)
