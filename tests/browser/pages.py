@@ -4,6 +4,8 @@ from tests.conftest import ROBOTS
 
 OVER_ALL = ["index.html", "compare.html"]
 STAGE_PAGES = [
-    f"{robot}/{stage}.html" for robot in ROBOTS for stage in ("validation", "workspace", "inverse", "trajectory", "vision")
+    f"{robot}/{stage}.html"
+    for robot in ROBOTS
+    for stage in ("validation", "workspace", "inverse", "trajectory", "vision")
 ]
 PAGES = OVER_ALL + STAGE_PAGES + [f"{robot}/teach.html" for robot in ROBOTS]
