@@ -18,6 +18,7 @@ import typer
 import yaml
 
 from er3a.files.program_file import ProgramsFile
+from er3a.files.hand_eye_file import HandEyeFile
 from er3a.files.robot_file import RobotFile
 from er3a.files.yaml_file import parse, read_yaml
 from er3a.pipeline.cli import app
@@ -103,6 +104,8 @@ def test_yaml_in_documents_is_accepted(block):
         return
     if set(settings) <= set(Study.model_fields):
         model, base = Study, "config/small.yaml"
+    elif settings.get("kind") == "hand_eye":
+        model, base = HandEyeFile, "data/vision/fixed_camera.yaml"
     else:
         model, base = RobotFile, "data/robots/er3_600.yaml"
     assert set(settings) <= set(model.model_fields)
