@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from er3a.collision.bodies import self_pairs
 from er3a.collision.envelopes import envelopes_of
+from er3a.collision.matrix import collision_matrix
 from er3a.collision.scene import Box, Cylinder, Plane, Sphere
 from er3a.files.path_file import PathFile
 from er3a.files.yaml_file import parse
@@ -229,4 +229,7 @@ def contacts_of(robot, scene) -> Contacts:
                 solids.append(("sphere", (solid.radius,), solid.T))
             case Plane():
                 solids.append(("plane", (solid.normal, solid.offset), None))
-    return Contacts(table_of(robot), capsules, self_pairs(robot), solids)
+    met = {(row.first, row.second) for row in collision_matrix(robot).rows if row.state == "meets"}
+    named = ["base" if capsule.link == 0 else f"link_{capsule.link}" for capsule in envelopes_of(robot)]
+    pairs = [(i, j) for i, first in enumerate(named) for j, second in enumerate(named) if (first, second) in met]
+    return Contacts(table_of(robot), capsules, tuple(pairs), solids)

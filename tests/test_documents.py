@@ -17,8 +17,8 @@ import pytest
 import typer
 import yaml
 
-from er3a.files.program_file import ProgramsFile
 from er3a.files.hand_eye_file import HandEyeFile
+from er3a.files.program_file import ProgramsFile
 from er3a.files.robot_file import RobotFile
 from er3a.files.yaml_file import parse, read_yaml
 from er3a.pipeline.cli import app

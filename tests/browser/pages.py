@@ -6,6 +6,6 @@ OVER_ALL = ["index.html", "compare.html"]
 STAGE_PAGES = [
     f"{robot}/{stage}.html"
     for robot in ROBOTS
-    for stage in ("validation", "workspace", "collision", "inverse", "trajectory")
+    for stage in ("validation", "workspace", "collision", "inverse", "trajectory", "dynamics")
 ]
 PAGES = OVER_ALL + STAGE_PAGES + [f"{robot}/teach.html" for robot in ROBOTS]

@@ -25,7 +25,7 @@ from er3a.pipeline.cli import app
 from er3a.pipeline.results import FORMAT_VERSION, check_results, read_provenance, write_checksums
 from tests.conftest import ALL_THERE
 
-STAGES = ("validation", "workspace", "collision", "inverse", "trajectory")
+STAGES = ("validation", "workspace", "collision", "inverse", "trajectory", "dynamics")
 
 
 @contextmanager
