@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from er3a.pipeline.messages import collision, hand_eye  # noqa: F401  (their sentences)
+from er3a.pipeline.messages import hand_eye, pairs  # noqa: F401  (their sentences)
 from er3a.pipeline.messages.expectations import demonstrated
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.say import counted, joined, listed, say, sentence, word
