@@ -2,7 +2,8 @@
 
 The wrist factor turns with joint 5 alone and the elbow factor with joint 3 alone: both are asin(sin(q + phase)), the
 signed distance of q + phase from the nearest multiple of pi. The shoulder factor is a constant and two sines: of q2,
-and of q2 and q3 together. Phases and coefficients are read off the factors themselves.
+and of q2 and q3 together. Where joints are coupled, q is what the rows of the table move by. Phases and coefficients
+are read off the factors themselves.
 """
 
 from __future__ import annotations
@@ -59,16 +60,17 @@ def factor_forms(robot: Robot) -> FactorForms:
         if the arm's determinant does not factor this way
     """
     arm = wrist_partitioned_arm(robot)
+    back = np.eye(6) if robot.coupling is None else np.linalg.inv(robot.coupling)
     phases = []
     for joint, kind in ((WRIST_JOINT, "wrist"), (ELBOW_JOINT, "elbow")):
         q = np.zeros((2, 6))
         q[1, joint] = np.pi / 2
-        at_0, at_90 = np.sin(getattr(determinant_factors(robot, q), kind))
+        at_0, at_90 = np.sin(getattr(determinant_factors(robot, q @ back.T), kind))
         phases.append(float(np.arctan2(at_0, at_90)))
     sense = float(robot.direction[1] * robot.direction[2] * arm.elbow_sign)
     q = np.zeros((25, 6))
     q[:, 1:3] = np.stack(np.meshgrid(*[np.linspace(0, 5, 5)] * 2), axis=-1).reshape(-1, 2)
     both = q[:, 1] + sense * q[:, 2]
     columns = np.stack([np.ones(25), np.cos(q[:, 1]), np.sin(q[:, 1]), np.cos(both), np.sin(both)], axis=1)
-    shoulder = np.linalg.lstsq(columns, determinant_factors(robot, q).shoulder, rcond=None)[0]
+    shoulder = np.linalg.lstsq(columns, determinant_factors(robot, q @ back.T).shoulder, rcond=None)[0]
     return FactorForms(phases[0], phases[1], sense, shoulder)

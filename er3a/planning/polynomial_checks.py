@@ -32,11 +32,12 @@ DEGREE = 24  # by which a sine of so short a turn is met to rounding
 def limit_intervals(robot: Robot, motion: PiecewiseMotion) -> list[Interval[AboveLimit | BelowLimit]]:
     """Where joints leave their limits, one interval per joint, side and stretch."""
     found: list[Interval[AboveLimit | BelowLimit]] = []
-    for j in range(len(robot.lower)):
+    for j in np.flatnonzero(~robot.continuous).tolist():
+        scale = 1000.0 if robot.slides[j] else float(np.degrees(1.0))
         for sign, limit, finding in ((1.0, robot.upper[j], AboveLimit), (-1.0, robot.lower[j], BelowLimit)):
             pieces = motion.of_joint(motion.angle, j, sign)
             for start, end, most in pieces.above(sign * limit + LIMIT_TOLERANCE):
-                reached, bound = np.degrees([sign * most, limit]).tolist()
+                reached, bound = scale * sign * most, scale * float(limit)
                 found.append(Interval(start, end, finding(j + 1, reached, bound)))
     return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
 
@@ -59,8 +60,17 @@ def rate_intervals(motion: PiecewiseMotion, limit: RateLimit) -> list[Interval[R
 
 
 def polynomial_events(robot: Robot, motion: PiecewiseMotion, near: NearSingular) -> list[SingularEvent]:
-    """All crossings of singular sets, and the nearest pass of each stretch below its type's threshold."""
+    """All crossings of singular sets, and the nearest pass of each stretch below its type's threshold.
+
+    Raises
+    ------
+    NotWristPartitionedError
+        if the sets of this arm are no functions of single joints
+    """
     events: list[SingularEvent] = []
+    if robot.coupling is not None:
+        moved = (series @ robot.coupling.T for series in (motion.angle, motion.velocity, motion.acceleration))
+        motion = PiecewiseMotion(motion.times, *moved)
     for kind in TYPES:
         for distance in _distances(robot, motion, kind, near.of(kind)):
             events += _events(kind, distance, near.of(kind), motion.duration)

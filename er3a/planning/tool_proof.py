@@ -25,10 +25,12 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.kinematics.factor_forms import ELBOW_JOINT, WRIST_JOINT, FactorForms, factor_forms
+from er3a.kinematics.chain import arm_length
+from er3a.kinematics.factor_forms import ELBOW_JOINT, WRIST_JOINT, factor_forms
 from er3a.kinematics.forward import frames, jacobian
 from er3a.kinematics.near_singular import NearSingular
-from er3a.kinematics.singularity import TYPES, characteristic_length, determinant_factors
+from er3a.kinematics.singularity import TYPES, SingularityType, characteristic_length, determinant_factors
+from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.runs import runs
 from er3a.planning.follow import follow
@@ -308,7 +310,7 @@ def _settle(followed: Followed, wanted: Wanted, progress: PiecewiseMotion, start
         over = np.abs((velocity, acceleration, jerk)[limit.order - 1]) > limit.allowed
         sure = (highest[limit.order] <= limit.allowed) | ~np.isfinite(limit.most)
         open_[:, k], broken[:, k] = known & ~(sure | over).all(axis=1), over.any(axis=1)
-    open_[known, 5] = _near_open(factor_forms(robot), robot, wanted.near, q[known], bounds.change[known])
+    open_[known, 5] = _near_open(robot, wanted.near, q[known], bounds.change[known])
     return _Settled(
         start=start,
         end=end,
@@ -411,20 +413,34 @@ def _mean_jerk(followed: Followed, start: Reals, end: Reals) -> Reals:
 def _outside(robot: Robot, q: Reals) -> Flags:
     """Whether angles (..., n) are outside the limits."""
     outside: Flags = (q < robot.lower - LIMIT_TOLERANCE) | (q > robot.upper + LIMIT_TOLERANCE)
-    return outside
+    return outside & ~robot.continuous
 
 
-def _near_open(forms: FactorForms, robot: Robot, near: NearSingular, q: Reals, change: Reals) -> Flags:
+def _near_open(robot: Robot, near: NearSingular, q: Reals, change: Reals) -> Flags:
     """Whether it is open that an interval keeps its distance from each singular set."""
-    in_q2, in_both = forms.shoulder_slopes
-    moved = {
-        "wrist": change[:, WRIST_JOINT],
-        "elbow": change[:, ELBOW_JOINT],
-        "shoulder": in_q2 * change[:, 1] + in_both * (change[:, 1] + change[:, 2]),
-    }
+    moved = _factors_change(robot, change)
     factors = determinant_factors(robot, q)
     found = np.zeros(len(q), bool)
     for kind in TYPES:
         size = np.abs(getattr(factors, kind))
         found |= (size >= near.of(kind)) & (size - moved[kind] < near.of(kind))
     return found
+
+
+def _factors_change(robot: Robot, change: Reals) -> dict[SingularityType, Reals]:
+    """By how much the distances from the singular sets change at most (k,), if joints do by ``change`` (k, n).
+
+    An angle between axes or links by no more than all joints together; a distance of the wrist centre by no more than
+    that times the arm's length. Where the factors' forms are known, less.
+    """
+    if closed_form_missing(robot) is not None:
+        both = change.sum(axis=1)
+        return {"wrist": both, "elbow": both, "shoulder": 2 * arm_length(robot) * both}
+    if robot.coupling is not None:
+        change = change @ np.abs(robot.coupling).T
+    in_q2, in_both = factor_forms(robot).shoulder_slopes
+    return {
+        "wrist": change[:, WRIST_JOINT],
+        "elbow": change[:, ELBOW_JOINT],
+        "shoulder": in_q2 * change[:, 1] + in_both * (change[:, 1] + change[:, 2]),
+    }

@@ -36,8 +36,9 @@ def built(folder: Path, entry: dict, table: str | None = None, ends=None):
     file = folder / "paths.yaml"
     before = [JOINTS | {"name": name} for name in ends or {}]
     file.write_text(json.dumps({"kind": "paths", "paths": [*before, entry]}))
-    command = load_paths(file).paths[-1].command(CommandSource(file, f"paths[{len(before)}]"))
-    return build(load_robot("er3a_c60"), command, ends or {})
+    robot = load_robot("er3a_c60")
+    command = load_paths(file).paths[-1].command(CommandSource(file, f"paths[{len(before)}]"), robot)
+    return build(robot, command, ends or {})
 
 
 def test_line_and_arc_start_and_end_where_they_say(tmp_path):

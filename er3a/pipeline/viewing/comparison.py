@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +25,9 @@ CONVENTIONS = {"standard": N_("standard"), "modified": N_("modified")}
 def write_compare(study: Study, results: Path, output: Path) -> None:
     """Render ``compare.html`` from the tables and summaries of all robots."""
     robots = {name: study.robot(name) for name in study.robots}
-    values = {name: parameters(robot) | key_figures(results / name) for name, robot in robots.items()}
+    values = {
+        name: parameters(robot) | key_figures(results / name, study.stages(name)) for name, robot in robots.items()
+    }
     borders = {name: border_mm(results / name) for name in robots}
     rows = list(dict.fromkeys(key for own in values.values() for key in own))
     groups = list(dict.fromkeys(group for group, _, _ in rows))
@@ -76,10 +79,10 @@ def parameters(robot: Robot) -> dict[tuple[str, str, str], float | str | None]:
     return found
 
 
-def key_figures(folder: Path) -> dict[tuple[str, str, str], float | str | None]:
+def key_figures(folder: Path, stages: Sequence[str]) -> dict[tuple[str, str, str], float | str | None]:
     """Verdicts and key figures of a robot's stages by (stage, name, unit)."""
     found: dict[tuple[str, str, str], float | str | None] = {}
-    for stage in STAGES.values():
+    for stage in (STAGES[name] for name in stages if name in STAGES):
         head, title = stage_head(folder / stage.name, stage), tr(stage.title)
         found[title, tr("verdict"), ""] = page.status_word(head.status)
         for figure in head.figures:

@@ -29,7 +29,11 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
     robots = [
         {
             "robot": study.robot(name),
-            "heads": [stage_head(results / name / stage.name, stage) for stage in STAGES.values()],
+            "heads": {
+                stage: stage_head(results / name / stage, STAGES[stage])
+                for stage in study.stages(name)
+                if stage in STAGES
+            },
             "expected": study.entry(name).expect,
         }
         for name in study.robots

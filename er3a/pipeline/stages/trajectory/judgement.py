@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.kinematics.near_singular import NearSingular
+from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning.intervals import (
@@ -84,7 +85,7 @@ def judge(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits)
     near : distances below which a pass counts as near-singular
     """
     if motion.polynomials is not None:
-        found = _joint_faults(robot, motion.polynomials, near, limits)
+        found = _joint_faults(robot, motion.polynomials, motion.checks, near, limits)
     else:
         found = _tool_faults(robot, motion, near, limits)
     times = np.unique(np.concatenate([motion.checks, [event.t for event in found.events]]))
@@ -127,9 +128,16 @@ def _verdict(found: _Found, beyond: bool, jumps: bool, of_tool: bool) -> PathVer
     return next((verdict for verdict, there in faults.items() if there), "safe")
 
 
-def _joint_faults(robot: Robot, motion: PiecewiseMotion, near: NearSingular, limits: JointLimits) -> _Found:
+def _joint_faults(
+    robot: Robot, motion: PiecewiseMotion, checks: Reals, near: NearSingular, limits: JointLimits
+) -> _Found:
+    if closed_form_missing(robot) is None:
+        events = polynomial_events(robot, motion, near)
+    else:  # sampled: a move of the joints takes no harm from singular poses
+        t = np.union1d(checks, motion.times)
+        events = singular_events(robot, t, motion.joints(t), motion.joints, near)
     return _Found(
-        events=polynomial_events(robot, motion, near),
+        events=events,
         limits=limit_intervals(robot, motion),
         fast=[part for limit in limits.rates for part in rate_intervals(motion, limit)],
         undecided=[],

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 
 from er3a.diagnosis.diagnose import Diagnosis, Hypothesis, diagnosis_of, residuals
 from er3a.diagnosis.ranking import Ranking, usable
 from er3a.identifiability.statements import made_from_table, title_of
-from er3a.kinematics.table_batch import COLUMNS
 from er3a.pipeline.stages.validation.diagnosis_model import (
     CorrectedTable,
     RankedHypothesis,
@@ -57,7 +58,8 @@ def _ranked(hypothesis: Hypothesis) -> RankedHypothesis:
 
 def table_record(robot: Robot) -> CorrectedTable:
     """A robot's table as the results hold it."""
-    return CorrectedTable(robot.convention, **{name: tuple(getattr(robot, name).tolist()) for name in COLUMNS})
+    columns = [field.name for field in fields(CorrectedTable) if field.name != "convention"]
+    return CorrectedTable(robot.convention, **{name: tuple(getattr(robot, name).tolist()) for name in columns})
 
 
 def _residuals(reference_set: str, ranking: Ranking) -> Residuals:
