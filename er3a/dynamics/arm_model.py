@@ -7,7 +7,7 @@ belong to the joints that the drives move, and are added there, because Pinocchi
 
 References
 ----------
-.. [1] R. Featherstone, *Rigid Body Dynamics Algorithms*, chapters 5 to 7 (RNEA, CRBA, ABA).
+.. [1] R. Featherstone, *Rigid MassBody Dynamics Algorithms*, chapters 5 to 7 (RNEA, CRBA, ABA).
 .. [2] B. Siciliano et al., *Robotics: Modelling, Planning and Control*, 7.2 and 7.5.
 """
 
@@ -24,7 +24,7 @@ from er3a.kinematics.chain import constant_links, joint_starts, row_values
 from er3a.kinematics.forward import forward, jacobian
 from er3a.numerics.arrays import Reals
 from er3a.robots.derived import derived
-from er3a.robots.masses import GRAVITY, Body, Drives, Load, moved, no_body
+from er3a.robots.masses import GRAVITY, Drives, Load, MassBody, moved, no_body
 from er3a.robots.robot import Robot
 
 PARAMETERS = 10
@@ -52,7 +52,7 @@ class ArmModel:
     load: Load | None
     model: Any
     to_rows: Reals
-    bodies: tuple[tuple[int | None, Body], ...]
+    bodies: tuple[tuple[int | None, MassBody], ...]
 
     def rigid_torques(self, q: Reals, qd: Reals, qdd: Reals) -> Reals:
         """Torques (N, n) of gravity and of the masses' motion (RNEA); no rotors, no friction, no forces at the tool."""
@@ -118,7 +118,7 @@ def arm_model(robot: Robot, load: Load | None = None, gravity: float = GRAVITY) 
         if Pinocchio is not installed
     """
     pin = pinocchio()
-    bodies: list[tuple[int | None, Body]] = [(each.link, each.body) for each in robot.masses.links if each.link > 0]
+    bodies: list[tuple[int | None, MassBody]] = [(each.link, each.body) for each in robot.masses.links if each.link > 0]
     if not bodies:
         raise RobotError(robot.name, "no link has a mass; add the group inertia to its file")
     if load is not None:

@@ -15,7 +15,7 @@ from er3a.collision.envelopes import envelopes_of
 from er3a.dynamics.arm_model import drives_of
 from er3a.dynamics.estimate import capsule_body
 from er3a.numerics.arrays import Reals
-from er3a.robots.masses import Body, NoBody, about, no_body, six_moments, together
+from er3a.robots.masses import MassBody, NoBody, about, no_body, six_moments, together
 from er3a.robots.robot import Envelope, Robot
 
 WATER = 1000.0
@@ -129,7 +129,7 @@ def mass_findings(robot: Robot) -> tuple[MassFinding, ...]:
         body = robot.masses.body(link)
         if body is None or body.mass == 0:
             rotor = moved_by_one and link > 0 and armature[link - 1] > 0
-            carries = any((robot.masses.body(k) or Body(0.0)).mass for k in range(link + 1, robot.rows + 1))
+            carries = any((robot.masses.body(k) or MassBody(0.0)).mass for k in range(link + 1, robot.rows + 1))
             found += [MissingLink(link, not rotor and not carries)] if link else []
         elif problem := no_body(body):
             found.append(ImpossibleInertia(link, problem))
@@ -140,7 +140,7 @@ def mass_findings(robot: Robot) -> tuple[MassFinding, ...]:
     return (*found, *_against_weight(robot, any(isinstance(each, MissingLink) for each in found)))
 
 
-def _against_shape(link: int, body: Body, capsules: list[Envelope]) -> list[MassFinding]:
+def _against_shape(link: int, body: MassBody, capsules: list[Envelope]) -> list[MassFinding]:
     shape = together([capsule_body(capsule, WATER) for capsule in capsules])
     found: list[MassFinding] = []
     density = WATER * body.mass / shape.mass
@@ -152,7 +152,7 @@ def _against_shape(link: int, body: Body, capsules: list[Envelope]) -> list[Mass
         found.append(CentreOutside(link, 1000 * outside))
     own, expected = _gyration(body.inertia_matrix, body.mass), _gyration(shape.inertia_matrix, shape.mass)
     less = body.inertia_matrix - body.mass * about(centre)
-    at_centre = Body(body.mass, body.centre, six_moments(less))
+    at_centre = MassBody(body.mass, body.centre, six_moments(less))
     expected_trace = float(np.trace(shape.inertia_matrix)) * body.mass / shape.mass
     given, rest = float(np.trace(body.inertia_matrix)), float(np.trace(less))
     if (

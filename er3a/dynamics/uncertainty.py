@@ -16,7 +16,7 @@ import numpy as np
 
 from er3a.dynamics.arm_model import PARAMETERS, ArmModel
 from er3a.numerics.arrays import Reals
-from er3a.robots.masses import Body, about
+from er3a.robots.masses import MassBody, about
 from er3a.robots.robot import Grade
 
 AXES = np.eye(3)
@@ -42,14 +42,14 @@ ASSUMED: dict[Grade, MassTolerance] = {
 """Assumptions, used where a file gives no tolerances: no source states such numbers."""
 
 
-def parameters(body: Body) -> Reals:
+def parameters(body: MassBody) -> Reals:
     """(10,): m, m c, and the inertia about the frame's origin as xx, xy, yy, xz, yz, zz."""
     c = np.array(body.centre)
     tensor = body.inertia_matrix + body.mass * about(c)
     return np.array([body.mass, *(body.mass * c), *(tensor[entry] for entry in UPPER)])
 
 
-def centre_directions(body: Body) -> Reals:
+def centre_directions(body: MassBody) -> Reals:
     """(3, 10): how the parameters change per m that the centre moves along each axis."""
     c, found = np.array(body.centre), np.zeros((3, PARAMETERS))
     for axis in range(3):

@@ -13,7 +13,7 @@ from er3a.files.mass_fields import HEAVIEST_PAYLOAD_KG, IMPOSSIBLE, BodyFields
 from er3a.files.units import Triple
 from er3a.files.yaml_file import StrictModel
 from er3a.geometry.transforms import transform
-from er3a.robots.masses import Body, Load, moved, no_body, six_moments, together
+from er3a.robots.masses import Load, MassBody, moved, no_body, six_moments, together
 from er3a.robots.robot import Grade
 
 THREE_ZEROS = [0.0, 0.0, 0.0]
@@ -82,11 +82,11 @@ def load_of(loads: list[LoadFields]) -> Load | None:
     )
 
 
-def _body(load: LoadFields) -> Body:
+def _body(load: LoadFields) -> MassBody:
     return load.body.body if load.body else mesh_body(load.mesh)  # type: ignore[arg-type]  # one of both is there
 
 
-def mesh_body(given: MeshMass) -> Body:
+def mesh_body(given: MeshMass) -> MassBody:
     """Mass, centre and inertia of a closed mesh filled evenly; :class:`InputError` if it is none."""
     import trimesh  # slow to import, and few studies need it
 
@@ -103,7 +103,7 @@ def mesh_body(given: MeshMass) -> Body:
     mesh.apply_scale(given.unit_mm / 1000)
     mesh.density = given.density_kg_m3
     x, y, z = mesh.center_mass.tolist()
-    body = Body(float(mesh.mass), (x, y, z), six_moments(mesh.moment_inertia))
+    body = MassBody(float(mesh.mass), (x, y, z), six_moments(mesh.moment_inertia))
     if problem := no_body(body):
         raise InputError(given.file, None, IMPOSSIBLE[problem], "Check the mesh")
     if body.mass > HEAVIEST_PAYLOAD_KG:

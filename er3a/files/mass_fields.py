@@ -12,7 +12,7 @@ from er3a.files.units import FARTHEST_MM, Triple, check_degrees
 from er3a.files.yaml_file import StrictModel
 from er3a.geometry.transforms import rot_z, transform
 from er3a.kinematics.chain import constant_links, joint_starts
-from er3a.robots.masses import Body, Drives, LinkMass, Masses, WristLoad, moved, no_body
+from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, WristLoad, moved, no_body
 from er3a.robots.robot import MOST_JOINTS, Robot
 
 HEAVIEST_LINK_KG = 20_000.0
@@ -72,12 +72,12 @@ class BodyFields(StrictModel):
         return self
 
     @property
-    def body(self) -> Body:
+    def body(self) -> MassBody:
         """In SI units, in the frame of the file."""
         x, y, z = (value / 1000 for value in self.centre_mm)
         xx, yy, zz, xy, xz, yz = self.inertia_kg_m2
         offset = None if self.centre_tolerance_mm is None else self.centre_tolerance_mm / 1000
-        return Body(self.mass_kg, (x, y, z), (xx, yy, zz, xy, xz, yz), self.mass_tolerance_kg, offset)
+        return MassBody(self.mass_kg, (x, y, z), (xx, yy, zz, xy, xz, yz), self.mass_tolerance_kg, offset)
 
 
 class LinkRow(BodyFields):

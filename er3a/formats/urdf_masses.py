@@ -17,7 +17,7 @@ import numpy as np
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Reals
-from er3a.robots.masses import Body, Drives, LinkMass, Masses, moved, no_body, together
+from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, moved, no_body, together
 from er3a.robots.robot import Robot
 
 
@@ -52,7 +52,7 @@ def masses_from_urdf(
     masses, notes : notes name links whose inertia no body can have; those are left out
     """
     at_zero = np.concatenate([robot.base[None], frames(robot, np.zeros(robot.joints))[:-1]])
-    found: dict[int, list[Body]] = {}
+    found: dict[int, list[MassBody]] = {}
     notes: list[str] = []
     for link in root.findall("link"):
         inertial = link.find("inertial")
@@ -88,15 +88,15 @@ def write_masses(robot: Robot, names: Sequence[str], root: ElementTree.Element) 
         ElementTree.SubElement(inertial, "inertia", {key: repr(value) for key, value in zip(ENTRIES, body.inertia)})
 
 
-def _body(inertial: ElementTree.Element) -> tuple[Body, Reals]:
+def _body(inertial: ElementTree.Element) -> tuple[MassBody, Reals]:
     """Mass and inertia about the centre, and the frame of the centre (4, 4) in the link's."""
     origin, mass, inertia = (inertial.find(tag) for tag in ("origin", "mass", "inertia"))
     moments = [_number(inertia, key) for key in ENTRIES]
     xyz, rpy = (_triple(origin, key) for key in ("xyz", "rpy"))
     xx, yy, zz, xy, xz, yz = moments
-    body = Body(_number(mass, "value"), (0.0, 0.0, 0.0), (xx, yy, zz, xy, xz, yz))
+    body = MassBody(_number(mass, "value"), (0.0, 0.0, 0.0), (xx, yy, zz, xy, xz, yz))
     if not np.isfinite([*xyz, *rpy]).all():
-        return Body(math.nan), np.eye(4)
+        return MassBody(math.nan), np.eye(4)
     return body, transform(xyz, rpy)
 
 

@@ -18,7 +18,7 @@ from er3a.geometry.transforms import as_floats
 from er3a.kinematics.chain import constant_links, joint_starts, row_values
 from er3a.kinematics.classes.chain_solvers import ArmClassCode, ChainSolver, Redundancy, Unsolved, chain_solver
 from er3a.kinematics.classes.links import size_of
-from er3a.kinematics.classes.self_motion import Curve, PoseChain
+from er3a.kinematics.classes.self_motion import PoseChain, TracedCurve
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM
 from er3a.kinematics.self_motions import SelfMotionCurve, self_motion_of
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -151,7 +151,7 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
     if certainty == CONTINUUM and solver.chain.code in ("general_six", "six_one_prismatic"):
         found.append(chain.roots(_starts(robot, STARTS)))
     candidates = np.concatenate(found)
-    curves: list[Curve] = []
+    curves: list[TracedCurve] = []
     alone: list[Reals] = []
     for x in candidates:
         if any(chain.holds(curve, x) for curve in curves):

@@ -104,7 +104,7 @@ def rank_losses(
         times, values = t[first:last], q[first:last]
         if len(times) < 2:
             continue
-        times, values = _refined(robot, times, values, joints, threshold, speed, t[-1] - t[0])
+        times, values = _refined(robot, times, values, joints, threshold=threshold, speed=speed, duration=t[-1] - t[0])
         found += _stretches(robot, times, values, joints, threshold)
     return sorted(found, key=lambda loss: loss.t)
 
@@ -121,6 +121,7 @@ def _refined(
     t: Reals,
     q: Reals,
     joints: Callable[[Reals], Reals],
+    *,
     threshold: float,
     speed: Reals | None,
     duration: float,

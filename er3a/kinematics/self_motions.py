@@ -10,7 +10,7 @@ import numpy as np
 from er3a.display import Displayed, Sheet, shortly
 from er3a.geometry.angles import wrap_to_pi
 from er3a.kinematics.chain import joint_starts, row_values
-from er3a.kinematics.classes.self_motion import Curve, PoseChain
+from er3a.kinematics.classes.self_motion import PoseChain, TracedCurve
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.joint_limits import limit_margin, nearest_equivalent, within
 from er3a.robots.robot import Robot
@@ -50,7 +50,7 @@ class SelfMotionCurve(Displayed):
     robot: Robot
     T: Reals
     chain: PoseChain = field(repr=False)
-    curve: Curve = field(repr=False)
+    curve: TracedCurve = field(repr=False)
     lengths: Reals = field(repr=False)
     start: float = 0.0
     shift: Reals = field(default_factory=lambda: np.zeros(0))
@@ -83,7 +83,7 @@ def _place_of(lengths: Reals, t: Reals, closed: bool) -> Reals:
     return np.asarray(np.interp(t - laps * lap, lengths, np.arange(len(lengths))) + laps * last)
 
 
-def self_motion_of(robot: Robot, T: Reals, chain: PoseChain, curve: Curve, q_ref: Reals) -> list[SelfMotionCurve]:
+def self_motion_of(robot: Robot, T: Reals, chain: PoseChain, curve: TracedCurve, q_ref: Reals) -> list[SelfMotionCurve]:
     """One for each part of a curve that lies within the joint limits; one for the whole of it if none does."""
     q = _joints(robot, curve.points)
     steps = np.diff(np.where(robot.slides, q / chain.size, q), axis=0)
@@ -97,7 +97,19 @@ def self_motion_of(robot: Robot, T: Reals, chain: PoseChain, curve: Curve, q_ref
     for part in parts:
         best = int(part[np.linalg.norm(near[part] - q_ref, axis=1).argmin()])
         roomiest = int(part[limit_margin(robot, near[part]).argmax()])
-        made.append(_part(robot, T, chain, curve, lengths, q_ref, bool(inside.any()), best, roomiest))
+        made.append(
+            _part(
+                robot,
+                T,
+                chain,
+                curve,
+                lengths,
+                q_ref=q_ref,
+                any_inside=bool(inside.any()),
+                best=best,
+                roomiest=roomiest,
+            )
+        )
     return made
 
 
@@ -117,8 +129,9 @@ def _part(
     robot: Robot,
     T: Reals,
     chain: PoseChain,
-    curve: Curve,
+    curve: TracedCurve,
     lengths: Reals,
+    *,
     q_ref: Reals,
     any_inside: bool,
     best: int,

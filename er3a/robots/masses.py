@@ -23,7 +23,7 @@ NoBody = Literal["not_finite", "negative_mass", "negative_moment", "triangle"]
 
 
 @dataclass(frozen=True)
-class Body:
+class MassBody:
     """Mass, centre of mass, and inertia about that centre; axes are those of the frame in which the centre is given.
 
     Attributes
@@ -52,11 +52,11 @@ class LinkMass:
     """The body of a link, in the frame on its joint's axis that moves with it, as for envelopes; link 0 is the base."""
 
     link: int
-    body: Body
+    body: MassBody
 
 
 @dataclass(frozen=True)
-class Load(Body):
+class Load(MassBody):
     """What hangs on the flange (centre and inertia in the flange's frame), and what the surroundings do to the tool.
 
     Attributes
@@ -133,12 +133,12 @@ class Masses:
     wrist: WristLoad | None = None
     weight: float = np.nan
 
-    def body(self, link: int) -> Body | None:
+    def body(self, link: int) -> MassBody | None:
         """The body of a link; None where it is unknown."""
         return next((each.body for each in self.links if each.link == link), None)
 
 
-def no_body(body: Body) -> NoBody | None:
+def no_body(body: MassBody) -> NoBody | None:
     """Why no rigid body can have these numbers; None if one can [1]_.
 
     The triangle inequality: no principal moment exceeds the sum of the other two.
@@ -158,15 +158,15 @@ def no_body(body: Body) -> NoBody | None:
     return "triangle" if moments[2] > (moments[0] + moments[1]) * (1 + TRIANGLE_TOLERANCE) else None
 
 
-def moved(body: Body, T: Reals) -> Body:
+def moved(body: MassBody, T: Reals) -> MassBody:
     """A body as seen in another frame, where T (4, 4) takes coordinates of its own frame to those."""
     R = T[:3, :3]
     x, y, z = (R @ np.array(body.centre) + T[:3, 3]).tolist()
     moments = six_moments(R @ body.inertia_matrix @ R.T)
-    return Body(body.mass, (x, y, z), moments, body.mass_tolerance, body.centre_tolerance)
+    return MassBody(body.mass, (x, y, z), moments, body.mass_tolerance, body.centre_tolerance)
 
 
-def together(bodies: list[Body]) -> Body:
+def together(bodies: list[MassBody]) -> MassBody:
     """Several bodies of one frame as one, by the parallel axis theorem; tolerances of masses add."""
     mass = sum(body.mass for body in bodies)
     centres = np.array([body.centre for body in bodies]).reshape(-1, 3)
@@ -176,7 +176,7 @@ def together(bodies: list[Body]) -> Body:
     x, y, z = centre.tolist()
     known = [body.mass_tolerance for body in bodies if body.mass_tolerance is not None]
     offsets = [body.centre_tolerance for body in bodies if body.centre_tolerance is not None]
-    return Body(
+    return MassBody(
         mass,
         (x, y, z),
         six_moments(tensor),

@@ -7,9 +7,7 @@ from typing import Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
-from scipy.stats import chi2
-from scipy.stats import f as variance_ratio
-from scipy.stats import t as student
+from scipy.special import chdtrc, chdtri, fdtrc, stdtrit
 
 from er3a.display import Displayed, Sheet, first_rows, shortly
 from er3a.geometry.transforms import rpy_of
@@ -30,7 +28,7 @@ from er3a.vision.vision_findings import (
     MoreScatter,
     NoRotation,
     NothingFits,
-    ParallelAxes,
+    ParallelTurns,
     QuaternionOrder,
     Suspect,
     TooFewSamples,
@@ -168,7 +166,7 @@ def calibrate_hand_eye(samples: CalibrationSet) -> HandEye:
     kept = samples.take(used)
     warnings: list[CalibrationWarning] = [angles.warning] if angles.warning else []
     warnings += _warnings(kept, refined, greatest, apart)
-    half_width = student.ppf((1 + SURE) / 2, refined.freedom) * np.sqrt(np.diag(refined.covariance))
+    half_width = stdtrit(refined.freedom, (1 + SURE) / 2) * np.sqrt(np.diag(refined.covariance))
     found = HandEye(
         samples=samples,
         used=used,
@@ -244,7 +242,7 @@ def _check_determined(samples: CalibrationSet) -> tuple[float, float]:
     _, size, axes = np.linalg.svd(turns, full_matrices=False)
     apart = float(np.arctan2(size[1], size[0]))
     if apart < LEAST_SPREAD:
-        raise HandEyeError(ParallelAxes(tuple(axes[0].tolist()), float(np.degrees(apart))))
+        raise HandEyeError(ParallelTurns(tuple(axes[0].tolist()), float(np.degrees(apart))))
     return greatest, apart
 
 
@@ -253,7 +251,7 @@ def _warnings(samples: CalibrationSet, refined: Refined, greatest: float, apart:
     if greatest < LITTLE_TURN or apart < LITTLE_SPREAD:
         found.append(LittleMotion(float(np.degrees(greatest)), float(np.degrees(apart))))
     free = 6 * len(samples) - 12
-    largest = float(np.sqrt(chi2.ppf(1 - EXCLUDED, free) / free))
+    largest = float(np.sqrt(chdtri(free, EXCLUDED) / free))
     if samples.camera_covariance is not None and refined.scatter > largest:
         found.append(MoreScatter(float(refined.scatter), largest))
     if order := _other_order(samples, refined):
@@ -306,7 +304,7 @@ def board_scale(samples: CalibrationSet, refined: Refined) -> tuple[float, float
             break
     free = len(r) - 13
     scatter = np.sqrt(r @ r / max(free, 1))
-    return s, float(student.ppf((1 + SURE) / 2, max(free, 1)) * scatter * np.sqrt(inverse[12, 12]))
+    return s, float(stdtrit(max(free, 1), (1 + SURE) / 2) * scatter * np.sqrt(inverse[12, 12]))
 
 
 def _answer(name: MethodName, samples: CalibrationSet, refined: Refined, half_width: Reals) -> MethodAnswer:
@@ -348,7 +346,7 @@ def directions_tried(samples: CalibrationSet, refined: Refined) -> tuple[Directi
     twin = best ^ 1  # both streams the other way round
     directions = []
     for k, ((flange_inverted, target_inverted), (cost, raw)) in enumerate(zip(DIRECTIONS, found)):
-        probability = float(variance_ratio.sf(cost / costs[best], free, free)) if np.isfinite(cost) else 0.0
+        probability = float(fdtrc(free, free, cost / costs[best])) if np.isfinite(cost) else 0.0
         status: DirectionStatus = "excluded" if probability < EXCLUDED else "open"
         status = {best: "best", twin: "same_problem"}.get(k, status)  # type: ignore[assignment]
         rms = [None, None] if raw is None else [float(np.sqrt((raw[:, part] ** 2).mean())) for part in _PARTS]
@@ -393,7 +391,7 @@ def _touch(found: HandEye, touched: Reals) -> TouchCheck:
     shared = np.einsum("mik,kl,njl->minj", J, found.covariance[part, part], J).reshape(3 * len(J), -1)
     whole = shared + (own + found.samples.touch_deviation**2 + 1e-18) * np.eye(len(shared))
     flat = difference.ravel()
-    probability = float(chi2.sf(flat @ np.linalg.solve(whole, flat), len(flat)))
+    probability = float(chdtrc(len(flat), flat @ np.linalg.solve(whole, flat)))
     half_width = 1.96 * np.sqrt(np.diag(whole)).reshape(-1, 3)
     return TouchCheck(difference, half_width, probability)
 

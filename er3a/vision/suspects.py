@@ -16,7 +16,7 @@ from typing import get_args
 
 import numpy as np
 from scipy.spatial.transform import Rotation
-from scipy.stats import f as variance_ratio
+from scipy.special import fdtrc
 
 from er3a.geometry.transforms import rotation_angle
 from er3a.numerics.arrays import Flags, Reals
@@ -143,7 +143,7 @@ def worst_sample(samples: CalibrationSet, refined: Refined) -> tuple[int, FarFro
         return None
     squares = (refined.whitened**2 / np.maximum(1 - refined.leverage, 0.02)).sum(axis=1)
     others = np.maximum((refined.whitened**2).sum() - (refined.whitened**2).sum(axis=1), 1e-300) / free
-    probability = variance_ratio.sf(squares / 6 / others, 6, free)
+    probability = fdtrc(6, free, squares / 6 / others)
     worst = int(probability.argmin())
     if probability[worst] * len(samples) >= FALSE_ALARMS:
         return None

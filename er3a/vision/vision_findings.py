@@ -115,7 +115,7 @@ class AllSamplesEqual:
 
 
 @dataclass(frozen=True)
-class ParallelAxes:
+class ParallelTurns:
     """All motions turn about one direction (by the flange's axes at a sample), so that the shift along it is open."""
 
     axis: tuple[float, float, float]
@@ -138,7 +138,7 @@ class NothingFits:
     code: Literal["nothing_fits"] = "nothing_fits"
 
 
-NotCalibratable = TooFewSamples | AllSamplesEqual | ParallelAxes | NoRotation | NothingFits
+NotCalibratable = TooFewSamples | AllSamplesEqual | ParallelTurns | NoRotation | NothingFits
 
 
 class HandEyeError(Er3aError):

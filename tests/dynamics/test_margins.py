@@ -16,7 +16,7 @@ from er3a.dynamics.margins import greatest_payload, greatest_speed_scale
 from er3a.dynamics.torque_timing import fastest_under_torques
 from er3a.dynamics.torques import holding_torques, known, torque_parts
 from er3a.dynamics.wrist import levers, load_diagram, worst_levers, wrist_to_flange, wrist_use
-from er3a.robots.masses import Body, Drives, LinkMass, Load, Masses, WristLoad
+from er3a.robots.masses import Drives, LinkMass, Load, MassBody, Masses, WristLoad
 from er3a.robots.robot import Robot
 from testing.arms import make_arm
 
@@ -97,7 +97,7 @@ def test_an_arm_that_cannot_stand_has_no_margin_and_unknown_limits_none(arm):
 def test_the_worst_holding_pose_of_two_links_is_stretched_out():
     g, a = 9.81, 0.5
     rods = tuple(
-        LinkMass(k, Body(m, (c, 0.0, 0.0), (0.01, 0.01, 0.01, 0, 0, 0))) for k, m, c in ((1, 3, 0.2), (2, 2, 0.3))
+        LinkMass(k, MassBody(m, (c, 0.0, 0.0), (0.01, 0.01, 0.01, 0, 0, 0))) for k, m, c in ((1, 3, 0.2), (2, 2, 0.3))
     )
     tilt = np.eye(4)
     tilt[:3, :3] = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]

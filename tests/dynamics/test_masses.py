@@ -27,7 +27,7 @@ from er3a.errors import InputError
 from er3a.files.load_file import LoadFields, load_of
 from er3a.files.robot_writer import write_robot
 from er3a.formats.urdf import export_urdf, import_urdf
-from er3a.robots.masses import Body, Drives, LinkMass, Masses, WristLoad, about, moved, no_body, together
+from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, WristLoad, about, moved, no_body, together
 from er3a.robots.robot import Envelope, Robot
 
 
@@ -51,7 +51,7 @@ def scaled(factor: float):
     return lambda body: replace(body, inertia=tuple(factor * value for value in body.inertia))
 
 
-def about_origin(body: Body) -> Body:
+def about_origin(body: MassBody) -> MassBody:
     tensor = body.inertia_matrix + body.mass * about(np.array(body.centre))
     return replace(body, inertia=(tensor[0, 0], tensor[1, 1], tensor[2, 2], tensor[0, 1], tensor[0, 2], tensor[1, 2]))
 
@@ -87,12 +87,12 @@ def test_the_sum_against_the_manufacturers_weight(arm):
 
 
 def test_what_no_body_can_be():
-    assert no_body(Body(1.0, inertia=(1, 1, 1, 0, 0, 0))) is None
-    assert no_body(Body(1.0, inertia=(1, 1, 2, 0, 0, 0))) is None  # a disc
-    assert no_body(Body(1.0, inertia=(1, 1, 2.1, 0, 0, 0))) == "triangle"
-    assert no_body(Body(1.0, inertia=(1, 1, 1, 2, 0, 0))) == "negative_moment"
-    assert no_body(Body(-1.0)) == "negative_mass"
-    assert no_body(Body(np.nan)) == "not_finite"
+    assert no_body(MassBody(1.0, inertia=(1, 1, 1, 0, 0, 0))) is None
+    assert no_body(MassBody(1.0, inertia=(1, 1, 2, 0, 0, 0))) is None  # a disc
+    assert no_body(MassBody(1.0, inertia=(1, 1, 2.1, 0, 0, 0))) == "triangle"
+    assert no_body(MassBody(1.0, inertia=(1, 1, 1, 2, 0, 0))) == "negative_moment"
+    assert no_body(MassBody(-1.0)) == "negative_mass"
+    assert no_body(MassBody(np.nan)) == "not_finite"
 
 
 def test_capsules_are_solid_capsules():
@@ -119,7 +119,7 @@ def test_guessed_masses_stand_out_of_nothing(arm):
 def test_bodies_together_and_moved():
     rng = np.random.default_rng(0)
     points, masses = rng.normal(size=(6, 3)), rng.uniform(1, 2, 6)
-    dust = [Body(m, tuple(p)) for p, m in zip(points.tolist(), masses.tolist())]
+    dust = [MassBody(m, tuple(p)) for p, m in zip(points.tolist(), masses.tolist())]
     halves = together([together(dust[:2]), together(dust[2:])])
     centre = masses @ points / masses.sum()
     tensor = sum(m * about(p - centre) for m, p in zip(masses, points))

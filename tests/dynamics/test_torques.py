@@ -16,7 +16,7 @@ from er3a.dynamics.demands import power_imbalance
 from er3a.dynamics.torques import accelerations, torque_parts
 from er3a.dynamics.uncertainty import parameters, torque_tolerance
 from er3a.errors import Er3aError, PoseError, RobotError, ShapeError
-from er3a.robots.masses import Body, Drives, LinkMass, Load, Masses
+from er3a.robots.masses import Drives, LinkMass, Load, MassBody, Masses
 from er3a.robots.robot import Robot
 
 G = 9.81
@@ -24,7 +24,7 @@ RELATIVE = 1e-9
 MOTIONS = 20
 
 
-def random_body(random: np.random.Generator) -> Body:
+def random_body(random: np.random.Generator) -> MassBody:
     """A body made of three points and a ball, so that it can be one."""
     points, masses = random.normal(scale=0.1, size=(3, 3)), random.uniform(0.2, 2.0, 3)
     centre = masses @ points / masses.sum()
@@ -33,7 +33,7 @@ def random_body(random: np.random.Generator) -> Body:
     tensor += 1e-3 * np.eye(3)
     x, y, z = centre.tolist()
     xx, yy, zz, xy, xz, yz = (float(tensor[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
-    return Body(float(masses.sum()), (x, y, z), (xx, yy, zz, xy, xz, yz))
+    return MassBody(float(masses.sum()), (x, y, z), (xx, yy, zz, xy, xz, yz))
 
 
 def random_arm(seed: int, convention: str, sliding: list[bool], coupling: np.ndarray | None = None) -> Robot:
@@ -132,7 +132,7 @@ def frames_and_steps(robot: Robot, q: np.ndarray) -> tuple[list[np.ndarray], lis
     return [frame for frame, _ in found], [step for _, step in found]
 
 
-def mass_and_potential(robot: Robot, q: np.ndarray, bodies: dict[int, Body]) -> tuple[np.ndarray, complex]:
+def mass_and_potential(robot: Robot, q: np.ndarray, bodies: dict[int, MassBody]) -> tuple[np.ndarray, complex]:
     """Mass matrix and potential energy from kinetic energies ``m |p'|^2 / 2 + tr(R' S R'^T) / 2``; q may be complex."""
     frames, steps = frames_and_steps(robot, q)
     M, V = np.zeros((len(q), len(q)), complex), 0j
@@ -149,7 +149,7 @@ def mass_and_potential(robot: Robot, q: np.ndarray, bodies: dict[int, Body]) -> 
     return M, V
 
 
-def lagrange(robot: Robot, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, bodies: dict[int, Body]) -> np.ndarray:
+def lagrange(robot: Robot, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, bodies: dict[int, MassBody]) -> np.ndarray:
     """``M qdd + (dM/dt) qd - d(qd M qd / 2 - V)/dq``, derivatives by complex steps, plus friction and rotors."""
     h, n = 1e-30, len(q)
     M, _ = mass_and_potential(robot, q.astype(complex), bodies)
@@ -166,7 +166,7 @@ def lagrange(robot: Robot, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, bodie
     return tau
 
 
-def bodies_of(robot: Robot) -> dict[int, Body]:
+def bodies_of(robot: Robot) -> dict[int, MassBody]:
     return {each.link: each.body for each in robot.masses.links if each.link > 0}
 
 
@@ -196,7 +196,7 @@ def test_a_load_counts_as_part_of_the_last_link():
     load = Load(3.0, (0.02, -0.01, 0.08), (0.004, 0.005, 0.003, 1e-4, -2e-4, 3e-4))
     x, y, z = load.centre
     # In the frame of joint 6 the flange is shifted by d6 along z.
-    last = Body(3.0, (x, y, z + 0.0785), load.inertia)
+    last = MassBody(3.0, (x, y, z + 0.0785), load.inertia)
     q, qd, qdd = motions(arm)
     expected = np.array([lagrange(arm, *row, bodies_of(arm) | {6: last}) for row in zip(q, qd, qdd)])
     found = er3a.torques(arm, q, qd, qdd, load)
@@ -233,7 +233,7 @@ def toolbox_arm(arm: Robot):
         from roboticstoolbox import DHRobot, RevoluteDH
     links, drives = [], arm.masses.drives
     for k in range(6):
-        body = bodies_of(arm).get(k + 1, Body(0.0))
+        body = bodies_of(arm).get(k + 1, MassBody(0.0))
         frame = (shift(arm.a[k], 0, arm.d[k]) @ turn("x", arm.alpha[k])).real
         back = np.linalg.inv(frame)
         R = back[:3, :3]
@@ -383,7 +383,7 @@ def test_the_regressor_gives_the_torques_and_the_tolerance_bounds_them():
             x, y, z = (np.array(each.body.centre) + random.choice([-1, 1], 3) * 0.010).tolist()
             ratio = 1 + 0.20 * random.choice([-1, 1])
             moments = tuple(ratio * value for value in each.body.inertia)
-            links.append(LinkMass(each.link, Body(ratio * each.body.mass, (x, y, z), moments)))
+            links.append(LinkMass(each.link, MassBody(ratio * each.body.mass, (x, y, z), moments)))
         other = arm.replace(masses=Masses(tuple(links)))
         off = np.abs(er3a.torques(other, q, qd, qdd, load) - tau)
         assert (off <= 1.25 * half + 1e-3).all()

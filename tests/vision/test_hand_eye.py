@@ -22,7 +22,7 @@ from er3a.vision.vision_findings import (
     LittleMotion,
     MoreScatter,
     NoRotation,
-    ParallelAxes,
+    ParallelTurns,
     QuaternionOrder,
     RepeatedPose,
     RotationMismatch,
@@ -280,7 +280,7 @@ def test_sets_that_determine_nothing_say_why():
     about_z = flange.copy()
     about_z[:, :3, :3] = Rotation.from_euler("z", random.uniform(-60, 60, (10, 1)), degrees=True).as_matrix()
     found = refusal(about_z)
-    assert isinstance(found, ParallelAxes)
+    assert isinstance(found, ParallelTurns)
     assert abs(found.axis[2]) == pytest.approx(1)
 
 

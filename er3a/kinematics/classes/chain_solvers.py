@@ -130,7 +130,7 @@ class _Fixed:
 
 
 @dataclass(frozen=True, eq=False)
-class SphericalWrist(_Fixed):
+class SphericalWristSolver(_Fixed):
     """Axes 2 and 3 parallel, and a spherical wrist."""
 
     links: Reals
@@ -423,7 +423,7 @@ def _of_six(links: Reals, sliding: Flags) -> ChainSolver:
         axes, points = axes_of(links)
         wrist = recognised(axes, points, poses_of(links, np.zeros(6)))
         if isinstance(wrist, WristPartitionedArm):
-            return SphericalWrist(links, constants_of(wrist))
+            return SphericalWristSolver(links, constants_of(wrist))
         parallel = three_parallel(links)
         if parallel is not None:
             return ParallelAxes(parallel)

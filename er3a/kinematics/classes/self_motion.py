@@ -322,7 +322,7 @@ def roots_from_starts(links: Reals, sliding: Flags, T: Reals, starts: Reals, out
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class TracedCurve:
     """A traced curve of self-motion.
 
     Attributes
@@ -381,7 +381,7 @@ class PoseChain:
         """Whether joint values (n,) that solve the pose can move with the tool at rest."""
         return free_direction(self.links, self.sliding, self.T, self._scaled(x), np.empty(len(x))) > 0
 
-    def curve(self, x: Reals) -> Curve | None:
+    def curve(self, x: Reals) -> TracedCurve | None:
         """The curve through joint values (n,) that solve the pose; None if they can't move with the tool at rest."""
         start, v = self._scaled(x), np.empty(len(x))
         dimension = free_direction(self.links, self.sliding, self.T, start, v)
@@ -395,7 +395,7 @@ class PoseChain:
             path = np.concatenate([points[:count][::-1], path[1:]])
         if len(path) < 3:
             return None
-        return Curve(self._in_m(path), end == CLOSED, self._dimension(path))
+        return TracedCurve(self._in_m(path), end == CLOSED, self._dimension(path))
 
     def _dimension(self, path: Reals) -> int:
         n = len(self.sliding)
@@ -406,7 +406,7 @@ class PoseChain:
             found.append(null_share(J, np.zeros(n), out))
         return int(np.median(found))
 
-    def members(self, curve: Curve, at: Reals) -> Reals:
+    def members(self, curve: TracedCurve, at: Reals) -> Reals:
         """Joint values (k, n) at places (k,) counted in the curve's points; of closed curves also beyond its ends."""
         last = len(curve.points) - 1
         laps = np.floor(at / last) if curve.closed else np.zeros_like(at)
@@ -416,7 +416,7 @@ class PoseChain:
         lap = np.where(self.sliding, 0.0, curve.points[-1] - curve.points[0])
         return self._in_m(out) + laps[:, None] * lap
 
-    def holds(self, curve: Curve, x: Reals) -> bool:
+    def holds(self, curve: TracedCurve, x: Reals) -> bool:
         """Whether joint values (n,) lie on a traced curve: beside its polyline."""
         away = self._scaled(x) - self._scaled(curve.points)
         away = np.where(self.sliding, away, away - TURN * np.round(away / TURN))

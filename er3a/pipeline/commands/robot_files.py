@@ -20,6 +20,7 @@ from er3a.pipeline.stages.registry import STAGES
 def import_urdf(
     file: Annotated[Path, typer.Argument(help="a URDF of a serial arm (expanded, if it is xacro)")],
     output: Annotated[Path, typer.Option(help="the robot file to write")],
+    *,
     base: Annotated[str | None, typer.Option(help="the link at which the arm begins; the root by default")] = None,
     tip: Annotated[str | None, typer.Option(help="the link at which it ends, if the file leaves a choice")] = None,
     snap: Annotated[bool, typer.Option(help="take angles within 1e-4 rad of a right angle for it, and say so")] = False,

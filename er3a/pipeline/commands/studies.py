@@ -36,6 +36,7 @@ from er3a.pipeline.verdicts import StageVerdict, read_verdicts
 @app.command(rich_help_panel=FIRST)
 def new(
     folder: Annotated[Path, typer.Argument(help="where the study is written; no file that is there is touched")],
+    *,
     urdf: Annotated[Path | None, typer.Option(help="the arm, as URDF")] = None,
     base: Annotated[str | None, typer.Option(help="the URDF's link at which the arm begins")] = None,
     tip: Annotated[str | None, typer.Option(help="the URDF's link at which the arm ends")] = None,

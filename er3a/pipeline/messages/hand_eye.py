@@ -20,7 +20,7 @@ from er3a.vision.vision_findings import (
     NoMajority,
     NoRotation,
     NothingFits,
-    ParallelAxes,
+    ParallelTurns,
     QuaternionOrder,
     RepeatedPose,
     RotationMismatch,
@@ -174,7 +174,7 @@ def _(found: AllSamplesEqual) -> str:
 
 
 @say.register
-def _(found: ParallelAxes) -> str:
+def _(found: ParallelTurns) -> str:
     return sentence(
         found.code,
         "all motions turn about one direction ({x:.2f}, {y:.2f}, {z:.2f}) within {spread:.2g} deg, so that the shift "

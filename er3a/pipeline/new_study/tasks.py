@@ -29,8 +29,8 @@ from er3a.pipeline.new_study.surroundings import SampledReach
 from er3a.pipeline.stages.trajectory.collisions import Surroundings, measured
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.stages.trajectory.judgement import judge
-from er3a.pipeline.stages.trajectory.limits import limits_of, wanted_of
 from er3a.pipeline.stages.trajectory.motion import motion_of
+from er3a.pipeline.stages.trajectory.motion_demands import limits_of, wanted_of
 from er3a.planning.commands import CommandSource
 from er3a.planning.polynomial_checks import limit_intervals, rate_intervals
 from er3a.planning.timing import JointLimits

@@ -26,10 +26,10 @@ from er3a.pipeline.stages.dynamics.model import (
 from er3a.pipeline.stages.dynamics.path_loads import LoadedArm, PathTorques, path_torques
 from er3a.pipeline.stages.dynamics.wrist_check import diagram_rows, wrist_uses
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
-from er3a.pipeline.stages.trajectory.limits import limits_of
 from er3a.pipeline.stages.trajectory.listed_motions import study_motions
+from er3a.pipeline.stages.trajectory.motion_demands import limits_of
 from er3a.pipeline.study import Study
-from er3a.robots.masses import Body, LinkMass, Load, Masses
+from er3a.robots.masses import LinkMass, Load, MassBody, Masses
 from er3a.robots.robot import Grade, Robot
 
 CHECKS_PER_SAMPLE = 1
@@ -110,7 +110,7 @@ def _loaded_arm(
     return LoadedArm(
         robot=robot,
         load=load,
-        unit_payload=Body(1.0, (x, y, z), (square, square, square, 0.0, 0.0, 0.0)),
+        unit_payload=MassBody(1.0, (x, y, z), (square, square, square, 0.0, 0.0, 0.0)),
         gravity=settings.gravity_m_s2,
         links_grade=grades[0],
         load_grade=grades[1],

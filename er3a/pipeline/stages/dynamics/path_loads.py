@@ -18,7 +18,7 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.dynamics.model import BindingLimit, JointLoad, PathLoad, TorqueRows, WristMoment
 from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning.timing import JointLimits, NoTimeLaw, TimingError, fastest, nodes_along
-from er3a.robots.masses import Body, Load, together
+from er3a.robots.masses import Load, MassBody, together
 from er3a.robots.robot import Grade, Robot
 
 
@@ -35,7 +35,7 @@ class LoadedArm:
 
     robot: Robot
     load: Load | None
-    unit_payload: Body
+    unit_payload: MassBody
     gravity: float
     links_grade: Grade
     load_grade: Grade

@@ -35,7 +35,7 @@ from er3a.pipeline.stages.inverse.rankings import rankings, sequence
 from er3a.pipeline.stages.inverse.solution_map import solution_map
 from er3a.pipeline.stages.inverse.solve_target import solve_target
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
-from er3a.pipeline.stages.trajectory.limits import limits_of
+from er3a.pipeline.stages.trajectory.motion_demands import limits_of
 from er3a.pipeline.study import Study
 
 STAGE = "inverse"

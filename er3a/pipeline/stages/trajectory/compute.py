@@ -18,7 +18,6 @@ from er3a.pipeline.stages.trajectory.avoidance_results import AvoidanceTask, spe
 from er3a.pipeline.stages.trajectory.collisions import Surroundings, clearance_rows, measured
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.stages.trajectory.judgement import Judgement, judge
-from er3a.pipeline.stages.trajectory.limits import limits_of, planning_of, wanted_of
 from er3a.pipeline.stages.trajectory.listed_motions import listed_motions
 from er3a.pipeline.stages.trajectory.model import (
     AllSafe,
@@ -37,6 +36,7 @@ from er3a.pipeline.stages.trajectory.model import (
     TrajectorySummary,
 )
 from er3a.pipeline.stages.trajectory.motion import Motion
+from er3a.pipeline.stages.trajectory.motion_demands import limits_of, planning_of, wanted_of
 from er3a.pipeline.stages.trajectory.path_summary import path_summary
 from er3a.pipeline.stages.trajectory.written_programs import program_files
 from er3a.pipeline.study import Study

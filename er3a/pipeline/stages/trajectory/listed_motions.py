@@ -14,8 +14,8 @@ from er3a.files.path_file import load_paths
 from er3a.files.scene_file import load_scene
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
-from er3a.pipeline.stages.trajectory.limits import planning_of, wanted_of
 from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
+from er3a.pipeline.stages.trajectory.motion_demands import planning_of, wanted_of
 from er3a.pipeline.stages.trajectory.program_paths import planned_entries
 from er3a.pipeline.study import Study
 from er3a.planning.commands import CommandSource
@@ -63,7 +63,7 @@ def listed_motions(file: Path, task: PlanningTask, wanted: Wanted, checks_per_sa
         source = CommandSource(file, f"paths[{i}]")
         for entry in planned_entries(task.robot, listed, source):
             try:
-                motion = motion_of(task.robot, entry, checks_per_sample, source, ends, wanted, task)
+                motion = motion_of(task.robot, entry, checks_per_sample, source, ends, wanted, task=task)
             except NotWristPartitionedError:
                 motion = None
             end = np.full(task.robot.joints, np.nan) if motion is None else motion.q[-1]

@@ -76,6 +76,7 @@ def motion_of(
     source: CommandSource,
     ends: Mapping[str, Reals],
     wanted: Wanted,
+    *,
     task: PlanningTask | None = None,
 ) -> Motion:
     """Plan a path, and follow it if it is one of the tool; ``ends`` as for :func:`er3a.planning.build.build`.
