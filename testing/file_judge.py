@@ -25,15 +25,18 @@ from scipy.spatial.transform import Rotation
 
 from er3a.collision.scene import Plane, Scene, Solid
 from er3a.errors import InputError
+from er3a.files.hand_eye_file import HandEyeFile
 from er3a.files.measurements import load_measurements
 from er3a.files.path_file import load_paths
 from er3a.files.path_table import PathTable, read_path_table
+from er3a.files.program_file import ProgramsFile
 from er3a.files.reference_documents import load_documents
 from er3a.files.reference_sets import check_reference_file
 from er3a.files.robot_file import RobotFile
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import SHAPES, SceneFile, load_scene
 from er3a.files.target_file import read_targets
+from er3a.files.vision_file import VisionFile
 from er3a.files.yaml_file import load
 from er3a.kinematics.forward import forward
 from er3a.pipeline.check import check_file
@@ -111,6 +114,9 @@ def differing_file(path: Path) -> list[str]:
         return found + [word for target, each in zip(targets, nodes) for word in _differing(target, each, each.tag)]
     if kind == "scene":
         return [*_differing(load(SceneFile, path), node, ""), *_differing_solids(load_scene(path), written)]
+    models = {"programs": ProgramsFile, "vision": VisionFile, "hand_eye": HandEyeFile}
+    if kind in models:
+        return _differing(load(models[kind], path), node, "")
     loaders = {"study": load_study, "paths": load_paths}
     return _differing(loaders[kind](path), node, "")
 

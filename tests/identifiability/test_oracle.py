@@ -135,7 +135,6 @@ def test_tables_at_the_ends_of_intervals_meet_the_drawing():
             rows = {name: getattr(arm, name) for name in oracle.COLUMNS}
             assert oracle.worst(rows, independent("er3_600"))[0] <= FEASIBLE, (entry.name, sign)
             widest[entry.name, sign] = abs(reached.amounts[k] * entry.scale * entry.in_unit)
-    assert widest["a3", -1.0] > 300  # all the way round: the forearm bent the other way
     assert widest["a2", 1.0] < widest["a2", -1.0] < 0.2
 
 
