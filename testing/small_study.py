@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from er3a.pipeline.study import load_study
+
 ROOT = Path(__file__).resolve().parents[1]
 STUDY = "config/small.yaml"
 PARTS = ("Snakefile", "workflow", "er3a", "config", "data", "profiles")
@@ -54,3 +56,8 @@ def contents(folder: Path) -> dict[str, bytes]:
     """Results and pages by path; sampled blocks, which go when a run is done, left out."""
     found = [*folder.glob("results/*/*/*"), *folder.glob("reports/**/*.html")]
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in found if path.is_file()}
+
+
+def stages_of(robot: str) -> tuple[str, ...]:
+    """The stages that a robot of the small study goes through."""
+    return load_study(ROOT / "config/small.yaml").stages(robot)

@@ -18,11 +18,12 @@ from er3a.pipeline.checksums import check_checksum, write_checksum
 from er3a.pipeline.cli import app
 from er3a.pipeline.study import STAGES
 from er3a.pipeline.viewing.preview import draw_preview
+from testing.small_study import stages_of
 from tests.conftest import ROBOT, ROBOTS, ROOT
 from tests.viewing.pictures import joints_seen
 
 RERUN = Path(sys.executable).with_name("rerun")
-RECORDINGS = [f"{robot}/{stage}.rrd" for robot in ROBOTS for stage in STAGES]
+RECORDINGS = [f"{robot}/{stage}.rrd" for robot in ROBOTS for stage in stages_of(robot)]
 ROW = re.compile(r"^\| `(/[^`]*)` \| [^|]+ \| [^|]* \| (\w+) \|$", flags=re.MULTILINE)
 
 

@@ -13,10 +13,11 @@ from babel.messages.pofile import read_po
 
 from er3a.pipeline.messages import extract, language
 from er3a.pipeline.stages.run import show
-from er3a.pipeline.study import STAGES, load_study
+from er3a.pipeline.study import load_study
 from er3a.pipeline.teach.panel import write_teach_page
 from er3a.pipeline.viewing.figures import house_style
 from er3a.pipeline.viewing.index import write_index
+from testing.small_study import stages_of
 from tests.conftest import ROBOTS, ROOT
 from tests.viewing.untranslated import PageTexts, plain_words, texts_from_files, wide_letters
 
@@ -57,8 +58,7 @@ def own_texts(small_study):
     return files | texts_from_files(data) | texts_from_files(small_study.folder / "config") | set(ROBOTS)
 
 
-@pytest.mark.parametrize("name", ROBOTS)
-@pytest.mark.parametrize("stage", STAGES)
+@pytest.mark.parametrize(("stage", "name"), [(stage, name) for name in ROBOTS for stage in stages_of(name)])
 def test_each_word_of_a_stage_s_page_can_be_translated(stage, name, small_study, own_texts, tmp_path, monkeypatch):
     monkeypatch.chdir(small_study.folder)
     study, page = load_study("config/small.yaml"), tmp_path / "page.html"

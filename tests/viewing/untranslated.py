@@ -21,12 +21,19 @@ from babel.messages.pofile import read_po
 from matplotlib.figure import Figure
 
 from er3a.pipeline.messages import language
+from er3a.pipeline.messages.hand_eye import METHODS
 
 KEPT = re.compile(r"(\{[^}]*\}|%\(\w+\)s|<[^>]*>|&\w+;)")
 WIDE = {ord(letter): ord(letter) + 0xFEE0 for letter in "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"}
 WORD = re.compile(r"[A-Za-z]{3,}")
 # Units, and names that are the same in every language.
-SAME_EVERYWHERE = {"deg", "rad", "er3a", "csv", "sha", "rrd", "rpm"}
+SAME_EVERYWHERE = {"deg", "rad", "er3a", "csv", "sha", "rrd", "rpm", "ppb", "krl", "rpl", "xpl", "urscript"}
+SAME_EVERYWHERE |= {name.lower() for name in METHODS.values()}  # of closed forms, by who found them
+PROGRAM_SUFFIXES = ("src", "dat", "script", "pgm", "var", "XPL")
+NAMES = re.compile(
+    r"\b(?:alpha|beta|offset|direction|lower|upper|speed) ?\d(?:, \d)*\b"  # entries of a table
+    rf"|\b[\w-]+\.(?:{'|'.join(PROGRAM_SUFFIXES)})\b|\b[A-Z_]{{4,}}\[\d+\]"  # files and frames of programs
+)
 SPOKEN = {"alt", "aria-label", "title", "placeholder", "data-differs"}
 FIGURE_TEXTS = {"text", "name", "title", "label", "hovertemplate", "ticktext", "hovertext"}
 
@@ -90,11 +97,10 @@ def plain_words(texts: Iterable[str], own_texts: set[str]) -> list[str]:
     own = sorted(own_texts, key=len, reverse=True)
     found = []
     for text in texts:
-        rest = text
+        rest = NAMES.sub(" ", text.replace("−", "-"))
         for piece in own:
             rest = rest.replace(piece, " ")
         rest = re.sub(r"\$[^$]*\$|\\\w+", " ", rest)  # formulas
-        rest = re.sub(r"\b(?:alpha|beta|offset)[1-6]\b", " ", rest)  # names of a table's entries
         if any(word.lower() not in SAME_EVERYWHERE for word in WORD.findall(rest)):
             found.append(" ".join(text.split()))
     return list(dict.fromkeys(found))
@@ -108,6 +114,9 @@ def texts_from_files(folder: Path) -> set[str]:
     for file in folder.rglob("*.csv"):
         with file.open(encoding="utf-8", newline="") as lines:
             found.update(cell for row in csv.reader(lines) for cell in row)
+    for suffix in PROGRAM_SUFFIXES:
+        for file in folder.rglob(f"*.{suffix}"):
+            found.update(line.strip().removesuffix(":") for line in file.read_text("utf-8", "replace").splitlines())
     found.update([text.split(":")[0] for text in found])
     return {text for text in found if WORD.search(text)}
 
