@@ -19,15 +19,15 @@ from er3a.pipeline.viewing.palette import MUTED, rgb
 _PLANE_THICKNESS = 0.002  # m
 
 
-def log_scene(stream: rr.RecordingStream, study: Study, name: str, stage: str) -> None:
-    """Log the solids of a robot's scene in a stage, each an entity of its own; of planes the part around the arm."""
+def log_scene(stream: rr.RecordingStream, study: Study, name: str, stage: str, below: str | None = None) -> None:
+    """Log the solids of a robot's scene in a stage, each an entity below it (or ``below``); of planes the near part."""
     file = study.scene(name, stage)
     if file is None:
         return
     robot = study.robot(name)
     for solid, T, shape in _solids(load_scene(file), robot.base[:3, 3], 3 * size_of(robot)):
         place = rr.Transform3D(translation=T[:3, 3], mat3x3=T[:3, :3])
-        stream.log(f"{stage}/scene/{solid}", place, shape, static=True)
+        stream.log(f"{below or stage}/scene/{solid}", place, shape, static=True)
 
 
 def _solids(

@@ -49,7 +49,7 @@ def record(study: Study, stored: Stored[ProgramsResults], output: Path) -> None:
     name, results = stored.robot, stored.results
     robot, motion = study.robot(name), results.motion
     with recording(output, name, STAGE, _layout(robot, motion)) as stream:
-        log_scene(stream, study, name, SCENE_OF)
+        log_scene(stream, study, name, SCENE_OF, STAGE)
         log_arm(stream, robot, np.radians(motion.q_deg[0]) if len(motion) else np.zeros(len(robot.lower)))
         starts, start = [], 0.0
         for program in results.summary.programs:
