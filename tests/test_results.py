@@ -74,6 +74,7 @@ def test_shape_of_a_summary(tmp_path, study):
                     {"official": ["dh", "limits", "speeds", "wrist_load", "weight"], "inferred": ["zero", "envelopes"]},
                 ),
                 ("data/manual_refs/er3_600/envelope.csv", {"official": 9}),
+                ("data/scenes/table_and_post.yaml", {}),
             )
         ],
         "code": code_digest(f"{STAGE.package}.compute", STAGE.verdict_messages),

@@ -202,18 +202,6 @@ def check_samples(table: Path) -> str:
     return "samples of a hand-eye calibration"
 
 
-def calibration_files(path: str | Path) -> list[Path]:
-    """A calibration set's own file and the tables and images that it names."""
-    path = Path(path)
-    head = load(HandEyeFile, path)
-    names = [head.samples, head.touched, *((head.streams.flange, head.streams.target) if head.streams else ())]
-    files = [path, *(path.parent / name for name in names if name)]
-    if head.images is not None and head.samples:
-        table = path.parent / head.samples
-        files += [table.parent / row["image"] for row in _rows(table)[0] if row.get("image")]
-    return files
-
-
 def _rows(table: Path) -> tuple[list[dict[str, Any]], list[str]]:
     header = read_header(table)
     columns: dict[str, CsvColumn] = {}

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import InputError
-from er3a.files.hand_eye_file import Positive, StandardDeviations, calibration_files
+from er3a.files.hand_eye_file import Positive, StandardDeviations
 from er3a.files.robot_file import Name, Text
 from er3a.files.target_file import UNIT_LENGTH_TOLERANCE, Line
 from er3a.files.units import PositionMm, RpyDeg, Triple
@@ -174,9 +174,3 @@ def load_vision(path: str | Path, robot: Robot | None = None) -> VisionFile:
             problem = f"{len(angles)} angles, and the robot {robot.name} has {len(robot.lower)} joints"
             raise InputError(path, key, problem, "Give one for each joint")
     return found
-
-
-def vision_files(path: str | Path) -> list[Path]:
-    """A vision file, its calibration set, and the tables and images of that."""
-    own = Path(path)
-    return [own, *calibration_files(own.parent / load(VisionFile, own).calibration)]

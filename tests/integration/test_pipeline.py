@@ -57,7 +57,8 @@ def test_every_stage_leaves_results_a_page_and_a_recording(small_study):
             assert (summary["robot"], summary["stage"]) == (robot, stage)
             assert summary["verdict"]["status"] in ("pass", "caution", "fail", "no_reference")
             assert summary["verdict"]["text"].endswith(".")
-            assert {"name", "value", "unit", "uncertainty", "of"} == set(summary["figures"][0])
+            for figure in summary["figures"]:
+                assert {"name", "value", "unit", "uncertainty", "of"} == set(figure)
             assert summary["provenance"]["inputs"][0]["path"] == f"data/robots/{robot}.yaml"
             for suffix in ("html", "rrd"):
                 assert (small_study.folder / "reports" / robot / f"{stage}.{suffix}").stat().st_size > 1000
@@ -90,7 +91,7 @@ def test_a_page_s_foot_names_inputs_with_grades_and_the_command_that_makes_it_ag
     foot = html.unescape(page.read_text(encoding="utf-8").partition('class="provenance"')[2])
     reach = small_study.folder / "data/manual_refs/er3_600/reach.csv"
     assert hashlib.sha256(reach.read_bytes()).hexdigest() in foot
-    assert "official (dh, limits, speeds), inferred (zero, envelopes)" in foot
+    assert "official (dh, limits, speeds, wrist_load, weight), inferred (zero, envelopes)" in foot
     command = re.search(r"<code>make run STUDY=config/small.yaml ARGS=(\S+)</code>", foot)
     assert command[1] == "reports/er3_600/validation.html"
     page.rename(tmp_path / "kept.html")

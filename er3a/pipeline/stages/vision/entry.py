@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from pydantic import Field
 
 from er3a.files.robot_file import Text
+from er3a.files.vision_inputs import vision_files
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.stages.stage import Stage
@@ -33,8 +34,6 @@ class VisionSettings(StrictModel):
 
 
 def _inputs(study: Study, robot: str) -> list[Path]:
-    from er3a.files.vision_file import vision_files  # with all of the room behind it, which a study does without
-
     file = study.entry(robot).vision
     return [*vision_files(file), *study.scenes(robot, STAGE.name)] if file else []
 
