@@ -120,7 +120,7 @@ def with_toy(fresh_project, small_study):
     registry = package / "pipeline/stages/registry.py"
     text = registry.read_text(encoding="utf-8")
     text = text.replace("\nSTAGES:", "from er3a.pipeline.stages.toy.entry import STAGE as TOY\n\nSTAGES:", 1)
-    registry.write_text(re.sub(r"TRAJECTORY\)\}", "TRAJECTORY, TOY)}", text), encoding="utf-8")
+    registry.write_text(text.replace("DYNAMICS, VISION)", "DYNAMICS, VISION, TOY)"), encoding="utf-8")
     study = project.folder / STUDY
     study.write_text(study.read_text(encoding="utf-8") + "\ntoy: {factor: 3}\n", encoding="utf-8")
     for robot in project.robots:

@@ -339,10 +339,10 @@ def test_arm_without_closed_form_is_solved_by_iteration_and_said_so(tmp_path):
         np.testing.assert_allclose(T[:3, 3] * 1000, target.xyz_mm, atol=1e-6)
     far = target_named(results, "too_far")
     assert far.obstacle.code == "nothing_found"
-    assert [unsolved.why.code for unsolved in far.reason.unsolved] == ["unreachable"]
+    assert [unsolved.why.code for unsolved in far.reason.unsolved] == ["no_solution_of_class"]
     for view in ("report", "record"):
         run.show(view, "inverse", study, "bent", folder, tmp_path / view)
-    assert "no closed form, because axes 4, 5 and 6" in (tmp_path / "report").read_text(encoding="utf-8")
+    assert "six revolute joints without special geometry" in (tmp_path / "report").read_text(encoding="utf-8")
 
 
 def test_empty_target_list_is_one_clear_error(tmp_path):
