@@ -94,7 +94,7 @@ def test_a_study_from_nothing_to_its_reports(er3a, tmp_path, source, name, valid
     done = er3a(cell, "run", "--cores", "2")
     assert done.returncode == 0, done.stderr
     pages = {path.relative_to(cell / "reports").as_posix() for path in (cell / "reports").rglob("*.html")}
-    stages = ("validation", "workspace", "collision", "inverse", "trajectory", "dynamics")
+    stages = ("validation", "workspace", "collision", "inverse", "trajectory", "dynamics", "vision")
     assert pages == {"index.html", "compare.html", *(f"{name}/{page}.html" for page in (*stages, "teach"))}
     verdicts = {each["stage"]: each["status"] for each in json.loads(er3a(cell, "verdicts", "--json").stdout)}
     assert verdicts["inverse"] == verdicts["trajectory"] == "pass"
