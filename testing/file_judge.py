@@ -25,7 +25,8 @@ from scipy.spatial.transform import Rotation
 
 from er3a.collision.scene import Plane, Scene, Solid
 from er3a.errors import InputError
-from er3a.files.hand_eye_file import HandEyeFile
+from er3a.files.csv_file import read_csv
+from er3a.files.hand_eye_file import POINTS, HandEyeFile, sample_rows
 from er3a.files.measurements import load_measurements
 from er3a.files.path_file import load_paths
 from er3a.files.path_table import PathTable, read_path_table
@@ -183,7 +184,7 @@ def _differing_poses(robot, written: dict[str, yaml.Node]) -> list[str]:
 
     convention = {key.value: value.value for key, value in written["dh"].value}["convention"]
     low, high = np.array(column("limits", "lower_deg")), np.array(column("limits", "upper_deg"))
-    q_deg = low + (high - low) * np.array([0.3, 0.6, 0.2, 0.8, 0.4, 0.7])
+    q_deg = low + (high - low) * np.resize([0.3, 0.6, 0.2, 0.8, 0.4, 0.7], len(low))
     T = placement("base")
     rows = zip(
         column("dh", "a_mm"), column("dh", "alpha_deg"), column("dh", "d_mm"), column("dh", "beta_deg"), strict=True
@@ -243,6 +244,9 @@ def differing_table(path: Path) -> list[str]:
         return _differing_points(read_path_table(path), table)
     if path.parent.name == "targets":
         rows: list = list(read_targets(path))
+    elif {"target_x_mm", "seen_x_mm"} & set(table.columns):
+        samples = read_csv(path, POINTS) if "seen_x_mm" in table else sample_rows(path)[0]
+        rows = [[value for name, value in row.items() if name != "row"] for row in samples]
     elif path.name == "documents.csv":
         table["derived_from"] = table["derived_from"].str.replace(" ", "")
         rows = [replace(each, derived_from=(";".join(each.derived_from),)) for each in load_documents(path)]

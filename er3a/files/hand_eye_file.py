@@ -160,7 +160,7 @@ def read_calibration(path: str | Path, robot: Robot | None) -> tuple[Calibration
         names, q = tuple(f"{t:.3f} s" for t in times), None
     else:
         table = path.parent / str(head.samples)
-        rows, header = _rows(table)
+        rows, header = sample_rows(table)
         flange, q = _flange(table, rows, header, robot)
         names = tuple(str(row.get("name") or f"row {row['row']}") for row in rows)
         if head.images is not None:
@@ -195,14 +195,15 @@ def check_samples(table: Path) -> str:
     if "seen_x_mm" in read_header(table):
         _touched(table)
         return "touched points"
-    rows, header = _rows(table)
+    rows, header = sample_rows(table)
     for stream in ("flange", "target"):
         if form := pose_form(table, header, stream):
             poses_of(table, rows, stream, form)
     return "samples of a hand-eye calibration"
 
 
-def _rows(table: Path) -> tuple[list[dict[str, Any]], list[str]]:
+def sample_rows(table: Path) -> tuple[list[dict[str, Any]], list[str]]:
+    """The samples of a table as dicts by column, with a ``row`` key (file line), and its header."""
     header = read_header(table)
     columns: dict[str, CsvColumn] = {}
     for name in ("name", "image"):
@@ -252,7 +253,7 @@ def _flange(
 
 
 def _stream(table: Path, name: str, robot: Robot | None) -> Stream:
-    rows, header = _rows(table)
+    rows, header = sample_rows(table)
     if "t_s" not in header:
         raise InputError(table, "header", "the column t_s is missing", "Add the time of each row in seconds")
     t = np.array([row["t_s"] for row in rows], dtype=float)

@@ -32,7 +32,7 @@ function compare(a, b, sign) {
 function makeSortable(table) {
   const body = table.tBodies[0];
   const written = [...body.rows];
-  if (written.length < 2) return;
+  if (written.length < 2 || !table.tHead) return; // a listing keeps its lines in order
   const headers = [...table.tHead.rows[0].cells];
   headers.forEach((header, column) => {
     // No button element: browsers leave those out of a header that is repeated on the next printed sheet.

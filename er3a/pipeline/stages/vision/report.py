@@ -63,7 +63,7 @@ def report(study: Study, stored: Stored[VisionResults], output: Path) -> None:
 
 
 def _listed(values: Iterable[float], digits: int = 1) -> str:
-    return ",\u00a0".join(fixed(value, digits) for value in values)
+    return ", ".join(fixed(value, digits) for value in values)
 
 
 def _poses(found: CalibrationResult) -> list[tuple[str, str, list[list[str]]]]:
