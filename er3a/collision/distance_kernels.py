@@ -396,23 +396,54 @@ def measure(layout: Layout, q: Reals, found: Reals, least: Reals, pair: Integers
 
 
 @kernel
+def _apart_along(
+    w: Reals, shape: tuple[Integers, Integers, Reals, Reals], a: int, b: int, room: Reals, axis: Reals
+) -> bool:
+    """Whether a direction (3,) shows that a body lies wholly beyond another, neither of them a half-space."""
+    start, _, radius, disc = shape
+    for r in range(3):
+        room[_V, r] = axis[r]
+    _support(w, start[a], start[a + 1], disc[a], room, -1.0, 0)
+    _support(w, start[b], start[b + 1], disc[b], room, 1.0, 1)
+    gap = -radius[a] - radius[b]
+    for r in range(3):
+        gap += axis[r] * (room[0, r] - room[1, r])
+    return bool(gap > EXACT)
+
+
+@kernel
 def which_overlap(layout: Layout, q: Reals, found: Flags) -> None:
-    """Which pairs overlap, (N, K), in arms (N, n); with one column, whether any does."""
+    """Which pairs overlap, (N, K), in arms (N, n); with one column, whether any does.
+
+    The direction that kept a pair apart in the arm before is tried first: it mostly does so again.
+    """
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))
     T, w = np.empty((q.shape[1] + 1, 4, 4)), np.empty(layout.points.shape)
     middle, reach, first, second = np.empty(layout.centre.shape), layout.reach, layout.first, layout.second
     shape = (layout.start, layout.kind, layout.radius, layout.disc)
-    one = found.shape[1] == 1
+    one, axes = found.shape[1] == 1, np.zeros((len(first), 3))
     for n in range(q.shape[0]):
         place(layout, q[n], T, w, middle)
         for k in range(found.shape[1]):
             found[n, k] = False
         for k in range(len(first)):
-            if _apart(middle, reach, first[k], second[k]) < 0:
-                overlap = pair_distance(w, shape, first[k], second[k], room, near)[0] < 0
-                found[n, 0 if one else k] |= overlap
-                if one and overlap:
-                    break
+            a, b = first[k], second[k]
+            if _apart(middle, reach, a, b) >= 0:
+                continue
+            solid = layout.kind[b] != HALF_SPACE
+            if solid and _apart_along(w, shape, a, b, room, axes[k]):
+                continue
+            overlap = pair_distance(w, shape, a, b, room, near)[0] < 0
+            found[n, 0 if one else k] |= overlap
+            if one and overlap:
+                break
+            width = 0.0
+            for r in range(3):
+                axes[k, r] = near[0, r] - near[1, r]
+                width += axes[k, r] ** 2
+            if solid and width > 0:
+                for r in range(3):
+                    axes[k, r] /= np.sqrt(width)
 
 
 @kernel

@@ -8,12 +8,16 @@ from __future__ import annotations
 
 import ast
 import hashlib
+import re
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
 _ROOT = Path(__file__).resolve().parents[2]
 _PACKAGE = _ROOT / "er3a"
+# Every process asks for a digest, and a parser would take a second for it; a line of prose that looks like this names
+# no module. One line (a comment left off), or a bracket of lines.
+_IMPORT = re.compile(r"^[ \t]*(?:from (?P<module>[\w.]+) )?import (?P<names>\([^)]*\)|[\w., \t]+)", flags=re.MULTILINE)
 VIEWS = ("report.py", "page.py", "panel.py", "index.py")
 
 
@@ -54,13 +58,17 @@ def sources(modules: Iterable[str], root: Path = _ROOT) -> set[Path]:
 def _imports(path: Path, root: Path) -> tuple[str, ...]:
     """All names that a file imports, public names of er3a by the modules that they come from."""
     names: list[str] = []
-    for node in ast.walk(ast.parse(path.read_bytes())):
-        if isinstance(node, ast.Import):
-            names += [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.module == "er3a":
-            names += [_public(root).get(alias.name, f"er3a.{alias.name}") for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+    for found in _IMPORT.finditer(path.read_text(encoding="utf-8")):
+        module, listed = (
+            found["module"],
+            [part.split()[0] for part in found["names"].strip("()").split(",") if part.split()],
+        )
+        if module is None:
+            names += listed
+        elif module == "er3a":
+            names += [_public(root).get(name, f"er3a.{name}") for name in listed]
+        else:
+            names += [module, *(f"{module}.{name}" for name in listed)]
     return tuple(names)
 
 

@@ -207,7 +207,9 @@ class StudyBase(StrictModel):
         return {"seed": self.seed, "robot": entry, key: settings}
 
     def own_titles(self) -> dict[str, str]:
-        """People's titles and notes in the language of the pages, by what they translate."""
+        """People's titles and notes in the language of the pages, by what they translate; none in English."""
+        if self.report.language == "en":
+            return {}
         files = {file for name in self.robots for stage in self.stages(name) for file in self.inputs(name, stage)}
         return translations_in(sorted(files), self.report.language)
 

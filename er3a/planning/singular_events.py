@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.signal import find_peaks
 
 from er3a.kinematics.near_singular import NearSingular, factor_of
 from er3a.kinematics.rank_loss import rank_losses
@@ -145,6 +144,8 @@ def _root(factor: Factor, start: float, end: float, duration: float) -> float:
 
 def _minima(times: Reals, f: Reals, factor: Factor, near: float, duration: float) -> list[tuple[float, float]]:
     """Local minima of the distance below the threshold, apart from the changes of sign: time and distance."""
+    from scipy.signal import find_peaks  # slow to import, and what only shows motions doesn't need it
+
     size = np.abs(f)
     padded = np.concatenate([[np.inf], size, [np.inf]])
     peaks = find_peaks(-padded)[0] - 1

@@ -176,14 +176,10 @@ def serve(
         for part in np.array_split(alive, max(1, len(alive) * len(direction) // _POSES)):
             found = inverse_batch(asked, poses(points[part][:, None], direction).reshape(-1, 4, 4))
             value = manipulability(arm, robot.direction * found.q + robot.offset)
-            counts = found.within_limits
-            if free is not None:
-                counts = counts.copy()
-                counts[counts] = free(found.q[counts])
-            value = np.where(counts, value, NO).reshape(len(part), -1, SLOTS)
+            value = np.where(found.within_limits, value, NO).reshape(len(part), -1, SLOTS)
             q = found.q[..., limited]
             inside = np.minimum(q - asked.lower[limited], asked.upper[limited] - q).min(axis=-1, initial=np.inf)
-            rolled = value.argmax(axis=1)[:, None]
+            rolled = _best_roll(value, found.q.reshape(*value.shape, -1), free)[:, None]
             value = np.take_along_axis(value, rolled, axis=1)[:, 0]
             inside = np.take_along_axis(inside.reshape(len(part), -1, SLOTS), rolled, axis=1)[:, 0]
             least[part] = np.minimum(least[part], value)
@@ -191,6 +187,26 @@ def serve(
             limit_margin[part] = np.fmin(limit_margin[part], inside)
         alive = np.flatnonzero(least_any > NO)
     return least, least_any, np.where(least > NO, limit_margin, 0.0)
+
+
+def _best_roll(value: Reals, q: Reals, free: Free | None) -> Integers:
+    """Which roll serves best among those whose arm counts, (n, 8); ``value`` (n, rolls, 8) of others becomes NO.
+
+    Only the best are asked whether they count, and the next best of those that don't.
+    """
+    best: Integers = value.argmax(axis=1)
+    if free is None:
+        return best
+    point, slot = np.nonzero(np.take_along_axis(value, best[:, None], axis=1)[:, 0] > NO)
+    while point.size:
+        roll = best[point, slot]
+        refused = ~free(q[point, roll, slot])
+        point, slot, roll = point[refused], slot[refused], roll[refused]
+        value[point, roll, slot] = NO
+        best[point, slot] = value[point, :, slot].argmax(axis=1)
+        left = value[point, best[point, slot], slot] > NO
+        point, slot = point[left], slot[left]
+    return best
 
 
 def fitting_places(field: Field, bricks: Flags, box: Reals) -> Places:
