@@ -29,7 +29,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from er3a.collision.bodies import Bodies
 from er3a.collision.envelopes import link_frames
@@ -239,8 +239,14 @@ def _contacts(motion: _Motion, times: Reals, q: Reals, near: float) -> list[Cont
 
     found = []
     for a, b in runs(overlap):
-        start = brentq(least, times[known[a - 1]], times[known[a]], xtol=near) if a > 0 else times[known[a]]
-        end = brentq(least, times[known[b - 1]], times[known[b]], xtol=near) if b < len(known) else times[known[b - 1]]
+        start = (
+            scipy.optimize.brentq(least, times[known[a - 1]], times[known[a]], xtol=near) if a > 0 else times[known[a]]
+        )
+        end = (
+            scipy.optimize.brentq(least, times[known[b - 1]], times[known[b]], xtol=near)
+            if b < len(known)
+            else times[known[b - 1]]
+        )
         rows = np.array([motion.measure(times[i], q[i], every) for i in known[a:b]])
         deepest = rows.min(axis=0)
         order = np.argsort(deepest, kind="stable")

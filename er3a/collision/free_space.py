@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from er3a.collision.bodies import Bodies
 from er3a.collision.distance_kernels import FREE, free_between
@@ -182,7 +182,7 @@ def joined_to_home(bodies: Bodies, places: ClearPlaces, home: Reals, neighbours:
     clear = np.flatnonzero(places.clear)
     q = np.concatenate([home[None], places.witness[clear]])
     reach = np.maximum(bodies.robot.upper - bodies.robot.lower, 1e-9)
-    away, near = cKDTree(q / reach).query(q / reach, k=min(neighbours + 1, len(q)))
+    away, near = scipy.spatial.cKDTree(q / reach).query(q / reach, k=min(neighbours + 1, len(q)))
     first = np.repeat(np.arange(len(q)), near.shape[1] - 1)
     second, length = near[:, 1:].ravel(), away[:, 1:].ravel()
     order = np.lexsort((second, first, length))

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
+import scipy
 
 from er3a.collision.distance_kernels import distances_from_hull
 from er3a.errors import Er3aError
@@ -59,7 +59,7 @@ def convex_pieces(vertices: Reals, faces: Integers, threshold: float, seed: int)
     Er3aError
         if the mesh is not convex and coacd, which splits it, is not installed
     """
-    hull = ConvexHull(vertices)
+    hull = scipy.spatial.ConvexHull(vertices)
     corners = vertices[faces]
     volume = float(np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum()) / 6
     if hull.volume - volume <= CONVEX * hull.volume:
@@ -82,7 +82,7 @@ def hull_of(points: Reals) -> ConvexPieces:
 
     What the corners left out stand out by is the margin; the excess is not that of a mesh, but 0: corners are points.
     """
-    corners = points[ConvexHull(points).vertices]
+    corners = points[scipy.spatial.ConvexHull(points).vertices]
     if len(corners) <= MOST_CORNERS:
         return ConvexPieces((corners,), 0.0, 0.0)
     kept = _corners(corners[np.unique((fibonacci_sphere(MOST_CORNERS) @ corners.T).argmax(axis=1))])
@@ -126,7 +126,7 @@ def _excess(vertices: Reals, faces: Integers, pieces: Sequence[Reals], seed: int
     scene.add_triangles(vertices.astype(np.float32), faces.astype(np.uint32))
     points = []
     for piece in pieces:
-        triangles = piece[ConvexHull(piece).simplices]
+        triangles = piece[scipy.spatial.ConvexHull(piece).simplices]
         area = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
         rows = random.choice(len(area), SURFACE_POINTS // len(pieces) + 1, p=area / area.sum())
         weights = random.dirichlet(np.ones(3), len(rows))
@@ -137,8 +137,8 @@ def _excess(vertices: Reals, faces: Integers, pieces: Sequence[Reals], seed: int
 
 def _corners(points: Reals) -> Reals:
     try:
-        corners: Reals = points[ConvexHull(points).vertices]
-    except QhullError:  # flat
+        corners: Reals = points[scipy.spatial.ConvexHull(points).vertices]
+    except scipy.spatial.QhullError:  # flat
         return points
     return corners
 

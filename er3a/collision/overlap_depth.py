@@ -7,7 +7,7 @@ The difference holds the origin while the cores overlap; its nearest face is the
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
+import scipy
 
 from er3a.numerics.arrays import Reals
 
@@ -18,8 +18,8 @@ def overlap_depth(first: Reals, second: Reals) -> float:
     """Depth (m) by which the hulls of two sets of points (n, 3), (m, 3) overlap; 0 for sets that lie in one plane."""
     difference = (first[:, None] - second[None]).reshape(-1, 3)
     try:
-        offsets = ConvexHull(difference).equations[:, 3]
-    except QhullError:
+        offsets = scipy.spatial.ConvexHull(difference).equations[:, 3]
+    except scipy.spatial.QhullError:
         return 0.0
     return max(0.0, float(-offsets.max()))
 

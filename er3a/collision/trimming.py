@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
+import scipy
 
 from er3a.collision.shapes import Body
 from er3a.numerics.arrays import Reals
@@ -61,7 +61,7 @@ def _clipped(body: Body, centre: Reals, radius: float) -> list[Body]:
     crossings = (kept[:, None] + share * (cut[None] - kept[:, None])).reshape(-1, 3)
     points = np.concatenate([kept, crossings])
     try:
-        points = points[ConvexHull(points).vertices]
-    except QhullError:  # a sliver
+        points = points[scipy.spatial.ConvexHull(points).vertices]
+    except scipy.spatial.QhullError:  # a sliver
         return []
     return [replace(body, points=points)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
+import scipy
 
 from er3a.dynamics.arm_model import ArmModel
 from er3a.dynamics.torques import TorqueParts
@@ -43,7 +43,7 @@ def demand(t: Reals, qd: Reals, tau: Reals) -> Demand:
     power, duration = tau * qd, max(float(t[-1] - t[0]), 1e-12)
 
     def whole(values: Reals) -> Reals:
-        return cumulative_trapezoid(values, t, axis=0)[-1] if len(t) > 1 else np.zeros(values.shape[1])
+        return scipy.integrate.cumulative_trapezoid(values, t, axis=0)[-1] if len(t) > 1 else np.zeros(values.shape[1])
 
     return Demand(
         peak=np.abs(tau).max(axis=0),

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 from er3a.dynamics.arm_model import ArmModel, drives_of
 from er3a.dynamics.torques import direction_of, holding_torques, known, torque_parts
@@ -67,7 +67,7 @@ def fastest_under_torques(model: ArmModel, q: Reals, speed: Reals, peak: Reals) 
     q, way = q[kept], way[kept]
     if len(way) == 2:
         q, way = np.linspace(q[0], q[1], STRAIGHT_NODES), np.linspace(0.0, way[1], STRAIGHT_NODES)
-    spline = CubicSpline(way, q)
+    spline = scipy.interpolate.CubicSpline(way, q)
     pace = _toppra(way, spline, speed, torque_rows(model, way, spline, speed, peak))
     between = (pace[:-1] + pace[1:]) / 2
     if (between <= 0).any():
@@ -81,7 +81,7 @@ def fastest_under_torques(model: ArmModel, q: Reals, speed: Reals, peak: Reals) 
 Rows = tuple[Reals, Reals, Reals, Reals, Reals]
 
 
-def torque_rows(model: ArmModel, way: Reals, spline: CubicSpline, speed: Reals, peak: Reals) -> Rows:
+def torque_rows(model: ArmModel, way: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, peak: Reals) -> Rows:
     """Constraints ``F (a s'' + b s'^2 + c) <= g`` at the nodes: a, b, c (N, k), F (N, 2k, k), g (N, 2k).
 
     k is the number of joints whose peak torque is known.
@@ -102,7 +102,7 @@ def torque_rows(model: ArmModel, way: Reals, spline: CubicSpline, speed: Reals, 
     return a[:, bound], b[:, bound], c[:, bound], F, g[:, np.tile(bound, 2)]
 
 
-def _toppra(way: Reals, spline: CubicSpline, speed: Reals, rows: Rows) -> Reals:
+def _toppra(way: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, rows: Rows) -> Reals:
     """Speed along the way at its nodes (N,)."""
     try:
         with warnings.catch_warnings():  # of escapes in docstrings, when Python compiles the library

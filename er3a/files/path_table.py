@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
@@ -95,7 +95,9 @@ def read_path_table(path: str | Path) -> PathTable:
         size, poses = np.abs(np.diff(joints, axis=0)).max(axis=1), None
     else:
         poses, joints = _poses(path, lines, rows, forms[0]), None
-        turn = Rotation.from_matrix(np.swapaxes(poses[:-1, :3, :3], -1, -2) @ poses[1:, :3, :3]).magnitude()
+        turn = scipy.spatial.transform.Rotation.from_matrix(
+            np.swapaxes(poses[:-1, :3, :3], -1, -2) @ poses[1:, :3, :3]
+        ).magnitude()
         size = np.maximum(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1), turn)
     repeated = np.concatenate([[False], size < SAME_POINT])
     if repeated[1:].all():
@@ -142,7 +144,7 @@ def _poses(path: Path, lines: Integers, rows: list[dict[str, Any]], form: str) -
     if form in ("rpy_deg", "zyz_deg"):
         angles = _block(path, rows, names, "give the orientation as a quaternion or a matrix")
         order = "ZYX" if form == "rpy_deg" else "ZYZ"
-        T[:, :3, :3] = Rotation.from_euler(
+        T[:, :3, :3] = scipy.spatial.transform.Rotation.from_euler(
             order, angles[:, ::-1] if form == "rpy_deg" else angles, degrees=True
         ).as_matrix()
         return T
@@ -152,7 +154,7 @@ def _poses(path: Path, lines: Integers, rows: list[dict[str, Any]], form: str) -
         for i in np.flatnonzero(np.abs(length - 1) > UNIT_LENGTH_TOLERANCE):
             problem = f"the quaternion's length is {length[i]:.9g}, not 1"
             raise InputError(path, _where(lines[i], names), problem, "Divide w, x, y and z by it")
-        T[:, :3, :3] = Rotation.from_quat(values, scalar_first=True).as_matrix()
+        T[:, :3, :3] = scipy.spatial.transform.Rotation.from_quat(values, scalar_first=True).as_matrix()
         return T
     R = values.reshape(-1, 3, 3)
     off = np.abs(R @ np.swapaxes(R, -1, -2) - np.eye(3)).max(axis=(-1, -2))

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn
@@ -69,7 +69,7 @@ def poses_of(path: Path, rows: list[dict[str, Any]], stream: str, form: str) -> 
                 where = f"row {row['row']}, columns {stream}_qw to {stream}_qz"
                 problem = f"the quaternion's length is {length:.6g}, not 1"
                 raise InputError(path, where, problem, "Correct the sample, or remove its row")
-        return posed(Rotation.from_quat(values, scalar_first=True).as_matrix(), position / 1000)
+        return posed(scipy.spatial.transform.Rotation.from_quat(values, scalar_first=True).as_matrix(), position / 1000)
     return posed(_rotations(path, rows, stream, values.reshape(-1, 3, 3)), position / 1000)
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
-from scipy.spatial.transform import Rotation
 
 from er3a.errors import InputError
 from er3a.files.robot_file import Name
@@ -108,7 +108,7 @@ class Orientation(StrictModel):
             first, second, third = (transform(np.zeros(3), turn)[:3, :3] for turn in _zyz_turns(self.zyz_deg))
             return first @ second @ third
         if self.quaternion_wxyz is not None:
-            return Rotation.from_quat(self.quaternion_wxyz, scalar_first=True).as_matrix()
+            return scipy.spatial.transform.Rotation.from_quat(self.quaternion_wxyz, scalar_first=True).as_matrix()
         u, _, vt = np.linalg.svd(np.array(self.matrix))
         return u @ vt
 

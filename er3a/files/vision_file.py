@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
+import scipy
 from pydantic import Field, model_validator
-from scipy.spatial.transform import Rotation
 
 from er3a.errors import InputError
 from er3a.files.hand_eye_file import Positive, StandardDeviations
@@ -114,7 +114,7 @@ class ObjectEntry(StrictModel):
     def pose(self) -> Reals:
         """T_camera_object (4, 4), m."""
         T = np.eye(4)
-        T[:3, :3] = Rotation.from_quat(self.quaternion_wxyz, scalar_first=True).as_matrix()
+        T[:3, :3] = scipy.spatial.transform.Rotation.from_quat(self.quaternion_wxyz, scalar_first=True).as_matrix()
         T[:3, 3] = np.array(self.xyz_mm) / 1000
         return T
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from er3a.display import Displayed, Sheet, shortly
 from er3a.errors import Er3aError, InputError
@@ -222,7 +222,7 @@ def _motion(joint: UrdfJoint, values: Reals) -> Reals:
     if joint.type == "prismatic":
         T[:, :3, 3] = values[:, None] * joint.axis
     else:
-        T[:, :3, :3] = Rotation.from_rotvec(values[:, None] * joint.axis).as_matrix()
+        T[:, :3, :3] = scipy.spatial.transform.Rotation.from_rotvec(values[:, None] * joint.axis).as_matrix()
     return T
 
 

@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import Bounds, LinearConstraint, milp
+import scipy
 
 from er3a.identifiability.entries import TableNumber, shifted
 from er3a.identifiability.requirements import Asked
@@ -284,8 +284,8 @@ class Region:
         up = np.minimum(trust, np.maximum(self.widest - amounts, 0.0))
         down = np.minimum(trust, np.maximum(self.widest + amounts, 0.0))
         cost = np.concatenate([-toward + IDLE_COST, toward + IDLE_COST, [EXCESS_COST]])
-        bounds = Bounds(np.zeros(2 * k + 1), np.concatenate([up, down, [np.inf]]))
-        solved = milp(cost, constraints=LinearConstraint(A, low, high), bounds=bounds)
+        bounds = scipy.optimize.Bounds(np.zeros(2 * k + 1), np.concatenate([up, down, [np.inf]]))
+        solved = scipy.optimize.milp(cost, constraints=scipy.optimize.LinearConstraint(A, low, high), bounds=bounds)
         if solved.x is None:
             return np.zeros(k)
         step: Reals = solved.x[:k] - solved.x[k : 2 * k]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from er3a.geometry.sphere import fibonacci_sphere
 from er3a.kinematics.batch import inverse_batch
@@ -49,7 +49,7 @@ def solvable(robot: Robot, T: Reals) -> Flags:
 def neighbours(robot: Robot, T: Reals, random: np.random.Generator) -> Neighbours:
     """Search around a pose (4, 4) of the tool."""
     turned = np.tile(T, (RANDOM_ORIENTATIONS, 1, 1))
-    turned[:, :3, :3] = Rotation.random(RANDOM_ORIENTATIONS, rng=random).as_matrix()
+    turned[:, :3, :3] = scipy.spatial.transform.Rotation.random(RANDOM_ORIENTATIONS, rng=random).as_matrix()
     shifted_to = _nearest_position(robot, T)
     return Neighbours(
         orientation_ratio=float(solvable(robot, turned).mean()),
@@ -64,7 +64,7 @@ def _least_turn(robot: Robot, T: Reals) -> float | None:
 
     def turned_ok(about: Reals, by: Reals) -> Flags:
         poses = np.tile(T, (len(about), 1, 1))
-        poses[:, :3, :3] = Rotation.from_rotvec(about * by[:, None]).as_matrix() @ T[:3, :3]
+        poses[:, :3, :3] = scipy.spatial.transform.Rotation.from_rotvec(about * by[:, None]).as_matrix() @ T[:3, :3]
         return solvable(robot, poses)
 
     found = turned_ok(np.repeat(axes, TURN_STEPS, axis=0), np.tile(angles, DIRECTIONS)).reshape(DIRECTIONS, TURN_STEPS)

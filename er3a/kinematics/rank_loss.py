@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+import scipy
 
 from er3a.kinematics.chain import arm_length, axes_at_zero_theta
 from er3a.kinematics.forward import jacobian
@@ -167,7 +167,9 @@ def _stretches(robot: Robot, t: Reals, q: Reals, joints: Callable[[Reals], Reals
             def size(time: float) -> float:
                 return float(_smallest_and_sign(robot, joints(np.array([time])))[0][0])
 
-            near = minimize_scalar(size, bounds=(begin, end), method="bounded", options={"xatol": 1e-12 * t[-1]})
+            near = scipy.optimize.minimize_scalar(
+                size, bounds=(begin, end), method="bounded", options={"xatol": 1e-12 * t[-1]}
+            )
             if near.fun < value:
                 at, value = float(near.x), float(near.fun)
         axes = dependent_axes(robot, joints(np.array([at]))[0])

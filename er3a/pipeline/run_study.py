@@ -17,7 +17,7 @@ from er3a.errors import Er3aError
 from er3a.files.kept_files import half_written
 from er3a.files.shipped import ROOT
 from er3a.pipeline.check import check_study
-from er3a.pipeline.checksums import corrupted
+from er3a.pipeline.corrupted import corrupted
 
 _STATE = Path(".snakemake")
 

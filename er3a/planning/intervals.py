@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Generic, Literal, TypeVar
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
+import scipy
 
 from er3a.findings import Finding
 from er3a.kinematics.inverse import inverse
@@ -254,10 +254,13 @@ def _peaks_between(t: Reals, values: Reals, function: Callable[[float], float]) 
         if values[i] - slope**2 / (2 * curvature) <= 0:
             continue
         near = {"bounds": (t[i - 1], t[i + 1]), "method": "bounded", "options": {"xatol": 1e-10 * (t[-1] - t[0])}}
-        best = minimize_scalar(lambda at: -function(at), **near)
+        best = scipy.optimize.minimize_scalar(lambda at: -function(at), **near)
         if best.fun >= 0:
             continue
-        ends = [brentq(function, *sorted((side, best.x)), xtol=1e-12 * (t[-1] - t[0])) for side in t[[i - 1, i + 1]]]
+        ends = [
+            scipy.optimize.brentq(function, *sorted((side, best.x)), xtol=1e-12 * (t[-1] - t[0]))
+            for side in t[[i - 1, i + 1]]
+        ]
         found.append((float(ends[0]), float(ends[1]), float(-best.fun)))
     return found
 
@@ -269,4 +272,4 @@ def _root(function: Callable[[float], float], t: Reals, values: Reals, a: int, b
     low, high = function(t[a]), function(t[b])
     if not low * high < 0:
         return float(t[a] if abs(values[a]) < abs(values[b]) else t[b])
-    return float(brentq(function, t[a], t[b], xtol=1e-12 * (t[-1] - t[0])))
+    return float(scipy.optimize.brentq(function, t[a], t[b], xtol=1e-12 * (t[-1] - t[0])))

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from er3a.errors import PoseError
 from er3a.geometry.transforms import check_poses
@@ -231,7 +231,7 @@ def rotation_between(T_start: Reals, T_end: Reals, half_turn_axis: Reals | None 
     PoseError
         if ``half_turn_axis`` can't choose
     """
-    rotation = Rotation.from_matrix(T_end[:3, :3] @ T_start[:3, :3].T).as_rotvec()
+    rotation = scipy.spatial.transform.Rotation.from_matrix(T_end[:3, :3] @ T_start[:3, :3].T).as_rotvec()
     angle = np.linalg.norm(rotation)
     half_turn = bool(abs(angle - np.pi) < HALF_TURN_TOLERANCE)
     if half_turn_axis is not None and not half_turn:
@@ -243,7 +243,11 @@ def rotation_between(T_start: Reals, T_end: Reals, half_turn_axis: Reals | None 
 
 def turning_poses(T_start: Reals, points: Reals, rotation: Reals, progress: Reals) -> Reals:
     """T_base_tool (..., 4, 4) at points (..., 3), turned from ``T_start`` by shares (...,) of a rotation vector."""
-    turns = Rotation.from_rotvec(progress.reshape(-1, 1) * rotation).as_matrix().reshape(*progress.shape, 3, 3)
+    turns = (
+        scipy.spatial.transform.Rotation.from_rotvec(progress.reshape(-1, 1) * rotation)
+        .as_matrix()
+        .reshape(*progress.shape, 3, 3)
+    )
     T = np.zeros((*progress.shape, 4, 4))
     T[..., :3, :3] = turns @ T_start[:3, :3]
     T[..., :3, 3] = points

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.polynomial import chebyshev
-from scipy.optimize import brentq
 
 from er3a.numerics.arrays import Integers, Reals
 from er3a.planning.profiles import Rates
@@ -67,7 +67,9 @@ class Pieces:
         low, high = value(start), value(end)
         if not low * high < 0:
             return start if abs(low) < abs(high) else end
-        return float(brentq(value, start, end, xtol=max(LOCATED * (b - a), 1e-300), rtol=4 * np.finfo(float).eps))
+        return float(
+            scipy.optimize.brentq(value, start, end, xtol=max(LOCATED * (b - a), 1e-300), rtol=4 * np.finfo(float).eps)
+        )
 
     def above(self, level: float) -> list[tuple[float, float, float]]:
         """Stretches on which the function is greater than a level: start, end, and its greatest value there."""

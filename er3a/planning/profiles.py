@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+import scipy
 
 from er3a.numerics.arrays import Integers, Reals
 
@@ -158,7 +158,7 @@ class Timetable:
 
     def __init__(self, times: Reals, progress: Reals, halts: Reals):
         self.times, self.progress = np.asarray(times, float), np.asarray(progress, float)
-        slopes = PchipInterpolator(self.times, self.progress).derivative()(self.times)
+        slopes = scipy.interpolate.PchipInterpolator(self.times, self.progress).derivative()(self.times)
         slopes[np.asarray(halts, bool)] = 0.0
         slopes[[0, -1]] = 0.0
         self._slopes = slopes

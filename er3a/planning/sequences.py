@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from er3a.errors import PathError
 from er3a.numerics.arrays import Flags, Reals
@@ -105,7 +105,11 @@ class SegmentPath:
         progress = np.asarray(progress, float)
         values = self._values(progress)[0]
         i = self.curve.piece(progress)[0]
-        turns = Rotation.from_rotvec(values[..., 3:].reshape(-1, 3)).as_matrix().reshape(*progress.shape, 3, 3)
+        turns = (
+            scipy.spatial.transform.Rotation.from_rotvec(values[..., 3:].reshape(-1, 3))
+            .as_matrix()
+            .reshape(*progress.shape, 3, 3)
+        )
         T = np.zeros((*progress.shape, 4, 4))
         T[..., :3, :3] = turns @ self.origins[i]
         T[..., :3, 3] = values[..., :3]

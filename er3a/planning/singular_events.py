@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from er3a.kinematics.near_singular import NearSingular, factor_of
 from er3a.kinematics.rank_loss import rank_losses
@@ -139,7 +139,7 @@ def _root(factor: Factor, start: float, end: float, duration: float) -> float:
     low, high = float(factor(start)), float(factor(end))
     if not low * high < 0:
         return start if abs(low) < abs(high) else end
-    return float(brentq(factor, start, end, xtol=1e-14 * duration, rtol=4 * np.finfo(float).eps))
+    return float(scipy.optimize.brentq(factor, start, end, xtol=1e-14 * duration, rtol=4 * np.finfo(float).eps))
 
 
 def _minima(times: Reals, f: Reals, factor: Factor, near: float, duration: float) -> list[tuple[float, float]]:
@@ -167,7 +167,7 @@ def _minima(times: Reals, f: Reals, factor: Factor, near: float, duration: float
         left = max(times[max(before - 1, 0)], times[0] + 2 * step)
         right = min(times[min(after, last)], times[-1] - 2 * step)
         if 0 < i < last and right > left and slope(left) < 0 < slope(right):
-            at = brentq(slope, left, right, xtol=1e-13 * duration)
+            at = scipy.optimize.brentq(slope, left, right, xtol=1e-13 * duration)
             refined = abs(float(factor(at)))
             if refined <= distance * (1 + FLAT):
                 low, distance = at, refined

@@ -20,7 +20,7 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 from er3a.errors import Er3aError
 from er3a.numerics.arrays import Flags, Reals
@@ -222,7 +222,7 @@ def fastest(q: Reals, limits: JointLimits, programmed: Reals | None = None) -> T
     if len(way) == 2:
         q, way = np.linspace(q[0], q[1], STRAIGHT_NODES), np.linspace(0.0, way[1], STRAIGHT_NODES)
         programmed = None
-    spline = CubicSpline(way, q)
+    spline = scipy.interpolate.CubicSpline(way, q)
     cap = None if programmed is None else np.gradient(way, programmed[kept])
     speed = _toppra(way, spline, limits, cap)
     pace = (speed[:-1] + speed[1:]) / 2
@@ -240,7 +240,7 @@ def within_limits(curve: PiecewiseMotion, limits: JointLimits, least: float = 0.
     return motion if factor <= 1 else Timed(curve.scaled(factor))
 
 
-def run_along(way: Reals, spline: CubicSpline, speed: Reals, t: Reals) -> Callable[[Reals], Rates]:
+def run_along(way: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, t: Reals) -> Callable[[Reals], Rates]:
     """The way run at speeds (N,) at its nodes at times (N,), evenly accelerated between them."""
     pull = np.diff(speed**2) / (2 * np.diff(way))
 
@@ -268,7 +268,7 @@ def standing(q: Reals, duration: float) -> Timed:
 
 def through(t: Reals, q: Reals) -> Timed:
     """The smooth motion from rest to rest through angles (N, n) in rad at times (N,) in s: a cubic spline."""
-    spline = CubicSpline(t, q, bc_type="clamped")
+    spline = scipy.interpolate.CubicSpline(t, q, bc_type="clamped")
     return Timed(polynomial_motion(lambda at: (spline(at), spline(at, 1), spline(at, 2)), t, 3))
 
 
@@ -287,7 +287,7 @@ def _stacked(series: list[Reals]) -> Reals:
     return np.concatenate([np.pad(part, ((0, 0), (0, most - part.shape[1]), (0, 0))) for part in series])
 
 
-def _toppra(way: Reals, spline: CubicSpline, limits: JointLimits, cap: Reals | None) -> Reals:
+def _toppra(way: Reals, spline: scipy.interpolate.CubicSpline, limits: JointLimits, cap: Reals | None) -> Reals:
     """Speed along the way at its nodes (N,)."""
     try:
         with warnings.catch_warnings():  # of escapes in docstrings, when Python compiles the library

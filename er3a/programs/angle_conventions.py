@@ -23,7 +23,7 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from er3a.geometry.transforms import rpy_of, transform
 from er3a.numerics.arrays import Reals
@@ -48,7 +48,7 @@ def pose_of(numbers: Sequence[float], convention: Convention) -> Reals:
     T = np.eye(4)
     T[:3, 3] = given[:3] / MM
     if convention == "abb":
-        T[:3, :3] = Rotation.from_quat(given[[4, 5, 6, 3]]).as_matrix()
+        T[:3, :3] = scipy.spatial.transform.Rotation.from_quat(given[[4, 5, 6, 3]]).as_matrix()
     else:
         reversed_turn = transform(np.zeros(3), -np.radians(given[3:6]))  # Rz(-rz) Ry(-ry) Rx(-rx)
         T[:3, :3] = reversed_turn[:3, :3].T
@@ -64,7 +64,7 @@ def numbers_of(T: Reals, convention: Convention) -> tuple[float, ...]:
     elif convention == "ur":
         turned = _rotation_vector(T[:3, :3].tolist())
     elif convention == "abb":
-        turned = Rotation.from_matrix(T[:3, :3]).as_quat(canonical=True)[[3, 0, 1, 2]]
+        turned = scipy.spatial.transform.Rotation.from_matrix(T[:3, :3]).as_quat(canonical=True)[[3, 0, 1, 2]]
     else:
         back = np.eye(4)
         back[:3, :3] = T[:3, :3].T

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from er3a.numerics.arrays import Reals
 
@@ -34,8 +34,10 @@ def arc_poses(start: Reals, via: Reals, end: Reals, shares: Reals) -> Reals | No
     turn = (angle * shares)[:, None]
     poses = np.tile(np.eye(4), (len(shares), 1, 1))
     poses[:, :3, 3] = centre + np.cos(turn) * spoke + np.sin(turn) * np.cross(normal, spoke)
-    rotation = Rotation.from_matrix(end[:3, :3] @ start[:3, :3].T).as_rotvec()
-    poses[:, :3, :3] = Rotation.from_rotvec(shares[:, None] * rotation).as_matrix() @ start[:3, :3]
+    rotation = scipy.spatial.transform.Rotation.from_matrix(end[:3, :3] @ start[:3, :3].T).as_rotvec()
+    poses[:, :3, :3] = (
+        scipy.spatial.transform.Rotation.from_rotvec(shares[:, None] * rotation).as_matrix() @ start[:3, :3]
+    )
     return poses
 
 

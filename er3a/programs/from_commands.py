@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import assert_never
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
@@ -162,7 +162,9 @@ class _Making:
             middle = self.pose.copy()
             middle[:3, 3] = (self.pose[:3, 3] + end[:3, 3]) / 2
             sense = _sense(turn / np.pi, None if axis is None else self.to_robot[:3, :3] @ axis)
-            middle[:3, :3] = Rotation.from_rotvec(sense * turn / 2).as_matrix() @ self.pose[:3, :3]
+            middle[:3, :3] = (
+                scipy.spatial.transform.Rotation.from_rotvec(sense * turn / 2).as_matrix() @ self.pose[:3, :3]
+            )
             seconds /= 2
             self.found.append(self._motion("line", PoseTarget(middle), Rate(seconds, "s"), FINE))
         self.found.append(self._motion("line", PoseTarget(end, joints=joints), Rate(seconds, "s"), zone))
@@ -212,7 +214,7 @@ def _halts(timing: float | Times, count: int) -> dict[int, float]:
 
 
 def _turn(start: Reals, end: Reals) -> Reals:
-    found: Reals = Rotation.from_matrix(end[:3, :3] @ start[:3, :3].T).as_rotvec()
+    found: Reals = scipy.spatial.transform.Rotation.from_matrix(end[:3, :3] @ start[:3, :3].T).as_rotvec()
     return found
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from er3a.errors import PoseError
 from er3a.kinematics.forward import forward
@@ -161,7 +161,7 @@ def _changed(pose: Reals, old: tuple[NamedFrame, NamedFrame], new: tuple[NamedFr
 
 def _between(motion: ArmMotion, start: Reals, end: Reals) -> Iterator[Reals]:
     """Poses on the way, near enough to each other that the arm's branch is the same."""
-    turn = Rotation.from_matrix(end[:3, :3] @ start[:3, :3].T).as_rotvec()
+    turn = scipy.spatial.transform.Rotation.from_matrix(end[:3, :3] @ start[:3, :3].T).as_rotvec()
     way = float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
     count = int(min(max(way / STEP_M, float(np.linalg.norm(turn)) / STEP_RAD, 1), MOST_STEPS)) + 1
     shares = np.arange(1, count) / count
@@ -173,5 +173,5 @@ def _between(motion: ArmMotion, start: Reals, end: Reals) -> Iterator[Reals]:
     for share in shares:
         pose = np.eye(4)
         pose[:3, 3] = start[:3, 3] + share * (end[:3, 3] - start[:3, 3])
-        pose[:3, :3] = Rotation.from_rotvec(share * turn).as_matrix() @ start[:3, :3]
+        pose[:3, :3] = scipy.spatial.transform.Rotation.from_rotvec(share * turn).as_matrix() @ start[:3, :3]
         yield pose

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from er3a.geometry.transforms import rpy_of, transform
 from er3a.numerics.arrays import Reals
@@ -274,9 +274,11 @@ def _of_poses(name: str, values: list[Value | None], keywords: dict[str, Value])
         plain = numbers(values[0])
         if plain is not None and len(plain) == 3 and finite(plain):
             if name == "rpy2rotvec":
-                turn = Rotation.from_matrix(transform(np.zeros(3), np.array(plain))[:3, :3]).as_rotvec()
+                turn = scipy.spatial.transform.Rotation.from_matrix(
+                    transform(np.zeros(3), np.array(plain))[:3, :3]
+                ).as_rotvec()
             else:
-                turn = rpy_of(Rotation.from_rotvec(plain).as_matrix())
+                turn = rpy_of(scipy.spatial.transform.Rotation.from_rotvec(plain).as_matrix())
             return tuple(map(float, turn))
     poses = [pose for pose in map(_pose, values) if pose is not None]
     if name == "pose_inv" and len(poses) == 1:
@@ -297,14 +299,14 @@ def _of_poses(name: str, values: list[Value | None], keywords: dict[str, Value])
             share = number(values[2] if len(values) > 2 else keywords.get("alpha"))
             if share is None or not math.isfinite(share):
                 return None
-            turn = Rotation.from_matrix(a[:3, :3].T @ b[:3, :3]).as_rotvec()
+            turn = scipy.spatial.transform.Rotation.from_matrix(a[:3, :3].T @ b[:3, :3]).as_rotvec()
             found = a.copy()
             found[:3, 3] += share * (b[:3, 3] - a[:3, 3])
-            found[:3, :3] = a[:3, :3] @ Rotation.from_rotvec(share * turn).as_matrix()
+            found[:3, :3] = a[:3, :3] @ scipy.spatial.transform.Rotation.from_rotvec(share * turn).as_matrix()
             return _record(found)
         case "point_dist":
             return float(np.linalg.norm(a[:3, 3] - b[:3, 3]))
         case "pose_dist":
-            turn = Rotation.from_matrix(a[:3, :3].T @ b[:3, :3]).as_rotvec()
+            turn = scipy.spatial.transform.Rotation.from_matrix(a[:3, :3].T @ b[:3, :3]).as_rotvec()
             return float(np.linalg.norm([*(a[:3, 3] - b[:3, 3]), *turn]))
     return None

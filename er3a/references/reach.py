@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import LinearConstraint, minimize
+import scipy
 
 from er3a.errors import RobotError
 from er3a.kinematics.forward import frames
@@ -64,7 +64,7 @@ def search(robot: Robot, quantity: Extreme, starts: int) -> tuple[float, Reals]:
         return _within_sums(robot, scan, cost, cost_and_slope, starts, sign)
     best = scan[np.argsort(cost(scan), kind="stable")[: (starts + 1) // 2]]
     results = [
-        minimize(
+        scipy.optimize.minimize(
             cost_and_slope,
             start,
             jac=True,
@@ -99,8 +99,10 @@ def _within_sums(
     order = np.argsort(cost(scan), kind="stable")[:starts]
     found = [scan[order[0]]]
     for start in scan[order]:
-        sums = LinearConstraint(factors, ends[0], ends[1])
-        end = minimize(cost_and_slope, start, jac=True, method="SLSQP", bounds=bounds, constraints=[sums])
+        sums = scipy.optimize.LinearConstraint(factors, ends[0], ends[1])
+        end = scipy.optimize.minimize(
+            cost_and_slope, start, jac=True, method="SLSQP", bounds=bounds, constraints=[sums]
+        )
         if within(robot, end.x):
             found.append(end.x)
     q = min(found, key=lambda each: float(cost(each)))

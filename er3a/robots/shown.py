@@ -1,4 +1,4 @@
-"""Joint values as people read and write them: degrees, and mm of joints that slide."""
+"""Joint values as people read and write them: degrees, and mm of joints that slide; the size to draw an arm at."""
 
 from __future__ import annotations
 
@@ -31,3 +31,8 @@ def joint_names(robot: Robot) -> tuple[str, ...]:
 def joint_columns(robot: Robot) -> tuple[str, ...]:
     """Names of the joints with the unit they are shown in: ``q1_deg``, of those that slide ``q3_mm``."""
     return tuple(f"q{k + 1}_{'mm' if slides else 'deg'}" for k, slides in enumerate(robot.slides))
+
+
+def size_of(robot: Robot) -> float:
+    """A length (m) to scale drawings with: the sum of all link lengths."""
+    return float(np.abs(robot.a).sum() + np.abs(robot.d).sum())

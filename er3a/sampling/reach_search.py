@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import LinearConstraint, minimize
+import scipy
 
 from er3a.kinematics.forward import forward, jacobian
 from er3a.numerics.arrays import Reals
@@ -63,7 +63,7 @@ def _best(robot: Robot, grid: Grid, q: Reals, values: Reals, factors: tuple[floa
     if robot.combined:
         sums_of = np.array([limit.factors for limit in robot.combined])
         ends = np.array([(limit.lower, limit.upper) for limit in robot.combined]).T
-        sums, fine = LinearConstraint(sums_of, ends[0], ends[1]), {"ftol": 1e-15, "maxiter": 500}
+        sums, fine = scipy.optimize.LinearConstraint(sums_of, ends[0], ends[1]), {"ftol": 1e-15, "maxiter": 500}
         ways: dict[str, Any] = {
             "jac": True,
             "method": "SLSQP",
@@ -71,9 +71,12 @@ def _best(robot: Robot, grid: Grid, q: Reals, values: Reals, factors: tuple[floa
             "constraints": [sums],
             "options": fine,
         }
-        ended = [minimize(goal, start, **ways) for start in starts]
+        ended = [scipy.optimize.minimize(goal, start, **ways) for start in starts]
         kept = [float(end.fun) for end in ended if within(robot, end.x)]
         return float(min([*kept, *(goal(start)[0] for start in starts)]))
     tight = {"ftol": 1e-15, "gtol": 1e-12, "maxiter": 500}
-    found = [minimize(goal, q0, jac=True, method="L-BFGS-B", bounds=bounds, options=tight).fun for q0 in starts]
+    found = [
+        scipy.optimize.minimize(goal, q0, jac=True, method="L-BFGS-B", bounds=bounds, options=tight).fun
+        for q0 in starts
+    ]
     return float(min(found))

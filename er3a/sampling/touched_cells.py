@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.sampling.grid import Grid
@@ -49,7 +49,7 @@ class Growth:
 def section_cells(tally: Tally, grid: Grid) -> TouchedSection:
     """The side section, all azimuths folded in."""
     padded = np.pad(tally.section == 0, ((0, 1), (1, 1)), constant_values=True)
-    labels, _ = ndimage.label(padded)
+    labels, _ = scipy.ndimage.label(padded)
     sizes = np.bincount(labels.ravel())
     is_void = (sizes >= SECTION_VOID_CELLS) & (np.arange(len(sizes)) != labels[-1, 0])
     is_void[0] = False

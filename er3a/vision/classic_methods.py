@@ -26,7 +26,7 @@ from collections.abc import Callable
 from typing import Literal, get_args
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from er3a.numerics.arrays import Reals
 from er3a.vision.tangent import inverted, log_rotation, posed, skew
@@ -88,7 +88,7 @@ def _nearest_rotation(M: Reals) -> Reals:
 
 def _quaternions(R: Reals) -> Reals:
     """Unit quaternions (P, 4), real part first and not negative."""
-    q: Reals = Rotation.from_matrix(R).as_quat(canonical=True, scalar_first=True)
+    q: Reals = scipy.spatial.transform.Rotation.from_matrix(R).as_quat(canonical=True, scalar_first=True)
     return q
 
 
@@ -96,7 +96,7 @@ def _horaud(A: Reals, C: Reals) -> Reals:
     a, c = _quaternions(A[:, :3, :3]), _quaternions(C[:, :3, :3])
     K = _left_product(a) - _right_product(c)
     q = np.linalg.eigh(np.einsum("pki,pkj->ij", K, K))[1][:, 0]
-    R = Rotation.from_quat(q, scalar_first=True).as_matrix()
+    R = scipy.spatial.transform.Rotation.from_quat(q, scalar_first=True).as_matrix()
     return posed(R, _translation(A, C, R))
 
 
@@ -160,7 +160,7 @@ def _daniilidis(A: Reals, C: Reals) -> Reals:
     s, length = max(zip(roots.real, lengths), key=lambda each: each[1])
     real, dual = (s * u1 + u2) / np.sqrt(length), (s * w1 + w2) / np.sqrt(length)
     t = 2 * (_right_product(np.r_[real[0], -real[1:]][None])[0] @ dual)[1:]
-    return posed(Rotation.from_quat(real, scalar_first=True).as_matrix(), t)
+    return posed(scipy.spatial.transform.Rotation.from_quat(real, scalar_first=True).as_matrix(), t)
 
 
 def _dual_part(q: Reals, t: Reals) -> Reals:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 from er3a.collision.along import clearance_along
 from er3a.collision.bodies import Bodies
@@ -292,7 +292,7 @@ def _ratio(value: Reals, needed: float) -> Reals:
 
 def _smooth(times: Reals, q: Reals) -> PiecewiseMotion:
     """The cubic spline through joint values (N, n) at times (N,) in s."""
-    spline = CubicSpline(times, q)
+    spline = scipy.interpolate.CubicSpline(times, q)
     return polynomial_motion(lambda t: (spline(t), spline(t, 1), spline(t, 2)), times, CUBIC)
 
 

@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
-from scipy.special import chdtrc, chdtri, fdtrc, stdtrit
+import scipy
 
 from er3a.display import Displayed, Sheet, first_rows, shortly
 from er3a.geometry.transforms import rpy_of
@@ -166,7 +165,7 @@ def calibrate_hand_eye(samples: CalibrationSet) -> HandEye:
     kept = samples.take(used)
     warnings: list[CalibrationWarning] = [angles.warning] if angles.warning else []
     warnings += _warnings(kept, refined, greatest, apart)
-    half_width = stdtrit(refined.freedom, (1 + SURE) / 2) * np.sqrt(np.diag(refined.covariance))
+    half_width = scipy.special.stdtrit(refined.freedom, (1 + SURE) / 2) * np.sqrt(np.diag(refined.covariance))
     found = HandEye(
         samples=samples,
         used=used,
@@ -251,7 +250,7 @@ def _warnings(samples: CalibrationSet, refined: Refined, greatest: float, apart:
     if greatest < LITTLE_TURN or apart < LITTLE_SPREAD:
         found.append(LittleMotion(float(np.degrees(greatest)), float(np.degrees(apart))))
     free = 6 * len(samples) - 12
-    largest = float(np.sqrt(chdtri(free, EXCLUDED) / free))
+    largest = float(np.sqrt(scipy.special.chdtri(free, EXCLUDED) / free))
     if samples.camera_covariance is not None and refined.scatter > largest:
         found.append(MoreScatter(float(refined.scatter), largest))
     if order := _other_order(samples, refined):
@@ -276,7 +275,7 @@ def _other_order(samples: CalibrationSet, refined: Refined) -> QuaternionOrder |
     for stream in streams:
         T = getattr(samples, stream)
         for shift in (0, 2):  # x, y, z, w taken for w, x, y, z, and the other way round
-            R = Rotation.from_quat(np.roll(quaternion_of(T), shift, axis=1)).as_matrix()
+            R = scipy.spatial.transform.Rotation.from_quat(np.roll(quaternion_of(T), shift, axis=1)).as_matrix()
             turned = posed(R, T[:, :3, 3])
             again = replace(samples, flange=turned) if stream == "flange" else replace(samples, target=turned)
             raw = _residuals_of(again.hand, again.target, np.array([1e-3, 5e-3]))
@@ -304,7 +303,7 @@ def board_scale(samples: CalibrationSet, refined: Refined) -> tuple[float, float
             break
     free = len(r) - 13
     scatter = np.sqrt(r @ r / max(free, 1))
-    return s, float(stdtrit(max(free, 1), (1 + SURE) / 2) * scatter * np.sqrt(inverse[12, 12]))
+    return s, float(scipy.special.stdtrit(max(free, 1), (1 + SURE) / 2) * scatter * np.sqrt(inverse[12, 12]))
 
 
 def _answer(name: MethodName, samples: CalibrationSet, refined: Refined, half_width: Reals) -> MethodAnswer:
@@ -346,7 +345,7 @@ def directions_tried(samples: CalibrationSet, refined: Refined) -> tuple[Directi
     twin = best ^ 1  # both streams the other way round
     directions = []
     for k, ((flange_inverted, target_inverted), (cost, raw)) in enumerate(zip(DIRECTIONS, found)):
-        probability = float(fdtrc(free, free, cost / costs[best])) if np.isfinite(cost) else 0.0
+        probability = float(scipy.special.fdtrc(free, free, cost / costs[best])) if np.isfinite(cost) else 0.0
         status: DirectionStatus = "excluded" if probability < EXCLUDED else "open"
         status = {best: "best", twin: "same_problem"}.get(k, status)  # type: ignore[assignment]
         rms = [None, None] if raw is None else [float(np.sqrt((raw[:, part] ** 2).mean())) for part in _PARTS]
@@ -391,7 +390,7 @@ def _touch(found: HandEye, touched: Reals) -> TouchCheck:
     shared = np.einsum("mik,kl,njl->minj", J, found.covariance[part, part], J).reshape(3 * len(J), -1)
     whole = shared + (own + found.samples.touch_deviation**2 + 1e-18) * np.eye(len(shared))
     flat = difference.ravel()
-    probability = float(chdtrc(len(flat), flat @ np.linalg.solve(whole, flat)))
+    probability = float(scipy.special.chdtrc(len(flat), flat @ np.linalg.solve(whole, flat)))
     half_width = 1.96 * np.sqrt(np.diag(whole)).reshape(-1, 3)
     return TouchCheck(difference, half_width, probability)
 

@@ -15,8 +15,7 @@ from dataclasses import dataclass
 from typing import get_args
 
 import numpy as np
-from scipy.spatial.transform import Rotation
-from scipy.special import fdtrc
+import scipy
 
 from er3a.geometry.transforms import rotation_angle
 from er3a.numerics.arrays import Flags, Reals
@@ -129,7 +128,7 @@ def _mended(T: Reals, kind: SuspectKind) -> list[Reals]:
         return [away @ R @ np.diag([1.0, 1.0, -1.0])]
     axis = kind[-1]
     turns = (90.0, -90.0) if kind.startswith("quarter") else (180.0,)
-    return [R @ Rotation.from_euler(axis, turn, degrees=True).as_matrix() for turn in turns]
+    return [R @ scipy.spatial.transform.Rotation.from_euler(axis, turn, degrees=True).as_matrix() for turn in turns]
 
 
 def worst_sample(samples: CalibrationSet, refined: Refined) -> tuple[int, FarFromFit] | None:
@@ -143,7 +142,7 @@ def worst_sample(samples: CalibrationSet, refined: Refined) -> tuple[int, FarFro
         return None
     squares = (refined.whitened**2 / np.maximum(1 - refined.leverage, 0.02)).sum(axis=1)
     others = np.maximum((refined.whitened**2).sum() - (refined.whitened**2).sum(axis=1), 1e-300) / free
-    probability = fdtrc(6, free, squares / 6 / others)
+    probability = scipy.special.fdtrc(6, free, squares / 6 / others)
     worst = int(probability.argmin())
     if probability[worst] * len(samples) >= FALSE_ALARMS:
         return None

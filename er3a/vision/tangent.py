@@ -8,7 +8,7 @@ References
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from er3a.numerics.arrays import Reals
 
@@ -17,13 +17,13 @@ SMALL = 1e-4  # rad; below, series replace quotients of vanishing numbers
 
 def exp_rotation(v: Reals) -> Reals:
     """Rotation matrices (..., 3, 3) of rotation vectors (..., 3) in rad."""
-    R: Reals = Rotation.from_rotvec(v.reshape(-1, 3)).as_matrix().reshape(*v.shape, 3)
+    R: Reals = scipy.spatial.transform.Rotation.from_rotvec(v.reshape(-1, 3)).as_matrix().reshape(*v.shape, 3)
     return R
 
 
 def log_rotation(R: Reals) -> Reals:
     """Rotation vectors (..., 3) in rad, no longer than pi, of rotation matrices (..., 3, 3)."""
-    v: Reals = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_rotvec().reshape(R.shape[:-1])
+    v: Reals = scipy.spatial.transform.Rotation.from_matrix(R.reshape(-1, 3, 3)).as_rotvec().reshape(R.shape[:-1])
     return v
 
 
@@ -80,5 +80,7 @@ def step_between(T_from: Reals, T_to: Reals) -> Reals:
 def quaternion_of(T: Reals) -> Reals:
     """Unit quaternions (..., 4), real part first and not negative, of transforms (..., 4, 4)."""
     R = T[..., :3, :3]
-    q: Reals = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat(canonical=True, scalar_first=True)
+    q: Reals = scipy.spatial.transform.Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat(
+        canonical=True, scalar_first=True
+    )
     return q.reshape(*R.shape[:-2], 4)

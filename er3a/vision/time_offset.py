@@ -9,8 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
-from scipy.spatial.transform import Rotation, Slerp
+import scipy
 
 from er3a.numerics.arrays import Reals
 from er3a.vision.tangent import posed
@@ -44,13 +43,13 @@ def time_offset(hand: Stream, eye: Stream, widest: float) -> TimeOffset:
 
     Robust: a half of the compared turns may be wrong.
     """
-    arm = Slerp(hand.t, Rotation.from_matrix(hand.T[:, :3, :3]))
+    arm = scipy.spatial.transform.Slerp(hand.t, scipy.spatial.transform.Rotation.from_matrix(hand.T[:, :3, :3]))
     later = np.searchsorted(eye.t, eye.t + SPAN_S)
     first = np.flatnonzero(later < len(eye.t))
     first = first[eye.t[later[first]] - eye.t[first] < 2 * SPAN_S]
     first = first[:: max(1, len(first) // MOST_PAIRS)]
     last = later[first]
-    R = Rotation.from_matrix(eye.T[:, :3, :3])
+    R = scipy.spatial.transform.Rotation.from_matrix(eye.T[:, :3, :3])
     turned = (R[last] * R[first].inv()).magnitude()
     low, high = eye.t[first] - widest > hand.t[0], eye.t[last] + widest < hand.t[-1]
     kept = low & high
@@ -68,7 +67,7 @@ def time_offset(hand: Stream, eye: Stream, widest: float) -> TimeOffset:
     def cost(offset: float) -> float:
         return float(np.sum(np.minimum((off(offset) / scale) ** 2, INLIER**2)))
 
-    found = float(minimize_scalar(cost, bounds=(best - GRID_S, best + GRID_S), method="bounded").x)
+    found = float(scipy.optimize.minimize_scalar(cost, bounds=(best - GRID_S, best + GRID_S), method="bounded").x)
     rest, slope = off(found), (off(found + 1e-3) - off(found - 1e-3)) / 2e-3
     inlier = np.abs(rest) < INLIER * scale
     deviation = np.sqrt((rest[inlier] ** 2).mean() / max((slope[inlier] ** 2).sum(), 1e-300))
@@ -83,7 +82,7 @@ def paired(hand: Stream, eye: Stream, offset: float, count: int) -> tuple[Reals,
     """
     inside = np.flatnonzero((eye.t + offset > hand.t[0]) & (eye.t + offset < hand.t[-1]))
     t = eye.t[inside] + offset
-    arm = Slerp(hand.t, Rotation.from_matrix(hand.T[:, :3, :3]))
+    arm = scipy.spatial.transform.Slerp(hand.t, scipy.spatial.transform.Rotation.from_matrix(hand.T[:, :3, :3]))
     near = np.clip(t, hand.t[0] + 0.05, hand.t[-1] - 0.05)
     speed = (arm(near + 0.05) * arm(near - 0.05).inv()).magnitude()
     slow = np.argsort(speed, kind="stable")[: max(count, len(t) // 2)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.workspace.azimuths import TURN
@@ -88,9 +88,9 @@ def pockets(blocks: Blocks, inside: Flags) -> list[Flags]:
     void = (blocks.empty > 0.5) & inside
     around = np.concatenate([void[:, :, -2:], void, void[:, :, :2]], axis=2)
     around = np.concatenate([around[:1], around], axis=0)
-    core = ndimage.binary_erosion(around, _CUBE)
-    body = (ndimage.binary_dilation(core, _CUBE) & around)[1:, :, 2:-2]
-    labels, _ = ndimage.label(body)
+    core = scipy.ndimage.binary_erosion(around, _CUBE)
+    body = (scipy.ndimage.binary_dilation(core, _CUBE) & around)[1:, :, 2:-2]
+    labels, _ = scipy.ndimage.label(body)
     for i, j in _wraps(labels):
         labels[labels == max(i, j)] = min(i, j)
     volumes = blocks.volumes * blocks.empty

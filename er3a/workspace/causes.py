@@ -13,7 +13,7 @@ from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 from er3a.workspace.cavities import Cavity
-from er3a.workspace.proof import judge, ring_volumes
+from er3a.workspace.proof import ring_volumes, unfilled_arcs
 from er3a.workspace.section_arm import FULL_TURN, section_arm
 
 InSection = Callable[[Reals], tuple[Reals, Reals, Reals]]
@@ -117,7 +117,7 @@ def relaxations(robot: Robot, cavity: Cavity, in_section: InSection | None = Non
             return _ratio_sampled(robot, widened, cavity, chosen, in_section)
 
     found = [
-        _relaxed(robot, joint, side, ratio_filled)
+        _relaxed(robot, joint, side, ratio_filled, in_section is None)
         for joint in joints
         if robot.upper[joint - 1] - robot.lower[joint - 1] < FULL_TURN
         for side in _SIDES
@@ -126,13 +126,20 @@ def relaxations(robot: Robot, cavity: Cavity, in_section: InSection | None = Non
     return found, Unlimited(ratio_filled(_widened(robot, range(1, 7), _SIDES, 2 * np.pi)))
 
 
-def _relaxed(robot: Robot, joint: int, side: Side, ratio_filled: Callable[[Robot], float]) -> Relaxed:
+def _relaxed(robot: Robot, joint: int, side: Side, ratio_filled: Callable[[Robot], float], proven: bool) -> Relaxed:
     limit = float((robot.lower if side == "lower" else robot.upper)[joint - 1])
-    for step in STEPS:
+
+    def widened_by(step: float) -> Relaxed:
         filled = ratio_filled(_widened(robot, [joint], [side], float(np.radians(step))))
-        if filled >= _GONE:
+        return Relaxed(joint, side, float(np.degrees(limit)), step, filled)
+
+    if proven and (most := widened_by(STEPS[-1])).filled < _GONE:
+        return most  # no lesser step fills more; samples, spread thinner over a wider range, may tell otherwise
+    for step in STEPS:
+        found = widened_by(step)
+        if found.filled >= _GONE:
             break
-    return Relaxed(joint, side, float(np.degrees(limit)), step, filled)
+    return found
 
 
 def cause_of(single: list[Relaxed], unlimited: Unlimited) -> VoidCause:
@@ -176,9 +183,9 @@ def _open_angle(robot: Robot, cavity: Cavity, chosen: NDArray[np.intp]) -> Reals
     middle = cavity.cells[chosen].reshape(-1, 2, 2).mean(axis=2)
     half = np.minimum(1e-6, middle[:, 0] / 2)
     probes = np.stack([middle[:, 0] - half, middle[:, 0] + half, middle[:, 1] - half, middle[:, 1] + half], axis=1)
-    looked = judge(section_arm(robot), probes)
+    arcs = unfilled_arcs(section_arm(robot), probes)
     low, high = cavity.arcs[chosen].T
-    a, b = np.maximum(looked.unfilled[..., 0], low[:, None]), np.minimum(looked.unfilled[..., 1], high[:, None])
+    a, b = np.maximum(arcs[..., 0], low[:, None]), np.minimum(arcs[..., 1], high[:, None])
     open_angle: Reals = np.nansum(np.maximum(0, b - a), axis=1)
     return open_angle
 

@@ -10,9 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.workspace.azimuths import TURN
@@ -89,8 +88,8 @@ def cavities(section: SectionMap) -> tuple[list[Cavity], Cavity]:
     number[cell, slot] = np.arange(len(cell))
     edges = [_overlaps(section.neighbours, proof.unfilled, number), _across_zero(cell, arcs)]
     rows, columns = np.concatenate(edges, axis=1)
-    graph = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(cell), len(cell)))
-    _, label = connected_components(graph, directed=False)
+    graph = scipy.sparse.coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(cell), len(cell)))
+    _, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
     outside = np.unique(label[section.outermost[cell]])
     share = _empty_ratio(arcs, proof.empty[cell])
     is_open = np.isin(label, outside)

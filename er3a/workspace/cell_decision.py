@@ -37,7 +37,7 @@ def judge_cells(
     cells : (n, 4), m: rho_0, rho_1, z_0, z_1
     grid : configurations (m, 9), see :func:`er3a.workspace.filled.fill_configurations`, and their spacing in theta_2
         and tau, rad
-    most_boxes : of one emptiness proof
+    most_boxes : of one emptiness proof; 0: nothing is proven empty, only filled
     unfilled, empty : (n, MOST_ARCS, 2), azimuths (rad) that are not proven filled, and those of them that are proven
         empty, with their counts (n,): at first of the cell that this one was split off, on return of the cell itself
     witness : (n, 4), set to theta_2, tau, phi of a configuration that reaches the cell's middle, and 1 (else 0)
@@ -56,7 +56,7 @@ def judge_cells(
         known[:known_count] = empty_arcs[n, :known_count]
         count = _fill(arm, cell, grid, unfilled_arcs[n], unfilled_count[n], best, witness[n])
         unfilled_count[n] = count
-        if count == 0:
+        if count == 0 or most_boxes == 0:
             empty_count[n] = 0
             continue
         for k in range(count):

@@ -8,6 +8,7 @@ import numpy as np
 
 from er3a.geometry.open3d_loader import load_open3d
 from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.jit import kernel
 from er3a.sampling.grid import Grid
 
 _FLAT = 1e-9
@@ -86,13 +87,23 @@ def _planes(hull: Hull) -> tuple[Reals, Reals]:
     return normals, np.einsum("ij,ij->i", normals, a)
 
 
-def depth_inside(hull: Hull, points: Reals) -> Reals:
-    """Distance (...,) in m of points (..., 3) to the nearest face's plane, negative outside, -inf for a flat hull."""
-    flat = points.reshape(-1, 3)
-    depth = np.full(len(flat), np.inf if len(hull.triangles) else -np.inf)
-    if len(hull.triangles):
-        normals, offsets = _planes(hull)
-        for start in range(0, len(flat), 4096):
-            part = slice(start, start + 4096)
-            depth[part] = (offsets - flat[part] @ normals.T).min(axis=1)
-    return depth.reshape(points.shape[:-1])
+def inside_hull(hull: Hull, points: Reals) -> Flags:
+    """Which of the points (n, 3) lie in the hull; none in a flat one."""
+    if not len(hull.triangles):
+        return np.zeros(len(points), dtype=bool)
+    return _within_planes(*_planes(hull), points)
+
+
+@kernel
+def _within_planes(normals: Reals, offsets: Reals, points: Reals) -> Flags:
+    """Which points lie below all planes; the plane that the last one was above is tried first."""
+    within = np.ones(len(points), dtype=np.bool_)
+    last = 0
+    for n in range(len(points)):
+        for k in range(-1, len(offsets)):
+            face = last if k < 0 else k
+            along = normals[face, 0] * points[n, 0] + normals[face, 1] * points[n, 1] + normals[face, 2] * points[n, 2]
+            if along >= offsets[face]:
+                within[n], last = False, face
+                break
+    return within

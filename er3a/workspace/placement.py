@@ -15,8 +15,8 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.closed_form import SLOTS
@@ -251,5 +251,7 @@ def _places(field: Field, bricks: Flags, box: Reals, turned: bool) -> Places:
 def _sliding_least(values: Reals, points: Integers) -> Reals:
     """Least value over ``points`` (3,) lattice points from each one on; NO where the box leaves the lattice."""
     for axis, size in enumerate(points):
-        values = ndimage.minimum_filter1d(values, int(size), axis, mode="constant", cval=NO, origin=-(int(size) // 2))
+        values = scipy.ndimage.minimum_filter1d(
+            values, int(size), axis, mode="constant", cval=NO, origin=-(int(size) // 2)
+        )
     return values

@@ -138,6 +138,12 @@ def judge(arm: SectionArm, cells: Reals) -> Proof:
     return _judge(arm, np.ascontiguousarray(cells, dtype=float), _configuration_grid(arm), 0)
 
 
+def unfilled_arcs(arm: SectionArm, cells: Reals) -> Reals:
+    """Arcs (n, MOST_ARCS, 2) of given cells (n, 4) that one look does not prove filled, as in :class:`Proof`."""
+    cells = np.ascontiguousarray(cells, dtype=float)
+    return _judge(arm, cells, _configuration_grid(arm), 0, most_boxes=0).unfilled
+
+
 def _configuration_grid(arm: SectionArm) -> ConfigurationGrid:
     """Configurations of joints 2 and 3 over their limits, and the grid's steps (rad)."""
     span_2, span_3 = arm.theta_2[1] - arm.theta_2[0], arm.tau[1] - arm.tau[0]
@@ -168,7 +174,13 @@ def _quarters(cells: Reals) -> Reals:
 
 
 def _judge(
-    arm: SectionArm, cells: Reals, grid: ConfigurationGrid, level: int, parents: Proof | None = None, threads: int = 1
+    arm: SectionArm,
+    cells: Reals,
+    grid: ConfigurationGrid,
+    level: int,
+    parents: Proof | None = None,
+    threads: int = 1,
+    most_boxes: int = _MOST_BOXES,
 ) -> Proof:
     """Judge cells, beginning from what is known of those they were split off."""
     n = len(cells)
@@ -181,7 +193,7 @@ def _judge(
 
     def work(part: slice) -> int:
         known = (unfilled[part], counts[0, part]), (empty[part], counts[1, part])
-        return judge_cells(arm, cells[part], grid, _MOST_BOXES, *known, witness[part])
+        return judge_cells(arm, cells[part], grid, most_boxes, *known, witness[part])
 
     # Neighbours cost alike: small shares keep the threads busy to the end.
     parts = [slice(k, k + _SHARE) for k in range(0, n, _SHARE)]

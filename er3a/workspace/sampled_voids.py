@@ -23,8 +23,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.sampling.grid import Grid
@@ -88,7 +88,7 @@ def void_numbers(voids: list[SampledVoid], counts: Integers, inside: Flags) -> I
 
 def _enclosed(untouched: Flags) -> Integers:
     """Labels (0: none) of untouched components, connected by faces, that don't reach the outside of the grid."""
-    labels, count = ndimage.label(np.pad(untouched, 1, constant_values=True))
+    labels, count = scipy.ndimage.label(np.pad(untouched, 1, constant_values=True))
     renumber = np.arange(count + 1)
     renumber[labels[0, 0, 0]] = 0
     found: Integers = renumber[labels[1:-1, 1:-1, 1:-1]]
@@ -97,14 +97,14 @@ def _enclosed(untouched: Flags) -> Integers:
 
 def _pockets(untouched: Flags, candidates: Flags) -> Integers:
     """Labels of pockets that hold a cube of 3 x 3 x 3 untouched cells; layers thinner than that stay unlabelled."""
-    cores = ndimage.binary_erosion(untouched, _CUBE, border_value=1) & candidates
-    labels, _ = ndimage.label(cores)
-    return np.where(candidates & untouched, ndimage.maximum_filter(labels, size=3, mode="constant"), 0)
+    cores = scipy.ndimage.binary_erosion(untouched, _CUBE, border_value=1) & candidates
+    labels, _ = scipy.ndimage.label(cores)
+    return np.where(candidates & untouched, scipy.ndimage.maximum_filter(labels, size=3, mode="constant"), 0)
 
 
 def _judged(kind: VoidKind, labels: Integers, counts: Integers) -> Iterator[SampledVoid]:
     """Voids with their rim's evidence, without those that are small or wholly explained."""
-    for number, box in enumerate(ndimage.find_objects(labels), start=1):
+    for number, box in enumerate(scipy.ndimage.find_objects(labels), start=1):
         if box is None:
             continue
         cells = np.argwhere(labels[box] == number) + [side.start for side in box]
@@ -120,7 +120,7 @@ def _evidence(cells: NDArray[np.intp], counts: Integers) -> tuple[float, float]:
     box = tuple(slice(a, b) for a, b in zip(low, high))
     mask = np.zeros(high - low, dtype=bool)
     mask[tuple((cells - low).T)] = True
-    rim = counts[box][ndimage.binary_dilation(mask, _CUBE)]
+    rim = counts[box][scipy.ndimage.binary_dilation(mask, _CUBE)]
     rim = rim[rim > 0]
     expected = len(cells) * float(np.quantile(rim, _LOW_QUANTILE, method="lower")) if rim.size else 0.0
     return expected, unseen_cells(rim)

@@ -13,7 +13,7 @@ from er3a.sampling.grid import Grid
 from er3a.workspace.blocks import Blocks, blocks_of, mesh, pockets
 from er3a.workspace.causes import OnlySampled, Relaxed, Unlimited, VoidCause, cause_of, relaxations
 from er3a.workspace.cavities import Cavity, cavities
-from er3a.workspace.hull import Hull, depth_inside
+from er3a.workspace.hull import Hull, inside_hull
 from er3a.workspace.proven import Proven
 from er3a.workspace.sampled_voids import SampledVoid, VoidKind
 
@@ -59,7 +59,7 @@ def proven_voids(robot: Robot, proven: Proven, hull: Hull, shoulder: Reals) -> l
     ]
     blocks = _pocket_blocks(proven, outside)
     inside = blocks.empty > 0.5
-    inside[inside] = depth_inside(hull, proven.in_base(blocks.points()[inside])) > 0
+    inside[inside] = inside_hull(hull, proven.in_base(blocks.points()[inside]))
     for mask in pockets(blocks, inside):
         found.append(_void("open", robot, proven, _as_cavity(blocks, mask), shoulder, (blocks, mask)))
     return sorted(found, key=lambda void: -void.lower)

@@ -12,12 +12,10 @@ from pathlib import Path
 
 import pytest
 from rerun.chunk import RrdReader
-from typer.testing import CliRunner
 
 from er3a.pipeline.checksums import check_checksum, write_checksum
-from er3a.pipeline.cli import app
 from er3a.pipeline.study import STAGES
-from er3a.pipeline.viewing.preview import draw_preview
+from er3a.pipeline.viewing import preview
 from testing.small_study import stages_of
 from tests.conftest import ROBOT, ROBOTS, ROOT
 from tests.viewing.pictures import joints_seen
@@ -96,17 +94,17 @@ def vulkan() -> None:
 
 @pytest.mark.parametrize("recording", RECORDINGS)
 def test_the_preview_shows_the_arm_and_the_page_shows_the_preview(small_study, recording, vulkan):
-    preview = (small_study.folder / "reports" / recording).with_suffix(".webp")
-    check_checksum(preview)
-    assert len(preview.read_bytes()) < 150_000
-    assert joints_seen(preview.read_bytes()) >= 4
-    assert 'src="data:image/webp;base64,' in preview.with_suffix(".html").read_text(encoding="utf-8")
+    picture = (small_study.folder / "reports" / recording).with_suffix(".webp")
+    check_checksum(picture)
+    assert len(picture.read_bytes()) < 150_000
+    assert joints_seen(picture.read_bytes()) >= 4
+    assert 'src="data:image/webp;base64,' in picture.with_suffix(".html").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("stage", STAGES)
 def test_a_preview_drawn_again_is_the_same_to_the_byte(small_study, stage, vulkan, tmp_path):
     recording = small_study.folder / f"reports/{ROBOT}/{stage}.rrd"
-    assert draw_preview(recording, tmp_path / "again.webp") is None
+    assert preview.draw_preview(recording, tmp_path / "again.webp") is None
     assert (tmp_path / "again.webp").read_bytes() == recording.with_suffix(".webp").read_bytes()
 
 
@@ -120,12 +118,12 @@ def copied(small_study, tmp_path):
     return tmp_path
 
 
-def test_without_a_driver_the_preview_is_empty_and_one_line_says_why(copied, monkeypatch):
+def test_without_a_driver_the_preview_is_empty_and_one_line_says_why(copied, monkeypatch, capsys):
     for name in ("VK_DRIVER_FILES", "VK_ICD_FILENAMES"):
         monkeypatch.setenv(name, "/nowhere")
     monkeypatch.setenv("LIBGL_DRIVERS_PATH", "/nowhere")
-    done = CliRunner().invoke(app, ["preview", "inverse", "er3_600", "--reports", str(copied)])
-    assert done.exit_code == 0
-    assert re.fullmatch(r"note: previews of recordings were skipped: the Rerun viewer .+\n", done.stderr)
+    preview.main(copied / "er3_600/inverse.rrd", copied / "er3_600/inverse.webp")
+    told = capsys.readouterr().err
+    assert re.fullmatch(r"note: previews of recordings were skipped: the Rerun viewer .+\n", told)
     assert (copied / "er3_600/inverse.webp").read_bytes() == b""
     check_checksum(copied / "er3_600/inverse.webp")

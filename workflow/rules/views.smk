@@ -33,7 +33,7 @@ rule preview:
     message:
         "{wildcards.robot}: preview {wildcards.stage}"
     shell:
-        "er3a preview {wildcards.stage} {wildcards.robot} 2> {log}"
+        "python -m er3a.pipeline.viewing.preview {input} {output} 2> {log}"
 
 
 rule report:

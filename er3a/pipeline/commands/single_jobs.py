@@ -79,20 +79,6 @@ def record(
 
 
 @app.command(rich_help_panel=JOBS)
-def preview(stage: StageName, robot: RobotName, reports: Reports = DEFAULT_REPORTS):
-    """Draw a stage's recording as a picture for its page; an empty file where nothing can draw it."""
-    from er3a.pipeline.checksums import check_checksum, write_checksum
-    from er3a.pipeline.viewing.preview import draw_preview
-
-    recording = reports / robot / f"{stage}.rrd"
-    check_checksum(recording)
-    picture = recording.with_suffix(".webp")
-    if problem := draw_preview(recording, picture):
-        print_note(f"previews of recordings were skipped: {problem}")
-    write_checksum(picture)
-
-
-@app.command(rich_help_panel=JOBS)
 def report(
     stage: StageName,
     robot: RobotName,

@@ -97,12 +97,11 @@ def trial(study: Study, robot: str, whole: bool) -> Trial:
         places: dict[str, list[str | Path]] = {
             "sample": ["--study", file, "--part", "1-of-1", "--output", part],
             "compute": ["--study", file, "--results", folder / "results"],
-            "preview": ["--reports", folder / "reports"],
             "teach": ["--study", file, "--reports", folder / "reports"],
         }
 
         def carry_out(verb: str, stage: str, *words: str | Path) -> None:
-            options = places.get(verb, [*places["compute"], *places["preview"]])
+            options = places.get(verb, [*places["compute"], "--reports", folder / "reports"])
             timings[verb, stage] = timed([str(word) for word in ("er3a", verb, *words, *options)])
 
         def carry_out_stage(stage: str) -> None:
@@ -110,7 +109,9 @@ def trial(study: Study, robot: str, whole: bool) -> Trial:
             for view in STAGES[stage].views:
                 carry_out(view, stage, stage, robot)
                 if view == "record":
-                    carry_out("preview", stage, stage, robot)
+                    recording = folder / "reports" / robot / f"{stage}.rrd"
+                    drawing = ["er3a.pipeline.viewing.preview", str(recording), str(recording.with_suffix(".webp"))]
+                    timings["preview", stage] = timed(drawing)
 
         carry_out("sample", "workspace", robot)
         if whole:

@@ -10,18 +10,17 @@ from typing import Any
 
 import jinja2
 import numpy as np
-import trimesh
+import scipy
 from markupsafe import Markup
-from scipy.spatial.transform import Rotation
 
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.teach.scripts import TEACH, import_map
-from er3a.pipeline.viewing.arm import size_of
 from er3a.pipeline.viewing.palette import BODY, INK, JOINTS, LINK
 from er3a.robots.robot import Robot
+from er3a.robots.shown import size_of
 
 _HERE = Path(__file__).parent
 MOST_FRAMES = 240
@@ -145,6 +144,8 @@ def _solid(solid: Box | Cylinder | Sphere | Mesh) -> dict[str, Any]:
     if isinstance(solid, Cylinder):
         return {"kind": "cylinder", "radius": solid.radius, "length": solid.length, **common}
     if isinstance(solid, Mesh):
+        import trimesh  # slow to import, and few scenes need it
+
         hulls = [trimesh.convex.convex_hull(piece) for piece in solid.pieces]
         points = np.concatenate([hull.vertices for hull in hulls]) if hulls else np.empty((0, 3))
         starts = np.cumsum([0, *(len(hull.vertices) for hull in hulls)])
@@ -156,7 +157,11 @@ def _solid(solid: Box | Cylinder | Sphere | Mesh) -> dict[str, Any]:
 def _motion(robot: Robot, motion: PlayedMotion) -> dict[str, Any]:
     rows = _shown(motion)
     T = frames(robot, motion.q[rows])
-    turns = Rotation.from_matrix(T[..., :3, :3].reshape(-1, 3, 3)).as_quat(scalar_first=True).reshape(*T.shape[:2], 4)
+    turns = (
+        scipy.spatial.transform.Rotation.from_matrix(T[..., :3, :3].reshape(-1, 3, 3))
+        .as_quat(scalar_first=True)
+        .reshape(*T.shape[:2], 4)
+    )
     poses = np.concatenate([T[..., :3, 3], turns], axis=-1).astype("<f4")
     trail = T[:: max(1, len(rows) // TRAIL_POINTS), -1, :3, 3]
     return {

@@ -16,13 +16,9 @@ from er3a.pipeline.viewing.palette import BODY, JOINT_NAMES, LINK, rgb
 from er3a.pipeline.viewing.palette import JOINTS as JOINT_COLOURS
 from er3a.pipeline.viewing.recording import seconds
 from er3a.robots.robot import Robot
+from er3a.robots.shown import size_of
 
 _TAPER = (1.0, 0.92, 0.8, 0.66, 0.55, 0.45)
-
-
-def size_of(robot: Robot) -> float:
-    """A length (m) to scale drawings with: the sum of all link lengths."""
-    return float(np.abs(robot.a).sum() + np.abs(robot.d).sum())
 
 
 def arm_view(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.font_manager import fontManager
 from matplotlib.rcsetup import cycler
@@ -89,5 +90,7 @@ def svg_data_uri(figure: Figure) -> str:
     glyphs = "none" if language.current() == "zh" and not chinese else "path"
     buffer = io.BytesIO()
     with matplotlib.rc_context(STYLE | {"svg.fonttype": glyphs}):
-        figure.savefig(buffer, format="svg", dpi=160, metadata={"Date": None})
+        figure.dpi = 160
+        # Not savefig: it would draw a figure with a layout twice.
+        FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})
     return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")

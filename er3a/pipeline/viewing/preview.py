@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 import subprocess
+import sys
 import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,6 +15,7 @@ from rerun.experimental import ViewerClient
 
 from er3a.errors import Er3aError
 from er3a.files.kept_files import write_atomically
+from er3a.pipeline.checksums import check_checksum, write_checksum
 from er3a.pipeline.viewing.viewer import LOOPBACK, free_port, viewer_running
 
 WINDOW = (1400, 900)  # pixels
@@ -91,3 +93,21 @@ def _why(messages: str) -> str:
     panic = re.search(r"panicked at '(.+?)'\n", messages, flags=re.DOTALL)
     said = panic[1] if panic else (messages.strip().splitlines() or ["without a word"])[-1]
     return f"the Rerun viewer ended: {said} (docs/recordings.md tells what it needs)"
+
+
+def main(recording: Path, picture: Path) -> None:
+    """Draw a recording as a picture for its page; an empty file where nothing can draw it.
+
+    The workflow calls this as a program of its own: drawing needs little of what a command of ``er3a`` loads.
+    """
+    try:
+        check_checksum(recording)
+        if problem := draw_preview(recording, picture):
+            print(f"note: previews of recordings were skipped: {problem}", file=sys.stderr)
+        write_checksum(picture)
+    except Er3aError as error:
+        sys.exit(f"error: {error}")
+
+
+if __name__ == "__main__":
+    main(*map(Path, sys.argv[1:]))

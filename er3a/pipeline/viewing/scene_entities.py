@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 import rerun as rr
-from scipy.spatial import ConvexHull
+import scipy
 
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
 from er3a.files.scene_file import load_scene
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.arm import size_of
 from er3a.pipeline.viewing.palette import MUTED, rgb
+from er3a.robots.shown import size_of
 
 _PLANE_THICKNESS = 0.002  # m
 
@@ -53,7 +53,7 @@ def _solids(
 
 def pieces_mesh(pieces: Sequence[Reals], colour: tuple[int, ...]) -> rr.Mesh3D:
     """Convex pieces (k, 3) each, m, as one mesh."""
-    hulls = [ConvexHull(piece) for piece in pieces]
+    hulls = [scipy.spatial.ConvexHull(piece) for piece in pieces]
     starts = np.cumsum([0, *(len(piece) for piece in pieces)])
     triangles = [start + _outward(hull) for start, hull in zip(starts, hulls)]
     return rr.Mesh3D(
@@ -61,7 +61,7 @@ def pieces_mesh(pieces: Sequence[Reals], colour: tuple[int, ...]) -> rr.Mesh3D:
     )
 
 
-def _outward(hull: ConvexHull) -> Integers:
+def _outward(hull: scipy.spatial.ConvexHull) -> Integers:
     """A hull's triangles with their corners in order around the outward normal."""
     corners = hull.points[hull.simplices]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from er3a.numerics.arrays import Reals
 
@@ -33,7 +33,7 @@ def deviation(line: HasPoses, T: Reals) -> tuple[Reals, Reals, Reals]:
     """
     progress = np.linspace(0.0, 1.0, POINTS)
     on_path, at = _points(line.poses(progress)), _points(T)
-    _, near = cKDTree(on_path).query(at)
+    _, near = scipy.spatial.cKDTree(on_path).query(at)
     middle = np.clip(near, 1, POINTS - 2)
     squares = np.stack([((at - on_path[middle + k]) ** 2).sum(axis=1) for k in (-1, 0, 1)])
     curvature = squares[0] - 2 * squares[1] + squares[2]

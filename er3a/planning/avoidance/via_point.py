@@ -14,7 +14,7 @@ from itertools import product
 from typing import Any, Literal, cast
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from er3a.kinematics.forward import frames
 from er3a.kinematics.near_singular import factor_of
@@ -95,7 +95,7 @@ class BentPath:
             size = bend.size(progress)[..., None]
             T[..., :3, 3] += size * bend.shift
             if bend.tilt.any():
-                turns = Rotation.from_rotvec((size * bend.tilt).reshape(-1, 3)).as_matrix()
+                turns = scipy.spatial.transform.Rotation.from_rotvec((size * bend.tilt).reshape(-1, 3)).as_matrix()
                 T[..., :3, :3] = turns.reshape(*progress.shape, 3, 3) @ T[..., :3, :3]
         return T
 
@@ -230,7 +230,7 @@ def _plane_across(axis: Reals) -> Reals:
 def _moved(pose: Reals, moves: Reals) -> Reals:
     T = np.repeat(pose[None], len(moves), axis=0)
     T[:, :3, 3] += moves[:, :3]
-    T[:, :3, :3] = Rotation.from_rotvec(moves[:, 3:]).as_matrix() @ T[:, :3, :3]
+    T[:, :3, :3] = scipy.spatial.transform.Rotation.from_rotvec(moves[:, 3:]).as_matrix() @ T[:, :3, :3]
     return T
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from er3a.collision.pairs import PairOverlaps
 from er3a.collision.scene import Scene
@@ -79,7 +79,9 @@ def solve_target(robot: Robot, target: Target, random: np.random.Generator, scen
             near = _neighbours(robot, target, random)
             advice = _what_would_help(near)
     x, y, z = (target.T[:3, 3] * 1000).tolist()
-    quaternion = Rotation.from_matrix(target.T[:3, :3]).as_quat(canonical=True, scalar_first=True)
+    quaternion = scipy.spatial.transform.Rotation.from_matrix(target.T[:3, :3]).as_quat(
+        canonical=True, scalar_first=True
+    )
     result = TargetResult(
         name=target.name,
         note=target.note,

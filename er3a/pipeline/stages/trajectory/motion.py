@@ -6,8 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.integrate import cumulative_simpson
-from scipy.interpolate import CubicHermiteSpline
+import scipy
 
 from er3a.collision.along import RateBounds
 from er3a.errors import PoseError
@@ -163,7 +162,9 @@ def _joint_motion(
 ) -> Motion:
     q, velocity, _ = move.joints(checks)
     speed = np.linalg.norm(np.einsum("nij,nj->ni", jacobian(robot, q)[:, :3], velocity), axis=1)
-    way = CubicHermiteSpline(checks, cumulative_simpson(speed, x=checks, initial=0.0), speed)
+    way = scipy.interpolate.CubicHermiteSpline(
+        checks, scipy.integrate.cumulative_simpson(speed, x=checks, initial=0.0), speed
+    )
     return Motion(
         entry=entry,
         built=built,

@@ -81,7 +81,6 @@ class PathFigure:
         legend = self.figure.legend(
             handles=handles, loc="upper center", bbox_to_anchor=(0.5, 1.0), ncols=9, fontsize=FONT
         )
-        self.figure.set_layout_engine("none")  # saving the figure before has set the default one
         image = svg_data_uri(self.figure)
         legend.remove()
         return image

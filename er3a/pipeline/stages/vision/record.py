@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-from scipy.spatial.transform import Rotation
+import scipy
 
 from er3a.files.vision_file import VisionFile, load_vision
 from er3a.kinematics.forward import forward
@@ -17,11 +17,12 @@ from er3a.pipeline.messages.vision import pose_words
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.vision.model import ObjectResult, PoseEstimate, SampleRows, VisionResults, VisionSummary
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.arm import arm_view, log_arm, send_motion, size_of
+from er3a.pipeline.viewing.arm import arm_view, log_arm, send_motion
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, rgb
 from er3a.pipeline.viewing.recording import ARM, TIMELINE, escaped, log_note, note_view, recording
 from er3a.pipeline.viewing.scene_entities import log_scene
 from er3a.robots.robot import Robot
+from er3a.robots.shown import size_of
 from er3a.vision.tangent import posed
 
 STAGE = "vision"
@@ -74,7 +75,7 @@ def _sight(robot: Robot, summary: VisionSummary) -> float:
 
 
 def _placed(pose: PoseEstimate) -> Reals:
-    R = Rotation.from_quat(pose.quaternion_wxyz, scalar_first=True).as_matrix()
+    R = scipy.spatial.transform.Rotation.from_quat(pose.quaternion_wxyz, scalar_first=True).as_matrix()
     return posed(R, np.array(pose.xyz_mm) / 1000)
 
 
