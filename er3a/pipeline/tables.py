@@ -22,16 +22,18 @@ from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, Self, get_type_hints
+from typing import TYPE_CHECKING, Any, ClassVar, Self, get_type_hints
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from er3a.findings import Finding
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Texts = NDArray[np.object_]
 Findings = NDArray[np.object_]
@@ -203,6 +205,8 @@ class Table:
 
     def frame(self) -> pd.DataFrame:
         """The table for pandas, with the names and the values of the file."""
+        import pandas as pd  # slow to import, and pages and recordings need none
+
         return pd.DataFrame({name: values for name, values, _ in self._flat()})
 
     def _flat(self) -> Iterator[tuple[str, NDArray[Any], Column]]:

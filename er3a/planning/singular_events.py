@@ -144,11 +144,10 @@ def _root(factor: Factor, start: float, end: float, duration: float) -> float:
 
 def _minima(times: Reals, f: Reals, factor: Factor, near: float, duration: float) -> list[tuple[float, float]]:
     """Local minima of the distance below the threshold, apart from the changes of sign: time and distance."""
-    from scipy.signal import find_peaks  # slow to import, and what only shows motions doesn't need it
-
     size = np.abs(f)
-    padded = np.concatenate([[np.inf], size, [np.inf]])
-    peaks = find_peaks(-padded)[0] - 1
+    starts = np.flatnonzero(np.concatenate([[True], size[1:] != size[:-1]]))  # of stretches of equal values
+    ends, level = np.append(starts[1:], len(size)) - 1, size[starts]
+    lowest = (np.append(np.inf, level[:-1]) > level) & (np.append(level[1:], np.inf) > level)
     step, last = SLOPE_STEP * duration, len(f) - 1
 
     def slope(at: float) -> Any:
@@ -157,7 +156,7 @@ def _minima(times: Reals, f: Reals, factor: Factor, near: float, duration: float
         return 8 * (c - b) - (d - a)
 
     found = []
-    for i in peaks:
+    for i in (starts[lowest] + ends[lowest]) // 2:
         beside = slice(max(i - 1, 0), i + 2)
         if size[i] > 2 * near or size[beside].min() <= ON_SET or np.ptp(np.sign(f[beside])) > 0:
             continue
