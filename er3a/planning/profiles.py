@@ -190,12 +190,15 @@ def times_at(law: TimeLaw, shares: Reals) -> Reals:
     breaks = law.breaks
     done = law(breaks)[0]
     after = np.clip(np.searchsorted(done, shares, side="left"), 1, len(breaks) - 1)
-    low, high = breaks[after - 1].copy(), breaks[after].copy()
-    for _ in range(HALVINGS):
-        middle = (low + high) / 2
-        early = law(middle)[0] < shares
-        low, high = np.where(early, middle, low), np.where(early, high, middle)
+    times = np.full(len(shares), np.nan)
     for k in (0, -1):  # a halt is at rest, so that rounding would shift the time by much
-        beside = breaks[np.clip(after + k, 0, len(breaks) - 1)]
-        high = np.where(np.abs(law(beside)[0] - shares) < SAME_SHARE, beside, high)
-    return high
+        times = np.where(np.abs(done[after + k] - shares) < SAME_SHARE, breaks[after + k], times)
+    between = np.flatnonzero(np.isnan(times))
+    if between.size:
+        low, high = breaks[after[between] - 1], breaks[after[between]]
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2
+            early = law(middle)[0] < shares[between]
+            low, high = np.where(early, middle, low), np.where(early, high, middle)
+        times[between] = high
+    return times
