@@ -228,7 +228,7 @@ class Table:
     @classmethod
     def read(cls, content: bytes) -> Self:
         """Read what :meth:`write` wrote; ``KeyError`` naming a column that is missing."""
-        stored = pq.read_table(pa.BufferReader(content))
+        stored = pq.ParquetFile(pa.BufferReader(content)).read()
         arrays: dict[str, Any] = {}
         slides: tuple[bool, ...] = ()
         for name, spec in cls.columns().items():
@@ -237,7 +237,7 @@ class Table:
                 slides = tuple("_mm" in each for each in names)
             if not names or (spec.parts and len(names) != len(spec.parts)):
                 raise KeyError(spec.pattern)
-            parts = [stored[part].to_numpy() for part in names]
+            parts = [_values(stored[part], spec) for part in names]
             arrays[name] = np.stack(parts, axis=1).astype(spec.dtype) if spec.is_group else parts[0]
             if spec.kind:
                 arrays[name] = _array(tuple(_decoded(spec.kind, text) for text in parts[0]), spec)
@@ -253,6 +253,15 @@ def _array(values: tuple[Any, ...], spec: Column) -> NDArray[Any]:
     array = np.empty(len(values), object)
     array[:] = values
     return array
+
+
+def _values(stored: pa.ChunkedArray, spec: Column) -> NDArray[Any]:
+    """A column of a file; its own ``to_numpy`` would load pandas."""
+    whole = stored.combine_chunks()
+    if pa.types.is_integer(whole.type) or pa.types.is_floating(whole.type):
+        return np.array(np.from_dlpack(whole))
+    rows = whole.to_pylist()
+    return _array(tuple(map(np.array, rows) if spec.lists else rows), replace(spec, pattern=""))
 
 
 def _coded(finding: Finding | None) -> str | None:

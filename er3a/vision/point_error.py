@@ -159,5 +159,6 @@ def draws(covariance: Reals) -> Reals:
 def error_sizes(covariance: Reals) -> tuple[Reals, Reals]:
     """Distances (m) and angles (rad), each (...,), below which 95 % of errors of a covariance (..., 6, 6) stay."""
     drawn = draws(covariance)
-    distance, angle = (np.linalg.norm(drawn[..., part], axis=-1) for part in (slice(3), slice(3, 6)))
+    square = drawn**2
+    distance, angle = (np.sqrt(square[..., part].sum(axis=-1)) for part in (slice(3), slice(3, 6)))
     return np.quantile(distance, 0.95, axis=0), np.quantile(angle, 0.95, axis=0)

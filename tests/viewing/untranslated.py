@@ -18,7 +18,7 @@ import plotly.graph_objects as go
 import pytest
 import yaml
 from babel.messages.pofile import read_po
-from matplotlib.figure import Figure
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.hand_eye import METHODS
@@ -77,8 +77,8 @@ def wide_letters() -> Iterator[list[str]]:
     shown: list[str] = []
     to_json = go.Figure.to_json
 
-    def saved(figure, *_, **__):
-        shown.extend(text.get_text() for text in figure.findobj(matplotlib.text.Text) if text.get_visible())
+    def saved(canvas, *_, **__):
+        shown.extend(text.get_text() for text in canvas.figure.findobj(matplotlib.text.Text) if text.get_visible())
 
     def drawn(figure, *arguments, **named):
         shown.extend(_texts_of_figure(figure.to_dict()))
@@ -87,7 +87,7 @@ def wide_letters() -> Iterator[list[str]]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(language, "_catalogue", Wide(catalogue_texts()))
         patch.setattr(language, "_language", "zh")
-        patch.setattr(Figure, "savefig", saved)
+        patch.setattr(FigureCanvasSVG, "print_svg", saved)
         patch.setattr(go.Figure, "to_json", drawn)
         yield shown
 

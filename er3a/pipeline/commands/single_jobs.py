@@ -116,8 +116,9 @@ def index(study: StudyFile = DEFAULT_STUDY, results: Results = DEFAULT_RESULTS, 
     from er3a.pipeline.viewing.figures import house_style
     from er3a.pipeline.viewing.index import write_index
 
+    shown = _study_to_show(study)
     with house_style():
-        write_index(_study_to_show(study), results, reports)
+        write_index(shown, results, reports)
     for page in OVERALL:
         write_checksum(reports / page)
 

@@ -13,7 +13,6 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.font_manager import fontManager
 from matplotlib.rcsetup import cycler
-from matplotlib.text import Text
 
 from er3a.pipeline.messages import language
 from er3a.pipeline.viewing.palette import GRID, INK, MUTED, SIX_JOINTS
@@ -58,8 +57,14 @@ STYLE: dict[RcKeyType, Any] = {
 
 
 def house_style() -> AbstractContextManager[None]:
-    """The look of all figures of the pages, for what is drawn within it."""
-    return matplotlib.rc_context(STYLE)
+    """The look of all figures of the pages, in the language of the pages, for what is drawn within it."""
+    if language.current() != "zh":
+        return matplotlib.rc_context(STYLE)
+    present = {font.name for font in fontManager.ttflist}
+    chinese = [name for name in CHINESE_FONTS if name in present][:1]
+    # Without a font for it here, Chinese stays text, for which the reader's browser finds one.
+    glyphs = "path" if chinese else "none"
+    return matplotlib.rc_context(STYLE | {"font.family": [*FONTS, *chinese], "svg.fonttype": glyphs})
 
 
 def new_figure(rows: int = 1, columns: int = 1, width: float = 9.0, height: float = 4.5, **subplots):
@@ -75,22 +80,10 @@ def equal_scale(axes: Axes, x_label: str, y_label: str) -> None:
     axes.set_ylabel(y_label)
 
 
-def _chinese_font() -> list[str]:
-    """The name of a font of this machine that has Chinese signs; none if there is none."""
-    present = {font.name for font in fontManager.ttflist}
-    return [name for name in CHINESE_FONTS if name in present][:1]
-
-
 def svg_data_uri(figure: Figure) -> str:
-    """The figure as a ``data:`` address of an SVG image (dense clouds rasterised at 160 dpi)."""
-    chinese = _chinese_font() if language.current() == "zh" else []
-    for text in figure.findobj(Text):
-        text.set_fontfamily([*FONTS, *chinese])
-    # Without a font for it here, Chinese stays text, for which the reader's browser finds one.
-    glyphs = "none" if language.current() == "zh" and not chinese else "path"
+    """A figure in the house style as a ``data:`` address of an SVG image (dense clouds rasterised at 160 dpi)."""
     buffer = io.BytesIO()
-    with matplotlib.rc_context(STYLE | {"svg.fonttype": glyphs}):
-        figure.dpi = 160
-        # Not savefig: it would draw a figure with a layout twice.
-        FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})
+    figure.dpi = 160
+    # Not savefig: it would draw a figure with a layout twice.
+    FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})
     return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")

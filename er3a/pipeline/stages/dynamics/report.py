@@ -14,7 +14,6 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics.load_figures import diagram_figure, holding_figure, torque_figure
 from er3a.pipeline.stages.dynamics.model import BindingLimit, DynamicsResults, DynamicsSummary, MotorNeed, PathLoad, Use
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.figures import house_style
 from er3a.pipeline.viewing.page import fixed, head_of, number, render, run_command
 
 MOST_USES = 12
@@ -25,14 +24,13 @@ def report(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
     """Write the dynamics page of a robot."""
     robot, results = study.robot(stored.robot), stored.results
     summary = results.summary
-    with house_style():
-        figures = [
-            (path, torque_figure(path, results.torques.take(results.torques.path == path.name)))
-            for path in summary.paths
-            if path.complete
-        ]
-        holding = holding_figure(summary) if summary.holding else None
-        diagram = diagram_figure(summary, results.diagram) if len(results.diagram) else None
+    figures = [
+        (path, torque_figure(path, results.torques.take(results.torques.path == path.name)))
+        for path in summary.paths
+        if path.complete
+    ]
+    holding = holding_figure(summary) if summary.holding else None
+    diagram = diagram_figure(summary, results.diagram) if len(results.diagram) else None
     render(
         Path(__file__).with_name("report.html.j2"),
         output,
