@@ -2,7 +2,7 @@
 
 With q(s) the joints along the share s of the way, J q' = v, where v is the tool's twist per unit of s (its linear part
 divided by a characteristic length). From one solved pose the motion is continued by bounds alone: as long as the joints
-have turned by little, the inverse of J has grown by little, so that
+have turned by little, the inverse of J has grown by little, so that::
 
     |q''| <= B (|v'| + C V^2),   |q'''| <= B (|v''| + 3 C V |q''| + C V^3),   B = b / (1 - b sqrt(n) C h V),
 

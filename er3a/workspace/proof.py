@@ -180,6 +180,7 @@ def _judge(
     level: int,
     parents: Proof | None = None,
     threads: int = 1,
+    *,
     most_boxes: int = _MOST_BOXES,
 ) -> Proof:
     """Judge cells, beginning from what is known of those they were split off."""
