@@ -11,9 +11,9 @@ M is the longer way of a capsule's two ends (its other points move no farther), 
 the other link for two links. The way is bounded on a grid of the motion so fine that no end moves by more than
 twice the depth from point to point: a chord over a time h, plus A h^2 / 3, where A bounds the end's acceleration.
 With levers of at most L, joint speeds v and accelerations a, ``A = L (sum |a| + (sum |v|)^2)``, and v and a are bounds
-over the whole interval, which whoever knows the motion gives. Where the motion has no such bounds (at singular poses of a
-path of the tool, through which nothing is proven) the bulge of the parabola through three points takes the place of
-A h^2 / 3.
+over the whole interval, which whoever knows the motion gives. Where the motion has no such bounds (at singular poses
+of a path of the tool, through which nothing is proven) the bulge of the parabola through three points takes the place
+of A h^2 / 3.
 
 References
 ----------
