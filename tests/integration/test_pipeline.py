@@ -23,8 +23,8 @@ from typer.testing import CliRunner
 from er3a.errors import ResultError
 from er3a.pipeline.cli import app
 from er3a.pipeline.results import FORMAT_VERSION, check_results, read_provenance, write_checksums
-from testing.small_study import stages_of
-from tests.conftest import ALL_THERE
+from testing.small_study import STUDY, stages_of
+from tests.conftest import ALL_THERE, ROBOT, leave_one_robot
 
 STAGES = ("validation", "workspace", "collision", "inverse", "trajectory", "dynamics")
 
@@ -227,16 +227,17 @@ def test_changing_the_box_reruns_only_workspaces(small_study):
 @pytest.mark.long
 def test_results_are_the_same_bytes_on_one_core_and_with_another_scatter(small_study, fresh_project):
     again = fresh_project("again")
+    leave_one_robot(again.folder / STUDY)
     again.snakemake("--cores", "1", "--set-scatter", "blocks=3", "--until", "record")
     compared = 0
-    for path in sorted((small_study.folder / "results").rglob("*")):
+    for path in sorted((small_study.folder / "results" / ROBOT).rglob("*")):
         if path.is_file():
             twin = again.folder / path.relative_to(small_study.folder)
             assert path.read_bytes() == twin.read_bytes(), path.name
             compared += 1
-    assert compared >= 2 * len(small_study.robots) * len(STAGES)
+    assert compared >= 2 * len(STAGES)
     rerun = Path(sys.executable).with_name("rerun")
-    for path in sorted((small_study.folder / "reports").rglob("*.rrd")):
+    for path in sorted((small_study.folder / "reports" / ROBOT).rglob("*.rrd")):
         twin = again.folder / path.relative_to(small_study.folder)
         command = [rerun, "rrd", "compare", "--unordered", path, twin]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
