@@ -150,3 +150,9 @@ def test_each_stage_s_inputs_exist_and_are_its_own(study, monkeypatch):
 def test_a_study_is_frozen(study):
     with pytest.raises(ValueError, match="frozen"):
         study.seed = 1
+
+
+def test_on_a_cluster_each_stage_is_a_group_of_its_own():
+    profile = yaml.safe_load((ROOT / "profiles/slurm/config.yaml").read_text(encoding="utf-8"))
+    views = {f"{verb}={{stage}}" for verb in ("record", "preview", "report")}
+    assert {*profile["groups"]} == {f"compute_{stage}={stage}" for stage in STAGES} | views
