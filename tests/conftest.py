@@ -24,20 +24,18 @@ from testing.processes import run
 from testing.small_study import STUDY, fresh
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
-ROBOT = "er3_600"  # the one that the fast tests study
+ROBOT = "er3_600"  # the one of those tests for which one is enough
 LONGEST_S = 900
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests of the small study that ask for a robot which the fast set's lacks are long; time limits of long ones."""
-    others = {name for name in ROBOTS if name != ROBOT}
+    """Tests of the finished small study are long; time limits of long ones and of those that run Snakemake."""
     for item in items:
-        of_a_study = "shared_folder" in getattr(item, "fixturenames", ())
-        values = item.callspec.params.values() if of_a_study and hasattr(item, "callspec") else ()
-        if others & {str(value).partition("/")[0] for value in values}:
+        fixtures = getattr(item, "fixturenames", ())
+        if "small_study" in fixtures:
             item.add_marker(pytest.mark.long)
-        if of_a_study or item.get_closest_marker("long"):
+        if "shared_folder" in fixtures or item.get_closest_marker("long"):
             item.add_marker(pytest.mark.timeout(LONGEST_S))
 
 
@@ -107,18 +105,13 @@ def copy_of_project(source_folder: Path, folder: Path) -> StudyRun:
 
 
 @pytest.fixture(scope="session")
-def shared_folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder that all processes of this test run share, with the project as it stood when the first one asked.
-
-    Unless a long test is among those that are run, its small study has one robot.
-    """
+def shared_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder that all processes of this test run share, with the project as it stood when the first one asked."""
     own = tmp_path_factory.getbasetemp()
     shared = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
     with once(shared / "snapshot") as wanted:
         if wanted:
             copy_of_project(ROOT, shared / "snapshot")
-            if not any(item.get_closest_marker("long") for item in request.session.items):
-                leave_one_robot(shared / "snapshot" / STUDY)
     return shared
 
 

@@ -131,6 +131,7 @@ def test_circular_imports_end(package):
     assert len(package.digests("pipeline.stages.made.compute")[0]) == 64
 
 
+@pytest.mark.long
 def test_sentences_of_a_page_count_to_its_views_and_those_of_a_verdict_to_its_numbers_too(package):
     stages = ("validation", "workspace", "collision", "inverse", "trajectory", "dynamics")
     ask = "from er3a.pipeline.stages.registry import STAGES\n"

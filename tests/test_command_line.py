@@ -137,6 +137,7 @@ def test_a_program_reads_verdicts_and_continuous_integration_an_exit_code(small_
     assert verdicts("--fail-on", "never").returncode == 2
 
 
+@pytest.mark.long
 def test_a_run_ends_with_1_for_findings_and_with_2_for_an_input(small_study):
     def run(study: str, level: str) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", "er3a", "run", "--study", study, "--fail-on", level]
@@ -156,6 +157,7 @@ def test_a_run_ends_with_1_for_findings_and_with_2_for_an_input(small_study):
     assert (done.returncode, done.stderr) == (2, "error: nowhere.yaml: there is no such file. Check the path\n")
 
 
+@pytest.mark.long
 def test_diff_ends_with_1_if_anything_differs(small_study, tmp_path):
     results = small_study.folder / "results"
     same = called("diff", results, results)

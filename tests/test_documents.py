@@ -227,6 +227,7 @@ def assert_make_words(target: str, words: list[str]) -> None:
             assert value in CAMPAIGNS, word
 
 
+@pytest.mark.long
 def test_commands_that_need_no_study_run_as_they_stand_in_the_documents(tmp_path):
     found = {command for page in PAGES for command in commands(page) if command.startswith("er3a ")}
     lines = sorted((RUN.index(line.split()[1]), line) for line in found if line.split()[1] in RUN)

@@ -41,6 +41,7 @@ def test_formats_give_the_same_mesh(tmp_path, suffix):
     assert len(found.faces) == 20
 
 
+@pytest.mark.long
 def test_pieces_with_their_margin_hold_the_mesh_and_come_again(tmp_path):
     angle_iron().export(tmp_path / "iron.stl")
     made = [import_mesh(tmp_path / "iron.stl", tmp_path / f"{k}.json", "mm", 0.05, 0) for k in range(2)]

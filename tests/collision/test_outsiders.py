@@ -36,6 +36,7 @@ def test_distances_are_those_of_coal_and_fcl(kind, random):
     assert deep or kind in ("capsule", "sphere")
 
 
+@pytest.mark.long
 def test_ball_in_a_cylinder_is_as_deep_as_plain_geometry_has_it(random):
     met = 0
     while met < 20:

@@ -61,6 +61,7 @@ def turned(robot: Robot, *joints: int) -> Robot:
     return robot.replace(direction=robot.direction * signs)
 
 
+@pytest.mark.long
 def test_signs_that_no_document_fixes_are_open():
     found = evidence("er3_600")
     for joint in (1, 4, 5, 6):
@@ -153,6 +154,7 @@ def test_a_sign_that_its_own_document_excludes_is_contradicted():
     assert about(turned(load_robot("er3a_c60"), 5), "direction5")["direction5"].status == "contradicted"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["er3_600", "er3a_c60"])
 @pytest.mark.parametrize("entry", ["direction1", "direction2", "direction4", "direction5", "offset6", "upper4"])
 def test_the_proposed_measurement_settles_or_contradicts(name, entry):
@@ -253,6 +255,7 @@ def test_a_tighter_tolerance_settles_less():
     assert (found["a3"].status, found["d4"].status) == ("weak", "settled")
 
 
+@pytest.mark.long
 def test_the_same_input_gives_the_same_evidence():
     names = ("a3", "d4", "direction5", "upper2")
     first, second = (about(load_robot("er3_600"), *names) for _ in range(2))
@@ -306,6 +309,7 @@ def poses(random: np.random.Generator, count: int) -> np.ndarray:
     return np.round(np.degrees(random.uniform(puma().lower, puma().upper, (count, 6))))
 
 
+@pytest.mark.long
 def test_a_tracker_settles_a_foreign_arm_but_for_how_its_flange_is_turned(random):
     robot = puma()
     found = evidence_of(robot, tracked(robot, poses(random, 30), 0.1), Documents())
@@ -348,6 +352,7 @@ def test_standard_deviations_give_the_interval_of_least_squares(random):
         assert (high - low) / 2 == pytest.approx(1.96 * error[names.index(name)], rel=0.02)
 
 
+@pytest.mark.long
 def test_no_feasible_table_lies_outside_the_intervals(random):
     """Tables on rays from the true one, as far as an own forward kinematics says that they are feasible."""
     robot, at, half_width = puma(), poses(random, 8), 0.5
@@ -384,6 +389,7 @@ def _slope(robot: Robot, name: str, at: np.ndarray) -> np.ndarray:
     return (up - down) / 2e-4
 
 
+@pytest.mark.long
 def test_derived_documents_prove_nothing(random):
     """The same tracker once as a document of its own, once made from what the table was made from."""
     robot = puma().replace(origins={entry.name: "manual" for entry in entries_of(puma())})

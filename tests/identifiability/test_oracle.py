@@ -119,6 +119,7 @@ def test_ends_of_intervals_are_attained_by_tables_that_meet_the_documents(entry)
         assert oracle.worst(arm, independent(name))[0] <= FEASIBLE, end
 
 
+@pytest.mark.long
 def test_tables_at_the_ends_of_intervals_meet_the_drawing():
     """Every table that bounds an interval of the er3_600, which its drawing leaves wide, is put to the oracle."""
     robot, references = load_robot("er3_600"), load_references("er3_600")
@@ -215,6 +216,7 @@ def test_signs_of_the_er3_600_are_open_one_by_one_and_all_together():
     assert max(oracle.tool_off(rows, same)[0]) < 1e-6
 
 
+@pytest.mark.long
 def test_what_contradicts_the_article_is_what_the_real_arm_has_otherwise():
     """The table of the er3a_c60 meets both documents; what evidence says of the article's is where the two differ."""
     stated = [said for said in oracle.statements_of("er3a_c60") if said.trusted]

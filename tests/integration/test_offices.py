@@ -51,6 +51,7 @@ def test_a_study_and_a_checkout_with_blanks_quotes_and_umlauts(fresh_project, tm
     assert (folder / table).is_file()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", LONG_NAMES)
 def test_a_robot_s_name_may_have_64_letters_and_repeat_itself(fresh_project, name):
     project = fresh_project("long")

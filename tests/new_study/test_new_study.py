@@ -69,6 +69,7 @@ def test_the_readme_tells_what_stands_there_and_which_references_count(written):
     assert (folder / "data/robots" / f"{name}.yaml").read_bytes() == (ROOT / f"data/robots/{name}.yaml").read_bytes()
 
 
+@pytest.mark.long
 def test_a_urdf_with_an_odd_name(tmp_path, monkeypatch):
     urdf = tmp_path / "KR-6 (R700) ü.urdf"
     urdf.write_text(export_urdf(load_robot("er3_600")), encoding="utf-8")
@@ -87,6 +88,7 @@ def test_names_come_from_odd_files_too(tmp_path, stem, name):
     assert arm_of(None, table, None).robot.name == name
 
 
+@pytest.mark.long
 def test_an_arm_without_closed_form_gets_targets_and_a_joint_move(tmp_path, monkeypatch):
     table = tmp_path / "ur.csv"
     table.write_text(UR, encoding="utf-8")

@@ -147,6 +147,7 @@ def test_a_program_is_paths_and_safe_paths_are_programs(study, tmp_path):
     assert {"weld_2.src", "weld_2.XPL", "weld_2.script", "weld_2.pgm", "weld_2.csv"} <= set(results.programs.file)
 
 
+@pytest.mark.long
 def test_unsafe_paths_have_programs_only_where_that_is_asked(study):
     def languages_of(name: str, **changes) -> set[str]:
         settings = study.section(TrajectorySettings).model_copy(update={"avoidance": "stop", **changes})

@@ -380,6 +380,7 @@ def test_choices_that_do_not_fit_are_refused(study, tmp_path, change, message):
         compute(with_paths(study, tmp_path, LINE | change), "er3a_c60")
 
 
+@pytest.mark.long
 def test_extreme_paths_give_results(study, tmp_path):
     far = {"xyz_mm": [5000, 0, 300], "rpy_deg": [180, 0, 0]}
     paths = [

@@ -200,6 +200,7 @@ def test_every_check_has_the_agreed_keys(folders):
                 assert (abs(check["difference"]) <= check["tolerance"] + 1e-9) == (check["status"] == "pass")
 
 
+@pytest.mark.long
 def test_equal_inputs_give_equal_bytes_which_are_read_as_they_were_computed(study, folders, stored, tmp_path):
     results, read = compute(study, "er3_600"), stored["er3_600"].results
     write_results(tmp_path, study, "er3_600", STAGES["validation"], results, say)
@@ -230,6 +231,7 @@ def test_one_wrong_number_fails_where_it_shows(study, tmp_path, edit, missed):
     assert missed in with_status(results, "fail")
 
 
+@pytest.mark.long
 def test_the_studys_tool_and_base_do_not_matter(study, folders, tmp_path):
     entry = study.entry("er3_600").model_copy(update={"tool": Placement(xyz_mm=[0.0, 0.0, 100.0])})
     moved = study.model_copy(update={"robots": {**study.robots, "er3_600": entry}})

@@ -166,6 +166,7 @@ def test_locked_joints_run_through_all_three_verbs(tmp_path, locked, code):
     assert (tmp_path / "workspace.rrd").stat().st_size > 10_000
 
 
+@pytest.mark.long
 def test_an_arm_without_a_spherical_wrist_gets_the_general_proof(tmp_path):
     study = make_study({"skew": skew_file(tmp_path)}, samples=10_000, cells_across=64)
     found = compute(study, "skew")

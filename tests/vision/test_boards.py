@@ -92,6 +92,7 @@ def test_covariances_are_those_of_corners_that_scatter():
     assert np.abs(np.cov(white) - np.eye(6)).max() < 0.25
 
 
+@pytest.mark.long
 def test_a_camera_is_calibrated_from_images_alone(tmp_path):
     """Eye-to-hand: images, joint poses and nothing else; the truth lies within twice the intervals."""
     random = np.random.default_rng(3)
@@ -118,6 +119,7 @@ def test_a_camera_is_calibrated_from_images_alone(tmp_path):
     assert caught.value.field == "sample 6"
 
 
+@pytest.mark.long
 def test_intrinsics_estimated_from_the_images_come_with_deviations():
     random = np.random.default_rng(4)
     images = [rendered(CHESS, T, random) for T in board_places(random, 8)]

@@ -188,6 +188,7 @@ def test_a_shifted_board_is_named_though_no_angle_tells_it():
     assert found.off_mm == pytest.approx(10, abs=2)
 
 
+@pytest.mark.long
 def test_sound_sets_name_hardly_any_sample():
     named = [len(calibrate_hand_eye(a_set("eye_in_hand", seed, 12)).suspects) for seed in range(60)]
     assert sum(named) <= 4  # 0.6 to be expected at one false alarm in a hundred sets

@@ -30,6 +30,7 @@ def states(robot: Robot, proof, R, origin, points: np.ndarray) -> np.ndarray:
     return SectionMap(proof).status(np.hypot(x, y), np.arctan2(y, x), z)
 
 
+@pytest.mark.long
 def test_bounds_of_an_arm_with_a_skew_wrist(random):
     robot = skew()
     arm, R, origin = general_arm(robot)
@@ -75,6 +76,7 @@ angles = st.floats(-np.pi, np.pi)
 lengths = st.lists(st.floats(-0.4, 0.4), min_size=6, max_size=6)
 
 
+@pytest.mark.long
 @settings(max_examples=10, deadline=None)
 @given(lengths, lengths, st.lists(angles, min_size=6, max_size=6), st.lists(st.floats(0, 7), min_size=6, max_size=6))
 def test_no_sample_of_a_random_table_lies_in_an_empty_cell(a, d, alpha, spans):

@@ -75,6 +75,7 @@ def proven(request):
 # --- the known arms ---
 
 
+@pytest.mark.long
 def test_no_sample_lies_in_an_empty_cell(proven):
     robot, section = proven
     filled = 0.0
