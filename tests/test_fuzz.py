@@ -29,6 +29,7 @@ def test_sound_files_are_accepted_and_read_as_they_are_written(tmp_path):
         assert outcome.fault is None, name
 
 
+@pytest.mark.long
 def test_damaged_files_are_refused_clearly_or_read_as_they_are_written(tmp_path):
     found = run(150, 7, tmp_path)
     assert [(name, damage, outcome.fault) for name, damage, _, outcome in found if outcome.fault] == []

@@ -15,6 +15,8 @@ from er3a.pipeline.results import Provenance
 from er3a.pipeline.viewing.page import render
 from testing.small_study import ROOT
 
+pytestmark = pytest.mark.long
+
 TEMPLATE = """{% extends "base.html.j2" %}
 {% block head %}{{ player_style }}{% endblock %}
 {% block title %}Test{% endblock %}

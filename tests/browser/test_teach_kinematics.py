@@ -23,6 +23,8 @@ from er3a.robots.robot import Robot
 from testing.arms import arms, joints_at_random, make_arm, margin, pose_errors
 from testing.teach_kinematics import NEAR, SOLVE
 
+pytestmark = pytest.mark.long
+
 POSES, AGREE = 1000, 1e-9
 STUDY = load_study("config/small.yaml")
 

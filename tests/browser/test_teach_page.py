@@ -24,6 +24,8 @@ from er3a.pipeline.teach import panel as teach_page
 from er3a.pipeline.teach.words import WORDS
 from testing.arms import make_arm, pose_errors
 
+pytestmark = pytest.mark.long
+
 LARGEST_PAGE = 8_000_000
 SELECT_ALL = Keys.CONTROL + "a" + Keys.NULL
 KEYS_AND_CODES = {"Shift", "Page", "Down", "Home", "End", "ZYX", "ZYZ", "JavaScript"}

@@ -141,6 +141,7 @@ def test_members_of_a_set_differ_by_less_than_the_uncertainty_everywhere():
         assert (np.ptp(difference, axis=0) < uncertainty).all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", TRUSTED)
 def test_noise_raises_no_alarm(name, random):
     """Neither noise that the references own up to, nor ten times more than they say."""

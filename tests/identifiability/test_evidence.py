@@ -78,6 +78,7 @@ def test_joints_reversed_that_no_document_fixes_are_still_open():
     assert {each.status for each in found.entries if each.entry.startswith("direction")} == {"open"}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["er3_600", "er3a_c60"])
 def test_lengths_along_parallel_axes_mean_something_together_only(name):
     found = evidence(name)

@@ -20,6 +20,8 @@ from er3a.identifiability.requirements import Asked, requirements_of
 from er3a.kinematics.table_batch import tables_of
 from testing import plain_oracle as oracle
 
+pytestmark = pytest.mark.long
+
 INDEPENDENT = {"er3a_c60": ("vrml_2020",), "er3_600": ("drawing_v1_1",)}
 """Of the documents that a length or an angle doesn't rest on, those that don't contradict each other."""
 CONTINUOUS = [f"{column}{joint}" for column in ("a", "d", "alpha", "offset") for joint in range(1, 7)]

@@ -38,6 +38,7 @@ def copied(fresh_project, folder: Path):
     return moved
 
 
+@pytest.mark.long
 @needs_make
 def test_a_study_and_a_checkout_with_blanks_quotes_and_umlauts(fresh_project, tmp_path):
     folder = copied(fresh_project, tmp_path / "my cöpy of it")

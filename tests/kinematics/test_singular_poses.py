@@ -21,6 +21,8 @@ from testing.singular_poses import (
     turned,
 )
 
+pytestmark = pytest.mark.long
+
 
 @pytest.mark.parametrize("kind", CLASSES)
 def test_the_generating_branch_is_found(robot, random, kind):

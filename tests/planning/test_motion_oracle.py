@@ -9,6 +9,8 @@ from er3a.files.robot_library import load_robot
 from testing.motion_cases import JOINT_KINDS, TOOL_KINDS, Tally, compare, looked_at, random_spec
 from testing.motion_oracle import Truth
 
+pytestmark = pytest.mark.long
+
 POINTS = 60_001
 
 

@@ -107,6 +107,7 @@ CAGES = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", CAGES)
 def test_scenes_that_leave_nothing_have_one_verdict(case, tmp_path):
     shapes, expected = CAGES[case]

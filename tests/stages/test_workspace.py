@@ -98,6 +98,7 @@ def test_the_border_that_is_compared_has_no_chords(found, tmp_path):
     assert len(set(views)) > 1  # others stand in the table, and are left out
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "drawn"), [("er3_600", True), ("er3a_c60", False)])
 def test_no_page_speaks_of_a_drawing_that_there_is_not(found, name, drawn, tmp_path):
     study = make_study({name: ROBOTS / f"{name}.yaml"})

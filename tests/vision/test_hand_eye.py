@@ -140,6 +140,7 @@ def coverage(setup: str, stated: bool, runs: int, seed: int) -> np.ndarray:
     return (np.abs(error) <= half).mean(axis=0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stated", [True, False])
 @pytest.mark.parametrize("setup", SETUPS)
 def test_intervals_hold_the_truth_as_often_as_they_say(setup, stated):

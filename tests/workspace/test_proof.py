@@ -86,6 +86,7 @@ def test_no_sample_lies_in_an_empty_cell(proven):
     assert filled > 0.9
 
 
+@pytest.mark.long
 def test_filled_cells_are_reached_at_random_points(proven, random):
     robot, section = proven
     R, origin = section_frame(robot)
