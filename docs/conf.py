@@ -116,12 +116,11 @@ def write_gallery(app: Sphinx) -> None:
         parts.append("The pages of a study are shown here if one was run first: `make run`, then `make docs`.")
     else:
         parts += ["What `make run` writes, as it is: each page is one file that works offline.\n"]
-        stages = [*STAGES, "teach"]
-        parts += [f"| robot | {' | '.join(stages)} |", f"|---{'|---' * len(stages)}|"]
-        for robot in robots:
-            pages = {stage: reports / robot / f"{stage}.html" for stage in stages}
-            links = [_copied(page, gallery / robot) if page.is_file() else "" for page in pages.values()]
-            parts.append(f"| {robot} | {' | '.join(links)} |")
+        parts += [f"| | {' | '.join(robots)} |", f"|---{'|---' * len(robots)}|"]
+        for stage in (*STAGES, "teach"):
+            pages = {robot: reports / robot / f"{stage}.html" for robot in robots}
+            links = [_copied(page, gallery / robot) if page.is_file() else "" for robot, page in pages.items()]
+            parts.append(f"| {stage} | {' | '.join(links)} |")
     (GENERATED / "gallery.md").write_text("\n".join(parts) + "\n", encoding="utf-8")
 
 
