@@ -1,4 +1,4 @@
-"""er3a: can this kinematic model of a six-axis robot be trusted, and what can the robot do?
+"""er3a: can this kinematic model of an industrial robot be trusted, and what can the robot do?
 
 The names below are imported on first use, so that one part of the package does not depend on all others.
 """

@@ -78,7 +78,7 @@ def _crate(robots) -> ROCrate:
     crate = ROCrate(gen_preview=False)
     crate.name = f"er3a study of {', '.join(robots)}"
     crate.description = (
-        "Evidence on kinematic models of six-axis robots: results (Parquet and JSON), reports (HTML), Rerun "
+        "Evidence on kinematic models of industrial robots: results (Parquet and JSON), reports (HTML), Rerun "
         "recordings, the inputs they rest on, and the lock of the software. Start at `reports/index.html`."
     )
     crate.license = LICENCE
