@@ -17,7 +17,6 @@ from er3a.program_check.program_check_findings import (
     RANKS,
     BothSidesChecked,
     CheckFinding,
-    ClearanceNotMeasured,
     Level,
     LoopComesBackOtherwise,
     MayMove,
@@ -176,7 +175,7 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
     for ending in execution.endings:
         if end == len(execution.steps):
             checker.close_loop(ending)
-    located = _located(execution, checker, options.measures and obstacles is None, end)
+    located = _located(execution, checker, end)
     verdicts = _verdicts(program, execution, checker.motions, located)
     level: Level = worst_of(each.level for each in located)
     main = execution.main() if execution.endings else None
@@ -185,11 +184,8 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
     return ProgramCheck(execution, level, located, verdicts, checker.motions, way, cycle)
 
 
-def _located(execution: Execution, checker: StepChecker, blind: bool, end: int) -> tuple[LocatedFinding, ...]:
-    """All findings, like ones of an instruction grouped; ``blind`` if collisions could not be looked for.
-
-    ``end``: number of the first step that was not checked.
-    """
+def _located(execution: Execution, checker: StepChecker, end: int) -> tuple[LocatedFinding, ...]:
+    """All findings, like ones of an instruction grouped; ``end``: number of the first step that was not checked."""
     program = execution.program
     top = Place(program.file)
     moving = {step.place for step in execution.steps if isinstance(step.instruction, Unknown)}
@@ -198,8 +194,6 @@ def _located(execution: Execution, checker: StepChecker, blind: bool, end: int) 
         for each in program.findings
         if not (isinstance(each, NotUnderstood) and each.place in moving)
     ]
-    if blind:
-        found.append(LocatedFinding("caution", ClearanceNotMeasured(), top))
     if end < len(execution.steps):
         found.append(LocatedFinding("caution", RestNotChecked(len(checker.motions)), execution.steps[end].place))
     for number, motion in checker.motions.items():

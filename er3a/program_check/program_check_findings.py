@@ -330,13 +330,6 @@ class LoopComesBackOtherwise:
     code: Literal["loop_comes_back_otherwise"] = "loop_comes_back_otherwise"
 
 
-@dataclass(frozen=True)
-class ClearanceNotMeasured:
-    """No collision was looked for: the Coal library is missing."""
-
-    code: Literal["clearance_not_measured"] = "clearance_not_measured"
-
-
 CheckFinding = (
     ProgramFinding
     | AboveLimit
@@ -379,7 +372,6 @@ CheckFinding = (
     | BothSidesChecked
     | NotFollowedToEnd
     | LoopComesBackOtherwise
-    | ClearanceNotMeasured
 )
 
 FAILS = frozenset(

@@ -61,8 +61,8 @@ class Obstacles:
         return self.bodies[id(arm)]
 
 
-def obstacles_of(robot: Robot, scene: Scene | None, tolerance: float) -> Obstacles | None:
-    """Obstacles, or None where clearance can't be measured."""
+def obstacles_of(robot: Robot, scene: Scene | None, tolerance: float) -> Obstacles:
+    """What a robot must not meet, itself among it."""
     return Obstacles(scene, tolerance, {id(robot): Bodies(robot, scene)})
 
 

@@ -464,8 +464,3 @@ def _(found: found_in.LoopComesBackOtherwise) -> str:
         joint=found.joint,
         difference=found.difference_deg,
     )
-
-
-@say.register
-def _(found: found_in.ClearanceNotMeasured) -> str:
-    return sentence(found.code, "collisions were not looked for: the Coal library is missing")

@@ -50,7 +50,7 @@ class Avoided:
 
 @dataclass(frozen=True)
 class AvoidanceTask:
-    """What all paths of a robot have in common; without ``surroundings`` clearances stay unknown.
+    """What all paths of a robot have in common.
 
     Attributes
     ----------
@@ -61,10 +61,10 @@ class AvoidanceTask:
     near: NearSingular
     limits: JointLimits
     only: StrategyName | None
-    surroundings: Surroundings | None
+    surroundings: Surroundings
     planning: PlanningTask
 
-    def avoid(self, motion: Motion, found: Judgement, along: ClearanceAlong | None) -> Avoided:
+    def avoid(self, motion: Motion, found: Judgement, along: ClearanceAlong) -> Avoided:
         """Compare the strategies where a path is not safe; find its fastest time law where it can be run as it is.
 
         A strategy on whose motion the arm meets its surroundings or itself is not usable. Where the path keeps the
@@ -80,7 +80,7 @@ class AvoidanceTask:
             quickest = _quickest(segment)
             if found.verdict != "safe":
                 results = compare(replace(segment, limits=self._no_more_than(found), allowed=self.limits), self.only)
-        collides = along is not None and bool(along.contacts)
+        collides = bool(along.contacts)
         if (collides or found.beyond or found.limits) and motion.no_way is None and self.only in (None, "planned"):
             results += self._planned(motion)
         met = {result.name: self._meets(result.cost) for result in results if result.cost}
@@ -144,8 +144,6 @@ class AvoidanceTask:
 
     def _meets(self, cost: StrategyCost) -> tuple[PairOverlaps | None, float | None]:
         """The deepest overlap on a motion, and its least clearance in mm (None if nothing can meet)."""
-        if self.surroundings is None:
-            return None, None
         curve = cost.motion.curve
         grid = np.linspace(0.0, curve.duration, CLEARANCE_TIMES)
         along = clearance_along(

@@ -29,10 +29,8 @@ class ClearanceSection:
     rows: list[list[str]]
 
 
-def clearance_section(results: TrajectoryResults) -> ClearanceSection | None:
-    """What the section needs; None where no clearance was measured."""
-    if not results.summary.clearance_measured:
-        return None
+def clearance_section(results: TrajectoryResults) -> ClearanceSection:
+    """What the section needs."""
     paths = [(path, path.clearance) for path in results.summary.paths if path.clearance]
     if not paths:
         return ClearanceSection(None, [])

@@ -28,27 +28,24 @@ def measured(surroundings: Surroundings, motion: Motion) -> ClearanceAlong:
     )
 
 
-def collisions(along: ClearanceAlong | None) -> list[Interval[BodiesOverlap]]:
+def collisions(along: ClearanceAlong) -> list[Interval[BodiesOverlap]]:
     """Stretches of overlap."""
-    contacts = along.contacts if along else ()
     return [
         Interval(contact.start, contact.end, BodiesOverlap(contact.pairs, contact.depth * 1000, contact.at))
-        for contact in contacts
+        for contact in along.contacts
     ]
 
 
-def least_clearance(along: ClearanceAlong | None) -> LeastClearance | None:
+def least_clearance(along: ClearanceAlong) -> LeastClearance | None:
     """Where the arm comes nearest to anything; None where nothing could be measured."""
-    least = along.least if along else -1
-    if along is None or least < 0 or (pair := along.pair[least]) is None:
+    least = along.least
+    if least < 0 or (pair := along.pair[least]) is None:
         return None
     return LeastClearance(float(along.distance[least] * 1000), float(along.t[least]), pair, along.measured)
 
 
-def clearance_rows(name: str, along: ClearanceAlong | None) -> Clearances:
+def clearance_rows(name: str, along: ClearanceAlong) -> Clearances:
     """One row per time at which the clearance was measured in full; NaN where the path can't be reached."""
-    if along is None:
-        return Clearances.empty()
     return Clearances(
         path=np.full(len(along.t), name, object),
         t_s=along.t,

@@ -92,12 +92,11 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     )
     summary = TrajectorySummary(
         verdict=_verdict(paths, skipped),
-        figures=_figures(paths, length, surroundings is not None, used),
+        figures=_figures(paths, length, used),
         characteristic_length_m=length,
         near=thresholds,
         joint_limits=used,
         scene=scene.title if scene else None,
-        clearance_measured=surroundings is not None,
         penetration_tolerance_mm=settings.penetration_tolerance_mm,
         paths=tuple(paths),
         not_followed=tuple(skipped),
@@ -175,7 +174,7 @@ def _verdict(
     return Verdict(status, counts)
 
 
-def _figures(paths: list[PathSummary], length: float, measured: bool, limits: LimitsUsed) -> tuple[Figure, ...]:
+def _figures(paths: list[PathSummary], length: float, limits: LimitsUsed) -> tuple[Figure, ...]:
     events = [event for path in paths for event in path.singularities]
     bounded = [path for path in paths if path.max_joint_speed_deg_s]
     agreement = max((path.velocity_check_deg_s * 1e6 for path in bounded), default=None)
@@ -187,7 +186,7 @@ def _figures(paths: list[PathSummary], length: float, measured: bool, limits: Li
         Figure("safe", sum(path.verdict == "safe" for path in paths), ""),
         Figure("singular_poses", sum(event.crossing for event in events), ""),
         Figure("near_passes", sum(not event.crossing for event in events), ""),
-        Figure("colliding", colliding if measured else None, ""),
+        Figure("colliding", colliding, ""),
         Figure("max_joint_speed", speed, "deg/s"),
         Figure(
             "assumed_speed_ratio" if any(limits.speed_assumed) else "speed_ratio",

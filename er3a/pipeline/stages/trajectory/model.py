@@ -309,7 +309,6 @@ class TrajectorySummary(Summary):
     near: NearThresholds
     joint_limits: LimitsUsed
     scene: str | None
-    clearance_measured: bool
     penetration_tolerance_mm: float
     paths: tuple[PathSummary, ...]
     not_followed: tuple[PathNotFollowed, ...] = ()

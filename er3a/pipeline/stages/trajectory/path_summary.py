@@ -33,7 +33,7 @@ def path_summary(
     robot: Robot,
     motion: Motion,
     found: Judgement,
-    along: ClearanceAlong | None,
+    along: ClearanceAlong,
     avoided: Avoided,
     limits: JointLimits,
 ) -> PathSummary:
