@@ -155,7 +155,7 @@ function withCursors(figure) {
     for (const { left, right, bottom, top, t0, t1, cursor } of panels) {
       cursor.hidden = shown !== name || time < t0 || time > t1;
       const u = left + ((time - t0) / (t1 - t0 || 1)) * (right - left);
-      cursor.style.left = `${x + u * width}px`;
+      cursor.style.left = `${(100 * (x + u * width)) / figure.clientWidth}%`; // never past a page that just became narrower
       cursor.style.top = `${y + (1 - top) * height}px`;
       cursor.style.height = `${(top - bottom) * height}px`;
     }
