@@ -10,11 +10,22 @@ from er3a.pipeline.messages.dynamics import FIGURES
 from er3a.pipeline.messages.dynamics_verdict import quantity_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import listed, say
+from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, moment, player, player_style
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics.load_figures import diagram_figure, holding_figure, torque_figure
-from er3a.pipeline.stages.dynamics.model import BindingLimit, DynamicsResults, DynamicsSummary, MotorNeed, PathLoad, Use
+from er3a.pipeline.stages.dynamics.model import (
+    BindingLimit,
+    DynamicsResults,
+    DynamicsSummary,
+    JointLoad,
+    MotorNeed,
+    PathLoad,
+    Use,
+)
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import fixed, head_of, number, render, run_command
+from er3a.robots.robot import Robot
+from er3a.robots.shown import meant
 
 MOST_USES = 12
 NONE = "–"
@@ -47,11 +58,29 @@ def report(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
         motors=[_motor(motor) for motor in summary.motors],
         paths=[_path(path) for path in summary.paths],
         figures=figures,
+        player=player(robot, _motions(robot, results)),
+        player_style=player_style(),
         joints=[(path.name, _joints(path)) for path in summary.paths if path.complete],
         wrist=_wrist(summary),
         holding=holding,
         diagram=diagram,
     )
+
+
+def _motions(robot: Robot, results: DynamicsResults) -> list[PlayedMotion]:
+    """The paths that the arm can follow, with the moment at which each joint feels most."""
+    motions = []
+    for path in results.summary.paths:
+        if not path.complete:
+            continue
+        rows = results.torques.take(results.torques.path == path.name)
+        peaks = [PlayedEvent(load.peak_at_s, load.peak_at_s, _peak(load), "plain") for load in path.joints]
+        motions.append(PlayedMotion(path.name, "", rows.t_s, meant(robot, rows.q), peaks))
+    return motions
+
+
+def _peak(load: JointLoad) -> str:
+    return tr("J{joint} at its greatest: {peak} {unit}", joint=load.joint, peak=number(load.peak, 3), unit=load.unit)
 
 
 def _links(summary: DynamicsSummary) -> list[list[str]]:
@@ -128,7 +157,7 @@ def _joints(path: PathLoad) -> list[list[str]]:
         [
             f"J{load.joint}",
             f"{number(load.peak, 3)} ± {number(load.tolerance, 2)}",
-            fixed(load.peak_at_s, 2),
+            moment(path.name, load.peak_at_s, fixed(load.peak_at_s, 2)),
             f"{number(load.rms, 3)} ± {number(load.rms_tolerance, 2)}",
             *(number(_no_noise(value), 3) for value in (load.gravity, load.inertia, load.velocity, load.friction)),
             *(number(_no_noise(value), 3) for value in (load.power_w, load.braking_w)),
