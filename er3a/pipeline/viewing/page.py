@@ -49,6 +49,9 @@ SCRIPT_WORDS = {
     "svg": N_("download"),
     "enlarge": N_("enlarge"),
     "close": N_("close"),
+    "contents": N_("Contents"),
+    "filter": N_("Show rows with"),
+    "link": N_("link to this section"),
 }
 
 
@@ -75,6 +78,11 @@ class Picture:
         both sides, and the motion's name."""
         edges = ((*ax.get_position().extents, *ax.get_xlim()) for ax, _ in self.over_time)
         return [[*(round(float(value), 5) for value in own), name] for own, (_, name) in zip(edges, self.over_time)]
+
+    @property
+    def shades(self) -> bool:
+        """Whether brightness means something in it, so that a dark page must not turn it round."""
+        return any(drawn.get_array() is not None for ax in self.figure.axes for drawn in (*ax.collections, *ax.images))
 
     @property
     def inches(self) -> float:
