@@ -57,9 +57,11 @@ ASIDES = frozenset(
         "BRAKE",
         "TIME_BLOCK",
         "CONST_VEL",
+        "ON_ERROR_PROCEED",
         "STOP",
     ]
 )
+OUTER_AXES = frozenset(["ASYPTP", "ASYCONT", "ASYSTOP", "ASYCANCEL"])  # which run beside the arm's own
 Handler = Callable[["_Statement"], None]
 
 
@@ -100,6 +102,8 @@ class _Statement:
             HANDLERS[first](self)
         elif first in ASIDES:
             self.builder.aside(self.place, self.text)
+        elif first in OUTER_AXES:
+            self.builder.unknown(self.place, self.text, may_move=False)
         elif first in ("DECL", "GLOBAL", "CONST", "SIGNAL") or self._declares():
             self._declaration()
         elif words.texts[words.at + 1] == ":" and words.kinds[words.at + 2] == "end":
