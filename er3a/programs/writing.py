@@ -44,8 +44,8 @@ RESERVED = frozenset(
     for words in (
         "and anin anout bas bool brake case char circ const continue decl def defdat default deffct delay do else end",
         "enddat endfct endfor endif endloop endswitch endwhile enum exit exor ext extfct false for global goto halt if",
-        "import int interrupt is lin loop maximum minimum not or prio ptp public real repeat return sec signal spl spline",
-        "struc switch then to trigger true until wait when while",
+        "import int interrupt is lin loop maximum minimum not or prio ptp public real repeat return sec signal",
+        "spl spline struc switch then to trigger true until wait when while",
         "break elif join kill local movec movej movel movep pass run sleep sync thread xor",
     )
     for word in words.split()
