@@ -77,7 +77,7 @@ class WriteOptions:
     Attributes
     ----------
     robot : the arm; without it joints can't be told from poses, nor poses from joints
-    start : (6,), rad, where the arm is before the first motion
+    start : (n,), rad, where the arm is before the first motion
     notes : findings of those who made the sequence, to be said in the head
     head : further lines of the head
     """

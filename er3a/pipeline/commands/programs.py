@@ -139,10 +139,9 @@ def _checked(file: Path, robot: Robot, options: CheckOptions) -> CheckedFile:
     from er3a.programs.read_program import read_program
 
     try:
-        program = read_program(file)
+        return CheckedFile(file, check(read_program(file), robot, options))
     except InputError as error:
         return CheckedFile(file, None, error)
-    return CheckedFile(file, check(program, robot, options))
 
 
 def _joints(text: str | None, robot: Robot) -> Reals | None:

@@ -27,6 +27,7 @@ REASONS: dict[Unresolved, str] = {
     "position_unknown": N_("it depends on where the arm stands, which is not known"),
     "external_tool": N_("the workpiece is moved along a fixed tool, which is not supported"),
     "not_understood": N_("it is not understood"),
+    "too_many_joints": N_("it turns axes that the arm does not have"),
 }
 ENDS: dict[EndKind, str] = {
     "drifts": N_("the loop never comes back to a state that it was in; it was followed for a limited number of rounds"),
