@@ -29,6 +29,7 @@ from er3a.program_check.program_check_findings import (
     ZoneTooLarge,
     ZoneWithoutSize,
 )
+from er3a.program_check.rest_targets import target_findings
 from er3a.program_check.target_joints import Arms, Goal, PlacedMotion, goal_of
 from er3a.program_check.ways import CheckRules, MotionWay, joint_way, limit_findings, tool_way
 from er3a.program_check.zone_clearance import zone_clearance
@@ -118,6 +119,17 @@ class StepChecker:
             before = -1
         self._joints.append(joints)
         self._before.append(before)
+
+    @property
+    def different(self) -> int:
+        """How many motions that differ were checked."""
+        return len(self._known)
+
+    def rest(self, first: int) -> tuple[int, dict[int, tuple[CheckFinding, ...]]]:
+        """As :func:`target_findings`, of the steps from one on."""
+        steps = self.execution.steps
+        motions = {i: what for i in range(first, len(steps)) if isinstance(what := steps[i].instruction, ArmMotion)}
+        return target_findings(self.arms, motions, {i: _key(motion) for i, motion in motions.items()})
 
     def close_loop(self, ending: Ending) -> None:
         """Where a loop begins again: whether the arm stands as it did then, and the corner between the rounds."""
