@@ -40,6 +40,7 @@ from er3a.robots.robot import Robot
 MOST_OF_A_MOTION = 0.5  # that a zone may take
 TOLERANCE = 1e-9
 SAME_JOINTS = 1e-4  # rad
+BEND_SAMPLES = 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,7 +280,8 @@ class StepChecker:
             [way.joints_at(np.array(1 - before)), way.joints_at(np.array(1.0)), after.joints_at(np.array(behind))]
         )
         if np.isfinite(corners).all():
-            hit = zone_clearance(self.obstacles.of(way.arm), corners, self.obstacles.tolerance)
+            bend = _bend(way, 1 - before, 1.0) + _bend(after, 0.0, behind)
+            hit = zone_clearance(self.obstacles.of(way.arm), corners, self.obstacles.tolerance, bend)
             if hit is not None:
                 found.append(hit)
         return tuple(found)
@@ -296,6 +298,14 @@ def _zone_share(motion: ArmMotion, way: MotionWay) -> float:
         case "share":
             return min(zone.value, 1.0) * MOST_OF_A_MOTION
     return MOST_OF_A_MOTION
+
+
+def _bend(way: MotionWay, first: float, last: float) -> Reals:
+    """By how much joints (n,) leave the straight way between two shares of a motion, at samples, rad."""
+    shares = np.linspace(first, last, BEND_SAMPLES)
+    q = way.joints_at(shares)
+    found: Reals = np.abs(q - q[0] - np.linspace(0, 1, BEND_SAMPLES)[:, None] * (q[-1] - q[0])).max(axis=0)
+    return found
 
 
 def _said(motion: ArmMotion) -> list[CheckFinding]:
