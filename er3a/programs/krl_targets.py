@@ -52,7 +52,7 @@ def target(memory: ProgramMemory, value: Value, frames: Frames, said: tuple[str,
     if memory.read("$IPO_MODE") == "#TCP":
         return UnresolvedTarget(text, "external_tool")
     if _has_axes(value):
-        return _joints(memory, value, text)
+        return UnresolvedTarget(text, "not_understood") if is_frame(value) else _joints(memory, value, text)
     return _pose(memory, value, frames, text)
 
 

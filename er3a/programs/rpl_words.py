@@ -23,7 +23,7 @@ from er3a.programs.values import Record, Value
 RPL = Lexicon(
     re.compile(
         rf"""(?P<text>"[^"]*"|'[^']*')|(?P<number>{NUMBER})|(?P<name>[^\W\d]\w*)"""
-        r"""|(?P<mark>:=|&&|\|\||<>|!=|==|<=|>=|\*\*|[^\s\w])"""
+        r"""|(?P<mark>:=|&&|\|\||<>|!=|==|<=|>=|\*\*|\S)"""
     ),
     ranks={
         **dict.fromkeys(("OR", "or", "||"), 1),

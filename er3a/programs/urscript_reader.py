@@ -38,7 +38,7 @@ from er3a.programs.values import POSE_KEYS, Record
 UR = Lexicon(
     re.compile(
         rf"""(?P<text>"[^"]*"|'[^']*')|(?P<number>0x[0-9A-Fa-f]+|{NUMBER})|(?P<name>[^\W\d]\w*)"""
-        r"""|(?P<mark>==|!=|<=|>=|[^\s\w])"""
+        r"""|(?P<mark>==|!=|<=|>=|\S)"""
     ),
     ranks={
         "or": 1,

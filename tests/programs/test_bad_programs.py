@@ -51,6 +51,8 @@ LIMITS = RunLimits(operations=20_000, ways=50, rounds=20)
         ("a.csv", "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n0,0,nan,0,0,0\n", "no finite number"),
         ("a.csv", "t_s,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n1,0,0,0,0,0,0\n1,0,0,0,0,0,0\n", "must rise"),
         ("a.src", "", "is empty"),
+        ("a.src", "DEF a( )\nFOR i=1 TO\nENDFOR\nEND\n", "line 2: this FOR can't be read"),
+        ("a.src", "DEF a( )\nSWITCH i\nCASE {\nENDSWITCH\nEND\n", "line 3: this CASE can't be read"),
         ("a.txt", "hello\n", "no program that is known"),
         ("a.dat", "DEFDAT A\nENDDAT\n", "Give its .src file"),
     ],

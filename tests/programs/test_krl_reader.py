@@ -275,3 +275,18 @@ def test_the_zone_of_a_joint_spline_is_that_of_its_data(tmp_path):
     joint, line = moves(run(tmp_path, body))
     assert (joint.zone.kind, joint.zone.value) == ("share", 0.2)
     assert (line.zone.kind, line.zone.value) == ("distance", 0.05)
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["中文", "LIN {X 1} 中", "PTP é {A1 1}", "X=1 µ", "'", "°", "\\", "LIN {X 1,}", "PTP {A1 1,A1 2}", "LIN {X a,X b}"],
+)
+def test_lines_that_are_no_krl_are_kept_and_named(line, tmp_path):
+    execution = run(tmp_path, line)
+    assert [each.text for each in execution.program.findings if isinstance(each, NotUnderstood)] == [line]
+    assert [step.instruction for step in execution.steps] == [Unknown(line)]
+
+
+def test_a_position_of_axes_and_coordinates_is_none(tmp_path):
+    (motion,) = moves(run(tmp_path, "PTP {X 400,A1 5}"))
+    assert motion.target.reason == "not_understood"
