@@ -36,6 +36,8 @@ from er3a.programs.syntax import Fixed, Move, Program
 from er3a.robots.robot import Robot
 
 ASSUMED_SPEED_DEG_S = 180.0
+MOST_MOTIONS = 1_000
+MOST_ROUNDS = 20  # times as many motions as may differ are carried out
 NEAR = NearSingular(float(np.radians(5)), float(np.radians(5)), 0.03)
 
 
@@ -53,7 +55,8 @@ class CheckOptions:
     acceleration_time : s, in which each joint is taken to reach its full speed
     penetration_tolerance : m; no overlap deeper than this goes unnoticed
     measures : whether to look for collisions
-    most_motions : that are carried out and differ or not; those behind them are not checked, which is said
+    most_motions : that differ, and a multiple of them that are carried out; of those behind them only the targets are
+        checked, which is said
     """
 
     start: Reals | None = None
@@ -64,7 +67,7 @@ class CheckOptions:
     acceleration_time: float = 0.25
     penetration_tolerance: float = 0.001
     measures: bool = True
-    most_motions: int = 20_000
+    most_motions: int = MOST_MOTIONS
     assumed: AssumedRates = field(default_factory=AssumedRates)
     limits: RunLimits = field(default_factory=RunLimits)
 
@@ -169,9 +172,7 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
     obstacles = obstacles_of(robot, options.scene, options.penetration_tolerance) if options.measures else None
     checker = StepChecker(robot, CheckRules(options.near, limits, options.assumed), obstacles, execution)
     checker.start = options.start
-    end = next(iter(execution.motions[options.most_motions : options.most_motions + 1]), len(execution.steps))
-    for number in range(end):
-        checker.check(number)
+    end = _checked_until(checker, options.most_motions)
     for ending in execution.endings:
         if end == len(execution.steps):
             checker.close_loop(ending)
@@ -182,6 +183,17 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
     way = () if main is None else execution.way(main)
     cycle = _cycle(execution, checker.motions, main, way)
     return ProgramCheck(execution, level, located, verdicts, checker.motions, way, cycle)
+
+
+def _checked_until(checker: StepChecker, most: int) -> int:
+    """Check step by step; the number of the first step that is not checked."""
+    steps = checker.execution.steps
+    for number, step in enumerate(steps):
+        full = checker.different >= most or len(checker.motions) >= MOST_ROUNDS * most
+        if full and isinstance(step.instruction, ArmMotion):
+            return number
+        checker.check(number)
+    return len(steps)
 
 
 def _located(execution: Execution, checker: StepChecker, end: int) -> tuple[LocatedFinding, ...]:
@@ -195,7 +207,12 @@ def _located(execution: Execution, checker: StepChecker, end: int) -> tuple[Loca
         if not (isinstance(each, NotUnderstood) and each.place in moving)
     ]
     if end < len(execution.steps):
-        found.append(LocatedFinding("caution", RestNotChecked(len(checker.motions)), execution.steps[end].place))
+        targets, wrong = checker.rest(end)
+        rest = RestNotChecked(len(checker.motions), targets)
+        found.append(LocatedFinding("caution", rest, execution.steps[end].place))
+        for number, each_wrong in wrong.items():
+            step = execution.steps[number]
+            found += [LocatedFinding(level_of(each), each, step.place, step.calls) for each in each_wrong]
     for number, motion in checker.motions.items():
         step = execution.steps[number]
         found += [LocatedFinding(level_of(each), each, step.place, step.calls) for each in motion.findings]

@@ -56,7 +56,7 @@ class WayNotKnown:
 
 @dataclass(frozen=True)
 class TargetOutOfReach:
-    """No solution of the arm brings the tool to the target."""
+    """No solution of the arm brings the tool to the target; ``reasons`` are empty where they were not looked for."""
 
     reasons: tuple[Unsolved, ...]
     code: Literal["target_out_of_reach"] = "target_out_of_reach"
@@ -299,9 +299,10 @@ class NeverReached:
 
 @dataclass(frozen=True)
 class RestNotChecked:
-    """The program has more motions than are checked; those from here on are not."""
+    """The program has more motions than are checked; of those from here on only ``targets`` targets are."""
 
     checked: int
+    targets: int
     code: Literal["rest_not_checked"] = "rest_not_checked"
 
 

@@ -29,6 +29,7 @@ from er3a.program_check.program_check_findings import (
     ZoneTooLarge,
     ZoneWithoutSize,
 )
+from er3a.program_check.rest_targets import target_findings
 from er3a.program_check.target_joints import Arms, Goal, PlacedMotion, goal_of
 from er3a.program_check.ways import CheckRules, MotionWay, joint_way, limit_findings, tool_way
 from er3a.program_check.zone_clearance import zone_clearance
@@ -39,6 +40,7 @@ from er3a.robots.robot import Robot
 MOST_OF_A_MOTION = 0.5  # that a zone may take
 TOLERANCE = 1e-9
 SAME_JOINTS = 1e-4  # rad
+BEND_SAMPLES = 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +120,17 @@ class StepChecker:
             before = -1
         self._joints.append(joints)
         self._before.append(before)
+
+    @property
+    def different(self) -> int:
+        """How many motions that differ were checked."""
+        return len(self._known)
+
+    def rest(self, first: int) -> tuple[int, dict[int, tuple[CheckFinding, ...]]]:
+        """As :func:`target_findings`, of the steps from one on."""
+        steps = self.execution.steps
+        motions = {i: what for i in range(first, len(steps)) if isinstance(what := steps[i].instruction, ArmMotion)}
+        return target_findings(self.arms, motions, {i: _key(motion) for i, motion in motions.items()})
 
     def close_loop(self, ending: Ending) -> None:
         """Where a loop begins again: whether the arm stands as it did then, and the corner between the rounds."""
@@ -267,7 +280,8 @@ class StepChecker:
             [way.joints_at(np.array(1 - before)), way.joints_at(np.array(1.0)), after.joints_at(np.array(behind))]
         )
         if np.isfinite(corners).all():
-            hit = zone_clearance(self.obstacles.of(way.arm), corners, self.obstacles.tolerance)
+            bend = _bend(way, 1 - before, 1.0) + _bend(after, 0.0, behind)
+            hit = zone_clearance(self.obstacles.of(way.arm), corners, self.obstacles.tolerance, bend)
             if hit is not None:
                 found.append(hit)
         return tuple(found)
@@ -284,6 +298,14 @@ def _zone_share(motion: ArmMotion, way: MotionWay) -> float:
         case "share":
             return min(zone.value, 1.0) * MOST_OF_A_MOTION
     return MOST_OF_A_MOTION
+
+
+def _bend(way: MotionWay, first: float, last: float) -> Reals:
+    """By how much joints (n,) leave the straight way between two shares of a motion, at samples, rad."""
+    shares = np.linspace(first, last, BEND_SAMPLES)
+    q = way.joints_at(shares)
+    found: Reals = np.abs(q - q[0] - np.linspace(0, 1, BEND_SAMPLES)[:, None] * (q[-1] - q[0])).max(axis=0)
+    return found
 
 
 def _said(motion: ArmMotion) -> list[CheckFinding]:

@@ -1,53 +1,89 @@
 """Whether an arm stays clear however it rounds a corner within its zone.
 
-The ways that a zone allows lie in the triangle of joint angles between where the zone begins, the corner, and where it
-ends. (For lines this is the triangle of the tool but for the bend of the joints' way within the zone.) A triangle is
-free if the arm at its middle is farther from everything than any point of the arm moves to the triangle's corners; else
-it is cut in four.
+The ways that a zone allows lie in the triangle of joint values between where the zone begins, the corner, and where it
+ends; for lines, whose joints bend, within ``bend`` of it. A triangle is free if at its middle each pair of bodies is
+farther apart than they can come nearer to each other within it; else it is cut in four. How near they can come is
+bounded by levers: no point of a body is farther from a joint's axis than the links between and the body are long.
 """
 
 from __future__ import annotations
 
+import heapq
+
 import numpy as np
 
 from er3a.collision.bodies import Bodies
+from er3a.collision.envelopes import link_frames
+from er3a.kinematics.chain import row_values
 from er3a.numerics.arrays import Reals
 from er3a.program_check.program_check_findings import ZoneCollides, ZoneNotSettled
 
 MOST_POSES = 4000
-BENT = 1.1  # by which a point may move farther within a triangle than to its corners
 
 
-def zone_clearance(bodies: Bodies, corners: Reals, tolerance: float) -> ZoneCollides | ZoneNotSettled | None:
+def zone_clearance(
+    bodies: Bodies, corners: Reals, tolerance: float, bend: Reals | None = None
+) -> ZoneCollides | ZoneNotSettled | None:
     """Look for a way round a corner that collides; None if all are free.
 
     Parameters
     ----------
     corners : (3, n), rad, joints where the zone begins, at the corner, where it ends
-    tolerance : m, of an overlap that may go unnoticed
+    tolerance : m; no overlap deeper than this goes unnoticed
+    bend : (n,), rad, by which joints may be off the triangle; None for not at all
     """
     every = np.arange(len(bodies.pairs))
     if not every.size:
         return None
-    own = bodies.second >= 0
-    waiting, measured, least = [corners], 0, np.inf
+    levers = pair_levers(bodies, corners)
+    coupling = bodies.robot.coupling
+    off: Reals | float = 0.0
+    if bend is not None:
+        off = levers @ (bend if coupling is None else np.abs(coupling) @ bend)
+    waiting: list[tuple[float, int, Reals]] = [(0.0, 0, corners)]
+    measured, least, settled = 0, np.inf, True
     while waiting:
-        triangle = waiting.pop()
+        _, _, triangle = heapq.heappop(waiting)  # the nearest to anything first
         middle = triangle.mean(axis=0)
-        ends = bodies.ends(np.vstack([middle, triangle]))
-        moved = BENT * float(np.linalg.norm(ends[1:] - ends[0], axis=-1).max())
-        distances = bodies.distances(ends[0], every)
+        distances = bodies.told(bodies.distances(bodies.ends(middle), every))
         measured += 1
         worst = int(np.argmin(distances))
         least = min(least, float(distances[worst]))
         if distances[worst] < -tolerance:
             return ZoneCollides(bodies.pairs[worst], -1000 * float(distances[worst]))
-        free = distances > np.where(own, 2.0, 1.0) * moved
-        if free.all() or moved < tolerance:
+        nearer = (levers @ np.abs(row_values(bodies.robot, triangle - middle)).T).max(axis=1)
+        open_ = distances <= nearer + off - tolerance
+        if not open_.any():
             continue
-        if measured + len(waiting) > MOST_POSES:
-            return ZoneNotSettled(1000 * least)
+        if measured >= MOST_POSES or (open_ & (nearer < np.maximum(off, tolerance))).any():
+            settled = False  # smaller parts would not tell more
+            if measured >= MOST_POSES:
+                break
+            continue
         a, b, c = triangle
         ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
-        waiting += [np.stack(part) for part in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
-    return None
+        parts = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+        for i, part in enumerate(parts):
+            heapq.heappush(waiting, (float(distances[worst]), 4 * measured + i, np.stack(part)))
+    return None if settled else ZoneNotSettled(1000 * least)
+
+
+def pair_levers(bodies: Bodies, corners: Reals) -> Reals:
+    """By how much a pair of bodies can come nearer per motion of each row of the table: (P, m), m/rad or m/m.
+
+    Of two links only the rows between them count. Holds for joints (n,) between the corners (k, n).
+    """
+    robot = bodies.robot
+    origins = link_frames(robot, corners)[..., :3, 3]
+    along = np.linalg.norm(np.diff(origins, axis=-2), axis=-1).max(axis=0)  # of a slide the longest is at a corner
+    before = np.concatenate([[0.0], np.cumsum(along)])
+    links = np.array([body.link for body in bodies.capsules], dtype=int)
+    size = np.array([np.linalg.norm(body.points, axis=1).max() for body in bodies.capsules])
+    row = np.arange(robot.rows)
+    reach = before[links][:, None] - before[row + 1] + size[:, None]  # a link's origin is on its joint's axis
+    reach = np.where(robot.sliding, 1.0, reach) * (row < links[:, None])
+    own = bodies.second >= 0
+    far = np.where(own, bodies.second, bodies.first)
+    base = np.where(own, links[bodies.first], 0)
+    found: Reals = reach[far] * (row >= base[:, None])
+    return found

@@ -1,6 +1,6 @@
 """CSV tables of a motion over time.
 
-Columns, in this order: ``t_s`` (from 0, rising); ``q1_deg`` ... ``q6_deg``, the joints; ``x_mm, y_mm, z_mm`` and
+Columns, in this order: ``t_s`` (from 0, rising); ``q1_deg``, ``q2_deg`` ..., the joints; ``x_mm, y_mm, z_mm`` and
 ``roll_deg, pitch_deg, yaw_deg``, the tool in the base frame with R = Rz(yaw) Ry(pitch) Rx(roll). The poses follow from
 the joints and are for the reader; ``t_s`` may be left out, and other columns are passed over. Lines that begin with
 ``#`` are comments.
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from itertools import pairwise
 
 import numpy as np
@@ -24,7 +25,7 @@ from er3a.programs.program_text import ProgramText
 from er3a.programs.syntax import Fixed, Program
 
 TIME = "t_s"
-JOINT_COLUMNS = tuple(f"q{i}_deg" for i in range(1, 7))
+JOINT_COLUMN = re.compile(r"q([1-9]\d?)_deg$")
 POSE_COLUMNS = ("x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg")
 DECIMALS = 6
 
@@ -35,7 +36,7 @@ def write_csv(times: Reals, joints: Reals, poses: Reals, head: tuple[str, ...] =
     Parameters
     ----------
     times : (n,), s
-    joints : (n, 6), rad
+    joints : (n, m), rad
     poses : (n, 4, 4), T_base_tool, m
     head : comments, one to a line
     """
@@ -43,9 +44,14 @@ def write_csv(times: Reals, joints: Reals, poses: Reals, head: tuple[str, ...] =
     rows = np.column_stack([times, np.degrees(joints), poses[:, :3, 3] * 1000, turned])
     rows = np.round(rows, DECIMALS) + 0.0
     lines = [f"# {line}" for line in head]
-    lines.append(",".join((TIME, *JOINT_COLUMNS, *POSE_COLUMNS)))
+    lines.append(",".join((TIME, *joint_columns(joints.shape[1]), *POSE_COLUMNS)))
     lines += [",".join(f"{value:.{DECIMALS}f}" for value in row) for row in rows]
     return "\n".join(lines) + "\n"
+
+
+def joint_columns(count: int) -> tuple[str, ...]:
+    """Names of the columns of so many joints."""
+    return tuple(f"q{i}_deg" for i in range(1, count + 1))
 
 
 def read_csv_program(source: ProgramText) -> Program:
@@ -59,14 +65,16 @@ def read_csv_program(source: ProgramText) -> Program:
     kept = [(i, line) for i, line in enumerate(source.lines, 1) if line.strip() and not line.startswith("#")]
     rows = list(csv.reader((line for _, line in kept), strict=False))
     if not rows:
-        raise InputError(source.path, None, "holds no rows", f"Give the columns {', '.join(JOINT_COLUMNS)}")
+        raise InputError(source.path, None, "holds no rows", "Give the columns q1_deg, q2_deg ...")
     head = [name.strip() for name in rows[0]]
     twice = next((name for name in head if head.count(name) > 1), None)
-    missing = next((name for name in JOINT_COLUMNS if name not in head), None)
+    last = max((int(match[1]) for name in head if (match := JOINT_COLUMN.match(name))), default=1)
+    names = joint_columns(last)
+    missing = next((name for name in names if name not in head), None)
     if twice or missing:
         problem = f"the column {twice or missing} is {'there twice' if twice else 'missing'}"
-        raise InputError(source.path, f"line {kept[0][0]}", problem, f"Give {', '.join(JOINT_COLUMNS)} once each")
-    columns = [head.index(name) for name in JOINT_COLUMNS]
+        raise InputError(source.path, f"line {kept[0][0]}", problem, f"Give {', '.join(names)} once each")
+    columns = [head.index(name) for name in names]
     timed = head.index(TIME) if TIME in head else None
     table = [
         _numbers(source, number, row, columns + ([] if timed is None else [timed]), head)
@@ -74,14 +82,14 @@ def read_csv_program(source: ProgramText) -> Program:
     ]
     if timed is not None:
         for i, (before, after) in enumerate(pairwise(table)):
-            if not after[6] > before[6]:
-                problem = f"t_s is {after[6]:g} after {before[6]:g}"
+            if not after[-1] > before[-1]:
+                problem = f"t_s is {after[-1]:g} after {before[-1]:g}"
                 raise InputError(source.path, f"line {kept[i + 2][0]}", problem, "Times must rise")
     builder = CodeBuilder("MAIN", (), Place(source.path, 1))
     for i, values in enumerate(table):
         place = Place(source.path, kept[i + 1][0])
-        speed = Rate(values[6] - table[i - 1][6], "s") if timed is not None and i else None
-        builder.add(Fixed(place, ArmMotion("joint", JointTarget(np.radians(values[:6])), "row", speed=speed)))
+        speed = Rate(values[-1] - table[i - 1][-1], "s") if timed is not None and i else None
+        builder.add(Fixed(place, ArmMotion("joint", JointTarget(np.radians(values[: len(names)])), "row", speed=speed)))
     findings: tuple[ProgramFinding, ...] = (*source.findings, *(() if table else (NothingMoves(),)))
     routine = builder.routine(Place(source.path, len(source.lines)))
     return Program(

@@ -54,7 +54,8 @@ IN_DEGREES: Mapping[str, Callable[[float], float]] = {
     "SQRT": math.sqrt,
     "ABS": abs,
 }
-SAME = {"AND": "AND", "and": "AND", "B_AND": "AND", "&": "AND", "OR": "OR", "or": "OR", "B_OR": "OR"}
+SAME = {"AND": "AND", "and": "AND", "B_AND": "AND", "&": "AND", "&&": "AND"}
+SAME |= dict.fromkeys(("OR", "or", "B_OR", "||"), "OR")
 EXCLUSIVE = {"EXOR", "XOR", "xor", "B_EXOR"}
 
 

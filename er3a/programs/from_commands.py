@@ -50,7 +50,7 @@ class PathListing:
 
     Attributes
     ----------
-    start : (6,), rad, its first target
+    start : (n,), rad, its first target
     """
 
     listing: Listing
@@ -70,8 +70,8 @@ def listing_of(
 
     Parameters
     ----------
-    start : (6,), rad, joints at the path's start
-    ends : (n, 6), rad, joints at the end of each segment or row behind the start, where they are known: they fix the
+    start : (n,), rad, joints at the path's start
+    ends : (k, n), rad, joints at the end of each segment or row behind the start, where they are known: they fix the
         branch for languages that write joints
     """
     making = _Making(robot, start)
@@ -117,7 +117,7 @@ class _Making:
         self.halts: dict[int, float] = {}
 
     def joints(self, points: Reals, times: Reals, zones: list[Zone]) -> None:
-        """Joint motions to points (n, 6)."""
+        """Joint motions to points (k, n)."""
         for i, (point, seconds, zone) in enumerate(zip(points, times, zones)):
             blend = FINE if i in self.halts else zone
             self.found.append(self._motion("joint", JointTarget(point), Rate(float(seconds), "s"), blend))

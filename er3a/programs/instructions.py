@@ -17,7 +17,9 @@ from er3a.numerics.arrays import Reals
 RateUnit = Literal["m/s", "m/s2", "rad/s", "rad/s2", "share", "s"]
 ZoneKind = Literal["fine", "distance", "angle", "share", "velocity", "named"]
 MotionKind = Literal["joint", "line", "arc", "spline"]
-Unresolved = Literal["undefined", "not_finite", "position_unknown", "external_tool", "not_understood"]
+Unresolved = Literal[
+    "undefined", "not_finite", "position_unknown", "external_tool", "not_understood", "too_many_joints"
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,11 +92,11 @@ class NamedFrame:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointTarget:
-    """Joint angles (6,) in rad; NaN for a joint that stays as it is.
+    """Joint angles (n,) in rad; NaN for a joint that stays as it is.
 
     Attributes
     ----------
-    external : names and values (rad or m as the controller has them, not converted) of axes beyond the six
+    external : names and values (rad or m as the controller has them, not converted) of axes beside the arm's
     """
 
     joints: Reals
@@ -108,8 +110,8 @@ class PoseTarget:
     Attributes
     ----------
     configuration : what the program says about the branch, as it says it: KRL's S and T, RPL's CFG and turns
-    near : (6,), rad, joints that the solution shall be near to
-    joints : (6,), rad, the solution, where it is known
+    near : (n,), rad, joints that the solution shall be near to
+    joints : (n,), rad, the solution, where it is known
     external : as of :class:`JointTarget`
     """
 

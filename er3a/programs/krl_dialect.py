@@ -29,6 +29,13 @@ MODAL = ("$TOOL", "$BASE", "$VEL", "$ACC", "$APO", "$VEL_AXIS", "$ACC_AXIS", "$I
 MODAL_DATA = ("PDAT_ACT", "LDAT_ACT", "FDAT_ACT", "%spline")
 HARMLESS = frozenset(
     [
+        "DELETE_BACKWARD_BUFFER",
+        "VAR_STATE",
+        "CIOCTL",
+        "COPEN",
+        "CCLOSE",
+        "MSGINFO",
+        "MSGLOG",
         "SET_CD_PARAMS",
         "STRCLEAR",
         "STRCOPY",
@@ -203,7 +210,7 @@ def _settings(memory: ProgramMemory, kind: MotionKind, move: Move) -> Settings:
             base_of(memory),
             _speed(memory, kind),
             _acceleration(memory, kind),
-            _zone(memory, move.words),
+            _zone(memory, kind, move.words),
         )
         memory.kept[key] = found
     return found
@@ -233,13 +240,13 @@ def _axis_share(memory: ProgramMemory, name: str) -> Rate | None:
     return None if least is None else Rate(least / 100, "share")
 
 
-def _zone(memory: ProgramMemory, words: tuple[str, ...]) -> Zone:
+def _zone(memory: ProgramMemory, kind: MotionKind, words: tuple[str, ...]) -> Zone:
     word = next((word for word in words if word.startswith("C_")), None)
     if word is None:
         return FINE
     distance = number(memory.read("$APO.CDIS"))
     share = number(memory.read("$APO.CPTP"))
-    if word == "C_PTP" and share is not None:
+    if (word == "C_PTP" or (word == "C_SPL" and kind == "joint")) and share is not None:
         return Zone("share", share / 100, word)
     if word in ("C_DIS", "C_SPL", "C_PTP") and distance is not None:
         return Zone("distance", distance / 1000, word)

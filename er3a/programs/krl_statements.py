@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable
 
 from er3a.errors import InputError
-from er3a.programs.code_builder import CodeBuilder
+from er3a.programs.code_builder import CodeBuilder, fault
 from er3a.programs.instructions import Place
 from er3a.programs.krl_words import PLAIN, PLAIN_DATA, KrlWords, plain_record
 from er3a.programs.lexing import MisreadError
@@ -57,9 +57,11 @@ ASIDES = frozenset(
         "BRAKE",
         "TIME_BLOCK",
         "CONST_VEL",
+        "ON_ERROR_PROCEED",
         "STOP",
     ]
 )
+OUTER_AXES = frozenset(["ASYPTP", "ASYCONT", "ASYSTOP", "ASYCANCEL"])  # which run beside the arm's own
 Handler = Callable[["_Statement"], None]
 
 
@@ -74,7 +76,10 @@ def statement(builder: CodeBuilder, place: Place, text: str, signals: dict[str, 
     reading = _Statement(builder, place, text, signals, inside_data)
     try:
         reading.read()
-    except MisreadError:
+    except MisreadError as error:
+        if reading.words.texts[0] in ("FOR", "CASE"):  # without which the lines behind would mean something else
+            problem = f"this {reading.words.texts[0]} can't be read ({error})"
+            raise fault(place, problem, "Write FOR i=1 TO 9, or CASE 1, 2") from None
         builder.unknown(place, text, may_move=not inside_data)
     except RecursionError:
         raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
@@ -92,6 +97,8 @@ class _Statement:
 
     def read(self) -> None:
         words, first = self.words, self.words.next
+        if words.kind == "end":
+            raise MisreadError("no words")
         if first in MOTIONS:
             words.take()
             self._motion(first)
@@ -100,6 +107,8 @@ class _Statement:
             HANDLERS[first](self)
         elif first in ASIDES:
             self.builder.aside(self.place, self.text)
+        elif first in OUTER_AXES:
+            self.builder.unknown(self.place, self.text, may_move=False)
         elif first in ("DECL", "GLOBAL", "CONST", "SIGNAL") or self._declares():
             self._declaration()
         elif words.texts[words.at + 1] == ":" and words.kinds[words.at + 2] == "end":

@@ -52,7 +52,7 @@ def target(memory: ProgramMemory, value: Value, frames: Frames, said: tuple[str,
     if memory.read("$IPO_MODE") == "#TCP":
         return UnresolvedTarget(text, "external_tool")
     if _has_axes(value):
-        return _joints(memory, value, text)
+        return UnresolvedTarget(text, "not_understood") if is_frame(value) else _joints(memory, value, text)
     return _pose(memory, value, frames, text)
 
 
@@ -109,11 +109,14 @@ def _joints(memory: ProgramMemory, value: Record, text: str, missing: float | No
     degrees = _components(value, AXIS_KEYS, text)
     if isinstance(degrees, UnresolvedTarget):
         return degrees
+    count = memory.cell.joints
+    if any(degrees[count:]):
+        return UnresolvedTarget(text, "too_many_joints")
     here = memory.here.joints
-    kept = np.full(6, np.nan) if here is None else here
+    kept = np.full(count, np.nan) if here is None else here
     if missing is not None:
-        kept = np.full(6, missing)
-    joints = [kept[i] if each is None else math.radians(each) for i, each in enumerate(degrees)]
+        kept = np.full(count, missing)
+    joints = [kept[i] if each is None else math.radians(each) for i, each in enumerate(degrees[:count])]
     return JointTarget(np.array(joints), _external(value))
 
 

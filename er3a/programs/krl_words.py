@@ -12,7 +12,7 @@ from er3a.programs.values import Record
 KRL = Lexicon(
     re.compile(
         rf"""(?P<text>"[^"]*")|(?P<number>{NUMBER})|(?P<enum>\#\s*[A-Za-z_]\w*)|(?P<whole>'[HhBb][0-9A-Fa-f]+')"""
-        r"""|(?P<name>[A-Za-z_$][\w$]*)|(?P<mark>==|<>|<=|>=|\.\.|[^\s\w])"""
+        r"""|(?P<name>[A-Za-z_$][\w$]*)|(?P<mark>==|<>|<=|>=|\.\.|\S)"""
     ),
     ranks={
         **dict.fromkeys(("==", "<>", "<", ">", "<=", ">="), 1),
@@ -62,15 +62,18 @@ class KrlWords(Words):
             kind = self.take()
             self.take()
         items: list[tuple[str, Expression]] = []
-        while not self.accept("}"):
+        if self.accept("}"):
+            return Aggregate(kind, ())
+        while True:
             name = self.name()
+            if any(name == other for other, _ in items):
+                raise MisreadError(f"{name} is given twice")
             if self.accept("["):
                 self.expect("]")
             items.append((name, self.expression()))
             if not self.accept(","):
                 self.expect("}")
-                break
-        return Aggregate(kind, tuple(items))
+                return Aggregate(kind, tuple(items))
 
 
 def plain_record(kind: str | None, items: str) -> Constant | None:
@@ -83,6 +86,6 @@ def plain_record(kind: str | None, items: str) -> Constant | None:
         found = [(name.upper(), text.upper() if text[0] == "#" else float(text)) for name, text in zip(names, texts)]
     except ValueError:
         return None
-    if not all(isinstance(value, str) or math.isfinite(value) for _, value in found):
+    if len(dict(found)) < len(found) or not all(isinstance(value, str) or math.isfinite(value) for _, value in found):
         return None
     return Constant(Record((kind or "").upper(), tuple(found)))

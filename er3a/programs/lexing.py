@@ -149,9 +149,10 @@ class Words:
         """A name with the fields, indices and arguments behind it."""
         name = self.take()
         value = self.lexicon.constants.get(name.upper())
-        if value is not None:
-            return Constant(value)
-        found: Expression = Variable(name)
+        return self.parts_of(Variable(name)) if value is None else Constant(value)
+
+    def parts_of(self, found: Expression) -> Expression:
+        """An expression with the fields, indices and arguments behind it."""
         while self.kind == "mark":
             if self.accept("."):
                 found = Member(found, self.name())
@@ -159,8 +160,9 @@ class Words:
                 placed, _ = self.arguments("]")
                 found = Element(found, tuple(each for each in placed if each is not None))
             elif self.next == "(":
+                name = dotted(found)
                 self.take()
-                found = Invocation(dotted(found), *self.arguments())
+                found = Invocation(name, *self.arguments())
             else:
                 break
         return found
@@ -210,4 +212,6 @@ def dotted(expression: Expression) -> str:
             return f"{dotted(of)}.{name}"
         case Element(of=of):
             return f"{dotted(of)}[]"
+        case Invocation(function=function):
+            return f"{function}()"
     raise MisreadError("not a name")

@@ -8,12 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from er3a.numerics.arrays import Reals
+from er3a.programs.arm_joints import MOST_ROBOT_AXES
 from er3a.programs.instructions import ArmMotion, JointTarget, NamedFrame, PoseTarget
 
 NO_FRAME = NamedFrame()
 
 Flange = Callable[[Reals], Reals]
-"""T_robot_flange (4, 4) of joint angles (6,) in rad."""
+"""T_robot_flange (4, 4) of joint angles (n,) in rad."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,13 +24,15 @@ class Cell:
     Attributes
     ----------
     flange : forward kinematics of the arm; None if no arm is given
-    start : (6,), rad, joints where the program starts
+    start : (n,), rad, joints where the program starts
+    joints : n, how many the arm has
     frames : poses (4, 4) of tools and bases by the program's names for them
     tool, base : (4, 4), for motions whose program sets none; None if no arm is given
     """
 
     flange: Flange | None = None
     start: Reals | None = None
+    joints: int = MOST_ROBOT_AXES
     frames: Mapping[str, Reals] = field(default_factory=dict)
     tool: Reals | None = None
     base: Reals | None = None
@@ -41,7 +44,7 @@ class Position:
 
     Attributes
     ----------
-    joints : (6,), rad; None where unknown
+    joints : (n,), rad; None where unknown
     pose : T_base_tool (4, 4), in ``base`` for ``tool``; None where it is known only through ``joints``
     """
 

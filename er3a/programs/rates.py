@@ -13,21 +13,22 @@ from er3a.robots.robot import Robot
 ASSUMED_JOINT_SPEED = math.radians(100.0)  # rad/s, of a joint whose greatest speed no table gives
 
 
-def joint_speeds(robot: Robot | None) -> Reals:
-    """Greatest speeds (6,) of the joints, rad/s."""
+def joint_speeds(robot: Robot | None, joints: int) -> Reals:
+    """Greatest speeds (n,) of the joints, rad/s."""
     if robot is None:
-        return np.full(6, ASSUMED_JOINT_SPEED)
+        return np.full(joints, ASSUMED_JOINT_SPEED)
     return np.where(np.isnan(robot.speed), ASSUMED_JOINT_SPEED, robot.speed)
 
 
 def share_of_greatest(ready: ReadyMotion, robot: Robot | None) -> float | None:
     """The speed of a joint motion as a share of the greatest; None if the program gives none that can be told."""
-    speed, greatest = ready.motion.speed, joint_speeds(robot)
+    speed = ready.motion.speed
     if speed is None:
         return None
     if speed.unit == "share":
         return speed.value
     moved = _moved(ready)
+    greatest = joint_speeds(robot, 1 if moved is None else len(moved))
     if speed.unit == "rad/s":
         lead = int(np.argmax(moved)) if moved is not None else 0
         return float(speed.value / greatest[lead])
@@ -46,7 +47,7 @@ def leading_joint_speed(ready: ReadyMotion, robot: Robot | None) -> float | None
         return speed.value
     moved = _moved(ready)
     lead = int(np.argmax(moved)) if moved is not None else 0
-    return float(speed.value * joint_speeds(robot)[lead])
+    return float(speed.value * joint_speeds(robot, lead + 1)[lead])
 
 
 def tool_speed(ready: ReadyMotion) -> float | None:

@@ -23,12 +23,12 @@ from er3a.programs.values import Record, Value
 RPL = Lexicon(
     re.compile(
         rf"""(?P<text>"[^"]*"|'[^']*')|(?P<number>{NUMBER})|(?P<name>[^\W\d]\w*)"""
-        r"""|(?P<mark>:=|<>|!=|==|<=|>=|\*\*|[^\s\w])"""
+        r"""|(?P<mark>:=|&&|\|\||<>|!=|==|<=|>=|\*\*|\S)"""
     ),
     ranks={
-        **dict.fromkeys(("OR", "or"), 1),
+        **dict.fromkeys(("OR", "or", "||"), 1),
         **dict.fromkeys(("XOR", "xor"), 2),
-        **dict.fromkeys(("AND", "and", "&"), 3),
+        **dict.fromkeys(("AND", "and", "&", "&&"), 3),
         **dict.fromkeys(("=", "==", "<>", "!="), 4),
         **dict.fromkeys(("<", ">", "<=", ">="), 5),
         "+": 6,

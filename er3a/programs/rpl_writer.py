@@ -132,19 +132,14 @@ class RplWriter(Writer):
 
     def _arc(self, ready: ReadyMotion) -> None:
         """Lines near the arc, through the joints that the arm's table gives."""
-        motion, near = ready.motion, ready.joints_before
-        frames = (motion.tool, motion.base)
+        motion = ready.motion
         poses = None
         if ready.pose is not None and ready.pose_before is not None and ready.via is not None and motion.angle is None:
             poses = chords(ready.pose_before, ready.via, ready.pose, self.options.arc_deviation)
-        targets: list[str] = []
-        for i, pose in enumerate(() if poses is None else poses):
-            last = poses is not None and i == len(poses) - 1
-            near = ready.joints if last and ready.joints is not None else self.resolver.solve(pose, frames, near)
-            if near is None:
-                break
-            targets.append(_joints_text(near))
-        if poses is None or len(targets) < len(poses):
+        frames = (motion.tool, motion.base)
+        joints = [None] if poses is None else self.resolver.solve(poses, frames, ready.joints_before)
+        targets = [_joints_text(each) for each in joints if each is not None]
+        if len(targets) < len(joints):
             self.left_out(motion)
             return
         self.count["arcs"] += 1

@@ -7,17 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from er3a.errors import ShapeError
+from er3a.errors import InputError, ShapeError
 from er3a.geometry.transforms import check_poses
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
+from er3a.programs.arm_joints import not_expressed
 from er3a.programs.dialect import Dialect
 from er3a.programs.execution import Execution, RunLimits
+from er3a.programs.instructions import ArmMotion, JointTarget
 from er3a.programs.krl_dialect import KrlDialect
 from er3a.programs.machine import Machine
 from er3a.programs.position import Cell
 from er3a.programs.rpl_dialect import RplDialect
-from er3a.programs.syntax import Language, Program
+from er3a.programs.syntax import Fixed, Language, Program
 from er3a.programs.urscript_dialect import UrScriptDialect
 from er3a.robots.robot import Robot
 
@@ -42,14 +44,18 @@ def execute(
     Parameters
     ----------
     robot : the arm, for what the text gives by where the arm stands: partial and relative targets
-    start : (6,), rad, joints where the program starts
+    start : (n,), rad, joints where the program starts
     frames : T_flange_tool of tools and T_robot_base of bases (4, 4) in m, by the program's names for them
 
     Raises
     ------
+    InputError
+        for an arm that the program's language, or the table, has not the joints of
     ShapeError, PoseError
         for a start that has not an angle for each joint, and a frame that is no rigid transform
     """
+    if robot is not None and (reason := not_expressed(program.language, robot) or _other_table(program, robot)):
+        raise InputError(program.file, None, reason, "Give the arm that the program is meant for")
     if robot is not None and start is not None and np.shape(start) != robot.lower.shape:
         raise ShapeError("start", np.shape(start), f"({len(robot.lower)},)")
     flange = None
@@ -60,7 +66,18 @@ def execute(
             return forward(bare, joints)
 
     known = {name: check_poses(pose, name) for name, pose in (frames or {}).items()}
-    cell = Cell(flange, start, known)
+    cell = Cell(flange, start, frames=known)
     if robot is not None:
-        cell = replace(cell, tool=robot.tool, base=np.eye(4))
+        cell = replace(cell, joints=robot.joints, tool=robot.tool, base=np.eye(4))
     return Machine(program, DIALECTS[program.language](), cell, limits or RunLimits()).run()
+
+
+def _other_table(program: Program, robot: Robot) -> str:
+    """Why a table of joints is none of an arm's; empty if it is."""
+    if program.language != "csv":
+        return ""
+    instructions = (each.instruction for each in program.operations() if isinstance(each, Fixed))
+    first = next((each.target for each in instructions if isinstance(each, ArmMotion)), None)
+    if not isinstance(first, JointTarget) or len(first.joints) == robot.joints:
+        return ""
+    return f"the table has {len(first.joints)} joints, and this arm has {robot.joints}"

@@ -56,6 +56,12 @@ HARMLESS = (
         "varmsg",
         "rq_set_",
         "is_",
+        "encoder_",
+        "conveyor_pulse_decode",
+        "reset_",
+        "tool_contact",
+        "time",
+        "switch_",
     ),
 )
 OUTPUTS = {
@@ -120,6 +126,8 @@ class UrScriptDialect:
         if name == "get_inverse_kin" and values and isinstance(values[0], Record):
             near = values[1] if len(values) > 1 else keywords.get("qnear")
             return Solved(values[0], near if near is not None else ())
+        if name == "struct":
+            return Record(name, tuple(keywords.items()))
         found = _of_position(memory, name, values)
         if found is None:
             found = _of_poses(name, values, keywords)
@@ -183,7 +191,8 @@ class UrScriptDialect:
         if call.function in OUTPUTS and len(given) == 2:
             values = [memory.value(each) for each in given]
             return Output(f"{OUTPUTS[call.function]}[{shown(values[0])}]", shown(values[1]))
-        return Aside(doing.text) if call.function.startswith(HARMLESS) else Unknown(doing.text)
+        remote = "." in call.function  # a method of an object of another process, which moves nothing by itself
+        return Aside(doing.text) if remote or call.function.startswith(HARMLESS) else Unknown(doing.text)
 
 
 def _tool(memory: ProgramMemory) -> NamedFrame:

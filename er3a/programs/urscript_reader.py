@@ -38,7 +38,7 @@ from er3a.programs.values import POSE_KEYS, Record
 UR = Lexicon(
     re.compile(
         rf"""(?P<text>"[^"]*"|'[^']*')|(?P<number>0x[0-9A-Fa-f]+|{NUMBER})|(?P<name>[^\W\d]\w*)"""
-        r"""|(?P<mark>==|!=|<=|>=|[^\s\w])"""
+        r"""|(?P<mark>==|!=|<=|>=|\S)"""
     ),
     ranks={
         "or": 1,
@@ -69,7 +69,11 @@ class UrWords(Words):
         super().__init__(UR, text)
 
     def special(self) -> Expression | None:
-        """Lists and poses."""
+        """Lists and poses, with an index behind them."""
+        found = self._list()
+        return None if found is None else self.parts_of(found)
+
+    def _list(self) -> Expression | None:
         kind = "p" if self.next == "p" and self.texts[self.at + 1] == "[" else ""
         if kind:
             self.take()
@@ -86,8 +90,7 @@ class UrWords(Words):
         placed, _ = self.arguments("]")
         if None in placed:
             raise MisreadError("an element is missing")
-        found: Expression = Listed(kind, tuple(each for each in placed if each is not None))
-        return found
+        return Listed(kind, tuple(each for each in placed if each is not None))
 
     def _numbers(self) -> tuple[int | float, ...] | None:
         """Numbers alone up to the closing bracket, which is passed; None, with nothing passed, for anything else."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from er3a.programs.instructions import Listing
+from er3a.errors import InputError
+from er3a.programs.arm_joints import not_expressed, other_count
+from er3a.programs.instructions import JointTarget, Listing
 from er3a.programs.krl_writer import KrlWriter
 from er3a.programs.rpl_writer import RplWriter, XplWriter
 from er3a.programs.syntax import Language
@@ -15,6 +17,7 @@ WRITERS: dict[Language, type[Writer]] = {
     "rpl": RplWriter,
     "xpl": XplWriter,
 }
+WITHOUT_JOINTS = "Write a table (csv), or a language that has these joints"
 
 
 def write_program(listing: Listing, language: Language, options: WriteOptions | None = None) -> WrittenProgram:
@@ -25,7 +28,15 @@ def write_program(listing: Listing, language: Language, options: WriteOptions | 
     ------
     ValueError
         for a language that is none of krl, urscript, rpl, xpl
+    InputError
+        for an arm that the language has no joint targets for
     """
     if language not in WRITERS:
         raise ValueError(f"no writer for {language!r}; known: {', '.join(WRITERS)}")
-    return WRITERS[language](listing, options or WriteOptions()).write()
+    options = options or WriteOptions()
+    counts = {len(each.target.joints) for each in listing.motions if isinstance(each.target, JointTarget)}
+    reasons = [not_expressed(language, options.robot)] if options.robot is not None else []
+    for reason in (*reasons, *(other_count(language, count) for count in sorted(counts))):
+        if reason:
+            raise InputError(None, None, reason, WITHOUT_JOINTS)
+    return WRITERS[language](listing, options).write()

@@ -39,6 +39,19 @@ from er3a.programs.resolving import ReadyMotion, Resolver, with_default_frames
 from er3a.robots.robot import Robot
 
 HEAD = "er3a: "
+RESERVED = frozenset(
+    word
+    for words in (
+        "and anin anout bas bool brake case char circ const continue decl def defdat default deffct delay do else end",
+        "enddat endfct endfor endif endloop endswitch endwhile enum exit exor ext extfct false for global goto halt if",
+        "import int interrupt is lin loop maximum minimum not or prio ptp public real repeat return sec signal",
+        "spl spline struc switch then to trigger true until wait when while",
+        "break elif join kill local movec movej movel movep pass run sleep sync thread xor",
+    )
+    for word in words.split()
+)
+"""Words of the languages, which can't be names of programs."""
+
 ARC_DEVIATION = 0.0001  # m, of lines that stand for an arc
 
 
@@ -64,7 +77,7 @@ class WriteOptions:
     Attributes
     ----------
     robot : the arm; without it joints can't be told from poses, nor poses from joints
-    start : (6,), rad, where the arm is before the first motion
+    start : (n,), rad, where the arm is before the first motion
     notes : findings of those who made the sequence, to be said in the head
     head : further lines of the head
     """
@@ -94,10 +107,12 @@ class Writer(ABC):
 
     def write(self) -> WrittenProgram:
         """The files."""
-        for i, instruction in enumerate(self.listing.instructions):
+        instructions = [with_default_frames(each, self.robot) for each in self.listing.instructions]
+        ready = [self.resolver.ready(each) if isinstance(each, ArmMotion) else each for each in instructions]
+        for i, instruction in enumerate(ready):
             if i == self.listing.repeats_from:
                 self.begin_loop()
-            self._add(with_default_frames(instruction, self.robot))
+            self._add(instruction)
         if self.listing.repeats_from is not None:
             self.end_loop()
         findings = (*self.options.notes, *self._findings())
@@ -148,10 +163,10 @@ class Writer(ABC):
         if name not in self.tools:
             self.tools.append(name)
 
-    def _add(self, instruction: Instruction) -> None:
+    def _add(self, instruction: Instruction | ReadyMotion) -> None:
         match instruction:
-            case ArmMotion():
-                self.motion(self.resolver.ready(instruction))
+            case ReadyMotion():
+                self.motion(instruction)
             case Remark(text=text):
                 self._remark(text)
             case Disabled(text=text):
@@ -236,7 +251,8 @@ def head_line(finding: WriteFinding) -> str:
 def program_name(name: str, longest: int) -> str:
     """A name that every controller takes: letters, digits and underscores, a letter first."""
     plain = re.sub(r"[^A-Za-z0-9_]+", "_", name).strip("_") or "program"
-    return (plain if plain[0].isalpha() else f"p{plain}")[:longest]
+    taken = not plain[0].isalpha() or plain.lower() in RESERVED
+    return (f"p{plain}" if taken else plain)[:longest]
 
 
 def ascii_text(text: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -222,3 +223,53 @@ def test_motions_beyond_the_most_are_no_pass(tmp_path):
     assert [verdict.level for verdict in check.verdicts] == ["pass"] * 4 + ["caution"] * 3
     assert "rest_not_checked" in codes(check)
     assert "rest_not_checked" not in codes(checked(body, tmp_path, most_motions=7))
+
+
+def test_targets_beyond_the_most_motions_are_checked_for_reach_and_limits(tmp_path):
+    near = [f"LIN {{X {300 + i},Y 0,Z 450,A 0,B 0,C 180}}" for i in range(6)]
+    first = f"PTP {axes(HOME)}"
+    faults = ["LIN {X 3000}", "LIN {X 3000,Y 0,Z 450,A 0,B 0,C 180}", "PTP {A1 500}", "PTP XNOWHERE"]
+    body = "\n".join([first, *near, *faults, near[0]])
+    check = checked(body, tmp_path, most_motions=4)
+    said = next(each for each in check.findings if each.finding.code == "rest_not_checked")
+    assert (said.place.line, said.finding.checked, said.finding.targets) == (11, 4, 8)
+    behind = {(each.place.line, each.finding.code) for each in check.findings if each.place.line > 13}
+    assert {(14, "target_out_of_reach"), (15, "target_out_of_reach")} <= behind
+    assert {(16, "above_limit"), (17, "target_not_given")} <= behind
+    assert not any(line == 18 for line, _ in behind)
+    whole = checked(body, tmp_path)
+    wrong = {"target_out_of_reach", "way_out_of_reach", "above_limit", "target_not_given"}
+    lines = {each.place.line for each in whole.findings if each.finding.code in wrong}
+    assert lines == {line for line, code in behind if code in wrong}
+
+
+def test_motions_that_are_repeated_count_once(tmp_path):
+    body = f"FOR i=1 TO 30\nPTP {axes(HOME)}\nPTP {{A1 10}}\nENDFOR"
+    check = checked(body, tmp_path, most_motions=4)
+    assert "rest_not_checked" not in codes(check)
+    assert len(check.motions) == 60
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("suffix", [".src", ".script", ".pgm"])
+def test_a_program_of_100_000_lines_has_a_result_within_a_minute_of_work(suffix, tmp_path):
+    angle = np.linspace(0, 60 * np.pi, 100_000)
+    x, y = 400 + 30 * np.cos(angle), 30 * np.sin(angle)
+    x[-2] = 5000.0
+    if suffix == ".src":
+        lines = [f"LIN {{X {a:.3f},Y {b:.3f},Z 450,A 0,B 0,C 180}} C_DIS" for a, b in zip(x, y)]
+        text = "\n".join(["DEF a( )", *lines, "END", ""])
+    elif suffix == ".script":
+        lines = [f" movel(p[{a / 1000:.6f},{b / 1000:.6f},0.45,3.14159,0,0],r=0.001)" for a, b in zip(x, y)]
+        text = "\n".join(["def a():", *lines, "end", ""])
+    else:
+        joints = [f"POINTJ({a:.4f},-10,-10,0,-70,0)" for a in x - 400]
+        text = "\n".join(["", *(f"MJOINT({point}, v50perc, fine, tool0);" for point in joints)])
+    (tmp_path / f"a{suffix}").write_text(text)
+    begun = time.process_time()
+    check = check_program(read_program(tmp_path / f"a{suffix}"), ROBOT, CheckOptions(start=HOME))
+    assert time.process_time() - begun < 60
+    assert len(check.verdicts) == 100_000
+    assert {"target_out_of_reach", "above_limit"} & {
+        each.finding.code for each in check.findings if each.place.line > 99_000
+    }

@@ -261,3 +261,32 @@ def test_speeds_and_zones_set_as_a_whole_count_like_their_fields(tmp_path):
     first, second = execute(read_program(tmp_path / "a.src")).listing().motions
     assert (first.speed.value, first.acceleration.value, first.zone.value) == (0.3, 2.0, 0.02)
     assert second.speed.value == 0.2
+
+
+def test_axes_beside_the_arm_are_named_and_leave_the_arm_where_it_is(tmp_path):
+    body = "PTP {A1 0,A2 -20,A3 0,A4 0,A5 -60,A6 0}\nASYPTP {E1 10}\nON_ERROR_PROCEED\nPTP {A1 5}"
+    execution = run(tmp_path, body)
+    assert [each.text for each in execution.program.findings if isinstance(each, NotUnderstood)] == ["ASYPTP {E1 10}"]
+    np.testing.assert_allclose(np.degrees(moves(execution)[1].target.joints), [5, -20, 0, 0, -60, 0])
+
+
+def test_the_zone_of_a_joint_spline_is_that_of_its_data(tmp_path):
+    body = "SPTP XP1 WITH $APO = SAPO_PTP(PPDAT1) C_Spl\nSLIN XP1 WITH $APO = SAPO(LCPDAT1) C_SPL"
+    joint, line = moves(run(tmp_path, body))
+    assert (joint.zone.kind, joint.zone.value) == ("share", 0.2)
+    assert (line.zone.kind, line.zone.value) == ("distance", 0.05)
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["中文", "LIN {X 1} 中", "PTP é {A1 1}", "X=1 µ", "'", "°", "\\", "LIN {X 1,}", "PTP {A1 1,A1 2}", "LIN {X a,X b}"],
+)
+def test_lines_that_are_no_krl_are_kept_and_named(line, tmp_path):
+    execution = run(tmp_path, line)
+    assert [each.text for each in execution.program.findings if isinstance(each, NotUnderstood)] == [line]
+    assert [step.instruction for step in execution.steps] == [Unknown(line)]
+
+
+def test_a_position_of_axes_and_coordinates_is_none(tmp_path):
+    (motion,) = moves(run(tmp_path, "PTP {X 400,A1 5}"))
+    assert motion.target.reason == "not_understood"

@@ -220,3 +220,24 @@ def test_a_changed_solution_or_element_is_not_taken_for_the_old_one(tmp_path):
     (tmp_path / "a.src").write_text(f"DEF a( )\n{body}END\n")
     (motion,) = execute(read_program(tmp_path / "a.src")).listing().motions
     assert isinstance(motion.target, UnresolvedTarget)
+
+
+def test_structures_lists_and_remote_objects_of_urscript(tmp_path):
+    (tmp_path / "a.script").write_text(
+        "def a():\n"
+        "  part = struct(height = 0.02, pick = p[0.3,0,0.3,0,1.57,0])\n"
+        '  link = rpc_factory("xmlrpc", "http://127.0.0.1:40000")\n'
+        "  link.write(struct(A = True))\n"
+        '  first = link.read(["A", "B"])[0]\n'
+        "  q = [[0,0,0,0,0,0], [0.1,0,0,0,-1,0]][1]\n"
+        "  movel(part.pick)\n"
+        "  movej(q)\n"
+        "  movej([q[0], q[1], 0, 0, [1, -1][1], 0])\n"
+        "end\n"
+    )
+    execution = execute(read_program(tmp_path / "a.script"))
+    line, first, second = execution.listing().motions
+    np.testing.assert_allclose(line.target.pose[:3, 3], [0.3, 0, 0.3])
+    np.testing.assert_allclose(first.target.joints, [0.1, 0, 0, 0, -1, 0])
+    np.testing.assert_allclose(second.target.joints, first.target.joints)
+    assert [step for step in execution.steps if isinstance(step.instruction, Unknown)] == []

@@ -260,3 +260,38 @@ def test_tools_are_written_as_each_language_has_them(tmp_path):
         moves = execute(read_program(saved(tmp_path, written)), robot).listing().motions
         np.testing.assert_allclose(moves[1].tool.pose, tool, atol=1e-9)
         np.testing.assert_allclose(moves[1].target.pose, end, atol=2e-8)
+
+
+def wound_path(count):
+    """Joints near enough to each other to be one branch, and their poses."""
+    rng = np.random.default_rng(11)
+    q = np.radians([10.0, -20.0, 15.0, 5.0, -60.0, 20.0]) + np.cumsum(rng.uniform(-0.01, 0.01, (count, 6)), axis=0)
+    return q, forward(ROBOT, q)
+
+
+@pytest.mark.parametrize("language", ["rpl", "xpl"])
+def test_joints_of_a_long_table_of_poses_are_those_it_was_made_of(language, tmp_path):
+    q, poses = wound_path(2500)  # more than are solved at once
+    command = ToolTableCommand(poses, tuple(map(str, range(len(q)))), 100.0, blend=0.0)
+    listing = listing_of(command, ROBOT, q[0]).listing
+    moves = read_back(tmp_path, write_program(listing, language, WriteOptions(ROBOT))).listing().motions
+    np.testing.assert_allclose(np.degrees([each.target.joints for each in moves]), np.degrees(q), rtol=0, atol=1e-6)
+
+
+def test_poses_that_are_written_as_poses_need_no_inverse(monkeypatch):
+    q, poses = wound_path(50)
+    listing = listing_of(ToolTableCommand(poses, tuple(map(str, range(50))), 9.0, blend=0.001), ROBOT, q[0]).listing
+    wanted = {language: write_program(listing, language, WriteOptions(ROBOT)).files for language in LANGUAGES[:2]}
+    monkeypatch.setattr("er3a.programs.resolving.inverse_batch", None)
+    for language, files in wanted.items():
+        assert write_program(listing, language, WriteOptions(ROBOT)).files == files
+
+
+def test_a_table_that_leaves_the_reach_is_left_out_from_there_and_said():
+    q, poses = wound_path(30)
+    poses = poses.copy()
+    poses[20, 0, 3] += 5.0
+    listing = listing_of(ToolTableCommand(poses, tuple(map(str, range(30))), 9.0, blend=0.0), ROBOT, q[0]).listing
+    written = write_program(listing, "rpl", WriteOptions(ROBOT))
+    assert TargetsLeftOut(1) in written.findings
+    assert written.files[".pgm"].count("MLIN(POINTJ") == 28

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import re
 
-from er3a.programs.instructions import Listing, Pause
+import numpy as np
+import pytest
+
+from er3a.programs.instructions import ArmMotion, JointTarget, Listing, Pause
+from er3a.programs.read_program import read_program
+from er3a.programs.run_program import execute
 from er3a.programs.write_program import write_program
 from er3a.programs.writing import WriteOptions
 from tests.programs.test_round_trips import ROBOT, listing_of, tool_path
@@ -38,3 +43,15 @@ def test_waits_and_loops():
     listing = Listing("waits", (Pause(0.5), Pause(), Pause(condition="$IN[3]")), repeats_from=1, language="krl")
     lines = write_program(listing, "krl").files[".src"].split("\n")
     assert lines[4:] == ["WAIT SEC 0.5", "LOOP", "HALT", "WAIT FOR $IN[3]", "ENDLOOP", "END", ""]
+
+
+@pytest.mark.parametrize("name", ["loop", "End", "LIN", "movej", "halt"])
+@pytest.mark.parametrize("language", ["krl", "urscript", "rpl", "xpl"])
+def test_no_program_is_named_by_a_word_of_its_language(name, language, tmp_path):
+    listing = Listing(name, (ArmMotion("joint", JointTarget(np.zeros(6))),))
+    written = write_program(listing, language)
+    assert written.name == f"p{name}"
+    for suffix, text in written.files.items():
+        (tmp_path / f"{written.name}{suffix}").write_text(text)
+    path = tmp_path / f"{written.name}{next(iter(written.files))}"
+    assert len(execute(read_program(path)).motions) == 1

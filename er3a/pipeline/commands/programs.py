@@ -48,7 +48,9 @@ def check_program(
         bool, typer.Option("--verdicts", help="a line for each motion, also for those that pass")
     ] = False,
     sarif: Annotated[Path | None, typer.Option(help="write SARIF 2.1.0 to this file")] = None,
-    most_motions: Annotated[int, typer.Option(help="how many motions are checked; the rest is named", min=1)] = 20_000,
+    most_motions: Annotated[
+        int, typer.Option(help="how many motions are checked; of the rest the targets", min=1)
+    ] = 1_000,
     fail_on: Annotated[FailOn, typer.Option(help="exit code 1 for findings from this level on")] = FailOn.fail,
     as_json: AsJson = False,
 ):
@@ -139,10 +141,9 @@ def _checked(file: Path, robot: Robot, options: CheckOptions) -> CheckedFile:
     from er3a.programs.read_program import read_program
 
     try:
-        program = read_program(file)
+        return CheckedFile(file, check(read_program(file), robot, options))
     except InputError as error:
         return CheckedFile(file, None, error)
-    return CheckedFile(file, check(program, robot, options))
 
 
 def _joints(text: str | None, robot: Robot) -> Reals | None:

@@ -27,6 +27,7 @@ REASONS: dict[Unresolved, str] = {
     "position_unknown": N_("it depends on where the arm stands, which is not known"),
     "external_tool": N_("the workpiece is moved along a fixed tool, which is not supported"),
     "not_understood": N_("it is not understood"),
+    "too_many_joints": N_("it turns axes that the arm does not have"),
 }
 ENDS: dict[EndKind, str] = {
     "drifts": N_("the loop never comes back to a state that it was in; it was followed for a limited number of rounds"),
@@ -202,6 +203,8 @@ def _(found: found_in.WayNotKnown) -> str:
 
 @say.register
 def _(found: found_in.TargetOutOfReach) -> str:
+    if not found.reasons:
+        return sentence("target_out_of_reach.bare", "the target is out of reach")
     return sentence(found.code, "the target is out of reach: {reasons}", reasons=joined(listed(found.reasons)))
 
 
@@ -439,10 +442,18 @@ def _(found: found_in.NeverReached) -> str:
 
 @say.register
 def _(found: found_in.RestNotChecked) -> str:
+    if not found.targets:
+        return sentence(
+            found.code,
+            "only the first {checked} motions that are carried out were checked, none from here on",
+            checked=found.checked,
+        )
     return sentence(
-        found.code,
-        "only the first {checked} motions that are carried out were checked, none from here on",
+        "rest_not_checked.targets",
+        "only the first {checked} motions that are carried out were checked; of those from here on {targets} targets, "
+        "for reach and limits, and not the ways to them",
         checked=found.checked,
+        targets=found.targets,
     )
 
 

@@ -39,6 +39,7 @@ from er3a.programs.program_outcomes import ProgramOutcome
 from er3a.programs.read_program import read_program
 
 OUTCOMES: dict[Level, ProgramOutcome] = {"pass": "pass", "note": "pass", "caution": "caution", "fail": "fail"}
+MOST_MOTIONS = 20_000
 MOST_POINTS = 20_000  # of a program's motion that are kept
 
 
@@ -89,6 +90,7 @@ def _options(study: Study, listed: ProgramsFile) -> CheckOptions:
         assumed=AssumedRates(
             own.tool_speed_mm_s / 1000, own.tool_acceleration_mm_s2 / 1000, own.joint_speed_percent / 100
         ),
+        most_motions=MOST_MOTIONS,
         limits=RunLimits(own.most_steps, own.most_branches, own.loop_rounds),
     )
 

@@ -27,6 +27,7 @@ from er3a.pipeline.messages.trajectory import (
 from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, moment, player, player_style
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.trajectory.clearance_figures import clearance_section
+from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.stages.trajectory.model import (
     AvoidanceRows,
     NearThresholds,
@@ -45,6 +46,7 @@ from er3a.pipeline.stages.trajectory.path_figures import PathFigure
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import fixed, head_of, number, render, run_command
 from er3a.planning.path_verdicts import PathVerdict
+from er3a.programs.arm_joints import WORDS, not_expressed
 from er3a.robots.robot import Robot
 
 DRAWN = 250
@@ -120,6 +122,7 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
         robot=robot,
         robot_pages=study.pages(stored.robot),
         sections=sections,
+        unwritten=[WORDS[each] for each in study.section(TrajectorySettings).programs if not_expressed(each, robot)],
         clearance=clearance_section(results),
         assumed=assumed,
         turning=turning_figure(robot, results),
