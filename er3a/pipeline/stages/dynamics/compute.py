@@ -133,7 +133,12 @@ def _holding(arm: LoadedArm) -> tuple[HoldingTorque, ...]:
     q = np.where(slides, 1000 * found.q, np.degrees(found.q))
     return tuple(
         HoldingTorque(
-            j + 1, float(found.values[j]), float(tolerance[j]), "N" if slides[j] else "N m", tuple(q[j].tolist())
+            joint=j + 1,
+            torque=float(found.values[j]),
+            bound=float(found.bound[j]),
+            tolerance=float(tolerance[j]),
+            unit="N" if slides[j] else "N m",
+            q=tuple(q[j].tolist()),
         )
         for j in range(arm.robot.joints)
     )

@@ -41,8 +41,8 @@ def drive_uses(robot: Robot, paths: tuple[PathLoad, ...], holding: tuple[Holding
     for held in holding:
         rated = float(drives.rated[held.joint - 1])
         if np.isfinite(rated):
-            torque = abs(held.torque)
-            found.append(Use("holding", held.joint, None, torque, torque + held.tolerance, rated, held.unit))
+            upper = held.bound + held.tolerance
+            found.append(Use("holding", held.joint, None, abs(held.torque), upper, rated, held.unit))
     return tuple(found)
 
 

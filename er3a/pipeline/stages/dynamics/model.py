@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from er3a.dynamics.margins import Binding
 from er3a.dynamics.plausibility import MassFinding
 from er3a.dynamics.wrist import WristQuantity
 from er3a.numerics.arrays import Reals
@@ -159,10 +160,14 @@ class MassesUsed:
 
 @dataclass(frozen=True)
 class HoldingTorque:
-    """The greatest torque found that a joint holds at rest within the limits, and the pose where it does."""
+    """The greatest torque found that a joint holds at rest within the limits, and the pose where it does.
+
+    ``bound``: the absolute value that none of the poses within the limits exceeds, for the masses as given.
+    """
 
     joint: int
     torque: float
+    bound: float
     tolerance: float
     unit: Unit
     q: tuple[float, ...]
@@ -199,9 +204,13 @@ class JointLoad:
 
 @dataclass(frozen=True)
 class BindingLimit:
-    """The greatest value under a limit; joint and time of what binds, None where nothing does."""
+    """The greatest value under the limits, and what binds; None where nothing does.
+
+    ``t_s`` is None for the effective torque, which is one of the whole path.
+    """
 
     value: float | None
+    by: Binding | None
     joint: int | None
     t_s: float | None
 
@@ -212,6 +221,7 @@ class WristMoment:
 
     joint: int
     moment_n_m: float
+    tolerance: float
     t_s: float
 
 
