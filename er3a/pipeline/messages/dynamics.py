@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import er3a.pipeline.messages.planning  # noqa: F401
+from er3a.dynamics.margins import Binding
 from er3a.dynamics.plausibility import (
     AboutOrigin,
     CentreOutside,
@@ -26,6 +27,7 @@ FIGURES = {
     "utilisation": N_("Tightest comparison with a limit"),
     "power_balance": N_("Power balance, greatest error"),
 }
+BINDING: dict[Binding, str] = {"peak": N_("peak"), "rms": N_("effective"), "speed": N_("speed")}
 WHY: dict[NoBody, str] = {
     "not_finite": N_("holds something that is no number"),
     "negative_mass": N_("its mass is below 0"),

@@ -110,10 +110,10 @@ def _no_limits(
     doubts: int,
     inferred: bool,
 ) -> NoLimits:
-    torques = [(load.peak, load.tolerance, load.joint, load.unit, path.name) for path in paths for load in path.joints]
-    complete = sum(path.complete for path in paths)
-    if torques:
-        peak, tolerance, joint, unit, name = max(torques, key=lambda each: each[0])
-        return NoLimits(complete, joint, peak, tolerance, unit, name, missing, doubts, inferred)
-    held = max(holding, key=lambda each: abs(each.torque))
-    return NoLimits(complete, held.joint, abs(held.torque), held.tolerance, held.unit, None, missing, doubts, inferred)
+    followed = [path for path in paths if path.complete]
+    if followed:
+        path = max(followed, key=lambda path: path.hardest.peak)
+        load, shown = path.hardest, (missing, doubts, inferred)
+        return NoLimits(len(followed), load.joint, load.peak, load.tolerance, load.unit, path.name, *shown)
+    held = max(holding, key=lambda each: (each.unit == "N m", abs(each.torque)))
+    return NoLimits(0, held.joint, abs(held.torque), held.tolerance, held.unit, None, missing, doubts, inferred)

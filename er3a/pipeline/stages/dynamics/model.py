@@ -249,6 +249,11 @@ class PathLoad:
     kinematic_s: float | None
     no_law: NoTimeLaw | None
 
+    @property
+    def hardest(self) -> JointLoad:
+        """The joint with the greatest peak; one that turns if there is any, because N and N m don't compare."""
+        return max(self.joints, key=lambda load: (load.unit == "N m", load.peak))
+
 
 @dataclass(frozen=True)
 class MotorNeed:

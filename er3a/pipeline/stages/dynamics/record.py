@@ -25,7 +25,7 @@ PAUSE = 1.0  # s between two paths
 LONGEST = 0.35  # of the arm's size, the arrow of the greatest torque
 WIDTH = 0.012  # of the arm's size
 CLEAR = 0.037  # of the arm's size, from the middle of a joint's drum to outside it
-CURVES = {"torque": "Torque of the drive (N m)", "gravity": "Part against gravity (N m)", "power": "Power (W)"}
+CURVES = {"torque": "Torque of the drive ({unit})", "gravity": "Part against gravity ({unit})", "power": "Power (W)"}
 SHOWN_S = rr.TimeRange(
     start=rr.TimeRangeBoundary.cursor_relative(seconds=-4), end=rr.TimeRangeBoundary.cursor_relative(seconds=12)
 )
@@ -51,10 +51,12 @@ def record(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
 
 
 def _layout(robot: Robot) -> rrb.Horizontal:
+    slides = robot.slides
+    unit = "N" if slides.all() else "N m or N" if slides.any() else "N m"
     series = [
         rrb.TimeSeriesView(
             origin=f"/{STAGE}/curves/{curve}",
-            name=title,
+            name=title.format(unit=unit),
             axis_x=rrb.TimeAxis(view_range=SHOWN_S),
             plot_legend=rrb.PlotLegend(visible=curve == "torque"),
         )
