@@ -70,6 +70,8 @@ ARMS: dict[str, Callable[[], Robot]] = {
     "sliding": lambda: random_arm(3, "standard", [False, False, True, False]),
     "sliding, modified": lambda: random_arm(4, "modified", [True, False, True, False, False]),
     "coupled": lambda: random_arm(5, "standard", [False] * 4, COUPLED),
+    "one": lambda: random_arm(8, "standard", [False]),
+    "one that slides": lambda: random_arm(9, "modified", [True]),
     "seven": lambda: random_arm(6, "standard", [False] * 7),
     "er3a_c60": lambda: er3a.load_robot("er3a_c60"),
 }

@@ -12,7 +12,16 @@ from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import listed, say, word
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics.load_figures import bound_text, diagram_figure, holding_figure, torque_figure
-from er3a.pipeline.stages.dynamics.model import BindingLimit, DynamicsResults, DynamicsSummary, HoldingTorque, MotorNeed, PathLoad, Unit, Use
+from er3a.pipeline.stages.dynamics.model import (
+    BindingLimit,
+    DynamicsResults,
+    DynamicsSummary,
+    HoldingTorque,
+    MotorNeed,
+    PathLoad,
+    Unit,
+    Use,
+)
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import fixed, head_of, number, render, run_command
 
