@@ -19,6 +19,7 @@ from er3a.pipeline.stages.dynamics.model import (
     Overload,
     PathLoad,
     Use,
+    hardest_held,
 )
 from er3a.robots.masses import Load
 from er3a.robots.robot import Robot
@@ -62,7 +63,7 @@ def unknowns(robot: Robot, load: Load | None) -> tuple[DataOpen, ...]:
         for what, numbers in open_joints.items()
         if numbers
     ]
-    last = set(joints[-3:])
+    last = {joint for joint in joints[-3:] if not robot.slides[joint - 1]}
     if wrist is None or not np.isfinite(wrist.payload):
         found.append(DataOpen("payload"))
     asked: tuple[tuple[Need, set[int]], ...] = (
@@ -115,5 +116,5 @@ def _no_limits(
         path = max(followed, key=lambda path: path.hardest.peak)
         load, shown = path.hardest, (missing, doubts, inferred)
         return NoLimits(len(followed), load.joint, load.peak, load.tolerance, load.unit, path.name, *shown)
-    held = max(holding, key=lambda each: (each.unit == "N m", abs(each.torque)))
+    held = hardest_held(holding)
     return NoLimits(0, held.joint, abs(held.torque), held.tolerance, held.unit, None, missing, doubts, inferred)

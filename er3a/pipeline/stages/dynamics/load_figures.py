@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.stages.dynamics.model import DiagramRows, DynamicsSummary, PathLoad, TorqueRows, Unit
+from er3a.pipeline.stages.dynamics.model import DiagramRows, DynamicsSummary, PathLoad, TorqueRows, Unit, hardest_held
 from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.page import Picture, number
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED
@@ -85,7 +85,7 @@ def holding_figure(summary: DynamicsSummary) -> Picture:
     ax.set_xticks(joints, [f"J{j + 1}" for j in joints])
     ax.set_ylabel(tr("holding torque ({unit})", unit=torque_unit({held.unit for held in summary.holding})))
     ax.grid(visible=False, axis="x")
-    worst = max(summary.holding, key=lambda held: (held.unit == "N m", abs(held.torque)))
+    worst = hardest_held(summary.holding)
     caption = tr(
         "At rest J{joint} has to hold most: {torque} ± {tolerance} {unit}. No pose within the joint limits needs more "
         "than {bound} {unit} there, for the masses as given.",

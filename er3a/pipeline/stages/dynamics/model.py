@@ -173,6 +173,15 @@ class HoldingTorque:
     q: tuple[float, ...]
 
 
+NOTHING_HELD = 1e-9
+"""N m or N: less than that is rounding."""
+
+
+def hardest_held(holding: tuple[HoldingTorque, ...]) -> HoldingTorque:
+    """The joint that holds most; one that turns if any has something to hold, because N and N m don't compare."""
+    return max(holding, key=lambda held: (held.unit == "N m" and held.bound > NOTHING_HELD, held.bound))
+
+
 @dataclass(frozen=True)
 class JointLoad:
     """What a path asks of a drive.
