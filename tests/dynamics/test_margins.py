@@ -310,3 +310,30 @@ def test_demands_of_a_drive_in_closed_form():
     assert found.work[0] - found.recovered[0] == pytest.approx(3 * np.pi, rel=1e-6)
     assert found.power[0] == pytest.approx(4.0, rel=1e-6)  # 3 cos^2 + 4 sin cos is at most (3 + 5) / 2
     assert found.braking[0] == pytest.approx(1.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("viscous", [0.0, 0.3, 3.0])
+def test_times_under_torques_are_those_of_full_thrust_and_full_braking(viscous):
+    """One joint with a vertical axis: the fastest motion accelerates fully, then brakes fully; closed forms."""
+    peak, dry, inertia, angle = 5.0, 0.5, 0.3, 2.0
+    drives = replace(Drives.unknown(1), armature=np.array([0.1]), coulomb=np.array([dry]), viscous=np.array([viscous]))
+    body = MassBody(2.0, (0.3, 0, 0), (0.01, 0.01, 0.02, 0, 0, 0))
+    one = Robot(
+        name="one", title="one", convention="standard", a=[0.5], alpha=[0.0], d=[0.0], direction=[1.0], offset=[0.0],
+        lower=[-3.0], upper=[3.0], masses=Masses((LinkMass(1, body),), drives),
+    )  # fmt: skip
+    found = fastest_under_torques(arm_model(one), np.array([[0.0], [angle]]), np.array([1e3]), np.array([peak]))
+    up, down = (peak - dry) / inertia, (peak + dry) / inertia
+
+    def halves(top: float) -> tuple[float, float]:
+        """Way and time to a top speed and back to rest, of ``v' = up - k v`` and ``v' = -down - k v``."""
+        k = viscous / inertia
+        if not k:
+            return top**2 / 2 * (1 / up + 1 / down), top * (1 / up + 1 / down)
+        first, last = -np.log1p(-k * top / up) / k, np.log1p(k * top / down) / k
+        return (up * first - top) / k + (top - down * last) / k, first + last
+
+    highest = up * inertia / viscous * (1 - 1e-12) if viscous else 100.0
+    shortest = halves(scipy.optimize.brentq(lambda top: halves(top)[0] - angle, 1e-6, highest))[1]
+    assert np.abs(found.torques).max() <= peak * (1 + 1e-3)
+    assert shortest * (1 - 1e-6) <= found.timed.duration <= shortest * (1.1 if viscous else 1.001)
