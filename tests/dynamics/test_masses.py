@@ -394,3 +394,12 @@ def test_known_faults_of_published_urdfs_are_named_and_sound_ones_are_not(tmp_pa
     assert found["ur5_robot"] >= {(UnlikelyInertia, link) for link in (4, 5, 6)}
     assert (UnlikelyDensity, 0) in found["kr16_2"]
     assert [found[name] for name in sound] == [set()] * 4
+
+
+def test_masses_that_no_file_may_state_are_one_error_when_an_arm_is_written(arm, tmp_path):
+    heavy = with_body(arm, 2, lambda body: replace(body, mass=40_000.0))
+    with pytest.raises(InputError, match="heavier than any link") as caught:
+        write_robot(heavy, tmp_path / "er3a_c60.yaml")
+    assert caught.value.field.startswith("inertia.links[2].mass_kg")
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "er3a_c60.yaml").exists()
