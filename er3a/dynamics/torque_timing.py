@@ -84,7 +84,7 @@ def _fastest_pace(
     model: ArmModel, way: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, peak: Reals
 ) -> tuple[Reals, Reals]:
     """Speeds along the way and times (N,) at its nodes."""
-    rows = TorqueRows.along(model, way, spline, speed, peak)
+    rows = TorquesAlong.along(model, way, spline, speed, peak)
     around = rows.slow
     for _ in range(MOST_ROUNDS if rows.viscous.any() else 1):
         pace = _toppra(way, spline, speed, rows.constraints(around))
@@ -103,7 +103,7 @@ Rows = tuple[Reals, Reals, Reals, Reals, Reals]
 
 
 @dataclass(frozen=True, eq=False)
-class TorqueRows:
+class TorquesAlong:
     """Torques ``a s'' + b s'^2 + c + viscous s'`` at the nodes (N, k) of the k joints whose peak (k,) is known.
 
     Attributes
@@ -123,7 +123,7 @@ class TorqueRows:
     @classmethod
     def along(
         cls, model: ArmModel, way: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, peak: Reals
-    ) -> TorqueRows:
+    ) -> TorquesAlong:
         """The torques along a way."""
         q, slope, bend = (np.ascontiguousarray(spline(way, order)) for order in range(3))
         rest, bound, drives = np.zeros_like(q), np.isfinite(peak), drives_of(model.robot)
