@@ -57,6 +57,14 @@ class PointMass:
 
 
 @dataclass(frozen=True)
+class InertiaWithoutMass:
+    """A link has an inertia and no mass, as sums of parameters that were identified together do."""
+
+    link: int
+    code: Literal["inertia_without_mass"] = "inertia_without_mass"
+
+
+@dataclass(frozen=True)
 class CentreOutside:
     """A centre of mass is outside the link's shape."""
 
@@ -110,6 +118,7 @@ MassFinding = (
     ImpossibleInertia
     | MissingLink
     | PointMass
+    | InertiaWithoutMass
     | CentreOutside
     | UnlikelyDensity
     | UnlikelyInertia
@@ -127,17 +136,23 @@ def mass_findings(robot: Robot) -> tuple[MassFinding, ...]:
     found: list[MassFinding] = []
     for link in range(robot.rows + 1):
         body = robot.masses.body(link)
-        if body is None or body.mass == 0:
+        if body is None or (body.mass == 0 and not any(body.inertia)):
             rotor = moved_by_one and link > 0 and armature[link - 1] > 0
-            carries = any((robot.masses.body(k) or MassBody(0.0)).mass for k in range(link + 1, robot.rows + 1))
+            carries = any(_counts(robot.masses.body(k)) for k in range(link + 1, robot.rows + 1))
             found += [MissingLink(link, not rotor and not carries)] if link else []
         elif problem := no_body(body):
             found.append(ImpossibleInertia(link, problem))
+        elif body.mass == 0:
+            found.append(InertiaWithoutMass(link))
         elif not any(body.inertia):
             found.append(PointMass(link))
         elif link in shapes:
             found += _against_shape(link, body, shapes[link], beyond)
     return (*found, *_against_weight(robot, any(isinstance(each, MissingLink) for each in found)))
+
+
+def _counts(body: MassBody | None) -> bool:
+    return body is not None and (body.mass > 0 or any(body.inertia))
 
 
 def _against_shape(link: int, body: MassBody, shape: LinkShape, size: float) -> list[MassFinding]:

@@ -8,6 +8,7 @@ from er3a.dynamics.plausibility import (
     AboutOrigin,
     CentreOutside,
     ImpossibleInertia,
+    InertiaWithoutMass,
     MissingLink,
     PointMass,
     SumOffWeight,
@@ -57,6 +58,11 @@ def _(found: MissingLink) -> str:
 @say.register
 def _(found: PointMass) -> str:
     return sentence(found.code, "link {link}: a mass without inertia", link=found.link)
+
+
+@say.register
+def _(found: InertiaWithoutMass) -> str:
+    return sentence(found.code, "link {link}: an inertia without a mass; it counts as given", link=found.link)
 
 
 @say.register
