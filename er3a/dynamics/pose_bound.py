@@ -82,8 +82,9 @@ def bounded_torque(model: ArmModel, joint: int, size: Size, start: Bounded) -> B
     used, bound = _used_rows(robot, at_corners, robot.lower[None], robot.upper[None])
     if not used.any():
         return Bounded(start.found, start.q, max(start.found, float(bound[0])))
-    most = _bounded_norm(robot, caps, start.q, CLOSE).bound
-    if most <= start.found * (1 + CLOSE):
+    settled = start.found * (1 + CLOSE)
+    most = _bounded_norm(robot, caps, start.q, CLOSE, settled).bound
+    if most <= settled:
         return Bounded(start.found, start.q, max(start.found, most))
     found = _branch_and_bound(robot, at_corners, size, start, CLOSE)
     return Bounded(found.found, found.q, min(found.bound, most))
@@ -104,8 +105,13 @@ def _ahead(at: list[Reals], row: int) -> int:
     return int(np.prod([each.shape[1] for each in at[: row + 1]]))
 
 
-def _bounded_norm(robot: Robot, norms: Callable[[list[Reals]], Reals], q: Reals, close: float) -> Bounded:
-    """The greatest of norms (B, K) of vectors that are affine in the rows' corners; ``q`` is a pose to start at."""
+def _bounded_norm(
+    robot: Robot, norms: Callable[[list[Reals]], Reals], q: Reals, close: float, useless: float = np.inf
+) -> Bounded:
+    """The greatest of norms (B, K) of vectors that are affine in the rows' corners.
+
+    ``q`` is a pose to start at; a bound above ``useless`` is of no use, so nothing more is done once one is sure.
+    """
 
     def at_corners(at: list[Reals]) -> tuple[Reals, Reals]:
         values = norms(at)
@@ -115,28 +121,31 @@ def _bounded_norm(robot: Robot, norms: Callable[[list[Reals]], Reals], q: Reals,
         found: Reals = norms(_at(robot, np.zeros(robot.rows, bool), q, q))[:, 0]
         return found
 
-    return _branch_and_bound(robot, at_corners, size, Bounded(float(size(q[None])[0]), q, np.inf), close)
+    return _branch_and_bound(robot, at_corners, size, Bounded(float(size(q[None])[0]), q, np.inf), close, useless)
 
 
-def _branch_and_bound(robot: Robot, at_corners: AtCorners, size: Size, start: Bounded, close: float) -> Bounded:
+def _branch_and_bound(
+    robot: Robot, at_corners: AtCorners, size: Size, start: Bounded, close: float, useless: float = np.inf
+) -> Bounded:
     low, high = robot.lower[None], robot.upper[None]
-    used, bound = _used_rows(robot, at_corners, low, high)
+    used, _ = _used_rows(robot, at_corners, low, high)
+    bound, joint = _bounds(robot, at_corners, used, low, high)
     best, q = start.found, start.q
     each = 3 ** int(used.sum())
     batch, left, dropped = max(1, BATCH_CORNERS // each), MOST_CORNERS // each, 0.0
     while True:
         open_ = bound > best * (1 + close)
         dropped = max(dropped, float(bound[~open_].max(initial=0.0)))
-        low, high, bound = low[open_], high[open_], bound[open_]
-        if not len(bound) or left <= 0 or len(bound) > MOST_BOXES:
+        low, high, bound, joint = low[open_], high[open_], bound[open_], joint[open_]
+        if not len(bound) or left <= 0 or len(bound) > MOST_BOXES or best > useless:
             break
         order = np.argsort(-bound, kind="stable")
         taken, kept = order[:batch], order[batch:]
-        halves = _halved(low[taken], high[taken], _split_joint(robot, at_corners, used, low[taken], high[taken]))
+        halves = _halved(low[taken], high[taken], joint[taken])
         inside = _may_be_within(robot, *halves)
         halves = halves[0][inside], halves[1][inside]
-        bounds, _ = _bounds(robot, at_corners, used, *halves)
-        left -= len(taken) + len(bounds)
+        bounds, joints = _bounds(robot, at_corners, used, *halves)
+        left -= len(bounds)
         middle = (halves[0] + halves[1]) / 2
         middle = middle[within(robot, middle)]
         values = size(middle)
@@ -145,6 +154,7 @@ def _branch_and_bound(robot: Robot, at_corners: AtCorners, size: Size, start: Bo
         low = np.concatenate([low[kept], halves[0]])
         high = np.concatenate([high[kept], halves[1]])
         bound = np.concatenate([bound[kept], np.minimum(bounds, np.repeat(bound[taken], 2)[inside])])
+        joint = np.concatenate([joint[kept], joints])
     most = max(best, dropped, float(bound.max(initial=0.0)))
     return Bounded(best, q, most * (1 + ROUNDING))
 
@@ -154,11 +164,25 @@ def _at(robot: Robot, used: Flags, low: Reals, high: Reals) -> list[Reals]:
     return [found[:, row] if used[row] else found[:, row, APEX:] for row in range(robot.rows)]
 
 
-def _bounds(robot: Robot, at_corners: AtCorners, used: Flags, low: Reals, high: Reals) -> tuple[Reals, Reals]:
-    """Bounds (B,) of boxes, and the values (B, K) at their corners."""
+def _bounds(robot: Robot, at_corners: AtCorners, used: Flags, low: Reals, high: Reals) -> tuple[Reals, Integers]:
+    """Bounds (B,) of boxes, and the joint (B,) whose interval makes each coarse: by how far corners are off the chord.
+
+    Where joints are coupled, boxes of rows leave that out, so there all that a row changes counts.
+    """
     values, cap = at_corners(_at(robot, used, low, high))
-    values = np.broadcast_to(values, (len(low), values.shape[1]))
-    return np.minimum(np.abs(values).max(axis=1), cap), values
+    cube = np.broadcast_to(values, (len(low), values.shape[1])).reshape(len(low), *(3 if each else 1 for each in used))
+    coarse = np.zeros((len(low), robot.rows))
+    for row in np.flatnonzero(used):
+        first, last, apex = (np.take(cube, corner, axis=row + 1) for corner in range(3))
+        off = np.abs(apex - (first + last) / 2)
+        if robot.coupling is not None:
+            off += np.abs(last - first)
+        coarse[:, row] = off.max(axis=tuple(range(1, robot.rows)))
+    if robot.coupling is not None:
+        coarse = coarse @ np.abs(robot.coupling)
+    most = np.abs(cube).max(axis=tuple(range(1, robot.rows + 1)))
+    joint: Integers = (coarse * (high > low)).argmax(axis=1)
+    return np.minimum(most, cap), joint
 
 
 def _used_rows(robot: Robot, at_corners: AtCorners, low: Reals, high: Reals) -> tuple[Flags, Reals]:
@@ -170,24 +194,6 @@ def _used_rows(robot: Robot, at_corners: AtCorners, low: Reals, high: Reals) -> 
     most = float(cap[0]) if np.isfinite(cap[0]) else float(np.abs(cube).max())
     used = [bool(np.ptp(cube, axis=row).max() > IDLE * most) for row in range(robot.rows)]
     return np.array(used), np.minimum(np.abs(cube).max(keepdims=True).reshape(1), cap)
-
-
-def _split_joint(robot: Robot, at_corners: AtCorners, used: Flags, low: Reals, high: Reals) -> Integers:
-    """The joint (B,) whose interval makes a box's bound coarse: by how far corners are off the chord of their ends.
-
-    Where joints are coupled, boxes of rows leave that out, so there all that a row changes counts.
-    """
-    _, values = _bounds(robot, at_corners, used, low, high)
-    cube = values.reshape(len(low), *(3 if each else 1 for each in used))
-    coarse = np.zeros((len(low), robot.rows))
-    for row in np.flatnonzero(used):
-        ends = np.moveaxis(cube, row + 1, 1).reshape(len(low), 3, -1)
-        off = ends[:, APEX] - ends[:, :APEX].mean(axis=1) if robot.coupling is None else np.ptp(ends, axis=1)
-        coarse[:, row] = np.abs(off).max(axis=1)
-    if robot.coupling is not None:
-        coarse = coarse @ np.abs(robot.coupling)
-    joint: Integers = (coarse * (high > low)).argmax(axis=1)
-    return joint
 
 
 def _halved(low: Reals, high: Reals, joint: Integers) -> tuple[Reals, Reals]:

@@ -11,7 +11,8 @@ from er3a.pipeline.viewing.page import Picture, number
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED
 
 DRAWN = 161
-PARTS = ("gravity", "inertia", "velocity", "friction")
+PARTS = ("gravity", "inertia", "velocity", "friction", "tool")
+STYLES = ("-", "--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)))
 
 
 def joint_colour(joint: int) -> str:
@@ -44,8 +45,10 @@ def torque_figure(path: PathLoad, rows: TorqueRows) -> Picture:
         power.plot(rows.t_s, rows.power_w[:, j], color=colour)
     torque.legend(ncols=3, fontsize=8)
     torque.set_ylabel(tr("torque of the drive ({unit})", unit=unit))
-    names = {"gravity": tr("gravity"), "inertia": tr("inertia"), "velocity": tr("velocity"), "friction": tr("friction")}
-    for part, style in zip(PARTS, ("-", "--", ":", "-.")):
+    names = dict(zip(PARTS, (tr("gravity"), tr("inertia"), tr("velocity"), tr("friction"), tr("forces at the tool"))))
+    for part, style in zip(PARTS, STYLES):
+        if part == "tool" and not rows.tool.any():
+            continue
         parts.plot(rows.t_s, getattr(rows, part)[:, worst], color=INK, linestyle=style, label=names[part])
     parts.legend(fontsize=8)
     parts.set_ylabel(tr("parts at J{joint} ({unit})", joint=worst + 1, unit=load.unit))
@@ -53,13 +56,7 @@ def torque_figure(path: PathLoad, rows: TorqueRows) -> Picture:
     power.set_ylabel(tr("power of the drive (W)"))
     for ax in (torque, parts, power):
         ax.set_xlabel(tr("time (s)"))
-    greatest = {
-        "gravity": load.gravity,
-        "inertia": load.inertia,
-        "velocity": load.velocity,
-        "friction": load.friction,
-    }
-    most = max(greatest, key=lambda name: greatest[name])
+    most = max(PARTS, key=lambda part: getattr(load, part))
     caption = tr(
         "J{joint} feels most: {peak} ± {tolerance} {unit} at {t:.2f} s, mainly {part}. Shaded: by how much torques may "
         "be off by the tolerances of masses and centres. Power below 0 goes back into the drive.",

@@ -11,7 +11,7 @@ from er3a.pipeline.messages.dynamics_verdict import quantity_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import listed, say, word
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.dynamics.load_figures import bound_text, diagram_figure, holding_figure, torque_figure
+from er3a.pipeline.stages.dynamics.load_figures import PARTS, bound_text, diagram_figure, holding_figure, torque_figure
 from er3a.pipeline.stages.dynamics.model import (
     BindingLimit,
     DynamicsResults,
@@ -158,8 +158,8 @@ def _joints(path: PathLoad) -> list[list[str]]:
             f"{number(_no_noise(load.peak), 3)} ± {number(_no_noise(load.tolerance), 2)}",
             fixed(load.peak_at_s, 2),
             f"{number(_no_noise(load.rms), 3)} ± {number(_no_noise(load.rms_tolerance), 2)}",
-            *(number(_no_noise(value), 3) for value in (load.gravity, load.inertia, load.velocity, load.friction)),
-            *(number(_no_noise(value), 3) for value in (load.power_w, load.braking_w)),
+            *(number(_no_noise(getattr(load, part)), 3) for part in PARTS),
+            *(number(_no_noise(value), 3) for value in (load.power_w, load.braking_w, load.work_j, load.recovered_j)),
         ]
         for load in path.joints
     ]
