@@ -22,7 +22,7 @@ from er3a.robots.joint_limits import within
 from er3a.robots.masses import Drives, LinkMass, Load, MassBody, Masses, WristLoad
 from er3a.robots.robot import CombinedLimit, Robot
 from testing.arms import make_arm
-from tests.dynamics.test_torques import COUPLED, random_arm
+from tests.dynamics.test_torques import COUPLED, mass_and_potential, random_arm
 
 PEAK = np.array([30.0, 45.0, 25.0, 8.0, 5.0, 3.0])
 UNKNOWN = np.full(6, np.nan)
@@ -337,3 +337,24 @@ def test_times_under_torques_are_those_of_full_thrust_and_full_braking(viscous):
     shortest = halves(scipy.optimize.brentq(lambda top: halves(top)[0] - angle, 1e-6, highest))[1]
     assert np.abs(found.torques).max() <= peak * (1 + 1e-3)
     assert shortest * (1 - 1e-6) <= found.timed.duration <= shortest * (1.1 if viscous else 1.001)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("joint", [1, 2, 4])
+def test_the_bound_of_a_wall_mounted_arm_against_potential_energies_alone(arm, joint):
+    """The torque as a derivative of potential energy by complex steps, climbed by SciPy: nothing of the library."""
+    mounted = arm.replace(base=WALL)
+    bodies = {each.link: each.body for each in arm.masses.links if each.link}
+
+    def torque(q: np.ndarray) -> float:
+        step = q.astype(complex)
+        step[joint] += 1e-30j
+        return abs(mass_and_potential(mounted, step, bodies)[1].imag / 1e-30)
+
+    starts = np.random.default_rng(4).uniform(arm.lower, arm.upper, (200, 6))
+    best = sorted(starts, key=torque)[-4:]
+    ends = list(zip(arm.lower, arm.upper))
+    tops = [scipy.optimize.minimize(lambda q: -torque(q), q, bounds=ends, method="L-BFGS-B").fun for q in best]
+    found = worst_holding(arm_model(mounted))
+    assert -min(tops) <= found.bound[joint]
+    assert -min(tops) == pytest.approx(abs(found.values[joint]), rel=1e-3)
