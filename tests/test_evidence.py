@@ -62,6 +62,7 @@ def test_campaigns_that_start_commands_rest_on_all_stages():
     assert {"er3a/pipeline/cli.py", "er3a/pipeline/stages/validation/compute.py"} <= names
 
 
+@pytest.mark.long
 def test_the_list_is_no_failure_but_a_release_needs_current_pages(capsys):
     stale = sum(each.standing != "current" for each in evidence())
     assert main([]) == 0

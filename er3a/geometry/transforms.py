@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.errors import PoseError, ShapeError
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Reals, for_kernel
 from er3a.numerics.jit import kernel
 
 ORTHONORMAL_TOLERANCE = 1e-6
@@ -111,7 +111,7 @@ def check_poses(T: Reals, argument: str = "T") -> Reals:
     T = as_floats(T, argument)
     if T.ndim < 2 or T.shape[-2:] != (4, 4):
         raise ShapeError(argument, T.shape, "(..., 4, 4)")
-    if _all_rigid(np.ascontiguousarray(T).reshape(-1, 4, 4)):
+    if _all_rigid(for_kernel(T).reshape(-1, 4, 4)):
         return T
     for index in np.ndindex(T.shape[:-2]):
         if fault := _fault_of(T[index]):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.kinematics.table_batch import Tables, fill_frames, kernel_columns
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.arrays import Flags, Integers, Reals, for_kernel
 from er3a.numerics.jit import kernel
 from er3a.references.quantities import FRAME_OF_POINT, AxisDistance, Extreme, SectionExtent
 
@@ -48,7 +48,7 @@ def climb_to_extreme(
     columns = kernel_columns(table)
     q = np.ascontiguousarray(starts)
     lower, upper = np.minimum(table.lower[0], table.upper[0]), np.maximum(table.lower[0], table.upper[0])
-    value = _climb(np.ascontiguousarray(base), columns, (lower, upper), q, joints, (*code, sign))
+    value = _climb(for_kernel(base), columns, (lower, upper), q, joints, (*code, sign))
     return q[0], float(value)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from er3a.kinematics.forward import rows_of, slide_row, step_row, turn_row, write_rows
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.arrays import Flags, Integers, Reals, for_kernel
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 
@@ -71,7 +71,7 @@ def frames_of(tables: Tables, base: Reals, q: Reals) -> Reals:
     """Frames (H, P, m + 1, 4, 4) of each table at row values (P, m) in rad or m, as
     :func:`er3a.kinematics.forward.frames` has them for one robot without tool; the last is the flange."""
     out = np.empty((len(tables), len(q), tables.d.shape[1] + 1, 4, 4))
-    fill_frames(np.ascontiguousarray(base), *kernel_columns(tables), q, out)
+    fill_frames(for_kernel(base), *kernel_columns(tables), np.require(q, requirements=["C", "W"]), out)
     return out
 
 
@@ -88,7 +88,8 @@ def kernel_columns(tables: Tables) -> tuple[Reals, Reals, Reals, Reals, Reals, R
         rows = tables.modified
         for link, column in ((a, tables.a), (alpha, tables.alpha), (beta, tables.beta)):
             link[rows, :joints], link[rows, joints] = column[rows], 0.0
-    return a, alpha, beta, d, tables.direction, tables.offset, tables.sliding
+    a, alpha, beta, d = (for_kernel(each) for each in (a, alpha, beta, d))
+    return a, alpha, beta, d, for_kernel(tables.direction), for_kernel(tables.offset), for_kernel(tables.sliding)
 
 
 @kernel

@@ -171,7 +171,7 @@ def prove_place(
     NotWristPartitionedError
     """
     half = (task.box[[1, 0, 2]] if turned else task.box) / 2
-    constants, middle = _constants(robot, task, roll), np.asarray(centre, float)
+    constants, middle = _constants(robot, task, roll), np.ascontiguousarray(centre, float)
     answer = used = 0
     # Coarse pieces first, everywhere: what refutes a place is found before effort goes into its rims.
     for smallest in _SMALLEST:

@@ -10,7 +10,7 @@ from selenium.webdriver.support.wait import WebDriverWait
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import frames
-from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, moment, player, player_style
+from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, moment, player, player_style, stretch
 from er3a.pipeline.results import Provenance
 from er3a.pipeline.viewing.page import render
 from testing.small_study import ROOT
@@ -23,7 +23,8 @@ TEMPLATE = """{% extends "base.html.j2" %}
 {% block header %}<h1>Test page</h1>{% endblock %}
 {% block content %}{{ player }}<p>{{ link }}</p>
 <figure data-play="bow" data-panels="[[0.1, 0.1, 0.9, 0.9, 0.0, 2.0]]"><img alt="" src="data:image/svg+xml,%3Csvg
-xmlns='http://www.w3.org/2000/svg' width='400' height='200'/%3E"></figure><p style="height: 300vh"></p>{% endblock %}"""
+xmlns='http://www.w3.org/2000/svg' width='400' height='200'/%3E"></figure>
+<p class="stretch" {{ stretch }}>bent</p><p style="height: 300vh"></p>{% endblock %}"""
 T = np.linspace(0.0, 2.0, 50)
 READ = """const [i, done] = arguments;
 import("er3a/poses").then(({ decodePoses, poseBetween }) => {
@@ -42,6 +43,7 @@ def bow(robot) -> PlayedMotion:
 def page(browser, tmp_path):
     robot = load_robot("er3a_c60")
     still = PlayedMotion("still", "It stands.", np.array([0.0, 1.0]), np.zeros((2, 6)))
+    way = PlayedMotion("way", "It goes.", np.arange(9.0), np.zeros((9, 6)), timed=False)
     scene = load_scene(ROOT / "data/scenes/table_and_post.yaml")
     (tmp_path / "page.html.j2").write_text(TEMPLATE, encoding="utf-8")
     render(
@@ -49,9 +51,10 @@ def page(browser, tmp_path):
         tmp_path / "page.html",
         command=None,
         provenance=Provenance(inputs=(), code="0" * 64),
-        player=player(robot, [bow(robot), still], scene),
+        player=player(robot, [bow(robot), still, way], scene),
         player_style=player_style(),
         link=moment("bow", 1.25, "the event"),
+        stretch=stretch("way", 2.0, 4.0),
     )
     browser.get_log("browser")
     browser.get((tmp_path / "page.html").as_uri())
@@ -122,3 +125,14 @@ def test_it_stays_in_sight_beside_a_plot_far_down_the_page(page):
         "const r = document.querySelector('.player .stand').getBoundingClientRect(); return [r.top, r.bottom]"
     )
     assert 0 <= stand[0] < stand[1] <= page.execute_script("return innerHeight")
+
+
+def test_a_way_without_times_counts_its_points_and_what_is_played_is_framed(page):
+    stretch = page.find_element(By.CSS_SELECTOR, ".stretch")
+    assert "now" not in stretch.get_attribute("class")
+    page.execute_script("arguments[0].click()", stretch)
+    until(page, lambda: clock(page) == "point 4 of 8")
+    assert "now" in stretch.get_attribute("class")
+    page.execute_script("document.querySelector('.player .forward').click()")
+    until(page, lambda: clock(page) == "point 5 of 8")
+    assert "now" not in stretch.get_attribute("class")

@@ -118,6 +118,7 @@ def test_a_measured_tool_sees_more_than_the_flange(random):
     np.testing.assert_allclose(er3a.forward(found.robot, q)[:, :3, 3], er3a.forward(truth, q)[:, :3, 3], atol=1e-9)
 
 
+@pytest.mark.long
 def test_intervals_cover_the_truth_in_95_of_100_runs(random):
     names, inside = covered(load_robot("er3_600"), 120, 25, 0.05, random)
     assert len(names) == 20

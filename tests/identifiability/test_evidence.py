@@ -105,6 +105,7 @@ def test_what_the_second_cad_model_settles_of_the_er3a_c60():
     assert found["base"].status == found["tool"].status == "given"
 
 
+@pytest.mark.long
 def test_the_table_read_from_the_step_model_is_consistent_with_it():
     found = evidence("er3_600")
     assert {found[entry].status for entry in ("d1", "d6", "a5", "alpha4", "offset5")} == {"consistent"}

@@ -35,7 +35,10 @@ def new(*words: object) -> tuple[int, str, str]:
     return done.exit_code, done.output, str(done.exception or "")
 
 
-@pytest.fixture(scope="module", params=["er3_600", "er3a_c60", "er3a_c60_article"])
+LONG = [pytest.param(name, marks=pytest.mark.long) for name in ("er3_600", "er3a_c60_article")]
+
+
+@pytest.fixture(scope="module", params=["er3a_c60", *LONG])
 def written(request, tmp_path_factory) -> tuple[str, Path]:
     folder = tmp_path_factory.mktemp("new") / "a cell ü"
     write_study(arm_of(None, None, request.param), folder)

@@ -91,7 +91,9 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
     report(study, stored["er3a_c60"], tmp_path / "programs.html")
     record(study, stored["er3a_c60"], tmp_path / "programs.rrd")
     html = (tmp_path / "programs.html").read_text(encoding="utf-8")
-    assert 'data-arm="collision_with_table:10"' in html
+    motion = stored["er3a_c60"].results.motion
+    met = motion.take((motion.program == "collision_with_table") & (motion.line == 10))
+    assert f'data-play="collision_with_table" data-from="{met.t_s[0]}" data-t="{met.t_s[-1]}"' in html
     assert html.count('<div class="listing"') == len(stored["er3a_c60"].results.summary.programs)
     assert "the tool TOOL_DATA[7] is not given" in html
     assert (tmp_path / "programs.rrd").stat().st_size > 100_000

@@ -116,6 +116,7 @@ def test_radians_are_told_from_degrees(tmp_path, poses):
         load_hand_eye(write(tmp_path, table), load_robot("er3a_c60"))
 
 
+@pytest.mark.long
 def test_two_clocks_are_brought_together(tmp_path):
     """Streams of an arm that swings, the camera's clock 0.137 s behind; one pose in ten is a wrong detection."""
     random = np.random.default_rng(3)

@@ -13,7 +13,7 @@ References
 
 from __future__ import annotations
 
-from math import comb
+from math import comb, factorial
 
 import numpy as np
 
@@ -30,6 +30,7 @@ CLOSE = 1e-13
 LOCAL_ORDER = 12
 LOCAL_NOISE = 1e-11
 LOCAL_GROWTH = 1e3
+LEFT_OVER = 1 / (2**LOCAL_ORDER * factorial(LOCAL_ORDER + 1))  # of interpolation at Chebyshev's nodes
 FIRST_ANGLE = 0.1234
 _HALF = np.tan(np.pi / ARCS / 2)
 
@@ -203,8 +204,12 @@ def zeros_on_circle(terms: Reals, noise: float, found: Reals, stack: Reals) -> i
 
 
 @kernel
-def zeros_between(values: Reals, noise: float, low: float, high: float, found: Reals, stack: Reals) -> int:
-    """The same on a short interval, from values (13,) with that noise at :data:`NODES` of it."""
+def zeros_between(values: Reals, noise: float, peak: float, low: float, high: float, found: Reals, stack: Reals) -> int:
+    """The same on a short interval, from values (13,) with that noise at :data:`NODES` of it.
+
+    To the noise comes what a polynomial of degree 12 leaves of the trigonometric one, whose largest value is ``peak``:
+    by Bernstein's inequality no 13th derivative exceeds ``8^13 peak``.
+    """
     largest = 0.0
     for i in range(LOCAL_ORDER + 1):
         total = 0.0
@@ -214,8 +219,9 @@ def zeros_between(values: Reals, noise: float, low: float, high: float, found: R
         largest = max(largest, abs(values[i]))
     coefficients = np.empty(LOCAL_ORDER + 1)
     coefficients[:] = stack[0, : LOCAL_ORDER + 1]
-    count = isolate(stack, LOCAL_ORDER, max(LOCAL_NOISE * largest, LOCAL_GROWTH * noise), found, 0)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    noise += LEFT_OVER * peak * (DEGREE * half) ** (LOCAL_ORDER + 1)
+    count = isolate(stack, LOCAL_ORDER, max(LOCAL_NOISE * largest, LOCAL_GROWTH * noise), found, 0)
     for row in range(count):
         a, b = found[row, 0], found[row, 1]
         if found[row, 2] != 0.0:

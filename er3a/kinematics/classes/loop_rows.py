@@ -102,7 +102,7 @@ def hidden_angles(e: Scratch, level: float, m: LoopMemory) -> int:
             dark[waiting, 0], dark[waiting, 1] = low + part * step - margin, low + (part + 1) * step + margin
             dark[waiting, 2] = 0.0
             waiting += 1
-    F, M = m.F, m.M
+    F, M, peak = m.F, m.M, np.abs(e.samples).max()
     looked = 0
     while waiting > 0:
         waiting -= 1
@@ -114,7 +114,7 @@ def hidden_angles(e: Scratch, level: float, m: LoopMemory) -> int:
         for i in range(LOCAL_ORDER + 1):
             m.values[i], rounding = determinant_at(e.equations, middle + half * NODES[i], F, M)
             noise = max(noise, rounding)
-        found = zeros_between(m.values, noise, low, high, m.found, m.stack)
+        found = zeros_between(m.values, noise, peak, low, high, m.found, m.stack)
         if found < 0:
             return -1
         for row in range(found):

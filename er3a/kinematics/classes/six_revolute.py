@@ -101,16 +101,22 @@ def _trial(reading: Reading, links: Reals, T: Reals, memory: LoopMemory) -> floa
 
 
 def solve_six_revolute(arm: SixRevolute, T: Reals) -> RowsFound:
-    """All solutions for poses T (N, 4, 4), m; each reading takes the poses that those before it left in doubt."""
+    """All solutions for poses T (N, 4, 4), m; each reading takes the poses that those before it left in doubt.
+
+    After ``MOST_READINGS`` that told something a pose stays in doubt; those whose determinant vanishes don't count, as
+    they may do so beside special geometry where others don't.
+    """
     T = np.ascontiguousarray(T, dtype=float)
     q, count = np.full((len(T), SLOTS, 6), np.nan), np.zeros(len(T), dtype=np.int64)
     certainty = np.full(len(T), CONTINUUM)
+    told = np.zeros(len(T), dtype=np.int64)
     memory, left = new_memory(arm.sliding), np.arange(len(T))
-    for reading in arm.readings[:MOST_READINGS]:
+    for reading in arm.readings:
         verdicts = np.empty(len(left), dtype=np.int64)
         rows_by_reading(reading, arm.links, arm.size, T, left, memory, q, count, verdicts)
         certainty[left] = np.minimum(certainty[left], verdicts)
-        left = left[verdicts != CERTAIN]
+        told[left] += verdicts != CONTINUUM
+        left = left[(verdicts != CERTAIN) & (told[left] < MOST_READINGS)]
     _in_order(q, count)
     q[:, :, arm.sliding] *= arm.size
     return RowsFound(q, count, certainty)

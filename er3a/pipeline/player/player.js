@@ -2,8 +2,9 @@
  * Plays motions of an arm on a page: a time bar, play and step, events, and a cursor in every plot over time.
  *
  * Poses come with the page, so nothing is computed here but what lies between two of them. Any element of the page may
- * have `data-play="MOTION"` and `data-t="SECONDS"`: it then leads to that moment. A plot is a figure with
- * `data-play="MOTION"` and `data-panels`, a list of `[left, bottom, right, top, t0, t1]` in parts of its picture.
+ * have `data-play="MOTION"` and `data-t="SECONDS"`: it then leads to that moment, and is marked as `now` from
+ * `data-from` to it. A plot is a figure with `data-panels`, a list of `[left, bottom, right, top, t0, t1, MOTION]` in
+ * parts of its picture; without a motion of its own a panel shows that of the figure's `data-play`.
  */
 
 import { add, column, scaled } from "er3a/algebra";
@@ -31,6 +32,7 @@ let awaited = false;
 
 const orbit = new Orbit(canvas, data.target, 0.75 * data.size, refresh);
 const plots = [...document.querySelectorAll("figure[data-panels]")].map(withCursors);
+const stretches = [...document.querySelectorAll("[data-from]")];
 
 function prepared(motion) {
   return { ...motion, poses: decodePoses(motion.poses, motion.times.length, table.a.length + 1) };
@@ -38,7 +40,7 @@ function prepared(motion) {
 
 const start = () => motion.times[0];
 const end = () => motion.times.at(-1);
-const fixed = (value) => value.toFixed(3).replace("-", "−");
+const fixed = (value, digits = 3) => value.toFixed(digits).replace("-", "−");
 
 /** Shows a moment of a motion; `name` is that of the motion, null for the one that is shown. */
 export function goTo(name, time) {
@@ -63,7 +65,7 @@ function refresh() {
 function frame(now) {
   awaited = false;
   if (playing) {
-    t += ((now - last) / 1000) * Number(part("speed").value);
+    t += ((now - last) / 1000) * Number(part("speed").value) * (motion.rate ?? 1);
     last = now;
     if (t >= end()) {
       t = end();
@@ -84,8 +86,9 @@ function draw() {
   picture.shadow(solids, poses, floor, page.grid);
   picture.solids([{ solids: surroundings, poses: [table.base], ghost: false }, { solids, poses, ghost: false }]);
   picture.line(motion.trail, page.ink, 1.5);
+  for (const { way, status } of motion.events) if (way.length) picture.line(way, data.colours[status], 3);
   for (const { from, to, text, t0, t1 } of motion.marks ?? []) {
-    if (t < t0 || t > t1) continue;
+    if (t < t0 || t > t1 || (t === t1 && t0 < t1 && t1 < end())) continue; // where two meet, the later one
     picture.line([from, to], data.colours.mark, 3);
     picture.word(text, scaled(add(from, to), 0.5), page.ink, page.halo);
   }
@@ -101,12 +104,17 @@ function toolFrame(T) {
 function tell() {
   if (bar.dataset.motion !== motion.name) newMotion();
   bar.value = String(t);
-  bar.setAttribute("aria-valuetext", `${fixed(t)} s`);
-  clock.textContent = words.clock.replace("{t}", fixed(t)).replace("{end}", fixed(end()));
+  const [said, digits] = motion.rate ? [words.points, 0] : [words.clock, 3];
+  clock.textContent = said.replace("{t}", fixed(t, digits)).replace("{end}", fixed(end(), digits));
+  bar.setAttribute("aria-valuetext", clock.textContent);
   const near = motion.events.filter((event) => t >= event.t - 1e-9 && t <= event.until + 1e-9);
   const text = near.map((event) => event.text).join("; ") || motion.text;
   if (told.textContent !== text) told.textContent = text;
   for (const plot of plots) plot(motion.name, t);
+  for (const { dataset, classList } of stretches) {
+    const [from, to] = [Number(dataset.from), Number(dataset.t)];
+    classList.toggle("now", dataset.play === motion.name && t >= from - 1e-9 && t <= to + 1e-9);
+  }
 }
 
 function newMotion() {
@@ -126,13 +134,12 @@ function newMotion() {
 
 /** Lays a cursor over each panel of a plot; returns what moves them. */
 function withCursors(figure) {
-  const name = figure.dataset.play;
   const image = figure.querySelector("img");
-  const panels = JSON.parse(figure.dataset.panels).map(([left, bottom, right, top, t0, t1]) => {
+  const panels = JSON.parse(figure.dataset.panels).map(([left, bottom, right, top, t0, t1, name = figure.dataset.play]) => {
     const cursor = document.createElement("span");
     cursor.className = "cursor";
     figure.append(cursor);
-    return { left, bottom, right, top, t0, t1, cursor };
+    return { left, bottom, right, top, t0, t1, name, cursor };
   });
   /** The picture's own edge in the figure: its place less border and padding. */
   const inner = () => {
@@ -147,12 +154,12 @@ function withCursors(figure) {
     const [u, v] = [(event.offsetX - edge) / width, 1 - (event.offsetY - edge) / height];
     const panel = panels.find(({ left, right, bottom, top }) => u >= left && u <= right && v >= bottom && v <= top);
     if (!panel) return;
-    goTo(name, panel.t0 + ((u - panel.left) / (panel.right - panel.left)) * (panel.t1 - panel.t0));
+    goTo(panel.name, panel.t0 + ((u - panel.left) / (panel.right - panel.left)) * (panel.t1 - panel.t0));
     dock();
   });
   return (shown, time) => {
     const { x, y, width, height } = inner();
-    for (const { left, right, bottom, top, t0, t1, cursor } of panels) {
+    for (const { left, right, bottom, top, t0, t1, name, cursor } of panels) {
       cursor.hidden = shown !== name || time < t0 || time > t1;
       const u = left + ((time - t0) / (t1 - t0 || 1)) * (right - left);
       cursor.style.left = `${(100 * (x + u * width)) / figure.clientWidth}%`; // never past a page that just became narrower

@@ -18,14 +18,16 @@ from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.teach.scripts import TEACH, import_map
-from er3a.pipeline.viewing.palette import BODY, INK, JOINTS, LINK
+from er3a.pipeline.viewing.palette import BODY, INK, JOINTS, LINK, VERDICTS
 from er3a.robots.robot import Robot
 from er3a.robots.shown import size_of
 
 _HERE = Path(__file__).parent
 MOST_FRAMES = 240
+UNTIMED_S = 8.0  # how long a motion without times is shown
 TRAIL_POINTS = 200
 SCENE_COLOUR = "#b9a78f"
+COLOURS = {status: VERDICTS[status] for status in ("caution", "fail")}
 AXES = ("#b42318", "#18794e", "#0b5c94")
 LEVEL = 1e-6  # by which a plane's normal may differ from the vertical to be drawn as the floor
 WORDS = {
@@ -39,6 +41,7 @@ WORDS = {
     "speed": N_("speed ×"),
     "time": N_("time of the motion"),
     "clock": N_("t = {t} s of {end} s"),
+    "points": N_("point {t} of {end}"),
     "undock": N_("put the player back in its place"),
     "picture": N_("The arm on its path. Drag or use the arrow keys to turn the picture, + and − to zoom."),
     "help": N_(
@@ -51,7 +54,7 @@ WORDS = {
 
 @dataclass(frozen=True)
 class PlayedEvent:
-    """Something to be seen at ``t`` (s), until ``until``; ``status`` (``caution`` or ``fail``) colours it."""
+    """Something to be seen from ``t`` to ``until`` (s); ``status`` (``plain``, ``caution``, ``fail``) colours it."""
 
     t: float
     until: float
@@ -78,6 +81,7 @@ class PlayedMotion:
     ----------
     name, text : what it is called, and what is said of it where no event is near
     t : (N,), s, rising; q : (N, n), joint coordinates, finite
+    timed : false where no times are known: ``t`` counts points then, which are shown at an even pace
     """
 
     name: str
@@ -86,6 +90,7 @@ class PlayedMotion:
     q: Reals
     events: Sequence[PlayedEvent] = ()
     marks: Sequence[Mark] = field(default=())
+    timed: bool = True
 
 
 def player(robot: Robot, motions: Sequence[PlayedMotion], scene: Scene | None = None) -> Markup:
@@ -111,6 +116,11 @@ def moment(motion: str, t: float, text: str) -> Markup:
     return Markup('<a href="#player" data-play="{}" data-t="{}">{}</a>').format(motion, t, text)
 
 
+def stretch(motion: str, t0: float, t1: float) -> Markup:
+    """Attributes of an element that leads the player to ``t1`` (s) and is marked from ``t0`` on."""
+    return Markup('data-play="{}" data-from="{}" data-t="{}"').format(motion, t0, t1)
+
+
 def player_style() -> Markup:
     """The player's style sheet, for a page's head."""
     return Markup(f"<style>{(_HERE / 'player.css').read_text(encoding='utf-8')}</style>")
@@ -127,7 +137,7 @@ def _data(robot: Robot, motions: Sequence[PlayedMotion], scene: Scene | None, wo
         },
         "size": size,
         "target": (robot.base @ [0, 0, 0.35 * size, 1])[:3].tolist(),
-        "colours": {"joints": JOINTS, "link": LINK, "body": BODY, "mark": INK},
+        "colours": {"joints": JOINTS, "link": LINK, "body": BODY, "mark": INK, **COLOURS},
         "axes": AXES,
         "floor": max(floors) if floors else None,
         "scene": [_solid(solid) for solid in solids if not isinstance(solid, Plane)],
@@ -166,16 +176,26 @@ def _motion(robot: Robot, motion: PlayedMotion) -> dict[str, Any]:
     trail = T[:: max(1, len(rows) // TRAIL_POINTS), -1, :3, 3]
     return {
         "name": motion.name,
+        "rate": None if motion.timed else max(1.0, float(motion.t[-1]) / UNTIMED_S),
         "text": motion.text,
         "times": np.round(motion.t[rows], 6).tolist(),
         "poses": base64.b64encode(poses.tobytes()).decode("ascii"),
         "trail": np.round(trail, 5).tolist(),
-        "events": [asdict(event) for event in sorted(motion.events, key=lambda event: event.t)],
+        "events": [
+            asdict(event) | {"way": _way(event, motion.t[rows], T[:, -1, :3, 3])}
+            for event in sorted(motion.events, key=lambda event: event.t)
+        ],
         "marks": [
             {"from": mark.start, "to": mark.end, "text": mark.text, "t0": mark.t0, "t1": mark.t1}
             for mark in motion.marks
         ],
     }
+
+
+def _way(event: PlayedEvent, t: Reals, points: Reals) -> list[list[float]]:
+    """The flange's way while something is wrong."""
+    during = points[(t >= event.t) & (t <= event.until)] if event.status in COLOURS else points[:0]
+    return np.round(during[:: max(1, len(during) // TRAIL_POINTS)], 5).tolist() if len(during) > 1 else []
 
 
 def _shown(motion: PlayedMotion) -> np.ndarray:

@@ -6,8 +6,11 @@ Variants of a sweep stand in the section of their sweep only.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from er3a.pipeline.code_digest import code_digest
+from er3a.pipeline.messages.decision import decision
+from er3a.pipeline.messages.language import tr
 from er3a.pipeline.results import Provenance, result_records
 from er3a.pipeline.stages.registry import STAGES, all_messages
 from er3a.pipeline.study import Study
@@ -26,18 +29,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
 
     The comparison offers the robots that are written in the study, not the variants that sweeps make of them.
     """
-    robots = [
-        {
-            "robot": study.robot(name),
-            "heads": {
-                stage: stage_head(results / name / stage, STAGES[stage])
-                for stage in study.stages(name)
-                if stage in STAGES
-            },
-            "expected": study.entry(name).expect,
-        }
-        for name in study.robots
-    ]
+    robots = [_entry(study, name, results / name) for name in study.robots]
     page.render(
         Path(__file__).with_name("index.html.j2"),
         folder / "index.html",
@@ -54,3 +46,21 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
     )
     write_compare(study, results, folder / "compare.html")
     write_junit(read_verdicts(study, results), folder / "junit.xml")
+
+
+def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
+    """What the index shows of a robot."""
+    expected = study.entry(name).expect
+    heads = {stage: stage_head(results / stage, STAGES[stage]) for stage in study.stages(name) if stage in STAGES}
+    failed = [
+        tr(STAGES[stage].title)
+        for stage, head in heads.items()
+        if head.status == "fail" and expected.get(stage) != "fail"  # one that is expected is a demonstration
+    ]
+    table = heads["validation"].status if "validation" in heads else "not_computed"
+    return {
+        "robot": study.robot(name),
+        "heads": heads,
+        "expected": expected,
+        "decision": decision(table, failed),
+    }

@@ -101,6 +101,87 @@ function enlarge(image) {
   dialog.showModal();
 }
 
+const MANY_ROWS = 12;
+
+// A field that leaves the rows in which its words stand.
+function filterFor(table) {
+  const field = document.createElement("input");
+  field.type = "search";
+  field.placeholder = field.ariaLabel = WORDS.filter;
+  field.addEventListener("input", () => {
+    const words = field.value.toLowerCase().split(/\s+/);
+    for (const row of table.tBodies[0].rows) {
+      const text = textOf(row).toLowerCase();
+      row.hidden = !words.every((word) => text.includes(word));
+    }
+  });
+  return field;
+}
+
+// A table that goes on beyond its right edge fades there.
+function fade(box) {
+  const tell = () => box.classList.toggle("more", box.scrollLeft + box.clientWidth < box.scrollWidth - 2);
+  box.addEventListener("scroll", tell, { passive: true });
+  new ResizeObserver(tell).observe(box);
+}
+
+function nameHeading(heading, taken) {
+  const plainName = heading.innerText.toLowerCase().replace(/[^\p{L}\p{N}]+/gu, "-").replace(/^-|-$/g, "") || "section";
+  for (let k = 1; !heading.id; k++) {
+    const name = k > 1 ? `${plainName}-${k}` : plainName;
+    if (!taken.has(name) && !document.getElementById(name)) heading.id = name;
+  }
+  taken.add(heading.id);
+  const link = document.createElement("a");
+  link.className = "anchor";
+  link.href = `#${encodeURIComponent(heading.id)}`;
+  link.textContent = "#";
+  link.title = link.ariaLabel = WORDS.link;
+  heading.append(" ", link);
+}
+
+// A list of the sections that stays in sight and names the one that is read.
+function addContents() {
+  const wide = matchMedia(document.body.classList.contains("wide") ? "not all" : "(min-width: 112rem) and (max-width: 149.99rem)");
+  const headings = [...document.querySelectorAll("main h2")];
+  if (headings.length < 3) return;
+  const titles = headings.map((heading) => heading.innerText);
+  const taken = new Set();
+  headings.forEach((heading) => nameHeading(heading, taken));
+  const list = document.createElement("ol");
+  const links = headings.map((heading, i) => {
+    const link = document.createElement("a");
+    link.href = `#${encodeURIComponent(heading.id)}`;
+    link.textContent = titles[i];
+    const item = document.createElement("li");
+    item.append(link);
+    list.append(item);
+    return link;
+  });
+  const summary = document.createElement("summary");
+  const details = document.createElement("details");
+  details.append(summary, list);
+  details.addEventListener("click", (event) => event.target.closest("a") && !wide.matches && (details.open = false));
+  const nav = document.createElement("nav");
+  nav.className = "contents";
+  nav.ariaLabel = WORDS.contents;
+  nav.append(details);
+  document.querySelector("main").prepend(nav);
+  const fit = () => (details.open = wide.matches);
+  const tell = () => {
+    const read = headings.findLastIndex((heading) => heading.getBoundingClientRect().top < 120);
+    summary.textContent = read < 0 || wide.matches ? WORDS.contents : `${WORDS.contents}: ${titles[read]}`;
+    links.forEach((link, i) => (i === read ? link.setAttribute("aria-current", "true") : link.removeAttribute("aria-current")));
+  };
+  wide.addEventListener("change", fit);
+  addEventListener("scroll", tell, { passive: true });
+  fit();
+  tell();
+}
+
+addContents();
+document.querySelectorAll(".scroll").forEach(fade);
+
 // A sheet of paper can't be unfolded.
 addEventListener("beforeprint", () => document.querySelectorAll(".provenance").forEach((details) => (details.open = true)));
 
@@ -109,6 +190,7 @@ for (const table of document.querySelectorAll("table")) {
   const tools = document.createElement("p");
   tools.className = "tools";
   tools.append(toolButton(WORDS.csv, () => download(csvOf(table), "text/csv", `${nameFor(table)}.csv`)));
+  if (table.tHead && table.tBodies[0]?.rows.length >= MANY_ROWS) tools.append(filterFor(table));
   (table.closest(".scroll") || table).after(tools);
 }
 

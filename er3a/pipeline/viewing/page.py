@@ -7,13 +7,14 @@ import os
 import platform
 import shlex
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import jinja2
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from er3a.files.kept_files import write_atomically
@@ -48,21 +49,40 @@ SCRIPT_WORDS = {
     "svg": N_("download"),
     "enlarge": N_("enlarge"),
     "close": N_("close"),
+    "contents": N_("Contents"),
+    "filter": N_("Show rows with"),
+    "link": N_("link to this section"),
 }
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure for a page: the image, what it shows (for those who can't see it), and what to conclude from it."""
+    """A figure for a page: the image, what it shows (for those who can't see it), and what to conclude from it.
+
+    ``over_time`` are axes whose x axis is the time (s) of a motion that the page's player shows, with its name.
+    """
 
     figure: Figure
     alt: str
     caption: str
+    over_time: Sequence[tuple[Axes, str]] = ()
 
     @property
     def uri(self) -> str:
         """The image as a data address."""
         return svg_data_uri(self.figure)
+
+    @property
+    def panels(self) -> list[list[float | str]]:
+        """Of a figure that was drawn: left, bottom, right and top of axes over time in parts of the image, the times at
+        both sides, and the motion's name."""
+        edges = ((*ax.get_position().extents, *ax.get_xlim()) for ax, _ in self.over_time)
+        return [[*(round(float(value), 5) for value in own), name] for own, (_, name) in zip(edges, self.over_time)]
+
+    @property
+    def shades(self) -> bool:
+        """Whether brightness means something in it, so that a dark page must not turn it round."""
+        return any(drawn.get_array() is not None for ax in self.figure.axes for drawn in (*ax.collections, *ax.images))
 
     @property
     def inches(self) -> float:

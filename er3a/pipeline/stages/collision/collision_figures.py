@@ -101,7 +101,8 @@ def clearance_over_time(results: CollisionResults) -> Picture | None:
         return None
     count = -(-len(names) // COLUMNS)
     figure, axes = new_figure(count, COLUMNS, width=11.0, height=ROW_HEIGHT * count + 0.4, sharey=True, squeeze=False)
-    for ax, name in zip(axes.flat, names):
+    panels = list(zip(axes.flat, names))
+    for ax, name in panels:
         part = rows.take(rows.path == name)
         ax.plot(part.t_s, part.clearance_mm, color=MODEL)
         ax.fill_between(part.t_s, part.clearance_mm, 0, where=part.clearance_mm < 0, color=VERDICTS["fail"], alpha=0.5)
@@ -119,7 +120,8 @@ def clearance_over_time(results: CollisionResults) -> Picture | None:
         if met
         else tr("No path comes to zero: none meets its surroundings or the arm itself.")
     )
-    return Picture(figure, tr("Clearance over time, one panel per path. {conclusion}", conclusion=caption), caption)
+    alt = tr("Clearance over time, one panel per path. {conclusion}", conclusion=caption)
+    return Picture(figure, alt, caption, panels)
 
 
 def closest_pair(robot: Robot, found: Closest) -> Picture:

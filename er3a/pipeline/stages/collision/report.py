@@ -6,10 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
+from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.collision import FIGURES, body_word, state_word, why
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import say
+from er3a.pipeline.player.player import Mark, PlayedEvent, PlayedMotion, moment, player, player_style
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.collision.collision_figures import by_pair, clearance_over_time, closest_pair, workspace
 from er3a.pipeline.stages.collision.model import (
@@ -18,6 +20,7 @@ from er3a.pipeline.stages.collision.model import (
     CollisionResults,
     MatrixRows,
     PairShares,
+    PathClearances,
     TargetClearances,
 )
 from er3a.pipeline.study import Study
@@ -31,6 +34,7 @@ def report(study: Study, stored: Stored[CollisionResults], output: Path) -> None
     """Write the page from the stage's results."""
     name, results, summary = stored.robot, stored.results, stored.results.summary
     robot = study.robot(name)
+    scene = study.scene(name, stored.stage)
     nearest = min(summary.closest, key=lambda found: found.clearance_mm, default=None)
     render(
         Path(__file__).with_name("report.html.j2"),
@@ -46,10 +50,45 @@ def report(study: Study, stored: Stored[CollisionResults], output: Path) -> None
         workspace=workspace(results),
         targets=_targets(results.targets),
         clearance=clearance_over_time(results),
+        player=player(robot, _motions(results), load_scene(scene) if scene else None),
+        player_style=player_style(),
         closest=[_closest(found) for found in sorted(summary.closest, key=lambda found: found.clearance_mm)],
         nearest=closest_pair(robot, nearest) if nearest else None,
         mounting=[_mounted(contact.solid, contact.depth_mm, contact.inside) for contact in summary.mounting],
     )
+
+
+def _motions(results: CollisionResults) -> list[PlayedMotion]:
+    """The paths, as far as the arm reaches them, with the line between the nearest points at each moment."""
+    closest = {found.name: found for found in results.summary.closest if found.kind == "path"}
+    motions = []
+    for name in dict.fromkeys(results.paths.path.tolist()):
+        rows = results.paths.take((results.paths.path == name) & np.isfinite(results.paths.q_deg).all(axis=1))
+        events = [_least(closest[name])] if name in closest else []
+        motions.append(PlayedMotion(name, "", rows.t_s, np.radians(rows.q_deg), events, _distances(rows)))
+    return motions
+
+
+def _least(found: Closest) -> PlayedEvent:
+    text = tr("least clearance {clearance} mm: {pair}", clearance=fixed(found.clearance_mm, 1), pair=say(found.between))
+    t = found.t_s or 0.0
+    return PlayedEvent(t, t, text, "fail" if found.clearance_mm < 0 else "plain")
+
+
+def _distances(rows: PathClearances) -> list[Mark]:
+    """The nearest points, each pair shown until the next was measured."""
+    until = np.append(rows.t_s[1:], rows.t_s[-1:])
+    return [
+        Mark(t0, t1, start, end, tr("{clearance} mm", clearance=fixed(clearance, 0)))
+        for t0, t1, start, end, clearance in zip(
+            rows.t_s.tolist(),
+            until.tolist(),
+            np.round(rows.from_mm / 1000, 5).tolist(),
+            np.round(rows.to_mm / 1000, 5).tolist(),
+            rows.clearance_mm.tolist(),
+        )
+        if np.isfinite(start).all() and np.isfinite(end).all()
+    ]
 
 
 def _matrix(rows: MatrixRows) -> list[list[str]]:
@@ -108,7 +147,7 @@ def _between(label: str) -> str:
 
 def _closest(found: Closest) -> list[str]:
     kind = tr("chosen solution of a target") if found.kind == "target" else tr("path")
-    at = tr("t = {t} s", t=fixed(found.t_s, 2)) if found.t_s is not None else ""
+    at = "" if found.t_s is None else moment(found.name, found.t_s, tr("t = {t} s", t=fixed(found.t_s, 2)))
     return [found.name, kind, fixed(found.clearance_mm, 1), at, say(found.between)]
 
 

@@ -68,7 +68,7 @@ def torque_figure(path: PathLoad, rows: TorqueRows) -> Picture:
         part=names[most],
     )
     alt = tr("Three panels over time for {path}: torques, their parts, powers.", path=path.name)
-    return Picture(figure, alt, caption)
+    return Picture(figure, alt, caption, [(ax, path.name) for ax in (torque, parts, power)])
 
 
 def holding_figure(summary: DynamicsSummary) -> Picture:

@@ -10,6 +10,7 @@ from er3a.pipeline.messages.dynamics import BINDING, FIGURES
 from er3a.pipeline.messages.dynamics_verdict import quantity_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import listed, say, word
+from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, moment, player, player_style
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics.load_figures import PARTS, bound_text, diagram_figure, holding_figure, torque_figure
 from er3a.pipeline.stages.dynamics.model import (
@@ -17,6 +18,7 @@ from er3a.pipeline.stages.dynamics.model import (
     DynamicsResults,
     DynamicsSummary,
     HoldingTorque,
+    JointLoad,
     MotorNeed,
     PathLoad,
     Unit,
@@ -24,6 +26,8 @@ from er3a.pipeline.stages.dynamics.model import (
 )
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import fixed, head_of, number, render, run_command
+from er3a.robots.robot import Robot
+from er3a.robots.shown import meant
 
 MOST_USES = 12
 NONE = "–"
@@ -56,6 +60,8 @@ def report(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
         motors=[_motor(motor) for motor in summary.motors],
         paths=[_path(path) for path in summary.paths],
         figures=figures,
+        player=player(robot, _motions(robot, results)),
+        player_style=player_style(),
         joints=[(path.name, _joints(path)) for path in summary.paths if path.complete],
         wrist=_wrist(summary),
         wrist_uses=_wrist_uses(summary),
@@ -64,6 +70,22 @@ def report(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
         held=[_held(held) for held in summary.holding],
         diagram=diagram,
     )
+
+
+def _motions(robot: Robot, results: DynamicsResults) -> list[PlayedMotion]:
+    """The paths that the arm can follow, with the moment at which each joint feels most."""
+    motions = []
+    for path in results.summary.paths:
+        if not path.complete:
+            continue
+        rows = results.torques.take(results.torques.path == path.name)
+        peaks = [PlayedEvent(load.peak_at_s, load.peak_at_s, _peak(load), "plain") for load in path.joints]
+        motions.append(PlayedMotion(path.name, "", rows.t_s, meant(robot, rows.q), peaks))
+    return motions
+
+
+def _peak(load: JointLoad) -> str:
+    return tr("J{joint} at its greatest: {peak} {unit}", joint=load.joint, peak=number(load.peak, 3), unit=load.unit)
 
 
 def _links(summary: DynamicsSummary) -> list[list[str]]:
@@ -156,7 +178,7 @@ def _joints(path: PathLoad) -> list[list[str]]:
         [
             _label(load.joint, load.unit),
             f"{number(_no_noise(load.peak), 3)} ± {number(_no_noise(load.tolerance), 2)}",
-            fixed(load.peak_at_s, 2),
+            moment(path.name, load.peak_at_s, fixed(load.peak_at_s, 2)),
             f"{number(_no_noise(load.rms), 3)} ± {number(_no_noise(load.rms_tolerance), 2)}",
             *(number(_no_noise(getattr(load, part)), 3) for part in PARTS),
             *(number(_no_noise(value), 3) for value in (load.power_w, load.braking_w, load.work_j, load.recovered_j)),

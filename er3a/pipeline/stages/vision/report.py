@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
+import numpy as np
+
+from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import joined, listed, say, word
 from er3a.pipeline.messages.vision import FIGURES, METHODS, direction_word, pose_words
+from er3a.pipeline.player.player import Mark, PlayedEvent, PlayedMotion, player, player_style
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.vision.model import (
     CalibrationResult,
@@ -22,6 +26,8 @@ from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import head_of, render, run_command
 
 NEARLY_HALF_TURN = 170.0
+POINTER_M = 0.15
+WAYS = {"move": N_("joint move to the approach"), "approach": N_("approach"), "retreat": N_("retreat")}
 AXES = ("x", "y", "z")
 PARTS = {
     "camera": N_("camera's noise in one reading"),
@@ -35,14 +41,15 @@ PARTS = {
 def report(study: Study, stored: Stored[VisionResults], output: Path) -> None:
     """Write the page from the stage's results."""
     name, results, summary = stored.robot, stored.results, stored.results.summary
-    found = summary.calibration
+    found, scene = summary.calibration, study.scene(name, stored.stage)
+    robot = study.robot(name)
     render(
         Path(__file__).with_name("report.html.j2"),
         output,
         summary,
         head=head_of(stored, FIGURES),
         command=run_command(study, f"{name}/vision.html"),
-        robot=study.robot(name),
+        robot=robot,
         robot_pages=study.pages(name),
         found=found,
         poses=_poses(found) if found else [],
@@ -58,8 +65,27 @@ def report(study: Study, stored: Stored[VisionResults], output: Path) -> None:
         grasps=[_grasp(each) for each in summary.objects if each.grasp],
         errors=[_errors(each) for each in summary.objects if each.error_mm],
         error_columns=[tr("Object"), *(f"{word('vision.part_of_error', PARTS, part)}>" for part in PARTS)],
+        player=player(robot, _motions(results), load_scene(scene) if scene else None),
+        player_style=player_style(),
         next_pose=_listed(found.next_view.q_deg) if found and found.next_view else "",
     )
+
+
+def _motions(results: VisionResults) -> list[PlayedMotion]:
+    """The way to each object grasped and away from it, point by point, with a line that points at the object."""
+    motions = []
+    for each in results.summary.objects:
+        rows = results.ways.take(results.ways.target == each.name)
+        if each.grasp is None or not len(rows):
+            continue
+        points = np.arange(len(rows), dtype=float)
+        parts = [(part, points[rows.part == part]) for part in dict.fromkeys(rows.part.tolist())]
+        events = [PlayedEvent(float(own[0]), float(own[-1]), tr(WAYS[part]), "plain") for part, own in parts]
+        x, y, z = (value / 1000 for value in each.xyz_mm)
+        mark = Mark(0.0, float(points[-1]), (x, y, z), (x, y, z + POINTER_M), each.name)
+        text = tr("{grasp}, turned by {turn} deg", grasp=each.grasp.grasp, turn=fixed(each.grasp.turn_deg, 0))
+        motions.append(PlayedMotion(each.name, text, points, np.radians(rows.q_deg), events, [mark], timed=False))
+    return motions
 
 
 def _listed(values: Iterable[float], digits: int = 1) -> str:
