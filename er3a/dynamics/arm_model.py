@@ -61,7 +61,8 @@ class ArmModel:
         pin = pinocchio()
         pool = pin.ModelPool(self.model, 1)
         rows = [np.asfortranarray(values.T) for values in (self._x(q), qd @ self.to_rows.T, qdd @ self.to_rows.T)]
-        tau: Reals = pin.rneaInParallel(1, pool, *rows).T @ self.to_rows
+        found = np.asarray(pin.rneaInParallel(1, pool, *rows))  # one row or one sample comes back as a vector
+        tau: Reals = found.reshape(self.robot.rows, len(q)).T @ self.to_rows
         return tau
 
     def mass_matrix(self, q: Reals) -> Reals:

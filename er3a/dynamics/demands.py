@@ -40,21 +40,30 @@ class Demand:
 
 def demand(t: Reals, qd: Reals, tau: Reals) -> Demand:
     """What a motion asks for, of torques and velocities (N, n) at times (N,) in s."""
-    power, duration = tau * qd, max(float(t[-1] - t[0]), 1e-12)
+    power, duration = tau * qd, float(t[-1] - t[0])
 
     def whole(values: Reals) -> Reals:
-        return scipy.integrate.cumulative_trapezoid(values, t, axis=0)[-1] if len(t) > 1 else np.zeros(values.shape[1])
+        return time_mean(t, values) * duration
 
     return Demand(
         peak=np.abs(tau).max(axis=0),
         peak_at=np.abs(tau).argmax(axis=0),
-        rms=np.sqrt(whole(tau**2) / duration),
+        rms=np.sqrt(time_mean(t, tau**2)),
         power=np.maximum(power, 0.0).max(axis=0),
         braking=np.maximum(-power, 0.0).max(axis=0),
         work=whole(np.maximum(power, 0.0)),
         recovered=whole(np.maximum(-power, 0.0)),
         speed=np.abs(qd).max(axis=0),
     )
+
+
+def time_mean(t: Reals, values: Reals) -> Reals:
+    """Means (n,) over times (N,) in s of values (N, n), by the trapezoidal rule; the plain mean if no time passes."""
+    if t[-1] > t[0]:
+        mean: Reals = scipy.integrate.trapezoid(values, t, axis=0) / (t[-1] - t[0])
+        return mean
+    still: Reals = values.mean(axis=0)
+    return still
 
 
 def power_imbalance(model: ArmModel, parts: TorqueParts, q: Reals, qd: Reals, qdd: Reals) -> float:

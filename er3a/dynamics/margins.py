@@ -1,7 +1,8 @@
 """How much more a motion could carry, and how much faster it could be, under the drives' torques.
 
 Torques are linear in the mass of a payload whose centre and radii of gyration stay, and quadratic in a scale of speed:
-gravity and Coulomb friction stay, viscous friction goes with it, inertia and velocity terms with its square [1]_.
+gravity and Coulomb friction stay, viscous friction goes with it, inertia and velocity terms with its square [1]_. So
+the square of the effective torque is a polynomial of degree two in the one and of degree four in the other.
 
 References
 ----------
@@ -11,64 +12,104 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
+from er3a.dynamics.demands import time_mean
 from er3a.numerics.arrays import Reals
+
+Binding = Literal["peak", "rms", "speed"]
+REAL = 1e-7
+"""A root of a polynomial is real if its imaginary part is less, in parts of its size."""
+
+
+@dataclass(frozen=True, eq=False)
+class DriveLimits:
+    """Peak torques, effective ones over a cycle, and joint speeds: (n,) each, NaN where unknown."""
+
+    peak: Reals
+    rated: Reals
+    speed: Reals
+
+    @property
+    def any_torque(self) -> bool:
+        """Whether a torque limit is known."""
+        return bool(np.isfinite([self.peak, self.rated]).any())
 
 
 @dataclass(frozen=True)
 class Margin:
-    """The greatest value, and what binds: the joint (from 0) and the number of the sample; None where nothing does."""
+    """The greatest value, and what binds; None where nothing does.
+
+    Attributes
+    ----------
+    joint : from 0; sample : its number, None for the effective torque, which is one of the whole motion
+    """
 
     value: float
+    by: Binding | None = None
     joint: int | None = None
     sample: int | None = None
 
 
-def greatest_payload(without: Reals, per_kg: Reals, limit: Reals) -> Margin | None:
-    """The greatest payload in kg that keeps all torques within the limits; None where no limit is known.
+def greatest_payload(t: Reals, without: Reals, per_kg: Reals, limits: DriveLimits) -> Margin | None:
+    """The greatest payload in kg that keeps peak and effective torques within limits; None where no limit is known.
 
     Parameters
     ----------
+    t : (N,), s
     without : (N, n), torques without payload
     per_kg : (N, n), what each kg adds
-    limit : (n,), NaN where unknown
     """
-    if not np.isfinite(limit).any():
+    if not limits.any_torque:
         return None
-    room = limit - np.sign(per_kg) * without
+    room = limits.peak - np.sign(per_kg) * without
     with np.errstate(divide="ignore", invalid="ignore"):
-        most = np.where(per_kg != 0, room / np.abs(per_kg), np.where(np.abs(without) > limit, 0.0, np.inf))
-    return _least(np.maximum(most, 0.0), np.abs(without) > limit, limit)
+        by_peak = np.where(per_kg != 0, np.maximum(room / np.abs(per_kg), 0.0), np.inf)
+    by_peak = np.where(np.abs(without) > limits.peak, 0.0, by_peak)
+    squares = [time_mean(t, part) for part in (per_kg**2, 2 * per_kg * without, without**2)]
+    return _least({"peak": by_peak, "rms": _by_rms(squares, limits.rated)[None]})
 
 
 def greatest_speed_scale(
-    at_rest: Reals, linear: Reals, square: Reals, limit: Reals, velocity: Reals, fastest: Reals
+    t: Reals, parts: tuple[Reals, Reals, Reals], velocity: Reals, limits: DriveLimits
 ) -> Margin | None:
     """The greatest s such that the motion run s times as fast, and any slower, keeps torques and speeds within limits.
 
     Parameters
     ----------
-    at_rest, linear, square : (N, n), torques ``at_rest + s linear + s^2 square``
-    limit : (n,), torques, NaN where unknown
+    t : (N,), s
+    parts : at_rest, linear, square, each (N, n): torques ``at_rest + s linear + s^2 square``
     velocity : (N, n), at s = 1
-    fastest : (n,), joint speeds, NaN where unknown
 
     Returns
     -------
     margin : s, 0 where the arm can't even stand, infinite for a motion that nothing bounds; None without torque limits
     """
-    if not np.isfinite(limit).any():
+    if not limits.any_torque:
         return None
-    by_torque = np.minimum(
-        _first_root(square, linear, at_rest - limit), _first_root(-square, -linear, -at_rest - limit)
-    )
+    (at_rest, linear, square), peak = parts, limits.peak
+    by_peak = np.minimum(_first_root(square, linear, at_rest - peak), _first_root(-square, -linear, -at_rest - peak))
+    by_peak = np.where(np.abs(at_rest) > peak, 0.0, by_peak)
     with np.errstate(divide="ignore", invalid="ignore"):
-        by_speed = np.where(np.isfinite(fastest) & (velocity != 0), fastest / np.abs(velocity), np.inf)
-    known = np.where(np.isfinite(limit), by_torque, np.inf)
-    both = np.minimum(known, by_speed)
-    return _least(both, np.abs(at_rest) > limit, np.zeros(len(limit)))
+        by_speed = np.where(velocity != 0, limits.speed / np.abs(velocity), np.inf)
+    products = (square**2, 2 * linear * square, 2 * at_rest * square + linear**2, 2 * at_rest * linear, at_rest**2)
+    squares = [time_mean(t, part) for part in products]
+    return _least({"peak": by_peak, "rms": _by_rms(squares, limits.rated)[None], "speed": by_speed})
+
+
+def _by_rms(squares: list[Reals], rated: Reals) -> Reals:
+    """The least s >= 0 (n,) above which polynomials (highest coefficient first) exceed rated squared; inf: none."""
+    found = np.full(len(rated), np.inf)
+    for joint in np.flatnonzero(np.isfinite(rated)):
+        polynomial = np.array([part[joint] for part in squares])
+        polynomial[-1] -= rated[joint] ** 2
+        roots = np.roots(polynomial)
+        real = np.sort(roots.real[(np.abs(roots.imag) <= REAL * np.abs(roots)) & (roots.real > 0)])
+        rising = real[np.polyval(polynomial, real * (1 + REAL)) > 0]
+        found[joint] = 0.0 if polynomial[-1] > 0 else rising[0] if len(rising) else np.inf
+    return found
 
 
 def _first_root(a: Reals, b: Reals, c: Reals) -> Reals:
@@ -84,8 +125,12 @@ def _first_root(a: Reals, b: Reals, c: Reals) -> Reals:
     return first
 
 
-def _least(values: Reals, broken: np.ndarray, limit: Reals) -> Margin:
-    values = np.where(broken, 0.0, np.where(np.isnan(limit), np.inf, values))
-    sample, joint = np.unravel_index(int(np.nanargmin(values)), values.shape)
-    least = float(values[sample, joint])
-    return Margin(least, int(joint), int(sample)) if np.isfinite(least) else Margin(least)
+def _least(values: dict[Binding, Reals]) -> Margin:
+    """The least of values (N, n), or (1, n) of the whole motion; NaN where nothing limits."""
+    least = Margin(np.inf)
+    for by, each in values.items():
+        each = np.where(np.isnan(each), np.inf, each)
+        sample, joint = np.unravel_index(int(each.argmin()), each.shape)
+        if each[sample, joint] < least.value:
+            least = Margin(float(each[sample, joint]), by, int(joint), None if by == "rms" else int(sample))
+    return least

@@ -1,7 +1,8 @@
 """Whether masses can be right: what stands out of the data of links, entry by entry.
 
 Numbers that no body can have are refused where a file is read (:func:`er3a.robots.masses.no_body`); here stand those
-that a body may have but hardly this one. The shape of a link is that of its capsules, given or estimated.
+that a body may have but hardly this one. Shapes are those of the links' meshes or capsules; where they are guessed from
+the table, only what is off by orders of magnitude counts.
 """
 
 from __future__ import annotations
@@ -11,18 +12,18 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.collision.envelopes import envelopes_of
 from er3a.dynamics.arm_model import drives_of
-from er3a.dynamics.estimate import capsule_body
+from er3a.dynamics.link_shapes import WATER, LinkShape, link_shapes
 from er3a.numerics.arrays import Reals
-from er3a.robots.masses import MassBody, NoBody, about, no_body, six_moments, together
-from er3a.robots.robot import Envelope, Robot
+from er3a.robots.masses import MassBody, NoBody, about, no_body, six_moments
+from er3a.robots.robot import Robot
 
-WATER = 1000.0
 LIGHTEST, HEAVIEST = 100.0, 12_000.0
-"""kg/m^3 of a link's capsules: thin shells, and more than solid steel."""
+"""kg/m^3 of a link's shape: thin shells, and more than solid steel."""
 BEYOND_SHAPE = 0.03
-"""m by which a centre may be outside the capsules, which leave out housings."""
+"""m by which a centre may be outside the hull of the shape, which leaves out housings."""
+GUESSED = 10.0
+"""How much wider bounds are of a guessed shape; a centre may then be outside by the arm's size."""
 WIDEST_RATIO, NARROWEST_RATIO = 3.0, 0.1
 """Radius of gyration against that of the filled capsules."""
 WEIGHT_RATIO = 0.15
@@ -53,6 +54,14 @@ class PointMass:
 
     link: int
     code: Literal["point_mass"] = "point_mass"
+
+
+@dataclass(frozen=True)
+class InertiaWithoutMass:
+    """A link has an inertia and no mass, as sums of parameters that were identified together do."""
+
+    link: int
+    code: Literal["inertia_without_mass"] = "inertia_without_mass"
 
 
 @dataclass(frozen=True)
@@ -109,6 +118,7 @@ MassFinding = (
     ImpossibleInertia
     | MissingLink
     | PointMass
+    | InertiaWithoutMass
     | CentreOutside
     | UnlikelyDensity
     | UnlikelyInertia
@@ -119,49 +129,55 @@ MassFinding = (
 
 def mass_findings(robot: Robot) -> tuple[MassFinding, ...]:
     """What stands out of a robot's masses, link by link, then of their sum."""
-    shapes: dict[int, list[Envelope]] = {}
-    for capsule in envelopes_of(robot):
-        shapes.setdefault(capsule.link, []).append(capsule)
+    shapes = link_shapes(robot)
+    beyond = float(np.abs(robot.a).sum() + np.abs(robot.d).sum())
     armature = drives_of(robot).armature
     moved_by_one = robot.coupling is None
     found: list[MassFinding] = []
     for link in range(robot.rows + 1):
         body = robot.masses.body(link)
-        if body is None or body.mass == 0:
+        if body is None or (body.mass == 0 and not any(body.inertia)):
             rotor = moved_by_one and link > 0 and armature[link - 1] > 0
-            carries = any((robot.masses.body(k) or MassBody(0.0)).mass for k in range(link + 1, robot.rows + 1))
+            carries = any(_counts(robot.masses.body(k)) for k in range(link + 1, robot.rows + 1))
             found += [MissingLink(link, not rotor and not carries)] if link else []
         elif problem := no_body(body):
             found.append(ImpossibleInertia(link, problem))
+        elif body.mass == 0:
+            found.append(InertiaWithoutMass(link))
         elif not any(body.inertia):
             found.append(PointMass(link))
         elif link in shapes:
-            found += _against_shape(link, body, shapes[link])
+            found += _against_shape(link, body, shapes[link], beyond)
     return (*found, *_against_weight(robot, any(isinstance(each, MissingLink) for each in found)))
 
 
-def _against_shape(link: int, body: MassBody, capsules: list[Envelope]) -> list[MassFinding]:
-    shape = together([capsule_body(capsule, WATER) for capsule in capsules])
+def _counts(body: MassBody | None) -> bool:
+    return body is not None and (body.mass > 0 or any(body.inertia))
+
+
+def _against_shape(link: int, body: MassBody, shape: LinkShape, size: float) -> list[MassFinding]:
+    water, slack = shape.water, GUESSED if shape.guessed else 1.0
     found: list[MassFinding] = []
-    density = WATER * body.mass / shape.mass
-    if not LIGHTEST <= density <= HEAVIEST:
+    density = WATER * body.mass / water.mass
+    if not LIGHTEST / slack <= density <= HEAVIEST * slack:
         found.append(UnlikelyDensity(link, body.mass, density))
     centre = np.array(body.centre)
-    outside = min(_distance(centre, capsule) - capsule.radius for capsule in capsules)
-    if outside > BEYOND_SHAPE:
+    outside = shape.outside(centre)
+    if outside > (size if shape.guessed else BEYOND_SHAPE):
         found.append(CentreOutside(link, 1000 * outside))
-    own, expected = _gyration(body.inertia_matrix, body.mass), _gyration(shape.inertia_matrix, shape.mass)
+    own, expected = _gyration(body.inertia_matrix, body.mass), _gyration(water.inertia_matrix, water.mass)
     less = body.inertia_matrix - body.mass * about(centre)
     at_centre = MassBody(body.mass, body.centre, six_moments(less))
-    expected_trace = float(np.trace(shape.inertia_matrix)) * body.mass / shape.mass
+    expected_trace = float(np.trace(water.inertia_matrix)) * body.mass / water.mass
     given, rest = float(np.trace(body.inertia_matrix)), float(np.trace(less))
     if (
-        given > PARALLEL_RATIO * expected_trace
+        not shape.guessed
+        and given > PARALLEL_RATIO * expected_trace
         and no_body(at_centre) is None
         and rest < PARALLEL_RATIO * expected_trace
     ):
         found.append(AboutOrigin(link, given / 2, rest / 2, expected_trace / 2))
-    elif not NARROWEST_RATIO <= own / expected <= WIDEST_RATIO:
+    elif not NARROWEST_RATIO / slack <= own / expected <= WIDEST_RATIO * slack:
         found.append(UnlikelyInertia(link, 1000 * own, 1000 * expected))
     return found
 
@@ -178,11 +194,3 @@ def _against_weight(robot: Robot, incomplete: bool) -> list[MassFinding]:
 def _gyration(tensor: Reals, mass: float) -> float:
     """Mean radius of gyration, m: half the trace is the second moment of the mass about the centre."""
     return float(np.sqrt(np.trace(tensor) / 2 / mass))
-
-
-def _distance(point: Reals, capsule: Envelope) -> float:
-    """Distance (m) of a point from a capsule's line."""
-    start, end = np.array(capsule.start), np.array(capsule.end)
-    along = end - start
-    share = np.clip((point - start) @ along / max(float(along @ along), 1e-30), 0.0, 1.0)
-    return float(np.linalg.norm(point - start - share * along))

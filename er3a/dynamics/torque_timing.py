@@ -1,8 +1,10 @@
 """The fastest time law along a way in joint space under the drives' torques and the joints' speeds, by TOPP-RA [1]_.
 
 Along a way q(s) torques are ``a s'' + b s'^2 + c``; so peak torques bound s'' and s'^2 linearly. Viscous friction
-goes with s' and counts with the greatest s' that the joints' speeds allow: the motion found keeps the limits, and is
-the fastest one if there is no viscous friction. Between nodes constraints are interpolated.
+goes with s', the root of s'^2. Where it costs torque its tangent at the s' of a motion known counts, which is nowhere
+below it; where it helps, the chord up to the greatest s' that the joints' speeds allow, which is nowhere above. So each
+motion found keeps the limits and is no slower than the one before; they are repeated until they gain nothing. Without
+viscous friction the motion is the fastest one. Between nodes constraints are interpolated.
 
 References
 ----------
@@ -36,6 +38,10 @@ from er3a.planning.timing import (
     standing,
 )
 
+MOST_ROUNDS = 30
+GAIN = 1e-3
+SLOWEST = 1e-3
+
 
 @dataclass(frozen=True, eq=False)
 class TimedTorques:
@@ -68,38 +74,83 @@ def fastest_under_torques(model: ArmModel, q: Reals, speed: Reals, peak: Reals) 
     if len(way) == 2:
         q, way = np.linspace(q[0], q[1], STRAIGHT_NODES), np.linspace(0.0, way[1], STRAIGHT_NODES)
     spline = scipy.interpolate.CubicSpline(way, q)
-    pace = _toppra(way, spline, speed, torque_rows(model, way, spline, speed, peak))
-    between = (pace[:-1] + pace[1:]) / 2
-    if (between <= 0).any():
-        raise TimingError(MustStandStill())
-    t = np.concatenate([[0.0], np.cumsum(np.diff(way) / between)])
+    pace, t = _fastest_pace(model, way, spline, speed, peak)
     timed = Timed(polynomial_motion(run_along(way, spline, pace, t), t, SPLINE_DEGREE))
     dry = known(drives_of(model.robot).coulomb) * (direction_of(spline(way, 1)) - direction_of(timed.velocity))
     return TimedTorques(timed, torque_parts(model, timed.q, timed.velocity, timed.acceleration).total + dry)
 
 
+def _fastest_pace(
+    model: ArmModel, way: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, peak: Reals
+) -> tuple[Reals, Reals]:
+    """Speeds along the way and times (N,) at its nodes."""
+    rows = TorquesAlong.along(model, way, spline, speed, peak)
+    around = rows.slow
+    for _ in range(MOST_ROUNDS if rows.viscous.any() else 1):
+        pace = _toppra(way, spline, speed, rows.constraints(around))
+        between = (pace[:-1] + pace[1:]) / 2
+        if (between <= 0).any():
+            raise TimingError(MustStandStill())
+        t = np.concatenate([[0.0], np.cumsum(np.diff(way) / between)])
+        gained = bool((pace > around * (1 + GAIN)).any())
+        around = np.maximum(pace, rows.slow * SLOWEST)
+        if not gained:
+            break
+    return pace, t
+
+
 Rows = tuple[Reals, Reals, Reals, Reals, Reals]
 
 
-def torque_rows(model: ArmModel, way: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, peak: Reals) -> Rows:
-    """Constraints ``F (a s'' + b s'^2 + c) <= g`` at the nodes: a, b, c (N, k), F (N, 2k, k), g (N, 2k).
+@dataclass(frozen=True, eq=False)
+class TorquesAlong:
+    """Torques ``a s'' + b s'^2 + c + viscous s'`` at the nodes (N, k) of the k joints whose peak (k,) is known.
 
-    k is the number of joints whose peak torque is known.
+    Attributes
+    ----------
+    fastest : (N,), greatest s' under the joints' speeds
+    slow : (N,), s' whose viscous friction takes half of what gravity and dry friction leave, at most ``fastest``
     """
-    q, slope, bend = (np.ascontiguousarray(spline(way, order)) for order in range(3))
-    rest, bound, drives = np.zeros_like(q), np.isfinite(peak), drives_of(model.robot)
-    held = model.rigid_torques(q, rest, rest)
-    armature = known(drives.armature)
-    a = model.rigid_torques(q, rest, slope) - held + armature * slope
-    b = model.rigid_torques(q, slope, bend) - held + armature * bend
-    c = held + model.tool_torques(q) + known(drives.coulomb) * direction_of(slope)
-    with np.errstate(divide="ignore"):
-        most = (speed / np.abs(slope)).min(axis=1)[:, None]
-    viscous = known(drives.viscous) * slope * most
-    g = np.concatenate([peak - np.maximum(viscous, 0.0), peak - np.maximum(-viscous, 0.0)], axis=1)
-    k = int(bound.sum())
-    F = np.broadcast_to(np.concatenate([np.eye(k), -np.eye(k)]), (len(way), 2 * k, k)).copy()
-    return a[:, bound], b[:, bound], c[:, bound], F, g[:, np.tile(bound, 2)]
+
+    a: Reals
+    b: Reals
+    c: Reals
+    viscous: Reals
+    peak: Reals
+    fastest: Reals
+    slow: Reals
+
+    @classmethod
+    def along(
+        cls, model: ArmModel, way: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, peak: Reals
+    ) -> TorquesAlong:
+        """The torques along a way."""
+        q, slope, bend = (np.ascontiguousarray(spline(way, order)) for order in range(3))
+        rest, bound, drives = np.zeros_like(q), np.isfinite(peak), drives_of(model.robot)
+        held = model.rigid_torques(q, rest, rest)
+        armature = known(drives.armature)
+        a = model.rigid_torques(q, rest, slope) - held + armature * slope
+        b = model.rigid_torques(q, slope, bend) - held + armature * bend
+        c = held + model.tool_torques(q) + known(drives.coulomb) * direction_of(slope)
+        viscous = known(drives.viscous) * slope
+        with np.errstate(divide="ignore", invalid="ignore"):
+            fastest = (speed / np.abs(slope)).min(axis=1)
+            room = np.maximum(peak - np.abs(c), SLOWEST * peak) / (2 * np.abs(viscous))
+        slow = np.minimum(fastest, np.where(np.isfinite(room), room, np.inf).min(axis=1))
+        return cls(a[:, bound], b[:, bound], c[:, bound], viscous[:, bound], peak[bound], fastest, slow)
+
+    def constraints(self, around: Reals) -> Rows:
+        """``F (a s'' + b s'^2 + c) <= g`` with a, b, c, g (N, 2k), F the unit matrix: upper ends first, then lower.
+
+        ``around`` (N,): s' at which viscous friction counts as it is.
+        """
+        around, viscous = around[:, None], np.concatenate([self.viscous, -self.viscous], axis=1)
+        costs, helps = np.maximum(viscous, 0.0), np.minimum(viscous, 0.0)
+        a, b, c = (np.concatenate([part, -part], axis=1) for part in (self.a, self.b, self.c))
+        b = b + costs / (2 * around) + helps / self.fastest[:, None]
+        g = np.tile(self.peak, 2) - costs * around / 2
+        F = np.broadcast_to(np.eye(a.shape[1]), (len(a), a.shape[1], a.shape[1])).copy()
+        return a, b, c, F, g
 
 
 def _toppra(way: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, rows: Rows) -> Reals:

@@ -66,14 +66,29 @@ def torque_tolerance(model: ArmModel, q: Reals, qd: Reals, qdd: Reals, links: Gr
     ----------
     links, load : grades of the links' masses and of the load, for bodies without tolerances of their own
     """
-    Y = model.regressor(q, qd, qdd)
-    half = np.zeros_like(q)
+    return sum(_halves(model, (q, qd, qdd), links, load), np.zeros_like(q))
+
+
+def load_tolerance(model: ArmModel, q: Reals, qd: Reals, qdd: Reals, load: Grade) -> Reals:
+    """Half-widths (N, n) of what the load alone adds to the torques; 0 without one."""
+    return _halves(model, (q, qd, qdd), load, load)[-1] if model.load else np.zeros_like(q)
+
+
+def _halves(model: ArmModel, motion: tuple[Reals, Reals, Reals], links: Grade, load: Grade) -> list[Reals]:
+    """What each body's tolerances add, the load's last."""
+    Y, halves = model.regressor(*motion), []
     for link, body in model.bodies:
-        assumed = ASSUMED[load if link is None else links]
-        mass = assumed.mass_ratio * body.mass if body.mass_tolerance is None else body.mass_tolerance
-        centre = assumed.centre if body.centre_tolerance is None else body.centre_tolerance
+        mass, centre = tolerances_of(body, load if link is None else links)
         own = Y[:, :, (model.robot.rows if link is None else link) - 1]
+        half = np.abs(own @ centre_directions(body).T).sum(axis=2) * centre
         if body.mass:
             half += np.abs(own @ parameters(body)) * mass / body.mass
-        half += np.abs(own @ centre_directions(body).T).sum(axis=2) * centre
-    return half
+        halves.append(half)
+    return halves
+
+
+def tolerances_of(body: MassBody, grade: Grade) -> tuple[float, float]:
+    """By how much a body's mass (kg) and centre (m) may be off: its own tolerances, or those of the grade."""
+    assumed = ASSUMED[grade]
+    mass = assumed.mass_ratio * body.mass if body.mass_tolerance is None else body.mass_tolerance
+    return mass, assumed.centre if body.centre_tolerance is None else body.centre_tolerance

@@ -1,7 +1,8 @@
 """The pose of an arm within its limits at which something is greatest, for several objectives at once.
 
 From evenly spread poses the best few are climbed: one joint after another is set to the best of a grid over its whole
-range, which is then refined about it. The outcome is the greatest found, and a lower bound of the greatest there is.
+range, which is then refined about it. The outcome is the greatest found: :mod:`er3a.dynamics.pose_bound` tells how much
+more there can be.
 """
 
 from __future__ import annotations
@@ -32,13 +33,12 @@ class Greatest:
     q: Reals
 
 
-def greatest_over_poses(robot: Robot, objective: Callable[[Reals], Reals], moving: Integers | None = None) -> Greatest:
+def greatest_over_poses(robot: Robot, objective: Callable[[Reals], Reals]) -> Greatest:
     """The greatest of each objective.
 
     Parameters
     ----------
     objective : values (N, k) at poses (N, n)
-    moving : joints (from 0) that matter; None for all
     """
     q = quasi_random_points(robot.lower, robot.upper, POSES)
     q = q[within(robot, q)]
@@ -49,11 +49,10 @@ def greatest_over_poses(robot: Robot, objective: Callable[[Reals], Reals], movin
     best = np.argsort(-values, axis=0, kind="stable")[:CLIMBS]
     targets = np.broadcast_to(np.arange(k), best.shape).ravel()
     poses, reached = q[best.ravel()], values[best.ravel(), targets]
-    joints = np.arange(robot.joints) if moving is None else moving
     for _ in range(MOST_ROUNDS):
         before = reached
-        for joint in joints:
-            poses, reached = _along(robot, objective, poses, targets, int(joint))
+        for joint in range(robot.joints):
+            poses, reached = _along(robot, objective, poses, targets, joint)
         if (reached <= before + NO_BETTER * np.abs(before)).all():
             break
     chosen = reached.reshape(-1, k).argmax(axis=0) * k + np.arange(k)

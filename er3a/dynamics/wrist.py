@@ -11,11 +11,13 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from er3a.dynamics.pose_bound import bounded_lever
 from er3a.dynamics.worst_pose import greatest_over_poses
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import frames
@@ -29,11 +31,15 @@ WristQuantity = Literal["payload", "moment", "inertia"]
 
 @dataclass(frozen=True)
 class WristUse:
-    """What a load asks for, against what is allowed: kg, N m or kg m^2; ``joint`` from 1, None for the payload."""
+    """What a load asks for, against what is allowed: kg, N m or kg m^2; ``joint`` from 1, None for the payload.
+
+    ``asked`` is in the worst pose found, ``most`` a bound that no pose exceeds, with the load's tolerances.
+    """
 
     quantity: WristQuantity
     joint: int | None
     asked: float
+    most: float
     allowed: float
 
     @property
@@ -51,26 +57,33 @@ def levers(robot: Robot, q: Reals, point: Reals) -> Reals:
     return far
 
 
-def worst_levers(robot: Robot, point: Reals) -> Reals:
-    """Greatest distance (m,) found of a point (3,) of the flange from each axis, within the limits."""
-    return greatest_over_poses(robot, lambda q: levers(robot, q, point), np.arange(1, robot.joints)).values
+def worst_levers(robot: Robot, point: Reals, rows: Sequence[int]) -> tuple[Reals, Reals]:
+    """Greatest distances (r,) in m of a point (3,) of the flange from some rows' axes (from 0): found, and bounds."""
+    climbed = greatest_over_poses(robot, lambda q: levers(robot, q, point)[:, list(rows)])
+    found = [bounded_lever(robot, point, row, q) for row, q in zip(rows, climbed.q)]
+    return np.array([each.found for each in found]), np.array([each.bound for each in found])
 
 
-def wrist_use(robot: Robot, wrist: WristLoad, load: Load, gravity: float = GRAVITY) -> tuple[WristUse, ...]:
-    """What a load asks of the wrist at rest, in the order of the table; only quantities that the wrist's data limit."""
-    far = worst_levers(robot, np.array(load.centre))
-    uses = [WristUse("payload", None, load.mass, wrist.payload)] if np.isfinite(wrist.payload) else []
-    uses += [
-        WristUse("moment", joint, load.mass * gravity * float(far[joint - 1]), allowed)
-        for joint, allowed in wrist.moment
-    ]
-    return (
-        *uses,
-        *(
-            WristUse("inertia", joint, load.mass * float(far[joint - 1]) ** 2 + _own(robot, load, joint), allowed)
-            for joint, allowed in wrist.inertia
-        ),
-    )
+def wrist_use(
+    robot: Robot, wrist: WristLoad, load: Load, gravity: float = GRAVITY, off: tuple[float, float] = (0.0, 0.0)
+) -> tuple[WristUse, ...]:
+    """What a load asks of the wrist at rest, in the order of the table; only quantities that the wrist's data limit.
+
+    ``off``: by how much the load's mass (kg) and centre (m) may be off, which ``most`` of the uses takes in.
+    """
+    heaviest, ratio = load.mass + off[0], 1 + off[0] / load.mass if load.mass else 1.0
+    joints = sorted({joint for joint, _ in (*wrist.moment, *wrist.inertia)})
+    found, bounds = worst_levers(robot, np.array(load.centre), [joint - 1 for joint in joints])
+    far = dict(zip(joints, zip(found.tolist(), (bounds + off[1]).tolist())))
+    uses = [WristUse("payload", None, load.mass, heaviest, wrist.payload)] if np.isfinite(wrist.payload) else []
+    for joint, allowed in wrist.moment:
+        lever, longest = far[joint]
+        uses.append(WristUse("moment", joint, load.mass * gravity * lever, heaviest * gravity * longest, allowed))
+    for joint, allowed in wrist.inertia:
+        (lever, longest), own = far[joint], _own(robot, load, joint)
+        most = heaviest * longest**2 + ratio * own
+        uses.append(WristUse("inertia", joint, load.mass * lever**2 + own, most, allowed))
+    return tuple(uses)
 
 
 def _own(robot: Robot, load: Load, joint: int) -> float:

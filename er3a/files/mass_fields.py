@@ -186,6 +186,9 @@ def check_masses(
         joints = [row.joint for row in listed]
         if joints and (max(joints) > len(slides) or len(set(joints)) != len(joints)):
             raise ValueError(f"{group}.rows: the joints come as {joints} | Write one row for each joint of the arm")
+    for i, about in enumerate(wrist.rows if wrist else []):
+        if slides[about.joint - 1]:
+            raise ValueError(f"wrist_load.rows[{i}]: joint {about.joint} slides | Give moments about joints that turn")
     for i, row in enumerate(drives.rows if drives else []):
         wrong = [key for key in (TURNING if slides[row.joint - 1] else SLIDING) if getattr(row, key) is not None]
         if wrong:

@@ -15,19 +15,20 @@ from er3a.files.kept_files import write_atomically
 from er3a.files.mass_writer import mass_groups
 from er3a.files.robot_file import SHORTEST_PLAIN_LENGTH_MM, RobotFile
 from er3a.files.robot_library import VALUES_OF_ROW
+from er3a.files.yaml_file import parse
 from er3a.geometry.transforms import rpy_of
 from er3a.robots.robot import CombinedLimit, Robot, Source
 
 _UNKNOWN = Source("not stated", "inferred")
 
 
-def robot_file(robot: Robot) -> RobotFile:
+def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
     """The file model of a robot; mm and degrees to 1e-11, so that rounding noise does not reach the file.
 
     Raises
     ------
-    pydantic.ValidationError
-        if the robot's values make no acceptable file
+    InputError
+        if the robot's values make no acceptable file; it names ``path``
     """
 
     def sourced(group: str) -> dict:
@@ -91,7 +92,7 @@ def robot_file(robot: Robot) -> RobotFile:
             placement = {"xyz_mm": map(_tidy, T[:3, 3] * 1000), "rpy_deg": map(_tidy, np.degrees(rpy_of(T)))}
             content[key] = sourced(key) | {name: list(values) for name, values in placement.items()}
     with warnings.catch_warnings(action="ignore", category=InputWarning):  # for those who write numbers by hand
-        return RobotFile.model_validate(content)
+        return parse(RobotFile, content, path)
 
 
 def _shown(robot: Robot, values: np.ndarray) -> np.ndarray:
@@ -158,7 +159,7 @@ def _decided(robot: Robot, rule: str) -> list[dict[str, Any]]:
 
 def write_robot(robot: Robot, path: Path) -> None:
     """Write a robot file that :func:`er3a.load_robot` reads back to the same numbers, to 1e-12 m and rad."""
-    text = yaml_text(robot_file(robot).model_dump(exclude_none=True, exclude_defaults=True))
+    text = yaml_text(robot_file(robot, path).model_dump(exclude_none=True, exclude_defaults=True))
     write_atomically(path, lambda file: file.write_text(text, encoding="utf-8"))
 
 

@@ -67,7 +67,7 @@ def masses_from_urdf(
         problem = no_body(body)
         if problem:
             notes.append(f"link {name} {WHY[problem]}; its mass was left out")
-        elif body.mass > 0:
+        elif body.mass > 0 or any(body.inertia):
             placed, number = place
             found.setdefault(number, []).append(moved(body, np.linalg.inv(at_zero[number]) @ placed @ T))
     missing = [name for k, name in enumerate(moving) if k + 1 not in found]

@@ -7,20 +7,30 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy
 
 import er3a
+from er3a.dynamics import pose_bound
 from er3a.dynamics.arm_model import arm_model
 from er3a.dynamics.demands import demand
 from er3a.dynamics.holding import worst_holding
-from er3a.dynamics.margins import greatest_payload, greatest_speed_scale
+from er3a.dynamics.margins import DriveLimits, greatest_payload, greatest_speed_scale
 from er3a.dynamics.torque_timing import fastest_under_torques
-from er3a.dynamics.torques import holding_torques, known, torque_parts
+from er3a.dynamics.torques import known, torque_parts
 from er3a.dynamics.wrist import levers, load_diagram, worst_levers, wrist_to_flange, wrist_use
+from er3a.robots.joint_limits import within
 from er3a.robots.masses import Drives, LinkMass, Load, MassBody, Masses, WristLoad
-from er3a.robots.robot import Robot
+from er3a.robots.robot import CombinedLimit, Robot
 from testing.arms import make_arm
+from tests.dynamics.test_torques import COUPLED, mass_and_potential, random_arm
 
 PEAK = np.array([30.0, 45.0, 25.0, 8.0, 5.0, 3.0])
+UNKNOWN = np.full(6, np.nan)
+TIMES = np.linspace(0, 3, 401)
+
+
+def limits(peak: np.ndarray = PEAK, rated: np.ndarray = UNKNOWN, speed: np.ndarray = UNKNOWN) -> DriveLimits:
+    return DriveLimits(peak, rated, speed)
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +61,9 @@ def test_the_greatest_payload_brings_one_drive_to_its_peak(arm):
     q, qd, qdd = swing()
     centre, moments = (0.02, 0.0, 0.08), (0.002, 0.002, 0.001, 0.0, 0.0, 0.0)
     without = er3a.torques(arm, q, qd, qdd)
-    found = greatest_payload(without, er3a.torques(arm, q, qd, qdd, Load(1.0, centre, moments)) - without, PEAK)
+    per_kg = er3a.torques(arm, q, qd, qdd, Load(1.0, centre, moments)) - without
+    found = greatest_payload(TIMES, without, per_kg, limits())
+    assert found.by == "peak"
 
     def utilisation(mass: float) -> np.ndarray:
         load = Load(mass, centre, tuple(mass * value for value in moments))
@@ -69,8 +81,8 @@ def test_the_greatest_speed_scale_brings_one_drive_to_its_peak(arm):
     parts, drives = torque_parts(arm_model(arm), q, qd, qdd), arm.masses.drives
     viscous = drives.viscous * qd
     at_rest = parts.gravity + parts.friction - viscous
-    args = (at_rest, viscous, parts.inertia + parts.velocity, PEAK, qd)
-    found = greatest_speed_scale(*args, np.full(6, np.nan))
+    args = TIMES, (at_rest, viscous, parts.inertia + parts.velocity), qd
+    found = greatest_speed_scale(*args, limits())
 
     def utilisation(scale: float) -> float:
         return float((np.abs(er3a.torques(arm, q, scale * qd, scale**2 * qdd)) / PEAK).max())
@@ -78,20 +90,53 @@ def test_the_greatest_speed_scale_brings_one_drive_to_its_peak(arm):
     assert utilisation(found.value) == pytest.approx(1.0, rel=1e-9)
     assert all(utilisation(share * found.value) <= 1 + 1e-9 for share in np.linspace(0.01, 1, 50))
     # Joint speeds may bind first.
-    slow = greatest_speed_scale(*args, np.full(6, 0.8))
+    slow = greatest_speed_scale(*args, limits(speed=np.full(6, 0.8)))
     assert slow.value == pytest.approx(1.0, rel=1e-4)
+    assert slow.by == "speed"
 
 
 def test_an_arm_that_cannot_stand_has_no_margin_and_unknown_limits_none(arm):
     q, qd, qdd = swing()
-    parts, unknown = torque_parts(arm_model(arm), q, qd, qdd), np.full(6, np.nan)
+    parts = torque_parts(arm_model(arm), q, qd, qdd)
     weak = np.where(np.arange(6) == 1, 0.5, np.nan)
     zero = np.zeros_like(q)
-    assert greatest_payload(parts.total, np.ones_like(q), weak).value == 0.0
-    assert greatest_speed_scale(parts.gravity, zero, parts.inertia, weak, qd, unknown).value == 0.0
-    assert greatest_payload(parts.total, np.ones_like(q), unknown) is None
-    assert greatest_speed_scale(parts.gravity, zero, parts.inertia, unknown, qd, unknown) is None
-    assert greatest_speed_scale(zero, zero, zero, PEAK, zero, unknown).value == np.inf
+    for by, weakest in (("peak", limits(weak)), ("rms", limits(UNKNOWN, weak))):
+        payload = greatest_payload(TIMES, parts.total, np.ones_like(q), weakest)
+        speed = greatest_speed_scale(TIMES, (parts.gravity, zero, parts.inertia), qd, weakest)
+        assert (payload.value, payload.by, payload.joint) == (0.0, by, 1)
+        assert (speed.value, speed.by, speed.joint) == (0.0, by, 1)
+    assert greatest_payload(TIMES, parts.total, np.ones_like(q), limits(UNKNOWN)) is None
+    assert greatest_speed_scale(TIMES, (parts.gravity, zero, parts.inertia), qd, limits(UNKNOWN)) is None
+    assert greatest_speed_scale(TIMES, (zero, zero, zero), zero, limits()).value == np.inf
+
+
+def test_rated_torques_bound_payload_and_speed_by_the_effective_ones(arm):
+    q, qd, qdd = swing()
+    centre, moments = (0.02, 0.0, 0.08), (0.002, 0.002, 0.001, 0.0, 0.0, 0.0)
+    rated = 0.4 * PEAK
+
+    def effective(scale: float = 1.0, mass: float = 0.0) -> np.ndarray:
+        """By Simpson's rule, of torques as the public function gives them."""
+        load = Load(mass, centre, tuple(mass * value for value in moments)) if mass else None
+        tau = er3a.torques(arm, q, scale * qd, scale**2 * qdd, load)
+        return np.sqrt(scipy.integrate.simpson(tau**2, x=TIMES, axis=0) / TIMES[-1])
+
+    without = er3a.torques(arm, q, qd, qdd)
+    per_kg = er3a.torques(arm, q, qd, qdd, Load(1.0, centre, moments)) - without
+    payload = greatest_payload(TIMES, without, per_kg, limits(PEAK, rated))
+    assert (payload.by, payload.sample) == ("rms", None)
+    assert payload.value < greatest_payload(TIMES, without, per_kg, limits()).value
+    ratios = effective(mass=payload.value) / rated
+    assert ratios.max() == pytest.approx(1.0, rel=2e-3)  # friction jumps within an interval
+    assert ratios.argmax() == payload.joint
+    parts = torque_parts(arm_model(arm), q, qd, qdd)
+    viscous = arm.masses.drives.viscous * qd
+    at_rest = parts.gravity + parts.friction - viscous
+    scale = greatest_speed_scale(TIMES, (at_rest, viscous, parts.inertia + parts.velocity), qd, limits(UNKNOWN, rated))
+    ratios = effective(scale=scale.value) / rated
+    assert (scale.by, int(ratios.argmax())) == ("rms", scale.joint)
+    assert ratios.max() == pytest.approx(1.0, rel=2e-3)
+    assert all((effective(scale=share * scale.value) < rated).all() for share in np.linspace(0.05, 0.99, 20))
 
 
 def test_the_worst_holding_pose_of_two_links_is_stretched_out():
@@ -106,15 +151,64 @@ def test_the_worst_holding_pose_of_two_links_is_stretched_out():
         direction=[1.0, 1.0], offset=[0.0, 0.0], lower=[-3.0, -2.5], upper=[3.0, 2.5], base=tilt, masses=Masses(rods),
     )  # fmt: skip
     found = worst_holding(arm_model(arm))
-    np.testing.assert_allclose(np.abs(found.values), [g * (3 * 0.2 + 2 * (a + 0.3)), g * 2 * 0.3], rtol=1e-5)
+    expected = np.array([g * (3 * 0.2 + 2 * (a + 0.3)), g * 2 * 0.3])
+    np.testing.assert_allclose(np.abs(found.values), expected, rtol=1e-5)
+    assert (found.bound >= expected * (1 - 1e-9)).all()
+    assert (found.bound <= expected * 1.0011).all()
+    # Limits that keep the arm away from there: the greatest by a fine grid of the law of levers.
+    kept = arm.replace(lower=[0.9, 0.4], upper=[1.4, 2.5])
+    x, y = np.meshgrid(np.linspace(0.9, 1.4, 501), np.linspace(0.4, 2.5, 2101))
+    first = np.abs(g * (3 * 0.2 * np.cos(x) + 2 * (a * np.cos(x) + 0.3 * np.cos(x + y)))).max()
+    second = np.abs(g * 2 * 0.3 * np.cos(x + y)).max()
+    found = worst_holding(arm_model(kept))
+    np.testing.assert_allclose(np.abs(found.values), [first, second], rtol=1e-5)
+    assert (found.bound >= [first, second]).all()
+    assert (found.bound <= np.array([first, second]) * 1.0012).all()
 
 
-def test_no_pose_needs_more_holding_torque_than_the_worst_found(arm):
-    model = arm_model(arm)
+KINDS = ("sliding", "coupled", "sum")
+WALL = np.array([[0.0, 0, 1, 0], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]])
+
+
+@pytest.mark.parametrize(
+    "kind", ["floor", *(pytest.param(each, marks=pytest.mark.long) for each in ("wall", "pushed", "seven")), *KINDS]
+)
+def test_no_pose_needs_more_holding_torque_than_the_bound(arm, kind):
+    """Of poses drawn at random, each then climbed joint by joint by differences of the torque alone."""
+    load = Load(1.5, (0.03, -0.02, 0.09), (0.002, 0.002, 0.001, 0.0, 0.0, 0.0))
+    if kind == "wall":
+        arm = arm.replace(base=WALL)
+    elif kind == "pushed":
+        load = replace(load, force=(40.0, -20.0, 90.0), moment=(3.0, -1.0, 2.0))
+    elif kind == "sum":
+        arm = arm.replace(combined=(CombinedLimit((0.0, 1.0, 1.0, 0.0, 0.0, 0.0), -0.5, 0.6),))
+    elif kind in ("sliding", "coupled"):
+        coupled = kind == "coupled"
+        arm = (
+            random_arm(5, "standard", [False] * 4, COUPLED)
+            if coupled
+            else random_arm(3, "standard", [False, False, True, False])
+        )
+    elif kind == "seven":
+        arm = random_arm(6, "modified", [False] * 7)
+    model = arm_model(arm, load)
     found = worst_holding(model)
-    q = np.random.default_rng(5).uniform(arm.lower, arm.upper, (20_000, 6))
-    assert (np.abs(holding_torques(model, q)).max(axis=0) <= np.abs(found.values) + 1e-9).all()
-    assert ((found.q >= arm.lower) & (found.q <= arm.upper)).all()
+    q = np.random.default_rng(5).uniform(arm.lower, arm.upper, (20_000, arm.joints))
+    q = q[within(arm, q)]
+    assert (np.abs(er3a.gravity(arm, q, load)).max(axis=0) <= np.abs(found.values) * (1 + 1e-6) + 1e-9).all()
+    assert within(arm, found.q).all()
+    assert (found.bound >= np.abs(found.values)).all()
+    assert (found.bound <= np.abs(found.values) * (1.03 if kind in ("coupled", "seven", "sum") else 1.002) + 1e-9).all()
+
+
+def test_a_bound_that_the_budget_cuts_short_still_holds(arm, monkeypatch):
+    whole = worst_holding(arm_model(arm)).bound
+    monkeypatch.setattr(pose_bound, "MOST_CORNERS", 1)
+    cut = worst_holding(arm_model(arm.replace(name="cut")))
+    assert (cut.bound >= np.abs(cut.values)).all()
+    assert (cut.bound[1:] > whole[1:]).any()
+    # Joint 1's axis is vertical: nothing to hold, and the bound says so.
+    assert cut.bound[0] < 1e-9
 
 
 def test_the_worked_example_of_a_manual():
@@ -131,12 +225,14 @@ def test_the_worked_example_of_a_manual():
 
 def test_levers_are_distances_of_the_load_from_the_axes(arm):
     point, q = np.array([0.03, -0.02, 0.1]), np.random.default_rng(2).uniform(arm.lower, arm.upper, (3000, 6))
-    far = worst_levers(arm, point)
+    far, bounds = worst_levers(arm, point, range(2, 6))
     seen = levers(arm, q, point)
-    assert (seen <= far + 1e-9).all()
+    assert (seen[:, 2:] <= far + 1e-9).all()
+    assert (far <= bounds).all()
+    assert (bounds <= far * (1 + 1.1e-5)).all()
     # Of a wrist whose axes meet: the distance from their point for joints 4 and 5, that from its own axis for 6.
     whole = np.hypot(np.hypot(0.03, 0.02), 0.1 + 0.0785)
-    np.testing.assert_allclose(far[3:], [whole, whole, np.hypot(0.03, 0.02)], atol=1e-6)
+    np.testing.assert_allclose(far[1:], [whole, whole, np.hypot(0.03, 0.02)], atol=1e-6)
     assert wrist_to_flange(arm) == pytest.approx(0.0785)
     # Against the cross product of joint 5's column of the Jacobian: a point moves by its distance for each radian.
     tool = np.eye(4)
@@ -214,3 +310,51 @@ def test_demands_of_a_drive_in_closed_form():
     assert found.work[0] - found.recovered[0] == pytest.approx(3 * np.pi, rel=1e-6)
     assert found.power[0] == pytest.approx(4.0, rel=1e-6)  # 3 cos^2 + 4 sin cos is at most (3 + 5) / 2
     assert found.braking[0] == pytest.approx(1.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("viscous", [0.0, 0.3, 3.0])
+def test_times_under_torques_are_those_of_full_thrust_and_full_braking(viscous):
+    """One joint with a vertical axis: the fastest motion accelerates fully, then brakes fully; closed forms."""
+    peak, dry, inertia, angle = 5.0, 0.5, 0.3, 2.0
+    drives = replace(Drives.unknown(1), armature=np.array([0.1]), coulomb=np.array([dry]), viscous=np.array([viscous]))
+    body = MassBody(2.0, (0.3, 0, 0), (0.01, 0.01, 0.02, 0, 0, 0))
+    one = Robot(
+        name="one", title="one", convention="standard", a=[0.5], alpha=[0.0], d=[0.0], direction=[1.0], offset=[0.0],
+        lower=[-3.0], upper=[3.0], masses=Masses((LinkMass(1, body),), drives),
+    )  # fmt: skip
+    found = fastest_under_torques(arm_model(one), np.array([[0.0], [angle]]), np.array([1e3]), np.array([peak]))
+    up, down = (peak - dry) / inertia, (peak + dry) / inertia
+
+    def halves(top: float) -> tuple[float, float]:
+        """Way and time to a top speed and back to rest, of ``v' = up - k v`` and ``v' = -down - k v``."""
+        k = viscous / inertia
+        if not k:
+            return top**2 / 2 * (1 / up + 1 / down), top * (1 / up + 1 / down)
+        first, last = -np.log1p(-k * top / up) / k, np.log1p(k * top / down) / k
+        return (up * first - top) / k + (top - down * last) / k, first + last
+
+    highest = up * inertia / viscous * (1 - 1e-12) if viscous else 100.0
+    shortest = halves(scipy.optimize.brentq(lambda top: halves(top)[0] - angle, 1e-6, highest))[1]
+    assert np.abs(found.torques).max() <= peak * (1 + 1e-3)
+    assert shortest * (1 - 1e-6) <= found.timed.duration <= shortest * (1.1 if viscous else 1.001)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("joint", [1, 2, 4])
+def test_the_bound_of_a_wall_mounted_arm_against_potential_energies_alone(arm, joint):
+    """The torque as a derivative of potential energy by complex steps, climbed by SciPy: nothing of the library."""
+    mounted = arm.replace(base=WALL)
+    bodies = {each.link: each.body for each in arm.masses.links if each.link}
+
+    def torque(q: np.ndarray) -> float:
+        step = q.astype(complex)
+        step[joint] += 1e-30j
+        return abs(mass_and_potential(mounted, step, bodies)[1].imag / 1e-30)
+
+    starts = np.random.default_rng(4).uniform(arm.lower, arm.upper, (200, 6))
+    best = sorted(starts, key=torque)[-4:]
+    ends = list(zip(arm.lower, arm.upper))
+    tops = [scipy.optimize.minimize(lambda q: -torque(q), q, bounds=ends, method="L-BFGS-B").fun for q in best]
+    found = worst_holding(arm_model(mounted))
+    assert -min(tops) <= found.bound[joint]
+    assert -min(tops) == pytest.approx(abs(found.values[joint]), rel=1e-3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,10 +13,12 @@ import yaml
 
 import er3a
 from er3a.dynamics.estimate import capsule_body, estimated_links
+from er3a.dynamics.link_shapes import filled
 from er3a.dynamics.plausibility import (
     AboutOrigin,
     CentreOutside,
     ImpossibleInertia,
+    InertiaWithoutMass,
     MissingLink,
     PointMass,
     SumOffWeight,
@@ -28,7 +31,8 @@ from er3a.files.load_file import LoadFields, load_of
 from er3a.files.robot_writer import write_robot
 from er3a.formats.urdf import export_urdf, import_urdf
 from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, WristLoad, about, moved, no_body, together
-from er3a.robots.robot import Envelope, Robot
+from er3a.robots.robot import ConvexPiece, Envelope, Robot
+from testing.fleet import UrdfFile, urdf_files
 
 
 @pytest.fixture(scope="module")
@@ -65,6 +69,7 @@ def about_origin(body: MassBody) -> MassBody:
         (scaled(1e-3), UnlikelyInertia, 2),
         (lambda body: replace(body, inertia=(0.0,) * 6), PointMass, 3),
         (lambda body: replace(body, inertia=(1.0, 0.1, 0.1, 0, 0, 0)), ImpossibleInertia, 3),
+        (lambda body: replace(body, mass=0.0), InertiaWithoutMass, 3),
         (lambda body: replace(body, mass=-1.0), ImpossibleInertia, 3),
         (about_origin, AboutOrigin, 4),
     ],
@@ -332,3 +337,71 @@ def test_a_load_from_a_mesh_and_a_density(tmp_path):
 def test_a_bad_load_is_refused(content, problem):
     with pytest.raises(ValueError, match=problem):
         load_fields(**content)
+
+
+# Shapes
+
+
+def test_filled_hulls_are_those_of_a_mesh_library():
+    points = np.random.default_rng(0).normal([0.3, -0.2, 0.5], 0.1, (40, 3))
+    mesh = trimesh.convex.convex_hull(points)
+    mesh.density = 1000.0
+    body = filled(points)
+    assert body.mass == pytest.approx(mesh.mass, rel=1e-9)
+    np.testing.assert_allclose(body.centre, mesh.center_mass, atol=1e-12)
+    np.testing.assert_allclose(body.inertia_matrix, mesh.moment_inertia, atol=1e-12)
+
+
+def test_masses_are_judged_by_meshes_where_there_are_any(arm):
+    """Link 2's mesh is a box beside its axis, which its capsules know nothing of; a flat piece has no volume."""
+    corners = 0.05 * np.array(list(itertools.product([-1, 1], repeat=3))) + [0.13, 0.0, 0.3]
+    pieces = (ConvexPiece(2, tuple(map(tuple, corners.tolist())), 0.0),)
+    flat = ConvexPiece(3, ((0.0, 0.0, 0.0), (0.1, 0.0, 0.0), (0.0, 0.1, 0.0), (0.1, 0.1, 0.0)), 0.0)
+    meshed = arm.replace(hulls=(*pieces, flat))
+
+    def findings(centre):
+        moments = (0.01, 0.01, 0.01, 0.0, 0.0, 0.0)
+        own = with_body(meshed, 2, lambda body: replace(body, mass=2.0, centre=centre, inertia=moments))
+        return [each for each in mass_findings(own) if not isinstance(each, MissingLink)]
+
+    assert findings((0.13, 0.0, 0.3)) == []
+    (off,) = findings((0.13, 0.0, 0.15))
+    assert (type(off), off.link, off.outside_mm) == (CentreOutside, 2, pytest.approx(100.0))
+
+
+def test_shapes_guessed_from_a_table_accuse_only_what_is_off_by_orders_of_magnitude():
+    """The table of a SCARA may have its links at any height along the parallel axes."""
+    moments = (0.04, 0.04, 0.04, 0.0, 0.0, 0.0)
+    links = (LinkMass(1, MassBody(4.0, (0.15, 0, 0.4), moments)), LinkMass(2, MassBody(3.0, (0.12, 0, 0.42), moments)))
+    scara = Robot(
+        name="scara", title="scara", convention="standard", a=[0.3, 0.25], alpha=[0.0, 0.0], d=[0.0, 0.0],
+        direction=[1.0, 1.0], offset=[0.0, 0.0], lower=[-2.0, -2.0], upper=[2.0, 2.0], masses=Masses(links),
+    )  # fmt: skip
+    assert mass_findings(scara) == ()
+    grams = with_body(scara, 2, lambda body: replace(body, mass=3000.0))
+    assert {type(each) for each in mass_findings(grams)} == {UnlikelyDensity}
+    metres = with_body(scara, 2, lambda body: replace(body, centre=(120.0, 0.0, 420.0)))
+    assert {type(each) for each in mass_findings(metres)} == {CentreOutside}
+
+
+@pytest.mark.long
+def test_known_faults_of_published_urdfs_are_named_and_sound_ones_are_not(tmp_path):
+    """The UR5's wrist has inertias of a far greater body; KUKA's files give each link 2 kg; the others are sound."""
+    found, sound = {}, ("vx300s.urdf", "urdf/z1.urdf", "xarm7.urdf", "robots/kinova.urdf")
+    for file in urdf_files(tmp_path):
+        name = next((each for each in (*sound, "ur5_robot", "kr16_2") if each in str(file)), None)
+        if name and isinstance(file, UrdfFile):
+            robot = import_urdf(file.path, snap=True).robot
+            found[name] = {(type(each), each.link) for each in mass_findings(robot)}
+    assert found["ur5_robot"] >= {(UnlikelyInertia, link) for link in (4, 5, 6)}
+    assert (UnlikelyDensity, 0) in found["kr16_2"]
+    assert [found[name] for name in sound] == [set()] * 4
+
+
+def test_masses_that_no_file_may_state_are_one_error_when_an_arm_is_written(arm, tmp_path):
+    heavy = with_body(arm, 2, lambda body: replace(body, mass=40_000.0))
+    with pytest.raises(InputError, match="heavier than any link") as caught:
+        write_robot(heavy, tmp_path / "er3a_c60.yaml")
+    assert caught.value.field.startswith("inertia.links[2].mass_kg")
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "er3a_c60.yaml").exists()

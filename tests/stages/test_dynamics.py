@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import yaml
 import er3a
 from er3a.dynamics.plausibility import MissingLink
 from er3a.errors import InputError
+from er3a.files.mass_fields import WristLoadFields, check_masses
 from er3a.pipeline.messages import dynamics, dynamics_verdict
 from er3a.pipeline.messages.say import listed, say
 from er3a.pipeline.results import Stored, read_results
@@ -31,6 +33,7 @@ from er3a.pipeline.stages.dynamics.model import (
 from er3a.pipeline.stages.dynamics.record import record
 from er3a.pipeline.stages.dynamics.report import report
 from er3a.pipeline.study import Study, load_study
+from er3a.robots.masses import Load
 
 CLAIM = {"source": "made up", "grade": "claim"}
 LOAD = {"mass_kg": 1.5, "centre_mm": [20.0, 0.0, 90.0], "inertia_kg_m2": [0.002, 0.002, 0.001, 0.0, 0.0, 0.0]}
@@ -264,3 +267,55 @@ def test_every_word_of_a_comparison_is_there():
         use = Use(quantity, None if quantity == "payload" else 5, None, 1.0, 1.1, 2.0, "N m")
         assert "50 %" in dynamics_verdict.use_text(use)
     assert set(dynamics.WHY) == {"not_finite", "negative_mass", "negative_moment", "triangle"}
+
+
+def test_holding_torques_come_with_a_bound_that_the_comparison_takes(full):
+    summary = full[1].results.summary
+    robot = full[0].robot("er3a_c60")
+    load = Load(1.5, (0.02, 0.0, 0.09), (0.002, 0.002, 0.001, 0.0, 0.0, 0.0))
+    q = np.random.default_rng(0).uniform(robot.lower, robot.upper, (5000, 6))
+    seen = np.abs(er3a.gravity(robot, q, load)).max(axis=0)
+    for held, most in zip(summary.holding, seen):
+        assert most <= held.bound
+        assert abs(held.torque) <= held.bound <= abs(held.torque) * 1.0011 + 1e-9
+    for use in summary.uses:
+        if use.quantity == "holding":
+            held = summary.holding[use.joint - 1]
+            assert use.upper == held.bound + held.tolerance
+
+
+def test_rated_torques_bind_payload_and_speed_too(full):
+    path = next(path for path in full[1].results.summary.paths if path.name == "joint_move")
+    assert (path.payload.by, path.payload.t_s) == ("rms", None)
+    assert path.speed_scale.by in ("peak", "rms", "speed")
+
+
+def test_the_loads_moments_along_a_path_have_tolerances(full):
+    """Mass 30 % and centre 20 mm along each axis, as its grade stands for: at rest no more than m g (L + 35 mm)."""
+    for path in full[1].results.summary.paths:
+        for moment in path.wrist:
+            assert 0 < moment.tolerance < 1.5 * 9.81 * (0.3 * 0.17 + 0.035) * 1.5
+
+
+def test_forces_of_joints_that_slide_are_not_called_torques_in_newton_metres(full, tmp_path):
+    study, found = full
+    summary = found.results.summary
+    slid = [replace(held, unit="N") if held.joint == 3 else held for held in summary.holding]
+    paths = [
+        replace(path, joints=tuple(replace(load, unit="N") if load.joint == 3 else load for load in path.joints))
+        for path in summary.paths
+    ]
+    motors = [replace(motor, unit="N") if motor.joint == 3 else motor for motor in summary.motors]
+    mixed = replace(summary, holding=tuple(slid), paths=tuple(paths), motors=tuple(motors))
+    report(study, replace(found, results=replace(found.results, summary=mixed)), tmp_path / "page.html")
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    for text in ("peak (N m or N)", "speed (deg/s or mm/s)", "load inertia (kg m² or kg)", "J3 (slides)"):
+        assert text in page
+    report(study, found, tmp_path / "plain.html")
+    assert "N m or N" not in (tmp_path / "plain.html").read_text(encoding="utf-8")
+
+
+def test_moments_about_a_joint_that_slides_are_refused():
+    wrist_group = WristLoadFields.model_validate({"rows": [{"joint": 3, "moment_n_m": 4.0}]})
+    with pytest.raises(ValueError, match="joint 3 slides"):
+        check_masses(None, None, wrist_group, [False, False, True, False])

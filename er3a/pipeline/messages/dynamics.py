@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import er3a.pipeline.messages.planning  # noqa: F401
+from er3a.dynamics.margins import Binding
 from er3a.dynamics.plausibility import (
     AboutOrigin,
     CentreOutside,
     ImpossibleInertia,
+    InertiaWithoutMass,
     MissingLink,
     PointMass,
     SumOffWeight,
@@ -26,6 +28,7 @@ FIGURES = {
     "utilisation": N_("Tightest comparison with a limit"),
     "power_balance": N_("Power balance, greatest error"),
 }
+BINDING: dict[Binding, str] = {"peak": N_("peak"), "rms": N_("effective"), "speed": N_("speed")}
 WHY: dict[NoBody, str] = {
     "not_finite": N_("holds something that is no number"),
     "negative_mass": N_("its mass is below 0"),
@@ -55,6 +58,11 @@ def _(found: MissingLink) -> str:
 @say.register
 def _(found: PointMass) -> str:
     return sentence(found.code, "link {link}: a mass without inertia", link=found.link)
+
+
+@say.register
+def _(found: InertiaWithoutMass) -> str:
+    return sentence(found.code, "link {link}: an inertia without a mass; it counts as given", link=found.link)
 
 
 @say.register

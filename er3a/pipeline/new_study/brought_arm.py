@@ -6,9 +6,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from pydantic import ValidationError
-
-from er3a.errors import Er3aError, InputError
+from er3a.errors import Er3aError
 from er3a.files.dh_table import read_dh_table
 from er3a.files.robot_file import NAME_PATTERN, RobotFile
 from er3a.files.robot_library import read_robot, robot_of, robot_path
@@ -79,11 +77,7 @@ def arm_of(
 def _from_urdf(path: Path, name: str, ends: tuple[str | None, str | None]) -> Arm:
     imported = import_urdf(path, base=ends[0], tip=ends[1], snap=True)
     robot = imported.robot.replace(name=name)
-    try:
-        content = robot_file(robot)
-    except ValidationError as error:
-        problem, _, remedy = str(error.errors()[0].get("ctx", {}).get("error", "")).partition(" | ")
-        raise InputError(path, None, problem or "its values make no robot file", remedy or "Check its units") from None
+    content = robot_file(robot, path)
     misfit = f"the table's flange differs from the URDF's by at most {imported.misfit_m * 1000:.2g} mm on random poses"
     return Arm(robot_of(content), _text(content), (*imported.notes, misfit))
 

@@ -22,6 +22,7 @@ from er3a.pipeline.stages.dynamics.model import (
     MotorNeed,
     TolerancesUsed,
     TorqueRows,
+    hardest_held,
 )
 from er3a.pipeline.stages.dynamics.path_loads import LoadedArm, PathTorques, path_torques
 from er3a.pipeline.stages.dynamics.wrist_check import diagram_rows, wrist_uses
@@ -34,6 +35,7 @@ from er3a.robots.robot import Grade, Robot
 
 CHECKS_PER_SAMPLE = 1
 WRIST_JOINTS = 3
+NO_FIGURE = Figure("holding_torque", None, "")
 
 
 def compute(study: Study, name: str) -> DynamicsResults:
@@ -120,7 +122,8 @@ def _loaded_arm(
 
 def _paths(study: Study, name: str, arm: LoadedArm, settings: DynamicsSettings) -> list[PathTorques]:
     joints = arm.robot.joints
-    wrist = tuple(range(max(1, joints - WRIST_JOINTS + 1), joints + 1))
+    last = range(max(1, joints - WRIST_JOINTS + 1), joints + 1)
+    wrist = tuple(joint for joint in last if not arm.robot.slides[joint - 1])
     motions = study_motions(study, name, CHECKS_PER_SAMPLE)
     return [path_torques(arm, each.motion, settings.samples, wrist) for each in motions if each.motion]
 
@@ -133,7 +136,12 @@ def _holding(arm: LoadedArm) -> tuple[HoldingTorque, ...]:
     q = np.where(slides, 1000 * found.q, np.degrees(found.q))
     return tuple(
         HoldingTorque(
-            j + 1, float(found.values[j]), float(tolerance[j]), "N" if slides[j] else "N m", tuple(q[j].tolist())
+            joint=j + 1,
+            torque=float(found.values[j]),
+            bound=float(found.bound[j]),
+            tolerance=float(tolerance[j]),
+            unit="N" if slides[j] else "N m",
+            q=tuple(q[j].tolist()),
         )
         for j in range(arm.robot.joints)
     )
@@ -205,14 +213,14 @@ def _figures(summaries, holding, uses, imbalances, masses) -> tuple[Figure, ...]
     loads = [load for path in summaries for load in path.joints]
     turning = [load for load in loads if load.unit == "N m"]
     peak = max(turning, key=lambda load: load.peak, default=None)
-    held = max((each for each in holding if each.unit == "N m"), key=lambda each: abs(each.torque), default=None)
+    held = hardest_held(holding) if holding else None
     energy = [sum(load.work_j for load in path.joints) for path in summaries if path.complete]
     total = sum(link.mass_kg or 0.0 for link in masses.links) if masses else None
     figures = (
         Figure("paths", sum(path.complete for path in summaries), "", of=len(summaries)),
         Figure("mass", total, "kg"),
         Figure("peak_torque", peak.peak if peak else None, "N m", peak.tolerance if peak else None),
-        Figure("holding_torque", abs(held.torque) if held else None, "N m", held.tolerance if held else None),
+        Figure("holding_torque", abs(held.torque), held.unit, held.tolerance) if held else NO_FIGURE,
         Figure("energy", max(energy, default=None), "J"),
         Figure("utilisation", 100 * uses[0].ratio if uses else None, "%"),
         Figure("power_balance", max(imbalances) * 1e9 if imbalances else None, "ppb"),

@@ -19,6 +19,7 @@ from er3a.pipeline.stages.dynamics.model import (
     Overload,
     PathLoad,
     Use,
+    hardest_held,
 )
 from er3a.robots.masses import Load
 from er3a.robots.robot import Robot
@@ -41,8 +42,8 @@ def drive_uses(robot: Robot, paths: tuple[PathLoad, ...], holding: tuple[Holding
     for held in holding:
         rated = float(drives.rated[held.joint - 1])
         if np.isfinite(rated):
-            torque = abs(held.torque)
-            found.append(Use("holding", held.joint, None, torque, torque + held.tolerance, rated, held.unit))
+            upper = held.bound + held.tolerance
+            found.append(Use("holding", held.joint, None, abs(held.torque), upper, rated, held.unit))
     return tuple(found)
 
 
@@ -62,7 +63,7 @@ def unknowns(robot: Robot, load: Load | None) -> tuple[DataOpen, ...]:
         for what, numbers in open_joints.items()
         if numbers
     ]
-    last = set(joints[-3:])
+    last = {joint for joint in joints[-3:] if not robot.slides[joint - 1]}
     if wrist is None or not np.isfinite(wrist.payload):
         found.append(DataOpen("payload"))
     asked: tuple[tuple[Need, set[int]], ...] = (
@@ -110,10 +111,10 @@ def _no_limits(
     doubts: int,
     inferred: bool,
 ) -> NoLimits:
-    torques = [(load.peak, load.tolerance, load.joint, load.unit, path.name) for path in paths for load in path.joints]
-    complete = sum(path.complete for path in paths)
-    if torques:
-        peak, tolerance, joint, unit, name = max(torques, key=lambda each: each[0])
-        return NoLimits(complete, joint, peak, tolerance, unit, name, missing, doubts, inferred)
-    held = max(holding, key=lambda each: abs(each.torque))
-    return NoLimits(complete, held.joint, abs(held.torque), held.tolerance, held.unit, None, missing, doubts, inferred)
+    followed = [path for path in paths if path.complete]
+    if followed:
+        path = max(followed, key=lambda path: path.hardest.peak)
+        load, shown = path.hardest, (missing, doubts, inferred)
+        return NoLimits(len(followed), load.joint, load.peak, load.tolerance, load.unit, path.name, *shown)
+    held = hardest_held(holding)
+    return NoLimits(0, held.joint, abs(held.torque), held.tolerance, held.unit, None, missing, doubts, inferred)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.stages.dynamics.model import DiagramRows, DynamicsSummary, PathLoad, TorqueRows
+from er3a.pipeline.stages.dynamics.model import DiagramRows, DynamicsSummary, PathLoad, TorqueRows, Unit, hardest_held
 from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.page import Picture, number
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED
 
 DRAWN = 161
-PARTS = ("gravity", "inertia", "velocity", "friction")
+PARTS = ("gravity", "inertia", "velocity", "friction", "tool")
+STYLES = ("-", "--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)))
 
 
 def joint_colour(joint: int) -> str:
@@ -19,11 +20,23 @@ def joint_colour(joint: int) -> str:
     return JOINTS[joint % len(JOINTS)]
 
 
+def bound_text(bound: float) -> str:
+    """Four digits of an upper bound, rounded up, because fewer would claim more."""
+    digit = 10.0 ** (np.floor(np.log10(bound)) - 3) if bound else 1.0
+    return number(float(np.ceil(bound / digit - 1e-5) * digit), 4)
+
+
+def torque_unit(units: set[Unit]) -> str:
+    """The unit of torques and forces of several joints, for a heading."""
+    return units.pop() if len(units) == 1 else tr("N m or N")
+
+
 def torque_figure(path: PathLoad, rows: TorqueRows) -> Picture:
     """Torques of all joints with their intervals, the parts of the most loaded one, and powers."""
     rows = rows.take(np.unique(np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round().astype(int)))
     figure, (torque, parts, power) = new_figure(1, 3, width=13.0, height=3.4)
-    worst = max(range(len(path.joints)), key=lambda j: path.joints[j].peak)
+    load, unit = path.hardest, torque_unit({load.unit for load in path.joints})
+    worst = load.joint - 1
     for j in range(rows.torque.shape[1]):
         colour = joint_colour(j)
         low, high = rows.torque[:, j] - rows.tolerance[:, j], rows.torque[:, j] + rows.tolerance[:, j]
@@ -31,24 +44,19 @@ def torque_figure(path: PathLoad, rows: TorqueRows) -> Picture:
         torque.plot(rows.t_s, rows.torque[:, j], color=colour, label=f"J{j + 1}")
         power.plot(rows.t_s, rows.power_w[:, j], color=colour)
     torque.legend(ncols=3, fontsize=8)
-    torque.set_ylabel(tr("torque of the drive (N m)"))
-    names = {"gravity": tr("gravity"), "inertia": tr("inertia"), "velocity": tr("velocity"), "friction": tr("friction")}
-    for part, style in zip(PARTS, ("-", "--", ":", "-.")):
+    torque.set_ylabel(tr("torque of the drive ({unit})", unit=unit))
+    names = dict(zip(PARTS, (tr("gravity"), tr("inertia"), tr("velocity"), tr("friction"), tr("forces at the tool"))))
+    for part, style in zip(PARTS, STYLES):
+        if part == "tool" and not rows.tool.any():
+            continue
         parts.plot(rows.t_s, getattr(rows, part)[:, worst], color=INK, linestyle=style, label=names[part])
     parts.legend(fontsize=8)
-    parts.set_ylabel(tr("parts at J{joint} (N m)", joint=worst + 1))
+    parts.set_ylabel(tr("parts at J{joint} ({unit})", joint=worst + 1, unit=load.unit))
     power.axhline(0.0, color=MUTED, linewidth=0.8)
     power.set_ylabel(tr("power of the drive (W)"))
     for ax in (torque, parts, power):
         ax.set_xlabel(tr("time (s)"))
-    load = path.joints[worst]
-    greatest = {
-        "gravity": load.gravity,
-        "inertia": load.inertia,
-        "velocity": load.velocity,
-        "friction": load.friction,
-    }
-    most = max(greatest, key=lambda name: greatest[name])
+    most = max(PARTS, key=lambda part: getattr(load, part))
     caption = tr(
         "J{joint} feels most: {peak} ± {tolerance} {unit} at {t:.2f} s, mainly {part}. Shaded: by how much torques may "
         "be off by the tolerances of masses and centres. Power below 0 goes back into the drive.",
@@ -72,18 +80,17 @@ def holding_figure(summary: DynamicsSummary) -> Picture:
     ax.bar(joints, size, color=[joint_colour(int(j)) for j in joints], width=0.6)
     ax.errorbar(joints, size, yerr=tolerance, fmt="none", ecolor=INK, capsize=4)
     ax.set_xticks(joints, [f"J{j + 1}" for j in joints])
-    ax.set_ylabel(tr("holding torque (N m)"))
+    ax.set_ylabel(tr("holding torque ({unit})", unit=torque_unit({held.unit for held in summary.holding})))
     ax.grid(visible=False, axis="x")
-    worst = summary.holding[int(size.argmax())]
-    where = ", ".join(f"{value:.0f}" for value in worst.q)
+    worst = hardest_held(summary.holding)
     caption = tr(
-        "At rest J{joint} has to hold most: {torque} ± {tolerance} {unit}, with the joints at ({where}). These are the "
-        "greatest values that a search over the joint limits found.",
+        "At rest J{joint} has to hold most: {torque} ± {tolerance} {unit}. No pose within the joint limits needs more "
+        "than {bound} {unit} there, for the masses as given.",
         joint=worst.joint,
         torque=number(abs(worst.torque), 3),
         tolerance=number(worst.tolerance, 2),
         unit=worst.unit,
-        where=where,
+        bound=bound_text(worst.bound),
     )
     return Picture(figure, tr("Bars: the greatest holding torque at each joint, with its tolerance."), caption)
 

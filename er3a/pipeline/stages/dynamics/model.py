@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from er3a.dynamics.margins import Binding
 from er3a.dynamics.plausibility import MassFinding
 from er3a.dynamics.wrist import WristQuantity
 from er3a.numerics.arrays import Reals
@@ -159,13 +160,26 @@ class MassesUsed:
 
 @dataclass(frozen=True)
 class HoldingTorque:
-    """The greatest torque found that a joint holds at rest within the limits, and the pose where it does."""
+    """The greatest torque found that a joint holds at rest within the limits, and the pose where it does.
+
+    ``bound``: the absolute value that none of the poses within the limits exceeds, for the masses as given.
+    """
 
     joint: int
     torque: float
+    bound: float
     tolerance: float
     unit: Unit
     q: tuple[float, ...]
+
+
+NOTHING_HELD = 1e-9
+"""N m or N: less than that is rounding."""
+
+
+def hardest_held(holding: tuple[HoldingTorque, ...]) -> HoldingTorque:
+    """The joint that holds most; one that turns if any has something to hold, because N and N m don't compare."""
+    return max(holding, key=lambda held: (held.unit == "N m" and held.bound > NOTHING_HELD, held.bound))
 
 
 @dataclass(frozen=True)
@@ -199,9 +213,13 @@ class JointLoad:
 
 @dataclass(frozen=True)
 class BindingLimit:
-    """The greatest value under a limit; joint and time of what binds, None where nothing does."""
+    """The greatest value under the limits, and what binds; None where nothing does.
+
+    ``t_s`` is None for the effective torque, which is one of the whole path.
+    """
 
     value: float | None
+    by: Binding | None
     joint: int | None
     t_s: float | None
 
@@ -212,6 +230,7 @@ class WristMoment:
 
     joint: int
     moment_n_m: float
+    tolerance: float
     t_s: float
 
 
@@ -238,6 +257,11 @@ class PathLoad:
     torque_timed_s: float | None
     kinematic_s: float | None
     no_law: NoTimeLaw | None
+
+    @property
+    def hardest(self) -> JointLoad:
+        """The joint with the greatest peak; one that turns if there is any, because N and N m don't compare."""
+        return max(self.joints, key=lambda load: (load.unit == "N m", load.peak))
 
 
 @dataclass(frozen=True)

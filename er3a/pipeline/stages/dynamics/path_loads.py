@@ -10,10 +10,10 @@ import numpy as np
 
 from er3a.dynamics.arm_model import ArmModel, arm_model, drives_of
 from er3a.dynamics.demands import Demand, demand, power_imbalance
-from er3a.dynamics.margins import Margin, greatest_payload, greatest_speed_scale
+from er3a.dynamics.margins import DriveLimits, Margin, greatest_payload, greatest_speed_scale
 from er3a.dynamics.torque_timing import fastest_under_torques
 from er3a.dynamics.torques import TorqueParts, known, torque_parts
-from er3a.dynamics.uncertainty import torque_tolerance
+from er3a.dynamics.uncertainty import load_tolerance, torque_tolerance
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.dynamics.model import BindingLimit, JointLoad, PathLoad, TorqueRows, WristMoment
 from er3a.pipeline.stages.trajectory.motion import Motion
@@ -86,7 +86,7 @@ def path_torques(arm: LoadedArm, motion: Motion, samples: int, wrist: tuple[int,
     tau, tolerance = parts.total, arm.tolerance(q, qd, qdd)
     asked = demand(t, qd, tau)
     own = np.diagonal(arm.model.mass_matrix(q), axis1=1, axis2=2)
-    payload, scale = _margins(arm, parts, q, qd, qdd)
+    payload, scale = _margins(arm, parts, t, q, qd, qdd)
     timed, kinematic, no_law = _timings(arm, motion.joints, t, q)
     summary = PathLoad(
         name=entry.name,
@@ -141,16 +141,17 @@ def _joint_loads(robot: Robot, t: Reals, parts: TorqueParts, tolerance: Reals, a
 
 
 def _margins(
-    arm: LoadedArm, parts: TorqueParts, q: Reals, qd: Reals, qdd: Reals
+    arm: LoadedArm, parts: TorqueParts, t: Reals, q: Reals, qd: Reals, qdd: Reals
 ) -> tuple[Margin | None, Margin | None]:
-    """Greatest further payload and greatest speed scale under the peak torques."""
+    """Greatest further payload and greatest speed scale under peak and rated torques, and joint speeds."""
     drives = drives_of(arm.robot)
     more = arm.with_unit.rigid_torques(q, qd, qdd) - arm.model.rigid_torques(q, qd, qdd)
     viscous = known(drives.viscous) * qd
     at_rest = parts.gravity + parts.tool + parts.friction - viscous
+    limits = DriveLimits(drives.peak, drives.rated, arm.robot.speed)
     return (
-        greatest_payload(parts.total, more, drives.peak),
-        greatest_speed_scale(at_rest, viscous, parts.inertia + parts.velocity, drives.peak, qd, arm.robot.speed),
+        greatest_payload(t, parts.total, more, limits),
+        greatest_speed_scale(t, (at_rest, viscous, parts.inertia + parts.velocity), qd, limits),
     )
 
 
@@ -176,14 +177,14 @@ def _wrist_moments(
     if arm.load is None:
         return ()
     by_load = np.abs(arm.model.rigid_torques(q, qd, qdd) - arm.bare.rigid_torques(q, qd, qdd))
-    at = by_load.argmax(axis=0)
-    return tuple(WristMoment(j, float(by_load[at[j - 1], j - 1]), float(t[at[j - 1]])) for j in wrist)
+    off = load_tolerance(arm.model, q, qd, qdd, arm.load_grade)
+    most = [(j, int(by_load[:, j - 1].argmax())) for j in wrist]
+    return tuple(WristMoment(j, float(by_load[at, j - 1]), float(off[at, j - 1]), float(t[at])) for j, at in most)
 
 
 def _bound(margin: Margin | None, t: Reals) -> BindingLimit | None:
     if margin is None:
         return None
     value = margin.value if np.isfinite(margin.value) else None
-    if margin.joint is None or margin.sample is None:
-        return BindingLimit(value, None, None)
-    return BindingLimit(value, margin.joint + 1, float(t[margin.sample]))
+    joint = None if margin.joint is None else margin.joint + 1
+    return BindingLimit(value, margin.by, joint, None if margin.sample is None else float(t[margin.sample]))

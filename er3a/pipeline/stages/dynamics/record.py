@@ -25,7 +25,7 @@ PAUSE = 1.0  # s between two paths
 LONGEST = 0.35  # of the arm's size, the arrow of the greatest torque
 WIDTH = 0.012  # of the arm's size
 CLEAR = 0.037  # of the arm's size, from the middle of a joint's drum to outside it
-CURVES = {"torque": "Torque of the drive (N m)", "gravity": "Part against gravity (N m)", "power": "Power (W)"}
+CURVES = {"torque": "Torque of the drive ({unit})", "gravity": "Part against gravity ({unit})", "power": "Power (W)"}
 SHOWN_S = rr.TimeRange(
     start=rr.TimeRangeBoundary.cursor_relative(seconds=-4), end=rr.TimeRangeBoundary.cursor_relative(seconds=12)
 )
@@ -40,21 +40,23 @@ def record(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
         runs = [(path, results.torques.take(results.torques.path == path.name)) for path in summary.paths]
         runs = [(path, rows) for path, rows in runs if len(rows)]
         log_arm(stream, robot, _joints(robot, runs[0][1])[0] if runs else np.zeros(robot.joints))
-        greatest = max((float(np.abs(rows.torque).max()) for _, rows in runs), default=1.0)
+        scale = _arrow_scales(robot, [rows.torque for _, rows in runs])
         start = 0.0
         for path, rows in runs:
             stream.set_time(TIMELINE, duration=start)
             text = f"## {path.name}\n{escaped(path.title)}"
             stream.log(f"{STAGE}/now", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
-            _run(stream, robot, rows, start, LONGEST * size_of(robot) / max(greatest, 1e-12))
+            _run(stream, robot, rows, start, scale)
             start += path.duration_s + PAUSE
 
 
 def _layout(robot: Robot) -> rrb.Horizontal:
+    slides = robot.slides
+    unit = "N" if slides.all() else "N m or N" if slides.any() else "N m"
     series = [
         rrb.TimeSeriesView(
             origin=f"/{STAGE}/curves/{curve}",
-            name=title,
+            name=title.format(unit=unit),
             axis_x=rrb.TimeAxis(view_range=SHOWN_S),
             plot_legend=rrb.PlotLegend(visible=curve == "torque"),
         )
@@ -70,7 +72,15 @@ def _layout(robot: Robot) -> rrb.Horizontal:
     return rrb.Horizontal(view, rrb.Vertical(*series, name="Curves"), words, column_shares=[2, 1.4, 1], name="Torques")
 
 
-def _run(stream: rr.RecordingStream, robot: Robot, rows: TorqueRows, start: float, scale: float) -> None:
+def _arrow_scales(robot: Robot, torques: list[Reals]) -> Reals:
+    """Metres per N m, or per N of joints that slide, (n,): the greatest of each gets the longest arrow."""
+    peaks = np.abs(np.concatenate([*torques, np.zeros((1, robot.joints))])).max(axis=0)
+    turning, sliding = (peaks[robot.slides == slides].max(initial=1e-12) for slides in (False, True))
+    scales: Reals = LONGEST * size_of(robot) / np.where(robot.slides, sliding, turning)
+    return scales
+
+
+def _run(stream: rr.RecordingStream, robot: Robot, rows: TorqueRows, start: float, scale: Reals) -> None:
     """The arm, an arrow on each axis as long as its torque, and the curves."""
     times = start + rows.t_s
     send_motion(stream, robot, times, _joints(robot, rows))
@@ -79,7 +89,7 @@ def _run(stream: rr.RecordingStream, robot: Robot, rows: TorqueRows, start: floa
         colour = rgb(JOINTS[j % len(JOINTS)])
         origins = np.tile(parts[j + 1, ALONG_Z, :3, 3] / 2, (len(times), 1))
         vectors = np.zeros((len(times), 3))
-        vectors[:, 2] = robot.direction[j] * rows.torque[:, j] * scale
+        vectors[:, 2] = robot.direction[j] * rows.torque[:, j] * scale[j]
         origins[:, 2] += CLEAR * size_of(robot) * np.sign(vectors[:, 2])
         arrows = rr.Arrows3D.columns(
             origins=origins,
@@ -109,7 +119,8 @@ def _note(robot: Robot, summary: DynamicsSummary) -> str:
             "",
             "**Look first** at the arrow that is longest while the arm runs: that joint's drive feels most.",
             "",
-            "- arrow on an axis: the drive's torque, along the axis by the right-hand rule; all to one scale",
+            "- arrow on an axis: the drive's torque, along the axis by the right-hand rule; all to one scale "
+            "(forces of joints that slide to one of their own)",
             "- power below 0: the drive brakes",
         ]
     )

@@ -6,20 +6,22 @@ from pathlib import Path
 
 import numpy as np
 
-from er3a.pipeline.messages.dynamics import FIGURES
+from er3a.pipeline.messages.dynamics import BINDING, FIGURES
 from er3a.pipeline.messages.dynamics_verdict import quantity_word
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.messages.say import listed, say
+from er3a.pipeline.messages.say import listed, say, word
 from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, moment, player, player_style
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.dynamics.load_figures import diagram_figure, holding_figure, torque_figure
+from er3a.pipeline.stages.dynamics.load_figures import PARTS, bound_text, diagram_figure, holding_figure, torque_figure
 from er3a.pipeline.stages.dynamics.model import (
     BindingLimit,
     DynamicsResults,
     DynamicsSummary,
+    HoldingTorque,
     JointLoad,
     MotorNeed,
     PathLoad,
+    Unit,
     Use,
 )
 from er3a.pipeline.study import Study
@@ -62,7 +64,10 @@ def report(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
         player_style=player_style(),
         joints=[(path.name, _joints(path)) for path in summary.paths if path.complete],
         wrist=_wrist(summary),
+        wrist_uses=_wrist_uses(summary),
+        units=_units(summary),
         holding=holding,
+        held=[_held(held) for held in summary.holding],
         diagram=diagram,
     )
 
@@ -106,11 +111,25 @@ def _use(use: Use) -> list[str]:
     ]
 
 
+def _units(summary: DynamicsSummary) -> dict[str, str]:
+    """Units of torques, speeds and inertias in headings, by what the arm's joints do."""
+    torque = {held.unit for held in summary.holding}
+    turning = {"torque": "N m", "speed": "deg/s", "inertia": "kg m²"}
+    sliding = {"torque": "N", "speed": "mm/s", "inertia": "kg"}
+    mixed = {"torque": tr("N m or N"), "speed": tr("deg/s or mm/s"), "inertia": tr("kg m² or kg")}
+    return mixed if len(torque) > 1 else sliding if torque == {"N"} else turning
+
+
+def _label(joint: int, unit: Unit) -> str:
+    return f"J{joint}" if unit == "N m" else tr("J{joint} (slides)", joint=joint)
+
+
 def _motor(motor: MotorNeed) -> list[str]:
     inertia = f"{number(motor.inertia_low, 2)} – {number(motor.inertia_high, 2)}"
+    needs = motor.peak, motor.rms, motor.holding, motor.speed, motor.power_w
     return [
-        f"J{motor.joint}",
-        *(number(value, 3) for value in (motor.peak, motor.rms, motor.holding, motor.speed, motor.power_w)),
+        _label(motor.joint, motor.unit),
+        *(number(_no_noise(value), 3) for value in needs),
         inertia,
         *(
             NONE if value is None else number(value, 3)
@@ -128,14 +147,14 @@ def _motor(motor: MotorNeed) -> list[str]:
 def _path(path: PathLoad) -> list[str]:
     if not path.complete:
         return [path.name, tr("not followed all along"), *[NONE] * 6]
-    worst = max(path.joints, key=lambda load: load.peak)
+    worst = path.hardest
     energy, back = sum(load.work_j for load in path.joints), sum(load.recovered_j for load in path.joints)
     timed = NONE if path.torque_timed_s is None else fixed(path.torque_timed_s, 2)
     if path.no_law:
         timed = say(path.no_law)
     return [
         path.name,
-        f"{number(worst.peak, 3)} ± {number(worst.tolerance, 2)} (J{worst.joint})",
+        f"{number(worst.peak, 3)} ± {number(worst.tolerance, 2)} {worst.unit} (J{worst.joint})",
         number(energy, 3),
         number(back, 3),
         _bound(path.payload),
@@ -149,26 +168,44 @@ def _bound(bound: BindingLimit | None) -> str:
     if bound is None:
         return NONE
     value = tr("no bound") if bound.value is None else number(bound.value, 3)
-    return value if bound.joint is None else f"{value} (J{bound.joint})"
+    if bound.by is None:
+        return value
+    return f"{value} (J{bound.joint}, {word('dynamics.binding', BINDING, bound.by)})"
 
 
 def _joints(path: PathLoad) -> list[list[str]]:
     return [
         [
-            f"J{load.joint}",
-            f"{number(load.peak, 3)} ± {number(load.tolerance, 2)}",
+            _label(load.joint, load.unit),
+            f"{number(_no_noise(load.peak), 3)} ± {number(_no_noise(load.tolerance), 2)}",
             moment(path.name, load.peak_at_s, fixed(load.peak_at_s, 2)),
-            f"{number(load.rms, 3)} ± {number(load.rms_tolerance, 2)}",
-            *(number(_no_noise(value), 3) for value in (load.gravity, load.inertia, load.velocity, load.friction)),
-            *(number(_no_noise(value), 3) for value in (load.power_w, load.braking_w)),
+            f"{number(_no_noise(load.rms), 3)} ± {number(_no_noise(load.rms_tolerance), 2)}",
+            *(number(_no_noise(getattr(load, part)), 3) for part in PARTS),
+            *(number(_no_noise(value), 3) for value in (load.power_w, load.braking_w, load.work_j, load.recovered_j)),
         ]
         for load in path.joints
     ]
 
 
+def _held(held: HoldingTorque) -> list[str]:
+    found, bound, tolerance = (_no_noise(value) for value in (abs(held.torque), held.bound, held.tolerance))
+    pose = ", ".join(fixed(value, 0) for value in held.q)
+    return [_label(held.joint, held.unit), number(found, 4), bound_text(bound), number(tolerance, 2), pose]
+
+
+def _wrist_uses(summary: DynamicsSummary) -> list[list[str]]:
+    at_rest = [use for use in summary.uses if use.path is None and use.quantity in ("payload", "moment", "inertia")]
+    return [[*_use(use)[:2], *_use(use)[3:]] for use in at_rest]
+
+
 def _wrist(summary: DynamicsSummary) -> list[list[str]]:
     return [
-        [path.name, f"J{moment.joint}", number(_no_noise(moment.moment_n_m), 3), fixed(moment.t_s, 2)]
+        [
+            path.name,
+            f"J{moment.joint}",
+            f"{number(_no_noise(moment.moment_n_m), 3)} ± {number(_no_noise(moment.tolerance), 2)}",
+            fixed(moment.t_s, 2),
+        ]
         for path in summary.paths
         for moment in path.wrist
     ]

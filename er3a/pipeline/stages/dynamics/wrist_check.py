@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.dynamics.uncertainty import ASSUMED
+from er3a.dynamics.uncertainty import tolerances_of
 from er3a.dynamics.wrist import load_diagram, wrist_use
 from er3a.pipeline.stages.dynamics.model import DiagramRows, PathLoad, Use
 from er3a.robots.masses import Load
@@ -19,22 +19,21 @@ UNITS = {"payload": "kg", "moment": "N m", "inertia": "kg m²"}
 def wrist_uses(
     robot: Robot, load: Load | None, grade: Grade, gravity: float, paths: tuple[PathLoad, ...]
 ) -> tuple[Use, ...]:
-    """All that the wrist's data limit; upper ends by the load's tolerance of mass."""
+    """All that the wrist's data limit; upper ends by the load's tolerances."""
     wrist = robot.masses.wrist
     if wrist is None or load is None:
         return ()
-    off = ASSUMED[grade].mass_ratio if load.mass_tolerance is None else load.mass_tolerance / max(load.mass, 1e-12)
     uses = [
-        Use(use.quantity, use.joint, None, use.asked, use.asked * (1 + off), use.allowed, UNITS[use.quantity])
-        for use in wrist_use(robot, wrist, load, gravity)
+        Use(use.quantity, use.joint, None, use.asked, use.most, use.allowed, UNITS[use.quantity])
+        for use in wrist_use(robot, wrist, load, gravity, tolerances_of(load, grade))
     ]
     allowed = dict(wrist.moment)
     for path in paths:
         for moment in path.wrist:
             asked = moment.moment_n_m
             if moment.joint in allowed:
-                limit = allowed[moment.joint]
-                uses.append(Use("moment", moment.joint, path.name, asked, asked * (1 + off), limit, "N m"))
+                upper, limit = asked + moment.tolerance, allowed[moment.joint]
+                uses.append(Use("moment", moment.joint, path.name, asked, upper, limit, "N m"))
     return tuple(uses)
 
 
