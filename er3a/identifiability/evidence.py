@@ -167,15 +167,15 @@ class _Judge:
         own = self._independent(document)
         speaking = self._speaking(entry, own)
         extents = self._extents_of(own)
-        extent = extents.of(entry)
+        gauge = self.free.index(entry) in self._in_gauge
+        extent = extents.free_choice(entry) if gauge else extents.of(entry)
         concerned = [each for each in self._alternatives_of(own) if entry.name in each.names]
         by_all = self._names_open(self.trusted)
-        gauge = self.free.index(entry) in self._in_gauge
         status: Status = "weak"
-        if extent.excluded or entry.name in self._repaired(own):
-            status = "contradicted"
-        elif gauge:
+        if gauge:
             status = "gauge"
+        elif extent.excluded or entry.name in self._repaired(own):
+            status = "contradicted"
         elif not speaking:
             consistent = self._speaking(entry, range(len(self.references)))
             status = "consistent" if consistent and entry.name not in by_all else "open"
