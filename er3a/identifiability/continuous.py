@@ -82,9 +82,10 @@ class Extents:
     @staticmethod
     def _held(gauge: Gauge, places: Sequence[int]) -> Reals:
         """Combinations (g, k) of the entries at places that move no tool, of length 1."""
-        held = gauge.directions[:, list(places)]
+        held: Reals = gauge.directions[:, list(places)]
         held = held[np.linalg.norm(held, axis=1) > 0]
-        return held / np.linalg.norm(held, axis=1, keepdims=True) if len(held) else held
+        held /= np.linalg.norm(held, axis=1, keepdims=True)
+        return held
 
     @property
     def met_by(self) -> Tables:

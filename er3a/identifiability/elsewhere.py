@@ -15,8 +15,8 @@ import numpy as np
 
 from er3a.identifiability.entries import TableNumber, shifted
 from er3a.identifiability.feasible import OpenTable, Region
-from er3a.identifiability.restarts import amounts_between
 from er3a.identifiability.requirements import Asked
+from er3a.identifiability.restarts import amounts_between
 from er3a.kinematics.table_batch import Tables, join
 from er3a.numerics.arrays import Reals
 from er3a.numerics.quasi_random import quasi_random_points
