@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
 import er3a
+from er3a.errors import InputError
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
 from er3a.identifiability.entries import continuous_of, entries_of
@@ -404,6 +406,14 @@ def test_derived_documents_prove_nothing(random):
             ]
         )
         assert evidence_of(robot, stated, documents, only=["a2"])["a2"].status == status
+
+
+def test_a_table_that_names_an_unknown_document_is_refused():
+    """It would count as independent of the document that it was read from."""
+    robot = load_robot("er3_600")
+    wrong = {**robot.sources, "dh": replace(robot.sources["dh"], origin="step_v9")}
+    with pytest.raises(InputError, match=r"dh\.origin: the document 'step_v9' is not known"):
+        er3a.evidence(robot.replace(sources=wrong))
 
 
 def test_a_robot_without_references_has_everything_open():
