@@ -16,6 +16,7 @@ from er3a.identifiability.restarts import amounts_between
 from er3a.identifiability.tool_motion import NOT_OFF, ToolOff, ToolRange
 from er3a.kinematics.table_batch import Tables
 from er3a.numerics.arrays import Reals
+from er3a.references.seen import TableEntry
 
 FEW_STEPS = 10
 ALREADY = 1e-4  # of a scale's step, in which an entry counts as inside its interval
@@ -111,8 +112,21 @@ class Extents:
         if not self.met:
             return Extent(np.nan, np.nan, NOT_OFF, bool(self._blamed(factors)))
         low, high, excluded, at_least = self._found(factors)
+        measured = self._measured(entry) if at_least and np.count_nonzero(factors) == 1 else None
+        if measured and measured[0] <= value <= measured[1]:
+            (low, high), at_least = ((bound - value) / factor for bound in measured), False
         off = self._off(factors, low).worse(self._off(factors, high))
         return Extent(value + low * factor, value + high * factor, off, excluded, at_least)
+
+    def _measured(self, entry: TableNumber) -> tuple[float, float] | None:
+        """The bounds of an entry, in its unit, if a requirement is about it alone: no table can leave these."""
+        for each in self.asked.plain:
+            own = each.quantity
+            if not isinstance(own, TableEntry) or own.column == "d" or each.gaussian:  # d adds up along an axis
+                continue
+            if (own.column, own.joint) == (entry.column, entry.joint):
+                return each.expected - each.half_width, each.expected + each.half_width
+        return None
 
     def free_choice(self, entry: TableNumber) -> Extent:
         """The interval of an entry that moves no tool if others are changed with it."""
