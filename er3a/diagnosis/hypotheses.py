@@ -14,7 +14,7 @@ from er3a.diagnosis.fault_kinds import Faults
 from er3a.diagnosis.faults import Repair, repairs_of
 from er3a.diagnosis.fitting import MEETS, Fits, Search, descend, meet
 from er3a.diagnosis.free_numbers import FreeNumber, free_numbers, moved, wrapped
-from er3a.diagnosis.scanning import COARSE, FINE, PAIRED, arm_lengths, scanned
+from er3a.diagnosis.scanning import COARSE, DENSE, FINE, PAIRED, arm_lengths, scanned
 from er3a.kinematics.table_batch import Tables, join
 from er3a.numerics.arrays import Flags, Reals
 from er3a.references.quantities import Limit, PoseOutside
@@ -24,7 +24,7 @@ FREE_NUMBER = 1.5
 UNCHANGED = 1e-9
 LEAST_SCALE = 1e-3
 SAME_ANGLE, SAME_LENGTH = 0.1, 0.02  # rad; of the arm's length
-FEW_PASSES, MANY_PASSES = 3, 10
+FEW_PASSES, MANY_PASSES, ALL_PASSES = 3, 10, 40
 MOST_PROMISING = 400
 
 Difference = Callable[[Tables], Reals]
@@ -121,6 +121,12 @@ def double_faults(case: Case) -> Pool:
     return joined_pools([_two_repairs(case), *((_repair_and_number(case), _two_numbers(case)) if case.numbers else ())])
 
 
+def every_pair_refitted(case: Case) -> Pool:
+    """All pairs with a free number, from more places and to the end, however little promise they show: what tells
+    whether the pairs that explain are all that do."""
+    return joined_pools([_repair_and_number(case, thorough=True), _two_numbers(case, thorough=True)])
+
+
 def joined_pools(pools: Sequence[Pool]) -> Pool:
     """All hypotheses of several pools, in order."""
     return Pool(
@@ -141,26 +147,30 @@ def _two_repairs(case: Case) -> Pool:
     return case.pool(join(tables), *_named(pairs))
 
 
-def _repair_and_number(case: Case) -> Pool:
+def _repair_and_number(case: Case, thorough: bool = False) -> Pool:
     starts = join([repair.apply(case.given) for repair in case.repairs])
     first, group = _same_shape(starts)
     search = case.search(starts[first])
-    fits = scanned(search, [(place,) for place in range(len(case.numbers))], COARSE)
-    fits = _best_refined(search, descend(search, fits, FEW_PASSES))
+    fits = scanned(search, [(place,) for place in range(len(case.numbers))], FINE if thorough else COARSE)
+    fits = _refined(search, fits, thorough)
     rows = [np.flatnonzero(fits.start == shape) for shape in group]
     start = np.repeat(np.arange(len(starts)), [len(own) for own in rows])
     every = fits[np.concatenate(rows)]
     return _fitted(case, starts, [(r,) for r in case.repairs], Fits(start, every.which, every.amounts, every.left))
 
 
-def _two_numbers(case: Case) -> Pool:
+def _two_numbers(case: Case, thorough: bool = False) -> Pool:
     search = case.search(case.given)
     pairs = list(combinations(range(len(case.numbers)), 2))
-    fits = descend(search, scanned(search, pairs, PAIRED), FEW_PASSES)
-    return _fitted(case, case.given, [()], _best_refined(search, fits))
+    fits = _refined(search, scanned(search, pairs, DENSE if thorough else PAIRED), thorough)
+    return _fitted(case, case.given, [()], fits)
 
 
-def _best_refined(search: Search, fits: Fits) -> Fits:
+def _refined(search: Search, fits: Fits, thorough: bool) -> Fits:
+    """Fits from a scan brought to their bottoms: of the most promising, or of all."""
+    if thorough:
+        return meet(search, descend(search, fits, ALL_PASSES))
+    fits = descend(search, fits, FEW_PASSES)
     best = np.sort(np.argsort(fits.squares, kind="stable")[:MOST_PROMISING])
     return meet(search, fits.with_rows(best, descend(search, fits[best], MANY_PASSES)))
 
@@ -210,7 +220,7 @@ def _distinct(case: Case, starts: Tables, fits: Fits) -> Fits:
     order = np.lexsort((fits.greatest, *fits.which.T[::-1], fits.start))
     fits, is_angle, kept = fits[order], is_angle[order], changes[order]
     tolerance = np.where(is_angle, SAME_ANGLE, SAME_LENGTH * arm_lengths(starts)[fits.start, None])
-    for back in range(1, PAIRED.basins):
+    for back in range(1, DENSE.basins):
         same = (fits.start[back:] == fits.start[:-back]) & (fits.which[back:] == fits.which[:-back]).all(axis=1)
         apart = fits.amounts[back:] - fits.amounts[:-back]
         apart = np.abs(np.where(is_angle[back:], wrapped(apart), apart))

@@ -29,7 +29,16 @@ from numpy.typing import NDArray
 from er3a.diagnosis.fault_kinds import Fault, entry_of, place_of, rounded
 from er3a.diagnosis.fitting import MEETS
 from er3a.diagnosis.free_numbers import wrapped
-from er3a.diagnosis.hypotheses import SAME_ANGLE, SAME_LENGTH, Case, Pool, double_faults, joined_pools, single_faults
+from er3a.diagnosis.hypotheses import (
+    SAME_ANGLE,
+    SAME_LENGTH,
+    Case,
+    Pool,
+    double_faults,
+    every_pair_refitted,
+    joined_pools,
+    single_faults,
+)
 from er3a.diagnosis.scanning import arm_lengths
 from er3a.display import Displayed, Sheet
 from er3a.kinematics.table_batch import Tables, tables_of
@@ -89,6 +98,8 @@ def rank_case(case: Case) -> Ranking | None:
     pool = single_faults(case)
     if not pool.explains(case.uncertainty).any():
         pool = joined_pools([pool, double_faults(case)])
+        if pool.explains(case.uncertainty).any() and case.numbers:
+            pool = joined_pools([pool, every_pair_refitted(case)])
     per_fault = np.log(len(stated)) + np.log(len(pool.faults))
     units = np.array([reference.unit for reference in stated])
     score = _misfit(pool.difference / case.uncertainty, units) + per_fault * pool.cost

@@ -34,6 +34,7 @@ class ScanGrid:
 FINE = ScanGrid(24, (-1.0, -0.5, -0.25, 0.0, 0.25, 0.5, 1.0), 3)
 COARSE = ScanGrid(12, (-0.5, 0.0, 0.5), 2)
 PAIRED = ScanGrid(12, (-0.5, 0.0, 0.5), 3)
+DENSE = ScanGrid(24, (-1.0, -0.5, -0.25, -0.1, -0.03, 0.0, 0.03, 0.1, 0.25, 0.5, 1.0), 8)
 
 
 def scanned(search: Search, combinations: Sequence[tuple[int, ...]], grid: ScanGrid) -> Fits:

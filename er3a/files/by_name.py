@@ -13,6 +13,7 @@ from er3a.calibration.measured import Measurement, check_poses
 from er3a.diagnosis import diagnose as diagnosis
 from er3a.diagnosis.diagnose import Hypotheses
 from er3a.files.measurements import load_measurements
+from er3a.files.reference_documents import check_robot_origins
 from er3a.files.reference_sets import load_references
 from er3a.identifiability.entry_evidence import Evidence, Tolerance
 from er3a.identifiability.evidence import evidence_of
@@ -51,7 +52,8 @@ def evidence(robot: Robot, references: References | None = None, tolerance: Tole
     Raises
     ------
     InputError
-        if there is no such reference set, or it can't be read
+        if there is no such reference set, it can't be read, or the robot's own sets don't know a document that its
+        values name
     """
     wanted = robot.references if references is None else references
     parts: list[Any] = [wanted] if isinstance(wanted, ReferenceSet | str | Path) else list(wanted)
@@ -61,6 +63,8 @@ def evidence(robot: Robot, references: References | None = None, tolerance: Tole
         own = load_references(part) if isinstance(part, str | Path) else part
         stated += own.references if isinstance(own, ReferenceSet) else [own]
         documents |= own.documents.by_name if isinstance(own, ReferenceSet) else {}
+    if references is None:
+        check_robot_origins(robot, documents)
     return evidence_of(robot, stated, Documents(documents), tolerance)
 
 

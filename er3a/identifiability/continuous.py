@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from er3a.identifiability.elsewhere import FAR, Elsewhere, open_elsewhere, seen_entries
 from er3a.identifiability.entries import TableNumber, shifted
-from er3a.identifiability.feasible import MET, WIDEST_DEG, OpenTable, Region, farthest
+from er3a.identifiability.feasible import MET, WIDEST_DEG, OpenTable, Reached, Region, farthest
 from er3a.identifiability.gauge import Gauge
 from er3a.identifiability.requirements import Asked
 from er3a.identifiability.restarts import amounts_between
 from er3a.identifiability.tool_motion import NOT_OFF, ToolOff, ToolRange
 from er3a.kinematics.table_batch import Tables
 from er3a.numerics.arrays import Reals
+from er3a.references.seen import TableEntry
 
+FEW_STEPS = 10
 ALREADY = 1e-4  # of a scale's step, in which an entry counts as inside its interval
 
 
@@ -60,14 +63,30 @@ class Extents:
     ):
         self.asked, self.table, self.entries, self.tool = asked, table, tuple(entries), tool
         self.speaking = list(speaking)
-        held = gauge.directions[:, self.speaking]
-        held = held[np.linalg.norm(held, axis=1) > 0]
-        self.held = held / np.linalg.norm(held, axis=1, keepdims=True) if len(held) else held
+        self.held = self._held(gauge, self.speaking)
         self.region = Region(asked, table, [entries[k] for k in self.speaking], self.held)
         begun = np.zeros(len(self.speaking)) if found is None else amounts_between(table, found, self.region.entries)
         self.start: OpenTable | None = self.region.start(begun) if self.speaking else None
         self.table_meets = table is tool.table and (self.start is None or not self.start.amounts.any())
         self.met = self.start is None or self.start.open
+        self._extended: dict[bytes, Reached] = {}
+        self.elsewhere: list[Elsewhere] = []
+        if self.start is not None and self.met:
+            self.seen = sorted({*self.speaking, *seen_entries(asked, table, self.entries)})
+            everywhere = Region(asked, table, [entries[k] for k in self.seen], self._held(gauge, self.seen))
+            amounts = np.zeros(len(entries))
+            amounts[self.speaking] = self.start.amounts
+            self.begun = amounts[self.seen]
+            watched = [self.seen.index(k) for k in self.speaking]
+            self.elsewhere = open_elsewhere(everywhere, replace(self.start, amounts=self.begun), watched)
+
+    @staticmethod
+    def _held(gauge: Gauge, places: Sequence[int]) -> Reals:
+        """Combinations (g, k) of the entries at places that move no tool, of length 1."""
+        held: Reals = gauge.directions[:, list(places)]
+        held = held[np.linalg.norm(held, axis=1) > 0]
+        held /= np.linalg.norm(held, axis=1, keepdims=True)
+        return held
 
     @property
     def met_by(self) -> Tables:
@@ -89,20 +108,72 @@ class Extents:
         units = factors * factor / scales
         value = float(sum(u * v for u, v in zip(units, self._values()) if u))
         if self.start is None or not factors[self.speaking].any():
-            widest = farthest(self.table) if entry.unit == "mm" else WIDEST_DEG
-            return Extent(value - widest, value + widest, self._off(factors, widest / factor), False)
+            return self._anything(entry, value, self._off(factors, self._widest(entry) / factor))
         if not self.met:
             return Extent(np.nan, np.nan, NOT_OFF, bool(self._blamed(factors)))
-        toward = factors[self.speaking]
-        above, below = self.region.extent(self.start, toward), self.region.extent(self.start, -toward)
-        high, low = above.value, -below.value
-        excluded = not low - ALREADY <= 0 <= high + ALREADY and not self._could_stay(toward)
-        if not excluded:
-            low, high = min(low, 0.0), max(high, 0.0)
+        low, high, excluded, at_least = self._found(factors)
+        measured = self._measured(entry) if at_least and np.count_nonzero(factors) == 1 else None
+        if measured and measured[0] <= value <= measured[1]:
+            (low, high), at_least = ((bound - value) / factor for bound in measured), False
         off = self._off(factors, low).worse(self._off(factors, high))
-        return Extent(
-            value + low * factor, value + high * factor, off, excluded, not (above.finished and below.finished)
-        )
+        return Extent(value + low * factor, value + high * factor, off, excluded, at_least)
+
+    def _measured(self, entry: TableNumber) -> tuple[float, float] | None:
+        """The bounds of an entry, in its unit, if a requirement is about it alone: no table can leave these."""
+        for each in self.asked.plain:
+            own = each.quantity
+            if not isinstance(own, TableEntry) or own.column == "d" or each.gaussian:  # d adds up along an axis
+                continue
+            if (own.column, own.joint) == (entry.column, entry.joint):
+                return each.expected - each.half_width, each.expected + each.half_width
+        return None
+
+    def free_choice(self, entry: TableNumber) -> Extent:
+        """The interval of an entry that moves no tool if others are changed with it."""
+        return self._anything(entry, self._values()[self.entries.index(entry)], NOT_OFF)
+
+    def _anything(self, entry: TableNumber, value: float, off: ToolOff) -> Extent:
+        return Extent(value - self._widest(entry), value + self._widest(entry), off, False)
+
+    def _widest(self, entry: TableNumber) -> float:
+        return farthest(self.table) if entry.unit == "mm" else WIDEST_DEG
+
+    def _found(self, factors: Reals) -> tuple[float, float, bool, bool]:
+        """How low and how high a combination was found, in its scale; whether 0 is excluded; whether there may be
+        more."""
+        ways = [self._reached(sign * factors) for sign in (1.0, -1.0)]
+        high, low, at_least = ways[0][0], -ways[1][0], not all(finished for _, finished in ways)
+        excluded = False
+        if not self.table_meets:
+            near = [self._near(sign * factors).value for sign in (1.0, -1.0)]
+            excluded = not -near[1] - ALREADY <= 0 <= near[0] + ALREADY and not self._could_stay(factors)
+        return (low, high, True, at_least) if excluded else (min(low, 0.0), max(high, 0.0), False, at_least)
+
+    def _near(self, factors: Reals) -> Reached:
+        """How far the start's own surroundings extend."""
+        toward = factors[self.speaking]
+        key = toward.tobytes()
+        if key not in self._extended and self.start is not None:
+            self._extended[key] = self.region.extent(self.start, toward)
+        return self._extended[key]
+
+    def _reached(self, factors: Reals) -> tuple[float, bool]:
+        """How far a combination was found, in its scale, and whether that is its end: the end of the start's own
+        surroundings, with nothing beyond it from other starts, or all that is looked for."""
+        toward = factors[self.seen]
+        best = max(self.elsewhere, key=lambda each: float(toward @ each.point.amounts), default=None)
+        own = float(toward @ best.point.amounts) if best else -np.inf
+        if best is None or own - float(toward @ self.begun) < FAR:
+            near = self._near(factors)
+            if best is None or own <= near.value + ALREADY:
+                return near.value, near.finished
+            reached = best.region.followed(best.point, toward)
+            return max(own, reached.value), reached.finished
+        ways = [best.region.followed(best.point, toward, FEW_STEPS)]
+        if self.start is not None:
+            ways.append(self.region.extent(self.start, factors[self.speaking], quick=True))
+        value = max(own, *(way.value for way in ways))
+        return value, value > float(np.abs(toward) @ best.region.widest) - ALREADY
 
     def _values(self) -> list[float]:
         return [float(getattr(self.table, e.column)[0, e.joint - 1] * e.in_unit) for e in self.entries]
@@ -116,13 +187,15 @@ class Extents:
         step = np.array([[amount * entry.scale / factors[k]]])
         return self.tool.off(shifted(self.tool.table, [entry], step))
 
-    def _could_stay(self, toward: Reals) -> bool:
+    def _could_stay(self, factors: Reals) -> bool:
         """Whether some table with the combination as it is meets all requirements."""
         if self.start is None:
             return True
-        held = np.concatenate([self.held, toward[None] / np.linalg.norm(toward)])
-        region = Region(self.asked, self.table, self.region.entries, held)
-        for amounts in (np.zeros(len(toward)), self.start.amounts):
+        places = [(self.region, np.zeros(len(self.speaking))), (self.region, self.start.amounts)]
+        for own, amounts in (*places, *((each.region, each.point.amounts) for each in self.elsewhere)):
+            toward = factors[self.speaking if own is self.region else self.seen]
+            held = np.concatenate([own.gauge, toward[None] / np.linalg.norm(toward)])
+            region = Region(self.asked, own.table, own.entries, held)
             begun = amounts - toward * (toward @ amounts) / (toward @ toward)
             if region.start(begun, few_first=False).excess <= MET:
                 return True

@@ -24,7 +24,7 @@ from er3a.identifiability.reactions import reactions
 from er3a.identifiability.requirements import Asked, Requirement, requirements_of
 from er3a.identifiability.restarts import open_table
 from er3a.identifiability.tool_motion import NOT_OFF, ToolOff, ToolRange
-from er3a.kinematics.table_batch import Tables, tables_of
+from er3a.kinematics.table_batch import Tables, robot_of, tables_of
 from er3a.numerics.arrays import Flags
 from er3a.references.documents import Documents
 from er3a.references.reference import Reference, conflicts
@@ -167,15 +167,15 @@ class _Judge:
         own = self._independent(document)
         speaking = self._speaking(entry, own)
         extents = self._extents_of(own)
-        extent = extents.of(entry)
+        gauge = self.free.index(entry) in self._in_gauge
+        extent = extents.free_choice(entry) if gauge else extents.of(entry)
         concerned = [each for each in self._alternatives_of(own) if entry.name in each.names]
         by_all = self._names_open(self.trusted)
-        gauge = self.free.index(entry) in self._in_gauge
         status: Status = "weak"
-        if extent.excluded or entry.name in self._repaired(own):
-            status = "contradicted"
-        elif gauge:
+        if gauge:
             status = "gauge"
+        elif extent.excluded or entry.name in self._repaired(own):
+            status = "contradicted"
         elif not speaking:
             consistent = self._speaking(entry, range(len(self.references)))
             status = "consistent" if consistent and entry.name not in by_all else "open"
@@ -205,7 +205,15 @@ class _Judge:
         else:
             status = "settled" if own and extents.met else "weak" if speaking else "open"
         off = _worst([each.off for each in concerned])
+        if status == "settled" and not speaking:
+            speaking = self._speaking_at(extents.met_by, entry, own)
         return self._described(entry, status, Extent(*interval, off, False), concerned, speaking)
+
+    def _speaking_at(self, table: Tables, entry: TableNumber, among: Sequence[int]) -> tuple[int, ...]:
+        """References that react to an entry of another table (a batch of one), as they may not do at the robot's."""
+        references = [self.references[i] for i in among]
+        reacts = reactions(robot_of(table, 0, self.robot), references, [entry])[:, 0]
+        return tuple(i for i, own in zip(among, reacts) if own)
 
     def _excluded_by_all(self, entry: TableNumber) -> bool:
         """Whether what an entry rests on itself excludes it: then it was not even taken over rightly."""

@@ -6,6 +6,8 @@ central differences.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from er3a.kinematics.table_batch import Tables, fill_frames, kernel_columns
@@ -34,22 +36,31 @@ def measure_code(quantity: Extreme) -> tuple[int, int, int] | None:
     return None
 
 
-def climb_to_extreme(
-    table: Tables, base: Reals, code: tuple[int, int, int], sign: float, starts: Reals, joints: Integers
-) -> tuple[Reals, float]:
-    """The joint vector (n,) at which a measure of a table (a batch of one) is greatest, and ``sign`` times it in m.
+Climber = Callable[[Reals], tuple[Reals, float]]
+
+
+def climber(table: Tables, base: Reals, code: tuple[int, int, int], sign: float, joints: Integers) -> Climber:
+    """What climbs to where a measure of a table (a batch of one) is extreme.
 
     Parameters
     ----------
     sign : 1 for the greatest, -1 for the least value
-    starts : (P, n), climbed from the first and, if another is higher than where that leads, from the best of them
     joints : (d,), those that are turned
+
+    Returns
+    -------
+    climber : takes joint vectors (P, n) and climbs from the first and, if another is higher than where that leads, from
+        the best of them; gives the joint vector (n,) where that ends, and ``sign`` times the measure there in m
     """
-    columns = kernel_columns(table)
-    q = np.ascontiguousarray(starts)
-    lower, upper = np.minimum(table.lower[0], table.upper[0]), np.maximum(table.lower[0], table.upper[0])
-    value = _climb(for_kernel(base), columns, (lower, upper), q, joints, (*code, sign))
-    return q[0], float(value)
+    columns, base = kernel_columns(table), for_kernel(base)
+    bounds = np.minimum(table.lower[0], table.upper[0]), np.maximum(table.lower[0], table.upper[0])
+
+    def climb(starts: Reals) -> tuple[Reals, float]:
+        q = np.ascontiguousarray(starts)
+        value = _climb(base, columns, bounds, q, joints, (*code, sign))
+        return q[0], float(value)
+
+    return climb
 
 
 @kernel

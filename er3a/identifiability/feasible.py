@@ -36,11 +36,12 @@ FIRST_TRUST, LEAST_TRUST, GROWTH, SHRINKING = 4.0, 1e-3, 3.0, 0.4
 STEPS, RETURNS = 40, 8
 FOLLOWED = 0.05  # of a half-width, by which an extreme that was followed may be missed
 IDLE_COST, EXCESS_COST = 1e-4, 1e3
-SETTLED_GAIN = 4e-3
+SETTLED_GAIN, IDLE_STEPS = 4e-3, 5
 SEARCH_STEPS = 40
 UNSEEN = 1e-6  # of the largest singular value, below which measurements see nothing
 MOST_DAMPING, NOTHING_GAINED = 1e3, 1e-3
 DAMPINGS = 1e-2, 1e-5
+STAYING = 0.9  # of a half-width, up to which steps leave alone what is met
 FEW = 3
 
 
@@ -127,11 +128,22 @@ class Region:
             if self.excess(off) <= MET and not self.asked.likely:
                 break
             trial, trial_off = self._nearer(amounts, off, self.basis, (0.0, damping))
-            trial, trial_off = self._nearer(trial, trial_off, self.basis, (0.9, damping))
+            trial, trial_off = self._nearer(trial, trial_off, self.basis, (STAYING, damping))
             if self.excess(trial_off) < self.excess(off) or self.asked.likely:
                 amounts, off = trial, trial_off
         off = self.off(amounts, afresh=True)
         chi2 = float((off[self.asked.likely] ** 2).sum())
+        return OpenTable(amounts, off, self.slope(amounts), self.excess(off), chi2, self.asked.places)
+
+    def restarted(self, amounts: Reals, chi2: float) -> OpenTable | None:
+        """An open table near one, found by damped Gauss-Newton steps alone; None if they lead to none."""
+        off = self.off(amounts, afresh=True)
+        amounts, off = self._nearer(amounts, off, self.basis, (STAYING, DAMPINGS[0]))
+        if not self.allowed(off, chi2):
+            return None
+        off = self.off(amounts, afresh=True)
+        if not self.allowed(off, chi2):
+            return None
         return OpenTable(amounts, off, self.slope(amounts), self.excess(off), chi2, self.asked.places)
 
     def _few_changed(self, amounts: Reals, off: Reals) -> tuple[Reals, Reals]:
@@ -144,12 +156,12 @@ class Region:
                 if k not in chosen and not self.gauge[:, k].any():
                     basis = np.eye(len(amounts))[:, [*chosen, k]]
                     near = self._nearer(*best, basis, (0.0, DAMPINGS[-1]))
-                    rest = self._exceeded(near[1], 0.9)
+                    rest = self._exceeded(near[1], STAYING)
                     tried.append((float(rest @ rest), k, near))
             if not tried:
                 break
             least = min(tried, key=lambda each: each[:2])
-            if not least[0] < float(np.sum(self._exceeded(best[1], 0.9) ** 2)):
+            if not least[0] < float(np.sum(self._exceeded(best[1], STAYING) ** 2)):
                 break
             chosen.append(least[1])
             best = least[2]
@@ -163,8 +175,8 @@ class Region:
         inner, damping = how
         rest = self._exceeded(off, inner)
         used = [k for k in range(len(amounts)) if basis[k].any()]
+        self.off(amounts)
         for _ in range(SEARCH_STEPS):
-            self.off(amounts)
             slope, places = self.slope(amounts, used), self.asked.places
             while damping < MOST_DAMPING:
                 step = basis @ self._toward(rest, slope @ basis[used], damping)
@@ -183,11 +195,12 @@ class Region:
                 break
         return amounts, off
 
-    def extent(self, start: OpenTable, toward: Reals) -> Reached:
-        """How far the set extends from a start along ``toward`` (k,)."""
+    def extent(self, start: OpenTable, toward: Reals, quick: bool = False) -> Reached:
+        """How far the set extends from a start along ``toward`` (k,); ``quick``: with what makes kinks held only."""
         kinks = self._kinks(start) & (toward == 0)
         ways = [self.gauge] + ([np.concatenate([self.gauge, np.eye(len(toward))[kinks]])] if kinks.any() else [])
-        found = [Region(self.asked, self.table, self.entries, held)._followed(start, toward) for held in ways]
+        ways = ways[-1:] if quick else ways
+        found = [Region(self.asked, self.table, self.entries, held).followed(start, toward) for held in ways]
         return max(found, key=lambda reached: (reached.value, reached.finished))
 
     def _kinks(self, start: OpenTable) -> Flags:
@@ -195,20 +208,21 @@ class Region:
             self._kinked = self.asked.kinked(self.at(start.amounts), self.entries)
         return self._kinked
 
-    def _followed(self, start: OpenTable, toward: Reals) -> Reached:
-        """The extent along one way, as far as it goes."""
+    def followed(self, start: OpenTable, toward: Reals, steps: int = STEPS) -> Reached:
+        """The extent along one way, as far as it goes in some steps."""
         amounts, off, slope = start.amounts, start.off, start.slope
         places, trust, finished = start.places, FIRST_TRUST, False
         passed = [amounts]
         self.asked.follow(places)
-        for _ in range(STEPS):
+        for _ in range(steps):
             step = self._step(amounts, off, slope, toward, start.chi2, trust)
-            gained = float(toward @ (amounts - start.amounts))
-            finished = float(toward @ step) < SETTLED_GAIN * max(1.0, abs(gained)) * min(1.0, trust)
+            settled = SETTLED_GAIN * max(1.0, abs(float(toward @ (amounts - start.amounts))))
+            idle = len(passed) > IDLE_STEPS and float(toward @ (amounts - passed[-1 - IDLE_STEPS])) < settled
+            finished = idle or float(toward @ step) < settled * min(1.0, trust)
             if finished:
                 break
             trial, trial_off = self._returned(amounts + step, slope)
-            if self._allowed(trial_off, start.chi2) and toward @ trial > toward @ amounts:
+            if self.allowed(trial_off, start.chi2) and toward @ trial > toward @ amounts:
                 long = np.abs(step).max() > 0.9 * trust
                 amounts, off = trial, trial_off
                 passed.append(amounts)
@@ -225,7 +239,8 @@ class Region:
             finished = False
         return Reached(float(toward @ passed[-1]), finished, passed[-1])
 
-    def _allowed(self, off: Reals, chi2: float) -> bool:
+    def allowed(self, off: Reals, chi2: float) -> bool:
+        """Whether components (m,) are met, and as likely as the likeliest leave open."""
         likely = (off[self.asked.likely] ** 2).sum()
         return self.excess(off) <= MET and likely <= chi2 + PROFILE**2 * (1 + MET) + MET
 
@@ -245,12 +260,11 @@ class Region:
         return amounts, off
 
     def _exceeded(self, off: Reals, inner: float) -> Reals:
-        """Components (m,), each of what lies outside ``inner`` half-widths where more than one is exceeded; of a
-        likelihood all."""
+        """Components (m,), each of what lies outside ``inner`` half-widths; of a likelihood all."""
         rest = np.zeros_like(off)
         for part in self.asked.bounded:
             length = float(np.linalg.norm(off[part]))
-            if length > 1.0 - MET / 2 or inner == 0.0:
+            if length > inner:
                 rest[part] = off[part] * (1 - inner / length if inner else 1.0)
         rest[self.asked.likely] = off[self.asked.likely] if inner < 1 - MET else 0.0
         return rest

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.identifiability.entries import TableNumber, shifted
-from er3a.identifiability.extreme_climb import climb_to_extreme, measure_code
+from er3a.identifiability.extreme_climb import Climber, climber, measure_code
 from er3a.identifiability.peaks import best_apart, box_points, climb, peak
 from er3a.kinematics.table_batch import Tables, frames_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
-from er3a.references.predict import state_of_tables
+from er3a.references.components import Components
 from er3a.references.quantities import FRAME_OF_POINT, MM, Extreme, Limit, PoseOutside, Quantity, Speed
 from er3a.references.reference import Reference, conflicts
 from er3a.robots.robot import Robot
@@ -90,6 +90,24 @@ def _stated(reference: Reference) -> float:
     return float(reference.expected if reference.expected is not None else np.nan)
 
 
+@dataclass(frozen=True, eq=False)
+class _Spread:
+    """Joint vectors within limits: a few and many all over them, (P, n) each; joints that are turned (A, n), and where
+    to."""
+
+    limits: Reals
+    lower: Reals
+    upper: Reals
+    watched: Reals
+    scanned: Reals
+    turned: Flags
+    elsewhere: Reals
+
+    def across(self, q: Reals) -> Reals:
+        """Joint vectors (A, n), one joint elsewhere than in q (n,): there a climb that ended on a saddle goes on."""
+        return np.where(self.turned, self.elsewhere, q)
+
+
 class FollowedExtreme:
     """An extreme over the joint limits, and where it was attained last."""
 
@@ -101,6 +119,7 @@ class FollowedExtreme:
         self.sign = 1.0 if quantity.extreme == "greatest" else -1.0
         self.q = np.zeros(self.count)
         self.known = False
+        self._spread: _Spread | None = None
         self.code = measure_code(quantity)
         box = np.zeros(len(self.joints)), np.ones(len(self.joints))
         self.watched, self.scanned = box_points(*box, WATCHED), box_points(*box, SCANNED)
@@ -108,18 +127,19 @@ class FollowedExtreme:
     def at(self, table: Tables) -> float:
         """The extreme in mm of a table (a batch of one)."""
         if self.code is not None:
-            lower, upper = table.lower[0], table.upper[0]
+            spread = self._spread_of(table)
+            climb_from = climber(table, self.base, self.code, self.sign, np.array(self.joints))
             if not self.known:
-                self.q = self._scanned(table, self.code)
-            q = np.clip(self.q, np.minimum(lower, upper), np.maximum(lower, upper))
+                self.q = self._scanned(table, spread, climb_from)
+            q = np.clip(self.q, spread.lower, spread.upper)
             q[0] = 0.0
-            joints, value = np.array(self.joints), -np.inf
-            last = np.concatenate([q[None], self._over_box(table, self.watched)])
+            value = -np.inf
+            last = np.concatenate([q[None], spread.watched])
             for _ in range(OVERTAKINGS):
-                self.q, now = climb_to_extreme(table, self.base, self.code, self.sign, last, joints)
+                self.q, now = climb_from(last)
                 if now <= value + OVERTAKEN_M:
                     break
-                value, last = now, np.concatenate([self.q[None], self._across(table, self.q)])
+                value, last = now, np.concatenate([self.q[None], spread.across(self.q)])
             self.known = True
             return self.sign * value * MM
         lower, upper = table.lower[0, self.joints], table.upper[0, self.joints]
@@ -140,30 +160,24 @@ class FollowedExtreme:
         self.q, self.known = self._whole(q), True
         return self.sign * value * MM
 
-    def _over_box(self, table: Tables, shares: Reals) -> Reals:
-        """Joint vectors (P, n) at shares (P, d) of the joint ranges."""
-        lower, upper = table.lower[0, self.joints], table.upper[0, self.joints]
-        return self._whole(lower + shares * (upper - lower))
+    def _spread_of(self, table: Tables) -> _Spread:
+        """Where to look, for the limits of a table: those of the last one, as a rule."""
+        limits = np.concatenate([table.lower[0], table.upper[0]])
+        if self._spread is None or not np.array_equal(self._spread.limits, limits):
+            lower, upper = np.minimum(*np.split(limits, 2)), np.maximum(*np.split(limits, 2))
+            low, wide = lower[self.joints], (upper - lower)[self.joints]
+            watched, scanned = (self._whole(low + shares * wide) for shares in (self.watched, self.scanned))
+            turned = np.repeat(np.eye(self.count, dtype=bool)[self.joints], len(ACROSS), axis=0)
+            elsewhere = lower + np.tile(ACROSS, len(self.joints))[:, None] * (upper - lower)
+            self._spread = _Spread(limits, lower, upper, watched, scanned, turned, elsewhere)
+        return self._spread
 
-    def _scanned(self, table: Tables, code: tuple[int, int, int]) -> Reals:
+    def _scanned(self, table: Tables, spread: _Spread, climb_from: Climber) -> Reals:
         """Where the best climb ends of those that begin at the best places all over the joint ranges, far apart."""
-        points = self._over_box(table, self.scanned)
-        values = self.sign * self._measure(table, points)[0]
-        ends = [
-            climb_to_extreme(table, self.base, code, self.sign, points[[i]], np.array(self.joints))
-            for i in best_apart(points, values, CLIMBS)
-        ]
+        values = self.sign * self._measure(table, spread.scanned)[0]
+        ends = [climb_from(spread.scanned[[i]]) for i in best_apart(spread.scanned, values, CLIMBS)]
         best: Reals = max(ends, key=lambda end: end[1])[0]
         return best
-
-    def _across(self, table: Tables, q: Reals) -> Reals:
-        """Joint vectors (P, n), one joint elsewhere than in q (n,): there a climb that ended on a saddle goes on."""
-        lower, upper = table.lower[0], table.upper[0]
-        found = np.repeat(q[None], len(ACROSS) * len(self.joints), axis=0)
-        for place, joint in enumerate(self.joints):
-            rows = slice(place * len(ACROSS), (place + 1) * len(ACROSS))
-            found[rows, joint] = lower[joint] + ACROSS * (upper - lower)[joint]
-        return found
 
     def along(self, tables: Tables) -> Reals:
         """The measure (H,) in mm of many tables where the extreme was attained last."""
@@ -192,6 +206,9 @@ class Asked:
     def __init__(self, robot: Robot, requirements: Sequence[Requirement]):
         self.robot, self.requirements = robot, tuple(requirements)
         self.plain = [each for each in requirements if not isinstance(each.quantity, Extreme)]
+        self._components = Components(
+            robot, [each.quantity for each in self.plain], [each.expected for each in self.plain]
+        )
         self.extreme = [
             (each, FollowedExtreme(each.quantity, robot)) for each in requirements if isinstance(each.quantity, Extreme)
         ]
@@ -299,8 +316,7 @@ class Asked:
     def _plain_off(self, tables: Tables) -> list[Reals]:
         if not self.plain:
             return []
-        state = state_of_tables(tables, self.robot, [each.quantity for each in self.plain])
-        return [each.quantity.off(state, each.expected) / each.half_width for each in self.plain]
+        return [off / each.half_width for off, each in zip(self._components.off(tables), self.plain)]
 
     def _joined(self, parts: list[Reals], count: int) -> Reals:
         if not parts:

@@ -18,7 +18,7 @@ from er3a.files.path_file import PathFile, ProgramPath, TablePath, load_paths
 from er3a.files.path_table import read_path_table
 from er3a.files.program_file import ProgramsFile, load_programs
 from er3a.files.reference_documents import FILE as DOCUMENTS
-from er3a.files.reference_documents import load_documents
+from er3a.files.reference_documents import check_robot_origins, load_documents
 from er3a.files.reference_rows import FORMATS
 from er3a.files.reference_sets import check_reference_file, load_references
 from er3a.files.robot_file import RobotFile
@@ -132,8 +132,8 @@ def check_study(path: Path) -> Study:
             robot, entry = study.robot(name), study.entry(name)
         except InputError as error:
             raise InputError(error.file or path, error.field, error.problem, error.remedy) from None
-        for reference in robot.references:
-            load_references(reference)
+        sets = [load_references(reference) for reference in robot.references]
+        check_robot_origins(robot, [document for own in sets for document in own.documents.by_name])
         read_targets(entry.targets)
         for planned in load_paths(entry.paths).paths:
             if isinstance(planned, TablePath):

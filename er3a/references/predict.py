@@ -91,18 +91,30 @@ def predict_tables(tables: Tables, robot: Robot, quantities: Sequence[Quantity])
 
 def state_of_tables(tables: Tables, robot: Robot, quantities: Sequence[Quantity]) -> ModelState:
     """The state of many tables, for quantities none of which is an extreme over the limits."""
-    poses = _poses_of(quantities)
-    return ModelState(
-        frames=frames_of(tables, robot.base, row_values(robot, joints_of(robot, poses))),
-        index=_places(poses),
-        direction=tables.direction,
-        lower=tables.lower,
-        upper=tables.upper,
-        speed=robot.speed,
-        extremes={},
-        columns={name: getattr(tables, name) for name in TABLE_COLUMNS}
-        | {"twist": np.where(tables.modified[:, None], tables.alpha[:, 1:], tables.alpha[:, :-1])},
-    )
+    return TablesState(robot, quantities).of(tables)
+
+
+class TablesState:
+    """States of tables of one arm at the poses at which quantities look at it; ``index``: places of the poses."""
+
+    def __init__(self, robot: Robot, quantities: Sequence[Quantity]):
+        poses = _poses_of(quantities)
+        self.robot, self.index = robot, _places(poses)
+        self._rows = row_values(robot, joints_of(robot, poses))
+
+    def of(self, tables: Tables) -> ModelState:
+        """The state of many tables."""
+        return ModelState(
+            frames=frames_of(tables, self.robot.base, self._rows),
+            index=self.index,
+            direction=tables.direction,
+            lower=tables.lower,
+            upper=tables.upper,
+            speed=self.robot.speed,
+            extremes={},
+            columns={name: getattr(tables, name) for name in TABLE_COLUMNS}
+            | {"twist": np.where(tables.modified[:, None], tables.alpha[:, 1:], tables.alpha[:, :-1])},
+        )
 
 
 def joints_of(robot: Robot, poses: Sequence[Pose]) -> Reals:

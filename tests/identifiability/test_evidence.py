@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
 import er3a
+from er3a.errors import InputError
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
 from er3a.identifiability.entries import continuous_of, entries_of
@@ -109,7 +111,7 @@ def test_what_the_second_cad_model_settles_of_the_er3a_c60():
 def test_the_table_read_from_the_step_model_is_consistent_with_it():
     found = evidence("er3_600")
     assert {found[entry].status for entry in ("d1", "d6", "a5", "alpha4", "offset5")} == {"consistent"}
-    assert {found[entry].status for entry in ("a1", "a2", "offset2")} == {"settled"}  # by the drawing
+    assert {found[entry].status for entry in ("a1", "a2", "offset2")} == {"weak"}  # by the drawing: arms askew meet it
     assert found["a2"].by == ("drawing_v1_1", "quick_manual")
     assert {found[entry].status for entry in ("d4", "a3", "offset3")} == {"weak"}  # one for the other
     assert {found[f"direction{joint}"].status for joint in (2, 3)} == {"consistent"}
@@ -405,6 +407,14 @@ def test_derived_documents_prove_nothing(random):
             ]
         )
         assert evidence_of(robot, stated, documents, only=["a2"])["a2"].status == status
+
+
+def test_a_table_that_names_an_unknown_document_is_refused():
+    """It would count as independent of the document that it was read from."""
+    robot = load_robot("er3_600")
+    wrong = {**robot.sources, "dh": replace(robot.sources["dh"], origin="step_v9")}
+    with pytest.raises(InputError, match=r"dh\.origin: the document 'step_v9' is not known"):
+        er3a.evidence(robot.replace(sources=wrong))
 
 
 def test_a_robot_without_references_has_everything_open():

@@ -84,18 +84,29 @@ def _of_claims(found: JudgedTable) -> list[str]:
 def _(found: LeftOpen) -> str:
     parts = [say(part) for part in found.parts if part.status != "settled"]
     told = [_what_speaks(found.counts), sentence(found.code, "{parts}.", parts=joined(parts)) if parts else ""]
-    if found.off.moves:
-        told.append(
-            sentence(
-                found.code,
-                "For what is open or weak the tool could be off by up to {mm:.0f} mm and {deg:.0f} deg.",
-                mm=found.off.mm,
-                deg=found.off.deg,
-            )
-        )
+    told += _how_far_off(found)
     if found.next_measurement:
         told.append(sentence(found.code, "To settle most: {measurement}.", measurement=say(found.next_measurement)))
     return joined([*told, *_contradiction(found.contradiction), *_of_claims(found)], " ")
+
+
+def _how_far_off(found: LeftOpen) -> list[str]:
+    told = []
+    if found.off.moves:
+        up_to = N_("For what is open or weak the tool could be off by up to {mm:.0f} mm and {deg:.0f} deg.")
+        at_least = N_("For what is open or weak the tool could be off by {mm:.0f} mm and {deg:.0f} deg, if not more.")
+        text = at_least if found.at_least else up_to
+        told.append(sentence(found.code, text, mm=found.off.mm, deg=found.off.deg))
+    if found.unbounded:
+        told.append(
+            sentence(
+                found.code,
+                "Of {count} entries that move the tool only the document that they were taken from speaks: if it is "
+                "wrong, there is no bound.",
+                count=found.unbounded,
+            )
+        )
+    return told
 
 
 def _what_speaks(counts: CheckCounts) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from er3a.files.reference_documents import check_robot_origins
 from er3a.files.reference_sets import load_references
 from er3a.identifiability.evidence import evidence_of
 from er3a.identifiability.proposals import proposals_of
@@ -59,6 +60,7 @@ def compute(study: Study, name: str) -> ValidationResults:
     robot = model_of(study, name)
     settings = study.section(ValidationSettings)
     sets = [load_references(reference) for reference in robot.references]
+    check_robot_origins(robot, [document for own in sets for document in own.documents.by_name])
 
     plain = is_six_turning(robot)
     stated = [quantity for references in sets for quantity in quantities_of(references.checkable)]

@@ -8,7 +8,7 @@ from functools import reduce
 from er3a.identifiability.entries import GROUP_OF
 from er3a.identifiability.entry_evidence import EntryEvidence, Evidence, Status
 from er3a.identifiability.tool_motion import NOT_OFF, ToolOff
-from er3a.identifiability.verdict_parts import PART_OF_GROUP, SETTLED, PartName, PartStatus, parts_of, together
+from er3a.identifiability.verdict_parts import PART_OF_GROUP, PartName, PartStatus, parts_of, together
 from er3a.pipeline.stages.validation.validation_findings import PartFound
 
 OF_THE_TOOL: tuple[PartName, ...] = ("geometry", "zero_and_directions")
@@ -37,8 +37,8 @@ def _part(evidence: Evidence, part: PartName, status: PartStatus, own: Sequence[
     return PartFound(
         part=part,
         status=status,
-        entries=len(own),
-        settled=sum(each.status in SETTLED for each in own),
+        entries=sum(each.status != "gauge" for each in own),
+        settled=len(named("settled")),
         contradicted=named("contradicted"),
         open=named("open"),
         off=off,

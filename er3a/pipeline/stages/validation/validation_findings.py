@@ -187,7 +187,7 @@ class PartFound:
     Attributes
     ----------
     status : the gravest of its entries'
-    entries, settled : how many it has, and how many of these are settled or mean nothing alone
+    entries, settled : how many it has that mean something alone, and how many of these are settled
     contradicted, open : names of such entries
     off : how far the tool could be off for what is weak or open; what only its own document speaks of has no bound
     """
@@ -209,12 +209,16 @@ class LeftOpen(JudgedTable):
     Attributes
     ----------
     parts : of the table
-    off : how far the tool could be off for what is left open, all over the joint ranges
+    off : how far the tool could be off for what is weak or open, all over the joint ranges
+    at_least : whether that is what was found, and more may be left open
+    unbounded : how many entries that move the tool only their own document speaks of: for these there is no bound
     next_measurement : the one that settles the entry for which it could be off farthest
     """
 
     parts: tuple[PartFound, ...]
     off: ToolOff
+    at_least: bool
+    unbounded: int
     next_measurement: Proposal | None
     contradiction: Contradiction | None
     code: Literal["validation.left_open"] = "validation.left_open"

@@ -101,9 +101,17 @@ def verdict_of(
     moving = [part for part in parts if part.part in OF_THE_TOOL]
     if not moving or any(part.status != "settled" for part in moving):
         off = reduce(ToolOff.worse, (part.off for part in moving), NOT_OFF)
-        return Verdict(
-            "caution", LeftOpen(**common, parts=parts, off=off, next_measurement=_next_measurement(evidence))
+        entries = (*evidence.entries, *evidence.combinations) if evidence else ()
+        statuses = [each.status for each in entries if each.moves_tool]
+        left = LeftOpen(
+            **common,
+            parts=parts,
+            off=off,
+            at_least=any(each.at_least for each in entries),
+            unbounded=statuses.count("consistent"),
+            next_measurement=_next_measurement(evidence),
         )
+        return Verdict("caution", left)
     return Verdict("pass", Confirmed(**common, grades=_grades(documented)))
 
 
