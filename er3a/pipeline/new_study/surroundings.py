@@ -10,6 +10,7 @@ import numpy as np
 
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
+from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
 
 DRAWN = 4000
@@ -18,15 +19,16 @@ FLOOR_BELOW_MM = 5
 ROOM_BELOW_M = 0.1
 TABLE_TOP, TABLE_FROM, TABLE_LENGTH, TABLE_WIDTH = 0.12, 0.4, 0.5, 0.9  # of the reach
 TABLE_THICKNESS_MM = 40
+LEAST_RADIUS_M = 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class SampledReach:
-    """Of the tool point over random joint angles.
+    """Of the tool point over random joint values.
 
     Attributes
     ----------
-    q : (N, 6) rad, drawn within the limits, a tenth of each range away from them
+    q : (N, n) rad or m, drawn within the limits, a tenth of each range away from them
     poses : (N, 4, 4) m
     radius : m, greatest distance from the base's origin
     side_deg : about the base's z axis, where most of the points lie; one of ``SIDES_DEG``
@@ -44,13 +46,14 @@ def reach_of(robot: Robot) -> SampledReach:
     """Sample what an arm reaches; the same for each call."""
     margin = 0.1 * (robot.upper - robot.lower)
     random = np.random.default_rng(0)
-    q = random.uniform(robot.lower + margin, robot.upper - margin, (DRAWN, 6))
+    q = random.uniform(robot.lower + margin, robot.upper - margin, (DRAWN, robot.joints))
+    q = q[kept] if (kept := within(robot, q)).any() else q
     poses = forward(robot, q)
     away = poses[:, :3, 3] - robot.base[:3, 3]
     azimuth = np.degrees(np.arctan2(away[:, 1], away[:, 0]))
     near = [np.count_nonzero(np.abs((azimuth - side + 180) % 360 - 180) < 45) for side in SIDES_DEG]
     side = SIDES_DEG[0] if near[0] > 0.4 * max(near) else SIDES_DEG[int(np.argmax(near))]
-    radius = float(np.linalg.norm(away, axis=1).max())
+    radius = max(float(np.linalg.norm(away, axis=1).max()), LEAST_RADIUS_M)
     return SampledReach(q, poses, radius, side, bool(np.mean(away[:, 2] > 0) >= 0.5))
 
 

@@ -16,7 +16,7 @@ from er3a.files.robot_writer import yaml_text
 from er3a.files.scene_file import SceneFile
 from er3a.files.shipped import ROOT
 from er3a.files.yaml_file import parse, read_yaml
-from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.pipeline.new_study.brought_arm import Arm
 from er3a.pipeline.new_study.surroundings import reach_of, scenes
 from er3a.pipeline.new_study.tasks import LEAST_TARGETS, Spot, TaskSearch
@@ -85,12 +85,12 @@ def _found(arm: Arm) -> tuple[dict[str, Any], list[Spot], list[dict[str, Any]]]:
 def _targets(spots: list[Spot]) -> list[dict[str, Any]]:
     notes = {
         True: ("Tool straight down.", "工具竖直朝下。"),
-        False: ("As the arm holds the tool at random joint angles.", "随机关节角下的工具姿态。"),
+        False: ("As the arm holds the tool at random joint values.", "随机关节值下的工具姿态。"),
     }
     found = []
     for number, spot in enumerate(spots, 1):
         note, note_zh = notes[spot.down]
-        found.append({"name": f"target_{number}", "note": note, "note_zh": note_zh, **spot.pose})
+        found.append({"name": f"target_{number}", "note": note, "note_zh": note_zh, **spot.written})
     return found
 
 
@@ -113,6 +113,6 @@ def _readme(arm: Arm, spots: list[Spot], paths: list[dict[str, Any]]) -> str:
     environment = jinja2.Environment(trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined)
     columns = {kind: ",".join(form.all_columns) for kind, form in FORMATS.items()}
     page = environment.from_string(template)
-    closed_form = closed_form_missing(arm.robot) is None
+    follows_tool = has_branches(arm.robot)
     parts = {"arm": arm, "robot": arm.robot, "spots": spots, "paths": paths, "columns": columns}
-    return page.render(**parts, closed_form=closed_form) + "\n"
+    return page.render(**parts, follows_tool=follows_tool) + "\n"

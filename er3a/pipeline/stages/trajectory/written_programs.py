@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from er3a.errors import Er3aError
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.trajectory.model import ProgramFiles
@@ -20,8 +21,10 @@ from er3a.programs.syntax import Language
 from er3a.programs.write_program import write_program
 from er3a.programs.writing import HEAD, WriteOptions, ascii_text, head_line, program_name
 from er3a.robots.robot import Robot
+from er3a.robots.shown import joint_columns, shown
 
 LONGEST_NAME = 24
+SIX = 6
 
 
 def written(
@@ -33,6 +36,8 @@ def written(
     ------
     ValueError
         for a path whose start can't be reached
+    Er3aError
+        for a controller's language and an arm of other than six turning joints
     """
     start = motion.q[0]
     if not np.isfinite(start).all():
@@ -45,7 +50,9 @@ def written(
         known = np.isfinite(joints[:, 0])
         told = tuple(HEAD + line for line in (*head, *map(head_line, unsafe)))
         poses = np.linalg.inv(robot.base) @ forward(robot, joints[known])
-        return {".csv": write_csv(times[known], joints[known], poses, told)}, unsafe
+        return {".csv": write_csv(times[known], shown(robot, joints[known]), poses, told, joint_columns(robot))}, unsafe
+    if not in_all_languages(robot):
+        raise Er3aError(f"{robot.name}: programs are written for six joints that turn; of this arm a table (csv) is")
     command = motion.entry.command(CommandSource(), robot)
     if isinstance(command, PlanCommand):  # a planned motion is written as the points that its samples are
         timing = Times(motion.samples, np.arange(len(motion.samples)))
@@ -59,6 +66,11 @@ def written(
     return program.files, program.findings
 
 
+def in_all_languages(robot: Robot) -> bool:
+    """Whether controllers' languages, which have six joints that turn, can say what this arm does."""
+    return robot.joints == robot.rows == SIX and not robot.sliding.any()
+
+
 def program_files(
     robot: Robot, motion: Motion, verdict: PathVerdict, languages: Sequence[Language], write_unsafe: bool
 ) -> ProgramFiles:
@@ -66,6 +78,8 @@ def program_files(
     rows: list[tuple[str, str, str]] = []
     allowed = verdict == "safe" or (write_unsafe and np.isfinite(motion.q[0]).all())
     for language in languages if allowed else ():
+        if language != "csv" and not in_all_languages(robot):
+            continue
         files, _ = written(robot, motion, verdict, language)
         name = program_name(motion.entry.name, LONGEST_NAME)
         rows += [(language, name + suffix, text) for suffix, text in files.items()]
