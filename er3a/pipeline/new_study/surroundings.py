@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from er3a.kinematics.forward import forward
+from er3a.collision.envelopes import envelopes_of
+from er3a.kinematics.forward import forward, frames
 from er3a.numerics.arrays import Reals
 from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
@@ -16,7 +17,7 @@ from er3a.robots.robot import Robot
 DRAWN = 4000
 SIDES_DEG = (0, 90, -90, 180)
 FLOOR_BELOW_MM = 5
-ROOM_BELOW_M = 0.1
+ROOM_BELOW_M, ROOM_BELOW = 0.1, 0.1  # at least, and of the reach
 TABLE_TOP, TABLE_FROM, TABLE_LENGTH, TABLE_WIDTH = 0.12, 0.4, 0.5, 0.9  # of the reach
 TABLE_THICKNESS_MM = 40
 LEAST_RADIUS_M = 0.05
@@ -59,8 +60,9 @@ def reach_of(robot: Robot) -> SampledReach:
 
 def scenes(robot: Robot, reach: SampledReach) -> list[dict[str, Any]]:
     """Scene files to try, the fullest first: the last is a floor below all that the arm reaches."""
-    ground = float(robot.base[2, 3]) * 1000
-    low = math.floor((float(reach.poses[:, 2, 3].min()) - ROOM_BELOW_M) * 100) * 10
+    ground = _foot_of(robot) * 1000
+    room = max(ROOM_BELOW_M, ROOM_BELOW * reach.radius)
+    low = math.floor((float(frames(robot, reach.q)[..., 2, 3].min()) - room) * 100) * 10
     deep = _scene("Floor below all that the arm reaches", "机械臂可达范围以下的地面", float(low))
     if not reach.stands:
         return [deep]
@@ -79,6 +81,14 @@ def scenes(robot: Robot, reach: SampledReach) -> list[dict[str, Any]]:
     floor = _scene("Table on the floor", "地面上的工作台", round(ground - FLOOR_BELOW_MM, 1))
     bare = _scene("Floor", "地面", round(ground - FLOOR_BELOW_MM, 1))
     return [floor | {"boxes": [table]}, bare, deep]
+
+
+def _foot_of(robot: Robot) -> float:
+    """Height (m) on which the arm stands: of the base's frame, or where the base goes deeper."""
+    lines = [point for each in envelopes_of(robot) if each.link == 0 for point in (each.start, each.end)]
+    points = [(0.0, 0.0, 0.0), *lines, *(point for each in robot.hulls if each.link == 0 for point in each.points)]
+    heights: Reals = np.array(points) @ robot.base[2, :3] + robot.base[2, 3]
+    return float(heights.min())
 
 
 def _scene(title: str, title_zh: str, height_mm: float) -> dict[str, Any]:

@@ -44,7 +44,7 @@ from er3a.selection.select import refusals
 
 MOST_TARGETS, LEAST_TARGETS, CHOICE = 5, 2, 30
 APART = 0.1  # of the reach
-TRIES, TRIES_ITERATION = 300, 25
+TRIES, TRIES_SLOW = 300, 40
 LIMIT_MARGIN_RAD = np.radians(8.0)
 FULL_POSE = 6  # joints that it takes to hold any pose
 FINE_BELOW = 40.0  # deg or mm
@@ -104,7 +104,8 @@ class TaskSearch:
 
     def spots(self) -> list[Spot]:
         """Poses far from one another: at most ``MOST_TARGETS``, fewer where the arm reaches no more of those tried."""
-        tries = TRIES_ITERATION if isinstance(arm_solver(self.robot).chain, Unsolved) else TRIES
+        slow = self.robot.joints > FULL_POSE or isinstance(arm_solver(self.robot).chain, Unsolved)
+        tries = TRIES_SLOW if slow else TRIES
         tried = (self._spot(written) for written in islice(self._candidates(), tries))
         choice = list(islice(filter(None, tried), CHOICE))
         found = choice[:1]
@@ -114,6 +115,18 @@ class TaskSearch:
                 break
             found.append(choice[int(np.argmax(away))])
         return found
+
+    def any_spots(self) -> list[Spot]:
+        """Poses of drawn joint values, whatever is in the way."""
+        reach = self.reach
+        values = [self._written(q) for q in reach.q[:MOST_TARGETS]]
+        written = [{"q_deg": each, "q_ref_deg": [*each]} for each in values]
+        points = (reach.poses[:MOST_TARGETS, :3, 3] * 1000).tolist()
+        return [Spot(pose, (x, y, z), q, "") for pose, (x, y, z), q in zip(written, points, reach.q)]
+
+    def any_path(self, spots: list[Spot]) -> list[dict[str, Any]]:
+        """A joint move between two of them, whatever is in the way."""
+        return list(islice(self._joint_moves(spots), len(DURATIONS_S) - 1, len(DURATIONS_S)))
 
     def paths(self, spots: list[Spot]) -> list[dict[str, Any]]:
         """Entries of a path file, each safe: a joint move and, where the arm has a closed form, a line and an arc."""
@@ -132,19 +145,29 @@ class TaskSearch:
             for q in self.reach.q:
                 yield {"q_deg": self._written(q)}
             return
-        base, middle, more = self.robot.base, self.reach.q.mean(axis=0), self.robot.joints > FULL_POSE
-        if self.reach.stands:
-            turn = np.radians(self.reach.side_deg)
-            out, aside = np.array([np.cos(turn), np.sin(turn), 0]), np.array([-np.sin(turn), np.cos(turn), 0])
-            for height in HEIGHTS:
-                for distance in DISTANCES:
-                    for share in ASIDE:
-                        point = base[:3, 3] + self.reach.radius * (distance * out + share * aside + [0, 0, height])
-                        written = {"xyz_mm": _millimetres(point), "rpy_deg": [180.0, 0.0, 0.0]}
-                        yield written | ({"q_ref_deg": self._written(middle)} if more else {})
-        for pose, q in zip(self.reach.poses, self.reach.q):
-            written = {"xyz_mm": _millimetres(pose[:3, 3]), "rpy_deg": np.round(np.degrees(rpy_of(pose))).tolist()}
-            yield written | ({"q_ref_deg": self._written(q)} if more else {})
+        if self.robot.joints > FULL_POSE:
+            middle = {"q_ref_deg": self._written(self.reach.q.mean(axis=0))}
+            yield from (pose | middle for pose in islice(self._above_ground(), TRIES_SLOW // 2))
+            yield from (pose | {"q_ref_deg": self._written(q)} for pose, q in zip(self._drawn(), self.reach.q))
+        else:
+            yield from self._above_ground()
+            yield from self._drawn()
+
+    def _above_ground(self) -> Iterator[dict[str, list[float]]]:
+        base = self.robot.base
+        if not self.reach.stands:
+            return
+        turn = np.radians(self.reach.side_deg)
+        out, aside = np.array([np.cos(turn), np.sin(turn), 0]), np.array([-np.sin(turn), np.cos(turn), 0])
+        for height in HEIGHTS:
+            for distance in DISTANCES:
+                for share in ASIDE:
+                    point = base[:3, 3] + self.reach.radius * (distance * out + share * aside + [0, 0, height])
+                    yield {"xyz_mm": _millimetres(point), "rpy_deg": [180.0, 0.0, 0.0]}
+
+    def _drawn(self) -> Iterator[dict[str, list[float]]]:
+        for pose in self.reach.poses:
+            yield {"xyz_mm": _millimetres(pose[:3, 3]), "rpy_deg": np.round(np.degrees(rpy_of(pose))).tolist()}
 
     def _spot(self, pose: dict[str, list[float]]) -> Spot | None:
         """The pose with its best solution: within the limits, clear of everything, far from singular."""
@@ -161,7 +184,8 @@ class TaskSearch:
             return None
         best = int(rows[margin[rows].argmax()])
         x, y, z = (target.T[:3, 3] * 1000).tolist()
-        return Spot(pose, (x, y, z), solutions.q[best], str(solutions.label[best]))
+        written = {key: [*values] for key, values in pose.items()}  # lists of its own: YAML would alias those it shares
+        return Spot(written, (x, y, z), solutions.q[best], str(solutions.label[best]))
 
     def _roomy(self, q: Reals) -> Flags:
         """Whether joints (N, n) are away from their limits, by 8 deg or a twentieth of the range."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,10 @@ HELP = "data/manual_refs/README.md"
 SCHEMAS = ("study", "robot", "targets", "paths", "scene")
 SAMPLES = 8_000_000
 """Of the workspace: a quarter of the project's own study."""
+NOTHING_CLEAR = (
+    "no poses were found that the arm reaches clear of itself, of its limits and of singularities: targets and path "
+    "are random joint values; check its table, its joint limits and its envelopes"
+)
 
 
 def write_study(arm: Arm, folder: Path) -> list[Path]:
@@ -40,7 +45,7 @@ def write_study(arm: Arm, folder: Path) -> list[Path]:
     Raises
     ------
     Er3aError
-        a file stands where one would be written, or no pose was found that the arm reaches; then nothing is written
+        a file stands where one would be written; then nothing is written
     """
     name = arm.robot.name
     places = {
@@ -53,7 +58,9 @@ def write_study(arm: Arm, folder: Path) -> list[Path]:
     }
     if there := sorted(place for place in places if (folder / place).exists()):
         raise Er3aError(f"{folder / there[0]} is there already, and is kept; give another folder")
-    scene, spots, paths = _found(arm)
+    scene, spots, paths, clear = _found(arm)
+    if not clear:
+        arm = replace(arm, notes=(*arm.notes, NOTHING_CLEAR))
     texts = {
         STUDY: _study(name),
         SCENE: _with_schema("scene", scene),
@@ -69,17 +76,17 @@ def write_study(arm: Arm, folder: Path) -> list[Path]:
     return [folder / place for place in texts if place not in aids]
 
 
-def _found(arm: Arm) -> tuple[dict[str, Any], list[Spot], list[dict[str, Any]]]:
-    """Scene, poses and paths: of the first scene in which the arm finds poses and a path."""
+def _found(arm: Arm) -> tuple[dict[str, Any], list[Spot], list[dict[str, Any]], bool]:
+    """Scene, poses and paths: of the first scene in which the arm finds poses and a path, and whether there is one."""
     reach = reach_of(arm.robot)
     settings = parse(TrajectorySettings, read_yaml(ROOT / STUDY)["trajectory"], STUDY)
     for scene in scenes(arm.robot, reach):
         search = TaskSearch(arm.robot, reach, parse(SceneFile, scene, None).scene(), settings)
         spots = search.spots()
         if len(spots) >= LEAST_TARGETS and (paths := search.paths(spots)):
-            return scene, spots, paths
-    problem = "no poses were found that it reaches clear of itself, of its limits and of singularities"
-    raise Er3aError(f"{arm.robot.name}: {problem}. Check its table, its joint limits and its envelopes")
+            return scene, spots, paths, True
+    spots = search.any_spots()
+    return scene, spots, search.any_path(spots), False
 
 
 def _targets(spots: list[Spot]) -> list[dict[str, Any]]:
