@@ -173,6 +173,9 @@ def _near_solved(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[list[i
 
 def _by_iteration(robot: Robot, T: Reals, q_ref: Reals) -> Solutions:
     arms = all_found(robot, T, STARTS)
+    solves = np.abs(forward(robot, q_ref) - T).max() <= SOLVES
+    if solves and not (len(arms) and greatest_move(np.asarray(arms), q_ref).min() < SAME_MEMBER):
+        arms = np.concatenate([np.reshape(arms, (-1, robot.joints)), q_ref[None]])  # random starts miss singular arms
     q, branch = _stacked(list(range(len(arms))), [_rows_of_branch(robot, q, q_ref) for q in arms], robot.joints)
     inside = within(robot, q)
     unsolved = () if len(arms) else solve(robot, T, respect_limits=False).unsolved
