@@ -61,7 +61,8 @@ class ArmModel:
         pin = pinocchio()
         pool = pin.ModelPool(self.model, 1)
         rows = [np.asfortranarray(values.T) for values in (self._x(q), qd @ self.to_rows.T, qdd @ self.to_rows.T)]
-        tau: Reals = pin.rneaInParallel(1, pool, *rows).T @ self.to_rows
+        found = np.reshape(pin.rneaInParallel(1, pool, *rows), rows[0].shape)  # of one joint it comes flat
+        tau: Reals = found.T @ self.to_rows
         return tau
 
     def mass_matrix(self, q: Reals) -> Reals:
