@@ -1,11 +1,14 @@
 """D-H tables as CSV: one row per joint, mm and degrees.
 
-Columns: ``joint`` (1 to 6), ``a_mm``, ``alpha_deg``, ``d_mm``; and, where they are known, ``offset_deg`` and
-``direction`` (theta = direction * q + offset), ``lower_deg``, ``upper_deg``, ``speed_deg_s``.
+Columns: ``joint`` (1 to 10), ``a_mm``, ``alpha_deg``, ``d_mm``; and, where they are known, ``offset_deg`` and
+``direction`` (theta = direction * q + offset), ``lower_deg``, ``upper_deg``, ``speed_deg_s``. Where a joint slides,
+``type`` says "prismatic" (else "revolute") and ``theta_deg`` where its theta stands; its limits and speed stand in
+``lower_mm``, ``upper_mm``, ``speed_mm_s``. A cell that does not apply to a joint is left empty.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,18 +16,24 @@ from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
 from er3a.files.robot_file import RobotFile
 from er3a.files.yaml_file import parse
-from er3a.robots.robot import Grade
+from er3a.robots.robot import MOST_JOINTS, Grade
 
-_NUMBER = CsvColumn(float)
+_NUMBER, _OF_KIND = CsvColumn(float), CsvColumn(float, optional=True)
 NEEDED = {"joint": CsvColumn(int), "a_mm": _NUMBER, "alpha_deg": _NUMBER, "d_mm": _NUMBER}
 OPTIONAL = {
-    "offset_deg": _NUMBER,
+    "type": CsvColumn(str, choices=("revolute", "prismatic")),
+    "theta_deg": _OF_KIND,
+    "offset_deg": _OF_KIND,
     "direction": CsvColumn(int),
-    "lower_deg": _NUMBER,
-    "upper_deg": _NUMBER,
-    "speed_deg_s": _NUMBER,
+    "lower_deg": _OF_KIND,
+    "upper_deg": _OF_KIND,
+    "lower_mm": _OF_KIND,
+    "upper_mm": _OF_KIND,
+    "speed_deg_s": _OF_KIND,
+    "speed_mm_s": _OF_KIND,
 }
 ASSUMED_LIMIT_DEG = 180.0
+ASSUMED_SLIDE_MM = 1000.0
 
 
 def read_dh_table(
@@ -50,42 +59,79 @@ def read_dh_table(
     header = read_header(path)
     rows = read_csv(path, NEEDED | {column: kind for column, kind in OPTIONAL.items() if column in header})
     given = set(header)
-    if given & {"lower_deg", "upper_deg"} and not given >= {"lower_deg", "upper_deg"}:
-        missing = "upper_deg" if "lower_deg" in given else "lower_deg"
-        raise InputError(path, f"column {missing}", "missing beside the other limit", "Give both limits, or none")
-    if [row["joint"] for row in rows] != [1, 2, 3, 4, 5, 6]:
+    for unit in ("deg", "mm"):
+        if len(pair := given & {f"lower_{unit}", f"upper_{unit}"}) == 1:
+            missing = ({f"lower_{unit}", f"upper_{unit}"} - pair).pop()
+            raise InputError(path, f"column {missing}", "missing beside the other limit", "Give both limits, or none")
+    if [row["joint"] for row in rows] != list(range(1, len(rows) + 1)) or not 1 <= len(rows) <= MOST_JOINTS:
         problem = f"the joints are {', '.join(str(row['joint']) for row in rows) or 'none'}"
-        raise InputError(
-            path, "column joint", problem, "er3a models six joints: write one row for each, 1 to 6 in order"
-        )
+        remedy = f"er3a models 1 to {MOST_JOINTS} joints: write one row for each, from 1 on in order"
+        raise InputError(path, "column joint", problem, remedy)
+    for row in rows:
+        _check_kind(path, row, given)
+    kinds = {_unit(row) for row in rows}
     notes = [] if convention == "modified" else ["the table was read as standard D-H; --modified if it is Craig's"]
     if not given & {"offset_deg", "direction"}:
         notes.append("no column offset_deg or direction: joint angles are taken to be the table's own")
-    if "lower_deg" not in given:
-        notes.append(f"no limits in the table: +-{ASSUMED_LIMIT_DEG:g} deg were assumed for all joints")
-    if "speed_deg_s" not in given:
-        notes.append("no column speed_deg_s: the study's assumed_speed_deg_s stands in for joint speeds")
+    if "deg" in kinds and "lower_deg" not in given:
+        notes.append(f"no limits in the table: +-{ASSUMED_LIMIT_DEG:g} deg were assumed for all joints that turn")
+    if "mm" in kinds and "lower_mm" not in given:
+        notes.append(f"no limits in the table: 0 to {ASSUMED_SLIDE_MM:g} mm were assumed for all joints that slide")
+    if any(f"speed_{unit}_s" not in given for unit in kinds):
+        notes.append("no speeds in the table: those that the study assumes stand in for them")
     return parse(RobotFile, _content(rows, given, name, convention, path.name), path), tuple(notes)
 
 
+def _unit(row: dict[str, Any]) -> str:
+    return "mm" if row.get("type") == "prismatic" else "deg"
+
+
+def _check_kind(path: Path, row: dict[str, Any], given: set[str]) -> None:
+    """Refuse cells that are empty, or filled in for the other kind of joint."""
+    unit = _unit(row)
+    own = {f"lower_{unit}", f"upper_{unit}", f"speed_{unit}_s", "theta_deg" if unit == "mm" else "offset_deg"}
+    for column in sorted(given & {key for key, kind in OPTIONAL.items() if kind.optional}):
+        where = f"row {row['row']}, column {column}"
+        if column in own and row[column] is None:
+            raise InputError(path, where, "empty", "Fill in a value")
+        if column not in own and row[column]:
+            kind = "slides" if unit == "mm" else "turns"
+            raise InputError(path, where, f"joint {row['joint']} {kind}", "Leave the cell empty, or correct its type")
+
+
 def _content(rows: list[dict[str, Any]], given: set[str], name: str, convention: str, source: str) -> dict[str, Any]:
-    def group(columns: dict[str, Any], known: bool) -> dict[str, Any]:
+    def group(row_of: Callable[[dict[str, Any]], dict[str, Any]], known: bool) -> dict[str, Any]:
         grade: Grade = "claim" if known else "inferred"
-        filled = [
-            {"joint": row["joint"]} | {key: row.get(key, value) for key, value in columns.items()} for row in rows
-        ]
+        filled = [{"joint": row["joint"]} | row_of(row) for row in rows]
         return {"source": f"Table {source}" if known else "Not in the table; assumed", "grade": grade, "rows": filled}
 
-    limits = {"lower_deg": -ASSUMED_LIMIT_DEG, "upper_deg": ASSUMED_LIMIT_DEG}
+    def table(row: dict[str, Any]) -> dict[str, Any]:
+        kind = {"type": "prismatic", "theta_deg": row.get("theta_deg") or 0.0} if _unit(row) == "mm" else {}
+        return kind | {key: row[key] for key in ("a_mm", "alpha_deg", "d_mm")}
+
+    def zero(row: dict[str, Any]) -> dict[str, Any]:
+        turns = {"offset_deg": row.get("offset_deg") or 0.0} if _unit(row) == "deg" else {}
+        return {"direction": row.get("direction", 1)} | turns
+
+    def limits(row: dict[str, Any]) -> dict[str, Any]:
+        unit = _unit(row)
+        assumed = {"deg": (-ASSUMED_LIMIT_DEG, ASSUMED_LIMIT_DEG), "mm": (0.0, ASSUMED_SLIDE_MM)}[unit]
+        return {key: row.get(key, value) for key, value in zip((f"lower_{unit}", f"upper_{unit}"), assumed)}
+
+    def speed(row: dict[str, Any]) -> dict[str, Any]:
+        key = f"speed_{_unit(row)}_s"
+        return {key: row[key]}
+
+    units = {_unit(row) for row in rows}
     content = {
         "kind": "robot",
         "name": name,
         "title": name,
         "zero_pose": "not stated",
-        "dh": {"convention": convention} | group(dict.fromkeys(("a_mm", "alpha_deg", "d_mm")), known=True),
-        "zero": group({"direction": 1, "offset_deg": 0.0}, known=bool(given & {"offset_deg", "direction"})),
-        "limits": group(limits, known="lower_deg" in given),
+        "dh": {"convention": convention} | group(table, known=True),
+        "zero": group(zero, known=bool(given & {"offset_deg", "direction"})),
+        "limits": group(limits, known=all(f"lower_{unit}" in given for unit in units)),
     }
-    if "speed_deg_s" in given:
-        content["speeds"] = group({"speed_deg_s": None}, known=True)
+    if all(f"speed_{unit}_s" in given for unit in units):
+        content["speeds"] = group(speed, known=True)
     return content

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
-from er3a.files.units import FARTHEST_MM, Triple, check_degrees
+from er3a.files.units import FARTHEST_MM, Triple, check_degrees, suspect
 from er3a.files.yaml_file import StrictModel
 from er3a.geometry.transforms import rot_z, transform
 from er3a.kinematics.chain import constant_links, joint_starts
@@ -63,7 +63,7 @@ class BodyFields(StrictModel):
         if 0 < max(map(abs, self.centre_mm)) < METRES_BELOW_MM and self.mass_kg > 0.5 and any(self.inertia_kg_m2):
             radius_mm = 1000 * float(np.sqrt(max(self.inertia_kg_m2[:3]) / self.mass_kg))
             if radius_mm > 100 * max(map(abs, self.centre_mm)) and max(map(abs, self.centre_mm)) > 0.02:
-                raise ValueError(f"centre_mm: {self.centre_mm} mm looks like metres | Multiply by 1000")
+                suspect(f"centre_mm: {self.centre_mm} mm may be metres")
         if max(map(abs, self.centre_mm)) > FARTHEST_MM:
             raise ValueError(f"centre_mm: {self.centre_mm} is more than 100 m | Write mm")
         if problem := no_body(self.body):

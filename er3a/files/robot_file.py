@@ -18,6 +18,7 @@ NAME_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 SHORTEST_PLAIN_LENGTH_MM = 2.0
 LONGEST_LENGTH_MM = 20_000.0
 RESIDUE_MM = 1e-3
+LEAST_LONGEST_MM = 10.0
 """A length as short as that is what a derivation leaves over, in mm or in metres."""
 FASTEST_DEG_S = 36_000.0
 FASTEST_MM_S = 100_000.0
@@ -188,7 +189,7 @@ class Capsule(StrictModel):
     @classmethod
     def _plain_lengths(cls, values):
         if RESIDUE_MM < max(map(abs, values)) < SHORTEST_PLAIN_LENGTH_MM:
-            raise ValueError(f"{values} mm can only be metres | Multiply by 1000")
+            suspect(f"envelopes.capsules: {values} mm may be metres")
         if max(map(abs, values)) > LONGEST_LENGTH_MM:
             raise ValueError(f"{values} mm is longer than any robot's link | Write the point in mm")
         return values
@@ -214,7 +215,7 @@ class LinkHull(StrictModel):
 class Envelopes(Sourced):
     """Capsules around links and tool, and convex pieces of their shapes, for clearance."""
 
-    capsules: Annotated[list[Capsule], Field(max_length=100)] = []
+    capsules: Annotated[list[Capsule], Field(max_length=1000)] = []
     meshes: Annotated[list[LinkPieces], Field(max_length=100)] = []
     hulls: Annotated[list[LinkHull], Field(max_length=1000)] = []
 
@@ -399,8 +400,11 @@ class RobotFile(StrictModel):
             suspect(f"dh.rows, zero.rows: {small} deg may be radians")
         check_placement("base", self.base)
         check_placement("tool", self.tool)
-        longest = max(max(abs(row.a_mm), abs(row.d_mm)) for row in self.dh.rows)
-        if 0 < longest < 10 and not any(row.type == "prismatic" for row in self.dh.rows):
+        longest, least = max(max(abs(row.a_mm), abs(row.d_mm)) for row in self.dh.rows), LEAST_LONGEST_MM
+        if self.dh.calibrated:  # lengths that were derived may all be short
+            placed = [abs(value) for each in (self.base, self.tool) if each for value in each.xyz_mm]
+            longest, least = max(longest, *placed, 0.0), SHORTEST_PLAIN_LENGTH_MM
+        if 0 < longest < least and not any(row.type == "prismatic" for row in self.dh.rows):
             raise ValueError(
                 f"dh.rows: the longest length is {longest:g} mm, which can only be metres | Multiply by 1000"
             )
@@ -455,7 +459,7 @@ def _check_limit(field: str, row: JointLimitRow | CombinedLimitRow, sliding: boo
     if sliding and max(abs(lower), abs(upper)) > FARTHEST_MM:
         raise ValueError(f"{field}: {named} slides more than 100 m | Write mm, not micrometres")
     if sliding and 0 < max(abs(lower), abs(upper)) < SHORTEST_PLAIN_LENGTH_MM:
-        raise ValueError(f"{field}: {lower:g} to {upper:g} mm can only be metres | Multiply by 1000")
+        suspect(f"{field}: {lower:g} to {upper:g} mm may be metres")
 
 
 def check_placement(field: str, placement: Placement | None) -> None:

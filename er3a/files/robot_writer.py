@@ -13,7 +13,7 @@ import yaml
 from er3a.errors import InputWarning
 from er3a.files.kept_files import write_atomically
 from er3a.files.mass_writer import mass_groups
-from er3a.files.robot_file import SHORTEST_PLAIN_LENGTH_MM, RobotFile
+from er3a.files.robot_file import LEAST_LONGEST_MM, SHORTEST_PLAIN_LENGTH_MM, RobotFile
 from er3a.files.robot_library import VALUES_OF_ROW
 from er3a.files.yaml_file import parse
 from er3a.geometry.transforms import rpy_of
@@ -64,7 +64,7 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
         "dh": sourced("dh")
         | {
             "convention": robot.convention,
-            "calibrated": bool(((lengths > 0) & (lengths < SHORTEST_PLAIN_LENGTH_MM)).any() or robot.beta.any()),
+            "calibrated": _short(lengths) or bool(robot.beta.any()),
             "rows": dh_rows,
         },
         "zero": sourced("zero") | {"rows": zero_rows},
@@ -93,6 +93,12 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
             content[key] = sourced(key) | {name: list(values) for name, values in placement.items()}
     with warnings.catch_warnings(action="ignore", category=InputWarning):  # for those who write numbers by hand
         return parse(RobotFile, content, path)
+
+
+def _short(lengths_mm: np.ndarray) -> bool:
+    """Whether a table has lengths so short that a person's would be taken for metres."""
+    short = (lengths_mm > 0) & (lengths_mm < SHORTEST_PLAIN_LENGTH_MM)
+    return bool(short.any() or 0 < lengths_mm.max() < LEAST_LONGEST_MM)
 
 
 def _shown(robot: Robot, values: np.ndarray) -> np.ndarray:

@@ -30,6 +30,7 @@ from er3a.robots.robot import MOST_JOINTS, ConvexPiece, Envelope, Robot, Source
 
 MISFIT_POSES = 1000
 NO_RANGE = math.pi
+NO_SLIDE_M, MOST_SLID_M = 1.0, 100.0
 MOST_TURNED = 20 * math.pi
 FASTEST = 100.0  # rad/s or m/s; what URDFs give above stands for a speed that no one knows
 
@@ -241,6 +242,13 @@ def _limits(path: Path, sources: list[UrdfJoint]) -> tuple[Reals, list[str]]:
         elif joint.type == "revolute" and max(abs(lower), abs(upper)) > MOST_TURNED:
             notes.append(f"joint {joint.name} has limits beyond ten turns: +-180 deg were assumed")
             lower, upper = -NO_RANGE, NO_RANGE
+        elif joint.type == "prismatic" and (lower == upper == 0 or (math.isnan(lower) and math.isnan(upper))):
+            has = "no limits" if math.isnan(lower) else "the limits 0 and 0"
+            notes.append(f"joint {joint.name} has {has}: +-{NO_SLIDE_M * 1000:g} mm were assumed")
+            lower, upper = -NO_SLIDE_M, NO_SLIDE_M
+        elif joint.type == "prismatic" and max(abs(lower), abs(upper)) > MOST_SLID_M:
+            notes.append(f"joint {joint.name} has limits beyond {MOST_SLID_M:g} m: it was held to that")
+            lower, upper = max(lower, -MOST_SLID_M), min(upper, MOST_SLID_M)
         if math.isnan(lower) or math.isnan(upper):
             missing = "lower" if math.isnan(lower) else "upper"
             raise InputError(path, f"joint {joint.name}", f"has no {missing}", f"Add {missing} to its <limit>")

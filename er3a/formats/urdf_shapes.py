@@ -22,6 +22,7 @@ from er3a.numerics.arrays import Reals
 from er3a.robots.robot import ConvexPiece, Envelope
 
 PRISM_SIDES = 24
+SMALLEST_SPHERE_M = 0.002
 THRESHOLD, SEED = 0.05, 0
 
 
@@ -50,7 +51,12 @@ def collision_shapes(
             pieces = ConvexPieces((cylinder_points(ends, radius, PRISM_SIDES),), 0.0, 0.0)
         case "sphere":
             x, y, z = T[:3, 3].tolist()
-            return [Envelope(link, (x, y, z), (x, y, z), float(numbers(path, where, shape, "radius", None)[0]))]
+            radius = float(numbers(path, where, shape, "radius", None)[0])
+            if radius < SMALLEST_SPHERE_M:
+                notes.append(
+                    f"{where}: a sphere of {1000 * radius:g} mm is taken as one of {1000 * SMALLEST_SPHERE_M:g} mm"
+                )
+            return [Envelope(link, (x, y, z), (x, y, z), max(radius, SMALLEST_SPHERE_M))]
         case "mesh":
             found = _mesh(path, where, shape, notes, split)
             if found is None:

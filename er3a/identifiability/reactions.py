@@ -92,6 +92,11 @@ def bases_of(robot: Robot, references: Sequence[Reference], documents: Documents
     return found
 
 
+def bases_untold(references: Sequence[Reference]) -> list[CheckBasis]:
+    """Likewise for arms whose entries are not varied: nothing is called independent."""
+    return [CheckBasis("consistency" if each.authoritative else "claim", (), (), ()) for each in references]
+
+
 def reactions(robot: Robot, references: Sequence[Reference], entries: Sequence[TableNumber]) -> Flags:
     """Whether the model's value (n, k) for each reference changes with each entry, the others as they are.
 

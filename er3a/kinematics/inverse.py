@@ -12,6 +12,7 @@ from er3a.kinematics.by_class import (
     all_motions,
     arm_solver,
     checked_parameters,
+    parameters_of,
     slot_of,
     slots_of_class,
     task_mask,
@@ -144,9 +145,13 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None) ->
     certain = found.certainty[0] == CERTAIN or solver.code not in BY_ELIMINATION
     unsolved: tuple[Unsolved, ...] = ()
     if not branches:
-        near = solve(robot, T, q_ref, mask=task_mask(robot), respect_limits=False, restarts=MISS_RESTARTS)
-        if bool(near.solved) and not solver.parameters:  # the class missed it
-            branches, rows, certain = [0], [_rows_of_branch(robot, near.q, q_ref)], False
+        open_pose = bool(solver.parameters)
+        near = solve(robot, T, q_ref, mask=task_mask(robot), respect_limits=open_pose, restarts=MISS_RESTARTS)
+        if bool(near.solved) and not (open_pose and redundancy is not None):
+            branches, rows = _near_solved(
+                robot, T, near.q, q_ref
+            )  # the class missed it, or the reference's parameters do
+            certain = False
         else:
             position, rotation = (float(np.asarray(error)) for error in (near.position_error, near.rotation_error))
             miss = NearestMiss(position * 1000, float(np.degrees(rotation)))
@@ -157,8 +162,20 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None) ->
     return Solutions(robot, q, np.ones_like(inside), inside, branch, method, unsolved, motions)
 
 
+def _near_solved(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[list[int], list[Reals]]:
+    """Branches and rows of a pose that joint values (n,) solve: all at their redundancy parameters, else they."""
+    if parameters_of(robot):
+        slots = slots_of_class(robot, T[None], q_ref[None], checked_parameters(robot, None, q[None], 1)).q[0]
+        if branches := np.flatnonzero(np.isfinite(slots[:, 0])).tolist():
+            return branches, [_rows_of_branch(robot, slots[slot], q_ref) for slot in branches]
+    return [0], [_rows_of_branch(robot, q, q_ref)]
+
+
 def _by_iteration(robot: Robot, T: Reals, q_ref: Reals) -> Solutions:
     arms = all_found(robot, T, STARTS)
+    solves = np.abs(forward(robot, q_ref) - T).max() <= SOLVES
+    if solves and not (len(arms) and greatest_move(np.asarray(arms), q_ref).min() < SAME_MEMBER):
+        arms = np.concatenate([np.reshape(arms, (-1, robot.joints)), q_ref[None]])  # random starts miss singular arms
     q, branch = _stacked(list(range(len(arms))), [_rows_of_branch(robot, q, q_ref) for q in arms], robot.joints)
     inside = within(robot, q)
     unsolved = () if len(arms) else solve(robot, T, respect_limits=False).unsolved

@@ -25,6 +25,8 @@ from er3a.kinematics.iteration import (
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
 
+ABOVE_ROUNDING = 1e-13  # of the normal matrix, which is singular where the arm is
+
 AnyArm = tuple[Reals, Reals, Reals, Flags, Reals, Reals]
 """Direction (m,), start (m,), links (m + 1, 4, 4), sliding (m,), coupling (m, n), each joint's unit (n,), 1 or m."""
 
@@ -82,11 +84,12 @@ def _descend(arm: AnyArm, limits: Limits, T: Reals, goal: Goal, x: Reals, e: Rea
             at_low, at_high = x[j] <= lower[j], x[j] >= upper[j]
             free[j] = not (respect and ((at_low and gradient[j] < 0.0) or (at_high and gradient[j] > 0.0)))
         M = J.T @ J
+        least = LEAST_DAMPING + ABOVE_ROUNDING * np.trace(M)
         for i in range(n):
             for j in range(n):
                 if not (free[i] and free[j]):
                     M[i, j] = 0.0
-            M[i, i] += DAMPING * square + LEAST_DAMPING + (0.0 if free[i] else 1.0)
+            M[i, i] += DAMPING * square + least + (0.0 if free[i] else 1.0)
             if not free[i]:
                 gradient[i] = 0.0
         step = np.linalg.solve(M, gradient)

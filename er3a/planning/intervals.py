@@ -18,7 +18,7 @@ from er3a.numerics.runs import runs
 from er3a.planning.branch_tracking import parabolas
 from er3a.planning.followed import Followed
 from er3a.planning.singular_events import Joints
-from er3a.robots.joint_limits import LIMIT_TOLERANCE
+from er3a.robots.joint_limits import LIMIT_TOLERANCE, CombinationExceeded, SlideExceeded
 from er3a.robots.robot import Robot
 
 
@@ -178,26 +178,78 @@ def rate_interval(limit: RateLimit, joint: int, start: float, end: float, most: 
     return Interval(start, end, cause)
 
 
-def out_of_limits(robot: Robot, t: Reals, q: Reals, joints: Joints) -> list[Interval[AboveLimit | BelowLimit]]:
-    """Where joints leave their limits, one interval per joint and side, its ends located on the motion.
+LimitCause = AboveLimit | BelowLimit | SlideExceeded | CombinationExceeded
+
+
+def joints_of(cause: LimitCause) -> tuple[int, ...]:
+    """The joints (from 1) whose limit is left; more than one for a limit of their sum."""
+    return cause.joints if isinstance(cause, CombinationExceeded) else (cause.joint,)
+
+
+@dataclass(frozen=True, eq=False)
+class LimitSide:
+    """One side of a limit of a joint, or of a sum of joints: ``sign * (factors @ q) <= sign * limit``; rad or m."""
+
+    robot: Robot
+    factors: Reals
+    sign: float
+    limit: float
+
+    def of(self, q: Reals) -> Reals:
+        """``sign`` times the joint or the sum, (...,), at joint values (..., n)."""
+        used = np.flatnonzero(self.factors)
+        alone = len(used) == 1 and self.factors[used[0]] == 1
+        value: Reals = self.sign * (q[..., used[0]] if alone else q @ self.factors)
+        return value
+
+    def cause(self, most: float) -> LimitCause:
+        """What is to be said where it gets beyond: its greatest :meth:`of`."""
+        used = np.flatnonzero(self.factors)
+        side: Literal["above", "below"] = "above" if self.sign > 0 else "below"
+        slides = bool(self.robot.slides[used].all())
+        scale = 1000.0 if slides else float(np.degrees(1.0))
+        reached, bound = scale * self.sign * most, scale * self.limit
+        if len(used) != 1 or self.factors[used[0]] != 1:
+            joints, factors = (used + 1).tolist(), self.factors[used].tolist()
+            return CombinationExceeded(
+                tuple(joints), tuple(factors), side, reached, abs(reached - bound), bound, slides
+            )
+        joint = int(used[0]) + 1
+        if slides:
+            return SlideExceeded(joint, side, reached, abs(reached - bound), bound)
+        return (AboveLimit if self.sign > 0 else BelowLimit)(joint, reached, bound)
+
+
+def limit_sides(robot: Robot) -> list[LimitSide]:
+    """Both sides of each limit of a joint and of each limit of a sum."""
+    lines = [
+        (row, robot.lower[j], robot.upper[j]) for j, row in enumerate(np.eye(robot.joints)) if not robot.continuous[j]
+    ]
+    lines += [(np.array(each.factors), each.lower, each.upper) for each in robot.combined]
+    return [
+        LimitSide(robot, factors, sign, float(limit))
+        for factors, lower, upper in lines
+        for sign, limit in ((1.0, upper), (-1.0, lower))
+    ]
+
+
+def out_of_limits(robot: Robot, t: Reals, q: Reals, joints: Joints) -> list[Interval[LimitCause]]:
+    """Where joints, or sums of joints, leave their limits, one interval per limit, its ends located on the motion.
 
     Parameters
     ----------
     t : (N,), s; q : (N, n), rad or m, NaN where unreachable; joints : values (..., n) at times (...,)
     """
-    found: list[Interval[AboveLimit | BelowLimit]] = []
-    for j in np.flatnonzero(~robot.continuous).tolist():
-        for sign, limit, finding in ((1.0, robot.upper[j], AboveLimit), (-1.0, robot.lower[j], BelowLimit)):
+    found: list[Interval[LimitCause]] = []
+    for side in limit_sides(robot):
+        bound = side.sign * side.limit
 
-            def beyond(at: float, j: int = j, sign: float = sign, limit: float = limit) -> float:
-                return float(sign * (joints(np.asarray(at))[..., j] - limit) - LIMIT_TOLERANCE)
+        def beyond(at: float, side: LimitSide = side, bound: float = bound) -> float:
+            return float(side.of(joints(np.asarray(at))) - bound - LIMIT_TOLERANCE)
 
-            values = sign * (q[:, j] - limit) - LIMIT_TOLERANCE
-            for start, end, most in _where_positive(t, values, beyond):
-                scale = 1000.0 if robot.slides[j] else float(np.degrees(1.0))
-                reached, bound = scale * (limit + sign * most), scale * float(limit)
-                found.append(Interval(start, end, finding(j + 1, reached, bound)))
-    return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
+        for start, end, most in _where_positive(t, side.of(q) - bound - LIMIT_TOLERANCE, beyond):
+            found.append(Interval(start, end, side.cause(bound + most)))
+    return sorted(found, key=lambda interval: (interval.start, joints_of(interval.cause)))
 
 
 def rates_exceeded(

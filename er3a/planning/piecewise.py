@@ -12,7 +12,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -27,6 +27,7 @@ NEARLY_REAL = 1e-3  # imaginary part of a double root that rounding has split; m
 TRIMMED = 1e-15  # of the greatest coefficient
 SAME_TIME = 1e-13  # share of the duration
 LOCATED = 1e-14  # share of the duration
+PIECES_AT_ONCE = 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,8 +185,9 @@ def polynomial_motion(rates: Callable[[Reals], Rates], breaks: Reals, degree: in
     times[-1] = breaks[-1]
     x = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
     t = times[:-1, None] + np.diff(times)[:, None] * (x + 1) / 2
-    values = rates(t)
-    return PiecewiseMotion(times, *(_trimmed(_interpolated(part)) for part in values))
+    blocks = range(0, len(t), PIECES_AT_ONCE)  # the points of a long motion would fill the memory
+    parts = [[_trimmed(_interpolated(part)).copy() for part in rates(t[k : k + PIECES_AT_ONCE])] for k in blocks]
+    return PiecewiseMotion(times, *(_joined(series) for series in zip(*parts)))
 
 
 def turning_points(series: Reals) -> Reals:
@@ -225,6 +227,14 @@ def _trimmed(series: Reals) -> Reals:
     size = np.abs(series)
     kept = np.flatnonzero((size > TRIMMED * size.max(axis=1, keepdims=True)).any(axis=(0, 2)))
     return series[:, : (int(kept[-1]) if kept.size else 0) + 1]
+
+
+def _joined(parts: Sequence[Reals]) -> Reals:
+    """Series (m_i, d_i + 1, n) of blocks one behind the other, of the greatest degree among them."""
+    if len(parts) == 1:
+        return parts[0]
+    most = max(part.shape[1] for part in parts)
+    return np.concatenate([np.pad(part, ((0, 0), (0, most - part.shape[1]), (0, 0))) for part in parts])
 
 
 def _slope(times: Reals, series: Reals) -> Reals:

@@ -13,11 +13,12 @@ from er3a.kinematics.singularity import TYPES, SingularityType
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.runs import runs
 from er3a.planning.intervals import (
-    AboveLimit,
-    BelowLimit,
     Interval,
+    LimitCause,
     RateCause,
     RateLimit,
+    joints_of,
+    limit_sides,
     rate_interval,
 )
 from er3a.planning.piecewise import Pieces, PiecewiseMotion
@@ -29,17 +30,14 @@ LONGEST_TURN = 1.0  # rad within one series of the shoulder's distance
 DEGREE = 24  # by which a sine of so short a turn is met to rounding
 
 
-def limit_intervals(robot: Robot, motion: PiecewiseMotion) -> list[Interval[AboveLimit | BelowLimit]]:
-    """Where joints leave their limits, one interval per joint, side and stretch."""
-    found: list[Interval[AboveLimit | BelowLimit]] = []
-    for j in np.flatnonzero(~robot.continuous).tolist():
-        scale = 1000.0 if robot.slides[j] else float(np.degrees(1.0))
-        for sign, limit, finding in ((1.0, robot.upper[j], AboveLimit), (-1.0, robot.lower[j], BelowLimit)):
-            pieces = motion.of_joint(motion.angle, j, sign)
-            for start, end, most in pieces.above(sign * limit + LIMIT_TOLERANCE):
-                reached, bound = scale * sign * most, scale * float(limit)
-                found.append(Interval(start, end, finding(j + 1, reached, bound)))
-    return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
+def limit_intervals(robot: Robot, motion: PiecewiseMotion) -> list[Interval[LimitCause]]:
+    """Where joints, or sums of joints, leave their limits, one interval per limit, side and stretch."""
+    found: list[Interval[LimitCause]] = []
+    for side in limit_sides(robot):
+        pieces = Pieces(motion.times, side.of(motion.angle))
+        for start, end, most in pieces.above(side.sign * side.limit + LIMIT_TOLERANCE):
+            found.append(Interval(start, end, side.cause(most)))
+    return sorted(found, key=lambda interval: (interval.start, joints_of(interval.cause)))
 
 
 def rate_intervals(motion: PiecewiseMotion, limit: RateLimit) -> list[Interval[RateCause]]:

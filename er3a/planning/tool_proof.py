@@ -301,7 +301,7 @@ def _settle(followed: Followed, wanted: Wanted, progress: PiecewiseMotion, start
     known = bounds.proven
     open_[:, 0] = ~known & ~unreached.all(axis=0)
     outside = _outside(robot, np.stack([q_start, q, q_end])).any(axis=0)
-    sure = ~_outside(robot, np.stack([q - bounds.change, q + bounds.change])).any(axis=0)
+    sure = ~_outside(robot, q, bounds.change)
     open_[:, 1], broken[:, 1] = known & ~np.all(sure | outside, axis=1), np.any(outside, axis=1)
     asks_jerk = any(limit.order == 3 for limit in wanted.rates)
     jerk = _mean_jerk(followed, start, end) if asks_jerk else np.zeros_like(q)
@@ -410,10 +410,19 @@ def _mean_jerk(followed: Followed, start: Reals, end: Reals) -> Reals:
     return rates
 
 
-def _outside(robot: Robot, q: Reals) -> Flags:
-    """Whether angles (..., n) are outside the limits."""
-    outside: Flags = (q < robot.lower - LIMIT_TOLERANCE) | (q > robot.upper + LIMIT_TOLERANCE)
-    return outside & ~robot.continuous
+def _outside(robot: Robot, q: Reals, change: Reals | None = None) -> Flags:
+    """Whether angles (..., n), or any that differ from them by at most ``change``, are outside each of the limits.
+
+    Shape (..., n + c): of the joints, then of the c sums of joints that are limited.
+    """
+    factors = np.array([limit.factors for limit in robot.combined]).reshape(-1, q.shape[-1])
+    ends = [(limit.lower, limit.upper) for limit in robot.combined]
+    lower = np.concatenate([np.where(robot.continuous, -np.inf, robot.lower), [low for low, _ in ends]])
+    upper = np.concatenate([np.where(robot.continuous, np.inf, robot.upper), [high for _, high in ends]])
+    values = np.concatenate([q, q @ factors.T], axis=-1)
+    spread = 0.0 if change is None else np.concatenate([change, change @ np.abs(factors).T], axis=-1)
+    outside: Flags = (values - spread < lower - LIMIT_TOLERANCE) | (values + spread > upper + LIMIT_TOLERANCE)
+    return outside
 
 
 def _near_open(robot: Robot, near: NearSingular, q: Reals, change: Reals) -> Flags:

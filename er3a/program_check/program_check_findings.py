@@ -15,6 +15,7 @@ from er3a.planning.tool_proof import Undecided
 from er3a.programs.execution import EndKind
 from er3a.programs.instructions import Unresolved
 from er3a.programs.program_findings import ProgramFinding
+from er3a.robots.joint_limits import CombinationExceeded, SlideExceeded
 
 Level = Literal["pass", "note", "caution", "fail"]
 RANKS: dict[Level, int] = {"pass": 0, "note": 1, "caution": 2, "fail": 3}
@@ -335,6 +336,8 @@ CheckFinding = (
     ProgramFinding
     | AboveLimit
     | BelowLimit
+    | SlideExceeded
+    | CombinationExceeded
     | TooFast
     | TargetNotGiven
     | FrameNotGiven
@@ -378,7 +381,15 @@ CheckFinding = (
 FAILS = frozenset(
     (
         *("target_not_given", "target_out_of_reach", "way_out_of_reach", "configuration_ends"),
-        *("above_limit", "below_limit", "too_fast", "motion_collides", "arc_has_no_circle"),
+        *(
+            "above_limit",
+            "below_limit",
+            "slide_exceeded",
+            "combination_exceeded",
+            "too_fast",
+            "motion_collides",
+            "arc_has_no_circle",
+        ),
     )
 )
 NOTES = frozenset(

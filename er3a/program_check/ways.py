@@ -19,13 +19,14 @@ from er3a.numerics.arrays import Reals
 from er3a.planning.arcs import arc
 from er3a.planning.followed import Followed
 from er3a.planning.intervals import (
-    AboveLimit,
     AccelerationTooGreat,
     AccelerationTooGreatIfAssumed,
-    BelowLimit,
+    LimitCause,
     RateCause,
     TooFast,
     TooFastIfAssumed,
+    joints_of,
+    limit_sides,
     out_of_limits,
     rates_exceeded,
     unreachable,
@@ -147,15 +148,10 @@ def _scaled(shares: tuple[Reals, Reals, Reals], start: Reals, step: Reals) -> tu
     return start + share, speed, acceleration
 
 
-def limit_findings(arm: Robot, q: Reals) -> tuple[AboveLimit | BelowLimit, ...]:
-    """Joints (n,) in rad that are beyond a limit."""
-    found: list[AboveLimit | BelowLimit] = []
-    for j, (angle, low, high) in enumerate(zip(q.tolist(), arm.lower.tolist(), arm.upper.tolist())):
-        if angle > high + LIMIT_TOLERANCE:
-            found.append(AboveLimit(j + 1, *np.degrees([angle, high]).tolist()))
-        if angle < low - LIMIT_TOLERANCE:
-            found.append(BelowLimit(j + 1, *np.degrees([angle, low]).tolist()))
-    return tuple(found)
+def limit_findings(arm: Robot, q: Reals) -> tuple[LimitCause, ...]:
+    """Joints (n,) in rad or m, and sums of them, that are beyond a limit."""
+    sides = [(side, float(side.of(q))) for side in limit_sides(arm)]
+    return tuple(side.cause(value) for side, value in sides if value > side.sign * side.limit + LIMIT_TOLERANCE)
 
 
 def tool_way(
@@ -212,7 +208,9 @@ def _followed_findings(followed: Followed, proof: ToolProof, way: MotionWay, rul
     ends = bool(found)
     t, kept = np.unique(np.concatenate([way.t, proof.t]), return_index=True)
     solved = np.concatenate([way.q, proof.q])[kept]
-    limits = {(type(each.cause), each.cause.joint): each.cause for each in out_of_limits(arm, t, solved, way.joints)}
+    limits = {
+        (type(each.cause), joints_of(each.cause)): each.cause for each in out_of_limits(arm, t, solved, way.joints)
+    }
     found += list(limits.values())
     events = singular_events(arm, t, solved, way.joints, rules.near)
     at = np.unique(np.concatenate([t, [event.t for event in events]]))

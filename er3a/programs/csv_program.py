@@ -30,21 +30,24 @@ POSE_COLUMNS = ("x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg")
 DECIMALS = 6
 
 
-def write_csv(times: Reals, joints: Reals, poses: Reals, head: tuple[str, ...] = ()) -> str:
+def write_csv(
+    times: Reals, joints: Reals, poses: Reals, head: tuple[str, ...] = (), columns: tuple[str, ...] = ()
+) -> str:
     """A table of a motion.
 
     Parameters
     ----------
     times : (n,), s
-    joints : (n, m), rad
+    joints : (n, k), deg, or mm of joints that slide
     poses : (n, 4, 4), T_base_tool, m
     head : comments, one to a line
+    columns : names of the k columns of joints, if other than ``q1_deg`` ...
     """
     turned = np.degrees(rpy_of(poses))
-    rows = np.column_stack([times, np.degrees(joints), poses[:, :3, 3] * 1000, turned])
+    rows = np.column_stack([times, joints, poses[:, :3, 3] * 1000, turned])
     rows = np.round(rows, DECIMALS) + 0.0
     lines = [f"# {line}" for line in head]
-    lines.append(",".join((TIME, *joint_columns(joints.shape[1]), *POSE_COLUMNS)))
+    lines.append(",".join((TIME, *(columns or joint_columns(joints.shape[1])), *POSE_COLUMNS)))
     lines += [",".join(f"{value:.{DECIMALS}f}" for value in row) for row in rows]
     return "\n".join(lines) + "\n"
 

@@ -26,6 +26,7 @@ CellState = Literal["filled", "touched", "empty", "undecided", "partly_filled"]
 
 SIX = 6
 TARGET = 0.002
+LEAST_BOUND_M = 1e-4  # for a tool point that no joint moves
 VOID_RATIO = 0.25
 GENERAL_CELLS, GENERAL_SAMPLES, GENERAL_BOXES = 4, 250, 1000
 """For each cell of the budget, where the general method is all there is: its cells, samples and boxes."""
@@ -118,13 +119,14 @@ def lacking_for_proof(robot: Robot) -> ClosedFormMissing | None:
 def _bounded_by_lengths(robot: Robot, points: int, seed: int, lacks: ClosedFormMissing) -> Proven:
     """One ring that the tool point can't leave, of arms with other joints, or with some that depend on one another."""
     bound = tool_bound(robot)
-    low, high = bound.height - bound.radius, bound.height + bound.radius
+    reach, radius = max(bound.reach, LEAST_BOUND_M), max(bound.radius, LEAST_BOUND_M)
+    low, high = bound.height - radius, bound.height + radius
     unfilled, empty = np.full((2, 1, MOST_ARCS, 2), np.nan)
     unfilled[0, 0] = 0.0, TURN
-    cells, none = np.array([[0.0, bound.reach, low, high]]), np.zeros((1, 4))
+    cells, none = np.array([[0.0, reach, low, high]]), np.zeros((1, 4))
     proof = Proof(cells, unfilled, empty, np.zeros(1, dtype=np.int64), none, 0)
     section = SectionMap(proof)
-    estimate = estimate_volume(_nothing_found, section, bound.reach, (low, high), points, seed)
+    estimate = estimate_volume(_nothing_found, section, reach, (low, high), points, seed)
     R = constant_links(robot)[0, :3, :3].T
     witness = np.full((1, robot.joints), np.nan)
     return Proven(None, proof, section, R, bound.axis_point, witness, estimate, GeneralMethod(lacks))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from er3a.files.robot_library import load_robot
 from er3a.geometry.angles import wrap_to_pi
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.by_class import checked_parameters, parameters_of, task_mask
@@ -183,3 +184,28 @@ def test_the_crx_is_cuspidal_and_the_ur_is_not_found_to_be():
     along = np.linalg.det(scaled_jacobian(robot, move.start + share * (move.end - move.start)))
     assert (np.sign(along) == np.sign(along[0])).all()
     assert cuspidal_move(ARMS["three_parallel"][0]) is None
+
+
+def test_a_reference_whose_redundancy_parameters_lead_nowhere_does_not_hide_the_solutions():
+    """Two joints that slide below a turning arm: at the slides of the reference the pose is out of reach."""
+    six = load_robot("er3_600")
+    two, quarter = np.zeros(2), np.array([-np.pi / 2, np.pi / 2])
+    parts = {key: np.concatenate([two, getattr(six, key)]) for key in ("a", "d", "beta")}
+    robot = six.replace(
+        **parts,
+        alpha=np.concatenate([quarter, six.alpha]),
+        offset=np.concatenate([two, six.offset]),
+        direction=np.concatenate([np.ones(2), six.direction]),
+        lower=np.concatenate([two, six.lower]),
+        upper=np.concatenate([np.full(2, 5.0), six.upper]),
+        speed=np.full(8, np.nan),
+        sliding=np.array([True, True] + [False] * 6),
+        continuous=np.zeros(8, dtype=bool),
+        envelopes=(), hulls=(), references=(), sources={},
+    )  # fmt: skip
+    q = np.concatenate([[4.0, 3.0], np.radians([10.0, -20.0, 15.0, 30.0, 40.0, 50.0])])
+    T = forward(robot, q)
+    solutions = inverse(robot, T)
+    assert solutions.within_limits.any()
+    np.testing.assert_allclose(forward(robot, solutions.q), np.broadcast_to(T, (len(solutions.q), 4, 4)), atol=1e-9)
+    assert not len(inverse(robot, T, redundancy=np.zeros(2)).q)  # what is asked for is not changed

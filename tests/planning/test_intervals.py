@@ -7,14 +7,19 @@ import pytest
 
 from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import transform
+from er3a.kinematics.forward import forward
+from er3a.kinematics.near_singular import NearSingular
 from er3a.kinematics.solutions import WristTooFar
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.planning.arcs import arc
 from er3a.planning.follow import follow
 from er3a.planning.intervals import AboveLimit, TooFast, out_of_limits, rates_exceeded, unreachable
-from er3a.planning.moves import JointMove
-from er3a.planning.polynomial_checks import rate_intervals
+from er3a.planning.moves import JointMove, line
+from er3a.planning.polynomial_checks import limit_intervals, rate_intervals
 from er3a.planning.timing import joint_limits
+from er3a.planning.tool_proof import Wanted, follow_and_prove
+from er3a.robots.joint_limits import CombinationExceeded
+from er3a.robots.robot import CombinedLimit
 
 GRID = np.linspace(0, 1, 21)
 
@@ -83,3 +88,43 @@ def test_short_stretch_out_of_reach_between_check_points_is_found():
     reach = inside - 0.0785  # the wrist centre's greatest distance from axis 1 at this height
     assert y[1] == pytest.approx(np.sqrt(2 * 2e-5 / (1 / path.radius - 1 / reach)), rel=1e-3)
     assert any(isinstance(reason.why, WristTooFar) for reason in interval.cause.reasons)
+
+
+def with_sum_limit(upper_deg):
+    robot = load_robot("er3_600")
+    return robot.replace(combined=(CombinedLimit((0, 1, 1, 0, 0, 0), np.radians(-200.0), np.radians(upper_deg)),))
+
+
+def test_a_limit_of_a_sum_holds_all_along_a_joint_move():
+    """J2 and J3 keep their own limits; their sum goes from 0 to 20 deg."""
+    q = np.radians([[0, 0, 0, 0, 0, 0], [0, 40, -20, 0, 0, 0]])
+    motion = JointMove(q[0], q[1], 1.0).polynomials()
+    assert limit_intervals(with_sum_limit(30), motion) == []
+    (interval,) = limit_intervals(with_sum_limit(15), motion)
+    cause = interval.cause
+    assert isinstance(cause, CombinationExceeded)
+    assert (cause.joints, cause.side) == ((2, 3), "above")
+    assert (cause.value, cause.excess, cause.limit) == pytest.approx((20, 5, 15))
+    at = motion.joints(np.array(interval.start))
+    assert np.degrees(at[1] + at[2]) == pytest.approx(15, abs=1e-6)
+    found = out_of_limits(with_sum_limit(15), GRID, motion.joints(GRID), motion.joints)
+    assert [type(each.cause) for each in found] == [CombinationExceeded]
+    assert found[0].start == pytest.approx(interval.start, abs=1e-7)
+
+
+def test_a_limit_of_a_sum_is_proven_along_a_line_of_the_tool():
+    robot = load_robot("er3_600")
+    start = forward(robot, np.radians([0.0, 10, 10, 0, 60, 0]))
+    end = start.copy()
+    end[0, 3] += 0.08
+    way, t = line(start, end, 2.0), np.linspace(0, 2, 9)
+    wanted = Wanted(joint_limits(robot, np.full(6, 10.0), 0.25).rates, NearSingular(0.01, 0.01, 0.001))
+    free, proof = follow_and_prove(robot, way, t, wanted)
+    assert "limits" not in {part.cause.quantity for part in proof.undecided}
+    sums = free.q[:, 1] + free.q[:, 2]
+    top = np.degrees(sums.min() + 0.6 * np.ptp(sums))
+    tight = with_sum_limit(top)
+    followed, proof = follow_and_prove(tight, way, t, wanted, free.q[0])
+    found = out_of_limits(tight, followed.t, followed.q, followed.joints)
+    assert [type(each.cause) for each in found] == [CombinationExceeded]
+    assert "limits" not in {part.cause.quantity for part in proof.undecided}

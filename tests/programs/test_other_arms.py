@@ -61,7 +61,7 @@ def test_krl_moves_as_many_axes_as_the_arm_has(joints, tmp_path):
 def test_a_table_has_a_column_for_each_joint(joints, tmp_path):
     robot = arm(joints)
     q = np.random.default_rng(1).uniform(robot.lower, robot.upper, (4, joints))
-    (tmp_path / "a.csv").write_text(write_csv(np.arange(4.0), q, forward(robot, q)))
+    (tmp_path / "a.csv").write_text(write_csv(np.arange(4.0), np.degrees(q), forward(robot, q)))
     program = read_program(tmp_path / "a.csv")
     check = check_program(program, robot, CheckOptions(start=q[0], measures=False))
     ends = [check.motions[number].end for number in check.main]

@@ -197,7 +197,7 @@ def test_a_table_over_time_is_written_and_read(tmp_path):
     rng = np.random.default_rng(6)
     joints = rng.uniform(ROBOT.lower, ROBOT.upper, (20, 6))
     times = np.linspace(0, 3, 20)
-    text = write_csv(times, joints, forward(ROBOT, joints), ("a path",))
+    text = write_csv(times, np.degrees(joints), forward(ROBOT, joints), ("a path",))
     assert text.startswith("# a path\nt_s,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm,roll_deg,")
     execution = run(tmp_path, "a.csv", text)
     back = np.array([each.target.joints for each in said(execution)])

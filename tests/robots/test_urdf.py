@@ -136,7 +136,7 @@ def test_fixed_joints_are_merged_and_side_frames_ignored(tmp_path, random):
     [
         (urdf([REAL_ARM[0]] * 11), "11 moving joints"),
         (urdf([("planar", *REAL_ARM[0][1:]), *REAL_ARM[1:]]), "type 'planar'"),
-        (urdf([("prismatic", *REAL_ARM[0][1:]), *REAL_ARM[1:]], limit=""), "has no lower"),
+        (urdf([("prismatic", *REAL_ARM[0][1:]), *REAL_ARM[1:]], limit='<limit upper="1"/>'), "has no lower"),
         (urdf(limit='<limit lower="2" upper="-2" velocity="1"/>'), "lower limit 2 above upper -2"),
         (urdf(limit='<mimic joint="j1"/><limit lower="-2" upper="2"/>'), "follows 'j1', which is no joint"),
         (urdf([("revolute", "0 0 nan", "0 0 0", "0 0 1"), *REAL_ARM[1:]]), "'0 0 nan'"),

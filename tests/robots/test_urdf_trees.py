@@ -11,9 +11,11 @@ from er3a.files.robot_library import load_robot
 from er3a.files.robot_writer import write_robot
 from er3a.formats.from_axes import table_from_axes
 from er3a.formats.urdf import export_urdf, import_urdf
+from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.forward import forward, frames
 from testing.arms import make_arm
-from testing.fleet import DhModel, dh_models
+from testing.fleet import DhModel, UrdfFile, dh_models, urdf_files
+from testing.fleet_study import round_trip, singular_joints
 
 LIMIT = '<limit lower="-1.5" upper="1.5" velocity="2" effort="0"/>'
 
@@ -58,7 +60,7 @@ def peer_poses(path, names, q, frame):
             at = model.joints[model.getJointId(name)]
             full[at.idx_q : at.idx_q + at.nq] = value if at.nq == 1 else [np.cos(value), np.sin(value)]
         pinocchio.framesForwardKinematics(model, data, full)
-        poses.append(data.oMf[model.getFrameId(frame)].homogeneous.copy())
+        poses.append(data.oMf[model.getFrameId(frame, pinocchio.FrameType.BODY)].homogeneous.copy())
     return np.array(poses)
 
 
@@ -181,3 +183,65 @@ def test_models_of_robotics_toolbox_have_its_poses(model, random, tmp_path):
     back = import_urdf(path).robot
     write_robot(back, tmp_path / f"{robot.name}.yaml")
     np.testing.assert_allclose(forward(load_robot(tmp_path / f"{robot.name}.yaml"), q), model.poses(q), atol=1e-10)
+
+
+PACKAGED = {
+    "ur_description/urdf/ur5_robot.urdf": "three_parallel",
+    "ur_description/urdf/ur3_gripper.urdf": "three_parallel",
+    "z1_description/urdf/z1.urdf": "three_parallel",
+    "kinova_description/robots/kinova.urdf": "spherical_wrist",
+    "xacro/kuka_description/kuka_kr16/urdf/kr16_2.urdf": "spherical_wrist",
+    "xacro/unimation_puma560_description/urdf/puma560_robot.urdf": "spherical_wrist",
+    "xacro/abb_irb140_description/urdf/irb140.urdf": "general_six",
+    "talos_data/robots/talos_left_arm.urdf": "general_six",
+    "panda_description/urdf/panda.urdf": "redundant",
+    "xarm_description/urdf/xarm7.urdf": "redundant",
+    "so_arm_description/urdf/so100.urdf": "free_roll",
+    "xacro/lynxmotion_al5d_description/urdf/al5d_robot.urdf": "planar_wrist",
+    "finger_edu_description/robots/finger_edu.urdf": "position",
+}
+
+
+@pytest.fixture(scope="module")
+def packaged(tmp_path_factory):
+    found = urdf_files(tmp_path_factory.mktemp("expanded"))
+    return {each.name: each.path for each in found if isinstance(each, UrdfFile) and each.name in PACKAGED}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "arm_class"), PACKAGED.items())
+def test_urdfs_of_packages_from_import_to_the_inverse(packaged, name, arm_class, random, tmp_path):
+    path = packaged[name]
+    plain = import_urdf(path)
+    q = random.uniform(plain.robot.lower, plain.robot.upper, (20, plain.robot.joints))
+    expected = np.array(peer_poses(path, plain.joints, q, plain.tip))
+    np.testing.assert_allclose(forward(plain.robot, q), expected, atol=1e-9)
+    write_robot(import_urdf(path, snap=True).robot.replace(name="made"), tmp_path / "made.yaml")
+    made = load_robot(tmp_path / "made.yaml")
+    assert arm_solver(made).chain.code == arm_class
+    whole = arm_class not in ("free_roll", "position")
+    assert {round_trip(made, own, 1e-6, whole) for own in q[:3]} == {None}
+    assert {round_trip(made, own, 1e-5, whole) for own in singular_joints(made)} <= {None}
+    (tmp_path / "out.urdf").write_text(export_urdf(made), encoding="utf-8")
+    back = import_urdf(tmp_path / "out.urdf", base="base", tip="tool").robot
+    np.testing.assert_allclose(forward(back, q), forward(made, q), atol=1e-9)
+
+
+def test_what_urdfs_leave_out_or_overdo_is_assumed_with_a_note(written):
+    far = '<limit lower="-1000" upper="5" velocity="2" effort="0"/>'
+    sphere = '<link name="ball"><collision><geometry><sphere radius="0.0005"/></geometry></collision></link>'
+    path = written(
+        joint("far", "prismatic", "base", "a", more=far),
+        joint("open", "prismatic", "a", "b", more=""),
+        row(2, start="b"),
+        sphere,
+        '<joint name="f" type="fixed"><parent link="l1"/><child link="ball"/></joint>',
+    )
+    imported = import_urdf(path)
+    assert imported.robot.lower[:2].tolist() == [-100, -1]
+    assert imported.robot.upper[:2].tolist() == [5, 1]
+    told = " ".join(imported.notes)
+    for word in ("far has limits beyond 100 m", "open has no limits: +-1000 mm", "0.5 mm is taken as one of 2 mm"):
+        assert word in told
+    write_robot(imported.robot, path.with_suffix(".yaml"))
+    load_robot(path.with_suffix(".yaml"))

@@ -20,11 +20,13 @@ from er3a.files.path_file import PathFile, ProgramPath
 from er3a.files.target_file import TargetEntry
 from er3a.files.yaml_file import parse
 from er3a.geometry.transforms import rpy_of
+from er3a.kinematics.by_class import arm_solver
+from er3a.kinematics.classes.chain_solvers import Unsolved
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.near_singular import NearSingular
 from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.kinematics.wrist_partitioned import has_branches
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.new_study.surroundings import SampledReach
 from er3a.pipeline.stages.trajectory.collisions import Surroundings, measured
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
@@ -35,14 +37,17 @@ from er3a.planning.commands import CommandSource
 from er3a.planning.polynomial_checks import limit_intervals, rate_intervals
 from er3a.planning.timing import JointLimits
 from er3a.planning.tool_proof import Wanted
-from er3a.robots.joint_limits import limit_margin
+from er3a.robots.joint_limits import limit_margin, within
 from er3a.robots.robot import Robot
+from er3a.robots.shown import shown
 from er3a.selection.select import refusals
 
 MOST_TARGETS, LEAST_TARGETS, CHOICE = 5, 2, 30
 APART = 0.1  # of the reach
-TRIES_CLOSED_FORM, TRIES_ITERATION = 300, 25
+TRIES, TRIES_SLOW = 300, 40
 LIMIT_MARGIN_RAD = np.radians(8.0)
+FULL_POSE = 6  # joints that it takes to hold any pose
+FINE_BELOW = 40.0  # deg or mm
 SINGULAR_MARGIN = 2.0  # times what the study calls near
 LEAST_SINGULAR_VALUE = 0.05  # for arms without a closed form
 DOWN_DEG = (180, 0, 0)
@@ -55,22 +60,28 @@ SAMPLES = 50
 
 @dataclass(frozen=True, eq=False)
 class Spot:
-    """A pose that the arm reaches: xyz in mm, rpy in whole degrees, and the solution (6,) in rad that is best there."""
+    """A pose that the arm reaches, and the solution (n,) in rad or m that is best there.
 
+    Attributes
+    ----------
+    written : the pose as target files write it: ``xyz_mm`` with ``rpy_deg`` in whole degrees, or ``q_deg``
+    xyz_mm : the tool point
+    """
+
+    written: dict[str, list[float]]
     xyz_mm: tuple[float, float, float]
-    rpy_deg: tuple[float, float, float]
     q: Reals
     label: str
 
     @property
     def pose(self) -> dict[str, list[float]]:
-        """As the files write it."""
-        return {"xyz_mm": list(self.xyz_mm), "rpy_deg": list(self.rpy_deg)}
+        """As path files write it."""
+        return {key: [*self.written[key]] for key in ("xyz_mm", "rpy_deg")}
 
     @property
     def down(self) -> bool:
-        """Whether the tool points straight down."""
-        return self.rpy_deg[:2] == DOWN_DEG[:2]
+        """Whether the tool is asked to point straight down."""
+        return tuple(self.written.get("rpy_deg", ())[:2]) == DOWN_DEG[:2]
 
 
 @dataclass
@@ -81,20 +92,21 @@ class TaskSearch:
     reach: SampledReach
     scene: Scene
     settings: TrajectorySettings
-    closed_form: bool = field(init=False)
+    follows_tool: bool = field(init=False)
     near: NearSingular = field(init=False)
     limits: JointLimits = field(init=False)
     wanted: Wanted = field(init=False)
 
     def __post_init__(self) -> None:
-        self.closed_form = has_branches(self.robot)
+        self.follows_tool = has_branches(self.robot)
         self.limits, self.wanted = limits_of(self.robot, self.settings), wanted_of(self.robot, self.settings)
         self.near = self.wanted.near
 
     def spots(self) -> list[Spot]:
         """Poses far from one another: at most ``MOST_TARGETS``, fewer where the arm reaches no more of those tried."""
-        tries = TRIES_CLOSED_FORM if self.closed_form else TRIES_ITERATION
-        tried = (self._spot(*candidate) for candidate in islice(self._candidates(), tries))
+        slow = self.robot.joints > FULL_POSE or isinstance(arm_solver(self.robot).chain, Unsolved)
+        tries = TRIES_SLOW if slow else TRIES
+        tried = (self._spot(written) for written in islice(self._candidates(), tries))
         choice = list(islice(filter(None, tried), CHOICE))
         found = choice[:1]
         while choice and len(found) < MOST_TARGETS:
@@ -104,47 +116,92 @@ class TaskSearch:
             found.append(choice[int(np.argmax(away))])
         return found
 
+    def any_spots(self) -> list[Spot]:
+        """Poses of drawn joint values, whatever is in the way."""
+        reach = self.reach
+        values = [self._written(q) for q in reach.q[:MOST_TARGETS]]
+        written = [{"q_deg": each, "q_ref_deg": [*each]} for each in values]
+        points = (reach.poses[:MOST_TARGETS, :3, 3] * 1000).tolist()
+        return [Spot(pose, (x, y, z), q, "") for pose, (x, y, z), q in zip(written, points, reach.q)]
+
+    def any_path(self, spots: list[Spot]) -> list[dict[str, Any]]:
+        """A joint move between two of them, whatever is in the way."""
+        return list(islice(self._joint_moves(spots), len(DURATIONS_S) - 1, len(DURATIONS_S)))
+
     def paths(self, spots: list[Spot]) -> list[dict[str, Any]]:
         """Entries of a path file, each safe: a joint move and, where the arm has a closed form, a line and an arc."""
         found = [self._first_safe(self._joint_moves(spots))]
-        if self.closed_form:
+        if self.follows_tool:
             found += [self._first_safe(self._lines(spots)), self._first_safe(self._arcs(spots))]
         return [entry for entry in found if entry]
 
-    def _candidates(self) -> Iterator[tuple[tuple[float, float, float], tuple[float, float, float]]]:
-        """Poses to try: above the ground on the side where the arm works, tool down; then those of drawn joints."""
-        base = self.robot.base
-        if self.reach.stands:
-            turn = np.radians(self.reach.side_deg)
-            out, aside = np.array([np.cos(turn), np.sin(turn), 0]), np.array([-np.sin(turn), np.cos(turn), 0])
-            for height in HEIGHTS:
-                for distance in DISTANCES:
-                    for share in ASIDE:
-                        point = base[:3, 3] + self.reach.radius * (distance * out + share * aside + [0, 0, height])
-                        yield _millimetres(point), (180.0, 0.0, 0.0)
-        for pose in self.reach.poses:
-            roll, pitch, yaw = np.round(np.degrees(rpy_of(pose))).tolist()
-            yield _millimetres(pose[:3, 3]), (roll, pitch, yaw)
+    def _candidates(self) -> Iterator[dict[str, list[float]]]:
+        """Poses to try: above the ground on the side where the arm works, tool down; then those of drawn joints.
 
-    def _spot(self, xyz_mm: tuple[float, float, float], rpy_deg: tuple[float, float, float]) -> Spot | None:
+        Arms with fewer than six joints get joint values alone: a rounded pose is none that they can hold. Those with
+        more get the joint values that settle what a pose leaves open.
+        """
+        if self.robot.joints < FULL_POSE:
+            for q in self.reach.q:
+                yield {"q_deg": self._written(q)}
+            return
+        if self.robot.joints > FULL_POSE:
+            middle = {"q_ref_deg": self._written(self.reach.q.mean(axis=0))}
+            yield from (pose | middle for pose in islice(self._above_ground(), TRIES_SLOW // 2))
+            yield from (pose | {"q_ref_deg": self._written(q)} for pose, q in zip(self._drawn(), self.reach.q))
+        else:
+            yield from self._above_ground()
+            yield from self._drawn()
+
+    def _above_ground(self) -> Iterator[dict[str, list[float]]]:
+        base = self.robot.base
+        if not self.reach.stands:
+            return
+        turn = np.radians(self.reach.side_deg)
+        out, aside = np.array([np.cos(turn), np.sin(turn), 0]), np.array([-np.sin(turn), np.cos(turn), 0])
+        for height in HEIGHTS:
+            for distance in DISTANCES:
+                for share in ASIDE:
+                    point = base[:3, 3] + self.reach.radius * (distance * out + share * aside + [0, 0, height])
+                    yield {"xyz_mm": _millimetres(point), "rpy_deg": [180.0, 0.0, 0.0]}
+
+    def _drawn(self) -> Iterator[dict[str, list[float]]]:
+        for pose in self.reach.poses:
+            yield {"xyz_mm": _millimetres(pose[:3, 3]), "rpy_deg": np.round(np.degrees(rpy_of(pose))).tolist()}
+
+    def _spot(self, pose: dict[str, list[float]]) -> Spot | None:
         """The pose with its best solution: within the limits, clear of everything, far from singular."""
-        written = {"name": "spot", "xyz_mm": list(xyz_mm), "rpy_deg": list(rpy_deg)}
         try:
-            target = parse(TargetEntry, written, None).target(self.robot)
+            target = parse(TargetEntry, {"name": "spot", **pose}, None).target(self.robot)
             solutions = inverse(self.robot, target.T, target.q_ref)
         except Er3aError:
             return None
         free = np.array([why is None for why in refusals(self.robot, solutions, self.scene)], dtype=bool)
         margin = limit_margin(self.robot, solutions.q)
-        rows = np.flatnonzero(free & solutions.solved & (margin > LIMIT_MARGIN_RAD))
+        rows = np.flatnonzero(free & solutions.solved & within(self.robot, solutions.q) & self._roomy(solutions.q))
         rows = rows[self._regular(solutions.q[rows])]
         if not rows.size:
             return None
         best = int(rows[margin[rows].argmax()])
-        return Spot(xyz_mm, rpy_deg, solutions.q[best], str(solutions.label[best]))
+        x, y, z = (target.T[:3, 3] * 1000).tolist()
+        written = {key: [*values] for key, values in pose.items()}  # lists of its own: YAML would alias those it shares
+        return Spot(written, (x, y, z), solutions.q[best], str(solutions.label[best]))
+
+    def _roomy(self, q: Reals) -> Flags:
+        """Whether joints (N, n) are away from their limits, by 8 deg or a twentieth of the range."""
+        robot = self.robot
+        least = np.minimum(np.where(robot.slides, np.inf, LIMIT_MARGIN_RAD), (robot.upper - robot.lower) / 20)
+        room = (np.minimum(q - robot.lower, robot.upper - q) > least) | robot.continuous
+        return np.asarray(room.all(axis=-1))
+
+    def _written(self, q: Reals) -> list[float]:
+        """Joint values (n,) as files have them: whole degrees and mm, hundredths where the range is small."""
+        step = np.where(shown(self.robot, self.robot.upper - self.robot.lower) > FINE_BELOW, 1.0, 0.01)
+        values: list[float] = (np.round(np.round(shown(self.robot, q) / step) * step, 2) + 0.0).tolist()
+        return values
 
     def _regular(self, q: Reals) -> Any:
-        if self.closed_form:
+        if self.follows_tool:
             return self.near.margin(self.robot, q) > SINGULAR_MARGIN
         smallest = conditioning(self.robot, q, characteristic_length(self.robot)).smallest_singular_value
         return smallest > LEAST_SINGULAR_VALUE
@@ -152,7 +209,7 @@ class TaskSearch:
     def _joint_moves(self, spots: list[Spot]) -> Iterator[dict[str, Any]]:
         for first, start in enumerate(spots):
             for end in spots[first + 1 :]:
-                degrees = [np.round(np.degrees(spot.q)).tolist() for spot in (start, end)]
+                degrees = [self._written(spot.q) for spot in (start, end)]
                 for duration in DURATIONS_S:
                     yield {
                         "name": "joint_move",
@@ -195,7 +252,7 @@ class TaskSearch:
             )
         except Er3aError:
             return False
-        if self.closed_form:
+        if self.follows_tool:
             if judge(self.robot, motion, self.near, self.limits).verdict != "safe":
                 return False
         elif (
@@ -227,10 +284,10 @@ def _distance(spot: Spot, other: Spot) -> float:
     return float(np.linalg.norm(np.subtract(spot.xyz_mm, other.xyz_mm)))
 
 
-def _millimetres(point: Reals) -> tuple[float, float, float]:
-    x, y, z = (np.round(point * 200) * 5 + 0.0).tolist()  # to 5 mm
-    return x, y, z
+def _millimetres(point: Reals) -> list[float]:
+    rounded: list[float] = (np.round(point * 200) * 5 + 0.0).tolist()  # to 5 mm
+    return rounded
 
 
 def _shifted(spot: Spot, way: Reals) -> dict[str, list[float]]:
-    return {"xyz_mm": list(_millimetres(np.array(spot.xyz_mm) / 1000 + way)), "rpy_deg": list(spot.rpy_deg)}
+    return {"xyz_mm": _millimetres(np.array(spot.xyz_mm) / 1000 + way), "rpy_deg": [*spot.written["rpy_deg"]]}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from er3a.files.robot_writer import yaml_text
 from er3a.files.scene_file import SceneFile
 from er3a.files.shipped import ROOT
 from er3a.files.yaml_file import parse, read_yaml
-from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.pipeline.new_study.brought_arm import Arm
 from er3a.pipeline.new_study.surroundings import reach_of, scenes
 from er3a.pipeline.new_study.tasks import LEAST_TARGETS, Spot, TaskSearch
@@ -28,6 +29,10 @@ HELP = "data/manual_refs/README.md"
 SCHEMAS = ("study", "robot", "targets", "paths", "scene")
 SAMPLES = 8_000_000
 """Of the workspace: a quarter of the project's own study."""
+NOTHING_CLEAR = (
+    "no poses were found that the arm reaches clear of itself, of its limits and of singularities: targets and path "
+    "are random joint values; check its table, its joint limits and its envelopes"
+)
 
 
 def write_study(arm: Arm, folder: Path) -> list[Path]:
@@ -40,7 +45,7 @@ def write_study(arm: Arm, folder: Path) -> list[Path]:
     Raises
     ------
     Er3aError
-        a file stands where one would be written, or no pose was found that the arm reaches; then nothing is written
+        a file stands where one would be written; then nothing is written
     """
     name = arm.robot.name
     places = {
@@ -53,7 +58,9 @@ def write_study(arm: Arm, folder: Path) -> list[Path]:
     }
     if there := sorted(place for place in places if (folder / place).exists()):
         raise Er3aError(f"{folder / there[0]} is there already, and is kept; give another folder")
-    scene, spots, paths = _found(arm)
+    scene, spots, paths, clear = _found(arm)
+    if not clear:
+        arm = replace(arm, notes=(*arm.notes, NOTHING_CLEAR))
     texts = {
         STUDY: _study(name),
         SCENE: _with_schema("scene", scene),
@@ -69,28 +76,28 @@ def write_study(arm: Arm, folder: Path) -> list[Path]:
     return [folder / place for place in texts if place not in aids]
 
 
-def _found(arm: Arm) -> tuple[dict[str, Any], list[Spot], list[dict[str, Any]]]:
-    """Scene, poses and paths: of the first scene in which the arm finds poses and a path."""
+def _found(arm: Arm) -> tuple[dict[str, Any], list[Spot], list[dict[str, Any]], bool]:
+    """Scene, poses and paths: of the first scene in which the arm finds poses and a path, and whether there is one."""
     reach = reach_of(arm.robot)
     settings = parse(TrajectorySettings, read_yaml(ROOT / STUDY)["trajectory"], STUDY)
     for scene in scenes(arm.robot, reach):
         search = TaskSearch(arm.robot, reach, parse(SceneFile, scene, None).scene(), settings)
         spots = search.spots()
         if len(spots) >= LEAST_TARGETS and (paths := search.paths(spots)):
-            return scene, spots, paths
-    problem = "no poses were found that it reaches clear of itself, of its limits and of singularities"
-    raise Er3aError(f"{arm.robot.name}: {problem}. Check its table, its joint limits and its envelopes")
+            return scene, spots, paths, True
+    spots = search.any_spots()
+    return scene, spots, search.any_path(spots), False
 
 
 def _targets(spots: list[Spot]) -> list[dict[str, Any]]:
     notes = {
         True: ("Tool straight down.", "工具竖直朝下。"),
-        False: ("As the arm holds the tool at random joint angles.", "随机关节角下的工具姿态。"),
+        False: ("As the arm holds the tool at random joint values.", "随机关节值下的工具姿态。"),
     }
     found = []
     for number, spot in enumerate(spots, 1):
         note, note_zh = notes[spot.down]
-        found.append({"name": f"target_{number}", "note": note, "note_zh": note_zh, **spot.pose})
+        found.append({"name": f"target_{number}", "note": note, "note_zh": note_zh, **spot.written})
     return found
 
 
@@ -113,6 +120,6 @@ def _readme(arm: Arm, spots: list[Spot], paths: list[dict[str, Any]]) -> str:
     environment = jinja2.Environment(trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined)
     columns = {kind: ",".join(form.all_columns) for kind, form in FORMATS.items()}
     page = environment.from_string(template)
-    closed_form = closed_form_missing(arm.robot) is None
+    follows_tool = has_branches(arm.robot)
     parts = {"arm": arm, "robot": arm.robot, "spots": spots, "paths": paths, "columns": columns}
-    return page.render(**parts, closed_form=closed_form) + "\n"
+    return page.render(**parts, follows_tool=follows_tool) + "\n"

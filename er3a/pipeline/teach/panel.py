@@ -25,6 +25,7 @@ from er3a.robots.robot import Robot
 
 _HERE = Path(__file__).parent
 TABLE = ("a", "alpha", "d", "beta", "direction", "offset", "lower", "upper", "base", "tool")
+SIX = 6
 NEAR_LIMIT = np.radians(5.0)
 NEAR_SINGULAR = 1e-2  # smallest singular value below which an arm without named singularities is warned of one
 
@@ -32,6 +33,17 @@ NEAR_SINGULAR = 1e-2  # smallest singular value below which an arm without named
 def write_teach_page(study: Study, name: str, output: Path) -> None:
     """Write the teach panel of a robot of the study to ``output``."""
     robot = study.robot(name)
+    if robot.joints != SIX or robot.rows != SIX or robot.sliding.any() or robot.coupling is not None:
+        render(
+            _HERE / "teach_absent.html.j2",
+            output,
+            robot=robot,
+            robot_pages=study.pages(name),
+            words=_translated(WORDS),
+            command=run_command(study, f"{name}/teach.html"),
+            provenance=_provenance(study, name),
+        )
+        return
     settings = study.section(TrajectorySettings)
     near = {
         "wrist": np.radians(settings.near_wrist_deg),
@@ -51,12 +63,13 @@ def write_teach_page(study: Study, name: str, output: Path) -> None:
         panel=panel,
         modules=import_map(sorted(_HERE.glob("*.js"))),
         command=run_command(study, f"{name}/teach.html"),
-        provenance=Provenance(
-            inputs=input_records(study.inputs(name, "teach")),
-            code=code_digest(__name__),
-            config=study.settings(name, "trajectory"),
-        ),
+        provenance=_provenance(study, name),
     )
+
+
+def _provenance(study: Study, name: str) -> Provenance:
+    inputs = input_records(study.inputs(name, "teach"))
+    return Provenance(inputs=inputs, code=code_digest(__name__), config=study.settings(name, "trajectory"))
 
 
 def panel_data(robot: Robot, near: dict[str, float]) -> dict[str, Any]:

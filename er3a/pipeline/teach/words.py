@@ -12,6 +12,10 @@ WORDS: dict[str, Any] = {
         "Move the joints and watch the tool: its pose, the limits, how near the arm comes to a singularity, and which "
         "other joint angles reach the same pose."
     ),
+    "absent": N_(
+        "The teach panel moves arms with six joints that turn, each by itself; this arm has others. "
+        "Its recordings show it in motion."
+    ),
     "no_script": N_("This page computes in the browser; it needs JavaScript."),
     "view": N_("The arm"),
     "picture": N_(

@@ -13,10 +13,9 @@ from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning.intervals import (
-    AboveLimit,
     AccelerationTooGreatIfAssumed,
-    BelowLimit,
     Interval,
+    LimitCause,
     PathOutOfReach,
     RateCause,
     TooFastIfAssumed,
@@ -52,7 +51,7 @@ class Judgement:
 
     verdict: PathVerdict
     events: list[SingularEvent]
-    limits: list[Interval[AboveLimit | BelowLimit]]
+    limits: list[Interval[LimitCause]]
     beyond: list[Interval[PathOutOfReach]]
     fast: list[Interval[RateCause]]
     undecided: list[Interval[Undecided]]
@@ -71,7 +70,7 @@ class _Found:
     """Faults of a motion, and its greatest speeds and accelerations (n,), if any are known."""
 
     events: list[SingularEvent]
-    limits: list[Interval[AboveLimit | BelowLimit]]
+    limits: list[Interval[LimitCause]]
     fast: list[Interval[RateCause]]
     undecided: list[Interval[Undecided]]
     greatest: tuple[Reals, Reals] | None

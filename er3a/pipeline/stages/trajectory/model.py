@@ -19,7 +19,7 @@ from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.planning.avoidance.strategies import NotUsable
 from er3a.planning.avoidance.strategy_names import StrategyName
-from er3a.planning.intervals import AboveLimit, BelowLimit, PathOutOfReach, RateCause
+from er3a.planning.intervals import LimitCause, PathOutOfReach, RateCause
 from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.tool_proof import Undecided
 from er3a.planning.way_around import NoWayAround
@@ -249,7 +249,7 @@ class PathSummary:
     start_turn_deg: tuple[float, ...] | None
     singularities: tuple[Singularity, ...]
     unreachable: tuple[Stretch[PathOutOfReach], ...]
-    out_of_limits: tuple[Stretch[AboveLimit | BelowLimit], ...]
+    out_of_limits: tuple[Stretch[LimitCause], ...]
     too_fast: tuple[Stretch[RateCause], ...]
     undecided: tuple[Stretch[Undecided], ...]
     jumps: tuple[Jump, ...]

@@ -21,6 +21,7 @@ from er3a.programs.syntax import Language
 from er3a.programs.write_program import write_program
 from er3a.programs.writing import HEAD, WriteOptions, ascii_text, head_line, program_name
 from er3a.robots.robot import Robot
+from er3a.robots.shown import joint_columns, shown
 
 LONGEST_NAME = 24
 
@@ -34,6 +35,8 @@ def written(
     ------
     ValueError
         for a path whose start can't be reached
+    InputError
+        for a controller's language that has other joints than this arm
     """
     start = motion.q[0]
     if not np.isfinite(start).all():
@@ -46,7 +49,7 @@ def written(
         known = np.isfinite(joints[:, 0])
         told = tuple(HEAD + line for line in (*head, *map(head_line, unsafe)))
         poses = np.linalg.inv(robot.base) @ forward(robot, joints[known])
-        return {".csv": write_csv(times[known], joints[known], poses, told)}, unsafe
+        return {".csv": write_csv(times[known], shown(robot, joints[known]), poses, told, joint_columns(robot))}, unsafe
     command = motion.entry.command(CommandSource(), robot)
     if isinstance(command, PlanCommand):  # a planned motion is written as the points that its samples are
         timing = Times(motion.samples, np.arange(len(motion.samples)))

@@ -44,15 +44,15 @@ def against_itself(
 
 
 def checks_of_set(
-    references: ReferenceSet, values: Reals, bases: Sequence[CheckBasis]
+    references: ReferenceSet, values: Reals, bases: Sequence[CheckBasis], joints: int = 6
 ) -> tuple[list[Check], list[Conflict]]:
     """Judge a model's values (n,) of the set's checkable references, and list what the set says nothing about.
 
-    ``bases`` (n,): what each of these checks rests on.
+    ``bases`` (n,): what each of these checks rests on; ``joints`` : of the arm.
     """
     stated = _Stated(references.name, references.checkable, values, bases)
     checks = [stated.check(i) for i in range(len(values))]
-    return [*checks, *_gaps(references)], stated.conflicts()
+    return [*checks, *_gaps(references, joints)], stated.conflicts()
 
 
 class _Stated:
@@ -134,7 +134,7 @@ def _without_value(set_name: str, reference: Reference, note: Note) -> Unjudged:
     )
 
 
-def _gaps(references: ReferenceSet) -> list[Unjudged]:
+def _gaps(references: ReferenceSet, joints: int) -> list[Unjudged]:
     """What the set says nothing about."""
     name, note = references.name, SetHasNoData(references.name)
     stated = {reference.quantity for reference in references.checkable}
@@ -149,7 +149,7 @@ def _gaps(references: ReferenceSet) -> list[Unjudged]:
     ]
     quantities = {reference.quantity for reference in references.references}
     with_axis = {row.joint for row in references.of(AxisRow)}
-    for joint in range(1, 7):
+    for joint in range(1, joints + 1):
         if "axes" in present and joint not in with_axis:
             gaps.append(Unjudged(AxisPosition(joint, None), "axes", "mm", note, reference_set=name))
         wanted: list[tuple[str, ReferenceSubject, Quantity]] = [

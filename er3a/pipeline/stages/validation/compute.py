@@ -8,7 +8,7 @@ from er3a.files.reference_documents import check_robot_origins
 from er3a.files.reference_sets import load_references
 from er3a.identifiability.evidence import evidence_of
 from er3a.identifiability.proposals import proposals_of
-from er3a.identifiability.reactions import bases_of
+from er3a.identifiability.reactions import bases_of, bases_untold
 from er3a.kinematics.table_batch import robot_of
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.pipeline.stages.validation.check_model import Check, Conflict, Unjudged
@@ -74,8 +74,10 @@ def compute(study: Study, name: str) -> ValidationResults:
     for references in sets:
         quantities = quantities_of(references.checkable)
         state = state_of(robot, quantities, extremes=values, axes=circles.axes)
-        bases = bases_of(robot, references.checkable, references.documents) if plain else ()
-        judged, contradictions = checks_of_set(references, read(quantities, state), bases)
+        bases = (
+            bases_of(robot, references.checkable, references.documents) if plain else bases_untold(references.checkable)
+        )
+        judged, contradictions = checks_of_set(references, read(quantities, state), bases, robot.joints)
         checks += judged
         conflicts += contradictions
     checks += _without_reference(robot, values, checks)

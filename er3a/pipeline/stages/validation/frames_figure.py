@@ -22,9 +22,9 @@ LABEL_SHIFT = 9
 
 
 def link_frames(robot: Robot, other: Robot | None, other_label: str) -> Figure:
-    """The links at all joints 0 with frames 0 (base) to 6 (flange), x red, y green, z blue; another table dashed."""
+    """The links at all joints 0 with frames 0 (base) to n (flange), x red, y green, z blue; another table dashed."""
     figure, axes = new_figure(width=5.4, height=5.6)
-    zero = np.zeros(6)
+    zero = np.zeros(robot.joints)
     corners = skeleton(robot, zero) * 1000
     drawn = [corners]
     if other is not None:
@@ -58,8 +58,8 @@ def link_frames(robot: Robot, other: Robot | None, other_label: str) -> Figure:
 
 
 def _frames_of_links(robot: Robot) -> Reals:
-    """Frames 1 to 6 of the table (6, 4, 4) at all joints 0: those in which its rows are written."""
-    return np.stack([forward(robot, np.zeros(6), frame=k) for k in range(1, 7)])
+    """Frames 1 to m of the table (m, 4, 4) at all joints 0: those in which its rows are written."""
+    return np.stack([forward(robot, np.zeros(robot.joints), frame=k) for k in range(1, robot.rows + 1)])
 
 
 def _seen(points: Reals) -> Reals:

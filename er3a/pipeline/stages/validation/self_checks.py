@@ -40,7 +40,8 @@ GROUP: Literal["round_trips"] = "round_trips"
 def table_checks(robot: Robot) -> list[Check]:
     """Checks of the table alone: sound numbers in plausible units, and whether a closed-form inverse applies to it."""
     parts = [robot.a, robot.alpha, robot.d, robot.offset, robot.lower, robot.upper, robot.base]
-    lengths, limits = np.abs([robot.a, robot.d]), np.abs([robot.lower, robot.upper])
+    limits = np.abs([robot.lower, robot.upper])
+    lengths = np.concatenate([np.abs([robot.a, robot.d]).ravel(), limits[:, robot.slides].ravel()])
     turning = limits[:, ~robot.slides & ~robot.continuous]
     faults: dict[SelfChecked, int] = {
         "numbers_not_finite": sum(int((~np.isfinite(part)).sum()) for part in parts),

@@ -41,13 +41,14 @@ SHOWN_DECIMALS = 9
 def set_summaries(
     robot: Robot, sets: list[ReferenceSet], checks: list[Check], poses: KeyPoses, diagnoses: Mapping[str, SetDiagnosis]
 ) -> tuple[SetSummary, ...]:
-    """What was found against each reference set; diagnoses by its name."""
+    """What was found against each reference set; diagnoses by its name, as far as there are any."""
     found = []
     for references in sets:
         counts = counts_of(check for check in checks if check.reference_set == references.name)
         weighing = counts.independent, counts.consistency
         most_fail = sum(each.failed for each in weighing) > sum(each.total for each in weighing) / 2
-        unexplained = isinstance(diagnoses[references.name].conclusion, NoFaultStandsOut | NoFewFaultsExplain)
+        diagnosis = diagnoses.get(references.name)  # there is none of arms with other than six turning joints
+        unexplained = diagnosis is not None and isinstance(diagnosis.conclusion, NoFaultStandsOut | NoFewFaultsExplain)
         found.append(
             SetSummary(
                 name=references.name,

@@ -59,12 +59,15 @@ def _draw_top(figure: Figure, axes: Axes, robot: Robot, cells: CellMap) -> None:
     axis = robot.base[:2, 3] * 1000
     axes.plot(*axis, "+", color=INK, markersize=10, markeredgewidth=1.6)
     title = tr("From above: joint 1 makes a full turn")
-    if robot.upper[0] - robot.lower[0] < _FULL_TURN:
+    if robot.slides[0]:
+        lower, upper = (fixed(limit, 0) for limit in 1000 * np.array([robot.lower[0], robot.upper[0]]))
+        title = tr("From above: joint 1 slides from {lower} to {upper} mm", lower=lower, upper=upper)
+    elif robot.upper[0] - robot.lower[0] < _FULL_TURN and not robot.continuous[0]:
         lower, upper = (fixed(limit, 0) for limit in np.degrees([robot.lower[0], robot.upper[0]]))
         title = tr("From above: joint 1 turns from {lower} to {upper} deg", lower=lower, upper=upper)
         size = max(np.ptp(cells.edges(0)), np.ptp(cells.edges(1))) / 2
         for limit in (robot.lower[0], robot.upper[0]):
-            tool = forward(robot, np.array([limit, 0, 0, 0, 0, 0]))[:2, 3] * 1000 - axis
+            tool = forward(robot, np.append(limit, np.zeros(robot.joints - 1)))[:2, 3] * 1000 - axis
             length = np.linalg.norm(tool)
             if length > 1:
                 axes.plot(*np.transpose([axis, axis + tool / length * size]), color=LIMIT, linewidth=1.8)
