@@ -20,7 +20,7 @@ from er3a.planning.path_verdicts import PATH_VERDICTS, PathVerdict
 from er3a.planning.tool_proof import Wanted
 from er3a.planning.way_around import PlanningTask
 from er3a.program_check.check_program import NEAR, CheckOptions, assumed_limits
-from er3a.programs.arm_joints import not_expressed
+from er3a.programs.arm_joints import not_written
 from er3a.programs.program_findings import WriteFinding
 from er3a.programs.syntax import Language
 from er3a.programs.write_program import WITHOUT_JOINTS
@@ -57,7 +57,7 @@ def programs_of(
     InputError
         for a path file that can't be used, a name that it does not have, an arm that the language can't move by joints
     """
-    if reason := not_expressed(language, robot):
+    if reason := not_written(language, robot):
         raise InputError(None, None, reason, WITHOUT_JOINTS)
     surroundings = Surroundings(Bodies(robot, scene), TOLERANCE)
     task = PlanningTask(robot, surroundings.bodies, TOLERANCE, assumed_limits(robot, CheckOptions()), SEED)

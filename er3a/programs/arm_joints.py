@@ -27,6 +27,11 @@ def not_expressed(language: Language, robot: Robot) -> str:
     return other_count(language, robot.joints)
 
 
+def not_written(language: Language, robot: Robot) -> str:
+    """Why a language has no program for an arm; empty if it has. A table holds any joints, those that slide in mm."""
+    return "" if language == "csv" else not_expressed(language, robot)
+
+
 def other_count(language: Language, joints: int) -> str:
     """Why a language has no joint targets of so many angles; empty if it has."""
     known = JOINTS.get(language)

@@ -46,7 +46,7 @@ from er3a.pipeline.stages.trajectory.path_figures import PathFigure
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import fixed, head_of, number, render, run_command
 from er3a.planning.path_verdicts import PathVerdict
-from er3a.programs.arm_joints import WORDS, not_expressed
+from er3a.programs.arm_joints import WORDS, not_written
 from er3a.robots.robot import Robot
 
 DRAWN = 250
@@ -122,7 +122,7 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
         robot=robot,
         robot_pages=study.pages(stored.robot),
         sections=sections,
-        unwritten=[WORDS[each] for each in study.section(TrajectorySettings).programs if not_expressed(each, robot)],
+        unwritten=[WORDS[each] for each in study.section(TrajectorySettings).programs if not_written(each, robot)],
         clearance=clearance_section(results),
         assumed=assumed,
         turning=turning_figure(robot, results),

@@ -13,7 +13,7 @@ from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning.commands import CommandSource, JointTableCommand, PlanCommand, ToolMoveCommand
 from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.profiles import Times
-from er3a.programs.arm_joints import not_expressed
+from er3a.programs.arm_joints import not_written
 from er3a.programs.csv_program import write_csv
 from er3a.programs.from_commands import listing_of
 from er3a.programs.program_findings import WriteFinding, WrittenUnsafe
@@ -70,7 +70,7 @@ def program_files(
     rows: list[tuple[str, str, str]] = []
     allowed = verdict == "safe" or (write_unsafe and np.isfinite(motion.q[0]).all())
     for language in languages if allowed else ():
-        if not_expressed(language, robot):
+        if not_written(language, robot):
             continue
         files, _ = written(robot, motion, verdict, language)
         name = program_name(motion.entry.name, LONGEST_NAME)
