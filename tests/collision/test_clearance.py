@@ -10,7 +10,7 @@ from er3a.collision.clearance import clearance
 from er3a.collision.envelopes import capsule_poses, default_envelopes, envelopes_of
 from er3a.collision.pairs import LinkAndSolid, LinkPair
 from er3a.collision.scene import Scene
-from er3a.errors import InputError
+from er3a.errors import InputError, InputWarning
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.files.robot_writer import write_robot
 from er3a.files.scene_file import SceneFile, load_scene
@@ -111,15 +111,23 @@ def test_envelopes_of_the_file_replace_the_default(tmp_path):
     [
         ({"link": 7}, "envelopes.capsules[0].link"),
         ({"radius_mm": 0.05}, "envelopes.capsules[0].radius_mm"),
-        ({"to_mm": [0, 0, 0.3]}, "envelopes.capsules[0].to_mm"),
         ({"colour": 1}, "envelopes.capsules[0].colour"),
     ],
 )
 def test_bad_envelopes_are_refused(tmp_path, change, field):
+    with pytest.raises(InputError) as caught:
+        with_capsule(tmp_path, change)
+    assert caught.value.field == field
+
+
+def test_capsules_that_look_like_metres_are_a_warning(tmp_path):
+    with pytest.warns(InputWarning, match="envelopes.capsules: .* mm may be metres"):
+        with_capsule(tmp_path, {"to_mm": [0, 0, 0.3]})
+
+
+def with_capsule(tmp_path, change):
     content = yaml.safe_load((ROBOTS / "er3_600.yaml").read_text(encoding="utf-8"))
     capsule = {"link": 6, "from_mm": [0.0, 0.0, 0.0], "to_mm": [0.0, 0.0, 300.0], "radius_mm": 20.0} | change
     content |= {"name": "arm", "envelopes": {"source": "x", "grade": "inferred", "capsules": [capsule]}}
     (tmp_path / "arm.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
-    with pytest.raises(InputError) as caught:
-        load_robot(tmp_path / "arm.yaml")
-    assert caught.value.field == field
+    return load_robot(tmp_path / "arm.yaml")

@@ -14,6 +14,7 @@ from er3a.collision.envelopes import envelopes_of
 from er3a.collision.matrix import collision_matrix
 from er3a.collision.pairs import CarriedAndLink, CarriedAndSolid, LinkPair
 from er3a.collision.scene import Scene
+from er3a.errors import InputError
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.files.robot_writer import write_robot
 from er3a.files.scene_file import SceneFile
@@ -209,5 +210,5 @@ def test_what_the_tool_carries_is_looked_at_and_may_touch_what_is_allowed():
 def test_files_decide_only_on_what_there_is():
     assert (ROBOTS / "er3_600.yaml").is_file()
     rules = (PairRule("base", "link_9", "allow", "x"),)
-    with pytest.raises(ValueError, match="there is no 'link_9'"):
+    with pytest.raises(InputError, match="there is no 'link_9'"):
         write_robot(load_robot("er3_600").replace(pair_rules=rules), ROBOTS / "never_written.yaml")
