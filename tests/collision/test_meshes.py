@@ -31,6 +31,7 @@ def angle_iron() -> trimesh.Trimesh:
     return trimesh.Trimesh(vertices, np.concatenate([faces[:, ::-1], faces + 6, side]), process=False)
 
 
+@pytest.mark.filterwarnings("ignore:Setting the shape:DeprecationWarning")  # of the library that writes DAE
 @pytest.mark.parametrize("suffix", ["stl", "obj", "dae", "glb"])
 def test_formats_give_the_same_mesh(tmp_path, suffix):
     mesh = angle_iron()
