@@ -30,7 +30,7 @@ def test_tab_key_reaches_everything_in_the_page_s_order(browser, small_study, pa
         assert outlined, f"focus can't be seen on control {number}"
     assert reached == list(range(len(reached)))
     kinds = browser.execute_script(
-        "return controls.slice(0, arguments[0]).map((c) => c.className || c.tagName)", MOST_TABS
+        "return controls.slice(0, arguments[0]).map((c) => c.classList[0] || c.tagName)", MOST_TABS
     )
     assert kinds[0] == "A" or page == "index.html"
     if sortable:

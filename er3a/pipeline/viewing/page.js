@@ -144,7 +144,7 @@ function nameHeading(heading, taken) {
 function addContents() {
   const wide = matchMedia(document.body.classList.contains("wide") ? "not all" : "(min-width: 112rem) and (max-width: 149.99rem)");
   const headings = [...document.querySelectorAll("main h2")];
-  if (headings.length < 3) return;
+  if (headings.length < 3 || document.body.classList.contains("teach")) return;
   const titles = headings.map((heading) => heading.innerText);
   const taken = new Set();
   headings.forEach((heading) => nameHeading(heading, taken));

@@ -181,10 +181,15 @@ def _joints(path: PathLoad) -> list[list[str]]:
             moment(path.name, load.peak_at_s, fixed(load.peak_at_s, 2)),
             f"{number(_no_noise(load.rms), 3)} ± {number(_no_noise(load.rms_tolerance), 2)}",
             *(number(_no_noise(getattr(load, part)), 3) for part in PARTS),
-            *(number(_no_noise(value), 3) for value in (load.power_w, load.braking_w, load.work_j, load.recovered_j)),
+            _both(load.power_w, load.braking_w),
+            _both(load.work_j, load.recovered_j),
         ]
         for load in path.joints
     ]
+
+
+def _both(given: float, taken: float) -> str:
+    return f"{number(_no_noise(given), 3)} / {number(_no_noise(taken), 3)}"
 
 
 def _held(held: HoldingTorque) -> list[str]:
