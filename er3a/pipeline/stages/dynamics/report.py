@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from markupsafe import Markup
 
 from er3a.pipeline.messages.dynamics import BINDING, FIGURES
 from er3a.pipeline.messages.dynamics_verdict import quantity_word
@@ -188,8 +189,8 @@ def _joints(path: PathLoad) -> list[list[str]]:
     ]
 
 
-def _both(given: float, taken: float) -> str:
-    return f"{number(_no_noise(given), 3)} / {number(_no_noise(taken), 3)}"
+def _both(given: float, taken: float) -> Markup:
+    return Markup("{}<br>{}").format(number(_no_noise(given), 3), number(_no_noise(taken), 3))
 
 
 def _held(held: HoldingTorque) -> list[str]:
