@@ -157,7 +157,8 @@ def test_arms_with_other_joints_get_a_study_that_holds(tmp_path, monkeypatch, ta
     assert languages == (
         {"csv", "krl"} if joints == 5 else {"csv"}
     )  # of those with joints that turn, KRL has fewer too
-    header, row, *_ = [line for line in found.programs.text[0].splitlines() if not line.startswith("#")]
+    text = found.programs.text[list(found.programs.language).index("csv")]
+    header, row, *_ = [line for line in text.splitlines() if not line.startswith("#")]
     assert len(header.split(",")) == len(row.split(",")) == 1 + joints + 6
     assert [name for name in header.split(",") if name.startswith("q")] == list(joint_columns(arm.robot))
 
