@@ -235,17 +235,15 @@ def _limits(path: Path, sources: list[UrdfJoint]) -> tuple[Reals, list[str]]:
         if joint.type == "continuous":
             notes.append(f"joint {joint.name} is continuous: it has no limits, and one turn is sampled")
             lower, upper = -math.pi, math.pi
-        elif joint.type == "revolute" and (lower == upper == 0 or (math.isnan(lower) and math.isnan(upper))):
+        elif lower == upper == 0 or (math.isnan(lower) and math.isnan(upper)):
             has = "no limits" if math.isnan(lower) else "the limits 0 and 0"
-            notes.append(f"joint {joint.name} has {has}: +-180 deg were assumed")
-            lower, upper = -NO_RANGE, NO_RANGE
+            turns = joint.type == "revolute"
+            half, shown = (NO_RANGE, "180 deg") if turns else (NO_SLIDE_M, f"{NO_SLIDE_M * 1000:g} mm")
+            notes.append(f"joint {joint.name} has {has}: +-{shown} were assumed")
+            lower, upper = -half, half
         elif joint.type == "revolute" and max(abs(lower), abs(upper)) > MOST_TURNED:
             notes.append(f"joint {joint.name} has limits beyond ten turns: +-180 deg were assumed")
             lower, upper = -NO_RANGE, NO_RANGE
-        elif joint.type == "prismatic" and (lower == upper == 0 or (math.isnan(lower) and math.isnan(upper))):
-            has = "no limits" if math.isnan(lower) else "the limits 0 and 0"
-            notes.append(f"joint {joint.name} has {has}: +-{NO_SLIDE_M * 1000:g} mm were assumed")
-            lower, upper = -NO_SLIDE_M, NO_SLIDE_M
         elif joint.type == "prismatic" and max(abs(lower), abs(upper)) > MOST_SLID_M:
             notes.append(f"joint {joint.name} has limits beyond {MOST_SLID_M:g} m: it was held to that")
             lower, upper = max(lower, -MOST_SLID_M), min(upper, MOST_SLID_M)

@@ -156,6 +156,10 @@ def test_ends_of_intervals_are_attained_by_tables_that_meet_the_documents(entry)
         assert oracle.worst(arm, independent(name))[0] <= FEASIBLE, end
 
 
+def test_the_drawing_settles_no_entry_of_the_er3_600():
+    assert settled("er3_600") == []
+
+
 def table_at(name, entry, sign):
     """The table with which the search ends, begun from the farthest one that it knows."""
     robot = load_robot(name)
@@ -207,7 +211,7 @@ def signatures(tables: oracle.Rows, rows: oracle.Rows) -> np.ndarray:
     return (T * [1, 1, 1, 1000]).reshape(len(T), -1)
 
 
-@pytest.mark.parametrize("name", ["er3a_c60", "er3_600"])
+@pytest.mark.parametrize("name", ["er3a_c60"])  # nothing of the er3_600 is settled by its drawing
 def test_discrete_changes_of_settled_entries_are_excluded_or_the_same_robot_as_without(name):
     """All combinations of up to three changes: one that holds a settled entry and meets the independent documents is
     the same arm as a combination of changes of others."""
@@ -230,7 +234,7 @@ def test_discrete_changes_of_settled_entries_are_excluded_or_the_same_robot_as_w
             if np.abs(own - theirs).max(axis=1).min() > 1e-6:
                 assert oracle.worst(flipped(rows, [each]), independent(name))[0] > 1, each
             checked += 1
-    assert checked or not held
+    assert checked
 
 
 def _plain(said: oracle.Statement) -> bool:
