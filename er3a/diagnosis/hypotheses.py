@@ -23,6 +23,7 @@ from er3a.references.reference import Reference, expected_of
 FREE_NUMBER = 1.5
 UNCHANGED = 1e-9
 LEAST_SCALE = 1e-3
+DECIMALS = 12
 SAME_ANGLE, SAME_LENGTH = 0.1, 0.02  # rad; of the arm's length
 FEW_PASSES, MANY_PASSES, ALL_PASSES = 3, 10, 40
 MOST_PROMISING = 400
@@ -138,13 +139,26 @@ def joined_pools(pools: Sequence[Pool]) -> Pool:
 
 
 def _two_repairs(case: Case) -> Pool:
+    """Every two repairs, and the other way round where that leads to a table that no two lead to otherwise."""
     repairs = case.repairs
-    tables, pairs = [], list[tuple[Repair, ...]]()
     singles = [repair.apply(case.given) for repair in repairs]
-    for i, first in enumerate(repairs[:-1]):
-        tables.append(first.apply(join(singles[i + 1 :])))
-        pairs += [(first, second) for second in repairs[i + 1 :]]
-    return case.pool(join(tables), *_named(pairs))
+    places = list(combinations(range(len(repairs)), 2))
+    one_way = [first.apply(join(singles[i + 1 :])) for i, first in enumerate(repairs[:-1])]
+    other_way = [last.apply(join(singles[:j])) for j, last in enumerate(repairs) if j]
+    turned = [(j, i) for j in range(len(repairs)) for i in range(j)]
+    tables = join([*one_way, *other_way])
+    kept = np.flatnonzero((_first_alike(tables) >= len(places)) | (np.arange(len(tables)) < len(places)))
+    pairs = [(*places, *turned)[k] for k in kept.tolist()]
+    return case.pool(tables[kept], *_named([(repairs[i], repairs[j]) for i, j in pairs]))
+
+
+def _first_alike(tables: Tables) -> NDArray[np.int64]:
+    """For each table the place of the first that is the same, (H,)."""
+    columns = [getattr(tables, field.name) for field in fields(tables) if field.name != "modified"]
+    rows = np.hstack([tables.modified[:, None].astype(float), *columns]).round(DECIMALS) + 0.0
+    _, first, alike = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    found: NDArray[np.int64] = first[alike.reshape(-1)]
+    return found
 
 
 def _repair_and_number(case: Case, thorough: bool = False) -> Pool:

@@ -7,8 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from er3a.identifiability.challenges import challenges_to
 from er3a.identifiability.elsewhere import FAR, Elsewhere, open_elsewhere, seen_entries
 from er3a.identifiability.entries import TableNumber, shifted
+from er3a.identifiability.entry_evidence import Tolerance
 from er3a.identifiability.feasible import MET, WIDEST_DEG, OpenTable, Reached, Region, farthest
 from er3a.identifiability.gauge import Gauge
 from er3a.identifiability.requirements import Asked
@@ -47,6 +49,7 @@ class Extents:
     ----------
     table : from which the search starts (a batch of one)
     entries : all that can take any value; speaking : places of those to which a requirement reacts
+    tolerance : how far the tool may be off for what counts as settled
     found : a table that meets the requirements, if the search from ``table`` is known to find none
     """
 
@@ -60,7 +63,9 @@ class Extents:
         tool: ToolRange,
         *,
         found: Tables | None = None,
+        tolerance: Tolerance | None = None,
     ):
+        self.tolerance = tolerance or Tolerance()
         self.asked, self.table, self.entries, self.tool = asked, table, tuple(entries), tool
         self.speaking = list(speaking)
         self.held = self._held(gauge, self.speaking)
@@ -70,15 +75,16 @@ class Extents:
         self.table_meets = table is tool.table and (self.start is None or not self.start.amounts.any())
         self.met = self.start is None or self.start.open
         self._extended: dict[bytes, Reached] = {}
+        self._challenged = False
         self.elsewhere: list[Elsewhere] = []
         if self.start is not None and self.met:
             self.seen = sorted({*self.speaking, *seen_entries(asked, table, self.entries)})
-            everywhere = Region(asked, table, [entries[k] for k in self.seen], self._held(gauge, self.seen))
+            self._everywhere = Region(asked, table, [entries[k] for k in self.seen], self._held(gauge, self.seen))
             amounts = np.zeros(len(entries))
             amounts[self.speaking] = self.start.amounts
             self.begun = amounts[self.seen]
-            watched = [self.seen.index(k) for k in self.speaking]
-            self.elsewhere = open_elsewhere(everywhere, replace(self.start, amounts=self.begun), watched)
+            self._begun = replace(self.start, amounts=self.begun)
+            self.elsewhere = open_elsewhere(self._everywhere, self._begun, self._watched)
 
     @staticmethod
     def _held(gauge: Gauge, places: Sequence[int]) -> Reals:
@@ -112,6 +118,8 @@ class Extents:
         if not self.met:
             return Extent(np.nan, np.nan, NOT_OFF, bool(self._blamed(factors)))
         low, high, excluded, at_least = self._found(factors)
+        if not at_least and self._challenge():
+            low, high, excluded, at_least = self._found(factors)
         measured = self._measured(entry) if at_least and np.count_nonzero(factors) == 1 else None
         if measured and measured[0] <= value <= measured[1]:
             (low, high), at_least = ((bound - value) / factor for bound in measured), False
@@ -127,6 +135,34 @@ class Extents:
             if (own.column, own.joint) == (entry.column, entry.joint):
                 return each.expected - each.half_width, each.expected + each.half_width
         return None
+
+    @property
+    def _watched(self) -> list[int]:
+        """Places of the entries to which a requirement reacts, among those that are seen."""
+        return [self.seen.index(k) for k in self.speaking]
+
+    def _challenge(self) -> bool:
+        """Look once for tables that speak against what was found; whether there are any."""
+        if self._challenged or self.start is None or not self.met:
+            return False
+        self._challenged = True
+        matters = {place: self._step_that_matters(self.entries[self.seen[place]]) for place in self._watched}
+        found = challenges_to(self._everywhere, self._begun, matters)
+        self.elsewhere += found
+        return bool(found)
+
+    def _step_that_matters(self, entry: TableNumber) -> float:
+        """The least change of an entry, in its scale, by which the tool is off by more than is tolerated."""
+        if entry.unit == "mm":
+            return self.tolerance.mm / entry.in_unit / entry.scale
+        one = self.tool.off(shifted(self.tool.table, [entry], np.array([[entry.scale]])))
+        return 1.0 / max(one.mm / self.tolerance.mm, one.deg / self.tolerance.deg)
+
+    def may_reverse(self, joint: int) -> bool:
+        """Whether a table was found whose joint (from 1) turns the other way, however its rows are written."""
+        self._challenge()
+        own = self.table.direction[0, joint - 1]
+        return any(each.region.table.direction[0, joint - 1] != own for each in self.elsewhere)
 
     def free_choice(self, entry: TableNumber) -> Extent:
         """The interval of an entry that moves no tool if others are changed with it."""

@@ -8,7 +8,7 @@ frame round, or the z axis with its joint reversed, changes rows but no robot.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,6 @@ from er3a.identifiability.feasible import OpenTable, Region
 from er3a.identifiability.requirements import Asked
 from er3a.identifiability.restarts import amounts_between
 from er3a.kinematics.table_batch import Tables, join
-from er3a.numerics.arrays import Reals
 from er3a.numerics.quasi_random import quasi_random_points
 
 STARTS, MORE_STARTS = 8, 48
@@ -26,7 +25,7 @@ WIDTHS = 0.1, 1.0, 0.3, 1.0
 WIDEST_M, WIDEST_RAD = 0.4, np.pi
 REACTS = 1e-9
 FAR = 3.0  # of an entry's scale
-A_LENGTH_M, ROUNDED = 0.3, 6
+A_LENGTH_M, REVERSED_RAD, UNWATCHED, ROUNDED = 0.3, 0.3, 0.01, 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +50,7 @@ def open_elsewhere(region: Region, start: OpenTable, watched: Sequence[int]) -> 
         if n == STARTS and not any(_is_far(each, start, watched) for each in found):
             break
         reached = region.restarted(amounts, start.chi2)
-        nearest = _nearest(region, reached, start.chi2) if reached else None
+        nearest = _nearest(region, reached, start.chi2, watched) if reached else None
         found += [nearest] if nearest else []
     return found
 
@@ -73,27 +72,29 @@ def seen_entries(asked: Asked, table: Tables, entries: Sequence[TableNumber]) ->
     return found
 
 
-def _nearest(region: Region, point: OpenTable, chi2: float) -> Elsewhere | None:
+def _nearest(region: Region, point: OpenTable, chi2: float, watched: Sequence[int]) -> Elsewhere | None:
     """The same robot in the rows that are nearest to the region's table."""
     own = region.at(point.amounts)
-    every = same_robots(own)
-    i = int(np.argmin(_distance(every, region).round(ROUNDED)))
-    if i == 0:
+    nearest = nearest_rows(own, region, watched)
+    if nearest is own:
         return Elsewhere(region, point)
-    table = region.table.with_column("direction", slice(None), every.direction[[i]])
+    table = region.table.with_column("direction", slice(None), nearest.direction)
     other = Region(region.asked, table, region.entries, region.gauge)
-    reached = other.restarted(amounts_between(table, every[[i]], region.entries), chi2)
+    reached = other.restarted(amounts_between(table, nearest, region.entries), chi2)
     return Elsewhere(other, reached) if reached else None
 
 
-def _distance(tables: Tables, region: Region) -> Reals:
-    """How far (H,) entries are from a region's table, in rad and in lengths that compare with them."""
-    apart = []
-    for entry in region.entries:
-        own = (getattr(tables, entry.column) - getattr(region.table, entry.column))[:, entry.joint - 1]
-        apart.append(own / A_LENGTH_M if entry.unit == "mm" else (own + np.pi) % (2 * np.pi) - np.pi)
-    distance: Reals = np.abs(apart).sum(axis=0)
-    return distance
+def nearest_rows(own: Tables, region: Region, watched: Collection[int]) -> Tables:
+    """A robot's rows (a batch of one) as near as they can be written to a region's table, above all in the entries at
+    places ``watched``; of equals those with fewer joints reversed."""
+    every = same_robots(own)
+    apart = list(REVERSED_RAD * (every.direction != region.table.direction).T)
+    for place, entry in enumerate(region.entries):
+        off = (getattr(every, entry.column) - getattr(region.table, entry.column))[:, entry.joint - 1]
+        turned = off / A_LENGTH_M if entry.unit == "mm" else (off + np.pi) % (2 * np.pi) - np.pi
+        apart.append(turned if place in watched else UNWATCHED * turned)
+    i = int(np.argmin(np.abs(apart).sum(axis=0).round(ROUNDED)))
+    return every[[i]] if i else own
 
 
 def same_robots(table: Tables) -> Tables:

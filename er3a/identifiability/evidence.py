@@ -203,7 +203,9 @@ class _Judge:
             else:
                 status = "weak" if speaking else "contradicted" if self._excluded_by_all(entry) else "consistent"
         else:
-            status = "settled" if own and extents.met else "weak" if speaking else "open"
+            doubtful = bool(own) and extents.met and extents.may_reverse(entry.joint)
+            interval = (-1.0, 1.0) if doubtful else interval
+            status = "settled" if own and extents.met and not doubtful else "weak" if speaking or doubtful else "open"
         off = _worst([each.off for each in concerned])
         if status == "settled" and not speaking:
             speaking = self._speaking_at(extents.met_by, entry, own)
@@ -385,7 +387,7 @@ class _Judge:
             table = fewest.table if fewest else self.table
             speaking = [k for k, entry in enumerate(self.free) if self._speaking(entry, own)]
             asked = self._asked_of(own)
-            near = Extents(asked, table, self.free, speaking, self.gauge, self.tool)
+            near = Extents(asked, table, self.free, speaking, self.gauge, self.tool, tolerance=self.tolerance)
             self._extents[own] = near if near.met else self._far(asked, near)
         return self._extents[own]
 
@@ -398,7 +400,9 @@ class _Judge:
         self._found.append(found)
         joints = list(range(found.direction.shape[1]))
         table = self.table.with_column("direction", joints, found.direction)
-        return Extents(asked, table, self.free, near.speaking, self.gauge, self.tool, found=found)
+        return Extents(
+            asked, table, self.free, near.speaking, self.gauge, self.tool, found=found, tolerance=self.tolerance
+        )
 
 
 def _sum_of(factors: Sequence[tuple[TableNumber, float]]) -> str:

@@ -228,6 +228,11 @@ class Asked:
         joined: Reals = self._joined(parts, 1)[0]
         return joined
 
+    def plain_off(self, tables: Tables) -> Reals:
+        """Components (H, m) of many tables, of the requirements that are no extremes (the first ones)."""
+        parts = self._plain_off(tables)
+        return np.concatenate(parts, axis=-1) if parts else np.empty((len(tables), 0))
+
     def plain_violation(self, tables: Tables) -> Reals:
         """Violations (H, r) of many tables, of the requirements that are no extremes (the first ones)."""
         lengths = [

@@ -421,3 +421,49 @@ def test_a_robot_without_references_has_everything_open():
     found = evidence_of(puma(), [], Documents())
     assert {each.status for each in found.entries} == {"open", "gauge", "given"}
     assert found.table_meets
+
+
+def ur5e() -> Robot:
+    """Universal Robots UR5e, standard D-H, from its maker's table."""
+    right = np.pi / 2
+    return puma().replace(
+        a=np.array([0, -425, -392.2, 0, 0, 0]) / 1000,
+        alpha=np.array([right, 0, 0, right, -right, 0]),
+        d=np.array([162.5, 0, 0, 133.3, 99.7, 99.6]) / 1000,
+        lower=np.full(6, -2 * np.pi),
+        upper=np.full(6, 2 * np.pi),
+    )
+
+
+@pytest.mark.long
+def test_entries_of_which_another_arm_has_others_are_not_settled_by_few_poses():
+    """Eight places of the flange that another arm comes to as well, but for less than half a millimetre."""
+    robot, half_width = ur5e(), 0.5
+    at = np.array(
+        [
+            (9, 324, -256, 323, -135, -55),
+            (236, -65, 36, -340, 183, 27),
+            (-123, 208, -142, -33, -263, -70),
+            (-214, -171, 180, -158, -11, 346),
+            (332, 162, 30, -161, -244, 338),
+            (12, -277, 89, 199, 81, 300),
+            (-331, 21, -29, -315, 102, 254),
+            (67, -173, 245, 7, 8, 182),
+        ],
+        float,
+    )
+    other = robot.replace(
+        a=np.array([-4.258, -423.067, -388.83, 0.095, -61.207, -10.0]) / 1000,
+        d=np.array([156.389, 0, 7.895, 133.3, 77.407, 74.286]) / 1000,
+        alpha=np.radians([89.149, 1.331, 4.799, 93.4, -76.991, -0.042]),
+        offset=np.radians([0.982, -0.116, -0.939, 1.21, -38.99, 110.788]),
+    )
+    places = [[frame_of(arm, pose)[:3, 3] * 1000 for pose in at] for arm in (robot, other)]
+    assert np.abs(np.subtract(*places)).max() < half_width
+    names = ("d1", "a6", "alpha1", "offset1", "offset3")
+    found = evidence_of(robot, tracked(robot, at, half_width), Documents(), only=names)
+    for name in names:
+        low, high = found[name].interval
+        apart = next(entry for entry in continuous_of(robot) if entry.name == name).value(other)
+        assert found[name].status == "weak"
+        assert found[name].at_least or low <= apart <= high

@@ -337,6 +337,8 @@ def test_cells_of_the_index_say_first_what_validation_came_to(study, folders, tm
         assert 0 < cell.index("This table was not validated") < cell.rindex("</p>")
     cell = cells[list(STAGES).index("trajectory")]
     assert cell.index("This table was not validated") < cell.index("safe")
+    compared = (tmp_path / "compare.html").read_text(encoding="utf-8")
+    assert compared.index("This table was not validated") < compared.index('id="borders"')
 
 
 def own_paths(*names):

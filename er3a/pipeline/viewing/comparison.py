@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from er3a.pipeline.code_digest import code_digest
+from er3a.pipeline.messages.foundations import caveat
 from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.results import AbsentResults, Input, Provenance, input_records, read_stage, result_records
 from er3a.pipeline.stages.registry import STAGES
@@ -35,6 +36,7 @@ def write_compare(study: Study, results: Path, output: Path) -> None:
     data = {
         name: {
             "title": own_title(robot.title),
+            "caveat": caveat(stage_head(results / name / "validation", STAGES["validation"]).status),
             "values": [values[name].get(row) for row in rows],
             "border": borders[name],
         }
