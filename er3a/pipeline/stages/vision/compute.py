@@ -20,6 +20,8 @@ from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
+from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
+from er3a.pipeline.stages.trajectory.motion_demands import limits_of
 from er3a.pipeline.stages.vision.calibration_results import (
     calibration_result,
     in_degrees,
@@ -28,10 +30,12 @@ from er3a.pipeline.stages.vision.calibration_results import (
     sample_rows,
 )
 from er3a.pipeline.stages.vision.entry import VisionSettings
+from er3a.pipeline.stages.vision.grasp_programs import grasp_programs
 from er3a.pipeline.stages.vision.model import (
     CalibrationResult,
     ErrorMapRows,
     ErrorParts,
+    GraspPrograms,
     GraspResult,
     ObjectResult,
     SampleRows,
@@ -49,7 +53,9 @@ from er3a.pipeline.stages.vision.vision_verdicts import (
     UnsureGrasp,
 )
 from er3a.pipeline.study import Study
+from er3a.planning.timing import JointLimits
 from er3a.robots.robot import Robot
+from er3a.vision.grasp_motion import PARTS
 from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspPlan, GraspTask, plan_grasp
 from er3a.vision.hand_eye import HandEye, calibrate_hand_eye
 from er3a.vision.next_view import FieldOfView, in_sight, next_view
@@ -62,6 +68,7 @@ VIEW_STREAM = 0
 CONTRADICTED = 1e-3
 MUCH_SCATTER = 3.0
 MAP_MARGIN = 0.25  # of the objects' extent
+LEG_ROWS = 13
 LEAST_MAP = 0.2  # m, to each side of the objects' middle
 
 Found = (
@@ -92,7 +99,7 @@ def compute(study: Study, name: str) -> VisionResults:
     except HandEyeError as error:
         verdict: Verdict[Found] = Verdict("fail", CalibrationImpossible(error.finding))
         summary = VisionSummary(verdict, (), task_file.title, title, None, ())
-        return VisionResults(summary, SampleRows.empty(), ErrorMapRows.empty(), WayRows.empty())
+        return VisionResults(summary, SampleRows.empty(), ErrorMapRows.empty(), WayRows.empty(), GraspPrograms.empty())
     picture = None if head.setup == "eye_to_hand" else np.radians(task_file.picture_deg or [])
     camera = _camera_at(robot, found, picture)
     places = {each.name: camera @ each.pose() for each in task_file.objects}
@@ -104,7 +111,11 @@ def compute(study: Study, name: str) -> VisionResults:
     calibration = calibration_result(head, found, to_add, offset)
     doubt = _doubt(calibration)
     settings = study.section(VisionSettings)
-    planned = [] if doubt else _planned(robot, task_file, found, scene, (settings, picture))
+    motions = study.section(TrajectorySettings)
+    planned = []
+    if not doubt:
+        limits = (limits_of(robot, motions), study.seed)
+        planned = _planned(robot, task_file, found, scene, (settings, picture), limits)
     objects = tuple(_object(entry, places[entry.name], plan, error) for entry, plan, error in planned)
     summary = VisionSummary(
         verdict=Verdict("fail", doubt) if doubt else _verdict(calibration, objects, settings),
@@ -122,6 +133,11 @@ def compute(study: Study, name: str) -> VisionResults:
         sample_rows(found, len(robot.lower)),
         _error_map(found, (camera, picture, robot), seen, places_m, (covariances, settings.map_cells)),
         WayRows.stacked(_ways(entry.name, plan.chosen) for entry, plan, _ in planned if plan.chosen),
+        GraspPrograms.stacked(
+            grasp_programs(robot, entry.name, np.radians(task_file.home_deg), plan.chosen, motions.programs)
+            for entry, plan, _ in planned
+            if plan.chosen
+        ),
     )
 
 
@@ -162,8 +178,9 @@ def _planned(
     found: HandEye,
     scene: Scene | None,
     asked: tuple[VisionSettings, Reals | None],
+    motion: tuple[JointLimits, int],
 ) -> Planned:
-    settings, picture = asked
+    (settings, picture), (limits, seed) = asked, motion
     tolerance = (*(mm / 1000 for mm in task_file.gripper.tolerance_mm), *np.radians(task_file.gripper.tolerance_deg))
     needs = GraspNeeds(
         settings.least_clearance_mm / 1000,
@@ -172,7 +189,8 @@ def _planned(
         tuple(map(float, tolerance)),  # type: ignore[arg-type]
     )
     bodies = Bodies(robot, scene)
-    task = GraspTask(robot, scene, bodies, np.radians(task_file.home_deg), needs)
+    speed = settings.line_speed_mm_s / 1000
+    task = GraspTask(robot, scene, bodies, np.radians(task_file.home_deg), needs, limits, speed, seed)
     accuracy = task_file.arm.accuracy()
     camera = _camera_at(robot, found, picture)
     rows: Planned = []
@@ -238,6 +256,8 @@ def _grasp(chosen: ChosenGrasp) -> GraspResult:
         singular_value=chosen.singular_value,
         probability=chosen.probability,
         deviation=chosen.deviation,
+        corners=sum(leg.part == "move" for leg in chosen.legs) - 1,
+        duration_s=sum(leg.duration for leg in chosen.legs),
     )
 
 
@@ -277,15 +297,24 @@ def _figures(calibration: CalibrationResult, objects: tuple[ObjectResult, ...]) 
     )
 
 
-def _ways(name: str, chosen: ChosenGrasp | None) -> WayRows:
-    if chosen is None:
-        return WayRows.empty()
-    parts = {"move": chosen.move, "approach": chosen.approach, "retreat": chosen.retreat}
+def _ways(name: str, chosen: ChosenGrasp) -> WayRows:
+    """The whole motion, each point once."""
+    parts: list[str] = []
+    times, rows, now = [], [], 0.0
+    for leg in chosen.legs:
+        t, q = leg.sampled(LEG_ROWS)
+        first = int(bool(parts))  # a leg starts where the one before ended
+        parts += [leg.part] * (len(t) - first)
+        times.append(now + t[first:])
+        rows.append(q[first:])
+        now += leg.duration
+    part = np.array(parts, object)
     return WayRows(
-        target=np.full(sum(map(len, parts.values())), name, object),
-        part=np.concatenate([np.full(len(q), part, object) for part, q in parts.items()]),
-        step=np.concatenate([np.arange(len(q)) for q in parts.values()]),
-        q_deg=np.degrees(np.concatenate(list(parts.values()))),
+        target=np.full(len(part), name, object),
+        part=part,
+        step=np.concatenate([np.arange((part == each).sum()) for each in PARTS]),
+        t_s=np.concatenate(times),
+        q_deg=np.degrees(np.concatenate(rows)),
     )
 
 

@@ -150,9 +150,11 @@ class GraspResult:
     Attributes
     ----------
     turn_deg : about the object's z axis
-    clearance_mm, nearest : least along move, approach and retreat, and what is nearest there
+    clearance_mm, nearest : proven along move, approach and retreat, and what is nearest there
     limit_margin_deg, singular_value : least along approach and retreat
     probability, deviation : that the gripper's tolerance is kept, and that figure's standard deviation from its draws
+    corners : of the planner's way to the approach; 0 for the straight joint move
+    duration_s : of the whole motion, without the gripper
     """
 
     grasp: str
@@ -168,6 +170,8 @@ class GraspResult:
     singular_value: float
     probability: float
     deviation: float
+    corners: int
+    duration_s: float
 
 
 @dataclass(frozen=True)
@@ -249,7 +253,18 @@ class WayRows(Table):
     target: Texts = column("name of the object", dtype=object)
     part: Texts = column("move, approach or retreat", dtype=object)
     step: Integers = column("number of the point in its part", dtype=np.int64)
+    t_s: Reals = column("time from the start, without the gripper's", "s")
     q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
+
+
+@dataclass(frozen=True, eq=False)
+class GraspPrograms(Table):
+    """Programs of the grasps for controllers: from home to the approach, to the grasp, and away."""
+
+    target: Texts = column("name of the object", dtype=object)
+    language: Texts = column("krl, urscript, rpl, xpl or csv", dtype=object)
+    file: Texts = column("name of the file", dtype=object)
+    text: Texts = column("what the file holds", dtype=object)
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,6 +274,7 @@ class VisionResults(Results[VisionSummary]):
     samples: SampleRows
     error_map: ErrorMapRows
     ways: WayRows
+    programs: GraspPrograms
 
 
 RESULTS = VisionResults
