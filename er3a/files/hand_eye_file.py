@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from pydantic import Field, model_validator
 
+from er3a.calibration.outcomes import LevelName
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
 from er3a.files.pose_columns import ROWS_TO_JUDGE_UNITS, pose_columns, pose_form, poses_of
@@ -106,6 +107,7 @@ class HandEyeFile(StrictModel):
     ``camera_standard_deviation`` is that of T_camera_board by the camera's axes; without it, it is estimated.
     ``board_mm``: the board's edges along its x and y, for views. ``touched``: a table of points that the camera placed
     (``seen_x_mm``; with the camera on the flange: that lie on the board) and the robot touched (``touched_x_mm``).
+    ``table_corrections``: entries of the arm's table that are estimated with the poses; samples with joint angles only.
     """
 
     kind: Literal["hand_eye"]
@@ -121,6 +123,7 @@ class HandEyeFile(StrictModel):
     board_mm: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = None
     touched: Text | None = None
     touch_standard_deviation_mm: Positive = 0.1
+    table_corrections: LevelName | None = None
 
     @model_validator(mode="after")
     def _one_source_of_samples(self) -> Self:

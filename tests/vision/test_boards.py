@@ -16,7 +16,7 @@ from er3a.vision.boards import Board, BoardNotFoundError, Camera, board_drawing,
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.hand_eye import calibrate_hand_eye
 from er3a.vision.opencv import opencv
-from tests.vision.made import off, pose
+from testing.hand_eye_sets import off, pose
 from tests.vision.test_hand_eye_file import HEAD, columns, write
 
 SIZE = (1280, 960)
@@ -149,7 +149,7 @@ def test_without_opencv_images_say_so_and_numbers_work(monkeypatch):
     with pytest.raises(Er3aError, match=r"install er3a\[vision\]"):
         opencv()
     random = np.random.default_rng(6)
-    from tests.vision.made import flange_poses, noisy, seen
+    from testing.hand_eye_sets import flange_poses, noisy, seen
 
     flange = flange_poses(random, 8)
     calibrate_hand_eye(CalibrationSet("eye_in_hand", flange, noisy(seen("eye_in_hand", flange), random)))

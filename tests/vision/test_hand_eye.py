@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
-from scipy.stats import t as student
 
 from er3a.vision.calibration_set import CalibrationSet
-from er3a.vision.classic_methods import METHOD_NAMES, mean_pose, motions, park, solved_by
+from er3a.vision.classic_methods import METHOD_NAMES, solved_by
 from er3a.vision.hand_eye import calibrate_hand_eye
-from er3a.vision.likelihood import PoseObservations, flange_to_camera, refine, residuals
+from er3a.vision.likelihood import flange_to_camera, residuals
 from er3a.vision.tangent import moved
 from er3a.vision.vision_findings import (
     AllSamplesEqual,
@@ -28,7 +27,8 @@ from er3a.vision.vision_findings import (
     RotationMismatch,
     TooFewSamples,
 )
-from tests.vision.made import X_TRUE, Y_TRUE, covariance, flange_poses, noisy, off, pose, seen
+from testing.hand_eye_coverage import pose_coverage
+from testing.hand_eye_sets import X_TRUE, Y_TRUE, covariance, flange_poses, noisy, off, pose, seen
 
 SETUPS = ("eye_in_hand", "eye_to_hand")
 
@@ -122,30 +122,12 @@ def test_the_refinement_ends_where_scipy_finds_the_least_squares():
     np.testing.assert_allclose(found.scatter**2 * (6 * 15 - 12), 2 * least.cost, rtol=1e-9)
 
 
-def coverage(setup: str, stated: bool, runs: int, seed: int) -> np.ndarray:
-    """Share of runs (12,) whose 95 % intervals hold the truth."""
-    random = np.random.default_rng(seed)
-    flange = flange_poses(random, 14)
-    deviations = np.array([3e-4] * 3 + [1e-3] * 3) if stated else np.zeros(6)
-    true_flange = np.broadcast_to(flange, (runs, 14, 4, 4))
-    errors = random.normal(size=(runs, 14, 6)) * deviations
-    believed = moved(true_flange, errors)
-    B = noisy(np.broadcast_to(seen(setup, flange), (runs, 14, 4, 4)), random)
-    F = believed if setup == "eye_in_hand" else np.linalg.inv(believed)
-    X = park(*motions(F, B))
-    known = (covariance(14), np.diag(deviations**2)) if stated else (None, None)
-    found = refine(PoseObservations(setup, F, B, *known), X, mean_pose(F @ X[:, None] @ B))
-    half = student.ppf(0.975, found.freedom) * np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2))
-    error = np.concatenate([off(found.X, X_TRUE), off(found.Y, Y_TRUE)], axis=1)
-    return (np.abs(error) <= half).mean(axis=0)
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("stated", [True, False])
 @pytest.mark.parametrize("setup", SETUPS)
 def test_intervals_hold_the_truth_as_often_as_they_say(setup, stated):
     """Of 600 runs with 12 numbers: three standard deviations of each share, and 94 to 96 % in all."""
-    held = coverage(setup, stated, 600, 17)
+    held = pose_coverage(setup, stated, 600, 17)
     assert (np.abs(held - 0.95) < 3.5 * np.sqrt(0.95 * 0.05 / 600)).all()
     assert 0.94 < held.mean() < 0.96
 
@@ -153,7 +135,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say(setup, stated):
 @pytest.mark.long
 @pytest.mark.parametrize("setup", SETUPS)
 def test_intervals_hold_the_truth_in_ten_thousand_runs(setup):
-    held = np.mean([coverage(setup, stated, 1250, 100 * k) for k in range(4) for stated in (True, False)], axis=0)
+    held = np.mean([pose_coverage(setup, stated, 1250, 100 * k) for k in range(4) for stated in (True, False)], axis=0)
     assert (held > 0.94).all()
     assert (held < 0.96).all()
 

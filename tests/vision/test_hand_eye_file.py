@@ -18,7 +18,7 @@ from er3a.files.vision_file import load_vision
 from er3a.files.vision_inputs import vision_files
 from er3a.kinematics.forward import forward
 from testing import camera_cells
-from tests.vision.made import X_TRUE, Y_TRUE, flange_poses, noisy, off, seen
+from testing.hand_eye_sets import X_TRUE, Y_TRUE, flange_poses, noisy, off, seen
 
 POSITION = ("x_mm", "y_mm", "z_mm")
 HEAD = "kind: hand_eye\ntitle: made\nsource: a test\nsetup: {setup}\nsamples: samples.csv\n"

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+import er3a.pipeline.messages.calibration  # noqa: F401
 from er3a.geometry.transforms import rpy_of
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.say import say, sentence, word
 from er3a.vision.hand_eye import HandEye, spread_of
+from er3a.vision.table_corrections import NoCorrections, TableCorrections
 from er3a.vision.tangent import quaternion_of
 from er3a.vision.time_offset import TimeOffset
 from er3a.vision.vision_findings import (
@@ -210,6 +212,52 @@ def _(found: DirectionTried) -> str:
     )
 
 
+NO_CORRECTIONS = {
+    "joints": N_("corrections to the table need recorded joint angles, of an arm with six joints that turn"),
+    "few": N_("too few samples for corrections to the table"),
+    "steps": N_("no corrections to the table fit: it has a gross fault or is another arm's"),
+}
+
+
+@say.register
+def _(found: NoCorrections) -> str:
+    return word("vision.no_corrections", NO_CORRECTIONS, found.why)
+
+
+def correction_verdict(probability: float, before: float, after: float, limit: float = 0.01) -> str:
+    """Whether the samples speak against the table as it is."""
+    if probability < limit:
+        return sentence(
+            "vision.corrections",
+            "The samples speak against the table: with corrections the residuals fall from {before:.3g} to {after:.3g} "
+            "standard deviations, by chance with a probability of {p:.1g}",
+            before=before,
+            after=after,
+            p=probability,
+        )
+    return sentence(
+        "vision.corrections",
+        "The samples do not speak against the table: corrections lower the residuals from {before:.3g} to {after:.3g} "
+        "standard deviations, as chance does with a probability of {p:.2g}",
+        before=before,
+        after=after,
+        p=probability,
+    )
+
+
+def correction_lines(found: TableCorrections | NoCorrections) -> list[str]:
+    """Corrections to a table as lines for a terminal."""
+    if isinstance(found, NoCorrections):
+        return [say(found)]
+    lines = ["corrections to the arm's table, with 95 % intervals:"]
+    for each, half in zip(found.estimates, found.entry_half_width):
+        lines.append(f"  {each.name:<9}{each.nominal:>10.3f} {each.correction:>+9.4f} ± {half:.4f} {each.unit}")
+    lines += [f"  {say(each)}" for each in found.held]
+    verdict = correction_verdict(found.probability, found.scatter_before, found.scatter)
+    mm, deg = 1000 * found.moved[0], np.degrees(found.moved[1])
+    return [*lines, verdict, f"with them the camera is {mm:.3g} mm and {deg:.2g} deg elsewhere"]
+
+
 def direction_word(found: DirectionTried) -> str:
     """Which streams are inverted, in words."""
     text = DIRECTION_WORDS[found.flange_inverted, found.target_inverted]
@@ -263,7 +311,9 @@ def hand_eye_lines(found: HandEye, offset: TimeOffset | None) -> str:
     return "\n".join(lines)
 
 
-def hand_eye_record(found: HandEye, offset: TimeOffset | None) -> dict[str, object]:
+def hand_eye_record(
+    found: HandEye, offset: TimeOffset | None, table: TableCorrections | NoCorrections | None = None
+) -> dict[str, object]:
     """A calibration as plain data, for another program; half widths of 95 % intervals in mm and deg."""
 
     def pose(T: np.ndarray, half: np.ndarray) -> dict[str, object]:
@@ -302,4 +352,19 @@ def hand_eye_record(found: HandEye, offset: TimeOffset | None) -> dict[str, obje
         "warnings": [{"code": each.code, "text": say(each)} for each in found.warnings],
         "time_offset_s": offset.offset if offset else None,
         "touch_probability": found.touch.probability if found.touch else None,
+        "table_corrections": _corrections_record(table) if table else None,
+    }
+
+
+def _corrections_record(found: TableCorrections | NoCorrections) -> dict[str, object]:
+    if isinstance(found, NoCorrections):
+        return {"code": found.code, "text": say(found)}
+    return {
+        "entries": [
+            {"entry": each.name, "unit": each.unit, "correction": each.correction, "half_width": half}
+            for each, half in zip(found.estimates, found.entry_half_width.tolist())
+        ],
+        "held": [say(each) for each in found.held],
+        "probability": found.probability,
+        "scatter": found.scatter,
     }

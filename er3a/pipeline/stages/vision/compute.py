@@ -60,6 +60,7 @@ from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspP
 from er3a.vision.hand_eye import HandEye, calibrate_hand_eye
 from er3a.vision.next_view import FieldOfView, in_sight, next_view
 from er3a.vision.point_error import ArmAccuracy, SeenPoseError, error_sizes, seen_pose, seen_pose_error
+from er3a.vision.table_corrections import correct_table
 from er3a.vision.tangent import inverted
 from er3a.vision.vision_findings import BoardScale, HandEyeError, MoreScatter, NoMajority, QuaternionOrder
 
@@ -108,7 +109,8 @@ def compute(study: Study, name: str) -> VisionResults:
     if view is not None:
         middle = np.mean([each.pose()[:3, 3] for each in task_file.objects], axis=0)
         to_add = next_view(robot, found, view, middle, scene, study.seed + VIEW_STREAM)
-    calibration = calibration_result(head, found, to_add, offset)
+    table = correct_table(found, robot, head.table_corrections) if head.table_corrections else None
+    calibration = calibration_result(head, found, to_add, offset, table)
     doubt = _doubt(calibration)
     settings = study.section(VisionSettings)
     motions = study.section(TrajectorySettings)

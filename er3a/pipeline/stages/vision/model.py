@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
+from er3a.calibration.calibrate import Close
+from er3a.calibration.outcomes import Held, LevelName
 from er3a.collision.pairs import Pair
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
@@ -21,6 +24,7 @@ from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.vision.calibration_set import Setup
 from er3a.vision.classic_methods import MethodName
 from er3a.vision.grasping import GraspRefusal
+from er3a.vision.table_corrections import NoCorrections
 from er3a.vision.vision_findings import CalibrationWarning, DirectionTried, GraspOutcome, Suspect
 
 Three = tuple[float, float, float]
@@ -93,6 +97,42 @@ class OffsetResult:
 
 
 @dataclass(frozen=True)
+class EntryCorrection:
+    """An entry of the arm's table (such as d4), in mm or deg, with half the 95 % interval of its correction."""
+
+    entry: str
+    unit: Literal["mm", "deg"]
+    nominal: float
+    correction: float
+    half_width: float
+
+
+@dataclass(frozen=True)
+class TableResult:
+    """Corrections to the arm's table, estimated with the poses.
+
+    Attributes
+    ----------
+    held : why the other entries keep their values; close : pairs whose errors are correlated by more than 0.9
+    scatter, scatter_before : root mean square of the residuals with and without them, in standard deviations
+    probability : that residuals fall as much by chance, if no entry is wrong
+    moved_mm, moved_deg : how far the hand-eye pose is from the one without corrections
+    hand_eye : with them
+    """
+
+    level: LevelName
+    entries: tuple[EntryCorrection, ...]
+    held: tuple[Held, ...]
+    close: tuple[Close, ...]
+    scatter: float
+    scatter_before: float
+    probability: float
+    moved_mm: float
+    moved_deg: float
+    hand_eye: PoseEstimate
+
+
+@dataclass(frozen=True)
 class CalibrationResult:
     """The calibration.
 
@@ -104,6 +144,7 @@ class CalibrationResult:
     camera_mm, camera_deg : the camera's standard deviation by axis, root mean square of the three
     spread_mm, spread_deg : root mean square distance of the board's places, by sample, from their mean
     moved_mm, moved_deg : how far the hand-eye pose would be off with the samples that were left out; None without any
+    table : corrections to the arm's table, where the set asks for them
     """
 
     title: str
@@ -130,6 +171,7 @@ class CalibrationResult:
     touch: TouchResult | None
     next_view: ViewToAdd | None
     time_offset: OffsetResult | None
+    table: TableResult | NoCorrections | None
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from er3a.files.scene_file import load_scene
+from er3a.pipeline.messages.hand_eye import correction_verdict
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import joined, listed, say, word
 from er3a.pipeline.messages.vision import FIGURES, METHODS, direction_word, pose_words
@@ -19,6 +20,7 @@ from er3a.pipeline.stages.vision.model import (
     GraspPrograms,
     ObjectResult,
     PoseEstimate,
+    TableResult,
     TouchResult,
     VisionResults,
 )
@@ -27,6 +29,7 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import head_of, render, run_command, text_address
 from er3a.programs.arm_joints import WORDS, not_written
+from er3a.vision.table_corrections import NoCorrections
 
 NEARLY_HALF_TURN = 170.0
 POINTER_M = 0.15
@@ -61,6 +64,9 @@ def report(study: Study, stored: Stored[VisionResults], output: Path) -> None:
         methods=_methods(found) if found else [],
         disagreement=_disagreement(found) if found else "",
         directions=_directions(found) if found else [],
+        corrections=_corrections(found.table) if found and isinstance(found.table, TableResult) else [],
+        held=_held(found.table) if found else [],
+        corrected=_corrected(found.table) if found and isinstance(found.table, TableResult) else "",
         touched=_touched(found.touch) if found and found.touch else [],
         residuals=residual_picture(results.samples, found) if found else None,
         map=map_picture(results.error_map, summary.objects) if len(results.error_map) else None,
@@ -169,6 +175,30 @@ def _directions(found: CalibrationResult) -> list[list[str]]:
         ]
         for each in found.directions
     ]
+
+
+def _corrections(found: TableResult) -> list[list[str]]:
+    return [
+        [
+            each.entry,
+            f"{fixed(each.nominal, 3)} {each.unit}",
+            fixed(each.correction, 4),
+            f"± {fixed(each.half_width, 4)}",
+            tr("differs") if abs(each.correction) > each.half_width else "",
+        ]
+        for each in found.entries
+    ]
+
+
+def _held(found: TableResult | NoCorrections | None) -> list[str]:
+    """Why entries keep their values, or why none is corrected."""
+    if found is None:
+        return []
+    return [say(found)] if isinstance(found, NoCorrections) else listed(found.held)
+
+
+def _corrected(found: TableResult) -> str:
+    return correction_verdict(found.probability, found.scatter_before, found.scatter)
 
 
 def _touched(found: TouchResult) -> list[list[str]]:
