@@ -8,6 +8,7 @@ A table of samples has one row for each: where the flange was, as joint angles (
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -101,6 +102,14 @@ class StreamsEntry(StrictModel):
     widest_s: Annotated[float, Field(gt=0, le=3600)] = 2.0
 
 
+@dataclass(frozen=True, eq=False)
+class SeenImages:
+    """Image files as the table names them, and what was found in each."""
+
+    names: tuple[str, ...]
+    views: BoardViews
+
+
 class HandEyeFile(StrictModel):
     """A calibration set.
 
@@ -148,11 +157,14 @@ def load_hand_eye(path: str | Path, arm: Robot | None = None) -> CalibrationSet:
     return read_calibration(path, arm)[0]
 
 
-def read_calibration(path: str | Path, robot: Robot | None) -> tuple[CalibrationSet, TimeOffset | None]:
-    """A calibration set, and the offset between its streams' clocks, if they have two."""
+def read_calibration(
+    path: str | Path, robot: Robot | None
+) -> tuple[CalibrationSet, TimeOffset | None, SeenImages | None]:
+    """A calibration set, the offset between its streams' clocks if they have two, and its images if it has any."""
     path = Path(path)
     head = load(HandEyeFile, path)
     offset: TimeOffset | None = None
+    images: SeenImages | None = None
     covariance = head.camera_standard_deviation
     per_sample: Reals | None = None
     if head.streams is not None:
@@ -167,8 +179,8 @@ def read_calibration(path: str | Path, robot: Robot | None) -> tuple[Calibration
         flange, q = _flange(table, rows, header, robot)
         names = tuple(str(row.get("name") or f"row {row['row']}") for row in rows)
         if head.images is not None:
-            views = _targets_of_images(table, rows, head.images, table.parent)
-            target, per_sample = views.target, views.covariance
+            images = _targets_of_images(table, rows, head.images, table.parent)
+            target, per_sample = images.views.target, images.views.covariance
         else:
             target = poses_of(table, rows, "target", _form(table, header, "target"))
     if covariance is not None:
@@ -184,7 +196,7 @@ def read_calibration(path: str | Path, robot: Robot | None) -> tuple[Calibration
         touched=_touched(path.parent / head.touched) if head.touched else None,
         touch_deviation=head.touch_standard_deviation_mm / 1000,
     )
-    return samples, offset
+    return samples, offset, images
 
 
 def check_samples(table: Path) -> str:
@@ -279,7 +291,7 @@ def _touched(table: Path) -> Reals:
     return found
 
 
-def _targets_of_images(table: Path, rows: list[dict[str, Any]], entry: ImageEntry, folder: Path) -> BoardViews:
+def _targets_of_images(table: Path, rows: list[dict[str, Any]], entry: ImageEntry, folder: Path) -> SeenImages:
     for row in rows:
         if not row.get("image"):
             raise InputError(table, f"row {row['row']}, column image", "no image is named", "Name its file")
@@ -289,18 +301,20 @@ def _targets_of_images(table: Path, rows: list[dict[str, Any]], entry: ImageEntr
         K = np.array([[own.fx, 0, own.cx], [0, own.fy, own.cy], [0, 0, 1.0]])
         camera = Camera(K, np.array(own.distortion))
     files = [folder / row["image"] for row in rows]
-    images = [_grey(file) for file in files]
+    images = [grey_image(file) for file in files]
     try:
-        return board_views(images, entry.board.board(), camera, entry.pixel_standard_deviation)
+        views = board_views(images, entry.board.board(), camera, entry.pixel_standard_deviation)
     except BoardNotFoundError as error:
         x, y = entry.board.squares
         problem = f"{error.corners} corners of a {entry.board.pattern} board of {x} x {y} found"
         remedy = "Check squares, dictionary and the image; or remove the sample"
         where = f"sample {rows[error.image].get('name') or error.image + 1}"
         raise InputError(files[error.image], where, problem, remedy) from None
+    return SeenImages(tuple(str(row["image"]) for row in rows), views)
 
 
-def _grey(file: Path) -> NDArray[np.uint8]:
+def grey_image(file: Path) -> NDArray[np.uint8]:
+    """A picture's grey levels (h, w)."""
     try:
         with Image.open(file) as image:
             return np.asarray(image.convert("L"))

@@ -138,7 +138,7 @@ def test_two_clocks_are_brought_together(tmp_path):
     write(tmp_path, {"t_s": t_arm} | columns(arm(t_arm), "flange", "quaternion"))
     shutil.move(tmp_path / "samples.csv", tmp_path / "hand.csv")
     path = write(tmp_path, {"t_s": t_eye} | columns(target, "target", "quaternion"), head)
-    samples, offset = read_calibration(path, None)
+    samples, offset, _ = read_calibration(path, None)
     assert abs(offset.offset - 0.137) < max(offset.half_width, 1e-3)
     assert offset.half_width < 5e-3
     from er3a.vision.hand_eye import calibrate_hand_eye

@@ -128,7 +128,7 @@ def hand_eye(
     from er3a.vision.vision_findings import HandEyeError
 
     arm, asked = load_robot(robot) if robot else None, load(HandEyeFile, file).table_corrections
-    samples, offset = read_calibration(file, arm)
+    samples, offset, _ = read_calibration(file, arm)
     try:
         found = calibrate_hand_eye(samples)
     except HandEyeError as error:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.files.hand_eye_file import HandEyeFile
+from er3a.files.hand_eye_file import HandEyeFile, SeenImages
 from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.vision.model import (
     CalibrationResult,
+    CornerRows,
     EntryCorrection,
     MethodResult,
     OffsetResult,
@@ -20,10 +21,11 @@ from er3a.pipeline.stages.vision.model import (
     TouchResult,
     ViewToAdd,
 )
+from er3a.vision.boards import projected
 from er3a.vision.hand_eye import HandEye, MethodAnswer, spread_of
 from er3a.vision.next_view import NextView
 from er3a.vision.table_corrections import NoCorrections, TableCorrections
-from er3a.vision.tangent import quaternion_of
+from er3a.vision.tangent import inverted, quaternion_of
 from er3a.vision.time_offset import TimeOffset
 
 
@@ -150,3 +152,26 @@ def sample_rows(found: HandEye, joints: int) -> SampleRows:
         predicted_mm=1000 * predicted[:, :3, 3],
         q_deg=np.full((count, joints), np.nan) if samples.q is None else np.degrees(samples.q),
     )
+
+
+def corner_rows(found: HandEye, images: SeenImages | None) -> CornerRows:
+    """One row for each corner in each image."""
+    if images is None:
+        return CornerRows.empty()
+    predicted = inverted(found.samples.hand @ found.X) @ found.Y
+    views, tables = images.views, []
+    for k, (name, points, seen, by_board) in enumerate(
+        zip(images.names, views.points, views.corners, views.reprojected)
+    ):
+        count = len(points)
+        tables.append(
+            CornerRows(
+                sample=np.full(count, found.samples.names[k], object),
+                image=np.full(count, name, object),
+                used=np.full(count, found.used[k]),
+                seen_px=seen,
+                by_board_px=by_board,
+                by_arm_px=projected(points, predicted[k], views.camera),
+            )
+        )
+    return CornerRows.stacked(tables)

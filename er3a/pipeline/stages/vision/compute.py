@@ -24,6 +24,7 @@ from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.stages.trajectory.motion_demands import limits_of
 from er3a.pipeline.stages.vision.calibration_results import (
     calibration_result,
+    corner_rows,
     in_degrees,
     in_mm,
     quaternion,
@@ -33,6 +34,7 @@ from er3a.pipeline.stages.vision.entry import VisionSettings
 from er3a.pipeline.stages.vision.grasp_programs import grasp_programs
 from er3a.pipeline.stages.vision.model import (
     CalibrationResult,
+    CornerRows,
     ErrorMapRows,
     ErrorParts,
     GraspPrograms,
@@ -93,14 +95,15 @@ def compute(study: Study, name: str) -> VisionResults:
     if head.setup == "eye_in_hand" and task_file.picture_deg is None:
         problem = "missing, though the camera is on the flange"
         raise InputError(file, "picture_deg", problem, "Add the joint angles at which the picture was taken")
-    samples, offset = read_calibration(head_path, robot)
+    samples, offset, images = read_calibration(head_path, robot)
     title = scene.title if scene else None
     try:
         found = calibrate_hand_eye(samples)
     except HandEyeError as error:
         verdict: Verdict[Found] = Verdict("fail", CalibrationImpossible(error.finding))
         summary = VisionSummary(verdict, (), task_file.title, title, None, ())
-        return VisionResults(summary, SampleRows.empty(), ErrorMapRows.empty(), WayRows.empty(), GraspPrograms.empty())
+        empty = (SampleRows.empty(), ErrorMapRows.empty(), WayRows.empty(), GraspPrograms.empty(), CornerRows.empty())
+        return VisionResults(summary, *empty)
     picture = None if head.setup == "eye_to_hand" else np.radians(task_file.picture_deg or [])
     camera = _camera_at(robot, found, picture)
     places = {each.name: camera @ each.pose() for each in task_file.objects}
@@ -140,6 +143,7 @@ def compute(study: Study, name: str) -> VisionResults:
             for entry, plan, _ in planned
             if plan.chosen
         ),
+        corner_rows(found, images),
     )
 
 

@@ -278,6 +278,18 @@ class SampleRows(Table):
 
 
 @dataclass(frozen=True, eq=False)
+class CornerRows(Table):
+    """Corners of the board in the images; none where poses were recorded."""
+
+    sample: Texts = column("name of the sample", dtype=object)
+    image: Texts = column("name of the image's file", dtype=object)
+    used: Flags = column("whether the calibration rests on it", dtype=bool)
+    seen_px: Reals = vector("seen_{}_px", "corner as detected, to the right and down", "px", parts="xy")
+    by_board_px: Reals = vector("by_board_{}_px", "where the board's pose in this image puts it", "px", parts="xy")
+    by_arm_px: Reals = vector("by_arm_{}_px", "where the arm and the calibration put it", "px", parts="xy")
+
+
+@dataclass(frozen=True, eq=False)
 class ErrorMapRows(Table):
     """Errors of a point seen, at the mean height of the objects, from camera and calibration."""
 
@@ -317,6 +329,7 @@ class VisionResults(Results[VisionSummary]):
     error_map: ErrorMapRows
     ways: WayRows
     programs: GraspPrograms
+    corners: CornerRows
 
 
 RESULTS = VisionResults

@@ -7,7 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from er3a.files.hand_eye_file import HandEyeFile
 from er3a.files.scene_file import load_scene
+from er3a.files.vision_file import load_vision
+from er3a.files.yaml_file import load
 from er3a.pipeline.messages.hand_eye import correction_verdict
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import joined, listed, say, word
@@ -24,7 +27,7 @@ from er3a.pipeline.stages.vision.model import (
     TouchResult,
     VisionResults,
 )
-from er3a.pipeline.stages.vision.vision_figures import map_picture, residual_picture
+from er3a.pipeline.stages.vision.vision_figures import image_picture, map_picture, residual_picture
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import head_of, render, run_command, text_address
@@ -69,6 +72,7 @@ def report(study: Study, stored: Stored[VisionResults], output: Path) -> None:
         corrected=_corrected(found.table) if found and isinstance(found.table, TableResult) else "",
         touched=_touched(found.touch) if found and found.touch else [],
         residuals=residual_picture(results.samples, found) if found else None,
+        images=image_picture(results.corners, _image_folder(study, name)) if len(results.corners) else None,
         map=map_picture(results.error_map, summary.objects) if len(results.error_map) else None,
         overview=[_overview(each) for each in summary.objects],
         grasps=[_grasp(each) for each in summary.objects if each.grasp],
@@ -80,6 +84,13 @@ def report(study: Study, stored: Stored[VisionResults], output: Path) -> None:
         player_style=player_style(),
         next_pose=_listed(found.next_view.q_deg) if found and found.next_view else "",
     )
+
+
+def _image_folder(study: Study, name: str) -> Path:
+    """Where the table of samples stands, beside which its images are."""
+    file = Path(str(study.entry(name).vision))
+    head = file.parent / load_vision(file).calibration
+    return (head.parent / str(load(HandEyeFile, head).samples)).parent
 
 
 def _programs(rows: GraspPrograms) -> list[tuple[str, list[tuple[str, str]]]]:

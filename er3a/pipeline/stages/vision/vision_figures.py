@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
+from er3a.files.hand_eye_file import grey_image
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import joined
-from er3a.pipeline.stages.vision.model import CalibrationResult, ErrorMapRows, ObjectResult, SampleRows
+from er3a.pipeline.stages.vision.model import CalibrationResult, CornerRows, ErrorMapRows, ObjectResult, SampleRows
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.page import Picture
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL
+
+MOST_IMAGES = 9
+WIDEST_PX = 480
+ARROW_PX = 30.0
 
 
 def residual_picture(rows: SampleRows, found: CalibrationResult) -> Picture:
@@ -38,6 +45,55 @@ def residual_picture(rows: SampleRows, found: CalibrationResult) -> Picture:
         mm=fixed(sizes[0][worst], 2),
     )
     return Picture(figure, tr("Bars of the residual of each sample, in mm and in degrees"), caption)
+
+
+def image_picture(rows: CornerRows, folder: Path) -> Picture:
+    """The images with the greatest residuals: corners detected, and arrows to where arm and calibration put them."""
+    off = rows.by_arm_px - rows.seen_px
+    size = {
+        name: float(np.sqrt((off[rows.image == name] ** 2).sum(axis=1).mean())) for name in dict.fromkeys(rows.image)
+    }
+    shown = sorted(size, key=lambda name: -size[name])[:MOST_IMAGES]
+    columns = min(3, len(shown))
+    lines = -(-len(shown) // columns)
+    figure, axes = new_figure(lines, columns, height=2.6 * lines, squeeze=False)
+    usual = float(np.median(list(size.values())))
+    scale = max(1.0, float(f"{ARROW_PX / max(usual, 1e-3):.1g}"))
+    for ax, name in zip(axes.ravel(), shown):
+        own = rows.image == name
+        picture = grey_image(folder / name)
+        step = max(1, picture.shape[1] // WIDEST_PX)
+        height, width = picture.shape
+        frame = (-0.5, width - 0.5, height - 0.5, -0.5)
+        ax.imshow(picture[::step, ::step], cmap="gray", vmin=0, vmax=255, extent=frame, rasterized=True)
+        seen, arrow = rows.seen_px[own], scale * off[own]
+        ax.plot(*seen.T, ".", color=MODEL, markersize=3, label=tr("detected"))
+        ends = np.stack([seen, seen + arrow, np.full_like(seen, np.nan)], axis=1).reshape(-1, 2)
+        ax.plot(*ends.T, color=HIGHLIGHT, linewidth=1, label=tr("to the reprojected corner"))
+        left = "" if rows.used[own].all() else tr(", left out")
+        ax.set_title(f"{rows.sample[own][0]}: {fixed(size[name], 2)} px{left}", fontsize=8)
+        ax.set_xlim(-0.5, width - 0.5)
+        ax.set_ylim(height - 0.5, -0.5)
+        ax.set_aspect("equal")
+        ax.set_axis_off()
+    for ax in axes.ravel()[len(shown) :]:
+        ax.set_axis_off()
+    axes[0, 0].legend(loc="lower left", fontsize=6)
+    by_board = float(np.sqrt(((rows.by_board_px - rows.seen_px)[rows.used] ** 2).sum(axis=1).mean()))
+    by_arm = float(np.sqrt((off[rows.used] ** 2).sum(axis=1).mean()))
+    caption = tr(
+        "Corners as detected, and lines from there towards where arm and calibration put them, {scale:g} times as long "
+        "as they are; the {shown} of {count} images with the greatest residuals. In the images used, detected corners "
+        "are {board} px (root mean square) from the board's pose in that image, which is the camera's noise, and {arm} "
+        "px from the arm's. Lines all in one direction are a wrong pose of the arm or the board; lines that turn about "
+        "a point a wrong end of the board; short ones in all directions noise.",
+        scale=scale,
+        shown=len(shown),
+        count=len(size),
+        board=fixed(by_board, 2),
+        arm=fixed(by_arm, 2),
+    )
+    return Picture(figure, tr("Images of the board with detected and reprojected corners"), caption)
 
 
 def map_picture(rows: ErrorMapRows, objects: tuple[ObjectResult, ...]) -> Picture:
