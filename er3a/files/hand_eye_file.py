@@ -2,8 +2,8 @@
 
 A table of samples has one row for each: where the flange was, as joint angles (``q1_deg`` ..) or as a pose
 (``flange_x_mm`` ..), and where the camera saw the board (``target_x_mm`` ..) or in which ``image``. Orientations are
-``_qw`` .. ``_qz``, ``_roll_deg``, ``_pitch_deg``, ``_yaw_deg`` (R = Rz(yaw) Ry(pitch) Rx(roll)), or ``_r11`` ..
-``_r33`` by rows. ``name`` is optional.
+``_qw`` .. ``_qz``, ``_roll_deg``, ``_pitch_deg``, ``_yaw_deg`` (R = Rz(yaw) Ry(pitch) Rx(roll)), ``_r11`` ..
+``_r33`` by rows, or ``_rx_rad`` .. ``_rz_rad`` (a rotation vector). ``name`` is optional.
 """
 
 from __future__ import annotations
@@ -33,6 +33,10 @@ from er3a.vision.time_offset import Stream, TimeOffset, paired, time_offset
 
 STREAM_SAMPLES = 60
 MOST_SAMPLES = 2000
+SHOWN_HEADER = 60
+SEPARATORS = {";": "semicolons", "\t": "tabs"}
+EXAMPLE = "flange_x_mm, .., flange_qw, .., flange_qz, target_x_mm, .., target_qz (lengths in mm)"
+EPOCH_DIGITS = 10  # of the seconds since 1970, which recorders write
 POINTS = {f"{part}_{c}_mm": CsvColumn() for part in ("seen", "touched") for c in "xyz"}
 
 Positive = Annotated[float, Field(gt=0, le=1e5)]
@@ -225,12 +229,20 @@ def sample_rows(table: Path) -> tuple[list[dict[str, Any]], list[str]]:
         if name in header:
             columns[name] = CsvColumn(str, optional=name == "name")
     if "t_s" in header:
-        columns["t_s"] = CsvColumn()
+        columns["t_s"] = CsvColumn(digits=EPOCH_DIGITS, quantity="time in s")
     joints = sum(1 for name in header if name.startswith("q") and name.endswith("_deg") and name[1:-4].isdigit())
     columns |= {f"q{joint + 1}_deg": CsvColumn() for joint in range(joints)}
     for stream in ("flange", "target"):
         if form := pose_form(table, header, stream):
             columns |= pose_columns(stream, form)
+    if not columns:
+        first = ", ".join(header)[:SHOWN_HEADER]
+        apart = next((word for mark, word in SEPARATORS.items() if len(header) == 1 and mark in header[0]), None)
+        problem = (
+            f"the columns are separated by {apart}" if apart else f"the first line names no column of samples: {first}"
+        )
+        remedy = "Separate them by commas" if apart else f"Begin with a header such as {EXAMPLE}"
+        raise InputError(table, "header", problem, remedy)
     rows = read_csv(table, columns)
     if not rows:
         raise InputError(table, None, "the table has a header but no samples", "Add a row for each sample")

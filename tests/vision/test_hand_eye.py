@@ -15,17 +15,21 @@ from er3a.vision.likelihood import flange_to_camera, residuals
 from er3a.vision.tangent import moved
 from er3a.vision.vision_findings import (
     AllSamplesEqual,
+    AngleOrder,
     BoardScale,
     FarFromFit,
     HandEyeError,
     LittleMotion,
     MoreScatter,
     NoRotation,
+    OtherDirection,
+    OtherReading,
     ParallelTurns,
     QuaternionOrder,
     RepeatedPose,
     RotationMismatch,
     TooFewSamples,
+    TransposedRotations,
 )
 from testing.hand_eye_coverage import pose_coverage
 from testing.hand_eye_sets import X_TRUE, Y_TRUE, covariance, flange_poses, noisy, off, pose, seen
@@ -217,14 +221,36 @@ def test_a_board_of_another_size_is_named_with_the_factor():
     assert scale[0].factor == pytest.approx(1.05, abs=scale[0].half_width)
 
 
-@pytest.mark.parametrize("stream", ["flange", "target"])
-def test_a_quaternion_read_in_the_other_order_is_named(stream):
+@pytest.mark.parametrize("stream", ["flange", "target", "both"])
+@pytest.mark.parametrize("how", ["quaternion", "kuka", "static_xyz", "transposed"])
+def test_orientations_read_by_another_convention_are_named(stream, how):
+    """Written by scipy in one convention, taken for another: A, B, C in columns of roll, pitch, yaw, ..."""
     samples = a_set("eye_in_hand", 14)
-    T = getattr(samples, stream)
-    q = Rotation.from_matrix(T[:, :3, :3]).as_quat()
-    T[:, :3, :3] = Rotation.from_quat(np.roll(q, 1, axis=1)).as_matrix()
-    found = [each for each in calibrate_hand_eye(samples).warnings if isinstance(each, QuaternionOrder)]
-    assert found[0].stream == stream
+    for name in ("flange", "target") if stream == "both" else (stream,):
+        T = getattr(samples, name)
+        R = Rotation.from_matrix(T[:, :3, :3])
+        T[:, :3, :3] = {
+            "quaternion": lambda R: Rotation.from_quat(R.as_quat(scalar_first=True)),
+            "kuka": lambda R: Rotation.from_euler("xyz", R.as_euler("ZYX")),
+            "static_xyz": lambda R: Rotation.from_euler("xyz", R.as_euler("XYZ")),
+            "transposed": lambda R: R.inv(),
+        }[how](R).as_matrix()
+    (found,) = [each for each in calibrate_hand_eye(samples).warnings if isinstance(each, OtherReading)]
+    kind = {"quaternion": QuaternionOrder, "transposed": TransposedRotations}.get(how, AngleOrder)
+    assert isinstance(found, kind)
+    assert found.stream == stream
+    assert found.rms_other_deg < 0.3
+    if kind is AngleOrder:
+        products = {"kuka": "Rz(roll) Ry(pitch) Rx(yaw)", "static_xyz": "Rx(roll) Ry(pitch) Rz(yaw)"}
+        assert found.product == products[how]
+
+
+@pytest.mark.parametrize("setup", SETUPS)
+def test_the_other_setup_is_named(setup):
+    samples = a_set(setup, 15)
+    other = CalibrationSet(next(each for each in SETUPS if each != setup), samples.flange, samples.target)
+    assert any(isinstance(each, OtherDirection) for each in calibrate_hand_eye(other).warnings)
+    assert not any(isinstance(each, OtherDirection) for each in calibrate_hand_eye(samples).warnings)
 
 
 def test_residuals_beyond_what_is_stated_are_said():

@@ -14,6 +14,7 @@ from er3a.vision.tangent import quaternion_of
 from er3a.vision.time_offset import TimeOffset
 from er3a.vision.vision_findings import (
     AllSamplesEqual,
+    AngleOrder,
     BoardScale,
     DirectionTried,
     FarFromFit,
@@ -22,11 +23,13 @@ from er3a.vision.vision_findings import (
     NoMajority,
     NoRotation,
     NothingFits,
+    OtherDirection,
     ParallelTurns,
     QuaternionOrder,
     RepeatedPose,
     RotationMismatch,
     TooFewSamples,
+    TransposedRotations,
 )
 
 MENDING = {
@@ -37,7 +40,7 @@ MENDING = {
     "mirrored_tilt": N_("the board's tilt is mirrored, as of a flat board seen from far or head-on"),
     "rotation": N_("no turn that detectors mistake explains it"),
 }
-STREAMS = {"flange": N_("flange"), "target": N_("board")}
+STREAMS = {"flange": N_("flange"), "target": N_("board"), "both": N_("flange and board")}
 POSES = {
     "eye_in_hand": (N_("camera on the flange (T_flange_camera)"), N_("board in the base (T_base_board)")),
     "eye_to_hand": (N_("camera in the base (T_base_camera)"), N_("board on the flange (T_flange_board)")),
@@ -122,6 +125,42 @@ def _(found: QuaternionOrder) -> str:
         stream=word("vision.stream", STREAMS, found.stream),
         after=found.rms_other_deg,
         before=found.rms_given_deg,
+    )
+
+
+@say.register
+def _(found: AngleOrder) -> str:
+    return sentence(
+        found.code,
+        "the angles of the {stream} fit if they are read as R = {product}: the residuals are {after:.2g} deg then, as "
+        "given {before:.3g} deg; convert them to R = Rz(yaw) Ry(pitch) Rx(roll)",
+        stream=word("vision.stream", STREAMS, found.stream),
+        product=found.product,
+        after=found.rms_other_deg,
+        before=found.rms_given_deg,
+    )
+
+
+@say.register
+def _(found: TransposedRotations) -> str:
+    return sentence(
+        found.code,
+        "the rotations of the {stream} are transposed, with positions as they should be: read so, the residuals are "
+        "{after:.2g} deg, as given {before:.3g} deg; write matrices by rows",
+        stream=word("vision.stream", STREAMS, found.stream),
+        after=found.rms_other_deg,
+        before=found.rms_given_deg,
+    )
+
+
+@say.register
+def _(found: OtherDirection) -> str:
+    if found.flange_inverted == found.target_inverted:
+        return sentence(found.code, "the samples exclude this direction; invert both streams")
+    return sentence(
+        found.code,
+        "the samples exclude this direction: they fit with one stream inverted. Either the setup is the other one, or "
+        "the poses of the flange are those of the base in it (T_flange_base), or the board's those of the camera in it",
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
@@ -64,7 +65,7 @@ from er3a.vision.next_view import FieldOfView, in_sight, next_view
 from er3a.vision.point_error import ArmAccuracy, SeenPoseError, error_sizes, seen_pose, seen_pose_error
 from er3a.vision.table_corrections import correct_table
 from er3a.vision.tangent import inverted
-from er3a.vision.vision_findings import BoardScale, HandEyeError, MoreScatter, NoMajority, QuaternionOrder
+from er3a.vision.vision_findings import BoardScale, HandEyeError, MoreScatter, NoMajority, OtherReading
 
 STAGE = "vision"
 VIEW_STREAM = 0
@@ -155,7 +156,7 @@ def _camera_at(robot: Robot, found: HandEye, picture: Reals | None) -> Reals:
 
 def _doubt(found: CalibrationResult) -> CalibrationDoubtful | DirectionContradicted | TouchContradicts | None:
     """Why no grasp may rest on a calibration; None if nothing speaks against it."""
-    grave = (NoMajority, QuaternionOrder, BoardScale)
+    grave = (NoMajority, BoardScale, *get_args(OtherReading))
     doubts = tuple(
         each
         for each in found.warnings
