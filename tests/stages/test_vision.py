@@ -59,7 +59,11 @@ def test_tables_say_what_the_summary_says(folders):
     results = read_results(folders["er3_600"], VisionResults).results
     found = results.summary.calibration
     assert results.samples.used.sum() == found.used
-    assert (results.error_map.together_mm >= results.error_map.calibration_mm).all()
+    cells = results.error_map
+    own = cells.reached
+    assert own.any()
+    assert (cells.together_mm[own] >= np.maximum(cells.calibration_mm, cells.arm_mm)[own]).all()
+    assert np.isnan(cells.together_mm[~own]).all()
     for each in results.summary.objects:
         last = results.ways.take((results.ways.target == each.name) & (results.ways.part == "approach")).q_deg[-1]
         np.testing.assert_allclose(last, each.grasp.q_deg)

@@ -32,6 +32,7 @@ from er3a.pipeline.stages.vision.calibration_results import (
     sample_rows,
 )
 from er3a.pipeline.stages.vision.entry import VisionSettings
+from er3a.pipeline.stages.vision.error_map import MapTask, error_map
 from er3a.pipeline.stages.vision.grasp_programs import grasp_programs
 from er3a.pipeline.stages.vision.model import (
     CalibrationResult,
@@ -61,19 +62,16 @@ from er3a.robots.robot import Robot
 from er3a.vision.grasp_motion import PARTS
 from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspPlan, GraspTask, plan_grasp
 from er3a.vision.hand_eye import HandEye, calibrate_hand_eye
-from er3a.vision.next_view import FieldOfView, in_sight, next_view
+from er3a.vision.next_view import next_view
 from er3a.vision.point_error import ArmAccuracy, SeenPoseError, error_sizes, seen_pose, seen_pose_error
 from er3a.vision.table_corrections import correct_table
-from er3a.vision.tangent import inverted
 from er3a.vision.vision_findings import BoardScale, HandEyeError, MoreScatter, NoMajority, OtherReading
 
 STAGE = "vision"
 VIEW_STREAM = 0
 CONTRADICTED = 1e-3
 MUCH_SCATTER = 3.0
-MAP_MARGIN = 0.25  # of the objects' extent
 LEG_ROWS = 13
-LEAST_MAP = 0.2  # m, to each side of the objects' middle
 
 Found = (
     CalibrationImpossible
@@ -131,13 +129,22 @@ def compute(study: Study, name: str) -> VisionResults:
         calibration=calibration,
         objects=objects,
     )
-    seen = task_file.view.view(head.board_mm or [1.0, 1.0])
-    places_m = np.array([T[:3, 3] for T in places.values()])
-    covariances = np.mean([each.standard_deviation.covariance() for each in task_file.objects], axis=0)
+    map_task = MapTask(
+        robot=robot,
+        home=np.radians(task_file.home_deg),
+        accuracy=task_file.arm.accuracy(),
+        T_base_camera=camera,
+        picture=picture,
+        view=task_file.view.view(head.board_mm or [1.0, 1.0]),
+        places=np.array(list(places.values())),
+        T_object_tool=task_file.objects[0].grasps[0].grasp().T_object_tool,
+        camera_covariance=np.mean([each.standard_deviation.covariance() for each in task_file.objects], axis=0),
+        cells=settings.map_cells,
+    )
     return VisionResults(
         summary,
         sample_rows(found, len(robot.lower)),
-        _error_map(found, (camera, picture, robot), seen, places_m, (covariances, settings.map_cells)),
+        error_map(found, map_task),
         WayRows.stacked(_ways(entry.name, plan.chosen) for entry, plan, _ in planned if plan.chosen),
         GraspPrograms.stacked(
             grasp_programs(robot, entry.name, np.radians(task_file.home_deg), plan.chosen, motions.programs)
@@ -322,34 +329,4 @@ def _ways(name: str, chosen: ChosenGrasp) -> WayRows:
         step=np.concatenate([np.arange((part == each).sum()) for each in PARTS]),
         t_s=np.concatenate(times),
         q_deg=np.degrees(np.concatenate(rows)),
-    )
-
-
-def _error_map(
-    found: HandEye,
-    camera: tuple[Reals, Reals | None, Robot],
-    view: FieldOfView,
-    places: Reals,
-    asked: tuple[Reals, int],
-) -> ErrorMapRows:
-    """Errors on a square around the objects, at their mean height, from the camera where it saw them."""
-    T_base_camera, picture, robot = camera
-    covariance, cells = asked
-    middle = places.mean(axis=0)
-    half = max(LEAST_MAP, (1 + MAP_MARGIN) * float(np.abs(places[:, :2] - middle[:2]).max()))
-    steps = np.linspace(-half, half, cells)
-    x, y = (part.ravel() for part in np.meshgrid(middle[0] + steps, middle[1] + steps))
-    points = np.tile(np.eye(4), (len(x), 1, 1))
-    points[:, :3, 3] = np.column_stack([x, y, np.full(len(x), middle[2])])
-    seen = inverted(T_base_camera) @ points
-    q = np.broadcast_to(np.zeros(len(robot.lower)), (len(x), len(robot.lower)))
-    parts = seen_pose_error(
-        found, seen, np.broadcast_to(covariance, (len(x), 6, 6)), ArmAccuracy(), (robot, q, picture)
-    )
-    return ErrorMapRows(
-        x_mm=1000 * x,
-        y_mm=1000 * y,
-        in_view=in_sight(view, seen[:, :3, 3]),
-        calibration_mm=1000 * error_sizes(parts.calibration)[0],
-        together_mm=1000 * error_sizes(parts.calibration + parts.camera)[0],
     )

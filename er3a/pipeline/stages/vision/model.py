@@ -291,13 +291,19 @@ class CornerRows(Table):
 
 @dataclass(frozen=True, eq=False)
 class ErrorMapRows(Table):
-    """Errors of a point seen, at the mean height of the objects, from camera and calibration."""
+    """Errors of the first object's grasp, held at each cell of a square at the objects' mean height.
+
+    What 95 % of errors stay below; NaN where the arm doesn't reach.
+    """
 
     x_mm: Reals = column("position in the base's frame", "mm")
     y_mm: Reals = column("position in the base's frame", "mm")
     in_view: Flags = column("whether the camera sees it", dtype=bool)
-    calibration_mm: Reals = column("distance that 95 % of errors of the calibration stay below", "mm")
-    together_mm: Reals = column("the same with the camera's noise in one reading", "mm")
+    reached: Flags = column("whether the arm reaches it with that grasp, within its limits", dtype=bool)
+    calibration_mm: Reals = column("distance, from the calibration alone", "mm")
+    arm_mm: Reals = column("distance, from the arm's repeatability and table alone", "mm")
+    together_mm: Reals = column("distance, from camera's noise, calibration, repeatability and table", "mm")
+    together_deg: Reals = column("turn, from all of them", "deg")
 
 
 @dataclass(frozen=True, eq=False)

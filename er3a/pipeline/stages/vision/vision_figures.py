@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 from er3a.files.hand_eye_file import grey_image
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import joined
 from er3a.pipeline.stages.vision.model import CalibrationResult, CornerRows, ErrorMapRows, ObjectResult, SampleRows
@@ -99,15 +100,19 @@ def image_picture(rows: CornerRows, folder: Path) -> Picture:
 def map_picture(rows: ErrorMapRows, objects: tuple[ObjectResult, ...]) -> Picture:
     """Errors around the objects, from above."""
     x, y = np.unique(rows.x_mm), np.unique(rows.y_mm)
-    shape = (len(y), len(x))
-    values = [
-        np.where(rows.in_view, column, np.nan).reshape(shape) for column in (rows.calibration_mm, rows.together_mm)
-    ]
-    titles = (tr("calibration alone"), tr("with the camera's noise"))
-    figure, axes = new_figure(1, 2, height=4.2, sharey=True)
-    for ax, value, title in zip(axes, values, titles):
+    seen = rows.in_view
+    both = seen & rows.reached
+    panels = (
+        (tr("calibration alone"), rows.calibration_mm, tr("95 % of errors below (mm)")),
+        (tr("repeatability and table"), rows.arm_mm, tr("95 % of errors below (mm)")),
+        (tr("everything"), rows.together_mm, tr("95 % of errors below (mm)")),
+        (tr("everything, turns"), rows.together_deg, tr("95 % of errors below (°)")),
+    )
+    figure, axes = new_figure(2, 2, height=7.4)
+    for ax, (title, column, label) in zip(axes.ravel(), panels):
+        value = np.where(seen, column, np.nan).reshape(len(y), len(x))
         mesh = ax.pcolormesh(x, y, value, cmap="viridis", shading="nearest", rasterized=True)
-        figure.colorbar(mesh, ax=ax, label=tr("95 % of errors below (mm)"), shrink=0.85)
+        figure.colorbar(mesh, ax=ax, label=label, shrink=0.85)
         for each in objects:
             ax.plot(each.xyz_mm[0], each.xyz_mm[1], "o", color="white", markeredgecolor=INK)
             ax.annotate(
@@ -116,16 +121,24 @@ def map_picture(rows: ErrorMapRows, objects: tuple[ObjectResult, ...]) -> Pictur
         ax.set_title(title)
         ax.grid(False)
         equal_scale(ax, "x (mm)", "y (mm)")
-    seen = rows.in_view
-    blank = "" if seen.all() else tr("Blank cells are out of the camera's view.")
+    blank = "" if both.all() else tr("Blank cells are out of the camera's view or of the arm's reach.")
     caption = tr(
-        "Errors of a point that the camera places at the objects' mean height, seen from above. The calibration's own "
-        "part goes from {least} to {most} mm where the camera sees; one reading with the camera's noise from {low} to "
-        "{high} mm. Where the left map is far below the right one, more samples for the calibration help little.",
-        least=fixed(rows.calibration_mm[seen].min(initial=np.inf), 2),
-        most=fixed(rows.calibration_mm[seen].max(initial=0), 2),
-        low=fixed(rows.together_mm[seen].min(initial=np.inf), 2),
-        high=fixed(rows.together_mm[seen].max(initial=0), 2),
+        "Errors of a grasp (the first object's, held at each place) at the objects' mean height, seen from above. The "
+        "calibration's own part goes from {least} to {most} mm where the camera sees, that of repeatability and table "
+        "from {arm_least} to {arm_most} mm; with the camera's noise in one reading all of them make {low} to {high} mm "
+        "and {turn_low} to {turn_high}°. Where the first map is far below the third, more samples for the calibration "
+        "help little.",
+        **_range(rows.calibration_mm[seen], "least", "most"),
+        **_range(rows.arm_mm[both], "arm_least", "arm_most"),
+        **_range(rows.together_mm[both], "low", "high"),
+        **_range(rows.together_deg[both], "turn_low", "turn_high"),
     )
     caption = joined([caption, blank], " ")
-    return Picture(figure, tr("Two maps of the error around the objects, from above"), caption)
+    return Picture(figure, tr("Four maps of the error around the objects, from above"), caption)
+
+
+def _range(values: Reals, low: str, high: str) -> dict[str, str]:
+    """The least and greatest, to be filled in; a dash where there are none."""
+    if not values.size:
+        return {low: "–", high: "–"}
+    return {low: fixed(float(values.min()), 2), high: fixed(float(values.max()), 2)}
