@@ -36,6 +36,7 @@ MOST_SAMPLES = 2000
 SHOWN_HEADER = 60
 SEPARATORS = {";": "semicolons", "\t": "tabs"}
 EXAMPLE = "flange_x_mm, .., flange_qw, .., flange_qz, target_x_mm, .., target_qz (lengths in mm)"
+LEAST_SQUARE_MM = 0.5
 EPOCH_DIGITS = 10  # of the seconds since 1970, which recorders write
 POINTS = {f"{part}_{c}_mm": CsvColumn() for part in ("seen", "touched") for c in "xyz"}
 
@@ -62,6 +63,12 @@ class BoardEntry(StrictModel):
     square_mm: Positive
     marker_mm: Positive | None = None
     dictionary: Text = "DICT_4X4_50"
+
+    @model_validator(mode="after")
+    def _in_mm(self) -> Self:
+        if self.square_mm < LEAST_SQUARE_MM:
+            raise ValueError(f"square_mm: {self.square_mm:g} mm can only be metres | Multiply by 1000")
+        return self
 
     @model_validator(mode="after")
     def _markers_fit(self) -> Self:
@@ -314,6 +321,12 @@ def _targets_of_images(table: Path, rows: list[dict[str, Any]], entry: ImageEntr
         camera = Camera(K, np.array(own.distortion))
     files = [folder / row["image"] for row in rows]
     images = [grey_image(file) for file in files]
+    for row, file, image in zip(rows, files, images):
+        if image.shape != images[0].shape:
+            (height, width), (first_height, first_width) = image.shape, images[0].shape
+            problem = f"is {width} x {height} pixels, and the first image {first_width} x {first_height}"
+            where = f"sample {row.get('name') or row['row'] - 1}"
+            raise InputError(file, where, problem, "Take all images with one camera setting; remove the sample")
     try:
         views = board_views(images, entry.board.board(), camera, entry.pixel_standard_deviation)
     except BoardNotFoundError as error:

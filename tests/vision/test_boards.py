@@ -119,6 +119,22 @@ def test_a_camera_is_calibrated_from_images_alone(tmp_path):
     assert caught.value.field == "sample 6"
 
 
+def test_an_image_of_another_size_and_squares_in_metres_are_named(tmp_path):
+    for number, size in enumerate([(128, 96), (128, 96), (64, 48)]):
+        Image.fromarray(np.full(size[::-1], 128, np.uint8)).save(tmp_path / f"{number}.png")
+    head = HEAD.format(setup="eye_to_hand") + (
+        "images:\n  board: {pattern: charuco, squares: [7, 5], square_mm: 30, marker_mm: 22}\n"
+    )
+    flange = np.stack([pose([0, 0, k], [0.4, 0, 0.4]) for k in range(3)])
+    table = columns(flange, "flange", "quaternion") | {"image": np.array([f"{n}.png" for n in range(3)])}
+    with pytest.raises(InputError, match="64 x 48 pixels, and the first image 128 x 96") as caught:
+        load_hand_eye(write(tmp_path, table, head))
+    assert caught.value.field == "sample 3"
+    metres = head.replace("square_mm: 30, marker_mm: 22", "square_mm: 0.03, marker_mm: 0.022")
+    with pytest.raises(InputError, match="can only be metres"):
+        load_hand_eye(write(tmp_path, table, metres))
+
+
 @pytest.mark.long
 def test_intrinsics_estimated_from_the_images_come_with_deviations():
     random = np.random.default_rng(4)

@@ -17,6 +17,7 @@ from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.page import Picture
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL
 
+LEAST_RANGE = 0.02  # of the greatest value, by which a map's colours go beyond its values
 MOST_IMAGES = 9
 WIDEST_PX = 480
 ARROW_PX = 30.0
@@ -111,12 +112,21 @@ def map_picture(rows: ErrorMapRows, objects: tuple[ObjectResult, ...]) -> Pictur
     figure, axes = new_figure(2, 2, height=7.4)
     for ax, (title, column, label) in zip(axes.ravel(), panels):
         value = np.where(seen, column, np.nan).reshape(len(y), len(x))
-        mesh = ax.pcolormesh(x, y, value, cmap="viridis", shading="nearest", rasterized=True)
+        known = value[np.isfinite(value)]
+        ends = (known.min() - LEAST_RANGE * known.max(), (1 + LEAST_RANGE) * known.max()) if known.size else (0.0, 1.0)
+        mesh = ax.pcolormesh(
+            x, y, value, cmap="viridis", shading="nearest", rasterized=True, vmin=ends[0], vmax=ends[1]
+        )
         figure.colorbar(mesh, ax=ax, label=label, shrink=0.85)
         for each in objects:
             ax.plot(each.xyz_mm[0], each.xyz_mm[1], "o", color="white", markeredgecolor=INK)
             ax.annotate(
-                each.name, each.xyz_mm[:2], xytext=(4, 4), textcoords="offset points", fontsize=8, color="white"
+                each.name,
+                each.xyz_mm[:2],
+                xytext=(4, 4),
+                textcoords="offset points",
+                fontsize=8,
+                bbox={"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 0.5},
             )
         ax.set_title(title)
         ax.grid(False)
