@@ -27,6 +27,7 @@ PAGES = (
     "speed",
     "diagnosis",
     "calibration",
+    "hand_eye",
     "workspace",
     "paths",
     "clearance",

@@ -16,7 +16,6 @@ from er3a.files.yaml_file import vanished
 from er3a.formats.text_file import read_text
 
 LARGEST_DIGITS = 9
-LARGEST = 10.0**LARGEST_DIGITS
 
 MOST_BYTES = 50_000_000
 
@@ -43,12 +42,15 @@ class CsvColumn:
     optional : an empty field is read as None
     choices : the allowed values, for columns of words
     always : whether the table must have the column; without it all its values are None
+    digits : of a number in front of the point, at most; quantity : what such numbers are
     """
 
     type: type = float
     optional: bool = False
     choices: tuple[str, ...] = ()
     always: bool = True
+    digits: int = LARGEST_DIGITS
+    quantity: str = "length or angle"
 
 
 def read_csv(path: str | Path, columns: Mapping[str, CsvColumn]) -> list[dict[str, Any]]:
@@ -140,9 +142,9 @@ def _value(path: Path, row: int, name: str, text: str, column: CsvColumn) -> Any
         raise InputError(path, where, f"'{text}' is not {number}", f"Write {number} without a unit")
     if not math.isfinite(value):
         raise InputError(path, where, f"'{text}' is not a finite number", "Write a number, or remove the row")
-    if abs(value) > LARGEST or vanished(text, value):
-        problem = f"'{text}' is too {'large' if value else 'small'} for any length or angle"
-        raise InputError(path, where, problem, "Check its exponent")
+    if abs(value) > 10.0**column.digits or vanished(text, value):
+        problem = f"'{text}' is too {'large' if value else 'small'} for any {column.quantity}"
+        raise InputError(path, where, problem, "Check its exponent and unit")
     return value
 
 

@@ -2,12 +2,13 @@
 
 A table of samples has one row for each: where the flange was, as joint angles (``q1_deg`` ..) or as a pose
 (``flange_x_mm`` ..), and where the camera saw the board (``target_x_mm`` ..) or in which ``image``. Orientations are
-``_qw`` .. ``_qz``, ``_roll_deg``, ``_pitch_deg``, ``_yaw_deg`` (R = Rz(yaw) Ry(pitch) Rx(roll)), or ``_r11`` ..
-``_r33`` by rows. ``name`` is optional.
+``_qw`` .. ``_qz``, ``_roll_deg``, ``_pitch_deg``, ``_yaw_deg`` (R = Rz(yaw) Ry(pitch) Rx(roll)), ``_r11`` ..
+``_r33`` by rows, or ``_rx_rad`` .. ``_rz_rad`` (a rotation vector). ``name`` is optional.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from pydantic import Field, model_validator
 
+from er3a.calibration.outcomes import LevelName
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
 from er3a.files.pose_columns import ROWS_TO_JUDGE_UNITS, pose_columns, pose_form, poses_of
@@ -31,6 +33,11 @@ from er3a.vision.time_offset import Stream, TimeOffset, paired, time_offset
 
 STREAM_SAMPLES = 60
 MOST_SAMPLES = 2000
+SHOWN_HEADER = 60
+SEPARATORS = {";": "semicolons", "\t": "tabs"}
+EXAMPLE = "flange_x_mm, .., flange_qw, .., flange_qz, target_x_mm, .., target_qz (lengths in mm)"
+LEAST_SQUARE_MM = 0.5
+EPOCH_DIGITS = 10  # of the seconds since 1970, which recorders write
 POINTS = {f"{part}_{c}_mm": CsvColumn() for part in ("seen", "touched") for c in "xyz"}
 
 Positive = Annotated[float, Field(gt=0, le=1e5)]
@@ -56,6 +63,12 @@ class BoardEntry(StrictModel):
     square_mm: Positive
     marker_mm: Positive | None = None
     dictionary: Text = "DICT_4X4_50"
+
+    @model_validator(mode="after")
+    def _in_mm(self) -> Self:
+        if self.square_mm < LEAST_SQUARE_MM:
+            raise ValueError(f"square_mm: {self.square_mm:g} mm can only be metres | Multiply by 1000")
+        return self
 
     @model_validator(mode="after")
     def _markers_fit(self) -> Self:
@@ -100,12 +113,21 @@ class StreamsEntry(StrictModel):
     widest_s: Annotated[float, Field(gt=0, le=3600)] = 2.0
 
 
+@dataclass(frozen=True, eq=False)
+class SeenImages:
+    """Image files as the table names them, and what was found in each."""
+
+    names: tuple[str, ...]
+    views: BoardViews
+
+
 class HandEyeFile(StrictModel):
     """A calibration set.
 
     ``camera_standard_deviation`` is that of T_camera_board by the camera's axes; without it, it is estimated.
     ``board_mm``: the board's edges along its x and y, for views. ``touched``: a table of points that the camera placed
     (``seen_x_mm``; with the camera on the flange: that lie on the board) and the robot touched (``touched_x_mm``).
+    ``table_corrections``: entries of the arm's table that are estimated with the poses; samples with joint angles only.
     """
 
     kind: Literal["hand_eye"]
@@ -121,6 +143,7 @@ class HandEyeFile(StrictModel):
     board_mm: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = None
     touched: Text | None = None
     touch_standard_deviation_mm: Positive = 0.1
+    table_corrections: LevelName | None = None
 
     @model_validator(mode="after")
     def _one_source_of_samples(self) -> Self:
@@ -145,11 +168,14 @@ def load_hand_eye(path: str | Path, arm: Robot | None = None) -> CalibrationSet:
     return read_calibration(path, arm)[0]
 
 
-def read_calibration(path: str | Path, robot: Robot | None) -> tuple[CalibrationSet, TimeOffset | None]:
-    """A calibration set, and the offset between its streams' clocks, if they have two."""
+def read_calibration(
+    path: str | Path, robot: Robot | None
+) -> tuple[CalibrationSet, TimeOffset | None, SeenImages | None]:
+    """A calibration set, the offset between its streams' clocks if they have two, and its images if it has any."""
     path = Path(path)
     head = load(HandEyeFile, path)
     offset: TimeOffset | None = None
+    images: SeenImages | None = None
     covariance = head.camera_standard_deviation
     per_sample: Reals | None = None
     if head.streams is not None:
@@ -164,8 +190,8 @@ def read_calibration(path: str | Path, robot: Robot | None) -> tuple[Calibration
         flange, q = _flange(table, rows, header, robot)
         names = tuple(str(row.get("name") or f"row {row['row']}") for row in rows)
         if head.images is not None:
-            views = _targets_of_images(table, rows, head.images, table.parent)
-            target, per_sample = views.target, views.covariance
+            images = _targets_of_images(table, rows, head.images, table.parent)
+            target, per_sample = images.views.target, images.views.covariance
         else:
             target = poses_of(table, rows, "target", _form(table, header, "target"))
     if covariance is not None:
@@ -181,7 +207,7 @@ def read_calibration(path: str | Path, robot: Robot | None) -> tuple[Calibration
         touched=_touched(path.parent / head.touched) if head.touched else None,
         touch_deviation=head.touch_standard_deviation_mm / 1000,
     )
-    return samples, offset
+    return samples, offset, images
 
 
 def check_samples(table: Path) -> str:
@@ -210,12 +236,20 @@ def sample_rows(table: Path) -> tuple[list[dict[str, Any]], list[str]]:
         if name in header:
             columns[name] = CsvColumn(str, optional=name == "name")
     if "t_s" in header:
-        columns["t_s"] = CsvColumn()
+        columns["t_s"] = CsvColumn(digits=EPOCH_DIGITS, quantity="time in s")
     joints = sum(1 for name in header if name.startswith("q") and name.endswith("_deg") and name[1:-4].isdigit())
     columns |= {f"q{joint + 1}_deg": CsvColumn() for joint in range(joints)}
     for stream in ("flange", "target"):
         if form := pose_form(table, header, stream):
             columns |= pose_columns(stream, form)
+    if not columns:
+        first = ", ".join(header)[:SHOWN_HEADER]
+        apart = next((word for mark, word in SEPARATORS.items() if len(header) == 1 and mark in header[0]), None)
+        problem = (
+            f"the columns are separated by {apart}" if apart else f"the first line names no column of samples: {first}"
+        )
+        remedy = "Separate them by commas" if apart else f"Begin with a header such as {EXAMPLE}"
+        raise InputError(table, "header", problem, remedy)
     rows = read_csv(table, columns)
     if not rows:
         raise InputError(table, None, "the table has a header but no samples", "Add a row for each sample")
@@ -276,7 +310,7 @@ def _touched(table: Path) -> Reals:
     return found
 
 
-def _targets_of_images(table: Path, rows: list[dict[str, Any]], entry: ImageEntry, folder: Path) -> BoardViews:
+def _targets_of_images(table: Path, rows: list[dict[str, Any]], entry: ImageEntry, folder: Path) -> SeenImages:
     for row in rows:
         if not row.get("image"):
             raise InputError(table, f"row {row['row']}, column image", "no image is named", "Name its file")
@@ -286,18 +320,26 @@ def _targets_of_images(table: Path, rows: list[dict[str, Any]], entry: ImageEntr
         K = np.array([[own.fx, 0, own.cx], [0, own.fy, own.cy], [0, 0, 1.0]])
         camera = Camera(K, np.array(own.distortion))
     files = [folder / row["image"] for row in rows]
-    images = [_grey(file) for file in files]
+    images = [grey_image(file) for file in files]
+    for row, file, image in zip(rows, files, images):
+        if image.shape != images[0].shape:
+            (height, width), (first_height, first_width) = image.shape, images[0].shape
+            problem = f"is {width} x {height} pixels, and the first image {first_width} x {first_height}"
+            where = f"sample {row.get('name') or row['row'] - 1}"
+            raise InputError(file, where, problem, "Take all images with one camera setting; remove the sample")
     try:
-        return board_views(images, entry.board.board(), camera, entry.pixel_standard_deviation)
+        views = board_views(images, entry.board.board(), camera, entry.pixel_standard_deviation)
     except BoardNotFoundError as error:
         x, y = entry.board.squares
         problem = f"{error.corners} corners of a {entry.board.pattern} board of {x} x {y} found"
         remedy = "Check squares, dictionary and the image; or remove the sample"
         where = f"sample {rows[error.image].get('name') or error.image + 1}"
         raise InputError(files[error.image], where, problem, remedy) from None
+    return SeenImages(tuple(str(row["image"]) for row in rows), views)
 
 
-def _grey(file: Path) -> NDArray[np.uint8]:
+def grey_image(file: Path) -> NDArray[np.uint8]:
+    """A picture's grey levels (h, w)."""
     try:
         with Image.open(file) as image:
             return np.asarray(image.convert("L"))

@@ -1,4 +1,7 @@
-"""Poses in CSV tables: a position in mm and an orientation in one of three forms, by row and column in every error."""
+"""Poses in CSV tables: a position in mm and an orientation in one of four forms, by row and column in every error.
+
+Rotation vectors (axis times angle, in rad) are what OpenCV's detectors and the pendants of Universal Robots give.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +13,17 @@ import scipy
 
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn
-from er3a.files.target_table import FORMS
+from er3a.files.target_table import FORMS as TARGET_FORMS
 from er3a.files.units import METRES_BELOW_MM, WIDEST_IN_RADIANS
 from er3a.geometry.transforms import transform
 from er3a.numerics.arrays import Reals
-from er3a.vision.tangent import posed
+from er3a.vision.tangent import exp_rotation, posed
 
-FORM_NAMES = ("quaternion_wxyz", "rpy_deg", "matrix")
+FORMS: dict[str, tuple[str, ...]] = {
+    **{name: TARGET_FORMS[name] for name in ("quaternion_wxyz", "rpy_deg", "matrix")},
+    "rotation_vector_rad": ("rx_rad", "ry_rad", "rz_rad"),
+}
+LONGEST_VECTOR = 2 * np.pi * 1.01
 POSITION = ("x_mm", "y_mm", "z_mm")
 UNIT_LENGTH_TOLERANCE = 1e-3  # quaternions are written with as few as four digits
 ORTHONORMAL_TOLERANCE = 1e-3
@@ -32,7 +39,7 @@ def pose_form(path: Path, header: list[str], stream: str) -> str | None:
     InputError
         for two forms
     """
-    forms = [form for form in FORM_NAMES if {f"{stream}_{name}" for name in FORMS[form]} & set(header)]
+    forms = [form for form, names in FORMS.items() if {f"{stream}_{name}" for name in names} & set(header)]
     if len(forms) > 1:
         problem = f"{stream} has two forms of orientation, {forms[0]} and {forms[1]}"
         raise InputError(path, "header", problem, "Keep the columns of one")
@@ -51,7 +58,7 @@ def poses_of(path: Path, rows: list[dict[str, Any]], stream: str, form: str) -> 
     ------
     InputError
         naming the row: positions in metres among mm, quaternions without unit length, mirrored or skewed matrices,
-        angles in radians
+        angles in radians, rotation vectors in degrees
     """
     position = np.array([[row[f"{stream}_{name}"] for name in POSITION] for row in rows], dtype=float)
     _check_millimetres(path, rows, stream, position)
@@ -62,6 +69,13 @@ def poses_of(path: Path, rows: list[dict[str, Any]], stream: str, form: str) -> 
             problem = f"the widest angle is {widest:g} deg, which can only be radians"
             raise InputError(path, f"columns {stream}_roll_deg to {stream}_yaw_deg", problem, "Convert to degrees")
         return transform(position / 1000, np.radians(values))
+    if form == "rotation_vector_rad":
+        for row, v in zip(rows, values):
+            if (length := float(np.linalg.norm(v))) > LONGEST_VECTOR:
+                where = f"row {row['row']}, columns {stream}_rx_rad to {stream}_rz_rad"
+                problem = f"the rotation vector's length is {length:.4g}, more than a turn, which can only be degrees"
+                raise InputError(path, where, problem, "Convert to radians; roll, pitch and yaw have other columns")
+        return posed(exp_rotation(values), position / 1000)
     if form == "quaternion_wxyz":
         for row, q in zip(rows, values):
             length = float(np.linalg.norm(q))

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from er3a.errors import Er3aError
 from er3a.numerics.arrays import Reals
 from er3a.vision.opencv import opencv
-from er3a.vision.tangent import exp_rotation, inverse_right_jacobian, posed
+from er3a.vision.tangent import exp_rotation, inverse_right_jacobian, log_rotation, posed
 
 Pattern = Literal["chessboard", "charuco", "apriltag"]
 LEAST_CORNERS = 6
@@ -138,6 +138,14 @@ def estimated_camera(points: Sequence[Reals], corners: Sequence[Reals], size: tu
     found = cv2.calibrateCameraExtended(on_board, in_image, size, None, None)
     distortion = found[2].ravel()
     return Camera(found[1], distortion, found[5].ravel()[: 4 + len(distortion)])
+
+
+def projected(points: Reals, T_camera_board: Reals, camera: Camera) -> Reals:
+    """Where points (k, 3), m, of a board at T_camera_board (4, 4) stand in the image, (k, 2) pixels."""
+    turn = log_rotation(T_camera_board[:3, :3])
+    pixels = opencv().projectPoints(points, turn, T_camera_board[:3, 3], camera.matrix, camera.distortion)[0]
+    found: Reals = pixels.reshape(-1, 2)
+    return found
 
 
 def board_points(board: Board) -> Reals:

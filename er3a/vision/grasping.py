@@ -2,8 +2,9 @@
 
 A grasp is reached along a straight line of the tool and left along another, straight up. Every grasp, in every turn
 that the object's symmetry allows, with every joint solution, is judged at the grasp first: limits, singularity,
-clearance. The best of them are then followed along both lines and along the joint move that leads there. Of those that
-pass, the one is taken whose smallest margin, each divided by what is asked of it, is greatest.
+clearance. The best of them are then followed along both lines, and on the way that leads there from where the arm waits
+(:mod:`er3a.vision.grasp_motion`). Of those that pass, the one is taken whose smallest margin, each divided by what is
+asked of it, is greatest.
 
 The object and what is held are no bodies of the scene; the arm, its tool's capsule if it has one, and the scene are.
 """
@@ -12,12 +13,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
-import scipy
 
-from er3a.collision.along import clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.clearance import clearance
 from er3a.collision.pairs import Pair
@@ -27,10 +26,12 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.numerical import solve
 from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.numerics.arrays import Reals
-from er3a.planning.moves import JointMove, line
-from er3a.planning.piecewise import PiecewiseMotion, polynomial_motion
+from er3a.planning.moves import line
+from er3a.planning.timing import JointLimits
+from er3a.planning.way_around import NoWayAround, PlanningTask
 from er3a.robots.joint_limits import limit_margin
 from er3a.robots.robot import Robot
+from er3a.vision.grasp_motion import GraspLeg, Part, least_clearance, tool_leg, transfer
 from er3a.vision.point_error import draws
 from er3a.vision.tangent import skew
 
@@ -38,9 +39,8 @@ ANY_TURN = 12  # turns tried of an object that looks alike from all sides
 WAYPOINTS = 13
 FOLLOWED = 6  # candidates that are followed along the lines
 WIDEST_STEP = 0.35  # rad between waypoints of an approach; more is a jump
-LOWEST_DEPTH = 1e-3  # m of overlap that may go unnoticed between points
-UNIT_S = 1.0
-CUBIC, QUINTIC = 3, 5
+LEG_POINTS = 41
+PLANNING_TOLERANCE = 1e-3  # m
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,18 +136,43 @@ class LineLeaves:
 
 
 @dataclass(frozen=True)
-class WayCollides:
-    """Something is nearer than asked on the way."""
+class LineUnproven:
+    """The bounds don't settle that the straight line there or away keeps limits, rates and regular poses."""
 
-    part: Literal["move", "approach", "retreat"]
+    part: Literal["approach", "retreat"]
+    code: Literal["line_unproven"] = "line_unproven"
+
+
+@dataclass(frozen=True)
+class WayCollides:
+    """Something is nearer than asked on a straight line."""
+
+    part: Part
     pair: Pair
     clearance_mm: float
     needed_mm: float
     code: Literal["way_collides"] = "way_collides"
 
 
-GraspRefusal = GraspOutOfReach | GraspNearLimits | GraspSingular | GraspCollides | LineLeaves | WayCollides
-_FAR: tuple[type, ...] = (GraspOutOfReach, GraspNearLimits, GraspSingular, GraspCollides, LineLeaves, WayCollides)
+@dataclass(frozen=True)
+class NoTransfer:
+    """The straight joint move from where the arm waits collides, and the planner gives no other way."""
+
+    why: NoWayAround
+    code: Literal["no_transfer"] = "no_transfer"
+
+
+GraspRefusal = (
+    GraspOutOfReach
+    | GraspNearLimits
+    | GraspSingular
+    | GraspCollides
+    | LineLeaves
+    | LineUnproven
+    | WayCollides
+    | NoTransfer
+)
+_FAR: tuple[type, ...] = get_args(GraspRefusal)
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,8 +183,8 @@ class ChosenGrasp:
     ----------
     grasp : its name; turn : rad, about the object's z
     T_base_tool : (4, 4); q_before, q, q_after : (n,), rad, at the beginning of the approach, the grasp, and away
-    move, approach, retreat : (K, n), rad, joint angles along the way, in order
-    clearance : m, least along all of it; None where it can't be measured
+    legs : the motion, in order
+    clearance : m, proven along all of it; None where it can't be measured
     limit_margin : rad; singular_value : least along both lines
     margin : smallest of the three, each divided by what is asked
     probability : that the error stays within the gripper's tolerance; deviation : of that figure, from its draws
@@ -171,9 +196,7 @@ class ChosenGrasp:
     q_before: Reals
     q: Reals
     q_after: Reals
-    move: Reals
-    approach: Reals
-    retreat: Reals
+    legs: tuple[GraspLeg, ...]
     clearance: float | None
     nearest: Pair | None
     limit_margin: float
@@ -204,13 +227,22 @@ class _Candidate:
 
 @dataclass(frozen=True, eq=False)
 class GraspTask:
-    """What all objects share: arm, surroundings, where the arm waits, needs."""
+    """What all objects share.
+
+    Attributes
+    ----------
+    home : (n,), rad, where the arm waits
+    limits : of the joints' rates; line_speed : m/s, the tool's greatest on approach and retreat; seed : of the planner
+    """
 
     robot: Robot
     scene: Scene | None
     bodies: Bodies | None
     home: Reals
     needs: GraspNeeds
+    limits: JointLimits
+    line_speed: float
+    seed: int
 
 
 def plan_grasp(
@@ -290,74 +322,70 @@ def _ratio(value: Reals, needed: float) -> Reals:
     return np.asarray(value) / needed if needed > 0 else np.full(np.shape(value), np.inf)
 
 
-def _smooth(times: Reals, q: Reals) -> PiecewiseMotion:
-    """The cubic spline through joint values (N, n) at times (N,) in s."""
-    spline = scipy.interpolate.CubicSpline(times, q)
-    return polynomial_motion(lambda t: (spline(t), spline(t, 1), spline(t, 2)), times, CUBIC)
-
-
 def _followed(task: GraspTask, candidate: _Candidate, target: DetectedObject) -> ChosenGrasp | GraspRefusal:
-    T = candidate.T
+    robot, T, needs = task.robot, candidate.T, task.needs
     before = T @ translation(0, 0, -target.approach)
     after = translation(0, 0, target.retreat) @ T
-    parts: dict[Literal["approach", "retreat"], Reals] = {}
-    for part, end, length in (("approach", before, target.approach), ("retreat", after, target.retreat)):
-        found = _along(task, T, end, candidate.q)
-        if len(found) < WAYPOINTS:
-            return LineLeaves(part, 1000 * length * max(len(found) - 1, 0) / (WAYPOINTS - 1))  # type: ignore[arg-type]
-        parts[part] = found  # type: ignore[index]
-    approach, retreat = parts["approach"][::-1], parts["retreat"]
-    q = np.concatenate([approach, retreat])
-    limit = float(limit_margin(task.robot, q).min())
-    value = conditioning(task.robot, q, characteristic_length(task.robot)).smallest_singular_value
-    move = JointMove(task.home, approach[0], UNIT_S)
-    times = np.linspace(0.0, UNIT_S, WAYPOINTS)
-    ways: dict[Literal["move", "approach", "retreat"], PiecewiseMotion] = {
-        "approach": _smooth(times, approach),
-        "retreat": _smooth(times, retreat),
-        "move": polynomial_motion(move.joints, times[[0, -1]], QUINTIC),
-    }
-    least: tuple[float, Pair | None] = (np.inf, None)
-    for name, way in ways.items():
-        if task.bodies is None:
-            break
-        along = clearance_along(task.bodies, way.joints, way.rate_bounds, times, times, LOWEST_DEPTH)
-        pair = along.pair[along.least] if along.least >= 0 else None
-        if pair is not None:
-            distance = float(along.distance[along.least])
-            needed = 0.0 if name == "move" else task.needs.clearance
-            if distance < needed or along.contacts:
-                return WayCollides(name, pair, 1000 * distance, 1000 * needed)
-            least = min(least, (distance, pair), key=lambda each: each[0])
-    margin = min(
-        float(_ratio(np.array(limit), task.needs.limit_margin)),
-        float(_ratio(value.min(), task.needs.singular_value)),
-        float(_ratio(np.array(least[0]), task.needs.clearance)),
+    lines: list[GraspLeg] = []
+    parts: tuple[tuple[Literal["approach", "retreat"], Reals, float], ...] = (
+        ("approach", before, target.approach),
+        ("retreat", after, target.retreat),
+    )
+    for part, end, length in parts:
+        points = _along(task, T, end, candidate.q)
+        if len(points) < WAYPOINTS:
+            return LineLeaves(part, 1000 * length * max(len(points) - 1, 0) / (WAYPOINTS - 1))
+        ends = (before, T) if part == "approach" else (T, after)
+        points = points[::-1] if part == "approach" else points
+        legs = tool_leg(robot, part, points, ends, task.limits, task.line_speed)
+        if legs is None:
+            return LineUnproven(part)
+        if (refusal := _too_near(task, part, legs)) is not None:
+            return refusal
+        lines += legs
+    q_before = lines[0].joints(np.zeros(1))[0]
+    planning = PlanningTask(robot, task.bodies, PLANNING_TOLERANCE, task.limits, task.seed)
+    moves = transfer(planning, task.home, q_before)
+    if not isinstance(moves, tuple):
+        return NoTransfer(moves)
+    every = np.concatenate([leg.sampled(LEG_POINTS)[1] for leg in lines])
+    limit = float(limit_margin(robot, every).min())
+    value = float(conditioning(robot, every, characteristic_length(robot)).smallest_singular_value.min())
+    least = least_clearance(task.bodies, (*moves, *lines)) if task.bodies is not None else None
+    asked = (
+        (limit, needs.limit_margin),
+        (value, needs.singular_value),
+        (least[0] if least else np.inf, needs.clearance),
     )
     return ChosenGrasp(
         grasp=candidate.grasp,
         turn=candidate.turn,
         T_base_tool=T,
-        q_before=approach[0],
+        q_before=q_before,
         q=candidate.q,
-        q_after=retreat[-1],
-        move=ways["move"].joints(times),
-        approach=approach,
-        retreat=retreat,
-        clearance=least[0] if least[1] is not None else None,
-        nearest=least[1],
+        q_after=lines[-1].q_end,
+        legs=(*moves, *lines),
+        clearance=least[0] if least else None,
+        nearest=least[1] if least else None,
         limit_margin=limit,
-        singular_value=float(value.min()),
-        margin=margin,
+        singular_value=value,
+        margin=min(float(_ratio(np.array(own), needed)) for own, needed in asked),
         probability=np.nan,
         deviation=np.nan,
     )
 
 
+def _too_near(task: GraspTask, part: Part, legs: tuple[GraspLeg, ...]) -> WayCollides | None:
+    least = least_clearance(task.bodies, legs) if task.bodies is not None else None
+    if least is None or least[0] >= task.needs.clearance:
+        return None
+    return WayCollides(part, least[1], 1000 * least[0], 1000 * task.needs.clearance)
+
+
 def _along(task: GraspTask, T_from: Reals, T_to: Reals, q: Reals) -> Reals:
     """Joint angles (k, n) at equal steps of a line, from ``q`` on; ends before the first that can't be had."""
     robot = task.robot
-    path = line(T_from, T_to, UNIT_S)
+    path = line(T_from, T_to, 1.0)
     rows = [q]
     for T in path.poses(np.linspace(0.0, 1.0, WAYPOINTS))[1:]:
         found = solve(robot, T, rows[-1], restarts=0)

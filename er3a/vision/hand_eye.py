@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 import scipy
@@ -14,8 +13,9 @@ from er3a.numerics.arrays import Flags, Reals
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.classic_methods import METHOD_NAMES, MethodName, mean_pose, solved_by
 from er3a.vision.likelihood import PoseObservations, Refined, refine, residuals
+from er3a.vision.readings import other_reading
 from er3a.vision.suspects import angles_between, check_angles, repeated_poses, worst_sample
-from er3a.vision.tangent import inverted, log_rotation, moved, posed, quaternion_of, skew, step_between, transposed
+from er3a.vision.tangent import inverted, log_rotation, moved, skew, step_between, transposed
 from er3a.vision.vision_findings import (
     AllSamplesEqual,
     BoardScale,
@@ -27,8 +27,8 @@ from er3a.vision.vision_findings import (
     MoreScatter,
     NoRotation,
     NothingFits,
+    OtherDirection,
     ParallelTurns,
-    QuaternionOrder,
     Suspect,
     TooFewSamples,
 )
@@ -42,7 +42,7 @@ EXCLUDED = 1e-3
 SURE = 0.95
 MOST_FACTS = 10
 SCALE_ROUNDS = 20
-MUCH_ROTATION, MUCH_BETTER = np.radians(3), 5
+SURE_SCALE = 3.0  # half widths of its interval, from 0; a vaguer factor comes of samples that don't fit at all
 LEAST_SCALE_ERROR = 2e-3
 DIRECTIONS = ((False, False), (True, True), (True, False), (False, True))
 
@@ -164,7 +164,8 @@ def calibrate_hand_eye(samples: CalibrationSet) -> HandEye:
         refined = _fitted(samples.take(used))
     kept = samples.take(used)
     warnings: list[CalibrationWarning] = [angles.warning] if angles.warning else []
-    warnings += _warnings(kept, refined, greatest, apart)
+    directions = directions_tried(kept, refined)
+    warnings += _warnings(kept, refined, greatest, apart, directions)
     half_width = scipy.special.stdtrit(refined.freedom, (1 + SURE) / 2) * np.sqrt(np.diag(refined.covariance))
     found = HandEye(
         samples=samples,
@@ -179,7 +180,7 @@ def calibrate_hand_eye(samples: CalibrationSet) -> HandEye:
         greatest_turn=greatest,
         axes_apart=apart,
         methods=tuple(_answer(name, kept, refined, half_width) for name in METHOD_NAMES),
-        directions=directions_tried(kept, refined),
+        directions=directions,
         suspects=(*suspects, *repeated_poses(samples)),
         warnings=tuple(warnings),
         without_suspects=None if used.all() else _shift_with_all(samples, refined),
@@ -245,7 +246,13 @@ def _check_determined(samples: CalibrationSet) -> tuple[float, float]:
     return greatest, apart
 
 
-def _warnings(samples: CalibrationSet, refined: Refined, greatest: float, apart: float) -> list[CalibrationWarning]:
+def _warnings(
+    samples: CalibrationSet,
+    refined: Refined,
+    greatest: float,
+    apart: float,
+    directions: tuple[DirectionTried, ...],
+) -> list[CalibrationWarning]:
     found: list[CalibrationWarning] = []
     if greatest < LITTLE_TURN or apart < LITTLE_SPREAD:
         found.append(LittleMotion(float(np.degrees(greatest)), float(np.degrees(apart))))
@@ -253,36 +260,15 @@ def _warnings(samples: CalibrationSet, refined: Refined, greatest: float, apart:
     largest = float(np.sqrt(scipy.special.chdtri(free, EXCLUDED) / free))
     if samples.camera_covariance is not None and refined.scatter > largest:
         found.append(MoreScatter(float(refined.scatter), largest))
-    if order := _other_order(samples, refined):
-        return [*found, order]
+    if reading := other_reading(samples, refined.residual):
+        return [*found, reading]
+    if directions[0].status == "excluded":
+        best = next(each for each in directions if each.status == "best")
+        return [*found, OtherDirection(best.flange_inverted, best.target_inverted)]
     factor, half_width = board_scale(samples, refined)
-    if abs(factor - 1) > max(2 * half_width, LEAST_SCALE_ERROR):
+    if abs(factor - 1) > max(2 * half_width, LEAST_SCALE_ERROR) and factor > SURE_SCALE * half_width:
         found.append(BoardScale(factor, half_width))
     return found
-
-
-def _other_order(samples: CalibrationSet, refined: Refined) -> QuaternionOrder | None:
-    """Whether a stream's quaternions were read in the wrong order.
-
-    That keeps all turning angles, for it moves quaternions as a rotation and a mirror of four dimensions does; so only
-    a fit can tell.
-    """
-    given = float(np.sqrt((refined.residual[:, 3:] ** 2).mean()))
-    if given < MUCH_ROTATION:
-        return None
-    best: tuple[float, QuaternionOrder] | None = None
-    streams: tuple[Literal["flange", "target"], ...] = ("flange", "target")
-    for stream in streams:
-        T = getattr(samples, stream)
-        for shift in (0, 2):  # x, y, z, w taken for w, x, y, z, and the other way round
-            R = scipy.spatial.transform.Rotation.from_quat(np.roll(quaternion_of(T), shift, axis=1)).as_matrix()
-            turned = posed(R, T[:, :3, 3])
-            again = replace(samples, flange=turned) if stream == "flange" else replace(samples, target=turned)
-            raw = _residuals_of(again.hand, again.target, np.array([1e-3, 5e-3]))
-            other = np.inf if raw is None else float(np.sqrt((raw[:, 3:] ** 2).mean()))
-            if other < given / MUCH_BETTER and (best is None or other < best[0]):
-                best = other, QuaternionOrder(stream, float(np.degrees(given)), float(np.degrees(other)))
-    return best[1] if best else None
 
 
 def board_scale(samples: CalibrationSet, refined: Refined) -> tuple[float, float]:

@@ -109,6 +109,19 @@ def flange_to_camera(setup: Setup, F: Reals, X: Reals, Y: Reals) -> Reals:
     return G
 
 
+def whitening(seen: PoseObservations, sigma: Reals, X: Reals, Y: Reals) -> Reals:
+    """Matrices (..., N, 6, 6) that give residuals unit covariance."""
+    if seen.camera_covariance is None:
+        S = sigma[..., :, None] ** 2 * np.eye(6)
+    else:
+        S = np.broadcast_to(seen.camera_covariance, (*sigma.shape, 6))
+    if (own := _flange_covariance(seen)) is not None:
+        G = flange_to_camera(seen.setup, seen.F, X, Y)
+        S = S + G @ own @ transposed(G)
+    W: Reals = np.linalg.inv(np.linalg.cholesky(S))
+    return W
+
+
 def refine(seen: PoseObservations, X: Reals, Y: Reals) -> Refined:
     """The likeliest poses from starts X, Y (..., 4, 4).
 
@@ -123,7 +136,7 @@ def refine(seen: PoseObservations, X: Reals, Y: Reals) -> Refined:
     converged = np.ones(X.shape[:-2], dtype=bool)
     for _ in range(VARIANCE_ROUNDS if known is None else (1 if _flange_covariance(seen) is None else WEIGHT_ROUNDS)):
         sigma = np.broadcast_to(np.repeat(deviations, 3, axis=-1)[..., None, :], batch)
-        W = _whitening(seen, sigma, X, Y)
+        W = whitening(seen, sigma, X, Y)
         X, Y, converged = _steps(seen, W, X, Y)
         raw, derivative = residuals(seen.F, seen.B, X, Y)
         white, J = (W @ raw[..., None])[..., 0], W @ derivative
@@ -155,19 +168,6 @@ def _flange_covariance(seen: PoseObservations) -> Reals | None:
     """The flange's covariance, if it has one that is not zero."""
     own = seen.flange_covariance
     return own if own is not None and np.any(own) else None
-
-
-def _whitening(seen: PoseObservations, sigma: Reals, X: Reals, Y: Reals) -> Reals:
-    """Matrices (..., N, 6, 6) that give residuals unit covariance."""
-    if seen.camera_covariance is None:
-        S = sigma[..., :, None] ** 2 * np.eye(6)
-    else:
-        S = np.broadcast_to(seen.camera_covariance, (*sigma.shape, 6))
-    if (own := _flange_covariance(seen)) is not None:
-        G = flange_to_camera(seen.setup, seen.F, X, Y)
-        S = S + G @ own @ transposed(G)
-    W: Reals = np.linalg.inv(np.linalg.cholesky(S))
-    return W
 
 
 def _steps(seen: PoseObservations, W: Reals, X: Reals, Y: Reals) -> tuple[Reals, Reals, Reals]:

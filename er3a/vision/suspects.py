@@ -135,13 +135,16 @@ def worst_sample(samples: CalibrationSet, refined: Refined) -> tuple[int, FarFro
     """The sample whose residuals are too large beside those of all others; None if there is none.
 
     Each sample's six residuals, with the share that it pulls towards itself taken back, over the others' scatter are
-    distributed as F with 6 and the remaining degrees of freedom.
+    distributed as F with 6 and the remaining degrees of freedom. What is within stated deviations is not too large,
+    however little the others scatter.
     """
     free = 6 * len(samples) - 12 - 6
     if free < 6:
         return None
     squares = (refined.whitened**2 / np.maximum(1 - refined.leverage, 0.02)).sum(axis=1)
     others = np.maximum((refined.whitened**2).sum() - (refined.whitened**2).sum(axis=1), 1e-300) / free
+    if samples.camera_covariance is not None:
+        others = np.maximum(others, 1.0)
     probability = scipy.special.fdtrc(6, free, squares / 6 / others)
     worst = int(probability.argmin())
     if probability[worst] * len(samples) >= FALSE_ALARMS:

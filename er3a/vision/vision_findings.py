@@ -57,14 +57,47 @@ class NoMajority:
     code: Literal["no_majority"] = "no_majority"
 
 
+Streams = Literal["flange", "target", "both"]
+
+
 @dataclass(frozen=True)
 class QuaternionOrder:
-    """The samples fit if the quaternions of one stream are read with their real part at the other end."""
+    """The samples fit if the quaternions of one stream, or both, are read with their real part at the other end."""
 
-    stream: Literal["flange", "target"]
+    stream: Streams
     rms_given_deg: float
     rms_other_deg: float
     code: Literal["quaternion_order"] = "quaternion_order"
+
+
+@dataclass(frozen=True)
+class AngleOrder:
+    """The samples fit if the angles of a stream, or both, are read as ``product``: Rx(roll) Ry(pitch) Rz(yaw), ..."""
+
+    stream: Streams
+    product: str
+    rms_given_deg: float
+    rms_other_deg: float
+    code: Literal["angle_order"] = "angle_order"
+
+
+@dataclass(frozen=True)
+class TransposedRotations:
+    """The samples fit if the rotations of a stream, or both, are transposed while the positions stay."""
+
+    stream: Streams
+    rms_given_deg: float
+    rms_other_deg: float
+    code: Literal["transposed_rotations"] = "transposed_rotations"
+
+
+@dataclass(frozen=True)
+class OtherDirection:
+    """The samples exclude the direction in which they are given; with these streams inverted they fit."""
+
+    flange_inverted: bool
+    target_inverted: bool
+    code: Literal["other_direction"] = "other_direction"
 
 
 @dataclass(frozen=True)
@@ -94,7 +127,17 @@ class MoreScatter:
     code: Literal["more_scatter"] = "more_scatter"
 
 
-CalibrationWarning = NoMajority | QuaternionOrder | BoardScale | LittleMotion | MoreScatter
+OtherReading = QuaternionOrder | AngleOrder | TransposedRotations
+CalibrationWarning = (
+    NoMajority
+    | QuaternionOrder
+    | AngleOrder
+    | TransposedRotations
+    | OtherDirection
+    | BoardScale
+    | LittleMotion
+    | MoreScatter
+)
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
+from er3a.files.shipped import ROOT
 from er3a.pipeline.results import read_results, read_stage
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.vision.model import VisionResults
 from er3a.pipeline.study import load_study
+from testing.hand_eye_sets import pose
+from tests.vision.test_boards import CHARUCO, board_places, rendered
+from tests.vision.test_hand_eye_file import HEAD, columns, write
 
 STAGE = STAGES["vision"]
 
@@ -54,7 +59,11 @@ def test_tables_say_what_the_summary_says(folders):
     results = read_results(folders["er3_600"], VisionResults).results
     found = results.summary.calibration
     assert results.samples.used.sum() == found.used
-    assert (results.error_map.together_mm >= results.error_map.calibration_mm).all()
+    cells = results.error_map
+    own = cells.reached
+    assert own.any()
+    assert (cells.together_mm[own] >= np.maximum(cells.calibration_mm, cells.arm_mm)[own]).all()
+    assert np.isnan(cells.together_mm[~own]).all()
     for each in results.summary.objects:
         last = results.ways.take((results.ways.target == each.name) & (results.ways.part == "approach")).q_deg[-1]
         np.testing.assert_allclose(last, each.grasp.q_deg)
@@ -82,3 +91,41 @@ def test_page_and_recording_are_written(study, folders, tmp_path, name):
     page = (tmp_path / "report").read_text(encoding="utf-8")
     assert "T_flange_board" in page or "T_base_board" in page
     assert (tmp_path / "record").stat().st_size > 10_000
+
+
+@pytest.mark.long
+def test_images_come_with_their_reprojected_corners(study, tmp_path):
+    """Rendered boards, one of them taken with the arm 5 mm beside where it says it was: its lines all point one way."""
+    random = np.random.default_rng(3)
+    Y, X = pose([3, -4, 20], [0.02, 0.03, 0.05]), pose([150, 5, 30], [0.7, 0.1, 1.2])
+    places = board_places(random, 14)
+    flange = np.array([X @ T @ np.linalg.inv(Y) for T in places])
+    for number, T in enumerate(places):
+        Image.fromarray(rendered(CHARUCO, T, random)).save(tmp_path / f"{number}.png")
+    flange[3, :3, 3] += [0.005, 0, 0]
+    head = HEAD.format(setup="eye_to_hand") + (
+        "images:\n  board: {pattern: charuco, squares: [7, 5], square_mm: 30, marker_mm: 22}\n"
+        "  intrinsics: {fx: 1100.0, fy: 1105.0, cx: 640.0, cy: 470.0}\n  pixel_standard_deviation: 0.3\n"
+    )
+    table = columns(flange, "flange", "quaternion") | {"image": np.array([f"{n}.png" for n in range(14)])}
+    made = write(tmp_path, table, head)
+    text = (ROOT / "data/vision/er3a_c60.yaml").read_text(encoding="utf-8")
+    (tmp_path / "vision.yaml").write_text(text.replace("fixed_camera.yaml", made.name), encoding="utf-8")
+    entry = study.robots["er3a_c60"].model_copy(update={"vision": str(tmp_path / "vision.yaml")})
+    own = study.model_copy(update={"robots": {"er3a_c60": entry}})
+    folder = tmp_path / "results"
+    folder.mkdir()
+    run.compute("vision", own, "er3a_c60", folder)
+    corners = read_results(folder, VisionResults).results.corners
+    assert set(corners.image) == {f"{n}.png" for n in range(14)}
+    sound = corners.used
+    assert set(corners.image[~sound]) == {"3.png"}
+    assert np.sqrt(((corners.by_board_px - corners.seen_px)[sound] ** 2).sum(axis=1).mean()) < 0.5
+    off = corners.by_arm_px - corners.seen_px
+    assert np.sqrt((off[sound] ** 2).sum(axis=1).mean()) < 1.5
+    aside = off[~sound]
+    assert np.linalg.norm(aside.mean(axis=0)) > 0.8 * np.linalg.norm(aside, axis=1).mean() > 4
+    run.show("report", "vision", own, "er3a_c60", folder, tmp_path / "page.html")
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "detected and reprojected corners" in page
+    assert "times as long" in page

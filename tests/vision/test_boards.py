@@ -16,7 +16,7 @@ from er3a.vision.boards import Board, BoardNotFoundError, Camera, board_drawing,
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.hand_eye import calibrate_hand_eye
 from er3a.vision.opencv import opencv
-from tests.vision.made import off, pose
+from testing.hand_eye_sets import off, pose
 from tests.vision.test_hand_eye_file import HEAD, columns, write
 
 SIZE = (1280, 960)
@@ -119,6 +119,22 @@ def test_a_camera_is_calibrated_from_images_alone(tmp_path):
     assert caught.value.field == "sample 6"
 
 
+def test_an_image_of_another_size_and_squares_in_metres_are_named(tmp_path):
+    for number, size in enumerate([(128, 96), (128, 96), (64, 48)]):
+        Image.fromarray(np.full(size[::-1], 128, np.uint8)).save(tmp_path / f"{number}.png")
+    head = HEAD.format(setup="eye_to_hand") + (
+        "images:\n  board: {pattern: charuco, squares: [7, 5], square_mm: 30, marker_mm: 22}\n"
+    )
+    flange = np.stack([pose([0, 0, k], [0.4, 0, 0.4]) for k in range(3)])
+    table = columns(flange, "flange", "quaternion") | {"image": np.array([f"{n}.png" for n in range(3)])}
+    with pytest.raises(InputError, match="64 x 48 pixels, and the first image 128 x 96") as caught:
+        load_hand_eye(write(tmp_path, table, head))
+    assert caught.value.field == "sample 3"
+    metres = head.replace("square_mm: 30, marker_mm: 22", "square_mm: 0.03, marker_mm: 0.022")
+    with pytest.raises(InputError, match="can only be metres"):
+        load_hand_eye(write(tmp_path, table, metres))
+
+
 @pytest.mark.long
 def test_intrinsics_estimated_from_the_images_come_with_deviations():
     random = np.random.default_rng(4)
@@ -149,7 +165,7 @@ def test_without_opencv_images_say_so_and_numbers_work(monkeypatch):
     with pytest.raises(Er3aError, match=r"install er3a\[vision\]"):
         opencv()
     random = np.random.default_rng(6)
-    from tests.vision.made import flange_poses, noisy, seen
+    from testing.hand_eye_sets import flange_poses, noisy, seen
 
     flange = flange_poses(random, 8)
     calibrate_hand_eye(CalibrationSet("eye_in_hand", flange, noisy(seen("eye_in_hand", flange), random)))

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import sys
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -12,14 +16,22 @@ from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.files.vision_file import load_vision
 from er3a.kinematics.forward import forward
+from er3a.pipeline.stages.vision.grasp_programs import grasp_programs
+from er3a.planning.timing import joint_limits
+from er3a.planning.way_around import EndOutsideLimits, PlannerMissing
+from er3a.program_check.check_program import CheckOptions, check_program
+from er3a.programs.read_program import read_program
 from er3a.robots.joint_limits import within
-from er3a.vision.grasping import GraspNeeds, GraspTask, plan_grasp
+from er3a.vision.grasp_motion import PARTS
+from er3a.vision.grasping import GraspNeeds, GraspTask, NoTransfer, plan_grasp
 from er3a.vision.hand_eye import calibrate_hand_eye
 from er3a.vision.next_view import board_visible, next_view
 from er3a.vision.point_error import ArmAccuracy, error_sizes, seen_pose, seen_pose_error
 from er3a.vision.tangent import moved, step_between
 from testing.camera_cells import CARRIED, FIXED, FOLDER, SCENE, seen_from
 
+SPEED = 0.1
+BEHIND_THE_POST = np.radians([120, -30, -20, 0, -90, 0])  # from there the straight move to the can meets the post
 NEEDS = GraspNeeds(0.005, np.radians(2), 0.02, (0.003, 0.003, 0.004, *np.radians([5, 5, 5])))
 
 
@@ -34,7 +46,17 @@ def task_of(cell, robot):
     file = load_vision(FOLDER / f"{cell.robot}.yaml", robot)
     scene = load_scene(SCENE)
     picture = None if file.picture_deg is None else np.radians(file.picture_deg)
-    return file, GraspTask(robot, scene, Bodies(robot, scene), np.radians(file.home_deg), NEEDS), picture
+    task = GraspTask(robot, scene, Bodies(robot, scene), np.radians(file.home_deg), NEEDS, limits_of(robot), SPEED, 1)
+    return file, task, picture
+
+
+def limits_of(robot):
+    return joint_limits(robot, np.radians([180, 180, 180, 360, 360, 360]), 0.25)
+
+
+def along(chosen, part, count=13):
+    """Joint angles (K, n) of a part of the motion."""
+    return np.concatenate([leg.sampled(count)[1] for leg in chosen.legs if leg.part == part])
 
 
 def test_the_study_sets_give_the_truth_within_their_intervals(cell):
@@ -122,19 +144,101 @@ def test_grasps_are_what_the_arm_can_carry_out(cell):
             assert plan.refusal is not None
             continue
         chosen = plan.chosen
-        for q, wanted in ((chosen.q, chosen.T_base_tool), (chosen.approach[-1], chosen.T_base_tool)):
+        approach, retreat = along(chosen, "approach"), along(chosen, "retreat")
+        for q, wanted in ((chosen.q, chosen.T_base_tool), (approach[-1], chosen.T_base_tool)):
             assert np.abs(step_between(wanted, forward(robot, q))).max() < 1e-6
-        line = forward(robot, chosen.approach)[:, :3, 3]
+        line = forward(robot, approach)[:, :3, 3]
         tool_z = chosen.T_base_tool[:3, 2]
         off_line = (line - line[-1]) - np.outer((line - line[-1]) @ tool_z, tool_z)
         assert np.abs(off_line).max() < 1e-6
         assert np.linalg.norm(line[0] - line[-1]) == pytest.approx(target.approach, abs=1e-6)
-        away = forward(robot, chosen.retreat)[:, :3, 3]
+        away = forward(robot, retreat)[:, :3, 3]
         np.testing.assert_allclose(away[-1] - away[0], [0, 0, target.retreat], atol=1e-6)
-        every = np.concatenate([chosen.approach, chosen.retreat])
+        every = np.concatenate([approach, retreat])
         assert within(robot, every).all()
         assert clearance(robot, every, task.scene).distance.min() >= NEEDS.clearance
-        assert clearance(robot, chosen.move, task.scene).distance.min() >= chosen.clearance - 1e-3
+        whole = np.concatenate([along(chosen, part, 301) for part in PARTS])
+        assert clearance(robot, whole, task.scene).distance.min() >= chosen.clearance
+
+
+def chosen_from(home, name="fixed_camera"):
+    """The fixed cell's arm, scene, and its plan for the can from a place where it waits."""
+    robot = load_robot(FIXED.robot)
+    found = calibrate_hand_eye(load_hand_eye(FOLDER / f"{name}.yaml", robot))
+    file, task, _ = task_of(FIXED, robot)
+    target = file.objects[0].detected()
+    T = seen_pose(found, target.T_camera_object)
+    return robot, task, plan_grasp(replace(task, home=home), target, T, lambda q: target.covariance)
+
+
+@pytest.fixture(scope="module")
+def round_the_post():
+    return chosen_from(BEHIND_THE_POST)
+
+
+@pytest.mark.long
+def test_the_planner_leads_round_what_the_straight_move_meets(round_the_post):
+    robot, task, plan = round_the_post
+    chosen = plan.chosen
+    moves = [leg for leg in chosen.legs if leg.part == "move"]
+    assert len(moves) > 1
+    straight = np.linspace(BEHIND_THE_POST, chosen.q_before, 301)
+    assert clearance(robot, straight, task.scene).distance.min() < 0
+    every = np.concatenate([leg.sampled(301)[1] for leg in chosen.legs])
+    assert clearance(robot, every, task.scene).distance.min() >= chosen.clearance > 0
+    assert within(robot, every).all()
+    np.testing.assert_allclose(moves[0].joints(np.zeros(1))[0], BEHIND_THE_POST)
+    for leg, behind in pairwise(chosen.legs):
+        np.testing.assert_allclose(leg.joints(np.array([leg.duration]))[0], behind.joints(np.zeros(1))[0], atol=1e-9)
+
+
+@pytest.mark.long
+def test_rates_of_the_motion_keep_the_limits(round_the_post):
+    """By differences of angles, whatever the bounds say."""
+    robot, _, plan = round_the_post
+    limits = limits_of(robot)
+    for leg in plan.chosen.legs:
+        t, q = leg.sampled(2001)
+        speed = np.diff(q, axis=0) / t[1]
+        assert (np.abs(speed) <= limits.speed * (1 + 1e-6)).all()
+        assert (np.abs(np.diff(speed, axis=0)) / t[1] <= limits.acceleration * (1 + 1e-4)).all()
+        if leg.part != "move":
+            tool = forward(robot, q)[:, :3, 3]
+            assert np.linalg.norm(np.diff(tool, axis=0), axis=1).max() / t[1] <= SPEED * (1 + 1e-6)
+
+
+def test_without_the_planner_the_object_says_so(monkeypatch):
+    monkeypatch.setitem(sys.modules, "ompl", None)
+    _, _, plan = chosen_from(BEHIND_THE_POST)
+    assert plan.chosen is None
+    assert plan.refusal == NoTransfer(PlannerMissing())
+
+
+def test_a_start_outside_the_limits_is_named():
+    robot = load_robot(FIXED.robot)
+    _, _, plan = chosen_from(BEHIND_THE_POST + np.array([robot.upper[0], 0, 0, 0, 0, 0]))
+    assert isinstance(plan.refusal, NoTransfer)
+    assert isinstance(plan.refusal.why, EndOutsideLimits)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("language", ["krl", "urscript", "rpl", "xpl", "csv"])
+def test_the_written_program_is_the_proven_motion(round_the_post, tmp_path, language):
+    """Read back and checked motion by motion, in the same scene."""
+    robot, task, plan = round_the_post
+    rows = grasp_programs(robot, "can", BEHIND_THE_POST, plan.chosen, [language])
+    files = [tmp_path / name for name in rows.file]
+    for file, text in zip(files, rows.text):
+        file.write_text(text, encoding="utf-8")
+    program = read_program(files[0])
+    check = check_program(program, robot, CheckOptions(start=BEHIND_THE_POST, scene=task.scene))
+    assert check.level != "fail", [each.finding for each in check.findings]
+    known = [each.least_clearance_mm for each in check.verdicts if each.least_clearance_mm is not None]
+    assert len(known) >= len(plan.chosen.legs)
+    assert min(known) >= 1000 * plan.chosen.clearance - 1.0
+    if language != "csv":
+        assert "close the gripper here" in rows.text[0]
+        assert len(check.verdicts) == 1 + len(plan.chosen.legs)
 
 
 def test_success_is_the_share_of_errors_that_the_gripper_forgives(cell):

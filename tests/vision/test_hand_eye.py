@@ -7,28 +7,32 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
-from scipy.stats import t as student
 
 from er3a.vision.calibration_set import CalibrationSet
-from er3a.vision.classic_methods import METHOD_NAMES, mean_pose, motions, park, solved_by
+from er3a.vision.classic_methods import METHOD_NAMES, solved_by
 from er3a.vision.hand_eye import calibrate_hand_eye
-from er3a.vision.likelihood import PoseObservations, flange_to_camera, refine, residuals
+from er3a.vision.likelihood import flange_to_camera, residuals
 from er3a.vision.tangent import moved
 from er3a.vision.vision_findings import (
     AllSamplesEqual,
+    AngleOrder,
     BoardScale,
     FarFromFit,
     HandEyeError,
     LittleMotion,
     MoreScatter,
     NoRotation,
+    OtherDirection,
+    OtherReading,
     ParallelTurns,
     QuaternionOrder,
     RepeatedPose,
     RotationMismatch,
     TooFewSamples,
+    TransposedRotations,
 )
-from tests.vision.made import X_TRUE, Y_TRUE, covariance, flange_poses, noisy, off, pose, seen
+from testing.hand_eye_coverage import pose_coverage
+from testing.hand_eye_sets import X_TRUE, Y_TRUE, covariance, flange_poses, noisy, off, pose, seen
 
 SETUPS = ("eye_in_hand", "eye_to_hand")
 
@@ -122,30 +126,12 @@ def test_the_refinement_ends_where_scipy_finds_the_least_squares():
     np.testing.assert_allclose(found.scatter**2 * (6 * 15 - 12), 2 * least.cost, rtol=1e-9)
 
 
-def coverage(setup: str, stated: bool, runs: int, seed: int) -> np.ndarray:
-    """Share of runs (12,) whose 95 % intervals hold the truth."""
-    random = np.random.default_rng(seed)
-    flange = flange_poses(random, 14)
-    deviations = np.array([3e-4] * 3 + [1e-3] * 3) if stated else np.zeros(6)
-    true_flange = np.broadcast_to(flange, (runs, 14, 4, 4))
-    errors = random.normal(size=(runs, 14, 6)) * deviations
-    believed = moved(true_flange, errors)
-    B = noisy(np.broadcast_to(seen(setup, flange), (runs, 14, 4, 4)), random)
-    F = believed if setup == "eye_in_hand" else np.linalg.inv(believed)
-    X = park(*motions(F, B))
-    known = (covariance(14), np.diag(deviations**2)) if stated else (None, None)
-    found = refine(PoseObservations(setup, F, B, *known), X, mean_pose(F @ X[:, None] @ B))
-    half = student.ppf(0.975, found.freedom) * np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2))
-    error = np.concatenate([off(found.X, X_TRUE), off(found.Y, Y_TRUE)], axis=1)
-    return (np.abs(error) <= half).mean(axis=0)
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("stated", [True, False])
 @pytest.mark.parametrize("setup", SETUPS)
 def test_intervals_hold_the_truth_as_often_as_they_say(setup, stated):
     """Of 600 runs with 12 numbers: three standard deviations of each share, and 94 to 96 % in all."""
-    held = coverage(setup, stated, 600, 17)
+    held = pose_coverage(setup, stated, 600, 17)
     assert (np.abs(held - 0.95) < 3.5 * np.sqrt(0.95 * 0.05 / 600)).all()
     assert 0.94 < held.mean() < 0.96
 
@@ -153,7 +139,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say(setup, stated):
 @pytest.mark.long
 @pytest.mark.parametrize("setup", SETUPS)
 def test_intervals_hold_the_truth_in_ten_thousand_runs(setup):
-    held = np.mean([coverage(setup, stated, 1250, 100 * k) for k in range(4) for stated in (True, False)], axis=0)
+    held = np.mean([pose_coverage(setup, stated, 1250, 100 * k) for k in range(4) for stated in (True, False)], axis=0)
     assert (held > 0.94).all()
     assert (held < 0.96).all()
 
@@ -235,14 +221,36 @@ def test_a_board_of_another_size_is_named_with_the_factor():
     assert scale[0].factor == pytest.approx(1.05, abs=scale[0].half_width)
 
 
-@pytest.mark.parametrize("stream", ["flange", "target"])
-def test_a_quaternion_read_in_the_other_order_is_named(stream):
+@pytest.mark.parametrize("stream", ["flange", "target", "both"])
+@pytest.mark.parametrize("how", ["quaternion", "kuka", "static_xyz", "transposed"])
+def test_orientations_read_by_another_convention_are_named(stream, how):
+    """Written by scipy in one convention, taken for another: A, B, C in columns of roll, pitch, yaw, ..."""
     samples = a_set("eye_in_hand", 14)
-    T = getattr(samples, stream)
-    q = Rotation.from_matrix(T[:, :3, :3]).as_quat()
-    T[:, :3, :3] = Rotation.from_quat(np.roll(q, 1, axis=1)).as_matrix()
-    found = [each for each in calibrate_hand_eye(samples).warnings if isinstance(each, QuaternionOrder)]
-    assert found[0].stream == stream
+    for name in ("flange", "target") if stream == "both" else (stream,):
+        T = getattr(samples, name)
+        R = Rotation.from_matrix(T[:, :3, :3])
+        T[:, :3, :3] = {
+            "quaternion": lambda R: Rotation.from_quat(R.as_quat(scalar_first=True)),
+            "kuka": lambda R: Rotation.from_euler("xyz", R.as_euler("ZYX")),
+            "static_xyz": lambda R: Rotation.from_euler("xyz", R.as_euler("XYZ")),
+            "transposed": lambda R: R.inv(),
+        }[how](R).as_matrix()
+    (found,) = [each for each in calibrate_hand_eye(samples).warnings if isinstance(each, OtherReading)]
+    kind = {"quaternion": QuaternionOrder, "transposed": TransposedRotations}.get(how, AngleOrder)
+    assert isinstance(found, kind)
+    assert found.stream == stream
+    assert found.rms_other_deg < 0.3
+    if kind is AngleOrder:
+        products = {"kuka": "Rz(roll) Ry(pitch) Rx(yaw)", "static_xyz": "Rx(roll) Ry(pitch) Rz(yaw)"}
+        assert found.product == products[how]
+
+
+@pytest.mark.parametrize("setup", SETUPS)
+def test_the_other_setup_is_named(setup):
+    samples = a_set(setup, 15)
+    other = CalibrationSet(next(each for each in SETUPS if each != setup), samples.flange, samples.target)
+    assert any(isinstance(each, OtherDirection) for each in calibrate_hand_eye(other).warnings)
+    assert not any(isinstance(each, OtherDirection) for each in calibrate_hand_eye(samples).warnings)
 
 
 def test_residuals_beyond_what_is_stated_are_said():

@@ -18,7 +18,7 @@ from er3a.files.vision_file import load_vision
 from er3a.files.vision_inputs import vision_files
 from er3a.kinematics.forward import forward
 from testing import camera_cells
-from tests.vision.made import X_TRUE, Y_TRUE, flange_poses, noisy, off, seen
+from testing.hand_eye_sets import X_TRUE, Y_TRUE, flange_poses, noisy, off, seen
 
 POSITION = ("x_mm", "y_mm", "z_mm")
 HEAD = "kind: hand_eye\ntitle: made\nsource: a test\nsetup: {setup}\nsamples: samples.csv\n"
@@ -33,6 +33,8 @@ def columns(T: np.ndarray, stream: str, form: str) -> dict[str, np.ndarray]:
     if form == "rpy":
         rpy = R.as_euler("xyz", degrees=True)
         return found | {f"{stream}_{name}_deg": rpy[:, k] for k, name in enumerate(("roll", "pitch", "yaw"))}
+    if form == "vector":
+        return found | {f"{stream}_r{c}_rad": R.as_rotvec()[:, k] for k, c in enumerate("xyz")}
     return found | {f"{stream}_r{r + 1}{c + 1}": T[:, r, c] for r in range(3) for c in range(3)}
 
 
@@ -52,7 +54,7 @@ def poses() -> tuple[np.ndarray, np.ndarray]:
     return flange, noisy(seen("eye_in_hand", flange), random)
 
 
-@pytest.mark.parametrize("form", ["quaternion", "rpy", "matrix"])
+@pytest.mark.parametrize("form", ["quaternion", "rpy", "matrix", "vector"])
 def test_every_form_of_orientation_gives_the_poses(tmp_path, poses, form):
     flange, target = poses
     found = load_hand_eye(write(tmp_path, columns(flange, "flange", form) | columns(target, "target", form)))
@@ -110,6 +112,31 @@ def test_bad_samples_are_named(tmp_path, poses, what, where, told):
     assert "\n" not in str(caught.value)
 
 
+def test_rotation_vectors_in_degrees_are_told(tmp_path, poses):
+    table = columns(poses[0], "flange", "quaternion") | columns(poses[1], "target", "vector")
+    for c in "xyz":
+        table[f"target_r{c}_rad"] = np.degrees(table[f"target_r{c}_rad"])
+    with pytest.raises(InputError, match="can only be degrees"):
+        load_hand_eye(write(tmp_path, table))
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("flange_x_mm;flange_y_mm\n1;2\n", "separated by semicolons"),
+        ("flange_x_mm\tflange_y_mm\n1\t2\n", "separated by tabs"),
+        ("hand,0.1,0.2\neye,0.1,0.2\n", "names no column of samples: hand, 0.1"),
+        ("flange_x_m,flange_y_m,flange_z_m,flange_qw\n1,2,3,1\n", "not a unit"),
+    ],
+)
+def test_tables_of_other_tools_are_told_what_they_lack(tmp_path, text, told):
+    write(tmp_path, {})
+    (tmp_path / "samples.csv").write_text(text)
+    with pytest.raises(InputError, match=told) as caught:
+        load_hand_eye(tmp_path / "set.yaml")
+    assert caught.value.remedy
+
+
 def test_radians_are_told_from_degrees(tmp_path, poses):
     table = {f"q{j}_deg": np.linspace(-2, 2, 8) for j in range(1, 7)} | columns(poses[1], "target", "quaternion")
     with pytest.raises(InputError, match="can only be radians"):
@@ -130,15 +157,16 @@ def test_two_clocks_are_brought_together(tmp_path):
 
     t_arm, t_eye = np.arange(0, 40, 0.01), np.arange(1, 38, 0.05)
     target = noisy(seen("eye_in_hand", arm(t_eye + 0.137)), random, 3e-4, 1e-3)
+    epoch = 1_491_416_776.0  # recorders write seconds since 1970
     wrong = random.choice(len(t_eye), len(t_eye) // 10, replace=False)
     target[wrong, :3, :3] = Rotation.random(len(wrong), random_state=4).as_matrix()
     head = HEAD.format(setup="eye_in_hand").replace(
         "samples: samples.csv", "streams: {flange: hand.csv, target: samples.csv}"
     )
-    write(tmp_path, {"t_s": t_arm} | columns(arm(t_arm), "flange", "quaternion"))
+    write(tmp_path, {"t_s": epoch + t_arm} | columns(arm(t_arm), "flange", "quaternion"))
     shutil.move(tmp_path / "samples.csv", tmp_path / "hand.csv")
-    path = write(tmp_path, {"t_s": t_eye} | columns(target, "target", "quaternion"), head)
-    samples, offset = read_calibration(path, None)
+    path = write(tmp_path, {"t_s": epoch + t_eye} | columns(target, "target", "quaternion"), head)
+    samples, offset, _ = read_calibration(path, None)
     assert abs(offset.offset - 0.137) < max(offset.half_width, 1e-3)
     assert offset.half_width < 5e-3
     from er3a.vision.hand_eye import calibrate_hand_eye

@@ -118,22 +118,26 @@ def hand_eye(
     as_json: AsJson = False,
 ):
     """Estimate where a camera is, with 95 % intervals, and name the samples and conventions that can't be right."""
-    from er3a.files.hand_eye_file import read_calibration
+    from er3a.files.hand_eye_file import HandEyeFile, read_calibration
     from er3a.files.robot_library import load_robot
-    from er3a.pipeline.messages.hand_eye import hand_eye_lines, hand_eye_record
+    from er3a.files.yaml_file import load
+    from er3a.pipeline.messages.hand_eye import correction_lines, hand_eye_lines, hand_eye_record
     from er3a.pipeline.messages.say import say
     from er3a.vision.hand_eye import calibrate_hand_eye
+    from er3a.vision.table_corrections import correct_table
     from er3a.vision.vision_findings import HandEyeError
 
-    samples, offset = read_calibration(file, load_robot(robot) if robot else None)
+    arm, asked = load_robot(robot) if robot else None, load(HandEyeFile, file).table_corrections
+    samples, offset, _ = read_calibration(file, arm)
     try:
         found = calibrate_hand_eye(samples)
     except HandEyeError as error:
         raise Er3aError(f"{file}: {say(error.finding)}") from None
+    table = correct_table(found, arm, asked) if arm and asked else None
     if as_json:
-        print_json(hand_eye_record(found, offset))
+        print_json(hand_eye_record(found, offset, table))
         return
-    print(hand_eye_lines(found, offset))
+    print("\n".join([hand_eye_lines(found, offset), *(correction_lines(table) if table else [])]))
 
 
 @app.command(rich_help_panel=ROBOT_FILES)

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
+import er3a.pipeline.messages.calibration  # noqa: F401
 from er3a.geometry.transforms import rpy_of
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.say import say, sentence, word
 from er3a.vision.hand_eye import HandEye, spread_of
+from er3a.vision.table_corrections import NoCorrections, TableCorrections
 from er3a.vision.tangent import quaternion_of
 from er3a.vision.time_offset import TimeOffset
 from er3a.vision.vision_findings import (
     AllSamplesEqual,
+    AngleOrder,
     BoardScale,
     DirectionTried,
     FarFromFit,
@@ -20,11 +23,13 @@ from er3a.vision.vision_findings import (
     NoMajority,
     NoRotation,
     NothingFits,
+    OtherDirection,
     ParallelTurns,
     QuaternionOrder,
     RepeatedPose,
     RotationMismatch,
     TooFewSamples,
+    TransposedRotations,
 )
 
 MENDING = {
@@ -35,7 +40,7 @@ MENDING = {
     "mirrored_tilt": N_("the board's tilt is mirrored, as of a flat board seen from far or head-on"),
     "rotation": N_("no turn that detectors mistake explains it"),
 }
-STREAMS = {"flange": N_("flange"), "target": N_("board")}
+STREAMS = {"flange": N_("flange"), "target": N_("board"), "both": N_("flange and board")}
 POSES = {
     "eye_in_hand": (N_("camera on the flange (T_flange_camera)"), N_("board in the base (T_base_board)")),
     "eye_to_hand": (N_("camera in the base (T_base_camera)"), N_("board on the flange (T_flange_board)")),
@@ -120,6 +125,42 @@ def _(found: QuaternionOrder) -> str:
         stream=word("vision.stream", STREAMS, found.stream),
         after=found.rms_other_deg,
         before=found.rms_given_deg,
+    )
+
+
+@say.register
+def _(found: AngleOrder) -> str:
+    return sentence(
+        found.code,
+        "the angles of the {stream} fit if they are read as R = {product}: the residuals are {after:.2g} deg then, as "
+        "given {before:.3g} deg; convert them to R = Rz(yaw) Ry(pitch) Rx(roll)",
+        stream=word("vision.stream", STREAMS, found.stream),
+        product=found.product,
+        after=found.rms_other_deg,
+        before=found.rms_given_deg,
+    )
+
+
+@say.register
+def _(found: TransposedRotations) -> str:
+    return sentence(
+        found.code,
+        "the rotations of the {stream} are transposed, with positions as they should be: read so, the residuals are "
+        "{after:.2g} deg, as given {before:.3g} deg; write matrices by rows",
+        stream=word("vision.stream", STREAMS, found.stream),
+        after=found.rms_other_deg,
+        before=found.rms_given_deg,
+    )
+
+
+@say.register
+def _(found: OtherDirection) -> str:
+    if found.flange_inverted == found.target_inverted:
+        return sentence(found.code, "the samples exclude this direction; invert both streams")
+    return sentence(
+        found.code,
+        "the samples exclude this direction: they fit with one stream inverted. Either the setup is the other one, or "
+        "the poses of the flange are those of the base in it (T_flange_base), or the board's those of the camera in it",
     )
 
 
@@ -210,6 +251,52 @@ def _(found: DirectionTried) -> str:
     )
 
 
+NO_CORRECTIONS = {
+    "joints": N_("corrections to the table need recorded joint angles, of an arm with six joints that turn"),
+    "few": N_("too few samples for corrections to the table"),
+    "steps": N_("no corrections to the table fit: it has a gross fault or is another arm's"),
+}
+
+
+@say.register
+def _(found: NoCorrections) -> str:
+    return word("vision.no_corrections", NO_CORRECTIONS, found.why)
+
+
+def correction_verdict(probability: float, before: float, after: float, limit: float = 0.01) -> str:
+    """Whether the samples speak against the table as it is."""
+    if probability < limit:
+        return sentence(
+            "vision.corrections",
+            "The samples speak against the table: with corrections the residuals fall from {before:.3g} to {after:.3g} "
+            "standard deviations, by chance with a probability of {p:.1g}",
+            before=before,
+            after=after,
+            p=probability,
+        )
+    return sentence(
+        "vision.corrections",
+        "The samples do not speak against the table: corrections lower the residuals from {before:.3g} to {after:.3g} "
+        "standard deviations, as chance does with a probability of {p:.2g}",
+        before=before,
+        after=after,
+        p=probability,
+    )
+
+
+def correction_lines(found: TableCorrections | NoCorrections) -> list[str]:
+    """Corrections to a table as lines for a terminal."""
+    if isinstance(found, NoCorrections):
+        return [say(found)]
+    lines = ["corrections to the arm's table, with 95 % intervals:"]
+    for each, half in zip(found.estimates, found.entry_half_width):
+        lines.append(f"  {each.name:<9}{each.nominal:>10.3f} {each.correction:>+9.4f} ± {half:.4f} {each.unit}")
+    lines += [f"  {say(each)}" for each in found.held]
+    verdict = correction_verdict(found.probability, found.scatter_before, found.scatter)
+    mm, deg = 1000 * found.moved[0], np.degrees(found.moved[1])
+    return [*lines, verdict, f"with them the camera is {mm:.3g} mm and {deg:.2g} deg elsewhere"]
+
+
 def direction_word(found: DirectionTried) -> str:
     """Which streams are inverted, in words."""
     text = DIRECTION_WORDS[found.flange_inverted, found.target_inverted]
@@ -263,7 +350,9 @@ def hand_eye_lines(found: HandEye, offset: TimeOffset | None) -> str:
     return "\n".join(lines)
 
 
-def hand_eye_record(found: HandEye, offset: TimeOffset | None) -> dict[str, object]:
+def hand_eye_record(
+    found: HandEye, offset: TimeOffset | None, table: TableCorrections | NoCorrections | None = None
+) -> dict[str, object]:
     """A calibration as plain data, for another program; half widths of 95 % intervals in mm and deg."""
 
     def pose(T: np.ndarray, half: np.ndarray) -> dict[str, object]:
@@ -302,4 +391,19 @@ def hand_eye_record(found: HandEye, offset: TimeOffset | None) -> dict[str, obje
         "warnings": [{"code": each.code, "text": say(each)} for each in found.warnings],
         "time_offset_s": offset.offset if offset else None,
         "touch_probability": found.touch.probability if found.touch else None,
+        "table_corrections": _corrections_record(table) if table else None,
+    }
+
+
+def _corrections_record(found: TableCorrections | NoCorrections) -> dict[str, object]:
+    if isinstance(found, NoCorrections):
+        return {"code": found.code, "text": say(found)}
+    return {
+        "entries": [
+            {"entry": each.name, "unit": each.unit, "correction": each.correction, "half_width": half}
+            for each, half in zip(found.estimates, found.entry_half_width.tolist())
+        ],
+        "held": [say(each) for each in found.held],
+        "probability": found.probability,
+        "scatter": found.scatter,
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from er3a.pipeline.messages import hand_eye, pairs  # noqa: F401  (their sentences)
+from er3a.pipeline.messages import hand_eye, pairs, planning  # noqa: F401  (their sentences)
 from er3a.pipeline.messages.expectations import demonstrated
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.say import counted, joined, listed, say, sentence, word
@@ -22,10 +22,12 @@ from er3a.vision.grasping import (
     GraspOutOfReach,
     GraspSingular,
     LineLeaves,
+    LineUnproven,
+    NoTransfer,
     WayCollides,
 )
 
-PARTS = {"move": N_("joint move to the approach"), "approach": N_("approach"), "retreat": N_("retreat")}
+PARTS = {"move": N_("move to the approach"), "approach": N_("approach"), "retreat": N_("retreat")}
 
 
 @say.register
@@ -165,6 +167,22 @@ def _(found: LineLeaves) -> str:
         "the straight {part} leaves limits or regular poses {mm:.0f} mm from the grasp",
         part=word("vision.part", PARTS, found.part),
         mm=found.after_mm,
+    )
+
+
+@say.register
+def _(found: LineUnproven) -> str:
+    return sentence(
+        found.code,
+        "along the straight {part} the bounds do not settle that limits, rates and regular poses are kept",
+        part=word("vision.part", PARTS, found.part),
+    )
+
+
+@say.register
+def _(found: NoTransfer) -> str:
+    return sentence(
+        found.code, "the straight move to the approach collides, and there is no other: {why}", why=say(found.why)
     )
 
 

@@ -220,6 +220,11 @@ def run_command(study: Study, page: str) -> str | None:
     return shlex.join(["make", "run", f"STUDY={file}", f"ARGS=reports/{page}"])
 
 
+def text_address(text: str) -> str:
+    """The data address of a file of text, for a link that saves it."""
+    return f"data:text/plain;base64,{base64.b64encode(text.encode()).decode()}"
+
+
 def _preview(picture: Path) -> str | None:
     """The preview of a recording as a data address; None where there is none or none could be drawn."""
     content = picture.read_bytes() if picture.is_file() else b""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -44,7 +43,7 @@ from er3a.pipeline.stages.trajectory.model import (
 from er3a.pipeline.stages.trajectory.path_figure_3d import turning_figure
 from er3a.pipeline.stages.trajectory.path_figures import PathFigure
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.page import fixed, head_of, number, render, run_command
+from er3a.pipeline.viewing.page import fixed, head_of, number, render, run_command, text_address
 from er3a.planning.path_verdicts import PathVerdict
 from er3a.programs.arm_joints import WORDS, not_written
 from er3a.robots.robot import Robot
@@ -147,9 +146,7 @@ def _events(path: PathSummary) -> list[PlayedEvent]:
 
 def _programs(rows: ProgramFiles) -> list[ProgramLink]:
     texts = zip(rows.file.tolist(), rows.text.tolist())
-    return [
-        ProgramLink(file, f"data:text/plain;base64,{base64.b64encode(text.encode()).decode()}") for file, text in texts
-    ]
+    return [ProgramLink(file, text_address(text)) for file, text in texts]
 
 
 def _section(path: PathSummary, rows: PathChecks, figure: PathDrawing, programs: list[ProgramLink]) -> PathSection:

@@ -4,23 +4,28 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.files.hand_eye_file import HandEyeFile
+from er3a.files.hand_eye_file import HandEyeFile, SeenImages
 from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.vision.model import (
     CalibrationResult,
+    CornerRows,
+    EntryCorrection,
     MethodResult,
     OffsetResult,
     PoseEstimate,
     SampleRows,
+    TableResult,
     Three,
     TouchedPoint,
     TouchResult,
     ViewToAdd,
 )
+from er3a.vision.boards import projected
 from er3a.vision.hand_eye import HandEye, MethodAnswer, spread_of
 from er3a.vision.next_view import NextView
-from er3a.vision.tangent import quaternion_of
+from er3a.vision.table_corrections import NoCorrections, TableCorrections
+from er3a.vision.tangent import inverted, quaternion_of
 from er3a.vision.time_offset import TimeOffset
 
 
@@ -43,7 +48,11 @@ def quaternion(T: Reals) -> tuple[float, float, float, float]:
 
 
 def calibration_result(
-    head: HandEyeFile, found: HandEye, view: NextView | None, offset: TimeOffset | None
+    head: HandEyeFile,
+    found: HandEye,
+    view: NextView | None,
+    offset: TimeOffset | None,
+    table: TableCorrections | NoCorrections | None,
 ) -> CalibrationResult:
     """All that the summary says of a calibration."""
     spread, turned = spread_of(found)
@@ -73,6 +82,25 @@ def calibration_result(
         touch=_touch(found),
         next_view=_next(view) if view else None,
         time_offset=OffsetResult(offset.offset, offset.half_width, float(np.degrees(offset.rms))) if offset else None,
+        table=_table(table) if isinstance(table, TableCorrections) else table,
+    )
+
+
+def _table(found: TableCorrections) -> TableResult:
+    rows = zip(found.estimates, found.entry_half_width.tolist())
+    return TableResult(
+        level=found.level,
+        entries=tuple(
+            EntryCorrection(each.name, each.unit, each.nominal, each.correction, half) for each, half in rows
+        ),
+        held=found.held,
+        close=found.close,
+        scatter=found.scatter,
+        scatter_before=found.scatter_before,
+        probability=found.probability,
+        moved_mm=float(1000 * found.moved[0]),
+        moved_deg=float(np.degrees(found.moved[1])),
+        hand_eye=_estimate(found.X, found.half_width[:6]),
     )
 
 
@@ -124,3 +152,26 @@ def sample_rows(found: HandEye, joints: int) -> SampleRows:
         predicted_mm=1000 * predicted[:, :3, 3],
         q_deg=np.full((count, joints), np.nan) if samples.q is None else np.degrees(samples.q),
     )
+
+
+def corner_rows(found: HandEye, images: SeenImages | None) -> CornerRows:
+    """One row for each corner in each image."""
+    if images is None:
+        return CornerRows.empty()
+    predicted = inverted(found.samples.hand @ found.X) @ found.Y
+    views, tables = images.views, []
+    for k, (name, points, seen, by_board) in enumerate(
+        zip(images.names, views.points, views.corners, views.reprojected)
+    ):
+        count = len(points)
+        tables.append(
+            CornerRows(
+                sample=np.full(count, found.samples.names[k], object),
+                image=np.full(count, name, object),
+                used=np.full(count, found.used[k]),
+                seen_px=seen,
+                by_board_px=by_board,
+                by_arm_px=projected(points, predicted[k], views.camera),
+            )
+        )
+    return CornerRows.stacked(tables)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
@@ -20,18 +21,25 @@ from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
+from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
+from er3a.pipeline.stages.trajectory.motion_demands import limits_of
 from er3a.pipeline.stages.vision.calibration_results import (
     calibration_result,
+    corner_rows,
     in_degrees,
     in_mm,
     quaternion,
     sample_rows,
 )
 from er3a.pipeline.stages.vision.entry import VisionSettings
+from er3a.pipeline.stages.vision.error_map import MapTask, error_map
+from er3a.pipeline.stages.vision.grasp_programs import grasp_programs
 from er3a.pipeline.stages.vision.model import (
     CalibrationResult,
+    CornerRows,
     ErrorMapRows,
     ErrorParts,
+    GraspPrograms,
     GraspResult,
     ObjectResult,
     SampleRows,
@@ -49,20 +57,21 @@ from er3a.pipeline.stages.vision.vision_verdicts import (
     UnsureGrasp,
 )
 from er3a.pipeline.study import Study
+from er3a.planning.timing import JointLimits
 from er3a.robots.robot import Robot
+from er3a.vision.grasp_motion import PARTS
 from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspPlan, GraspTask, plan_grasp
 from er3a.vision.hand_eye import HandEye, calibrate_hand_eye
-from er3a.vision.next_view import FieldOfView, in_sight, next_view
+from er3a.vision.next_view import next_view
 from er3a.vision.point_error import ArmAccuracy, SeenPoseError, error_sizes, seen_pose, seen_pose_error
-from er3a.vision.tangent import inverted
-from er3a.vision.vision_findings import BoardScale, HandEyeError, MoreScatter, NoMajority, QuaternionOrder
+from er3a.vision.table_corrections import correct_table
+from er3a.vision.vision_findings import BoardScale, HandEyeError, MoreScatter, NoMajority, OtherReading
 
 STAGE = "vision"
 VIEW_STREAM = 0
 CONTRADICTED = 1e-3
 MUCH_SCATTER = 3.0
-MAP_MARGIN = 0.25  # of the objects' extent
-LEAST_MAP = 0.2  # m, to each side of the objects' middle
+LEG_ROWS = 13
 
 Found = (
     CalibrationImpossible
@@ -85,14 +94,15 @@ def compute(study: Study, name: str) -> VisionResults:
     if head.setup == "eye_in_hand" and task_file.picture_deg is None:
         problem = "missing, though the camera is on the flange"
         raise InputError(file, "picture_deg", problem, "Add the joint angles at which the picture was taken")
-    samples, offset = read_calibration(head_path, robot)
+    samples, offset, images = read_calibration(head_path, robot)
     title = scene.title if scene else None
     try:
         found = calibrate_hand_eye(samples)
     except HandEyeError as error:
         verdict: Verdict[Found] = Verdict("fail", CalibrationImpossible(error.finding))
         summary = VisionSummary(verdict, (), task_file.title, title, None, ())
-        return VisionResults(summary, SampleRows.empty(), ErrorMapRows.empty(), WayRows.empty())
+        empty = (SampleRows.empty(), ErrorMapRows.empty(), WayRows.empty(), GraspPrograms.empty(), CornerRows.empty())
+        return VisionResults(summary, *empty)
     picture = None if head.setup == "eye_to_hand" else np.radians(task_file.picture_deg or [])
     camera = _camera_at(robot, found, picture)
     places = {each.name: camera @ each.pose() for each in task_file.objects}
@@ -101,10 +111,15 @@ def compute(study: Study, name: str) -> VisionResults:
     if view is not None:
         middle = np.mean([each.pose()[:3, 3] for each in task_file.objects], axis=0)
         to_add = next_view(robot, found, view, middle, scene, study.seed + VIEW_STREAM)
-    calibration = calibration_result(head, found, to_add, offset)
+    table = correct_table(found, robot, head.table_corrections) if head.table_corrections else None
+    calibration = calibration_result(head, found, to_add, offset, table)
     doubt = _doubt(calibration)
     settings = study.section(VisionSettings)
-    planned = [] if doubt else _planned(robot, task_file, found, scene, (settings, picture))
+    motions = study.section(TrajectorySettings)
+    planned = []
+    if not doubt:
+        limits = (limits_of(robot, motions), study.seed)
+        planned = _planned(robot, task_file, found, scene, (settings, picture), limits)
     objects = tuple(_object(entry, places[entry.name], plan, error) for entry, plan, error in planned)
     summary = VisionSummary(
         verdict=Verdict("fail", doubt) if doubt else _verdict(calibration, objects, settings),
@@ -114,14 +129,29 @@ def compute(study: Study, name: str) -> VisionResults:
         calibration=calibration,
         objects=objects,
     )
-    seen = task_file.view.view(head.board_mm or [1.0, 1.0])
-    places_m = np.array([T[:3, 3] for T in places.values()])
-    covariances = np.mean([each.standard_deviation.covariance() for each in task_file.objects], axis=0)
+    map_task = MapTask(
+        robot=robot,
+        home=np.radians(task_file.home_deg),
+        accuracy=task_file.arm.accuracy(),
+        T_base_camera=camera,
+        picture=picture,
+        view=task_file.view.view(head.board_mm or [1.0, 1.0]),
+        places=np.array(list(places.values())),
+        T_object_tool=task_file.objects[0].grasps[0].grasp().T_object_tool,
+        camera_covariance=np.mean([each.standard_deviation.covariance() for each in task_file.objects], axis=0),
+        cells=settings.map_cells,
+    )
     return VisionResults(
         summary,
         sample_rows(found, len(robot.lower)),
-        _error_map(found, (camera, picture, robot), seen, places_m, (covariances, settings.map_cells)),
+        error_map(found, map_task),
         WayRows.stacked(_ways(entry.name, plan.chosen) for entry, plan, _ in planned if plan.chosen),
+        GraspPrograms.stacked(
+            grasp_programs(robot, entry.name, np.radians(task_file.home_deg), plan.chosen, motions.programs)
+            for entry, plan, _ in planned
+            if plan.chosen
+        ),
+        corner_rows(found, images),
     )
 
 
@@ -133,7 +163,7 @@ def _camera_at(robot: Robot, found: HandEye, picture: Reals | None) -> Reals:
 
 def _doubt(found: CalibrationResult) -> CalibrationDoubtful | DirectionContradicted | TouchContradicts | None:
     """Why no grasp may rest on a calibration; None if nothing speaks against it."""
-    grave = (NoMajority, QuaternionOrder, BoardScale)
+    grave = (NoMajority, BoardScale, *get_args(OtherReading))
     doubts = tuple(
         each
         for each in found.warnings
@@ -162,8 +192,9 @@ def _planned(
     found: HandEye,
     scene: Scene | None,
     asked: tuple[VisionSettings, Reals | None],
+    motion: tuple[JointLimits, int],
 ) -> Planned:
-    settings, picture = asked
+    (settings, picture), (limits, seed) = asked, motion
     tolerance = (*(mm / 1000 for mm in task_file.gripper.tolerance_mm), *np.radians(task_file.gripper.tolerance_deg))
     needs = GraspNeeds(
         settings.least_clearance_mm / 1000,
@@ -172,7 +203,8 @@ def _planned(
         tuple(map(float, tolerance)),  # type: ignore[arg-type]
     )
     bodies = Bodies(robot, scene)
-    task = GraspTask(robot, scene, bodies, np.radians(task_file.home_deg), needs)
+    speed = settings.line_speed_mm_s / 1000
+    task = GraspTask(robot, scene, bodies, np.radians(task_file.home_deg), needs, limits, speed, seed)
     accuracy = task_file.arm.accuracy()
     camera = _camera_at(robot, found, picture)
     rows: Planned = []
@@ -238,6 +270,8 @@ def _grasp(chosen: ChosenGrasp) -> GraspResult:
         singular_value=chosen.singular_value,
         probability=chosen.probability,
         deviation=chosen.deviation,
+        corners=sum(leg.part == "move" for leg in chosen.legs) - 1,
+        duration_s=sum(leg.duration for leg in chosen.legs),
     )
 
 
@@ -277,43 +311,22 @@ def _figures(calibration: CalibrationResult, objects: tuple[ObjectResult, ...]) 
     )
 
 
-def _ways(name: str, chosen: ChosenGrasp | None) -> WayRows:
-    if chosen is None:
-        return WayRows.empty()
-    parts = {"move": chosen.move, "approach": chosen.approach, "retreat": chosen.retreat}
+def _ways(name: str, chosen: ChosenGrasp) -> WayRows:
+    """The whole motion, each point once."""
+    parts: list[str] = []
+    times, rows, now = [], [], 0.0
+    for leg in chosen.legs:
+        t, q = leg.sampled(LEG_ROWS)
+        first = int(bool(parts))  # a leg starts where the one before ended
+        parts += [leg.part] * (len(t) - first)
+        times.append(now + t[first:])
+        rows.append(q[first:])
+        now += leg.duration
+    part = np.array(parts, object)
     return WayRows(
-        target=np.full(sum(map(len, parts.values())), name, object),
-        part=np.concatenate([np.full(len(q), part, object) for part, q in parts.items()]),
-        step=np.concatenate([np.arange(len(q)) for q in parts.values()]),
-        q_deg=np.degrees(np.concatenate(list(parts.values()))),
-    )
-
-
-def _error_map(
-    found: HandEye,
-    camera: tuple[Reals, Reals | None, Robot],
-    view: FieldOfView,
-    places: Reals,
-    asked: tuple[Reals, int],
-) -> ErrorMapRows:
-    """Errors on a square around the objects, at their mean height, from the camera where it saw them."""
-    T_base_camera, picture, robot = camera
-    covariance, cells = asked
-    middle = places.mean(axis=0)
-    half = max(LEAST_MAP, (1 + MAP_MARGIN) * float(np.abs(places[:, :2] - middle[:2]).max()))
-    steps = np.linspace(-half, half, cells)
-    x, y = (part.ravel() for part in np.meshgrid(middle[0] + steps, middle[1] + steps))
-    points = np.tile(np.eye(4), (len(x), 1, 1))
-    points[:, :3, 3] = np.column_stack([x, y, np.full(len(x), middle[2])])
-    seen = inverted(T_base_camera) @ points
-    q = np.broadcast_to(np.zeros(len(robot.lower)), (len(x), len(robot.lower)))
-    parts = seen_pose_error(
-        found, seen, np.broadcast_to(covariance, (len(x), 6, 6)), ArmAccuracy(), (robot, q, picture)
-    )
-    return ErrorMapRows(
-        x_mm=1000 * x,
-        y_mm=1000 * y,
-        in_view=in_sight(view, seen[:, :3, 3]),
-        calibration_mm=1000 * error_sizes(parts.calibration)[0],
-        together_mm=1000 * error_sizes(parts.calibration + parts.camera)[0],
+        target=np.full(len(part), name, object),
+        part=part,
+        step=np.concatenate([np.arange((part == each).sum()) for each in PARTS]),
+        t_s=np.concatenate(times),
+        q_deg=np.degrees(np.concatenate(rows)),
     )

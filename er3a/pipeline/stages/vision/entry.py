@@ -12,6 +12,7 @@ from er3a.files.vision_inputs import vision_files
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.stages.stage import Stage
+from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.stages.vision.no_camera import NoCamera
 
 if TYPE_CHECKING:
@@ -23,6 +24,8 @@ class VisionSettings(StrictModel):
 
     ``least_singular_value`` : of the Jacobian with lengths divided by the wrist's reach. ``least_success`` : the
     probability below which a grasp counts as unsure. ``map_cells`` : cells across the map of errors.
+    ``line_speed_mm_s`` : the tool's greatest speed on approach and retreat. Limits of the joints' rates, and the
+    languages in which grasps are written as programs, are those of ``trajectory``.
     """
 
     scene: Text | None = None
@@ -31,6 +34,7 @@ class VisionSettings(StrictModel):
     least_singular_value: Annotated[float, Field(ge=0, le=1)] = 0.02
     least_success: Annotated[float, Field(ge=0, le=1)] = 0.95
     map_cells: Annotated[int, Field(ge=4, le=200)] = 30
+    line_speed_mm_s: Annotated[float, Field(gt=0, le=10_000)] = 100.0
 
 
 def _inputs(study: Study, robot: str) -> list[Path]:
@@ -46,7 +50,7 @@ STAGE = Stage(
     name="vision",
     title=N_("vision"),
     question=N_("Is the camera calibrated well enough, and which objects can be grasped?"),
-    settings={"vision": VisionSettings},
+    settings={"vision": VisionSettings, "trajectory": TrajectorySettings},
     inputs=_inputs,
     missing=_missing,
     absences=(NoCamera,),

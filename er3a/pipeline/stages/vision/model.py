@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
+from er3a.calibration.calibrate import Close
+from er3a.calibration.outcomes import Held, LevelName
 from er3a.collision.pairs import Pair
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
@@ -21,6 +24,7 @@ from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.vision.calibration_set import Setup
 from er3a.vision.classic_methods import MethodName
 from er3a.vision.grasping import GraspRefusal
+from er3a.vision.table_corrections import NoCorrections
 from er3a.vision.vision_findings import CalibrationWarning, DirectionTried, GraspOutcome, Suspect
 
 Three = tuple[float, float, float]
@@ -93,6 +97,42 @@ class OffsetResult:
 
 
 @dataclass(frozen=True)
+class EntryCorrection:
+    """An entry of the arm's table (such as d4), in mm or deg, with half the 95 % interval of its correction."""
+
+    entry: str
+    unit: Literal["mm", "deg"]
+    nominal: float
+    correction: float
+    half_width: float
+
+
+@dataclass(frozen=True)
+class TableResult:
+    """Corrections to the arm's table, estimated with the poses.
+
+    Attributes
+    ----------
+    held : why the other entries keep their values; close : pairs whose errors are correlated by more than 0.9
+    scatter, scatter_before : root mean square of the residuals with and without them, in standard deviations
+    probability : that residuals fall as much by chance, if no entry is wrong
+    moved_mm, moved_deg : how far the hand-eye pose is from the one without corrections
+    hand_eye : with them
+    """
+
+    level: LevelName
+    entries: tuple[EntryCorrection, ...]
+    held: tuple[Held, ...]
+    close: tuple[Close, ...]
+    scatter: float
+    scatter_before: float
+    probability: float
+    moved_mm: float
+    moved_deg: float
+    hand_eye: PoseEstimate
+
+
+@dataclass(frozen=True)
 class CalibrationResult:
     """The calibration.
 
@@ -104,6 +144,7 @@ class CalibrationResult:
     camera_mm, camera_deg : the camera's standard deviation by axis, root mean square of the three
     spread_mm, spread_deg : root mean square distance of the board's places, by sample, from their mean
     moved_mm, moved_deg : how far the hand-eye pose would be off with the samples that were left out; None without any
+    table : corrections to the arm's table, where the set asks for them
     """
 
     title: str
@@ -130,6 +171,7 @@ class CalibrationResult:
     touch: TouchResult | None
     next_view: ViewToAdd | None
     time_offset: OffsetResult | None
+    table: TableResult | NoCorrections | None
 
 
 @dataclass(frozen=True)
@@ -150,9 +192,11 @@ class GraspResult:
     Attributes
     ----------
     turn_deg : about the object's z axis
-    clearance_mm, nearest : least along move, approach and retreat, and what is nearest there
+    clearance_mm, nearest : proven along move, approach and retreat, and what is nearest there
     limit_margin_deg, singular_value : least along approach and retreat
     probability, deviation : that the gripper's tolerance is kept, and that figure's standard deviation from its draws
+    corners : of the planner's way to the approach; 0 for the straight joint move
+    duration_s : of the whole motion, without the gripper
     """
 
     grasp: str
@@ -168,6 +212,8 @@ class GraspResult:
     singular_value: float
     probability: float
     deviation: float
+    corners: int
+    duration_s: float
 
 
 @dataclass(frozen=True)
@@ -232,14 +278,32 @@ class SampleRows(Table):
 
 
 @dataclass(frozen=True, eq=False)
+class CornerRows(Table):
+    """Corners of the board in the images; none where poses were recorded."""
+
+    sample: Texts = column("name of the sample", dtype=object)
+    image: Texts = column("name of the image's file", dtype=object)
+    used: Flags = column("whether the calibration rests on it", dtype=bool)
+    seen_px: Reals = vector("seen_{}_px", "corner as detected, to the right and down", "px", parts="xy")
+    by_board_px: Reals = vector("by_board_{}_px", "where the board's pose in this image puts it", "px", parts="xy")
+    by_arm_px: Reals = vector("by_arm_{}_px", "where the arm and the calibration put it", "px", parts="xy")
+
+
+@dataclass(frozen=True, eq=False)
 class ErrorMapRows(Table):
-    """Errors of a point seen, at the mean height of the objects, from camera and calibration."""
+    """Errors of the first object's grasp, held at each cell of a square at the objects' mean height.
+
+    What 95 % of errors stay below; NaN where the arm doesn't reach.
+    """
 
     x_mm: Reals = column("position in the base's frame", "mm")
     y_mm: Reals = column("position in the base's frame", "mm")
     in_view: Flags = column("whether the camera sees it", dtype=bool)
-    calibration_mm: Reals = column("distance that 95 % of errors of the calibration stay below", "mm")
-    together_mm: Reals = column("the same with the camera's noise in one reading", "mm")
+    reached: Flags = column("whether the arm reaches it with that grasp, within its limits", dtype=bool)
+    calibration_mm: Reals = column("distance, from the calibration alone", "mm")
+    arm_mm: Reals = column("distance, from the arm's repeatability and table alone", "mm")
+    together_mm: Reals = column("distance, from camera's noise, calibration, repeatability and table", "mm")
+    together_deg: Reals = column("turn, from all of them", "deg")
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,7 +313,18 @@ class WayRows(Table):
     target: Texts = column("name of the object", dtype=object)
     part: Texts = column("move, approach or retreat", dtype=object)
     step: Integers = column("number of the point in its part", dtype=np.int64)
+    t_s: Reals = column("time from the start, without the gripper's", "s")
     q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
+
+
+@dataclass(frozen=True, eq=False)
+class GraspPrograms(Table):
+    """Programs of the grasps for controllers: from home to the approach, to the grasp, and away."""
+
+    target: Texts = column("name of the object", dtype=object)
+    language: Texts = column("krl, urscript, rpl, xpl or csv", dtype=object)
+    file: Texts = column("name of the file", dtype=object)
+    text: Texts = column("what the file holds", dtype=object)
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,6 +334,8 @@ class VisionResults(Results[VisionSummary]):
     samples: SampleRows
     error_map: ErrorMapRows
     ways: WayRows
+    programs: GraspPrograms
+    corners: CornerRows
 
 
 RESULTS = VisionResults

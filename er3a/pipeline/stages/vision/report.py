@@ -7,27 +7,36 @@ from pathlib import Path
 
 import numpy as np
 
+from er3a.files.hand_eye_file import HandEyeFile
 from er3a.files.scene_file import load_scene
+from er3a.files.vision_file import load_vision
+from er3a.files.yaml_file import load
+from er3a.pipeline.messages.hand_eye import correction_verdict
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import joined, listed, say, word
 from er3a.pipeline.messages.vision import FIGURES, METHODS, direction_word, pose_words
 from er3a.pipeline.player.player import Mark, PlayedEvent, PlayedMotion, player, player_style
 from er3a.pipeline.results import Stored
+from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.stages.vision.model import (
     CalibrationResult,
+    GraspPrograms,
     ObjectResult,
     PoseEstimate,
+    TableResult,
     TouchResult,
     VisionResults,
 )
-from er3a.pipeline.stages.vision.vision_figures import map_picture, residual_picture
+from er3a.pipeline.stages.vision.vision_figures import image_picture, map_picture, residual_picture
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed, number
-from er3a.pipeline.viewing.page import head_of, render, run_command
+from er3a.pipeline.viewing.page import head_of, render, run_command, text_address
+from er3a.programs.arm_joints import WORDS, not_written
+from er3a.vision.table_corrections import NoCorrections
 
 NEARLY_HALF_TURN = 170.0
 POINTER_M = 0.15
-WAYS = {"move": N_("joint move to the approach"), "approach": N_("approach"), "retreat": N_("retreat")}
+WAYS = {"move": N_("move to the approach"), "approach": N_("approach"), "retreat": N_("retreat")}
 AXES = ("x", "y", "z")
 PARTS = {
     "camera": N_("camera's noise in one reading"),
@@ -58,11 +67,17 @@ def report(study: Study, stored: Stored[VisionResults], output: Path) -> None:
         methods=_methods(found) if found else [],
         disagreement=_disagreement(found) if found else "",
         directions=_directions(found) if found else [],
+        corrections=_corrections(found.table) if found and isinstance(found.table, TableResult) else [],
+        held=_held(found.table) if found else [],
+        corrected=_corrected(found.table) if found and isinstance(found.table, TableResult) else "",
         touched=_touched(found.touch) if found and found.touch else [],
         residuals=residual_picture(results.samples, found) if found else None,
+        images=image_picture(results.corners, _image_folder(study, name)) if len(results.corners) else None,
         map=map_picture(results.error_map, summary.objects) if len(results.error_map) else None,
         overview=[_overview(each) for each in summary.objects],
         grasps=[_grasp(each) for each in summary.objects if each.grasp],
+        programs=_programs(results.programs),
+        unwritten=[WORDS[each] for each in study.section(TrajectorySettings).programs if not_written(each, robot)],
         errors=[_errors(each) for each in summary.objects if each.error_mm],
         error_columns=[tr("Object"), *(f"{word('vision.part_of_error', PARTS, part)}>" for part in PARTS)],
         player=player(robot, _motions(results), load_scene(scene) if scene else None),
@@ -71,20 +86,34 @@ def report(study: Study, stored: Stored[VisionResults], output: Path) -> None:
     )
 
 
+def _image_folder(study: Study, name: str) -> Path:
+    """Where the table of samples stands, beside which its images are."""
+    file = Path(str(study.entry(name).vision))
+    head = file.parent / load_vision(file).calibration
+    return (head.parent / str(load(HandEyeFile, head).samples)).parent
+
+
+def _programs(rows: GraspPrograms) -> list[tuple[str, list[tuple[str, str]]]]:
+    """Of each object its programs: the file's name, and the data address of its text."""
+    found: dict[str, list[tuple[str, str]]] = {}
+    for target, file, text in zip(rows.target.tolist(), rows.file.tolist(), rows.text.tolist()):
+        found.setdefault(target, []).append((file, text_address(text)))
+    return list(found.items())
+
+
 def _motions(results: VisionResults) -> list[PlayedMotion]:
-    """The way to each object grasped and away from it, point by point, with a line that points at the object."""
+    """The way to each object grasped and away from it, with a line that points at the object."""
     motions = []
     for each in results.summary.objects:
         rows = results.ways.take(results.ways.target == each.name)
         if each.grasp is None or not len(rows):
             continue
-        points = np.arange(len(rows), dtype=float)
-        parts = [(part, points[rows.part == part]) for part in dict.fromkeys(rows.part.tolist())]
+        parts = [(part, rows.t_s[rows.part == part]) for part in dict.fromkeys(rows.part.tolist())]
         events = [PlayedEvent(float(own[0]), float(own[-1]), tr(WAYS[part]), "plain") for part, own in parts]
         x, y, z = (value / 1000 for value in each.xyz_mm)
-        mark = Mark(0.0, float(points[-1]), (x, y, z), (x, y, z + POINTER_M), each.name)
+        mark = Mark(0.0, float(rows.t_s[-1]), (x, y, z), (x, y, z + POINTER_M), each.name)
         text = tr("{grasp}, turned by {turn} deg", grasp=each.grasp.grasp, turn=fixed(each.grasp.turn_deg, 0))
-        motions.append(PlayedMotion(each.name, text, points, np.radians(rows.q_deg), events, [mark], timed=False))
+        motions.append(PlayedMotion(each.name, text, rows.t_s, np.radians(rows.q_deg), events, [mark]))
     return motions
 
 
@@ -159,6 +188,30 @@ def _directions(found: CalibrationResult) -> list[list[str]]:
     ]
 
 
+def _corrections(found: TableResult) -> list[list[str]]:
+    return [
+        [
+            each.entry,
+            f"{fixed(each.nominal, 3)} {each.unit}",
+            fixed(each.correction, 4),
+            f"± {fixed(each.half_width, 4)}",
+            tr("differs") if abs(each.correction) > each.half_width else "",
+        ]
+        for each in found.entries
+    ]
+
+
+def _held(found: TableResult | NoCorrections | None) -> list[str]:
+    """Why entries keep their values, or why none is corrected."""
+    if found is None:
+        return []
+    return [say(found)] if isinstance(found, NoCorrections) else listed(found.held)
+
+
+def _corrected(found: TableResult) -> str:
+    return correction_verdict(found.probability, found.scatter_before, found.scatter)
+
+
 def _touched(found: TouchResult) -> list[list[str]]:
     return [
         [str(k + 1), *(f"{fixed(d, 2)} ± {fixed(h, 2)}" for d, h in zip(point.difference_mm, point.half_width_mm))]
@@ -187,6 +240,8 @@ def _grasp(each: ObjectResult) -> list[str]:
         _listed(grasp.q_before_deg),
         _listed(grasp.q_deg),
         f"{near} ({say(grasp.nearest)})" if grasp.nearest else near,
+        tr("straight") if not grasp.corners else tr("planned, {corners} corners", corners=grasp.corners),
+        fixed(grasp.duration_s, 1),
         fixed(grasp.limit_margin_deg, 0),
         fixed(grasp.singular_value, 2),
     ]

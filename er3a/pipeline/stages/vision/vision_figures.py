@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
+from er3a.files.hand_eye_file import grey_image
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import joined
-from er3a.pipeline.stages.vision.model import CalibrationResult, ErrorMapRows, ObjectResult, SampleRows
+from er3a.pipeline.stages.vision.model import CalibrationResult, CornerRows, ErrorMapRows, ObjectResult, SampleRows
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.page import Picture
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL
+
+LEAST_RANGE = 0.02  # of the greatest value, by which a map's colours go beyond its values
+MOST_IMAGES = 9
+WIDEST_PX = 480
+ARROW_PX = 30.0
 
 
 def residual_picture(rows: SampleRows, found: CalibrationResult) -> Picture:
@@ -40,36 +49,106 @@ def residual_picture(rows: SampleRows, found: CalibrationResult) -> Picture:
     return Picture(figure, tr("Bars of the residual of each sample, in mm and in degrees"), caption)
 
 
+def image_picture(rows: CornerRows, folder: Path) -> Picture:
+    """The images with the greatest residuals: corners detected, and arrows to where arm and calibration put them."""
+    off = rows.by_arm_px - rows.seen_px
+    size = {
+        name: float(np.sqrt((off[rows.image == name] ** 2).sum(axis=1).mean())) for name in dict.fromkeys(rows.image)
+    }
+    shown = sorted(size, key=lambda name: -size[name])[:MOST_IMAGES]
+    columns = min(3, len(shown))
+    lines = -(-len(shown) // columns)
+    figure, axes = new_figure(lines, columns, height=2.6 * lines, squeeze=False)
+    usual = float(np.median(list(size.values())))
+    scale = max(1.0, float(f"{ARROW_PX / max(usual, 1e-3):.1g}"))
+    for ax, name in zip(axes.ravel(), shown):
+        own = rows.image == name
+        picture = grey_image(folder / name)
+        step = max(1, picture.shape[1] // WIDEST_PX)
+        height, width = picture.shape
+        frame = (-0.5, width - 0.5, height - 0.5, -0.5)
+        ax.imshow(picture[::step, ::step], cmap="gray", vmin=0, vmax=255, extent=frame, rasterized=True)
+        seen, arrow = rows.seen_px[own], scale * off[own]
+        ax.plot(*seen.T, ".", color=MODEL, markersize=3, label=tr("detected"))
+        ends = np.stack([seen, seen + arrow, np.full_like(seen, np.nan)], axis=1).reshape(-1, 2)
+        ax.plot(*ends.T, color=HIGHLIGHT, linewidth=1, label=tr("to the reprojected corner"))
+        left = "" if rows.used[own].all() else tr(", left out")
+        ax.set_title(f"{rows.sample[own][0]}: {fixed(size[name], 2)} px{left}", fontsize=8)
+        ax.set_xlim(-0.5, width - 0.5)
+        ax.set_ylim(height - 0.5, -0.5)
+        ax.set_aspect("equal")
+        ax.set_axis_off()
+    for ax in axes.ravel()[len(shown) :]:
+        ax.set_axis_off()
+    axes[0, 0].legend(loc="lower left", fontsize=6)
+    by_board = float(np.sqrt(((rows.by_board_px - rows.seen_px)[rows.used] ** 2).sum(axis=1).mean()))
+    by_arm = float(np.sqrt((off[rows.used] ** 2).sum(axis=1).mean()))
+    caption = tr(
+        "Corners as detected, and lines from there towards where arm and calibration put them, {scale:g} times as long "
+        "as they are; the {shown} of {count} images with the greatest residuals. In the images used, detected corners "
+        "are {board} px (root mean square) from the board's pose in that image, which is the camera's noise, and {arm} "
+        "px from the arm's. Lines all in one direction are a wrong pose of the arm or the board; lines that turn about "
+        "a point a wrong end of the board; short ones in all directions noise.",
+        scale=scale,
+        shown=len(shown),
+        count=len(size),
+        board=fixed(by_board, 2),
+        arm=fixed(by_arm, 2),
+    )
+    return Picture(figure, tr("Images of the board with detected and reprojected corners"), caption)
+
+
 def map_picture(rows: ErrorMapRows, objects: tuple[ObjectResult, ...]) -> Picture:
     """Errors around the objects, from above."""
     x, y = np.unique(rows.x_mm), np.unique(rows.y_mm)
-    shape = (len(y), len(x))
-    values = [
-        np.where(rows.in_view, column, np.nan).reshape(shape) for column in (rows.calibration_mm, rows.together_mm)
-    ]
-    titles = (tr("calibration alone"), tr("with the camera's noise"))
-    figure, axes = new_figure(1, 2, height=4.2, sharey=True)
-    for ax, value, title in zip(axes, values, titles):
-        mesh = ax.pcolormesh(x, y, value, cmap="viridis", shading="nearest", rasterized=True)
-        figure.colorbar(mesh, ax=ax, label=tr("95 % of errors below (mm)"), shrink=0.85)
+    seen = rows.in_view
+    both = seen & rows.reached
+    panels = (
+        (tr("calibration alone"), rows.calibration_mm, tr("95 % of errors below (mm)")),
+        (tr("repeatability and table"), rows.arm_mm, tr("95 % of errors below (mm)")),
+        (tr("everything"), rows.together_mm, tr("95 % of errors below (mm)")),
+        (tr("everything, turns"), rows.together_deg, tr("95 % of errors below (°)")),
+    )
+    figure, axes = new_figure(2, 2, height=7.4)
+    for ax, (title, column, label) in zip(axes.ravel(), panels):
+        value = np.where(seen, column, np.nan).reshape(len(y), len(x))
+        known = value[np.isfinite(value)]
+        ends = (known.min() - LEAST_RANGE * known.max(), (1 + LEAST_RANGE) * known.max()) if known.size else (0.0, 1.0)
+        mesh = ax.pcolormesh(
+            x, y, value, cmap="viridis", shading="nearest", rasterized=True, vmin=ends[0], vmax=ends[1]
+        )
+        figure.colorbar(mesh, ax=ax, label=label, shrink=0.85)
         for each in objects:
             ax.plot(each.xyz_mm[0], each.xyz_mm[1], "o", color="white", markeredgecolor=INK)
             ax.annotate(
-                each.name, each.xyz_mm[:2], xytext=(4, 4), textcoords="offset points", fontsize=8, color="white"
+                each.name,
+                each.xyz_mm[:2],
+                xytext=(4, 4),
+                textcoords="offset points",
+                fontsize=8,
+                bbox={"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 0.5},
             )
         ax.set_title(title)
         ax.grid(False)
         equal_scale(ax, "x (mm)", "y (mm)")
-    seen = rows.in_view
-    blank = "" if seen.all() else tr("Blank cells are out of the camera's view.")
+    blank = "" if both.all() else tr("Blank cells are out of the camera's view or of the arm's reach.")
     caption = tr(
-        "Errors of a point that the camera places at the objects' mean height, seen from above. The calibration's own "
-        "part goes from {least} to {most} mm where the camera sees; one reading with the camera's noise from {low} to "
-        "{high} mm. Where the left map is far below the right one, more samples for the calibration help little.",
-        least=fixed(rows.calibration_mm[seen].min(initial=np.inf), 2),
-        most=fixed(rows.calibration_mm[seen].max(initial=0), 2),
-        low=fixed(rows.together_mm[seen].min(initial=np.inf), 2),
-        high=fixed(rows.together_mm[seen].max(initial=0), 2),
+        "Errors of a grasp (the first object's, held at each place) at the objects' mean height, seen from above. The "
+        "calibration's own part goes from {least} to {most} mm where the camera sees, that of repeatability and table "
+        "from {arm_least} to {arm_most} mm; with the camera's noise in one reading all of them make {low} to {high} mm "
+        "and {turn_low} to {turn_high}°. Where the first map is far below the third, more samples for the calibration "
+        "help little.",
+        **_range(rows.calibration_mm[seen], "least", "most"),
+        **_range(rows.arm_mm[both], "arm_least", "arm_most"),
+        **_range(rows.together_mm[both], "low", "high"),
+        **_range(rows.together_deg[both], "turn_low", "turn_high"),
     )
     caption = joined([caption, blank], " ")
-    return Picture(figure, tr("Two maps of the error around the objects, from above"), caption)
+    return Picture(figure, tr("Four maps of the error around the objects, from above"), caption)
+
+
+def _range(values: Reals, low: str, high: str) -> dict[str, str]:
+    """The least and greatest, to be filled in; a dash where there are none."""
+    if not values.size:
+        return {low: "–", high: "–"}
+    return {low: fixed(float(values.min()), 2), high: fixed(float(values.max()), 2)}

@@ -1,4 +1,4 @@
-"""Sets with known truth for the tests, made without the project's own camera cells."""
+"""Hand-eye sets with known truth, made without the project's own camera cells."""
 
 from __future__ import annotations
 

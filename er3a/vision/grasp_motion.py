@@ -1,0 +1,150 @@
+"""The motion of a grasp, leg by leg: from where the arm waits to the approach, to the grasp, and away.
+
+The arm halts at the end of each leg, so that the way is the same whatever ramps a controller has. Between the place
+where it waits and the approach the legs are straight moves of all joints: a single one if that keeps clear, else those
+of a way that the planner found (:mod:`er3a.planning.way_around`). Approach and retreat are straight lines of the tool,
+followed and settled by bounds (:mod:`er3a.planning.tool_proof`). Arms without closed form go along them in short
+straight moves of the joints. Clearance is proven along each leg as it is run (:mod:`er3a.collision.along`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from er3a.collision.along import RateBounds, clearance_along
+from er3a.collision.bodies import Bodies
+from er3a.collision.pairs import Pair
+from er3a.kinematics.near_singular import NearSingular
+from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.numerics.arrays import Reals
+from er3a.planning.follow import follow
+from er3a.planning.intervals import OVER
+from er3a.planning.moves import JointMove, line
+from er3a.planning.timing import JointLimits
+from er3a.planning.tool_proof import Wanted, follow_and_prove, jerk_intervals
+from er3a.planning.way_around import EndOutsideLimits, NoneFound, NoWayAround, PlanningTask, WayAround, way_around
+from er3a.robots.joint_limits import limits_exceeded, within
+from er3a.robots.robot import Robot
+
+Part = Literal["move", "approach", "retreat"]
+PARTS: tuple[Part, ...] = ("move", "approach", "retreat")
+DEPTH = 2e-4  # m, to within which the least clearance is found
+PEAKS = (15 / 8, 10 / np.sqrt(3), 60.0)  # of a quintic from rest to rest: speed, acceleration and jerk, by duration
+SPARE = 1.02  # of the duration, so that bounds settle what samples allow
+LEAST_DURATION = 0.05  # s
+CHECKS = 41
+NO_NEAR = NearSingular(0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class GraspLeg:
+    """A part of the way from halt to halt.
+
+    Attributes
+    ----------
+    duration : s; joints : angles (k, n) in rad at times (k,); rates : bounds of speeds and accelerations between times
+    q_end : (n,), rad; T_end : T_base_tool (4, 4) where the tool runs straight there, None where all joints do
+    """
+
+    part: Part
+    duration: float
+    joints: Callable[[Reals], Reals]
+    rates: RateBounds
+    q_end: Reals
+    T_end: Reals | None = None
+
+    def sampled(self, count: int) -> tuple[Reals, Reals]:
+        """Times (count,) in s from 0, and joints (count, n) in rad."""
+        times = np.linspace(0.0, self.duration, count)
+        return times, self.joints(times)
+
+
+def joint_legs(part: Part, corners: Reals, limits: JointLimits) -> tuple[GraspLeg, ...]:
+    """Straight moves of all joints from corner to corner (k, n), rad, as fast as their limits allow on quintics."""
+    return tuple(_joint_leg(part, a, b, limits) for a, b in pairwise(corners))
+
+
+def _joint_leg(part: Part, start: Reals, end: Reals, limits: JointLimits) -> GraspLeg:
+    turn = np.abs(end - start)
+    least = [(PEAKS[0] * turn / limits.speed).max(), np.sqrt(PEAKS[1] * turn / limits.acceleration).max()]
+    if limits.jerk is not None:
+        least.append(np.cbrt(PEAKS[2] * turn / limits.jerk).max())
+    move = JointMove(start, end, max(LEAST_DURATION, *map(float, least)))
+    motion = move.polynomials()
+    return GraspLeg(part, move.duration, lambda t: move.joints(t)[0], motion.rate_bounds, end)
+
+
+def transfer(task: PlanningTask, start: Reals, end: Reals) -> tuple[GraspLeg, ...] | NoWayAround:
+    """Legs from joints (n,) to joints (n,), rad, on which nothing touches; or why there are none."""
+    if outside := limits_exceeded(task.robot, start):
+        return EndOutsideLimits("start", outside)
+    straight = joint_legs("move", np.stack([start, end]), task.limits)
+    if task.bodies is None or _touches_nothing(task.bodies, straight):
+        return straight
+    found = way_around(task, start, end)
+    if not isinstance(found, WayAround):
+        return found
+    legs = joint_legs("move", found.corners, task.limits)
+    if not (within(task.robot, found.corners).all() and _touches_nothing(task.bodies, legs)):
+        return NoneFound(task.rounds)
+    return legs
+
+
+def _touches_nothing(bodies: Bodies, legs: tuple[GraspLeg, ...]) -> bool:
+    least = least_clearance(bodies, legs)
+    return least is None or least[0] > 0
+
+
+def tool_leg(
+    robot: Robot, part: Part, waypoints: Reals, ends: tuple[Reals, Reals], limits: JointLimits, speed: float
+) -> tuple[GraspLeg, ...] | None:
+    """The straight line of the tool between two poses (4, 4), within limits and off singular poses; None if that fails.
+
+    Parameters
+    ----------
+    waypoints : (k, n), rad, joints along it, from a search
+    speed : m/s, the tool's greatest
+    """
+    if closed_form_missing(robot) is not None:
+        return joint_legs(part, waypoints, limits)
+    length = float(np.linalg.norm(ends[1][:3, 3] - ends[0][:3, 3]))
+    duration = max(LEAST_DURATION, PEAKS[0] * length / speed)
+    path, times = line(*ends, duration), np.linspace(0, duration, CHECKS)
+    _, velocity, acceleration = follow(robot, path, times, waypoints[0]).rates(times)
+    needed = [np.abs(velocity / limits.speed), np.sqrt(np.abs(acceleration / limits.acceleration))]
+    if limits.jerk is not None:
+        needed.append(np.cbrt(np.abs(np.diff(acceleration, axis=0) / times[1] / limits.jerk)))
+    slower = max(float(each.max()) for each in needed)
+    if not np.isfinite(slower):
+        return None
+    duration *= max(1.0, SPARE * slower)
+    path = line(*ends, duration)
+    wanted = Wanted(limits.rates, NO_NEAR)
+    followed, proof = follow_and_prove(robot, path, np.linspace(0, duration, CHECKS), wanted, waypoints[0])
+    over = (np.abs(proof.rates) > np.stack([limits.speed, limits.acceleration]) * (1 + OVER)).any()
+    over |= limits.jerk is not None and bool(jerk_intervals(proof, limits.rates[2]))
+    if followed.jumps or proof.undecided or over or not proof.proven.all() or not within(robot, proof.q).all():
+        return None
+    q_end = followed.joints(np.array([duration]))[0]
+    return (GraspLeg(part, duration, followed.joints, proof.rate_bounds, q_end, ends[1]),)
+
+
+def least_clearance(bodies: Bodies, legs: tuple[GraspLeg, ...]) -> tuple[float, Pair] | None:
+    """What the arm is proven to keep clear by along legs, m (below 0 where it overlaps), and what is nearest there.
+
+    None where nothing can meet.
+    """
+    least: tuple[float, Pair] | None = None
+    for leg in legs:
+        times = np.linspace(0.0, leg.duration, CHECKS)
+        along = clearance_along(bodies, leg.joints, leg.rates, times, times, DEPTH)
+        pair = along.pair[along.least] if along.least >= 0 else None
+        if pair is not None:
+            distance = float(along.distance[along.least]) - DEPTH
+            least = min(least or (np.inf, pair), (distance, pair), key=lambda each: each[0])
+    return least

@@ -1,0 +1,283 @@
+"""Corrections to an arm's table together with hand-eye and board pose, from the same samples.
+
+To the twelve numbers of both poses come the table's entries. The samples can't tell all of them apart: the first
+joint's d and offset move the arm as the base's frame does, in which a fixed camera or board stands; the last rows move
+the flange, on which the other of the two is. So the twelve numbers come first, then the entries in the order of
+preference of :mod:`er3a.calibration.parameters`; one whose effect lies in the span of those before it (to 0.1 % of its
+size) keeps its value, and is told with those that act as it does. What is left is estimated by Gauss-Newton steps, with
+the weights and intervals of :mod:`er3a.vision.likelihood`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import scipy
+
+from er3a.calibration.calibrate import CLOSE, Close, Estimate
+from er3a.calibration.outcomes import Held, LevelName, MovesNothing, NotToldApart
+from er3a.calibration.parameters import DEPENDENT, NO_EFFECT, SCALE, Parameter, parallel_pairs, parameters_of
+from er3a.calibration.parameters import moved as moved_tables
+from er3a.kinematics.chain import row_values
+from er3a.kinematics.table_batch import Tables, frames_of, join, robot_of, tables_of
+from er3a.numerics.arrays import Reals
+from er3a.robots.robot import Robot
+from er3a.vision.calibration_set import CalibrationSet
+from er3a.vision.hand_eye import SURE, HandEye
+from er3a.vision.likelihood import (
+    UNKNOWNS,
+    VARIANCE_ROUNDS,
+    PoseObservations,
+    flange_to_camera,
+    refine,
+    residuals,
+    whitening,
+)
+from er3a.vision.tangent import inverse_right_jacobian, inverted, moved, step_between
+
+STEP = 1e-6  # m and rad
+STEPS = 40
+STEP_ENDS = 1e-10
+HALVINGS = 10
+TABLE_JOINTS = 6
+LEAST_FREEDOM = 6
+
+
+@dataclass(frozen=True)
+class NoCorrections:
+    """Why no corrections come with a calibration.
+
+    ``joints``: no joint angles were recorded, or the arm has not six; ``few``: too few samples for so many numbers;
+    ``steps``: the search does not end.
+    """
+
+    why: Literal["joints", "few", "steps"]
+    code: Literal["no_corrections"] = "no_corrections"
+
+
+@dataclass(frozen=True, eq=False)
+class TableCorrections:
+    """Hand-eye and board pose with the table's corrections.
+
+    Attributes
+    ----------
+    robot : with the corrected table
+    level : which entries were asked for
+    estimates : of those that can be told, in mm and deg, with half-widths of their 95 % intervals (k,)
+    held : why the others keep their values
+    X, Y, half_width : as of :class:`er3a.vision.hand_eye.HandEye`, (12,)
+    moved : (2,), m and rad: how far X is from the one without corrections
+    scatter, scatter_before : root mean square of the residuals with and without corrections, in standard deviations
+    probability : of residuals that fall as much by chance, if no entry were wrong
+    """
+
+    robot: Robot
+    level: LevelName
+    estimates: tuple[Estimate, ...]
+    entry_half_width: Reals
+    held: tuple[Held, ...]
+    close: tuple[Close, ...]
+    X: Reals
+    Y: Reals
+    half_width: Reals
+    moved: Reals
+    scatter: float
+    scatter_before: float
+    probability: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """Samples that were used, and the table they are predicted by."""
+
+    robot: Robot
+    samples: CalibrationSet
+    rows: Reals
+
+    def flange(self, tables: Tables) -> Reals:
+        """T_base_flange (H, N, 4, 4) by each table."""
+        found: Reals = frames_of(tables, self.robot.base, self.rows)[:, :, -1]
+        return found
+
+    def hand(self, flange: Reals) -> Reals:
+        return flange if self.samples.setup == "eye_in_hand" else inverted(flange)
+
+    def linear(self, table: Tables, parameters: list[Parameter], X: Reals, Y: Reals) -> tuple[Reals, Reals, Reals]:
+        """F (N, 4, 4), residuals (N, 6), and their derivatives by poses and entries (N, 6, 12 + p)."""
+        F = self.hand(self.flange(table)[0])
+        raw, J = residuals(F, self.samples.target, X, Y)
+        count = len(parameters)
+        if not count:
+            return F, raw, J
+        both = STEP * np.concatenate([np.eye(count), -np.eye(count)])
+        flange = self.flange(moved_tables(join([table] * (2 * count)), parameters, both))
+        shift = step_between(flange[count:], flange[:count]) / (2 * STEP)
+        by_entry = -np.einsum("nij,pnj->nip", flange_to_camera(self.samples.setup, F, X, Y), shift)
+        by_entry[:, 3:] = inverse_right_jacobian(raw[:, 3:]) @ by_entry[:, 3:]
+        return F, raw, np.concatenate([J, by_entry], axis=2)
+
+
+def correct_table(found: HandEye, robot: Robot, level: LevelName = "all_entries") -> TableCorrections | NoCorrections:
+    """Estimate the entries of a table with the poses of a calibration, from the samples that it rests on.
+
+    Parameters
+    ----------
+    found : a calibration of samples with joint angles
+    robot : whose table turned the angles into poses
+    """
+    samples = found.samples.take(found.used)
+    if samples.q is None or robot.joints != TABLE_JOINTS or robot.slides.any():
+        return NoCorrections("joints")
+    problem = _Problem(robot, samples, row_values(robot, samples.q))
+    every = list(parameters_of(robot, level))
+    seen = _seen(samples, samples.hand, samples.camera_covariance)
+    sigma = np.broadcast_to(np.repeat(found.deviations, 3), (len(samples), 6))
+    _, _, J = problem.linear(tables_of(robot), every, found.X, found.Y)
+    kept, held = _identified(whitening(seen, sigma, found.X, found.Y) @ J, every, samples.setup, robot)
+    if 6 * len(samples) - UNKNOWNS - len(kept) < LEAST_FREEDOM:
+        return NoCorrections("few")
+    fit = _fit(problem, kept, found)
+    return NoCorrections("steps") if fit is None else _result(problem, (level, kept, held), found, fit)
+
+
+def _seen(samples: CalibrationSet, F: Reals, covariance: Reals | None) -> PoseObservations:
+    return PoseObservations(samples.setup, F, samples.target, covariance, samples.flange_covariance)
+
+
+def _identified(J: Reals, every: list[Parameter], setup: str, robot: Robot) -> tuple[list[Parameter], tuple[Held, ...]]:
+    """Which entries the samples tell apart, and why the others keep their values; J is whitened, (N, 6, 12 + p)."""
+    J = SCALE * J.reshape(-1, J.shape[-1])
+    poses = ("T_flange_camera", "T_base_board") if setup == "eye_in_hand" else ("T_base_camera", "T_flange_board")
+    names = [*(poses[0],) * 6, *(poses[1],) * 6, *(each.name for each in every)]
+    norms = np.linalg.norm(J, axis=0)
+    columns = list(range(UNKNOWNS))
+    held: list[Held] = []
+    for k in range(UNKNOWNS, J.shape[1]):
+        if norms[k] <= NO_EFFECT * norms.max():
+            held.append(MovesNothing(names[k]))
+            continue
+        scaled = J[:, columns] / norms[columns]
+        share, *_ = np.linalg.lstsq(scaled, J[:, k], rcond=None)
+        if np.linalg.norm(J[:, k] - scaled @ share) > DEPENDENT * norms[k]:
+            columns.append(k)
+            continue
+        partners = [names[i] for i, part in zip(columns, share) if abs(part) > DEPENDENT * norms[k]]
+        entries = (names[k], *dict.fromkeys(partners))
+        between = [pair for _, pair in parallel_pairs(robot) if set(entries) == {f"d{joint}" for joint in pair}]
+        held.append(NotToldApart(entries, between[0] if between else None))
+    return [every[k - UNKNOWNS] for k in columns[UNKNOWNS:]], tuple(held)
+
+
+@dataclass(frozen=True, eq=False)
+class _JointFit:
+    """Poses, amounts (k,), S (N, 6, 6) of the residuals, their sum of squares, covariance and freedom (12 + k,)."""
+
+    X: Reals
+    Y: Reals
+    amounts: Reals
+    S: Reals
+    squares: float
+    covariance: Reals
+    freedom: Reals
+    scatter: float
+
+
+def _fit(problem: _Problem, kept: list[Parameter], found: HandEye) -> _JointFit | None:
+    samples, given = problem.samples, tables_of(problem.robot)
+    stated = samples.camera_covariance is not None
+    X, Y, amounts, deviations = found.X, found.Y, np.zeros(len(kept)), found.deviations
+    count = UNKNOWNS + len(kept)
+    for _ in range(1 if stated else VARIANCE_ROUNDS):
+        F = problem.hand(problem.flange(moved_tables(given, kept, amounts[None]))[0])
+        sigma = np.broadcast_to(np.repeat(deviations, 3), (len(samples), 6))
+        W = whitening(_seen(samples, F, samples.camera_covariance), sigma, X, Y)
+        steps = _steps(problem, kept, W, (X, Y, amounts))
+        if steps is None:
+            return None
+        X, Y, amounts, white, J = steps
+        inverse = np.linalg.pinv(np.einsum("nki,nkj->ij", J, J), hermitian=True)
+        redundancy = 1 - np.einsum("nki,ij,nkj->nk", J, inverse, J)
+        parts = np.array([redundancy[:, :3].sum(), redundancy[:, 3:].sum()])
+        if not stated:
+            ratio = np.sqrt([(white[:, :3] ** 2).sum(), (white[:, 3:] ** 2).sum()] / parts)
+            deviations = np.asarray(deviations * ratio, float)
+            if np.abs(ratio - 1).max() < 1e-6:
+                break
+    free = 6.0 * len(samples) - count
+    squares = float((white**2).sum())
+    scatter = float(np.sqrt(squares / free))
+    freedom = np.full(count, free if stated else parts.min())
+    if not stated:
+        freedom[:UNKNOWNS] = parts[np.array([0, 0, 0, 1, 1, 1] * 2)]
+    W_inverse = np.linalg.inv(W)
+    S: Reals = np.asarray(W_inverse @ np.swapaxes(W_inverse, 1, 2), float)
+    return _JointFit(X, Y, amounts, S, squares, inverse * (scatter**2 if stated else 1.0), freedom, scatter)
+
+
+def _steps(
+    problem: _Problem, kept: list[Parameter], W: Reals, start: tuple[Reals, Reals, Reals]
+) -> tuple[Reals, Reals, Reals, Reals, Reals] | None:
+    """Poses, amounts, whitened residuals (N, 6) and derivatives at the least squares; None if the steps don't end."""
+    given = tables_of(problem.robot)
+    X, Y, amounts = start
+
+    def at(X: Reals, Y: Reals, amounts: Reals) -> tuple[Reals, Reals]:
+        _, raw, J = problem.linear(moved_tables(given, kept, amounts[None]), kept, X, Y)
+        return (W @ raw[..., None])[..., 0], W @ J
+
+    white, J = at(X, Y, amounts)
+    for _ in range(STEPS):
+        flat = J.reshape(-1, J.shape[-1])
+        scale = np.linalg.norm(flat, axis=0)
+        step = -np.linalg.lstsq(flat / scale, white.ravel(), rcond=None)[0] / scale
+        for _ in range(HALVINGS):
+            new = moved(X, step[:6]), moved(Y, step[6:UNKNOWNS]), amounts + step[UNKNOWNS:]
+            white_new, J_new = at(*new)
+            if (white_new**2).sum() <= (white**2).sum() * (1 + 1e-9):
+                break
+            step = step / 2
+        (X, Y, amounts), white, J = new, white_new, J_new
+        if np.abs(step).max() < STEP_ENDS:
+            return X, Y, amounts, white, J
+    return None
+
+
+def _result(
+    problem: _Problem, asked: tuple[LevelName, list[Parameter], tuple[Held, ...]], found: HandEye, fit: _JointFit
+) -> TableCorrections:
+    (level, kept, held), robot, samples = asked, problem.robot, problem.samples
+    error = np.sqrt(np.diag(fit.covariance))
+    half = scipy.special.stdtrit(fit.freedom, (1 + SURE) / 2) * error
+    correlation = (fit.covariance / np.outer(error, error))[UNKNOWNS:, UNKNOWNS:]
+    rows, columns = np.nonzero(np.triu(np.abs(correlation) > CLOSE, 1))
+    before = refine(PoseObservations(samples.setup, samples.hand, samples.target, fit.S), found.X, found.Y)
+    squares_before = float((before.whitened**2).sum())
+    free = 6 * len(samples) - UNKNOWNS - len(kept)
+    ratio = (squares_before - fit.squares) / max(len(kept), 1) / (fit.squares / free)
+    step = step_between(found.X, fit.X)
+    units = np.array([each.in_unit for each in kept])
+    return TableCorrections(
+        robot=robot_of(moved_tables(tables_of(robot), kept, fit.amounts[None]), 0, robot),
+        level=level,
+        estimates=tuple(
+            Estimate(
+                each,
+                float(getattr(robot, each.column)[each.joint - 1] * each.in_unit),
+                float(amount * each.in_unit),
+                float(own * each.in_unit),
+            )
+            for each, amount, own in zip(kept, fit.amounts, error[UNKNOWNS:])
+        ),
+        entry_half_width=half[UNKNOWNS:] * units,
+        held=held,
+        close=tuple(Close(kept[i].name, kept[j].name, float(correlation[i, j])) for i, j in zip(rows, columns)),
+        X=fit.X,
+        Y=fit.Y,
+        half_width=half[:UNKNOWNS],
+        moved=np.array([np.linalg.norm(step[:3]), np.linalg.norm(step[3:])]),
+        scatter=fit.scatter,
+        scatter_before=float(np.sqrt(squares_before / (6 * len(samples) - UNKNOWNS))),
+        probability=float(scipy.special.fdtrc(len(kept), free, max(ratio, 0.0))) if kept else 1.0,
+    )

@@ -1,0 +1,131 @@
+"""Corrections to a table from hand-eye samples: known truth, what can't be told apart, and how often intervals hold."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from er3a.calibration.outcomes import MovesNothing, NotToldApart
+from er3a.vision.calibration_set import CalibrationSet
+from er3a.vision.hand_eye import calibrate_hand_eye
+from er3a.vision.table_corrections import NoCorrections, TableCorrections, correct_table
+from testing.hand_eye_coverage import POSITION, ROBOT, ROTATION, a_set, table_coverage
+from testing.hand_eye_sets import X_TRUE, Y_TRUE, flange_poses, noisy, off, seen
+
+WRONG = {"a2": 4e-4, "d4": -3e-4, "offset3": np.radians(0.05), "alpha5": np.radians(-0.04)}
+
+
+def corrected(samples) -> TableCorrections:
+    found = correct_table(calibrate_hand_eye(samples), ROBOT)
+    assert isinstance(found, TableCorrections)
+    return found
+
+
+@pytest.mark.parametrize("stated", [True, False])
+@pytest.mark.parametrize("setup", ["eye_in_hand", "eye_to_hand"])
+def test_wrong_entries_are_found_within_their_intervals(setup, stated):
+    found = corrected(a_set(setup, 1, WRONG, 40, stated))
+    by_name = {each.name: (each.correction, half) for each, half in zip(found.estimates, found.entry_half_width)}
+    for entry, error in WRONG.items():
+        value, half = by_name[entry]
+        truth = 1000 * error if entry[:-1] in ("a", "d") else np.degrees(error)
+        assert abs(value) > half or entry == "d4"
+        assert abs(value - truth) < 2 * half
+    assert found.probability < 1e-6
+    assert found.scatter < 1.2
+    assert np.abs(off(found.X, X_TRUE)[:3]).max() < 5e-4
+
+
+@pytest.mark.long
+def test_a_right_table_is_not_spoken_against():
+    by_chance = [corrected(a_set("eye_to_hand", seed, {})).probability for seed in range(6)]
+    assert min(by_chance) > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("setup", "base", "flange"),
+    [("eye_in_hand", "T_base_board", "T_flange_camera"), ("eye_to_hand", "T_base_camera", "T_flange_board")],
+)
+def test_what_can_not_be_told_apart_is_named(setup, base, flange):
+    """What moves the base's frame, the flange's, or two parallel axes, as the poses or each other do."""
+    held = {each.entries[0]: each for each in corrected(a_set(setup, 2, {})).held if isinstance(each, NotToldApart)}
+    for entry, pose in {"d1": base, "offset1": base, "d6": flange, "offset6": flange, "a6": flange}.items():
+        assert held[entry].entries == (entry, pose)
+    assert set(held["d2"].entries) == {"d2", "d3"}
+    assert held["d2"].parallel_joints == (2, 3)
+
+
+def test_held_entries_change_no_prediction():
+    """An error of a held entry is taken up in full by what it can't be told from: the residuals stay as they were."""
+    alike = corrected(a_set("eye_to_hand", 3, {"d1": 2e-3, "offset6": np.radians(0.3)}))
+    sound = corrected(a_set("eye_to_hand", 3, {}))
+    assert alike.scatter == pytest.approx(sound.scatter, abs=1e-6)
+    for a, b in zip(alike.estimates, sound.estimates):
+        assert a.correction == pytest.approx(b.correction, abs=1e-4)
+
+
+def test_corrections_are_those_of_scipys_least_squares():
+    """An oracle with forward kinematics of plain matrices, for the entries that were estimated."""
+    samples = a_set("eye_in_hand", 4, WRONG)
+    found = corrected(samples)
+    assert ROBOT.convention == "standard"
+    names = [each.name for each in found.estimates if not each.name.startswith("beta")]
+    betas = [each.name for each in found.estimates if each.name.startswith("beta")]
+
+    def predicted(p):
+        table = {name: np.array(getattr(ROBOT, name)) for name in ("a", "d", "alpha", "offset", "beta")}
+        for entry, amount in zip(names + betas, p[12:]):
+            table[entry[:-1]][int(entry[-1]) - 1] += amount
+        flange = np.tile(ROBOT.base, (len(samples), 1, 1))
+        for j in range(6):
+            theta = ROBOT.direction[j] * samples.q[:, j] + table["offset"][j]
+            turn = np.tile(np.eye(4), (len(theta), 1, 1))
+            turn[:, :3, :3] = Rotation.from_rotvec(np.outer(theta, [0, 0, 1])).as_matrix()
+            link = np.eye(4)
+            link[:3, :3] = Rotation.from_euler("XY", [table["alpha"][j], table["beta"][j]]).as_matrix()
+            link[:3, 3] = table["a"][j], 0, table["d"][j]
+            flange = flange @ turn @ link
+        X, Y = np.eye(4), np.eye(4)
+        X[:3, :3], X[:3, 3] = Rotation.from_rotvec(p[3:6]).as_matrix(), p[:3]
+        Y[:3, :3], Y[:3, 3] = Rotation.from_rotvec(p[9:12]).as_matrix(), p[6:9]
+        return np.linalg.inv(flange @ X) @ Y
+
+    def cost(p):
+        T = predicted(p)
+        turn = Rotation.from_matrix(samples.target[:, :3, :3] @ np.swapaxes(T[:, :3, :3], 1, 2)).as_rotvec()
+        return np.concatenate([(samples.target[:, :3, 3] - T[:, :3, 3]) / POSITION, turn / ROTATION]).ravel()
+
+    start = np.concatenate(
+        [np.r_[T[:3, 3], Rotation.from_matrix(T[:3, :3]).as_rotvec()] for T in (X_TRUE, Y_TRUE)]
+        + [np.zeros(len(names) + len(betas))]
+    )
+    least = least_squares(cost, start, xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    by_name = {each.name: each for each in found.estimates}
+    for entry, amount in zip(names + betas, least.x[12:]):
+        assert by_name[entry].correction == pytest.approx(amount * by_name[entry].parameter.in_unit, abs=2e-5)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("stated", [True, False])
+def test_intervals_hold_the_truth_as_often_as_they_say(stated):
+    """Of 18 entries and the poses' 12 numbers, each time at other joint angles; 10 000 runs are in the evidence."""
+    inside = table_coverage("eye_to_hand", stated, 150, 1000)
+    assert 0.935 < inside.mean() < 0.965
+
+
+def test_without_joint_angles_or_samples_enough_it_says_so():
+    flange = flange_poses(np.random.default_rng(5), 12)
+    poses = calibrate_hand_eye(
+        CalibrationSet("eye_in_hand", flange, noisy(seen("eye_in_hand", flange), np.random.default_rng(6)))
+    )
+    assert correct_table(poses, ROBOT) == NoCorrections("joints")
+    few = a_set("eye_in_hand", 7, {}, 5)
+    assert correct_table(calibrate_hand_eye(few), ROBOT) == NoCorrections("few")
+
+
+def test_a_level_asks_for_its_entries_only():
+    found = correct_table(calibrate_hand_eye(a_set("eye_in_hand", 8, {})), ROBOT, "lengths")
+    assert {each.name[0] for each in found.estimates} <= {"a", "d"}
+    assert not any(isinstance(each, MovesNothing) for each in found.held)
