@@ -121,7 +121,7 @@ class _Motion:
         """Bounds (k,) of the ends' accelerations between times (k,) and (k,), m/s^2; infinite where there are none."""
         sliding = self.bodies.robot.sliding
         speed, acceleration = self.rates(start, end)
-        known = np.isfinite(speed + acceleration).all(axis=1)[:, None]
+        known = np.asarray(np.isfinite(speed + acceleration).all(axis=1, keepdims=True))
         speed, acceleration = (self._of_rows(np.where(known, part, 0.0)) for part in (speed, acceleration))
         turning, shifting = speed[:, ~sliding].sum(axis=1), speed[:, sliding].sum(axis=1)
         bent = acceleration[:, ~sliding].sum(axis=1) + turning**2

@@ -8,7 +8,8 @@ have turned by little, the inverse of J has grown by little, so that::
 
 with b the norm of the inverse at the pose solved, h the way from there, V the sum of the joints' rates, and C the
 greatest length of a column of J (turning an earlier joint turns a column, turning a later one turns its lever: no
-derivative of a column is longer). Where the bound on q'' that is put in comes out no greater, the motion exists over
+derivative of a column is longer). Under a coupling u = c q, V is the sum of the rows' rates, C is of the rows' columns,
+and the norm of c goes with sqrt(n). Where the bound on q'' that is put in comes out no greater, the motion exists over
 the whole interval, on one branch and without a singular pose [1]_; Taylor's formula then bounds angles, speeds,
 accelerations and distances from singular sets on it. An interval that settles less than is asked is halved. What is
 left when intervals are short beyond use is *undecided*.
@@ -80,6 +81,8 @@ class ToolProof:
     jerk : (m, n), rad/s^3, met in each interval, where a limit of jerk is to be settled; else 0
     steps : times (k,) in s at which the acceleration steps, and by how much, (k, n) in rad/s^2; the same
     undecided : stretches, and what is open there; a rate is not where its limit is exceeded elsewhere
+    beside : the same next to the times at which the path is said to be singular, or to end: it settles what is open
+        there only if whoever judges the path finds it so
     """
 
     times: Reals
@@ -93,6 +96,7 @@ class ToolProof:
     jerk: Reals
     steps: tuple[Reals, Reals]
     undecided: tuple[Interval[Undecided], ...]
+    beside: tuple[Interval[Undecided], ...]
 
     def rate_bounds(self, start: Reals, end: Reals) -> tuple[Reals, Reals]:
         """As :meth:`er3a.planning.piecewise.PiecewiseMotion.rate_bounds`."""
@@ -260,11 +264,12 @@ def _proof(followed: Followed, done: list[_Settled], singular: Reals) -> ToolPro
     order = np.argsort(t, kind="stable")
     duration = followed.line.duration
     undecided: list[Interval[Undecided]] = []
+    beside: list[Interval[Undecided]] = []
     for k, quantity in enumerate(QUANTITIES):
         for first, last in runs(whole.open[:, k]):
             start, end = np.array([whole.start[first]]), np.array([whole.end[last - 1]])
-            if _distance(singular, start, end)[0] > BESIDE_EVENT[0] * duration:
-                undecided.append(Interval(float(start[0]), float(end[0]), Undecided(quantity)))
+            apart = _distance(singular, start, end)[0] > BESIDE_EVENT[0] * duration
+            (undecided if apart else beside).append(Interval(float(start[0]), float(end[0]), Undecided(quantity)))
     return ToolProof(
         times=times,
         proven=whole.proven,
@@ -277,6 +282,7 @@ def _proof(followed: Followed, done: list[_Settled], singular: Reals) -> ToolPro
         jerk=whole.jerk,
         steps=_acceleration_steps(followed),
         undecided=tuple(sorted(undecided, key=lambda part: part.start)),
+        beside=tuple(sorted(beside, key=lambda part: part.start)),
     )
 
 
@@ -328,7 +334,8 @@ def _settle(followed: Followed, wanted: Wanted, progress: PiecewiseMotion, start
 def _continued(followed: Followed, q: Reals, dq: Reals, ddq: Reals, s: tuple[Reals, Reals, Reals]) -> _Bounds:
     """Continue the motion from solved poses (k, n) at middles over intervals, by the formulas of the module's text."""
     robot, n = followed.robot, q.shape[-1]
-    length, root = characteristic_length(robot), np.sqrt(n)
+    coupling = np.eye(n) if robot.coupling is None else robot.coupling
+    length, root = characteristic_length(robot), np.sqrt(n) * np.linalg.norm(coupling, 2)
     count = len(q)
     solved = np.isfinite(dq[:, 0])
     h = np.maximum(s[2] - s[1], s[1] - s[0])
@@ -337,7 +344,7 @@ def _continued(followed: Followed, q: Reals, dq: Reals, ddq: Reals, s: tuple[Rea
     b, reach = np.full(count, np.inf), np.full(count, np.inf)
     b[solved], reach[solved] = _inverse_and_reach(robot, q[solved], length)
     sum_first, first, second = (np.full(count, np.inf) for _ in range(3))
-    sum_first[solved] = np.abs(dq[solved]).sum(axis=1)
+    sum_first[solved] = np.abs(dq[solved] @ coupling.T).sum(axis=1)
     first[solved], second[solved] = np.linalg.norm(dq[solved], axis=1), np.linalg.norm(ddq[solved], axis=1)
     with np.errstate(all="ignore"):
 
