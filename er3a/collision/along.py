@@ -12,9 +12,9 @@ the other link for two links. The way is bounded on a grid of the motion so fine
 twice the depth from point to point: a chord over a time h, plus A h^2 / 3, where A bounds the end's acceleration.
 With levers of at most L, rows that turn at speeds v and accelerations a and rows that slide at w and b,
 ``A = L (sum |a| + (sum |v|)^2) + sum |b| + 2 sum |v| sum |w|``: bounds over the whole interval, which whoever knows the
-motion gives for the joints, and which a coupling turns into those of rows. Where the motion has no such bounds (at singular poses
-of a path of the tool, through which nothing is proven) the bulge of the parabola through three points takes the place
-of A h^2 / 3.
+motion gives for the joints, and which a coupling turns into those of rows. Where the motion has no such bounds (at
+singular poses of a path of the tool, through which nothing is proven) the bulge of the parabola through three points
+takes the place of A h^2 / 3.
 
 References
 ----------

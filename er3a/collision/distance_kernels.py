@@ -7,9 +7,9 @@ iteration [2]_, whose closest points of a simplex are found region by region [1]
 
 A point of a body moves, while each row k of the table moves by up to ``h_k`` from where it is, by no more than the sum
 over the rows, from the body inwards, of ``h_k`` if it slides, or of ``2 sin(h_k / 2)`` times its distance from the
-axis, which the rows farther out have changed by no more than what they have added so far. A row moves by no more than what
-the joints that the coupling lays on it do together. A body moves, as a set, by no more than its points do. A pair whose
-distance exceeds that is apart in the whole box of joint vectors.
+axis, which the rows farther out have changed by no more than what they have added so far. A row moves by no more than
+what the joints that the coupling lays on it do together. A body moves, as a set, by no more than its points do. A pair
+whose distance exceeds that is apart in the whole box of joint vectors.
 
 References
 ----------
