@@ -22,9 +22,9 @@ from testing.motion_cases import ASSUMED, JOINT_KINDS, TOOL_KINDS, Tally, compar
 from testing.motion_oracle import GRAZING, GRAZING_JERK, GRAZING_RAD, POINTS, SPAN_S, TOUCH
 
 ROBOTS = ("er3_600", "er3a_c60")
-PATHS = {**dict.fromkeys(JOINT_KINDS, 60), **dict.fromkeys(TOOL_KINDS, 20)}  # per robot
+PATHS = {**dict.fromkeys(JOINT_KINDS, 30), **dict.fromkeys(TOOL_KINDS, 10)}  # per robot
 SAMPLES = (2, 500)
-QUERIES, SEED, DENSE, OTHER_S = 6, 20261120, 1001, 60.0
+QUERIES, SEED, DENSE, OTHER_S = 4, 20261120, 1001, 60.0
 FREE = 0.005  # m, by which both ends of a query are clear
 
 
