@@ -315,7 +315,7 @@ def _settle(followed: Followed, wanted: Wanted, progress: PiecewiseMotion, start
     velocity, acceleration = dq * speed[:, None], ddq * speed[:, None] ** 2 + dq * pull[:, None]
     blur = (2 * bounds.blur * speed**2 / (end - start))[:, None]
     law = (speed, pull, half)
-    rates, highest = _rate_bounds(bounds, velocity, acceleration, np.abs(jerk) + blur, progress, (start, end), law)
+    rates, highest = _rate_bounds(bounds, (velocity, acceleration, np.abs(jerk) + blur), progress, (start, end), law)
     unreached = np.isnan(np.stack([q_start, q, q_end])[..., 0])
     open_, broken = (np.zeros((count, len(QUANTITIES)), bool) for _ in range(2))
     known = bounds.proven
@@ -422,17 +422,16 @@ def _inverse_and_reach(robot: Robot, q: Reals, length: float) -> tuple[Reals, Re
 
 def _rate_bounds(
     bounds: _Bounds,
-    velocity: Reals,
-    acceleration: Reals,
-    mean_jerk: Reals,
+    met: tuple[Reals, Reals, Reals],
     progress: PiecewiseMotion,
     ends: tuple[Reals, Reals],
     law: tuple[Reals, Reals, Reals],
 ) -> tuple[Reals, dict[int, Reals]]:
     """Rates at the middles (k, 2, n), and bounds of speed, acceleration and jerk over the intervals.
 
-    ``mean_jerk`` (k, n) bounds the size of a jerk met in each.
+    ``met`` are velocities and accelerations at the middles, and bounds of the size of a jerk met in each, (k, n).
     """
+    velocity, acceleration, mean_jerk = met
     speed, pull, half = (part[:, None] for part in law)
     piece = np.clip(np.searchsorted(progress.times, (ends[0] + ends[1]) / 2) - 1, 0, len(progress.times) - 2)
     jerk, snap = (np.abs(series[piece, :, 0]).sum(axis=1)[:, None] for series in (progress.jerk, progress.snap))
