@@ -2,8 +2,8 @@
 
 Paths come as plain numbers in degrees, millimetres and seconds, arms as their tables. Laws of time, rounded corners and
 rotations are written down once more; joints of paths of the tool follow from plane trigonometry, for arms with a
-vertical first axis, parallel axes 2 and 3 in the plane of axis 1, and a spherical wrist. Speeds and accelerations of
-those are differences of their angles.
+vertical first axis, parallel axes 2 and 3 in the plane of axis 1, and a spherical wrist. Speeds, accelerations
+and jerks are differences of their angles; an acceleration that steps shows as a jerk beyond any limit.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
+import numba
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation
@@ -19,6 +20,8 @@ from scipy.spatial.transform import Rotation
 POINTS = 500_001
 GRAZING = 1e-5  # relative, of limits of rates
 GRAZING_RAD = 1e-7  # of joint limits
+GRAZING_JERK = 1e-3  # relative, of limits of jerk
+SPAN_S = 2e-4  # of one difference of accelerations; jerks are means over three of them
 TOUCH = 1e-7  # rad or m, between two crossings next to one another
 
 
@@ -305,51 +308,77 @@ def _stack(points, spin, starts, frame=None):
 
 def joints_of(arm: Arm, T, q_start):
     """Angles (n, 6) along poses (n, 4, 4) on the branch of the start, made continuous; NaN where out of reach."""
-    centre = T[:, :3, 3] + T[:, :3, :3] @ arm.wrist_in_tool - arm.base
-    r, z = np.hypot(centre[:, 0], centre[:, 1]), centre[:, 2]
     at_start = factors(arm, q_start[None])[0]
-    front, bent = np.sign(at_start[2]), np.sign(at_start[1])
-    x2, z2, upper, fore = arm.plane
-    x, z = front * r - x2, z - z2
-    far = np.hypot(x, z)
-    cosine = (far**2 + upper**2 - fore**2) / (2 * far * upper)
-    with np.errstate(invalid="ignore"):
-        inner = np.arccos(cosine)
-    lean = np.arctan2(z, x) - bent * inner
-    pitch = np.arctan2(z - upper * np.sin(lean), x - upper * np.cos(lean))
-    azimuth = np.arctan2(centre[:, 1], centre[:, 0]) + (np.pi if front < 0 else 0.0)
-    q = np.empty((len(T), 6))
-    q[:, 0] = arm.sense[0] * (azimuth - arm.zero[0])
-    q[:, 1] = arm.sense[1] * (lean - arm.zero[1])
-    q[:, 2] = arm.sense[2] * (pitch - arm.zero[2] - (lean - arm.zero[1]))
-    R = arm.links[0][:3, :3]
-    for k in range(3):
-        R = R @ _turn(arm.direction[k] * q[:, k] + arm.offset[k])[:, :3, :3] @ arm.links[k + 1][:3, :3]
-    M = np.swapaxes(R, 1, 2) @ T[:, :3, :3] @ arm.links[6][:3, :3].T
     L4, L5 = arm.links[4][:3, :3], arm.links[5][:3, :3]
-    # M = Rz L4 Rz L5 Rz: its last entry is p cos + s sin + c of the middle angle.
-    p, s, c = L4[2, 0] * L5[0, 2] + L4[2, 1] * L5[1, 2], L4[2, 1] * L5[0, 2] - L4[2, 0] * L5[1, 2], L4[2, 2] * L5[2, 2]
-    wanted = (M[:, 2, 2] - c) / np.hypot(p, s)
-    start5 = arm.direction[4] * q_start[4] + arm.offset[4]
-    mid = np.arctan2(s, p)
-    side = np.sign(np.sin(start5 - mid))
-    theta5 = mid + side * _accurate_acos(wanted, M, L4, L5)
-    N = L4 @ _turn(theta5)[:, :3, :3] @ L5
-    theta4 = np.arctan2(M[:, 1, 2], M[:, 0, 2]) - np.arctan2(N[:, 1, 2], N[:, 0, 2])
-    theta6 = np.arctan2(-M[:, 2, 1], M[:, 2, 0]) - np.arctan2(-N[:, 2, 1], N[:, 2, 0])
-    for k, theta in ((3, theta4), (4, theta5), (5, theta6)):
-        q[:, k] = arm.direction[k] * (theta - arm.offset[k])
-    good = np.isfinite(q).all(axis=1)
-    if good.any():
-        q[good] = np.unwrap(q[good], axis=0)
-        q += 2 * np.pi * np.round((q_start - q[np.argmax(good)]) / (2 * np.pi))
+    # The wrist turns by Rz L4 Rz L5 Rz: the last entry is p cos + s sin + c of the middle angle.
+    p, s = L4[2, 0] * L5[0, 2] + L4[2, 1] * L5[1, 2], L4[2, 1] * L5[0, 2] - L4[2, 0] * L5[1, 2]
+    middle = np.arctan2(s, p)
+    side = np.sign(np.sin(arm.direction[4] * q_start[4] + arm.offset[4] - middle))
+    signs = np.array([np.sign(at_start[2]), np.sign(at_start[1]), side, middle])
+    turns = np.array([link[:3, :3] for link in arm.links])
+    fixed = (arm.base, arm.plane, arm.zero, arm.sense, arm.direction, arm.offset, arm.wrist_in_tool)
+    q = np.empty((len(T), 6))
+    _solved(np.ascontiguousarray(T), turns, fixed, signs, np.asarray(q_start, float), q)
     return q
 
 
-def _accurate_acos(cosine, M, L4, L5):
-    """The angle by its sine too, which the cosine alone loses next to 0 and pi; for links at right angles."""
-    sine = np.hypot(M[:, 0, 2], M[:, 1, 2])
-    return np.arctan2(sine, np.clip(cosine, -1, 1))
+@numba.njit(cache=True, error_model="numpy")
+def _product(A, B, out):
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = A[i, 0] * B[0, j] + A[i, 1] * B[1, j] + A[i, 2] * B[2, j]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _solved(T, turns, fixed, signs, q_start, q):
+    """Pose by pose: the arm in its plane, then what is left for the wrist; angles made continuous."""
+    base, plane, zero, sense, direction, offset, wrist = fixed
+    front, bent, side, middle = signs
+    Z, R, A, M = np.zeros((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    last = q_start.copy()
+    Z[2, 2] = 1.0
+    for n in range(len(T)):
+        x, y, z = base * -1.0
+        for k in range(4):
+            part = 1.0 if k == 3 else wrist[k]
+            x, y, z = x + T[n, 0, k] * part, y + T[n, 1, k] * part, z + T[n, 2, k] * part
+        ahead, up = front * np.hypot(x, y) - plane[0], z - plane[1]
+        far = np.hypot(ahead, up)
+        inner = np.arccos((far**2 + plane[2] ** 2 - plane[3] ** 2) / (2 * far * plane[2]))
+        if np.isnan(inner):
+            q[n] = np.nan
+            continue
+        lean = np.arctan2(up, ahead) - bent * inner
+        pitch = np.arctan2(up - plane[2] * np.sin(lean), ahead - plane[2] * np.cos(lean))
+        q[n, 0] = sense[0] * (np.arctan2(y, x) + (np.pi if front < 0 else 0.0) - zero[0])
+        q[n, 1] = sense[1] * (lean - zero[1])
+        q[n, 2] = sense[2] * (pitch - zero[2] - (lean - zero[1]))
+        R[:] = turns[0]
+        for k in range(3):
+            angle = direction[k] * q[n, k] + offset[k]
+            Z[0, 0] = Z[1, 1] = np.cos(angle)
+            Z[1, 0] = np.sin(angle)
+            Z[0, 1] = -Z[1, 0]
+            _product(R, Z, A)
+            _product(A, turns[k + 1], R)
+        _product(R.T, T[n, :3, :3], A)
+        _product(A, turns[6].T, M)
+        theta5 = middle + side * np.arctan2(np.hypot(M[0, 2], M[1, 2]), min(1.0, max(-1.0, M[2, 2])))
+        Z[0, 0] = Z[1, 1] = np.cos(theta5)
+        Z[1, 0] = np.sin(theta5)
+        Z[0, 1] = -Z[1, 0]
+        _product(turns[4], Z, A)
+        _product(A, turns[5], R)
+        angles = (
+            np.arctan2(M[1, 2], M[0, 2]) - np.arctan2(R[1, 2], R[0, 2]),
+            theta5,
+            np.arctan2(-M[2, 1], M[2, 0]) - np.arctan2(-R[2, 1], R[2, 0]),
+        )
+        for k in range(3):
+            q[n, 3 + k] = direction[3 + k] * (angles[k] - offset[3 + k])
+        for j in range(6):
+            q[n, j] -= 2 * np.pi * np.round((q[n, j] - last[j]) / (2 * np.pi))
+            last[j] = q[n, j]
 
 
 # ---------------------------------------------------------------- comparison
@@ -357,16 +386,21 @@ def _accurate_acos(cosine, M, L4, L5):
 
 @dataclass(frozen=True)
 class Truth:
-    """What dense points show: times, crossings (type number, time), and stretches (order, joint, start, end, ratio)."""
+    """What dense points show: times, crossings (type number, time), and stretches (order, joint, start, end).
+
+    ``jerk`` (N, 6) are means over ``jerk_span`` seconds from each time on, where a limit of jerk is given.
+    """
 
     t: np.ndarray
     crossings: list[tuple[int, float]]
     stretches: list[tuple[int, int, float, float]]
     out_of_reach: bool
+    jerk: np.ndarray | None = None
+    jerk_span: float = 0.0
 
 
 def truth(spec, arm: Arm, limits, q_start=None, points=POINTS) -> Truth:
-    """Look at a path; limits: (speed, acceleration), each (6,)."""
+    """Look at a path; limits: (speed, acceleration) or (speed, acceleration, jerk), each (6,)."""
     if q_start is None:
         joints, ends = joint_path(spec)
         duration = ends[-1]
@@ -392,6 +426,17 @@ def truth(spec, arm: Arm, limits, q_start=None, points=POINTS) -> Truth:
             most = limits[order - 1][j]
             above = np.abs(values[:, j]) > most * (1 + GRAZING) + noise[order - 1]
             found += [(order, j, t[a], t[b]) for a, b in _runs(above)]
+    jerk, span = None, 0.0
+    if len(limits) == 3:
+        stride = max(1, round(SPAN_S / h))
+        step, span = stride * h, 3 * stride * h
+        jerk = (
+            q[3 * stride :] - 3 * q[2 * stride : -stride] + 3 * q[stride : -2 * stride] - q[: -3 * stride]
+        ) / step**3
+        unsure = 128 * np.finfo(float).eps * np.pi * 4 / step**3
+        for j in range(6):
+            above = np.abs(jerk[:, j]) > limits[2][j] * (1 + GRAZING_JERK) + unsure
+            found += [(3, j, t[a], t[b] + span) for a, b in _runs(above)]
     crossings = []
     if q_start is None:
         f = factors(arm, q)
@@ -399,7 +444,7 @@ def truth(spec, arm: Arm, limits, q_start=None, points=POINTS) -> Truth:
             for i in np.flatnonzero(f[:-1, kind] * f[1:, kind] < 0):
                 root = _polished(lambda x, kind=kind: factors(arm, joints(x))[:, kind], t[i], t[i + 1])
                 crossings.append((kind, root))
-    return Truth(t, crossings, found, bool(missing.any()))
+    return Truth(t, crossings, found, bool(missing.any()), jerk, span)
 
 
 def _polished(f, low, high):

@@ -10,10 +10,11 @@ thin the obstacle, and the least clearance is found to within it.
 M is the longer way of a capsule's two ends (its other points move no farther), in space for a solid, in the frame of
 the other link for two links. The way is bounded on a grid of the motion so fine that no end moves by more than
 twice the depth from point to point: a chord over a time h, plus A h^2 / 3, where A bounds the end's acceleration.
-With levers of at most L, joint speeds v and accelerations a, ``A = L (sum |a| + (sum |v|)^2)``, and v and a are bounds
-over the whole interval, which whoever knows the motion gives. Where the motion has no such bounds (at singular poses
-of a path of the tool, through which nothing is proven) the bulge of the parabola through three points takes the place
-of A h^2 / 3.
+With levers of at most L, rows that turn at speeds v and accelerations a and rows that slide at w and b,
+``A = L (sum |a| + (sum |v|)^2) + sum |b| + 2 sum |v| sum |w|``: bounds over the whole interval, which whoever knows the
+motion gives for the joints, and which a coupling turns into those of rows. Where the motion has no such bounds (at
+singular poses of a path of the tool, through which nothing is proven) the bulge of the parabola through three points
+takes the place of A h^2 / 3.
 
 References
 ----------
@@ -102,12 +103,30 @@ class _Motion:
 
     @cached_property
     def lever(self) -> float:
-        """No point of a body is farther from a joint's axis that moves it, m."""
-        rest = np.zeros(len(self.bodies.robot.lower))
-        T = link_frames(self.bodies.robot, rest)
+        """No point of a body is farther from a joint's axis that moves it, m, within the limits of rows that slide."""
+        robot = self.bodies.robot
+        T = link_frames(robot, np.zeros(robot.joints))
         links = np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1).sum()
+        slides = self._of_rows(np.maximum(np.abs(robot.lower), np.abs(robot.upper)))[robot.sliding].sum()
         origins = T[[capsule.link for capsule in self.bodies.capsules], None, :3, 3]
-        return float(links + np.linalg.norm(self.bodies.ends(rest) - origins, axis=-1).max())
+        own = np.linalg.norm(self.bodies.ends(np.zeros(robot.joints)) - origins, axis=-1).max()
+        return float(links + slides + own)
+
+    def _of_rows(self, sizes: Reals) -> Reals:
+        """What rows (..., m) move by at most where joints move by up to ``sizes`` (..., n)."""
+        coupling = self.bodies.robot.coupling
+        return sizes if coupling is None else np.asarray(sizes @ np.abs(coupling).T)
+
+    def acceleration(self, start: Reals, end: Reals) -> Reals:
+        """Bounds (k,) of the ends' accelerations between times (k,) and (k,), m/s^2; infinite where there are none."""
+        sliding = self.bodies.robot.sliding
+        speed, acceleration = self.rates(start, end)
+        known = np.asarray(np.isfinite(speed + acceleration).all(axis=1, keepdims=True))
+        speed, acceleration = (self._of_rows(np.where(known, part, 0.0)) for part in (speed, acceleration))
+        turning, shifting = speed[:, ~sliding].sum(axis=1), speed[:, sliding].sum(axis=1)
+        bent = acceleration[:, ~sliding].sum(axis=1) + turning**2
+        found = self.lever * bent + acceleration[:, sliding].sum(axis=1) + 2 * turning * shifting
+        return np.where(known[:, 0], found, np.inf)
 
     def tracked(self, q: Reals) -> Reals:
         """End points (..., tracks, 2, 3): of links in other links' frames, then of capsules in space."""
@@ -133,9 +152,9 @@ def clearance_along(
 
     Parameters
     ----------
-    rates : bounds (k, n) of the sizes of joint speeds (rad/s) and accelerations (rad/s^2) between times (k,) and (k,);
+    rates : bounds (k, n) of the sizes of joint speeds (rad/s or m/s) and accelerations between times (k,) and (k,);
         infinite where there are none
-    joints : angles (n, 6) in rad at times (n,) in s; NaN where the motion is unknown
+    joints : values (N, n) in rad or m at times (N,) in s; NaN where the motion is unknown
     t : (N,), s, rising: where the motion is known or not; refined as needed
     shown : times (K,) of ``t`` at which the clearance is wanted
     depth : m; see the module's text
@@ -189,8 +208,7 @@ def _steps(motion: _Motion, times: Reals, q: Reals) -> Reals:
     """How far the tracked ends move at most between neighbouring times (m + 1,); (m, tracks)."""
     here = motion.tracked(q)
     h = np.diff(times)
-    speed, acceleration = (bound.sum(axis=1) for bound in motion.rates(times[:-1], times[1:]))
-    bulge = motion.lever * (acceleration + speed**2) * h**2 / 3
+    bulge = motion.acceleration(times[:-1], times[1:]) * h**2 / 3
     moved: Reals = np.linalg.norm(np.diff(here, axis=0), axis=-1).max(axis=-1) + bulge[:, None]
     free = np.flatnonzero(~np.isfinite(bulge))
     if free.size:

@@ -28,7 +28,7 @@ class Clearance:
 
 
 def clearance(robot: Robot, q: Reals, scene: Scene | None) -> Clearance:
-    """Least distance of each arm (N, n) in rad from the scene's solids and from itself.
+    """Least distance of each arm (N, n) in rad or m from the scene's solids and from itself.
 
     Raises
     ------
@@ -36,5 +36,5 @@ def clearance(robot: Robot, q: Reals, scene: Scene | None) -> Clearance:
         if the scene is none
     """
     bodies = Bodies(robot, scene)
-    distance, pair = bodies.least(np.asarray(q, float).reshape(-1, len(robot.a)))
+    distance, pair = bodies.least(np.asarray(q, float).reshape(-1, robot.joints))
     return Clearance(distance, tuple(bodies.pairs[k] if k >= 0 else None for k in pair))

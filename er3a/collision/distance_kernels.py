@@ -5,10 +5,11 @@ the radius of its disc) or a half-space (a normal, and how far along it the soli
 that of their cores less both radii. Two lines are measured in closed form [1]_, all else by the Gilbert-Johnson-Keerthi
 iteration [2]_, whose closest points of a simplex are found region by region [1]_.
 
-A point of a body moves, while each joint k turns by up to ``h_k`` from where it is, by no more than the sum over the
-joints, from the body inwards, of ``2 sin(h_k / 2)`` times its distance from the axis, which the joints farther out have
-changed by no more than what they have added so far. A body moves, as a set, by no more than its points do. A pair whose
-distance exceeds that is apart in the whole box of joint vectors.
+A point of a body moves, while each row k of the table moves by up to ``h_k`` from where it is, by no more than the sum
+over the rows, from the body inwards, of ``h_k`` if it slides, or of ``2 sin(h_k / 2)`` times its distance from the
+axis, which the rows farther out have changed by no more than what they have added so far. A row moves by no more than
+what the joints that the coupling lays on it do together. A body moves, as a set, by no more than its points do. A pair
+whose distance exceeds that is apart in the whole box of joint vectors.
 
 References
 ----------
@@ -23,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from er3a.kinematics.forward import rows_of, step_row, turn_row, write_rows
+from er3a.kinematics.forward import rows_of, slide_row, step_row, turn_row, write_rows
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
 
@@ -39,20 +40,24 @@ _V, _WEIGHT, ROOM = 12, 13, 17  # rows of scratch memory behind the simplex and 
 
 
 class Layout(NamedTuple):
-    """An arm of n joints with B bodies of P points in all, and K pairs of them, as kernels take it.
+    """An arm of n joints and m rows with B bodies of P points in all, and K pairs of them, as kernels take it.
 
     Attributes
     ----------
-    direction, offset : (n,); base : (4, 4); links : (n + 1, 4, 4), see ``kinematics.chain.constant_links``
+    direction : (m,); starts : (m,), see ``kinematics.chain.joint_starts``; sliding : (m,)
+    coupling : (m, n), what joints move the rows by; no rows where each joint moves its own
+    base : (4, 4); links : (m + 1, 4, 4), see ``kinematics.chain.constant_links``
     link : (B,), ``WORLD`` for solids; start : (B + 1,), of each body's points; points : (P, 3), m, in the link's frame
     kind : (B,); radius, disc : (B,), m; centre : (B, 3), reach : (B,), of a ball around the body, m
     first, second : (K,), numbers of bodies, the second's link being the outer one or, of a solid, the arm's the first
     joined : (K,), whether a joint joins them, so that only overlap means anything, not how far apart they are
-    inner : (K,), the joint (from 0) from which on joints change how the two lie
+    inner : (K,), the row (from 0) from which on rows change how the two lie
     """
 
     direction: Reals
-    offset: Reals
+    starts: Reals
+    sliding: Flags
+    coupling: Reals
     base: Reals
     links: Reals
     link: Integers
@@ -70,22 +75,42 @@ class Layout(NamedTuple):
 
 
 @kernel
+def _row_value(coupling: Reals, q: Reals, k: int) -> float:
+    """What row k moves by, for joints (n,)."""
+    if coupling.shape[0] == 0:
+        return float(q[k])
+    value = 0.0
+    for j in range(q.shape[0]):
+        value += coupling[k, j] * q[j]
+    return value
+
+
+@kernel
+def _row_reach(coupling: Reals, half: Reals, k: int) -> float:
+    """What row k moves by at most while each joint moves by up to ``half`` (n,)."""
+    if coupling.shape[0] == 0:
+        return float(half[k])
+    value = 0.0
+    for j in range(half.shape[0]):
+        value += abs(coupling[k, j]) * half[j]
+    return value
+
+
+@kernel
 def place(layout: Layout, q: Reals, T: Reals, world: Reals, middle: Reals) -> None:
-    """Frames ``T`` (n + 1, 4, 4) of base and links at joint angles (n,), points (P, 3) and middles (B, 3) in space."""
-    direction, offset, links, centre, points = (
-        layout.direction,
-        layout.offset,
-        layout.links,
-        layout.centre,
-        layout.points,
-    )
+    """Frames ``T`` (m + 1, 4, 4) of base and links at joint values (n,), points (P, 3) and middles (B, 3) in space."""
+    direction, starts, sliding = layout.direction, layout.starts, layout.sliding
+    links, centre, points = layout.links, layout.centre, layout.points
     link, start = layout.link, layout.start
     T[0] = layout.base
     x, y, z = rows_of(links[0])
-    for k in range(q.shape[0]):
-        angle = direction[k] * q[k] + offset[k]
-        c, s = np.cos(angle), np.sin(angle)
-        x, y, z = turn_row(x, c, s), turn_row(y, c, s), turn_row(z, c, s)
+    for k in range(direction.shape[0]):
+        moved = direction[k] * _row_value(layout.coupling, q, k) + starts[k]
+        if sliding[k]:
+            x, y, z = slide_row(x, moved), slide_row(y, moved), slide_row(z, moved)
+        else:
+            c, s = np.cos(moved), np.sin(moved)
+            x, y, z = turn_row(x, c, s), turn_row(y, c, s), turn_row(z, c, s)
         write_rows(x, y, z, T[k + 1])
         x, y, z = step_row(x, links[k + 1]), step_row(y, links[k + 1]), step_row(z, links[k + 1])
     for b in range(link.shape[0]):
@@ -377,7 +402,7 @@ def measure(layout: Layout, q: Reals, found: Reals, least: Reals, pair: Integers
     (N,) tells whether cores overlapped.
     """
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))
-    T, w = np.empty((q.shape[1] + 1, 4, 4)), np.empty(layout.points.shape)
+    T, w = np.empty(layout.links.shape), np.empty(layout.points.shape)
     middle, reach, first, second = np.empty(layout.centre.shape), layout.reach, layout.first, layout.second
     shape, joined = (layout.start, layout.kind, layout.radius, layout.disc), layout.joined
     for n in range(q.shape[0]):
@@ -418,7 +443,7 @@ def which_overlap(layout: Layout, q: Reals, found: Flags) -> None:
     The direction that kept a pair apart in the arm before is tried first: it mostly does so again.
     """
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))
-    T, w = np.empty((q.shape[1] + 1, 4, 4)), np.empty(layout.points.shape)
+    T, w = np.empty(layout.links.shape), np.empty(layout.points.shape)
     middle, reach, first, second = np.empty(layout.centre.shape), layout.reach, layout.first, layout.second
     shape = (layout.start, layout.kind, layout.radius, layout.disc)
     one, axes = found.shape[1] == 1, np.zeros((len(first), 3))
@@ -447,16 +472,20 @@ def which_overlap(layout: Layout, q: Reals, found: Flags) -> None:
 
 
 @kernel
-def body_motion(T: Reals, w: Reals, first: int, last: int, joints: tuple[int, int], half: Reals) -> float:
-    """How far points in rows of ``w`` move at most while some joints (from, to) turn by up to ``half`` (n,) each."""
-    moved = 0.0
-    for k in range(joints[1] - 1, joints[0] - 1, -1):
+def _body_motion(layout: Layout, T: Reals, w: Reals, b: int, inner: int, half: Reals) -> float:
+    """How far a body moves at most, seen from what carries row ``inner``, while joints move by up to ``half`` (n,)."""
+    moved, first, last = 0.0, layout.start[b], layout.start[b + 1]
+    for k in range(layout.link[b] - 1, inner - 1, -1):
+        reach = _row_reach(layout.coupling, half, k)
+        if layout.sliding[k]:
+            moved += reach
+            continue
         lever = 0.0
         for p in range(first, last):
             x, y, z = w[p, 0] - T[k + 1, 0, 3], w[p, 1] - T[k + 1, 1, 3], w[p, 2] - T[k + 1, 2, 3]
             along = x * T[k + 1, 0, 2] + y * T[k + 1, 1, 2] + z * T[k + 1, 2, 2]
             lever = max(lever, x * x + y * y + z * z - along * along)
-        moved += 2 * np.sin(min(half[k], np.pi) / 2) * (np.sqrt(max(lever, 0.0)) + moved)
+        moved += 2 * np.sin(min(reach, np.pi) / 2) * (np.sqrt(max(lever, 0.0)) + moved)
     return moved
 
 
@@ -464,8 +493,7 @@ def body_motion(T: Reals, w: Reals, first: int, last: int, joints: tuple[int, in
 def _pair_motion(layout: Layout, T: Reals, w: Reals, k: int, half: Reals) -> float:
     """How far the bodies of a pair move against each other at most; what moves is no cylinder."""
     b = layout.first[k] if layout.link[layout.second[k]] == WORLD else layout.second[k]
-    joints = (layout.inner[k], layout.link[b])
-    return body_motion(T, w, layout.start[b], layout.start[b + 1], joints, half)
+    return _body_motion(layout, T, w, b, layout.inner[k], half)
 
 
 @kernel
@@ -503,7 +531,7 @@ def free_between(layout: Layout, start: Reals, end: Reals, depth: float, most: i
     may hold no overlap deeper than ``depth`` (m)
     """
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))
-    placed = (np.empty((start.shape[0] + 1, 4, 4)), np.empty(layout.points.shape), np.empty(layout.centre.shape))
+    placed = (np.empty(layout.links.shape), np.empty(layout.points.shape), np.empty(layout.centre.shape))
     stack = np.empty((DEEPEST, 2))
     stack[0, 0], stack[0, 1] = 0.0, 1.0
     height, looked, result = 1, 0, FREE
@@ -537,7 +565,7 @@ def judge_polyline(layout: Layout, q: Reals, depth: float, states: Integers) -> 
     """
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))
     n = q.shape[1]
-    placed = (np.empty((n + 1, 4, 4)), np.empty(layout.points.shape), np.empty(layout.centre.shape))
+    placed = (np.empty(layout.links.shape), np.empty(layout.points.shape), np.empty(layout.centre.shape))
     stack, half = np.empty((DEEPEST, 2), np.int64), np.empty(n)
     stack[0, 0], stack[0, 1] = 0, len(q) - 1
     height, looked = 1, 0
@@ -580,10 +608,11 @@ def search_boxes(
     """
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))
     n = box.shape[1]
-    T, w, middle = np.empty((n + 1, 4, 4)), np.empty(layout.points.shape), np.empty(layout.centre.shape)
+    T, w, middle = np.empty(layout.links.shape), np.empty(layout.points.shape), np.empty(layout.centre.shape)
     overlapping, goal = aim
     shape, a, b = (layout.start, layout.kind, layout.radius, layout.disc), layout.first[k], layout.second[k]
     last, sign = layout.link[a if layout.link[b] == WORLD else b], -1.0 if overlapping else 1.0
+    cuts = (layout.inner[k], last) if layout.coupling.shape[0] == 0 else (0, n)
     stack, value = np.empty((DEEPEST, 2, n)), np.empty(2)
     stack[0] = box
     height, looked, least, outcome = 1, 0, np.inf, FREE
@@ -605,7 +634,7 @@ def search_boxes(
             least = min(least, distance - moved)
             continue
         widest, cut = -1.0, 0
-        for j in range(layout.inner[k], last):
+        for j in range(cuts[0], cuts[1]):
             alone[:] = 0.0
             alone[j] = half[j]
             part = _pair_motion(layout, T, w, k, alone)

@@ -108,7 +108,7 @@ class ClearPlaces:
 def sample_joint_space(bodies: Bodies, samples: int, random: np.random.Generator) -> JointSpace:
     """Try random joint vectors, uniform within the limits."""
     robot = bodies.robot
-    q = random.uniform(robot.lower, robot.upper, (samples, len(robot.a)))
+    q = random.uniform(robot.lower, robot.upper, (samples, robot.joints))
     own = bodies.second >= 0
     hit = bodies.overlaps(q)
     itself, scene = (~np.asarray(hit[:, part].any(axis=1)) for part in (own, ~own))
@@ -136,7 +136,7 @@ def find_places(
         ((points - corner) / cell).astype(np.int64), axis=0, return_inverse=True, return_counts=True
     )
     where = where.ravel()
-    witness = np.full((len(index), len(robot.a)), np.nan)
+    witness = np.full((len(index), robot.joints), np.nan)
     free = np.flatnonzero(space.free)[::-1]
     witness[where[free]] = space.q[free]  # the first one of each cell stays
     tries = tries.astype(np.int64)

@@ -4,7 +4,7 @@ Bodies of one link never move against each other, so they are no pair. Every oth
 harmless:
 
 - *never*: the two are apart in all joint vectors within the limits, proven by bounds of the distance over boxes of
-  joint angles, which are halved until each is decided;
+  joint values, which are halved until each is decided;
 - *joined*: they overlap in all of them, proven likewise, because a joint joins them. Then only the region around that
   joint is left out: what lies within the two bodies' girths of where they overlap in the pose that holds them farthest
   apart. What is left of them is judged again, so that an arm that folds onto itself is seen;
@@ -56,7 +56,7 @@ class JudgedPair:
     Attributes
     ----------
     bodies : pairs to be watched
-    witness : (n,), rad, a joint vector in which watched bodies overlap; None where none was found
+    witness : (n,), rad or m, a joint vector in which watched bodies overlap; None where none was found
     least : m, a lower bound of the distance of bodies that never meet; NaN for others
     left_out : m, radius of the region around the joint that is left out, 0 where there is none
     boxes : how many boxes of joint vectors were looked at
@@ -135,7 +135,7 @@ def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int = 
         boxes = min(boxes, BOXES_MORE)
     found = []
     for k, pair in enumerate(pairs):
-        at, least = np.empty(len(robot.a)), distance[:, k]
+        at, least = np.empty(robot.joints), distance[:, k]
         overlapping = bool(least[0] < 0)
         if meets[k]:
             found.append(JudgedPair("meets", (pair,), q[least.argmin()]))
@@ -197,7 +197,7 @@ def _sampled(robot: Robot, layout: Layout) -> tuple[Reals, Reals]:
 def _nearest_points(robot: Robot, pair: tuple[Body, Body], q: Reals) -> list[Reals]:
     """Where the two cores are nearest in an arm pose (n,), each (3,) in its own link's frame, m."""
     layout = layout_of(robot, pair, [(0, 1)])
-    T, world, middle = np.empty((len(q) + 1, 4, 4)), np.empty(layout.points.shape), np.empty((2, 3))
+    T, world, middle = np.empty(layout.links.shape), np.empty(layout.points.shape), np.empty((2, 3))
     place(layout, q, T, world, middle)
     near, shape = np.zeros((2, 3)), (layout.start, layout.kind, layout.radius, layout.disc)
     _, deep = pair_distance(world, shape, 0, 1, np.empty((ROOM, 3)), near)

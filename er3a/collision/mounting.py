@@ -37,9 +37,8 @@ def base_contacts(robot: Robot, scene: Scene | None) -> tuple[BaseContact, ...]:
     if not pairs:
         return ()
     layout = layout_of(robot, bodies, pairs)
-    n = len(robot.a)
     w = np.empty(layout.points.shape)
-    place(layout, np.zeros(n), np.empty((n + 1, 4, 4)), w, np.empty(layout.centre.shape))
+    place(layout, np.zeros(robot.joints), np.empty(layout.links.shape), w, np.empty(layout.centre.shape))
     shape = (layout.start, layout.kind, layout.radius, layout.disc)
     found: dict[str, BaseContact] = {}
     for a, b in pairs:

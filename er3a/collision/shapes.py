@@ -12,7 +12,7 @@ from er3a.collision.envelopes import envelopes_of
 from er3a.collision.overlap_depth import cylinder_points
 from er3a.collision.pairs import link_label
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Solid, Sphere
-from er3a.kinematics.chain import constant_links
+from er3a.kinematics.chain import constant_links, joint_starts
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
@@ -29,7 +29,7 @@ class Body:
     Attributes
     ----------
     name : ``base``, ``link_3``, or that of the solid or of what is carried
-    link : 0 for the base, k for the link that joint k turns, ``WORLD`` for what stands around
+    link : 0 for the base, k for the link that row k moves, ``WORLD`` for what stands around
     points : (k, 3), m, in the link's frame; a half-space has its normal and, in the second row, its offset first
     kind, radius, disc : see ``distance_kernels``
     """
@@ -55,8 +55,8 @@ def carried_bodies(robot: Robot, scene: Scene | None) -> tuple[Body, ...]:
     """What the tool carries, in the frame of the last link; a cylinder as a prism around it, under 1 % too wide."""
     if scene is None or not scene.carried:
         return ()
-    last = len(robot.a)
-    poses = frames(robot, np.zeros(last))
+    last = robot.rows
+    poses = frames(robot, np.zeros(robot.joints))
     T = np.linalg.inv(poses[last - 1]) @ poses[last]
     bodies = [body for solid in scene.carried for body in solid_bodies(solid)]
     points = [cylinder_points(b.points, b.disc, SIDES) if b.kind == CYLINDER else b.points for b in bodies]
@@ -99,7 +99,9 @@ def layout_of(
         reach[b] = float(np.hypot(spread, body.disc)) + body.radius
     return Layout(
         direction=np.array(robot.direction, float),
-        offset=np.array(robot.offset),
+        starts=joint_starts(robot),
+        sliding=np.array(robot.sliding),
+        coupling=np.empty((0, robot.joints)) if robot.coupling is None else np.array(robot.coupling, float),
         base=np.array(robot.base),
         links=np.array(constant_links(robot)),
         link=np.array([body.link for body in bodies], np.int64),
@@ -118,13 +120,12 @@ def layout_of(
 
 
 def _first_joint(robot: Robot, inner: Body, outer: Body) -> int:
-    """The first joint (from 0) that changes how two bodies lie: not one about whose axis the inner body is round."""
+    """The first row (from 0) that changes how two bodies lie: not one that turns about an axis of the inner body."""
     if outer.link == WORLD:
         return 0
-    if inner.kind != HULL or inner.link >= outer.link:
+    if inner.kind != HULL or inner.link >= outer.link or robot.sliding[inner.link]:
         return inner.link
-    zero = np.zeros(len(robot.a))
-    poses = frames(robot, zero)
+    poses = frames(robot, np.zeros(robot.joints))
     start = robot.base if inner.link == 0 else poses[inner.link - 1]
     axis, point = poses[inner.link][:3, 2], poses[inner.link][:3, 3]
     placed = inner.points @ start[:3, :3].T + start[:3, 3] - point

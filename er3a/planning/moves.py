@@ -69,7 +69,7 @@ class ToolPath(Protocol):
         """Shares of the way (m,), from 0 to 1, between which the twist and its derivative are continuous."""
 
     def twist_bounds(self, start: Reals, end: Reals) -> Reals:
-        """Bounds (k, 3, 2) of the sizes of twist, its first and its second derivative by progress.
+        """Bounds (k, 4, 2) of the sizes of twist and of its first three derivatives by progress.
 
         Linear (m), then angular (rad), between shares (k,) and (k,), no edge in between.
         """
@@ -162,9 +162,9 @@ class Segment(ABC):
 
     def twist_bounds(self, start: Reals, end: Reals) -> Reals:
         """See :class:`ToolPath`."""
-        linear = self.length * np.array([1.0, self.bend, self.bend**2])
-        bounds = np.stack([linear, [self.turned, 0.0, 0.0]], axis=-1)
-        return np.broadcast_to(bounds, (len(start), 3, 2))
+        linear = self.length * self.bend ** np.arange(4.0)
+        bounds = np.stack([linear, [self.turned, 0.0, 0.0, 0.0]], axis=-1)
+        return np.broadcast_to(bounds, (len(start), 4, 2))
 
     def poses(self, progress: Reals) -> Reals:
         """See :class:`ToolPath`."""

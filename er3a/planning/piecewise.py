@@ -131,6 +131,11 @@ class PiecewiseMotion:
         return _slope(self.times, self.acceleration)
 
     @cached_property
+    def snap(self) -> Reals:
+        """(m, d + 1, n), rad/s^4, the jerk's slope."""
+        return _slope(self.times, self.jerk)
+
+    @cached_property
     def steps(self) -> Reals:
         """(m + 1, n), rad/s^2, by which the acceleration steps between pieces, and from and to rest."""
         signs = np.where(np.arange(self.acceleration.shape[1]) % 2, -1.0, 1.0)[:, None]

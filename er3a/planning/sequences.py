@@ -70,22 +70,19 @@ class SegmentPath:
         """See :class:`er3a.planning.moves.ToolPath`.
 
         The angular velocity of a rotation vector w is J(w) w', and J is the mean over u in 0..1 of the rotations by
-        u w, so that its change with w is at most 1/2 and the next 1/3.
+        u w, so that its change with w is at most 1/2, the next 1/3, and the one after 1/4.
         """
-        piece = self.curve.piece((start + end) / 2)[0]
-        first, second, third = np.moveaxis(self._slopes[piece], 1, 0)
-        spin_slope = second[:, 1] + first[:, 1] ** 2 / 2
-        spin_bend = third[:, 1] + 1.5 * first[:, 1] * second[:, 1] + first[:, 1] ** 3 / 3
-        return np.stack(
-            [first, np.stack([second[:, 0], spin_slope], -1), np.stack([third[:, 0], spin_bend], -1)], axis=1
-        )
+        slopes = self._slopes[self.curve.piece((start + end) / 2)[0]]
+        a, b, c, d = slopes[..., 1].T
+        spin = [a, b + a**2 / 2, c + 1.5 * a * b + a**3 / 3, d + 2 * a * c + 1.5 * b**2 + 2 * a**2 * b + a**4 / 4]
+        return np.stack([slopes[..., 0], np.stack(spin, axis=-1)], axis=-1)
 
     @cached_property
     def _slopes(self) -> Reals:
-        """(n, 3, 2) bounds on each piece of the derivatives 1 to 3 by progress of position and rotation vector."""
-        spans, found = np.diff(self.curve.edges), np.empty((len(self.origins), 3, 2))
+        """(n, 4, 2) bounds on each piece of the derivatives 1 to 4 by progress of position and rotation vector."""
+        spans, found = np.diff(self.curve.edges), np.empty((len(self.origins), 4, 2))
         series = self.curve.coefficients
-        for order in range(3):
+        for order in range(4):
             series = series[:, 1:] * np.arange(1, series.shape[1])[:, None]
             x = (1 - np.cos(np.pi * np.arange(POWERS) / (POWERS - 1))) / 2
             values = np.einsum("mpk,xp->mxk", series, x[:, None] ** np.arange(series.shape[1]))
@@ -93,7 +90,7 @@ class SegmentPath:
             found[:, order] = SIX_POINTS * size / spans[:, None] ** (order + 1)
         for k, arc in ((k, arc) for k, arc in enumerate(self.arcs) if arc is not None):
             rate = (self.arc_shares[k, 1] - self.arc_shares[k, 0]) / spans[k]
-            found[k, :, 0] = [arc.length * rate * (arc.angle * rate) ** order for order in range(3)]
+            found[k, :, 0] = [arc.length * rate * (arc.angle * rate) ** order for order in range(4)]
         return found
 
     def progress(self, t: Reals) -> Rates:

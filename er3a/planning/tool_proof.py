@@ -4,14 +4,17 @@ With q(s) the joints along the share s of the way, J q' = v, where v is the tool
 divided by a characteristic length). From one solved pose the motion is continued by bounds alone: as long as the joints
 have turned by little, the inverse of J has grown by little, so that::
 
-    |q''| <= B (|v'| + C V^2),   |q'''| <= B (|v''| + 3 C V |q''| + C V^3),   B = b / (1 - b sqrt(n) C h V),
+    |q''| <= B (|v'| + C V^2),   |q'''| <= B (|v''| + 3 C V A + C V^3),   B = b / (1 - b sqrt(n) C h V),
+    |q''''| <= B (|v'''| + C (4 V Z + 3 A^2 + 6 V^2 A + V^4)),
 
-with b the norm of the inverse at the pose solved, h the way from there, V the sum of the joints' rates, and C the
-greatest length of a column of J (turning an earlier joint turns a column, turning a later one turns its lever: no
-derivative of a column is longer). Where the bound on q'' that is put in comes out no greater, the motion exists over
-the whole interval, on one branch and without a singular pose [1]_; Taylor's formula then bounds angles, speeds,
-accelerations and distances from singular sets on it. An interval that settles less than is asked is halved. What is
-left when intervals are short beyond use is *undecided*.
+with b the norm of the inverse at the pose solved, h the way from there, V, A, Z sums over the joints of the sizes of
+q', q'', q''', and C the greatest length of a column of J (turning an earlier joint turns a column, turning a later one
+turns its lever: no derivative of a column is longer). Under a coupling u = c q, V is the sum of the rows' rates, C is
+of the rows' columns, and the norm of c goes with sqrt(n). Where the bound on q'' that is put in comes out no greater,
+the motion exists over the whole interval, on one branch and without a singular pose [1]_; Taylor's formula then bounds
+angles, speeds, accelerations and distances from singular sets on it, and the bound on q'''' how far jerks are from the
+mean of the interval. An interval that settles less than is asked is halved. What is left when intervals are short
+beyond use is *undecided*.
 
 References
 ----------
@@ -51,6 +54,7 @@ FIRST_INTERVALS = 64
 GROWN = 0.5  # b sqrt(n) C h V up to which a motion is continued
 ATTEMPTS = 3
 MOST_ROUNDS = 3
+BLURRED = 1e-9  # relative, rounding of second derivatives by differences of the Jacobian
 STEP_ASIDE = 1e-10  # share of the duration
 
 Quantity = Literal["singular", "limits", "speed", "acceleration", "jerk", "near"]
@@ -80,6 +84,8 @@ class ToolProof:
     jerk : (m, n), rad/s^3, met in each interval, where a limit of jerk is to be settled; else 0
     steps : times (k,) in s at which the acceleration steps, and by how much, (k, n) in rad/s^2; the same
     undecided : stretches, and what is open there; a rate is not where its limit is exceeded elsewhere
+    beside : the same next to the times at which the path is said to be singular, or to end: it settles what is open
+        there only if whoever judges the path finds it so
     """
 
     times: Reals
@@ -93,6 +99,7 @@ class ToolProof:
     jerk: Reals
     steps: tuple[Reals, Reals]
     undecided: tuple[Interval[Undecided], ...]
+    beside: tuple[Interval[Undecided], ...]
 
     def rate_bounds(self, start: Reals, end: Reals) -> tuple[Reals, Reals]:
         """As :meth:`er3a.planning.piecewise.PiecewiseMotion.rate_bounds`."""
@@ -112,13 +119,18 @@ class Wanted:
 
 @dataclass(frozen=True, eq=False)
 class _Bounds:
-    """Over intervals (k,): angles' change, sizes of rates (k, n), and whether the motion was continued."""
+    """Over intervals (k,): angles' change, sizes of rates (k, n), and whether the motion was continued.
+
+    ``blur`` (k,) is by how much rounding may falsify second derivatives.
+    """
 
     proven: Flags
     change: Reals
     first: Reals
     second: Reals
     third: Reals
+    fourth: Reals
+    blur: Reals
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,6 +202,7 @@ def prove(followed: Followed, wanted: Wanted, singular: Reals) -> ToolProof:
         count += len(start)
         broken |= found.broken.any(axis=0)
         least = np.where(broken, SETTLED_ELSEWHERE, SHORTEST) * duration
+        least[4] = SETTLED_ELSEWHERE * duration  # below, jerks are differences of equal numbers
         least[0] = (SETTLED_ELSEWHERE if broken.any() else SHORTEST) * duration
         beside = _distance(singular, start, end) < BESIDE_EVENT[0] * duration
         shortest = np.where(beside[:, None], np.maximum(least, BESIDE_EVENT[1] * duration), least)
@@ -260,11 +273,12 @@ def _proof(followed: Followed, done: list[_Settled], singular: Reals) -> ToolPro
     order = np.argsort(t, kind="stable")
     duration = followed.line.duration
     undecided: list[Interval[Undecided]] = []
+    beside: list[Interval[Undecided]] = []
     for k, quantity in enumerate(QUANTITIES):
         for first, last in runs(whole.open[:, k]):
             start, end = np.array([whole.start[first]]), np.array([whole.end[last - 1]])
-            if _distance(singular, start, end)[0] > BESIDE_EVENT[0] * duration:
-                undecided.append(Interval(float(start[0]), float(end[0]), Undecided(quantity)))
+            apart = _distance(singular, start, end)[0] > BESIDE_EVENT[0] * duration
+            (undecided if apart else beside).append(Interval(float(start[0]), float(end[0]), Undecided(quantity)))
     return ToolProof(
         times=times,
         proven=whole.proven,
@@ -277,6 +291,7 @@ def _proof(followed: Followed, done: list[_Settled], singular: Reals) -> ToolPro
         jerk=whole.jerk,
         steps=_acceleration_steps(followed),
         undecided=tuple(sorted(undecided, key=lambda part: part.start)),
+        beside=tuple(sorted(beside, key=lambda part: part.start)),
     )
 
 
@@ -291,11 +306,16 @@ def _settle(followed: Followed, wanted: Wanted, progress: PiecewiseMotion, start
     q_start, q_end = followed.joints_at(shares)[at].reshape(2, count, -1)
     q = followed.joints_at(s)
     dq, ddq = followed.through_jacobian(q, s)
-    bounds = _continued(followed, q, dq, ddq, (s_start, s, s_end))
+    asks_jerk = any(limit.order == 3 for limit in wanted.rates)
+    none = np.zeros_like(q), np.full_like(q, np.inf), np.ones(count)
+    jerk, third, apart = _mean_thirds(followed, start, end) if asks_jerk else none
+    bounds = _continued(followed, q, (dq, ddq, third), (s_start, s, s_end), apart)
     for beside in (q_start, q_end):
         bounds.proven[:] &= (np.abs(beside - q) <= bounds.change * (1 + 1e-6) + LIMIT_TOLERANCE).all(axis=1)
     velocity, acceleration = dq * speed[:, None], ddq * speed[:, None] ** 2 + dq * pull[:, None]
-    rates, highest = _rate_bounds(bounds, velocity, acceleration, progress, (start, end), (speed, pull, half))
+    blur = (2 * bounds.blur * speed**2 / (end - start))[:, None]
+    law = (speed, pull, half)
+    rates, highest = _rate_bounds(bounds, (velocity, acceleration, np.abs(jerk) + blur), progress, (start, end), law)
     unreached = np.isnan(np.stack([q_start, q, q_end])[..., 0])
     open_, broken = (np.zeros((count, len(QUANTITIES)), bool) for _ in range(2))
     known = bounds.proven
@@ -303,11 +323,9 @@ def _settle(followed: Followed, wanted: Wanted, progress: PiecewiseMotion, start
     outside = _outside(robot, np.stack([q_start, q, q_end])).any(axis=0)
     sure = ~_outside(robot, q, bounds.change)
     open_[:, 1], broken[:, 1] = known & ~np.all(sure | outside, axis=1), np.any(outside, axis=1)
-    asks_jerk = any(limit.order == 3 for limit in wanted.rates)
-    jerk = _mean_jerk(followed, start, end) if asks_jerk else np.zeros_like(q)
     for limit in wanted.rates:
         k = 1 + limit.order
-        over = np.abs((velocity, acceleration, jerk)[limit.order - 1]) > limit.allowed
+        over = np.abs((velocity, acceleration, jerk)[limit.order - 1]) > limit.allowed + (blur if k == 4 else 0.0)
         sure = (highest[limit.order] <= limit.allowed) | ~np.isfinite(limit.most)
         open_[:, k], broken[:, k] = known & ~(sure | over).all(axis=1), over.any(axis=1)
     open_[known, 5] = _near_open(robot, wanted.near, q[known], bounds.change[known])
@@ -325,49 +343,70 @@ def _settle(followed: Followed, wanted: Wanted, progress: PiecewiseMotion, start
     )
 
 
-def _continued(followed: Followed, q: Reals, dq: Reals, ddq: Reals, s: tuple[Reals, Reals, Reals]) -> _Bounds:
-    """Continue the motion from solved poses (k, n) at middles over intervals, by the formulas of the module's text."""
+def _continued(
+    followed: Followed,
+    q: Reals,
+    derivatives: tuple[Reals, Reals, Reals],
+    s: tuple[Reals, Reals, Reals],
+    apart: Reals,
+) -> _Bounds:
+    """Continue the motion from solved poses (k, n) at middles over intervals, by the formulas of the module's text.
+
+    ``derivatives`` by s are the first two there and a mean of the third, taken over ``apart`` (k,); infinite for none.
+    """
+    dq, ddq, mean_third = derivatives
     robot, n = followed.robot, q.shape[-1]
-    length, root = characteristic_length(robot), np.sqrt(n)
+    coupling = np.eye(n) if robot.coupling is None else robot.coupling
+    length, root = characteristic_length(robot), np.sqrt(n) * np.linalg.norm(coupling, 2)
     count = len(q)
     solved = np.isfinite(dq[:, 0])
     h = np.maximum(s[2] - s[1], s[1] - s[0])
     sizes = followed.line.twist_bounds(s[0], s[2]) / np.array([length, 1.0])
-    v1, v2 = np.linalg.norm(sizes, axis=-1)[:, 1:].T
+    v1, v2, v3 = np.linalg.norm(sizes, axis=-1)[:, 1:].T
     b, reach = np.full(count, np.inf), np.full(count, np.inf)
     b[solved], reach[solved] = _inverse_and_reach(robot, q[solved], length)
     sum_first, first, second = (np.full(count, np.inf) for _ in range(3))
-    sum_first[solved] = np.abs(dq[solved]).sum(axis=1)
+    sum_first[solved] = np.abs(dq[solved] @ coupling.T).sum(axis=1)
     first[solved], second[solved] = np.linalg.norm(dq[solved], axis=1), np.linalg.norm(ddq[solved], axis=1)
     with np.errstate(all="ignore"):
 
-        def formulas(most: Reals) -> tuple[Reals, Reals, Reals]:
-            """Bounds of q'' and q''' if q'' is no greater than ``most``, and whether the motion is continued."""
+        def formulas(most: Reals, third: Reals) -> tuple[Reals, Reals, Reals, Reals]:
+            """Bounds of q'' to q'''' if q'' and q''' are no greater, and whether the motion is continued."""
             V = sum_first + root * h * most
             C = np.sqrt(1 + (reach * np.exp(np.minimum(h * V, 1.0))) ** 2)
             grown = b * root * C * h * V
             B = b / (1 - grown)
             within = (grown < GROWN) & (h * V < 1.0)
-            return B * (v1 + C * V**2), B * (v2 + 3 * C * V * root * most + C * V**3), within
+            A, Z = root * most, root * third
+            fourth = B * (v3 + C * (4 * V * Z + 3 * A**2 + 6 * V**2 * A + V**4))
+            return B * (v1 + C * V**2), B * (v2 + 3 * C * V * A + C * V**3), fourth, within
 
         most = np.maximum(1.5 * b * (v1 + np.sqrt(1 + reach**2) * sum_first**2), second)
         proven = np.zeros(count, bool)
         for _ in range(ATTEMPTS):
-            bound, _, within = formulas(most)
+            bound, _, _, within = formulas(most, most)
             now = solved & within & (bound <= most)
             proven |= now
             most = np.where(proven, np.minimum(most, np.where(now, bound, np.inf)), 1.3 * np.maximum(bound, most))
         third = np.full(count, np.inf)
         for _ in range(ATTEMPTS):
-            bound, next_, _ = formulas(most)
+            bound, next_, _, _ = formulas(most, third)
             third = np.minimum(third, next_)
             most = np.minimum(np.minimum(most, bound), second + h * third)
+        blur = BLURRED * b * np.sqrt(1 + reach**2) * np.maximum(1.0, sum_first) * sum_first
+        mean = np.linalg.norm(mean_third, axis=1) + 2 * np.sqrt(n) * blur / apart
+        fourth = formulas(most, third)[2]
+        for _ in range(ATTEMPTS):
+            third = np.fmin(third, mean + 2 * h * fourth)
+            most = np.minimum(most, second + h * third)
+            fourth = np.fmin(fourth, formulas(most, third)[2])
     h, third = h[:, None], third[:, None]
     high2 = np.minimum(np.abs(ddq) + h * third, most[:, None])
     high1 = np.abs(dq) + h * np.abs(ddq) + h**2 * third / 2
     change = h * np.abs(dq) + h**2 * np.abs(ddq) / 2 + h**3 * third / 6
-    found = (change, high1, high2, np.broadcast_to(third, q.shape))
-    return _Bounds(proven, *(np.where(proven[:, None], part, np.inf) for part in found))
+    found = (change, high1, high2, np.broadcast_to(third, q.shape), np.broadcast_to(fourth[:, None], q.shape))
+    change, high1, high2, third, fourth = (np.where(proven[:, None], part, np.inf) for part in found)
+    return _Bounds(proven, change, high1, high2, third, fourth, blur)
 
 
 def _inverse_and_reach(robot: Robot, q: Reals, length: float) -> tuple[Reals, Reals]:
@@ -383,31 +422,45 @@ def _inverse_and_reach(robot: Robot, q: Reals, length: float) -> tuple[Reals, Re
 
 def _rate_bounds(
     bounds: _Bounds,
-    velocity: Reals,
-    acceleration: Reals,
+    met: tuple[Reals, Reals, Reals],
     progress: PiecewiseMotion,
     ends: tuple[Reals, Reals],
     law: tuple[Reals, Reals, Reals],
 ) -> tuple[Reals, dict[int, Reals]]:
-    """Rates at the middles (k, 2, n), and bounds of speed, acceleration and jerk over the intervals."""
+    """Rates at the middles (k, 2, n), and bounds of speed, acceleration and jerk over the intervals.
+
+    ``met`` are velocities and accelerations at the middles, and bounds of the size of a jerk met in each, (k, n).
+    """
+    velocity, acceleration, mean_jerk = met
     speed, pull, half = (part[:, None] for part in law)
     piece = np.clip(np.searchsorted(progress.times, (ends[0] + ends[1]) / 2) - 1, 0, len(progress.times) - 2)
-    jerk = np.abs(progress.jerk[piece, :, 0]).sum(axis=1)[:, None]
+    jerk, snap = (np.abs(series[piece, :, 0]).sum(axis=1)[:, None] for series in (progress.jerk, progress.snap))
     most_pull = np.abs(pull) + half * jerk
     most_speed = speed + half * np.abs(pull) + half**2 * jerk / 2
     with np.errstate(invalid="ignore"):
         third = bounds.third * most_speed**3 + 3 * bounds.second * most_speed * most_pull + bounds.first * jerk
         fast = np.abs(velocity) + half * np.abs(acceleration) + half**2 * third / 2
         hard = np.abs(acceleration) + half * third
-    return np.stack([velocity, acceleration], axis=1), {1: fast, 2: hard, 3: third}
+        bent = bounds.second * (3 * most_pull**2 + 4 * most_speed * jerk) + bounds.first * snap
+        fourth = bounds.fourth * most_speed**4 + 6 * bounds.third * most_speed**2 * most_pull + bent
+        jerky = np.minimum(third, mean_jerk + 2 * half * fourth)
+    return np.stack([velocity, acceleration], axis=1), {1: fast, 2: hard, 3: np.where(np.isnan(jerky), third, jerky)}
 
 
-def _mean_jerk(followed: Followed, start: Reals, end: Reals) -> Reals:
-    """Mean jerk (k, n) over intervals: there is a time in each at which it is met, joint by joint."""
+def _mean_thirds(followed: Followed, start: Reals, end: Reals) -> tuple[Reals, Reals, Reals]:
+    """Mean jerk (k, n) over intervals, mean third derivative by the share of the way, and the shares' differences (k,).
+
+    There is a time in each interval at which a joint's jerk is the mean one; likewise its third derivative.
+    """
     inner = (end - start) * 1e-3  # off the ends, where the law's acceleration may step
-    first, last = start + inner, end - inner
-    rates: Reals = (followed.rates(last)[2] - followed.rates(first)[2]) / (last - first)[:, None]
-    return rates
+    times = np.concatenate([start + inner, end - inner])
+    share, speed, pull = followed.line.progress(times)
+    _, dq, ddq = followed.derivatives(share)
+    rates = ddq * speed[:, None] ** 2 + dq * pull[:, None]
+    halves = [np.split(part, 2) for part in (times, share, rates, ddq)]
+    length, apart, gained, bent = (last - first for first, last in halves)
+    with np.errstate(all="ignore"):
+        return gained / length[:, None], bent / apart[:, None], apart
 
 
 def _outside(robot: Robot, q: Reals, change: Reals | None = None) -> Flags:

@@ -6,7 +6,19 @@ import numpy as np
 import pytest
 
 from er3a.files.robot_library import load_robot
-from testing.motion_cases import JOINT_KINDS, TOOL_KINDS, Tally, compare, looked_at, random_spec
+from er3a.geometry.transforms import rpy_of
+from er3a.kinematics.forward import forward
+from er3a.pipeline.stages.trajectory import judgement
+from testing.motion_cases import (
+    JOINT_KINDS,
+    TOOL_KINDS,
+    Tally,
+    compare,
+    judged,
+    limits_of,
+    looked_at,
+    random_spec,
+)
 from testing.motion_oracle import Truth
 
 pytestmark = pytest.mark.long
@@ -37,3 +49,20 @@ def test_the_comparison_can_fail(tmp_path):
     wrong = compare(robot, spec, written, 2, Tally(), more)
     assert any("missed wrist" in text for text in wrong)
     assert any("missed order 1 J4" in text for text in wrong)
+
+
+def test_what_is_open_beside_an_event_is_undecided_where_nobody_finds_the_event(tmp_path, monkeypatch):
+    """A line through the aligned wrist, judged by someone who does not see that it is singular."""
+    robot = load_robot("er3_600")
+    q = np.radians([10.0, -30.0, 20.0, 0.0, 4.0, 15.0])
+    T = forward(robot, np.stack([q, q * np.array([1, 1, 1, 1, -1, 1])]))
+    ends = [{"xyz_mm": (pose[:3, 3] * 1000).tolist(), "rpy_deg": np.degrees(rpy_of(pose)).tolist()} for pose in T]
+    written = {"kind": "line", "start_deg": np.degrees(q).tolist(), "end": ends[1], "duration_s": 20.0}
+    limits = limits_of(robot, {"limits_jerk": False, "known_acceleration": False})
+    motion, seen = judged(robot, written, 50, limits)
+    assert seen.verdict == "singular"
+    assert motion.proof.beside
+    monkeypatch.setattr(judgement, "singular_events", lambda *_: [])
+    blind = judged(robot, written, 50, limits)[1]
+    assert blind.verdict != "safe"
+    assert blind.undecided

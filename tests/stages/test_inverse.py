@@ -298,7 +298,10 @@ def test_each_rule_ranks_the_branches(computed):
 def test_map_counts_what_the_solver_finds(computed, random):
     name, results = computed
     robot, table = load_robot(name), results.map
+    scene = load_scene(ROOT / "data/scenes/table_and_post.yaml") if results.summary.scene else None
     assert (table.within_limits <= table.solutions).all()
+    assert (table.clear <= table.within_limits).all()
+    assert 0 < table.clear.sum() < table.within_limits.sum()
     for row in random.choice(len(table), 40, replace=False):
         T = np.eye(4)
         turn = {"tool_down": ("x", 180), "tool_level": ("y", 90)}[table.orientation[row]]
@@ -306,6 +309,8 @@ def test_map_counts_what_the_solver_finds(computed, random):
         T[:3, 3] = np.array([table.x_mm[row], 0, table.z_mm[row]]) / 1000
         solved = inverse(robot, T)
         assert len(set(solved.branch[solved.within_limits])) == table.within_limits[row]
+        touching = clearance(robot, solved.q, scene).distance < 0
+        assert len(set(solved.branch[solved.within_limits & ~touching])) == table.clear[row]
 
 
 def test_sequence_is_no_worse_than_greed(computed):

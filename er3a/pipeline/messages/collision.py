@@ -45,7 +45,7 @@ def why(state: PairState, least_mm: float, left_out_mm: float, boxes: int, witne
 
     Parameters
     ----------
-    witness : joint angles in words; empty where there are none
+    witness : joint values with their units; empty where there are none
     """
     match state:
         case "never":
@@ -57,10 +57,10 @@ def why(state: PairState, least_mm: float, left_out_mm: float, boxes: int, witne
         case "undecided":
             return tr("Neither proven apart nor found to meet, in {boxes} boxes; watched.", boxes=boxes)
     if not left_out_mm:
-        return tr("They meet at joints ({witness}) deg.", witness=witness)
+        return tr("They meet at joints ({witness}).", witness=witness)
     joined = tr(
         "Overlap in every pose at their joint: a region of {radius:.0f} mm there is left out.", radius=left_out_mm
     )
     if witness:
-        return tr("{first} {rest}", first=joined, rest=tr("Beyond it they meet at ({witness}) deg.", witness=witness))
+        return tr("{first} {rest}", first=joined, rest=tr("Beyond it they meet at ({witness}).", witness=witness))
     return tr("{first} {rest}", first=joined, rest=tr("Nothing beyond it was found to meet."))

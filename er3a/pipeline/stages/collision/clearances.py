@@ -14,6 +14,7 @@ from er3a.pipeline.stages.collision.model import Closest, PathClearances, Target
 from er3a.pipeline.stages.trajectory.collisions import Surroundings, measured
 from er3a.pipeline.stages.trajectory.listed_motions import ListedMotion
 from er3a.robots.robot import Robot
+from er3a.robots.shown import shown
 from er3a.selection.nearest import nearest
 from er3a.selection.select import refusals_of
 
@@ -33,7 +34,7 @@ def target_clearances(robot: Robot, bodies: Bodies, file: str) -> tuple[TargetCl
                 target=np.full(len(rows), target.name, object),
                 branch=solutions.branch[rows],
                 label=solutions.label[rows],
-                q_deg=np.degrees(solutions.q[rows]),
+                q_deg=shown(robot, solutions.q[rows]),
                 clearance_mm=distance * 1000,
                 between=np.array(between, object),
             )
@@ -45,7 +46,7 @@ def target_clearances(robot: Robot, bodies: Bodies, file: str) -> tuple[TargetCl
                 closest.append(
                     _closest(bodies, (target.name, "target", None), solutions.q[chosen], distance[at], pair[at])
                 )
-    return TargetClearances.stacked(tables), closest
+    return TargetClearances.stacked(tables).of_joints(robot.slides), closest
 
 
 def path_clearances(
@@ -69,7 +70,7 @@ def path_clearances(
             PathClearances(
                 path=np.full(len(q), entry.name, object),
                 t_s=along.t,
-                q_deg=np.degrees(q),
+                q_deg=shown(bodies.robot, q),
                 clearance_mm=along.distance * 1000,
                 between=np.array([bodies.pairs[k].label if k >= 0 else "" for k in pair], object),
                 from_mm=near[:, 0] * 1000,
@@ -80,7 +81,7 @@ def path_clearances(
         if least >= 0 and pair[least] >= 0:
             about = (entry.name, "path", float(along.t[least]))
             closest.append(_closest(bodies, about, q[least], along.distance[least], pair[least]))
-    return PathClearances.stacked(tables), closest
+    return PathClearances.stacked(tables).of_joints(bodies.robot.slides), closest
 
 
 def _closest(bodies: Bodies, about: tuple, q: Reals, distance: float, pair: int) -> Closest:
@@ -92,7 +93,7 @@ def _closest(bodies: Bodies, about: tuple, q: Reals, distance: float, pair: int)
         float(distance * 1000),
         bodies.pairs[pair],
         t,
-        tuple(np.degrees(q).tolist()),
+        tuple(shown(bodies.robot, q).tolist()),
         tuple(points[0].tolist()),
         tuple(points[1].tolist()),
     )

@@ -14,6 +14,7 @@ from er3a.pipeline.viewing.page import Picture
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, LINK, MODEL, MUTED, REFERENCE, VERDICTS
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot
+from er3a.robots.shown import meant
 
 MOST_PAIRS = 12
 COLUMNS = 4
@@ -126,7 +127,7 @@ def clearance_over_time(results: CollisionResults) -> Picture | None:
 
 def closest_pair(robot: Robot, found: Closest) -> Picture:
     """The arm where it is nearest to anything, from the side and from above, with the two points."""
-    points = skeleton(robot, np.radians(found.q_deg)) * 1000
+    points = skeleton(robot, meant(robot, np.array(found.q_deg))) * 1000
     pair = np.array([found.from_mm, found.to_mm])
     figure, axes = new_figure(1, 2, width=11.0, height=4.6)
     labels = (tr("x (mm)"), tr("y (mm)"), tr("z (mm)"))

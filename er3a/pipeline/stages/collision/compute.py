@@ -36,6 +36,7 @@ from er3a.pipeline.stages.collision.model import (
 )
 from er3a.pipeline.stages.trajectory.listed_motions import study_motions
 from er3a.pipeline.study import Study
+from er3a.robots.shown import shown
 
 STAGE = "collision"
 CHECKS = 1  # points of a path checked between its samples to begin with; clearance adds what it needs
@@ -51,7 +52,7 @@ def compute(study: Study, name: str) -> CollisionResults:
     space = sample_joint_space(bodies, settings.samples, np.random.default_rng([study.seed, SAMPLES_STREAM]))
     random = np.random.default_rng([study.seed, PLACES_STREAM])
     places = find_places(bodies, space, settings.cells_across, settings.rounds, random)
-    home = np.clip(np.zeros(len(robot.a)), robot.lower, robot.upper)
+    home = np.clip(np.zeros(robot.joints), robot.lower, robot.upper)
     least, nearest = bodies.least(home[None])
     at_home = bodies.pairs[nearest[0]] if nearest[0] >= 0 and least[0] < 0 else None
     if at_home is None:
@@ -76,7 +77,7 @@ def compute(study: Study, name: str) -> CollisionResults:
             of_itself=_share(space.of_itself),
             of_scene=_share(space.of_scene),
             whole=_share(space.whole),
-            home_deg=None if at_home else tuple(np.degrees(home).tolist()),
+            home_deg=None if at_home else tuple(shown(robot, home).tolist()),
             proven_m=DEPTH,
             penetration_tolerance_mm=settings.penetration_tolerance_mm,
             places=places_found,
@@ -90,15 +91,16 @@ def compute(study: Study, name: str) -> CollisionResults:
             tries=places.tries,
             clear=places.clear,
             joined=places.joined,
-            witness_deg=np.degrees(places.witness),
-        ),
+            witness_deg=shown(robot, places.witness),
+        ).of_joints(robot.slides),
         targets=targets,
         paths=paths,
     )
 
 
 def _matrix(bodies: Bodies) -> MatrixRows:
-    unknown = np.full(len(bodies.robot.a), np.nan)
+    robot = bodies.robot
+    unknown = np.full(robot.joints, np.nan)
     watched = {tuple(pair.label.split("/")) for pair, second in zip(bodies.pairs, bodies.second) if second >= 0}
     return MatrixRows.of_rows(
         (
@@ -109,11 +111,11 @@ def _matrix(bodies: Bodies) -> MatrixRows:
             1000 * row.least,
             1000 * row.left_out,
             row.boxes,
-            unknown if row.witness is None else np.degrees(row.witness),
+            unknown if row.witness is None else shown(robot, row.witness),
             row.reason,
         )
         for row in bodies.matrix
-    )
+    ).of_joints(robot.slides)
 
 
 def _pair_shares(bodies: Bodies, space: JointSpace) -> PairShares:

@@ -19,6 +19,7 @@ from er3a.pipeline.viewing.palette import HIGHLIGHT, JOINTS, MODEL, MUTED, VERDI
 from er3a.pipeline.viewing.recording import ARM, TIMELINE, escaped, log_note, note_view, recording, seconds, send_series
 from er3a.pipeline.viewing.scene_entities import log_scene, pieces_mesh
 from er3a.robots.robot import Robot
+from er3a.robots.shown import meant
 
 STAGE = "collision"
 PAUSE = 0.5  # s between two paths
@@ -48,7 +49,7 @@ def record(study: Study, stored: Stored[CollisionResults], output: Path) -> None
     with recording(output, name, STAGE, rrb.Horizontal(view, right, column_shares=[2, 1], name="Collision")) as stream:
         log_note(stream, STAGE, NOTE)
         log_scene(stream, study, name, STAGE)
-        log_arm(stream, robot, np.radians(results.summary.home_deg or np.zeros(len(robot.a))))
+        log_arm(stream, robot, meant(robot, np.array(results.summary.home_deg or np.zeros(robot.joints))))
         _bodies(stream, robot)
         _places(stream, results)
         _paths(stream, robot, results)
@@ -94,7 +95,7 @@ def _paths(stream: rr.RecordingStream, robot: Robot, results: CollisionResults) 
         text = rr.TextDocument(f"## {escaped(str(name))}\n{escaped(told)}", media_type=rr.MediaType.MARKDOWN)
         stream.log(f"{STAGE}/now", text)
         if known.any():
-            send_motion(stream, robot, times[known], np.radians(rows.q_deg[known]))
+            send_motion(stream, robot, times[known], meant(robot, rows.q_deg[known]))
             _pair_lines(stream, times[known], rows.from_mm[known] / 1000, rows.to_mm[known] / 1000)
         broken = np.append(times, times[-1] + 1e-3)
         values = np.append(rows.clearance_mm, np.nan)[:, None]

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from er3a.files.scene_file import load_scene
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.collision import FIGURES, body_word, state_word, why
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
@@ -26,6 +27,8 @@ from er3a.pipeline.stages.collision.model import (
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.page import head_of, render, run_command
+from er3a.robots.robot import Robot
+from er3a.robots.shown import meant
 
 NO_BREAK_SPACE = "\u00a0"
 
@@ -44,13 +47,13 @@ def report(study: Study, stored: Stored[CollisionResults], output: Path) -> None
         command=run_command(study, f"{name}/collision.html"),
         robot=robot,
         robot_pages=study.pages(name),
-        matrix=_matrix(results.matrix),
+        matrix=_matrix(robot, results.matrix),
         by_pair=by_pair(results.pairs),
         pairs=_pairs(results.pairs),
         workspace=workspace(results),
         targets=_targets(results.targets),
         clearance=clearance_over_time(results),
-        player=player(robot, _motions(results), load_scene(scene) if scene else None),
+        player=player(robot, _motions(robot, results), load_scene(scene) if scene else None),
         player_style=player_style(),
         closest=[_closest(found) for found in sorted(summary.closest, key=lambda found: found.clearance_mm)],
         nearest=closest_pair(robot, nearest) if nearest else None,
@@ -58,14 +61,14 @@ def report(study: Study, stored: Stored[CollisionResults], output: Path) -> None
     )
 
 
-def _motions(results: CollisionResults) -> list[PlayedMotion]:
+def _motions(robot: Robot, results: CollisionResults) -> list[PlayedMotion]:
     """The paths, as far as the arm reaches them, with the line between the nearest points at each moment."""
     closest = {found.name: found for found in results.summary.closest if found.kind == "path"}
     motions = []
     for name in dict.fromkeys(results.paths.path.tolist()):
         rows = results.paths.take((results.paths.path == name) & np.isfinite(results.paths.q_deg).all(axis=1))
         events = [_least(closest[name])] if name in closest else []
-        motions.append(PlayedMotion(name, "", rows.t_s, np.radians(rows.q_deg), events, _distances(rows)))
+        motions.append(PlayedMotion(name, "", rows.t_s, meant(robot, rows.q_deg), events, _distances(rows)))
     return motions
 
 
@@ -91,7 +94,7 @@ def _distances(rows: PathClearances) -> list[Mark]:
     ]
 
 
-def _matrix(rows: MatrixRows) -> list[list[str]]:
+def _matrix(robot: Robot, rows: MatrixRows) -> list[list[str]]:
     order = sorted(range(len(rows)), key=lambda k: STATES.index(rows.state[k]))
     return [
         [
@@ -103,7 +106,7 @@ def _matrix(rows: MatrixRows) -> list[list[str]]:
                 rows.least_mm[k],
                 rows.left_out_mm[k],
                 int(rows.boxes[k]),
-                _angles(rows.witness_deg[k]),
+                _angles(robot, rows.witness_deg[k]),
                 rows.reason[k],
             ),
         ]
@@ -111,8 +114,11 @@ def _matrix(rows: MatrixRows) -> list[list[str]]:
     ]
 
 
-def _angles(values: np.ndarray) -> str:
-    return ", ".join(fixed(value, 0) for value in values) if np.isfinite(values).all() else ""
+def _angles(robot: Robot, values: Reals) -> str:
+    """Joint values in words, each with its unit; empty where there are none."""
+    if not np.isfinite(values).all():
+        return ""
+    return ", ".join(fixed(value, 0) + (" mm" if slides else "°") for value, slides in zip(values, robot.slides))
 
 
 def _pairs(rows: PairShares) -> list[list[str]]:

@@ -72,7 +72,7 @@ def compute(study: Study, name: str) -> InverseResults:
         sequence=sequence(robot, targets, solved, scene, limits_of(robot, motion).acceleration),
         round_trips=_round_trips(trips) if trips else None,
     )
-    number_of_solutions = solution_map(robot, settings.map_cells) if has_branches(robot) else MapRows.empty()
+    number_of_solutions = solution_map(robot, settings.map_cells, scene) if has_branches(robot) else MapRows.empty()
     return InverseResults(summary, solutions, RankingRows.stacked(ranked), number_of_solutions)
 
 

@@ -208,6 +208,10 @@ class MapRows(Table):
     z_mm: Reals = column("tool position in the base's frame", "mm")
     solutions: Integers = column("branches", dtype=np.int64)
     within_limits: Integers = column("branches within the limits", dtype=np.int64)
+    clear: Integers = column(
+        "of these, those that touch neither the scene nor the arm itself; between poses nothing is known",
+        dtype=np.int64,
+    )
 
 
 @dataclass(frozen=True, eq=False)

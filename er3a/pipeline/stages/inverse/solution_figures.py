@@ -17,6 +17,7 @@ from er3a.pipeline.messages.say import word
 from er3a.pipeline.stages.inverse.model import MapRows, RoundTrips, SolutionRows, TargetResult
 from er3a.pipeline.stages.inverse.shape_colours import colour_of, shape_of
 from er3a.pipeline.viewing.figures import equal_scale, new_figure, row_of_panels
+from er3a.pipeline.viewing.numbers import number
 from er3a.pipeline.viewing.page import Picture
 from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, JOINT_NAMES, MODEL, MUTED
 from er3a.pipeline.viewing.skeleton import skeleton
@@ -75,7 +76,7 @@ def histogram(trips: RoundTrips) -> Picture:
 
 
 def solutions_per_position(table: MapRows) -> Picture:
-    """Maps of the number of branches within the limits, one for each orientation of the tool."""
+    """Maps of the number of branches within the limits and clear, one for each orientation of the tool."""
     orientations = list(dict.fromkeys(table.orientation))
     figure, axes = new_figure(1, len(orientations), width=10.5, height=4.8, squeeze=False)
     colours = ListedColormap(["#ffffff", *matplotlib.colormaps["viridis_r"](np.linspace(0.08, 0.95, 8))])
@@ -83,10 +84,11 @@ def solutions_per_position(table: MapRows) -> Picture:
     for panel, orientation in zip(axes[0], orientations):
         rows = table.take(table.orientation == orientation)
         x, z = np.unique(rows.x_mm), np.unique(rows.z_mm)
-        counts = rows.within_limits.reshape(len(x), len(z)).T
+        counts, within = (part.reshape(len(x), len(z)).T for part in (rows.clear, rows.within_limits))
         reached = rows.solutions.reshape(len(x), len(z)).T > 0
         image = panel.pcolormesh(x, z, counts, cmap=colours, vmin=-0.5, vmax=8.5, rasterized=True)
         panel.contour(x, z, reached, levels=[0.5], colors=INK, linewidths=1.0)
+        panel.contour(x, z, within > 0, levels=[0.5], colors=INK, linewidths=0.8, linestyles="dashed")
         panel.plot([0], [0], marker="P", markersize=9, color=HIGHLIGHT, markeredgecolor="white", linestyle="none")
         panel.set_title(word("orientation.title", ORIENTATION_TITLES, orientation), **TITLE)
         panel.set_aspect("equal")
@@ -98,19 +100,22 @@ def solutions_per_position(table: MapRows) -> Picture:
             panel.set_xlim(x[columns[0]] - edge, x[columns[-1]] + edge)
             panel.set_ylim(min(z[heights[0]] - edge, -edge), z[heights[-1]] + edge)
         panel.grid(visible=False)
-        share = 100 * (counts > 0).sum() / max(reached.sum(), 1)
+        share, clear = (100 * (part > 0).sum() / max(reached.sum(), 1) for part in (within, counts))
+        named = word("orientation", ORIENTATIONS, orientation)
         shares.append(
-            tr("{orientation}: {share:.0f} %", orientation=word("orientation", ORIENTATIONS, orientation), share=share)
+            tr("{orientation}: {share:.0f} %, clear {clear:.0f} %", orientation=named, share=share, clear=clear)
         )
     listed = tr("; ").join(shares)
     bar = figure.colorbar(image, ax=axes[0].tolist(), ticks=range(9), shrink=0.85)
-    bar.set_label(tr("branches within the limits"))
+    bar.set_label(tr("branches within the limits and clear"))
     return Picture(
         figure,
         tr("Maps of the number of solutions in the vertical plane through axis 1"),
         tr(
-            "Of the tool positions inside the line, which the arm reaches when limits are left aside, the limits leave "
-            "at least one branch for {shares}. White inside it: forbidden by limits alone. Pink cross: base.",
+            "Of the {count} tool positions inside the line, which the arm reaches when limits are left aside, the "
+            "limits leave at least one branch (dashed line), and one in which nothing is touched, for {shares}. All "
+            "branches of each position were tried; between positions nothing is known. Pink cross: base.",
+            count=number(int((table.solutions > 0).sum())),
             shares=listed,
         ),
     )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from er3a.collision.bodies import Bodies
+from er3a.collision.scene import Scene
 from er3a.geometry.transforms import transform
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.chain import axes_at_zero_theta
@@ -17,8 +19,8 @@ RPY_DEG: dict[ToolOrientation, tuple[float, float, float]] = {
 }
 
 
-def solution_map(robot: Robot, cells: int) -> MapRows:
-    """Number of branches, and of those within the limits, on a grid of ``cells`` by ``cells``."""
+def solution_map(robot: Robot, cells: int, scene: Scene | None) -> MapRows:
+    """Number of branches, of those within the limits, and of those clear too, on a grid of ``cells`` by ``cells``."""
     points, T_base_tool = axes_at_zero_theta(robot)[1:]
     if closed_form_missing(robot) is None:
         arm = wrist_partitioned_arm(robot)
@@ -29,10 +31,14 @@ def solution_map(robot: Robot, cells: int) -> MapRows:
     ticks = (np.arange(cells) + 0.5) / cells * 2 - 1
     x, z = (part.ravel() for part in np.meshgrid(ticks * reach, middle + ticks * reach, indexing="ij"))
     position = np.stack([x, np.zeros_like(x), z], axis=1)
-    tables = []
+    tables, bodies = [], Bodies(robot, scene)
     for orientation, rpy_deg in RPY_DEG.items():
         T = robot.base @ transform(position, np.broadcast_to(np.radians(rpy_deg), position.shape))
         found = inverse_batch(robot, T)
+        clear = found.within_limits.copy()
+        # Arms of one branch after another: neighbours are alike, which makes asking faster.
+        slot, pose = np.nonzero(clear.T)
+        clear[pose, slot] = bodies.free(found.q[pose, slot])
         tables.append(
             MapRows(
                 orientation=np.full(len(x), orientation, dtype=object),
@@ -40,6 +46,7 @@ def solution_map(robot: Robot, cells: int) -> MapRows:
                 z_mm=z * 1000,
                 solutions=found.solved.sum(axis=1),
                 within_limits=found.within_limits.sum(axis=1),
+                clear=clear.sum(axis=1),
             )
         )
     return MapRows.stacked(tables)

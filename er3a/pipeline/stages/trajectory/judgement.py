@@ -165,11 +165,14 @@ def _tool_faults(robot: Robot, motion: Motion, near: NearSingular, limits: Joint
         fast += rates_exceeded(at, rates[:, limit.order - 1], limit, partial(_rate, motion, limit.order))
     known = rates[np.isfinite(rates).all(axis=(1, 2))]
     greatest = np.abs(known).max(axis=0) if len(known) else None
+    followed = motion.followed
+    assert followed is not None
+    ends = followed.jumps or np.isnan(followed.q).any() or any(event.crossing for event in events)
     return _Found(
         events=events,
         limits=out_of_limits(robot, t, q, motion.joints),
         fast=fast,
-        undecided=list(proof.undecided),
+        undecided=[*proof.undecided, *(() if ends else proof.beside)],
         greatest=None if greatest is None else (greatest[0], greatest[1]),
     )
 

@@ -54,23 +54,30 @@ def upright_slices(robot: Robot, capability: CapabilitySummary, cells: Capabilit
     return figure
 
 
-def level_slices(capability: CapabilitySummary, cells: CapabilityCells) -> Figure:
-    """Reachability in three slices across axis 1."""
+def level_slices(capability: CapabilitySummary, cells: CapabilityCells, percent: Reals, label: str) -> Figure:
+    """A percentage of each cell, NaN where unknown, in three slices across axis 1."""
     lookup = CellLookup(capability, cells)
     line = lookup.reach * np.linspace(-1, 1, PIXELS)
     x, y = np.meshgrid(line, line, indexing="ij")
     figure, axes = new_figure(1, 3, width=12.0, height=4.1, sharey=True)
     for panel, height in zip(axes, _quantiles(cells)):
         row = lookup.row(np.hypot(x, y), np.arctan2(y, x), np.full(x.shape, height))
-        values = _looked_up(cells.reachability, row) * 100
+        values = np.ma.masked_invalid(_looked_up(percent, row))
         mesh = panel.pcolormesh(line * 1000, line * 1000, values.T, cmap=SHADES, vmin=0, vmax=100, rasterized=True)
         panel.set_title(tr("{height} mm up axis 1", height=fixed(1000 * height, 0)))
         across = tr("across it (mm)") if panel is axes[0] else ""
         equal_scale(panel, tr(_PLANE) if panel is axes[1] else "", across)
         panel.set_aspect("equal", adjustable="box")
         panel.grid(False)
-    figure.colorbar(mesh, ax=axes, label=tr("tool directions reached (%)"), shrink=0.8)
+    figure.colorbar(mesh, ax=axes, label=label, shrink=0.8)
     return figure
+
+
+def clear_percent(cells: CapabilityCells) -> Reals:
+    """Of the poses tried in each cell and reached, those held with nothing touched, %; NaN where none was reached."""
+    reached = cells.reached_tries.astype(float)
+    found: Reals = np.divide(100.0 * cells.clear_tries, reached, out=np.full(len(reached), np.nan), where=reached > 0)
+    return found
 
 
 def placement_views(

@@ -8,9 +8,15 @@ from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import say, word
 from er3a.pipeline.messages.workspace import STATUS
-from er3a.pipeline.stages.workspace.capability_figures import level_slices, placement_views, upright_slices
+from er3a.pipeline.stages.workspace.capability_figures import (
+    clear_percent,
+    level_slices,
+    placement_views,
+    upright_slices,
+)
 from er3a.pipeline.stages.workspace.model import (
     CapabilitySummary,
+    ClearSummary,
     NeedsClosedForm,
     PlacementSummary,
     PlaceSummary,
@@ -54,7 +60,12 @@ def _pictures(robot: Robot, results: WorkspaceResults, capability: CapabilitySum
             _slices_caption(capability),
         ),
         Picture(
-            level_slices(capability, results.capability),
+            level_slices(
+                capability,
+                results.capability,
+                100.0 * results.capability.reachability.astype(float),
+                tr("tool directions reached (%)"),
+            ),
             tr("Slices across axis 1: reachability"),
             tr(
                 "Where joint 1 is limited, the sector behind the arm loses directions first: "
@@ -63,7 +74,39 @@ def _pictures(robot: Robot, results: WorkspaceResults, capability: CapabilitySum
             if capability.sectors > 1
             else tr("Joint 1 makes a full turn, so what counts is the distance from axis 1 and the height alone."),
         ),
+        Picture(
+            level_slices(
+                capability,
+                results.capability,
+                clear_percent(results.capability),
+                tr("reached poses held clear (%)"),
+            ),
+            tr("Slices across axis 1: reached poses that an arm holds with nothing touched"),
+            _clear_caption(capability.clear),
+        ),
     ]
+
+
+def _clear_caption(clear: ClearSummary) -> str:
+    if clear.scene is None:
+        what = tr("An estimate: {share} % of the poses reached can be held without the arm touching itself.",
+                  share=number(100 * clear.share, 2))  # fmt: skip
+    else:
+        what = tr(
+            "An estimate: {share} % of the poses reached can be held without touching “{scene}” or the arm itself.",
+            share=number(100 * clear.share, 2),
+            scene=clear.scene,
+        )
+    tried = tr(
+        "{tries} random poses were tried in each cell and sector, {reached} of all are reached, {clear} proven clear "
+        "by an arm; in {without} cells and sectors none was found. Shares of so few tries tell good regions from bad "
+        "ones, not single cells.",
+        tries=clear.tries,
+        reached=number(clear.reached),
+        clear=number(clear.clear),
+        without=number(clear.without),
+    )
+    return tr("{first} {rest}", first=what, rest=tried)
 
 
 def _slices_caption(capability: CapabilitySummary) -> str:

@@ -151,6 +151,22 @@ class RollSummary:
 
 
 @dataclass(frozen=True)
+class ClearSummary:
+    """Random poses tried in each cell and sector, and of those reached the share held with nothing touched, by volume.
+
+    ``scene`` is as in :class:`PlacementSummary`; ``without`` counts cells and sectors with poses that are reached, but
+    none that was found clear.
+    """
+
+    scene: str | None
+    tries: int
+    reached: int
+    clear: int
+    share: float
+    without: int
+
+
+@dataclass(frozen=True)
 class CapabilitySummary:
     """What the tool can do in the cells of the section, in so many directions and sectors of azimuth."""
 
@@ -161,6 +177,7 @@ class CapabilitySummary:
     roll: RollSummary
     overall: Overall
     core_m3: Core
+    clear: ClearSummary
 
 
 @dataclass(frozen=True)

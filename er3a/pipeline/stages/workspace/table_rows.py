@@ -29,6 +29,7 @@ from er3a.robots.shown import shown
 from er3a.sampling import touched_cells
 from er3a.sampling.tally import UNTOUCHED, Tally
 from er3a.workspace.capability import Capability
+from er3a.workspace.clear_poses import ClearPoses
 from er3a.workspace.hull import Hull
 from er3a.workspace.placement import Places
 from er3a.workspace.proven import Proven
@@ -126,10 +127,12 @@ def void_surfaces(voids: Sequence[Void]) -> tuple[VoidVertices, VoidTriangles]:
     )
 
 
-def capability(middles: Reals, found: Capability) -> CapabilityCells:
-    """Reached cells and sectors; ``middles`` (n, 2), m, are those of all cells."""
+def capability(middles: Reals, found: Capability, tried: ClearPoses) -> CapabilityCells:
+    """Reached cells and sectors, in which poses were tried; ``middles`` (n, 2), m, are those of all cells."""
     cell, sector = np.nonzero(found.reachability)
     return CapabilityCells(
+        reached_tries=tried.reached.astype(np.int16),
+        clear_tries=tried.clear.astype(np.int16),
         rho_m=middles[cell, 0],
         z_m=middles[cell, 1],
         azimuth_deg=360.0 * sector / found.reachability.shape[1],

@@ -10,10 +10,12 @@ import numpy as np
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
 from er3a.kinematics.configuration import branch_labels
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.workspace import table_rows
 from er3a.pipeline.stages.workspace.entry import BoxTask, CapabilitySettings
 from er3a.pipeline.stages.workspace.model import (
     CapabilitySummary,
+    ClearSummary,
     NeedsClosedForm,
     PlacementSummary,
     PlaceSummary,
@@ -25,15 +27,19 @@ from er3a.pipeline.stages.workspace.model import (
 from er3a.pipeline.stages.workspace.workspace_tables import BoxPlaces, CapabilityCells
 from er3a.robots.robot import Robot
 from er3a.workspace.capability import map_capability, overall, rings
+from er3a.workspace.clear_poses import ClearPoses, try_poses
 from er3a.workspace.dexterous import dexterous_core
 from er3a.workspace.directions import cone_directions, roll_of
 from er3a.workspace.placement import MIXED, NO, Task, narrowed
 from er3a.workspace.placement_proof import BoxPlacement, find_places
+from er3a.workspace.proof import ring_volumes
 from er3a.workspace.proven import lacking_for_proof
 from er3a.workspace.section_arm import section_arm, section_frame
 
 MOST_ACROSS = 64
 LISTED = 5
+CELL_TRIES, LEAST_TRIES = 192, 3  # poses tried in a cell, and in each sector of it
+CLEAR_STREAM = 11
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,14 +53,15 @@ class ToolCapability:
 
 
 def tool_capability(
-    robot: Robot, settings: CapabilitySettings, cell: float, scene: Scene | None = None
+    robot: Robot, settings: CapabilitySettings, cell: float, scene: Scene | None = None, seed: int = 0
 ) -> ToolCapability:
     """Work out what the tool can do.
 
     Parameters
     ----------
     cell : m, edge of the workspace's cells; taken coarser where more than ``MOST_ACROSS`` would span the reach
-    scene : what the arm may not touch where it serves the box; nor may it touch itself
+    scene : what the arm may not touch where it serves the box, and in clear poses; nor may it touch itself
+    seed : of the poses tried
     """
     if lacks := lacking_for_proof(robot):
         return ToolCapability(NeedsClosedForm(lacks), None, CapabilityCells.empty(), BoxPlaces.empty())
@@ -64,6 +71,8 @@ def tool_capability(
     middles = np.stack([cells[:, :2].mean(axis=1), cells[:, 2:].mean(axis=1)], axis=1)
     found = map_capability(robot, middles, settings.directions, roll)
     (x, y, z), origin = section_frame(robot)
+    random = np.random.default_rng([seed, CLEAR_STREAM])
+    tried = _tried(robot, middles, found.reachability, Bodies(robot, scene), random)
     summary = CapabilitySummary(
         directions=settings.directions,
         cell_m=cell,
@@ -72,6 +81,7 @@ def tool_capability(
         roll=RollSummary(roll.free, len(roll.angles)),
         overall=overall(found, cells),
         core_m3=dexterous_core(robot, cells, settings.directions, roll, settings.proof_poses),
+        clear=_clear_summary(cells, found.reachability, tried, scene),
     )
     task = _task(settings.placement)
     bodies = Bodies(narrowed(robot, task.margin), scene)
@@ -79,8 +89,32 @@ def tool_capability(
     return ToolCapability(
         summary,
         _placement_summary(robot, settings.placement, task, placement, float(found.manipulability.max()), scene),
-        table_rows.capability(middles, found),
+        table_rows.capability(middles, found, tried),
         table_rows.places(placement.best_turns),
+    )
+
+
+def _tried(
+    robot: Robot, middles: Reals, reachability: Reals, bodies: Bodies, random: np.random.Generator
+) -> ClearPoses:
+    cell, sector = np.nonzero(reachability)
+    width = 2 * np.pi / reachability.shape[1]
+    tries = max(LEAST_TRIES, CELL_TRIES // reachability.shape[1])
+    return try_poses(robot, middles[cell], (width * sector, width), tries, bodies.free, random)
+
+
+def _clear_summary(cells: Reals, reachability: Reals, tried: ClearPoses, scene: Scene | None) -> ClearSummary:
+    """Cells weigh by their volume and reachability, since each was tried equally often."""
+    cell, _ = np.nonzero(reachability)
+    volume = ring_volumes(cells)[cell]
+    reached = float(volume @ tried.reached)
+    return ClearSummary(
+        scene=scene.title if scene else None,
+        tries=tried.tries,
+        reached=int(tried.reached.sum()),
+        clear=int(tried.clear.sum()),
+        share=float(volume @ tried.clear) / reached if reached > 0 else 0.0,
+        without=int(((tried.reached > 0) & (tried.clear == 0)).sum()),
     )
 
 

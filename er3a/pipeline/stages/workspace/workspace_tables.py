@@ -147,6 +147,10 @@ class CapabilityCells(Table):
     solutions: Singles = column("mean number of solutions per reached direction", dtype=np.float32)
     most_solutions: NDArray[np.int8] = column("most solutions that any direction has", dtype=np.int8)
     manipulability_m3: Singles = column("greatest |det J| of any reached pose", "m^3", dtype=np.float32)
+    reached_tries: NDArray[np.int16] = column("of the random poses tried there, those that are reached", dtype=np.int16)
+    clear_tries: NDArray[np.int16] = column(
+        "of these, those that an arm holds that touches neither the scene nor itself", dtype=np.int16
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,72 @@
+"""How many of the poses that a tool reaches in a cell can be held with nothing touched: tried at random, not proven.
+
+A pose counts as reached if an arm within the limits is found, and as clear if one of its arms touches neither the
+surroundings nor itself. An arm that does is proof for its pose; a share of few tries is an estimate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from er3a.kinematics.batch import inverse_batch
+from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.robots.robot import Robot
+from er3a.workspace.directions import across, poses
+from er3a.workspace.section_arm import section_frame
+
+Free = Callable[[Reals], Flags]
+"""Which arms (N, n), rad, are free of collisions, (N,)."""
+_POSES = 50_000
+
+
+@dataclass(frozen=True, eq=False)
+class ClearPoses:
+    """What came of the poses tried in cells: of ``tries`` in each, how many were reached and clear, both (n,)."""
+
+    tries: int
+    reached: Integers
+    clear: Integers
+
+
+def try_poses(
+    robot: Robot, middles: Reals, azimuths: tuple[Reals, float], tries: int, free: Free, random: np.random.Generator
+) -> ClearPoses:
+    """Try poses with the tool point on the circles of cells' middles, orientations uniform over all.
+
+    Parameters
+    ----------
+    middles : (n, 2), m, radius and height about axis 1; azimuths : their sectors' middles (n,) and width, rad
+    tries : poses in each; free : which arms count as clear
+
+    Raises
+    ------
+    NotWristPartitionedError
+    """
+    R, origin = section_frame(robot)
+    reached, clear = (np.zeros(len(middles), np.int64) for _ in range(2))
+    for start in range(0, len(middles), step := max(1, _POSES // tries)):
+        part = slice(start, start + step)
+        rho, z = middles[part, 0, None], middles[part, 1, None]
+        at = azimuths[0][part, None] + azimuths[1] * (random.random((len(rho), tries)) - 0.5)
+        points = np.stack([rho * np.cos(at), rho * np.sin(at), np.broadcast_to(z, at.shape)], axis=-1) @ R + origin
+        found = inverse_batch(robot, poses(points, _orientations(random, at.shape)).reshape(-1, 4, 4))
+        slot, pose = np.nonzero(found.within_limits.T)  # arms of one branch after another are alike
+        held = np.zeros(at.size, bool)
+        held[pose[free(found.q[pose, slot])]] = True
+        reached[part] = found.within_limits.any(axis=1).reshape(at.shape).sum(axis=1)
+        clear[part] = held.reshape(at.shape).sum(axis=1)
+    return ClearPoses(tries, reached, clear)
+
+
+def _orientations(random: np.random.Generator, shape: tuple[int, ...]) -> Reals:
+    """Uniform over all orientations (..., 3, 3): a direction, and a roll about it."""
+    count = int(np.prod(shape))
+    z = random.normal(size=(count, 3))
+    z /= np.linalg.norm(z, axis=1, keepdims=True)
+    x, y = across(z)
+    roll = 2 * np.pi * random.random((count, 1))
+    c, s = np.cos(roll), np.sin(roll)
+    return np.stack([c * x + s * y, c * y - s * x, z], axis=-1).reshape(*shape, 3, 3)
