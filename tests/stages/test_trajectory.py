@@ -322,7 +322,7 @@ def test_the_page_says_first_what_validation_came_to(study, stored, tmp_path, st
         assert body.index(told) < body.index('class="verdict') < body.index("safe")
 
 
-def test_cells_of_the_index_say_first_what_validation_came_to(study, folders, tmp_path):
+def test_the_index_says_once_before_a_robot_s_cells_what_validation_came_to(study, folders, tmp_path):
     one = study.model_copy(update={"robots": {"er3_600": study.robots["er3_600"]}})
     for stage in (each for each in one.stages("er3_600") if each != "trajectory"):
         absent = AbsentResults(Summary(Verdict("not_computed", NotComputed("made up")), ()))
@@ -330,13 +330,10 @@ def test_cells_of_the_index_say_first_what_validation_came_to(study, folders, tm
     shutil.copytree(folders["er3_600"], tmp_path / "results/er3_600/trajectory")
     write_index(one, tmp_path / "results", tmp_path)
     index = (tmp_path / "index.html").read_text(encoding="utf-8")
-    cells = index.split("<td data-label=")[1:]
-    assert len(cells) == len(STAGES)
-    assert "This table was not validated" not in cells[0]
-    for cell in cells[1 : len(one.stages("er3_600"))]:
-        assert 0 < cell.index("This table was not validated") < cell.rindex("</p>")
-    cell = cells[list(STAGES).index("trajectory")]
-    assert cell.index("This table was not validated") < cell.index("safe")
+    about, cells = index.split('<ul class="cells">')
+    assert about.count("This table was not validated") == 1
+    assert "This table was not validated" not in cells
+    assert [f'href="er3_600/{stage}.html"' in cells for stage in one.stages("er3_600")] == [True] * 8
 
 
 def own_paths(*names):

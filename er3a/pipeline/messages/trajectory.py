@@ -21,7 +21,6 @@ from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.intervals import RateCause
 
 FIGURES = {
-    "paths": N_("Paths planned"),
     "safe": N_("Paths safe as they are"),
     "singular_poses": N_("Singular poses met"),
     "near_passes": N_("Near passes"),

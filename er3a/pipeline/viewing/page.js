@@ -186,7 +186,7 @@ document.querySelectorAll(".scroll").forEach(fade);
 addEventListener("beforeprint", () => document.querySelectorAll(".provenance").forEach((details) => (details.open = true)));
 
 for (const table of document.querySelectorAll("table")) {
-  if (!table.classList.contains("index")) makeSortable(table);
+  makeSortable(table);
   const tools = document.createElement("p");
   tools.className = "tools";
   tools.append(toolButton(WORDS.csv, () => download(csvOf(table), "text/csv", `${nameFor(table)}.csv`)));
