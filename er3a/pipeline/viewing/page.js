@@ -179,7 +179,61 @@ function addContents() {
   tell();
 }
 
+// The first time that a page uses a term of the glossary, its meaning can be asked for, by pointer, key or touch.
+function explainTerms(terms) {
+  const letters = (text) => text.replace(/[.*+?^${}()|[\]\\]/g, "\\$&").replaceAll(" ", "\\s+");
+  const named = Object.keys(terms).sort((a, b) => b.length - a.length);
+  const pattern = new RegExp(named.map((term) => (/\w$/.test(term) ? `\\b${letters(term)}(?:s|es)?\\b` : letters(term))).join("|"), "i");
+  const open = new Map(named.map((term) => [term.toLowerCase(), terms[term]]));
+  const skipped = "a, button, label, summary, code, svg, script, noscript, h1, h2, h3, thead, .cells, .badge, .term, [hidden]";
+  const texts = document.createTreeWalker(document.querySelector("main"), NodeFilter.SHOW_TEXT);
+  const found = [];
+  while (texts.nextNode()) if (pattern.test(texts.currentNode.data) && !texts.currentNode.parentElement.closest(skipped)) found.push(texts.currentNode);
+  for (let text of found) {
+    for (let hit; (hit = pattern.exec(text.data)); ) {
+      const rest = text.splitText(hit.index + hit[0].length);
+      const said = hit[0].toLowerCase().replace(/\s+/g, " ");
+      const term = [said, said.replace(/s$/, ""), said.replace(/es$/, "")].find((word) => open.has(word));
+      if (term) {
+        explain(text.splitText(hit.index), open.get(term));
+        open.delete(term);
+      }
+      text = rest;
+    }
+  }
+}
+
+function explain(text, meaning) {
+  const term = document.createElement("span");
+  const tip = document.createElement("span");
+  term.className = "term";
+  term.tabIndex = 0;
+  tip.className = "tip";
+  tip.role = "tooltip";
+  tip.id = `term-${document.querySelectorAll(".tip").length}`;
+  tip.textContent = meaning;
+  tip.hidden = true;
+  term.setAttribute("aria-describedby", tip.id);
+  text.replaceWith(term);
+  term.append(text);
+  document.body.append(tip);
+  const show = () => {
+    tip.hidden = false;
+    const at = term.getBoundingClientRect();
+    tip.style.left = `${Math.max(8, Math.min(at.left, document.documentElement.clientWidth - tip.offsetWidth - 8))}px`;
+    tip.style.top = `${at.top > tip.offsetHeight + 8 ? at.top - tip.offsetHeight - 4 : at.bottom + 4}px`;
+  };
+  const asked = () => document.activeElement === term || term.matches(":hover") || tip.matches(":hover");
+  const leave = () => setTimeout(() => asked() || (tip.hidden = true), 150);
+  for (const event of ["pointerenter", "focus"]) term.addEventListener(event, show);
+  for (const event of ["pointerleave", "blur"]) term.addEventListener(event, leave);
+  tip.addEventListener("pointerleave", leave);
+  term.addEventListener("keydown", (event) => event.key === "Escape" && (tip.hidden = true));
+  addEventListener("scroll", () => tip.hidden || (asked() ? show() : leave()), { passive: true, capture: true });
+}
+
 addContents();
+explainTerms(JSON.parse(document.getElementById("terms").textContent));
 document.querySelectorAll(".scroll").forEach(fade);
 
 // A sheet of paper can't be unfolded.

@@ -21,6 +21,7 @@ from er3a.files.kept_files import write_atomically
 from er3a.files.shipped import INSTALLED, ROOT, view_command
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.foundations import caveat
+from er3a.pipeline.messages.glossary import glossary
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import Provenance, Stored
@@ -184,6 +185,7 @@ def render(
         style=(_HERE / "style.css").read_text(encoding="utf-8"),
         script=(_HERE / "page.js").read_text(encoding="utf-8"),
         script_words={key: tr(word) for key, word in SCRIPT_WORDS.items()},
+        terms=glossary(),
         verdict_words=VERDICT_WORDS,
         pages=PAGES,
         language=language.current(),
