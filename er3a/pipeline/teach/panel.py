@@ -21,11 +21,11 @@ from er3a.pipeline.teach.scripts import import_map
 from er3a.pipeline.teach.words import WORDS
 from er3a.pipeline.viewing.page import render, run_command
 from er3a.pipeline.viewing.palette import BODY, INK, JOINT_NAMES, LINK, SIX_JOINTS
+from er3a.pipeline.viewing.panel_link import has_panel
 from er3a.robots.robot import Robot
 
 _HERE = Path(__file__).parent
 TABLE = ("a", "alpha", "d", "beta", "direction", "offset", "lower", "upper", "base", "tool")
-SIX = 6
 NEAR_LIMIT = np.radians(5.0)
 NEAR_SINGULAR = 1e-2  # smallest singular value below which an arm without named singularities is warned of one
 
@@ -33,7 +33,7 @@ NEAR_SINGULAR = 1e-2  # smallest singular value below which an arm without named
 def write_teach_page(study: Study, name: str, output: Path) -> None:
     """Write the teach panel of a robot of the study to ``output``."""
     robot = study.robot(name)
-    if robot.joints != SIX or robot.rows != SIX or robot.sliding.any() or robot.coupling is not None:
+    if not has_panel(robot):
         render(
             _HERE / "teach_absent.html.j2",
             output,

@@ -169,14 +169,78 @@ function addContents() {
   document.querySelector("main").prepend(nav);
   const fit = () => (details.open = wide.matches);
   const tell = () => {
-    const read = headings.findLastIndex((heading) => heading.getBoundingClientRect().top < 120);
+    const read = headings.findLastIndex((heading) => heading.checkVisibility() && heading.getBoundingClientRect().top < 120);
     summary.textContent = read < 0 || wide.matches ? WORDS.contents : `${WORDS.contents}: ${titles[read]}`;
     links.forEach((link, i) => (i === read ? link.setAttribute("aria-current", "true") : link.removeAttribute("aria-current")));
   };
   wide.addEventListener("change", fit);
-  addEventListener("scroll", tell, { passive: true });
+  for (const event of ["scroll", "resize"]) addEventListener(event, tell, { passive: true });
   fit();
   tell();
+}
+
+// Joints that a sentence names, as "(10, −20, 30, 0, 45, 0) deg", lead to the arm in the teach panel.
+function linkJoints(page) {
+  const angle = "[−-]?\\d+(?:\\.\\d+)?";
+  const vector = new RegExp(`[(（]((?:${angle}[,，]\\s*){5}${angle})(?=[)）]\\s*(?:deg|°|度))`);
+  const texts = document.createTreeWalker(page, NodeFilter.SHOW_TEXT);
+  const found = [];
+  while (texts.nextNode()) if (vector.test(texts.currentNode.data) && !texts.currentNode.parentElement.closest("a, code, h2, script")) found.push(texts.currentNode);
+  for (let text of found) {
+    for (let hit; (hit = vector.exec(text.data)); ) {
+      const named = text.splitText(hit.index + 1);
+      text = named.splitText(hit[1].length);
+      const link = document.createElement("a");
+      link.href = `${page.dataset.panel}#q=${hit[1].replace(/\s/g, "").replaceAll("−", "-").replaceAll("，", ",")}`;
+      named.replaceWith(link);
+      link.append(named);
+    }
+  }
+}
+
+// Of parts that are alike, one at a time: picked by list, buttons, a link or the browser's search. A sheet of paper has all.
+function showOneOf(group) {
+  const parts = [...group.children];
+  if (parts.length < 2) return;
+  const idOf = (part) => part.querySelector("h2").id;
+  const chooser = document.createElement("select");
+  chooser.append(...parts.map((part) => new Option(part.querySelector("h2").firstChild.textContent.trim(), idOf(part))));
+  const choose = (part, all = false) => {
+    chooser.value = idOf(part);
+    everything.checked = all;
+    for (const other of parts) other === part || all ? other.removeAttribute("hidden") : other.setAttribute("hidden", "until-found");
+    dispatchEvent(new Event("resize")); // for what takes its size from a part that was not there
+    dispatchEvent(new CustomEvent("chosen", { detail: chooser.value }));
+  };
+  const go = (index) => {
+    choose(parts[(index + parts.length) % parts.length]);
+    history.replaceState(null, "", `#${encodeURIComponent(chooser.value)}`);
+  };
+  const label = document.createElement("label");
+  label.append(`${group.dataset.oneOf} `, chooser);
+  const every = document.createElement("label");
+  const everything = document.createElement("input");
+  everything.type = "checkbox";
+  every.append(everything, ` ${WORDS.all}`);
+  const strip = document.createElement("p");
+  strip.className = "pickers";
+  strip.append(
+    label, toolButton(WORDS.previous, () => go(chooser.selectedIndex - 1)), toolButton(WORDS.next, () => go(chooser.selectedIndex + 1)), every,
+  );
+  group.before(strip);
+  chooser.addEventListener("change", () => go(chooser.selectedIndex));
+  everything.addEventListener("change", () => choose(parts[chooser.selectedIndex], everything.checked));
+  for (const part of parts) part.addEventListener("beforematch", () => choose(part));
+  const follow = () => {
+    const aim = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    const part = aim && parts.find((each) => each.contains(aim));
+    if (!part || everything.checked) return;
+    choose(part);
+    aim.scrollIntoView();
+  };
+  addEventListener("hashchange", follow);
+  choose(parts[0]);
+  follow();
 }
 
 // The first time that a page uses a term of the glossary, its meaning can be asked for, by pointer, key or touch.
@@ -232,7 +296,9 @@ function explain(text, meaning) {
   addEventListener("scroll", () => tip.hidden || (asked() ? show() : leave()), { passive: true, capture: true });
 }
 
+document.querySelectorAll("main[data-panel]").forEach(linkJoints);
 addContents();
+document.querySelectorAll("[data-one-of]").forEach(showOneOf);
 explainTerms(JSON.parse(document.getElementById("terms").textContent));
 document.querySelectorAll(".scroll").forEach(fade);
 

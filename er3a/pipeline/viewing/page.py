@@ -29,6 +29,7 @@ from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import svg_data_uri
 from er3a.pipeline.viewing.numbers import fixed, number
+from er3a.pipeline.viewing.panel_link import has_panel
 from er3a.version import __version__
 
 _HERE = Path(__file__).parent
@@ -53,6 +54,9 @@ SCRIPT_WORDS = {
     "contents": N_("Contents"),
     "filter": N_("Show rows with"),
     "link": N_("link to this section"),
+    "previous": N_("Previous"),
+    "next": N_("Next"),
+    "all": N_("all at once"),
 }
 
 
@@ -179,6 +183,7 @@ def render(
         "fixed": fixed,
         "tr": tr,
         "own": language.own_title,
+        "has_panel": has_panel,
         "sentence": whole_sentence,
     }
     html = environment.get_template(template.name).render(
