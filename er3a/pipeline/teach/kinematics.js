@@ -55,7 +55,7 @@ export function frames(table, links, q) {
 }
 
 /** Columns of the geometric Jacobian at the tool point, base frame: linear part (m/rad), then angular (rad/rad) [2]. */
-function jacobian(table, T) {
+export function jacobian(table, T) {
   const tool = column(T[6], 3);
   return JOINTS.map((k) => {
     const axis = scaled(column(T[k], 2), table.direction[k]);

@@ -3,8 +3,9 @@
 import { closedForm } from "er3a/inverse";
 import { constantLinks, frames, JOINTS } from "er3a/kinematics";
 import { showMeasures, showPose, write } from "er3a/readouts";
-import { SolutionList } from "er3a/solutions";
+import { SolutionList, whyNot } from "er3a/solutions";
 import { fill, fixed, inDegrees, plainDegrees, toDegrees, toRadians } from "er3a/text";
+import { addTasks } from "er3a/tasks";
 import { ArmView } from "er3a/view";
 
 const LIST_PAUSE = 120; // ms between two lists of solutions while the arm moves
@@ -90,6 +91,8 @@ function moveJoint(k, angle) {
 
 const KEYS = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 };
 
+let before = 0; // angle of the joint whose field has the focus, when it got that or last took Enter
+
 for (const k of JOINTS) {
   sliders[k].addEventListener("input", () => moveJoint(k, toRadians(Number(sliders[k].value))));
   sliders[k].addEventListener("keydown", (event) => {
@@ -103,9 +106,10 @@ for (const k of JOINTS) {
     const angle = toRadians(fields[k].valueAsNumber);
     const reason = refusal(k, angle);
     fields[k].setAttribute("aria-invalid", String(reason !== ""));
-    if (reason === "") moveJoint(k, angle);
-    else write(byId("message"), reason);
+    moveJoint(k, reason === "" ? angle : before); // what is refused leaves no trace of its first digits
+    if (reason !== "") write(byId("message"), reason);
   });
+  for (const event of ["focus", "change"]) fields[k].addEventListener(event, () => (before = q[k]));
   fields[k].addEventListener("blur", () => {
     fields[k].setAttribute("aria-invalid", "false");
     showJoint(k);
@@ -168,6 +172,10 @@ function frame(now) {
     refresh();
   }
 }
+
+export const points = addTasks(data, links, arm, {
+  joints, moveTo, refusal, tool: () => frames(table, links, q)[6], why: (found) => whyNot(data, found),
+});
 
 for (const k of JOINTS) showJoint(k);
 takeLink();

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from er3a.files.scene_file import load_scene
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.singularity import characteristic_length
 from er3a.kinematics.wrist_partitioned import closed_form_missing
@@ -14,6 +15,7 @@ from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import say
+from er3a.pipeline.player.player import scene_data
 from er3a.pipeline.results import Provenance, input_records
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.study import Study
@@ -50,7 +52,8 @@ def write_teach_page(study: Study, name: str, output: Path) -> None:
         "elbow": np.radians(settings.near_elbow_deg),
         "shoulder": settings.near_shoulder_mm / 1000,
     }
-    panel = panel_data(robot, near)
+    scene = study.scene(name, "trajectory")
+    panel = panel_data(robot, near) | {"scene": scene_data(load_scene(scene) if scene else None)}
     render(
         _HERE / "teach.html.j2",
         output,

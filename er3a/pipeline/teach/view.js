@@ -4,16 +4,17 @@ import { add, column, moved, norm, scaled, subtract, turned } from "er3a/algebra
 import { frames, JOINTS, sizeOf } from "er3a/kinematics";
 import { Orbit } from "er3a/orbit";
 import { eyeOf, Picture } from "er3a/scene";
-import { armSolids, drums } from "er3a/solids";
+import { armSolids, drums, sceneSolids } from "er3a/solids";
 
 export class ArmView extends Orbit {
   /** `draw` is called when the view has changed and the picture has to be drawn again. */
-  constructor(canvas, { table, colours, joint_names: names }, links, draw) {
+  constructor(canvas, { table, colours, joint_names: names, scene }, links, draw) {
     const atZero = frames(table, links, [0, 0, 0, 0, 0, 0]);
     const apart = (k) => norm(subtract(column(atZero[k], 3), column(atZero[k - 1], 3)));
     super(canvas, column(atZero[1], 3), [2, 3, 4, 5, 6].reduce((sum, k) => sum + apart(k), 0), () => draw());
     Object.assign(this, { table, links, names });
     this.size = sizeOf(table);
+    this.surroundings = sceneSolids(scene ?? []);
     this.solids = armSolids(table, this.size, colours);
     this.drums = drums(table, this.size);
     this.jointColours = colours.joints;
@@ -29,7 +30,7 @@ export class ArmView extends Orbit {
     const poses = this.#poses(q);
     picture.floor(base, size / 10, base[2], page.grid);
     picture.shadow(solids, poses, base[2], page.grid);
-    const groups = [{ solids, poses, ghost: false }];
+    const groups = [{ solids: this.surroundings, poses, ghost: false }, { solids, poses, ghost: false }];
     if (ghost) groups.push({ solids, poses: this.#poses(ghost), ghost: true });
     picture.solids(groups);
     this.#axes(poses);
