@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.ui import Select
 from selenium.webdriver.support.wait import WebDriverWait
 
 from er3a.files.path_file import load_paths
@@ -379,3 +380,15 @@ def test_the_chinese_panel_says_why_an_arm_has_no_solutions(browser, folder, chi
     panel = Panel(browser, folder / "chinese_offset_wrist.html").open("#q=10,20,30,40,50,60")
     assert "因为轴 4、5、6 不交于一点，相差 10 mm" in panel.text(".solutions")
     assert english(panel.texts()) == set()
+
+
+def test_the_table_is_shown_row_by_row_on_the_arm(panel):
+    panel.move(0, 0, 12, 0, 0, 0)
+    chooser = Select(panel.one("#frames"))
+    assert len(chooser.options) == 8
+    chooser.select_by_value("3")
+    panel.until(lambda: panel.text("#row"))
+    assert panel.text("#row").startswith("Row 3: turn by θ = −12.0° about z, go 0.00 mm along z and 70.00 mm along")
+    chooser.select_by_value("all")
+    panel.until(lambda: panel.text("#row") == "")
+    assert panel.clean()

@@ -95,6 +95,16 @@ function angleShortOfLine(a, b, axis) {
   return Math.atan2(dot(axis, cross(a, b)), Math.abs(dot(a, b) - dot(a, axis) * dot(b, axis)));
 }
 
+/** The table's own frames, 0 (base) to 6: those in which its rows are written; `T` are the joints' frames of `frames`. */
+export function tableFrames(table, T) {
+  const parts = linkParts(table);
+  const rows = JOINTS.map((k) => {
+    const moved = multiply(T[k], parts[k + 1].along);
+    return table.convention === "standard" ? multiply(moved, parts[k + 1].across) : moved;
+  });
+  return [table.base, ...rows];
+}
+
 /** A length (m) to scale drawings with: the sum of all link lengths and the tool's. */
 export function sizeOf(table) {
   return [...table.a, ...table.d].reduce((sum, value) => sum + Math.abs(value), 0) + norm(column(table.tool, 3));

@@ -124,6 +124,7 @@ for (const button of document.querySelectorAll("[data-view]")) {
 }
 byId("zoom-in").addEventListener("click", () => view.zoom(1 / 1.25));
 byId("zoom-out").addEventListener("click", () => view.zoom(1.25));
+byId("frames").addEventListener("change", refresh);
 for (const choice of document.querySelectorAll("input[name=orientation]")) {
   choice.addEventListener("change", refresh);
 }
@@ -151,6 +152,20 @@ function takeLink() {
   else moveTo(angles);
 }
 
+/** Numbers of the table's frames that are asked for; writes the row between two of them. */
+function showRow() {
+  const chosen = byId("frames").value;
+  const k = Number(chosen) - 1;
+  if (chosen === "" || chosen === "all") {
+    write(byId("row"), "");
+    return chosen === "" ? [] : [0, 1, 2, 3, 4, 5, 6];
+  }
+  const theta = inDegrees(table.direction[k] * q[k] + table.offset[k]);
+  const values = { row: k + 1, theta, d: fixed(1000 * table.d[k], 2), a: fixed(1000 * table.a[k], 2), alpha: inDegrees(table.alpha[k], 2) };
+  write(byId("row"), fill(words.row[table.convention], values));
+  return [k, k + 1];
+}
+
 /** Has the next frame show the arm as it then is. */
 function refresh() {
   if (!awaited) requestAnimationFrame(frame);
@@ -160,7 +175,7 @@ function refresh() {
 function frame(now) {
   awaited = false;
   const T = frames(table, links, q);
-  view.show(q, ghost);
+  view.show(q, ghost, showRow());
   showPose(T[6]);
   showMeasures(data, arm, T);
   if (listed) return;

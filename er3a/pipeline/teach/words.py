@@ -24,6 +24,20 @@ WORDS: dict[str, Any] = {
     ),
     "view_help": N_("Drag to turn the view. With the picture in focus the wheel and the plus and minus keys zoom."),
     "views": {"overview": N_("Overview"), "side": N_("Side"), "front": N_("Front"), "top": N_("Top")},
+    "frames": N_("Frames of the table"),
+    "frames_none": N_("none"),
+    "frames_all": N_("all"),
+    "frames_row": N_("row {row}"),
+    "row": {
+        "standard": N_(
+            "Row {row}: turn by θ = {theta} about z, go {d} mm along z and {a} mm along the new x, turn by α = {alpha} "
+            "about it."
+        ),
+        "modified": N_(
+            "Row {row}: go {a} mm along x, turn by α = {alpha} about it, turn by θ = {theta} about the new z, go {d} "
+            "mm along it."
+        ),
+    },
     "zoom_in": N_("Closer"),
     "zoom_out": N_("Farther"),
     "joints": N_("Joints"),
