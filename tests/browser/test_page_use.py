@@ -95,6 +95,27 @@ return parts.map((heading) => heading.id);
 """
 
 
+def test_a_filter_stays_in_the_address(browser, small_study):
+    browser.get((small_study.folder / "reports/er3a_c60/validation.html").as_uri())
+    field = next(
+        each for each in browser.find_elements(By.CSS_SELECTOR, ".tools input[type=search]") if each.is_displayed()
+    )
+    table = "arguments[0].closest('.tools').previousElementSibling"
+    shown = f"return [...{table}.querySelectorAll('tbody tr')].filter(row => !row.hidden).map(row => row.innerText)"
+    everything = browser.execute_script(shown, field)
+    browser.execute_script("arguments[0].value = 'alpha6'; arguments[0].dispatchEvent(new Event('input'))", field)
+    kept = browser.execute_script(shown, field)
+    assert 0 < len(kept) < len(everything)
+    address = browser.current_url
+    browser.get("about:blank")
+    browser.get(address)
+    field = next(
+        each for each in browser.find_elements(By.CSS_SELECTOR, ".tools input[type=search]") if each.is_displayed()
+    )
+    assert field.get_property("value") == "alpha6"
+    assert browser.execute_script(shown, field) == kept
+
+
 def test_joint_vectors_lead_to_the_teach_panel(browser, small_study):
     reports = small_study.folder / "reports/er3a_c60"
     counts = {}

@@ -117,6 +117,11 @@ def test_comparison_shows_the_pair_that_is_picked(browser, small_study):
     assert [float(text) for text in cells("J1 d")[:2]] == [round(robot.d[0] * 1000, 6) for robot in robots]
     assert shown() == ["er3a_c60", "er3_600"]
     browser.find_element(By.ID, "only-differences").click()
+    address = browser.current_url
+    assert address.endswith("#a=er3a_c60&b=er3_600&differs")
+    browser.get("about:blank")
+    browser.get(address)
+    assert shown() == ["er3a_c60", "er3_600"]
     rows = [row for row in browser.find_elements(By.CSS_SELECTOR, "#comparison tbody tr") if row.is_displayed()]
     assert rows
     assert all(row.find_elements(By.TAG_NAME, "td")[5].text for row in rows)

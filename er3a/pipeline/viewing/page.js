@@ -16,7 +16,7 @@ function numberIn(text) {
 }
 
 function textOf(cell) {
-  return cell.innerText.replace(/\s*\n\s*/g, " ").trim();
+  return (cell.innerText || cell.textContent).replace(/\s*\n\s*/g, " ").trim(); // what is folded has no inner text
 }
 
 // Numbers by value, then words by letter; empty cells and dashes come last either way.
@@ -103,18 +103,28 @@ function enlarge(image) {
 
 const MANY_ROWS = 12;
 
-// A field that leaves the rows in which its words stand.
+// A field that leaves the rows in which its words stand. The address keeps them, as "?2=words" for the page's third table.
 function filterFor(table) {
+  const number = String([...document.querySelectorAll("table")].indexOf(table));
   const field = document.createElement("input");
   field.type = "search";
   field.placeholder = field.ariaLabel = WORDS.filter;
-  field.addEventListener("input", () => {
+  field.value = new URLSearchParams(location.search).get(number) ?? "";
+  const filter = () => {
     const words = field.value.toLowerCase().split(/\s+/);
     for (const row of table.tBodies[0].rows) {
       const text = textOf(row).toLowerCase();
       row.hidden = !words.every((word) => text.includes(word));
     }
+  };
+  field.addEventListener("input", () => {
+    filter();
+    const address = new URL(location.href);
+    if (field.value) address.searchParams.set(number, field.value);
+    else address.searchParams.delete(number);
+    history.replaceState(null, "", address);
   });
+  if (field.value) filter();
   return field;
 }
 
