@@ -144,7 +144,7 @@ def test_another_wording_of_a_page_computes_nothing_and_one_of_a_verdict_its_sta
 
 @pytest.mark.long
 def test_editing_the_base_template_renders_all_pages_and_no_number(small_study):
-    with edited(small_study.folder / "er3a/pipeline/viewing/base.html.j2", "<main>", "<main >"):
+    with edited(small_study.folder / "er3a/pipeline/viewing/base.html.j2", "</main>", "</main >"):
         expected = {f"{robot}: report {stage}" for robot in small_study.robots for stage in stages_of(robot)} | panels(
             small_study
         )
