@@ -15,8 +15,8 @@ from er3a.pipeline.messages.decision import decision
         ("caution", ["trajectory", "vision"], "Not as it stands: see trajectory, vision"),
         ("caution", [], "Use it with care"),
         ("pass", [], "Use it: "),
-        ("no_reference", [], "Nothing tells whether its table is right"),
-        ("not_computed", [], "Nothing tells whether its table is right"),
+        ("no_reference", [], "There is no evidence on its table"),
+        ("not_computed", [], "There is no evidence on its table"),
     ],
 )
 def test_the_table_decides_first_then_what_fails(table, failed, start):

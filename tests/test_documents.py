@@ -23,6 +23,7 @@ from er3a.files.program_file import ProgramsFile
 from er3a.files.robot_file import RobotFile
 from er3a.files.yaml_file import parse, read_yaml
 from er3a.pipeline.cli import app
+from er3a.pipeline.messages.glossary import GLOSSARY
 from er3a.pipeline.study import Study
 from testing.evidence import CAMPAIGNS
 
@@ -249,3 +250,9 @@ def test_links_between_documents_lead_somewhere():
             if not (page.parent / target).exists() and "generated/" not in target:
                 broken.append((name_of(page), target))
     assert broken == []
+
+
+def test_the_glossary_has_the_terms_that_pages_explain():
+    table = (ROOT / "docs/glossary.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| ([^|]+?) (?:\([^|]*\) )?\| ([^|]+) \|", table, re.MULTILINE)
+    assert set(GLOSSARY.items()) <= set(rows)

@@ -36,7 +36,7 @@ def load_documents(path: str | Path) -> Documents:
             remedy = f"Write a short name in small letters, digits and _, other than '{NO_DOCUMENT}'"
             raise InputError(path, where, f"'{name}' is no name of a document", remedy)
         if name in found:
-            raise InputError(path, where, f"the document '{name}' stands here twice", "Keep one of the two")
+            raise InputError(path, where, f"the document '{name}' is given twice", "Keep one of the two")
         parents = tuple(part.strip() for part in fields["derived_from"].split(";")) if fields["derived_from"] else ()
         found[name] = Document(name, fields["title"], fields["publisher"], parents)
     for fields in table:

@@ -93,7 +93,7 @@ class Orientation(StrictModel):
         if not forms:
             raise ValueError(f"the orientation is missing | Add one of {', '.join(ORIENTATION_FORMS)}")
         if len(forms) > 1:
-            raise ValueError(f"the orientation stands here twice, as {' and '.join(forms)} | Keep one")
+            raise ValueError(f"the orientation is given twice, as {' and '.join(forms)} | Keep one")
 
     def transform_at(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
         """The pose (4, 4) with this orientation at a position (3,) in m."""

@@ -74,7 +74,7 @@ class _PlainLoader(yaml.SafeLoader):
                 )
             if key in seen:
                 raise yaml.constructor.ConstructorError(
-                    None, None, f"the key {key!r} stands here twice; keep one of the two", key_node.start_mark
+                    None, None, f"the key {key!r} is given twice; keep one of the two", key_node.start_mark
                 )
             seen.add(key)
         return super().construct_mapping(node, deep=True)

@@ -172,7 +172,7 @@ class StudyBase(StrictModel):
 
     def inputs(self, name: str, stage: str) -> list[Path]:
         """The files that a stage, or the teach panel, reads for a robot."""
-        more = REGISTRY[stage].inputs(self, name) if stage in REGISTRY else []
+        more = REGISTRY[stage].inputs(self, name) if stage in REGISTRY else self.scenes(name, "trajectory")
         robot = self.robot_file(name)
         return [robot, *pieces_named_in(robot), *more]
 

@@ -6,11 +6,13 @@ import csv
 import io
 
 import pytest
+from selenium.webdriver import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.expected_conditions import staleness_of
 from selenium.webdriver.support.wait import WebDriverWait
 
+from er3a.pipeline.messages.glossary import GLOSSARY
 from er3a.pipeline.results import Provenance
 from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.page import Picture, render
@@ -18,7 +20,8 @@ from er3a.pipeline.viewing.page import Picture, render
 TEMPLATE = """{% extends "base.html.j2" %}
 {% block title %}Test{% endblock %}
 {% block header %}<h1>Test page</h1>{% endblock %}
-{% block content %}{{ ui.table(["name", "value (mm)>"], rows, "Lengths") }}{{ ui.picture(picture) }}{% endblock %}"""
+{% block content %}{{ ui.table(["name", "value (mm)>"], rows, "Lengths") }}{{ ui.picture(picture) }}
+<p>Some branches of an arm's branch have a <em>Wrist centre</em>.</p>{% endblock %}"""
 ROWS = [["b, long", "−1\u202f234.5"], ["a", "20"], ['"c"', "–"], ["d", "3"], ["e", "5.0·10⁻³"]]
 
 
@@ -74,6 +77,33 @@ def test_figure_is_enlarged_and_closed_by_keyboard(page):
     )
     page.switch_to.active_element.send_keys(Keys.ESCAPE)
     WebDriverWait(page, 5).until(staleness_of(dialog))
+
+
+def test_a_term_of_the_glossary_explains_itself_to_keys_and_pointer(page):
+    term = page.find_element(By.CSS_SELECTOR, ".term")
+    tip = page.find_element(By.ID, term.get_attribute("aria-describedby"))
+    assert not tip.is_displayed()
+    page.execute_script("arguments[0].focus()", term)
+    assert tip.is_displayed()
+    assert tip.text in GLOSSARY.values()
+    term.send_keys(Keys.ESCAPE)
+    assert not tip.is_displayed()
+    ActionChains(page).move_to_element(term).perform()
+    assert tip.is_displayed()
+    box = tip.rect
+    assert box["x"] >= 0
+    assert box["x"] + box["width"] <= page.execute_script("return innerWidth")
+
+
+def test_each_term_is_explained_once_and_by_its_own_meaning(page):
+    found = page.execute_script(
+        "return [...document.querySelectorAll('.term')].map(t => "
+        "[t.textContent, document.getElementById(t.getAttribute('aria-describedby')).textContent])"
+    )
+    assert [text for text, _ in found] == ["branches", "Wrist centre"]
+    assert len({meaning for _, meaning in found}) == len(found)
+    for text, meaning in found:
+        assert any(text.lower().startswith(term) and GLOSSARY[term] == meaning for term in GLOSSARY)
 
 
 def test_figure_is_offered_for_download(page):

@@ -56,7 +56,8 @@ return [controls.indexOf(document.activeElement), outlineStyle !== "none" && par
 @pytest.mark.parametrize("page", STAGE_PAGES)
 def test_figures_enlarge_and_give_the_focus_back(browser, small_study, page):
     browser.get((small_study.folder / "reports" / page).as_uri())
-    buttons = browser.find_elements(By.CSS_SELECTOR, "figure button")
+    found = browser.find_elements(By.CSS_SELECTOR, "figure button")
+    buttons = [button for button in found if browser.execute_script("return arguments[0].checkVisibility()", button)]
     for button in (buttons[0], buttons[-1]):
         button.send_keys(Keys.ENTER)
         dialog = browser.find_element(By.CSS_SELECTOR, "dialog[open]")
@@ -64,6 +65,74 @@ def test_figures_enlarge_and_give_the_focus_back(browser, small_study, page):
         browser.switch_to.active_element.send_keys(Keys.ESCAPE)
         WebDriverWait(browser, PAUSE).until(staleness_of(dialog))
         assert browser.switch_to.active_element == button
+
+
+@pytest.mark.parametrize("stage", ["inverse", "trajectory"])
+def test_one_target_or_path_is_shown_at_a_time_and_the_address_keeps_which(browser, small_study, stage):
+    address = (small_study.folder / f"reports/er3a_c60/{stage}.html").as_uri()
+    browser.get(address)
+    names = browser.execute_script("return [...document.querySelectorAll('[data-one-of] h2')].map(h => h.id)")
+    assert browser.execute_script(SHOWN_PARTS) == names[:1]
+    chooser = browser.find_element(By.CSS_SELECTOR, ".pickers select")
+    chooser.send_keys(Keys.ARROW_DOWN)
+    assert browser.execute_script(SHOWN_PARTS) == names[1:2]
+    assert browser.current_url.endswith(f"#{names[1]}")
+    browser.get("about:blank")
+    browser.get(f"{address}#{names[3]}")
+    assert browser.execute_script(SHOWN_PARTS) == names[3:4]
+    link = browser.find_element(By.CSS_SELECTOR, f'tbody a[href="#{names[2]}"]')
+    browser.execute_script("arguments[0].click()", link)
+    WebDriverWait(browser, PAUSE).until(lambda _: browser.execute_script(SHOWN_PARTS) == names[2:3])
+    height = browser.execute_script("return document.body.scrollHeight")
+    browser.execute_script("document.querySelector('.pickers input').click()")
+    assert browser.execute_script(SHOWN_PARTS) == names
+    assert browser.execute_script("return document.body.scrollHeight") > 1.5 * height
+
+
+SHOWN_PARTS = """
+const parts = [...document.querySelectorAll("[data-one-of] h2")].filter((heading) => heading.checkVisibility());
+return parts.map((heading) => heading.id);
+"""
+
+
+def test_a_filter_stays_in_the_address(browser, small_study):
+    browser.get((small_study.folder / "reports/er3a_c60/validation.html").as_uri())
+    field = next(
+        each for each in browser.find_elements(By.CSS_SELECTOR, ".tools input[type=search]") if each.is_displayed()
+    )
+    table = "arguments[0].closest('.tools').previousElementSibling"
+    shown = f"return [...{table}.querySelectorAll('tbody tr')].filter(row => !row.hidden).map(row => row.innerText)"
+    everything = browser.execute_script(shown, field)
+    browser.execute_script("arguments[0].value = 'alpha6'; arguments[0].dispatchEvent(new Event('input'))", field)
+    kept = browser.execute_script(shown, field)
+    assert 0 < len(kept) < len(everything)
+    address = browser.current_url
+    browser.get("about:blank")
+    browser.get(address)
+    field = next(
+        each for each in browser.find_elements(By.CSS_SELECTOR, ".tools input[type=search]") if each.is_displayed()
+    )
+    assert field.get_property("value") == "alpha6"
+    assert browser.execute_script(shown, field) == kept
+
+
+def test_joint_vectors_lead_to_the_teach_panel(browser, small_study):
+    reports = small_study.folder / "reports/er3a_c60"
+    counts = {}
+    for stage in ("inverse", "vision", "collision"):
+        browser.get((reports / f"{stage}.html").as_uri())
+        counts[stage] = browser.execute_script(
+            "return document.querySelectorAll('main a[href^=\"teach.html#q=\"]').length"
+        )
+    assert all(counts.values()), counts
+    browser.get((reports / "inverse.html").as_uri())
+    link = browser.find_element(By.CSS_SELECTOR, 'tbody a[href^="teach.html#q="]')
+    shown = [float(angle.replace("−", "-")) for angle in link.text.split(",")]
+    browser.get(link.get_attribute("href"))
+    taken = browser.execute_script(
+        "return [...document.querySelectorAll('.joint input[type=number]')].map(f => f.valueAsNumber)"
+    )
+    assert taken == pytest.approx(shown, abs=0.06)
 
 
 @pytest.mark.parametrize("page", ["compare.html", *STAGE_PAGES])
@@ -80,6 +149,7 @@ def test_every_table_sorts_by_every_column(browser, small_study, page):
 
 
 SORT_ALL = """
+for (const part of document.querySelectorAll("[data-one-of] > [hidden]")) part.hidden = false;
 const columns = [];
 for (const table of document.querySelectorAll("table")) {
   [...table.querySelectorAll(".sort")].forEach((control, column) => {

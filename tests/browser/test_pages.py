@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import base64
+import re
+
 import pytest
 from axe_core_python.selenium import Axe
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select
 
 from er3a.files.robot_library import load_robot
+from er3a.pipeline.viewing.index import FIRST
 from testing import chromium
 from tests.browser.pages import OVER_ALL, PAGES
+from tests.conftest import ROBOTS
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -46,9 +51,45 @@ def serious_faults(browser, **options) -> list[tuple[str, list[str]]]:
 @pytest.mark.long
 def test_index_leads_to_every_page(browser, small_study):
     browser.get((small_study.folder / "reports/index.html").as_uri())
-    links = browser.execute_script("return [...document.querySelectorAll('tbody a')].map(a => a.href)")
+    links = browser.execute_script("return [...document.querySelectorAll('.cells a, .panel-link a')].map(a => a.href)")
     found = {link.rsplit("/", 2)[-2] + "/" + link.rsplit("/", 1)[-1] for link in links}
     assert found == set(PAGES) - set(OVER_ALL)
+
+
+def test_index_cells_are_links_as_a_whole_and_what_is_open_stands_first(browser, small_study):
+    browser.get((small_study.folder / "reports/index.html").as_uri())
+    for width in (390, 1440, 2560):
+        with chromium.emulating(browser, width):
+            assert browser.execute_script(CELLS_THAT_ARE_NO_LINK) == []
+    orders = browser.execute_script(STATUSES)
+    assert len(orders) == len(ROBOTS)
+    assert all(order == sorted(order, key=FIRST.index) for order in orders)
+    drawn = browser.execute_script(
+        "return [...document.querySelectorAll('.thumbnail polyline')].map(l => l.getBBox().height)"
+    )
+    assert len(drawn) >= 2 * len(ROBOTS)
+    assert max(drawn) > 100
+
+
+# In a corner of each cell, far from its words, the page's topmost element is the cell's link.
+CELLS_THAT_ARE_NO_LINK = """
+return [...document.querySelectorAll(".cells > li")].filter((cell) => {
+  cell.scrollIntoView({ block: "center" });
+  const box = cell.getBoundingClientRect();
+  const hit = document.elementFromPoint(box.right - 4, box.bottom - 4);
+  return hit?.tagName !== "A" || !cell.contains(hit);
+}).map((cell) => cell.innerText);
+"""
+STATUSES = """
+const statuses = (cells) => [...cells.querySelectorAll(".badge")].map((badge) => badge.classList[1]);
+return [...document.querySelectorAll(".cells")].map(statuses);
+"""
+
+
+def test_index_prints_on_one_sheet(browser, small_study):
+    browser.get((small_study.folder / "reports/index.html").as_uri())
+    pdf = base64.b64decode(browser.execute_cdp_cmd("Page.printToPDF", {"preferCSSPageSize": True})["data"])
+    assert len(re.findall(rb"/Type ?/Page\b", pdf)) == 1
 
 
 @pytest.mark.long
@@ -76,6 +117,11 @@ def test_comparison_shows_the_pair_that_is_picked(browser, small_study):
     assert [float(text) for text in cells("J1 d")[:2]] == [round(robot.d[0] * 1000, 6) for robot in robots]
     assert shown() == ["er3a_c60", "er3_600"]
     browser.find_element(By.ID, "only-differences").click()
+    address = browser.current_url
+    assert address.endswith("#a=er3a_c60&b=er3_600&differs")
+    browser.get("about:blank")
+    browser.get(address)
+    assert shown() == ["er3a_c60", "er3_600"]
     rows = [row for row in browser.find_elements(By.CSS_SELECTOR, "#comparison tbody tr") if row.is_displayed()]
     assert rows
     assert all(row.find_elements(By.TAG_NAME, "td")[5].text for row in rows)

@@ -87,6 +87,43 @@ def test_agrees_with_python_on_random_poses(page, name, random):
         assert [slot["gap"] for slot in solved["unsolved"]] == pytest.approx(gap[n][missing], abs=AGREE)
 
 
+FRAMES = """
+const [data, q, done] = arguments;
+import("er3a/kinematics").then(({ constantLinks, frames, tableFrames }) =>
+  done(tableFrames(data.table, frames(data.table, constantLinks(data.table), q))));
+"""
+REACH = """
+const [data, q, T, done] = arguments;
+Promise.all([import("er3a/kinematics"), import("er3a/goal")]).then(([{ constantLinks }, { jointsFor }]) =>
+  done(jointsFor(data.table, constantLinks(data.table), null, T, q)));
+"""
+
+
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+def test_the_table_s_frames_are_those_of_forward_kinematics(page, convention, random):
+    robot = load_robot("er3a_c60").replace(convention=convention)
+    for q in joints_at_random(robot, random, 5):
+        found = page.execute_async_script(FRAMES, panel_data(robot, NEAR), q.tolist())
+        expected = [robot.base, *(forward(robot, q, frame=k) for k in range(1, 7))]
+        np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def test_iteration_reaches_poses_of_any_arm_and_stays_within_the_limits(page, random):
+    robot = make_arm(alpha=np.radians([-90, 5, -90, 90, -90, 0]))
+    starts = joints_at_random(robot, random, 20) * 0.5
+    goals = forward(robot, np.clip(starts + 0.3, robot.lower, robot.upper))
+    reached = 0
+    for start, T in zip(starts, goals):
+        found = page.execute_async_script(REACH, panel_data(robot, NEAR), start.tolist(), T.tolist())
+        if "q" in found:
+            q = np.array(found["q"])
+            assert ((q >= robot.lower) & (q <= robot.upper)).all()
+            for errors in pose_errors(forward(robot, q), T):
+                assert errors.max() < 1e-8
+            reached += 1
+    assert reached >= 18
+
+
 @given(robot=arms(), data=st.data())
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_any_table_of_the_class_is_solved(page, robot, data):

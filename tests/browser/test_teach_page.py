@@ -10,11 +10,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.ui import Select
 from selenium.webdriver.support.wait import WebDriverWait
 
+from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.pipeline.messages import language
@@ -22,6 +25,9 @@ from er3a.pipeline.messages.kinematics import BRANCHES
 from er3a.pipeline.study import load_study
 from er3a.pipeline.teach import panel as teach_page
 from er3a.pipeline.teach.words import WORDS
+from er3a.programs.read_program import read_program
+from er3a.programs.resolving import Resolver
+from er3a.programs.run_program import execute
 from testing.arms import make_arm, pose_errors
 
 pytestmark = pytest.mark.long
@@ -67,7 +73,9 @@ class Panel:
     def texts(self) -> list[str]:
         """All that the panel says, in writing or aloud."""
         return self.browser.execute_script(
-            """const walker = document.createTreeWalker(document.querySelector("main"), NodeFilter.SHOW_TEXT);
+            """for (const term of document.querySelectorAll(".term")) term.replaceWith(...term.childNodes);
+            document.querySelector("main").normalize();
+            const walker = document.createTreeWalker(document.querySelector("main"), NodeFilter.SHOW_TEXT);
             const texts = [...document.querySelectorAll("main [aria-label]")].map((e) => e.ariaLabel);
             while (walker.nextNode()) {
               if (walker.currentNode.parentNode.localName !== "script") texts.push(walker.currentNode.data.trim());
@@ -123,14 +131,14 @@ def test_keys_move_a_joint_and_stop_at_its_limits(panel):
 
 def test_typing_moves_a_joint_and_says_why_not(panel):
     field = panel.one("#joint-J3 input[type=number]")
-    field.send_keys(SELECT_ALL, "42.5")
+    field.send_keys(SELECT_ALL, "42.5", Keys.ENTER)
     assert panel.joints()[2] == pytest.approx(42.5)
     field.send_keys(SELECT_ALL, "106")
-    assert panel.joints()[2] == pytest.approx(10)
+    assert panel.joints()[2] == pytest.approx(42.5)
     assert panel.text("#message") == "J3 stays between −75.0° and 105.0°."
     assert field.get_attribute("aria-invalid") == "true"
     field.send_keys(Keys.TAB)
-    assert field.get_attribute("value") == "10"
+    assert field.get_attribute("value") == "42.5"
 
 
 def test_a_link_restores_the_joints(panel):
@@ -212,6 +220,86 @@ def test_every_solution_keeps_the_tool_in_place(panel):
     assert re.search(r"J3 at 138\.\d° is \d+\.\d° above its limit of 105°", outside.text)
     panel.browser.execute_script("arguments[0].click()", outside)
     assert panel.joints() == pytest.approx(start)
+    assert re.search(r"The arm stays where it is: .*J3 at 138\.\d° is \d+\.\d° above", panel.text("#refused"))
+
+
+def type_pose(panel, *values: float) -> None:
+    for field, value in zip(panel.browser.find_elements(By.CSS_SELECTOR, "#pose-form input"), values):
+        field.send_keys(SELECT_ALL, str(value))
+    panel.one("#pose-form button[type=submit]").click()
+
+
+def tool(panel) -> tuple[np.ndarray, np.ndarray]:
+    """Position (mm) and rotation of the tool by er3a's forward kinematics at the panel's joints."""
+    T = forward(load_robot("er3a_c60"), np.radians(panel.joints()))
+    return T[:3, 3] * 1000, T[:3, :3]
+
+
+def test_a_typed_pose_is_reached_or_refused_in_words(panel):
+    panel.move(10, 20, -10, 5, 30, 0)
+    type_pose(panel, 380, 120, 300, 180, -15, 30)
+    position, rotation = tool(panel)
+    np.testing.assert_allclose(position, [380, 120, 300], atol=1e-6)
+    turn = Rotation.from_euler("ZYX", [30, -15, 180], degrees=True).as_matrix()
+    np.testing.assert_allclose(rotation, turn, atol=1e-9)
+    reached = panel.joints()
+    type_pose(panel, 1800, 0, 300, 180, 0, 0)
+    assert panel.joints() == pytest.approx(reached)
+    assert re.search(r"The arm stays: the wrist centre would be .* too far from axis 2", panel.text("#pose-message"))
+    panel.one("#pose-form input").send_keys(SELECT_ALL, Keys.DELETE)
+    panel.one("#pose-form button[type=submit]").click()
+    assert "needs a number" in panel.text("#pose-message")
+
+
+@pytest.mark.parametrize("frame", ["base", "tool", "joints"])
+def test_jogging_moves_along_and_about_the_frame_s_axes(panel, frame):
+    panel.move(10, 20, -10, 5, 30, 0)
+    panel.browser.execute_script("document.querySelector(`input[value=${arguments[0]}]`).click()", frame)
+    for axis in range(6):
+        joints, (position, rotation) = np.array(panel.joints()), tool(panel)
+        panel.browser.execute_script(
+            "document.querySelector(`[data-jog='${arguments[0]}'][data-sign='+']`).click()", axis
+        )
+        moved, turned = tool(panel)
+        if frame == "joints":
+            np.testing.assert_allclose(np.array(panel.joints()) - joints, 5 * np.eye(6)[axis], atol=1e-9)
+            continue
+        along = 10 * np.eye(3)[axis] if axis < 3 else np.zeros(3)
+        about = Rotation.from_rotvec(np.radians(5) * np.eye(3)[axis - 3] if axis >= 3 else np.zeros(3)).as_matrix()
+        np.testing.assert_allclose(moved - position, along if frame == "base" else rotation @ along, atol=1e-6)
+        np.testing.assert_allclose(turned, about @ rotation if frame == "base" else rotation @ about, atol=1e-9)
+
+
+def test_way_points_become_a_path_file_and_a_program_that_er3a_reads(panel, tmp_path):
+    panel.browser.execute_script("localStorage.clear()")
+    panel.open()
+    assert not panel.one("#export-path").is_enabled()
+    kept = [(10, 20, -10, 5, 30, 0), (-30.5, 10, 20, 0, 45.123456, 90)]
+    for joints in kept:
+        panel.move(*joints)
+        panel.one("#save-point").click()
+    panel.move(0, 0, 0, 0, 0, 0)
+    panel.one("#points button").click()
+    assert panel.joints() == pytest.approx(kept[0])
+    texts = {}
+    for what in ("pathFile", "program"):
+        ask = "const [what, done] = arguments; import('er3a/panel').then((panel) => done(panel.points[what]()))"
+        texts[what] = panel.browser.execute_async_script(ask, what)
+    robot = load_robot("er3a_c60")
+    (tmp_path / "taught.yaml").write_text(texts["pathFile"], encoding="utf-8")
+    (path,) = load_paths(tmp_path / "taught.yaml").paths
+    np.testing.assert_allclose(path.points_deg, kept, atol=1e-8)
+    (tmp_path / "taught.pgm").write_text(texts["program"], encoding="utf-8")
+    execution = execute(read_program(tmp_path / "taught.pgm"), robot)
+    assert {found.code for found in execution.program.findings} <= {"program_data_file_missing"}
+    assert execution.complete
+    resolver = Resolver(robot, None)
+    found = [resolver.ready(motion).joints for motion in execution.listing().motions]
+    np.testing.assert_allclose(np.degrees(found), kept, atol=1e-5)
+    panel.open()
+    assert len(panel.browser.find_elements(By.CSS_SELECTOR, "#points li")) == 2
+    panel.one("#clear-points").click()
+    assert panel.clean()
 
 
 @pytest.mark.parametrize(
@@ -292,3 +380,15 @@ def test_the_chinese_panel_says_why_an_arm_has_no_solutions(browser, folder, chi
     panel = Panel(browser, folder / "chinese_offset_wrist.html").open("#q=10,20,30,40,50,60")
     assert "因为轴 4、5、6 不交于一点，相差 10 mm" in panel.text(".solutions")
     assert english(panel.texts()) == set()
+
+
+def test_the_table_is_shown_row_by_row_on_the_arm(panel):
+    panel.move(0, 0, 12, 0, 0, 0)
+    chooser = Select(panel.one("#frames"))
+    assert len(chooser.options) == 8
+    chooser.select_by_value("3")
+    panel.until(lambda: panel.text("#row"))
+    assert panel.text("#row").startswith("Row 3: turn by θ = −12.0° about z, go 0.00 mm along z and 70.00 mm along")
+    chooser.select_by_value("all")
+    panel.until(lambda: panel.text("#row") == "")
+    assert panel.clean()

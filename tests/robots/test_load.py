@@ -302,10 +302,10 @@ def test_a_key_written_twice_is_refused_with_its_line(write):
     line = text.splitlines().index("title: EFORT ER3-600") + 2
     error = refusal(write(text.replace("title: EFORT ER3-600\n", "title: EFORT ER3-600\ntitle: again\n")))
     assert error.field == f"line {line}, column 1"
-    assert "the key 'title' stands here twice" in error.problem
+    assert "the key 'title' is given twice" in error.problem
     row = "{joint: 2, a_mm: 295, alpha_deg: 0, d_mm: 0}"
     error = refusal(write(text.replace(row, row.replace("d_mm: 0", "a_mm: 37"))))
-    assert "the key 'a_mm' stands here twice" in error.problem
+    assert "the key 'a_mm' is given twice" in error.problem
 
 
 @pytest.mark.parametrize("text", ["0295", "1:30", "0x127", "1_000"])

@@ -368,9 +368,9 @@ def test_page_and_recording_show_every_target(folders, tmp_path):
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     targets = read_results(folders[name], RESULTS).results.summary.targets
     for target in targets:
-        assert f'<section id="{target.name}">' in page
+        assert f'<h2 id="{target.name}">' in page
     assert page.count("data:image/svg+xml") == len(targets) + 2
-    assert "nan" not in page.split("<main>")[1].split("data:image")[0]
+    assert "nan" not in page.split("<main")[1].split("data:image")[0]
     run.show("record", "inverse", make_study(), name, folders[name], tmp_path / "inverse.rrd")
     rerun = Path(sys.executable).with_name("rerun")
     shown = subprocess.run(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from typer.testing import CliRunner
 
 from er3a.errors import ResultError
 from er3a.pipeline.cli import app
-from er3a.pipeline.results import Verdict, write_checksums
+from er3a.pipeline.results import Verdict, read_stage, write_checksums
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import load_study
 from er3a.pipeline.viewing.diff import changes, write_diff
@@ -88,3 +89,20 @@ def test_other_bytes_and_a_stage_on_one_side_are_named(folders, tmp_path):
 def test_a_folder_without_results_is_one_error(folders, tmp_path):
     with pytest.raises(ResultError, match="holds no results"):
         changes(folders[0], tmp_path / "nothing")
+
+
+@pytest.mark.long
+def test_a_border_that_moved_is_told_by_how_far(small_study, tmp_path):
+    folders = tmp_path / "old", tmp_path / "new"
+    for folder in folders:
+        shutil.copytree(small_study.folder / "results/er3_600/workspace", folder / "er3_600/workspace")
+    assert changes(*folders) == []
+    new = folders[1] / "er3_600/workspace"
+    border = read_stage(new, STAGES["workspace"]).results.border
+    flange = (border.point == "tool_point") & (border.view == "section")
+    replace(border, z_m=border.z_m + 0.005 * flange).write(new / "border.parquet")
+    write_checksums(new)
+    found = {change.what: change.difference for change in changes(*folders)}
+    assert set(found) == {"border.parquet", "border of the tool point, section"}
+    moved = float(found["border of the tool point, section"].split(" mm")[0])
+    assert 4.9 < moved <= 5.0

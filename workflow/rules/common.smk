@@ -8,7 +8,8 @@ from snakemake.dag import PeriodicityDetector
 from er3a.pipeline.code_digest import code_digest
 from er3a.errors import Er3aError
 from er3a.files.shipped import view_command
-from er3a.pipeline.messages.language import catalogue_file
+from er3a.pipeline.messages import captions, language
+from er3a.pipeline.messages.language import catalogue_file, tr
 from er3a.pipeline.stages.registry import STAGES, all_messages
 from er3a.pipeline.study import load_study
 
@@ -31,7 +32,17 @@ ROBOTS = STUDY.names
 
 # Pages depend on the words of their language, results and recordings don't.
 LANGUAGE = STUDY.report.language
+language.use(LANGUAGE, STUDY.own_titles())
 CATALOGUE = [] if LANGUAGE == "en" else os.path.relpath(catalogue_file(LANGUAGE))
+
+
+# Snakemake's own report: its text, and what it calls pages and robots. The text of its first page has no params.
+config["description"] = captions.of_study()
+
+
+def titled(robot):
+    """A robot's title in the language of the pages."""
+    return language.own_title(STUDY.robot(robot).title)
 
 
 # Snakemake takes a name that repeats one part twenty times for a rule that feeds itself for ever. Robots and stages are

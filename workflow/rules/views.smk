@@ -30,7 +30,7 @@ rule report:
             "reports/{robot}/{stage}.html",
             caption="../report/stage.rst",
             category="{robot}",
-            labels={"page": "{stage}"},
+            labels=lambda wildcards: {tr(captions.PAGE): tr(STAGES[wildcards.stage].title)},
         ),
     log:
         "logs/{robot}/{stage}.report.log",
@@ -40,6 +40,7 @@ rule report:
         "../envs/er3a.yaml"
     params:
         language=LANGUAGE,
+        caption=lambda wildcards: captions.of_stage(titled(wildcards.robot), STAGES[wildcards.stage].question),
         code=lambda wildcards: code_of(wildcards.stage, "report"),
     message:
         "{wildcards.robot}: report {wildcards.stage}"
@@ -56,7 +57,7 @@ rule teach:
             "reports/{robot}/teach.html",
             caption="../report/teach.rst",
             category="{robot}",
-            labels={"page": "teach panel"},
+            labels={tr(captions.PAGE): tr(captions.TEACH_PANEL)},
         ),
     log:
         "logs/{robot}/teach.log",
@@ -66,6 +67,7 @@ rule teach:
         "../envs/er3a.yaml"
     params:
         language=LANGUAGE,
+        caption=lambda wildcards: captions.of_teach_panel(titled(wildcards.robot)),
         settings=settings("trajectory"),
         code=code_digest("er3a.pipeline.teach.panel"),
     message:
@@ -84,14 +86,14 @@ rule index:
         report(
             "reports/index.html",
             caption="../report/index.rst",
-            category="all robots",
-            labels={"page": "index"},
+            category=tr(captions.ALL_ROBOTS),
+            labels={tr(captions.PAGE): tr(captions.INDEX)},
         ),
         report(
             "reports/compare.html",
             caption="../report/compare.rst",
-            category="all robots",
-            labels={"page": "two robots side by side"},
+            category=tr(captions.ALL_ROBOTS),
+            labels={tr(captions.PAGE): tr(captions.COMPARISON)},
         ),
         "reports/junit.xml",
     log:
@@ -102,6 +104,7 @@ rule index:
         "../envs/er3a.yaml"
     params:
         language=LANGUAGE,
+        captions=[captions.of_index(), captions.of_comparison()],
         expected={name: STUDY.entry(name).expect for name in STUDY.robots},
         code=code_digest("er3a.pipeline.viewing.index", *all_messages()),
     message:

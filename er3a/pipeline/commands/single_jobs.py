@@ -110,7 +110,7 @@ def report(
 
 @app.command(rich_help_panel=JOBS)
 def teach(robot: RobotName, study: StudyFile = DEFAULT_STUDY, reports: Reports = DEFAULT_REPORTS):
-    """Write a robot's teach panel: sliders, the arm in 3-D, its pose and all ways to it, in one page."""
+    """Write a robot's teach panel: sliders, the arm in 3-D, its pose and all IK solutions of it, in one page."""
     from er3a.pipeline.checksums import write_checksum
     from er3a.pipeline.teach.panel import write_teach_page
 

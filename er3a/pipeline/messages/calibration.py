@@ -112,7 +112,7 @@ def _(found: Misfit) -> str:
 def _(found: CorrectionsFound) -> str:
     return sentence(
         found.code,
-        "The positions ask for corrections of {entries}, beyond their 95 % intervals.",
+        "The positions indicate corrections of {entries}, beyond their 95 % intervals.",
         entries=joined(found.entries, ", "),
     )
 
@@ -121,8 +121,8 @@ def _(found: CorrectionsFound) -> str:
 def _(found: NoCorrectionFound) -> str:
     return counted(
         found.code,
-        "The positions ask for no correction: the interval (95 %) holds 0.",
-        "The positions ask for no correction: all {count} intervals (95 %) hold 0.",
+        "The positions indicate no correction: the interval (95 %) holds 0.",
+        "The positions indicate no correction: all {count} intervals (95 %) hold 0.",
         found.intervals,
     )
 

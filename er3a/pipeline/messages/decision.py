@@ -17,4 +17,4 @@ def decision(table: str, failed: Sequence[str]) -> str:
         return tr("Use it: what moves the tool is settled, and nothing here fails.")
     if table == "caution":
         return tr("Use it with care: nothing contradicts its table, but part of it is not settled.")
-    return tr("Nothing tells whether its table is right: check it before you use it.")
+    return tr("There is no evidence on its table: check it before you use it.")

@@ -76,7 +76,7 @@ def _(found: NoData) -> str:
     needs: list[Need] = [each.what for each in found.needs if each.what in ("masses", "peak", "load")]
     return sentence(
         found.code,
-        "No data: without masses there are no torques to tell. Needed: {needs}.",
+        "No data: torques need masses. Needed: {needs}.",
         needs=joined(map(need_word, needs), ", "),
     )
 
@@ -87,7 +87,7 @@ def _(found: NoLimits) -> str:
     if found.path:
         greatest = sentence(
             found.code,
-            "No drive's limits are known, so nothing tells whether the motors bear this. The greatest torque is "
+            "No drive's limits are known, so the motors can't be judged. The greatest torque is "
             "{torque:.3g} ± {tolerance:.2g} {unit}, at J{joint} on path {path}.",
             path=found.path,
             **parts,
@@ -95,7 +95,7 @@ def _(found: NoLimits) -> str:
     else:
         greatest = sentence(
             found.code,
-            "No drive's limits are known, so nothing tells whether the motors bear this. The greatest holding torque "
+            "No drive's limits are known, so the motors can't be judged. The greatest holding torque "
             "is {torque:.3g} ± {tolerance:.2g} {unit}, at J{joint}.",
             **parts,
         )

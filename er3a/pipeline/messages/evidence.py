@@ -24,8 +24,8 @@ STATUS_MEANINGS = {
     "settled": N_("independent documents leave open less than moves the tool by the tolerance"),
     "weak": N_("independent documents react to it, but leave more than the tolerance open"),
     "contradicted": N_("the evidence excludes the value"),
-    "consistent": N_("only the document that it was taken from speaks of it"),
-    "open": N_("nothing tells it from another value that moves the tool"),
+    "consistent": N_("no document but its own source covers it"),
+    "open": N_("no document distinguishes it from another value that moves the tool"),
     "gauge": N_("alone it means nothing: changed together with others it describes the same robot"),
     "given": N_("chosen by who writes the file"),
 }

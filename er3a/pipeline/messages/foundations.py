@@ -8,10 +8,10 @@ from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.say import word
 
 FOUNDATIONS: Mapping[str, str] = {
-    "fail": N_("Validation contradicts this table: what stands here is true of the table, not of the robot."),
-    "caution": N_("Validation leaves part of this table open: what stands here holds only as far as the table does."),
-    "no_reference": N_("Nothing was compared with this table: what stands here holds only as far as the table does."),
-    "not_computed": N_("This table was not validated: what stands here holds only as far as the table does."),
+    "fail": N_("Validation contradicts this table: these results are true of the table, not of the robot."),
+    "caution": N_("Validation leaves part of this table open: these results hold only as far as the table does."),
+    "no_reference": N_("Nothing was compared with this table: these results hold only as far as the table does."),
+    "not_computed": N_("This table was not validated: these results hold only as far as the table does."),
 }
 
 

@@ -9,8 +9,7 @@ from er3a.pipeline.stages.programs.model import ProgramSummary
 from er3a.programs.syntax import Language
 
 FIGURES = {
-    "programs": N_("Programs checked"),
-    "instructions": N_("Motion instructions"),
+    "programs_passed": N_("Programs that pass"),
     "instructions_passed": N_("Motion instructions that pass"),
     "instructions_caution": N_("Motion instructions with caution"),
     "instructions_failed": N_("Motion instructions that fail"),

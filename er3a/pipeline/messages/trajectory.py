@@ -21,14 +21,13 @@ from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.intervals import RateCause
 
 FIGURES = {
-    "paths": N_("Paths planned"),
     "safe": N_("Paths safe as they are"),
     "singular_poses": N_("Singular poses met"),
     "near_passes": N_("Near passes"),
     "colliding": N_("Paths with a collision, whatever else is wrong"),
     "max_joint_speed": N_("Speed of the joint nearest to its limit"),
-    "assumed_speed_ratio": N_("Share of that joint's assumed limit"),
-    "speed_ratio": N_("Share of that joint's limit"),
+    "assumed_speed_ratio": N_("Ratio to that joint's assumed limit"),
+    "speed_ratio": N_("Ratio to that joint's limit"),
     "velocity_check": N_("Velocity check, greatest error"),
     "characteristic_length": N_("Characteristic length of the Jacobian"),
 }
@@ -117,7 +116,7 @@ def _apart_from_collisions(path: PathSummary) -> str:
             return sentence("path.no_fault", "no fault")
         return sentence(
             "path.harmless",
-            "passes singular poses ({places}), which a joint move does without harm",
+            "passes singular poses ({places}); joint moves are unaffected by singularities",
             places=joined(met),
         )
     if met or path.jumps:
@@ -190,9 +189,9 @@ def advice(path: PathSummary) -> str | None:
     if len(path.avoidance) == 1:
         (only,) = path.avoidance
         if only.name == "planned":
-            return sentence("advice.no_way", "There is no way around: {reason}", reason=reasons(only))
+            return sentence("advice.no_way", "No avoidance strategy works: {reason}", reason=reasons(only))
         parts = {"way": word("advice", ADVICE, only.name), "reason": reasons(only)}
-        return sentence("advice.only", "{way}, as the study asks for, does not repair it: {reason}", **parts)
+        return sentence("advice.only", "{way}, as the study requires, does not repair it: {reason}", **parts)
     return sentence("advice.none", "No avoidance strategy completes this path: {why}", why=why)
 
 

@@ -101,8 +101,7 @@ def _how_far_off(found: LeftOpen) -> list[str]:
         told.append(
             sentence(
                 found.code,
-                "Of {count} entries that move the tool only the document that they were taken from speaks: if it is "
-                "wrong, there is no bound.",
+                "{count} entries that move the tool rest on their own source alone: if it is wrong, there is no bound.",
                 count=found.unbounded,
             )
         )
@@ -111,7 +110,7 @@ def _how_far_off(found: LeftOpen) -> list[str]:
 
 def _what_speaks(counts: CheckCounts) -> str:
     if not counts.independent.total:
-        text = N_("No independent document speaks of this table ({checks}).")
+        text = N_("No independent document covers this table ({checks}).")
     else:
         text = N_("Nothing independent contradicts the table ({checks}), but:")
     return sentence("validation.left_open", text, checks=counted_checks(counts))

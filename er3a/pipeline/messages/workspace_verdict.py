@@ -17,9 +17,7 @@ from er3a.workspace.causes import VoidCause
 
 @say.register
 def _(found: Flat) -> str:
-    return sentence(
-        found.code, "The tool point moves on a plane, a line or not at all, so there is no volume to speak of."
-    )
+    return sentence(found.code, "The tool point moves on a plane, a line or not at all, so there is no volume.")
 
 
 @say.register

@@ -203,6 +203,9 @@ for (const link of document.querySelectorAll("[data-t]")) {
   });
 }
 addEventListener("resize", refresh);
+const show = (name) => motions.has(name) && goTo(name, motions.get(name).times[0]);
+addEventListener("chosen", ({ detail }) => show(detail));
+show(decodeURIComponent(location.hash.slice(1)));
 part("controls").hidden = false;
 refresh();
 performance.mark("player");

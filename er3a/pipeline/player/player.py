@@ -140,10 +140,15 @@ def _data(robot: Robot, motions: Sequence[PlayedMotion], scene: Scene | None, wo
         "colours": {"joints": JOINTS, "link": LINK, "body": BODY, "mark": INK, **COLOURS},
         "axes": AXES,
         "floor": max(floors) if floors else None,
-        "scene": [_solid(solid) for solid in solids if not isinstance(solid, Plane)],
+        "scene": scene_data(scene),
         "motions": [_motion(robot, motion) for motion in motions],
         "words": words,
     }
+
+
+def scene_data(scene: Scene | None) -> list[dict[str, Any]]:
+    """A scene's solids as the drawing code takes them; planes are left out."""
+    return [_solid(solid) for solid in scene.solids if not isinstance(solid, Plane)] if scene else []
 
 
 def _solid(solid: Box | Cylinder | Sphere | Mesh) -> dict[str, Any]:

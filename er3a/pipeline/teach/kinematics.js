@@ -55,7 +55,7 @@ export function frames(table, links, q) {
 }
 
 /** Columns of the geometric Jacobian at the tool point, base frame: linear part (m/rad), then angular (rad/rad) [2]. */
-function jacobian(table, T) {
+export function jacobian(table, T) {
   const tool = column(T[6], 3);
   return JOINTS.map((k) => {
     const axis = scaled(column(T[k], 2), table.direction[k]);
@@ -93,6 +93,16 @@ export function determinantFactors(T, wristInTool) {
 
 function angleShortOfLine(a, b, axis) {
   return Math.atan2(dot(axis, cross(a, b)), Math.abs(dot(a, b) - dot(a, axis) * dot(b, axis)));
+}
+
+/** The table's own frames, 0 (base) to 6: those in which its rows are written; `T` are the joints' frames of `frames`. */
+export function tableFrames(table, T) {
+  const parts = linkParts(table);
+  const rows = JOINTS.map((k) => {
+    const moved = multiply(T[k], parts[k + 1].along);
+    return table.convention === "standard" ? multiply(moved, parts[k + 1].across) : moved;
+  });
+  return [table.base, ...rows];
 }
 
 /** A length (m) to scale drawings with: the sum of all link lengths and the tool's. */

@@ -3,8 +3,9 @@
 import { closedForm } from "er3a/inverse";
 import { constantLinks, frames, JOINTS } from "er3a/kinematics";
 import { showMeasures, showPose, write } from "er3a/readouts";
-import { SolutionList } from "er3a/solutions";
+import { SolutionList, whyNot } from "er3a/solutions";
 import { fill, fixed, inDegrees, plainDegrees, toDegrees, toRadians } from "er3a/text";
+import { addTasks } from "er3a/tasks";
 import { ArmView } from "er3a/view";
 
 const LIST_PAUSE = 120; // ms between two lists of solutions while the arm moves
@@ -90,6 +91,8 @@ function moveJoint(k, angle) {
 
 const KEYS = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 };
 
+let before = 0; // angle of the joint whose field has the focus, when it got that or last took Enter
+
 for (const k of JOINTS) {
   sliders[k].addEventListener("input", () => moveJoint(k, toRadians(Number(sliders[k].value))));
   sliders[k].addEventListener("keydown", (event) => {
@@ -103,9 +106,10 @@ for (const k of JOINTS) {
     const angle = toRadians(fields[k].valueAsNumber);
     const reason = refusal(k, angle);
     fields[k].setAttribute("aria-invalid", String(reason !== ""));
-    if (reason === "") moveJoint(k, angle);
-    else write(byId("message"), reason);
+    moveJoint(k, reason === "" ? angle : before); // what is refused leaves no trace of its first digits
+    if (reason !== "") write(byId("message"), reason);
   });
+  for (const event of ["focus", "change"]) fields[k].addEventListener(event, () => (before = q[k]));
   fields[k].addEventListener("blur", () => {
     fields[k].setAttribute("aria-invalid", "false");
     showJoint(k);
@@ -120,6 +124,7 @@ for (const button of document.querySelectorAll("[data-view]")) {
 }
 byId("zoom-in").addEventListener("click", () => view.zoom(1 / 1.25));
 byId("zoom-out").addEventListener("click", () => view.zoom(1.25));
+byId("frames").addEventListener("change", refresh);
 for (const choice of document.querySelectorAll("input[name=orientation]")) {
   choice.addEventListener("change", refresh);
 }
@@ -147,6 +152,20 @@ function takeLink() {
   else moveTo(angles);
 }
 
+/** Numbers of the table's frames that are asked for; writes the row between two of them. */
+function showRow() {
+  const chosen = byId("frames").value;
+  const k = Number(chosen) - 1;
+  if (chosen === "" || chosen === "all") {
+    write(byId("row"), "");
+    return chosen === "" ? [] : [0, 1, 2, 3, 4, 5, 6];
+  }
+  const theta = inDegrees(table.direction[k] * q[k] + table.offset[k]);
+  const values = { row: k + 1, theta, d: fixed(1000 * table.d[k], 2), a: fixed(1000 * table.a[k], 2), alpha: inDegrees(table.alpha[k], 2) };
+  write(byId("row"), fill(words.row[table.convention], values));
+  return [k, k + 1];
+}
+
 /** Has the next frame show the arm as it then is. */
 function refresh() {
   if (!awaited) requestAnimationFrame(frame);
@@ -156,7 +175,7 @@ function refresh() {
 function frame(now) {
   awaited = false;
   const T = frames(table, links, q);
-  view.show(q, ghost);
+  view.show(q, ghost, showRow());
   showPose(T[6]);
   showMeasures(data, arm, T);
   if (listed) return;
@@ -168,6 +187,10 @@ function frame(now) {
     refresh();
   }
 }
+
+export const points = addTasks(data, links, arm, {
+  joints, moveTo, refusal, tool: () => frames(table, links, q)[6], why: (found) => whyNot(data, found),
+});
 
 for (const k of JOINTS) showJoint(k);
 takeLink();

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from er3a.files.scene_file import load_scene
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.singularity import characteristic_length
 from er3a.kinematics.wrist_partitioned import closed_form_missing
@@ -14,6 +15,7 @@ from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import say
+from er3a.pipeline.player.player import scene_data
 from er3a.pipeline.results import Provenance, input_records
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.study import Study
@@ -21,11 +23,11 @@ from er3a.pipeline.teach.scripts import import_map
 from er3a.pipeline.teach.words import WORDS
 from er3a.pipeline.viewing.page import render, run_command
 from er3a.pipeline.viewing.palette import BODY, INK, JOINT_NAMES, LINK, SIX_JOINTS
+from er3a.pipeline.viewing.panel_link import has_panel
 from er3a.robots.robot import Robot
 
 _HERE = Path(__file__).parent
 TABLE = ("a", "alpha", "d", "beta", "direction", "offset", "lower", "upper", "base", "tool")
-SIX = 6
 NEAR_LIMIT = np.radians(5.0)
 NEAR_SINGULAR = 1e-2  # smallest singular value below which an arm without named singularities is warned of one
 
@@ -33,7 +35,7 @@ NEAR_SINGULAR = 1e-2  # smallest singular value below which an arm without named
 def write_teach_page(study: Study, name: str, output: Path) -> None:
     """Write the teach panel of a robot of the study to ``output``."""
     robot = study.robot(name)
-    if robot.joints != SIX or robot.rows != SIX or robot.sliding.any() or robot.coupling is not None:
+    if not has_panel(robot):
         render(
             _HERE / "teach_absent.html.j2",
             output,
@@ -50,7 +52,8 @@ def write_teach_page(study: Study, name: str, output: Path) -> None:
         "elbow": np.radians(settings.near_elbow_deg),
         "shoulder": settings.near_shoulder_mm / 1000,
     }
-    panel = panel_data(robot, near)
+    scene = study.scene(name, "trajectory")
+    panel = panel_data(robot, near) | {"scene": scene_data(load_scene(scene) if scene else None)}
     render(
         _HERE / "teach.html.j2",
         output,

@@ -78,20 +78,13 @@ export class SolutionList {
 
   #missing({ slot, fault, gap }) {
     const { words, branch_labels: labels } = this.data;
-    const amount = fault === "orientation" ? inDegrees(gap) : inMillimetres(gap);
-    const reason = fill(words.missing, { reason: fill(words.faults[fault], { gap: amount }) });
+    const reason = fill(words.missing, { reason: faultWords(words, fault, gap) });
     return element("li", "branch missing", "", [element("b", "", labels[slot]), element("span", "row-verdict", reason)]);
   }
 
   #verdict(row) {
-    const { words, table, joint_names: names } = this.data;
-    if (row.withinLimits) return words.within;
-    const reasons = excesses(table, row.q).map(({ joint, angle, excess, above, limit }) =>
-      fill(words[above ? "above" : "below"], {
-        joint: names[joint], angle: inDegrees(angle), excess: inDegrees(excess), limit: inDegrees(limit, 0),
-      }),
-    );
-    return fill(words.leaves, { reasons: reasons.join(words.separator) });
+    const { words } = this.data;
+    return row.withinLimits ? words.within : fill(words.leaves, { reasons: beyondLimits(this.data, row.q) });
   }
 
   #button(row, parts) {
@@ -99,7 +92,10 @@ export class SolutionList {
     button.type = "button";
     button.dataset.row = this.rows.indexOf(row);
     button.setAttribute("aria-disabled", String(!row.withinLimits));
-    button.addEventListener("click", () => row.withinLimits && this.choose(row.q));
+    button.addEventListener("click", () => {
+      if (row.withinLimits) this.choose(row.q);
+      write(byId("refused"), row.withinLimits ? "" : fill(this.data.words.not_moved, { reasons: beyondLimits(this.data, row.q) }));
+    });
     for (const event of ["pointerenter", "focus"]) button.addEventListener(event, () => this.ghost(row.q));
     for (const event of ["pointerleave", "blur"]) button.addEventListener(event, () => this.ghost(null));
     this.buttons.push(button);
@@ -111,6 +107,25 @@ export class SolutionList {
     const at = order.indexOf(this.current);
     this.choose(this.rows[order[(at + by + order.length) % order.length]].q);
   }
+}
+
+/** Which joints leave their limits, and by how much. */
+function beyondLimits({ words, table, joint_names: names }, q) {
+  const reasons = excesses(table, q).map(({ joint, angle, excess, above, limit }) =>
+    fill(words[above ? "above" : "below"], {
+      joint: names[joint], angle: inDegrees(angle), excess: inDegrees(excess), limit: inDegrees(limit, 0),
+    }),
+  );
+  return reasons.join(words.separator);
+}
+
+const faultWords = (words, fault, gap) =>
+  fill(words.faults[fault], { gap: fault === "orientation" ? inDegrees(gap) : inMillimetres(gap) });
+
+/** Why the arm can't take a pose, from what was found instead of joints. */
+export function whyNot(data, { row, branch }) {
+  if (row) return beyondLimits(data, row.q);
+  return branch ? faultWords(data.words, branch.fault, branch.gap) : data.words.not_found;
 }
 
 const signed = (angle) => `${angle > 0 ? "+" : ""}${inDegrees(angle, 0)}`;

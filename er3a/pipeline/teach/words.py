@@ -25,6 +25,20 @@ WORDS: dict[str, Any] = {
     ),
     "view_help": N_("Drag to turn the view. With the picture in focus the wheel and the plus and minus keys zoom."),
     "views": {"overview": N_("Overview"), "side": N_("Side"), "front": N_("Front"), "top": N_("Top")},
+    "frames": N_("Frames of the table"),
+    "frames_none": N_("none"),
+    "frames_all": N_("all"),
+    "frames_row": N_("row {row}"),
+    "row": {
+        "standard": N_(
+            "Row {row}: turn by θ = {theta} about z, go {d} mm along z and {a} mm along the new x, turn by α = {alpha} "
+            "about it."
+        ),
+        "modified": N_(
+            "Row {row}: go {a} mm along x, turn by α = {alpha} about it, turn by θ = {theta} about the new z, go {d} "
+            "mm along it."
+        ),
+    },
     "zoom_in": N_("Closer"),
     "zoom_out": N_("Farther"),
     "joints": N_("Joints"),
@@ -46,6 +60,44 @@ WORDS: dict[str, Any] = {
     "not_copied": N_("This browser lets no page copy; take it from here: {text}"),
     "bad_link": N_("The link's joints were not taken: {reason}"),
     "bad_count": N_("it names {count} numbers where six are needed."),
+    "jog": N_("Jog"),
+    "jog_help": N_(
+        "Along and about the axes of the base or of the tool, the tool point at rest while it turns, or joint by joint."
+    ),
+    "jog_frame": N_("Frame"),
+    "jog_frames": {"base": N_("base"), "tool": N_("tool"), "joints": N_("joints")},
+    "jog_axes": ["X", "Y", "Z", "RX", "RY", "RZ"],
+    "jog_mm": N_("step in mm"),
+    "jog_deg": N_("step in degrees"),
+    "jog_step": N_("A step needs a number above 0."),
+    "typed_pose": N_("Go to a pose"),
+    "pose_fields": [
+        N_("x in mm"),
+        N_("y in mm"),
+        N_("z in mm"),
+        N_("roll in degrees"),
+        N_("pitch in degrees"),
+        N_("yaw in degrees"),
+    ],
+    "pose_go": N_("Go there"),
+    "pose_take": N_("Take the present pose"),
+    "pose_number": N_("“{field}” needs a number."),
+    "not_reached": N_("The arm stays: {reason}."),
+    "not_found": N_(
+        "iteration from here found no joint angles within the limits, which does not prove that there are none"
+    ),
+    "points": N_("Way points"),
+    "points_help": N_(
+        "Saved points become a path file (joint moves that stop at each point) or a program in RPL at a tenth of full "
+        "speed. Nothing here checks the way between them: er3a check and the trajectory stage do, and er3a "
+        "check-program."
+    ),
+    "save_point": N_("Save this point"),
+    "export_path": N_("Export path file"),
+    "export_program": N_("Export program"),
+    "clear_points": N_("Remove all"),
+    "go_to_point": N_("go to point {number}"),
+    "remove_point": N_("remove point {number}"),
     "pose": N_("Tool pose"),
     "pose_help": N_("Of the tool's frame in the base frame."),
     "position": N_("Position"),
@@ -94,7 +146,7 @@ WORDS: dict[str, Any] = {
     },
     "near_unnamed": N_("Near a singularity: the smallest singular value is {value}."),
     "unnamed": N_("The kinds of singularity of this arm have no names here, because {reason}."),
-    "solutions": N_("All ways to this pose"),
+    "solutions": N_("All IK solutions of this pose"),
     "solutions_help": N_(
         "Choose one and the arm goes there; the tool stays. Point at one to see it as a pale arm. Branches: "
         "wrist before axis 1 or over the head (back), elbow up or down, wrist flipped or not. "
@@ -111,6 +163,7 @@ WORDS: dict[str, Any] = {
     "below": N_("{joint} at {angle} is {excess} below its limit of {limit}"),
     "turn": N_("{joint} {turn}"),
     "other_turns": N_("Further turns:"),
+    "not_moved": N_("The arm stays where it is: {reasons}."),
     "missing": N_("not there: {reason}"),
     "faults": {
         "too_far": N_("the wrist centre would be {gap} too far from axis 2"),
@@ -120,10 +173,15 @@ WORDS: dict[str, Any] = {
     },
     "free": {
         "wrist": N_(
-            "Axes 4 and 6 are in one line: J4 and J6 can be traded, so there are endless many; J4 is kept here."
+            "Axes 4 and 6 are in one line: J4 and J6 can be traded, so there are infinitely many solutions; J4 is "
+            "kept here."
         ),
-        "elbow": N_("The wrist centre is on axis 2: J2 is free, so there are endless many; J2 is kept here."),
-        "shoulder": N_("The wrist centre is on axis 1: J1 is free, so there are endless many; J1 is kept here."),
+        "elbow": N_(
+            "The wrist centre is on axis 2: J2 is free, so there are infinitely many solutions; J2 is kept here."
+        ),
+        "shoulder": N_(
+            "The wrist centre is on axis 1: J1 is free, so there are infinitely many solutions; J1 is kept here."
+        ),
     },
     "no_closed_form": N_(
         "None are shown: the page solves arms with a spherical wrist and parallel axes 2 and 3 in closed form. For "

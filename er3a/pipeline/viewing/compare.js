@@ -21,6 +21,17 @@ function shownDifference(a, b) {
   return a === b ? "" : document.querySelector("[data-differs]").dataset.differs;
 }
 
+// The address keeps what is compared: "#a=NAME&b=NAME&differs".
+function takeAddress() {
+  const asked = new URLSearchParams(location.hash.slice(1));
+  pickers.forEach((picker, side) => {
+    const name = asked.get("ab"[side]);
+    if (name !== null && Object.hasOwn(compared, name)) picker.value = name;
+  });
+  if (asked.has("a")) onlyDifferences.checked = asked.has("differs");
+  compareRobots();
+}
+
 function compareRobots() {
   const [a, b] = pickers.map((picker) => compared[picker.value]);
   document.getElementById("title-a").textContent = a.title;
@@ -35,5 +46,12 @@ function compareRobots() {
   }
 }
 
-[...pickers, onlyDifferences].forEach((control) => control.addEventListener("change", compareRobots));
-compareRobots();
+function picked() {
+  const differs = onlyDifferences.checked ? "&differs" : "";
+  history.replaceState(null, "", `#a=${pickers[0].value}&b=${pickers[1].value}${differs}`);
+  compareRobots();
+}
+
+[...pickers, onlyDifferences].forEach((control) => control.addEventListener("change", picked));
+addEventListener("hashchange", takeAddress);
+takeAddress();

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +11,9 @@ import pandas as pd
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.foundations import caveat
 from er3a.pipeline.messages.language import N_, own_title, tr
-from er3a.pipeline.results import AbsentResults, Input, Provenance, input_records, read_stage, result_records
+from er3a.pipeline.results import AbsentResults, Input, Provenance, input_records, result_records
 from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.stages.workspace.model import WorkspaceResults
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.heads import stage_head
@@ -20,16 +21,17 @@ from er3a.pipeline.viewing.numbers import number
 from er3a.robots.robot import Robot
 
 BORDER_POINT = "tool_point"
+Workspaces = Mapping[str, WorkspaceResults | AbsentResults]
 CONVENTIONS = {"standard": N_("standard"), "modified": N_("modified")}
 
 
-def write_compare(study: Study, results: Path, output: Path) -> None:
-    """Render ``compare.html`` from the tables and summaries of all robots."""
+def write_compare(study: Study, results: Path, workspaces: Workspaces, output: Path) -> None:
+    """Render ``compare.html`` from the tables and summaries of all robots, and their workspaces."""
     robots = {name: study.robot(name) for name in study.robots}
     values = {
         name: parameters(robot) | key_figures(results / name, study.stages(name)) for name, robot in robots.items()
     }
-    borders = {name: border_mm(results / name) for name in robots}
+    borders = {name: border_mm(workspaces[name]) for name in robots}
     rows = list(dict.fromkeys(key for own in values.values() for key in own))
     groups = list(dict.fromkeys(group for group, _, _ in rows))
     rows.sort(key=lambda row: groups.index(row[0]))
@@ -96,11 +98,10 @@ def key_figures(folder: Path, stages: Sequence[str]) -> dict[tuple[str, str, str
     return found
 
 
-def border_mm(folder: Path) -> list[list[list[float]]]:
+def border_mm(workspace: WorkspaceResults | AbsentResults) -> list[list[list[float]]]:
     """The arcs of the tool point's border in the section through axis 1: lists of (radius, height) in mm."""
-    results = read_stage(folder / "workspace", STAGES["workspace"]).results
-    if isinstance(results, AbsentResults):
+    if isinstance(workspace, AbsentResults):
         return []
-    border: pd.DataFrame = results.border.frame()
+    border: pd.DataFrame = workspace.border.frame()
     arcs = border[(border["point"] == BORDER_POINT) & (border["view"] == "section")].groupby("arc", sort=False)
     return [(arc[["rho_m", "z_m"]].to_numpy() * 1000).round(2).tolist() for _, arc in arcs]

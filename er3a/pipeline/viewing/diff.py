@@ -7,18 +7,24 @@ import shlex
 from dataclasses import astuple, dataclass
 from pathlib import Path
 
+import numpy as np
+
 from er3a.errors import ResultError
 from er3a.files.kept_files import sha256
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.results import CHECKSUMS, Input, Provenance, result_records
+from er3a.pipeline.results import CHECKSUMS, AbsentResults, Input, Provenance, read_stage, result_records
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.heads import stage_head
 from er3a.pipeline.viewing.numbers import number
 from er3a.pipeline.viewing.page import Head, ShownFigure
 
+POINTS = {"tool_point": N_("tool point"), "wrist_centre": N_("wrist centre"), "flange": N_("flange")}
+VIEWS = {"section": N_("section"), "side": N_("side view")}
+SAME_BORDER_MM = 1e-6
 COLUMNS = (N_("robot"), N_("stage"), N_("what"), N_("old"), N_("new"), N_("difference"), N_("note"))
 
 
@@ -67,6 +73,8 @@ def changes(old: Path, new: Path) -> list[Change]:
         if stage in STAGES:
             found += _in_heads(robot, stage, *(stage_head(folder, STAGES[stage]) for folder in folders))
         found += _in_tables(robot, stage, *folders)
+        if stage == "workspace":
+            found += _in_borders(robot, *folders)
     return found
 
 
@@ -134,6 +142,44 @@ def _moved(a: ShownFigure | None, b: ShownFigure | None) -> tuple[str, str]:
         return shown, ""
     within = abs(difference) <= math.hypot(a.uncertainty, b.uncertainty)
     return shown, tr("within the 95 % interval of the difference") if within else tr("more than the intervals explain")
+
+
+def _in_borders(robot: str, old: Path, new: Path) -> list[Change]:
+    """How far each exact border moved: the greatest distance of a point of one from the other, either way."""
+    borders = [_borders(folder) for folder in (old, new)]
+    found = []
+    for key in sorted(borders[0] | borders[1]):
+        point, view = key
+        what = tr("border of the {point}, {view}", point=tr(POINTS[point]), view=tr(VIEWS[view]))
+        before, after = (own.get(key) for own in borders)
+        if before is None or after is None:
+            there = (tr("there"), "–") if after is None else ("–", tr("there"))
+            found.append(Change(robot, "workspace", what, *there, tr("only here")))
+        elif (moved := 1000 * max(_farthest(before, after), _farthest(after, before))) > SAME_BORDER_MM:
+            found.append(Change(robot, "workspace", what, "", "", tr("{moved} mm at most", moved=number(moved, 3))))
+    return found
+
+
+def _borders(folder: Path) -> dict[tuple[str, str], list[Reals]]:
+    """By point and view the arcs of the border, (n, 2), in m."""
+    stored = read_stage(folder, STAGES["workspace"]).results if (folder / "border.parquet").is_file() else None
+    if stored is None or isinstance(stored, AbsentResults):
+        return {}
+    found: dict[tuple[str, str], list[Reals]] = {}
+    for (point, view, _), arc in stored.border.frame().groupby(["point", "view", "arc"], sort=False):
+        found.setdefault((point, view), []).append(arc[["rho_m", "z_m"]].to_numpy())
+    return found
+
+
+def _farthest(arcs: list[Reals], others: list[Reals]) -> float:
+    """The greatest distance of the arcs' points from the other arcs, as lines from point to point."""
+    points = np.concatenate(arcs)[:, None]
+    starts, ends = (np.concatenate([arc[part] for arc in others]) for part in (np.s_[:-1], np.s_[1:]))
+    along = ends - starts
+    squares = np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
+    share = np.clip(((points - starts) * along).sum(axis=2) / squares, 0.0, 1.0)
+    gaps = np.linalg.norm(points - starts - share[..., None] * along, axis=2)
+    return float(gaps.min(axis=1).max())
 
 
 def _in_tables(robot: str, stage: str, old: Path, new: Path) -> list[Change]:

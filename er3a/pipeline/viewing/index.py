@@ -11,7 +11,7 @@ from typing import Any
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.decision import decision
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.results import Provenance, result_records
+from er3a.pipeline.results import Provenance, read_stage, result_records
 from er3a.pipeline.stages.registry import STAGES, all_messages
 from er3a.pipeline.study import Study
 from er3a.pipeline.verdicts import read_verdicts
@@ -20,8 +20,10 @@ from er3a.pipeline.viewing.comparison import write_compare
 from er3a.pipeline.viewing.heads import stage_head
 from er3a.pipeline.viewing.junit import write_junit
 from er3a.pipeline.viewing.sweep_section import sweep_sections
+from er3a.pipeline.viewing.thumbnail import thumbnail
 
 SHOWN_FIGURES = 3
+FIRST = ("fail", "conflict", "caution", "no_reference", "not_computed", "pass")  # what is open stands first
 
 
 def write_index(study: Study, results: Path, folder: Path) -> None:
@@ -29,12 +31,16 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
 
     The comparison offers the robots that are written in the study, not the variants that sweeps make of them.
     """
-    robots = [_entry(study, name, results / name) for name in study.robots]
+    workspaces = {name: read_stage(results / name / "workspace", STAGES["workspace"]).results for name in study.robots}
+    robots = [
+        _entry(study, name, results / name) | {"thumbnail": thumbnail(study.robot(name), workspaces[name])}
+        for name in study.robots
+    ]
     page.render(
         Path(__file__).with_name("index.html.j2"),
         folder / "index.html",
         robots=robots,
-        stages=STAGES,
+        questions={stage.name: stage.question for stage in STAGES.values()},
         shown_figures=SHOWN_FIGURES,
         sweeps=sweep_sections(study, results),
         command=page.run_command(study, "index.html"),
@@ -44,7 +50,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
             seed=study.seed,
         ),
     )
-    write_compare(study, results, folder / "compare.html")
+    write_compare(study, results, workspaces, folder / "compare.html")
     write_junit(read_verdicts(study, results), folder / "junit.xml")
 
 
@@ -58,9 +64,11 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         if head.status == "fail" and expected.get(stage) != "fail"  # one that is expected is a demonstration
     ]
     table = heads["validation"].status if "validation" in heads else "not_computed"
+    shown = sorted(heads.values(), key=lambda head: FIRST.index(head.status))
     return {
         "robot": study.robot(name),
-        "heads": heads,
+        "heads": shown,
+        "counts": [(status, sum(head.status == status for head in shown)) for status in FIRST],
         "expected": expected,
         "decision": decision(table, failed),
     }

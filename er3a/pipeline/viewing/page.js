@@ -16,7 +16,7 @@ function numberIn(text) {
 }
 
 function textOf(cell) {
-  return cell.innerText.replace(/\s*\n\s*/g, " ").trim();
+  return (cell.innerText || cell.textContent).replace(/\s*\n\s*/g, " ").trim(); // what is folded has no inner text
 }
 
 // Numbers by value, then words by letter; empty cells and dashes come last either way.
@@ -103,18 +103,28 @@ function enlarge(image) {
 
 const MANY_ROWS = 12;
 
-// A field that leaves the rows in which its words stand.
+// A field that leaves the rows in which its words stand. The address keeps them, as "?2=words" for the page's third table.
 function filterFor(table) {
+  const number = String([...document.querySelectorAll("table")].indexOf(table));
   const field = document.createElement("input");
   field.type = "search";
   field.placeholder = field.ariaLabel = WORDS.filter;
-  field.addEventListener("input", () => {
+  field.value = new URLSearchParams(location.search).get(number) ?? "";
+  const filter = () => {
     const words = field.value.toLowerCase().split(/\s+/);
     for (const row of table.tBodies[0].rows) {
       const text = textOf(row).toLowerCase();
       row.hidden = !words.every((word) => text.includes(word));
     }
+  };
+  field.addEventListener("input", () => {
+    filter();
+    const address = new URL(location.href);
+    if (field.value) address.searchParams.set(number, field.value);
+    else address.searchParams.delete(number);
+    history.replaceState(null, "", address);
   });
+  if (field.value) filter();
   return field;
 }
 
@@ -169,24 +179,144 @@ function addContents() {
   document.querySelector("main").prepend(nav);
   const fit = () => (details.open = wide.matches);
   const tell = () => {
-    const read = headings.findLastIndex((heading) => heading.getBoundingClientRect().top < 120);
+    const read = headings.findLastIndex((heading) => heading.checkVisibility() && heading.getBoundingClientRect().top < 120);
     summary.textContent = read < 0 || wide.matches ? WORDS.contents : `${WORDS.contents}: ${titles[read]}`;
     links.forEach((link, i) => (i === read ? link.setAttribute("aria-current", "true") : link.removeAttribute("aria-current")));
   };
   wide.addEventListener("change", fit);
-  addEventListener("scroll", tell, { passive: true });
+  for (const event of ["scroll", "resize"]) addEventListener(event, tell, { passive: true });
   fit();
   tell();
 }
 
+// Joints that a sentence names, as "(10, −20, 30, 0, 45, 0) deg", lead to the arm in the teach panel.
+function linkJoints(page) {
+  const angle = "[−-]?\\d+(?:\\.\\d+)?";
+  const vector = new RegExp(`[(（]((?:${angle}[,，]\\s*){5}${angle})(?=[)）]\\s*(?:deg|°|度))`);
+  const texts = document.createTreeWalker(page, NodeFilter.SHOW_TEXT);
+  const found = [];
+  while (texts.nextNode()) if (vector.test(texts.currentNode.data) && !texts.currentNode.parentElement.closest("a, code, h2, script")) found.push(texts.currentNode);
+  for (let text of found) {
+    for (let hit; (hit = vector.exec(text.data)); ) {
+      const named = text.splitText(hit.index + 1);
+      text = named.splitText(hit[1].length);
+      const link = document.createElement("a");
+      link.href = `${page.dataset.panel}#q=${hit[1].replace(/\s/g, "").replaceAll("−", "-").replaceAll("，", ",")}`;
+      named.replaceWith(link);
+      link.append(named);
+    }
+  }
+}
+
+// Of parts that are alike, one at a time: picked by list, buttons, a link or the browser's search. A sheet of paper has all.
+function showOneOf(group) {
+  const parts = [...group.children];
+  if (parts.length < 2) return;
+  const idOf = (part) => part.querySelector("h2").id;
+  const chooser = document.createElement("select");
+  chooser.append(...parts.map((part) => new Option(part.querySelector("h2").firstChild.textContent.trim(), idOf(part))));
+  const choose = (part, all = false) => {
+    chooser.value = idOf(part);
+    everything.checked = all;
+    for (const other of parts) other === part || all ? other.removeAttribute("hidden") : other.setAttribute("hidden", "until-found");
+    dispatchEvent(new Event("resize")); // for what takes its size from a part that was not there
+    dispatchEvent(new CustomEvent("chosen", { detail: chooser.value }));
+  };
+  const go = (index) => {
+    choose(parts[(index + parts.length) % parts.length]);
+    history.replaceState(null, "", `#${encodeURIComponent(chooser.value)}`);
+  };
+  const label = document.createElement("label");
+  label.append(`${group.dataset.oneOf} `, chooser);
+  const every = document.createElement("label");
+  const everything = document.createElement("input");
+  everything.type = "checkbox";
+  every.append(everything, ` ${WORDS.all}`);
+  const strip = document.createElement("p");
+  strip.className = "pickers";
+  strip.append(
+    label, toolButton(WORDS.previous, () => go(chooser.selectedIndex - 1)), toolButton(WORDS.next, () => go(chooser.selectedIndex + 1)), every,
+  );
+  group.before(strip);
+  chooser.addEventListener("change", () => go(chooser.selectedIndex));
+  everything.addEventListener("change", () => choose(parts[chooser.selectedIndex], everything.checked));
+  for (const part of parts) part.addEventListener("beforematch", () => choose(part));
+  const follow = () => {
+    const aim = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    const part = aim && parts.find((each) => each.contains(aim));
+    if (!part || everything.checked) return;
+    choose(part);
+    aim.scrollIntoView();
+  };
+  addEventListener("hashchange", follow);
+  choose(parts[0]);
+  follow();
+}
+
+// The first time that a page uses a term of the glossary, its meaning can be asked for, by pointer, key or touch.
+function explainTerms(terms) {
+  const letters = (text) => text.replace(/[.*+?^${}()|[\]\\]/g, "\\$&").replaceAll(" ", "\\s+");
+  const named = Object.keys(terms).sort((a, b) => b.length - a.length);
+  const pattern = new RegExp(named.map((term) => (/\w$/.test(term) ? `\\b${letters(term)}(?:s|es)?\\b` : letters(term))).join("|"), "i");
+  const open = new Map(named.map((term) => [term.toLowerCase(), terms[term]]));
+  const skipped = "a, button, label, summary, code, svg, script, noscript, h1, h2, h3, thead, .cells, .badge, .term, [hidden]";
+  const texts = document.createTreeWalker(document.querySelector("main"), NodeFilter.SHOW_TEXT);
+  const found = [];
+  while (texts.nextNode()) if (pattern.test(texts.currentNode.data) && !texts.currentNode.parentElement.closest(skipped)) found.push(texts.currentNode);
+  for (let text of found) {
+    for (let hit; (hit = pattern.exec(text.data)); ) {
+      const rest = text.splitText(hit.index + hit[0].length);
+      const said = hit[0].toLowerCase().replace(/\s+/g, " ");
+      const term = [said, said.replace(/s$/, ""), said.replace(/es$/, "")].find((word) => open.has(word));
+      if (term) {
+        explain(text.splitText(hit.index), open.get(term));
+        open.delete(term);
+      }
+      text = rest;
+    }
+  }
+}
+
+function explain(text, meaning) {
+  const term = document.createElement("span");
+  const tip = document.createElement("span");
+  term.className = "term";
+  term.tabIndex = 0;
+  tip.className = "tip";
+  tip.role = "tooltip";
+  tip.id = `term-${document.querySelectorAll(".tip").length}`;
+  tip.textContent = meaning;
+  tip.hidden = true;
+  term.setAttribute("aria-describedby", tip.id);
+  text.replaceWith(term);
+  term.append(text);
+  document.body.append(tip);
+  const show = () => {
+    tip.hidden = false;
+    const at = term.getBoundingClientRect();
+    tip.style.left = `${Math.max(8, Math.min(at.left, document.documentElement.clientWidth - tip.offsetWidth - 8))}px`;
+    tip.style.top = `${at.top > tip.offsetHeight + 8 ? at.top - tip.offsetHeight - 4 : at.bottom + 4}px`;
+  };
+  const asked = () => document.activeElement === term || term.matches(":hover") || tip.matches(":hover");
+  const leave = () => setTimeout(() => asked() || (tip.hidden = true), 150);
+  for (const event of ["pointerenter", "focus"]) term.addEventListener(event, show);
+  for (const event of ["pointerleave", "blur"]) term.addEventListener(event, leave);
+  tip.addEventListener("pointerleave", leave);
+  term.addEventListener("keydown", (event) => event.key === "Escape" && (tip.hidden = true));
+  addEventListener("scroll", () => tip.hidden || (asked() ? show() : leave()), { passive: true, capture: true });
+}
+
+document.querySelectorAll("main[data-panel]").forEach(linkJoints);
 addContents();
+document.querySelectorAll("[data-one-of]").forEach(showOneOf);
+explainTerms(JSON.parse(document.getElementById("terms").textContent));
 document.querySelectorAll(".scroll").forEach(fade);
 
 // A sheet of paper can't be unfolded.
 addEventListener("beforeprint", () => document.querySelectorAll(".provenance").forEach((details) => (details.open = true)));
 
 for (const table of document.querySelectorAll("table")) {
-  if (!table.classList.contains("index")) makeSortable(table);
+  makeSortable(table);
   const tools = document.createElement("p");
   tools.className = "tools";
   tools.append(toolButton(WORDS.csv, () => download(csvOf(table), "text/csv", `${nameFor(table)}.csv`)));

@@ -21,6 +21,7 @@ from er3a.files.kept_files import write_atomically
 from er3a.files.shipped import INSTALLED, ROOT, view_command
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.foundations import caveat
+from er3a.pipeline.messages.glossary import glossary
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import Provenance, Stored
@@ -28,6 +29,7 @@ from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import svg_data_uri
 from er3a.pipeline.viewing.numbers import fixed, number
+from er3a.pipeline.viewing.panel_link import has_panel
 from er3a.version import __version__
 
 _HERE = Path(__file__).parent
@@ -52,6 +54,9 @@ SCRIPT_WORDS = {
     "contents": N_("Contents"),
     "filter": N_("Show rows with"),
     "link": N_("link to this section"),
+    "previous": N_("Previous"),
+    "next": N_("Next"),
+    "all": N_("all at once"),
 }
 
 
@@ -178,12 +183,14 @@ def render(
         "fixed": fixed,
         "tr": tr,
         "own": language.own_title,
+        "has_panel": has_panel,
         "sentence": whole_sentence,
     }
     html = environment.get_template(template.name).render(
         style=(_HERE / "style.css").read_text(encoding="utf-8"),
         script=(_HERE / "page.js").read_text(encoding="utf-8"),
         script_words={key: tr(word) for key, word in SCRIPT_WORDS.items()},
+        terms=glossary(),
         verdict_words=VERDICT_WORDS,
         pages=PAGES,
         language=language.current(),

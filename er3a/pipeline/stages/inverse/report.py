@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from markupsafe import Markup
 
 from er3a.kinematics.solutions import ClosedForm
 from er3a.pipeline.messages.inverse import FIGURES, FREE_AT, NEAREST_RULE, limits_in_short
@@ -28,6 +29,7 @@ from er3a.pipeline.stages.inverse.solution_figures import histogram, overlay, so
 from er3a.pipeline.stages.inverse.symptoms import symptoms
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import Picture, fixed, head_of, number, render, run_command
+from er3a.pipeline.viewing.panel_link import panel_link
 from er3a.robots.joint_limits import LimitsExceeded
 from er3a.robots.robot import Robot
 from er3a.selection.rules import RULES
@@ -73,7 +75,7 @@ def report(study: Study, stored: Stored[InverseResults], output: Path) -> None:
         robot=robot,
         robot_pages=study.pages(name),
         nearest_rule=tr(NEAREST_RULE),
-        overview=[_overview_row(target) for target in summary.targets],
+        overview=[_overview_row(robot, target) for target in summary.targets],
         sections=[_section(robot, target, results) for target in summary.targets],
         rule_columns=[tr("Branch"), *map(_rule_heading, rules)],
         trips=trips,
@@ -82,7 +84,7 @@ def report(study: Study, stored: Stored[InverseResults], output: Path) -> None:
         symptoms=symptoms(summary),
         rules=[(_rule(rule), word("rule.title", RULE_TITLES, rule)) for rule in RULES],
         mix=tr(", ").join(f"{_rule(rule)} {weight:g}" for rule, weight in summary.mix.items()),
-        stops=_stops(summary.sequence),
+        stops=_stops(robot, summary.sequence),
         move=_move_rule(summary.sequence),
     )
 
@@ -95,14 +97,14 @@ def _section(robot: Robot, target: TargetResult, results: InverseResults) -> Tar
         picture=overlay(robot, target, branches),
         position=_listed(target.xyz_mm),
         orientation=_listed(target.rpy_deg),
-        reference=_listed(target.q_ref_deg),
+        reference=_joints(robot, target.q_ref_deg),
         reason=say(target.reason),
         advice=listed(target.advice),
         joints=[f"J{k + 1} ({'mm' if slides else '°'})>" for k, slides in enumerate(robot.slides)],
         method="" if isinstance(target.method, ClosedForm) else say(target.method),
         families=_self_motions(target.families),
         unsolved=joined(listed(target.unsolved)),
-        rows=_branch_rows(rows, branches),
+        rows=_branch_rows(robot, rows, branches),
         rules=_rule_rows(results.rankings.take(results.rankings.target == target.name)),
         residual_mm=rows.position_residual_mm.max() if len(rows) else None,
         residual_deg=rows.orientation_residual_deg.max() if len(rows) else None,
@@ -182,30 +184,30 @@ def _move_rule(sequence: Visits | None) -> tuple[str, str]:
     return (RULES[sequence.rule].unit, word("rule.title", RULE_TITLES, sequence.rule)) if sequence else ("", "")
 
 
-def _stops(sequence: Visits | None) -> list[list[str]]:
+def _stops(robot: Robot, sequence: Visits | None) -> list[list[str]]:
     return [
         [
             stop.target,
             _short(stop.label, stop.branch),
             _short(stop.greedy_label, stop.greedy_branch),
-            _listed(stop.q_deg),
+            _joints(robot, stop.q_deg),
         ]
         for stop in (sequence.stops if sequence else ())
     ]
 
 
-def _overview_row(target: TargetResult) -> list[str]:
+def _overview_row(robot: Robot, target: TargetResult) -> list[str]:
     unreached = target.obstacle if not target.solutions else None
     return [
-        target.name,
+        Markup('<a href="#{0}">{0}</a>').format(target.name),
         _listed(target.xyz_mm),
         tr("{within} of {all}", within=target.within_limits, all=target.solutions),
-        tr("none") if target.chosen_deg is None else _listed(target.chosen_deg),
+        tr("none") if target.chosen_deg is None else _joints(robot, target.chosen_deg),
         say(unreached or target.reason),
     ]
 
 
-def _branch_rows(rows: SolutionRows, branches: SolutionRows) -> list[list[str]]:
+def _branch_rows(robot: Robot, rows: SolutionRows, branches: SolutionRows) -> list[list[str]]:
     inside = rows.branch[rows.within_limits]
     ranks = branches.rank[branches.rank > 0]
     cells = []
@@ -213,7 +215,7 @@ def _branch_rows(rows: SolutionRows, branches: SolutionRows) -> list[list[str]]:
         place, turns = int((ranks <= branches.rank[k]).sum()), int((inside == branches.branch[k]).sum())
         cells.append(
             [
-                _on_one_line(branches.label[k], int(branches.branch[k])),
+                panel_link(robot, branches.q_deg[k], _on_one_line(branches.label[k], int(branches.branch[k]))),
                 *(fixed(angle, 1) for angle in branches.q_deg[k]),
                 fixed(branches.limit_margin_deg[k], 1),
                 fixed(branches.manipulability[k], 3),
@@ -246,6 +248,11 @@ def _short(label: str, branch: int) -> str:
 
 def _on_one_line(label: str, branch: int) -> str:
     return _short(label, branch).replace(" ", NO_BREAK_SPACE)
+
+
+def _joints(robot: Robot, q_deg: Iterable[float]) -> str:
+    """Joint angles that lead to the arm in the teach panel."""
+    return panel_link(robot, q_deg, _listed(q_deg))
 
 
 def _listed(values: Iterable[float]) -> str:

@@ -220,11 +220,11 @@ def _verdict(
 
 def _figures(programs: list[ProgramSummary]) -> tuple[Figure, ...]:
     asked = [each for each in programs if each.expect in (None, "pass")]
+    instructions = sum(each.motions for each in programs)
     clear = [each.least_clearance_mm for each in asked if each.least_clearance_mm is not None]
     return (
-        Figure("programs", len(programs), ""),
-        Figure("instructions", sum(each.motions for each in programs), ""),
-        Figure("instructions_passed", sum(each.passed for each in programs), ""),
+        Figure("programs_passed", sum(each.outcome == "pass" for each in programs), "", of=len(programs)),
+        Figure("instructions_passed", sum(each.passed for each in programs), "", of=instructions),
         Figure("instructions_caution", sum(each.caution for each in programs), ""),
         Figure("instructions_failed", sum(each.failed for each in programs), ""),
         Figure("least_clearance", min(clear, default=None), "mm"),

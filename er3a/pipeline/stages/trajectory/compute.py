@@ -182,8 +182,7 @@ def _figures(paths: list[PathSummary], length: float, limits: LimitsUsed) -> tup
     speed, limit = max(speeds, key=lambda pair: pair[0] / pair[1], default=(None, None))
     colliding = sum(bool(path.collisions) for path in paths)
     return (
-        Figure("paths", len(paths), ""),
-        Figure("safe", sum(path.verdict == "safe" for path in paths), ""),
+        Figure("safe", sum(path.verdict == "safe" for path in paths), "", of=len(paths)),
         Figure("singular_poses", sum(event.crossing for event in events), ""),
         Figure("near_passes", sum(not event.crossing for event in events), ""),
         Figure("colliding", colliding, ""),

@@ -39,6 +39,7 @@ FRAMES_PER_SECOND = 50
 TRAIL_POINTS = 60
 SKELETON_EVERY = 100
 GHOST_ALPHA = 110
+LABELS_APART = 0.15  # of the arm's size
 GHOST_WIDTH = 0.006  # of the arm's size
 EYE_DIRECTION = np.array([0.6, -0.7, 0.35])
 CONDITION_SCALE = LogNorm(3, 300)
@@ -202,16 +203,29 @@ def _line(points: Reals, condition: Reals) -> rr.LineStrips3D:
 def _ghosts(stream: rr.RecordingStream, robot: Robot, path: PathSummary, rows: PathChecks) -> None:
     """The arm as a line at each singular pose, and a point with its type at the tool; none left of the path before."""
     at = [int(np.argmin(np.abs(rows.t_s - event.t_s))) for event in path.singularities]
-    labels = [
-        f"{'' if event.crossing else 'near '}{event_word(event)}, t = {event.t_s:.3f} s" for event in path.singularities
-    ]
     points = rows.xyz_mm[at] / 1000
+    labels = _labels(path, points, LABELS_APART * size_of(robot))
+    above = points[list(labels)] + np.array(
+        [0.0, 0.0, LABELS_APART * size_of(robot)]
+    )  # clear of the joints' own labels
+    named = rr.Points3D(above, radii=0.001, colors=[rgb(HIGHLIGHT)] * len(labels), labels=list(labels.values()))
+    stream.log(f"{STAGE}/marks/named", named)
     colours = [rgb(HIGHLIGHT)] * len(at)
-    stream.log(f"{STAGE}/marks", rr.Points3D(points, radii=0.012, colors=colours, labels=labels))
+    stream.log(f"{STAGE}/marks", rr.Points3D(points, radii=0.012, colors=colours))
     q = meant(robot, rows.q_deg[at])
     strips = [skeleton(robot, joints) for joints in q if np.isfinite(joints).all()]
     ghost = [(*rgb(HIGHLIGHT), GHOST_ALPHA)] * len(strips)
     stream.log(f"{STAGE}/ghosts", rr.LineStrips3D(strips, colors=ghost, radii=GHOST_WIDTH * size_of(robot)))
+
+
+def _labels(path: PathSummary, points: Reals, apart: float) -> dict[int, str]:
+    """Labels of singular poses by number; those nearer than ``apart`` (m) share that of the first."""
+    shared: dict[int, list[str]] = {}
+    for i, event in enumerate(path.singularities):
+        first = next((k for k in shared if np.linalg.norm(points[k] - points[i]) < apart), i)
+        text = f"{'' if event.crossing else 'near '}{event_word(event)}, {event.t_s:.3f} s into the path"
+        shared.setdefault(first, []).append(text)
+    return {k: own[0] + (f", and {len(own) - 1} more" if own[1:] else "") for k, own in shared.items()}
 
 
 def _trail(stream: rr.RecordingStream, times: Reals, points: Reals, reached: Flags, colour: str) -> None:
@@ -229,7 +243,7 @@ def _events(stream: rr.RecordingStream, path: PathSummary, start: float) -> None
     for event in path.singularities:
         stream.set_time(TIMELINE, duration=start + event.t_s)
         how = "meets" if event.crossing else "passes near"
-        text = f"{how} the {event_word(event)} singularity"
+        text = f"{how} the {event_word(event)} singularity {_when(event.t_s, start)}"
         stream.log(f"{STAGE}/events", rr.TextLog(text, level=rr.TextLogLevel.WARN))
     for stretches, word in (
         (path.unreachable, "not reachable"),
@@ -240,7 +254,13 @@ def _events(stream: rr.RecordingStream, path: PathSummary, start: float) -> None
     ):
         for part in stretches:
             stream.set_time(TIMELINE, duration=start + part.t0_s)
-            stream.log(f"{STAGE}/events", rr.TextLog(f"{word}: {say(part.cause)}", level=rr.TextLogLevel.ERROR))
+            text = f"{word} {_when(part.t0_s, start)}: {say(part.cause)}"
+            stream.log(f"{STAGE}/events", rr.TextLog(text, level=rr.TextLogLevel.ERROR))
+
+
+def _when(t: float, start: float) -> str:
+    """A moment of a path, on the path's clock and on the timeline's."""
+    return f"{t:.3f} s into the path (here {start + t:.3f} s)"
 
 
 def _note(robot: Robot, summary: TrajectorySummary) -> str:

@@ -29,6 +29,7 @@ from er3a.pipeline.stages.validation.model import (
     ValidationSummary,
 )
 from er3a.pipeline.stages.validation.subject import model_of
+from er3a.pipeline.stages.validation.symbolic_section import formulas
 from er3a.pipeline.stages.validation.wording import typographic
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import Picture, fixed, head_of, render, run_command
@@ -81,6 +82,7 @@ def report(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
         robot_pages=study.pages(name),
         table_evidence=evidence_section(summary.evidence),
         frames=_frames_picture(robot, summary),
+        formulas=formulas(robot),
         sets=[_set_story(found, judged, results.key_poses) for found in summary.sets],
         diagnoses=diagnosis_stories(summary, results.residuals),
         corrections=correction_stories(summary, results.corrections),

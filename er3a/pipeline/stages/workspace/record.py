@@ -25,6 +25,8 @@ from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot
 
 STAGE = "workspace"
+POINT_SHARE = 0.1  # radius of a point of the cloud, of the mean distance between points
+DIMMEST = 0.3  # of the colour scale: darker points can't be seen on the viewer's ground
 _COLOURS = {"enclosed": HIGHLIGHT, "open": REFERENCE}
 
 
@@ -63,10 +65,12 @@ def record(study: Study, stored: Stored[WorkspaceResults], output: Path) -> None
 def _log_cloud(stream: rr.RecordingStream, cloud: Cloud, middle: float, reach: float) -> None:
     points, value = cloud.point_m, cloud.manipulability_m3
     top = np.quantile(value, 0.99)
-    colours = (colormaps["viridis"](np.minimum(value / top, 1.0) if top > 0 else value)[:, :3] * 255).astype(np.uint8)
+    share = np.minimum(value / top, 1.0) if top > 0 else value
+    colours = (colormaps["viridis"](DIMMEST + (1 - DIMMEST) * share)[:, :3] * 255).astype(np.uint8)
+    radius = POINT_SHARE * reach * (1 / max(1, len(points))) ** (1 / 3)
     far = points[:, 1] >= middle
     for half, rows in (("far", far), ("near", ~far)):
-        entity = rr.Points3D(points[rows], colors=colours[rows], radii=reach * 0.0025)
+        entity = rr.Points3D(points[rows], colors=colours[rows], radii=radius)
         stream.log(f"{STAGE}/cloud/{half}", entity, static=True)
 
 

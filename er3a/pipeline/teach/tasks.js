@@ -1,0 +1,163 @@
+/** What a person has the arm do beyond single joints: go to a typed pose, jog, and keep way points. */
+
+import { column, multiply, rollPitchYaw, rotX, rotY, rotZ, translation } from "er3a/algebra";
+import { jointsFor } from "er3a/goal";
+import { write } from "er3a/readouts";
+import { fill, fixed, plainDegrees, toDegrees, toRadians } from "er3a/text";
+
+const SPEED = toRadians(30); // rad/s, of the joint that turns most, on the mean of a move
+
+const byId = (id) => document.getElementById(id);
+
+/** Brings the sections to life; `arm` tells and moves: `joints()`, `tool()`, `moveTo(q)`, `refusal(k, angle)`. */
+export function addTasks(data, links, closed, arm) {
+  const { table, words } = data;
+
+  /** Moves the tool to `T`, or says in `message` why not. */
+  function reach(T, message) {
+    const found = jointsFor(table, links, closed, T, arm.joints());
+    if (found.q) arm.moveTo(found.q);
+    write(message, found.q ? "" : fill(words.not_reached, { reason: arm.why(found) }));
+    return Boolean(found.q);
+  }
+
+  typePose(reach, arm, words);
+  jog(reach, arm, words, data.joint_names);
+  return wayPoints(data, arm);
+}
+
+function typePose(reach, arm, words) {
+  const form = byId("pose-form");
+  const fields = [...form.querySelectorAll("input")];
+  const message = byId("pose-message");
+  const take = () => {
+    const T = arm.tool();
+    const values = [...column(T, 3).map((value) => 1000 * value), ...rollPitchYaw(T).map(toDegrees)];
+    fields.forEach((field, i) => (field.value = String(Number(values[i].toFixed(3)) + 0)));
+  };
+  byId("pose-take").addEventListener("click", take);
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    const values = fields.map((field) => field.valueAsNumber);
+    const bad = fields.find((field) => !Number.isFinite(field.valueAsNumber));
+    for (const field of fields) field.setAttribute("aria-invalid", String(field === bad));
+    if (bad) return write(message, fill(words.pose_number, { field: bad.ariaLabel }));
+    const [roll, pitch, yaw] = values.slice(3).map(toRadians);
+    const turn = multiply(rotZ(yaw), multiply(rotY(pitch), rotX(roll)));
+    reach(multiply(translation(...values.slice(0, 3).map((value) => value / 1000)), turn), message);
+  });
+  take();
+}
+
+function jog(reach, arm, words, names) {
+  const message = byId("jog-message");
+  const frame = () => document.querySelector("input[name=jog-frame]:checked").value;
+  const buttons = [...document.querySelectorAll("[data-jog]")];
+  const label = () => {
+    const labels = frame() === "joints" ? names : words.jog_axes;
+    for (const button of buttons) write(button, `${labels[Number(button.dataset.jog)]} ${button.dataset.sign}`);
+  };
+  const step = (axis, sign) => {
+    const size = byId(axis < 3 && frame() !== "joints" ? "jog-mm" : "jog-deg").valueAsNumber;
+    if (!(size > 0)) return write(message, words.jog_step);
+    if (frame() === "joints") {
+      const angle = arm.joints()[axis] + sign * toRadians(size);
+      const reason = arm.refusal(axis, angle);
+      if (!reason) arm.moveTo(arm.joints().map((old, k) => (k === axis ? angle : old)));
+      return write(message, reason);
+    }
+    const along = [0, 1, 2].map((i) => (i === axis ? (sign * size) / 1000 : 0));
+    const turn = [rotX, rotY, rotZ][axis - 3]?.(sign * toRadians(size)) ?? translation(0, 0, 0);
+    const T = arm.tool();
+    if (frame() === "tool") return reach(multiply(T, multiply(translation(...along), turn)), message);
+    const turned = multiply(turn, T); // about the base's axes, the tool point at rest
+    return reach(turned.map((row, i) => (i < 3 ? [...row.slice(0, 3), T[i][3] + along[i]] : row)), message);
+  };
+  for (const button of buttons) {
+    button.addEventListener("click", () => step(Number(button.dataset.jog), button.dataset.sign === "+" ? 1 : -1));
+  }
+  for (const choice of document.querySelectorAll("input[name=jog-frame]")) choice.addEventListener("change", label);
+  label();
+}
+
+/** Way points in joint space; the browser keeps them where it keeps anything for pages on a disk. */
+function wayPoints(data, arm) {
+  const { words, name } = data;
+  const place = `er3a-points-${name}`;
+  const points = kept();
+  const list = byId("points");
+
+  function kept() {
+    try {
+      return JSON.parse(localStorage.getItem(place)) ?? [];
+    } catch {
+      return [];
+    }
+  }
+
+  function changed() {
+    try {
+      localStorage.setItem(place, JSON.stringify(points));
+    } catch {
+      // They last as long as the page.
+    }
+    list.replaceChildren(...points.map(item));
+    for (const id of ["export-path", "export-program"]) byId(id).disabled = points.length < 2;
+    byId("clear-points").disabled = points.length === 0;
+  }
+
+  function item(q, i) {
+    const made = document.createElement("li");
+    made.append(
+      button(q.map((angle) => fixed(toDegrees(angle))).join(", "), fill(words.go_to_point, { number: i + 1 }), () => arm.moveTo(q)),
+      " ",
+      button("×", fill(words.remove_point, { number: i + 1 }), () => {
+        points.splice(i, 1);
+        changed();
+      }),
+    );
+    return made;
+  }
+
+  function button(text, label, action) {
+    const made = document.createElement("button");
+    Object.assign(made, { type: "button", textContent: text, ariaLabel: label, title: label });
+    made.addEventListener("click", action);
+    return made;
+  }
+
+  byId("save-point").addEventListener("click", () => {
+    points.push(arm.joints());
+    changed();
+  });
+  byId("clear-points").addEventListener("click", () => {
+    points.length = 0;
+    changed();
+  });
+  byId("export-path").addEventListener("click", () => save(`${name}_taught.yaml`, pathFile(points)));
+  byId("export-program").addEventListener("click", () => save(`${name}_taught.pgm`, rplProgram(name, points)));
+  changed();
+  return { pathFile: () => pathFile(points), program: () => rplProgram(name, points) };
+}
+
+function save(file, text) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([text], { type: "text/plain" }));
+  link.download = file;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+/** A path file of er3a: joint moves through the points, which stop at each. */
+function pathFile(points) {
+  const rows = points.map((q) => `      - [${plainDegrees(q)}]\n`);
+  const moves = points.slice(1).map((q, i) => Math.max(1, ...q.map((angle, k) => Math.abs(angle - points[i][k]) / SPEED)));
+  const duration = Math.ceil(moves.reduce((sum, time) => sum + time, 0));
+  return `kind: paths\npaths:\n  - name: taught\n    title: Points taught in the teach panel\n    kind: joint_sequence\n    points_deg:\n${rows.join("")}    duration_s: ${duration}\n    samples: ${25 * duration}\n`;
+}
+
+/** A program in RPL: a joint move to each point, at a tenth of full speed. */
+function rplProgram(name, points) {
+  const moves = points.map((q) => `MJOINT(POINTJ(${q.map((angle) => toDegrees(angle).toFixed(6)).join(",")}), v10perc, fine, tool0);\n`);
+  return `(* er3a: taught on ${name}; not checked *)\n${moves.join("")}`;
+}
