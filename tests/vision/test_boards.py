@@ -112,7 +112,7 @@ def test_a_camera_is_calibrated_from_images_alone(tmp_path):
     assert np.linalg.norm(off(found.X, X)[:3]) < 2e-3
     assert np.linalg.norm(off(found.X, X)[3:]) < np.radians(0.2)
     assert np.abs(off(found.Y, Y)[:3]).max() < 2e-3
-    Image.fromarray(np.full((96, 128), 128, np.uint8)).save(tmp_path / "5.png")
+    Image.fromarray(np.full((960, 1280), 128, np.uint8)).save(tmp_path / "5.png")
     with pytest.raises(InputError, match="0 corners of a charuco board of 7 x 5") as caught:
         load_hand_eye(tmp_path / "set.yaml")
     assert caught.value.file.endswith("5.png")
