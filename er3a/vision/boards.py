@@ -27,6 +27,7 @@ from er3a.vision.tangent import exp_rotation, inverse_right_jacobian, log_rotati
 Pattern = Literal["chessboard", "charuco", "apriltag"]
 LEAST_CORNERS = 6
 LEAST_IMAGES = 5
+LEAST_RATIO = 2.0  # of the reprojection errors of a flat board's two poses, below which either may be the true one
 
 Image = NDArray[np.uint8]
 
@@ -81,6 +82,15 @@ class BoardViews:
     camera: Camera
 
 
+@dataclass(frozen=True)
+class AmbiguousTilt:
+    """Two poses of the flat board fit an image nearly alike: the other's errors are only ``ratio`` times as large."""
+
+    sample: str
+    ratio: float
+    code: Literal["ambiguous_tilt"] = "ambiguous_tilt"
+
+
 class BoardNotFoundError(Er3aError):
     """An image (by number, from 0) shows no such board."""
 
@@ -125,6 +135,12 @@ def board_views(
         ambiguous=np.array([each[3] for each in found]),
         camera=camera,
     )
+
+
+def ambiguous_tilts(views: BoardViews, names: Sequence[str]) -> tuple[AmbiguousTilt, ...]:
+    """The images that leave open which way the board is tilted; ``names`` of the samples, N."""
+    found = zip(names, views.ambiguous.tolist())
+    return tuple(AmbiguousTilt(name, ratio) for name, ratio in found if ratio < LEAST_RATIO)
 
 
 def estimated_camera(points: Sequence[Reals], corners: Sequence[Reals], size: tuple[int, int]) -> Camera:

@@ -12,7 +12,7 @@ from PIL import Image
 
 from er3a.errors import Er3aError, InputError
 from er3a.files.hand_eye_file import load_hand_eye
-from er3a.vision.boards import Board, BoardNotFoundError, Camera, board_drawing, board_views
+from er3a.vision.boards import Board, BoardNotFoundError, Camera, ambiguous_tilts, board_drawing, board_views
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.hand_eye import calibrate_hand_eye
 from er3a.vision.opencv import opencv
@@ -92,6 +92,14 @@ def test_covariances_are_those_of_corners_that_scatter():
     assert np.abs(np.cov(white) - np.eye(6)).max() < 0.25
 
 
+def test_a_board_seen_head_on_leaves_its_tilt_open():
+    """Small and nearly head-on, beside one that is tilted and near."""
+    random = np.random.default_rng(8)
+    places = [pose([1, 0.5, 10], [-0.1, -0.05, 1.5]), pose([30, 10, 0], [-0.1, -0.05, 0.5])]
+    views = board_views([rendered(CHARUCO, T, random) for T in places], CHARUCO, Camera(K, np.zeros(5)))
+    assert [each.sample for each in ambiguous_tilts(views, ("far", "near"))] == ["far"]
+
+
 @pytest.mark.long
 def test_a_camera_is_calibrated_from_images_alone(tmp_path):
     """Eye-to-hand: images, joint poses and nothing else; the truth lies within twice the intervals."""
@@ -112,7 +120,7 @@ def test_a_camera_is_calibrated_from_images_alone(tmp_path):
     assert np.linalg.norm(off(found.X, X)[:3]) < 2e-3
     assert np.linalg.norm(off(found.X, X)[3:]) < np.radians(0.2)
     assert np.abs(off(found.Y, Y)[:3]).max() < 2e-3
-    Image.fromarray(np.full((96, 128), 128, np.uint8)).save(tmp_path / "5.png")
+    Image.fromarray(np.full((960, 1280), 128, np.uint8)).save(tmp_path / "5.png")
     with pytest.raises(InputError, match="0 corners of a charuco board of 7 x 5") as caught:
         load_hand_eye(tmp_path / "set.yaml")
     assert caught.value.file.endswith("5.png")

@@ -23,12 +23,13 @@ from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.read_program import read_program
 from er3a.robots.joint_limits import within
 from er3a.vision.grasp_motion import PARTS
-from er3a.vision.grasping import GraspNeeds, GraspTask, NoTransfer, plan_grasp
+from er3a.vision.grasping import DetectedObject, Grasp, GraspNeeds, GraspTask, NoTransfer, plan_grasp
 from er3a.vision.hand_eye import calibrate_hand_eye
 from er3a.vision.next_view import board_visible, next_view
 from er3a.vision.point_error import ArmAccuracy, error_sizes, seen_pose, seen_pose_error
 from er3a.vision.tangent import moved, step_between
 from testing.camera_cells import CARRIED, FIXED, FOLDER, SCENE, seen_from
+from testing.hand_eye_sets import pose
 
 SPEED = 0.1
 BEHIND_THE_POST = np.radians([120, -30, -20, 0, -90, 0])  # from there the straight move to the can meets the post
@@ -265,3 +266,25 @@ def test_a_can_forgives_turns_about_its_axis_and_a_box_does_not(cell):
         shares[entry.name] = plan_grasp(task, target, T, lambda q, own=about_z: own).chosen.probability
     assert shares["can"] > 0.999
     assert shares["box"] < 0.3
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("name", "home"), [("ur5e", [0, -90, 90, -90, -90, 0]), ("lbr_iiwa_14", [0, 30, 0, -60, 0, 90, 0])]
+)
+def test_other_arms_grasp_along_straight_lines(name, home):
+    """A UR by its own closed form, seven joints by short moves of the joints: the tool stays on the line."""
+    robot = load_robot(name)
+    limits = joint_limits(robot, np.full(len(robot.lower), np.pi), 0.25)
+    task = GraspTask(robot, None, Bodies(robot, None), np.radians(home), NEEDS, limits, SPEED, 1)
+    T, certain = pose([0, 0, 10], [0.45, 0.1, 0.2]), np.eye(6) * 1e-10
+    target = DetectedObject("thing", T, certain, 4, (Grasp("top", pose([180, 0, 0], [0, 0, 0.1])),), 0.08, 0.08)
+    chosen = plan_grasp(task, target, T, lambda q: certain).chosen
+    for part in ("approach", "retreat"):
+        q = along(chosen, part, 21)
+        tool = forward(robot, q)[:, :3, 3]
+        assert np.linalg.norm((tool - tool[0])[:, :2], axis=1).max() < 5e-4
+        assert abs(tool[-1] - tool[0])[2] == pytest.approx(0.08, abs=1e-5)
+        assert within(robot, q).all()
+    if name == "ur5e":
+        assert [leg.part for leg in chosen.legs] == ["move", "approach", "retreat"]

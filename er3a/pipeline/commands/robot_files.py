@@ -123,12 +123,14 @@ def hand_eye(
     from er3a.files.yaml_file import load
     from er3a.pipeline.messages.hand_eye import correction_lines, hand_eye_lines, hand_eye_record
     from er3a.pipeline.messages.say import say
+    from er3a.vision.boards import ambiguous_tilts
     from er3a.vision.hand_eye import calibrate_hand_eye
     from er3a.vision.table_corrections import correct_table
     from er3a.vision.vision_findings import HandEyeError
 
     arm, asked = load_robot(robot) if robot else None, load(HandEyeFile, file).table_corrections
-    samples, offset, _ = read_calibration(file, arm)
+    samples, offset, images = read_calibration(file, arm)
+    open_tilts = ambiguous_tilts(images.views, samples.names) if images else ()
     try:
         found = calibrate_hand_eye(samples)
     except HandEyeError as error:
@@ -137,7 +139,8 @@ def hand_eye(
     if as_json:
         print_json(hand_eye_record(found, offset, table))
         return
-    print("\n".join([hand_eye_lines(found, offset), *(correction_lines(table) if table else [])]))
+    told = [f"sample {say(each)}" for each in open_tilts]
+    print("\n".join([hand_eye_lines(found, offset), *told, *(correction_lines(table) if table else [])]))
 
 
 @app.command(rich_help_panel=ROBOT_FILES)

@@ -8,6 +8,7 @@ import er3a.pipeline.messages.calibration  # noqa: F401
 from er3a.geometry.transforms import rpy_of
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.say import say, sentence, word
+from er3a.vision.boards import AmbiguousTilt
 from er3a.vision.hand_eye import HandEye, spread_of
 from er3a.vision.table_corrections import NoCorrections, TableCorrections
 from er3a.vision.tangent import quaternion_of
@@ -101,6 +102,17 @@ def _(found: RepeatedPose) -> str:
         first=found.first,
         mm=found.apart_mm,
         deg=found.apart_deg,
+    )
+
+
+@say.register
+def _(found: AmbiguousTilt) -> str:
+    return sentence(
+        found.code,
+        "{own_name}: the flat board is seen so nearly head-on, or so small, that its other tilt fits with only "
+        "{ratio:.2g} times the error: take the image nearer, or with the board tilted by 30 deg",
+        own_name=found.sample,
+        ratio=found.ratio,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import get_args
@@ -59,6 +60,7 @@ from er3a.pipeline.stages.vision.vision_verdicts import (
 from er3a.pipeline.study import Study
 from er3a.planning.timing import JointLimits
 from er3a.robots.robot import Robot
+from er3a.vision.boards import ambiguous_tilts
 from er3a.vision.grasp_motion import PARTS
 from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspPlan, GraspTask, plan_grasp
 from er3a.vision.hand_eye import HandEye, calibrate_hand_eye
@@ -113,6 +115,8 @@ def compute(study: Study, name: str) -> VisionResults:
         to_add = next_view(robot, found, view, middle, scene, study.seed + VIEW_STREAM)
     table = correct_table(found, robot, head.table_corrections) if head.table_corrections else None
     calibration = calibration_result(head, found, to_add, offset, table)
+    if images is not None:
+        calibration = replace(calibration, open_tilts=ambiguous_tilts(images.views, samples.names))
     doubt = _doubt(calibration)
     settings = study.section(VisionSettings)
     motions = study.section(TrajectorySettings)

@@ -21,6 +21,7 @@ from er3a.pipeline.stages.vision.vision_verdicts import (
     TouchContradicts,
 )
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
+from er3a.vision.boards import AmbiguousTilt
 from er3a.vision.calibration_set import Setup
 from er3a.vision.classic_methods import MethodName
 from er3a.vision.grasping import GraspRefusal
@@ -145,6 +146,7 @@ class CalibrationResult:
     spread_mm, spread_deg : root mean square distance of the board's places, by sample, from their mean
     moved_mm, moved_deg : how far the hand-eye pose would be off with the samples that were left out; None without any
     table : corrections to the arm's table, where the set asks for them
+    open_tilts : images that leave open which way the board is tilted
     """
 
     title: str
@@ -172,6 +174,7 @@ class CalibrationResult:
     next_view: ViewToAdd | None
     time_offset: OffsetResult | None
     table: TableResult | NoCorrections | None
+    open_tilts: tuple[AmbiguousTilt, ...] = ()
 
 
 @dataclass(frozen=True)
