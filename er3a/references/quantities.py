@@ -298,7 +298,7 @@ class AxisDistance(Extreme):
 
     def measure(self, T: Reals) -> Reals:
         k = self.axis - 1
-        across = np.cross(T[..., k, :3, 2], T[..., FRAME_OF_POINT[self.point], :3, 3] - T[..., k, :3, 3])
+        across = _cross(T[..., k, :3, 2], T[..., FRAME_OF_POINT[self.point], :3, 3] - T[..., k, :3, 3])
         return np.sqrt(_dot(across, across))
 
 
@@ -341,7 +341,7 @@ def nearest_on_line(direction: Reals, on_line: Reals, point: Reals) -> Reals:
 
 def angle_between(a: Reals, b: Reals, signed: bool) -> Reals:
     """Angle in deg; of lines (at most 90) if not signed."""
-    cross, dot = np.cross(a, b), _dot(a, b)
+    cross, dot = _cross(a, b), _dot(a, b)
     return np.degrees(np.arctan2(np.sqrt(_dot(cross, cross)), dot if signed else np.abs(dot)))
 
 

@@ -116,9 +116,6 @@ def rests_on(wildcards):
     return [f"results/{wildcards.robot}/{stage}/summary.json" for stage in others]
 
 
-def preview(wildcards):
-    """Input function: the picture of a stage's recording. Variants, of which there may be hundreds, have
-    none."""
-    if wildcards.robot in STUDY.variants or "record" not in STAGES[wildcards.stage].views:
-        return []
-    return f"reports/{wildcards.robot}/{wildcards.stage}.webp"
+def picture(wildcards):
+    """Input function: the picture of a stage's recording, if it has one."""
+    return [f"reports/{wildcards.robot}/{wildcards.stage}.webp"] if "record" in STAGES[wildcards.stage].views else []

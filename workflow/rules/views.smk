@@ -2,7 +2,8 @@ rule record:
     input:
         viewed,
     output:
-        "reports/{robot}/{stage}.rrd",
+        recording="reports/{robot}/{stage}.rrd",
+        picture="reports/{robot}/{stage}.webp",
     log:
         "logs/{robot}/{stage}.record.log",
     benchmark:
@@ -11,29 +12,11 @@ rule record:
         "../envs/er3a.yaml"
     params:
         code=lambda wildcards: code_of(wildcards.stage, "record"),
+        drawing=code_digest("er3a.pipeline.viewing.preview"),
     message:
         "{wildcards.robot}: record {wildcards.stage}"
     shell:
         "er3a record {wildcards.stage} {wildcards.robot} 2> {log}"
-
-
-rule preview:
-    input:
-        "reports/{robot}/{stage}.rrd",
-    output:
-        "reports/{robot}/{stage}.webp",
-    log:
-        "logs/{robot}/{stage}.preview.log",
-    benchmark:
-        "logs/{robot}/{stage}.preview.tsv"
-    conda:
-        "../envs/er3a.yaml"
-    params:
-        code=code_digest("er3a.pipeline.viewing.preview"),
-    message:
-        "{wildcards.robot}: preview {wildcards.stage}"
-    shell:
-        "python -m er3a.pipeline.viewing.preview {input} {output} 2> {log}"
 
 
 rule report:
@@ -41,7 +24,7 @@ rule report:
         viewed,
         rests_on,
         CATALOGUE,
-        preview=preview,
+        picture,
     output:
         report(
             "reports/{robot}/{stage}.html",

@@ -69,13 +69,23 @@ def record(
     results: Results = DEFAULT_RESULTS,
     reports: Reports = DEFAULT_REPORTS,
 ):
-    """Write a stage's Rerun recording from its results, in English: the viewer has no other letters."""
+    """Write a stage's Rerun recording from its results, in English: the viewer has no other letters.
+
+    The viewer draws it as a picture for the stage's page; of the many variants of a sweep the picture stays empty.
+    """
     from er3a.pipeline.checksums import write_checksum
+    from er3a.pipeline.viewing.preview import draw_preview, write_empty
 
     loaded, folder = _folder(study, results, robot, stage)
     recording = reports / robot / f"{stage}.rrd"
     run.show("record", stage, loaded, robot, folder, recording)
     write_checksum(recording)
+    picture = recording.with_suffix(".webp")
+    if robot in loaded.variants:
+        write_empty(picture)
+    elif problem := draw_preview(recording, picture):
+        print_note(f"previews of recordings were skipped: {problem}")
+    write_checksum(picture)
 
 
 @app.command(rich_help_panel=JOBS)

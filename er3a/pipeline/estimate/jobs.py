@@ -17,7 +17,7 @@ class Job:
 
     Attributes
     ----------
-    verb : sample, compute, record, preview, report, teach or index
+    verb : sample, compute, record, report, teach or index
     stage, robot : empty where the verb has none
     samples : how many are drawn
     needs : numbers of the jobs that must be done before
@@ -55,8 +55,7 @@ def jobs_of(study: Study) -> list[Job]:
             done = add("compute", stage, robot, needs=parts)
             shown, views = done, STAGES[stage].views
             if "record" in views:
-                recorded = add("record", stage, robot, needs=(done,))
-                shown = add("preview", stage, robot, needs=(recorded,)) if robot in study.robots else done
+                shown = add("record", stage, robot, needs=(done,))
             if "report" in views:
                 pages.append(add("report", stage, robot, needs=(shown,)))
         if "teach" in study.pages(robot):

@@ -108,10 +108,6 @@ def trial(study: Study, robot: str, whole: bool) -> Trial:
             carry_out("compute", stage, stage, robot, *([part] if STAGES[stage].sampled else []))
             for view in STAGES[stage].views:
                 carry_out(view, stage, stage, robot)
-                if view == "record":
-                    recording = folder / "reports" / robot / f"{stage}.rrd"
-                    drawing = ["er3a.pipeline.viewing.preview", str(recording), str(recording.with_suffix(".webp"))]
-                    timings["preview", stage] = timed(drawing)
 
         carry_out("sample", "workspace", robot)
         if whole:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import re
 import subprocess
-import sys
 import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,7 +14,6 @@ from rerun.experimental import ViewerClient
 
 from er3a.errors import Er3aError
 from er3a.files.kept_files import write_atomically
-from er3a.pipeline.checksums import check_checksum, write_checksum
 from er3a.pipeline.viewing.viewer import LOOPBACK, free_port, viewer_running
 
 WINDOW = (1400, 900)  # pixels
@@ -33,11 +31,17 @@ def draw_preview(recording: Path, output: Path) -> str | None:
     why it could not be drawn, None if it was; what could not be drawn becomes an empty file
     """
     try:
-        picture, problem = _picture(recording), None
+        picture = _picture(recording)
     except Er3aError as error:
-        picture, problem = b"", str(error)
+        write_empty(output)
+        return str(error)
     write_atomically(output, lambda file: file.write_bytes(picture))
-    return problem
+    return None
+
+
+def write_empty(output: Path) -> None:
+    """Write the picture of a recording that is not drawn."""
+    write_atomically(output, lambda file: file.write_bytes(b""))
 
 
 def _picture(recording: Path) -> bytes:
@@ -75,15 +79,17 @@ def _shoot(port: int, viewer: subprocess.Popen[bytes], shot: Path) -> None:
         try:
             client = client or ViewerClient(f"rerun+http://{LOOPBACK}:{port}/proxy")
             state = client.get_state()
-            ready = state.active_recording and not state.loading
-            if ready and not bare:
+            if not state.active_recording or state.loading:
+                time.sleep(0.05)
+                continue
+            if not bare:
                 client.run_command("ui.toggle_blueprint_panel")  # its tree unfolds or not, as loading goes
                 bare = True
             client.save_screenshot(str(shot))
         except (ConnectionError, RuntimeError):
             time.sleep(0.05)
             continue
-        if ready and shot.read_bytes() == before:
+        if shot.read_bytes() == before:
             return
         before = shot.read_bytes()
     raise Er3aError(f"the viewer drew no steady picture in {PATIENCE_S} s")
@@ -93,21 +99,3 @@ def _why(messages: str) -> str:
     panic = re.search(r"panicked at '(.+?)'\n", messages, flags=re.DOTALL)
     said = panic[1] if panic else (messages.strip().splitlines() or ["without a word"])[-1]
     return f"the Rerun viewer ended: {said} (docs/recordings.md tells what it needs)"
-
-
-def main(recording: Path, picture: Path) -> None:
-    """Draw a recording as a picture for its page; an empty file where nothing can draw it.
-
-    The workflow calls this as a program of its own: drawing needs little of what a command of ``er3a`` loads.
-    """
-    try:
-        check_checksum(recording)
-        if problem := draw_preview(recording, picture):
-            print(f"note: previews of recordings were skipped: {problem}", file=sys.stderr)
-        write_checksum(picture)
-    except Er3aError as error:
-        sys.exit(f"error: {error}")
-
-
-if __name__ == "__main__":
-    main(*map(Path, sys.argv[1:]))

@@ -6,7 +6,7 @@ import numpy as np
 
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.stages.dynamics.model import DiagramRows, DynamicsSummary, PathLoad, TorqueRows, Unit, hardest_held
-from er3a.pipeline.viewing.figures import new_figure
+from er3a.pipeline.viewing.figures import new_figure, row_of_panels
 from er3a.pipeline.viewing.page import Picture, number
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED
 
@@ -34,7 +34,7 @@ def torque_unit(units: set[Unit]) -> str:
 def torque_figure(path: PathLoad, rows: TorqueRows) -> Picture:
     """Torques of all joints with their intervals, the parts of the most loaded one, and powers."""
     rows = rows.take(np.unique(np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round().astype(int)))
-    figure, (torque, parts, power) = new_figure(1, 3, width=13.0, height=3.4)
+    figure, (torque, parts, power) = row_of_panels(3, 13.0, 3.4, (0.75, 0.55, 0.1, 0.15, 0.85))
     load, unit = path.hardest, torque_unit({load.unit for load in path.joints})
     worst = load.joint - 1
     for j in range(rows.torque.shape[1]):

@@ -16,7 +16,7 @@ from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import word
 from er3a.pipeline.stages.inverse.model import MapRows, RoundTrips, SolutionRows, TargetResult
 from er3a.pipeline.stages.inverse.shape_colours import colour_of, shape_of
-from er3a.pipeline.viewing.figures import equal_scale, new_figure
+from er3a.pipeline.viewing.figures import equal_scale, new_figure, row_of_panels
 from er3a.pipeline.viewing.numbers import number
 from er3a.pipeline.viewing.page import Picture
 from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, JOINT_NAMES, MODEL, MUTED
@@ -36,11 +36,12 @@ def overlay(robot: Robot, target: TargetResult, branches: SolutionRows) -> Pictu
     """
     panels = 3 if len(branches) else 2
     ratios = [1, 1, 1.25][:panels]
-    figure, axes = new_figure(1, panels, width=11.5 if panels == 3 else 8.5, height=4.9, width_ratios=ratios)
+    width = 11.5 if panels == 3 else 8.5
+    figure, axes = row_of_panels(panels, width, 4.9, (0.75, 1.05, 0.3, 0.35, 0.75), width_ratios=ratios)
     handles = _draw_arms(axes[0], axes[1], robot, target, branches)
     if panels == 3:
         handles += _draw_joints(axes[2], robot, target, branches)
-    figure.legend(handles=handles, loc="outside lower center", ncols=5 if panels == 3 else 2, frameon=False, fontsize=9)
+    figure.legend(handles=handles, loc="lower center", ncols=5 if panels == 3 else 2, frameon=False, fontsize=9)
     alt = tr(
         "{count} branches for target {own_name}, drawn over one another", count=len(branches), own_name=target.name
     )
