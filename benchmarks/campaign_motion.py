@@ -22,9 +22,9 @@ from testing.motion_cases import ASSUMED, JOINT_KINDS, TOOL_KINDS, Tally, compar
 from testing.motion_oracle import GRAZING, GRAZING_JERK, GRAZING_RAD, POINTS, SPAN_S, TOUCH
 
 ROBOTS = ("er3_600", "er3a_c60")
-PATHS = {**dict.fromkeys(JOINT_KINDS, 30), **dict.fromkeys(TOOL_KINDS, 10)}  # per robot
+PATHS = {**dict.fromkeys(JOINT_KINDS, 150), **dict.fromkeys(TOOL_KINDS, 10)}  # per robot
 SAMPLES = (2, 500)
-QUERIES, SEED, DENSE, OTHER_S = 4, 20261120, 1001, 60.0
+QUERIES, SEED, DENSE, OTHER_S = 12, 20261120, 1001, 60.0
 FREE = 0.005  # m, by which both ends of a query are clear
 
 
@@ -139,13 +139,13 @@ Random paths of {robots}, judged at `samples: 2` and 500, against {points:,} eve
 imports nothing of er3a (`testing/motion_oracle.py`): laws of time, rounded corners and rotations are written down once
 more, the joints of paths of the tool follow from plane trigonometry, speeds and accelerations are differences of
 angles, jerks means over {jerk_ms:g} ms of them. About two paths of five have a limit of jerk, half of them known
-accelerations instead of assumed ones. In each cell: what the oracle finds / what of that is missed / what is invented. Crossings are changes of sign
-of the three singular distances, matched one to one (for moves of the joints; a path of the tool that meets a singular
-pose is left out of the comparison, because which branch goes on behind it is a choice). Limits, speeds and
-accelerations and jerks are stretches of a joint. *Milder* are verdicts milder than what the oracle finds, assumed limits
-told from known ones. Grazing is left open within {grazing_rad:g} rad of a joint limit, {grazing:g} of a limit of speed or
-acceleration, {grazing_jerk:g} of a limit of jerk, {touch:g} rad or m between two crossings next to each other. Of jerks
-shorter than those means the oracle sees only a part; 1,000 paths of each kind were not run. Seed {seed}.
+accelerations instead of assumed ones. In each cell: what the oracle finds / what of that is missed / what is invented.
+Crossings are changes of sign of the three singular distances, matched one to one (for moves of the joints; a path of
+the tool that meets a singular pose is left out of the comparison, because which branch goes on behind it is a choice).
+Limits, speeds, accelerations and jerks are stretches of a joint. *Milder* are verdicts milder than what the oracle
+finds, assumed limits told from known ones. Grazing is left open within {grazing_rad:g} rad of a joint limit,
+{grazing:g} of a limit of speed or acceleration, {grazing_jerk:g} of a limit of jerk, {touch:g} rad or m between two
+crossings next to each other. Of jerks shorter than those means the oracle sees only a part. Seed {seed}.
 
 | paths | samples | number | crossings | limits | speeds | accelerations | jerks | unreachable / contradicted | safe | milder | undecided |
 |---|---|---|---|---|---|---|---|---|---|---|---|
