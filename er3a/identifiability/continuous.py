@@ -117,7 +117,7 @@ class Extents:
             return self._anything(entry, value, self._off(factors, self._widest(entry) / factor))
         if not self.met:
             return Extent(np.nan, np.nan, NOT_OFF, bool(self._blamed(factors)))
-        measured = self._measured(entry) if np.count_nonzero(factors) == 1 else None
+        measured = self._measured(entry, together=bool(np.count_nonzero(factors) > 1))
         ends = [(bound - value) / factor for bound in measured] if measured else []
         within = bool(ends) and ends[0] <= 0 <= ends[1]
         low, high, excluded, at_least = self._found(factors)
@@ -128,11 +128,12 @@ class Extents:
         off = self._off(factors, low).worse(self._off(factors, high))
         return Extent(value + low * factor, value + high * factor, off, excluded, at_least)
 
-    def _measured(self, entry: TableNumber) -> tuple[float, float] | None:
-        """The bounds of an entry, in its unit, if a requirement is about it alone: no table can leave these."""
+    def _measured(self, entry: TableNumber, together: bool) -> tuple[float, float] | None:
+        """The bounds of an entry, in its unit, if a requirement is about it alone: no table can leave these. Of what is
+        determined ``together`` from that entry on: lengths along parallel axes are measured as one."""
         for each in self.asked.plain:
             own = each.quantity
-            if not isinstance(own, TableEntry) or own.column == "d" or each.gaussian:  # d adds up along an axis
+            if not isinstance(own, TableEntry) or (own.column == "d") != together or each.gaussian:
                 continue
             if (own.column, own.joint) == (entry.column, entry.joint):
                 return each.expected - each.half_width, each.expected + each.half_width
