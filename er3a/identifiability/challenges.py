@@ -35,7 +35,7 @@ def challenges_to(region: Region, start: OpenTable, matters: Mapping[int, float]
     region : its entries are those that may change; start : an open table of it
     matters : places of entries that are held some way off, with the least step (in their scales) that matters
     """
-    search = _Search(region, start, matters)
+    search = _ManyStarts(region, start, matters)
     search.try_from(*_spread(region, start))
     for _ in range(ROUNDS):
         places = search.farthest()[:PUSHED_FROM]
@@ -76,7 +76,7 @@ def _pushed(
     return np.array(direction), np.array(amounts), np.array(held)
 
 
-class _Search:
+class _ManyStarts:
     """What was found so far.
 
     Attributes

@@ -117,20 +117,23 @@ class Extents:
             return self._anything(entry, value, self._off(factors, self._widest(entry) / factor))
         if not self.met:
             return Extent(np.nan, np.nan, NOT_OFF, bool(self._blamed(factors)))
+        measured = self._measured(entry, together=bool(np.count_nonzero(factors) > 1))
+        ends = [(bound - value) / factor for bound in measured] if measured else []
+        within = bool(ends) and ends[0] <= 0 <= ends[1]
         low, high, excluded, at_least = self._found(factors)
-        if not at_least and self._challenge():
+        if not at_least and not (within and self._small(factors, ends)) and self._challenge():
             low, high, excluded, at_least = self._found(factors)
-        measured = self._measured(entry) if at_least and np.count_nonzero(factors) == 1 else None
-        if measured and measured[0] <= value <= measured[1]:
-            (low, high), at_least = ((bound - value) / factor for bound in measured), False
+        if at_least and within:
+            (low, high), at_least = ends, False
         off = self._off(factors, low).worse(self._off(factors, high))
         return Extent(value + low * factor, value + high * factor, off, excluded, at_least)
 
-    def _measured(self, entry: TableNumber) -> tuple[float, float] | None:
-        """The bounds of an entry, in its unit, if a requirement is about it alone: no table can leave these."""
+    def _measured(self, entry: TableNumber, together: bool) -> tuple[float, float] | None:
+        """The bounds of an entry, in its unit, if a requirement is about it alone: no table can leave these. Of what is
+        determined ``together`` from that entry on: lengths along parallel axes are measured as one."""
         for each in self.asked.plain:
             own = each.quantity
-            if not isinstance(own, TableEntry) or own.column == "d" or each.gaussian:  # d adds up along an axis
+            if not isinstance(own, TableEntry) or (own.column == "d") != together or each.gaussian:
                 continue
             if (own.column, own.joint) == (entry.column, entry.joint):
                 return each.expected - each.half_width, each.expected + each.half_width
@@ -157,6 +160,10 @@ class Extents:
             return self.tolerance.mm / entry.in_unit / entry.scale
         one = self.tool.off(shifted(self.tool.table, [entry], np.array([[entry.scale]])))
         return 1.0 / max(one.mm / self.tolerance.mm, one.deg / self.tolerance.deg)
+
+    def _small(self, factors: Reals, ends: Sequence[float]) -> bool:
+        """Whether the tool is off by less than is tolerated at both ends of a combination."""
+        return all(self._off(factors, end).within(self.tolerance.mm, self.tolerance.deg) for end in ends)
 
     def may_reverse(self, joint: int) -> bool:
         """Whether a table was found whose joint (from 1) turns the other way, however its rows are written."""

@@ -169,6 +169,7 @@ def table_at(name, entry, sign):
     speaking = [k for k, each in enumerate(names) if each in free_of(name)]
     asked = Asked(robot, requirements_of(stated))
     extents = Extents(asked, table, free, speaking, gauge_of(robot, free), ToolRange(robot, table))
+    extents.of(free[names.index(entry)])  # by which what was found is challenged
     toward = (sign * np.eye(len(free))[names.index(entry)])[extents.seen]
     best = max(extents.elsewhere, key=lambda each: float(toward @ each.point.amounts))
     arm = best.region.at(best.region.followed(best.point, toward).amounts)
