@@ -12,7 +12,7 @@ import yaml
 from er3a.errors import InputError
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.kinematics.forward import forward
-from er3a.pipeline.study import STAGES, Study, load_study
+from er3a.pipeline.study import STAGES, RobotEntry, Study, load_study
 from testing.arms import placement
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -150,6 +150,22 @@ def test_each_stage_s_inputs_exist_and_are_its_own(study, monkeypatch):
 def test_a_study_is_frozen(study):
     with pytest.raises(ValueError, match="frozen"):
         study.seed = 1
+
+
+def test_a_robot_goes_through_the_stages_that_are_named(study_with):
+    named = ["validation", "workspace", "trajectory"]
+    study = study_with(lambda content: content["robots"]["er3a_c60_article"].update(stages=named, expect={}))
+    assert study.stages("er3a_c60_article") == ("validation", "workspace", "trajectory")
+    assert len(study.stages("er3a_c60")) == len(STAGES)
+
+
+@pytest.mark.parametrize(
+    ("stages", "told"),
+    [(["workspace"], "validation is missing"), (["validation", "workspace", "painting"], "no stage 'painting'")],
+)
+def test_stages_that_are_not_there_or_can_t_be_left_out_are_named(study, stages, told):
+    with pytest.raises(ValueError, match=told):
+        RobotEntry(targets="a", paths="b", stages=stages)
 
 
 def test_on_a_cluster_each_stage_is_a_group_of_its_own():

@@ -21,6 +21,7 @@ from er3a.robots.robot import Robot
 
 STAGES = tuple(REGISTRY)
 ExpectedStatus = Literal["pass", "caution", "fail", "no_reference"]
+COMPARED = ("validation", "workspace")
 SettingsT = TypeVar("SettingsT", bound=StrictModel)
 
 
@@ -32,6 +33,8 @@ class RobotEntry(StrictModel):
     ``tool_load`` and ``payload`` are the masses on its flange, which the stage dynamics alone looks at.
 
     ``expect`` says by stage what its verdict is to be: one that is as expected is no news, any other is a fault.
+
+    ``stages``: those it goes through, if not all; validation and workspace, which robots are compared by, always.
     """
 
     file: Text | None = None
@@ -45,6 +48,17 @@ class RobotEntry(StrictModel):
     tool_load: LoadFields | None = None
     payload: LoadFields | None = None
     expect: dict[Text, ExpectedStatus] = {}
+    stages: list[Text] | None = None
+
+    @model_validator(mode="after")
+    def _goes_through_stages_that_there_are(self):
+        if self.stages is not None:
+            for place, stage in enumerate(self.stages):
+                if stage not in REGISTRY:
+                    raise ValueError(f"stages[{place}]: there is no stage '{stage}' | Known: {', '.join(REGISTRY)}")
+            if left_out := [stage for stage in COMPARED if stage not in self.stages]:
+                raise ValueError(f"stages: {left_out[0]} is missing | Robots are compared by it; add it to the list")
+        return self
 
     @model_validator(mode="after")
     def _expects_of_stages_that_there_are(self):
@@ -120,7 +134,8 @@ class StudyBase(StrictModel):
     def stages(self, name: str) -> tuple[str, ...]:
         """The stages that a robot goes through."""
         variant = self.variants.get(name)
-        asked = STAGES if variant is None else tuple(self.sweeps[variant.sweep].stages)
+        named = self.robots[name].stages if variant is None else self.sweeps[variant.sweep].stages
+        asked = STAGES if named is None else tuple(named)
         return tuple(stage for stage in asked if REGISTRY[stage].wanted(self, name))
 
     def pages(self, name: str) -> tuple[str, ...]:

@@ -29,7 +29,7 @@ WORD = re.compile(r"[A-Za-z]{3,}")
 # Units, and names that are the same in every language.
 SAME_EVERYWHERE = {"deg", "rad", "er3a", "csv", "sha", "rrd", "rpm", "ppb", "krl", "rpl", "xpl", "urscript"}
 SAME_EVERYWHERE |= {name.lower() for name in METHODS.values()}  # of closed forms, by who found them
-PROGRAM_SUFFIXES = ("src", "dat", "script", "pgm", "var", "XPL")
+PROGRAM_SUFFIXES = ("csv", "src", "dat", "script", "pgm", "var", "XPL")
 NAMES = re.compile(
     r"\b(?:alpha|beta|offset|direction|lower|upper|speed) ?\d(?:, \d)*\b"  # entries of a table
     rf"|\b[\w-]+\.(?:{'|'.join(PROGRAM_SUFFIXES)})\b|\b[A-Z_]{{4,}}\[\d+\]"  # files and frames of programs

@@ -16,7 +16,7 @@ from er3a.errors import Er3aError
 from er3a.files.kept_files import write_atomically
 from er3a.pipeline.viewing.viewer import LOOPBACK, free_port, viewer_running
 
-WINDOW = (1400, 900)  # pixels
+WINDOW = (1200, 780)  # pixels
 TITLE_BAR = 36
 TIME_BAR = 34  # left out: it fills as loading goes
 QUALITY = 75
