@@ -120,7 +120,7 @@ def table() -> str:
         try:
             for name in ROBOTS:
                 file = Path(folder) / f"{name}.html"
-                write_teach_page(study, name, file)
+                write_teach_page(study, name, Path("results"), file)
                 for screen, (width, height) in SCREENS.items():
                     usable, rate, slow, used = speed(browser, file, width, height)
                     where = f"{screen}, {width} x {height}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -39,7 +40,7 @@ import("er3a/algebra").then((algebra) =>
 def page(browser, tmp_path_factory):
     """The browser on a teach panel, whose modules the tests call."""
     file = tmp_path_factory.mktemp("teach") / "teach.html"
-    write_teach_page(STUDY, "er3a_c60", file)
+    write_teach_page(STUDY, "er3a_c60", Path("nowhere"), file)
     browser.get(file.as_uri())
     return browser
 

@@ -44,7 +44,7 @@ class Panel:
     def __init__(self, browser, file: Path, name: str = "er3a_c60"):
         self.browser, self.file = browser, file
         if not file.exists():
-            teach_page.write_teach_page(load_study("config/small.yaml"), name, file)
+            teach_page.write_teach_page(load_study("config/small.yaml"), name, Path("results"), file)
 
     def open(self, fragment: str = "") -> Panel:
         self.browser.get("about:blank")

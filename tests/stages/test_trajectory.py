@@ -43,6 +43,7 @@ from er3a.pipeline.stages.trajectory.model import (
 from er3a.pipeline.stages.trajectory.record import record
 from er3a.pipeline.stages.trajectory.report import report
 from er3a.pipeline.study import Study, load_study
+from er3a.pipeline.teach.panel import write_teach_page
 from er3a.pipeline.viewing.index import write_index
 from er3a.planning.avoidance.strategies import STRATEGIES
 from er3a.planning.intervals import AboveLimit
@@ -338,6 +339,23 @@ def test_cells_of_the_index_say_first_what_validation_came_to(study, folders, tm
     assert cell.index("This table was not validated") < cell.index("safe")
     compared = (tmp_path / "compare.html").read_text(encoding="utf-8")
     assert compared.index("This table was not validated") < compared.index('id="borders"')
+
+
+@pytest.mark.parametrize(
+    ("status", "told"), [("fail", "Validation contradicts this table"), ("pass", None), (None, "was not validated")]
+)
+def test_the_teach_panel_says_first_what_validation_came_to(study, tmp_path, status, told):
+    if status:
+        found = AbsentResults(Summary(Verdict(status, NotComputed("made up")), ()))
+        write_results(
+            tmp_path / "results/er3_600/validation", study, "er3_600", STAGES["validation"], found, lambda found: "-"
+        )
+    write_teach_page(study, "er3_600", tmp_path / "results", tmp_path / "teach.html")
+    page = (tmp_path / "teach.html").read_text(encoding="utf-8")
+    body = page[page.index("<body") :]
+    assert ('class="caveat"' in body) == bool(told)
+    if told:
+        assert body.index(told) < body.index('class="panel"')
 
 
 def own_paths(*names):

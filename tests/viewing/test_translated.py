@@ -73,7 +73,7 @@ def test_each_word_of_the_other_pages_can_be_translated(small_study, own_texts, 
     with wide_letters():
         write_index(study, Path("results"), tmp_path)
         for name in small_study.robots:
-            write_teach_page(study, name, tmp_path / f"{name}.html")
+            write_teach_page(study, name, Path("results"), tmp_path / f"{name}.html")
     for page in tmp_path.glob("*.html"):
         assert plain_words(PageTexts(page.read_text(encoding="utf-8")).texts, own_texts) == [], page.name
 

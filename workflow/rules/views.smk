@@ -51,6 +51,7 @@ rule report:
 rule teach:
     input:
         inputs("teach"),
+        "results/{robot}/validation/summary.json",
         CATALOGUE,
     output:
         report(

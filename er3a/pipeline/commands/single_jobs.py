@@ -109,13 +109,18 @@ def report(
 
 
 @app.command(rich_help_panel=JOBS)
-def teach(robot: RobotName, study: StudyFile = DEFAULT_STUDY, reports: Reports = DEFAULT_REPORTS):
+def teach(
+    robot: RobotName,
+    study: StudyFile = DEFAULT_STUDY,
+    results: Results = DEFAULT_RESULTS,
+    reports: Reports = DEFAULT_REPORTS,
+):
     """Write a robot's teach panel: sliders, the arm in 3-D, its pose and all IK solutions of it, in one page."""
     from er3a.pipeline.checksums import write_checksum
     from er3a.pipeline.teach.panel import write_teach_page
 
     page = reports / robot / "teach.html"
-    write_teach_page(_study_to_show(study), robot, page)
+    write_teach_page(_study_to_show(study), robot, results, page)
     write_checksum(page)
 
 

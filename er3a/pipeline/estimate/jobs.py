@@ -45,6 +45,7 @@ def jobs_of(study: Study) -> list[Job]:
         return len(jobs) - 1
 
     for robot in study.names:
+        computed: dict[str, int] = {}
         for stage in study.stages(robot):
             parts: tuple[int, ...] = ()
             if STAGES[stage].sampled:
@@ -52,14 +53,14 @@ def jobs_of(study: Study) -> list[Job]:
                 parts = tuple(
                     add("sample", stage, robot, total * (n + 1) // count - total * n // count) for n in range(count)
                 )
-            done = add("compute", stage, robot, needs=parts)
+            done = computed[stage] = add("compute", stage, robot, needs=parts)
             shown, views = done, STAGES[stage].views
             if "record" in views:
                 shown = add("record", stage, robot, needs=(done,))
             if "report" in views:
                 pages.append(add("report", stage, robot, needs=(shown,)))
         if "teach" in study.pages(robot):
-            pages.append(add("teach", "", robot))
+            pages.append(add("teach", "", robot, needs=(computed["validation"],)))
     add("index", "", "", needs=tuple(pages))
     return jobs
 

@@ -97,7 +97,7 @@ def trial(study: Study, robot: str, whole: bool) -> Trial:
         places: dict[str, list[str | Path]] = {
             "sample": ["--study", file, "--part", "1-of-1", "--output", part],
             "compute": ["--study", file, "--results", folder / "results"],
-            "teach": ["--study", file, "--reports", folder / "reports"],
+            "teach": ["--study", file, "--results", folder / "results", "--reports", folder / "reports"],
         }
 
         def carry_out(verb: str, stage: str, *words: str | Path) -> None:

@@ -12,11 +12,12 @@ from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.singularity import characteristic_length
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.pipeline.code_digest import code_digest
+from er3a.pipeline.messages.foundations import caveat
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.player import scene_data
-from er3a.pipeline.results import Provenance, input_records
+from er3a.pipeline.results import SUMMARY, Provenance, input_records, read_verdict
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.study import Study
 from er3a.pipeline.teach.scripts import import_map
@@ -32,9 +33,11 @@ NEAR_LIMIT = np.radians(5.0)
 NEAR_SINGULAR = 1e-2  # smallest singular value below which an arm without named singularities is warned of one
 
 
-def write_teach_page(study: Study, name: str, output: Path) -> None:
-    """Write the teach panel of a robot of the study to ``output``."""
+def write_teach_page(study: Study, name: str, results: Path, output: Path) -> None:
+    """Write the teach panel of a robot of the study to ``output``; the verdict on its table is in ``results``."""
     robot = study.robot(name)
+    validated = results / name / "validation"
+    told_first = caveat(read_verdict(validated)[0] if (validated / SUMMARY).exists() else "not_computed")
     if not has_panel(robot):
         render(
             _HERE / "teach_absent.html.j2",
@@ -42,6 +45,7 @@ def write_teach_page(study: Study, name: str, output: Path) -> None:
             robot=robot,
             robot_pages=study.pages(name),
             words=_translated(WORDS),
+            told_first=told_first,
             command=run_command(study, f"{name}/teach.html"),
             provenance=_provenance(study, name),
         )
@@ -63,6 +67,7 @@ def write_teach_page(study: Study, name: str, output: Path) -> None:
         joint_colours=SIX_JOINTS,
         degrees=float(np.degrees(1.0)),
         words=panel["words"],
+        told_first=told_first,
         panel=panel,
         modules=import_map(sorted(_HERE.glob("*.js"))),
         command=run_command(study, f"{name}/teach.html"),

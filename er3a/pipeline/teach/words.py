@@ -12,7 +12,6 @@ WORDS: dict[str, Any] = {
         "Move the joints and watch the tool: its pose, the limits, how near the arm comes to a singularity, and which "
         "other joint angles reach the same pose."
     ),
-    "foundation": N_("This is the arm that the table describes; whether it is the robot is told by its validation."),
     "absent": N_(
         "The teach panel moves arms with six joints that turn, each by itself; this arm has others. "
         "Its recordings show it in motion."
