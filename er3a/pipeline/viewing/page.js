@@ -189,10 +189,11 @@ function addContents() {
   tell();
 }
 
-// Joints that a sentence names, as "(10, −20, 30, 0, 45, 0) deg", lead to the arm in the teach panel.
+// Joints that a sentence names, as "(10, −20, 30, 0, 45, 0) deg" or "(10°, −20°, 30°, 0°, 45°, 0°)", lead to the arm in
+// the teach panel.
 function linkJoints(page) {
   const angle = "[−-]?\\d+(?:\\.\\d+)?";
-  const vector = new RegExp(`[(（]((?:${angle}[,，]\\s*){5}${angle})(?=[)）]\\s*(?:deg|°|度))`);
+  const vector = new RegExp(`[(（]((?:${angle}°?[,，]\\s*){5}${angle})(?=°[)）]|[)）]\\s*(?:deg|°|度))`);
   const texts = document.createTreeWalker(page, NodeFilter.SHOW_TEXT);
   const found = [];
   while (texts.nextNode()) if (vector.test(texts.currentNode.data) && !texts.currentNode.parentElement.closest("a, code, h2, script")) found.push(texts.currentNode);
@@ -201,7 +202,7 @@ function linkJoints(page) {
       const named = text.splitText(hit.index + 1);
       text = named.splitText(hit[1].length);
       const link = document.createElement("a");
-      link.href = `${page.dataset.panel}#q=${hit[1].replace(/\s/g, "").replaceAll("−", "-").replaceAll("，", ",")}`;
+      link.href = `${page.dataset.panel}#q=${hit[1].replace(/[\s°]/g, "").replaceAll("−", "-").replaceAll("，", ",")}`;
       named.replaceWith(link);
       link.append(named);
     }
