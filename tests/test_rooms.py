@@ -31,6 +31,7 @@ def test_a_room_imports_nothing_from_those_above_it(room):
     assert [path.name for path in files if imported(path) & FOREIGN[room]] == []
 
 
+@pytest.mark.long
 def test_campaigns_are_imported_by_their_full_names():
     campaigns = {path.stem for path in (ROOT / "benchmarks").glob("*.py")}
     files = [path for room in FOREIGN for path in (ROOT / room).rglob("*.py")]

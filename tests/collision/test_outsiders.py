@@ -79,6 +79,7 @@ def test_moves_that_are_proven_free_are_so_at_every_point_that_pinocchio_looks_a
     assert {FREE, MEETS} <= set(states)
 
 
+@pytest.mark.long
 def test_a_path_proven_at_once_is_what_its_moves_are(random):
     robot = load_robot("er3a_c60")
     bodies = Bodies(robot, load_scene(SCENE))

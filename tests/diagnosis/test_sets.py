@@ -280,6 +280,7 @@ def test_few_references_leave_a_set_without_end_that_is_still_said_whole(arm):
     assert not any(isinstance(fault, WrongScale) and fault.factor <= 0 for faults in members for fault in faults)
 
 
+@pytest.mark.long
 def test_equal_input_gives_equal_output(arm):
     faulty, stated = changed(changed(arm, "alpha2", 0.1), "d4", -0.04), stated_of(arm)
     once, again = er3a.diagnose(faulty, stated), er3a.diagnose(faulty, stated)

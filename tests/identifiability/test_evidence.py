@@ -119,6 +119,7 @@ def test_the_table_read_from_the_step_model_is_consistent_with_it():
     assert [round(bound, 1) for bound in found["upper2"].interval] == [84.6, 85.0]  # the drawing's least x
 
 
+@pytest.mark.long
 def test_every_interval_holds_its_value_and_every_status_has_its_reason():
     for name in ("er3_600", "er3a_c60"):
         for each in evidence(name).entries:
@@ -130,14 +131,14 @@ def test_every_interval_holds_its_value_and_every_status_has_its_reason():
 @pytest.mark.parametrize(
     ("entry", "by", "status"),
     [
-        ("d1", 5.0, "contradicted"),
+        pytest.param("d1", 5.0, "contradicted", marks=pytest.mark.long),
         ("a3", 1.0, "contradicted"),
-        ("a3", 0.3, "settled"),
+        pytest.param("a3", 0.3, "settled", marks=pytest.mark.long),
         ("d4", 0.15, "settled"),
-        ("d4", 0.5, "contradicted"),
-        ("alpha3", 180.0, "contradicted"),
-        ("offset2", 10.0, "contradicted"),
-        ("alpha2", 0.5, "contradicted"),
+        pytest.param("d4", 0.5, "contradicted", marks=pytest.mark.long),
+        pytest.param("alpha3", 180.0, "contradicted", marks=pytest.mark.long),
+        pytest.param("offset2", 10.0, "contradicted", marks=pytest.mark.long),
+        pytest.param("alpha2", 0.5, "contradicted", marks=pytest.mark.long),
         ("lower1", 10.0, "contradicted"),
     ],
 )
@@ -146,6 +147,7 @@ def test_a_value_is_contradicted_outside_its_interval_and_not_inside(entry, by, 
     assert found[entry].status == status
 
 
+@pytest.mark.long
 def test_one_wrong_length_accuses_no_other():
     found = about(changed(load_robot("er3a_c60"), "d1", 5.0), *LENGTHS)
     assert {entry: found[entry].status for entry in LENGTHS} == dict.fromkeys(LENGTHS, "settled") | {
@@ -210,6 +212,7 @@ HEADS = {
 }
 
 
+@pytest.mark.long
 def test_all_that_is_proposed_entered_in_files_settles_every_entry(tmp_path):
     """A reference set with a line for each proposal: nothing is left open of the ER3-600."""
     robot, proposals = load_robot("er3_600"), proposals_of(evidence("er3_600")).values()
@@ -231,6 +234,7 @@ def test_all_that_is_proposed_entered_in_files_settles_every_entry(tmp_path):
     assert {part.status for part in parts_of(found)} == {"settled"}
 
 
+@pytest.mark.long
 def test_all_measurements_together_settle_the_tool():
     robot = load_robot("er3a_c60")
     shown = [measured(proposal, robot) for proposal in proposals_of(evidence("er3a_c60")).values()]
@@ -328,6 +332,7 @@ def test_a_tracker_settles_a_foreign_arm_but_for_how_its_flange_is_turned(random
     assert (wrong["a2"].status, wrong["d4"].status) == ("contradicted", "settled")
 
 
+@pytest.mark.long
 def test_standard_deviations_give_the_interval_of_least_squares(random):
     """Three points that the flange carries: 1.96 standard errors, from a Jacobian made by itself."""
     robot, at, sigma = puma(), poses(random, 15), 0.2

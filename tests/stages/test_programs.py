@@ -72,6 +72,7 @@ def test_the_motion_follows_the_listing(stored):
     assert text.text[30] == "   LIN {X 360.00, Y 150.00, Z 200.00, A 0.00, B 0.00, C 180.00}"
 
 
+@pytest.mark.long
 def test_equal_inputs_give_equal_bytes(study, folders, tmp_path):
     run.compute("programs", study, "er3_600", tmp_path)
     for file in sorted(folders["er3_600"].iterdir()):

@@ -70,6 +70,7 @@ def test_tables_say_what_the_summary_says(folders):
         assert each.error_mm.together >= max(each.error_mm.camera, each.error_mm.calibration, each.error_mm.table)
 
 
+@pytest.mark.long
 def test_equal_inputs_give_equal_bytes(study, folders, tmp_path):
     run.compute("vision", study, "er3_600", tmp_path)
     for file in folders["er3_600"].iterdir():

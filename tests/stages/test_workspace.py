@@ -88,10 +88,9 @@ def test_tables_agree_with_the_summary(found):
     assert 0 < summary.hull.volume_m3 < 1.26
 
 
-def test_the_border_that_is_compared_has_no_chords(found, tmp_path):
+def test_the_border_that_is_compared_has_no_chords(found):
     """Points of different views once were joined, by lines of up to 2.4 m."""
-    write_results(tmp_path / "workspace", make_study(), "er3_600", STAGES["workspace"], found, say)
-    arcs = [np.array(arc) for arc in border_mm(tmp_path)]
+    arcs = [np.array(arc) for arc in border_mm(found)]
     assert len(arcs) > 2
     assert max(np.linalg.norm(np.diff(arc, axis=0), axis=1).max() for arc in arcs) < 30
     views = found.border.take(found.border.point == "tool_point").view
