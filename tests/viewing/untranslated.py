@@ -32,6 +32,7 @@ SAME_EVERYWHERE |= {name.lower() for name in METHODS.values()}  # of closed form
 PROGRAM_SUFFIXES = ("csv", "src", "dat", "script", "pgm", "var", "XPL")
 NAMES = re.compile(
     r"\b(?:alpha|beta|offset|direction|lower|upper|speed) ?\d(?:, \d)*\b"  # entries of a table
+    r"|\bT_[a-z]+_[a-z]+\b"  # transforms
     rf"|\b[\w-]+\.(?:{'|'.join(PROGRAM_SUFFIXES)})\b|\b[A-Z_]{{4,}}\[\d+\]"  # files and frames of programs
 )
 SPOKEN = {"alt", "aria-label", "title", "placeholder", "data-differs"}
