@@ -13,7 +13,7 @@ ARGS   ?=
 export STUDY
 # A run starts dozens of short processes: without compiled modules kept on disk each would compile them anew.
 unexport PYTHONDONTWRITEBYTECODE
-.PHONY: help run test test-all view estimate archive lint format schema words lock clean distclean campaigns docs evidence release-check
+.PHONY: help run test test-all view estimate archive lint format schema words lock clean distclean campaigns docs pictures evidence release-check
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## /  make \1\t/' | expand -t 18
@@ -68,6 +68,10 @@ campaigns: $(VENV)/dev.stamp  ## full-size evidence: writes the tables in docs/e
 docs: $(VENV)/docs.stamp  ## build the documentation site in docs/_build/html, warnings as errors
 	@$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html
 	@echo "docs/_build/html/index.html"
+
+pictures: $(VENV)/dev.stamp  ## pictures of the documentation again, from finished studies (config.yaml and gallery.yaml)
+	$(BIN)/python -m testing.pictures playing
+	$(BIN)/python -m testing.pictures arms
 
 evidence: $(VENV)/run.stamp  ## list which pages of evidence rest on the code that is here
 	@$(BIN)/python -m testing.evidence

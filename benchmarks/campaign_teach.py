@@ -8,7 +8,6 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-import psutil
 
 from er3a import forward, inverse, load_robot
 from er3a.geometry.angles import wrap_to_pi
@@ -52,17 +51,11 @@ def speed(browser, file: Path, width: int, height: int) -> list[float]:
         browser.get("about:blank")
         browser.get(file.as_uri())
         usable.append(browser.execute_script("return performance.getEntriesByName('usable')[0].startTime"))
-    before = processor_time(browser)
+    before = chromium.processor_time(browser)
     frames = browser.execute_async_script(ANIMATE, SECONDS)
-    used = processor_time(browser) - before
+    used = chromium.processor_time(browser) - before
     rate, slow = 1000 * len(frames) / sum(frames), float(np.quantile(frames, 0.95))
     return [statistics.median(usable), rate, slow, 1000 * used / len(frames)]
-
-
-def processor_time(browser) -> float:
-    """Seconds that all processes of the browser have computed."""
-    processes = psutil.Process(browser.service.process.pid).children(recursive=True)
-    return sum(sum(process.cpu_times()[:2]) for process in processes)
 
 
 def agreement(browser, name: str) -> tuple[int, list[float]]:

@@ -56,7 +56,10 @@ ROOMS = {
     "What an arm can reach": ("workspace",),
     "Paths": ("planning", "collision"),
     "Choosing solutions": ("selection",),
-    "References, diagnosis, calibration": ("references", "diagnosis", "calibration"),
+    "References, diagnosis, calibration": ("references", "identifiability", "diagnosis", "calibration"),
+    "Robot programs": ("programs", "program_check"),
+    "What the motors feel": ("dynamics",),
+    "Cameras": ("vision",),
     "Files and formats": ("formats", "files"),
     "Beneath": ("numerics",),
 }
@@ -85,6 +88,9 @@ def write_module_page(path: Path) -> str:
 
 def write_reference() -> None:
     """The pages on all modules, and one that lists them."""
+    library = {path.parent.name for path in ROOT.glob("er3a/*/__init__.py")} - {"pipeline"}
+    if missing := library - {room for rooms in ROOMS.values() for room in rooms}:
+        raise ValueError(f"rooms that the reference leaves out: {sorted(missing)}")
     parts = ["# Modules\n", "All modules of the library, by what they are about; `er3a` names the public functions.\n"]
     for title, rooms in ROOMS.items():
         paths = [path for room in rooms for path in sorted((ROOT / "er3a" / room).rglob("*.py"))]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
+import pytest
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -11,6 +12,12 @@ from er3a.kinematics.singularity import DeterminantFactors, determinant_factors
 from er3a.robots.robot import Robot
 
 DEG = np.pi / 180
+OTHERS_LONG = pytest.mark.parametrize(
+    "robot",
+    ["er3_600", *(pytest.param(name, marks=pytest.mark.long) for name in ("er3a_c60", "er3a_c60_article"))],
+    indirect=True,
+)
+"""For a test of the fixture ``robot`` that takes seconds: one robot in the fast set, the others among the long ones."""
 
 
 def placement(xyz, rpy) -> np.ndarray:
@@ -39,6 +46,65 @@ def make_arm(convention="standard", **changes) -> Robot:
         values["a"] = [0, 0.1, 0.4, 0.05, 0, 0]
         values["alpha"] = np.array([0, -90, 0, -90, 90, -90]) * DEG
     return Robot(**(values | changes))
+
+
+def made_of(rows: list[tuple[str, float, float, float, float, float]], **changes) -> Robot:
+    """An arm of standard rows: ``R`` or ``P``, a (mm), alpha (deg), d (mm), lower and upper (deg or mm)."""
+    kind, a, alpha, d, lower, upper = zip(*rows)
+    sliding = np.array([each == "P" for each in kind])
+    unit = np.where(sliding, 1e-3, DEG)
+    values = {
+        "name": "made",
+        "title": "made up",
+        "convention": "standard",
+        "a": np.array(a) / 1000,
+        "alpha": np.array(alpha) * DEG,
+        "d": np.array(d) / 1000,
+        "direction": np.ones(len(rows)),
+        "offset": np.zeros(len(rows)),
+        "sliding": sliding,
+        "lower": np.array(lower) * unit,
+        "upper": np.array(upper) * unit,
+    }
+    return Robot(**(values | changes))
+
+
+def scara() -> Robot:
+    """Two parallel axes, a slide downwards and a turn about it."""
+    return made_of(
+        [
+            ("R", 325, 0, 200, -130, 130),
+            ("R", 225, 180, 0, -145, 145),
+            ("P", 0, 0, 0, 0, 180),
+            ("R", 0, 0, 20, -360, 360),
+        ]
+    )
+
+
+def gantry() -> Robot:
+    """Three slides at right angles, without any link lengths."""
+    return made_of(
+        [("P", 0, -90, 0, 0, 1200), ("P", 0, 90, 0, 0, 800), ("P", 0, 0, 0, 0, 500)],
+        offset=np.array([0, -90, 0]) * DEG,
+        direction=np.array([1.0, -1, 1]),
+    )
+
+
+def palletiser() -> Robot:
+    """Four joints that move five rows: the wrist stays level whatever joints 2 and 3 do."""
+    rows = [
+        *(("R", 150, -90, 450, -170, 170), ("R", 600, 0, 0, -130, 10), ("R", 600, 0, 0, -10, 150)),
+        *(("R", 100, -90, 0, -175, 175), ("R", 0, 0, 120, -300, 300)),
+    ]
+    coupling = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, -1, 1, 0], [0, 0, -1, 0], [0, 0, 0, 1]])
+    limits = np.array([[-170, -130, -10, -300], [170, 10, 150, 300]]) * DEG
+    return made_of(rows, coupling=coupling, lower=limits[0], upper=limits[1])
+
+
+def five_axis() -> Robot:
+    """Shoulder, elbow, wrist pitch and roll: a direction of the tool, but no turn about it."""
+    rows = [("R", 0, 90, 300, -170, 170), ("R", 350, 0, 0, -10, 170), ("R", 300, 0, 0, -150, 150)]
+    return made_of([*rows, ("R", 0, 90, 0, -150, 150), ("R", 0, 0, 90, -180, 180)])
 
 
 def number(low: float, high: float):

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import psutil
 from selenium import webdriver
 
 SWITCHES = (
@@ -53,6 +54,12 @@ def emulating(browser: webdriver.Chrome, width: int = 0, height: int = 900, **me
     finally:
         browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": []})
         browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def processor_time(browser: webdriver.Chrome) -> float:
+    """Seconds that all processes of the browser have computed."""
+    processes = psutil.Process(browser.service.process.pid).children(recursive=True)
+    return sum(sum(process.cpu_times()[:2]) for process in processes)
 
 
 def _binary() -> str | None:

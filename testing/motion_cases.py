@@ -164,11 +164,12 @@ def compare(robot, spec, written, samples, tally: Tally, seen: Truth) -> list[st
     tally.paths += 1
     tally.undecided += found.verdict == "undecided"
     tally.safe += found.verdict == "safe"
+    ends = bool(found.beyond) or bool(motion.followed and motion.followed.jumps)
     if seen.out_of_reach or found.beyond:
         tally.unreachable += 1
-        if not (seen.out_of_reach and found.beyond):
+        if not (seen.out_of_reach and ends and found.verdict != "safe"):
             tally.missed_unreachable += 1
-            wrong.append(f"reach: oracle {seen.out_of_reach}, stage {bool(found.beyond)}")
+            wrong.append(f"reach: oracle {seen.out_of_reach}, stage {ends}")
         return wrong
     if any(event.crossing for event in found.events) and "q_start" in spec:
         return wrong  # which branch goes on behind it is a choice
@@ -186,7 +187,7 @@ def compare(robot, spec, written, samples, tally: Tally, seen: Truth) -> list[st
             s[:2] == (order, joint) and s[2] <= end + near and s[3] >= start - near for s in shown
         ):
             ratio = _ratio(motion, limits, seen, order, joint, start, end)
-            if ratio > 1 + 3 * GRAZING:
+            if ratio > 1 + 3 * GRAZING + seen.blur[order] / _limit(limits, order, joint):
                 tally.invented[order] += 1
                 wrong.append(f"invented order {order} J{joint + 1} {start:.6f}..{end:.6f} ratio {ratio}")
     least = max((_shown(limits, order, joint) for order, joint, *_ in seen.stretches), default=0)
@@ -217,7 +218,12 @@ def _ratio(motion, limits, seen, order, joint, start, end):
         near = np.abs(seen.jerk[here, joint]).max(initial=0.0) > limits.jerk[joint] * (1 - GRAZING_JERK)
         return 1.0 if near or end - start < 3 * seen.jerk_span else 2.0
     values = motion.rates(np.linspace(start, end, 50))[order][:, joint]
-    return float(np.nanmax(np.abs(values)) / (limits.speed, limits.acceleration)[order - 1][joint])
+    return float(np.nanmax(np.abs(values)) / _limit(limits, order, joint))
+
+
+def _limit(limits: JointLimits, order: int, joint: int) -> float:
+    """Of a speed or an acceleration; others are not measured in these."""
+    return float((np.inf, *limits.speed[[joint]], *limits.acceleration[[joint]], np.inf)[order])
 
 
 def _order(code: str) -> int:

@@ -23,6 +23,8 @@ GRAZING_RAD = 1e-7  # of joint limits
 GRAZING_JERK = 1e-3  # relative, of limits of jerk
 SPAN_S = 2e-4  # of one difference of accelerations; jerks are means over three of them
 TOUCH = 1e-7  # rad or m, between two crossings next to one another
+WIDER = 20  # points; an acceleration of a path of the tool that exceeds its limit for fewer has to do so on their mean
+NOISE = (0, 8, 32, 128)  # roundings of an angle in a difference of each order
 
 
 # ---------------------------------------------------------------- paths in joint space
@@ -88,26 +90,55 @@ def rounded(corners, sides, blends):
     starts = np.concatenate([[0.0], np.cumsum(sides)])
     begin, end = corners
     rates = (end - begin) / sides[:, None]
-    pieces = []
-    for k, blend in enumerate(blends):
-        if blend > 0:
-            before = np.stack([end[k] - blend * rates[k], rates[k], 0 * rates[k]])
-            after = np.stack([begin[k + 1] + blend * rates[k + 1], rates[k + 1], 0 * rates[k]])
-            jump = end[k] - begin[k + 1]  # another frame behind the corner
-            before[0] -= jump
-            pieces.append((starts[k + 1], blend, hermite(before, after, 2 * blend)))
+    pieces = np.zeros((len(blends), 6, begin.shape[1]))
+    for k in np.flatnonzero(blends > 0):
+        before = np.stack([end[k] - blends[k] * rates[k], rates[k], 0 * rates[k]])
+        after = np.stack([begin[k + 1] + blends[k] * rates[k + 1], rates[k + 1], 0 * rates[k]])
+        before[0] -= end[k] - begin[k + 1]  # another frame behind the corner
+        pieces[k] = hermite(before, after, 2 * blends[k])
 
     def value(way):
-        i = np.clip(np.searchsorted(starts, way, side="right") - 1, 0, len(sides) - 1)
-        found = begin[i] + (way - starts[i])[:, None] * rates[i]
-        frame = i.copy()
-        for k, (at, blend, c) in zip(np.flatnonzero(blends > 0), pieces):
-            here = (way > at - blend) & (way < at + blend)
-            x = (way[here] - at + blend)[:, None] ** np.arange(6)
-            found[here], frame[here] = x @ c, k + 1
-        return found, frame
+        side = np.clip(np.searchsorted(starts, way, side="right") - 1, 0, len(sides) - 1)
+        found = np.empty((len(way), begin.shape[1]))
+        _rounded(way, side, (starts, begin, rates), (np.asarray(blends, float), pieces), found)
+        return found, side
 
     return value
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _rounded(way, side, straight, corners, found):
+    """Values (n, k) at ways (n,) on sides (n,), which become those behind a corner where that is rounded."""
+    (starts, begin, rates), (blends, pieces) = straight, corners
+    for n in range(len(way)):
+        i, corner = side[n], -1
+        if i < len(blends) and way[n] > starts[i + 1] - blends[i]:
+            corner = i
+        elif i > 0 and way[n] < starts[i] + blends[i - 1]:
+            corner = i - 1
+        x = way[n] - (starts[i] if corner < 0 else starts[corner + 1] - blends[corner])
+        for j in range(found.shape[1]):
+            if corner < 0:
+                found[n, j] = begin[i, j] + x * rates[i, j]
+                continue
+            total = 0.0
+            for power in range(5, -1, -1):
+                total = total * x + pieces[corner, power, j]
+            found[n, j] = total
+        if corner >= 0:
+            side[n] = corner + 1
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _polynomials(t, c, found):
+    """Values (n, k) at times (n,) of polynomials with coefficients (6, k), the lowest power first."""
+    for n in range(len(t)):
+        for j in range(c.shape[1]):
+            total = 0.0
+            for power in range(5, -1, -1):
+                total = total * t[n] + c[power, j]
+            found[n, j] = total
+    return found
 
 
 def joint_path(spec) -> tuple[Callable, np.ndarray]:
@@ -117,7 +148,7 @@ def joint_path(spec) -> tuple[Callable, np.ndarray]:
         ends = [np.radians([spec["start_deg"], spec["start_velocity_deg_s"], spec["start_acceleration_deg_s2"]])]
         ends.append(np.radians([spec["end_deg"], spec["end_velocity_deg_s"], spec["end_acceleration_deg_s2"]]))
         c = hermite(*ends, T)
-        return (lambda t: t[:, None] ** np.arange(6) @ c), np.array([0.0, T])
+        return (lambda t: _polynomials(t, c, np.empty((len(t), 6)))), np.array([0.0, T])
     points = np.radians(spec["points_deg"])
     sides = np.abs(np.diff(points, axis=0)).max(axis=1)
     most = np.minimum(sides[:-1], sides[1:]) / 2
@@ -236,10 +267,20 @@ def _meeting(frames):
 
 def factors(arm: Arm, q):
     """Signed distances (n, 3) from the wrist (sine), elbow (sine) and shoulder (m) sets."""
-    upper = arm.zero[1] + arm.sense[1] * q[:, 1]
-    fore = arm.zero[2] + arm.sense[1] * q[:, 1] + arm.sense[2] * q[:, 2]
-    r = arm.plane[0] + arm.plane[2] * np.cos(upper) + arm.plane[3] * np.cos(fore)
-    return np.stack([np.sin(arm.direction[4] * q[:, 4] + arm.offset[4]), np.sin(fore - upper), r], axis=1)
+    wrist = np.array([arm.direction[4], arm.offset[4]], float)
+    found = np.empty((len(q), 3))
+    _factors(np.ascontiguousarray(q), arm.plane, arm.zero, arm.sense, wrist, found)
+    return found
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _factors(q, plane, zero, sense, wrist, found):
+    for n in range(len(q)):
+        upper = zero[1] + sense[1] * q[n, 1]
+        fore = zero[2] + sense[1] * q[n, 1] + sense[2] * q[n, 2]
+        found[n, 0] = np.sin(wrist[0] * q[n, 4] + wrist[1])
+        found[n, 1] = np.sin(fore - upper)
+        found[n, 2] = plane[0] + plane[2] * np.cos(upper) + plane[3] * np.cos(fore)
 
 
 # ---------------------------------------------------------------- paths of the tool
@@ -300,10 +341,20 @@ def _circle(a, b, c):
 
 def _stack(points, spin, starts, frame=None):
     T = np.zeros((len(points), 4, 4))
-    first = np.array([pose[:3, :3] for pose in starts])[np.zeros(len(points), int) if frame is None else frame]
-    T[:, :3, :3] = spin.as_matrix() @ first
+    first = np.array([pose[:3, :3] for pose in starts])
+    _turned(spin.as_matrix(), first, np.zeros(len(points), int) if frame is None else frame, T)
     T[:, :3, 3], T[:, 3, 3] = points, 1.0
     return T
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _turned(spin, first, frame, T):
+    """Rotations of frames (n,) by spins (n, 3, 3)."""
+    for n in range(len(T)):
+        for i in range(3):
+            for j in range(3):
+                for k in range(3):
+                    T[n, i, j] += spin[n, i, k] * first[frame[n], k, j]
 
 
 def joints_of(arm: Arm, T, q_start):
@@ -388,7 +439,8 @@ def _solved(T, turns, fixed, signs, q_start, q):
 class Truth:
     """What dense points show: times, crossings (type number, time), and stretches (order, joint, start, end).
 
-    ``jerk`` (N, 6) are means over ``jerk_span`` seconds from each time on, where a limit of jerk is given.
+    ``jerk`` (N, 6) are means over ``jerk_span`` seconds from each time on, where a limit of jerk is given. ``blur``: by
+    order (0 to 3), how far beyond a limit a rate has to be to be told from the rounding of differences.
     """
 
     t: np.ndarray
@@ -397,6 +449,7 @@ class Truth:
     out_of_reach: bool
     jerk: np.ndarray | None = None
     jerk_span: float = 0.0
+    blur: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
 
 
 def truth(spec, arm: Arm, limits, q_start=None, points=POINTS) -> Truth:
@@ -414,48 +467,74 @@ def truth(spec, arm: Arm, limits, q_start=None, points=POINTS) -> Truth:
     q = joints(t)
     missing = np.isnan(q).any(axis=1)
     h = t[1] - t[0]
-    speed = np.gradient(q, h, axis=0, edge_order=2)
-    pull = np.full_like(q, np.nan)
-    pull[1:-1] = (q[2:] - 2 * q[1:-1] + q[:-2]) / h**2
-    noise = np.array([8 * np.finfo(float).eps * np.pi * 4 / h, 32 * np.finfo(float).eps * np.pi * 4 / h**2])
+    eps = np.finfo(float).eps * np.pi * 4
+    stride = max(1, round(SPAN_S / h))  # of jerks
+    blur = (0.0, *(NOISE[order] * eps / (h * (stride if order == 3 else 1)) ** order for order in (1, 2, 3)))
     found: list[tuple[int, int, float, float]] = []
     for j in range(6):
         outside = (q[:, j] > arm.upper[j] + GRAZING_RAD) | (q[:, j] < arm.lower[j] - GRAZING_RAD)
         found += [(0, j, t[a], t[b]) for a, b in _runs(outside)]
-        for order, values in ((1, speed), (2, pull)):
-            most = limits[order - 1][j]
-            above = np.abs(values[:, j]) > most * (1 + GRAZING) + noise[order - 1]
-            found += [(order, j, t[a], t[b]) for a, b in _runs(above)]
+        angles = np.ascontiguousarray(q[:, j])
+        for order, most in enumerate((each[j] for each in limits), 1):
+            step = h * (stride if order == 3 else 1)
+            bound = most * (1 + (GRAZING_JERK if order == 3 else GRAZING)) + blur[order]
+            above = np.zeros(points, np.bool_)
+            _faster(angles, order, stride, bound * step**order, above)
+            if order == 2 and q_start is not None:
+                _without_flicker(angles, most * (1 + GRAZING) * (WIDER * h) ** 2, above)
+            found += [(order, j, t[a], t[b] + (3 * step if order == 3 else 0.0)) for a, b in _runs(above)]
     jerk, span = None, 0.0
     if len(limits) == 3:
-        stride = max(1, round(SPAN_S / h))
-        step, span = stride * h, 3 * stride * h
-        jerk = (
-            q[3 * stride :] - 3 * q[2 * stride : -stride] + 3 * q[stride : -2 * stride] - q[: -3 * stride]
-        ) / step**3
-        unsure = 128 * np.finfo(float).eps * np.pi * 4 / step**3
-        for j in range(6):
-            above = np.abs(jerk[:, j]) > limits[2][j] * (1 + GRAZING_JERK) + unsure
-            found += [(3, j, t[a], t[b] + span) for a, b in _runs(above)]
+        span = 3 * stride * h
+        thirds = q[3 * stride :] - 3 * q[2 * stride : -stride] + 3 * q[stride : -2 * stride] - q[: -3 * stride]
+        jerk = thirds / (stride * h) ** 3
     crossings = []
     if q_start is None:
         f = factors(arm, q)
         for kind in range(3):
-            for i in np.flatnonzero(f[:-1, kind] * f[1:, kind] < 0):
-                root = _polished(lambda x, kind=kind: factors(arm, joints(x))[:, kind], t[i], t[i + 1])
-                crossings.append((kind, root))
-    return Truth(t, crossings, found, bool(missing.any()), jerk, span)
+            low = np.flatnonzero(f[:-1, kind] * f[1:, kind] < 0)
+            roots = _polished(lambda x, kind=kind: factors(arm, joints(x))[:, kind], t[low], t[low + 1])
+            crossings += [(kind, root) for root in roots]
+    return Truth(t, crossings, found, bool(missing.any()), jerk, span, blur)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _faster(q, order, stride, most, above):
+    """Where differences of angles (n,) exceed ``most``: first or second about a point, third behind it."""
+    n = len(q)
+    if order == 1:
+        above[0] = abs(2 * q[1] - 1.5 * q[0] - 0.5 * q[2]) > most
+        above[n - 1] = abs(2 * q[n - 2] - 1.5 * q[n - 1] - 0.5 * q[n - 3]) > most
+        for i in range(1, n - 1):
+            above[i] = abs(q[i + 1] - q[i - 1]) > 2 * most
+    elif order == 2:
+        for i in range(1, n - 1):
+            above[i] = abs(q[i + 1] - 2 * q[i] + q[i - 1]) > most
+    else:
+        for i in range(n - 3 * stride):
+            above[i] = abs(q[i + 3 * stride] - 3 * (q[i + 2 * stride] - q[i + stride]) - q[i]) > most
+
+
+def _without_flicker(q, most, above):
+    """Leave out stretches (n,) of a few points at which second differences, taken wider, stay below ``most``.
+
+    Beside a straight elbow or an aligned wrist rounding of the angles is greater than their own.
+    """
+    for first, last in _runs(above):
+        middle = (first + last) // 2
+        if last - first < WIDER <= middle < len(q) - WIDER:
+            above[first : last + 1] = abs(q[middle + WIDER] - 2 * q[middle] + q[middle - WIDER]) > most
 
 
 def _polished(f, low, high):
-    """The root between two times, by halving."""
-    rising = f(np.array([high]))[0] > 0
+    """The roots (k,) between times, by halving."""
+    if not low.size:
+        return low
+    rising = f(high) > 0
     for _ in range(60):
         middle = (low + high) / 2
-        if (f(np.array([middle]))[0] > 0) == rising:
-            high = middle
-        else:
-            low = middle
+        behind = (f(middle) > 0) == rising
+        low, high = np.where(behind, low, middle), np.where(behind, middle, high)
     return (low + high) / 2
 
 

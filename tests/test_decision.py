@@ -5,12 +5,13 @@ from __future__ import annotations
 import pytest
 
 from er3a.pipeline.messages.decision import decision
+from er3a.pipeline.viewing.index import LED, led
 
 
 @pytest.mark.parametrize(
     ("table", "failed", "start"),
     [
-        ("fail", ["trajectory"], "Don't use this table"),
+        ("fail", ["trajectory"], "Never use this table"),
         ("pass", ["trajectory"], "Not as it stands: see trajectory"),
         ("caution", ["trajectory", "vision"], "Not as it stands: see trajectory, vision"),
         ("caution", [], "Use it with care"),
@@ -21,3 +22,17 @@ from er3a.pipeline.messages.decision import decision
 )
 def test_the_table_decides_first_then_what_fails(table, failed, start):
     assert decision(table, failed).startswith(start)
+
+
+@pytest.mark.parametrize(("end", "gap"), [(".", " "), (";", " "), ("。", ""), ("；", "")])
+def test_a_long_verdict_is_cut_at_the_end_of_a_clause_and_loses_nothing(end, gap):
+    clauses = [f"clause {k}, 1.5 mm off, which has no end of its own" + end for k in range(20)]
+    lead, rest = led(gap.join(clauses))
+    assert lead.endswith(end)
+    assert LED - len(clauses[0]) - 2 < len(lead) <= LED
+    assert lead + gap + rest == gap.join(clauses)
+
+
+def test_a_short_verdict_and_one_without_clauses_stay_whole():
+    assert led("All is well. Nothing is open.") == ("All is well. Nothing is open.", "")
+    assert led("word " * 100) == ("word " * 100, "")

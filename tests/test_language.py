@@ -64,3 +64,9 @@ def test_chinese_is_read_from_its_catalogue():
     finally:
         language.use("en")
     assert tr("All robots") == "All robots"
+
+
+def test_numbers_in_sentences_have_a_minus_sign_and_names_keep_their_hyphens():
+    text = language.filled("{name} at {at:.1f} deg, {rows:d} of {count}", "{name} at {at:.1f} deg, {rows:d} of {count}",
+                           {"name": "er3-600", "at": -206.58, "rows": -3, "count": -4})  # fmt: skip
+    assert text == "er3-600 at −206.6 deg, −3 of −4"

@@ -18,6 +18,7 @@ from er3a.collision.scene import Scene
 from er3a.collision.shapes import Body, arm_bodies, carried_bodies, layout_of, solid_bodies
 from er3a.errors import Er3aError
 from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.robots.joint_limits import but_for_turns
 from er3a.robots.robot import Robot
 
 
@@ -114,6 +115,14 @@ class Bodies:
             pair[row] = int(distances.argmin())
             least[row] = distances[pair[row]]
         return least, pair
+
+    def least_of_turns(self, q: Reals) -> tuple[Reals, Integers]:
+        """As :meth:`least`, for arms (N, n) many of which are others but for whole turns: those are measured once."""
+        if self.robot.coupling is not None:
+            return self.least(q)
+        _, first, inverse = np.unique(but_for_turns(self.robot, q), axis=0, return_index=True, return_inverse=True)
+        least, pair = self.least(q[first])
+        return least[inverse.reshape(-1)], pair[inverse.reshape(-1)]
 
     def overlaps(self, q: Reals) -> Flags:
         """Which pairs overlap, (N, P), in arms (N, n)."""

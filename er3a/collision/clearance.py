@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -27,6 +28,12 @@ class Clearance:
     pair: tuple[Pair | None, ...]
 
 
+@lru_cache(maxsize=8)
+def bodies_of(robot: Robot, scene: Scene | None) -> Bodies:
+    """The bodies of an arm and a scene, kept for as long as few others are asked for."""
+    return Bodies(robot, scene)
+
+
 def clearance(robot: Robot, q: Reals, scene: Scene | None) -> Clearance:
     """Least distance of each arm (N, n) in rad or m from the scene's solids and from itself.
 
@@ -35,6 +42,6 @@ def clearance(robot: Robot, q: Reals, scene: Scene | None) -> Clearance:
     Er3aError
         if the scene is none
     """
-    bodies = Bodies(robot, scene)
+    bodies = bodies_of(robot, scene)
     distance, pair = bodies.least(np.asarray(q, float).reshape(-1, robot.joints))
     return Clearance(distance, tuple(bodies.pairs[k] if k >= 0 else None for k in pair))

@@ -99,9 +99,15 @@ def _row_reach(coupling: Reals, half: Reals, k: int) -> float:
 @kernel
 def place(layout: Layout, q: Reals, T: Reals, world: Reals, middle: Reals) -> None:
     """Frames ``T`` (m + 1, 4, 4) of base and links at joint values (n,), points (P, 3) and middles (B, 3) in space."""
-    direction, starts, sliding = layout.direction, layout.starts, layout.sliding
-    links, centre, points = layout.links, layout.centre, layout.points
-    link, start = layout.link, layout.start
+    _place_frames(layout, q, T)
+    for b in range(layout.link.shape[0]):
+        _place_middle(layout, T, b, middle)
+        _place_points(layout, T, b, world)
+
+
+@kernel
+def _place_frames(layout: Layout, q: Reals, T: Reals) -> None:
+    direction, starts, sliding, links = layout.direction, layout.starts, layout.sliding, layout.links
     T[0] = layout.base
     x, y, z = rows_of(links[0])
     for k in range(direction.shape[0]):
@@ -113,18 +119,29 @@ def place(layout: Layout, q: Reals, T: Reals, world: Reals, middle: Reals) -> No
             x, y, z = turn_row(x, c, s), turn_row(y, c, s), turn_row(z, c, s)
         write_rows(x, y, z, T[k + 1])
         x, y, z = step_row(x, links[k + 1]), step_row(y, links[k + 1]), step_row(z, links[k + 1])
-    for b in range(link.shape[0]):
-        f = link[b]
+
+
+@kernel
+def _place_middle(layout: Layout, T: Reals, b: int, middle: Reals) -> None:
+    centre, f = layout.centre, layout.link[b]
+    for r in range(3):
         if f < 0:
-            for r in range(3):
-                middle[b, r] = centre[b, r]
-                for p in range(start[b], start[b + 1]):
-                    world[p, r] = points[p, r]
-            continue
-        for r in range(3):
-            u, v, w, t = T[f, r, 0], T[f, r, 1], T[f, r, 2], T[f, r, 3]
-            middle[b, r] = u * centre[b, 0] + v * centre[b, 1] + w * centre[b, 2] + t
-            for p in range(start[b], start[b + 1]):
+            middle[b, r] = centre[b, r]
+        else:
+            middle[b, r] = (
+                T[f, r, 0] * centre[b, 0] + T[f, r, 1] * centre[b, 1] + T[f, r, 2] * centre[b, 2] + T[f, r, 3]
+            )
+
+
+@kernel
+def _place_points(layout: Layout, T: Reals, b: int, world: Reals) -> None:
+    points, f = layout.points, layout.link[b]
+    for r in range(3):
+        for p in range(layout.start[b], layout.start[b + 1]):
+            if f < 0:
+                world[p, r] = points[p, r]
+            else:
+                u, v, w, t = T[f, r, 0], T[f, r, 1], T[f, r, 2], T[f, r, 3]
                 world[p, r] = u * points[p, 0] + v * points[p, 1] + w * points[p, 2] + t
 
 
@@ -440,27 +457,41 @@ def _apart_along(
 def which_overlap(layout: Layout, q: Reals, found: Flags) -> None:
     """Which pairs overlap, (N, K), in arms (N, n); with one column, whether any does.
 
-    The direction that kept a pair apart in the arm before is tried first: it mostly does so again.
+    What the arm before has shown is tried first, for it mostly holds again: the pair that overlapped, the direction
+    that kept a pair apart. Points of a body are placed only where the balls don't settle it.
     """
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))
     T, w = np.empty(layout.links.shape), np.empty(layout.points.shape)
     middle, reach, first, second = np.empty(layout.centre.shape), layout.reach, layout.first, layout.second
-    shape = (layout.start, layout.kind, layout.radius, layout.disc)
-    one, axes = found.shape[1] == 1, np.zeros((len(first), 3))
+    shape, link = (layout.start, layout.kind, layout.radius, layout.disc), layout.link
+    one, axes, hit, count = found.shape[1] == 1, np.zeros((len(first), 3)), 0, len(first)
+    placed = np.full(len(link), -1)  # the arm for which a body's points are
+    for b in range(len(link)):
+        _place_middle(layout, T, b, middle)
+        _place_points(layout, T, b, w)
     for n in range(q.shape[0]):
-        place(layout, q[n], T, w, middle)
+        _place_frames(layout, q[n], T)
+        for b in range(len(link)):
+            if link[b] >= 0:
+                _place_middle(layout, T, b, middle)
         for k in range(found.shape[1]):
             found[n, k] = False
-        for k in range(len(first)):
+        for turn in range(count):
+            k = hit + turn if hit + turn < count else hit + turn - count
             a, b = first[k], second[k]
-            if _apart(middle, reach, a, b) >= 0:
-                continue
             solid = layout.kind[b] != HALF_SPACE
+            if _balls_apart(middle, reach, a, b) if solid else _ball_above(layout, middle, a, b) >= 0:
+                continue
+            for body in (a, b):
+                if placed[body] != n and link[body] >= 0:
+                    _place_points(layout, T, body, w)
+                    placed[body] = n
             if solid and _apart_along(w, shape, a, b, room, axes[k]):
                 continue
             overlap = pair_distance(w, shape, a, b, room, near)[0] < 0
             found[n, 0 if one else k] |= overlap
             if one and overlap:
+                hit = k
                 break
             width = 0.0
             for r in range(3):
@@ -469,6 +500,21 @@ def which_overlap(layout: Layout, q: Reals, found: Flags) -> None:
             if solid and width > 0:
                 for r in range(3):
                     axes[k, r] /= np.sqrt(width)
+
+
+@kernel
+def _balls_apart(middle: Reals, reach: Reals, a: int, b: int) -> bool:
+    x, y, z = middle[a, 0] - middle[b, 0], middle[a, 1] - middle[b, 1], middle[a, 2] - middle[b, 2]
+    return bool(x * x + y * y + z * z >= (reach[a] + reach[b]) ** 2)
+
+
+@kernel
+def _ball_above(layout: Layout, middle: Reals, a: int, plane: int) -> float:
+    """How far the ball around a body stays above a half-space."""
+    height, p = -layout.points[layout.start[plane] + 1, 0] - layout.reach[a], layout.start[plane]
+    for r in range(3):
+        height += layout.points[p, r] * middle[a, r]
+    return float(height)
 
 
 @kernel

@@ -8,6 +8,8 @@ harmless:
 - *joined*: they overlap in all of them, proven likewise, because a joint joins them. Then only the region around that
   joint is left out: what lies within the two bodies' girths of where they overlap in the pose that holds them farthest
   apart. What is left of them is judged again, so that an arm that folds onto itself is seen;
+  A default shape that slides in a thicker one is joined to it likewise: of the guide only what lies along the sliding
+  axis is left out, and of what slides nothing;
 - *meets*: a joint vector in which they overlap was found, and one in which they don't: watched;
 - *undecided*: none of this within the number of boxes: watched.
 
@@ -34,7 +36,8 @@ from er3a.collision.distance_kernels import (
     search_boxes,
 )
 from er3a.collision.shapes import Body, arm_bodies, layout_of
-from er3a.collision.trimming import girth, trimmed
+from er3a.collision.trimming import beside_axis, girth, trimmed
+from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Reals
 from er3a.numerics.quasi_random import quasi_random_points
 from er3a.robots.derived import derived
@@ -46,6 +49,8 @@ SAMPLES = 1024
 BOXES = 50_000
 BOXES_MORE = 500  # for the other bodies of two links that are known to meet
 GOAL = 0.5  # of the least distance sampled, to be proven at first
+COAXIAL = 1e-9  # m
+AROUND_GUIDE = 1.05  # of the radii of a guide and of what slides in it
 GROWTH, GROWTHS = 1.25, 12  # of the region around a joint, until the rest comes apart
 
 
@@ -137,6 +142,14 @@ def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int = 
     for k, pair in enumerate(pairs):
         at, least = np.empty(robot.joints), distance[:, k]
         overlapping = bool(least[0] < 0)
+        if meets[k] and (guide := _guide(robot, pair)):
+            rest = [(part, pair[1]) for part in beside_axis(pair[0], *guide)]
+            parts = judged_pairs(robot, rest, boxes) if rest else []
+            watched = tuple(pair for each in parts for pair in each.bodies)
+            witness = next((each.witness for each in parts if each.witness is not None), None)
+            boxes_looked_at = sum(each.boxes for each in parts)
+            found.append(JudgedPair("joined", watched, witness, left_out=guide[2], boxes=boxes_looked_at))
+            continue
         if meets[k]:
             found.append(JudgedPair("meets", (pair,), q[least.argmin()]))
             continue
@@ -155,6 +168,38 @@ def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int = 
         else:
             found.append(JudgedPair("undecided", (pair,), q[0] if overlapping else None, boxes=looked))
     return found
+
+
+def _guide(robot: Robot, pair: tuple[Body, Body]) -> tuple[Reals, Reals, float] | None:
+    """Of a default shape that slides in another one: point and axis (3,) of the slide, and radius of what is left out.
+
+    In the inner link's frame, m. All joints between the two slide along this axis or turn about it, so that it lies
+    still in the guide; the axis leads through the guide's core, and the outer body is no thicker about it.
+    """
+    inner, outer = pair
+    between = range(inner.link, outer.link)
+    if robot.envelopes or robot.hulls or robot.coupling is not None or not any(robot.sliding[k] for k in between):
+        return None
+    poses = frames(robot, np.zeros(robot.joints))
+    start = robot.base if inner.link == 0 else poses[inner.link - 1]
+    axis, point = poses[inner.link][:3, 2], poses[inner.link][:3, 3]
+
+    def away(points: Reals) -> Reals:
+        distances: Reals = np.linalg.norm(np.cross(points - point, axis), axis=-1)
+        return distances
+
+    if max(away(poses[k][:3, 3] + side * poses[k][:3, 2]) for k in between for side in (0.0, 1.0)) > COAXIAL:
+        return None
+    carrier = poses[outer.link - 1]
+    thick = float(away(outer.points @ carrier[:3, :3].T + carrier[:3, 3]).max()) + outer.radius
+    slide = _in_frame(start, point, axis)
+    if thick > inner.radius or beside_axis(inner, *slide, inner.radius) == [inner]:
+        return None
+    return *slide, AROUND_GUIDE * (inner.radius + thick)
+
+
+def _in_frame(T: Reals, point: Reals, axis: Reals) -> tuple[Reals, Reals]:
+    return T[:3, :3].T @ (point - T[:3, 3]), T[:3, :3].T @ axis
 
 
 def _joined(robot: Robot, pair: tuple[Body, Body], farthest: Reals, looked: int, boxes: int) -> JudgedPair:

@@ -36,13 +36,29 @@ def trimmed(body: Body, centre: Reals, radius: float) -> list[Body]:
     length = float(along @ along)
     if length <= SHORTEST**2:
         return [body] if np.linalg.norm(away) > radius else []
+    return _outside(body, away, along, radius)
+
+
+def beside_axis(body: Body, point: Reals, axis: Reals, radius: float) -> list[Body]:
+    """What is left of a line that is farther than ``radius`` (m) from an axis through a point, both (3,)."""
+    start, along = body.points[0] - point, body.points[-1] - body.points[0]
+    away, across = start - (start @ axis) * axis, along - (along @ axis) * axis
+    if across @ across <= SHORTEST**2:
+        return [body] if np.linalg.norm(away) > radius else []
+    return _outside(body, away, across, radius)
+
+
+def _outside(body: Body, away: Reals, along: Reals, radius: float) -> list[Body]:
+    """The parts of a body's line where ``away + s along``, s from 0 to 1, is longer than ``radius``."""
+    length = float(along @ along)
     middle, half = -float(away @ along) / length, float((away @ along) ** 2 - length * (away @ away - radius**2))
     if half <= 0:
         return [body]
     half = float(np.sqrt(half)) / length
     parts = [(0.0, min(1.0, middle - half)), (max(0.0, middle + half), 1.0)]
+    start, line = body.points[0], body.points[-1] - body.points[0]
     return [
-        replace(body, points=np.array([start + low * along, start + high * along]))
+        replace(body, points=np.array([start + low * line, start + high * line]))
         for low, high in parts
         if high > low and (high - low) ** 2 * length > SHORTEST**2
     ]

@@ -1,4 +1,4 @@
-"""A robot as Pinocchio's model, and its algorithms over batches in the manufacturer's joint values.
+"""A robot as Pinocchio's model, and its algorithms [1]_ [2]_ over batches in the manufacturer's joint values.
 
 The model's joints are the rows of the table, with ``x = direction * (coupling @ q) + start``; so velocities are
 ``S @ qd`` with ``S = diag(direction) @ coupling``, and torques ``S.T @ tau`` (virtual work). Rotor inertia and friction
@@ -7,7 +7,7 @@ belong to the joints that the drives move, and are added there, because Pinocchi
 
 References
 ----------
-.. [1] R. Featherstone, *Rigid MassBody Dynamics Algorithms*, chapters 5 to 7 (RNEA, CRBA, ABA).
+.. [1] R. Featherstone, *Rigid Body Dynamics Algorithms*, chapters 5 to 7 (RNEA, CRBA, ABA).
 .. [2] B. Siciliano et al., *Robotics: Modelling, Planning and Control*, 7.2 and 7.5.
 """
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-import numpy as np
 from pydantic import Field, model_validator
 
 from er3a.files.robot_file import Name, Placement, Text, check_placement
 from er3a.files.robot_library import placement_transform
-from er3a.files.units import JointsDeg
+from er3a.files.units import JointsDeg, joint_values
 from er3a.files.yaml_file import StrictModel, load
 from er3a.numerics.arrays import Reals
 from er3a.programs.program_outcomes import ProgramOutcome
+from er3a.robots.robot import Robot
 
 
 class ProgramEntry(StrictModel):
@@ -26,9 +26,9 @@ class ProgramEntry(StrictModel):
     start_deg: JointsDeg | None = None
     expect: ProgramOutcome | None = None
 
-    def start(self) -> Reals | None:
-        """Joints (n,) in rad."""
-        return None if self.start_deg is None else np.radians(self.start_deg)
+    def start(self, robot: Robot) -> Reals | None:
+        """Joints (n,) in rad, or m of those that slide; :class:`InputError` if they are not as many as the robot's."""
+        return None if self.start_deg is None else joint_values(robot, self.start_deg, f"{self.name}.start_deg")
 
 
 class ProgramsFile(StrictModel):

@@ -178,12 +178,10 @@ class TargetFile(StrictModel):
 
     @model_validator(mode="after")
     def _own_names(self):
-        names = [target.name for target in self.targets]
-        for i, name in enumerate(names):
-            if name in names[:i]:
-                raise ValueError(
-                    f"targets[{i}].name: '{name}' is also that of targets[{names.index(name)}] | Rename it"
-                )
+        places: dict[str, int] = {}
+        for i, target in enumerate(self.targets):
+            if (first := places.setdefault(target.name, i)) != i:
+                raise ValueError(f"targets[{i}].name: '{target.name}' is also that of targets[{first}] | Rename it")
         return self
 
 

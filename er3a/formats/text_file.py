@@ -23,7 +23,7 @@ def read_text(path: Path, most: int = MAX_BYTES) -> str:
         reason = getattr(error, "strerror", None) or error
         raise InputError(path, None, f"can't be read ({reason})", "Check the path and its permissions") from None
     if raw is None:
-        raise InputError(path, None, f"larger than {most} bytes", "Input tables are small text files")
+        raise InputError(path, None, f"larger than {most} bytes", "Write long lists of targets or points as CSV tables")
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:

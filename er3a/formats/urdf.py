@@ -247,9 +247,6 @@ def _limits(path: Path, sources: list[UrdfJoint]) -> tuple[Reals, list[str]]:
         elif joint.type == "prismatic" and max(abs(lower), abs(upper)) > MOST_SLID_M:
             notes.append(f"joint {joint.name} has limits beyond {MOST_SLID_M:g} m: it was held to that")
             lower, upper = max(lower, -MOST_SLID_M), min(upper, MOST_SLID_M)
-        if math.isnan(lower) or math.isnan(upper):
-            missing = "lower" if math.isnan(lower) else "upper"
-            raise InputError(path, f"joint {joint.name}", f"has no {missing}", f"Add {missing} to its <limit>")
         rows.append((lower, upper))
     return np.array(rows), notes
 

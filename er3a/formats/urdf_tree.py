@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import re
 import xml.etree.ElementTree as ElementTree
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -84,6 +85,9 @@ class Tree:
         self.by_name = {joint.name: joint for joint in joints}
         self.by_child: dict[str, UrdfJoint] = {}
         self.by_parent: dict[str, list[UrdfJoint]] = {}
+        for name, number in Counter(joint.name for joint in joints).items():
+            if number > 1:
+                raise InputError(path, f"joint {name}", f"{number} joints have this name", "Give each its own")
         for joint in joints:
             if joint.child in self.by_child:
                 problem = f"two joints lead to it, {self.by_child[joint.child].name} and {joint.name}"
@@ -276,9 +280,12 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
     lower, upper, speed = math.nan, math.nan, math.nan
     if kind in ("revolute", "prismatic") and limit is not None:
         lower, upper = (_numbers(path, where, limit, key, (math.nan,))[0] for key in ("lower", "upper"))
+        if math.isnan(lower) != math.isnan(upper):  # the specification's default
+            notes.append(f"{where} has no {'lower' if math.isnan(lower) else 'upper'} limit: 0 was taken")
+            lower, upper = np.nan_to_num([lower, upper]).tolist()
         if lower > upper:
             raise InputError(path, where, f"lower limit {lower:g} above upper {upper:g}", "Swap them")
-    if kind in MOVING and limit is not None and limit.get("velocity"):
+    if kind in MOVING and limit is not None and (limit.get("velocity") or "inf") != "inf":
         speed = _numbers(path, where, limit, "velocity", (0.0,))[0] or math.nan
         if speed < 0:
             raise InputError(path, where, f"velocity {speed:g} is below 0", "Write the greatest speed, or 0 if unknown")
@@ -304,7 +311,8 @@ def _numbers(
     except ValueError:
         values = np.array([math.nan])
     if len(values) != len(default) or not np.isfinite(values).all():
-        raise InputError(path, f"{where}, {key}", f"'{text[:60]}' is not what stands there", "Write finite numbers")
+        count = f"{len(default)} finite numbers with blanks between them" if len(default) > 1 else "a finite number"
+        raise InputError(path, f"{where}, {key}", f"'{text[:60]}' is not {count}", "Write so many, and nothing else")
     return values
 
 

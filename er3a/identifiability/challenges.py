@@ -151,7 +151,7 @@ class _ManyStarts:
             going[rows[stalled | (after == 0)]] = False
             going &= damping < MOST_DAMPING
         chi2 = (off[:, likely] ** 2).sum(axis=1)
-        met = self._excess(off) <= MET
+        met = self.region.asked.excess(off) <= MET
         met &= chi2 <= self.start.chi2 + PROFILE**2
         return [amount if good else None for amount, good in zip(amounts, met)]
 
@@ -180,18 +180,7 @@ class _ManyStarts:
 
     def _rest(self, off: Reals) -> Reals:
         """Components (R, m) of what lies outside the half-widths, a little within; of a likelihood all."""
-        rest = np.zeros_like(off)
-        for part in self._bounded(off):
-            length = np.linalg.norm(off[:, part], axis=1, keepdims=True)
-            rest[:, part] = off[:, part] * np.maximum(1 - STAYING / np.maximum(length, 1e-300), 0.0)
+        rest = self.region.asked.outside(off, STAYING)
         likely = self.region.asked.likely
         rest[:, likely] = off[:, likely]
         return rest
-
-    def _excess(self, off: Reals) -> Reals:
-        exceeded = [np.linalg.norm(off[:, part], axis=1) - 1.0 for part in self._bounded(off)]
-        excess: Reals = np.max(exceeded, axis=0) if exceeded else np.full(len(off), -1.0)
-        return excess
-
-    def _bounded(self, off: Reals) -> list[slice]:
-        return [part for part in self.region.asked.bounded if part.stop <= off.shape[1]]

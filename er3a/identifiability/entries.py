@@ -81,6 +81,11 @@ def continuous_of(robot: Robot) -> tuple[TableNumber, ...]:
     return (*found, *(TableNumber("beta", j) for j in joints if robot.beta[j - 1]))
 
 
+def column_of(name: str) -> Column:
+    """The column that an entry's name (see :attr:`TableNumber.name`) is of."""
+    return cast(Column, name.rstrip("0123456789"))
+
+
 def document_of(robot: Robot, entry: TableNumber) -> str:
     """The document that an entry rests on: its own, else its group's, else the group's source, else the table."""
     if entry.name in robot.origins:

@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Literal
 
 from er3a.identifiability.alternatives import Alternative
-from er3a.identifiability.entries import EntryUnit
+from er3a.identifiability.entries import EntryUnit, column_of
 from er3a.identifiability.tool_motion import NOT_OFF, ToolOff
 from er3a.kinematics.table_batch import Tables
 from er3a.references.reference import Reference
@@ -74,7 +74,7 @@ class EntryEvidence:
     @property
     def moves_tool(self) -> bool:
         """Whether it is one of those that say where the tool is."""
-        return not self.entry.startswith(("lower", "upper", "speed"))
+        return column_of(self.entry) not in ("lower", "upper", "speed")
 
 
 @dataclass(frozen=True, eq=False)

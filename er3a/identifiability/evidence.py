@@ -11,6 +11,7 @@ from er3a.identifiability.alternatives import Alternative, alternatives_to, gaug
 from er3a.identifiability.continuous import Extent, Extents
 from er3a.identifiability.entries import (
     TableNumber,
+    column_of,
     continuous_of,
     document_of,
     entries_of,
@@ -319,7 +320,7 @@ class _Judge:
 
     def _flipped(self, name: str) -> float:
         value = self.values.get(name, 0.0)
-        if name.startswith(("offset", "alpha")):
+        if column_of(name) in ("offset", "alpha"):
             return value + 180.0 if value <= 0 else value - 180.0
         return -value
 

@@ -115,8 +115,7 @@ class Region:
 
     def excess(self, off: Reals) -> float:
         """The greatest violation, in half-widths."""
-        exceeded = [float(np.linalg.norm(off[part])) - 1.0 for part in self.asked.bounded]
-        return max(exceeded, default=-1.0)
+        return float(self.asked.excess(off))
 
     def start(self, amounts: Reals, few_first: bool = True) -> OpenTable:
         """A table that is left open near one. What meets everything stays as it is; else one that differs in one entry,
@@ -125,11 +124,11 @@ class Region:
         if self.excess(off) > MET and few_first:
             amounts, off = self._few_changed(amounts, off)
         for damping in DAMPINGS:
-            if self.excess(off) <= MET and not self.asked.likely:
+            if self.excess(off) <= MET and not len(self.asked.likely):
                 break
             trial, trial_off = self._nearer(amounts, off, self.basis, (0.0, damping))
             trial, trial_off = self._nearer(trial, trial_off, self.basis, (STAYING, damping))
-            if self.excess(trial_off) < self.excess(off) or self.asked.likely:
+            if self.excess(trial_off) < self.excess(off) or len(self.asked.likely):
                 amounts, off = trial, trial_off
         off = self.off(amounts, afresh=True)
         chi2 = float((off[self.asked.likely] ** 2).sum())
@@ -191,7 +190,7 @@ class Region:
                 break
             gained = 1 - (new @ new) / (rest @ rest)
             amounts, off, rest, damping = trial, new_off, new, max(damping / 30, 1e-9)
-            if gained < NOTHING_GAINED or (self.excess(off) <= MET and not self.asked.likely):
+            if gained < NOTHING_GAINED or (self.excess(off) <= MET and not len(self.asked.likely)):
                 break
         return amounts, off
 
@@ -261,11 +260,7 @@ class Region:
 
     def _exceeded(self, off: Reals, inner: float) -> Reals:
         """Components (m,), each of what lies outside ``inner`` half-widths; of a likelihood all."""
-        rest = np.zeros_like(off)
-        for part in self.asked.bounded:
-            length = float(np.linalg.norm(off[part]))
-            if length > inner:
-                rest[part] = off[part] * (1 - inner / length if inner else 1.0)
+        rest = self.asked.outside(off, inner)
         rest[self.asked.likely] = off[self.asked.likely] if inner < 1 - MET else 0.0
         return rest
 
@@ -320,7 +315,9 @@ class Region:
         rows: list[Reals] = []
         most: list[Reals] = []
         turns = 2 * np.pi * np.arange(TANGENTS) / TANGENTS
-        for part in self.asked.bounded:
+        for part, gaussian in zip(self.asked.slices, self.asked.gaussian):
+            if gaussian:
+                continue
             own, J = off[part], slope[part]
             if len(own) == 1:
                 tangents = np.array([[1.0], [-1.0]])
@@ -338,7 +335,7 @@ class Region:
     def _ball(self, off: Reals, slope: Reals, toward: Reals, chi2: float) -> tuple[Reals, Reals, float]:
         """Rows (r, k) of the likelihood's ball, the step (k,) to its middle, and its radius."""
         own = self.asked.likely
-        if not own:
+        if not len(own):
             return np.empty((0, len(toward))), np.zeros(len(toward)), 0.0
         J, rest = slope[own], off[own]
         _, values, basis = np.linalg.svd(J, full_matrices=False)

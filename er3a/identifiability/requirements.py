@@ -1,7 +1,7 @@
 """What references ask of a table's geometry, as smooth numbers that an optimiser can follow.
 
-A reference with a half-width asks for |off| <= half-width; one with a standard deviation is a term of a likelihood. Of
-references that contradict each other, either may be right, so they ask for no more than the hull of what they leave
+A reference with a half-width asks for ``|off| <= half-width``; one with a standard deviation is a term of a likelihood.
+Of references that contradict each other, either may be right, so they ask for no more than the hull of what they leave
 open. Extremes over the joint limits are followed along with where they are attained: their derivative with respect to
 the table is that at the maximiser (envelope theorem).
 """
@@ -16,7 +16,7 @@ import numpy as np
 from er3a.identifiability.entries import TableNumber, shifted
 from er3a.identifiability.extreme_climb import Climber, climber, measure_code
 from er3a.identifiability.peaks import best_apart, box_points, climb, peak
-from er3a.kinematics.table_batch import Tables, frames_of, tables_of
+from er3a.kinematics.table_batch import Tables, frames_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.references.components import Components
 from er3a.references.quantities import FRAME_OF_POINT, MM, Extreme, Limit, PoseOutside, Quantity, Speed
@@ -28,6 +28,7 @@ SLIGHT = 1e-3  # of a half-width
 SLOPE_STEP = 1e-3  # of an entry's scale
 SCANNED, WATCHED, OVERTAKEN_M = 512, 48, 1e-9
 ACROSS, OVERTAKINGS, CLIMBS = np.linspace(0.0, 1.0, 9), 4, 6
+TINY = 1e-300
 KINK_STEP, KINK = 1.0, 1.0  # of an entry's scale, and of a half-width
 
 
@@ -199,8 +200,8 @@ class Asked:
 
     Attributes
     ----------
-    blocks : of each requirement with a half-width, its slice of the components
-    gaussian : slices of those with a standard deviation
+    order : the requirements, those that are no extremes first; gaussian : (r,) bool, those with a standard deviation
+    sizes, slices : how many components each has, and which; likely : components of those with a standard deviation
     """
 
     def __init__(self, robot: Robot, requirements: Sequence[Requirement]):
@@ -213,7 +214,14 @@ class Asked:
             (each, FollowedExtreme(each.quantity, robot)) for each in requirements if isinstance(each.quantity, Extreme)
         ]
         self.order = (*self.plain, *(each for each, _ in self.extreme))
-        self._slices: list[slice] | None = None
+        half_widths = np.array([each.half_width for each in self.order])
+        self.gaussian = np.array([each.gaussian for each in self.order], dtype=bool)
+        self.sizes = np.concatenate([self._components.sizes, np.ones(len(self.extreme), dtype=np.int64)])
+        self._starts = np.cumsum(self.sizes) - self.sizes
+        self._plain_half = np.repeat(half_widths[: len(self.plain)], self._components.sizes)
+        self._most = np.where(self.gaussian, LIKELY, 1.0)
+        self.slices = [slice(start, start + size) for start, size in zip(self._starts.tolist(), self.sizes.tolist())]
+        self.likely = np.flatnonzero(np.repeat(self.gaussian, self.sizes))
 
     def __len__(self) -> int:
         return len(self.order)
@@ -221,25 +229,22 @@ class Asked:
     def off(self, table: Tables, afresh: bool = False) -> Reals:
         """Components (m,) of a table (a batch of one); ``afresh``: extremes are looked for all over the joint
         ranges."""
-        parts = self._plain_off(table)
+        extremes = []
         for each, followed in self.extreme:
             followed.known &= not afresh
-            parts.append(np.array([[(followed.at(table) - each.expected) / each.half_width]]))
-        joined: Reals = self._joined(parts, 1)[0]
-        return joined
+            extremes.append((followed.at(table) - each.expected) / each.half_width)
+        return np.append(self.plain_off(table)[0], extremes)
 
     def plain_off(self, tables: Tables) -> Reals:
         """Components (H, m) of many tables, of the requirements that are no extremes (the first ones)."""
-        parts = self._plain_off(tables)
-        return np.concatenate(parts, axis=-1) if parts else np.empty((len(tables), 0))
+        if not self.plain:
+            return np.empty((len(tables), 0))
+        off: Reals = self._components.off(tables) / self._plain_half
+        return off
 
     def plain_violation(self, tables: Tables) -> Reals:
         """Violations (H, r) of many tables, of the requirements that are no extremes (the first ones)."""
-        lengths = [
-            np.linalg.norm(off, axis=-1) / (LIKELY if each.gaussian else 1.0)
-            for off, each in zip(self._plain_off(tables), self.plain)
-        ]
-        return np.stack(lengths, axis=-1) - 1.0
+        return self.violation(self.plain_off(tables))
 
     def excluding(self, table: Tables, nominal: Tables) -> tuple[int, ...]:
         """Places of references that a table misses though another one meets them."""
@@ -261,10 +266,8 @@ class Asked:
 
     def off_near(self, tables: Tables) -> Reals:
         """Components (H, m) of many tables, extremes where they were attained last."""
-        parts = self._plain_off(tables)
-        for each, followed in self.extreme:
-            parts.append(((followed.along(tables) - each.expected) / each.half_width)[:, None])
-        return self._joined(parts, len(tables))
+        extremes = [(followed.along(tables) - each.expected) / each.half_width for each, followed in self.extreme]
+        return np.column_stack([self.plain_off(tables), *extremes])
 
     def slope(self, table: Tables, entries: Sequence[TableNumber]) -> Reals:
         """Derivative (m, k) with respect to entries, in their scales, at the table whose ``off`` was asked for last."""
@@ -290,43 +293,25 @@ class Asked:
 
     def violation(self, off: Reals) -> Reals:
         """How far each requirement is exceeded (..., r), in half-widths (or four standard deviations) less one."""
-        return (
-            np.stack(
-                [
-                    np.linalg.norm(off[..., part], axis=-1) / (LIKELY if each.gaussian else 1.0)
-                    for part, each in zip(self.slices, self.order)
-                ],
-                axis=-1,
-            )
-            - 1.0
-        )
+        lengths = self.lengths(off)
+        return lengths / self._most[: lengths.shape[-1]] - 1.0
 
-    @property
-    def slices(self) -> list[slice]:
-        """The components of each requirement, in ``order``."""
-        if self._slices is None:
-            self.off(tables_of(self.robot))
-        return self._slices or []
+    def lengths(self, off: Reals) -> Reals:
+        """Lengths (..., r) of components (..., m) of all requirements, or of those that are no extremes."""
+        starts = self._starts[self._starts < off.shape[-1]]
+        return np.sqrt(np.add.reduceat(off * off, starts, axis=-1)) if len(starts) else np.empty((*off.shape[:-1], 0))
 
-    @property
-    def bounded(self) -> list[slice]:
-        """Components of requirements with a half-width."""
-        return [part for part, each in zip(self.slices, self.order) if not each.gaussian]
+    def excess(self, off: Reals) -> Reals:
+        """How far (...,) the requirement with a half-width that is exceeded most is, in half-widths less one."""
+        lengths = self.lengths(off)
+        bounded = lengths[..., ~self.gaussian[: lengths.shape[-1]]]
+        most: Reals = bounded.max(axis=-1, initial=0.0) - 1.0
+        return most
 
-    @property
-    def likely(self) -> list[int]:
-        """Components of requirements with a standard deviation."""
-        return [i for part, each in zip(self.slices, self.order) if each.gaussian for i in range(part.start, part.stop)]
-
-    def _plain_off(self, tables: Tables) -> list[Reals]:
-        if not self.plain:
-            return []
-        return [off / each.half_width for off, each in zip(self._components.off(tables), self.plain)]
-
-    def _joined(self, parts: list[Reals], count: int) -> Reals:
-        if not parts:
-            self._slices = []
-            return np.empty((count, 0))
-        ends = np.cumsum([part.shape[-1] for part in parts])
-        self._slices = [slice(end - part.shape[-1], end) for part, end in zip(parts, ends.tolist())]
-        return np.concatenate(parts, axis=-1)
+    def outside(self, off: Reals, inner: float) -> Reals:
+        """Components (..., m) of what lies outside ``inner`` half-widths; 0 for requirements with a deviation."""
+        lengths = self.lengths(off)
+        count = lengths.shape[-1]
+        share = np.where(lengths > inner, 1.0 - inner / np.maximum(lengths, TINY), 0.0)
+        rest: Reals = off * np.repeat(np.where(self.gaussian[:count], 0.0, share), self.sizes[:count], axis=-1)
+        return rest

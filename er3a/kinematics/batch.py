@@ -16,6 +16,7 @@ from er3a.kinematics.configuration import slot_labels
 from er3a.kinematics.forward import checked_joints, forward
 from er3a.kinematics.inverse import BY_ELIMINATION, SAME_MEMBER, SOLVES, STARTS
 from er3a.kinematics.numerical import all_found
+from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.solutions import ByClass, Iteration, Method, Solutions
 from er3a.kinematics.wrist_partitioned import closed_form_missing, constants_for_blocks, solve_slots
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -39,8 +40,10 @@ def inverse_batch(
     """All solutions for many poses of the tool, in as many slots as the class of the arm's geometry has.
 
     At a singularity of a wrist-partitioned arm both branches that meet keep their slots: a free joint has its value of
-    ``q_ref`` in one and half a turn more in the other. Of other arms a self-motion has the member nearest to ``q_ref``
-    in a slot, and chains for which no class knows all solutions have what iteration finds. The numbers do not depend on
+    ``q_ref`` in one and half a turn more in the other. Next to two singularities, where the pose does not tell joints 4
+    and 6, a ``q_ref`` that solves it to 1e-12 and keeps the limits is in the slot of its branch. Of other arms a
+    self-motion has the member nearest to ``q_ref`` in a slot, and chains for which no class knows all solutions have
+    what iteration finds; next to two singularities ``q_ref`` may be missing. The numbers do not depend on
     the number of threads, nor on a pose's place in the batch.
 
     Parameters
@@ -82,22 +85,28 @@ def inverse_batch(
         found, fault, _ = solve_slots(robot, T[left], own, keep_folds=True, keep_free=True)
         q[left] = nearest_equivalent(robot, found, own[:, None])
         valid[left] = fault == REACHED
-        _put_own(robot, T[left], own, left, q)
+        _put_own(robot, T[left], own, left, q, valid)
         inside[left] = within(robot, q[left])
     branch = np.broadcast_to(np.arange(SLOTS), valid.shape)
     return Solutions(robot, q, valid, inside, branch, turn_range=_turn_range(robot, q) if turns else None)
 
 
-def _put_own(robot: Robot, T: Reals, own: Reals, left: Integers, q: Reals) -> None:
-    """Put references (k, 6) that solve their poses to rounding in the slots that are them but for rounding, if those
-    leave the limits or miss them."""
-    solved = np.flatnonzero((np.abs(forward(robot, own) - T).max(axis=(1, 2)) < SOLVES) & within(robot, own))
-    away = np.abs(q[left[solved]] - own[solved, None]).max(axis=2)
+def _put_own(robot: Robot, T: Reals, own: Reals, left: Integers, q: Reals, valid: Flags) -> None:
+    """Put references (k, 6) that solve their poses to rounding in their slots, if no row within the limits is them.
+
+    That is the slot that is the reference but for rounding, else the one whose branch it is on by the signs of its
+    factors: next to two singularities the row there is another member of what solves the pose to rounding.
+    """
+    own_rows = np.flatnonzero((np.abs(forward(robot, own) - T).max(axis=(1, 2)) < SOLVES) & within(robot, own))
+    rows, own = left[own_rows], own[own_rows]
+    away = np.abs(q[rows] - own[:, None]).max(axis=2)
     away = np.where(np.isnan(away), np.inf, away)
-    slot = away.argmin(axis=1)
-    distance, beyond = away[np.arange(len(solved)), slot], ~within(robot, q[left[solved], slot])
-    near = (distance < NEARLY_OWN) & (beyond | (distance > SAME_MEMBER))
-    q[left[solved[near]], slot[near]] = own[solved[near]]
+    lost = ~(within(robot, q[rows]) & (away < SAME_MEMBER)).any(axis=1)
+    rows, own, away = rows[lost], own[lost], away[lost]
+    factors = determinant_factors(robot, own)
+    slot = 4 * (factors.shoulder > 0) + 2 * (factors.elbow < 0) + (factors.wrist < 0)
+    slot = np.where(away.min(axis=1, initial=np.inf) < NEARLY_OWN, away.argmin(axis=1), slot)
+    q[rows, slot], valid[rows, slot] = own, True
 
 
 def _by_class(

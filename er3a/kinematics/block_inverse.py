@@ -23,7 +23,7 @@ from er3a.numerics.jit import kernel
 from er3a.robots.joint_limits import LIMIT_TOLERANCE
 
 BLOCK = 64
-NEAR = 1e-6  # m or rad from where a joint becomes free
+NEAR = 1e-6  # m, rad or their product, from where joints become free
 PER_TURN = 1 / TURN
 
 Joints = tuple[Reals, Reals, Reals, Reals]
@@ -209,6 +209,7 @@ def _wrist(arm: BlockConstants, w: Reals, side: Reals, sign: float, pair: Reals)
     """All angles of both wrist branches, for the elbow root of that sign."""
     half_s, half_c = arm.half_sum
     less_s, less_c = arm.half_difference
+    per_reach = 1.0 / (arm.upper_arm + arm.forearm)
     for i in range(BLOCK):
         x, y = side[_ACROSS * BLOCK + i], w[_PLANE * BLOCK + i]
         cos_bend, sin_bend = side[_COS_BEND * BLOCK + i], sign * side[_SIN_BEND * BLOCK + i]
@@ -238,7 +239,9 @@ def _wrist(arm: BlockConstants, w: Reals, side: Reals, sign: float, pair: Reals)
         upper = (cos_half * less_s + sin_half * less_c) * (sin_half * less_c - cos_half * less_s)
         lower = (cos_half * half_s + sin_half * half_c) * (cos_half * half_s - sin_half * half_c)
         edge = (abs(upper) < arm.edges[0] * sum_ * sum_) | (abs(lower) < arm.edges[1] * sum_ * sum_)
-        marked = (edge | (tilt < NEAR * length)) & (side[_REACHED * BLOCK + i] > 0.0)
+        # Distances from the three singular sets multiply what rounding does to joints 4 and 6.
+        share = abs(side[_ACROSS * BLOCK + i] + arm.point_2[0]) * abs(sin_bend) * per_reach
+        marked = (edge | (tilt * min(share, 1.0) < NEAR * length)) & (side[_REACHED * BLOCK + i] > 0.0)
         w[_MARK * BLOCK + i] = 1.0 if marked else w[_MARK * BLOCK + i]
         valid = side[_REACHED * BLOCK + i] if (upper > 0.0) & (lower > 0.0) else 0.0
         pair[_VALID * BLOCK + i] = valid

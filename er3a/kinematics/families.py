@@ -36,8 +36,7 @@ from er3a.robots.robot import Robot
 
 GRID = np.radians(2.0)
 SPLIT, ROUNDS = 16, 10  # an interval is cut into so many parts, so often
-SAME_FAMILY = 1e-8
-SAME_CURVE = 1e-7  # rad
+SAME_FAMILY = 1e-6  # rad; next to two singularities families that solve a pose to 1e-9 are no farther apart
 FREE_MOTION = 1e-7  # singular value below which joints move with the tool at rest
 CURVES: tuple[tuple[SingularityType, int, int], ...] = (("shoulder", 4, 0), ("elbow", 2, 1))  # slots apart, joint
 FREE_JOINT: dict[SingularityType, int] = {"shoulder": 0, "elbow": 1}
@@ -83,11 +82,16 @@ class Family(Displayed):
         return int(np.median((values < FREE_MOTION).sum(axis=1)))
 
     def holds(self, q: Reals) -> bool:
-        """Whether joint values (6,) are a member of a curve, turns aside; False for the lines of a wrist."""
+        """Whether joint values (6,) are a member of a curve, turns aside: near q0, or within the range.
+
+        False for the lines of a wrist.
+        """
         if self.kind == "wrist":
             return False
-        joint = FREE_JOINT[self.kind]
-        return bool(np.abs(wrap_to_pi(self.members(q[joint] - self.q0[joint]) - q)).max() < SAME_CURVE)
+        t = q[FREE_JOINT[self.kind]] - self.q0[FREE_JOINT[self.kind]]
+        if greatest_move(self.q0, q) >= TURN / 2 and not self.range[0] <= t <= self.range[1]:
+            return False
+        return bool(np.abs(wrap_to_pi(self.members(t) - q)).max() < SAME_FAMILY)
 
     def members(self, t: Reals) -> Reals:
         """Joint angles (..., 6) in rad at parameters (...,)."""
@@ -105,7 +109,10 @@ class Family(Displayed):
         low, high = np.degrees(self.range).tolist()
         within = "within the limits" if self.within_limits else "outside the limits"
         q0 = shortly(tuple(np.degrees(self.q0).tolist()))
-        return Sheet(f"Family {self.kind}, t from {shortly(low)} to {shortly(high)} deg, {within}, q0_deg {q0}")
+        of_surface = f", one curve of a surface of dimension {self.dimension}" if self.dimension > 1 else ""
+        return Sheet(
+            f"Family {self.kind}, t from {shortly(low)} to {shortly(high)} deg, {within}, q0_deg {q0}{of_surface}"
+        )
 
 
 def families(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[Family, ...]:
@@ -131,7 +138,7 @@ def _add(found: list[Family], new: list[Family]) -> None:
     for family in new:
         for k, known in enumerate(found):
             same = known.kind == family.kind and np.abs(known.q0 - family.q0).max() < SAME_FAMILY
-            if known.kind == family.kind and known.holds(family.q0) and greatest_move(known.q0, family.q0) < TURN / 2:
+            if known.kind == family.kind and known.holds(family.q0):
                 same = True
             elif same:
                 same = bool(np.abs(known.direction - family.direction).max() < SAME_FAMILY)

@@ -48,6 +48,7 @@ from er3a.robots.robot import Robot
 
 SAME_JOINTS = 1e-9
 SAME_MEMBER = 1e-6
+MISSED = 1e-4  # rad or m from all rows
 SOLVES = 1e-12  # m and parts of 1
 MOST_ROWS = 10_000
 STARTS = 400
@@ -143,6 +144,12 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None) ->
                 branches.append(slot_of(robot, T, member))
                 rows.append(member[None])
     certain = found.certainty[0] == CERTAIN or solver.code not in BY_ELIMINATION
+    if redundancy is None and within(robot, q_ref) and np.abs(forward(robot, q_ref) - T).max() <= SOLVES:
+        listed = np.concatenate([np.empty((0, robot.joints)), *rows])
+        if greatest_move(listed, q_ref).min(initial=np.inf) > MISSED:  # a double root that rounding takes off the axis
+            branches.append(slot_of(robot, T, q_ref))
+            rows.append(q_ref[None])
+            certain = False
     unsolved: tuple[Unsolved, ...] = ()
     if not branches:
         open_pose = bool(solver.parameters)

@@ -67,7 +67,8 @@ class SelfMotionCurve(Displayed):
         low, high = np.degrees(self.range).tolist()
         within = "within the limits" if self.within_limits else "outside the limits"
         q0 = shortly(tuple(np.degrees(self.q0).tolist()))
-        return Sheet(f"Self-motion, t from {shortly(low)} to {shortly(high)} deg, {within}, q0_deg {q0}")
+        of_surface = f", one curve of a surface of dimension {self.dimension}" if self.dimension > 1 else ""
+        return Sheet(f"Self-motion, t from {shortly(low)} to {shortly(high)} deg, {within}, q0_deg {q0}{of_surface}")
 
 
 def _joints(robot: Robot, x: Reals) -> Reals:

@@ -17,7 +17,7 @@ from er3a.kinematics.families import Family
 from er3a.kinematics.self_motions import SelfMotionCurve
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.robots.joint_limits import LimitsExceeded, limits_exceeded
+from er3a.robots.joint_limits import LimitsExceeded, but_for_turns, limits_exceeded
 from er3a.robots.robot import Robot
 
 Label = BranchLabel | SlotName | Literal["found_arm"]
@@ -239,6 +239,13 @@ class Solutions(Displayed):
         """Some of the solutions of one pose."""
         names = "q", "solved", "within_limits", "branch"
         return replace(self, **{name: getattr(self, name)[rows] for name in names})
+
+    def without_turns(self) -> Solutions:
+        """Of one pose: of rows that are others but for whole turns the first, the one nearest to the reference."""
+        first = np.unique(np.column_stack([self.branch, but_for_turns(self.robot, self.q)]), axis=0, return_index=True)[
+            1
+        ]
+        return self.take(np.sort(first))
 
     def sheet(self) -> Sheet:
         """One pose: each solution. Many: how many solutions each pose has, or the arm that iteration found for it."""

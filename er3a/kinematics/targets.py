@@ -11,6 +11,9 @@ from er3a.display import Displayed, Sheet, shortly
 from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Reals
 
+MANY_TARGETS = 1000
+"""Of more targets than these stages keep of each arm the turn that is nearest to the reference, and no others."""
+
 TargetOutcome = Literal["reached", "unreachable", "leaves limits", "collides"]
 """Whether an admissible solution exists, or what stands against it."""
 

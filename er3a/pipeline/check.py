@@ -81,7 +81,7 @@ def stage_forms(robot: Robot) -> dict[str, str]:
         "workspace": f"samples, {proven or 'volume bounded by lengths alone'}",
         "inverse": "by iteration, which may miss solutions" if iterated else f"all solutions, class {solver}",
         "trajectory": "moves of the joints and of the tool" if branches else "moves of the joints alone",
-        "teach panel": "with solutions" if spherical and plain and six else "absent",
+        "teach panel": "all solutions" if spherical and robot.coupling is None else "solutions found by iteration",
     }
 
 

@@ -24,6 +24,7 @@ from er3a.program_check.program_check_findings import Level
 from er3a.programs.instructions import Place
 from er3a.version import __version__
 
+BASE = "%SRCROOT%"
 SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 WORDS: dict[Level, str] = {"fail": "error", "caution": "warning", "note": "note", "pass": "pass"}
 UNREADABLE = "unreadable"
@@ -114,7 +115,7 @@ def cycle_line(checked: CheckedFile) -> str:
     time = f"{low} s" if low == high else f"{low} to {high} s"
     what = "one round of its loop" if cycle.repeats else "the program"
     more = f", and {cycle.waits} wait{'s' if cycle.waits > 1 else ''} for signals" if cycle.waits else ""
-    less = "" if cycle.complete else ", without the motions whose way is not known"
+    less = "" if cycle.complete else ", without the motions whose path is unknown"
     return f"{shown(checked.file)}: {what} takes about {time}{more}{less}"
 
 
@@ -198,7 +199,12 @@ def sarif_of(checked: Sequence[CheckedFile]) -> dict[str, Any]:
         "version": __version__,
         "rules": [{"id": code, "shortDescription": {"text": code.replace("_", " ")}} for code in sorted(rules)],
     }
-    run = {"tool": {"driver": driver}, "columnKind": "unicodeCodePoints", "results": results}
+    run = {
+        "tool": {"driver": driver},
+        "originalUriBaseIds": {BASE: {"description": {"text": "The folder that the command was run in."}}},
+        "columnKind": "unicodeCodePoints",
+        "results": results,
+    }
     return {"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}
 
 
@@ -214,7 +220,9 @@ def _result(
     calls: tuple[Place, ...] = (),
 ) -> dict[str, Any]:
     code, level, text = told
-    print_of = hashlib.sha256("\n".join((code, _uri(place.file), place.element, line_text)).encode()).hexdigest()[:32]
+    print_of = hashlib.sha256(
+        "\n".join((code, _uri_from_here(place.file), place.element, line_text)).encode()
+    ).hexdigest()[:32]
     number = seen[print_of] = seen.get(print_of, 0) + 1
     found: dict[str, Any] = {
         "ruleId": code,
@@ -229,7 +237,8 @@ def _result(
 
 
 def _location(place: Place) -> dict[str, Any]:
-    physical = {"artifactLocation": {"uri": _uri(place.file)}, "region": {"startLine": max(place.line, 1)}}
+    artifact = {"uri": _uri_from_here(place.file), "uriBaseId": BASE}
+    physical = {"artifactLocation": artifact, "region": {"startLine": max(place.line, 1)}}
     if not place.element:
         return {"physicalLocation": physical}
     logical = [{"fullyQualifiedName": place.element, "kind": "element"}]
@@ -245,3 +254,8 @@ def _line_text(place: Place, file: Path, lines: tuple[str, ...]) -> str:
 
 def _uri(file: Path | None) -> str:
     return quote(shown(file).replace(os.sep, "/"))
+
+
+def _uri_from_here(file: Path | None) -> str:
+    """A path from the folder that the command runs in, upwards too where the file lies beside it."""
+    return quote(os.path.relpath(file or "program").replace(os.sep, "/"))

@@ -30,8 +30,6 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from er3a.findings import Finding
-
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -214,7 +212,7 @@ class Table:
             array = getattr(self, name)
             parts = array.T if spec.is_group else [array]
             for part_name, part in zip(spec.names(len(parts), self.slides), parts):
-                yield part_name, np.array([_coded(each) for each in part], object) if spec.kind else part, spec
+                yield part_name, _coded(part) if spec.kind else part, spec
 
     def write(self, file: Path) -> None:
         """Write a Parquet file; equal tables give equal bytes."""
@@ -264,9 +262,13 @@ def _values(stored: pa.ChunkedArray, spec: Column) -> NDArray[Any]:
     return _array(tuple(map(np.array, rows) if spec.lists else rows), replace(spec, pattern=""))
 
 
-def _coded(finding: Finding | None) -> str | None:
-    """A finding as text: its code first, then its parameters."""
-    return None if finding is None else json.dumps({"code": finding.code} | asdict(finding), ensure_ascii=False)
+def _coded(findings: NDArray[Any]) -> NDArray[Any]:
+    """Findings (rows,) as text: code first, then parameters; one that stands in many rows is written out once."""
+    texts: dict[int, str | None] = {id(None): None}
+    for finding in findings:
+        if id(finding) not in texts:
+            texts[id(finding)] = json.dumps({"code": finding.code} | asdict(finding), ensure_ascii=False)
+    return np.array([texts[id(finding)] for finding in findings], object)
 
 
 @cache

@@ -21,7 +21,7 @@ class Arc(Segment):
     Attributes
     ----------
     centre, normal : (3,), m and unit vector, of the circle; the arc turns about the normal
-    angle : rad, greater than 0, less than a full circle
+    angle : rad, greater than 0; of an arc to a pose less than a full circle
     """
 
     centre: Reals

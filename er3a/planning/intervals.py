@@ -44,11 +44,12 @@ class BelowLimit:
 
 @dataclass(frozen=True)
 class TooFast:
-    """A joint (from 1) would have to turn faster than it can."""
+    """A joint (from 1) would have to move faster than it can; values are in mm if it ``slides``."""
 
     joint: int
     needed_deg_s: float
     limit_deg_s: float
+    slides: bool = False
     code: Literal["too_fast"] = "too_fast"
 
     @property
@@ -59,11 +60,12 @@ class TooFast:
 
 @dataclass(frozen=True)
 class TooFastIfAssumed:
-    """A joint (from 1), whose greatest speed is assumed, would have to turn faster."""
+    """A joint (from 1), whose greatest speed is assumed, would have to move faster; in mm if it ``slides``."""
 
     joint: int
     needed_deg_s: float
     limit_deg_s: float
+    slides: bool = False
     code: Literal["too_fast_if_assumed"] = "too_fast_if_assumed"
 
     @property
@@ -74,11 +76,12 @@ class TooFastIfAssumed:
 
 @dataclass(frozen=True)
 class AccelerationTooGreat:
-    """A joint (from 1) would have to accelerate more than it can."""
+    """A joint (from 1) would have to accelerate more than it can; in mm if it ``slides``."""
 
     joint: int
     needed_deg_s2: float
     limit_deg_s2: float
+    slides: bool = False
     code: Literal["acceleration_too_great"] = "acceleration_too_great"
 
     @property
@@ -89,11 +92,12 @@ class AccelerationTooGreat:
 
 @dataclass(frozen=True)
 class AccelerationTooGreatIfAssumed:
-    """A joint (from 1), whose greatest acceleration is assumed, would have to accelerate more."""
+    """A joint (from 1), whose greatest acceleration is assumed, would have to accelerate more; mm if it ``slides``."""
 
     joint: int
     needed_deg_s2: float
     limit_deg_s2: float
+    slides: bool = False
     code: Literal["acceleration_too_great_if_assumed"] = "acceleration_too_great_if_assumed"
 
     @property
@@ -104,11 +108,12 @@ class AccelerationTooGreatIfAssumed:
 
 @dataclass(frozen=True)
 class JerkTooGreat:
-    """A joint (from 1) would need a jerk beyond its limit; None where its acceleration steps."""
+    """A joint (from 1) would need a jerk beyond its limit (mm if it ``slides``); None where its acceleration steps."""
 
     joint: int
     needed_deg_s3: float | None
     limit_deg_s3: float
+    slides: bool = False
     code: Literal["jerk_too_great"] = "jerk_too_great"
 
     @property
@@ -151,12 +156,14 @@ class RateLimit:
     most : (n,), rad/s, rad/s^2 or rad/s^3; NaN where there is none
     assumed : (n,) bool, whether it is assumed
     step_allowed : (n,), rad/s^2, by which an acceleration may step all the same; for jerk
+    sliding : (n,) bool, whether the joint slides: m instead of rad; None for no joint
     """
 
     order: Literal[1, 2, 3]
     most: Reals
     assumed: Flags
     step_allowed: Reals
+    sliding: Flags | None = None
 
     @property
     def allowed(self) -> Reals:
@@ -166,15 +173,16 @@ class RateLimit:
 
 def rate_interval(limit: RateLimit, joint: int, start: float, end: float, most: float) -> Interval[RateCause]:
     """A stretch on which a joint (from 0) exceeds a limit, by its greatest value there."""
-    needed, allowed = np.degrees([most, limit.most[joint]]).tolist()
+    slides = limit.sliding is not None and bool(limit.sliding[joint])
+    needed, allowed = (np.array([most, limit.most[joint]]) * (1000.0 if slides else np.degrees(1.0))).tolist()
     cause: RateCause
     if limit.order == 3:
-        cause = JerkTooGreat(joint + 1, needed if np.isfinite(needed) else None, allowed)
+        cause = JerkTooGreat(joint + 1, needed if np.isfinite(needed) else None, allowed, slides)
     elif limit.order == 2:
         made = AccelerationTooGreatIfAssumed if limit.assumed[joint] else AccelerationTooGreat
-        cause = made(joint + 1, needed, allowed)
+        cause = made(joint + 1, needed, allowed, slides)
     else:
-        cause = (TooFastIfAssumed if limit.assumed[joint] else TooFast)(joint + 1, needed, allowed)
+        cause = (TooFastIfAssumed if limit.assumed[joint] else TooFast)(joint + 1, needed, allowed, slides)
     return Interval(start, end, cause)
 
 

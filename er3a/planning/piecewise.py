@@ -12,7 +12,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -28,6 +28,7 @@ TRIMMED = 1e-15  # of the greatest coefficient
 SAME_TIME = 1e-13  # share of the duration
 LOCATED = 1e-14  # share of the duration
 PIECES_AT_ONCE = 4096
+TIMES_AT_ONCE = 20_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +140,7 @@ class PiecewiseMotion:
     def steps(self) -> Reals:
         """(m + 1, n), rad/s^2, by which the acceleration steps between pieces, and from and to rest."""
         signs = np.where(np.arange(self.acceleration.shape[1]) % 2, -1.0, 1.0)[:, None]
-        first, last = (self.acceleration * signs).sum(axis=1), self.acceleration.sum(axis=1)
+        first, last = np.einsum("mdn,dz->mn", self.acceleration, signs), self.acceleration.sum(axis=1)
         rest = np.zeros((1, first.shape[1]))
         steps: Reals = np.abs(np.concatenate([first, rest]) - np.concatenate([rest, last]))
         return steps
@@ -147,6 +148,14 @@ class PiecewiseMotion:
     def rates(self, t: Reals) -> Rates:
         """Angles, velocities and accelerations at times (...,), each (..., n)."""
         t = np.asarray(t, float)
+        if t.size <= TIMES_AT_ONCE:
+            return self._rates_of_few(t)
+        flat = t.reshape(-1)
+        parts = [self._rates_of_few(flat[k : k + TIMES_AT_ONCE]) for k in range(0, len(flat), TIMES_AT_ONCE)]
+        q, velocity, acceleration = (np.concatenate(part).reshape(*t.shape, -1) for part in zip(*parts))
+        return q, velocity, acceleration
+
+    def _rates_of_few(self, t: Reals) -> Rates:
         i = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.times) - 2)
         span = self.times[i + 1] - self.times[i]
         x = np.divide(2 * (t - self.times[i]), span, out=np.zeros_like(t), where=span > 0) - 1
@@ -172,10 +181,13 @@ class PiecewiseMotion:
         """Bounds (k, n) of the sizes of velocity and acceleration between times (k,) and (k,)."""
         first = np.clip(np.searchsorted(self.times, start, side="right") - 1, 0, len(self.times) - 2)
         last = np.clip(np.searchsorted(self.times, end, side="left") - 1, first, len(self.times) - 2)
-        velocity, acceleration = (
-            greatest_between(np.abs(series).sum(axis=1), first, last) for series in (self.velocity, self.acceleration)
-        )
+        velocity, acceleration = (greatest_between(most, first, last) for most in self._bounds)
         return velocity, acceleration
+
+    @cached_property
+    def _bounds(self) -> tuple[Reals, Reals]:
+        """Bounds (m, n) of the sizes of velocity and acceleration on each piece."""
+        return _sizes(self.velocity), _sizes(self.acceleration)
 
     def scaled(self, factor: float) -> PiecewiseMotion:
         """The same way in ``factor`` times the time."""
@@ -190,9 +202,33 @@ def polynomial_motion(rates: Callable[[Reals], Rates], breaks: Reals, degree: in
     times[-1] = breaks[-1]
     x = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
     t = times[:-1, None] + np.diff(times)[:, None] * (x + 1) / 2
-    blocks = range(0, len(t), PIECES_AT_ONCE)  # the points of a long motion would fill the memory
-    parts = [[_trimmed(_interpolated(part)).copy() for part in rates(t[k : k + PIECES_AT_ONCE])] for k in blocks]
-    return PiecewiseMotion(times, *(_joined(series) for series in zip(*parts)))
+    series = [np.empty((len(t), 0, 0))] * 3
+    for k in range(0, len(t), PIECES_AT_ONCE):  # the points of a long motion would fill the memory
+        for order, values in enumerate(rates(t[k : k + PIECES_AT_ONCE])):
+            part = _trimmed(_interpolated(values))
+            if part.shape[1] > series[order].shape[1]:
+                wider = np.zeros((len(t), *part.shape[1:]))
+                if k:
+                    wider[:k, : series[order].shape[1]] = series[order][:k]
+                series[order] = wider
+            series[order][k : k + len(part), : part.shape[1]] = part
+    return PiecewiseMotion(times, *series)
+
+
+def chebyshev_times(times: Reals, degree: int) -> tuple[Reals, Reals]:
+    """Of pieces with ends (m + 1,): their ``degree + 1`` Chebyshev points (m, d + 1), and points between and at the
+    ends (m, d + 2), where a polynomial through the former is farthest from what it interpolates."""
+    k, spans = np.arange(degree + 2), np.diff(times)[:, None]
+    nodes, between = (np.cos(np.pi * part / (degree + 1)) for part in (k[:-1] + 0.5, k))
+    first, second = (times[:-1, None] + spans * (x + 1) / 2 for x in (nodes, between))
+    return first, second
+
+
+def motion_through(angles: Reals, times: Reals) -> PiecewiseMotion:
+    """The motion through angles (m, d + 1, n) at the Chebyshev points of pieces with ends (m + 1,) in s."""
+    angle = _trimmed(_interpolated(angles))
+    velocity = _slope(times, angle)
+    return PiecewiseMotion(times, angle, velocity, _slope(times, velocity))
 
 
 def turning_points(series: Reals) -> Reals:
@@ -234,12 +270,12 @@ def _trimmed(series: Reals) -> Reals:
     return series[:, : (int(kept[-1]) if kept.size else 0) + 1]
 
 
-def _joined(parts: Sequence[Reals]) -> Reals:
-    """Series (m_i, d_i + 1, n) of blocks one behind the other, of the greatest degree among them."""
-    if len(parts) == 1:
-        return parts[0]
-    most = max(part.shape[1] for part in parts)
-    return np.concatenate([np.pad(part, ((0, 0), (0, most - part.shape[1]), (0, 0))) for part in parts])
+def _sizes(series: Reals) -> Reals:
+    """Sums (m, n) of the coefficients' sizes of series (m, d + 1, n)."""
+    found = np.zeros(series[:, 0].shape)
+    for k in range(series.shape[1]):
+        found += np.abs(series[:, k])
+    return found
 
 
 def _slope(times: Reals, series: Reals) -> Reals:

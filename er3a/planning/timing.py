@@ -80,6 +80,7 @@ class JointLimits:
     jerk : greatest, rad/s^3, where one is given
     speed_assumed : (n,) bool, whether the speed is assumed; None for no joint
     acceleration_assumed : whether the accelerations are
+    sliding : (n,) bool, joints that slide: m instead of rad; None for none
     """
 
     speed: Reals
@@ -87,6 +88,7 @@ class JointLimits:
     jerk: Reals | None = None
     speed_assumed: Flags | None = None
     acceleration_assumed: bool = True
+    sliding: Flags | None = None
 
     @cached_property
     def rates(self) -> tuple[RateLimit, ...]:
@@ -94,10 +96,10 @@ class JointLimits:
         none, step = np.zeros(len(self.speed), bool), OVER * self.acceleration
         assumed = none if self.speed_assumed is None else self.speed_assumed
         found = [
-            RateLimit(1, self.speed, assumed, step),
-            RateLimit(2, self.acceleration, none | self.acceleration_assumed, step),
+            RateLimit(1, self.speed, assumed, step, self.sliding),
+            RateLimit(2, self.acceleration, none | self.acceleration_assumed, step, self.sliding),
         ]
-        return (*found, *([] if self.jerk is None else [RateLimit(3, self.jerk, none, step)]))
+        return (*found, *([] if self.jerk is None else [RateLimit(3, self.jerk, none, step, self.sliding)]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,8 +170,8 @@ def joint_limits(
     known = np.isfinite(robot.speed)
     speed = np.where(known, robot.speed, assumed_speed)
     if acceleration is None:
-        return JointLimits(speed, speed / acceleration_time, jerk, ~known)
-    return JointLimits(speed, acceleration, jerk, ~known, acceleration_assumed=False)
+        return JointLimits(speed, speed / acceleration_time, jerk, ~known, sliding=robot.slides)
+    return JointLimits(speed, acceleration, jerk, ~known, acceleration_assumed=False, sliding=robot.slides)
 
 
 def nodes_along(joints: Callable[[Reals], Reals], t: Reals, q: Reals, limits: JointLimits) -> tuple[Reals, Reals]:

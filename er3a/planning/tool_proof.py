@@ -47,9 +47,11 @@ from er3a.robots.joint_limits import LIMIT_TOLERANCE
 from er3a.robots.robot import Robot
 
 SHORTEST = 1e-9  # share of the duration
+SHORTEST_JERK = 2e-7  # share of the duration; below, jerks are differences of equal numbers
 SETTLED_ELSEWHERE = 1e-5  # share of the duration: shortest interval for what another interval breaks already
 BESIDE_EVENT = 2e-3, 1e-4  # shares of the duration: so near to a known singular pose no interval is made shorter
 MOST_INTERVALS = 240_000
+MANY_INTERVALS = 4_000  # beyond which means of jerks, which take two more poses each, pay
 FIRST_INTERVALS = 64
 GROWN = 0.5  # b sqrt(n) C h V up to which a motion is continued
 ATTEMPTS = 3
@@ -197,12 +199,14 @@ def prove(followed: Followed, wanted: Wanted, singular: Reals) -> ToolProof:
     start, end = edges[:-1], edges[1:]
     done: list[_Settled] = []
     count, broken = 0, np.zeros(len(QUANTITIES), bool)
+    asks_jerk = any(limit.order == 3 for limit in wanted.rates)
     while len(start):
-        found = _settle(followed, wanted, progress, start, end)
+        by_means = asks_jerk or count > MANY_INTERVALS
+        found = _settle(followed, wanted, (progress, by_means), start, end)
         count += len(start)
         broken |= found.broken.any(axis=0)
         least = np.where(broken, SETTLED_ELSEWHERE, SHORTEST) * duration
-        least[4] = SETTLED_ELSEWHERE * duration  # below, jerks are differences of equal numbers
+        least[4] = max(SHORTEST_JERK * duration, least[4])
         least[0] = (SETTLED_ELSEWHERE if broken.any() else SHORTEST) * duration
         beside = _distance(singular, start, end) < BESIDE_EVENT[0] * duration
         shortest = np.where(beside[:, None], np.maximum(least, BESIDE_EVENT[1] * duration), least)
@@ -295,8 +299,11 @@ def _proof(followed: Followed, done: list[_Settled], singular: Reals) -> ToolPro
     )
 
 
-def _settle(followed: Followed, wanted: Wanted, progress: PiecewiseMotion, start: Reals, end: Reals) -> _Settled:
-    """What the bounds say of intervals (k,)."""
+def _settle(
+    followed: Followed, wanted: Wanted, how: tuple[PiecewiseMotion, bool], start: Reals, end: Reals
+) -> _Settled:
+    """What the bounds say of intervals (k,); ``how``: the law of time, and whether means of jerks narrow them."""
+    progress, by_means = how
     robot, count = followed.robot, len(start)
     middle, half = (start + end) / 2, (end - start) / 2
     (s_start, s, s_end), (_, speed, _), (_, pull, _) = (
@@ -306,9 +313,8 @@ def _settle(followed: Followed, wanted: Wanted, progress: PiecewiseMotion, start
     q_start, q_end = followed.joints_at(shares)[at].reshape(2, count, -1)
     q = followed.joints_at(s)
     dq, ddq = followed.through_jacobian(q, s)
-    asks_jerk = any(limit.order == 3 for limit in wanted.rates)
     none = np.zeros_like(q), np.full_like(q, np.inf), np.ones(count)
-    jerk, third, apart = _mean_thirds(followed, start, end) if asks_jerk else none
+    jerk, third, apart = _mean_thirds(followed, start, end) if by_means else none
     bounds = _continued(followed, q, (dq, ddq, third), (s_start, s, s_end), apart)
     for beside in (q_start, q_end):
         bounds.proven[:] &= (np.abs(beside - q) <= bounds.change * (1 + 1e-6) + LIMIT_TOLERANCE).all(axis=1)
@@ -364,7 +370,7 @@ def _continued(
     sizes = followed.line.twist_bounds(s[0], s[2]) / np.array([length, 1.0])
     v1, v2, v3 = np.linalg.norm(sizes, axis=-1)[:, 1:].T
     b, reach = np.full(count, np.inf), np.full(count, np.inf)
-    b[solved], reach[solved] = _inverse_and_reach(robot, q[solved], length)
+    b[solved], reach[solved] = inverse_and_reach(robot, q[solved], length)
     sum_first, first, second = (np.full(count, np.inf) for _ in range(3))
     sum_first[solved] = np.abs(dq[solved] @ coupling.T).sum(axis=1)
     first[solved], second[solved] = np.linalg.norm(dq[solved], axis=1), np.linalg.norm(ddq[solved], axis=1)
@@ -409,7 +415,7 @@ def _continued(
     return _Bounds(proven, change, high1, high2, third, fourth, blur)
 
 
-def _inverse_and_reach(robot: Robot, q: Reals, length: float) -> tuple[Reals, Reals]:
+def inverse_and_reach(robot: Robot, q: Reals, length: float) -> tuple[Reals, Reals]:
     """Norm (k,) of the inverse of the scaled Jacobian, and greatest lever of the tool point over the length."""
     J = jacobian(robot, q)
     J[..., :3, :] /= length

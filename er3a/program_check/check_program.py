@@ -18,9 +18,9 @@ from er3a.program_check.program_check_findings import (
     BothSidesChecked,
     CheckFinding,
     Level,
-    LoopComesBackOtherwise,
     MayMove,
     NeverReached,
+    NotComeTo,
     NotFollowedToEnd,
     RestNotChecked,
     level_of,
@@ -30,12 +30,12 @@ from er3a.program_check.step_checks import CheckedMotion, StepChecker, obstacles
 from er3a.program_check.ways import CheckRules
 from er3a.programs.execution import Ending, Execution, RunLimits
 from er3a.programs.instructions import ArmMotion, Decision, Pause, Place, Unknown
-from er3a.programs.program_findings import NameTwice, NotUnderstood
+from er3a.programs.program_findings import FormInferred, NameTwice, NotUnderstood
 from er3a.programs.run_program import execute
 from er3a.programs.syntax import Fixed, Move, Program
 from er3a.robots.robot import Robot
 
-ASSUMED_SPEED_DEG_S = 180.0
+ASSUMED_SPEED, ASSUMED_SLIDE = np.radians(180.0), 0.5  # rad/s and m/s
 MOST_MOTIONS = 1_000
 MOST_ROUNDS = 20  # times as many motions as may differ are carried out
 NEAR = NearSingular(float(np.radians(5)), float(np.radians(5)), 0.03)
@@ -51,7 +51,7 @@ class CheckOptions:
     frames : T_flange_tool of tools and T_robot_base of bases (4, 4) in m, by the program's names for them
     scene : what the arm may not touch
     near : distances below which a pose of a line counts as near-singular
-    assumed_speed : (n,), rad/s, of joints whose speed no document gives
+    assumed_speed : (n,), rad/s or m/s, of joints whose speed no document gives
     acceleration_time : s, in which each joint is taken to reach its full speed
     penetration_tolerance : m; no overlap deeper than this goes unnoticed
     measures : whether to look for collisions
@@ -95,6 +95,7 @@ class MotionVerdict:
 
     Attributes
     ----------
+    line : in the program's own file, of the call for a motion of another module; 0 where there is none
     text : as the program has it; kind : of its motion; empty if it is never reached
     level : the worst of its findings
     times : how often it was carried out, or that many different times in a loop without end
@@ -102,6 +103,7 @@ class MotionVerdict:
     """
 
     place: Place
+    line: int
     text: str
     kind: str
     level: Level
@@ -154,7 +156,7 @@ class ProgramCheck:
 def assumed_limits(robot: Robot, options: CheckOptions) -> JointLimits:
     """Limits of the joints, with what is assumed where no document gives them."""
     speed = options.assumed_speed
-    assumed = np.full(robot.joints, np.radians(ASSUMED_SPEED_DEG_S)) if speed is None else speed
+    assumed = np.where(robot.slides, ASSUMED_SLIDE, ASSUMED_SPEED) if speed is None else speed
     return joint_limits(robot, assumed, options.acceleration_time)
 
 
@@ -223,16 +225,14 @@ def _located(execution: Execution, checker: StepChecker, end: int) -> tuple[Loca
             found.append(LocatedFinding("caution", unknown, step.place, step.calls))
         elif isinstance(what, Decision) and what.taken:
             found.append(LocatedFinding("note", BothSidesChecked(what.condition), step.place, step.calls))
-    for ending, joint, difference in checker.returns:
-        if joint:
-            other = LoopComesBackOtherwise(joint, difference)
-            found.append(LocatedFinding("caution", other, ending.place))
+    found += [LocatedFinding("caution", other, ending.place) for ending, other in checker.returns]
     for ending in execution.endings:
         if ending.kind not in ("end", "repeats", "joins"):
             stopped = NotFollowedToEnd(ending.kind)
             found.append(LocatedFinding(level_of(stopped), stopped, ending.place))
     for place in _unreached(execution):
-        found.append(LocatedFinding("note", NeverReached(), place))
+        missed = NeverReached() if execution.complete else NotComeTo()
+        found.append(LocatedFinding(level_of(missed), missed, place))
     groups: dict[tuple[Place, str, str], list[LocatedFinding]] = defaultdict(list)
     for each in found:
         groups[each.place, each.finding.code, _which(each.finding)].append(each)
@@ -251,12 +251,13 @@ def _which(finding: CheckFinding) -> str:
 
 
 def _place_of(finding: CheckFinding, top: Place) -> Place:
-    return finding.place if isinstance(finding, (NameTwice, NotUnderstood)) else top
+    return finding.place if isinstance(finding, (NameTwice, NotUnderstood, FormInferred)) else top
 
 
 def _unreached(execution: Execution) -> tuple[Place, ...]:
     met = {step.place for step in execution.steps}
-    return tuple(place for place, _ in _motion_texts(execution.program) if place not in met)
+    texts = _motion_texts(execution.program)
+    return tuple(place for place, _ in texts if place not in met and place.file == execution.program.file)
 
 
 def _motion_texts(program: Program) -> list[tuple[Place, str]]:
@@ -277,8 +278,11 @@ def _verdicts(
     located: tuple[LocatedFinding, ...],
 ) -> tuple[MotionVerdict, ...]:
     done: dict[Place, list[CheckedMotion]] = defaultdict(list)
+    lines: dict[Place, int] = {}
     for number, motion in motions.items():
-        done[execution.steps[number].place].append(motion)
+        step = execution.steps[number]
+        done[step.place].append(motion)
+        lines.setdefault(step.place, execution.own_line(step))
     worst: dict[Place, Level] = {}
     for each in located:
         worst[each.place] = worst_of((worst.get(each.place, "pass"), each.level))
@@ -286,6 +290,8 @@ def _verdicts(
     found = []
     for place, text in _motion_texts(program):
         here = done[place]
+        if not here and place not in met and place.file != program.file:
+            continue
         if not here and place in met:
             worst[place] = worst_of((worst.get(place, "pass"), "caution"))
         durations = [each.way.law.duration for each in here if each.way is not None]
@@ -293,6 +299,7 @@ def _verdicts(
         found.append(
             MotionVerdict(
                 place,
+                lines.get(place, place.line),
                 " ".join(text.split()),
                 here[0].kind if here else "",
                 worst.get(place, "pass"),
@@ -301,7 +308,7 @@ def _verdicts(
                 min(clear) * 1000 if clear else None,
             )
         )
-    return tuple(sorted(found, key=lambda each: each.place.line))
+    return tuple(sorted(found, key=lambda each: each.line))
 
 
 def _cycle(

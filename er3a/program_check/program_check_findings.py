@@ -79,6 +79,7 @@ class ConfigurationEnds:
     at_mm: float
     joint: int
     angle_deg: float
+    slides: bool = False
     code: Literal["configuration_ends"] = "configuration_ends"
 
 
@@ -104,21 +105,23 @@ class PassesSingularity:
 
 @dataclass(frozen=True)
 class FasterThanAssumed:
-    """A joint (from 1) would have to turn faster than is assumed of it; no document gives its speed."""
+    """A joint (from 1) of no documented speed would have to move faster than is assumed; mm if it ``slides``."""
 
     joint: int
     needed_deg_s: float
     assumed_deg_s: float
+    slides: bool = False
     code: Literal["faster_than_assumed"] = "faster_than_assumed"
 
 
 @dataclass(frozen=True)
 class AcceleratesMoreThanAssumed:
-    """A joint (from 1) would have to accelerate more than is assumed of it."""
+    """A joint (from 1) would have to accelerate more than is assumed of it; values are in mm if it ``slides``."""
 
     joint: int
     needed_deg_s2: float
     assumed_deg_s2: float
+    slides: bool = False
     code: Literal["accelerates_more_than_assumed"] = "accelerates_more_than_assumed"
 
 
@@ -161,10 +164,11 @@ class WholeTurn:
 
 @dataclass(frozen=True)
 class ArrivesOtherwise:
-    """A line or arc to joint angles ends at their tool pose, but in other joint angles."""
+    """A line or arc to joint angles ends at their tool pose, but in other joint angles; mm if the joint ``slides``."""
 
     joint: int
     difference_deg: float
+    slides: bool = False
     code: Literal["arrives_otherwise"] = "arrives_otherwise"
 
 
@@ -246,9 +250,16 @@ class ArcHasNoCircle:
 
 @dataclass(frozen=True)
 class ArcGoesOn:
-    """The arc has an angle of its own (CA) and ends elsewhere than at its target; it is not checked."""
+    """The arc has an angle of its own (CA) and ends elsewhere than at its target.
 
-    angle_deg: float
+    Attributes
+    ----------
+    angle_deg : None if it is not known; the arc is not checked then
+    turns : whether the tool turns on the way, so that its orientation at the end is the target's by assumption
+    """
+
+    angle_deg: float | None
+    turns: bool
     code: Literal["arc_goes_on"] = "arc_goes_on"
 
 
@@ -299,6 +310,13 @@ class NeverReached:
 
 
 @dataclass(frozen=True)
+class NotComeTo:
+    """A motion that the program had not come to when it was followed no further."""
+
+    code: Literal["not_come_to"] = "not_come_to"
+
+
+@dataclass(frozen=True)
 class RestNotChecked:
     """The program has more motions than are checked; of those from here on only ``targets`` targets are."""
 
@@ -325,10 +343,11 @@ class NotFollowedToEnd:
 
 @dataclass(frozen=True)
 class LoopComesBackOtherwise:
-    """When the loop begins again, a joint has another angle than in the round that was checked."""
+    """When the loop begins again, a joint is elsewhere than in the round that was checked; mm if it ``slides``."""
 
     joint: int
     difference_deg: float
+    slides: bool = False
     code: Literal["loop_comes_back_otherwise"] = "loop_comes_back_otherwise"
 
 
@@ -372,6 +391,7 @@ CheckFinding = (
     | SpeedNotGiven
     | MayMove
     | NeverReached
+    | NotComeTo
     | RestNotChecked
     | BothSidesChecked
     | NotFollowedToEnd
@@ -395,7 +415,7 @@ FAILS = frozenset(
 NOTES = frozenset(
     (
         *("way_not_known", "frame_taken_as_flange", "configuration_not_read", "zone_without_size", "speed_not_given"),
-        *("never_reached", "both_sides_checked", "program_other_encoding", "spline_as_line"),
+        *("never_reached", "both_sides_checked", "program_form_inferred", "program_other_encoding", "spline_as_line"),
     )
 )
 
@@ -406,6 +426,8 @@ def level_of(finding: CheckFinding) -> Level:
         return "caution" if finding.bounded else "fail"
     if isinstance(finding, NotFollowedToEnd) and finding.kind == "recursion":
         return "fail"
+    if isinstance(finding, ArcGoesOn):
+        return "caution" if finding.turns or finding.angle_deg is None else "note"
     if isinstance(finding, FrameNotGiven):
         return "fail" if finding.needed else "caution"
     return "fail" if finding.code in FAILS else "note" if finding.code in NOTES else "caution"

@@ -60,7 +60,7 @@ def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> list[P
         motion = check.motions.get(number)
         if motion is None or motion.stays or motion.start is None:
             continue
-        if motion.way is None:
+        if motion.way is None or motion.placed.motion.angle is not None:
             break
         line = check.execution.steps[number].place.line
         if motion.kind != "joint" and not np.allclose(motion.placed.arm.tool, robot.tool, rtol=0, atol=1e-12):

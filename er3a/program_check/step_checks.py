@@ -19,6 +19,7 @@ from er3a.program_check.program_check_findings import (
     ArcHasNoCircle,
     CheckFinding,
     ExternalAxesLeftOut,
+    LoopComesBackOtherwise,
     MoreThanFullSpeed,
     MotionCollides,
     SpeedNotGiven,
@@ -33,14 +34,16 @@ from er3a.program_check.rest_targets import target_findings
 from er3a.program_check.target_joints import Arms, Goal, PlacedMotion, goal_of
 from er3a.program_check.ways import CheckRules, MotionWay, joint_way, limit_findings, tool_way
 from er3a.program_check.zone_clearance import zone_clearance
+from er3a.program_check.zone_patch import bend_of_line, patch_of
 from er3a.programs.execution import Ending, Execution
-from er3a.programs.instructions import ArmMotion, JointTarget, Pause, PoseTarget, Target
+from er3a.programs.instructions import ArmMotion, JointTarget, Pause, PoseTarget, Target, Unknown
 from er3a.robots.robot import Robot
+from er3a.robots.shown import joint_shown
 
 MOST_OF_A_MOTION = 0.5  # that a zone may take
 TOLERANCE = 1e-9
 SAME_JOINTS = 1e-4  # rad
-BEND_SAMPLES = 9
+BEND_PARTS = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +102,7 @@ class StepChecker:
         self.arms, self.rules, self.obstacles, self.execution = Arms(robot), rules, obstacles, execution
         self.start: Reals | None = None
         self.motions: dict[int, CheckedMotion] = {}
-        self.returns: list[tuple[Ending, int, float]] = []
+        self.returns: list[tuple[Ending, LoopComesBackOtherwise]] = []
         self._joints: list[Reals | None] = []
         self._before: list[int] = []  # the motion that an arm blends from into the next; -1 for none
         self._known: dict[Hashable, CheckedMotion] = {}
@@ -118,6 +121,8 @@ class StepChecker:
             before = number
         elif isinstance(what, Pause):
             before = -1
+        elif isinstance(what, Unknown) and what.may_move:
+            joints, before = None, -1
         self._joints.append(joints)
         self._before.append(before)
 
@@ -141,7 +146,8 @@ class StepChecker:
         now = self._joints[ending.step]
         if then is not None and now is not None and np.abs(now - then).max() > SAME_JOINTS:
             joint = int(np.argmax(np.abs(now - then)))
-            self.returns.append((ending, joint + 1, float(np.degrees(now[joint] - then[joint]))))
+            other = joint_shown(self.arms.robot, joint, float(now[joint] - then[joint]))
+            self.returns.append((ending, LoopComesBackOtherwise(joint + 1, *other)))
         if isinstance(first.instruction, ArmMotion):
             self._corner(self._before[ending.step], ending.repeats_from)
 
@@ -155,9 +161,8 @@ class StepChecker:
         placed = self.arms.placed(motion)
         goal = goal_of(placed, motion.target, before)
         findings: list[CheckFinding] = [*goal.findings, *_said(motion)]
-        if motion.angle is not None:
-            angle = ArcGoesOn(float(np.degrees(motion.angle)))
-            return CheckedMotion(motion.kind, placed, before, None, None, (*findings, angle))
+        if motion.angle is not None and not np.isfinite(motion.angle):
+            return CheckedMotion(motion.kind, placed, before, None, None, (*findings, ArcGoesOn(None, turns=False)))
         if not goal.known:
             return CheckedMotion(motion.kind, placed, before, None, None, tuple(findings))
         if not is_given(motion):
@@ -203,6 +208,11 @@ class StepChecker:
         via = self._via(placed, before) if kind == "arc" else None
         if kind == "arc" and via is None:
             return CheckedMotion(kind, placed, before, None, goal.joints, (*findings, ArcHasNoCircle()))
+        if placed.motion.angle is not None:  # it goes elsewhere
+            findings = [each for each in findings if not isinstance(each, TargetOutOfReach)]
+            turns = bool(np.abs(end[:3, :3] - forward(placed.arm, before)[:3, :3]).max() > SAME_JOINTS)
+            findings.append(ArcGoesOn(float(np.degrees(placed.motion.angle)), turns))
+            given = None
         way = tool_way(placed.arm, placed.motion, before, (end, given, via), self.rules)
         if way is None:
             return CheckedMotion(kind, placed, before, None, before, tuple(findings), stays=True)
@@ -261,6 +271,18 @@ class StepChecker:
         )
         self.motions[second] = replace(self.motions[second], blended_ends=min(self.motions[second].blended_ends + 1, 2))
 
+    def _round_corner(
+        self, way: MotionWay, after: MotionWay, corners: Reals, shares: tuple[float, float]
+    ) -> CheckFinding | None:
+        """What stands in a way from joints (3, n) before a corner to behind it, over shares of the two motions."""
+        assert self.obstacles is not None
+        bodies, tolerance = self.obstacles.of(way.arm), self.obstacles.tolerance
+        if way.tool_path is None or after.tool_path is None or way.arm is not after.arm:
+            bend = _bend(way, 1 - shares[0], 1.0) + _bend(after, 0.0, shares[1])
+            return zone_clearance(bodies, corners, tolerance, bend)
+        slack = max(way.sagitta(shares[0]), after.sagitta(shares[1]))
+        return zone_clearance(bodies, corners, tolerance, patch=patch_of(way.arm, corners, slack))
+
     def _rounded(self, way: MotionWay, after: MotionWay, motion: CheckedMotion) -> tuple[CheckFinding, ...]:
         key = (id(way), id(after))
         if key not in self._corners:
@@ -280,11 +302,18 @@ class StepChecker:
             [way.joints_at(np.array(1 - before)), way.joints_at(np.array(1.0)), after.joints_at(np.array(behind))]
         )
         if np.isfinite(corners).all():
-            bend = _bend(way, 1 - before, 1.0) + _bend(after, 0.0, behind)
-            hit = zone_clearance(self.obstacles.of(way.arm), corners, self.obstacles.tolerance, bend)
+            hit = self._round_corner(way, after, corners, (before, behind))
             if hit is not None:
                 found.append(hit)
         return tuple(found)
+
+
+def _bend(way: MotionWay, first: float, last: float) -> Reals:
+    """By how much joints (n,) leave the straight way between two shares of a motion, rad; 0 in a joint move."""
+    if way.tool_path is None:
+        return np.zeros(way.q.shape[1])
+    q = way.joints_at(np.linspace(first, last, BEND_PARTS + 1))
+    return bend_of_line(way.arm, q, way.sagitta((last - first) / BEND_PARTS))
 
 
 def _zone_share(motion: ArmMotion, way: MotionWay) -> float:
@@ -298,14 +327,6 @@ def _zone_share(motion: ArmMotion, way: MotionWay) -> float:
         case "share":
             return min(zone.value, 1.0) * MOST_OF_A_MOTION
     return MOST_OF_A_MOTION
-
-
-def _bend(way: MotionWay, first: float, last: float) -> Reals:
-    """By how much joints (n,) leave the straight way between two shares of a motion, at samples, rad."""
-    shares = np.linspace(first, last, BEND_SAMPLES)
-    q = way.joints_at(shares)
-    found: Reals = np.abs(q - q[0] - np.linspace(0, 1, BEND_SAMPLES)[:, None] * (q[-1] - q[0])).max(axis=0)
-    return found
 
 
 def _said(motion: ArmMotion) -> list[CheckFinding]:

@@ -107,7 +107,8 @@ def goal_of(placed: PlacedMotion, target: Target | None, before: Reals | None) -
         if not open_.any():
             return Goal(target.joints, None, True)
         if before is None:
-            return Goal(None, None, False, (TargetNotGiven("", "position_unknown"),))
+            stays = bool(open_.all())
+            return Goal(None, None, stays, () if stays else (TargetNotGiven("", "position_unknown"),))
         return Goal(np.where(open_, before, target.joints), None, True)
     if placed.missing or placed.base is None:
         return Goal(None, None, False, placed.needed)

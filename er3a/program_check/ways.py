@@ -16,7 +16,7 @@ from er3a.kinematics.near_singular import NearSingular
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Reals
-from er3a.planning.arcs import arc
+from er3a.planning.arcs import Arc, arc
 from er3a.planning.followed import Followed
 from er3a.planning.intervals import (
     AccelerationTooGreat,
@@ -57,6 +57,7 @@ from er3a.program_check.program_check_findings import (
 from er3a.programs.instructions import ArmMotion
 from er3a.robots.joint_limits import LIMIT_TOLERANCE
 from er3a.robots.robot import Robot
+from er3a.robots.shown import joint_shown
 
 POINTS_APART_M, POINTS_APART_RAD = 0.01, np.radians(2.0)
 FEWEST_POINTS, MOST_POINTS = 21, 501
@@ -94,6 +95,7 @@ class MotionWay:
     length : m, of the tool point's way; for a joint move of the straight line between its ends
     turned : rad, by which the tool turns, or for a joint move the joint that turns most
     end : (n,), rad; None where the end is not reached
+    tool_path : of the tool; None for a joint move
     """
 
     arm: Robot
@@ -107,6 +109,14 @@ class MotionWay:
     turned: float
     end: Reals | None
     findings: tuple[CheckFinding, ...]
+    tool_path: Segment | None = None
+
+    def sagitta(self, share: float) -> float:
+        """By how much (m) a share of the tool's way bulges over the straight line between its ends."""
+        if not isinstance(self.tool_path, Arc):
+            return 0.0
+        half = min(self.tool_path.angle * share / 2, np.pi)
+        return float(self.tool_path.radius * (1 - np.cos(half)))
 
     def along_mm(self, t: float) -> float:
         """How far (mm) the tool point of a line has come at a time."""
@@ -164,11 +174,9 @@ def tool_way(
     goal : T_world_tool (4, 4) at the end; joints (n,) there, where the program gives them; the arc's point (3,), m
     """
     end, given, via = goal
-    if closed_form_missing(arm) is not None:
-        return LineNotChecked()
     T_start = forward(arm, start)
     try:
-        shape = line(T_start, end, 1.0) if via is None else arc(T_start, via, end, 1.0)
+        shape = line(T_start, end, 1.0) if via is None else _arc(T_start, via, end, (1.0, None), motion.angle)
     except PoseError:
         return ArcHasNoCircle()
     size = max(shape.length, TURN_LENGTH * shape.turned)
@@ -178,7 +186,7 @@ def tool_way(
     path: Segment = (
         line(T_start, end, law.duration, None, law.ramp)
         if via is None
-        else arc(T_start, via, end, law.duration, None, law.ramp)
+        else _arc(T_start, via, end, (law.duration, law.ramp), motion.angle)
     )
     times = np.linspace(0.0, law.duration, _points(path.length, path.turned))
     try:
@@ -189,11 +197,19 @@ def tool_way(
     end_joints = last if np.isfinite(last).all() else None
     way = MotionWay(
         *(arm, law, followed.t, followed.q, followed.joints, followed.joints_at, proof.rate_bounds),
-        *(path.length, path.turned, end_joints, ()),
+        *(path.length, path.turned, end_joints, (), path),
     )
     return replace(
-        way, findings=(*_followed_findings(followed, proof, way, rules), *_arrival_findings(followed, given))
+        way, findings=(*_followed_findings(followed, proof, way, rules), *_arrival_findings(followed, given, arm))
     )
+
+
+def _arc(T_start: Reals, via: Reals, end: Reals, time: tuple[float, float | None], angle: float | None) -> Arc:
+    """An arc in a time (s) with a ramp; with an angle (rad) of its own that far along its circle."""
+    made = arc(T_start, via, end, time[0], None, time[1])
+    if angle is None:
+        return made
+    return replace(made, normal=made.normal if angle > 0 else -made.normal, angle=abs(angle))
 
 
 def _followed_findings(followed: Followed, proof: ToolProof, way: MotionWay, rules: CheckRules) -> list[CheckFinding]:
@@ -202,9 +218,9 @@ def _followed_findings(followed: Followed, proof: ToolProof, way: MotionWay, rul
     found: list[CheckFinding] = [
         WayOutOfReach(way.along_mm(stretch.start), stretch.cause.reasons) for stretch in unreachable(followed)
     ]
-    found += [
-        ConfigurationEnds(way.along_mm(jump.t), jump.joint, float(np.degrees(jump.angle))) for jump in followed.jumps
-    ]
+    for jump in followed.jumps:
+        amount, slides = joint_shown(arm, jump.joint - 1, jump.angle)
+        found.append(ConfigurationEnds(way.along_mm(jump.t), jump.joint, amount, slides))
     ends = bool(found)
     t, kept = np.unique(np.concatenate([way.t, proof.t]), return_index=True)
     solved = np.concatenate([way.q, proof.q])[kept]
@@ -239,14 +255,14 @@ def _followed_findings(followed: Followed, proof: ToolProof, way: MotionWay, rul
 
 def _as_checked(cause: RateCause) -> CheckFinding:
     if isinstance(cause, TooFastIfAssumed):
-        return FasterThanAssumed(cause.joint, cause.needed_deg_s, cause.limit_deg_s)
+        return FasterThanAssumed(cause.joint, cause.needed_deg_s, cause.limit_deg_s, cause.slides)
     if isinstance(cause, TooFast):
         return cause
     assert isinstance(cause, AccelerationTooGreatIfAssumed | AccelerationTooGreat)
-    return AcceleratesMoreThanAssumed(cause.joint, cause.needed_deg_s2, cause.limit_deg_s2)
+    return AcceleratesMoreThanAssumed(cause.joint, cause.needed_deg_s2, cause.limit_deg_s2, cause.slides)
 
 
-def _arrival_findings(followed: Followed, given: Reals | None) -> list[CheckFinding]:
+def _arrival_findings(followed: Followed, given: Reals | None, arm: Robot) -> list[CheckFinding]:
     """Turns at rest at the start, and whether the end has the joints that the program gives."""
     found: list[CheckFinding] = []
     turn, last = followed.start_turn, followed.q[-1]
@@ -255,7 +271,7 @@ def _arrival_findings(followed: Followed, given: Reals | None) -> list[CheckFind
         found.append(TurnsAtStart(joint + 1, float(np.degrees(turn[joint]))))
     if given is not None and np.isfinite(last).all() and np.abs(last - given).max() > SAME_ARRIVAL:
         joint = int(np.argmax(np.abs(last - given)))
-        found.append(ArrivesOtherwise(joint + 1, float(np.degrees(last[joint] - given[joint]))))
+        found.append(ArrivesOtherwise(joint + 1, *joint_shown(arm, joint, float(last[joint] - given[joint]))))
     return found
 
 
@@ -268,20 +284,22 @@ def _rate_findings(arm: Robot, velocity: Reals, acceleration: Reals, limits: Joi
     """Of greatest speeds and accelerations (n,) of the joints."""
     found: list[CheckFinding] = []
     for j in np.flatnonzero(velocity > limits.speed * (1 + SPEED_TOLERANCE)).tolist():
-        needed, able = np.degrees([velocity[j], limits.speed[j]]).tolist()
-        known = bool(np.isfinite(arm.speed[j]))
-        found.append(TooFast(j + 1, needed, able) if known else FasterThanAssumed(j + 1, needed, able))
-    return found + _acceleration_findings(acceleration, limits)
+        (needed, slides), (able, _) = (joint_shown(arm, j, float(rates[j])) for rates in (velocity, limits.speed))
+        made = TooFast if np.isfinite(arm.speed[j]) else FasterThanAssumed
+        found.append(made(j + 1, needed, able, slides))
+    return found + _acceleration_findings(arm, acceleration, limits)
 
 
-def _acceleration_findings(acceleration: Reals, limits: JointLimits) -> list[CheckFinding]:
+def _acceleration_findings(arm: Robot, acceleration: Reals, limits: JointLimits) -> list[CheckFinding]:
     """The joint that asks most of its acceleration, if that is too much."""
     ratio = acceleration / limits.acceleration
     worst = int(np.argmax(ratio))
     if ratio[worst] <= 1 + SPEED_TOLERANCE:
         return []
-    needed, able = np.degrees([acceleration[worst], limits.acceleration[worst]]).tolist()
-    return [AcceleratesMoreThanAssumed(worst + 1, needed, able)]
+    (needed, slides), (able, _) = (
+        joint_shown(arm, worst, float(rates[worst])) for rates in (acceleration, limits.acceleration)
+    )
+    return [AcceleratesMoreThanAssumed(worst + 1, needed, able, slides)]
 
 
 def _joint_jumps(arm: Robot, start: Reals, end: Reals, moved: float, turned: float) -> list[CheckFinding]:
@@ -291,10 +309,11 @@ def _joint_jumps(arm: Robot, start: Reals, end: Reals, moved: float, turned: flo
         labels, first, last = branch_labels(arm), _slot(arm, start), _slot(arm, end)
         if first is not None and last is not None and first != last:
             found.append(ConfigurationChanges(labels[first], labels[last]))
-    lead = int(np.argmax(np.abs(step)))
-    if abs(step[lead]) > FAR_TURN and moved < NEAR_MOVE and turned < abs(step[lead]) / 2:
+    turned_by = np.where(arm.slides, 0.0, np.abs(step))
+    lead = int(np.argmax(turned_by))
+    if turned_by[lead] > FAR_TURN and moved < NEAR_MOVE and turned < turned_by[lead] / 2:
         found.append(JointJumps(lead + 1, float(np.degrees(step[lead])), moved * 1000))
-    for j in np.flatnonzero(np.abs(step) > np.pi + NO_WAY).tolist():
+    for j in np.flatnonzero(turned_by > np.pi + NO_WAY).tolist():
         nearer = float(wrap_to_pi(step[j]))
         if arm.lower[j] <= start[j] + nearer <= arm.upper[j]:
             found.append(WholeTurn(j + 1, *np.degrees([step[j], nearer]).tolist()))

@@ -1,6 +1,7 @@
 """CSV tables of a motion over time.
 
-Columns, in this order: ``t_s`` (from 0, rising); ``q1_deg``, ``q2_deg`` ..., the joints; ``x_mm, y_mm, z_mm`` and
+Columns, in this order: ``t_s`` (from 0, rising); ``q1_deg``, ``q2_deg`` ..., the joints
+(``q3_mm`` of one that slides); ``x_mm, y_mm, z_mm`` and
 ``roll_deg, pitch_deg, yaw_deg``, the tool in the base frame with R = Rz(yaw) Ry(pitch) Rx(roll). The poses follow from
 the joints and are for the reader; ``t_s`` may be left out, and other columns are passed over. Lines that begin with
 ``#`` are comments.
@@ -25,7 +26,7 @@ from er3a.programs.program_text import ProgramText
 from er3a.programs.syntax import Fixed, Program
 
 TIME = "t_s"
-JOINT_COLUMN = re.compile(r"q([1-9]\d?)_deg$")
+JOINT_COLUMN = re.compile(r"q([1-9]\d?)_(deg|mm)$")
 POSE_COLUMNS = ("x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg")
 DECIMALS = 6
 
@@ -71,8 +72,9 @@ def read_csv_program(source: ProgramText) -> Program:
         raise InputError(source.path, None, "holds no rows", "Give the columns q1_deg, q2_deg ...")
     head = [name.strip() for name in rows[0]]
     twice = next((name for name in head if head.count(name) > 1), None)
-    last = max((int(match[1]) for name in head if (match := JOINT_COLUMN.match(name))), default=1)
-    names = joint_columns(last)
+    units = {int(match[1]): match[2] for name in head if (match := JOINT_COLUMN.match(name))}
+    names = tuple(f"q{i}_{units.get(i, 'deg')}" for i in range(1, max(units, default=1) + 1))
+    slides = np.array([name.endswith("_mm") for name in names])
     missing = next((name for name in names if name not in head), None)
     if twice or missing:
         problem = f"the column {twice or missing} is {'there twice' if twice else 'missing'}"
@@ -92,11 +94,16 @@ def read_csv_program(source: ProgramText) -> Program:
     for i, values in enumerate(table):
         place = Place(source.path, kept[i + 1][0])
         speed = Rate(values[-1] - table[i - 1][-1], "s") if timed is not None and i else None
-        builder.add(Fixed(place, ArmMotion("joint", JointTarget(np.radians(values[: len(names)])), "row", speed=speed)))
+        given = np.array(values[: len(names)])
+        target = JointTarget(np.where(slides, given / 1000, np.radians(given)))
+        builder.add(Fixed(place, ArmMotion("joint", target, "row", speed=speed)))
     findings: tuple[ProgramFinding, ...] = (*source.findings, *(() if table else (NothingMoves(),)))
     routine = builder.routine(Place(source.path, len(source.lines)))
     return Program(
-        "csv", source.path.stem, source.path, {"MAIN": routine}, "MAIN", findings=findings, lines=source.lines
+        *("csv", source.path.stem, source.path, {"MAIN": routine}, "MAIN"),
+        findings=findings,
+        slides=tuple(slides.tolist()),
+        lines=source.lines,
     )
 
 

@@ -6,7 +6,7 @@ from typing import Protocol
 
 from er3a.programs.evaluation import Functions, ProgramMemory
 from er3a.programs.instructions import ArmMotion, Instruction
-from er3a.programs.syntax import Doing, Move
+from er3a.programs.syntax import Doing, Invocation, Move
 
 
 class Dialect(Functions, Protocol):
@@ -32,6 +32,9 @@ class Dialect(Functions, Protocol):
 
     def carry_out(self, memory: ProgramMemory, doing: Doing) -> Instruction | None:
         """A call of a function that is not in the program; None if it only sets variables."""
+
+    def harmless(self, call: Invocation) -> bool:
+        """Whether a function that is not in the program neither moves the arm nor sets what motions depend on."""
 
     def named(self, name: str) -> bool:
         """Whether the text that is assigned to this variable is kept, as the name of a tool or base."""

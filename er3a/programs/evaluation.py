@@ -139,18 +139,17 @@ class ProgramMemory:
         key = self.key(target)
         if key is not None:
             self.write(key, self._typed(key, value), local)
-        else:
-            self._forget(target)
+        else:  # an element changes, but which one is not known: none of its list is known from here
+            while isinstance(target, (Member, Element)):
+                target = target.of
+            if isinstance(target, Variable):
+                self.forget(target.name)
 
-    def _forget(self, target: Expression) -> None:
-        """An element changes, but which one is not known: none of its list is known from here."""
-        while isinstance(target, (Member, Element)):
-            target = target.of
-        if not isinstance(target, Variable):
-            return
+    def forget(self, variable: str) -> None:
+        """Nothing of a variable is known from here."""
         self.kept.clear()
         for values in (self.local, self.shared):
-            for name in [each for each in values if root(each) == target.name]:
+            for name in [each for each in values if root(each) == variable]:
                 values[name] = Unclear(name)
 
     def _set_field(self, target: Member, value: Value) -> bool:

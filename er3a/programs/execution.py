@@ -89,6 +89,11 @@ class Execution:
         """Numbers of the steps that move the arm."""
         return tuple(i for i, step in enumerate(self.steps) if isinstance(step.instruction, ArmMotion))
 
+    def own_line(self, step: Step) -> int:
+        """The line of the program's own file at which a step is met: the call's if it stands in another module."""
+        chain = (*step.calls, step.place)
+        return next((place.line for place in reversed(chain) if place.file == self.program.file), step.place.line)
+
     def way(self, ending: Ending) -> tuple[int, ...]:
         """Numbers of the steps of a way, from the first."""
         found = []

@@ -21,7 +21,7 @@ from er3a.programs.instructions import (
 )
 from er3a.programs.krl_settings import base_of, keep_setting, set_by_bas, tool_of
 from er3a.programs.krl_targets import FRAME_KEYS, frame_record, is_frame, record_pose, relative, target
-from er3a.programs.syntax import Doing, Invocation, Move
+from er3a.programs.syntax import Doing, Expression, Invocation, Move, Variable
 from er3a.programs.values import Record, Unclear, Value, number, numbers, shown
 
 KINDS: dict[str, MotionKind] = {"PTP": "joint", "LIN": "line", "CIRC": "arc", "SPL": "spline"}
@@ -157,7 +157,7 @@ class KrlDialect:
         plain = move.form.removesuffix("_REL")
         kind = KINDS[plain.removeprefix("S") if plain != "SPL" else plain]
         tool, base, speed, acceleration, zone = _settings(memory, kind, move)
-        values = [Unclear("") if each is None else memory.value(each) for each in move.arguments]
+        values = [self._argument(memory, each) for each in move.arguments]
         make = relative if plain != move.form else target
         in_tool = "#TOOL" in move.words
         made = [make(memory, value, (tool, base), (move.text, in_tool)) for value in values]
@@ -177,6 +177,15 @@ class KrlDialect:
             block if isinstance(block, int) and block else None,
         )
 
+    def _argument(self, memory: ProgramMemory, argument: Expression | None) -> Value:
+        """A motion's argument; to go to where the arm stands, wherever that is, no joint moves."""
+        if argument is None:
+            return Unclear("")
+        here = isinstance(argument, Variable) and argument.name in HERE + HERE_JOINTS
+        if here and isinstance(memory.value(argument), Unclear):
+            return Record("E6AXIS", ())
+        return memory.value(argument)
+
     def carry_out(self, memory: ProgramMemory, doing: Doing) -> Instruction | None:
         """Settings by BAS, ends of splines, signals by PULSE; the rest is unknown."""
         call = doing.what
@@ -189,7 +198,11 @@ class KrlDialect:
         if call.function == "PULSE" and call.arguments and call.arguments[0] is not None:
             name = memory.key(call.arguments[0]) or "$OUT"
             return Output(name, doing.text)
-        return Aside(doing.text) if call.function in HARMLESS else Unknown(doing.text)
+        return Aside(doing.text) if self.harmless(call) else Unknown(doing.text)
+
+    def harmless(self, call: Invocation) -> bool:
+        """Messages, files, signals."""
+        return call.function == "PULSE" or call.function in HARMLESS
 
 
 _SET = frozenset(

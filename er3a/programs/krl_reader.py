@@ -1,4 +1,4 @@
-"""Reads KUKA KRL: a .src file with the .dat file beside it.
+"""Reads KUKA KRL: a .src file with the .dat file beside it, and the modules beside it that it calls.
 
 Lines that are not understood are kept; blocks and texts without an end are errors.
 """
@@ -10,6 +10,7 @@ from pathlib import Path
 
 from er3a.programs.code_builder import CodeBuilder, fault
 from er3a.programs.instructions import Place
+from er3a.programs.krl_modules import apart, modules_of
 from er3a.programs.krl_statements import statement
 from er3a.programs.krl_words import KrlWords
 from er3a.programs.lexing import MisreadError
@@ -42,7 +43,14 @@ def read_krl(source: ProgramText) -> Program:
         reader.read_data(read_program_text(shared))
         reader.data += own
     routines = reader.read_routines()
-    by_name, more = linked(routines)
+    called: list[Routine] = []
+    for file in modules_of(source.path):
+        if all(routine.name != file.stem.upper() for routine in routines):
+            more_routines, more_data, more = _module(read_program_text(file))
+            called += more_routines
+            reader.data += more_data
+            findings += more
+    by_name, told = linked([*called, *routines])
     return Program(
         "krl",
         source.path.stem,
@@ -50,9 +58,19 @@ def read_krl(source: ProgramText) -> Program:
         by_name,
         routines[0].name,
         tuple(reader.data),
-        (*findings, *more),
+        (*findings, *told),
         source.lines,
     )
+
+
+def _module(source: ProgramText) -> tuple[list[Routine], list[Assign], list[ProgramFinding]]:
+    """Routines, data and findings of another module."""
+    reader = _KrlReader(source)
+    findings: list[ProgramFinding] = [*source.findings]
+    data_file = data_file_of(source.path, ".dat")
+    if data_file is not None:
+        findings += reader.read_data(read_program_text(data_file))
+    return (*apart(source, reader.read_routines(), reader.data), findings)
 
 
 def data_file_of(path: Path, suffix: str) -> Path | None:

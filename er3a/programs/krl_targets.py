@@ -14,13 +14,14 @@ from er3a.programs.values import Record, Unclear, Value, finite, number
 
 FRAME_KEYS = ("X", "Y", "Z", "A", "B", "C")
 AXIS_KEYS = ("A1", "A2", "A3", "A4", "A5", "A6")
+AXIS_KINDS = ("AXIS", "E6AXIS")
 EXTERNAL_KEYS = ("E1", "E2", "E3", "E4", "E5", "E6")
 NOT_NUMBERS = ("NAN", "INF", "INFINITY")
 Frames = tuple[NamedFrame, NamedFrame]
 
 
 def _has_axes(value: Record) -> bool:
-    return any(key in AXIS_KEYS for key, _ in value.items)
+    return value.kind in AXIS_KINDS or any(key in AXIS_KEYS for key, _ in value.items)
 
 
 def is_frame(value: Value | None) -> bool:

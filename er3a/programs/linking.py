@@ -95,7 +95,7 @@ def _linked(routine: Routine, known: Mapping[str, Routine]) -> Routine:
             keywords = tuple((name, calls.out(each)) for name, each in call.keywords)
             last: Operation = Call(operation.place, call.function, arguments, keywords, operation.text)
         else:
-            last = _mapped(operation, calls.out)
+            last = mapped(operation, calls.out)
         code += [*calls.found, last]
     starts.append(len(code))
     return replace(routine, code=tuple(_moved(operation, starts) for operation in code))
@@ -125,7 +125,7 @@ class _Calls:
     def out(self, expression: Expression) -> Expression:
         if not _calls(expression, self.known):
             return expression
-        expression = _within(expression, self.out)
+        expression = within(expression, self.out)
         if not isinstance(expression, Invocation) or expression.function not in self.known:
             return expression
         result = f"%value{len(self.found) + 1}"
@@ -134,7 +134,7 @@ class _Calls:
         return Variable(result)
 
 
-def _within(expression: Expression, each: Each) -> Expression:
+def within(expression: Expression, each: Each) -> Expression:
     """An expression with those right below it replaced."""
     match expression:
         case Member(of=of):
@@ -156,7 +156,7 @@ def _within(expression: Expression, each: Each) -> Expression:
             return expression
 
 
-def _mapped(operation: Operation, each: Each) -> Operation:
+def mapped(operation: Operation, each: Each) -> Operation:
     """An operation with its expressions replaced."""
     match operation:
         case Assign(value=value):

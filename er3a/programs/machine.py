@@ -15,6 +15,7 @@ from er3a.programs.evaluation import ProgramMemory, root
 from er3a.programs.execution import Ending, EndKind, Execution, RunLimits, Step
 from er3a.programs.instructions import ArmMotion, Decision, Instruction, Output, Pause, Place, Unknown
 from er3a.programs.position import Cell, Position
+from er3a.programs.quiet_branches import quiet_branches
 from er3a.programs.relevance import changed_by_threads, deciding
 from er3a.programs.syntax import (
     START,
@@ -83,6 +84,7 @@ class Machine:
         self.endings: list[Ending] = []
         self.budget = limits.operations
         self.deciding = deciding(program, dialect.modal)
+        self.quiet = quiet_branches(program, dialect)
         self.labels = {name: _labels(routine) for name, routine in program.routines.items()}
         self.seen: dict[Hashable, tuple[int, int, int]] = {}  # way, count, last step
         self.waiting: list[RunWay] = []
@@ -150,11 +152,11 @@ class Machine:
         if isinstance(operation, Move):
             motion = self.dialect.motion(memory, operation)
             self._note(way, operation.place, motion)
-            memory.here = memory.here.after(motion)
+            memory.here = memory.here.after(motion, memory.cell.flange)
         elif isinstance(operation, Fixed):
             self._note(way, operation.place, operation.instruction)
             if isinstance(operation.instruction, ArmMotion):
-                memory.here = memory.here.after(operation.instruction)
+                memory.here = memory.here.after(operation.instruction, memory.cell.flange)
             elif isinstance(operation.instruction, Unknown) and operation.instruction.may_move:
                 memory.here = Position()
         elif isinstance(operation, Assign):
@@ -218,6 +220,13 @@ class Machine:
             if not holds:
                 frame.at = branch.otherwise
             return not holds and branch.otherwise <= at
+        quiet = self.quiet.get((frame.routine.name, at))
+        if quiet is not None:
+            self._note(way, branch.place, Decision(branch.text, True))
+            for name in quiet.changed:
+                way.memory.forget(name)
+            frame.at = quiet.to
+            return quiet.to <= at
         if self.ways < self.limits.ways:
             other = way.fork(self.ways, len(self.seen))
             self.ways += 1

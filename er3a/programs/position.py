@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from er3a.numerics.arrays import Reals
 from er3a.programs.arm_joints import MOST_ROBOT_AXES
+from er3a.programs.circle import arc_end
 from er3a.programs.instructions import ArmMotion, JointTarget, NamedFrame, PoseTarget
 
 NO_FRAME = NamedFrame()
@@ -53,21 +55,34 @@ class Position:
     tool: NamedFrame = NO_FRAME
     base: NamedFrame = NO_FRAME
 
-    def after(self, motion: ArmMotion) -> Position:
-        """Where the arm stands behind a motion; unknown behind an arc that does not end at its target."""
+    def after(self, motion: ArmMotion, flange: Flange | None) -> Position:
+        """Where the arm stands behind a motion."""
         target = motion.target
         if motion.angle is not None:
-            return Position()
+            return self._after_arc(motion, motion.angle, flange)
         if isinstance(target, JointTarget):
             kept = np.isnan(target.joints)
             if not kept.any():
                 return Position(target.joints, None, motion.tool, motion.base)
+            if kept.all():
+                return self
             if self.joints is None:
                 return Position()
             return Position(np.where(kept, self.joints, target.joints), None, motion.tool, motion.base)
         if isinstance(target, PoseTarget):
             return Position(target.joints, target.pose, motion.tool, motion.base)
         return Position()
+
+    def _after_arc(self, motion: ArmMotion, angle: float, flange: Flange | None) -> Position:
+        """Behind an arc with an angle of its own."""
+        start = self.seen(motion.tool, motion.base, flange)
+        poses = isinstance(motion.target, PoseTarget) and isinstance(motion.via, PoseTarget)
+        if start is None or not poses or not math.isfinite(angle):
+            return Position()
+        assert isinstance(motion.target, PoseTarget)
+        assert isinstance(motion.via, PoseTarget)
+        end = arc_end(start, motion.via.pose, motion.target.pose, angle)
+        return Position() if end is None else Position(None, end, motion.tool, motion.base)
 
     def seen(self, tool: NamedFrame, base: NamedFrame, flange: Flange | None) -> Reals | None:
         """T_base_tool (4, 4) for this tool and base, or None if it can't be known."""

@@ -36,6 +36,15 @@ class NotUnderstood:
 
 
 @dataclass(frozen=True)
+class FormInferred:
+    """An element whose form is not known from any file of the controller; it was read as like ones are built."""
+
+    element: str
+    place: Place
+    code: Literal["program_form_inferred"] = "program_form_inferred"
+
+
+@dataclass(frozen=True)
 class OtherEncoding:
     """The text is not UTF-8; it was read as ``encoding``."""
 
@@ -50,7 +59,7 @@ class NothingMoves:
     code: Literal["program_nothing_moves"] = "program_nothing_moves"
 
 
-ProgramFinding = DataFileMissing | NameTwice | NotUnderstood | OtherEncoding | NothingMoves
+ProgramFinding = DataFileMissing | NameTwice | NotUnderstood | FormInferred | OtherEncoding | NothingMoves
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from pathlib import Path
 from er3a.errors import InputError
 from er3a.programs.csv_program import read_csv_program
 from er3a.programs.instructions import ArmMotion
+from er3a.programs.krl_modules import modules_of
 from er3a.programs.krl_reader import data_file_of, read_krl, shared_data_of
 from er3a.programs.program_findings import NothingMoves
 from er3a.programs.program_text import ProgramText, read_program_text
@@ -43,7 +44,7 @@ SIGNS: tuple[tuple[Language, re.Pattern[str]], ...] = (
     ),
     ("urscript", re.compile(r"(?m)^\s*(?:def\s+\w+\(.*\)\s*:|move[jlpc]\(|set_tcp\()")),
     ("rpl", re.compile(r"(?m)\bM(?:JOINT|LIN)\s*\(|:=|^\s*END_\w+\s*;")),
-    ("csv", re.compile(r"(?m)^[^#\n]*\bq1_deg\b[^\n]*,")),
+    ("csv", re.compile(r"(?m)^[^#\n]*\bq1_(?:deg|mm)\b[^\n]*,")),
 )
 KNOWN = "KRL (.src), URScript (.script), RPL (.pgm, .XPL) or CSV"
 
@@ -68,12 +69,13 @@ def read_program(path: str | Path) -> Program:
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
-    """A program's file, and the files with its points and frames, where there are such."""
+    """A program's file, the modules that it calls, and the files with their points and frames, where there are such."""
     language = SUFFIXES.get(path.suffix.lower())
     suffix = {"krl": ".dat", "rpl": ".var"}.get(language or "")
-    beside = data_file_of(path, suffix) if suffix else None
+    modules = (path, *modules_of(path)) if language == "krl" and path.is_file() else (path,)
+    beside = [data_file_of(module, suffix) for module in modules] if suffix else []
     shared = shared_data_of(path) if language == "krl" else None
-    return tuple(file for file in (path, beside, shared) if file is not None)
+    return tuple(file for file in (*modules, *beside, shared) if file is not None)
 
 
 def language_of(source: ProgramText) -> Language:
@@ -84,6 +86,8 @@ def language_of(source: ProgramText) -> Language:
     InputError
         if neither tells
     """
+    if not source.text.strip():
+        raise InputError(source.path, None, "is empty", f"Give a program in {KNOWN}")
     named = SUFFIXES.get(source.path.suffix.lower())
     if source.text.lstrip().startswith("<") or named == "xpl":
         return "xpl"
@@ -91,8 +95,6 @@ def language_of(source: ProgramText) -> Language:
         return named
     shown = [language for language, sign in SIGNS if sign.search(source.text)]
     if named is not None and not shown:
-        if not source.text.strip():
-            raise InputError(source.path, None, "is empty", f"Give a program in {KNOWN}")
         return named
     if not shown:
         raise InputError(source.path, None, "is no program that is known", f"Give one in {KNOWN}")

@@ -102,7 +102,11 @@ class RplDialect:
         """Functions of libraries move nothing; others are unknown."""
         call = doing.what
         assert isinstance(call, Invocation)
-        return Aside(doing.text) if call.function.startswith(LIBRARIES) else Unknown(doing.text)
+        return Aside(doing.text) if self.harmless(call) else Unknown(doing.text)
+
+    def harmless(self, call: Invocation) -> bool:
+        """Functions of libraries."""
+        return call.function.startswith(LIBRARIES)
 
 
 def _word(memory: ProgramMemory, expression: Expression | None) -> str:

@@ -14,12 +14,11 @@ from er3a.numerics.arrays import Reals
 from er3a.programs.arm_joints import not_expressed
 from er3a.programs.dialect import Dialect
 from er3a.programs.execution import Execution, RunLimits
-from er3a.programs.instructions import ArmMotion, JointTarget
 from er3a.programs.krl_dialect import KrlDialect
 from er3a.programs.machine import Machine
 from er3a.programs.position import Cell
 from er3a.programs.rpl_dialect import RplDialect
-from er3a.programs.syntax import Fixed, Language, Program
+from er3a.programs.syntax import Language, Program
 from er3a.programs.urscript_dialect import UrScriptDialect
 from er3a.robots.robot import Robot
 
@@ -54,7 +53,7 @@ def execute(
     ShapeError, PoseError
         for a start that has not an angle for each joint, and a frame that is no rigid transform
     """
-    if robot is not None and (reason := not_expressed(program.language, robot) or _other_table(program, robot)):
+    if robot is not None and (reason := _not_meant(program, robot)):
         raise InputError(program.file, None, reason, "Give the arm that the program is meant for")
     if robot is not None and start is not None and np.shape(start) != robot.lower.shape:
         raise ShapeError("start", np.shape(start), f"({len(robot.lower)},)")
@@ -72,12 +71,13 @@ def execute(
     return Machine(program, DIALECTS[program.language](), cell, limits or RunLimits()).run()
 
 
-def _other_table(program: Program, robot: Robot) -> str:
-    """Why a table of joints is none of an arm's; empty if it is."""
+def _not_meant(program: Program, robot: Robot) -> str:
+    """Why a program is none of an arm's; empty if it is."""
     if program.language != "csv":
-        return ""
-    instructions = (each.instruction for each in program.operations() if isinstance(each, Fixed))
-    first = next((each.target for each in instructions if isinstance(each, ArmMotion)), None)
-    if not isinstance(first, JointTarget) or len(first.joints) == robot.joints:
-        return ""
-    return f"the table has {len(first.joints)} joints, and this arm has {robot.joints}"
+        return not_expressed(program.language, robot)
+    if len(program.slides) != robot.joints:
+        return f"the table has {len(program.slides)} joints, and this arm has {robot.joints}"
+    for joint, (slides, own) in enumerate(zip(program.slides, robot.slides.tolist()), 1):
+        if slides != own:
+            return f"joint {joint} is in {'mm' if slides else 'deg'}, and this arm's {'slides' if own else 'turns'}"
+    return ""

@@ -240,6 +240,7 @@ class Program:
     entry : the routine with which it begins
     data : declarations (of a .dat or .var file, or of global variables), carried out first
     findings : what is to be said about the text
+    slides : whether each joint of a table slides, its targets in m; empty of other programs
     """
 
     language: Language
@@ -250,6 +251,7 @@ class Program:
     data: tuple[Assign, ...] = ()
     findings: tuple[ProgramFinding, ...] = ()
     lines: tuple[str, ...] = field(default=(), repr=False)
+    slides: tuple[bool, ...] = ()
 
     def operations(self) -> Iterator[Operation]:
         """All that the text holds, whether it is ever reached or not."""

@@ -191,8 +191,11 @@ class UrScriptDialect:
         if call.function in OUTPUTS and len(given) == 2:
             values = [memory.value(each) for each in given]
             return Output(f"{OUTPUTS[call.function]}[{shown(values[0])}]", shown(values[1]))
-        remote = "." in call.function  # a method of an object of another process, which moves nothing by itself
-        return Aside(doing.text) if remote or call.function.startswith(HARMLESS) else Unknown(doing.text)
+        return Aside(doing.text) if self.harmless(call) else Unknown(doing.text)
+
+    def harmless(self, call: Invocation) -> bool:
+        """Signals, messages, sockets; and methods of objects of other processes, which move nothing by themselves."""
+        return call.function != "set_tcp" and ("." in call.function or call.function.startswith(HARMLESS))
 
 
 def _tool(memory: ProgramMemory) -> NamedFrame:

@@ -11,6 +11,7 @@ from er3a.errors import InputError
 from er3a.programs.code_builder import CodeBuilder, fault
 from er3a.programs.instructions import Disabled, Place
 from er3a.programs.linking import linked
+from er3a.programs.program_findings import FormInferred
 from er3a.programs.program_text import ProgramText
 from er3a.programs.rpl_words import expression, initial
 from er3a.programs.syntax import (
@@ -18,6 +19,7 @@ from er3a.programs.syntax import (
     Doing,
     Expression,
     Fixed,
+    Halt,
     Invocation,
     Move,
     Opaque,
@@ -31,6 +33,7 @@ from er3a.programs.xml_tree import XmlNode, read_xml
 
 TOP = "Xpl-source"
 MOST_LOOPS = 50
+OTHER_SIDES = ("elsif", "elseif", "else")
 MOTION_PARTS = ("target", "speed", "zone", "tool", "refsys")
 
 
@@ -53,7 +56,8 @@ def read_xpl(source: ProgramText) -> Program:
     pous = [each for group in environment.all("Pous") for each in group.all("Pou")]
     if not pous:
         raise InputError(source.path, f"line {environment.line}", "holds no <Pou>", "Give a program with its Main")
-    routines = [_Pou(source, pou).routine() for pou in pous]
+    readers = [_Pou(source, pou) for pou in pous]
+    routines = [reader.routine() for reader in readers]
     by_name, findings = linked(routines)
     entry = next((pou for pou in pous if pou.text_of("Type") == "Program"), pous[0])
     data = tuple(
@@ -62,7 +66,7 @@ def read_xpl(source: ProgramText) -> Program:
         for kind in group.children
         for var in kind.all("Var")
     )
-    found = (*source.findings, *findings)
+    found = (*source.findings, *findings, *(each for reader in readers for each in reader.inferred))
     return Program("xpl", source.path.stem, source.path, by_name, entry.text_of("Name"), data, found, source.lines)
 
 
@@ -80,6 +84,7 @@ class _Pou:
         self.source, self.pou = source, pou
         self.name = pou.text_of("Name")
         self.place = Place(source.path, pou.line, self.name)
+        self.inferred: list[FormInferred] = []
 
     def routine(self) -> Routine:
         interface = [
@@ -102,13 +107,15 @@ class _Pou:
     def _body(self, builder: CodeBuilder, pou: XmlNode, path: str, within: tuple[XmlNode, ...]) -> None:
         counts: dict[str, int] = {}
         for body in pou.all("Body"):
-            for element in body.children:
+            for element, sides in _with_sides(body.children):
                 counts[element.tag] = counts.get(element.tag, 0) + 1
                 place = Place(self.source.path, element.line, f"{path}/{element.tag}[{counts[element.tag]}]")
                 if element.attributes.get("disable", "").lower() == "true":
                     builder.add(Fixed(place, Disabled(text_of(element))))
                 elif element.tag in ("while", "for"):
                     self._loop(builder, element, place, (*within, pou))
+                elif sides:
+                    self._if(builder, sides, place, (*within, pou))
                 elif element.child("pouref") is not None:
                     self._unknown_block(builder, element, place, (*within, pou))
                 else:
@@ -131,6 +138,22 @@ class _Pou:
         self._body(builder, body, f"{place.element}/{name}", within)
         builder.close(element.tag, place)
 
+    def _if(
+        self, builder: CodeBuilder, sides: list[tuple[str, str]], place: Place, within: tuple[XmlNode, ...]
+    ) -> None:
+        self.inferred.append(FormInferred("if", place))
+        for number, (condition, name) in enumerate(sides):
+            body = self._named(name, within)
+            if body is None or body in within or len(within) > MOST_LOOPS:
+                raise fault(place, f"there is no <Pou> '{name}' for a side of the if", "Add it, or correct <pouref>")
+            told = f"IF {condition} THEN"
+            if number == 0:
+                builder.open_if(place, expression(condition), told)
+            else:
+                builder.next_arm(place, expression(condition) if condition else None, told)
+            self._body(builder, body, f"{place.element}/{name}", within)
+        builder.close("if", place)
+
     def _unknown_block(self, builder: CodeBuilder, element: XmlNode, place: Place, within: tuple[XmlNode, ...]) -> None:
         """An element that is not understood and has bodies: each may be carried out, or not."""
         told = text_of(element)
@@ -152,6 +175,38 @@ class _Pou:
         return next((each for each in _below(self.pou) if each.text_of("Name") == name), None)
 
 
+def _with_sides(elements: list[XmlNode]) -> Iterator[tuple[XmlNode, list[tuple[str, str]]]]:
+    """Elements of a body; an ``if`` with its sides, which the ``elsif`` and ``else`` behind it are among."""
+    at = 0
+    while at < len(elements):
+        first, behind = elements[at], at + 1
+        while behind < len(elements) and elements[behind].tag in OTHER_SIDES:
+            behind += 1
+        sides = _sides(first, elements[at + 1 : behind]) if first.tag == "if" else []
+        at = behind if sides else at + 1
+        yield first, sides
+
+
+def _sides(element: XmlNode, more: list[XmlNode]) -> list[tuple[str, str]]:
+    """Conditions and bodies of an ``if``, as ``while`` has them, ``else`` without condition; empty if it has others.
+
+    No file of the controller with an ``if`` was at hand: a second body is taken for what else is done.
+    """
+    found: list[tuple[str, str]] = []
+    others = [*(each for each in element.children if each.tag in OTHER_SIDES), *more]
+    for part in (element, *others):
+        conditions = [each.text for tag in ("cond", "condition") for each in part.all(tag)]
+        bodies = [each.text for each in part.all("pouref")]
+        known = all(each.tag in ("cond", "condition", "pouref", *OTHER_SIDES) for each in part.children)
+        if part.tag == "else":
+            conditions = ["", *conditions]
+        if not known or len(conditions) != 1 or not 1 <= len(bodies) <= 1 + (part is element and not others):
+            return []
+        found.append((conditions[0], bodies[0]))
+        found += [("", each) for each in bodies[1:]]
+    return found if all(condition for condition, _ in found[:-1]) else []
+
+
 def _below(pou: XmlNode) -> Iterator[XmlNode]:
     for each in pou.all("Pou"):
         yield each
@@ -163,7 +218,7 @@ def _element(builder: CodeBuilder, element: XmlNode, place: Place) -> None:
     told = text_of(element)
     if element.tag in ("mjoint", "mlin"):
         parts = [element.child(tag) for tag in MOTION_PARTS]
-        given = tuple(None if part is None else expression(part.text) for part in parts)
+        given = tuple(None if part is None or not part.text else expression(part.text) for part in parts)
         builder.add(Move(place, element.tag.upper(), given, told))
     elif element.tag == "set":
         target = expression(element.text_of("dest"))
@@ -171,6 +226,10 @@ def _element(builder: CodeBuilder, element: XmlNode, place: Place) -> None:
     elif element.tag == "wait":
         condition = element.text_of("condition")
         builder.add(Waiting(place, "condition", expression(condition), condition))
+        if (told_by := element.text_of("var")) and element.text_of("timeout"):  # whether it came in time
+            builder.add(Assign(place, expression(told_by), Opaque(told), told))
+    elif element.tag == "end_pro":
+        builder.add(Halt(place))
     elif element.tag == "dwell":
         builder.add(Waiting(place, "seconds", expression(element.text_of("expr")), told))
     elif element.tag == "rem":

@@ -7,12 +7,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from er3a.kinematics.table_batch import Tables
+from er3a.kinematics.table_batch import Tables, tables_of
 from er3a.numerics.arrays import Reals
 from er3a.references.predict import TablesState
 from er3a.references.quantities import (
     COORDINATES,
     FRAME_OF_POINT,
+    FROM_UPRIGHT,
     MM,
     AxisAngle,
     AxisCoordinate,
@@ -20,8 +21,9 @@ from er3a.references.quantities import (
     PointCoordinate,
     Quantity,
     SectionCoordinate,
+    SegmentAngle,
+    TurnedApart,
     nearest_on_line,
-    turned_apart,
 )
 from er3a.robots.robot import Robot
 
@@ -35,6 +37,10 @@ class Components:
     Parameters
     ----------
     expected : (n,), in the quantities' units
+
+    Attributes
+    ----------
+    sizes : (n,), how many components each has
     """
 
     def __init__(self, robot: Robot, quantities: Sequence[Quantity], expected: Sequence[float]):
@@ -46,23 +52,28 @@ class Components:
             (own, _reader([quantities[i] for i in own], np.array([expected[i] for i in own]), self._state))
             for own in kinds.values()
         ]
-        self._count = len(quantities)
-
-    def off(self, tables: Tables) -> list[Reals]:
-        """For each quantity components (H, k) whose length is how far tables are off, in its unit."""
-        state = self._state.of(tables)
-        parts: list[Reals] = [np.empty(0)] * self._count
+        own_state = self._state.of(tables_of(robot))
+        self.sizes = np.zeros(len(quantities), dtype=np.int64)
         for own, reader in self._readers:
-            found = reader(state)
-            for place, i in enumerate(own):
-                parts[i] = found[:, place]
-        return parts
+            self.sizes[own] = reader(own_state).shape[-1]
+        starts = (np.cumsum(self.sizes) - self.sizes)[:, None]
+        self._columns = [(starts[own] + np.arange(self.sizes[own[0]])).ravel() for own, _ in self._readers]
+
+    def off(self, tables: Tables) -> Reals:
+        """Components (H, m), each quantity's side by side, whose length is how far tables are off, in its unit."""
+        state = self._state.of(tables)
+        off = np.empty((len(tables), int(self.sizes.sum())))
+        for columns, (_, reader) in zip(self._columns, self._readers):
+            off[:, columns] = reader(state).reshape(len(tables), -1)
+        return off
 
 
 def _kind(quantity: Quantity, expected: float) -> str:
     """What is read together; nothing for what is read alone."""
     if isinstance(quantity, AxisAngle):
         return "" if expected else "angle"
+    if isinstance(quantity, SegmentAngle):
+        return "" if expected else "segment"
     return {AxisCoordinate: "axis", PointCoordinate: "point", SectionCoordinate: "section"}.get(type(quantity), "")
 
 
@@ -70,6 +81,8 @@ def _reader(quantities: list[Quantity], expected: Reals, states: TablesState) ->
     first = quantities[0]
     if isinstance(first, AxisAngle) and not expected.any():
         return _angles([each for each in quantities if isinstance(each, AxisAngle)])
+    if isinstance(first, SegmentAngle) and not expected.any():
+        return _segments([each for each in quantities if isinstance(each, SegmentAngle)])
     if isinstance(first, AxisCoordinate):
         return _axis_points([each for each in quantities if isinstance(each, AxisCoordinate)], expected)
     if isinstance(first, PointCoordinate):
@@ -83,11 +96,19 @@ def _angles(quantities: list[AxisAngle]) -> Reader:
     joints = np.array([each.joint - 1 for each in quantities])
     toward = np.array([each.toward for each in quantities])
     signed = np.array([each.signed for each in quantities])
+    turned = TurnedApart(toward)
 
     def read(state: ModelState) -> Reals:
         axis = state.frames[:, 0][:, joints][..., :3, 2] * state.direction[:, joints, None]
         backward = ~signed & (np.einsum("hni,ni->hn", axis, toward) < 0)
-        return turned_apart(np.where(backward[..., None], -axis, axis), toward)
+        return turned.from_these(np.where(backward[..., None], -axis, axis))
+
+    return read
+
+
+def _segments(quantities: list[SegmentAngle]) -> Reader:
+    def read(state: ModelState) -> Reals:
+        return FROM_UPRIGHT.from_these(np.stack([each.direction(state) for each in quantities], axis=1))
 
     return read
 

@@ -222,13 +222,13 @@ class SegmentAngle(Quantity):
     unit: ClassVar[Unit] = "deg"
 
     def value(self, state: ModelState) -> Reals:
-        return angle_between(self._direction(state), np.array([0.0, 0.0, 1.0]), True)
+        return angle_between(self.direction(state), _UPRIGHT, True)
 
     def off(self, state: ModelState, expected: float) -> Reals:
-        upright = np.array([0.0, 0.0, 1.0])
-        return super().off(state, expected) if expected else turned_apart(self._direction(state), upright)
+        return super().off(state, expected) if expected else FROM_UPRIGHT.from_these(self.direction(state))
 
-    def _direction(self, state: ModelState) -> Reals:
+    def direction(self, state: ModelState) -> Reals:
+        """Where it points, (..., 3); of any length."""
         T = state.at(ZERO_POSE)
         if self.segment == "upper_arm":
             axis, vector = T[..., 1, :3, 2], T[..., 2, :3, 3] - T[..., 1, :3, 3]
@@ -345,18 +345,30 @@ def angle_between(a: Reals, b: Reals, signed: bool) -> Reals:
     return np.degrees(np.arctan2(np.sqrt(_dot(cross, cross)), dot if signed else np.abs(dot)))
 
 
+class TurnedApart:
+    """How far directions are turned from given ones, b (..., 3)."""
+
+    def __init__(self, b: Reals):
+        self._b = b
+        first = _cross(b, np.eye(3)[np.abs(b).argmin(axis=-1)])
+        self._first = first / np.sqrt(_dot(first, first))[..., None]
+        self._second = _cross(b, self._first)
+        self._length = np.sqrt(_dot(self._second, self._second))
+
+    def from_these(self, a: Reals) -> Reals:
+        """Vectors (..., 2) across b whose length is the angle in deg from b to a; smooth but for opposite ones."""
+        cross = _cross(self._b, a)
+        sine, cosine = np.sqrt(_dot(cross, cross)), _dot(a, self._b)
+        angle = np.degrees(np.arctan2(sine, cosine))
+        size = np.where(sine > 0, angle / np.where(sine > 0, sine, 1.0), 0.0)
+        along = np.where((sine == 0) & (cosine < 0), 180.0, size * _dot(cross, self._first))
+        across = size * _dot(cross, self._second) / self._length
+        return np.stack([along, across], axis=-1)
+
+
 def turned_apart(a: Reals, b: Reals) -> Reals:
-    """Vectors (..., 2) across b whose length is the angle in deg from b to a; smooth but for opposite directions."""
-    cross = _cross(b, a)
-    sine, cosine = np.sqrt(_dot(cross, cross)), _dot(a, b)
-    angle = np.degrees(np.arctan2(sine, cosine))
-    size = np.where(sine > 0, angle / np.where(sine > 0, sine, 1.0), 0.0)
-    first = _cross(b, np.eye(3)[np.abs(b).argmin(axis=-1)])
-    first = first / np.sqrt(_dot(first, first))[..., None]
-    along = np.where((sine == 0) & (cosine < 0), 180.0, size * _dot(cross, first))
-    second = _cross(b, first)
-    across = size * _dot(cross, second) / np.sqrt(_dot(second, second))
-    return np.stack([along, across], axis=-1)
+    """How far directions a are turned from b, (..., 2): see :class:`TurnedApart`."""
+    return TurnedApart(b).from_these(a)
 
 
 def _cross(a: Reals, b: Reals) -> Reals:
@@ -368,3 +380,7 @@ def _cross(a: Reals, b: Reals) -> Reals:
 def _dot(a: Reals, b: Reals) -> Reals:
     product: Reals = np.einsum("...i,...i->...", a, b)
     return product
+
+
+_UPRIGHT = np.array([0.0, 0.0, 1.0])
+FROM_UPRIGHT = TurnedApart(_UPRIGHT)

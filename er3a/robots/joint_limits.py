@@ -7,10 +7,11 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.geometry.angles import TURN
+from er3a.geometry.angles import TURN, wrap_to_pi
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
 
+SAME_DIGITS = 9  # of rad, m: joint values that are alike to these are one
 LIMIT_TOLERANCE = 1e-9
 
 
@@ -116,6 +117,12 @@ def nearest_equivalent(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
     outside = np.where(robot.lower - below < above - robot.upper, below, above)
     found = np.where(low <= high, inside, outside)
     return np.where(robot.slides, q, found) if robot.sliding.any() else found
+
+
+def but_for_turns(robot: Robot, q: Reals) -> Reals:
+    """Joint values (..., n) with their whole turns taken off, to ``SAME_DIGITS``."""
+    wrapped: Reals = np.where(robot.slides, q, wrap_to_pi(q))
+    return np.round(wrapped, SAME_DIGITS)
 
 
 def turn_of(robot: Robot) -> Reals | float:

@@ -14,6 +14,12 @@ def shown(robot: Robot, q: Reals) -> Reals:
     return values
 
 
+def joint_shown(robot: Robot, joint: int, value: float) -> tuple[float, bool]:
+    """A value of one joint (from 0) in rad or m, as degrees or mm, and whether it slides."""
+    slides = bool(robot.slides[joint])
+    return 1000.0 * value if slides else float(np.degrees(value)), slides
+
+
 def meant(robot: Robot, values: Reals) -> Reals:
     """Values (..., n) in degrees or mm, as rad or m."""
     values = np.asarray(values, float)

@@ -176,20 +176,22 @@ def nearest(
     moves, greatest = np.abs(solutions.q - q_ref), greatest_move(solutions.q, q_ref)
     distance: Reals = np.linalg.norm(moves, axis=1)
     allowed = solutions.within_limits if refused is None else [why is None for why in refused]
-    left, ordered = np.flatnonzero(allowed).tolist(), list[int]()
+    rows = np.flatnonzero(allowed)
+    left, ordered = rows[np.argsort(greatest[rows], kind="stable")].tolist(), list[int]()
     while left:
-        best = _first(left, greatest, distance, solutions.branch)
-        ordered.append(best)
-        left.remove(best)
+        alike = 1
+        while alike < len(left) and greatest[left[alike]] <= greatest[left[0]] + SAME_MOVE:
+            alike += 1
+        best = left.index(_first(left[:alike], distance, solutions.branch))
+        ordered.append(left.pop(best))
     why = _why_first(solutions, ordered, moves, distance) if ordered else why_none(robot, solutions, refused or ())
     return Choice(np.array(ordered, dtype=int), greatest, distance, why)
 
 
-def _first(rows: list[int], greatest: Reals, distance: Reals, branch: Integers) -> int:
-    for measure in (greatest, distance):
-        least = min(measure[row] for row in rows)
-        rows = [row for row in rows if measure[row] <= least + SAME_MOVE]
-    return min(rows, key=lambda row: (branch[row], row))
+def _first(rows: list[int], distance: Reals, branch: Integers) -> int:
+    """Of rows whose greatest moves are alike."""
+    least = min(distance[row] for row in rows)
+    return min((row for row in rows if distance[row] <= least + SAME_MOVE), key=lambda row: (branch[row], row))
 
 
 def _why_first(solutions: Solutions, order: list[int], moves: Reals, distance: Reals) -> WhyFirst:

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.collision.bodies import Bodies
+from er3a.collision.clearance import bodies_of
 from er3a.collision.pairs import PairOverlaps
 from er3a.collision.scene import Scene
 from er3a.display import Displayed, Sheet, first_rows, shortly
@@ -20,7 +21,7 @@ from er3a.robots.robot import Robot
 from er3a.selection.nearest import Refusal, WhyNone, nearest, why_none
 from er3a.selection.rules import RULES, RuleName, checked_weights, mixed_cost
 
-COLLIDES = 0.0  # m; a solution with less clearance is refused where a scene is given
+COLLIDES = 0.0  # m; a solution with less clearance is refused
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ def select(
     ----------
     rule : a name in ``RULES``, or weights of several, such as ``{"time": 1, "clearance": 2}``
     q_ref : (6,), rad, the joint angles that the arm comes from
-    scene : obstacles; rows that touch them, or in which the arm touches itself, are refused
+    scene : obstacles; rows that touch them are refused, and, with or without, those in which the arm touches itself
 
     Raises
     ------
@@ -129,18 +130,19 @@ def select(
 
 
 def refusals(robot: Robot, solutions: Solutions, scene: Scene | None) -> tuple[Refusal | None, ...]:
-    """Why each row is refused: limits that it leaves or, with a scene, what overlaps; None for the others."""
-    return tuple(solutions.reason) if scene is None else refusals_of(Bodies(robot, scene), solutions)
+    """Why each row is refused: limits that it leaves, or what overlaps; None for the others."""
+    return refusals_of(bodies_of(robot, scene), solutions)
 
 
 def refusals_of(bodies: Bodies, solutions: Solutions) -> tuple[Refusal | None, ...]:
     """Why each row is refused: limits that it leaves, or which of the bodies overlap; None for the others."""
     refused: list[Refusal | None] = list(solutions.reason)
     inside = np.flatnonzero(solutions.within_limits)
-    distance, pair = bodies.least(solutions.q[inside])
-    for row, depth, number in zip(inside, -distance, pair):
+    distance, pair = bodies.least_of_turns(solutions.q[inside])
+    told: dict[tuple[int, float], PairOverlaps] = {}  # turns share theirs
+    for row, depth, number in zip(inside.tolist(), (-distance).tolist(), pair.tolist()):
         if depth > COLLIDES:
-            refused[row] = PairOverlaps(bodies.pairs[number], float(depth * 1000))
+            refused[row] = told.setdefault((number, depth), PairOverlaps(bodies.pairs[number], depth * 1000))
     return tuple(refused)
 
 

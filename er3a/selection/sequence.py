@@ -11,13 +11,13 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal, get_args
 
 import numpy as np
 
-from er3a.collision.clearance import clearance
+from er3a.collision.clearance import bodies_of
 from er3a.collision.scene import Scene
 from er3a.display import Displayed, Sheet, first_rows
 from er3a.errors import Er3aError
@@ -85,6 +85,18 @@ def select_sequence(
     usable = [_usable(robot, solutions, scene, number) for number, solutions in enumerate(poses)]
     q_ref = checked_reference(robot, q_ref)
     sets = [solutions.q[rows] for solutions, rows in zip(poses, usable)]
+    found = best_of_sets(robot, sets, q_ref, rule, acceleration)
+    return replace(
+        found,
+        rows=np.array([rows[k] for rows, k in zip(usable, found.rows)]),
+        greedy_rows=np.array([rows[k] for rows, k in zip(usable, found.greedy_rows)]),
+    )
+
+
+def best_of_sets(
+    robot: Robot, sets: Sequence[Reals], q_ref: Reals, rule: MoveRule, acceleration: Reals | None = None
+) -> SequenceChoice:
+    """As :func:`select_sequence`, of sets (k, n) of joint values of which all may be taken."""
     total = _move_costs(robot, q_ref[None], sets[0], rule, acceleration)[0]
     came_from = []
     for before, after in pairwise(sets):
@@ -102,10 +114,10 @@ def select_sequence(
         greedy_cost += float(costs.min())
         at = q[greedy[-1]]
     return SequenceChoice(
-        rows=np.array([rows[k] for rows, k in zip(usable, best)]),
+        rows=np.array(best),
         q=np.array([q[k] for q, k in zip(sets, best)]),
         cost=float(total.min()),
-        greedy_rows=np.array([rows[k] for rows, k in zip(usable, greedy)]),
+        greedy_rows=np.array(greedy),
         greedy_cost=greedy_cost,
     )
 
@@ -119,8 +131,8 @@ def rest_to_rest(angle: Reals, speed: Reals, acceleration: Reals) -> Reals:
 
 def _usable(robot: Robot, solutions: Solutions, scene: Scene | None, number: int) -> Integers:
     rows = np.flatnonzero(solutions.within_limits)
-    if scene is not None and rows.size:
-        rows = rows[clearance(robot, solutions.q[rows], scene).distance >= 0]
+    if rows.size:
+        rows = rows[bodies_of(robot, scene).least_of_turns(solutions.q[rows])[0] >= 0]
     if not rows.size:
         raise Er3aError(f"pose {number} of the sequence has no solution within the limits and free of collisions")
     return rows

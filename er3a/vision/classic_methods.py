@@ -2,8 +2,8 @@
 
 All take ``F`` and ``B`` (N, 4, 4) with F_i X B_i = Y, and return X and Y. With the camera on the flange F is
 T_base_flange, X is T_flange_camera and Y T_base_board; with a fixed camera F is T_flange_base, X is T_base_camera and
-Y T_flange_board. B is T_camera_board. Park and those below it take motions between all pairs of samples,
-F_j^-1 F_i X = X B_j B_i^-1; Shah and Li take the samples themselves.
+Y T_flange_board. B is T_camera_board. Park [1]_, Horaud [2]_, Tsai [3]_, Andreff [4]_ and Daniilidis [5]_ take motions
+between all pairs of samples, F_j^-1 F_i X = X B_j B_i^-1; Shah [6]_ and Li [7]_ take the samples themselves.
 
 References
 ----------

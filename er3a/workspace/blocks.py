@@ -10,7 +10,7 @@ import scipy
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.workspace.azimuths import TURN
 from er3a.workspace.cavities import Cavity
-from er3a.workspace.proof import ring_volumes
+from er3a.workspace.proof import in_space, ring_volumes
 
 _CUBE = np.ones((3, 3, 3), dtype=bool)
 LEAST_BLOCKS = 8
@@ -24,6 +24,7 @@ class Blocks:
     ----------
     rho, z, azimuth : edges of the blocks along each axis, m, m and rad (0 to 2 pi)
     empty, unfilled : (n_rho, n_z, n_azimuth), share of each block's volume that is proven empty, or not proven filled
+    bar : m, where the blocks are of bars, 0 for rings; see :class:`er3a.workspace.proof.Proof`
     """
 
     rho: Reals
@@ -31,10 +32,14 @@ class Blocks:
     azimuth: Reals
     empty: Reals
     unfilled: Reals
+    bar: float = 0.0
 
     @property
     def volumes(self) -> Reals:
         """Volume of each block, m^3, in the shape of the arrays."""
+        if self.bar > 0:
+            across = np.diff(self.rho)[:, None] * np.diff(self.z)
+            return np.asarray(across[:, :, None] * np.diff(self.azimuth) * self.bar / TURN)
         section = (self.rho[1:] ** 2 - self.rho[:-1] ** 2)[:, None] * np.diff(self.z) / 2
         volumes: Reals = section[:, :, None] * np.diff(self.azimuth)
         return volumes
@@ -43,7 +48,7 @@ class Blocks:
         """Middles (n_rho, n_z, n_azimuth, 3) in the frame about axis 1, m."""
         rho, z, azimuth = ((edge[1:] + edge[:-1]) / 2 for edge in (self.rho, self.z, self.azimuth))
         rho, z, azimuth = np.meshgrid(rho, z, azimuth, indexing="ij")
-        return np.stack([rho * np.cos(azimuth), rho * np.sin(azimuth), z], axis=-1)
+        return in_space(rho, azimuth, z, self.bar)
 
 
 def blocks_of(pieces: Cavity, size: float, low: Reals, high: Reals, turns: int) -> Blocks:
@@ -60,11 +65,12 @@ def blocks_of(pieces: Cavity, size: float, low: Reals, high: Reals, turns: int) 
     azimuth = np.linspace(0, TURN, turns + 1)
     overlap = np.minimum(pieces.arcs[:, 1:], azimuth[1:]) - np.maximum(pieces.arcs[:, :1], azimuth[:-1])
     share = np.maximum(0, overlap) / (TURN / turns)
-    section = ring_volumes(pieces.cells) / turns
+    section = ring_volumes(pieces.cells, pieces.bar) / turns
     empty, unfilled = np.zeros((*shape, turns)), np.zeros((*shape, turns))
     cell_size = pieces.cells[:, 1] - pieces.cells[:, 0]
     first = np.floor((pieces.cells[:, [0, 2]] - low) / size + 1e-6).astype(np.int64)
-    ring = ring_volumes(np.stack([rho[:-1], rho[1:], np.zeros(shape[0]), np.full(shape[0], size)], axis=1)) / turns
+    column = np.stack([rho[:-1], rho[1:], np.zeros(shape[0]), np.full(shape[0], size)], axis=1)
+    ring = ring_volumes(column, pieces.bar) / turns
     fits = cell_size <= size * (1 + 1e-6)
     inside = fits & ((first >= 0) & (first < shape)).all(axis=1)
     where = tuple(first[inside].T)
@@ -75,7 +81,7 @@ def blocks_of(pieces: Cavity, size: float, low: Reals, high: Reals, turns: int) 
         a, b = np.maximum(first[n], 0), np.minimum(first[n] + count, shape)
         unfilled[a[0] : b[0], a[1] : b[1]] += share[n]
         empty[a[0] : b[0], a[1] : b[1]] += share[n] * pieces.empty[n]
-    return Blocks(rho, z, azimuth, np.minimum(empty, 1), np.minimum(unfilled, 1))
+    return Blocks(rho, z, azimuth, np.minimum(empty, 1), np.minimum(unfilled, 1), pieces.bar)
 
 
 def pockets(blocks: Blocks, inside: Flags) -> list[Flags]:
@@ -130,4 +136,4 @@ def mesh(blocks: Blocks, mask: Flags) -> tuple[Reals, Integers]:
     quads = number.reshape(-1, 4)
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     rho, z, azimuth = blocks.rho[used[:, 0]], blocks.z[used[:, 1]], blocks.azimuth[used[:, 2]]
-    return np.stack([rho * np.cos(azimuth), rho * np.sin(azimuth), z], axis=1), triangles
+    return in_space(rho, azimuth, z, blocks.bar), triangles

@@ -22,17 +22,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.geometry.sphere import fibonacci_sphere
-from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.block_constants import BlockConstants
 from er3a.kinematics.closed_form import SLOTS
-from er3a.kinematics.wrist_partitioned import constants_for_blocks
+from er3a.kinematics.wrist_partitioned import closed_form_missing, constants_for_blocks
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.joint_limits import LIMIT_TOLERANCE, theta_limits
 from er3a.robots.robot import Robot
 from er3a.workspace.directions import Roll, left_to_roll, poses, tool_rotations, with_full_turn
 from er3a.workspace.proof import ring_volumes
-from er3a.workspace.section_arm import FULL_TURN, section_frame
+from er3a.workspace.section_arm import FULL_TURN
+from er3a.workspace.tool_inverse import all_solutions, frame_about_axis_1, generic_manipulability
 
 SECTORS = 64
 """Sectors of azimuth with a limited joint 1, the first about azimuth 0; one bit each in a proof's masks."""
@@ -105,14 +105,9 @@ def map_capability(robot: Robot, middles: Reals, directions: int, roll: Roll) ->
     ----------
     middles : (n, 2), m, radius and height of the cells' middles about axis 1 (see ``section_arm.section_frame``)
     directions : how many, over the sphere; roll : how the roll is treated
-
-    Raises
-    ------
-    NotWristPartitionedError
     """
-    R, origin = section_frame(robot)
+    R, origin = frame_about_axis_1(robot)
     asked = with_full_turn(left_to_roll(robot, roll), 0)
-    arm = constants_for_blocks(robot)
     rotations = R.T @ tool_rotations(fibonacci_sphere(directions), roll)
     sectors = sector_count(robot)
     reachability, solutions, most, best = np.zeros((4, len(middles), sectors))
@@ -121,14 +116,21 @@ def map_capability(robot: Robot, middles: Reals, directions: int, roll: Roll) ->
     for start in range(0, len(middles), step := max(1, _POSES // per_cell)):
         part = slice(start, start + step)
         T = poses(points[part][:, None, None], rotations)
-        found = inverse_batch(asked, T.reshape(-1, 4, 4))
-        theta = robot.direction * found.q + robot.offset
-        shape = (len(T), directions, len(roll.angles), SLOTS)
-        values = manipulability(arm, theta).reshape(shape)
-        within = found.within_limits.reshape(shape)
+        q, within = all_solutions(asked, T.reshape(-1, 4, 4))
+        theta = robot.direction * q + robot.offset
+        shape = (len(T), directions, -1, SLOTS)
+        values = manipulability_of(robot, q, within).reshape(shape)
+        within = within.reshape(shape)
         out = reachability[part], solutions[part], most[part], best[part]
         _tally(theta[..., 0].reshape(shape), within, values, theta_limits(robot)[0], out)
     return Capability(reachability, solutions, most, best)
+
+
+def manipulability_of(robot: Robot, q: Reals, within: Flags) -> Reals:
+    """Manipulability (m^3) of joint values (..., n), rad; where these are not ``within`` the limits it may be 0."""
+    if closed_form_missing(robot):
+        return generic_manipulability(robot, q, within)
+    return manipulability(constants_for_blocks(robot), robot.direction * q + robot.offset)
 
 
 def manipulability(arm: BlockConstants, theta: Reals) -> Reals:

@@ -33,7 +33,7 @@ class Relaxed:
 
     Attributes
     ----------
-    joint : 1 to 6
+    joint : from 1; joints that slide are left as they are
     limit_deg : the limit as it is
     by_deg : by how much it is widened: the least of ``STEPS`` that makes the void vanish, or the most there is
     filled : ratio of the void that is then reached
@@ -104,14 +104,15 @@ def relaxations(robot: Robot, cavity: Cavity, in_section: InSection | None = Non
         and height about axis 1. Cells then count as reached if a random sample of the widened arm lies in them.
     """
     chosen = _probes(cavity)
+    turning = [joint for joint in range(1, robot.joints + 1) if not robot.slides[joint - 1]]
     if in_section is None:
         before = _open_angle(robot, cavity, chosen)
-        joints = range(1, 6)
+        joints = list(range(1, 6))
 
         def ratio_filled(widened: Robot) -> float:
             return _ratio_filled(widened, cavity, chosen, before)
     else:
-        joints = range(1, 7)
+        joints = turning
 
         def ratio_filled(widened: Robot) -> float:
             return _ratio_sampled(robot, widened, cavity, chosen, in_section)
@@ -123,7 +124,7 @@ def relaxations(robot: Robot, cavity: Cavity, in_section: InSection | None = Non
         for side in _SIDES
     ]
     found.sort(key=lambda relaxed: (relaxed.filled < _GONE, relaxed.by_deg, -relaxed.filled, relaxed.joint))
-    return found, Unlimited(ratio_filled(_widened(robot, range(1, 7), _SIDES, 2 * np.pi)))
+    return found, Unlimited(ratio_filled(_widened(robot, turning, _SIDES, 2 * np.pi)))
 
 
 def _relaxed(robot: Robot, joint: int, side: Side, ratio_filled: Callable[[Robot], float], proven: bool) -> Relaxed:
@@ -201,7 +202,7 @@ def _ratio_sampled(
 ) -> float:
     """Ratio by volume of the chosen arcs that samples of a widened arm lie in; fewer samples can only lower it."""
     random = np.random.Generator(np.random.Philox(key=len(chosen)))
-    q = random.uniform(widened.lower, widened.upper, (SAMPLES, 6))
+    q = random.uniform(widened.lower, widened.upper, (SAMPLES, robot.joints))
     # The arm as it is does not come here: at least one joint must be beyond its limit.
     q = q[((q < robot.lower) | (q > robot.upper)).any(axis=1)]
     rho, azimuth, z = in_section(forward(widened, q)[:, :3, 3])

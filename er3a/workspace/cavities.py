@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.workspace.azimuths import TURN
 from er3a.workspace.lookup import SectionMap
-from er3a.workspace.proof import MOST_LEVEL, ring_volumes
+from er3a.workspace.proof import MOST_LEVEL, in_space, ring_volumes
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +28,7 @@ class Cavity:
     enclosed : whether filled cells cut it off from the outside
     cells : (n, 4), m, sections; arcs : (n, 2), rad, one arc of azimuth each
     empty : (n,), share of each arc that is proven empty
+    bar : m, length of the cells, 0 for rings; see :class:`er3a.workspace.proof.Proof`
     lower, upper : bounds of its volume, m^3
     """
 
@@ -35,11 +36,12 @@ class Cavity:
     cells: Reals
     arcs: Reals
     empty: Reals
+    bar: float = 0.0
 
     @property
     def volumes(self) -> Reals:
         """Volume of each arc's piece of ring, (n,), m^3."""
-        volumes: Reals = ring_volumes(self.cells) * (self.arcs[:, 1] - self.arcs[:, 0]) / TURN
+        volumes: Reals = ring_volumes(self.cells, self.bar) * (self.arcs[:, 1] - self.arcs[:, 0]) / TURN
         return volumes
 
     @property
@@ -54,12 +56,15 @@ class Cavity:
 
     def part(self, chosen: Flags, enclosed: bool) -> Cavity:
         """Some of its arcs."""
-        return Cavity(enclosed, self.cells[chosen], self.arcs[chosen], self.empty[chosen])
+        return Cavity(enclosed, self.cells[chosen], self.arcs[chosen], self.empty[chosen], self.bar)
 
     def centroid(self) -> Reals:
         """Centroid (3,) in the frame about axis 1, m, weighted by what is proven empty."""
         weight = self.volumes * self.empty
         low, high, z = self.arcs[:, 0], self.arcs[:, 1], self.cells[:, 2:].mean(axis=1)
+        if self.bar > 0:
+            middles = in_space(self.cells[:, :2].mean(axis=1), (low + high) / 2, z, self.bar)
+            return np.asarray(weight @ middles / weight.sum())
         a, b = self.cells[:, 0], self.cells[:, 1]
         rho = 2 / 3 * (b**3 - a**3) / (b**2 - a**2)
         width = high - low
@@ -74,8 +79,9 @@ class Cavity:
         cells, arcs = self.cells[kept], self.arcs[kept]
         share = np.linspace(0, 1, 49)
         azimuth = arcs[:, :1] + (arcs[:, 1:] - arcs[:, :1]) * share
-        x, y = cells[:, 1:2] * np.cos(azimuth), cells[:, 1:2] * np.sin(azimuth)
-        low = np.array([x.min(), y.min(), cells[:, 2].min()])
+        x, y, _ = np.moveaxis(in_space(cells[:, 1:2], azimuth, cells[:, 3:], self.bar), -1, 0)
+        left = cells[:, 0] if self.bar > 0 else x
+        low = np.array([left.min(), y.min(), cells[:, 2].min()])
         return low, np.array([x.max(), y.max(), cells[:, 3].max()])
 
 
@@ -90,11 +96,12 @@ def cavities(section: SectionMap) -> tuple[list[Cavity], Cavity]:
     rows, columns = np.concatenate(edges, axis=1)
     graph = scipy.sparse.coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(cell), len(cell)))
     _, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
-    outside = np.unique(label[section.outermost[cell]])
+    ends = (proof.bar > 0) & ((arcs[:, 0] <= 0) | (arcs[:, 1] >= TURN))
+    outside = np.unique(label[section.outermost[cell] | ends])
     share = _empty_ratio(arcs, proof.empty[cell])
     is_open = np.isin(label, outside)
     cells = proof.cells[cell]
-    everything = Cavity(False, cells, arcs, share)
+    everything = Cavity(False, cells, arcs, share, proof.bar)
     enclosed = [everything.part(label == n, True) for n in np.unique(label[~is_open])]
     enclosed = [cavity for cavity in enclosed if cavity.lower > 0]
     return sorted(enclosed, key=lambda cavity: -cavity.lower), everything.part(is_open, False)

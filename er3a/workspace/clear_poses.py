@@ -11,11 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.kinematics.batch import inverse_batch
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot
 from er3a.workspace.directions import across, poses
-from er3a.workspace.section_arm import section_frame
+from er3a.workspace.tool_inverse import all_solutions, frame_about_axis_1
 
 Free = Callable[[Reals], Flags]
 """Which arms (N, n), rad, are free of collisions, (N,)."""
@@ -40,23 +39,20 @@ def try_poses(
     ----------
     middles : (n, 2), m, radius and height about axis 1; azimuths : their sectors' middles (n,) and width, rad
     tries : poses in each; free : which arms count as clear
-
-    Raises
-    ------
-    NotWristPartitionedError
     """
-    R, origin = section_frame(robot)
+    R, origin = frame_about_axis_1(robot)
     reached, clear = (np.zeros(len(middles), np.int64) for _ in range(2))
     for start in range(0, len(middles), step := max(1, _POSES // tries)):
         part = slice(start, start + step)
         rho, z = middles[part, 0, None], middles[part, 1, None]
         at = azimuths[0][part, None] + azimuths[1] * (random.random((len(rho), tries)) - 0.5)
         points = np.stack([rho * np.cos(at), rho * np.sin(at), np.broadcast_to(z, at.shape)], axis=-1) @ R + origin
-        found = inverse_batch(robot, poses(points, _orientations(random, at.shape)).reshape(-1, 4, 4))
-        slot, pose = np.nonzero(found.within_limits.T)  # arms of one branch after another are alike
+        q, inside = all_solutions(robot, poses(points, _orientations(random, at.shape)).reshape(-1, 4, 4))
         held = np.zeros(at.size, bool)
-        held[pose[free(found.q[pose, slot])]] = True
-        reached[part] = found.within_limits.any(axis=1).reshape(at.shape).sum(axis=1)
+        for slot, within in enumerate(inside.T):  # arms of one branch after another are alike
+            pose = np.flatnonzero(within & ~held)
+            held[pose] = free(q[pose, slot])
+        reached[part] = inside.any(axis=1).reshape(at.shape).sum(axis=1)
         clear[part] = held.reshape(at.shape).sum(axis=1)
     return ClearPoses(tries, reached, clear)
 

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
+from er3a.kinematics.chain import constant_links
+from er3a.kinematics.wrist_partitioned import closed_form_missing, wrist_partitioned_arm
 from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
@@ -28,7 +29,7 @@ class Roll:
     ----------
     free : whether it is left to joint 6
     angles : rad, the rolls to try; one if it is free
-    reach : m, distance of the wrist centre from the tool point; beside : m, from the tool's axis
+    reach : m, distance of the wrist centre (without one: of axis n) from the tool point; beside : m, from its axis
     """
 
     free: bool
@@ -43,23 +44,22 @@ class Roll:
 
 
 def roll_of(robot: Robot, rolls: int) -> Roll:
-    """Whether the robot's roll is free, else ``rolls`` even ones.
-
-    Raises
-    ------
-    NotWristPartitionedError
-    """
-    arm = wrist_partitioned_arm(robot)
-    axis_6 = arm.tool_rotation.T @ arm.axes[5]
-    reach, beside = float(np.linalg.norm(arm.wrist_in_tool)), float(np.hypot(*arm.wrist_in_tool[:2]))
+    """Whether the robot's roll is free, else ``rolls`` even ones."""
+    if closed_form_missing(robot):
+        last = constant_links(robot)[-1]
+        axis_6, wrist = last[2, :3], -last[:3, :3].T @ last[:3, 3]
+    else:
+        arm = wrist_partitioned_arm(robot)
+        axis_6, wrist = arm.tool_rotation.T @ arm.axes[5], arm.wrist_in_tool
+    reach, beside = float(np.linalg.norm(wrist)), float(np.hypot(*wrist[:2]))
     free = max(beside, float(np.hypot(*axis_6[:2]))) < _ON_AXIS
     angles = (0.0,) if free else tuple((2 * np.pi * np.arange(rolls) / rolls).tolist())
     return Roll(free, angles, reach, beside)
 
 
 def left_to_roll(robot: Robot, roll: Roll) -> Robot:
-    """The robot with a full turn of joint 6 if it is what a free roll is made of."""
-    return with_full_turn(robot, 5) if roll.free else robot
+    """The robot with a full turn of its last joint if it is what a free roll is made of."""
+    return with_full_turn(robot, robot.joints - 1) if roll.free else robot
 
 
 def with_full_turn(robot: Robot, joint: int) -> Robot:

@@ -1,7 +1,8 @@
-"""Any arm of six revolute joints as the general proof takes it: a chain of turns about z, and bounds of its levers.
+"""Any serial arm as the general proof takes it: a chain of joints about and along z, and bounds of its levers.
 
-The tool point is carried from the tip to axis 1: turned about the z axis of a joint's frame, then taken over a constant
-link. The distance of the point from a joint's axis, its *lever*, depends on the joints behind that one alone.
+The tool point is carried from the tip to axis 1: turned about the z axis of a joint's frame or shifted along it, then
+taken over a constant link. The distance of the point from a joint's axis, its *lever*, depends on the joints behind
+that one alone.
 """
 
 from __future__ import annotations
@@ -10,67 +11,291 @@ from typing import NamedTuple
 
 import numpy as np
 
+from er3a.geometry.transforms import rot_z, translation
 from er3a.geometry.vectors import Vector
-from er3a.kinematics.chain import constant_links, moving_tip
-from er3a.numerics.arrays import Reals
+from er3a.kinematics.chain import constant_links, joint_starts, moving_tip
+from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import kernel
+from er3a.robots.joint_limits import theta_limits
 from er3a.robots.robot import Robot
-from er3a.workspace.section_arm import FULL_TURN, at_most_a_turn
+from er3a.workspace.directions import across
+from er3a.workspace.section_arm import FULL_TURN, ROUND_OFF
+
+_SPARE = 0.01  # of what is reached, left on either side of bars
+_UPRIGHT, _ALONE = 1e-6, 1e-10
 
 
 class GeneralArm(NamedTuple):
     """Plain numbers for kernels, in the frame of joint 1 (z along axis 1).
 
+    n rows of the table move the point: ``x = drive @ v + start`` with x (n,) the angle theta of rows that turn (rad)
+    and the shift of those that slide (m). v (m,) are those values themselves, or the joints' where some depend on
+    others.
+
     Attributes
     ----------
-    links : (n, 4, 4), from the frame of each joint that moves the point to that of the joint before; the first unused
-    tip : (3,), m, the tool point in the frame that turns with the last of these joints
-    lower, upper : (n,), rad, theta of each joint, at most a full turn wide
-    levers : (n,), m, the point is never further from each axis
-    heights : lowest and highest z of the point, m
+    links : (n, 4, 4), from the frame of each row's joint to that of the one before; the first unused
+    tip : (3,), m, the tool point in the frame that moves with the last of these joints
+    sliding : (n,), whether the joint slides
+    lower, upper : (n,), rad or m, what x is never outside of, turns at most a full one wide
+    levers, radii : (n,), m, the point is never further from each axis; a joint that slides has the lever 1
+    heights : (n, 2), lowest and highest z of the point along each axis once its joint moved, m
+    drive, start : (n, m) and (n,)
+    v_lower, v_upper : (m,), limits of v; combined (c, m), least, most (c,): ``least <= combined @ v <= most``.
+        Where v[0] counts in one of these, the others decide how far joint 1 goes; see :func:`own_range`
+    to_joints : (m, m + 1), the manufacturer's joint values are ``to_joints @ [*v, 1]``, v[0] being x[0]
     full_turn : whether joint 1 covers a full turn
+    bar : m, length of the bars along a joint 1 that slides, 0 where it turns. Then the frame has y along the slide, the
+        point stands at x from 0 to ``radii[0]`` and, with the slide at its lower limit, at y from 0 on; places along
+        y are told as angles, ``bar`` being a turn, and so is the range of joint 1 (from 0)
     """
 
     links: Reals
     tip: Reals
+    sliding: Flags
     lower: Reals
     upper: Reals
     levers: Reals
-    heights: tuple[float, float]
+    radii: Reals
+    heights: Reals
+    drive: Reals
+    start: Reals
+    v_lower: Reals
+    v_upper: Reals
+    combined: Reals
+    least: Reals
+    most: Reals
+    to_joints: Reals
     full_turn: bool
+    bar: float
 
     @property
-    def reach(self) -> float:
-        """The point is never further from axis 1, m."""
-        return float(self.levers[0])
+    def carries_around(self) -> bool:
+        """Whether joint 1 can turn or shift the tool point with all rows behind it at rest."""
+        return bool(len(self.lower) > 1 and not self.drive[0, 1:].any() and not self.drive[1:, 0].any())
+
+    def joints(self, v: Reals) -> Reals:
+        """The manufacturer's joint values (N, m) for values (N, m), joint 1 at the middle of what these allow it."""
+        v = v.copy()
+        low, high = np.full(len(v), self.lower[0]), np.full(len(v), self.upper[0])
+        for row, least, most in zip(self.combined, self.least, self.most):
+            if row[0]:
+                ends = (np.array([[least], [most]]) - v[:, 1:] @ row[1:]) / row[0]
+                low, high = np.maximum(low, ends.min(axis=0)), np.minimum(high, ends.max(axis=0))
+        v[:, 0] = (low + high) / 2
+        return np.asarray(v @ self.to_joints[:, :-1].T + self.to_joints[:, -1])
 
 
-def general_arm(robot: Robot) -> tuple[GeneralArm, Reals, Reals]:
-    """The chain of a robot, and the frame about axis 1: x, y, z in the base frame as rows (3, 3), and origin (3,)."""
-    links = constant_links(robot)
-    last, tip = moving_tip(links)
-    lower, upper = at_most_a_turn(robot)[: last + 1].T.copy()
-    levers, heights = _levers(links, tip, last)
-    full_turn = bool(upper[0] - lower[0] >= FULL_TURN)
-    chain = np.ascontiguousarray(links[: last + 1])
-    arm = GeneralArm(chain, np.ascontiguousarray(tip), lower, upper, levers, heights, full_turn)
-    return arm, links[0, :3, :3].T, links[0, :3, 3]
+def coupled(robot: Robot) -> bool:
+    """Whether joints depend on one another, or sums of them have limits."""
+    return robot.coupling is not None or bool(robot.combined)
 
 
-def _levers(links: Reals, tip: Reals, last: int) -> tuple[Reals, tuple[float, float]]:
-    """Bounds of the distance from each axis and of the height along axis 1, from the tip inwards.
+def general_arm(robot: Robot, thickness: tuple[Reals, float] | None = None) -> tuple[GeneralArm, Reals, Reals]:
+    """The chain of a robot, and the frame about axis 1: x, y, z in the base frame as rows (3, 3), and origin (3,).
 
-    Turned about z, a point fills at most a disc of radius ``lever`` at heights between ``low`` and ``high``.
+    A joint 1 that slides along other joints makes bars; see :class:`GeneralArm`.
+
+    Parameters
+    ----------
+    thickness : direction (3,) in the frame of the last joint that moves the tool point, and a length (m), along which
+        the point is to slide besides; first joints that can't move are then part of the base
     """
-    levers = np.empty(last + 1)
-    levers[last], low, high = np.hypot(tip[0], tip[1]), tip[2], tip[2]
-    for k in range(last, 0, -1):
+    links = constant_links(robot)
+    last, tip = moving_tip(links, robot.sliding)
+    n = last + 1
+    sliding = robot.sliding[:n]
+    ends = theta_limits(robot)[:n]
+    if thickness is not None and not coupled(robot):
+        links, first = _without_locked(links, sliding, ends)
+        sliding, ends, n = sliding[first:], ends[first:], n - first
+    wide = (ends[:, 1] - ends[:, 0] >= FULL_TURN) & ~sliding
+    ends[wide, 1] = ends[wide, 0] + 2 * np.pi
+    lower, upper = ends.T.copy()
+    drive, start, v_lower, v_upper = np.eye(n), np.zeros(n), lower, upper
+    combined, least, most = np.empty((0, n)), np.empty(0), np.empty(0)
+    own = slice(last + 1 - n, last + 1)
+    to_joints = np.column_stack([np.diag(robot.direction[own]), -(robot.direction * joint_starts(robot))[own]])
+    if coupled(robot):
+        to_joints = np.eye(robot.joints, robot.joints + 1)
+        coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
+        drive = np.ascontiguousarray((robot.direction[:, None] * coupling)[:n])
+        start, v_lower, v_upper = joint_starts(robot)[:n].copy(), robot.lower.copy(), robot.upper.copy()
+        combined = np.array([limit.factors for limit in robot.combined]).reshape(-1, robot.joints)
+        least, most = np.array([[limit.lower, limit.upper] for limit in robot.combined]).reshape(-1, 2).T.copy()
+    links, full_turn = links[:n], bool(wide[0])
+    if thickness is not None:
+        direction, length = thickness
+        x, y = across(direction[None])
+        along = np.eye(4)
+        along[:3, :3], along[:3, 3] = np.stack([x[0], y[0], direction], axis=1), tip
+        links, tip = np.concatenate([links, along[None]]), np.zeros(3)
+        sliding, lower, upper = np.append(sliding, True), np.append(lower, 0.0), np.append(upper, length)
+        drive, start = np.pad(drive, ((0, 1), (0, 1))), np.append(start, 0.0)
+        drive[-1, -1] = 1.0
+        v_lower, v_upper = np.append(v_lower, 0.0), np.append(v_upper, length)
+        combined, to_joints = np.pad(combined, ((0, 0), (0, 1))), np.insert(to_joints, -1, 0.0, axis=1)
+    radii, heights = _levers(links, tip, sliding, lower, upper)
+    arm = GeneralArm(
+        links=np.ascontiguousarray(links),
+        tip=np.ascontiguousarray(tip),
+        sliding=np.ascontiguousarray(sliding),
+        lower=lower,
+        upper=upper,
+        levers=np.where(sliding, 1.0, radii),
+        radii=radii,
+        heights=heights,
+        drive=drive,
+        start=start,
+        v_lower=v_lower,
+        v_upper=v_upper,
+        combined=combined,
+        least=least,
+        most=most,
+        to_joints=to_joints,
+        full_turn=full_turn,
+        bar=0.0,
+    )
+    if coupled(robot) and not (arm.carries_around and not combined[:, 0].any()):
+        arm = _freed(arm, theta_limits(robot)[0])
+    return (
+        _along_slide(arm, links[0]) if sliding[0] and len(sliding) > 1 else (arm, links[0, :3, :3].T, links[0, :3, 3])
+    )
+
+
+def _without_locked(links: Reals, sliding: Flags, ends: Reals) -> tuple[Reals, int]:
+    """Links without the first joints that can't move, and how many there are."""
+    first = 0
+    while first < len(ends) - 1 and ends[first, 0] == ends[first, 1]:
+        held = translation(0, 0, ends[first, 0]) if sliding[first] else rot_z(ends[first, 0])
+        links = np.concatenate([[links[0] @ held @ links[1]], links[2:]])
+        first += 1
+    return links, first
+
+
+def _freed(arm: GeneralArm, ends: Reals) -> GeneralArm:
+    """The arm with joint 1's x in place of its value, so that rows behind it stay when it moves; unchanged where no
+    joints' values move row 1 alone.
+
+    Values along which row 1 alone moves are a line; the others' limits cut it off, each linear in what is left.
+
+    Parameters
+    ----------
+    ends : (2,), rad or m, the range of row 1
+    """
+    m = len(arm.v_lower)
+    target = np.eye(len(arm.lower))[0]
+    line = np.linalg.lstsq(arm.drive, target, rcond=None)[0]
+    if np.abs(arm.drive @ line - target).max() > _ALONE or abs(line[0]) < _ALONE or len(arm.lower) < 2:
+        return arm
+    line[np.abs(line) < _ALONE] = 0.0
+    share = np.append(0.0, arm.drive[0, 1:])
+    M = np.eye(m) - np.outer(line, share)
+    M[:, 0] = line
+    shift = -arm.start[0] * line
+    limits = np.concatenate([np.eye(m), arm.combined])
+    low, high = np.concatenate([[arm.v_lower, arm.v_upper], [arm.least, arm.most]], axis=1) - limits @ shift
+    rows = limits @ M
+    rows[np.abs(rows) < _ALONE] = 0.0
+    kept = (rows[:, 0] != 0) | (np.count_nonzero(rows, axis=1) > 1)
+    moved = np.outer(line, [arm.v_lower[0] / line[0], arm.v_upper[0] / line[0]])
+    v_lower, v_upper = arm.v_lower - moved.max(axis=1), arm.v_upper - moved.min(axis=1)
+    lower, upper, drive, start = (array.copy() for array in (arm.lower, arm.upper, arm.drive, arm.start))
+    v_lower[0], v_upper[0] = lower[0], upper[0] = ends
+    drive[0], drive[:, 0], start[0] = 0.0, 0.0, 0.0
+    drive[0, 0] = 1.0
+    return arm._replace(
+        lower=lower,
+        upper=upper,
+        drive=drive,
+        start=start,
+        v_lower=v_lower,
+        v_upper=v_upper,
+        combined=np.ascontiguousarray(rows[kept]),
+        least=np.ascontiguousarray(low[kept]),
+        most=np.ascontiguousarray(high[kept]),
+        to_joints=np.column_stack([M, shift]),
+        full_turn=False,
+    )
+
+
+@kernel
+def own_range(arm: GeneralArm, v: Reals) -> tuple[float, float]:
+    """How far joint 1 goes (lowest and highest x[0]) with the others at ``v``; none if the first is the greater."""
+    low, high = arm.lower[0], arm.upper[0]
+    for r in range(arm.combined.shape[0]):
+        factor = arm.combined[r, 0]
+        if factor == 0.0:
+            continue
+        total = 0.0
+        for j in range(1, v.shape[0]):
+            total += arm.combined[r, j] * v[j]
+        a, b = (arm.least[r] - total) / factor, (arm.most[r] - total) / factor
+        low, high = max(low, min(a, b)), min(high, max(a, b))
+    return low, high
+
+
+def _along_slide(arm: GeneralArm, first: Reals) -> tuple[GeneralArm, Reals, Reals]:
+    """The arm in a frame along its first joint, which slides, and that frame; z is as near to the base's as it can be.
+
+    Parameters
+    ----------
+    first : (4, 4), frame of joint 1 in the base frame
+    """
+    along = first[:3, 2]
+    up = np.array([0.0, 0.0, 1.0]) if np.hypot(along[0], along[1]) > _UPRIGHT else np.array([1.0, 0.0, 0.0])
+    up = up - (up @ along) * along
+    up /= np.linalg.norm(up)
+    frame = np.stack([np.cross(along, up), along, up])
+    links = arm.links.copy()
+    links[1, :3] = frame @ first[:3, :3] @ arm.links[1, :3]
+    low, high = _box(arm, links[1, :3])
+    size, slide = high - low, float(arm.upper[0] - arm.lower[0])
+    spare = _SPARE * (size + np.array([0.0, slide, 0.0])) + ROUND_OFF
+    corner = np.array([low[0] - spare[0], low[1] - spare[1], 0.0])
+    links[1, :3, 3] -= corner
+    bar = float(size[1] + slide + 2 * spare[1])
+    lower, upper, radii, heights = (array.copy() for array in (arm.lower, arm.upper, arm.radii, arm.heights))
+    start, lower[0], upper[0] = float(lower[0]), 0.0, 2 * np.pi * slide / bar
+    combined, to_joints = arm.combined.copy(), arm.to_joints.copy()
+    shift = start * combined[:, 0]
+    to_joints[:, -1] += start * to_joints[:, 0]
+    combined[:, 0] *= bar / (2 * np.pi)
+    to_joints[:, 0] *= bar / (2 * np.pi)
+    radii[0], heights[0] = size[0] + 2 * spare[0], (low[2], high[2])
+    arm = arm._replace(links=links, lower=lower, upper=upper, radii=radii, heights=heights, bar=bar)
+    arm = arm._replace(combined=combined, least=arm.least - shift, most=arm.most - shift, to_joints=to_joints)
+    return arm, frame, first[:3, 3] + (corner + np.array([0.0, start, 0.0])) @ frame
+
+
+def _box(arm: GeneralArm, link: Reals) -> tuple[Reals, Reals]:
+    """Lowest and highest corner (3,), m, of what the joints behind joint 1 reach, after the link (3, 4) behind it."""
+    middles = link[:, 3] + np.outer(arm.heights[1], link[:, 2])
+    across = np.hypot(link[:, 0], link[:, 1]) * arm.radii[1]
+    return middles.min(axis=0) - across, middles.max(axis=0) + across
+
+
+def _levers(links: Reals, tip: Reals, sliding: Flags, lower: Reals, upper: Reals) -> tuple[Reals, Reals]:
+    """Bounds of the distance from each axis (n,) and of the height along it (n, 2), from the tip inwards.
+
+    Turned about z, a point fills at most a disc of radius ``radius`` at heights between ``low`` and ``high``, and a
+    ball of radius ``ball`` about the frame's origin.
+    """
+    last = len(lower) - 1
+    radii, heights = np.empty(last + 1), np.empty((last + 1, 2))
+    radius, low, high, ball = np.hypot(tip[0], tip[1]), tip[2], tip[2], float(np.linalg.norm(tip))
+    for k in range(last, -1, -1):
+        if sliding[k]:
+            low, high, ball = low + lower[k], high + upper[k], ball + max(abs(lower[k]), abs(upper[k]))
+        radius, low, high = min(radius, ball), max(low, -ball), min(high, ball)
+        radii[k], heights[k] = radius, (low, high)
         R, t = links[k, :3, :3], links[k, :3, 3]
         middles = t + np.outer([low, high], R[:, 2])
-        levers[k - 1] = np.hypot(middles[:, 0], middles[:, 1]).max() + levers[k]
-        across = np.hypot(R[2, 0], R[2, 1]) * levers[k]
+        across = np.hypot(R[2, 0], R[2, 1]) * radius
+        radius = np.hypot(middles[:, 0], middles[:, 1]).max() + radius
         low, high = middles[:, 2].min() - across, middles[:, 2].max() + across
-    return levers, (float(low), float(high))
+        ball += float(np.linalg.norm(t))
+    return radii, heights
 
 
 @kernel
@@ -79,28 +304,17 @@ def place(arm: GeneralArm, theta: Reals, radii: Reals, columns: Reals, frame: Re
 
     Parameters
     ----------
-    theta : (n,), rad
-    radii : (n,), set to the point's distance from each axis, m
-    columns : (n, 3), set to the derivative of the point by each angle, m
+    theta : (n,), rad or m
+    radii : (n,), set to the point's distance from each axis, m; 1 for joints that slide
+    columns : (n, 3), set to the derivative of the point by each value, m
     frame : (3, 4), working memory
 
     Returns
     -------
-    x, y, z : m, in the frame of joint 1 before it turns
+    x, y, z : m, in the frame of joint 1 before it moves
     """
     n = theta.shape[0]
-    x, y, z = arm.tip[0], arm.tip[1], arm.tip[2]
-    for k in range(n - 1, -1, -1):
-        radii[k] = np.hypot(x, y)
-        c, s = np.cos(theta[k]), np.sin(theta[k])
-        x, y = c * x - s * y, s * x + c * y
-        if k > 0:
-            L = arm.links[k]
-            x, y, z = (
-                L[0, 0] * x + L[0, 1] * y + L[0, 2] * z + L[0, 3],
-                L[1, 0] * x + L[1, 1] * y + L[1, 2] * z + L[1, 3],
-                L[2, 0] * x + L[2, 1] * y + L[2, 2] * z + L[2, 3],
-            )
+    x, y, z = point_of(arm, theta, radii)
     frame[:] = 0.0
     frame[0, 0], frame[1, 1], frame[2, 2] = 1.0, 1.0, 1.0
     for k in range(n):
@@ -112,6 +326,11 @@ def place(arm: GeneralArm, theta: Reals, radii: Reals, columns: Reals, frame: Re
                     frame[r, j] = a * L[0, j] + b * L[1, j] + c * L[2, j]
                 frame[r, 3] += d
         wx, wy, wz = frame[0, 2], frame[1, 2], frame[2, 2]
+        if arm.sliding[k]:
+            columns[k, 0], columns[k, 1], columns[k, 2] = wx, wy, wz
+            for r in range(3):
+                frame[r, 3] += theta[k] * frame[r, 2]
+            continue
         px, py, pz = x - frame[0, 3], y - frame[1, 3], z - frame[2, 3]
         columns[k, 0], columns[k, 1], columns[k, 2] = wy * pz - wz * py, wz * px - wx * pz, wx * py - wy * px
         c, s = np.cos(theta[k]), np.sin(theta[k])
@@ -119,3 +338,57 @@ def place(arm: GeneralArm, theta: Reals, radii: Reals, columns: Reals, frame: Re
             a, b = frame[r, 0], frame[r, 1]
             frame[r, 0], frame[r, 1] = a * c + b * s, b * c - a * s
     return x, y, z
+
+
+@kernel
+def point_of(arm: GeneralArm, theta: Reals, radii: Reals) -> Vector:
+    """The tool point for one joint vector, and its levers; see :func:`place`."""
+    x, y, z = arm.tip[0], arm.tip[1], arm.tip[2]
+    for k in range(theta.shape[0] - 1, -1, -1):
+        if arm.sliding[k]:
+            radii[k] = 1.0
+            z += theta[k]
+        else:
+            radii[k] = np.sqrt(x * x + y * y)
+            c, s = np.cos(theta[k]), np.sin(theta[k])
+            x, y = c * x - s * y, s * x + c * y
+        if k > 0:
+            L = arm.links[k]
+            x, y, z = (
+                L[0, 0] * x + L[0, 1] * y + L[0, 2] * z + L[0, 3],
+                L[1, 0] * x + L[1, 1] * y + L[1, 2] * z + L[1, 3],
+                L[2, 0] * x + L[2, 1] * y + L[2, 2] * z + L[2, 3],
+            )
+    return x, y, z
+
+
+@kernel
+def curvature(arm: GeneralArm, moves: Reals, radii: Reals) -> float:
+    """Bound (m) on the second derivative of the point along a straight line of joint values.
+
+    ``|d2p / dx_i dx_j|`` for i <= j is at most the distance of p from axis j if both turn [1]_, 1 if j slides and 0 if
+    i does.
+
+    Parameters
+    ----------
+    moves : (n,), by how much each value changes, rad or m, no less than 0
+    radii : (n,), the levers at a point of the line
+
+    References
+    ----------
+    .. [1] ``w_i x (w_j x (p - o_j))``: J.-P. Merlet, *Parallel Robots*, 2nd ed., 2006, chapter 7.
+    """
+    total, behind, n = 0.0, 0.0, moves.shape[0]
+    inner = 0.0
+    for k in range(n):
+        inner += 0.0 if arm.sliding[k] else moves[k]
+    for k in range(n - 1, -1, -1):
+        if arm.sliding[k]:
+            total += 2.0 * moves[k] * inner
+            behind += moves[k]
+            continue
+        lever = min(arm.levers[k], radii[k] + behind)
+        inner -= moves[k]
+        total += lever * moves[k] * (moves[k] + 2.0 * inner)
+        behind += lever * moves[k]
+    return total

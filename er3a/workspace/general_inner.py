@@ -1,131 +1,424 @@
-"""What any six-revolute arm reaches at least: each regular joint vector reaches a ball around its tool point.
+"""What any serial arm reaches at least: a closed line of joint values whose image winds around a ring fills it.
 
-Let J be the 3 x n Jacobian of the tool point at a joint vector and B a right inverse of it (J B = 1). Move the joints
-by B s. Then the point moves by ``F(s) = s + R(s)`` with ``|R(s)| <= K |s|^2 / 2``, where
-``K = sum_ij b_i b_j lever_max(i,j)`` with the lengths b of the rows of B (second derivatives are bounded as in
-:mod:`.general_outer`). For a target y with ``|y| <= sigma - K sigma^2 / 2`` the map ``s -> y - R(s)`` takes the ball of
-radius sigma into itself, so it has a fixed point (Brouwer), and there F(s) = y. So the whole ball of that radius is
-reached, if sigma keeps all joints within their limits: ``b_i sigma <= margin_i``. This is the existence half of the
-Newton-Kantorovich theorem [1]_, without a condition on higher derivatives. Joint 1 takes part without a limit; what it
-turns narrows the azimuths that count as filled.
+Hold joint 1 still and let f take the other joints' values to radius and height of the tool point. The limits of the
+joints leave a convex set, so any closed line of joint values in it spans a disc. If f takes the line around a rectangle
+of the section without touching it, with a winding number other than 0, then f takes some point of the disc to each
+point of the rectangle: otherwise f could be drawn off that point, and the winding number would be that of a constant
+[1]_. No derivative has to be regular, joints may stand at their limits, and the line may run along the border of what
+is reached; so what is lost there is about the rectangle's own size.
+
+Where joint 1 slides, the section lies across it, and what holds of rings holds of bars.
+
+The line is a parallelogram about joint values that reach the rectangle's middle, along the two directions that change
+radius and height alone, cut off at the limits. It is sampled; between samples the tool point stays within an eighth of
+the second derivative's bound (:func:`er3a.workspace.general_arm.curvature`) of the chord. Over the disc the azimuth of
+the points in the rectangle stays within first-order terms and half that bound; joint 1 carries the ring around from
+there.
 
 References
 ----------
-.. [1] J. M. Ortega, W. C. Rheinboldt, *Iterative Solution of Nonlinear Equations in Several Variables*, 1970, 6.3 and
-   12.6.
+.. [1] J. M. Ortega, W. C. Rheinboldt, *Iterative Solution of Nonlinear Equations in Several Variables*, 1970, chapter 6
+   (the degree of a map, and Miranda's theorem as a case of it).
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.jit import kernel
-from er3a.workspace.azimuths import TURN, meets, remove
-from er3a.workspace.general_arm import GeneralArm, place
-from er3a.workspace.section_arm import ROUND_OFF
+from er3a.workspace.azimuths import TURN, measure, meets, remove
+from er3a.workspace.general_arm import GeneralArm, curvature, own_range, place, point_of
+from er3a.workspace.section_arm import ROUND_OFF, Cell
 
-_SINGULAR = 1e-10
-_ROOM, _SHORT, _ROUNDS = 0.2, 1e-9, 3
+_ROOM, _STEPS, _PER_EDGE, _CORNERS = 0.2, 8, 5, 4
+_TINY = 1e-12
+_PER_BUCKET = 48
+
+
+class Postures(NamedTuple):
+    """Joint values that are known, in buckets of the section.
+
+    Attributes
+    ----------
+    v : (most, m), with joint 1 at theta 0; azimuth (most,), rad, where they bring the tool point
+    following : (most,), the next one of the same bucket, or -1
+    first, counts : (n_rho, n_z), the first one of each bucket or -1, and how many it has
+    used : (1,), how many there are
+    size, low : (2,), m, edges of the buckets, and radius and height at which the first one begins
+    """
+
+    v: Reals
+    azimuth: Reals
+    following: Integers
+    first: Integers
+    counts: Integers
+    used: Integers
+    size: Reals
+    low: Reals
+
+
+class Memory(NamedTuple):
+    """Working memory for an arm of n rows and m joint values."""
+
+    theta: Reals
+    radii: Reals
+    columns: Reals
+    frame: Reals
+    slopes: Reals  # (3, m): radius, height and way across the arm's plane by each value
+    weights: Reals
+    directions: Reals  # (2, m)
+    v: Reals
+    points: Reals  # (corners, 2), radius and height
+    flat: Reals  # (corners, 2), x and y
+    thetas: Reals  # (corners, n)
+    levers: Reals  # (corners, n)
+    moves: Reals
+    ends: Reals  # (2,): how far joint 1 goes all over the line and at its middle
+
+
+def postures(arm: GeneralArm, across: int, most: int) -> Postures:
+    """An empty list with room for so many joint values."""
+    low, high = arm.heights[0]
+    size = np.array([arm.radii[0], high - low]) * (1 + 1e-9) / across + 1e-9
+    following, used = np.full(most, -1, dtype=np.int64), np.zeros(1, dtype=np.int64)
+    first, count = np.full((across, across), -1, dtype=np.int64), np.zeros((across, across), dtype=np.int64)
+    v = np.empty((most, len(arm.v_lower)))
+    return Postures(v, np.empty(most), following, first, count, used, size, np.array([0.0, low]))
+
+
+def memory(arm: GeneralArm) -> Memory:
+    """Working memory for an arm."""
+    n, m = arm.drive.shape
+    corners = _PER_EDGE * _CORNERS
+    return Memory(
+        np.empty(n),
+        np.empty(n),
+        np.empty((n, 3)),
+        np.empty((3, 4)),
+        np.empty((3, m)),
+        np.empty(m),
+        np.empty((2, m)),
+        np.empty(m),
+        np.empty((corners, 2)),
+        np.empty((corners, 2)),
+        np.empty((corners, n)),
+        np.empty((corners, n)),
+        np.empty(n),
+        np.empty(2),
+    )
 
 
 @kernel
-def _reached_ball(
-    arm: GeneralArm, theta: Reals, radii: Reals, columns: Reals, weights: Reals, b: Reals
-) -> tuple[float, float]:
-    """Radius (m) of the ball that is reached about the tool point, and sigma; ``b`` is set to the rows' lengths."""
-    n = theta.shape[0]
-    for k in range(n):
-        margin = np.pi if k == 0 else max(0.0, min(theta[k] - arm.lower[k], arm.upper[k] - theta[k]))
-        # Joints near a limit and joints with long levers are used less.
-        weights[k] = min(1.0, margin / _ROOM) ** 2 / max(arm.levers[k], _SHORT)
+def _radius(arm: GeneralArm, x: float, y: float) -> float:
+    """Distance from axis 1 (m), or the place across bars."""
+    return x if arm.bar > 0.0 else np.sqrt(x * x + y * y)
+
+
+@kernel
+def _azimuth(arm: GeneralArm, x: float, y: float) -> float:
+    """Azimuth about axis 1 (rad), or the place along bars."""
+    return y * TURN / arm.bar if arm.bar > 0.0 else np.arctan2(y, x)
+
+
+@kernel
+def _values(arm: GeneralArm, v: Reals, theta: Reals) -> None:
+    """Row values of joint values, with joint 1 at 0."""
+    n, m = arm.drive.shape
+    theta[0] = 0.0
+    for k in range(1, n):
+        total = arm.start[k]
+        for j in range(m):
+            total += arm.drive[k, j] * v[j]
+        theta[k] = total
+
+
+@kernel
+def _allowed(arm: GeneralArm, v: Reals) -> bool:
+    """Whether joint values respect the limits of sums, some value of joint 1 with them."""
+    low, high = own_range(arm, v)
+    if low > high:
+        return False
+    for r in range(arm.combined.shape[0]):
+        if arm.combined[r, 0] != 0.0:
+            continue
+        total = 0.0
+        for j in range(v.shape[0]):
+            total += arm.combined[r, j] * v[j]
+        if total < arm.least[r] or total > arm.most[r]:
+            return False
+    return True
+
+
+@kernel
+def keep(arm: GeneralArm, known: Postures, v: Reals, rho: float, z: float, azimuth: float) -> None:
+    """Add joint values to the list, if their bucket has room."""
+    i, j = int((rho - known.low[0]) / known.size[0]), int((z - known.low[1]) / known.size[1])
+    i, j = min(max(i, 0), known.first.shape[0] - 1), min(max(j, 0), known.first.shape[1] - 1)
+    at = known.used[0]
+    if at >= known.v.shape[0] or known.counts[i, j] >= _PER_BUCKET:
+        return
+    known.v[at], known.azimuth[at] = v, azimuth
+    known.following[at], known.first[i, j] = known.first[i, j], at
+    known.counts[i, j] += 1
+    known.used[0] = at + 1
+
+
+@kernel
+def sample(arm: GeneralArm, unit: Reals, known: Postures, memory: Memory) -> None:
+    """Add random joint values; unit (N, m) holds uniform numbers in (0, 1)."""
+    for row in range(unit.shape[0]):
+        for j in range(unit.shape[1]):
+            memory.v[j] = arm.v_lower[j] + unit[row, j] * (arm.v_upper[j] - arm.v_lower[j])
+        if not _allowed(arm, memory.v):
+            continue
+        _values(arm, memory.v, memory.theta)
+        x, y, z = point_of(arm, memory.theta, memory.radii)
+        keep(arm, known, memory.v, _radius(arm, x, y), z, _azimuth(arm, x, y))
+
+
+@kernel
+def _slopes(arm: GeneralArm, memory: Memory) -> tuple[float, float, float]:
+    """Radius, height (m) and azimuth (rad) at ``memory.v``, their slopes and the weights of the joints."""
+    _values(arm, memory.v, memory.theta)
+    x, y, z = place(arm, memory.theta, memory.radii, memory.columns, memory.frame)
+    rho = _radius(arm, x, y)
+    ux, uy = (x / rho, y / rho) if rho > 0.0 and arm.bar == 0.0 else (1.0, 0.0)
+    n, m = arm.drive.shape
+    for j in range(m):
+        along, aside, up, lever = 0.0, 0.0, 0.0, 0.0
+        for k in range(1, n):
+            factor = arm.drive[k, j]
+            if factor == 0.0:
+                continue
+            cx, cy = memory.columns[k, 0], memory.columns[k, 1]
+            along += factor * (ux * cx + uy * cy)
+            aside += factor * (ux * cy - uy * cx)
+            up += factor * memory.columns[k, 2]
+            lever += abs(factor) * arm.levers[k]
+        memory.slopes[0, j], memory.slopes[1, j], memory.slopes[2, j] = along, up, aside
+        margin = max(0.0, min(memory.v[j] - arm.v_lower[j], arm.v_upper[j] - memory.v[j]))
+        memory.weights[j] = min(1.0, margin / _ROOM) ** 2 / lever if lever > 0.0 else 0.0
+    return rho, z, _azimuth(arm, x, y)
+
+
+@kernel
+def _directions(memory: Memory, hold: float) -> bool:
+    """Least weighted changes of the joints that change radius or height alone; False where there are none.
+
+    hold: how firmly they keep the point in the arm's plane, 0 for not at all
+    """
     a = d = f = p = q = r = 0.0
-    for k in range(n):
-        x, y, z, w = columns[k, 0], columns[k, 1], columns[k, 2], weights[k]
-        a, d, f = a + w * x * x, d + w * y * y, f + w * z * z
-        p, q, r = p + w * x * y, q + w * x * z, r + w * y * z
-    # Inverse of the symmetric matrix ((a, p, q), (p, d, r), (q, r, f)).
-    A, P, Q = d * f - r * r, q * r - p * f, p * r - q * d
-    det = a * A + p * P + q * Q
-    if det <= _SINGULAR * (a + d + f) ** 3:
-        return 0.0, 0.0
-    D, R, F = a * f - q * q, p * q - a * r, a * d - p * p
-    limit = arm.levers[0]
-    for k in range(n):
-        x, y, z, w = columns[k, 0], columns[k, 1], columns[k, 2], weights[k] / det
-        u, v, t = A * x + P * y + Q * z, P * x + D * y + R * z, Q * x + R * y + F * z
-        b[k] = w * np.sqrt(u * u + v * v + t * t) * (1.0 + 1e-9)
-        if k > 0 and b[k] > 0.0:
-            margin = min(theta[k] - arm.lower[k], arm.upper[k] - theta[k]) - ROUND_OFF
-            limit = min(limit, max(0.0, margin) / b[k])
-    best, best_sigma, most = 0.0, 0.0, limit
-    for _ in range(_ROUNDS):
-        # Levers at any joint vector that sigma <= most allows.
-        K, behind = 0.0, 0.0
-        for k in range(n - 1, -1, -1):
-            lever = min(arm.levers[k], radii[k] + behind)
-            behind += b[k] * most * lever
-            inner = 0.0
-            for i in range(k):
-                inner += b[i]
-            K += lever * b[k] * (b[k] + 2.0 * inner)
-        sigma = min(most, 1.0 / K)
-        radius = sigma - 0.5 * K * sigma * sigma
-        if radius > best:
-            best, best_sigma = radius, sigma
-        most = min(most, sigma)
-    return best, best_sigma
+    s, w = memory.slopes, memory.weights
+    for j in range(w.shape[0]):
+        a, d, f = a + w[j] * s[0, j] ** 2, d + w[j] * s[1, j] ** 2, f + w[j] * s[2, j] ** 2
+        p, q, r = p + w[j] * s[0, j] * s[1, j], q + w[j] * s[0, j] * s[2, j], r + w[j] * s[1, j] * s[2, j]
+    if hold > 0.0 and f > 0.0:
+        # Take out of the first two rows what the third one explains.
+        f += (a + d + f) / hold
+        b_0, b_1 = q / f, r / f
+        a, d, p = a - q * b_0, d - r * b_1, p - q * b_1
+    else:
+        b_0 = b_1 = 0.0
+    det = a * d - p * p
+    if det <= _TINY * (a + d) ** 2:
+        return False
+    for j in range(w.shape[0]):
+        along, up = s[0, j] - b_0 * s[2, j], s[1, j] - b_1 * s[2, j]
+        memory.directions[0, j] = w[j] * (d * along - p * up) / det
+        memory.directions[1, j] = w[j] * (a * up - p * along) / det
+    return True
 
 
 @kernel
-def fill_from_samples(
+def _approach(arm: GeneralArm, rho: float, z: float, near: float, hold: float, memory: Memory) -> bool:
+    """Move ``memory.v`` until the tool point is within ``near`` (m) of a point of the section; sets the directions."""
+    best = np.inf
+    for _ in range(_STEPS):
+        rho_here, z_here, _ = _slopes(arm, memory)
+        d_rho, d_z = rho - rho_here, z - z_here
+        miss = np.sqrt(d_rho * d_rho + d_z * d_z)
+        if not _directions(memory, hold):
+            return False
+        if miss <= near:
+            return _allowed(arm, memory.v)
+        if miss > 0.9 * best:
+            return False
+        best = miss
+        longest = 0.0
+        for j in range(memory.v.shape[0]):
+            longest = max(longest, abs(memory.directions[0, j] * d_rho + memory.directions[1, j] * d_z))
+        share = min(1.0, 0.4 / longest) if longest > 0.0 else 1.0
+        for j in range(memory.v.shape[0]):
+            moved = memory.v[j] + share * (memory.directions[0, j] * d_rho + memory.directions[1, j] * d_z)
+            memory.v[j] = min(max(moved, arm.v_lower[j]), arm.v_upper[j])
+    return False
+
+
+@kernel
+def _misses(x_0: float, y_0: float, x_1: float, y_1: float, w: float, h: float) -> bool:
+    """Whether a segment misses the rectangle of half-widths w and h about the origin."""
+    if min(x_0, x_1) > w or max(x_0, x_1) < -w or min(y_0, y_1) > h or max(y_0, y_1) < -h:
+        return True
+    return bool(abs(x_0 * y_1 - x_1 * y_0) > abs(y_1 - y_0) * w + abs(x_1 - x_0) * h)
+
+
+@kernel
+def _winds(arm: GeneralArm, cell: Cell, across: float, up: float, memory: Memory) -> bool:
+    """Whether the parallelogram of so much (m) about ``memory.v`` winds around a rectangle; keeps its corners."""
+    rho, z = 0.5 * (cell[0] + cell[1]), 0.5 * (cell[2] + cell[3])
+    corners, n, m = memory.points.shape[0], arm.drive.shape[0], memory.v.shape[0]
+    memory.ends[0], memory.ends[1] = own_range(arm, memory.v)
+    turn_x, turn_y = (-1.0, 1.0, 1.0, -1.0, -1.0), (-1.0, -1.0, 1.0, 1.0, -1.0)
+    for c in range(corners):
+        edge, share = c // _PER_EDGE, (c % _PER_EDGE) / _PER_EDGE
+        s_0 = across * (turn_x[edge] + share * (turn_x[edge + 1] - turn_x[edge]))
+        s_1 = up * (turn_y[edge] + share * (turn_y[edge + 1] - turn_y[edge]))
+        v = memory.weights  # of no more use here
+        for j in range(m):
+            moved = memory.v[j] + s_0 * memory.directions[0, j] + s_1 * memory.directions[1, j]
+            v[j] = min(max(moved, arm.v_lower[j]), arm.v_upper[j])
+        if not _allowed(arm, v):
+            return False
+        a, b = own_range(arm, v)
+        memory.ends[0], memory.ends[1] = max(memory.ends[0], a), min(memory.ends[1], b)
+        _values(arm, v, memory.thetas[c])
+        x, y, height = point_of(arm, memory.thetas[c], memory.levers[c])
+        memory.flat[c, 0], memory.flat[c, 1] = x, y
+        memory.points[c, 0], memory.points[c, 1] = _radius(arm, x, y) - rho, height - z
+    safe = 64.0 * ROUND_OFF * (1.0 + cell[1] + arm.bar + abs(z))
+    w, h = 0.5 * (cell[1] - cell[0]) + safe, 0.5 * (cell[3] - cell[2]) + safe
+    winding = 0
+    for c in range(corners):
+        e = (c + 1) % corners
+        for k in range(n):
+            memory.moves[k] = abs(memory.thetas[e, k] - memory.thetas[c, k])
+        off = 0.125 * curvature(arm, memory.moves, memory.levers[c])
+        if arm.bar == 0.0:
+            flat = np.hypot(memory.flat[e, 0] - memory.flat[c, 0], memory.flat[e, 1] - memory.flat[c, 1])
+            nearest = rho + min(memory.points[c, 0], memory.points[e, 0]) - 0.5 * flat
+            off += min(flat, flat * flat / (8.0 * nearest)) if nearest > 0.0 else flat
+        x_0, y_0, x_1, y_1 = memory.points[c, 0], memory.points[c, 1], memory.points[e, 0], memory.points[e, 1]
+        if not _misses(x_0, y_0, x_1, y_1, w + off, h + off):
+            return False
+        side = x_0 * y_1 - x_1 * y_0
+        if y_0 <= 0.0 < y_1 and side > 0.0:
+            winding += 1
+        elif y_1 <= 0.0 < y_0 and side < 0.0:
+            winding -= 1
+    return winding != 0
+
+
+@kernel
+def _azimuths(arm: GeneralArm, cell: Cell, memory: Memory) -> tuple[bool, float, float]:
+    """Range of azimuths (rad) of the points that the parallelogram reaches in the rectangle, about ``memory.v``.
+
+    Returns
+    -------
+    known : bool; low, high : rad
+    """
+    n = arm.drive.shape[0]
+    _values(arm, memory.v, memory.theta)
+    x, y, _ = place(arm, memory.theta, memory.radii, memory.columns, memory.frame)
+    rho = np.hypot(x, y)
+    if arm.bar == 0.0 and (rho <= 0.0 or cell[0] <= 0.0):
+        return False, 0.0, 0.0
+    ux, uy = (x / rho, y / rho) if arm.bar == 0.0 else (1.0, 0.0)
+    low = high = least = 0.0
+    memory.moves[:] = 0.0
+    for c in range(memory.points.shape[0]):
+        aside = along = 0.0
+        for k in range(1, n):
+            move = memory.thetas[c, k] - memory.theta[k]
+            memory.moves[k] = max(memory.moves[k], abs(move))
+            aside += move * (ux * memory.columns[k, 1] - uy * memory.columns[k, 0])
+            along += move * (ux * memory.columns[k, 0] + uy * memory.columns[k, 1])
+        low, high, least = min(low, aside), max(high, aside), min(least, along)
+    second = 0.5 * curvature(arm, memory.moves, memory.radii) + 64.0 * ROUND_OFF * (1.0 + rho + arm.bar)
+    if arm.bar > 0.0:
+        return True, _azimuth(arm, x, y + low - second), _azimuth(arm, x, y + high + second)
+    low, high = (low - second) / cell[0], (high + second) / cell[0]
+    if low < -1.0 or high > 1.0 or rho + least - second <= 0.0:
+        return False, 0.0, 0.0
+    middle = np.arctan2(y, x)
+    return True, middle + np.arcsin(low) - ROUND_OFF, middle + np.arcsin(high) + ROUND_OFF
+
+
+@kernel
+def _try(
+    arm: GeneralArm, cell: Cell, hold: float, known: Postures, memory: Memory, arcs: Reals, count: int, witness: Reals
+) -> int:
+    """Fill a ring from ``memory.v``; returns the count of what is left open."""
+    rho, z = 0.5 * (cell[0] + cell[1]), 0.5 * (cell[2] + cell[3])
+    half_rho, half_z = 0.5 * (cell[1] - cell[0]), 0.5 * (cell[3] - cell[2])
+    if not _approach(arm, rho, z, 0.1 * min(half_rho, half_z), hold, memory):
+        return count
+    _values(arm, memory.v, memory.theta)
+    x, y, _ = point_of(arm, memory.theta, memory.radii)
+    azimuth = _azimuth(arm, x, y)
+    if np.isnan(witness[0]):
+        witness[:] = memory.v
+    a, b = own_range(arm, memory.v)
+    if not arm.full_turn and not meets(arcs, count, a + azimuth, b + azimuth):
+        return count
+    for scale in (1.25, 1.7, 2.5):
+        if not _winds(arm, cell, scale * half_rho, scale * half_z, memory):
+            continue
+        if arm.full_turn:
+            keep(arm, known, memory.v, rho, z, azimuth)
+            return 0
+        found, low, high = _azimuths(arm, cell, memory)
+        if not found:
+            continue
+        before = measure(arcs, count)
+        count = remove(arcs, count, memory.ends[0] + high, memory.ends[1] + low, False)
+        if measure(arcs, count) < before:
+            keep(arm, known, memory.v, rho, z, azimuth)
+        return count
+    return count
+
+
+@kernel
+def fill_cells(
     arm: GeneralArm,
-    unit: Reals,
-    size: float,
-    low: float,
-    marked: Flags,
+    cells: Reals,
     unfilled: Reals,
-    count: Integers,
+    counts: Integers,
     witness: Reals,
+    known: Postures,
+    memory: Memory,
+    tries: int,
 ) -> None:
-    """Try random joint vectors: mark the cells they lie in, and take what each proves filled out of the open arcs.
+    """Take what is proven filled of rings about axis 1 out of their open arcs.
 
     Parameters
     ----------
-    unit : (N, n), uniform numbers in (0, 1)
-    size, low : m, as in :func:`er3a.workspace.general_outer.mark_reachable`
-    marked : (n_rho, n_z, sectors) bool, set where a sample lies
-    unfilled : (n_rho, n_z, MOST_ARCS, 2), rad, and count (n_rho, n_z): azimuths that are not proven filled
-    witness : (n_rho, n_z, n), set to theta of the first sample in each cell (NaN before)
+    cells : (N, 4), m
+    unfilled, counts : (N, MOST_ARCS, 2), rad, and (N,); changed
+    witness : (N, m), joint values that reach the middle of the cell (joint 1 at theta 0), NaN before
+    known : joint values to begin from; those that fill a ring are added
+    tries : how many of them are tried for each ring
     """
-    n = arm.lower.shape[0]
-    theta, radii, columns, frame = np.empty(n), np.empty(n), np.empty((n, 3)), np.empty((3, 4))
-    weights, b = np.empty(n), np.empty(n)
-    a, z_a = arm.lower[0], arm.upper[0]
-    safe = 64.0 * ROUND_OFF * (1.0 + arm.levers[0] + abs(low))
-    for row in range(unit.shape[0]):
-        for k in range(n):
-            theta[k] = arm.lower[k] + unit[row, k] * (arm.upper[k] - arm.lower[k])
-        turn, theta[0] = theta[0], 0.0
-        x, y, z = place(arm, theta, radii, columns, frame)
-        rho, phi = np.hypot(x, y), np.arctan2(y, x)
-        i, j = int(rho / size), int((z - low) / size)
-        sector = int(np.floor(phi / TURN * marked.shape[2])) % marked.shape[2]
-        marked[i, j, sector] = True
-        if np.isnan(witness[i, j, 0]):
-            witness[i, j] = theta
-            witness[i, j, 0] = turn
-        if count[i, j] == 0:
-            continue
-        if not arm.full_turn and not meets(unfilled[i, j], count[i, j], a + phi, z_a + phi):
-            continue
-        d_rho = max(rho - i * size, (i + 1) * size - rho)
-        d_z = max(z - low - j * size, low + (j + 1) * size - z)
-        radius, sigma = _reached_ball(arm, theta, radii, columns, weights, b)
-        if radius * (1.0 - 1e-9) - safe < np.hypot(d_rho, d_z):
-            continue
-        if arm.full_turn:
-            count[i, j] = 0
-        else:
-            aside = b[0] * sigma + ROUND_OFF
-            count[i, j] = remove(unfilled[i, j], count[i, j], a + phi + aside, z_a + phi - aside, False)
+    for n in range(cells.shape[0]):
+        cell = cells[n, 0], cells[n, 1], cells[n, 2], cells[n, 3]
+        rho, z = 0.5 * (cell[0] + cell[1]), 0.5 * (cell[2] + cell[3])
+        i_0 = int((rho - known.low[0]) / known.size[0])
+        j_0 = int((z - known.low[1]) / known.size[1])
+        tried, ring = 0, 0
+        while tried < tries and ring <= 3 and counts[n] > 0:
+            for i in range(max(0, i_0 - ring), min(known.first.shape[0], i_0 + ring + 1)):
+                for j in range(max(0, j_0 - ring), min(known.first.shape[1], j_0 + ring + 1)):
+                    if max(abs(i - i_0), abs(j - j_0)) != ring:
+                        continue
+                    at = known.first[i, j]
+                    while at >= 0 and tried < tries and counts[n] > 0:
+                        azimuth, (a, b) = known.azimuth[at], own_range(arm, known.v[at])
+                        if arm.full_turn or meets(unfilled[n], counts[n], a + azimuth, b + azimuth):
+                            tried += 1
+                            memory.v[:] = known.v[at]
+                            hold = 0.0 if arm.full_turn or tried % 2 == 0 else 1e3
+                            counts[n] = _try(arm, cell, hold, known, memory, unfilled[n], counts[n], witness[n])
+                        at = known.following[at]
+            ring += 1

@@ -60,10 +60,12 @@ class SectionMap:
 
     @cached_property
     def outermost(self) -> Flags:
-        """Whether each cell (n,) lies on the outer border of the map (the axis is none)."""
+        """Whether each cell (n,) lies on the outer border of the map (the axis of rings is none)."""
         touches = np.zeros(len(self.proof.cells), dtype=bool)
         for edge in (self.owner[-1], self.owner[:, 0], self.owner[:, -1]):
             touches[edge] = True
+        if self.proof.bar > 0:
+            touches[self.owner[0]] = True
         return touches
 
 

@@ -18,14 +18,13 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.closed_form import SLOTS
-from er3a.kinematics.wrist_partitioned import constants_for_blocks
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot
-from er3a.workspace.capability import manipulability
+from er3a.workspace.capability import manipulability_of
 from er3a.workspace.directions import Roll, cone_directions, left_to_roll, poses, tool_rotations
-from er3a.workspace.section_arm import FULL_TURN, section_arm, section_frame
+from er3a.workspace.section_arm import FULL_TURN
+from er3a.workspace.tool_inverse import all_solutions, frame_about_axis_1, section_bounds
 
 NO = -1.0
 MIXED = -1
@@ -120,15 +119,11 @@ def survey(robot: Robot, task: Task, roll: Roll, coarsest: float, free: Free | N
     robot : with the limits that hold, see :func:`narrowed`
     coarsest : m, about the spacing
     free : which arms count; all, unless told otherwise
-
-    Raises
-    ------
-    NotWristPartitionedError
     """
-    arm, (R, origin) = section_arm(robot), section_frame(robot)
-    middle = origin + arm.centre[2] * R[2]
+    (_, _, height, reach), (R, origin) = section_bounds(robot), frame_about_axis_1(robot)
+    middle = origin + height * R[2]
     spacing = lattice_spacing(task.box, coarsest)
-    count = np.ceil(arm.reach / spacing).astype(int)
+    count = np.ceil(reach / spacing).astype(int)
     count[2] += 1
     start = middle - count * spacing
     # Heights count from the lowest place, so that the lowest box lies on lattice points.
@@ -140,7 +135,7 @@ def survey(robot: Robot, task: Task, roll: Roll, coarsest: float, free: Free | N
     asked = np.flatnonzero(
         (near >= task.clear - 1e-9)
         & (points[:, 2] >= task.lowest - 1e-9)
-        & (np.linalg.norm(points - middle, axis=1) <= arm.reach)
+        & (np.linalg.norm(points - middle, axis=1) <= reach)
     )
     least, least_any = np.full((len(points), SLOTS), NO), np.full(len(points), NO)
     limit_margin = np.zeros((len(points), SLOTS))
@@ -165,7 +160,7 @@ def serve(
     -------
     least, least_any, limit_margin : (n, 8), (n,), (n, 8), as in :class:`Field`
     """
-    asked, arm = left_to_roll(robot, roll), constants_for_blocks(robot)
+    asked = left_to_roll(robot, roll)
     limited = np.flatnonzero(asked.upper - asked.lower < FULL_TURN)
     least, least_any = np.full((len(points), SLOTS), np.inf), np.full(len(points), np.inf)
     limit_margin = np.full((len(points), SLOTS), np.inf)
@@ -174,12 +169,13 @@ def serve(
         if not alive.size:
             break
         for part in np.array_split(alive, max(1, len(alive) * len(direction) // _POSES)):
-            found = inverse_batch(asked, poses(points[part][:, None], direction).reshape(-1, 4, 4))
-            value = manipulability(arm, robot.direction * found.q + robot.offset)
-            value = np.where(found.within_limits, value, NO).reshape(len(part), -1, SLOTS)
-            q = found.q[..., limited]
+            q_all, within = all_solutions(asked, poses(points[part][:, None], direction).reshape(-1, 4, 4))
+            value = np.where(within, manipulability_of(robot, q_all, within), NO).reshape(len(part), -1, SLOTS)
+            q = q_all[..., limited]
             inside = np.minimum(q - asked.lower[limited], asked.upper[limited] - q).min(axis=-1, initial=np.inf)
-            rolled = _best_roll(value, found.q.reshape(*value.shape, -1), free)[:, None]
+            rolled = _best_roll(value, q_all.reshape(*value.shape, -1), free, (least[part] <= NO, least_any[part]))[
+                :, None
+            ]
             value = np.take_along_axis(value, rolled, axis=1)[:, 0]
             inside = np.take_along_axis(inside.reshape(len(part), -1, SLOTS), rolled, axis=1)[:, 0]
             least[part] = np.minimum(least[part], value)
@@ -189,16 +185,29 @@ def serve(
     return least, least_any, np.where(least > NO, limit_margin, 0.0)
 
 
-def _best_roll(value: Reals, q: Reals, free: Free | None) -> Integers:
+def _best_roll(value: Reals, q: Reals, free: Free | None, before: tuple[Flags, Reals]) -> Integers:
     """Which roll serves best among those whose arm counts, (n, 8); ``value`` (n, rolls, 8) of others becomes NO.
 
-    Only the best are asked whether they count, and the next best of those that don't.
+    ``before`` (n, 8), (n,): branches that fail in a direction looked at before, and what some branch has served with in
+    all of these. A branch that failed is asked only where it can raise what some branch serves with, else it is NO.
     """
     best: Integers = value.argmax(axis=1)
     if free is None:
         return best
+    failed, enough = before
+    _refuse(value, q, free, best, ~failed)
+    offered = np.take_along_axis(value, best[:, None], axis=1)[:, 0]
+    served = np.where(failed, NO, offered).max(axis=1)
+    late = failed & (offered > served[:, None]) & (served < enough)[:, None]
+    value[np.broadcast_to((failed & ~late)[:, None], value.shape)] = NO
+    _refuse(value, q, free, best, late)
+    return best
+
+
+def _refuse(value: Reals, q: Reals, free: Free, best: Integers, asked: Flags) -> None:
+    """Only the best rolls are asked whether they count, and the next best of those that don't."""
     # Arms of one branch after another: neighbours are alike, which makes asking faster.
-    slot, point = np.nonzero(np.take_along_axis(value, best[:, None], axis=1)[:, 0].T > NO)
+    slot, point = np.nonzero((asked & (np.take_along_axis(value, best[:, None], axis=1)[:, 0] > NO)).T)
     while point.size:
         roll = best[point, slot]
         refused = ~free(q[point, roll, slot])
@@ -207,7 +216,34 @@ def _best_roll(value: Reals, q: Reals, free: Free | None) -> Integers:
         best[point, slot] = value[point, :, slot].argmax(axis=1)
         left = value[point, best[point, slot], slot] > NO
         point, slot = point[left], slot[left]
-    return best
+
+
+def box_points(field: Field, box: Reals, centre: Reals) -> Reals:
+    """The lattice points (n, 3), m, of a box (3,), m, with its centre (3,) where :func:`fitting_places` put it."""
+    points = _lattice_points(field, box)
+    return centre + (np.indices(tuple(points)).reshape(3, -1).T - (points - 1) / 2) * field.spacing
+
+
+def serving_arms(robot: Robot, points: Reals, rotations: Reals, roll: Roll, slot: int, free: Free) -> Reals:
+    """The arms (m, joints), rad, that serve points along all directions: of one branch, or of the best with ``MIXED``.
+
+    Parameters
+    ----------
+    points : (n, 3), m; rotations : (k, rolls, 3, 3), see ``directions.tool_rotations``
+    free : which arms count; where none does, there is no arm
+    """
+    asked, rows = left_to_roll(robot, roll), np.arange(len(points))
+    first = np.zeros((len(points), SLOTS), bool), np.full(len(points), np.inf)
+    arms = []
+    for direction in rotations:
+        q, within = all_solutions(asked, poses(points[:, None], direction).reshape(-1, 4, 4))
+        value = np.where(within, manipulability_of(robot, q, within), NO).reshape(len(points), -1, SLOTS)
+        q = q.reshape(*value.shape, -1)
+        best = _best_roll(value, q, free, first)
+        offered = np.take_along_axis(value, best[:, None], axis=1)[:, 0]
+        chosen = offered.argmax(axis=1) if slot == MIXED else np.full(len(points), slot)
+        arms.append(q[rows, best[rows, chosen], chosen][offered[rows, chosen] > NO])
+    return np.concatenate(arms)
 
 
 def fitting_places(field: Field, bricks: Flags, box: Reals) -> Places:
@@ -221,13 +257,17 @@ def fitting_places(field: Field, bricks: Flags, box: Reals) -> Places:
     if abs(box[0] - box[1]) > 1e-9:
         found.append(_places(field, bricks, box[[1, 0, 2]], True))
     places = Places(*(np.concatenate([getattr(part, column.name) for part in found]) for column in fields(Places)))
-    merit = (-np.round(np.nan_to_num(places.limit_margin), 6), -np.round(places.least, 9), places.slot == MIXED)
+    merit = (
+        -np.round(np.nan_to_num(places.limit_margin, posinf=2 * np.pi), 6),
+        -np.round(places.least, 9),
+        places.slot == MIXED,
+    )
     order = np.lexsort((*np.round(places.centre.T, 6), -np.round(places.centre[:, 0], 6), *merit))
     return places.rows(order)
 
 
 def _places(field: Field, bricks: Flags, box: Reals, turned: bool) -> Places:
-    points = np.maximum(1, np.ceil(box / field.spacing - 1e-6)).astype(int) + 1
+    points = _lattice_points(field, box)
     any_branch = _sliding_least(field.least_any, points)
     where = np.nonzero(any_branch > NO)
     used = np.flatnonzero((field.least > NO).any(axis=(0, 1, 2)))
@@ -247,6 +287,12 @@ def _places(field: Field, bricks: Flags, box: Reals, turned: bool) -> Places:
         limit_margin=np.where(one, limit_margin[rows, slot], np.nan),
         proven=_sliding_least(bricks.astype(float), points - 1)[where] > 0,
     )
+
+
+def _lattice_points(field: Field, box: Reals) -> Integers:
+    """How many lattice points (3,) a box spans along each axis."""
+    count: Integers = np.maximum(1, np.ceil(box / field.spacing - 1e-6)).astype(int) + 1
+    return count
 
 
 def _sliding_least(values: Reals, points: Integers) -> Reals:

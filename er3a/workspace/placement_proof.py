@@ -13,14 +13,14 @@ import numpy as np
 
 from er3a.kinematics.block_constants import BlockConstants
 from er3a.kinematics.closed_form import SLOTS
-from er3a.kinematics.wrist_partitioned import constants_for_blocks
+from er3a.kinematics.wrist_partitioned import closed_form_missing, constants_for_blocks
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 from er3a.workspace.directions import Roll, across, left_to_roll, point_tool
 from er3a.workspace.interval_inverse import GOOD, NEVER, States, branches, holds, misses, theta_ranges
 from er3a.workspace.placement import MIXED, NO, Field, Free, Places, Task, fitting_places, narrowed, survey
-from er3a.workspace.section_arm import section_frame
+from er3a.workspace.tool_inverse import frame_about_axis_1
 
 Answer = Literal["proven", "refuted", "undecided"]
 PROVEN: Answer = "proven"
@@ -81,9 +81,7 @@ def find_places(
     count : how many places to choose; most_poses : how many neighbourhoods of poses their proofs may look at
     free : which arms count at the lattice's points; the proofs, of reach alone, look at none
 
-    Raises
-    ------
-    NotWristPartitionedError
+    Nothing is proven of arms without a spherical wrist.
     """
     robot = narrowed(robot, task.margin)
     field = survey(robot, task, roll, grid, free)
@@ -114,6 +112,8 @@ def choose_places(robot: Robot, task: Task, places: Places, roll: Roll, count: i
     free = np.ones(len(places.slot), dtype=bool)
 
     def proved(row: int, slot: int, most: int) -> tuple[Answer, int]:
+        if closed_form_missing(robot):
+            return "undecided", 0
         return prove_place(robot, task, places.centre[row], bool(places.turned[row]), slot, roll, most_poses=most)
 
     while len(rows) < count and refuted < _MOST_TRIES and free.any():
@@ -140,7 +140,7 @@ def choose_places(robot: Robot, task: Task, places: Places, roll: Roll, count: i
 
 def _turned_about_axis_1(robot: Robot, task: Task, centre: Reals, row: int) -> Flags:
     """Which places (n, 3) are that of ``row`` but for a turn about axis 1, where the task looks the same after one."""
-    R, origin = section_frame(robot)
+    R, origin = frame_about_axis_1(robot)
     if abs(task.axis @ R[2]) < 1 - SAME_DIRECTION:
         return np.zeros(len(centre), dtype=bool)
     local = (centre - origin) @ R.T
@@ -185,9 +185,7 @@ def prove_place(
 def proven_bricks(robot: Robot, task: Task, field: Field, roll: Roll) -> Flags:
     """Which bricks between eight lattice points are served at every point, by any mix of branches: (nx-1, ny-1, nz-1).
 
-    Raises
-    ------
-    NotWristPartitionedError
+    None of an arm without a spherical wrist.
     """
     serving = field.least_any > NO
     for axis in range(3):
@@ -195,7 +193,8 @@ def proven_bricks(robot: Robot, task: Task, field: Field, roll: Roll) -> Flags:
     bricks = np.argwhere(serving)
     good = np.zeros(len(bricks), dtype=bool)
     centres = field.origin + (bricks + 0.5) * field.spacing
-    _prove_all(_constants(robot, task, roll), centres, field.spacing / 2, MIXED, _POSES_PER_BRICK, good)
+    if not closed_form_missing(robot):
+        _prove_all(_constants(robot, task, roll), centres, field.spacing / 2, MIXED, _POSES_PER_BRICK, good)
     proven = np.zeros(serving.shape, dtype=bool)
     proven[tuple(bricks.T)] = good
     return proven

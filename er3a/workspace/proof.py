@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
@@ -36,6 +37,8 @@ class Proof:
     level : (n,), how often the cell was split off
     witness : (n, 4): theta_2, tau, phi of a configuration that reaches the cell's middle, and 1; or zeros
     boxes : how many boxes the emptiness proofs looked at
+    bar : m, length of the cells where they are bars along a first joint that slides; 0 for rings. Then rho is the place
+        across the bars beside z, and azimuths are places along them, their length being a turn
     """
 
     cells: Reals
@@ -44,15 +47,16 @@ class Proof:
     level: Integers
     witness: Reals
     boxes: int
+    bar: float = 0.0
 
     def rows(self, chosen: NDArray[Any]) -> Proof:
         """The same with some of the cells."""
-        return replace(self, **{name: getattr(self, name)[chosen] for name in _ARRAYS})
+        return _with_arrays(self, {name: getattr(self, name)[chosen] for name in _ARRAYS})
 
     @property
     def volumes(self) -> Reals:
-        """Volume of each ring, (n,), m^3."""
-        return ring_volumes(self.cells)
+        """Volume of each ring or bar, (n,), m^3."""
+        return ring_volumes(self.cells, self.bar)
 
     @property
     def unfilled_ratio(self) -> Reals:
@@ -77,15 +81,34 @@ class Proof:
         return (upper - lower) / upper if upper > 0 else 0.0
 
 
+Judge = Callable[[Reals, int, Proof | None], Proof]
+"""From cells (n, 4), their level and the proof of those they were split off (each cell's own row) to what is known."""
+
+
 def _arc_ratio(arcs: Reals) -> Reals:
     ratio: Reals = np.nansum(arcs[..., 1] - arcs[..., 0], axis=1) / TURN
     return ratio
 
 
-def ring_volumes(cells: Reals) -> Reals:
-    """Volumes (n,) in m^3 of rings with the sections (n, 4)."""
+def ring_volumes(cells: Reals, bar: float = 0.0) -> Reals:
+    """Volumes (n,) in m^3 of rings with the sections (n, 4), or of bars of that length (m)."""
+    if bar > 0:
+        return np.asarray((cells[:, 1] - cells[:, 0]) * (cells[:, 3] - cells[:, 2]) * bar)
     volumes: Reals = np.pi * (cells[:, 1] ** 2 - cells[:, 0] ** 2) * (cells[:, 3] - cells[:, 2])
     return volumes
+
+
+def in_space(rho: Reals, azimuth: Reals, z: Reals, bar: float = 0.0) -> Reals:
+    """Points (..., 3), m, of rings about axis 1, or of bars of that length (m), in their frame."""
+    if bar > 0:
+        return np.stack(np.broadcast_arrays(rho, azimuth * (bar / TURN), z), axis=-1)
+    return np.stack(np.broadcast_arrays(rho * np.cos(azimuth), rho * np.sin(azimuth), z), axis=-1)
+
+
+def in_section(points: Reals, bar: float = 0.0) -> tuple[Reals, Reals, Reals]:
+    """Radius (m), azimuth (rad) and height (m) of points (..., 3), as :func:`in_space` takes them."""
+    x, y, z = np.moveaxis(points, -1, 0)
+    return (x, y * (TURN / bar), z) if bar > 0 else (np.hypot(x, y), np.arctan2(y, x), z)
 
 
 def prove(arm: SectionArm, target: float, most_cells: int, across: int = 32, threads: int = 1) -> Proof:
@@ -99,11 +122,22 @@ def prove(arm: SectionArm, target: float, most_cells: int, across: int = 32, thr
     threads : how many to use; the result does not depend on it
     """
     configurations = _configuration_grid(arm)
-    cells = _first_cells(arm, across)
+
+    def judge(cells: Reals, level: int, parents: Proof | None) -> Proof:
+        return _judge(arm, cells, configurations, level, parents, threads)
+
+    return refined(judge, arm.reach, arm.heights, target, most_cells, across)
+
+
+def refined(
+    judge: Judge, reach: float, heights: tuple[float, float], target: float, most_cells: int, across: int = 32
+) -> Proof:
+    """Judge the cells of a rectangle of the section, and split what is undecided of most volume, as :func:`prove`."""
+    cells = _first_cells(reach, heights, across)
     level, looked, boxes, done, settled = 0, 0, 0, [], np.zeros(2)
     parents = None
     while len(cells):
-        judged = _judge(arm, cells, configurations, level, parents, threads)
+        judged = judge(cells, level, parents)
         looked, boxes = looked + len(cells), boxes + judged.boxes
         volumes, reached = judged.volumes, 1 - np.stack([judged.unfilled_ratio, judged.empty_ratio])
         undecided = volumes * (reached[1] - reached[0])
@@ -130,7 +164,11 @@ def sharpen(arm: SectionArm, proof: Proof, chosen: Flags) -> Proof:
 
 def _joined(parts: list[Proof], boxes: int) -> Proof:
     arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS}
-    return replace(parts[0], **arrays, boxes=boxes)
+    return replace(_with_arrays(parts[0], arrays), boxes=boxes)
+
+
+def _with_arrays(proof: Proof, arrays: dict[str, Any]) -> Proof:
+    return replace(proof, **arrays)
 
 
 def judge(arm: SectionArm, cells: Reals) -> Proof:
@@ -153,11 +191,11 @@ def _configuration_grid(arm: SectionArm) -> ConfigurationGrid:
     return grid, (span_2 / max(1, count_2 - 1), span_3 / max(1, count_3 - 1))
 
 
-def _first_cells(arm: SectionArm, across: int) -> Reals:
+def _first_cells(reach: float, heights: tuple[float, float], across: int) -> Reals:
     """Square cells over the rectangle that the arm can't leave."""
-    low, high = arm.heights
+    low, high = heights
     size = (high - low) * (1 + 1e-9) / across
-    wide = int(np.ceil(arm.reach * (1 + 1e-9) / size))
+    wide = int(np.ceil(reach * (1 + 1e-9) / size))
     i, j = (index.ravel() for index in np.indices((wide, across)))
     middle = (low + high) / 2 - size * across / 2
     return np.stack([i * size, (i + 1) * size, middle + j * size, middle + (j + 1) * size], axis=1)

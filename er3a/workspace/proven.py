@@ -15,21 +15,22 @@ from er3a.sampling.grid import tool_bound
 from er3a.workspace.azimuths import MOST_ARCS, TURN
 from er3a.workspace.cavities import cavities, rim
 from er3a.workspace.general import prove_general
-from er3a.workspace.general_arm import general_arm
+from er3a.workspace.general_arm import coupled, general_arm
 from er3a.workspace.lookup import EMPTY, SectionMap
-from er3a.workspace.proof import Proof, prove, sharpen
+from er3a.workspace.proof import Proof, in_section, prove, sharpen
 from er3a.workspace.section_arm import SectionArm, section_arm, section_frame
 from er3a.workspace.volume import VolumeEstimate, estimate_volume
 from er3a.workspace.witness import lies_in_cell, reach_points, witness_joints
 
 CellState = Literal["filled", "touched", "empty", "undecided", "partly_filled"]
 
-SIX = 6
 TARGET = 0.002
 LEAST_BOUND_M = 1e-4  # for a tool point that no joint moves
 VOID_RATIO = 0.25
-GENERAL_CELLS, GENERAL_SAMPLES, GENERAL_BOXES = 4, 250, 1000
-"""For each cell of the budget, where the general method is all there is: its cells, samples and boxes."""
+NEAR_WRIST = 0.07
+_SETTLED = 0.1  # of the volume
+GENERAL_CELLS = 4
+"""For each cell of the budget, where the general method is used: its cells."""
 
 
 @dataclass(frozen=True)
@@ -40,10 +41,18 @@ class SphericalWrist:
 
 
 @dataclass(frozen=True)
-class GeneralMethod:
-    """The cells were decided by the coarser method for any arm, because of what this one lacks."""
+class ToolNearWrist:
+    """The tool point is so near to the wrist centre, for the arm's reach, that its sphere proves little."""
 
-    lacks: ClosedFormMissing
+    distance_mm: float
+    code: Literal["tool_near_wrist"] = "tool_near_wrist"
+
+
+@dataclass(frozen=True)
+class GeneralMethod:
+    """The cells were decided by the method for any arm, because of what this one lacks."""
+
+    lacks: ClosedFormMissing | ToolNearWrist
     code: Literal["general_method"] = "general_method"
 
 
@@ -72,14 +81,19 @@ class Proven:
     estimate: VolumeEstimate
     method: ProofMethod
 
+    @property
+    def settles(self) -> bool:
+        """Whether so little is left undecided that the voids found are those there are."""
+        return self.arm is not None or self.proof.width <= _SETTLED
+
     def in_base(self, points: Reals) -> Reals:
         """Points (..., 3) from the frame about axis 1 to the base frame."""
         return points @ self.R + self.origin
 
     def in_section(self, points: Reals) -> tuple[Reals, Reals, Reals]:
-        """Distance from axis 1 (m), azimuth (rad) and height (m) of points (n, 3) in the base frame."""
-        x, y, z = self.R @ (points - self.origin).T
-        return np.hypot(x, y), np.arctan2(y, x), z
+        """Distance from axis 1 (m), azimuth (rad) and height (m) of points (n, 3) in the base frame; or places across
+        and along bars."""
+        return in_section((points - self.origin) @ self.R.T, self.proof.bar)
 
     def count_in_empty(self, points: Reals) -> int:
         """How many points (n, 3), m, base frame, lie where nothing is reached; more than none would refute the
@@ -98,10 +112,10 @@ class Proven:
 def prove_robot(robot: Robot, most_cells: int, points: int, seed: int) -> Proven:
     """Run the proof and the estimate that rests on it; bounds by lengths alone where the arm's build gives no more."""
     if lacks := lacking_for_proof(robot):
-        if robot.joints != SIX or robot.sliding.any() or robot.coupling is not None or robot.combined:
-            return _bounded_by_lengths(robot, points, seed, lacks)
         return _prove_general(robot, most_cells, points, seed, lacks)
     arm = section_arm(robot)
+    if arm.d < NEAR_WRIST * arm.reach:
+        return _prove_general(robot, most_cells, points, seed, ToolNearWrist(1000 * arm.d))
     section = SectionMap(prove(arm, TARGET, int((1 - VOID_RATIO) * most_cells)))
     section = _about_voids(arm, section, int(VOID_RATIO * most_cells))
     estimate = estimate_volume(arm, section, arm.reach, arm.heights, points, seed)
@@ -111,13 +125,11 @@ def prove_robot(robot: Robot, most_cells: int, points: int, seed: int) -> Proven
 
 def lacking_for_proof(robot: Robot) -> ClosedFormMissing | None:
     """Why the method for spherical wrists does not apply, which takes each joint's range by itself; None if it does."""
-    if robot.coupling is not None or robot.combined:
-        return CoupledJoints()
-    return closed_form_missing(robot)
+    return CoupledJoints() if coupled(robot) else closed_form_missing(robot)
 
 
-def _bounded_by_lengths(robot: Robot, points: int, seed: int, lacks: ClosedFormMissing) -> Proven:
-    """One ring that the tool point can't leave, of arms with other joints, or with some that depend on one another."""
+def _bounded_by_lengths(robot: Robot, points: int, seed: int, method: GeneralMethod) -> Proven:
+    """One ring that the tool point can't leave, of arms whose joint 1 slides or goes with others."""
     bound = tool_bound(robot)
     reach, radius = max(bound.reach, LEAST_BOUND_M), max(bound.radius, LEAST_BOUND_M)
     low, high = bound.height - radius, bound.height + radius
@@ -129,7 +141,7 @@ def _bounded_by_lengths(robot: Robot, points: int, seed: int, lacks: ClosedFormM
     estimate = estimate_volume(_nothing_found, section, reach, (low, high), points, seed)
     R = constant_links(robot)[0, :3, :3].T
     witness = np.full((1, robot.joints), np.nan)
-    return Proven(None, proof, section, R, bound.axis_point, witness, estimate, GeneralMethod(lacks))
+    return Proven(None, proof, section, R, bound.axis_point, witness, estimate, method)
 
 
 def _nothing_found(local: Reals) -> Flags:
@@ -137,24 +149,27 @@ def _nothing_found(local: Reals) -> Flags:
     return np.zeros(len(local), dtype=bool)
 
 
-def _prove_general(robot: Robot, most_cells: int, points: int, seed: int, lacks: ClosedFormMissing) -> Proven:
+def _prove_general(
+    robot: Robot, most_cells: int, points: int, seed: int, lacks: ClosedFormMissing | ToolNearWrist
+) -> Proven:
     arm, R, origin = general_arm(robot)
-    budgets = (GENERAL_SAMPLES * most_cells, GENERAL_BOXES * most_cells)
-    proof, theta = prove_general(arm, GENERAL_CELLS * most_cells, seed, *budgets)
+    if not arm.carries_around:
+        return _bounded_by_lengths(robot, points, seed, GeneralMethod(lacks))
+    proof, v = prove_general(arm, TARGET, GENERAL_CELLS * most_cells, seed)
     section = SectionMap(proof)
-    q = np.tile((robot.lower + robot.upper) / 2, (len(theta), 1))
-    count = theta.shape[1]
-    turned = robot.direction[:count] * (theta - robot.offset[:count])
-    middle = q[:, :count]
-    q[:, :count] = turned + 2 * np.pi * np.round((middle - turned) / (2 * np.pi))
+    q = np.tile((robot.lower + robot.upper) / 2, (len(v), 1))
+    first = 0 if arm.combined[:, :1].any() else 1
+    q[:, first : v.shape[1]] = arm.joints(v)[:, first:]
     q = np.where(lies_in_cell(robot, q, proof, R, origin)[:, None], q, np.nan)
 
     def search(local: Reals) -> Flags:
-        cells = section.cell_of(np.hypot(local[:, 0], local[:, 1]), local[:, 2])
+        rho, _, z = in_section(local, arm.bar)
+        cells = section.cell_of(rho, z)
         starts = np.where(np.isfinite(q[cells]), q[cells], (robot.lower + robot.upper) / 2)
         return np.isfinite(reach_points(robot, local @ R + origin, starts)[:, 0])
 
-    estimate = estimate_volume(search, section, arm.reach, arm.heights, points, seed)
+    low, high = arm.heights[0].tolist()
+    estimate = estimate_volume(search, section, float(arm.radii[0]), (low, high), points, seed)
     return Proven(None, proof, section, R, origin, q, estimate, GeneralMethod(lacks))
 
 

@@ -99,10 +99,9 @@ def _void(
     low, high = cavity.box()
     corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
     extent = np.ptp(proven.in_base(corners), axis=0)
-    local = proven.R @ (shoulder - proven.origin)
-    rho, size = np.hypot(local[0], local[1]), proven.section.size
-    near = (cavity.cells[:, [0, 2]] <= [rho + size, local[2] + size]).all(axis=1)
-    near &= (cavity.cells[:, [1, 3]] >= [rho - size, local[2] - size]).all(axis=1)
+    size, (rho, _, z) = proven.section.size, (float(part[0]) for part in proven.in_section(shoulder[None]))
+    near = (cavity.cells[:, [0, 2]] <= [rho + size, z + size]).all(axis=1)
+    near &= (cavity.cells[:, [1, 3]] >= [rho - size, z - size]).all(axis=1)
     vertices, triangles = mesh(*surface)
     return Void(
         kind=kind,
@@ -161,4 +160,4 @@ def _as_cavity(blocks: Blocks, mask: Flags) -> Cavity:
     width = (arcs[:, 1] - arcs[:, 0]) * unfilled
     middle = arcs.mean(axis=1)
     arcs = np.stack([middle - width / 2, middle + width / 2], axis=1)
-    return Cavity(False, cells, arcs, np.minimum(1.0, blocks.empty[i, j, k] / unfilled))
+    return Cavity(False, cells, arcs, np.minimum(1.0, blocks.empty[i, j, k] / unfilled), blocks.bar)

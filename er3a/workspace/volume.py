@@ -14,7 +14,7 @@ import numpy as np
 
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.workspace.lookup import EMPTY, FILLED, SectionMap, holds_azimuth
-from er3a.workspace.proof import judge
+from er3a.workspace.proof import in_space, judge, ring_volumes
 from er3a.workspace.section_arm import SectionArm
 
 POINT = 1e-7
@@ -45,29 +45,29 @@ def estimate_volume(
     points: int,
     seed: int,
 ) -> VolumeEstimate:
-    """Estimate the reached volume from uniform points in the cylinder about axis 1 that holds the workspace.
+    """Estimate the reached volume from uniform points in the cylinder about axis 1 (or the box) that holds it.
 
     Parameters
     ----------
     search : what decides a point that the section leaves open: an arm in its section form, or a function of points
         (n, 3) about axis 1 (m) that tells which are reached for certain
-    reach, heights : m, the cylinder
+    reach, heights : m, the section of the cylinder or box
     """
     random = np.random.Generator(np.random.Philox(key=seed))
     low, high = heights
     unit = random.random((points, 3))
-    rho, azimuth = reach * np.sqrt(unit[:, 0]), 2 * np.pi * unit[:, 1]
+    bar = section.proof.bar
+    rho, azimuth = reach * (unit[:, 0] if bar > 0 else np.sqrt(unit[:, 0])), 2 * np.pi * unit[:, 1]
     z = low + (high - low) * unit[:, 2]
     status = section.status(rho, azimuth, z)
     open_points = np.flatnonzero((status != FILLED) & (status != EMPTY))
     if isinstance(search, SectionArm):
         _decide(search, rho, azimuth, z, status)
     elif len(open_points):
-        r, turn = rho[open_points], azimuth[open_points]
-        found = search(np.stack([r * np.cos(turn), r * np.sin(turn), z[open_points]], axis=1))
+        found = search(in_space(rho[open_points], azimuth[open_points], z[open_points], bar))
         status[open_points[found]] = FILLED
     reached, undecided = int((status == FILLED).sum()), int(((status != FILLED) & (status != EMPTY)).sum())
-    solid = np.pi * reach**2 * (high - low)
+    solid = ring_volumes(np.array([[0.0, reach, low, high]]), bar)[0]
     value = float(solid * (reached + undecided / 2) / points)
     least, most = wilson(reached, points)[0], wilson(reached + undecided, points)[1]
     return VolumeEstimate(points, reached, undecided, value, float(solid * least), float(solid * most))

@@ -9,7 +9,7 @@ from er3a.kinematics.numerical import solve
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
-from er3a.workspace.proof import Proof
+from er3a.workspace.proof import Proof, in_section
 from er3a.workspace.section_arm import SectionArm, section_frame
 
 POSITION_ONLY = np.array([1, 1, 1, 0, 0, 0])
@@ -53,7 +53,7 @@ def witness_joints(robot: Robot, arm: SectionArm, proof: Proof) -> Reals:
 
 def lies_in_cell(robot: Robot, q: Reals, proof: Proof, R: Reals, origin: Reals) -> Flags:
     """Whether each joint vector (cells, 6) brings the tool point into its own cell; False for NaN."""
-    x, y, z = R @ (forward(robot, np.nan_to_num(q))[:, :3, 3] - origin).T
-    rho, (a, b, c, d) = np.hypot(x, y), proof.cells.T
+    rho, _, z = in_section((forward(robot, np.nan_to_num(q))[:, :3, 3] - origin) @ R.T, proof.bar)
+    a, b, c, d = proof.cells.T
     inside: Flags = np.isfinite(q[:, 0]) & (a <= rho) & (rho <= b) & (c <= z) & (z <= d)
     return inside

@@ -11,6 +11,13 @@ from selenium.webdriver.common.by import By
 from testing import chromium
 from tests.browser.pages import PAGES
 
+LARGEST_PAGE = 6_000_000
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_page_is_small_enough(small_study, page):
+    assert (small_study.folder / "reports" / page).stat().st_size < LARGEST_PAGE
+
 
 @pytest.mark.parametrize("page", PAGES)
 def test_page_fits_phone_laptop_and_4k(browser, small_study, page):
@@ -30,7 +37,9 @@ const size = parseFloat(getComputedStyle(document.documentElement).fontSize);
 const widths = [...document.querySelectorAll(`main p:not(${arguments[0]})`)].map((p) => p.offsetWidth);
 const { paddingLeft, paddingRight } = getComputedStyle(document.body);
 const inner = document.body.clientWidth - parseFloat(paddingLeft) - parseFloat(paddingRight);
-return [size, inner / innerWidth, Math.max(0, ...widths)];
+const contents = document.querySelector(".contents");
+const beside = contents && getComputedStyle(contents).position === "fixed" ? contents.offsetWidth : 0;
+return [size, (inner + beside) / innerWidth, Math.max(0, ...widths)];
 """
 A4 = (595, 842)  # points
 SHEET = 688  # CSS px that are left of A4 between the margins

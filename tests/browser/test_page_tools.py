@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 
+import numpy as np
 import pytest
 from selenium.webdriver import ActionChains
 from selenium.webdriver.common.by import By
@@ -110,3 +112,80 @@ def test_figure_is_offered_for_download(page):
     link = page.find_element(By.CSS_SELECTOR, "figure .tools a")
     assert link.get_attribute("download") == "test_page_a_line.svg"
     assert link.get_attribute("href").startswith("data:image/svg+xml")
+
+
+@pytest.fixture
+def plots(browser, tmp_path):
+    """A page with a curve, bars, a map with its colour bar and a drawing to scale, and what each shows."""
+    figure, (curve, bars, shades, drawing) = new_figure(1, 4, width=16.0)
+    curve.plot(np.linspace(0, 4, 41), np.linspace(0, 4, 41) ** 2, label="square")
+    curve.set(xlabel="time (s)", ylabel="way (m)", ylim=(-4, 20))
+    bars.bar([0, 1], [5.0, 0.25], label="used")
+    bars.set(xticks=[0, 1], xticklabels=["J1", "J2"], ylabel="torque (N m)", yscale="log", ylim=(0.1, 10))
+    mesh = shades.pcolormesh([0, 1, 2], [0, 1], [[2.0, 8.0]], vmin=0, vmax=10, rasterized=True)
+    figure.colorbar(mesh, ax=shades, label="share (%)")
+    shades.set(xlabel="x (mm)", ylabel="y (mm)")
+    drawing.plot([0, 100, 100], [0, 0, 100], label="border")
+    drawing.set(xlabel="x (mm)", ylabel="z (mm)", aspect=1.0, xlim=(-50, 150), ylim=(-50, 150))
+    template = tmp_path / "plots.html.j2"
+    template.write_text(
+        '{% extends "base.html.j2" %}{% block title %}Test{% endblock %}{% block header %}<h1>Test</h1>{% endblock %}'
+        "{% block content %}{{ ui.picture(picture) }}{% endblock %}",
+        encoding="utf-8",
+    )
+    render(
+        template,
+        tmp_path / "plots.html",
+        command="make run",
+        provenance=Provenance(inputs=(), code="0" * 64),
+        picture=Picture(figure, "Plots", "They answer."),
+    )
+    browser.set_window_size(1400, 900)
+    browser.get((tmp_path / "plots.html").as_uri())
+    return browser
+
+
+@pytest.mark.parametrize(
+    ("axes", "place", "said"),
+    [
+        pytest.param(0, (3.0, 15.0), {"time (s)": 3.0, "square": 9.0}, id="a curve over the pointer's place"),
+        pytest.param(1, (0.05, 1.0), {"used": 5.0}, id="a bar on a logarithmic axis"),
+        pytest.param(1, (1.0, 0.2), {"used": 0.25}, id="another bar"),
+        pytest.param(2, (0.5, 0.5), {"x (mm)": 0.5, "y (mm)": 0.5, "share (%)": 2.0}, id="a colour"),
+        pytest.param(2, (1.5, 0.5), {"share (%)": 8.0}, id="another colour"),
+        pytest.param(3, (98.0, 1.0), {"x (mm)": 100.0, "z (mm)": 0.0}, id="a corner of a drawing"),
+        pytest.param(3, (20.0, 80.0), {"x (mm)": 20.0, "z (mm)": 80.0}, id="an empty place of a drawing"),
+    ],
+)
+def test_a_figure_tells_the_pointer_the_values_that_were_drawn(plots, axes, place, said):
+    image = plots.find_element(By.CSS_SELECTOR, "figure img")
+    own = json.loads(image.get_attribute("data-axes"))[axes]
+    left, bottom, right, top = own["box"]
+
+    def part(scale, value):
+        low, high = np.log([scale["from"], scale["to"]]) if scale.get("log") else (scale["from"], scale["to"])
+        return ((np.log(value) if scale.get("log") else value) - low) / (high - low)
+
+    u = left + part(own["x"], place[0]) * (right - left)
+    v = bottom + part(own["y"], place[1]) * (top - bottom)
+    edge = plots.execute_script(
+        "const s = getComputedStyle(arguments[0]); return parseFloat(s.paddingLeft) + parseFloat(s.borderLeftWidth)",
+        image,
+    )
+    width, height = (image.size[side] - 2 * edge for side in ("width", "height"))
+    ActionChains(plots).move_to_element_with_offset(
+        image, round((u - 0.5) * width), round((0.5 - v) * height)
+    ).perform()
+    lines = dict(line.text.rpartition(": ")[::2] for line in plots.find_elements(By.CSS_SELECTOR, ".reading div"))
+    found = {name: float(lines[name].replace("≈ ", "").replace("−", "-")) for name in said}
+    pixel = {"x": abs(own["x"]["to"] - own["x"]["from"]) / (right - left) / width}
+    loose = {"square": 6 * pixel["x"] + 0.05, "used": 0.0, "share (%)": 0.1}
+    for name, value in said.items():
+        assert found[name] == pytest.approx(value, abs=loose.get(name, 2 * pixel["x"])), (name, lines)
+
+
+def test_a_figure_says_nothing_beside_its_axes(plots):
+    image = plots.find_element(By.CSS_SELECTOR, "figure img")
+    ActionChains(plots).move_to_element_with_offset(image, 0, 0).perform()
+    ActionChains(plots).move_to_element_with_offset(image, -image.size["width"] // 2 + 12, 0).perform()
+    assert not plots.find_element(By.CSS_SELECTOR, ".reading").is_displayed()

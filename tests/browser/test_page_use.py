@@ -9,6 +9,7 @@ from selenium.webdriver.support.expected_conditions import staleness_of
 from selenium.webdriver.support.wait import WebDriverWait
 
 from er3a.pipeline.viewing.figure_3d import WORDS
+from testing import chromium
 from tests.browser.pages import PAGES, STAGE_PAGES
 
 
@@ -67,7 +68,7 @@ def test_figures_enlarge_and_give_the_focus_back(browser, small_study, page):
         assert browser.switch_to.active_element == button
 
 
-@pytest.mark.parametrize("stage", ["inverse", "trajectory"])
+@pytest.mark.parametrize("stage", ["inverse", "trajectory", "programs", "dynamics"])
 def test_one_target_or_path_is_shown_at_a_time_and_the_address_keeps_which(browser, small_study, stage):
     address = (small_study.folder / f"reports/er3a_c60/{stage}.html").as_uri()
     browser.get(address)
@@ -88,6 +89,50 @@ def test_one_target_or_path_is_shown_at_a_time_and_the_address_keeps_which(brows
     assert browser.execute_script(SHOWN_PARTS) == names
     assert browser.execute_script("return document.body.scrollHeight") > 1.5 * height
 
+
+@pytest.mark.parametrize(("width", "beside"), [(390, False), (1440, True), (2560, True)])
+def test_the_contents_stand_at_the_side_where_there_is_room(browser, small_study, width, beside):
+    browser.get((small_study.folder / "reports/er3a_c60/workspace.html").as_uri())
+    with chromium.emulating(browser, width):
+        browser.execute_script("scrollTo(0, document.body.scrollHeight / 2)")
+        WebDriverWait(browser, PAUSE).until(lambda _: browser.execute_script(READ_SECTION))
+        contents, text, inside = browser.execute_script(CONTENTS)
+    assert (contents["right"] <= text["left"]) is beside
+    assert contents["top"] >= 0
+    assert inside
+
+
+def test_every_plot_with_axes_answers_the_pointer(browser, small_study):
+    for stage in ("validation", "workspace", "collision", "inverse", "trajectory", "dynamics", "vision"):
+        browser.get((small_study.folder / f"reports/er3a_c60/{stage}.html").as_uri())
+        silent, axes = browser.execute_script(SILENT_AXES)
+        assert axes, stage
+        assert silent == [], stage
+
+
+# The section that is read is marked, and the contents' place beside the text's.
+READ_SECTION = "return document.querySelector('.contents a[aria-current]') !== null"
+CONTENTS = """
+const place = (name) => document.querySelector(name).getBoundingClientRect().toJSON();
+return [place(".contents"), place("main h2"), document.documentElement.scrollWidth <= innerWidth];
+"""
+# In the middle of each of a page's axes the pointer gets numbers.
+SILENT_AXES = r"""
+const silent = [];
+let count = 0;
+for (const image of document.querySelectorAll("img[data-axes]")) {
+  const answers = new Answers(image);
+  const { left, top, w, h } = answers.edges();
+  for (const { box } of answers.axes) {
+    const [u, v] = [(box[0] + box[2]) / 2, (box[1] + box[3]) / 2];
+    const lines = answers.at({ clientX: left + u * w, clientY: top + (1 - v) * h }).map(({ text }) => text);
+    const told = lines.some((text) => /\d/.test(text)) && !lines.some((text) => /NaN|undefined|Infinity/.test(text));
+    if (!told) silent.push([image.alt, box, lines]);
+    count += 1;
+  }
+}
+return [silent, count];
+"""
 
 SHOWN_PARTS = """
 const parts = [...document.querySelectorAll("[data-one-of] h2")].filter((heading) => heading.checkVisibility());

@@ -95,8 +95,8 @@ import("er3a/kinematics").then(({ constantLinks, frames, tableFrames }) =>
 """
 REACH = """
 const [data, q, T, done] = arguments;
-Promise.all([import("er3a/kinematics"), import("er3a/goal")]).then(([{ constantLinks }, { jointsFor }]) =>
-  done(jointsFor(data.table, constantLinks(data.table), null, T, q)));
+Promise.all([import("er3a/kinematics"), import("er3a/goal")]).then(([{ constantLinks }, { goalOf, jointsFor }]) =>
+  done(jointsFor(goalOf(data, constantLinks(data.table)), null, T, q)));
 """
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
+from er3a.collision.bodies import Bodies
 from er3a.collision.clearance import clearance
 from er3a.collision.envelopes import capsule_poses, default_envelopes, envelopes_of
 from er3a.collision.pairs import LinkAndSolid, LinkPair
@@ -131,3 +132,15 @@ def with_capsule(tmp_path, change):
     content |= {"name": "arm", "envelopes": {"source": "x", "grade": "inferred", "capsules": [capsule]}}
     (tmp_path / "arm.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
     return load_robot(tmp_path / "arm.yaml")
+
+
+def test_turns_of_an_arm_are_measured_once(random, monkeypatch):
+    arm = load_robot("ur5e")
+    bodies, q = Bodies(arm, None), joints_at_random(arm, random, 30)
+    turned = np.concatenate([q, q + 2 * np.pi * random.integers(-1, 2, q.shape)])
+    each, measured = bodies.least(turned), []
+    monkeypatch.setattr(bodies, "least", lambda rows: measured.append(len(rows)) or Bodies.least(bodies, rows))
+    once = bodies.least_of_turns(turned)
+    np.testing.assert_allclose(once[0], each[0], atol=1e-9)
+    np.testing.assert_array_equal(once[1], each[1])
+    assert measured == [30]

@@ -19,7 +19,7 @@ from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.files.robot_writer import write_robot
 from er3a.files.scene_file import SceneFile
 from er3a.robots.robot import Envelope, PairRule, Robot
-from testing.arms import make_arm
+from testing.arms import OTHERS_LONG, make_arm
 
 SAMPLES = 500
 BENT = ((0.0, 0.0, 0.1), (0.16, 0.0, 0.1), (0.16, 0.0, -0.12))  # m, in the frame of link 6
@@ -72,6 +72,7 @@ def coal_distance(robot: Robot, q: np.ndarray, first: str, second: str) -> float
     return least
 
 
+@OTHERS_LONG
 def test_every_pair_of_links_stands_in_it_with_what_dense_sampling_finds(robot, random):
     """No pair that is said never to meet does, and witnesses overlap; by Coal on frames worked out apart."""
     robot = bent_tool(robot).replace(pair_rules=())
@@ -212,3 +213,20 @@ def test_files_decide_only_on_what_there_is():
     rules = (PairRule("base", "link_9", "allow", "x"),)
     with pytest.raises(InputError, match="there is no 'link_9'"):
         write_robot(load_robot("er3_600").replace(pair_rules=rules), ROBOTS / "never_written.yaml")
+
+
+def test_a_default_shape_that_slides_in_its_guide_is_joined_to_it():
+    """Of a SCARA the quill in the outer arm; shapes that a file states are taken at their word."""
+    zero = np.zeros(4)
+    scara = Robot(
+        "scara", "scara", "standard", np.array([0.325, 0.275, 0, 0]), np.array([0, np.pi, 0, 0]),
+        np.array([0.4, 0, 0, 0.05]), zero + 1, zero, np.array([-2.2, -2.4, 0, -6]), np.array([2.2, 2.4, 0.2, 6]),
+        sliding=np.array([False, False, True, False]),
+    )  # fmt: skip
+    assert rows_of(scara)["link_2", "link_4"].state == "joined"
+    raised = np.array([[0.4, 0.2, slide, turn] for slide in (0.0, 0.03, 0.2) for turn in (0.0, 3.0)])
+    assert Bodies(scara, None).free(raised).all()
+    assert not Bodies(scara, None).free(np.array([[0.0, 2.39, 0.0, 0.0]])).any()  # the outer arm folds onto the inner
+    stated = scara.replace(envelopes=envelopes_of(scara))
+    assert rows_of(stated)["link_2", "link_4"].state == "meets"
+    assert not Bodies(stated, None).free(raised[:2]).any()

@@ -19,7 +19,9 @@ FCL_M = 5e-5
 ROUND_M = 3e-4  # depth of a cylinder's core, for which a prism of 96 sides stands
 
 
-@pytest.mark.parametrize("kind", SHAPES)
+@pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=() if kind in ("capsule", "hull") else pytest.mark.long) for kind in SHAPES]
+)
 def test_distances_are_those_of_coal_and_fcl(kind, random):
     deep = 0
     for number in range(100):

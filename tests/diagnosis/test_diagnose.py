@@ -110,6 +110,7 @@ def test_unit_swap_scale_and_convention_are_named():
         assert (named,) in alike(er3a.diagnose(faulty, "er3a_c60")[0])
 
 
+@pytest.mark.long
 def test_two_faults_are_found_together():
     faulty = changed("er3a_c60", offset=(2, 0.0), d=(6, 0.0))
     first = er3a.diagnose(faulty, "er3a_c60")[0]
@@ -174,6 +175,7 @@ def test_faults_that_references_see_are_ranked_first(name, noise_mm, every, rand
     assert np.median([outcome.set_size for outcome in seen]) == 1
 
 
+@pytest.mark.long
 def test_a_hypothesis_costs_microseconds():
     robot = load_robot("er3a_c60_article")
     references = load_references("er3a_c60")

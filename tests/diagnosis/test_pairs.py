@@ -14,23 +14,10 @@ from er3a.diagnosis.diagnose import diagnosis_of
 from er3a.diagnosis.fault_kinds import entry_of
 from er3a.files.robot_library import load_robot
 from er3a.numerics.arrays import Reals
-from er3a.references.quantities import COORDINATES, PointCoordinate
-from er3a.references.reference import Reference
-from er3a.references.subjects import PointAtPose
+from testing.flange_positions import HALF_WIDTH_MM, flange_mm, references_to
 
 pytestmark = pytest.mark.long
 
-POSES = np.array(
-    [
-        (0, 0, 0, 0, 0, 0),
-        (40, -60, 50, 20, 35, 10),
-        (-75, -20, -95, 110, -40, 60),
-        (130, -100, 30, -65, 80, -20),
-        (10, 35, 75, -15, -100, 90),
-    ],
-    float,
-)
-HALF_WIDTH_MM = 0.2
 COLUMNS = ("a", "d", "alpha", "offset")
 ENTRIES = [f"{column}{joint}" for column in COLUMNS for joint in range(1, 7)]
 STARTS, PASSES, PROBE = 48, 60, 1e-6
@@ -43,17 +30,10 @@ CORRUPTED = [
 ]
 
 
-def flange_mm(numbers: Reals, direction: Reals, base: Reals) -> Reals:
-    """Positions (B, 15) at the poses, of rows (B, 4, 6) in m and rad, multiplied out."""
-    q = np.radians(POSES)
-    T = np.broadcast_to(base, (len(numbers), len(POSES), 4, 4))
-    for j in range(6):
-        a, d, alpha, offset = (np.repeat(numbers[:, [k], j], len(POSES), axis=1) for k in range(4))
-        t = direction[j] * q[None, :, j] + offset
-        ct, st, ca, sa, none = np.cos(t), np.sin(t), np.cos(alpha), np.sin(alpha), np.zeros_like(t)
-        link = [[ct, -st * ca, st * sa, a * ct], [st, ct * ca, -ct * sa, a * st], [none, sa, ca, d]]
-        T = T @ np.moveaxis(np.array([*link, [none, none, none, none + 1]]), (0, 1), (-2, -1))
-    return (1000 * T[..., :3, 3]).reshape(len(numbers), -1)
+def positions(numbers: Reals, direction: Reals, base: Reals) -> Reals:
+    """Positions (B, 15) of rows (B, 4, 6) in m and rad."""
+    signs = np.broadcast_to(direction, (len(numbers), 1, 6))
+    return flange_mm(np.concatenate([numbers, signs], axis=1), False, base)
 
 
 class Refit:
@@ -67,7 +47,7 @@ class Refit:
         """Residuals (B, 15) in half-widths with amounts (B, 2) added to flat places (B, 2)."""
         numbers = np.repeat(self.numbers.reshape(1, -1), len(places), axis=0)
         np.add.at(numbers, (np.arange(len(places))[:, None], places), amounts)
-        found = flange_mm(numbers.reshape(-1, 4, 6), self.robot.direction, self.robot.base)
+        found = positions(numbers.reshape(-1, 4, 6), self.robot.direction, self.robot.base)
         return (found - self.stated) / HALF_WIDTH_MM
 
     def slope(self, places: Reals, amounts: Reals, left: Reals) -> Reals:
@@ -125,23 +105,11 @@ class Refit:
 def test_the_pairs_in_the_verdict_are_all_that_explain(name, wrong):
     robot = load_robot(name).without_tool()
     numbers = np.stack([getattr(robot, column) for column in COLUMNS])
-    stated = flange_mm(numbers[None], robot.direction, robot.base)[0].round(1)
+    stated = positions(numbers[None], robot.direction, robot.base)[0].round(1)
     for entry, by in wrong.items():
         numbers[COLUMNS.index(entry[:-1]), int(entry[-1]) - 1] += by
     given = robot.replace(**dict(zip(COLUMNS, numbers)))
-    references = [
-        Reference(
-            PointAtPose(f"pose {i // 3}", "flange", COORDINATES[i % 3]),
-            "key_poses",
-            PointCoordinate(tuple(POSES[i // 3].tolist()), "flange", COORDINATES[i % 3]),
-            float(value),
-            HALF_WIDTH_MM,
-            "a drawing",
-            "official",
-        )
-        for i, value in enumerate(stated)
-    ]
-    best = diagnosis_of(given, references).hypotheses[0]
+    best = diagnosis_of(given, references_to(stated)).hypotheses[0]
     assert best.explains
     sets = [[entry_of(fault) for fault in faults] for faults in (best.faults, *best.indistinguishable_from)]
     in_verdict = {tuple(sorted(own, key=ENTRIES.index)) for own in sets if set(own) <= set(ENTRIES)}

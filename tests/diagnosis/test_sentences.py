@@ -48,9 +48,9 @@ from er3a.pipeline.messages.say import say
 @pytest.mark.parametrize(
     ("found", "text"),
     [
-        (WrongOffset(2, 0.0, -90.0), "joint 2: offset -90 deg missing"),
+        (WrongOffset(2, 0.0, -90.0), "joint 2: offset −90 deg missing"),
         (WrongOffset(3, 180.0, 0.0), "joint 3: offset is 180 deg, 0 deg fits"),
-        (WrongAlphaSign(3, 90.0, -90.0), "joint 3: alpha has the wrong sign (90 deg given, -90 deg fits)"),
+        (WrongAlphaSign(3, 90.0, -90.0), "joint 3: alpha has the wrong sign (90 deg given, −90 deg fits)"),
         (WrongLength(6, "d", 0.0, 78.50004), "joint 6: d missing, 78.5 mm fits"),
         (WrongLength(4, "d", 301.5, 299.0), "joint 4: d is 301.5 mm, 299 mm fits"),
         (WrongLength(1, "d", 367.5, 367.4371), "joint 1: d is 367.5 mm, 367.4 mm fits"),
@@ -62,39 +62,40 @@ from er3a.pipeline.messages.say import say
         (SwappedEntries(None), "columns a and d are swapped"),
         (WrongScale(1 / 1.05), "all lengths: scale wrong, times 0.952381 fits"),
         (WrongConvention("standard"), "the table is a modified one, read as standard"),
-        (LimitDecides(3, "upper"), "the upper limit of joint 3 would tell them apart"),
+        (LimitDecides(3, "upper"), "the upper limit of joint 3 would distinguish them"),
         (
             FlangePositionDecides((0.0, 45.0, 0.0, 0.0, 0.0, 0.0), 0.5, 12.34),
-            "the flange's position at joints (0, 45, 0, 0, 0, 0) deg would tell 50% of the pairs apart, by up to 12 mm",
+            "the flange's position at joints (0, 45, 0, 0, 0, 0) deg would distinguish 50% of the pairs, "
+            "by up to 12 mm",
         ),
         (
             MostLikelyFault((WrongOffset(2, 0.0, -90.0),), 1432.8, 0.0, "mm"),
-            "Most likely fault: joint 2: offset -90 deg missing; residual falls from 1433 mm to 0.0 mm.",
+            "Most likely fault: joint 2: offset −90 deg missing; residual falls from 1433 mm to 0.0 mm.",
         ),
         (
             NoFewFaultsExplain(7260, 1432.8, 444.2, "mm", 321.04),
             "No one or two faults explain the data, of 7260 that were tried: the first in rank still leaves 444 mm of "
             "1433 mm, and none leaves less than 321 mm. This is another arm, or more than two numbers are wrong, or "
-            "one is in a way that was not tried, or a reference is.",
+            "one is wrong in a manner that was not tried, or a reference is.",
         ),
         (
             MostLikelyFault((WrongOffset(4, 0.0, 180.0),), 136.0, 0.0, "mm", ((ReversedDirection(5),),)),
-            "Most likely fault: one of 2 that these references can't tell apart (joint 4: offset 180 deg missing; "
+            "Most likely fault: one of 2 that these references can't distinguish (joint 4: offset 180 deg missing; "
             "joint 5: direction reversed); residual falls from 136 mm to 0.0 mm.",
         ),
         (
             TooSmallToTell(((WrongLength(3, "a", 70.06, 70.0),), (WrongScale(0.99994),)), 0.06, 0.3, "mm"),
             "The disagreement (0.06 mm) is too small for these references to tell which of 2 faults it is: joint 3: a "
             "is 70.06 mm, 70 mm fits; all lengths: scale wrong, times 0.99994 fits. From about 0.30 mm on they would "
-            "tell them apart, as far as they ever do.",
+            "distinguish them, as far as they ever do.",
         ),
         (
             NoFaultStandsOut(1, 45, 2.5, 9000),
             "1 of 45 references is missed, by up to 2.5 times what it leaves open, but none of the 9000 faults and "
             "pairs of faults that were tried does better than the table as it is.",
         ),
-        (WrongAlpha(3, -70.0, -89.99997), "joint 3: alpha is -70 deg, -90 deg fits"),
-        (WrongLimit(3, "lower", -75.0, -65.0), "joint 3: lower limit is -75 deg, -65 deg fits"),
+        (WrongAlpha(3, -70.0, -89.99997), "joint 3: alpha is −70 deg, −90 deg fits"),
+        (WrongLimit(3, "lower", -75.0, -65.0), "joint 3: lower limit is −75 deg, −65 deg fits"),
         (
             Resolution(0.0512, 0.051, ("offset4",), ("offset6", "direction5")),
             "A length that is wrong alone would be noticed from 0.051 mm on. An angle that is wrong alone would be "

@@ -171,11 +171,11 @@ def test_the_first_set_is_all_single_entries_that_explain_and_no_more(arm, entry
     "wrong",
     [
         {"d5": 0.05, "a3": -0.03},
-        {"alpha2": np.radians(5), "d4": -0.04},
-        {"offset2": np.radians(-35), "alpha3": np.radians(50)},
-        {"offset1": np.radians(12), "d1": 0.2},
-        {"direction4": 0.0, "a2": 0.011},
-        {"direction1": 0.0, "offset5": np.radians(-70)},
+        pytest.param({"alpha2": np.radians(5), "d4": -0.04}, marks=pytest.mark.long),
+        pytest.param({"offset2": np.radians(-35), "alpha3": np.radians(50)}, marks=pytest.mark.long),
+        pytest.param({"offset1": np.radians(12), "d1": 0.2}, marks=pytest.mark.long),
+        pytest.param({"direction4": 0.0, "a2": 0.011}, marks=pytest.mark.long),
+        pytest.param({"direction1": 0.0, "offset5": np.radians(-70)}, marks=pytest.mark.long),
     ],
 )
 def test_pairs_are_solved_for(arm, wrong):

@@ -22,44 +22,16 @@ from er3a.diagnosis.fault_kinds import (
 )
 from er3a.files.robot_library import load_robot
 from er3a.numerics.arrays import Reals
-from er3a.references.quantities import COORDINATES, PointCoordinate
-from er3a.references.reference import Reference
-from er3a.references.subjects import PointAtPose
+from testing.flange_positions import HALF_WIDTH_MM, flange_mm, references_to
 
 pytestmark = pytest.mark.long
 
-POSES = np.array(
-    [
-        (0, 0, 0, 0, 0, 0),
-        (40, -60, 50, 20, 35, 10),
-        (-75, -20, -95, 110, -40, 60),
-        (130, -100, 30, -65, 80, -20),
-        (10, 35, 75, -15, -100, 90),
-    ],
-    float,
-)
-HALF_WIDTH_MM = 0.2
 A, D, ALPHA, OFFSET, DIRECTION = range(5)
 COLUMNS = ("a", "d", "alpha", "offset", "direction")
 WORTH_A_CLOSER_LOOK = 400.0  # half-widths, next to a place of the scan
 Arm = tuple[Reals, bool]
 """Columns (5, 6) in m and rad, and whether the rows are modified ones."""
 Change = Callable[[Arm], Arm]
-
-
-def flange_mm(columns: Reals, modified: bool, base: Reals) -> Reals:
-    """Positions (V, 15) at the poses, of V tables (V, 5, 6), multiplied out."""
-    T = np.broadcast_to(base, (len(columns), len(POSES), 4, 4))
-    for j in range(6):
-        a, d, alpha, offset, sign = (np.repeat(columns[:, [k], j], len(POSES), axis=1) for k in range(5))
-        t = sign * np.radians(POSES)[None, :, j] + offset
-        ct, st, ca, sa, none = np.cos(t), np.sin(t), np.cos(alpha), np.sin(alpha), np.zeros_like(t)
-        if modified:
-            link = [[ct, -st, none, a], [st * ca, ct * ca, -sa, -sa * d], [st * sa, ct * sa, ca, ca * d]]
-        else:
-            link = [[ct, -st * ca, st * sa, a * ct], [st, ct * ca, -ct * sa, a * st], [none, sa, ca, d]]
-        T = T @ np.moveaxis(np.array([*link, [none, none, none, none + 1]]), (0, 1), (-2, -1))
-    return (1000 * T[..., :3, 3]).reshape(len(columns), -1)
 
 
 def on_columns(change: Callable[[Reals], None]) -> Change:
@@ -235,19 +207,7 @@ def test_the_pairs_in_the_verdict_are_all_that_explain(name, wrong, numbers):
     for each in wrong:
         given = mistakes()[each](given)
     changed = robot.replace(**dict(zip(COLUMNS, given[0])), convention="modified" if given[1] else "standard")
-    references = [
-        Reference(
-            PointAtPose(f"pose {i // 3}", "flange", COORDINATES[i % 3]),
-            "key_poses",
-            PointCoordinate(tuple(POSES[i // 3].tolist()), "flange", COORDINATES[i % 3]),
-            float(value),
-            HALF_WIDTH_MM,
-            "a drawing",
-            "official",
-        )
-        for i, value in enumerate(stated)
-    ]
-    best = diagnosis_of(changed, references).hypotheses[0]
+    best = diagnosis_of(changed, references_to(stated)).hypotheses[0]
     assert best.explains
     assert len(best.faults) == 2
     sets = [{name_of(fault) for fault in faults} for faults in (best.faults, *best.indistinguishable_from)]

@@ -91,6 +91,7 @@ def test_lengths_along_parallel_axes_mean_something_together_only(name):
     assert [each.entry for each in found.combinations] == ["d2 + d3"]
 
 
+@pytest.mark.long
 def test_what_the_second_cad_model_settles_of_the_er3a_c60():
     found = evidence("er3a_c60")
     for entry in LENGTHS:
@@ -132,9 +133,9 @@ def test_every_interval_holds_its_value_and_every_status_has_its_reason():
     ("entry", "by", "status"),
     [
         pytest.param("d1", 5.0, "contradicted", marks=pytest.mark.long),
-        ("a3", 1.0, "contradicted"),
+        pytest.param("a3", 1.0, "contradicted", marks=pytest.mark.long),
         pytest.param("a3", 0.3, "settled", marks=pytest.mark.long),
-        ("d4", 0.15, "settled"),
+        pytest.param("d4", 0.15, "settled", marks=pytest.mark.long),
         pytest.param("d4", 0.5, "contradicted", marks=pytest.mark.long),
         pytest.param("alpha3", 180.0, "contradicted", marks=pytest.mark.long),
         pytest.param("offset2", 10.0, "contradicted", marks=pytest.mark.long),
@@ -155,6 +156,7 @@ def test_one_wrong_length_accuses_no_other():
     }
 
 
+@pytest.mark.long
 def test_a_sign_that_its_own_document_excludes_is_contradicted():
     assert about(turned(load_robot("er3_600"), 2), "direction2")["direction2"].status == "contradicted"
     assert about(turned(load_robot("er3a_c60"), 5), "direction5")["direction5"].status == "contradicted"
@@ -248,6 +250,7 @@ def test_all_measurements_together_settle_the_tool():
     }
 
 
+@pytest.mark.long
 def test_parts_say_how_far_the_tool_could_be_off():
     parts = {part.code: part for part in parts_of(evidence("er3_600"))}
     assert not settles_tool(evidence("er3_600"))
@@ -256,6 +259,7 @@ def test_parts_say_how_far_the_tool_could_be_off():
     assert {parts["limits"].status, parts["speeds"].status} <= {"weak", "consistent"}
 
 
+@pytest.mark.long
 def test_a_tighter_tolerance_settles_less():
     robot = load_robot("er3a_c60")
     references = load_references("er3a_c60")

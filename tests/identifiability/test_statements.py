@@ -51,6 +51,7 @@ def test_documents_with_an_ancestor_in_common_are_not_independent():
     assert documents.independent("none", "none")
 
 
+@pytest.mark.long
 def test_the_article_is_another_robot_and_contradicts_its_own_text():
     robot = load_robot("er3a_c60_article")
     other = not_the_robot_described(robot, load_references("er3a_c60"))

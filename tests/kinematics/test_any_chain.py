@@ -82,6 +82,7 @@ def test_no_sample_leaves_the_bound_and_single_precision_follows_double(robot):
     assert np.hypot(np.maximum(across - bound.offset, 0), height - bound.height).max() <= bound.radius + 1e-9
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("sampling", ["uniform", "sobol"])
 def test_samples_keep_limits_of_sums(sampling):
     arm = make_arm(coupling=FANUC, combined=(CombinedLimit((0, 1, 1, 0, 0, 0), -0.5, 0.7),))

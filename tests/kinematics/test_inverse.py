@@ -16,7 +16,17 @@ from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.pipeline.messages.kinematics import say
 from er3a.robots.joint_limits import limits_exceeded, nearest_equivalent
-from testing.arms import DEG, arms, joints_at_random, joints_within, make_arm, margin, placement, pose_errors
+from testing.arms import (
+    DEG,
+    OTHERS_LONG,
+    arms,
+    joints_at_random,
+    joints_within,
+    make_arm,
+    margin,
+    placement,
+    pose_errors,
+)
 
 TURN = 2 * np.pi
 
@@ -32,6 +42,7 @@ def assert_rows_reproduce(robot, T, rows, tolerance=1e-9):
     assert angle.max(initial=0) < tolerance
 
 
+@OTHERS_LONG
 def test_every_row_reproduces_its_pose_and_the_generating_joints_are_among_them(robot, random):
     q = joints_at_random(robot, random, 4000)
     q = q[margin(robot, q) > 0.02][:2000]
@@ -58,6 +69,7 @@ def test_all_slots_of_a_large_batch_reproduce_their_poses(robot, random):
     assert ((q[solved] > -np.pi - 1e-15) & (q[solved] <= np.pi)).all()
 
 
+@pytest.mark.long
 @settings(max_examples=200, deadline=None)
 @given(data=st.data(), robot=arms())
 def test_random_arms_are_solved(data, robot):

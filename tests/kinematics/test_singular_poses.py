@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy
 
+from er3a.files.robot_library import load_robot
 from er3a.kinematics.aligned_wrist import bend_of_wrist
+from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.families import Family, _nearest_wrists
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import determinant_factors
 from testing.arms import DEG, joints_at_random, make_arm, margin, pose_errors
+from testing.plain_oracle import table_of
 from testing.singular_poses import (
     CLASSES,
     admissible_slots,
@@ -170,3 +174,46 @@ def test_family_is_plain_data(robot):
     assert isinstance(family, Family)
     assert family.kind == "wrist"
     assert family.q0.shape == family.direction.shape == (6,)
+
+
+@pytest.mark.parametrize("name", ["er3a_c60", "er3_600"])
+@pytest.mark.parametrize("second", ["elbow", "shoulder"])
+def test_a_batch_gives_the_reference_next_to_two_singularities_and_on_a_limit(name, second, random):
+    """Poses by the table's own product of matrices; joint 4 or 6 stands on a limit."""
+    robot, table = load_robot(name), table_of(name)
+    joint, q = {"elbow": 2, "shoulder": 1}[second], []
+    for row in random.uniform(robot.lower, robot.upper, (120, 6)):
+        grid = np.linspace(robot.lower[joint], robot.upper[joint], 200)
+        rows = np.tile(row, (len(grid), 1))
+        rows[:, joint] = grid
+        factor = getattr(determinant_factors(robot, rows), second)
+        zeros = np.flatnonzero((factor[:-1] * factor[1:] < 0) & (np.abs(factor[:-1]) < 0.1))
+        if not zeros.size:
+            continue
+
+        def miss(value, row=row):
+            return float(getattr(determinant_factors(robot, np.r_[row[:joint], value, row[joint + 1 :]]), second))
+
+        near = scipy.optimize.brentq(miss, *grid[zeros[0] : zeros[0] + 2], xtol=1e-15)
+        size = 10 ** random.uniform(-10, -5, 2) * random.choice([-1, 1], 2)
+        row[joint], row[4] = near + size[0], -bend_of_wrist(robot, np.zeros(6)) + size[1]
+        limited = random.choice([3, 5])
+        row[limited] = random.choice([robot.lower[limited], robot.upper[limited]])
+        if (row[joint] > robot.lower[joint]) & (row[joint] < robot.upper[joint]):
+            q.append(row)
+    assert len(q) > 15
+    q = np.array(q)
+    T = np.array([flange_by_table(table, row) for row in q])
+    found = inverse_batch(robot, T, q)
+    own = found.within_limits & (np.abs(found.q - q[:, None]).max(axis=2) < 1e-6)
+    assert own.any(axis=1).all()
+    assert found.solved[own].all()
+
+
+def flange_by_table(table, q):
+    T = np.eye(4)
+    angles = table["direction"][0] * q + table["offset"][0]
+    for theta, a, d, alpha in zip(angles, table["a"][0], table["d"][0], table["alpha"][0]):
+        ct, st, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
+        T = T @ [[ct, -st * ca, st * sa, a * ct], [st, ct * ca, -ct * sa, a * st], [0, sa, ca, d], [0, 0, 0, 1]]
+    return T

@@ -11,7 +11,16 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import PoseError, ShapeError
-from er3a.geometry.transforms import check_poses, rot_x, rot_z, rotation_angle, rpy_of, transform, translation
+from er3a.geometry.transforms import (
+    check_poses,
+    rot_x,
+    rot_z,
+    rotation_angle,
+    rpy_along,
+    rpy_of,
+    transform,
+    translation,
+)
 from testing.arms import number
 
 angles = number(-np.pi, np.pi)
@@ -119,3 +128,10 @@ def test_wrong_shapes_are_refused(shape):
 def test_good_poses_are_returned(shape):
     T = np.broadcast_to(transform([1, 2, 3], [0.5, 0.4, 0.3]), shape)
     np.testing.assert_array_equal(check_poses(T), T)
+
+
+@pytest.mark.parametrize("direction", [(0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.0, 0.6, 0.8), (0.6, -0.48, -0.64)])
+def test_rpy_along_points_z_along_the_direction(direction):
+    roll, pitch, yaw = rpy_along(np.array(direction))
+    np.testing.assert_allclose(Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix()[:, 2], direction, atol=1e-12)
+    assert yaw == 0

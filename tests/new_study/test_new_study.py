@@ -79,6 +79,7 @@ def written(request, tmp_path_factory) -> tuple[str, Path]:
     return request.param, folder
 
 
+@pytest.mark.long
 def test_every_file_is_in_order(written, monkeypatch):
     name, folder = written
     monkeypatch.chdir(folder)

@@ -66,3 +66,25 @@ def test_what_is_open_beside_an_event_is_undecided_where_nobody_finds_the_event(
     blind = judged(robot, written, 50, limits)[1]
     assert blind.verdict != "safe"
     assert blind.undecided
+
+
+@pytest.mark.parametrize(
+    ("start", "xyz", "rpy", "duration"),
+    [
+        ([100.139823, -1.162150, 91.643238, 103.039661, -46.790756, -290.638948],
+         [-73.957903, 61.658870, 937.969084], [-56.984400, -13.630461, 93.025245], 1.283259),
+        ([-40.853948, 24.922158, 42.015753, 8.568680, -54.470744, -74.178321],
+         [136.651664, -78.231801, 894.654728], [83.195510, -33.719966, 74.401484], 2.310067),
+    ],
+)  # fmt: skip
+def test_where_a_branch_has_to_be_left_does_not_depend_on_samples(start, xyz, rpy, duration):
+    """Lines that only another branch can end: where it is taken, no curve settles, and so samples must not."""
+    robot = load_robot("er3a_c60")
+    written = {"kind": "line", "start_deg": start, "end": {"xyz_mm": xyz, "rpy_deg": rpy}, "duration_s": duration}
+    limits = limits_of(robot, {"limits_jerk": False, "known_acceleration": False})
+    found = [judged(robot, written, samples, limits) for samples in (2, 50, 500)]
+    jumps = {tuple((jump.t, jump.joint) for jump in motion.followed.jumps) for motion, _ in found}
+    assert len(jumps) == 1
+    assert jumps != {()}
+    assert len({judgement.verdict for _, judgement in found}) == 1
+    assert found[0][1].verdict not in ("safe", "undecided")

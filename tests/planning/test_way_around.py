@@ -45,7 +45,10 @@ def blocked(bodies, random):
             return q
 
 
-@pytest.mark.parametrize("title", ["default", "slot", "shelf", "post between tables"])
+@pytest.mark.parametrize(
+    "title",
+    [*(pytest.param(title, marks=pytest.mark.long) for title in ("default", "slot", "shelf")), "post between tables"],
+)
 def test_planned_motions_touch_nothing_and_keep_their_limits(title, random):
     scene = {"default": load_scene("data/scenes/table_and_post.yaml"), **hard_scenes(ROBOT)}[title]
     one = task(scene)
@@ -75,6 +78,7 @@ def test_the_straight_move_between_them_would_touch(random):
     assert contacts_of(ROBOT, scene).least(np.linspace(start, end, DENSE)).min() < 0
 
 
+@pytest.mark.long
 def test_equal_tasks_give_equal_bytes_whatever_was_planned_before(random):
     one = task(load_scene("data/scenes/table_and_post.yaml"))
     first, second = (blocked(one.bodies, random) for _ in range(2))
@@ -96,6 +100,7 @@ def test_jerk_is_kept_where_it_is_bounded(random):
     assert curve.steps.max() < 1e-6
 
 
+@pytest.mark.long
 def test_a_wall_through_the_arms_middle_has_no_way_around():
     """A wall in the plane of axis 1 and x, but for the base: from one side to the other there is none."""
     parts = {"front": (1.15, 1.5, 2.0, 3.1), "back": (-1.15, 1.5, 2.0, 3.1), "above": (0.0, 1.8, 0.4, 2.5)}

@@ -27,6 +27,7 @@ ROOT = Path(__file__).resolve().parents[2]
 FAULTS = ROOT / "data/programs/faults"
 ROBOT = load_robot("er3a_c60")
 HOME = np.radians([0.0, -10.0, -10.0, 0.0, -70.0, 0.0])
+LONG = ("drifting_loop", "singular_line")
 FOUND = {
     "collision_with_table": {"motion_collides"},
     "drifting_loop": {"not_followed_to_end", "way_out_of_reach"},
@@ -71,7 +72,7 @@ def test_every_faulty_program_has_its_faults_here():
     assert {path.stem for path in FAULTS.glob("*.src")} == set(FOUND)
 
 
-@pytest.mark.parametrize("name", FOUND)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.long if name in LONG else ()) for name in FOUND])
 def test_each_fault_is_found(name):
     check = check_program(read_program(FAULTS / f"{name}.src"), ROBOT, CheckOptions(start=HOME, scene=TABLE))
     assert codes(check) >= FOUND[name]
@@ -135,6 +136,7 @@ def test_the_branch_of_joint_angles_is_that_of_the_inverse():
     assert len(set(branch_labels(ROBOT))) == 8
 
 
+@pytest.mark.long
 def test_turn_chooses_among_the_solutions_of_a_pose(tmp_path):
     T = forward(ROBOT, np.radians([10.0, -20.0, -15.0, 20.0, -60.0, 30.0]))
     inside = [q for q in inverse(ROBOT, T).q if ((q >= ROBOT.lower) & (q <= ROBOT.upper)).all()]
@@ -273,3 +275,37 @@ def test_a_program_of_100_000_lines_has_a_result_within_a_minute_of_work(suffix,
     assert {"target_out_of_reach", "above_limit"} & {
         each.finding.code for each in check.findings if each.place.line > 99_000
     }
+
+
+@pytest.mark.parametrize("angle", [40.0, 120.0, 360.0, 500.0, -90.0])
+@pytest.mark.parametrize("turn", [0.0, 10.0])
+def test_an_arc_with_an_angle_of_its_own_is_followed_to_where_it_ends(angle, turn, tmp_path):
+    text = f"""DEF p( )
+PTP {{A1 0,A2 -10,A3 -10,A4 0,A5 -70,A6 0}}
+LIN {{X 400,Y 0,Z 350,A 0,B 0,C 180}}
+CIRC {{X 430,Y 30,Z 350,A 0,B 0,C 180}},{{X 460,Y 0,Z 350,A {turn},B 0,C 180}},CA {angle}
+LIN_REL {{Z 10}}
+END
+"""
+    path = tmp_path / "p.src"
+    path.write_text(text)
+    check = check_program(read_program(path), ROBOT, CheckOptions(start=np.zeros(6), measures=False))
+    found = [each for each in check.findings if each.finding.code == "arc_goes_on"]
+    assert [each.level for each in found] == ["caution" if turn else "note"]
+    way = next(each.way for each in check.motions.values() if each.kind == "arc")
+    assert np.isfinite(way.q).all()
+    assert way.length == pytest.approx(0.03 * np.radians(abs(angle)))
+    shares = np.linspace(0, 1, 50)
+    phi = np.radians(180 - angle * shares)  # from the start over the point: clockwise seen from above
+    wanted = np.stack([0.43 + 0.03 * np.cos(phi), 0.03 * np.sin(phi), np.full(50, 0.35)], axis=1)
+    np.testing.assert_allclose(forward(ROBOT, way.joints_at(shares))[:, :3, 3], wanted, atol=1e-9)
+    after = list(check.motions.values())[-1]
+    np.testing.assert_allclose(forward(ROBOT, after.end)[:3, 3], wanted[-1] + [0, 0, 0.01], atol=1e-7)
+
+
+def test_an_arc_whose_angle_is_not_known_is_not_checked(tmp_path):
+    path = tmp_path / "p.src"
+    path.write_text("DEF p( )\nCIRC {X 430,Y 30,Z 350,A 0,B 0,C 180},{X 460,Y 0,Z 350,A 0,B 0,C 180},CA w\nEND\n")
+    check = check_program(read_program(path), ROBOT, CheckOptions(start=np.zeros(6), measures=False))
+    assert {"arc_goes_on"} <= codes(check)
+    assert check.level == "caution"

@@ -93,6 +93,9 @@ def test_sarif_has_rules_places_and_fingerprints_that_stay(tmp_path):
         place, later = (each["locations"][0]["physicalLocation"]["region"]["startLine"] for each in (result, other))
         assert later == place + 2 or place == 1
         assert result["partialFingerprints"] == other["partialFingerprints"]
+        place = result["locations"][0]["physicalLocation"]["artifactLocation"]
+        assert place["uri"].startswith("../")  # beside the folder that the command runs in
+        assert place["uriBaseId"] in run_of["originalUriBaseIds"]
     relative = tmp_path / "b.sarif"
     check(f"{FAULTS}/outside_limits.src", "--sarif", str(relative))
     results = json.loads(relative.read_text())["runs"][0]["results"]
@@ -101,11 +104,12 @@ def test_sarif_has_rules_places_and_fingerprints_that_stay(tmp_path):
 
 
 def test_frames_and_start_are_checked():
-    assert "expected 6 joint angles" in str(
+    assert "expected 6 joint values" in str(
         run("check-program", "x.src", "--robot", "er3a_c60", "--start", "1,2").exception
     )
 
 
+@pytest.mark.long
 def test_paths_are_written_and_unsafe_ones_refused(tmp_path):
     words = ("program", "write", "data/paths/er3a_c60.yaml", "--robot", "er3a_c60", "--language", "krl")
     done = run(*words, "--output", str(tmp_path), "--only", "line_clean", "--only", "line_limits")

@@ -9,8 +9,11 @@ from scipy.spatial.transform import Rotation
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Plane, Scene
 from er3a.files.robot_library import load_robot
+from er3a.kinematics.forward import forward
+from er3a.kinematics.inverse import inverse
 from er3a.program_check.program_check_findings import ZoneCollides, ZoneNotSettled
-from er3a.program_check.zone_clearance import pair_levers, zone_clearance
+from er3a.program_check.zone_clearance import WHOLE, pair_levers, zone_clearance
+from er3a.program_check.zone_patch import bend_of_line, patch_of
 
 ROBOT = load_robot("er3a_c60")
 FLOOR = Scene("floor", (Plane("floor", np.array([0.0, 0.0, 1.0]), 0.1),))
@@ -83,3 +86,101 @@ def test_joints_that_bend_need_more_room():
     assert zone_clearance(BODIES, corners, 0.001) is None
     wide = zone_clearance(BODIES, corners, 0.001, np.full(6, 1.0))
     assert isinstance(wide, ZoneNotSettled)
+
+
+def line_corner(rng, size, turn):
+    """Joints (3, 6) before, at and behind a corner of two lines; None out of reach."""
+    q = joints(rng, 1)[0]
+    T = np.tile(forward(ROBOT, q), (3, 1, 1))
+    for i in (0, 2):
+        T[i, :3, 3] += size * rng.uniform(0.3, 1.0) * Rotation.random(random_state=rng.integers(10**9)).as_matrix()[0]
+        T[i, :3, :3] = Rotation.from_rotvec(rng.uniform(-turn, turn, 3)).as_matrix() @ T[i, :3, :3]
+    found = [inverse(ROBOT, each, q) for each in T]
+    near = [each.q[np.abs(each.q - q).max(axis=1).argmin()] if len(each.q) else None for each in found]
+    if any(each is None or np.abs(each - q).max() > 0.6 for each in near):
+        return None
+    return np.stack(near), T
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("turn", [0.0, 0.1])
+@pytest.mark.parametrize("seed", range(3))
+def test_no_overlap_of_a_way_between_two_lines_goes_unnoticed(seed, turn):
+    """Against blends of the tool's poses, solved one by one: parabolas and points of the triangle."""
+    rng = np.random.default_rng(seed)
+    every, told = np.arange(len(BODIES.pairs)), []
+    while len(told) < 6 or (type(None) not in told and len(told) < 40):
+        made = line_corner(rng, 0.05, turn)
+        if made is None:
+            continue
+        corners, T = made
+        found = zone_clearance(BODIES, corners, 0.001, patch=patch_of(ROBOT, corners, 0.0))
+        told.append(type(found))
+        t = np.linspace(0, 1, 21)
+        shares = np.concatenate([np.stack([(1 - t) ** 2, t**2], axis=1), rng.dirichlet(np.ones(3), 30)[:, :2]])
+        turns = Rotation.from_matrix(T[[0, 2], :3, :3] @ T[1, :3, :3].T).as_rotvec()
+        least, q = np.inf, corners[1]
+        for share in shares:
+            pose = T[1].copy()
+            pose[:3, 3] += share @ (T[[0, 2], :3, 3] - T[1, :3, 3])
+            pose[:3, :3] = Rotation.from_rotvec(share @ turns).as_matrix() @ pose[:3, :3]
+            solved = inverse(ROBOT, pose, q).q
+            if found is None:
+                assert len(solved), "a way that is proven is reached"
+            if len(solved):
+                near = solved[np.abs(solved - q).max(axis=1).argmin()]
+                least = min(least, BODIES.told(BODIES.distances(BODIES.ends(near), every)).min())
+        if found is None:
+            assert least >= -0.001
+        elif isinstance(found, ZoneNotSettled):
+            assert found.least_mm <= 1000 * least + 30
+    assert told.count(type(None)) >= 1
+
+
+def test_joints_bend_within_a_triangle_of_poses_by_no_more_than_is_said():
+    rng = np.random.default_rng(9)
+    proven, tightest = 0, 0.0
+    while proven < 10:
+        made = line_corner(rng, 0.01, 0.02)
+        if made is None:
+            continue
+        corners, _ = made
+        patch = patch_of(ROBOT, corners, 0.0)
+        bend, _ = patch.bend(WHOLE, corners)
+        if not np.isfinite(bend).all():
+            continue
+        proven += 1
+        shares = rng.dirichlet(np.ones(3), 50)
+        flat = shares @ corners
+        q = patch.joints(shares @ WHOLE, flat)
+        assert (np.abs(q - flat) <= bend).all()
+        tightest = max(tightest, (np.abs(q - flat) / bend).max())
+        np.testing.assert_allclose(forward(ROBOT, q), patch.poses(shares @ WHOLE), atol=1e-9)
+    assert tightest > 0.05  # and the bound is no wild guess
+
+
+def test_a_corner_through_a_singular_pose_is_not_settled():
+    q = np.radians([0.0, -10.0, -10.0, 0.0, 0.0, 0.0])
+    corners = q + np.radians([[-1, 0, 0, 0, 1, 0], [0, 0, 0, 0, 0, 0], [0, 1, 0, 0, -1, 0]])
+    found = zone_clearance(BODIES, corners, 0.001, patch=patch_of(ROBOT, corners, 0.0))
+    assert isinstance(found, ZoneNotSettled)
+
+
+def test_joints_of_a_line_leave_the_chord_by_no_more_than_is_said():
+    rng = np.random.default_rng(12)
+    proven = 0
+    while proven < 5:
+        made = line_corner(rng, 0.05, 0.1)
+        if made is None:
+            continue
+        patch = patch_of(ROBOT, made[0], 0.0)
+        shares = np.linspace(0, 1, 161)
+        at = np.stack([np.zeros(161), shares], axis=1)
+        q = patch.joints(at, made[0][1] + shares[:, None] * (made[0][2] - made[0][1]))
+        bend = bend_of_line(ROBOT, q[::10], 0.0)
+        if not np.isfinite(bend).all():
+            continue
+        proven += 1
+        off = np.abs(q - q[0] - shares[:, None] * (q[-1] - q[0])).max(axis=0)
+        assert (off <= bend + 1e-12).all()
+        assert (bend < 1.5 * off + 1e-3).all()

@@ -12,6 +12,8 @@ from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.pipeline import cli  # noqa: F401
 from er3a.pipeline.commands.options import app
+from er3a.pipeline.messages import program_check  # noqa: F401
+from er3a.pipeline.messages.say import say
 from er3a.planning.commands import JointSequenceCommand
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.csv_program import write_csv
@@ -21,6 +23,7 @@ from er3a.programs.run_program import execute
 from er3a.programs.write_program import write_program
 from er3a.programs.writing import WriteOptions
 from er3a.robots.robot import Robot
+from er3a.robots.shown import joint_columns, shown
 
 LENGTHS = [0.1, 0.3, 0.25, 0.05, 0.05, 0.05, 0.05, 0.05]
 
@@ -94,6 +97,24 @@ def test_an_arm_with_a_slide_is_refused(language, tmp_path):
     _, file = written(arm(6), language, tmp_path)
     with pytest.raises(InputError, match="joint 3 of this arm slides"):
         execute(read_program(file), arm(6, sliding=True))
+
+
+def test_a_slide_that_is_too_fast_is_told_in_millimetres_and_a_long_one_is_no_whole_turn(tmp_path):
+    """Joint 3 runs 4 m in 2 s: no turn, however many times pi metres are."""
+    robot = arm(4, sliding=True)
+    robot = robot.replace(lower=np.array([-2.5, -2.5, 0, -2.5]), upper=np.array([2.5, 2.5, 5, 2.5]))
+    q = np.array([[0.0, 0, 0, 0], [0.1, 0, 4, 0]])
+    text = write_csv(np.array([0.0, 2.0]), shown(robot, q), forward(robot, q), columns=joint_columns(robot))
+    (tmp_path / "a.csv").write_text(text)
+    with pytest.raises(InputError, match="joint 3 is in mm, and this arm's turns"):
+        execute(read_program(tmp_path / "a.csv"), arm(4))
+    check = check_program(read_program(tmp_path / "a.csv"), robot, CheckOptions(start=q[0], measures=False))
+    found = {each.finding.code: each.finding for each in check.findings}
+    assert found.keys() == {"speed_not_given", "faster_than_assumed", "accelerates_more_than_assumed"}
+    assert found["faster_than_assumed"].joint == 3
+    assert found["faster_than_assumed"].assumed_deg_s == 500
+    assert found["faster_than_assumed"].needed_deg_s > 2000
+    assert "mm/s" in say(found["faster_than_assumed"])
 
 
 def test_axes_that_the_arm_does_not_have_may_be_0_and_nothing_else(tmp_path):

@@ -79,9 +79,12 @@ def test_an_export_of_polyscope():
     assert {63, 64, 79, 80, 81} <= unknown
 
 
-def test_a_block_of_xpl_that_is_not_understood_is_followed_and_left_out():
-    execution = execute(read_program(STYLES / "JOB1.XPL"), ROBOT)
-    lines = {step.place.line for step in execution.steps if isinstance(step.instruction, ArmMotion)}
-    assert {25, 39, 40, 45} <= lines
-    assert {each.code for each in execution.program.findings} == {"program_not_understood"}
-    assert any(isinstance(step.instruction, Disabled) for step in execution.steps)
+def test_an_if_of_xpl_follows_its_condition_and_a_block_that_is_not_understood_is_followed_and_left_out(tmp_path):
+    text = (STYLES / "JOB1.XPL").read_text(encoding="utf-8")
+    for tag, lines, code in (("if", {25, 39, 45}, "program_form_inferred"), ("select", {25, 39, 40, 45}, None)):
+        path = tmp_path / "JOB1.XPL"
+        path.write_text(text.replace("<if>", f"<{tag}>").replace("</if>", f"</{tag}>"), encoding="utf-8")
+        execution = execute(read_program(path), ROBOT)
+        assert {step.place.line for step in execution.steps if isinstance(step.instruction, ArmMotion)} == lines
+        assert {each.code for each in execution.program.findings} - {code} == {"program_not_understood"}
+        assert any(isinstance(step.instruction, Disabled) for step in execution.steps)

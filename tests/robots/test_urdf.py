@@ -131,12 +131,21 @@ def test_fixed_joints_are_merged_and_side_frames_ignored(tmp_path, random):
     np.testing.assert_allclose(forward(with_flange, q), expected, atol=1e-9)
 
 
+def test_a_limit_that_is_not_given_is_0_as_the_specification_says(tmp_path):
+    found = import_urdf(written(tmp_path, urdf(limit='<limit upper="1" velocity="inf"/>')))
+    np.testing.assert_array_equal(found.robot.lower[:5], 0)  # the sixth turns without end
+    np.testing.assert_array_equal(found.robot.upper[:5], 1)
+    assert np.isnan(found.robot.speed).all()
+    assert sum("has no lower limit: 0 was taken" in note for note in found.notes) == 5
+
+
 @pytest.mark.parametrize(
     ("text", "told"),
     [
         (urdf([REAL_ARM[0]] * 11), "11 moving joints"),
         (urdf([("planar", *REAL_ARM[0][1:]), *REAL_ARM[1:]]), "type 'planar'"),
-        (urdf([("prismatic", *REAL_ARM[0][1:]), *REAL_ARM[1:]], limit='<limit upper="1"/>'), "has no lower"),
+        (urdf().replace('name="j2"', 'name="j1"'), "2 joints have this name"),
+        (urdf([("revolute", "0, 0, 1", "0 0 0", "0 0 1"), *REAL_ARM[1:]]), "'0, 0, 1' is not 3 finite numbers"),
         (urdf(limit='<limit lower="2" upper="-2" velocity="1"/>'), "lower limit 2 above upper -2"),
         (urdf(limit='<mimic joint="j1"/><limit lower="-2" upper="2"/>'), "follows 'j1', which is no joint"),
         (urdf([("revolute", "0 0 nan", "0 0 0", "0 0 1"), *REAL_ARM[1:]]), "'0 0 nan'"),

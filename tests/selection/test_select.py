@@ -53,7 +53,9 @@ def test_each_rule_orders_by_its_measure(arm, solutions):
         np.testing.assert_allclose(ranking.measured[name], expected, rtol=1e-9)
         ordered = expected[ranking.order] * (1 if RULES[name].best == "least" else -1)
         assert (np.diff(ordered) >= -1e-6).all()
-        assert sorted(ranking.order) == np.flatnonzero(solutions.within_limits).tolist()
+        usable = solutions.within_limits.copy()
+        usable[usable] = clearance(arm, solutions.q[usable], None).distance >= 0
+        assert sorted(ranking.order) == np.flatnonzero(usable).tolist()
         assert ranking.reason[ranking.chosen].place == 1
 
 

@@ -70,6 +70,7 @@ def test_what_lies_below_the_floor_is_lost(results):
     assert not rows.clear[rows.middle_mm[:, 2] < -100].any()
 
 
+@pytest.mark.long
 def test_equal_inputs_give_equal_bytes(folder, tmp_path):
     run.compute("collision", study_with(), NAME, tmp_path)
     assert {file.name: file.read_bytes() for file in folder.iterdir()} == {
@@ -116,6 +117,7 @@ def test_scenes_that_leave_nothing_have_one_verdict(case, tmp_path):
     assert (verdict.status, verdict.finding.code) == expected
 
 
+@pytest.mark.long
 def test_open_space_leaves_the_arm_itself(tmp_path):
     found = compute(study_with(None, samples=1000, rounds=0), NAME).summary
     assert found.scene is None

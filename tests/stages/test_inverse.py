@@ -7,6 +7,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,6 +25,7 @@ from er3a.pipeline.results import read_results
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.inverse.compute import compute
 from er3a.pipeline.stages.inverse.model import RESULTS, SINGULAR_PARTS, InverseResults, TargetResult
+from er3a.pipeline.stages.inverse.shown_targets import MOST_SHOWN, shown_targets
 from er3a.pipeline.study import Study, load_study
 from er3a.selection.rules import RULES
 
@@ -223,6 +225,7 @@ def test_round_trips_tell_when_the_solver_fails(monkeypatch):
     assert trips.worst_position > 1e-5
 
 
+@pytest.mark.long
 def test_results_are_the_same_bytes_in_another_process(tmp_path, monkeypatch):
     words = ["compute", "inverse", "er3a_c60", "--study", "config/small.yaml", "--results", str(tmp_path / "there")]
     subprocess.run([sys.executable, "-m", "er3a", *words], check=True, cwd=ROOT, capture_output=True)
@@ -378,3 +381,55 @@ def test_page_and_recording_show_every_target(folders, tmp_path):
     )
     for entity in ("/arm/link_1", "/inverse/targets/article_target/branch_7", "/inverse/targets/many_ways/frame"):
         assert entity in shown.stdout
+
+
+@pytest.mark.long
+def test_of_many_targets_one_turn_of_each_branch_is_kept_and_the_page_says_so(tmp_path, monkeypatch):
+    arm, random = load_robot("er3a_c60"), np.random.default_rng(5)
+    q = random.uniform(arm.lower, arm.upper, (12, 6))
+    xyz, rpy = [], []
+    for joints in q:
+        T = flange_by_hand("er3a_c60", np.degrees(joints))
+        xyz.append((1000 * T[:3, 3]).tolist())
+        rpy.append(Rotation.from_matrix(T[:3, :3]).as_euler("ZYX", degrees=True)[::-1].tolist())
+    lines = ["name,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg"]
+    lines += [
+        ",".join([f"t{k}", *(repr(value) for value in (*place, *turn))])
+        for k, (place, turn) in enumerate(zip(xyz, rpy))
+    ]
+    lines += [f"far{k},{3000 + k},0,0,0,0,0" for k in range(3)]
+    (tmp_path / "many.csv").write_text("\n".join(lines), encoding="utf-8")
+    study = make_study(er3a_c60={"targets": str(tmp_path / "many.csv"), "paths": "unused.yaml"})
+    every = compute(study, "er3a_c60")
+    monkeypatch.setattr("er3a.pipeline.stages.inverse.compute.MANY_TARGETS", 14)
+    monkeypatch.setattr("er3a.pipeline.stages.inverse.shown_targets.MOST_SHOWN", 5)
+    monkeypatch.setattr("er3a.pipeline.stages.inverse.compute.MOST_ADVISED", 2)
+    run.compute("inverse", study, "er3a_c60", tmp_path / "few")
+    few = read_results(tmp_path / "few", RESULTS).results
+    assert len(few.solutions) < len(every.solutions)
+    assert (every.summary.turns, few.summary.turns) == (True, False)
+    for whole, part in zip(every.summary.targets, few.summary.targets):
+        assert (whole.solutions, whole.within_limits) == (part.solutions, part.within_limits)
+        rows, kept = (each.solutions.take(each.solutions.target == whole.name) for each in (every, few))
+        for branch in np.unique(rows.branch):
+            own = rows.q_deg[rows.branch == branch]
+            nearest = own[np.abs(own).max(axis=1).argmin()]
+            np.testing.assert_allclose(kept.q_deg[kept.branch == branch], nearest[None], atol=1e-9)
+    asked = [target for target in few.summary.targets if target.outcome in ("unreachable", "leaves limits")]
+    assert sum(target.neighbours is not None for target in asked) == 2 < len(asked)
+    run.show("report", "inverse", study, "er3a_c60", tmp_path / "few", tmp_path / "page.html")
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "Of 15 targets" in page
+    assert "this page and the recording show 5" in page
+    assert "the turn nearest to the reference" in page
+    assert f"{len(asked) - 2} more were not looked at" in page
+
+
+def test_a_page_shows_targets_of_each_outcome():
+    targets = [SimpleNamespace(name=str(k), outcome="collides" if k == 900 else "reached") for k in range(1000)]
+    shown = [int(target.name) for target in shown_targets(targets)]
+    assert len(shown) == MOST_SHOWN
+    assert shown == sorted(set(shown))
+    assert {0, 900, 999} <= set(shown)
+    assert max(np.diff(shown)) < 20  # evenly over the list
+    assert shown_targets(targets[:MOST_SHOWN]) == targets[:MOST_SHOWN]

@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 
 from er3a.errors import InputError
+from er3a.files.robot_library import load_robot
+from er3a.kinematics.forward import forward
 from er3a.pipeline.results import Stored, read_results
 from er3a.pipeline.stages import run
+from er3a.pipeline.stages.programs.compute import compute as compute_programs
 from er3a.pipeline.stages.programs.model import RESULTS, ProgramsResults, SomeProgramsFail
 from er3a.pipeline.stages.programs.record import record
 from er3a.pipeline.stages.programs.report import report
@@ -18,6 +21,7 @@ from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.compute import compute as compute_paths
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.study import Study, load_study
+from er3a.programs.csv_program import write_csv
 
 ROBOTS = ("er3a_c60", "er3_600")
 
@@ -161,3 +165,17 @@ def test_unsafe_paths_have_programs_only_where_that_is_asked(study):
 
     assert languages_of("line_limits") == set()
     assert languages_of("line_limits", write_unsafe=True, programs=["krl", "csv"]) == {"krl", "csv"}
+
+
+def test_an_arm_of_seven_joints_has_its_table_checked(tmp_path):
+    """The study's speeds for six joints go on to the seventh."""
+    robot = load_robot("lbr_iiwa_14")
+    q = np.array([np.zeros(7), np.full(7, 0.2)])
+    (tmp_path / "a.csv").write_text(write_csv(np.array([0.0, 2.0]), np.degrees(q), forward(robot, q)))
+    entry = f"- {{name: a, title: a, file: {tmp_path / 'a.csv'}, start_deg: [0, 0, 0, 0, 0, 0, 0]}}"
+    (tmp_path / "programs.yaml").write_text(f"kind: programs\nprograms:\n{entry}\n")
+    study = load_study("config/gallery.yaml")
+    own = study.entry("lbr_iiwa_14").model_copy(update={"programs": str(tmp_path / "programs.yaml")})
+    study = study.model_copy(update={"robots": {"lbr_iiwa_14": own}})
+    program = compute_programs(study, "lbr_iiwa_14").summary.programs[0]
+    assert (program.outcome, program.motions) == ("pass", 2)

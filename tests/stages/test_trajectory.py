@@ -17,7 +17,7 @@ from er3a.errors import InputError
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import characteristic_length, conditioning
-from er3a.pipeline.messages.trajectory import FIGURES, advice, path_text
+from er3a.pipeline.messages.trajectory import FIGURES, advice, cause_text, path_text
 from er3a.pipeline.results import (
     AbsentResults,
     NotComputed,
@@ -47,8 +47,10 @@ from er3a.pipeline.teach.panel import write_teach_page
 from er3a.pipeline.viewing.index import write_index
 from er3a.planning.avoidance.strategies import STRATEGIES
 from er3a.planning.intervals import AboveLimit
+from testing.on_demand import OnDemand
+from testing.readme import README, answer
 
-ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
+ROBOTS = ("er3a_c60", pytest.param("er3a_c60_article", marks=pytest.mark.long), "er3_600")
 
 
 @pytest.fixture(scope="module")
@@ -58,22 +60,23 @@ def study() -> Study:
 
 @pytest.fixture(scope="module")
 def folders(study, tmp_path_factory) -> dict[str, Path]:
-    found = {}
-    for name in ROBOTS:
-        found[name] = tmp_path_factory.mktemp(name)
-        run.compute("trajectory", study, name, found[name])
-    return found
+    def computed(name: str) -> Path:
+        folder = tmp_path_factory.mktemp(name)
+        run.compute("trajectory", study, name, folder)
+        return folder
+
+    return OnDemand(computed)
 
 
 @pytest.fixture(scope="module")
 def stored(folders) -> dict[str, Stored[TrajectoryResults]]:
     """What is read of what was written."""
-    return {name: read_results(folder, RESULTS) for name, folder in folders.items()}
+    return OnDemand(lambda name: read_results(folders[name], RESULTS))
 
 
 @pytest.fixture(scope="module")
 def results(stored) -> dict[str, TrajectoryResults]:
-    return {name: found.results for name, found in stored.items()}
+    return OnDemand(lambda name: stored[name].results)
 
 
 def by_name(results: TrajectoryResults) -> dict[str, PathSummary]:
@@ -162,6 +165,7 @@ def test_velocities_in_the_table_are_those_of_the_angles(results, name):
     np.testing.assert_allclose(slope[2:-2], rows.q_deg_s[2:-2], atol=0.02)
 
 
+@pytest.mark.long
 def test_the_articles_line_starts_at_a_singular_pose_and_meets_a_second(results):
     path = by_name(results["er3a_c60_article"])["article_line"]
     assert path.verdict == "singular"
@@ -191,6 +195,8 @@ def test_strategies_are_listed_with_their_costs(results, name):
         assert 0 < stop.motion.done_ratio < 1
     assert paths["line_out"].strategy is None
     assert "out of reach from t =" in advice(paths["line_out"])
+    met = paths["line_collides"].collisions[0]
+    assert f"Nothing overlaps up to t = {met.t0_s:.4g} s ({met.s0_m * 1000:.1f} mm)" in advice(paths["line_collides"])
     assert paths["line_limits"].strategy == "planned" or "limit" in advice(paths["line_limits"])
     mended = paths["line_wrist"]
     assert mended.chosen.motion.max_joint_speed_ratio <= mended.max_joint_speed_ratio * (1 + 1e-6)
@@ -277,6 +283,7 @@ def test_tiles_beside_each_other_tell_of_one_path_and_of_different_counts(result
     assert FIGURES["colliding"] == "Paths with a collision, whatever else is wrong"
 
 
+@pytest.mark.long
 def test_articles_moves_are_those_of_robotics_toolbox(study, results):
     """jtraj and ctraj at the article's 50 samples of 5 s, ctraj on our law of time."""
     rtb, sm = pytest.importorskip("roboticstoolbox"), pytest.importorskip("spatialmath")
@@ -303,28 +310,35 @@ def test_equal_inputs_give_equal_bytes(study, folders, tmp_path):
 
 
 def test_page_and_recording_are_written(study, stored, tmp_path):
-    found = stored["er3a_c60_article"]
+    found = stored["er3_600"]
     report(study, found, tmp_path / "trajectory.html")
     record(study, found, tmp_path / "trajectory.rrd")
     html = (tmp_path / "trajectory.html").read_text()
-    assert "article_line" in html
+    assert "line_wrist" in html
+    for path in found.results.summary.paths:
+        assert (f'"name": "{path.name}, repaired"' in html) == (path.chosen is not None)
     assert html.count('<img src="data:image/svg+xml') == len(found.results.summary.paths) + 1
     assert (tmp_path / "trajectory.rrd").stat().st_size > 100_000
 
 
 @pytest.mark.parametrize(
-    ("status", "told"), [("fail", "Validation contradicts"), ("caution", "Validation leaves part"), ("pass", None)]
+    ("status", "told"),
+    [
+        ("fail", "Never use this table"),
+        pytest.param("caution", "Validation leaves part", marks=pytest.mark.long),
+        pytest.param("pass", None, marks=pytest.mark.long),
+    ],
 )
 def test_the_page_says_first_what_validation_came_to(study, stored, tmp_path, status, told):
     report(study, replace(stored["er3_600"], rests_on={"validation": status}), tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     body = page[page.index("<body") :]
-    assert ("Validation" in body[: body.index('class="verdict')]) == bool(told)
+    assert ('class="caveat ' in body[: body.index('class="verdict')]) == bool(told)
     if told:
         assert body.index(told) < body.index('class="verdict') < body.index("safe")
 
 
-def test_cells_of_the_index_say_first_what_validation_came_to(study, folders, tmp_path):
+def test_cells_of_the_index_say_first_what_validation_came_to(study, folders, stored, tmp_path):
     one = study.model_copy(update={"robots": {"er3_600": study.robots["er3_600"]}})
     for stage in (each for each in one.stages("er3_600") if each != "trajectory"):
         absent = AbsentResults(Summary(Verdict("not_computed", NotComputed("made up")), ()))
@@ -333,16 +347,22 @@ def test_cells_of_the_index_say_first_what_validation_came_to(study, folders, tm
     write_index(one, tmp_path / "results", tmp_path)
     index = (tmp_path / "index.html").read_text(encoding="utf-8")
     cells = index.split('<ul class="cells">')[1].split("\n<li>\n")[1:]
-    told = {re.search('href="er3_600/(.+?).html"', cell)[1]: "This table was not validated" in cell for cell in cells}
+    told = {
+        re.search('href="er3_600/(.+?).html"', cell)[1]: "This D-H table was not validated" in cell for cell in cells
+    }
     assert told == {stage: stage != "validation" for stage in one.stages("er3_600")}
     cell = next(cell for cell in cells if "er3_600/trajectory.html" in cell)
-    assert cell.index("This table was not validated") < cell.index("safe")
+    answer = cell[cell.index("</a></p>") :]
+    assert answer.index("This D-H table was not validated") < answer.index("safe")
+    meant = len(stored["er3_600"].results.summary.verdict.finding.demonstrations)
+    assert meant
+    assert f'class="badge pass as_meant">pass; {meant} fail as expected<' in answer
     compared = (tmp_path / "compare.html").read_text(encoding="utf-8")
-    assert compared.index("This table was not validated") < compared.index('id="borders"')
+    assert compared.index("This D-H table was not validated") < compared.index('id="borders"')
 
 
 @pytest.mark.parametrize(
-    ("status", "told"), [("fail", "Validation contradicts this table"), ("pass", None), (None, "was not validated")]
+    ("status", "told"), [("fail", "Never use this table"), ("pass", None), (None, "was not validated")]
 )
 def test_the_teach_panel_says_first_what_validation_came_to(study, tmp_path, status, told):
     if status:
@@ -353,7 +373,8 @@ def test_the_teach_panel_says_first_what_validation_came_to(study, tmp_path, sta
     write_teach_page(study, "er3_600", tmp_path / "results", tmp_path / "teach.html")
     page = (tmp_path / "teach.html").read_text(encoding="utf-8")
     body = page[page.index("<body") :]
-    assert ('class="caveat"' in body) == bool(told)
+    assert ('class="caveat ' in body) == bool(told)
+    assert ('class="caveat fail"' in body) == (status == "fail")
     if told:
         assert body.index(told) < body.index('class="panel"')
 
@@ -449,3 +470,63 @@ def test_path_that_goes_on_from_one_that_does_not_end_is_refused(study, tmp_path
     checks = compute(with_paths(study, tmp_path, LINE, after), "er3a_c60").checks
     last, first = (checks.q_deg[checks.path == name] for name in ("line", "next"))
     np.testing.assert_allclose(last[-1], first[0], atol=1e-9)
+
+
+def test_what_repairs_a_path_is_written_as_a_table(study, results):
+    results, robot = results["er3_600"], study.robot("er3_600")
+    rows = results.programs
+    tables = {path: text for path, file, text in zip(rows.path, rows.file, rows.text) if file.endswith("_repaired.csv")}
+    repaired = {path.name: path.strategy for path in results.summary.paths if path.chosen}
+    assert repaired
+    assert set(tables) == set(repaired)
+    for name, strategy in repaired.items():
+        motion = results.avoidance.take((results.avoidance.path == name) & (results.avoidance.strategy == strategy))
+        lines = [line for line in tables[name].splitlines() if not line.startswith("#")]
+        values = np.array([line.split(",") for line in lines[1:]], float)
+        np.testing.assert_allclose(values[:, 0], motion.t_s, atol=1e-6)
+        np.testing.assert_allclose(values[:, 1:7], motion.q_deg, atol=1e-6)
+        np.testing.assert_allclose(values[:, 7:10], motion.xyz_mm, atol=1e-5)  # this arm's base is the base frame
+    np.testing.assert_array_equal(robot.base, np.eye(4))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["line_wrist_near", "line_shoulder"])
+def test_the_slower_pace_that_is_advised_keeps_the_limits(study, results, tmp_path, name):
+    path = by_name(results["er3a_c60"])[name]
+    needed = float(re.search(r"duration_s ([\d.]+) in the path file", advice(path))[1])
+    (entry,) = own_paths(name)
+    entry.pop("expect")
+    slower, hardly = (
+        by_name(compute(with_paths(study, tmp_path, entry | {"duration_s": duration}), "er3a_c60"))[name]
+        for duration in (needed, 0.97 * needed)
+    )
+    assert path.too_fast
+    assert not slower.too_fast
+    assert hardly.too_fast
+
+
+def test_the_shortest_time_of_a_path_that_is_too_fast_is_told_with_what_it_means(results):
+    path = by_name(results["er3a_c60"])["line_shoulder"]
+    assert path.fastest_s < path.duration_s
+    assert (
+        f"only its pace is too fast: slower there and faster elsewhere, it can be done in {path.fastest_s:.2f} s"
+        in (path_text(path))
+    )
+    assert "it takes 9.00 s at least" in path_text(replace(path, fastest_s=9.0))
+
+
+def test_what_is_undecided_beside_another_fault_is_no_open_question(results):
+    path = by_name(results["er3a_c60"])["line_wrist_near"]
+    part = path.undecided[0]
+    assert path.verdict != "undecided"
+    assert cause_text(path, part).endswith("singular pose is met; the path is not safe either way")
+    assert "either way" not in cause_text(replace(path, verdict="undecided"), part)
+    assert "either way" not in cause_text(path, path.too_fast[0])
+
+
+def test_the_readme_tells_of_the_path_that_it_shows_as_the_stage_does(results):
+    path = by_name(results["er3a_c60"])["line_collides"]
+    met = {pair for part in path.collisions for pair in part.cause.pairs}
+    assert {(pair.link, pair.solid) for pair in met} == {(4, "post"), (6, "post")}
+    assert f"links 4 and 6 meet a post from {path.collisions[0].t0_s:.3f} s on" in answer("Is a path safe")
+    assert f"{path.collisions[0].t0_s:.3f} s" in (README.parent / "README.zh-CN.md").read_text(encoding="utf-8")

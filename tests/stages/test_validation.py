@@ -62,10 +62,12 @@ from er3a.references.subjects import (
     Reach,
     SegmentInclination,
 )
+from testing.on_demand import OnDemand
+from testing.readme import answer
 from tests.robots.test_conventions import random_arm
 
 MISSING_OFFSET = WrongOffset(2, 0.0, -90.0)
-NAMES = ("er3a_c60", "er3a_c60_article", "er3_600")
+NAMES = (pytest.param("er3a_c60", marks=pytest.mark.long), "er3a_c60_article", "er3_600")
 WRITTEN = {f"{name}.parquet" for name in table_types(RESULTS)} | {"summary.json", "SHA256SUMS"}
 
 
@@ -77,19 +79,22 @@ def study() -> Study:
 @pytest.fixture(scope="module")
 def folders(study, tmp_path_factory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("results")
-    for name in NAMES:
+
+    def computed(name: str) -> Path:
         run.compute("validation", study, name, folder / name)
-    return {name: folder / name for name in NAMES}
+        return folder / name
+
+    return OnDemand(computed)
 
 
 @pytest.fixture(scope="module")
 def stored(folders) -> dict[str, Stored[ValidationResults]]:
-    return {name: read_results(folder, RESULTS) for name, folder in folders.items()}
+    return OnDemand(lambda name: read_results(folders[name], RESULTS))
 
 
 @pytest.fixture(scope="module")
 def summaries(stored) -> dict[str, ValidationSummary]:
-    return {name: each.results.summary for name, each in stored.items()}
+    return OnDemand(lambda name: stored[name].results.summary)
 
 
 def edited_robot(study: Study, folder: Path, edit) -> Study:
@@ -123,14 +128,18 @@ def page_of(study: Study, stored: Stored[ValidationResults], folder: Path) -> st
     return " ".join((folder / "page.html").read_text(encoding="utf-8").split())
 
 
-def test_verdicts_on_the_three_robots(summaries):
-    assert {name: summary.verdict.status for name, summary in summaries.items()} == {
-        "er3a_c60": "caution",
-        "er3a_c60_article": "fail",
-        "er3_600": "caution",
-    }
-    assert isinstance(summaries["er3a_c60"].verdict.finding, LeftOpen)
-    assert isinstance(summaries["er3a_c60_article"].verdict.finding, AnotherArm)
+@pytest.mark.parametrize(
+    ("name", "status", "kind"),
+    [
+        pytest.param("er3a_c60", "caution", LeftOpen, marks=pytest.mark.long),
+        ("er3a_c60_article", "fail", AnotherArm),
+        ("er3_600", "caution", LeftOpen),
+    ],
+)
+def test_verdicts_on_the_three_robots(summaries, name, status, kind):
+    verdict = summaries[name].verdict
+    assert verdict.status == status
+    assert isinstance(verdict.finding, kind)
 
 
 def test_a_table_that_meets_all_but_that_nothing_settles_is_a_caution(summaries):
@@ -183,21 +192,22 @@ def test_the_article_table_is_told_apart_with_numbers(summaries):
     assert real.another_arm
 
 
+@pytest.mark.long
 def test_what_the_sources_do_not_say_is_no_reference(stored):
     silent = with_status(stored["er3a_c60"].results, "no_reference")
     assert {WholeGroup("speeds"), WholeGroup("envelope")} <= silent
     assert not silent & with_status(stored["er3a_c60"].results, "pass")
 
 
-def test_every_check_has_the_agreed_keys(folders):
+@pytest.mark.parametrize("name", NAMES)
+def test_every_check_has_the_agreed_keys(folders, name):
     keys = {"subject", "status", "measured", "expected", "difference", "tolerance", "unit", "source", "grade"}
-    for folder in folders.values():
-        for check in json.loads((folder / "summary.json").read_text())["checks"]:
-            assert keys | {"reference_set", "group"} <= set(check)
-            assert check["subject"]["code"]
-            if check["status"] in ("pass", "fail", "conflict"):
-                assert check["difference"] == pytest.approx(check["measured"] - check["expected"])
-                assert (abs(check["difference"]) <= check["tolerance"] + 1e-9) == (check["status"] == "pass")
+    for check in json.loads((folders[name] / "summary.json").read_text())["checks"]:
+        assert keys | {"reference_set", "group"} <= set(check)
+        assert check["subject"]["code"]
+        if check["status"] in ("pass", "fail", "conflict"):
+            assert check["difference"] == pytest.approx(check["measured"] - check["expected"])
+            assert (abs(check["difference"]) <= check["tolerance"] + 1e-9) == (check["status"] == "pass")
 
 
 @pytest.mark.long
@@ -342,7 +352,7 @@ def test_the_page_tells_the_articles_reader(study, stored, tmp_path):
         "the upper arm stands 90° from the vertical where 0° is stated",
         "Most likely fault: joint 2: offset −90 deg missing; residual falls from 1433 mm to 0.0 mm.",
         "No one or two faults explain the data",
-        "This is another arm, or more than two numbers are wrong, or one is in a way that was not tried",
+        "This is another arm, or more than two numbers are wrong, or one is wrong in a manner that was not tried",
         "Against er3a_c60: another arm",
         "What has no reference",
     ):
@@ -366,7 +376,7 @@ def test_the_article_is_another_robot_and_contradicts_itself_in_two_statements(s
     text = say(summaries["er3a_c60_article"].verdict.finding)
     first, second = text.index("This is not the robot that these describe"), text.index("contradicts its own text")
     assert "361.1 mm" in text[first:second]
-    assert "-90 deg" not in text[first:second]
+    assert "−90 deg" not in text[first:second]
     assert "it says nothing about any real robot" in text[second:]
     assert "Most likely fault" not in text
     page = page_of(study, stored["er3a_c60_article"], tmp_path)
@@ -428,6 +438,7 @@ def test_the_table_stands_beside_the_one_that_documents_describe_or_do_not_tell_
     assert allowed.table.a == tuple(load_robot("er3_600").a)
 
 
+@pytest.mark.long
 def test_a_limit_that_was_judged_is_not_shown_as_without_reference(study, stored, tmp_path):
     """Joint 6 of the er3a_c60: one source gives no limit, another one does."""
     limit = JointLimit(6, "upper")
@@ -435,10 +446,10 @@ def test_a_limit_that_was_judged_is_not_shown_as_without_reference(study, stored
     assert [check.status for check in checks] == ["pass"]
 
 
-def test_references_of_every_robot_load():
-    for name in NAMES:
-        for reference in load_robot(name).references:
-            assert load_references(reference).checkable
+@pytest.mark.parametrize("name", NAMES)
+def test_references_of_every_robot_load(name):
+    for reference in load_robot(name).references:
+        assert load_references(reference).checkable
 
 
 def test_diagnosis_names_the_articles_missing_offset_and_no_fault_of_another_arm(summaries):
@@ -450,10 +461,13 @@ def test_diagnosis_names_the_articles_missing_offset_and_no_fault_of_another_arm
     assert isinstance(real.conclusion, NoFewFaultsExplain)
     (claims,) = summaries["er3a_c60_article"].verdict.finding.claims
     assert (claims.claims, claims.failed) == (22, 4)
-    for name in ("er3a_c60", "er3_600"):
-        (found,) = summaries[name].diagnoses
-        assert isinstance(found.conclusion, NothingToExplain)
-        assert found.hypotheses == ()
+
+
+@pytest.mark.parametrize("name", [pytest.param("er3a_c60", marks=pytest.mark.long), "er3_600"])
+def test_diagnosis_of_the_right_tables_has_nothing_to_explain(summaries, name):
+    (found,) = summaries[name].diagnoses
+    assert isinstance(found.conclusion, NothingToExplain)
+    assert found.hypotheses == ()
 
 
 def test_diagnosis_in_the_summary_is_that_of_the_public_function(summaries):
@@ -470,12 +484,13 @@ def test_a_named_fault_is_in_the_verdict_and_on_the_page(study, tmp_path):
     found = stored.results.summary.verdict.finding
     assert isinstance(found, Contradicted)
     assert found.diagnosis.faults == (MISSING_OFFSET,)
-    assert "Most likely fault: joint 2: offset -90 deg missing" in say(found)
+    assert "Most likely fault: joint 2: offset −90 deg missing" in say(found)
     page = page_of(wrong, stored, tmp_path)
     assert "the named fault corrected: it meets the stated axes" in page
     assert page.index("<h2>Diagnosis") < page.index("<h2>Checks")
 
 
+@pytest.mark.long
 def test_positions_ask_for_no_correction_of_the_right_tables(stored, summaries):
     for name, level in (("er3a_c60", "lengths_and_offsets"), ("er3_600", "lengths")):
         (found,) = summaries[name].calibrations
@@ -543,3 +558,17 @@ def test_axes_that_a_set_lacks_are_no_reference(stored):
     silent = with_status(stored["er3a_c60_article"].results, "no_reference")
     assert {AxisPosition(2, None), AxisPosition(6, None)} <= silent
     assert AxisPosition(1, None) not in silent
+
+
+def test_the_readme_tells_which_table_can_be_trusted_as_validation_does(summaries):
+    told = answer("Can the table be trusted")
+    article, real = (
+        {figure.name: figure for figure in summaries[name].figures} for name in ("er3a_c60_article", "er3a_c60")
+    )
+    checks = article["independent_checks"]
+    assert f"{checks.of - checks.value} of {checks.of} independent checks fail" in told
+    assert f"its flange is {article['zero_pose_flange_error'].value:.0f} mm off" in told
+    assert real["independent_checks"].value == real["independent_checks"].of
+    moving = [each for each in summaries["er3a_c60"].evidence.entries if each.moves_tool and each.status == "open"]
+    assert {each.entry for each in moving} == {"alpha6", "offset6"}
+    assert "nothing contradicts it, alpha 6 and offset 6 stay open" in told

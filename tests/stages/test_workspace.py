@@ -151,7 +151,7 @@ def test_full_turn_of_joint_1_gives_a_symmetric_cloud():
     ("locked", "code"),
     [
         ({1: 0, 2: 0, 3: 0, 4: 0, 5: 0, 6: 90}, "workspace.flat"),
-        pytest.param({1: 10, 4: 0, 6: 0}, "workspace.flat", marks=pytest.mark.long),
+        pytest.param({1: 10, 4: 0, 6: 0}, "workspace.on_surface", marks=pytest.mark.long),
         pytest.param({3: 20}, None, marks=pytest.mark.long),
     ],
 )
@@ -273,3 +273,10 @@ def test_summary_is_plain_finite_json(tmp_path):
     summary = json.loads(text, parse_constant=lambda word: pytest.fail(f"{word} in summary.json"))
     assert {"volume_m3", "hull", "samples", "voids", "verdict", "figures", "provenance"} <= set(summary)
     assert 4 <= len(summary["figures"]) <= 8
+
+
+@pytest.mark.long
+def test_an_arm_of_seven_joints_has_bounds_of_its_volume():
+    summary = compute(load_study("config/gallery.yaml"), "lbr_iiwa_14").summary
+    assert summary.proof.width < 0.1
+    assert summary.proof.points_in_empty_cells == 0

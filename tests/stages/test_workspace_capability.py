@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 import yaml
 
+from er3a.collision.bodies import Bodies
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.files.yaml_file import load
+from er3a.kinematics.batch import inverse_batch
+from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
 from er3a.kinematics.wrist_partitioned import NoWristCentre
 from er3a.pipeline.stages.workspace.capability_texts import capability_context
@@ -23,6 +26,8 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import Picture
 from er3a.robots.robot import Robot
 from er3a.workspace.clear_poses import try_poses
+from er3a.workspace.directions import cone_directions, poses, roll_of, tool_rotations
+from er3a.workspace.placement import narrowed
 from er3a.workspace.section_arm import section_frame
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -72,6 +77,26 @@ def test_summary_and_tables_belong_together(done):
     for i in range(len(low)):
         for j in range(i):
             assert ((high[i] <= low[j] + 1e-9) | (high[j] <= low[i] + 1e-9)).any()
+
+
+def test_the_clearance_of_a_place_is_that_of_the_nearest_arm_on_its_lattice(done):
+    robot, placed = load_robot("er3_600"), done.placement
+    task = placed.task
+    tight, spacing = narrowed(robot, np.radians(task.limit_margin_deg)), np.array(placed.spacing_m)
+    rotations = tool_rotations(
+        cone_directions(np.array(task.tool_direction), np.radians(task.cone_deg)), roll_of(robot, 1)
+    )
+    one = [place for place in placed.places if place.branch is not None]
+    assert one
+    for place in one:
+        count = np.ceil(np.array(place.size_m) / spacing - 1e-6).astype(int) + 1
+        points = (
+            place.centre_m
+            + (np.stack(np.meshgrid(*map(np.arange, count)), axis=-1).reshape(-1, 3) - (count - 1) / 2) * spacing
+        )
+        found = inverse_batch(tight, poses(points[:, None], rotations[:, 0]).reshape(-1, 4, 4))
+        q = found.q[:, branch_labels(robot).index(place.branch)]
+        assert 1000 * Bodies(robot, None).least(q)[0].min() == pytest.approx(place.clearance_mm, abs=1e-6)
 
 
 def test_clear_poses_are_some_of_those_reached_and_fewer_among_obstacles(done):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from dataclasses import replace
 
@@ -102,7 +103,25 @@ def test_a_border_that_moved_is_told_by_how_far(small_study, tmp_path):
     flange = (border.point == "tool_point") & (border.view == "section")
     replace(border, z_m=border.z_m + 0.005 * flange).write(new / "border.parquet")
     write_checksums(new)
-    found = {change.what: change.difference for change in changes(*folders)}
-    assert set(found) == {"border.parquet", "border of the tool point, section"}
-    moved = float(found["border of the tool point, section"].split(" mm")[0])
-    assert 4.9 < moved <= 5.0
+    found = {change.what: change for change in changes(*folders)}
+    assert list(found) == ["border of the tool point, section", "border.parquet"]
+    moved = found["border of the tool point, section"]
+    assert 4.9 < float(moved.difference.split(" mm")[0]) <= 5.0
+    radius, height = (float(value.replace("−", "-")) for value in re.findall("[−0-9.]+(?= mm)", moved.note))
+    up, away = 1000 * border.z_m[flange] - height, 1000 * border.rho_m[flange] - radius
+    assert min(np.hypot(away, up).min(), np.hypot(away, up + 5).min()) < 1.0  # on one of the two borders
+
+
+@pytest.mark.long
+def test_an_entry_of_the_table_that_changed_is_told(small_study, tmp_path):
+    folders = tmp_path / "old", tmp_path / "new"
+    for folder in folders:
+        shutil.copytree(small_study.folder / "results/er3_600/validation", folder / "er3_600/validation")
+    path = folders[1] / "er3_600/validation/summary.json"
+    summary = json.loads(path.read_text())
+    (entry,) = [each for each in summary["evidence"]["entries"] if each["entry"] == "lower3"]
+    entry["value"] -= 1.5
+    path.write_text(json.dumps(summary))
+    write_checksums(path.parent)
+    (change,) = changes(*folders)
+    assert (change.what, change.difference) == ("lower3", "−1.50000 deg")

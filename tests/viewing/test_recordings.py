@@ -16,6 +16,7 @@ from rerun.chunk import RrdReader
 from er3a.pipeline.checksums import check_checksum
 from er3a.pipeline.study import STAGES
 from er3a.pipeline.viewing import preview
+from er3a.pipeline.viewing.arm import LABEL
 from testing.small_study import stages_of
 from tests.conftest import ROBOT, ROBOTS, ROOT
 from tests.viewing.pictures import joints_seen
@@ -115,3 +116,15 @@ def test_without_a_driver_the_preview_is_empty_and_one_line_says_why(small_study
     told = preview.draw_preview(small_study.folder / f"reports/{ROBOT}/inverse.rrd", tmp_path / "inverse.webp")
     assert re.fullmatch("the Rerun viewer .+", told)
     assert (tmp_path / "inverse.webp").read_bytes() == b""
+
+
+def luminance(colour: tuple[int, int, int]) -> float:
+    """Relative luminance of an sRGB colour, as WCAG 2 defines it."""
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in (value / 255 for value in colour)]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+@pytest.mark.parametrize("ground", [(13, 16, 17), (255, 255, 255)])  # of the viewer's two themes
+def test_labels_are_legible_on_dark_and_light_ground(ground):
+    darker, lighter = sorted((luminance(LABEL), luminance(ground)))
+    assert (lighter + 0.05) / (darker + 0.05) > 4.2  # no colour has more than 4.4 on both

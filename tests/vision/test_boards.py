@@ -63,7 +63,9 @@ def board_places(random: np.random.Generator, count: int) -> list[np.ndarray]:
     ]
 
 
-@pytest.mark.parametrize("board", [CHARUCO, CHESS, TAGS], ids=lambda board: board.pattern)
+@pytest.mark.parametrize(
+    "board", [CHARUCO, pytest.param(CHESS, marks=pytest.mark.long), TAGS], ids=lambda board: board.pattern
+)
 def test_rendered_boards_are_found_where_they_are(board):
     random = np.random.default_rng(1)
     places = board_places(random, 5)

@@ -166,6 +166,7 @@ def test_an_arm_without_limits_serves_what_lies_in_its_shell(height, answer):
     assert prove_place(robot, task, centre, False, MIXED, roll_of(robot, 1), most_poses=400_000)[0] == answer
 
 
+@pytest.mark.long
 def test_a_tool_aside_is_proven_by_rolls(random):
     robot = shell_arm(*NARROW, tool=TOOL_ASIDE)
     roll = roll_of(robot, 6)

@@ -177,6 +177,7 @@ def test_two_links_reach_a_shell(tool, inner):
         assert enclosed[0].lower < 4 / 3 * np.pi * inner**3 < enclosed[0].upper
 
 
+@pytest.mark.long
 def test_a_limited_joint_1_leaves_a_wedge():
     full = two_links(0.1)
     half = full.replace(lower=np.array([-1.0, *full.lower[1:]]), upper=np.array([1.0, *full.upper[1:]]))

@@ -39,7 +39,7 @@ def arm_class(links: Reals, sliding: Flags | None = None) -> ArmClass:
 
     - ``spherical_wrist``: axes 2 and 3 parallel to 1e-9 rad, axes 4, 5, 6 meet to 1e-9 m;
     - ``three_parallel``: axes 2, 3, 4 parallel, 5 and 6 meet; ``general_six``: any other six revolute joints;
-    - ``six_one_prismatic``: six joints, one of them (or two neighbours) prismatic;
+    - ``six_one_prismatic``: six joints, one of them prismatic;
     - ``arm_angle``: seven revolute joints, the first three axes meet, and the last three; ``redundant``: others with
       more than six joints;
     - ``scara``: four joints with one direction, one of them prismatic; ``free_roll``: five joints, the turn about the

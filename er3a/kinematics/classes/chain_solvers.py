@@ -191,7 +191,7 @@ class ParallelAxes(_Fixed):
 
 @dataclass(frozen=True, eq=False)
 class General(_Fixed):
-    """Any six joints of which at most one slides, or two neighbours do."""
+    """Any six joints of which at most one slides."""
 
     arm: SixRevolute
     code: ArmClassCode

@@ -6,7 +6,8 @@ null vector of its matrix gives two more, the remaining three follow one by one,
 
 Nothing is claimed beyond what was measured on the way: the polynomial's noise is known from terms that would vanish, a
 place where it sinks into the noise is searched like a zero, and if the noise is large, a zero yields no solution, or a
-place is dark, further readings of the loop are taken, whose solutions are united.
+place is dark, further readings of the loop are taken, whose solutions are united. What stays in doubt is solved at
+poses beside it, too, and the solutions there are followed back.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from er3a.kinematics.classes.hidden_joint import Reading, equations_of_pose, readings_of, sampled_determinant
 from er3a.kinematics.classes.links import inverse_rigid, invert_rigid, multiply_rigid, poses_of, size_of
@@ -32,6 +34,8 @@ LOUD = 1e-7
 FAMILY_PEAK = 1e-25
 MOST_READINGS = 4
 TRIALS = 24
+BESIDE, NOTHING_NEW = 24, 6  # poses beside one in doubt, and after how many that bring nothing new it is left
+ASIDE = (1e-3, 1e-2, 3e-2)  # how far beside, in turn: rad and parts of the size
 
 CERTAIN, UNCERTAIN, CONTINUUM = 0, 1, 2
 
@@ -66,7 +70,7 @@ class RowsFound:
 def prepared(links: Reals, sliding: Flags | None = None, seed: int = 7) -> SixRevolute:
     """The solver for a chain with constant links (7, 4, 4); readings are tried out on poses of random joints.
 
-    ``sliding`` (6,) tells prismatic joints; one of them, or two neighbours, are within what the method can do.
+    ``sliding`` (6,) tells prismatic joints; one is within what the method can do, of two no reading was left so far.
     """
     sliding = np.zeros(6, dtype=bool) if sliding is None else np.asarray(sliding, dtype=bool)
     size = size_of(links)
@@ -109,17 +113,46 @@ def solve_six_revolute(arm: SixRevolute, T: Reals) -> RowsFound:
     T = np.ascontiguousarray(T, dtype=float)
     q, count = np.full((len(T), SLOTS, 6), np.nan), np.zeros(len(T), dtype=np.int64)
     certainty = np.full(len(T), CONTINUUM)
-    told = np.zeros(len(T), dtype=np.int64)
-    memory, left = new_memory(arm.sliding), np.arange(len(T))
+    memory = new_memory(arm.sliding)
+    _by_readings(arm, T, memory, q, count, certainty)
+    _from_beside(arm, T, memory, q, count, certainty)
+    _in_order(q, count)
+    q[:, :, arm.sliding] *= arm.size
+    return RowsFound(q, count, certainty)
+
+
+def _by_readings(
+    arm: SixRevolute, T: Reals, memory: LoopMemory, q: Reals, count: Integers, certainty: Integers
+) -> None:
+    """Fill rows (N, 16, 6), their number (N,) and certainty (N,), which starts as CONTINUUM."""
+    told, left = np.zeros(len(T), dtype=np.int64), np.arange(len(T))
     for reading in arm.readings:
         verdicts = np.empty(len(left), dtype=np.int64)
         rows_by_reading(reading, arm.links, arm.size, T, left, memory, q, count, verdicts)
         certainty[left] = np.minimum(certainty[left], verdicts)
         told[left] += verdicts != CONTINUUM
         left = left[(verdicts != CERTAIN) & (told[left] < MOST_READINGS)]
-    _in_order(q, count)
-    q[:, :, arm.sliding] *= arm.size
-    return RowsFound(q, count, certainty)
+
+
+def _from_beside(
+    arm: SixRevolute, T: Reals, memory: LoopMemory, q: Reals, count: Integers, certainty: Integers
+) -> None:
+    """Add to poses in doubt what the solutions of poses beside them lead to."""
+    random, in_doubt = np.random.default_rng(3), np.flatnonzero(certainty == UNCERTAIN)
+    idle = np.zeros(len(in_doubt), dtype=np.int64)
+    for k in range(BESIDE):
+        in_doubt, idle = in_doubt[idle < NOTHING_NEW], idle[idle < NOTHING_NEW]
+        if not in_doubt.size:
+            return
+        way = random.normal(size=6) * ASIDE[k % len(ASIDE)]
+        beside = np.eye(4)
+        beside[:3, :3] = scipy.spatial.transform.Rotation.from_rotvec(way[:3]).as_matrix()
+        beside[:3, 3] = way[3:] * arm.size
+        near = np.full((len(in_doubt), SLOTS, 6), np.nan), np.zeros(len(in_doubt), dtype=np.int64)
+        _by_readings(arm, T[in_doubt] @ beside, memory, *near, np.full(len(in_doubt), CONTINUUM))
+        before = count[in_doubt]
+        followed_back(arm.links, arm.size, T, in_doubt, memory, *near, q, count)
+        idle = np.where(count[in_doubt] > before, 0, idle + 1)
 
 
 @kernel
@@ -146,6 +179,33 @@ def rows_by_reading(
         multiply_rigid(rest, links[0], pose_link)
         multiply_rigid(links[6], pose_link, rest)
         verdicts[i], count[n] = _by_reading(reading, links, pose, rest, m, q[n], count[n])
+
+
+@kernel
+def followed_back(
+    links: Reals,
+    size: float,
+    T: Reals,
+    numbers: Integers,
+    m: LoopMemory,
+    near: Reals,
+    near_count: Integers,
+    q: Reals,
+    count: Integers,
+) -> None:
+    """Add to ``q`` (N, 16, 6) and ``count`` (N,) what solutions (k, 16, 6) of poses beside those with these ``numbers``
+    (k,) lead to."""
+    pose = np.empty((4, 4))
+    for i in range(numbers.shape[0]):
+        n = numbers[i]
+        pose[:, :] = T[n]
+        for j in range(3):
+            pose[j, 3] /= size
+        for r in range(near_count[i]):
+            m.candidate[:] = near[i, r]
+            residual, pivot = newton(links, m.sliding, pose, m.candidate, 20, m.frames, m.J, m.dq, m.columns)
+            if residual < SOLVES:
+                count[n] = _add(links, pose, m, m.candidate, pivot, q[n], count[n])
 
 
 @kernel

@@ -14,6 +14,7 @@ from er3a.errors import Er3aError, InputError
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.commands.options import PROGRAMS, AsJson, FailOn, app, print_json, print_note
 from er3a.robots.robot import Robot
+from er3a.robots.shown import meant
 
 if TYPE_CHECKING:
     from er3a.pipeline.program_reports import CheckedFile
@@ -39,7 +40,7 @@ def check_program(
     files: Annotated[list[Path], typer.Argument(help="programs: .src, .script, .pgm, .XPL, or .csv of joints")],
     *,
     robot: RobotOption,
-    start: Annotated[str | None, typer.Option(help="joint angles before the program, deg: 0,-10,...")] = None,
+    start: Annotated[str | None, typer.Option(help="joint values before it, deg or mm: 0,-10,...")] = None,
     frames: Annotated[
         Path | None, typer.Option(help="a file of kind programs, whose frames TOOL_DATA[3] and the like stand for")
     ] = None,
@@ -147,7 +148,7 @@ def _checked(file: Path, robot: Robot, options: CheckOptions) -> CheckedFile:
 
 
 def _joints(text: str | None, robot: Robot) -> Reals | None:
-    """Joint angles (n,) in rad from a list in degrees."""
+    """Joint values (n,) in rad or m from a list in degrees, mm of joints that slide."""
     if text is None:
         return None
     try:
@@ -157,6 +158,6 @@ def _joints(text: str | None, robot: Robot) -> Reals | None:
     if len(found) != len(robot.lower) or not np.isfinite(found).all():
         count = len(robot.lower)
         raise Er3aError(
-            f"--start is '{text}'; expected {count} joint angles in degrees, such as {','.join('0' * count)}"
+            f"--start is '{text}'; expected {count} joint values (deg; mm of a slide), such as {','.join('0' * count)}"
         )
-    return np.radians(found)
+    return meant(robot, np.array(found))

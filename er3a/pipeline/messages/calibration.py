@@ -15,7 +15,7 @@ from er3a.calibration.outcomes import (
     NoPositions,
     NotToldApart,
 )
-from er3a.pipeline.messages.language import N_
+from er3a.pipeline.messages.language import N_, as_text
 from er3a.pipeline.messages.say import counted, joined, say, sentence, word
 
 LEVELS = {
@@ -40,11 +40,11 @@ def _(found: MovesNothing) -> str:
 def _(found: NotToldApart) -> str:
     entries = _listed(found.entries)
     if found.parallel_joints is None:
-        return sentence(found.code, "{entries} can't be told apart", entries=entries)
+        return sentence(found.code, "{entries} can't be separated", entries=entries)
     first, second = found.parallel_joints
     return sentence(
         found.code,
-        "{entries} can't be told apart: joints {first} and {second} are parallel",
+        "{entries} can't be separated: joints {first} and {second} are parallel",
         entries=entries,
         first=first,
         second=second,
@@ -75,7 +75,7 @@ def _(found: MorePositions) -> str:
     )
     if found.entries:
         needed = sentence(found.code, "{needed} for {entries}", needed=needed, entries=joined(found.entries, ", "))
-    poses = ["(" + ", ".join(f"{angle:g}" for angle in pose) + ") deg" for pose in found.examples_deg]
+    poses = ["(" + ", ".join(as_text(angle, "g") for angle in pose) + ") deg" for pose in found.examples_deg]
     return sentence(
         found.code,
         "{known}; {needed}. Spread them over all joints, for example {examples}.",

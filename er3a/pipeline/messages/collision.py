@@ -23,7 +23,7 @@ STATES: dict[PairState, str] = {
     "meets": N_("can meet"),
     "undecided": N_("undecided"),
     "allowed": N_("allowed"),
-    "watched": N_("asked for"),
+    "watched": N_("watched on request"),
 }
 
 
@@ -58,9 +58,7 @@ def why(state: PairState, least_mm: float, left_out_mm: float, boxes: int, witne
             return tr("Neither proven apart nor found to meet, in {boxes} boxes; watched.", boxes=boxes)
     if not left_out_mm:
         return tr("They meet at joints ({witness}).", witness=witness)
-    joined = tr(
-        "Overlap in every pose at their joint: a region of {radius:.0f} mm there is left out.", radius=left_out_mm
-    )
+    joined = tr("They touch by construction: within {radius:.0f} mm of their joint is left out.", radius=left_out_mm)
     if witness:
         return tr("{first} {rest}", first=joined, rest=tr("Beyond it they meet at ({witness}).", witness=witness))
     return tr("{first} {rest}", first=joined, rest=tr("Nothing beyond it was found to meet."))

@@ -7,10 +7,15 @@ from collections.abc import Sequence
 from er3a.pipeline.messages.language import tr
 
 
-def decision(table: str, failed: Sequence[str]) -> str:
-    """What to do with a robot's model, from validation's status and the titles of the stages that failed."""
+def decision(table: str, failed: Sequence[str], instead: str | None = None) -> str:
+    """What to do with a robot's model, from validation's status and the titles of the stages that failed.
+
+    ``instead`` is a model of the same arm that evidence does not contradict.
+    """
+    if table == "fail" and instead:
+        return tr("Never use this table: evidence contradicts it. Use {robot} instead.", robot=instead)
     if table == "fail":
-        return tr("Don't use this table: evidence contradicts it, and so what follows from it.")
+        return tr("Never use this table: evidence contradicts it, and so what follows from it.")
     if failed:
         return tr("Not as it stands: see {stages}.", stages=", ".join(failed))
     if table == "pass":

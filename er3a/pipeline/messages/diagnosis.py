@@ -35,7 +35,7 @@ from er3a.diagnosis.fault_kinds import (
     WrongScale,
     WrongUnit,
 )
-from er3a.pipeline.messages.language import N_
+from er3a.pipeline.messages.language import N_, as_text
 from er3a.pipeline.messages.say import counted, joined, say, sentence, word
 
 ENTRIES = {
@@ -78,8 +78,8 @@ ONE_LIMIT = {
     "upper": N_("upper limit is {given:g} deg, {fits} deg fits"),
 }
 LIMITS = {
-    "lower": N_("the lower limit of joint {joint} would tell them apart"),
-    "upper": N_("the upper limit of joint {joint} would tell them apart"),
+    "lower": N_("the lower limit of joint {joint} would distinguish them"),
+    "upper": N_("the upper limit of joint {joint} would distinguish them"),
 }
 LEAST_SHOWN, LEAST_FITTED = 0.005, 5e-5
 MOST_LISTED = 24
@@ -107,9 +107,8 @@ def fitted(found: WrongAlpha | WrongOffset | WrongLimit | WrongLength) -> str:
     )
     if abs(fits) < LEAST_FITTED:
         return "0"
-    return next(
-        (text for digits in (4, 5, 6) if (text := f"{fits:.{digits}g}") != f"{given:.{digits}g}"), f"{fits:.7g}"
-    )
+    text = next((text for d in (4, 5, 6) if (text := as_text(fits, f".{d}g")) != as_text(given, f".{d}g")), "")
+    return text or as_text(fits, ".7g")
 
 
 @say.register
@@ -219,18 +218,18 @@ def _(found: WrongScale) -> str:
 
 @say.register
 def _(found: FlangePositionDecides) -> str:
-    pose = ", ".join(f"{angle:g}" for angle in found.pose_deg)
+    pose = ", ".join(as_text(angle, "g") for angle in found.pose_deg)
     most = f"{found.most_mm:.0f} mm" if found.most_mm >= 10 else f"{found.most_mm:.1f} mm"
     if found.share == 1:
         return sentence(
             found.code,
-            "the flange's position at joints ({pose}) deg would tell all apart, by up to {most}",
+            "the flange's position at joints ({pose}) deg would distinguish all, by up to {most}",
             pose=pose,
             most=most,
         )
     return sentence(
         found.code,
-        "the flange's position at joints ({pose}) deg would tell {share:.0%} of the pairs apart, by up to {most}",
+        "the flange's position at joints ({pose}) deg would distinguish {share:.0%} of the pairs, by up to {most}",
         pose=pose,
         share=found.share,
         most=most,
@@ -302,7 +301,7 @@ def _(found: TooSmallToTell) -> str:
     return sentence(
         found.code,
         "The disagreement ({residual} {unit}) is too small for these references to tell which of {count} faults it is: "
-        "{candidates}. From about {told} {unit} on they would tell them apart, as far as they ever do.",
+        "{candidates}. From about {told} {unit} on they would distinguish them, as far as they ever do.",
         residual=shown(found.residual),
         count=len(found.candidates),
         candidates=_candidates(found.candidates),
@@ -341,7 +340,7 @@ def _(found: NoFewFaultsExplain) -> str:
         found.code,
         "No one or two faults explain the data, of {tried} that were tried: the first in rank still leaves {after} "
         "{unit} of {before} {unit}, and none leaves less than {least} {unit}. This is another arm, or more than two "
-        "numbers are wrong, or one is in a way that was not tried, or a reference is.",
+        "numbers are wrong, or one is wrong in a manner that was not tried, or a reference is.",
         tried=found.tried,
         after=shown(found.residual_after),
         before=shown(found.residual_before),
@@ -355,7 +354,7 @@ def _residual_falls(found: MostLikelyFault | MainFault) -> str:
     if found.alternatives:
         faults = sentence(
             "one_of",
-            "one of {count} that these references can't tell apart ({candidates})",
+            "one of {count} that these references can't distinguish ({candidates})",
             count=1 + len(found.alternatives),
             candidates=_candidates((found.faults, *found.alternatives)),
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from er3a.identifiability.proposals import LookAtMotion, MeasureAngle, MeasureLength, ReadLimit, TimeJoint
 from er3a.identifiability.statements import InconsistentWithOwnText, NotTheRobotDescribed
 from er3a.identifiability.verdict_parts import PartEvidence
-from er3a.pipeline.messages.language import N_
+from er3a.pipeline.messages.language import N_, as_text
 from er3a.pipeline.messages.references import motion_seen
 from er3a.pipeline.messages.say import joined, say, sentence, word
 from er3a.references.subjects import MotionOfJoint
@@ -64,7 +64,7 @@ def _(found: LookAtMotion) -> str:
         return sentence(
             found.code, "jog +J{joint} from the zero pose and see whether {motion}", joint=found.joint, motion=motion
         )
-    pose = joined([f"{angle:g}" for angle in found.pose_deg], ", ")
+    pose = joined([as_text(angle, "g") for angle in found.pose_deg], ", ")
     return sentence(
         "look_at_motion_from",
         "jog +J{joint} from ({own_pose}) deg and see whether {motion}",
@@ -96,8 +96,11 @@ def _(found: MeasureAngle) -> str:
     if found.column == "offset":
         text = N_("measure the angle {own_entry} of joint {joint} at the zero mark, to ±{half_width:g} deg")
     else:
-        text = N_("measure the angle {own_entry} between the axes at link {joint}, to ±{half_width:g} deg")
-    return sentence(found.code, text, own_entry=found.entry, joint=found.joint, half_width=found.half_width_deg)
+        text = N_(
+            "measure the angle {own_entry} between the z axes of frames {before} and {joint}, to ±{half_width:g} deg"
+        )
+    parts = {"own_entry": found.entry, "joint": found.joint, "before": found.joint - 1}
+    return sentence(found.code, text, **parts, half_width=found.half_width_deg)
 
 
 @say.register
@@ -105,8 +108,11 @@ def _(found: MeasureLength) -> str:
     if found.column == "d":
         text = N_("measure the length {own_entry} along the axis of joint {joint}, to ±{half_width:g} mm")
     else:
-        text = N_("measure the distance {own_entry} between the axes at link {joint}, to ±{half_width:g} mm")
-    return sentence(found.code, text, own_entry=found.entry, joint=found.joint, half_width=found.half_width_mm)
+        text = N_(
+            "measure the distance {own_entry} between the z axes of frames {before} and {joint}, to ±{half_width:g} mm"
+        )
+    parts = {"own_entry": found.entry, "joint": found.joint, "before": found.joint - 1}
+    return sentence(found.code, text, **parts, half_width=found.half_width_mm)
 
 
 @say.register

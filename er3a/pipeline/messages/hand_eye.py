@@ -54,7 +54,7 @@ DIRECTION_WORDS = {
 }
 STATUS_WORDS = {
     "best": N_("supported: the smallest residuals"),
-    "same_problem": N_("the same equations with the two unknowns swapped; poses alone can't tell it apart"),
+    "same_problem": N_("the same equations with the two unknowns swapped; poses alone can't distinguish them"),
     "excluded": N_("excluded by the residuals"),
     "open": N_("can't be told"),
 }
@@ -97,7 +97,7 @@ def _(found: RepeatedPose) -> str:
     return sentence(
         found.code,
         "{own_name}: the arm stands as in {first}, and the board is seen {mm:.2g} mm and {deg:.2g} deg apart; a sample "
-        "elsewhere would tell more",
+        "elsewhere would say more",
         own_name=found.sample,
         first=found.first,
         mm=found.apart_mm,
@@ -280,7 +280,7 @@ def correction_verdict(probability: float, before: float, after: float, limit: f
     if probability < limit:
         return sentence(
             "vision.corrections",
-            "The samples speak against the table: with corrections the residuals fall from {before:.3g} to {after:.3g} "
+            "The samples contradict the table: with corrections the residuals fall from {before:.3g} to {after:.3g} "
             "standard deviations, by chance with a probability of {p:.1g}",
             before=before,
             after=after,
@@ -288,7 +288,7 @@ def correction_verdict(probability: float, before: float, after: float, limit: f
         )
     return sentence(
         "vision.corrections",
-        "The samples do not speak against the table: corrections lower the residuals from {before:.3g} to {after:.3g} "
+        "The samples do not contradict the table: corrections lower the residuals from {before:.3g} to {after:.3g} "
         "standard deviations, as chance does with a probability of {p:.2g}",
         before=before,
         after=after,

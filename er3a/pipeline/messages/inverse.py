@@ -25,9 +25,9 @@ FIGURES = {
     "worst_orientation_residual": N_("worst orientation residual"),
 }
 NEAREST_RULE = N_(
-    "Of the solutions within the limits, take the one whose greatest joint move from the reference is least: where all "
-    "joints start and stop together, that joint decides how long the move takes. Between equals (to 1e-9 rad) the "
-    "least root of the summed squares of all joint moves decides, then the lower branch number."
+    "Of the solutions within the limits, take the one with the smallest maximum joint motion from the reference: where "
+    "all joints start and stop together, that joint decides how long the move takes. Between equals (to 1e-9 rad) the "
+    "smaller root of the summed squares of all joint motions decides, then the lower branch number."
 )
 FREE_AT = {
     "wrist": N_("axes 4 and 6 in line"),

@@ -25,8 +25,8 @@ NAMED = 3
 def _(found: NotReproduced) -> str:
     return sentence(
         found.code,
-        "The solver can't be trusted here: worst residual {worst_mm:.2g} mm and {worst_deg:.2g} deg, own joint angles "
-        "lost for {lost} random poses.",
+        "The solver can't be trusted here: worst residual {worst_mm:.2g} mm and {worst_deg:.2g} deg, the "
+        "joint angles of {lost} random poses not found again.",
         worst_mm=found.worst_mm,
         worst_deg=found.worst_deg,
         lost=found.lost,
@@ -35,13 +35,20 @@ def _(found: NotReproduced) -> str:
 
 @say.register
 def _(found: AllSolved) -> str:
-    every = sentence(
+    if not found.targets:
+        return _and_demonstrations("", found.demonstrations)
+    where = _where(found.collisions)
+    if not found.demonstrations:
+        return sentence(found.code, "Every target ({count}) has a solution {where}.", count=found.targets, where=where)
+    some = counted(
         found.code,
-        "Every target ({count}) has a solution {where}.",
-        count=found.targets,
-        where=_where(found.collisions),
+        "{count} of {total} targets has a solution {where}.",
+        "{count} of {total} targets have a solution {where}.",
+        found.targets,
+        total=found.targets + len(found.demonstrations),
+        where=where,
     )
-    return _and_demonstrations(every if found.targets else "", found.demonstrations)
+    return _and_demonstrations(some, found.demonstrations)
 
 
 @say.register
@@ -62,7 +69,7 @@ def _(found: SomeUnsolved) -> str:
         "{count} of {total} targets has a solution {where}; none for {none_for}.",
         "{count} of {total} targets have a solution {where}; none for {none_for}.",
         found.solved,
-        total=found.targets,
+        total=found.targets + len(found.demonstrations),
         where=_where(found.collisions),
         none_for=_none_for(found.unsolved),
     )
@@ -77,7 +84,7 @@ def _and_demonstrations(text: str, shown: tuple[Demonstration, ...]) -> str:
 def _where(collisions: bool) -> str:
     if collisions:
         return sentence("where", "within the limits and free of collisions")
-    return sentence("where", "within the limits")
+    return sentence("where", "within the limits in which the arm does not touch itself")
 
 
 def _none_for(unsolved: tuple[UnsolvedTarget, ...]) -> str:

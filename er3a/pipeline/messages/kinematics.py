@@ -128,11 +128,11 @@ def _(found: CombinationExceeded) -> str:
 
 
 def sum_of_joints(joints: Sequence[int], factors: Sequence[float]) -> str:
-    """A sum of joints as it is written: ``J2 + J3``, ``J3 - 0.5 J2``."""
+    """A sum of joints as it is written: ``J2 + J3``, ``J3 − 0.5 J2``."""
     text = ""
     for joint, factor in zip(joints, factors):
         size = "" if abs(factor) == 1 else f"{abs(factor):g} "
-        sign = (" - " if factor < 0 else " + ") if text else ("-" if factor < 0 else "")
+        sign = (" − " if factor < 0 else " + ") if text else ("−" if factor < 0 else "")
         text += f"{sign}{size}J{joint}"
     return text
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import gettext
 import io
 from collections.abc import Mapping
+from numbers import Real
 from pathlib import Path
 from string import Formatter
 from typing import Any
@@ -64,7 +65,13 @@ def tr(text: str, /, **parts: Any) -> str:
 def filled(text: str, template: str, parts: dict[str, Any]) -> str:
     """A translation of a template, its fields filled in with the formats of the template: translations have none."""
     formats = {name: spec or "" for _, name, spec, _ in Formatter().parse(template) if name}
-    return _AsIs().format(text, **{name: format(part, formats.get(name, "")) for name, part in parts.items()})
+    return _AsIs().format(text, **{name: as_text(part, formats.get(name, "")) for name, part in parts.items()})
+
+
+def as_text(part: Any, spec: str = "") -> str:
+    """A part of a text; a number's minus sign is no hyphen."""
+    text = format(part, spec)
+    return text.replace("-", "−") if isinstance(part, Real) else text
 
 
 def own_title(text: str) -> str:

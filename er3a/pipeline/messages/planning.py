@@ -62,12 +62,18 @@ def _(found: BelowLimit) -> str:
     )
 
 
+def unit_of(slides: bool) -> str:
+    """Of values of a joint."""
+    return "mm" if slides else "deg"
+
+
 @say.register
 def _(found: TooFast) -> str:
     return sentence(
         found.code,
-        "J{joint} would need {needed:.0f} deg/s; it can do {able:g} deg/s",
+        "J{joint} would need {needed:.0f} {unit}/s; it can do {able:g} {unit}/s",
         joint=found.joint,
+        unit=unit_of(found.slides),
         needed=found.needed_deg_s,
         able=found.limit_deg_s,
     )
@@ -77,8 +83,9 @@ def _(found: TooFast) -> str:
 def _(found: TooFastIfAssumed) -> str:
     return sentence(
         found.code,
-        "J{joint} would need {needed:.0f} deg/s; {able:g} deg/s are assumed",
+        "J{joint} would need {needed:.0f} {unit}/s; {able:g} {unit}/s are assumed",
         joint=found.joint,
+        unit=unit_of(found.slides),
         needed=found.needed_deg_s,
         able=found.limit_deg_s,
     )
@@ -88,8 +95,9 @@ def _(found: TooFastIfAssumed) -> str:
 def _(found: AccelerationTooGreat) -> str:
     return sentence(
         found.code,
-        "J{joint} would need {needed:.0f} deg/s²; it can do {able:g} deg/s²",
+        "J{joint} would need {needed:.0f} {unit}/s²; it can do {able:g} {unit}/s²",
         joint=found.joint,
+        unit=unit_of(found.slides),
         needed=found.needed_deg_s2,
         able=found.limit_deg_s2,
     )
@@ -99,8 +107,9 @@ def _(found: AccelerationTooGreat) -> str:
 def _(found: AccelerationTooGreatIfAssumed) -> str:
     return sentence(
         found.code,
-        "J{joint} would need {needed:.0f} deg/s²; {able:g} deg/s² are assumed",
+        "J{joint} would need {needed:.0f} {unit}/s²; {able:g} {unit}/s² are assumed",
         joint=found.joint,
+        unit=unit_of(found.slides),
         needed=found.needed_deg_s2,
         able=found.limit_deg_s2,
     )
@@ -108,12 +117,15 @@ def _(found: AccelerationTooGreatIfAssumed) -> str:
 
 @say.register
 def _(found: JerkTooGreat) -> str:
-    values = {"joint": found.joint, "able": found.limit_deg_s3}
+    values = {"joint": found.joint, "unit": unit_of(found.slides), "able": found.limit_deg_s3}
     if found.needed_deg_s3 is None:
-        return sentence(found.code, "J{joint}'s acceleration steps; its jerk may be {able:g} deg/s³", **values)
+        return sentence(found.code, "J{joint}'s acceleration steps; its jerk may be {able:g} {unit}/s³", **values)
     needed = found.needed_deg_s3
     return sentence(
-        found.code, "J{joint} would need {needed:.0f} deg/s³; its jerk may be {able:g} deg/s³", needed=needed, **values
+        found.code,
+        "J{joint} would need {needed:.0f} {unit}/s³; its jerk may be {able:g} {unit}/s³",
+        needed=needed,
+        **values,
     )
 
 
@@ -139,7 +151,7 @@ def _(found: PathOutOfReach) -> str:
 
 @say.register
 def _(found: MustStandStill) -> str:
-    return sentence(found.code, "the arm would have to stand still on the way")
+    return sentence(found.code, "the arm would have to stop along the path")
 
 
 @say.register
@@ -185,7 +197,7 @@ def _(found: EndUnreached) -> str:
 
 @say.register
 def _(found: NoneFound) -> str:
-    return sentence(found.code, "the planner found no way in {rounds} rounds; there may be one", rounds=found.rounds)
+    return sentence(found.code, "the planner found no path in {rounds} rounds; there may be one", rounds=found.rounds)
 
 
 @say.register

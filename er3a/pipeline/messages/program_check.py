@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import er3a.pipeline.messages.pairs
-import er3a.pipeline.messages.planning  # noqa: F401
+import er3a.pipeline.messages.pairs  # noqa: F401
 from er3a.kinematics.singularity import EventType
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.kinematics import SINGULARITIES, branch_word
 from er3a.pipeline.messages.language import N_
+from er3a.pipeline.messages.planning import unit_of
 from er3a.pipeline.messages.say import counted, joined, listed, say, sentence, word
 from er3a.program_check import program_check_findings as found_in
 from er3a.program_check.program_check_findings import Level
@@ -58,6 +58,15 @@ def _(found: text.NameTwice) -> str:
 @say.register
 def _(found: text.NotUnderstood) -> str:
     return sentence(found.code, "not understood: {text}", text=found.text)
+
+
+@say.register
+def _(found: text.FormInferred) -> str:
+    return sentence(
+        found.code,
+        "the structure of <{element}> is not documented; it was read like that of <while>",
+        element=found.element,
+    )
 
 
 @say.register
@@ -218,9 +227,10 @@ def _(found: found_in.WayOutOfReach) -> str:
 def _(found: found_in.ConfigurationEnds) -> str:
     return sentence(
         found.code,
-        "the configuration ends after {at:.1f} mm: J{joint} would have to jump by {angle:.1f} deg",
+        "the configuration ends after {at:.1f} mm: J{joint} would have to jump by {angle:.1f} {unit}",
         at=found.at_mm,
         joint=found.joint,
+        unit=unit_of(found.slides),
         angle=found.angle_deg,
     )
 
@@ -249,8 +259,9 @@ def _(found: found_in.PassesSingularity) -> str:
 def _(found: found_in.FasterThanAssumed) -> str:
     return sentence(
         found.code,
-        "J{joint} would need {needed:.0f} deg/s; {assumed:g} deg/s are assumed, since no document gives its speed",
+        "J{joint} would need {needed:.0f} {unit}/s; {assumed:g} {unit}/s are assumed, as no document gives its speed",
         joint=found.joint,
+        unit=unit_of(found.slides),
         needed=found.needed_deg_s,
         assumed=found.assumed_deg_s,
     )
@@ -260,8 +271,9 @@ def _(found: found_in.FasterThanAssumed) -> str:
 def _(found: found_in.AcceleratesMoreThanAssumed) -> str:
     return sentence(
         found.code,
-        "J{joint} would need {needed:.0f} deg/s²; {assumed:g} deg/s² are assumed",
+        "J{joint} would need {needed:.0f} {unit}/s²; {assumed:g} {unit}/s² are assumed",
         joint=found.joint,
+        unit=unit_of(found.slides),
         needed=found.needed_deg_s2,
         assumed=found.assumed_deg_s2,
     )
@@ -308,8 +320,9 @@ def _(found: found_in.WholeTurn) -> str:
 def _(found: found_in.ArrivesOtherwise) -> str:
     return sentence(
         found.code,
-        "the arm arrives in other joint angles than the target's: J{joint} differs by {difference:.2f} deg",
+        "the arm arrives in other joint angles than the target's: J{joint} differs by {difference:.2f} {unit}",
         joint=found.joint,
+        unit=unit_of(found.slides),
         difference=found.difference_deg,
     )
 
@@ -354,7 +367,7 @@ def _(found: found_in.MotionCollides) -> str:
 def _(found: found_in.ZoneCollides) -> str:
     return sentence(
         found.code,
-        "a way round the corner that the zone allows collides: {pair}, {depth:.1f} mm deep",
+        "a corner path that the blending zone allows collides: {pair}, {depth:.1f} mm deep",
         pair=say(found.pair),
         depth=found.depth_mm,
     )
@@ -364,7 +377,7 @@ def _(found: found_in.ZoneCollides) -> str:
 def _(found: found_in.ZoneNotSettled) -> str:
     return sentence(
         found.code,
-        "the ways round the corner that the zone allows pass within {least:.1f} mm of something; not all were measured",
+        "not every corner path that the zone allows is proven clear; the nearest measured passes at {least:.1f} mm",
         least=found.least_mm,
     )
 
@@ -393,11 +406,16 @@ def _(found: found_in.ArcHasNoCircle) -> str:
 
 @say.register
 def _(found: found_in.ArcGoesOn) -> str:
-    return sentence(
-        found.code,
-        "the arc has an angle of its own ({angle:g} deg) and does not end at its target; it was not checked",
-        angle=found.angle_deg,
-    )
+    if found.angle_deg is None:
+        return sentence("arc_goes_on.unknown", "the angle at which the arc ends is not known; the arc was not checked")
+    if found.turns:
+        return sentence(
+            "arc_goes_on.turns",
+            "the arc ends after {angle:g} deg, not at its target; the tool is taken to have the target's orientation "
+            "there",
+            angle=found.angle_deg,
+        )
+    return sentence(found.code, "the arc ends after {angle:g} deg, not at its target", angle=found.angle_deg)
 
 
 @say.register
@@ -437,7 +455,12 @@ def _(found: found_in.MayMove) -> str:
 
 @say.register
 def _(found: found_in.NeverReached) -> str:
-    return sentence(found.code, "no way through the program comes to this motion; it was not checked")
+    return sentence(found.code, "no branch of the program leads to this motion; it was not checked")
+
+
+@say.register
+def _(found: found_in.NotComeTo) -> str:
+    return sentence(found.code, "not checked: the program was not followed as far as this motion")
 
 
 @say.register
@@ -451,7 +474,7 @@ def _(found: found_in.RestNotChecked) -> str:
     return sentence(
         "rest_not_checked.targets",
         "only the first {checked} motions that are carried out were checked; of those from here on {targets} targets, "
-        "for reach and limits, and not the ways to them",
+        "for reach and limits, but not the motions between them",
         checked=found.checked,
         targets=found.targets,
     )
@@ -471,7 +494,8 @@ def _(found: found_in.NotFollowedToEnd) -> str:
 def _(found: found_in.LoopComesBackOtherwise) -> str:
     return sentence(
         found.code,
-        "the loop begins again with J{joint} {difference:.2f} deg from where it was in the round that was checked",
+        "the loop begins again with J{joint} {difference:.2f} {unit} from where it was in the round that was checked",
         joint=found.joint,
+        unit=unit_of(found.slides),
         difference=found.difference_deg,
     )

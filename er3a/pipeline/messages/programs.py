@@ -35,5 +35,5 @@ def cycle_text(program: ProgramSummary) -> str:
         if cycle.waits
         else ""
     )
-    unknown = "" if cycle.complete else tr("without the motions whose way is not known")
+    unknown = "" if cycle.complete else tr("without the motions whose path is unknown")
     return joined([what, waits, unknown], ", ")

@@ -14,7 +14,7 @@ def _(found: ProgramCounts) -> str:
         "programs.programs",
         "{passed} of {count} program passes",
         "{passed} of {count} programs pass",
-        found.programs,
+        found.programs + len(found.demonstrations),
         passed=found.passed,
     )
     unsound: dict[ProgramOutcome, tuple[str, ...]] = {"fail": found.failed, "caution": found.caution}

@@ -55,12 +55,12 @@ MOTION_WORDS = {
     "tilts_right": N_("the tool tilts to the right"),
     "tilts_forward": N_("the tool tilts forward"),
     "tilts_back": N_("the tool tilts back"),
-    "clockwise_looking_up": N_("the tool turns clockwise for who looks up"),
-    "clockwise_looking_down": N_("the tool turns clockwise for who looks down"),
-    "clockwise_looking_left": N_("the tool turns clockwise for who looks left"),
-    "clockwise_looking_right": N_("the tool turns clockwise for who looks right"),
-    "clockwise_looking_forward": N_("the tool turns clockwise for who looks forward"),
-    "clockwise_looking_back": N_("the tool turns clockwise for who looks back"),
+    "clockwise_looking_up": N_("the tool turns clockwise as seen looking up"),
+    "clockwise_looking_down": N_("the tool turns clockwise as seen looking down"),
+    "clockwise_looking_left": N_("the tool turns clockwise as seen looking left"),
+    "clockwise_looking_right": N_("the tool turns clockwise as seen looking right"),
+    "clockwise_looking_forward": N_("the tool turns clockwise as seen looking forward"),
+    "clockwise_looking_back": N_("the tool turns clockwise as seen looking back"),
 }
 
 check_complete("words for groups of references", GROUPS, GROUP_WORDS)

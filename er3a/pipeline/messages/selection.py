@@ -5,7 +5,7 @@ from __future__ import annotations
 import er3a.pipeline.messages.pairs  # noqa: F401
 from er3a.kinematics.solutions import SideUnsolved, Unsolved
 from er3a.pipeline.messages.kinematics import SIDES, branch_word
-from er3a.pipeline.messages.language import N_
+from er3a.pipeline.messages.language import N_, as_text
 from er3a.pipeline.messages.say import joined, listed, say, sentence, word
 from er3a.selection.nearest import (
     AllCollide,
@@ -132,7 +132,7 @@ def _(found: AllOutsideLimits) -> str:
         return sentence(found.code, "the only solution leaves them: {branch}: {reason}", branch=label, reason=reason)
     return sentence(
         found.code,
-        "all {count} solutions leave the limits; the least so is {branch}: {reason}",
+        "all {count} solutions leave the limits; the nearest to them is {branch}: {reason}",
         count=found.count,
         branch=label,
         reason=reason,
@@ -151,7 +151,7 @@ def _(found: AllCollide) -> str:
 
 @say.register
 def _(found: Measure) -> str:
-    return f"{RULE_NAMES[found.rule]} {found.value:.3g} {RULES[found.rule].unit}".removesuffix(" 1")
+    return f"{RULE_NAMES[found.rule]} {as_text(found.value, '.3g')} {RULES[found.rule].unit}".removesuffix(" 1")
 
 
 @say.register

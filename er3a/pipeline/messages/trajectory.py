@@ -18,7 +18,7 @@ from er3a.pipeline.stages.trajectory.model import (
     TriedStrategy,
 )
 from er3a.planning.avoidance.strategy_names import StrategyName
-from er3a.planning.intervals import RateCause
+from er3a.planning.intervals import JerkTooGreat, RateCause
 
 FIGURES = {
     "safe": N_("Paths safe as they are"),
@@ -54,6 +54,7 @@ MOST_PAIRS = 3
 NO_DEVIATION = 0.005  # mm or deg
 NO_TIME = 0.005  # s
 WHOLE = 10.0  # from which on numbers are rounded to whole ones
+PACE_MARGIN = 1.01  # by which a slower pace stays below the limits
 
 
 def kind_word(kind: PathKind) -> str:
@@ -107,7 +108,7 @@ def _apart_from_collisions(path: PathSummary) -> str:
     if path.unreachable:
         return joined(map(_when, path.unreachable))
     if faults := path.out_of_limits or _worst(path.too_fast):
-        return joined([*map(say, faults), *map(say, path.singularities)])
+        return joined([*map(say, faults), *map(say, path.singularities), _at_another_pace(path)])
     if path.undecided:
         return joined([*map(say, path.undecided), *map(say, path.singularities)])
     met = [say(event) for event in path.singularities if event.crossing]
@@ -132,6 +133,25 @@ def _worst(stretches: tuple[Stretch[RateCause], ...]) -> list[Stretch[RateCause]
     for part in sorted(stretches, key=lambda stretch: stretch.cause.ratio, reverse=True):
         found.setdefault(part.cause.code, part)
     return list(found.values())
+
+
+def _at_another_pace(path: PathSummary) -> str:
+    """What the shortest time of a path that is too fast means; empty where its pace is not its only fault."""
+    if path.fastest_s is None or not _only_too_fast(path):
+        return ""
+    if path.fastest_s > path.duration_s:
+        return sentence("path.pace", "it takes {fastest:.2f} s at least", fastest=path.fastest_s)
+    return sentence(
+        "path.pace",
+        "not the path, only its pace is too fast: slower there and faster elsewhere, it can be done in {fastest:.2f} s",
+        fastest=path.fastest_s,
+    )
+
+
+def _only_too_fast(path: PathSummary) -> bool:
+    """Whether speed and acceleration are all that is wrong with a path."""
+    other = path.unreachable or path.out_of_limits or path.collisions or path.jumps
+    return bool(path.too_fast) and not other and not any(isinstance(e.cause, JerkTooGreat) for e in path.too_fast)
 
 
 def _speeds(bounded: bool) -> str:
@@ -174,12 +194,20 @@ def _(found: BodiesOverlap) -> str:
     return sentence(found.code, "{pairs} overlap, up to {depth:.1f} mm at t = {t:.4g} s", **worst)
 
 
+def cause_text(path: PathSummary, part: Stretch) -> str:  # type: ignore[type-arg]
+    """Why a stretch of a path is listed; what is undecided is no open question where something else decides."""
+    told = say(part.cause)
+    if part in path.undecided and path.verdict != "undecided":
+        return sentence("path.either_way", "{open}; the path is not safe either way", open=told)
+    return told
+
+
 def advice(path: PathSummary) -> str | None:
     """What to do about a path; None where nothing is to be done."""
     if not path.avoidance:
         return None
     if path.chosen:
-        return _chosen(path.chosen, path.duration_s)
+        return _chosen(path.chosen, path.duration_s) + _slower_throughout(path)
     if path.unreachable:
         when = joined(map(_when, path.unreachable), ", ")
         why = sentence("advice.out_of_reach", "it is out of reach {when}", when=when)
@@ -189,10 +217,39 @@ def advice(path: PathSummary) -> str | None:
     if len(path.avoidance) == 1:
         (only,) = path.avoidance
         if only.name == "planned":
-            return sentence("advice.no_way", "No avoidance strategy works: {reason}", reason=reasons(only))
+            no_way = sentence("advice.no_way", "No avoidance strategy works: {reason}", reason=reasons(only))
+            return no_way + _clear(path)
         parts = {"way": word("advice", ADVICE, only.name), "reason": reasons(only)}
         return sentence("advice.only", "{way}, as the study requires, does not repair it: {reason}", **parts)
-    return sentence("advice.none", "No avoidance strategy completes this path: {why}", why=why)
+    return sentence("advice.none", "No avoidance strategy completes this path: {why}", why=why) + _clear(path)
+
+
+def _slower_throughout(path: PathSummary) -> str:
+    """The pace at which the whole path keeps the limits, and the setting that gives it; empty where none does."""
+    speed, acceleration = path.max_joint_speed_ratio, path.max_joint_acceleration_ratio
+    if speed is None or acceleration is None or not _only_too_fast(path):
+        return ""
+    longer = PACE_MARGIN * max(1.0, speed, acceleration**0.5)
+    return ". " + sentence(
+        "advice.slower",
+        "Or run all of it at {percent:.3g} % of its speed: duration_s {needed:.4g} in the path file, or the speed in "
+        "its program",
+        percent=100 / longer,
+        needed=path.duration_s * longer,
+    )
+
+
+def _clear(path: PathSummary) -> str:
+    """How far a path that collides could be used; empty for others."""
+    if not path.collisions or path.unreachable or not path.collisions[0].s0_m:
+        return ""
+    first = path.collisions[0]
+    return ". " + sentence(
+        "advice.clear_until",
+        "Nothing overlaps up to t = {t:.4g} s ({far:.1f} mm): end the path before, or move its end or what it meets",
+        t=first.t0_s,
+        far=first.s0_m * 1000,
+    )
 
 
 def reasons(tried: TriedStrategy) -> str:

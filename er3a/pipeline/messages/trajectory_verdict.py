@@ -29,13 +29,11 @@ def _(found: PathCounts) -> str:
         "trajectory.paths",
         "{safe} of {count} path is safe",
         "{safe} of {count} paths are safe",
-        found.paths,
+        found.paths + len(found.demonstrations),
         safe=found.safe,
     )
     if found.not_followed:
         parts = {"count": len(found.not_followed), "names": ", ".join(found.not_followed)}
-        faults.append(
-            sentence("trajectory.not_followed", "{count} not followed for want of branches ({names})", **parts)
-        )
+        faults.append(sentence("trajectory.not_followed", "{count} not followed to the end ({names})", **parts))
     told = [safe if found.paths else "", joined(faults, ", "), demonstrated(found.demonstrations)]
     return sentence("trajectory.verdict", "{finding}.", finding=joined(told))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import er3a.pipeline.messages.diagnosis  # noqa: F401
 from er3a.identifiability.reactions import CheckCounts
 from er3a.pipeline.messages.evidence import PART_WORDS
-from er3a.pipeline.messages.language import N_
+from er3a.pipeline.messages.language import N_, as_text
 from er3a.pipeline.messages.references import quoted
 from er3a.pipeline.messages.say import counted, joined, say, sentence, word
 from er3a.pipeline.stages.validation.validation_findings import (
@@ -93,8 +93,8 @@ def _(found: LeftOpen) -> str:
 def _how_far_off(found: LeftOpen) -> list[str]:
     told = []
     if found.off.moves:
-        up_to = N_("For what is open or weak the tool could be off by up to {mm:.0f} mm and {deg:.0f} deg.")
-        at_least = N_("For what is open or weak the tool could be off by {mm:.0f} mm and {deg:.0f} deg, if not more.")
+        up_to = N_("Open and weak entries could put the tool off by up to {mm:.0f} mm and {deg:.0f} deg.")
+        at_least = N_("Open and weak entries could put the tool off by {mm:.0f} mm and {deg:.0f} deg, or by more.")
         text = at_least if found.at_least else up_to
         told.append(sentence(found.code, text, mm=found.off.mm, deg=found.off.deg))
     if found.unbounded:
@@ -147,7 +147,7 @@ def _contradiction(found: Contradiction | None) -> list[str]:
 
 @say.register
 def _(found: NothingToCompare) -> str:
-    text = sentence(found.code, "There is no official, CAD or exported data to hold this model against.")
+    text = sentence(found.code, "There is no official, CAD or exported data to compare this model with.")
     return joined([text, *_of_claims(found)], " ")
 
 
@@ -245,4 +245,4 @@ def _chained(pair: str, words: Sequence[str]) -> str:
 
 
 def _value(value: float, unit: str) -> str:
-    return f"{value:.1f} {unit}" if unit else f"{value:g}"
+    return f"{as_text(value, '.1f')} {unit}" if unit else as_text(value, "g")

@@ -81,7 +81,7 @@ def _(found: GraspCounts) -> str:
         found.code,
         "{grasped} of {count} object can be grasped",
         "{grasped} of {count} objects can be grasped",
-        found.objects,
+        found.objects + len(found.demonstrations),
         grasped=found.grasped,
     )
     error = (
@@ -123,8 +123,8 @@ def _(found: GraspOutOfReach) -> str:
 def _(found: GraspNearLimits) -> str:
     return counted(
         found.code,
-        "the only solution is {margin:.1f} deg from the joint limits; {needed:g} deg are asked for",
-        "the best of {count} solutions is {margin:.1f} deg from the joint limits; {needed:g} deg are asked for",
+        "the only solution is {margin:.1f} deg from the joint limits; {needed:g} deg are required",
+        "the best of {count} solutions is {margin:.1f} deg from the joint limits; {needed:g} deg are required",
         found.solutions,
         margin=found.margin_deg,
         needed=found.needed_deg,
@@ -136,7 +136,7 @@ def _(found: GraspSingular) -> str:
     return sentence(
         found.code,
         "all solutions within the limits are singular: the least singular value is {value:.2g} at best, and {needed:g} "
-        "is asked for",
+        "is required",
         value=found.singular_value,
         needed=found.needed,
     )
@@ -153,7 +153,7 @@ def _(found: GraspCollides) -> str:
         )
     return sentence(
         found.code,
-        "at the grasp {pair} are {clear:.1f} mm apart at best; {needed:g} mm are asked for",
+        "at the grasp {pair} are {clear:.1f} mm apart at best; {needed:g} mm are required",
         pair=say(found.pair),
         clear=found.clearance_mm,
         needed=found.needed_mm,
@@ -198,7 +198,7 @@ def _(found: WayCollides) -> str:
         )
     return sentence(
         found.code,
-        "on the {part} {pair} are {clear:.1f} mm apart; {needed:g} mm are asked for",
+        "on the {part} {pair} are {clear:.1f} mm apart; {needed:g} mm are required",
         part=word("vision.part", PARTS, found.part),
         pair=say(found.pair),
         clear=found.clearance_mm,

@@ -13,7 +13,9 @@ FIGURES = {
     "volume": N_("reached volume"),
     "volume_lower": N_("reached volume, at least"),
     "volume_upper": N_("reached volume, at most"),
-    "hull_volume": N_("convex hull"),
+    "area_lower": N_("reached area, at least"),
+    "area_upper": N_("reached area, at most"),
+    "hull_volume": N_("convex hull of the samples"),
     "least_reach": N_("least distance from axis 1"),
     "samples": N_("samples"),
 }

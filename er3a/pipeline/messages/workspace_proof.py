@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from er3a.pipeline.messages import kinematics as _kinematics  # noqa: F401 (says what an arm lacks)
+from er3a.pipeline.messages.language import as_text
 from er3a.pipeline.messages.say import joined, say, sentence
 from er3a.workspace.causes import Disappears, Geometry, OnlySampled, Relaxed, SeveralLimits, VoidCause
-from er3a.workspace.proven import GeneralMethod, SphericalWrist
+from er3a.workspace.proven import GeneralMethod, SphericalWrist, ToolNearWrist
 
 
 @say.register
@@ -35,7 +36,7 @@ def _(found: Geometry) -> str:
 
 @say.register
 def _(found: OnlySampled) -> str:
-    return sentence(found.code, "unknown: only samples tell of it")
+    return sentence(found.code, "unknown: known from samples only")
 
 
 def is_predicate(cause: VoidCause) -> bool:
@@ -53,7 +54,7 @@ def _shrinks(limit: Relaxed) -> str:
 
 
 def _extended(limit: Relaxed) -> str:
-    shown = {"joint": limit.joint, "limit": f"{limit.extended_deg:+.4g}".replace("-", "−")}
+    shown = {"joint": limit.joint, "limit": as_text(limit.extended_deg, "+.4g")}
     if limit.side == "upper":
         return sentence("limit_extended", "joint {joint}'s upper limit is extended to {limit} deg", **shown)
     return sentence("limit_extended", "joint {joint}'s lower limit is extended to {limit} deg", **shown)
@@ -67,3 +68,10 @@ def _(found: SphericalWrist) -> str:
 @say.register
 def _(found: GeneralMethod) -> str:
     return sentence(found.code, "general method, because {lacks}", lacks=say(found.lacks))
+
+
+@say.register
+def _(found: ToolNearWrist) -> str:
+    return sentence(
+        found.code, "its tool point is only {distance:.3g} mm from the wrist centre", distance=found.distance_mm
+    )

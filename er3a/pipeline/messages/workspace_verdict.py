@@ -7,6 +7,7 @@ from er3a.pipeline.messages.workspace_proof import is_predicate
 from er3a.pipeline.stages.workspace.workspace_findings import (
     Flat,
     NoVoid,
+    OnSurface,
     Undersampled,
     VoidAtShoulder,
     VoidUncertain,
@@ -17,7 +18,35 @@ from er3a.workspace.causes import VoidCause
 
 @say.register
 def _(found: Flat) -> str:
-    return sentence(found.code, "The tool point moves on a plane, a line or not at all, so there is no volume.")
+    return sentence(found.code, "The tool point moves on a line or not at all, so there is no volume.")
+
+
+@say.register
+def _(found: OnSurface) -> str:
+    surface = found.surface
+    lower, upper = surface.lower, surface.upper
+    if upper is None:
+        return sentence(found.code, "The tool point moves on a surface; its area was not computed.")
+    if lower is None:
+        return sentence(
+            found.code,
+            "The tool point moves on a curved surface of at most {upper:.4g} m²: what two joints sweep, which counts "
+            "twice what they sweep twice.",
+            upper=upper,
+        )
+    if surface.kind == "plane":
+        return sentence(
+            found.code,
+            "The tool point moves on a plane and reaches at least {lower:.4g} m² and at most {upper:.4g} m² of it.",
+            lower=lower,
+            upper=upper,
+        )
+    return sentence(
+        found.code,
+        "The tool point moves on a sphere and reaches at least {lower:.4g} m² and at most {upper:.4g} m² of it.",
+        lower=lower,
+        upper=upper,
+    )
 
 
 @say.register
@@ -62,6 +91,12 @@ def _(found: VoidAtShoulder) -> str:
 
 @say.register
 def _(found: NoVoid) -> str:
+    if found.undecided_percent is not None:
+        return sentence(
+            found.code,
+            "The proof finds no enclosed void; {percent:.2g} % of the volume is left undecided.",
+            percent=found.undecided_percent,
+        )
     if found.proven:
         return sentence(found.code, "The workspace holds no enclosed void.")
     return sentence(found.code, "The samples leave no enclosed void inside the hull; no proof.")

@@ -40,7 +40,6 @@ from er3a.planning.tool_proof import Wanted
 from er3a.robots.joint_limits import limit_margin, within
 from er3a.robots.robot import Robot
 from er3a.robots.shown import shown
-from er3a.selection.select import refusals
 
 MOST_TARGETS, LEAST_TARGETS, CHOICE = 5, 2, 30
 APART = 0.1  # of the reach
@@ -96,11 +95,12 @@ class TaskSearch:
     near: NearSingular = field(init=False)
     limits: JointLimits = field(init=False)
     wanted: Wanted = field(init=False)
+    bodies: Bodies = field(init=False)
 
     def __post_init__(self) -> None:
         self.follows_tool = has_branches(self.robot)
         self.limits, self.wanted = limits_of(self.robot, self.settings), wanted_of(self.robot, self.settings)
-        self.near = self.wanted.near
+        self.near, self.bodies = self.wanted.near, Bodies(self.robot, self.scene)
 
     def spots(self) -> list[Spot]:
         """Poses far from one another: at most ``MOST_TARGETS``, fewer where the arm reaches no more of those tried."""
@@ -176,10 +176,10 @@ class TaskSearch:
             solutions = inverse(self.robot, target.T, target.q_ref)
         except Er3aError:
             return None
-        free = np.array([why is None for why in refusals(self.robot, solutions, self.scene)], dtype=bool)
         margin = limit_margin(self.robot, solutions.q)
-        rows = np.flatnonzero(free & solutions.solved & within(self.robot, solutions.q) & self._roomy(solutions.q))
+        rows = np.flatnonzero(solutions.solved & within(self.robot, solutions.q) & self._roomy(solutions.q))
         rows = rows[self._regular(solutions.q[rows])]
+        rows = rows[self.bodies.free(solutions.q[rows])]
         if not rows.size:
             return None
         best = int(rows[margin[rows].argmax()])
@@ -261,7 +261,7 @@ class TaskSearch:
             or any(rate_intervals(curve, limit) for limit in self.limits.rates)
         ):
             return False
-        around = Surroundings(Bodies(self.robot, self.scene), self.settings.penetration_tolerance_mm / 1000)
+        around = Surroundings(self.bodies, self.settings.penetration_tolerance_mm / 1000)
         return not measured(around, motion).contacts
 
 

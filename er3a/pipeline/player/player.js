@@ -7,19 +7,20 @@
  * parts of its picture; without a motion of its own a panel shows that of the figure's `data-play`.
  */
 
-import { add, column, scaled } from "er3a/algebra";
+import { add, column, scaled, translation } from "er3a/algebra";
 import { Orbit } from "er3a/orbit";
 import { decodePoses, poseBetween } from "er3a/poses";
 import { eyeOf, Picture } from "er3a/scene";
 import { armSolids, sceneSolids } from "er3a/solids";
 
+const WORLD = translation(0, 0, 0);
 const place = document.getElementById("player");
 const data = JSON.parse(document.getElementById("player-data").textContent);
 const { words, table } = data;
 const part = (name) => place.querySelector(`.${name}`);
 const [canvas, chooser, bar, clock, told] = ["arm", "motion", "time", "clock", "told"].map(part);
 const motions = new Map(data.motions.map((motion) => [motion.name, prepared(motion)]));
-const solids = armSolids(table, data.size, data.colours);
+const solids = [...armSolids(table, data.size, data.colours, data.pieces), ...sceneSolids(data.carried, table.a.length + 1)];
 const surroundings = sceneSolids(data.scene);
 const picture = new Picture(canvas);
 const floor = data.floor ?? column(table.base, 3)[2];
@@ -52,6 +53,8 @@ export function goTo(name, time) {
 function play(on) {
   if (on && t >= end()) t = start();
   playing = on;
+  place.toggleAttribute("data-playing", on);
+  if (!on) dispatchEvent(new Event("player-rests"));
   part("play").textContent = on ? words.pause : words.play;
   last = performance.now();
   refresh();
@@ -84,7 +87,7 @@ function draw() {
   picture.begin(eyeOf(orbit));
   picture.floor(column(table.base, 3), data.size / 10, floor, page.grid);
   picture.shadow(solids, poses, floor, page.grid);
-  picture.solids([{ solids: surroundings, poses: [table.base], ghost: false }, { solids, poses, ghost: false }]);
+  picture.solids([{ solids: surroundings, poses: [WORLD], ghost: false }, { solids, poses, ghost: false }]);
   picture.line(motion.trail, page.ink, 1.5);
   for (const { way, status } of motion.events) if (way.length) picture.line(way, data.colours[status], 3);
   for (const { from, to, text, t0, t1 } of motion.marks ?? []) {

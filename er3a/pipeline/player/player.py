@@ -13,12 +13,14 @@ import numpy as np
 import scipy
 from markupsafe import Markup
 
-from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
+from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Solid, Sphere
+from er3a.geometry.sphere import fibonacci_sphere
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.teach.scripts import TEACH, import_map
-from er3a.pipeline.viewing.palette import BODY, INK, JOINTS, LINK, VERDICTS
+from er3a.pipeline.viewing.palette import BODY, INK, JOINTS, LINK, VERDICTS, rgb
+from er3a.robots.joint_limits import theta_limits
 from er3a.robots.robot import Robot
 from er3a.robots.shown import size_of
 
@@ -26,9 +28,15 @@ _HERE = Path(__file__).parent
 MOST_FRAMES = 240
 UNTIMED_S = 8.0  # how long a motion without times is shown
 TRAIL_POINTS = 200
+MOST_FACES, FEWEST_CORNERS = 2000, 12  # of an arm, and of a convex piece
 SCENE_COLOUR = "#b9a78f"
 COLOURS = {status: VERDICTS[status] for status in ("caution", "fail")}
 AXES = ("#b42318", "#18794e", "#0b5c94")
+TABLE = (
+    *("a", "alpha", "d", "beta", "direction", "offset", "sliding"),
+    *("lower", "upper", "continuous", "base", "tool"),
+)
+DRAWING = ("algebra", "kinematics", "orbit", "scene", "solids")
 LEVEL = 1e-6  # by which a plane's normal may differ from the vertical to be drawn as the floor
 WORDS = {
     "player": N_("The motions, played"),
@@ -105,7 +113,7 @@ def player(robot: Robot, motions: Sequence[PlayedMotion], scene: Scene | None = 
             words=words,
             motions=shown,
             data=_data(robot, shown, scene, words),
-            scripts=import_map([*sorted(TEACH.glob("*.js")), _HERE / "poses.js"]),
+            scripts=import_map([*(TEACH / f"{name}.js" for name in DRAWING), _HERE / "poses.js"]),
             script=(_HERE / "player.js").read_text(encoding="utf-8"),
         )
     )
@@ -127,28 +135,71 @@ def player_style() -> Markup:
 
 
 def _data(robot: Robot, motions: Sequence[PlayedMotion], scene: Scene | None, words: dict[str, str]) -> dict[str, Any]:
-    size = size_of(robot)
-    solids = scene.solids if scene else ()
-    floors = [s.offset for s in solids if isinstance(s, Plane) and s.normal[2] > 1 - LEVEL]
+    size = drawn_size(robot)
     return {
-        "table": {
-            "convention": robot.convention,
-            **{key: getattr(robot, key).tolist() for key in ("a", "d", "alpha", "beta", "base", "tool")},
-        },
+        "table": table_data(robot),
         "size": size,
+        "pieces": drawn_pieces(robot),
         "target": (robot.base @ [0, 0, 0.35 * size, 1])[:3].tolist(),
         "colours": {"joints": JOINTS, "link": LINK, "body": BODY, "mark": INK, **COLOURS},
         "axes": AXES,
-        "floor": max(floors) if floors else None,
-        "scene": scene_data(scene),
+        "floor": floor_of(scene),
+        "scene": scene_data(scene.solids if scene else ()),
+        "carried": scene_data(scene.carried if scene else ()),
         "motions": [_motion(robot, motion) for motion in motions],
         "words": words,
     }
 
 
-def scene_data(scene: Scene | None) -> list[dict[str, Any]]:
-    """A scene's solids as the drawing code takes them; planes are left out."""
-    return [_solid(solid) for solid in scene.solids if not isinstance(solid, Plane)] if scene else []
+def table_data(robot: Robot) -> dict[str, Any]:
+    """A robot's table and limits as the scripts take them, SI; see ``teach/kinematics.js``."""
+    return {
+        "convention": robot.convention,
+        **{key: getattr(robot, key).tolist() for key in TABLE},
+        "slides": robot.slides.tolist(),
+        "coupling": None if robot.coupling is None else robot.coupling.tolist(),
+        "combined": [asdict(limit) for limit in robot.combined],
+    }
+
+
+def drawn_size(robot: Robot) -> float:
+    """A length (m) to scale drawings with: of all links, of the tool, and of how far joints slide."""
+    ways = np.ptp(theta_limits(robot), axis=1)[robot.sliding].sum()
+    return size_of(robot) + float(np.linalg.norm(robot.tool[:3, 3]) + ways) or 1.0
+
+
+def drawn_pieces(robot: Robot) -> list[dict[str, Any]]:
+    """The convex pieces of an arm's meshes with fewer corners, so that the whole arm has about ``MOST_FACES`` faces."""
+    corners = max(FEWEST_CORNERS, MOST_FACES // (2 * len(robot.hulls) or 1))
+    drawn = []
+    for piece in robot.hulls:
+        points = np.array(piece.points)
+        if len(points) > corners:
+            points = points[np.unique((fibonacci_sphere(corners) @ points.T).argmax(axis=1))]
+        try:
+            hull = scipy.spatial.ConvexHull(points)
+        except scipy.spatial.QhullError:  # flat: nothing to be seen of it but from above
+            continue
+        a, b, c = np.moveaxis(points[hull.simplices], 1, 0)
+        inwards = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0
+        faces = np.where(inwards[:, None], hull.simplices[:, ::-1], hull.simplices)
+        shade = zip(rgb(LINK), rgb(JOINTS[piece.link - 1] if piece.link else BODY))
+        colour = "#" + "".join(f"{round(0.6 * grey + 0.4 * own):02x}" for grey, own in shade)
+        drawn.append(
+            {"link": piece.link, "points": np.round(points, 5).tolist(), "faces": faces.tolist(), "colour": colour}
+        )
+    return drawn
+
+
+def floor_of(scene: Scene | None) -> float | None:
+    """The height (m) of the highest level floor of a scene, None where it has none."""
+    solids = scene.solids if scene else ()
+    return max((s.offset for s in solids if isinstance(s, Plane) and s.normal[2] > 1 - LEVEL), default=None)
+
+
+def scene_data(solids: Sequence[Solid]) -> list[dict[str, Any]]:
+    """Solids as the drawing code takes them; planes are left out."""
+    return [_solid(solid) for solid in solids if not isinstance(solid, Plane)]
 
 
 def _solid(solid: Box | Cylinder | Sphere | Mesh) -> dict[str, Any]:

@@ -17,7 +17,6 @@ import {
   across, add, beside, column, cross, dot, multiply, norm, wrapToPi, rotated, scaled, signedAngle, subtract, turned,
   turnedBack, unsignedAngle,
 } from "er3a/algebra";
-import { JOINTS } from "er3a/kinematics";
 
 const BOUNDARY = 1e-9; // m or rad by which a triangle may fail to close
 const FREE = 1e-13; // m or rad: so near to its axis, a joint can have any angle
@@ -26,6 +25,7 @@ const APART = 0.9e-9; // rad by which such roots are kept two
 const SAME_JOINTS = 1e-9; // rad
 const LIMIT_TOLERANCE = 1e-9; // rad
 const TURN = 2 * Math.PI;
+const JOINTS = [0, 1, 2, 3, 4, 5];
 
 /** What the solution takes of an arm: its axis lines with all table angles at 0, in the base frame. */
 export function closedForm(table, links) {
@@ -193,14 +193,21 @@ export function inverse(table, arm, T, near) {
   };
 }
 
-/** The joints of a row that leave their limits: `{joint, angle, excess, above, limit}`, rad. */
+/**
+ * What of a joint vector leaves its limits: `{joint, angle, excess, above, limit}`, rad (m of joints that slide), or
+ * `{sum, ...}` for the number of a limited sum of joints. A continuous joint has no limits.
+ */
 export function excesses(table, q) {
-  return JOINTS.flatMap((joint) => {
-    const [angle, lower, upper] = [q[joint], table.lower[joint], table.upper[joint]];
-    if (angle - upper > LIMIT_TOLERANCE) return [{ joint, angle, excess: angle - upper, above: true, limit: upper }];
-    if (lower - angle > LIMIT_TOLERANCE) return [{ joint, angle, excess: lower - angle, above: false, limit: lower }];
+  const beyond = (about, angle, lower, upper) => {
+    if (angle - upper > LIMIT_TOLERANCE) return [{ ...about, angle, excess: angle - upper, above: true, limit: upper }];
+    if (lower - angle > LIMIT_TOLERANCE) return [{ ...about, angle, excess: lower - angle, above: false, limit: lower }];
     return [];
-  });
+  };
+  return [
+    ...q.flatMap((angle, joint) => (table.continuous[joint] ? [] : beyond({ joint }, angle, table.lower[joint], table.upper[joint]))),
+    ...table.combined.flatMap(({ factors, lower, upper }, sum) =>
+      beyond({ sum }, factors.reduce((total, factor, k) => total + factor * q[k], 0), lower, upper)),
+  ];
 }
 
 function turnsOf(table, q, near) {

@@ -1,11 +1,13 @@
 /**
- * Forward kinematics, Jacobian and nearness to singularities of a six-axis arm, from its Denavit-Hartenberg table.
+ * Forward kinematics, Jacobian and nearness to singularities of an arm of any joints, from its Denavit-Hartenberg table.
  *
- * The table is the JSON form of er3a's Robot: `convention` ("standard" or "modified"), `a`, `d` (m), `alpha`, `beta`,
- * `offset`, `lower`, `upper` (rad), `direction` (+1 or -1), `base` and `tool` (4x4). Joint angles `q` are the manufacturer's
- * (rad); the table's own angle is `direction * q + offset`. Both conventions are the product
- * `links[0] Rz(theta_1) links[1] ... Rz(theta_6) links[6]` with constant links, the base in the first and the tool in
- * the last. The same formulas in Python: er3a/kinematics/chain.py, forward.py and singularity.py.
+ * The table is the JSON form of er3a's Robot: `convention` ("standard" or "modified"), per row `a`, `d` (m), `alpha`,
+ * `beta`, `offset` (rad), `direction` (+1 or -1) and `sliding`, per joint `lower`, `upper` (rad, m) and `slides`, the
+ * `coupling` (rows by joints; null where each joint moves its own row), `base` and `tool` (4x4). Joint values `q` are the
+ * manufacturer's (rad; m of joints that slide). Row k moves by `x = direction * u`, `u = coupling q`: it turns by
+ * `x + offset` about z, or shifts by x along z. Both conventions are the product
+ * `links[0] J(x_1) links[1] ... J(x_m) links[m]` with constant links, the base in the first and the tool in the last.
+ * The same formulas in Python: er3a/kinematics/chain.py, forward.py and singularity.py.
  *
  * References
  * [1] J. J. Craig, Introduction to Robotics, 3rd ed., section 3.4.
@@ -14,66 +16,77 @@
  */
 
 import {
-  add, column, cross, dot, multiply, norm, rotX, rotY, rotZ, scaled, singularValues, subtract, translation, turned, unit,
+  add, column, cross, dot, multiply, rotX, rotY, rotZ, scaled, singularValues, subtract, translation, turned, unit,
 } from "er3a/algebra";
 
-export const JOINTS = [0, 1, 2, 3, 4, 5];
+export const POSE = [0, 1, 2, 3, 4, 5]; // rows of a Jacobian: along and about x, y, z
 const IDENTITY = translation(0, 0, 0);
 
 /**
  * Each link's constant transform in two steps: along its joint's axis, then across to the next axis. Entry 0 is what
- * precedes joint 1 (base not included), entry k what follows the rotation of joint k.
+ * precedes joint 1 (base not included), entry k what follows the motion of row k.
  */
 export function linkParts(table) {
   const parts = Array.from({ length: table.a.length + 1 }, () => ({ along: IDENTITY, across: IDENTITY }));
   for (const k of table.a.keys()) {
     const turn = multiply(rotX(table.alpha[k]), rotY(table.beta[k]));
-    parts[k + 1].along = translation(0, 0, table.d[k]);
+    const along = translation(0, 0, table.d[k]);
+    parts[k + 1].along = table.sliding[k] ? multiply(along, rotZ(table.offset[k])) : along;
     parts[table.convention === "standard" ? k + 1 : k].across = multiply(translation(table.a[k], 0, 0), turn);
   }
   return parts;
 }
 
-/** The constant transforms between the joint rotations, base and tool included. */
+/** The constant transforms between the joints' motions, base and tool included. */
 export function constantLinks(table) {
   const links = linkParts(table).map((part) => multiply(part.along, part.across));
   links[0] = multiply(table.base, links[0]);
-  links[6] = multiply(links[6], table.tool);
+  links.push(multiply(links.pop(), table.tool));
   return links;
 }
 
-/** Entry k < 6: the frame with its z axis on the axis of joint k + 1, which turns with it. Entry 6: the tool frame. */
+/** What each row moves by (rad or m) in its own direction, for joint values `q`. */
+export const rowValues = (table, q) =>
+  table.direction.map((sign, k) => sign * (table.coupling ? table.coupling[k].reduce((sum, share, j) => sum + share * q[j], 0) : q[k]));
+
+/** Entry k < m: the frame with its z axis on the axis of row k + 1, which moves with it. The last entry: the tool frame. */
 export function frames(table, links, q) {
   const found = [];
   let T = links[0];
-  for (const k of JOINTS) {
-    T = multiply(T, rotZ(table.direction[k] * q[k] + table.offset[k]));
+  rowValues(table, q).forEach((x, k) => {
+    T = multiply(T, table.sliding[k] ? translation(0, 0, x) : rotZ(x + table.offset[k]));
     found.push(T);
     T = multiply(T, links[k + 1]);
-  }
+  });
   return [...found, T];
 }
 
-/** Columns of the geometric Jacobian at the tool point, base frame: linear part (m/rad), then angular (rad/rad) [2]. */
+/** Columns of the geometric Jacobian at the tool point, base frame: linear part, then angular, per rad or m of a joint [2]. */
 export function jacobian(table, T) {
-  const tool = column(T[6], 3);
-  return JOINTS.map((k) => {
-    const axis = scaled(column(T[k], 2), table.direction[k]);
-    return [...cross(axis, subtract(tool, column(T[k], 3))), ...axis];
+  const tool = column(T.at(-1), 3);
+  const rows = table.direction.map((sign, k) => {
+    const axis = scaled(column(T[k], 2), sign);
+    return table.sliding[k] ? [...axis, 0, 0, 0] : [...cross(axis, subtract(tool, column(T[k], 3))), ...axis];
   });
+  if (!table.coupling) return rows;
+  return table.lower.map((_, j) => POSE.map((r) => rows.reduce((sum, row, k) => sum + row[r] * table.coupling[k][j], 0)));
 }
 
-/** Measures of the Jacobian with its linear rows divided by a characteristic length (m) [3]. */
+/** Measures of the Jacobian with its linear rows divided by a characteristic length (m), columns of slides times it [3]. */
 export function conditioning(table, T, length) {
-  const columns = jacobian(table, T).map((entries) => entries.map((value, row) => (row < 3 ? value / length : value)));
-  const values = singularValues(columns);
-  const singular = values[5] <= 6 * Number.EPSILON * values[0];
+  const columns = scaledJacobian(table, T, length);
+  const values = singularValues(columns.length > 6 ? POSE.map((r) => columns.map((entries) => entries[r])) : columns);
+  const singular = values.at(-1) <= 6 * Number.EPSILON * values[0];
   return {
     manipulability: values.reduce((product, value) => product * value, 1),
-    smallestSingularValue: values[5],
-    conditionNumber: singular ? Infinity : values[0] / values[5],
+    smallestSingularValue: values.at(-1),
+    conditionNumber: singular ? Infinity : values[0] / values.at(-1),
   };
 }
+
+/** The Jacobian's columns in parts of a length (m): linear rows are divided by it, columns of joints that slide times it. */
+export const scaledJacobian = (table, T, length) =>
+  jacobian(table, T).map((entries, j) => entries.map((value, r) => value * (table.slides[j] ? length : 1) / (r < 3 ? length : 1)));
 
 /**
  * Signed distances from the three singular sets of a wrist-partitioned arm [2]: `wrist` (rad, axes 4 and 6 in line),
@@ -95,17 +108,19 @@ function angleShortOfLine(a, b, axis) {
   return Math.atan2(dot(axis, cross(a, b)), Math.abs(dot(a, b) - dot(a, axis) * dot(b, axis)));
 }
 
-/** The table's own frames, 0 (base) to 6: those in which its rows are written; `T` are the joints' frames of `frames`. */
+/** The table's own frames, 0 (base) to m: those in which its rows are written; `T` are the joints' frames of `frames`. */
 export function tableFrames(table, T) {
-  const parts = linkParts(table);
-  const rows = JOINTS.map((k) => {
-    const moved = multiply(T[k], parts[k + 1].along);
-    return table.convention === "standard" ? multiply(moved, parts[k + 1].across) : moved;
+  const parts = linkParts(table).slice(1);
+  const rows = parts.map(({ along, across }, k) => {
+    const moved = multiply(T[k], along);
+    return table.convention === "standard" ? multiply(moved, across) : moved;
   });
   return [table.base, ...rows];
 }
 
-/** A length (m) to scale drawings with: the sum of all link lengths and the tool's. */
-export function sizeOf(table) {
-  return [...table.a, ...table.d].reduce((sum, value) => sum + Math.abs(value), 0) + norm(column(table.tool, 3));
+/** The least and greatest motion [x, x] (rad or m) of row k within the joints' limits. */
+export function rowRange(table, k) {
+  const shares = table.coupling ? table.coupling[k] : table.lower.map((_, j) => (j === k ? 1 : 0));
+  const ends = shares.map((share, j) => [table.lower[j], table.upper[j]].map((end) => table.direction[k] * share * end));
+  return [Math.min, Math.max].map((of) => ends.reduce((sum, pair) => sum + of(...pair), 0));
 }

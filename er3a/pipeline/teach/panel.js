@@ -1,46 +1,58 @@
 /** The page's controls: sliders, fields and buttons move the arm; what follows from its joints is shown once a frame. */
 
-import { closedForm } from "er3a/inverse";
-import { constantLinks, frames, JOINTS } from "er3a/kinematics";
+import { Clearance } from "er3a/clearance";
+import { goalOf, solutionsByIteration } from "er3a/goal";
+import { closedForm, excesses } from "er3a/inverse";
+import { constantLinks, frames, rowValues } from "er3a/kinematics";
 import { showMeasures, showPose, write } from "er3a/readouts";
-import { SolutionList, whyNot } from "er3a/solutions";
-import { fill, fixed, inDegrees, plainDegrees, toDegrees, toRadians } from "er3a/text";
+import { beyondLimits, SolutionList, whyNot } from "er3a/solutions";
+import { fill, fixed, inDegrees, inUnit, meant, plain, shown } from "er3a/text";
 import { addTasks } from "er3a/tasks";
 import { ArmView } from "er3a/view";
 
 const LIST_PAUSE = 120; // ms between two lists of solutions while the arm moves
+const REST = 300; // ms at rest before solutions are looked for by iteration
+const SLICE = 8; // ms of each frame that this may take
+const STARTS = 80;
 const LINK_PAUSE = 300; // ms at rest before the page's address follows
-const SLACK = 1e-9; // rad by which the limits may be passed, for rounding
+const SLACK = 1e-9; // rad or m by which the limits may be passed, for rounding
 
 const byId = (id) => document.getElementById(id);
 const data = JSON.parse(byId("panel-data").textContent);
 const { table, words, joint_names: names } = data;
 const links = constantLinks(table);
 const arm = data.no_closed_form ? null : closedForm(table, links);
+const goal = goalOf(data, links);
+const JOINTS = [...table.lower.keys()];
 const rows = names.map((name) => byId(`joint-${name}`));
 const sliders = rows.map((row) => row.querySelector("input[type=range]"));
 const fields = rows.map((row) => row.querySelector("input[type=number]"));
 
 let q = startJoints();
 let ghost = null;
-let listed = arm === null;
+let listed = false;
 let lastListed = -Infinity;
+let lastMoved = -Infinity;
+let search = null; // for solutions, by iteration
 let awaited = false;
 let linkTimer = 0;
 
 const view = new ArmView(byId("arm"), data, links, refresh);
-const list = arm && new SolutionList(data, arm, goTo, (other) => {
+const clearance = new Clearance(data);
+const list = new SolutionList(data, arm, goTo, (other) => {
   ghost = other;
   refresh();
 });
 
-/** The joint angles (rad) that the arm stands at. */
+/** The joint values (rad, m) that the arm stands at. */
 export const joints = () => [...q];
 
-/** Moves the arm; `angles` (rad) must be within the limits. */
+/** Moves the arm; `angles` (rad, m) must be within the limits. */
 export function moveTo(angles) {
   q = [...angles];
-  listed = arm === null;
+  listed = false;
+  search = null;
+  lastMoved = performance.now();
   follow();
 }
 
@@ -66,27 +78,37 @@ function startJoints() {
 }
 
 function showJoint(k) {
-  const degrees = toDegrees(q[k]);
-  sliders[k].value = degrees;
-  sliders[k].setAttribute("aria-valuetext", fill(words.angle, { degrees: fixed(degrees, 1) }));
-  if (document.activeElement !== fields[k]) fields[k].value = Number(degrees.toFixed(3)) + 0;
+  const value = shown(table, k, q[k]);
+  sliders[k].value = value;
+  sliders[k].setAttribute("aria-valuetext", fill(words[table.slides[k] ? "way" : "angle"], { degrees: fixed(value, 1) }));
+  if (document.activeElement !== fields[k]) fields[k].value = Number(value.toFixed(3)) + 0;
+  if (table.continuous[k]) return write(rows[k].querySelector(".room"), words.endless_joint);
   const room = Math.min(q[k] - table.lower[k], table.upper[k] - q[k]);
   const share = room / ((table.upper[k] - table.lower[k]) / 2);
-  rows[k].dataset.state = room <= SLACK ? "at" : room < data.near.limit ? "near" : "clear";
+  rows[k].dataset.state = room <= SLACK ? "at" : room < (table.slides[k] ? data.near.slide : data.near.limit) ? "near" : "clear";
   rows[k].querySelector(".fill").style.width = `${100 * Math.max(0, share)}%`;
-  write(rows[k].querySelector(".room"), room <= SLACK ? words.at_limit : fill(words.room, { room: inDegrees(room) }));
+  write(rows[k].querySelector(".room"), room <= SLACK ? words.at_limit : fill(words.room, { room: inUnit(table, k, room) }));
 }
 
-/** Why joint `k` can't go to an angle (rad); empty if it can. */
-function refusal(k, angle) {
-  if (!Number.isFinite(angle)) return fill(words.no_number, { joint: names[k] });
-  if (angle >= table.lower[k] - SLACK && angle <= table.upper[k] + SLACK) return "";
-  const limits = { lower: inDegrees(table.lower[k]), upper: inDegrees(table.upper[k]) };
-  return fill(words.outside, { joint: names[k], ...limits });
+/** Why joint `k` can't go to a value (rad, m) while the others stay; empty if it can. */
+function refusal(k, value) {
+  if (!Number.isFinite(value)) return fill(words[table.slides[k] ? "no_length" : "no_number"], { joint: names[k] });
+  const beyond = excesses(table, q.map((old, j) => (j === k ? value : old))).filter(({ joint }) => joint === undefined || joint === k);
+  const own = beyond.find(({ joint }) => joint === k);
+  if (own) {
+    const limits = { lower: inUnit(table, k, table.lower[k]), upper: inUnit(table, k, table.upper[k]) };
+    return fill(words.outside, { joint: names[k], ...limits });
+  }
+  return beyond.length ? fill(words.not_moved, { reasons: beyondLimits(data, q.map((old, j) => (j === k ? value : old))) }) : "";
 }
 
-function moveJoint(k, angle) {
-  moveTo(q.map((old, j) => (j === k ? Math.min(table.upper[k], Math.max(table.lower[k], angle)) : old)));
+/** Moves one joint (rad, m) as far as its limits let it; where those of a sum of joints don't, it stays. */
+function moveJoint(k, value) {
+  const within = table.continuous[k] ? value : Math.min(table.upper[k], Math.max(table.lower[k], value));
+  const reason = refusal(k, within);
+  if (!reason) moveTo(q.map((old, j) => (j === k ? within : old)));
+  else showJoint(k);
+  write(byId("message"), reason);
 }
 
 const KEYS = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 };
@@ -94,19 +116,19 @@ const KEYS = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 
 let before = 0; // angle of the joint whose field has the focus, when it got that or last took Enter
 
 for (const k of JOINTS) {
-  sliders[k].addEventListener("input", () => moveJoint(k, toRadians(Number(sliders[k].value))));
+  sliders[k].addEventListener("input", () => moveJoint(k, meant(table, k, Number(sliders[k].value))));
   sliders[k].addEventListener("keydown", (event) => {
     const ends = { Home: table.lower[k], End: table.upper[k] };
     const step = KEYS[event.key] * (event.shiftKey ? 0.1 : 1);
     if (!(event.key in KEYS) && !(event.key in ends)) return;
     event.preventDefault();
-    moveJoint(k, event.key in ends ? ends[event.key] : toRadians(Number((toDegrees(q[k]) + step).toFixed(6))));
+    moveJoint(k, event.key in ends ? ends[event.key] : meant(table, k, Number((shown(table, k, q[k]) + step).toFixed(6))));
   });
   fields[k].addEventListener("input", () => {
-    const angle = toRadians(fields[k].valueAsNumber);
-    const reason = refusal(k, angle);
+    const value = meant(table, k, fields[k].valueAsNumber);
+    const reason = refusal(k, value);
     fields[k].setAttribute("aria-invalid", String(reason !== ""));
-    moveJoint(k, reason === "" ? angle : before); // what is refused leaves no trace of its first digits
+    moveJoint(k, reason === "" ? value : before); // what is refused leaves no trace of its first digits
     if (reason !== "") write(byId("message"), reason);
   });
   for (const event of ["focus", "change"]) fields[k].addEventListener(event, () => (before = q[k]));
@@ -117,7 +139,7 @@ for (const k of JOINTS) {
 }
 
 byId("zero").addEventListener("click", () => moveTo(startJoints()));
-byId("copy").addEventListener("click", () => copy(`[${plainDegrees(q)}]`, words.copied));
+byId("copy").addEventListener("click", () => copy(`[${plain(table, q)}]`, words.copied));
 byId("link").addEventListener("click", () => copy(location.href.split("#")[0] + fragment(), words.link_copied));
 for (const button of document.querySelectorAll("[data-view]")) {
   button.addEventListener("click", () => view.look(button.dataset.view));
@@ -140,16 +162,16 @@ async function copy(text, told) {
   write(byId("message"), fill(message, { text }));
 }
 
-const fragment = () => `#q=${plainDegrees(q).replaceAll(" ", "")}`;
+const fragment = () => `#q=${plain(table, q).replaceAll(" ", "")}`;
 
 /** Takes the joints of the page's address, or says why not. */
 function takeLink() {
   if (!location.hash.startsWith("#q=") || location.hash === fragment()) return;
-  const angles = location.hash.slice(3).split(",").map((word) => toRadians(word === "" ? NaN : Number(word)));
-  const counted = angles.length === 6 ? "" : fill(words.bad_count, { count: angles.length });
-  const reason = counted || JOINTS.map((k) => refusal(k, angles[k])).find(Boolean);
+  const given = location.hash.slice(3).split(",").map((word, k) => meant(table, k, word === "" ? NaN : Number(word)));
+  const counted = given.length === q.length ? "" : fill(words.bad_count, { count: given.length, joints: q.length });
+  const reason = counted || JOINTS.map((k) => refusal(k, given[k])).find(Boolean) || beyondLimits(data, given);
   if (reason) write(byId("message"), fill(words.bad_link, { reason }));
-  else moveTo(angles);
+  else moveTo(given);
 }
 
 /** Numbers of the table's frames that are asked for; writes the row between two of them. */
@@ -158,10 +180,11 @@ function showRow() {
   const k = Number(chosen) - 1;
   if (chosen === "" || chosen === "all") {
     write(byId("row"), "");
-    return chosen === "" ? [] : [0, 1, 2, 3, 4, 5, 6];
+    return chosen === "" ? [] : [0, ...table.a.map((_, row) => row + 1)];
   }
-  const theta = inDegrees(table.direction[k] * q[k] + table.offset[k]);
-  const values = { row: k + 1, theta, d: fixed(1000 * table.d[k], 2), a: fixed(1000 * table.a[k], 2), alpha: inDegrees(table.alpha[k], 2) };
+  const x = rowValues(table, q)[k];
+  const theta = inDegrees(table.offset[k] + (table.sliding[k] ? 0 : x));
+  const values = { row: k + 1, theta, d: fixed(1000 * (table.d[k] + (table.sliding[k] ? x : 0)), 2), a: fixed(1000 * table.a[k], 2), alpha: inDegrees(table.alpha[k], 2) };
   write(byId("row"), fill(words.row[table.convention], values));
   return [k, k + 1];
 }
@@ -175,21 +198,34 @@ function refresh() {
 function frame(now) {
   awaited = false;
   const T = frames(table, links, q);
-  view.show(q, ghost, showRow());
-  showPose(T[6]);
+  view.show(q, ghost, showRow(), clearance.show(T));
+  showPose(T.at(-1));
   showMeasures(data, arm, T);
-  if (listed) return;
-  if (now - lastListed > LIST_PAUSE) {
-    listed = true;
-    lastListed = now;
-    list.list(T[6], q);
-  } else {
-    refresh();
-  }
+  if (!listed) findSolutions(T.at(-1), now);
 }
 
-export const points = addTasks(data, links, arm, {
-  joints, moveTo, refusal, tool: () => frames(table, links, q)[6], why: (found) => whyNot(data, found),
+/** Lists the solutions of pose `T`: in closed form now and then, by iteration bit by bit once the arm is at rest. */
+function findSolutions(T, now) {
+  if (now - (arm ? lastListed : lastMoved) <= (arm ? LIST_PAUSE : REST)) return refresh();
+  lastListed = now;
+  if (arm) {
+    listed = true;
+    return list.list(T, q);
+  }
+  search ??= solutionsByIteration(goal, T, q, STARTS);
+  const until = performance.now() + SLICE;
+  let found = [q];
+  do {
+    const step = search.next();
+    listed = step.done;
+    found = step.value ?? found;
+  } while (!listed && performance.now() < until);
+  if (listed) list.listFound(found, fill(words.iterated, { count: found.length }));
+  else refresh();
+}
+
+export const points = addTasks(data, goal, arm, {
+  joints, moveTo, refusal, tool: () => frames(table, links, q).at(-1), why: (found) => whyNot(data, found),
 });
 
 for (const k of JOINTS) showJoint(k);

@@ -7,29 +7,36 @@ from typing import Any
 
 import numpy as np
 
+import er3a.pipeline.messages.pairs  # noqa: F401
+from er3a.collision.bodies import Bodies
+from er3a.collision.distance_kernels import CYLINDER, HALF_SPACE, HULL
+from er3a.collision.scene import Scene
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.singularity import characteristic_length
-from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.kinematics.wrist_partitioned import CoupledJoints, closed_form_missing
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.foundations import caveat
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import say
-from er3a.pipeline.player.player import scene_data
+from er3a.pipeline.player.player import drawn_pieces, drawn_size, floor_of, scene_data, table_data
 from er3a.pipeline.results import SUMMARY, Provenance, input_records, read_verdict
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.study import Study
 from er3a.pipeline.teach.scripts import import_map
 from er3a.pipeline.teach.words import WORDS
 from er3a.pipeline.viewing.page import render, run_command
-from er3a.pipeline.viewing.palette import BODY, INK, JOINT_NAMES, LINK, SIX_JOINTS
-from er3a.pipeline.viewing.panel_link import has_panel
+from er3a.pipeline.viewing.palette import BODY, INK, JOINTS, LINK
 from er3a.robots.robot import Robot
+from er3a.robots.shown import joint_names
 
+SIX = 6
 _HERE = Path(__file__).parent
-TABLE = ("a", "alpha", "d", "beta", "direction", "offset", "lower", "upper", "base", "tool")
 NEAR_LIMIT = np.radians(5.0)
+NEAR_END = 0.01  # m, of a joint that slides
+NEAR_TOUCH = 0.03  # m
+KINDS = {HULL: "hull", CYLINDER: "cylinder", HALF_SPACE: "half_space"}
 NEAR_SINGULAR = 1e-2  # smallest singular value below which an arm without named singularities is warned of one
 
 
@@ -38,33 +45,27 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
     robot = study.robot(name)
     validated = results / name / "validation"
     told_first = caveat(read_verdict(validated)[0] if (validated / SUMMARY).exists() else "not_computed")
-    if not has_panel(robot):
-        render(
-            _HERE / "teach_absent.html.j2",
-            output,
-            robot=robot,
-            robot_pages=study.pages(name),
-            words=_translated(WORDS),
-            told_first=told_first,
-            command=run_command(study, f"{name}/teach.html"),
-            provenance=_provenance(study, name),
-        )
-        return
     settings = study.section(TrajectorySettings)
     near = {
         "wrist": np.radians(settings.near_wrist_deg),
         "elbow": np.radians(settings.near_elbow_deg),
         "shoulder": settings.near_shoulder_mm / 1000,
     }
-    scene = study.scene(name, "trajectory")
-    panel = panel_data(robot, near) | {"scene": scene_data(load_scene(scene) if scene else None)}
+    scene_file = study.scene(name, "trajectory")
+    scene = load_scene(scene_file) if scene_file else None
+    panel = panel_data(robot, near) | {
+        "scene": scene_data(scene.solids if scene else ()),
+        "carried": scene_data(scene.carried if scene else ()),
+        "floor": floor_of(scene),
+        "clearance": clearance_data(robot, scene),
+    }
     render(
         _HERE / "teach.html.j2",
         output,
         robot=robot,
         robot_pages=study.pages(name),
-        joint_names=JOINT_NAMES[:6],
-        joint_colours=SIX_JOINTS,
+        joint_names=joint_names(robot),
+        joint_colours=JOINTS,
         degrees=float(np.degrees(1.0)),
         words=panel["words"],
         told_first=told_first,
@@ -87,18 +88,45 @@ def panel_data(robot: Robot, near: dict[str, float]) -> dict[str, Any]:
     ----------
     near : per type of singularity the distance (rad; m for shoulder) below which the panel warns
     """
-    missing = closed_form_missing(robot)
+    missing = closed_form_missing(robot) or (None if robot.coupling is None else CoupledJoints())
     labels = [] if missing else [branch_word(label) for label in branch_labels(robot)]
     return {
         "name": robot.name,
-        "table": {"convention": robot.convention} | {key: getattr(robot, key).tolist() for key in TABLE},
+        "table": table_data(robot),
+        "size": drawn_size(robot),
+        "pieces": drawn_pieces(robot),
         "characteristic_length": characteristic_length(robot),
         "no_closed_form": say(missing) if missing else None,
         "branch_labels": labels,
-        "near": {**near, "limit": NEAR_LIMIT, "value": NEAR_SINGULAR},
-        "joint_names": JOINT_NAMES[:6],
-        "colours": {"joints": SIX_JOINTS, "link": LINK, "body": BODY, "mark": INK},
+        "near": {**near, "limit": NEAR_LIMIT, "slide": NEAR_END, "value": NEAR_SINGULAR},
+        "programs": robot.joints == robot.rows == SIX and not robot.sliding.any() and robot.coupling is None,
+        "joint_names": joint_names(robot),
+        "colours": {"joints": JOINTS, "link": LINK, "body": BODY, "mark": INK},
         "words": _translated(WORDS),
+    }
+
+
+def clearance_data(robot: Robot, scene: Scene | None) -> dict[str, Any]:
+    """The bodies whose distances the panel watches and their pairs, as ``clearance.js`` takes them; SI units."""
+    found = Bodies(robot, scene)
+    layout = found.layout
+    return {
+        "near": NEAR_TOUCH,
+        "estimated": not robot.envelopes and not robot.hulls,
+        "bodies": [
+            {
+                "kind": KINDS[int(layout.kind[b])],
+                "link": int(layout.link[b]),
+                "points": layout.points[layout.start[b] : layout.start[b + 1]].tolist(),
+                "radius": float(layout.radius[b]),
+                "disc": float(layout.disc[b]),
+            }
+            for b in range(len(layout.link))
+        ],
+        "pairs": [
+            {"bodies": [int(first), int(second)], "joined": bool(joined), "text": say(pair)}
+            for first, second, joined, pair in zip(layout.first, layout.second, layout.joined, found.pairs)
+        ],
     }
 
 

@@ -6,8 +6,8 @@
  * `{corners, colour}`, the corners (indices of points) counter-clockwise as seen from outside.
  */
 
-import { add, beside, column, cross, moved, norm, scaled, subtract, turnedBack, unit } from "er3a/algebra";
-import { linkParts } from "er3a/kinematics";
+import { add, beside, column, cross, moved, multiply, norm, scaled, subtract, turnedBack, unit } from "er3a/algebra";
+import { linkParts, rowRange } from "er3a/kinematics";
 
 const TAPER = [1.0, 0.92, 0.8, 0.66, 0.55, 0.45]; // how much thinner the arm is at each joint; the last for all behind
 const THICKNESS = 0.046; // radius of the first joint's rods, in parts of the arm's size
@@ -15,8 +15,17 @@ const ROD_SIDES = 14;
 const DRUM_SIDES = 22;
 const SHORT = 1e-6; // m
 
-/** Everything that is drawn of an arm of the given size (m). */
-export function armSolids(table, size, colours) {
+/**
+ * Everything that is drawn of an arm of the given size (m): convex pieces `{link, points, faces, colour}` of links whose
+ * shapes are known, rods and drums of all others.
+ */
+export function armSolids(table, size, colours, pieces = []) {
+  const known = new Set(pieces.map((piece) => piece.link));
+  const own = pieces.map(({ link, points, faces, colour }) => ({ frame: link, ...mesh({ points, faces, colour }) }));
+  return [...own, ...plainSolids(table, size, colours).filter((solid) => !known.has(solid.frame))];
+}
+
+function plainSolids(table, size, colours) {
   const parts = linkParts(table);
   const thickest = THICKNESS * size;
   const body = { colour: colours.body, sides: ROD_SIDES };
@@ -35,11 +44,18 @@ export function armSolids(table, size, colours) {
     const drum = { colour: colours.joints[k % colours.joints.length], sides: DRUM_SIDES, mark: colours.mark, before: radius };
     solids.push(rod(k + 1, origin, along, 0.75 * radius, link), rod(k + 1, along, corner, 0.75 * radius, link));
     solids.push(rod(k + 1, ...ends, radius, drum));
+    if (table.sliding[k]) solids.push(rail(table, parts[k], k, 0.5 * radius, body));
   });
   const thin = 0.3 * thickest;
   solids.push(rod(last, scaled(turnedBack(table.tool, column(table.tool, 3)), -1), origin, thin, body));
   solids.push(rod(last, [0, 0, -0.25 * thin], [0, 0, 0.25 * thin], 2 * thin, { ...body, sides: DRUM_SIDES }));
   return solids.filter(Boolean);
+}
+
+/** What row k slides along, fixed to the link before it. */
+function rail(table, before, k, radius, look) {
+  const start = multiply(before.along, before.across);
+  return rod(k, ...rowRange(table, k).map((x) => moved(start, [0, 0, x])), radius, look);
 }
 
 /** Middles (m, in the frame that the joint turns) of the joints' drums, and their half length. */
@@ -91,14 +107,13 @@ const BOX_CORNERS = [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2,
 const PIECES = 6; // of a box's edge, so that its faces sort well by distance
 const BELTS = 10; // of a ball, from pole to pole
 
-/** What stands around an arm: `{kind, T, size | radius, length | points, faces, colour}`, m; all in frame 0. */
-export function sceneSolids(things) {
+/** What stands around an arm, or is carried: `{kind, T, size | radius, length | points, faces, colour}`, m, in a frame. */
+export function sceneSolids(things, frame = 0) {
   const made = { box, cylinder, sphere, mesh };
-  return things.map((thing) => placed(made[thing.kind](thing), thing.T));
-}
-
-function placed(solid, T) {
-  return { ...solid, frame: 0, points: solid.points.map((point) => moved(T, point)) };
+  return things.map((thing) => {
+    const solid = made[thing.kind](thing);
+    return { ...solid, frame, points: solid.points.map((point) => moved(thing.T, point)) };
+  });
 }
 
 function box({ size, colour }) {

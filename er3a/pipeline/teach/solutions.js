@@ -1,9 +1,8 @@
 /** The list of all joint solutions of the tool's pose, to click through. */
 
 import { excesses, inverse } from "er3a/inverse";
-import { JOINTS } from "er3a/kinematics";
 import { write } from "er3a/readouts";
-import { fill, fixed, inDegrees, inMillimetres, toDegrees } from "er3a/text";
+import { fill, fixed, inDegrees, inMillimetres, limited, shown } from "er3a/text";
 
 const SAME_ARM = 1e-6; // rad
 
@@ -27,10 +26,9 @@ export class SolutionList {
 
   /** Lists the solutions of pose `T`, which the arm has at joint angles `q`. */
   list(T, q) {
-    const { table, words } = this.data;
-    const { rows, unsolved, free } = inverse(table, this.arm, T, q);
-    const here = (row) => JOINTS.every((k) => Math.abs(row.q[k] - q[k]) < SAME_ARM);
-    if (!rows.some(here)) rows.push({ slot: null, q: [...q], withinLimits: true });
+    const { words } = this.data;
+    const { rows, unsolved, free } = inverse(this.data.table, this.arm, T, q);
+    if (!rows.some((row) => same(row.q, q))) rows.push({ slot: null, q: [...q], withinLimits: true });
     this.rows = rows;
     this.buttons = [];
     const items = [];
@@ -48,26 +46,38 @@ export class SolutionList {
     this.mark(q);
   }
 
+  /** Lists solutions that iteration found, the arm's own first, and `told` of them. */
+  listFound(found, told) {
+    this.rows = found.map((q) => ({ slot: null, q, withinLimits: true }));
+    this.buttons = [];
+    byId("branches").replaceChildren(...this.rows.map((row) => this.#branch([row])));
+    write(byId("count"), told);
+    this.ghost(null);
+    this.mark(found[0]);
+  }
+
   /** Marks the solution that the arm is in. */
   mark(q) {
-    this.current = this.rows.findIndex((row) => JOINTS.every((k) => Math.abs(row.q[k] - q[k]) < SAME_ARM));
+    this.current = this.rows.findIndex((row) => same(row.q, q));
     for (const button of this.buttons) button.ariaPressed = String(Number(button.dataset.row) === this.current);
   }
 
   #label(row) {
-    return row.slot === null ? this.data.words.current : this.data.branch_labels[row.slot];
+    const { words, branch_labels: labels } = this.data;
+    if (row.slot !== null) return labels[row.slot];
+    return this.arm ? words.current : fill(words.found, { number: this.rows.indexOf(row) + 1 });
   }
 
   #branch(turns) {
     const { words, joint_names: names } = this.data;
     const [first, ...further] = turns;
-    const joints = element("span", "row-joints", "", first.q.map((angle) => element("span", "", fixed(toDegrees(angle)))));
+    const joints = element("span", "row-joints", "", first.q.map((value, k) => element("span", "", fixed(shown(this.data.table, k, value)))));
     const verdict = element("span", first.withinLimits ? "row-verdict pass" : "row-verdict fail", this.#verdict(first));
     const button = this.#button(first, [element("b", "", this.#label(first)), joints, verdict]);
     const item = element("li", "branch", "", [button]);
     if (further.length) {
       const chips = further.map((row) => {
-        const turns = JOINTS.map((k) => [names[k], row.q[k] - first.q[k]]).filter(([, turn]) => Math.abs(turn) > 1);
+        const turns = names.map((name, k) => [name, row.q[k] - first.q[k]]).filter(([, turn]) => Math.abs(turn) > 1);
         const texts = turns.map(([joint, turn]) => fill(words.turn, { joint, turn: signed(turn) }));
         return this.#button(row, [texts.join(", ")]);
       });
@@ -110,12 +120,13 @@ export class SolutionList {
 }
 
 /** Which joints leave their limits, and by how much. */
-function beyondLimits({ words, table, joint_names: names }, q) {
-  const reasons = excesses(table, q).map(({ joint, angle, excess, above, limit }) =>
-    fill(words[above ? "above" : "below"], {
-      joint: names[joint], angle: inDegrees(angle), excess: inDegrees(excess), limit: inDegrees(limit, 0),
-    }),
-  );
+export function beyondLimits(data, q) {
+  const { words, table } = data;
+  const reasons = excesses(table, q).map((beyond) => {
+    const { name, text } = limited(data, beyond);
+    const { angle, excess, above, limit } = beyond;
+    return fill(words[above ? "above" : "below"], { joint: name, angle: text(angle), excess: text(excess), limit: text(limit, 0) });
+  });
   return reasons.join(words.separator);
 }
 
@@ -123,9 +134,12 @@ const faultWords = (words, fault, gap) =>
   fill(words.faults[fault], { gap: fault === "orientation" ? inDegrees(gap) : inMillimetres(gap) });
 
 /** Why the arm can't take a pose, from what was found instead of joints. */
-export function whyNot(data, { row, branch }) {
+export function whyNot(data, { row, branch, miss }) {
   if (row) return beyondLimits(data, row.q);
-  return branch ? faultWords(data.words, branch.fault, branch.gap) : data.words.not_found;
+  if (branch) return faultWords(data.words, branch.fault, branch.gap);
+  return fill(data.words.not_found, { length: inMillimetres(miss.length), angle: inDegrees(miss.angle) });
 }
+
+const same = (a, b) => a.every((value, k) => Math.abs(value - b[k]) < SAME_ARM);
 
 const signed = (angle) => `${angle > 0 ? "+" : ""}${inDegrees(angle, 0)}`;

@@ -3,26 +3,34 @@
 import { column, multiply, rollPitchYaw, rotX, rotY, rotZ, translation } from "er3a/algebra";
 import { jointsFor } from "er3a/goal";
 import { write } from "er3a/readouts";
-import { fill, fixed, plainDegrees, toDegrees, toRadians } from "er3a/text";
+import { fill, fixed, inDegrees, inMillimetres, meant, plain, shown, toDegrees, toRadians } from "er3a/text";
 
-const SPEED = toRadians(30); // rad/s, of the joint that turns most, on the mean of a move
+const SPEED = 30; // deg/s on the mean of a move, of the joint that takes longest
+const SLIDE_SPEED = 150; // mm/s
+const STILL = 1e-9; // rad or m
+const FOLLOWED = 1e-6; // m and rad
 
 const byId = (id) => document.getElementById(id);
 
-/** Brings the sections to life; `arm` tells and moves: `joints()`, `tool()`, `moveTo(q)`, `refusal(k, angle)`. */
-export function addTasks(data, links, closed, arm) {
+/** Brings the sections to life; `arm` tells and moves: `joints()`, `tool()`, `moveTo(q)`, `refusal(k, value)`. */
+export function addTasks(data, goal, closed, arm) {
   const { table, words } = data;
 
-  /** Moves the tool to `T`, or says in `message` why not. */
-  function reach(T, message) {
-    const found = jointsFor(table, links, closed, T, arm.joints());
-    if (found.q) arm.moveTo(found.q);
-    write(message, found.q ? "" : fill(words.not_reached, { reason: arm.why(found) }));
-    return Boolean(found.q);
+  /** Moves the tool to `T`, or says in `message` why not, or what of it the arm can't follow. */
+  function reach(T, message, starts) {
+    const found = jointsFor(goal, closed, T, arm.joints(), starts);
+    if (!found.q) return write(message, fill(words.not_reached, { reason: arm.why(found) }));
+    const { length, angle } = found.left;
+    const whole = length < FOLLOWED && angle < FOLLOWED;
+    const still = arm.joints().every((value, k) => Math.abs(value - found.q[k]) < STILL);
+    if (still && !whole) return write(message, words.no_such_motion);
+    arm.moveTo(found.q);
+    const left = { joints: table.lower.length, length: inMillimetres(length), angle: inDegrees(angle) };
+    return write(message, whole ? "" : fill(words.left_over, left));
   }
 
   typePose(reach, arm, words);
-  jog(reach, arm, words, data.joint_names);
+  jog((T, message) => reach(T, message, 1), arm, data);
   return wayPoints(data, arm);
 }
 
@@ -49,29 +57,34 @@ function typePose(reach, arm, words) {
   take();
 }
 
-function jog(reach, arm, words, names) {
+function jog(reach, arm, { words, table, joint_names: names }) {
   const message = byId("jog-message");
   const frame = () => document.querySelector("input[name=jog-frame]:checked").value;
   const buttons = [...document.querySelectorAll("[data-jog]")];
   const label = () => {
     const labels = frame() === "joints" ? names : words.jog_axes;
-    for (const button of buttons) write(button, `${labels[Number(button.dataset.jog)]} ${button.dataset.sign}`);
+    for (const button of buttons) {
+      const label = labels[Number(button.dataset.jog)];
+      button.hidden = label === undefined;
+      write(button, `${label} ${button.dataset.sign}`);
+    }
   };
   const step = (axis, sign) => {
-    const size = byId(axis < 3 && frame() !== "joints" ? "jog-mm" : "jog-deg").valueAsNumber;
+    const along = frame() === "joints" ? table.slides[axis] : axis < 3;
+    const size = byId(along ? "jog-mm" : "jog-deg").valueAsNumber;
     if (!(size > 0)) return write(message, words.jog_step);
     if (frame() === "joints") {
-      const angle = arm.joints()[axis] + sign * toRadians(size);
-      const reason = arm.refusal(axis, angle);
-      if (!reason) arm.moveTo(arm.joints().map((old, k) => (k === axis ? angle : old)));
+      const value = arm.joints()[axis] + sign * meant(table, axis, size);
+      const reason = arm.refusal(axis, value);
+      if (!reason) arm.moveTo(arm.joints().map((old, k) => (k === axis ? value : old)));
       return write(message, reason);
     }
-    const along = [0, 1, 2].map((i) => (i === axis ? (sign * size) / 1000 : 0));
+    const shift = [0, 1, 2].map((i) => (i === axis ? (sign * size) / 1000 : 0));
     const turn = [rotX, rotY, rotZ][axis - 3]?.(sign * toRadians(size)) ?? translation(0, 0, 0);
     const T = arm.tool();
-    if (frame() === "tool") return reach(multiply(T, multiply(translation(...along), turn)), message);
+    if (frame() === "tool") return reach(multiply(T, multiply(translation(...shift), turn)), message);
     const turned = multiply(turn, T); // about the base's axes, the tool point at rest
-    return reach(turned.map((row, i) => (i < 3 ? [...row.slice(0, 3), T[i][3] + along[i]] : row)), message);
+    return reach(turned.map((row, i) => (i < 3 ? [...row.slice(0, 3), T[i][3] + shift[i]] : row)), message);
   };
   for (const button of buttons) {
     button.addEventListener("click", () => step(Number(button.dataset.jog), button.dataset.sign === "+" ? 1 : -1));
@@ -82,14 +95,14 @@ function jog(reach, arm, words, names) {
 
 /** Way points in joint space; the browser keeps them where it keeps anything for pages on a disk. */
 function wayPoints(data, arm) {
-  const { words, name } = data;
+  const { words, name, table } = data;
   const place = `er3a-points-${name}`;
   const points = kept();
   const list = byId("points");
 
   function kept() {
     try {
-      return JSON.parse(localStorage.getItem(place)) ?? [];
+      return (JSON.parse(localStorage.getItem(place)) ?? []).filter((q) => q.length === table.lower.length);
     } catch {
       return [];
     }
@@ -102,14 +115,14 @@ function wayPoints(data, arm) {
       // They last as long as the page.
     }
     list.replaceChildren(...points.map(item));
-    for (const id of ["export-path", "export-program"]) byId(id).disabled = points.length < 2;
+    for (const id of ["export-path", "export-program"]) if (byId(id)) byId(id).disabled = points.length < 2;
     byId("clear-points").disabled = points.length === 0;
   }
 
   function item(q, i) {
     const made = document.createElement("li");
     made.append(
-      button(q.map((angle) => fixed(toDegrees(angle))).join(", "), fill(words.go_to_point, { number: i + 1 }), () => arm.moveTo(q)),
+      button(q.map((value, k) => fixed(shown(table, k, value))).join(", "), fill(words.go_to_point, { number: i + 1 }), () => arm.moveTo(q)),
       " ",
       button("×", fill(words.remove_point, { number: i + 1 }), () => {
         points.splice(i, 1);
@@ -134,10 +147,10 @@ function wayPoints(data, arm) {
     points.length = 0;
     changed();
   });
-  byId("export-path").addEventListener("click", () => save(`${name}_taught.yaml`, pathFile(points)));
-  byId("export-program").addEventListener("click", () => save(`${name}_taught.pgm`, rplProgram(name, points)));
+  byId("export-path").addEventListener("click", () => save(`${name}_taught.yaml`, pathFile(table, points)));
+  byId("export-program")?.addEventListener("click", () => save(`${name}_taught.pgm`, rplProgram(name, points)));
   changed();
-  return { pathFile: () => pathFile(points), program: () => rplProgram(name, points) };
+  return { pathFile: () => pathFile(table, points), program: () => rplProgram(name, points) };
 }
 
 function save(file, text) {
@@ -149,9 +162,10 @@ function save(file, text) {
 }
 
 /** A path file of er3a: joint moves through the points, which stop at each. */
-function pathFile(points) {
-  const rows = points.map((q) => `      - [${plainDegrees(q)}]\n`);
-  const moves = points.slice(1).map((q, i) => Math.max(1, ...q.map((angle, k) => Math.abs(angle - points[i][k]) / SPEED)));
+function pathFile(table, points) {
+  const rows = points.map((q) => `      - [${plain(table, q)}]\n`);
+  const time = (k, value) => Math.abs(shown(table, k, value)) / (table.slides[k] ? SLIDE_SPEED : SPEED);
+  const moves = points.slice(1).map((q, i) => Math.max(1, ...q.map((value, k) => time(k, value - points[i][k]))));
   const duration = Math.ceil(moves.reduce((sum, time) => sum + time, 0));
   return `kind: paths\npaths:\n  - name: taught\n    title: Points taught in the teach panel\n    kind: joint_sequence\n    points_deg:\n${rows.join("")}    duration_s: ${duration}\n    samples: ${25 * duration}\n`;
 }

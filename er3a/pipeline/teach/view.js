@@ -1,48 +1,72 @@
 /** The picture of the arm: what is drawn at given joint angles. */
 
-import { add, column, moved, norm, scaled, subtract, turned } from "er3a/algebra";
-import { frames, JOINTS, sizeOf, tableFrames } from "er3a/kinematics";
+import { add, column, moved, norm, scaled, subtract, translation, turned } from "er3a/algebra";
+import { frames, tableFrames } from "er3a/kinematics";
 import { Orbit } from "er3a/orbit";
 import { eyeOf, Picture } from "er3a/scene";
 import { armSolids, drums, sceneSolids } from "er3a/solids";
 
+const WORLD = translation(0, 0, 0);
+const TOUCHING = "#d1242f";
 const FRAME_COLOURS = ["#d62728", "#2ca02c", "#1f77b4"]; // of x, y, z
+
+const coloured = (solid, colour) => ({ ...solid, faces: solid.faces.map((face) => ({ ...face, colour })) });
+
+/** Where to look, and about how long the arm is from there (m). */
+function lookedAt(table, links, size) {
+  if (table.sliding.some(Boolean) || table.a.length < 3) {
+    const middle = table.lower.map((low, j) => (low + table.upper[j]) / 2);
+    return [scaled(add(column(table.base, 3), column(frames(table, links, middle).at(-1), 3)), 0.5), 0.75 * size];
+  }
+  const origins = frames(table, links, table.lower.map(() => 0)).map((T) => column(T, 3));
+  return [origins[1], origins.slice(2).reduce((sum, origin, k) => sum + norm(subtract(origin, origins[k + 1])), 0)];
+}
 
 export class ArmView extends Orbit {
   /** `draw` is called when the view has changed and the picture has to be drawn again. */
-  constructor(canvas, { table, colours, joint_names: names, scene }, links, draw) {
-    const atZero = frames(table, links, [0, 0, 0, 0, 0, 0]);
-    const apart = (k) => norm(subtract(column(atZero[k], 3), column(atZero[k - 1], 3)));
-    super(canvas, column(atZero[1], 3), [2, 3, 4, 5, 6].reduce((sum, k) => sum + apart(k), 0), () => draw());
-    Object.assign(this, { table, links, names });
-    this.size = sizeOf(table);
+  constructor(canvas, { table, size, colours, joint_names: names, pieces, scene, carried, floor }, links, draw) {
+    super(canvas, ...lookedAt(table, links, size), () => draw());
+    Object.assign(this, { table, links, size, rows: table.coupling ? table.a.map((_, k) => String(k + 1)) : names });
     this.surroundings = sceneSolids(scene ?? []);
-    this.solids = armSolids(table, this.size, colours);
-    this.drums = drums(table, this.size);
+    this.solids = [...armSolids(table, size, colours, pieces), ...sceneSolids(carried ?? [], table.a.length + 1)];
+    this.drums = drums(table, size);
     this.jointColours = colours.joints;
     this.picture = new Picture(canvas);
     this.base = column(table.base, 3);
+    this.floor = floor ?? this.base[2];
   }
 
-  /** Draws the arm at joint angles `q`, a pale one at `ghost` (null for none), and the table's frames with these numbers. */
-  show(q, ghost, numbers = []) {
-    const { picture, solids, page, size, base } = this;
+  /**
+   * Draws the arm at joint values `q`, a pale one at `ghost` (null for none), the table's frames with these numbers, and
+   * the nearest pair, `{from, to, text, links}`: a line, and links that touch in red.
+   */
+  show(q, ghost, numbers = [], nearest = null) {
+    const { picture, solids, page, size, base, floor } = this;
     picture.fit();
     picture.begin(eyeOf(this));
     const poses = this.#poses(q);
-    picture.floor(base, size / 10, base[2], page.grid);
-    picture.shadow(solids, poses, base[2], page.grid);
-    const groups = [{ solids: this.surroundings, poses, ghost: false }, { solids, poses, ghost: false }];
+    picture.floor(base, size / 10, floor, page.grid);
+    picture.shadow(solids, poses, floor, page.grid);
+    const touching = nearest?.links ?? [];
+    const shown = touching.length ? solids.map((solid) => (touching.includes(solid.frame) ? coloured(solid, TOUCHING) : solid)) : solids;
+    const groups = [{ solids: this.surroundings, poses: [WORLD], ghost: false }, { solids: shown, poses, ghost: false }];
     if (ghost) groups.push({ solids, poses: this.#poses(ghost), ghost: true });
     picture.solids(groups);
     if (numbers.length) this.#tableFrames(tableFrames(this.table, poses.slice(1)), numbers);
     else this.#axes(poses);
-    this.#toolFrame(poses[7]);
+    this.#toolFrame(poses.at(-1));
+    if (nearest?.text) this.#nearest(nearest);
   }
 
   /** Poses of base, the frames that the joints turn, and tool. */
   #poses(q) {
     return [this.table.base, ...frames(this.table, this.links, q)];
+  }
+
+  #nearest({ from, to, text, links }) {
+    const { picture, page } = this;
+    picture.line([from, to], links.length ? TOUCHING : page.ink, 3);
+    picture.word(text, scaled(add(from, to), 0.5), links.length ? TOUCHING : page.ink, page.halo);
   }
 
   #tableFrames(found, numbers) {
@@ -59,13 +83,12 @@ export class ArmView extends Orbit {
   }
 
   #axes(poses) {
-    for (const k of JOINTS) {
-      const { middle, half } = this.drums[k];
+    for (const [k, { middle, half }] of this.drums.entries()) {
       const axis = scaled(column(poses[k + 1], 2), this.table.direction[k]);
       const start = add(moved(poses[k + 1], middle), scaled(axis, half));
       const tip = add(start, scaled(axis, half));
       this.picture.line([start, tip], this.jointColours[k], 3);
-      this.picture.word(this.names[k], add(tip, scaled(axis, 0.6 * half)), this.page.ink, this.page.halo);
+      this.picture.word(this.rows[k], add(tip, scaled(axis, 0.6 * half)), this.page.ink, this.page.halo);
     }
   }
 

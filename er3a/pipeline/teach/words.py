@@ -12,10 +12,6 @@ WORDS: dict[str, Any] = {
         "Move the joints and watch the tool: its pose, the limits, how near the arm comes to a singularity, and which "
         "other joint angles reach the same pose."
     ),
-    "absent": N_(
-        "The teach panel moves arms with six joints that turn, each by itself; this arm has others. "
-        "Its recordings show it in motion."
-    ),
     "no_script": N_("This page computes in the browser; it needs JavaScript."),
     "view": N_("The arm"),
     "picture": N_(
@@ -42,15 +38,20 @@ WORDS: dict[str, Any] = {
     "zoom_out": N_("Farther"),
     "joints": N_("Joints"),
     "joints_help": N_(
-        "Arrow keys move by 1°, with Shift by 0.1°; Page Up and Page Down by 10°; Home and End go to the limits."
+        "Arrow keys move by 1° (1 mm where a joint slides), with Shift by a tenth; Page Up and Page Down by ten; Home "
+        "and End go to the limits."
     ),
     "slider": N_("{joint}, slider"),
     "typed": N_("{joint} in degrees"),
+    "typed_length": N_("{joint} in millimetres"),
     "angle": N_("{degrees} degrees"),
+    "way": N_("{degrees} millimetres"),
+    "endless_joint": N_("turns without end"),
     "room": N_("{room} from its limit"),
     "at_limit": N_("at its limit"),
     "outside": N_("{joint} stays between {lower} and {upper}."),
     "no_number": N_("{joint} needs a number, in degrees."),
+    "no_length": N_("{joint} needs a number, in millimetres."),
     "zero": N_("Zero pose"),
     "copy_joints": N_("Copy joints"),
     "copy_link": N_("Copy link"),
@@ -58,7 +59,7 @@ WORDS: dict[str, Any] = {
     "link_copied": N_("The link to this pose is copied."),
     "not_copied": N_("This browser lets no page copy; take it from here: {text}"),
     "bad_link": N_("The link's joints were not taken: {reason}"),
-    "bad_count": N_("it names {count} numbers where six are needed."),
+    "bad_count": N_("it names {count} numbers where {joints} are needed."),
     "jog": N_("Jog"),
     "jog_help": N_(
         "Along and about the axes of the base or of the tool, the tool point at rest while it turns, or joint by joint."
@@ -83,13 +84,22 @@ WORDS: dict[str, Any] = {
     "pose_number": N_("“{field}” needs a number."),
     "not_reached": N_("The arm stays: {reason}."),
     "not_found": N_(
-        "iteration from here found no joint angles within the limits, which does not prove that there are none"
+        "iteration found no joint values within the limits; the nearest stays {length} and {angle} away, which does "
+        "not prove that there are none"
     ),
+    "left_over": N_(
+        "The tool is {length} and {angle} away from what was asked, in what the {joints} joints of this arm cannot set."
+    ),
+    "no_such_motion": N_("The arm stays: its joints cannot move the tool that way."),
     "points": N_("Way points"),
     "points_help": N_(
-        "Saved points become a path file (joint moves that stop at each point) or a program in RPL at a tenth of full "
-        "speed. Nothing here checks the way between them: er3a check and the trajectory stage do, and er3a "
-        "check-program."
+        "Two or more saved points become a path file (joint moves that stop at each point) or a program in RPL at a "
+        "tenth of full speed. Nothing here checks the way between them: er3a check and the trajectory stage do, and "
+        "er3a check-program."
+    ),
+    "points_help_path": N_(
+        "Two or more saved points become a path file: joint moves that stop at each point. Nothing here checks the "
+        "way between them: er3a check and the trajectory stage do."
     ),
     "save_point": N_("Save this point"),
     "export_path": N_("Export path file"),
@@ -146,6 +156,7 @@ WORDS: dict[str, Any] = {
     "near_unnamed": N_("Near a singularity: the smallest singular value is {value}."),
     "unnamed": N_("The kinds of singularity of this arm have no names here, because {reason}."),
     "solutions": N_("All IK solutions of this pose"),
+    "solutions_some": N_("IK solutions of this pose"),
     "solutions_help": N_(
         "Choose one and the arm goes there; the tool stays. Point at one to see it as a pale arm. Branches: "
         "wrist before axis 1 or over the head (back), elbow up or down, wrist flipped or not. "
@@ -182,8 +193,27 @@ WORDS: dict[str, Any] = {
             "The wrist centre is on axis 1: J1 is free, so there are infinitely many solutions; J1 is kept here."
         ),
     },
+    "found": N_("solution {number}"),
+    "iterated": N_("{count} found by iteration; there may be others"),
     "no_closed_form": N_(
-        "None are shown: the page solves arms with a spherical wrist and parallel axes 2 and 3 in closed form. For "
-        "this arm it can't, because {reason}. The inverse page solves such arms by iteration."
+        "The page solves arms with a spherical wrist and parallel axes 2 and 3 in closed form. This arm it solves by "
+        "iteration within the joint limits, once the arm is at rest, because {reason}. The inverse page lists all "
+        "solutions of its targets where the arm's class has a solver."
     ),
+    "endless": N_(
+        "The arm has more joints than a pose asks for, so there are infinitely many solutions; some that are far "
+        "apart are shown."
+    ),
+    "clearance_help": N_(
+        "Clearance: the least distance between the arm's shapes and the scene's, and between links of the arm that can "
+        "meet, as the collision stage watches them. A line shows where."
+    ),
+    "clearance_estimated": N_(
+        "The robot's file gives no shapes of its links, so they are capsules along the table, as thick as arms of this "
+        "size usually are: an estimate."
+    ),
+    "clearance_is": N_("{distance} clear: {pair}."),
+    "overlap": N_("Touches: {pair} overlap by {distance}."),
+    "overlap_deep": N_("Touches: {pair} overlap by {distance} or more."),
+    "nothing_meets": N_("Nothing here can meet."),
 }

@@ -18,6 +18,8 @@ from er3a.pipeline.viewing.recording import seconds
 from er3a.robots.robot import Robot
 from er3a.robots.shown import size_of
 
+LABEL = (200, 90, 0)  # of labels: about as legible on the viewer's dark ground as on its light one
+LABEL_AT = 0.6  # of the axis arrow: off the drum, and short of the next joint
 _TAPER = (1.0, 0.92, 0.8, 0.66, 0.55, 0.45)
 
 
@@ -70,15 +72,16 @@ def log_arm(stream: rr.RecordingStream, robot: Robot, q: np.ndarray, entity: str
         )
         stream.log(f"{path}/joint", drum, static=True)
         if not ghost:
-            axis = rr.Arrows3D(
-                origins=[along / 2],
-                vectors=[[0, 0, robot.direction[k] * size * 3.2]],
-                radii=[size * 0.12],
-                colors=[colour],
+            arrow = np.array([0, 0, robot.direction[k] * size * 3.2])
+            axis = rr.Arrows3D(origins=[along / 2], vectors=[arrow], radii=[size * 0.12], colors=[colour])
+            tip = rr.Points3D(
+                [along / 2 + LABEL_AT * arrow],
+                radii=[size * 0.1],
+                colors=[LABEL],
                 labels=[JOINT_NAMES[k]],
                 show_labels=True,
             )
-            stream.log(f"{path}/axis", axis, static=True)
+            stream.log(f"{path}/axis", axis, tip, static=True)
     if not ghost:
         stream.log(f"{entity}/tool", rr.TransformAxes3D(radius * 3), static=True)
     log_pose(stream, robot, q, entity)

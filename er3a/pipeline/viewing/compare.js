@@ -55,3 +55,23 @@ function picked() {
 [...pickers, onlyDifferences].forEach((control) => control.addEventListener("change", picked));
 addEventListener("hashchange", takeAddress);
 takeAddress();
+
+// Where the pointer is in the section, on a border if one is close.
+function sectionAt(event) {
+  const place = new DOMPoint(event.clientX, event.clientY).matrixTransform(borders.getScreenCTM().inverse());
+  if (place.x < 0) return [];
+  const reach = NEAR / borders.getScreenCTM().a;
+  let near = { gap: reach, x: place.x, y: place.y };
+  for (const group of borders.querySelectorAll("g.a, g.b")) {
+    for (const { x, y } of [...group.children].flatMap((line) => [...line.points])) {
+      const gap = Math.hypot(x - place.x, y - place.y);
+      if (gap < near.gap) near = { gap, x, y, title: compared[group.dataset.robot].title, colour: getComputedStyle(group).stroke };
+    }
+  }
+  const line = (name, value) => ({ text: `${name}: ${shownValue(Math.round(value))}` });
+  const on = near.title ? [{ text: near.title, colour: near.colour }] : [];
+  return [...on, line(borders.dataset.across, near.x), line(borders.dataset.up, -near.y)];
+}
+
+const borders = document.getElementById("borders");
+addEventListener("DOMContentLoaded", () => answerPointer(borders, sectionAt));

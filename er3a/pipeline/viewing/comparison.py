@@ -38,7 +38,6 @@ def write_compare(study: Study, results: Path, workspaces: Workspaces, output: P
     data = {
         name: {
             "title": own_title(robot.title),
-            "caveat": caveat(stage_head(results / name / "validation", STAGES["validation"]).status),
             "values": [values[name].get(row) for row in rows],
             "border": borders[name],
         }
@@ -52,6 +51,9 @@ def write_compare(study: Study, results: Path, workspaces: Workspaces, output: P
         provenance=Provenance(_inputs(study, results), code_digest(__name__), seed=study.seed),
         rows=rows,
         data=data,
+        caveats={
+            name: caveat(stage_head(results / name / "validation", STAGES["validation"]).status) for name in robots
+        },
         low=corners.min(axis=0).tolist(),
         high=corners.max(axis=0).tolist(),
         compare_script=Path(__file__).with_name("compare.js").read_text(encoding="utf-8"),

@@ -1,4 +1,4 @@
-"""What moved between two results folders: verdicts, key figures, and tables."""
+"""What moved between two results folders: verdicts, key figures, the table's entries, borders, and files."""
 
 from __future__ import annotations
 
@@ -72,9 +72,11 @@ def changes(old: Path, new: Path) -> list[Change]:
         folders = old / robot / stage, new / robot / stage
         if stage in STAGES:
             found += _in_heads(robot, stage, *(stage_head(folder, STAGES[stage]) for folder in folders))
-        found += _in_tables(robot, stage, *folders)
+        if stage == "validation":
+            found += _in_entries(robot, *folders)
         if stage == "workspace":
             found += _in_borders(robot, *folders)
+        found += _in_tables(robot, stage, *folders)
     return found
 
 
@@ -144,6 +146,30 @@ def _moved(a: ShownFigure | None, b: ShownFigure | None) -> tuple[str, str]:
     return shown, tr("within the 95 % interval of the difference") if within else tr("more than the intervals explain")
 
 
+def _in_entries(robot: str, old: Path, new: Path) -> list[Change]:
+    """Entries of the D-H table, zero, limits and speeds that have another value."""
+    before, after = (_entries(folder) for folder in (old, new))
+    found = []
+    for name in {**before, **after}:
+        (a, unit), (b, new_unit) = before.get(name, (None, "")), after.get(name, (None, ""))
+        if a != b:
+            difference = tr("only here") if a is None or b is None else _value(b - a, unit)
+            found.append(Change(robot, "validation", name, _value(a, unit), _value(b, new_unit), difference))
+    return found
+
+
+def _entries(folder: Path) -> dict[str, tuple[float | None, str]]:
+    """Value and unit by the entry's name, as far as references speak of the table."""
+    stored = read_stage(folder, STAGES["validation"]).results
+    if isinstance(stored, AbsentResults) or stored.summary.evidence is None:
+        return {}
+    return {each.entry: (each.value, each.unit) for each in stored.summary.evidence.entries if each.value is not None}
+
+
+def _value(value: float | None, unit: str) -> str:
+    return f"{number(value, 6)} {unit}".strip()
+
+
 def _in_borders(robot: str, old: Path, new: Path) -> list[Change]:
     """How far each exact border moved: the greatest distance of a point of one from the other, either way."""
     borders = [_borders(folder) for folder in (old, new)]
@@ -155,8 +181,10 @@ def _in_borders(robot: str, old: Path, new: Path) -> list[Change]:
         if before is None or after is None:
             there = (tr("there"), "–") if after is None else ("–", tr("there"))
             found.append(Change(robot, "workspace", what, *there, tr("only here")))
-        elif (moved := 1000 * max(_farthest(before, after), _farthest(after, before))) > SAME_BORDER_MM:
-            found.append(Change(robot, "workspace", what, "", "", tr("{moved} mm at most", moved=number(moved, 3))))
+        elif (farthest := max(_farthest(before, after), _farthest(after, before)))[0] > SAME_BORDER_MM:
+            moved, radius, height = (number(value, 3) for value in farthest)
+            where = tr("most at {radius} mm from axis 1, {height} mm up", radius=radius, height=height)
+            found.append(Change(robot, "workspace", what, "–", "–", tr("{moved} mm at most", moved=moved), where))
     return found
 
 
@@ -171,15 +199,18 @@ def _borders(folder: Path) -> dict[tuple[str, str], list[Reals]]:
     return found
 
 
-def _farthest(arcs: list[Reals], others: list[Reals]) -> float:
-    """The greatest distance of the arcs' points from the other arcs, as lines from point to point."""
+def _farthest(arcs: list[Reals], others: list[Reals]) -> tuple[float, float, float]:
+    """The greatest distance of the arcs' points from the other arcs, as lines from point to point, and the radius and
+    height where it is, in mm."""
     points = np.concatenate(arcs)[:, None]
     starts, ends = (np.concatenate([arc[part] for arc in others]) for part in (np.s_[:-1], np.s_[1:]))
     along = ends - starts
     squares = np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
     share = np.clip(((points - starts) * along).sum(axis=2) / squares, 0.0, 1.0)
     gaps = np.linalg.norm(points - starts - share[..., None] * along, axis=2)
-    return float(gaps.min(axis=1).max())
+    nearest = gaps.min(axis=1)
+    radius, height = points[nearest.argmax(), 0]
+    return 1000 * float(nearest.max()), 1000 * float(radius), 1000 * float(height)
 
 
 def _in_tables(robot: str, stage: str, old: Path, new: Path) -> list[Change]:

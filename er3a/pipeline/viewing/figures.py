@@ -15,6 +15,7 @@ from matplotlib.font_manager import fontManager
 from matplotlib.rcsetup import cycler
 
 from er3a.pipeline.messages import language
+from er3a.pipeline.viewing.figure_readings import name_parts
 from er3a.pipeline.viewing.palette import GRID, INK, MUTED, SIX_JOINTS
 
 if TYPE_CHECKING:
@@ -101,6 +102,7 @@ def svg_data_uri(figure: Figure) -> str:
     """A figure in the house style as a ``data:`` address of an SVG image (dense clouds rasterised at 160 dpi)."""
     buffer = io.BytesIO()
     figure.dpi = 160
+    name_parts(figure)
     # Not savefig: it would draw a figure with a layout twice.
     FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})
     return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")

@@ -5,6 +5,7 @@ Variants of a sweep stand in the section of their sweep only.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from er3a.pipeline.viewing.sweep_section import sweep_sections
 from er3a.pipeline.viewing.thumbnail import thumbnail
 
 SHOWN_FIGURES = 3
+WHOLE, LED = 300, 260  # characters of a verdict that a cell shows whole, and those before which it breaks a longer one
 FIRST = ("fail", "conflict", "caution", "no_reference", "not_computed", "pass")  # what is open stands first
 
 
@@ -67,8 +69,27 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     shown = sorted(heads.values(), key=lambda head: FIRST.index(head.status))
     return {
         "robot": study.robot(name),
-        "heads": shown,
+        "table": table,
+        "heads": [(head, *led(head.text)) for head in shown],
         "counts": [(status, sum(head.status == status for head in shown)) for status in FIRST],
         "expected": expected,
-        "decision": decision(table, failed),
+        "decision": decision(table, failed, _instead(study, name, results.parent)),
     }
+
+
+def led(text: str) -> tuple[str, str]:
+    """A verdict's text up to the end of a sentence or clause, and the rest, which unfolds; empty for a short text."""
+    ends = [found.end() for found in re.finditer(r"[.;](?= )|[。；]", text[:LED])]
+    if len(text) <= WHOLE or not ends:
+        return text, ""
+    return text[: ends[-1]], text[ends[-1] :].strip()
+
+
+def _instead(study: Study, name: str, results: Path) -> str | None:
+    """A robot of the study that one of this robot's reference sets is about, and that its own evidence bears out."""
+    for other in study.references(name):
+        if other == name or other not in study.robots or "validation" not in study.stages(other):
+            continue
+        if stage_head(results / other / "validation", STAGES["validation"]).status in ("pass", "caution"):
+            return other
+    return None

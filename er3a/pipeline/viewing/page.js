@@ -94,11 +94,182 @@ function enlarge(image) {
   dialog.className = "enlarged";
   dialog.setAttribute("aria-label", image.alt);
   const close = toolButton(WORDS.close, () => dialog.close());
-  dialog.append(close, image.cloneNode());
+  const large = image.cloneNode();
+  dialog.append(close, large);
+  if (large.dataset.axes) answer(large);
   dialog.addEventListener("close", () => dialog.remove());
   dialog.addEventListener("click", (event) => event.target === dialog && dialog.close());
   document.body.append(dialog);
   dialog.showModal();
+}
+
+// The number that an axis has at a part of its length.
+const along = ({ from, to, log }, part) => (log ? from * (to / from) ** part : from + part * (to - from));
+
+// As precise as a pointer is: a thousandth of the axis.
+function reading({ from, to, log, ticks }, value, precision = 3) {
+  if (ticks) return ticks.reduce((best, tick) => (Math.abs(tick[0] - value) < Math.abs(best[0] - value) ? tick : best))[1];
+  const digits = precision - Math.ceil(Math.log10(log ? Math.abs(value) : Math.abs(to - from)));
+  const rounded = digits < 0 ? Math.round(value * 10 ** digits) * 10 ** -digits : value;
+  const text = rounded.toFixed(Math.min(9, Math.max(0, digits)));
+  return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "−");
+}
+
+// The points of a curve of a drawing, in parts of it from its lower left: runs that are drawn without a gap.
+function runsOf(drawing, name) {
+  const { width, height } = drawing.viewBox.baseVal;
+  const group = drawing.getElementById(name);
+  if (!group) return { runs: [], colour: "" };
+  const own = [...group.children].find((part) => part.tagName === "path");
+  const marks = [...group.querySelectorAll("use")];
+  const point = (x, y) => [x / width, 1 - y / height];
+  const drawn = (own?.getAttribute("d") ?? "").split("M").slice(1).map((run) => run.match(/[-\d.e]+/g).map(Number));
+  const runs = drawn.map((flat) => Array.from({ length: flat.length / 2 }, (_, i) => point(flat[2 * i], flat[2 * i + 1])));
+  for (const mark of own ? [] : marks) runs.push([point(Number(mark.getAttribute("x")), Number(mark.getAttribute("y")))]);
+  return { runs, colour: own?.style.stroke || marks[0]?.style.fill || "" };
+}
+
+// The height of a curve above a place, where it has one.
+function heightAt(runs, u) {
+  for (const run of runs) {
+    const i = run.findIndex(([x], k) => k > 0 && run[k - 1][0] <= u && u <= x);
+    if (i < 0) continue;
+    const [[x0, y0], [x1, y1]] = [run[i - 1], run[i]];
+    return x1 > x0 ? y0 + ((u - x0) / (x1 - x0)) * (y1 - y0) : y1;
+  }
+  return NaN;
+}
+
+const NEAR = 12; // pixels
+
+// What a figure's axes say where the pointer is: curves over an axis at that place, other curves and marks where they
+// are near, bars, and colours by their colour bar.
+class Answers {
+  constructor(image) {
+    this.image = image;
+    this.axes = JSON.parse(image.dataset.axes);
+    const source = new TextDecoder().decode(Uint8Array.from(atob(image.src.split(",")[1]), (letter) => letter.charCodeAt(0)));
+    this.drawing = new DOMParser().parseFromString(source, "image/svg+xml").documentElement;
+    for (const axes of this.axes) {
+      axes.drawn = axes.curves.map(([name, title]) => ({ title, ...runsOf(this.drawing, name) }));
+      for (const curve of axes.drawn) curve.over = !axes.drawn_to_scale && curve.runs.some((run) => run.length > 2) && curve.runs.every((run) => run.every(([x], k) => k === 0 || x >= run[k - 1][0]));
+    }
+  }
+
+  /** The drawing's own edges in the window. */
+  edges() {
+    const { left, top, width, height } = this.image.getBoundingClientRect();
+    const style = getComputedStyle(this.image);
+    const edge = parseFloat(style.paddingLeft) + parseFloat(style.borderLeftWidth);
+    const own = this.drawing.viewBox.baseVal;
+    const scale = Math.min((width - 2 * edge) / own.width, (height - 2 * edge) / own.height);
+    const [w, h] = [scale * own.width, scale * own.height];
+    return { left: left + (width - w) / 2, top: top + (height - h) / 2, w, h };
+  }
+
+  /** Lines of text, each with the colour of what it is about; none outside of all axes. */
+  at(event) {
+    const { left, top, w, h } = this.edges();
+    const [u, v] = [(event.clientX - left) / w, 1 - (event.clientY - top) / h];
+    const axes = this.axes.find(({ box }) => u >= box[0] && u <= box[2] && v >= box[1] && v <= box[3]);
+    if (!axes) return [];
+    const { box, x, y } = axes;
+    const across = (part) => along(x, (part - box[0]) / (box[2] - box[0]));
+    const up = (part) => along(y, (part - box[1]) / (box[3] - box[1]));
+    const named = (scale, value) => ({ text: `${scale.name ? `${scale.name}: ` : ""}${reading(scale, value)}` });
+    const bars = axes.bars.filter(([from, to, , , upright]) => {
+      const at = upright ? across(u) : up(v);
+      return at >= from && at <= to;
+    });
+    if (bars.length) {
+      const [along0, across0] = bars[0][4] ? [y, named(x, (bars[0][0] + bars[0][1]) / 2)] : [x, named(y, (bars[0][0] + bars[0][1]) / 2)];
+      const marks = this.near(axes, u, v, w, h);
+      return [across0, ...bars.map(([, , from, to, , title, colour]) => ({
+        text: `${title || along0.name}: ${from === 0 ? "" : `${reading(along0, from)} … `}${reading(along0, to)}`, colour,
+      })), ...marks.map(({ title, colour, point }) => ({ text: `${title || "●"}: ${reading(along0, bars[0][4] ? up(point[1]) : across(point[0]))}`, colour }))];
+    }
+    const over = axes.drawn.filter((curve) => curve.over).map((curve) => ({ ...curve, height: heightAt(curve.runs, u) }));
+    const read = over.filter(({ height }) => height >= box[1] - 1e-3 && height <= box[3] + 1e-3);
+    if (read.length) {
+      return [named(x, across(u)), ...read.map(({ title, colour, height }) => ({ text: `${title || y.name}: ${reading(y, up(height))}`, colour }))];
+    }
+    const [found] = this.near(axes, u, v, w, h);
+    const [place, title] = found ? [found.point, found.title] : [[u, v], ""];
+    const shade = axes.shades && this.shade(axes.shades, u, v);
+    return [
+      ...(title ? [{ text: title, colour: found.colour }] : []), named(x, across(place[0])), named(y, up(place[1])),
+      ...(shade ? [shade] : []),
+    ];
+  }
+
+  /** What is drawn close to the pointer, the closest first. */
+  near({ drawn }, u, v, w, h) {
+    const away = ([x, y]) => Math.hypot((x - u) * w, (y - v) * h);
+    return drawn
+      .flatMap(({ title, colour, runs }) => runs.flat().map((point) => ({ title, colour, point, gap: away(point) })))
+      .filter(({ gap }) => gap < NEAR)
+      .sort((a, b) => a.gap - b.gap)
+      .slice(0, 1);
+  }
+
+  /** The number that a colour stands for: the place of the colour bar that has it. */
+  shade({ box, upright, scale, steps }, u, v) {
+    if (!this.pixels) {
+      const canvas = document.createElement("canvas");
+      [canvas.width, canvas.height] = [this.image.naturalWidth, this.image.naturalHeight];
+      this.pixels = canvas.getContext("2d", { willReadFrequently: true });
+      this.pixels.drawImage(this.image, 0, 0, canvas.width, canvas.height);
+    }
+    const { width, height } = this.pixels.canvas;
+    const colour = (x, y) => this.pixels.getImageData(Math.round(x * width), Math.round((1 - y) * height), 1, 1).data;
+    const own = colour(u, v);
+    let best = { gap: 60, part: NaN };
+    for (let k = 2; k <= 254; k++) {
+      const part = k / 256;
+      const there = upright
+        ? colour((box[0] + box[2]) / 2, box[1] + part * (box[3] - box[1]))
+        : colour(box[0] + part * (box[2] - box[0]), (box[1] + box[3]) / 2);
+      const gap = (own[0] - there[0]) ** 2 + (own[1] - there[1]) ** 2 + (own[2] - there[2]) ** 2;
+      if (gap < best.gap) best = { gap, part };
+    }
+    if (Number.isNaN(best.part)) return null;
+    const value = steps
+      ? String(Math.round(along(scale, (Math.floor(best.part * steps) + 0.5) / steps)))
+      : `≈ ${reading(scale, along(scale, best.part), 2)}`;
+    return { text: `${scale.name}: ${value}`, colour: `rgb(${own[0]} ${own[1]} ${own[2]})` };
+  }
+}
+
+function answer(image) {
+  let answers = null;
+  answerPointer(image, (event) => (answers ??= new Answers(image)).at(event));
+}
+
+// The pointer, or a finger, asks a figure; the lines that it answers stand beside it.
+function answerPointer(image, linesAt) {
+  const box = document.createElement("div");
+  box.className = "reading";
+  box.hidden = true;
+  image.after(box);
+  const ask = (event) => {
+    const lines = linesAt(event);
+    box.hidden = lines.length === 0;
+    box.replaceChildren(...lines.map(({ text, colour }) => {
+      const line = document.createElement("div");
+      line.textContent = text;
+      if (colour) line.style.setProperty("--swatch", colour);
+      line.classList.toggle("swatch", Boolean(colour));
+      return line;
+    }));
+    const { offsetWidth: width, offsetHeight: height } = box;
+    const beyond = event.clientX + 16 + width > document.documentElement.clientWidth;
+    box.style.left = `${Math.max(4, beyond ? event.clientX - 16 - width : event.clientX + 16)}px`;
+    box.style.top = `${Math.max(4, Math.min(event.clientY + 12, innerHeight - height - 4))}px`;
+  };
+  image.addEventListener("pointermove", ask);
+  image.addEventListener("pointerdown", ask);
+  image.addEventListener("pointerleave", () => (box.hidden = true));
+  addEventListener("scroll", () => (box.hidden = true), { passive: true, capture: true });
 }
 
 const MANY_ROWS = 12;
@@ -152,7 +323,7 @@ function nameHeading(heading, taken) {
 
 // A list of the sections that stays in sight and names the one that is read.
 function addContents() {
-  const wide = matchMedia(document.body.classList.contains("wide") ? "not all" : "(min-width: 112rem) and (max-width: 149.99rem)");
+  const wide = matchMedia(document.body.classList.contains("wide") ? "not all" : "(min-width: 80rem)");
   const headings = [...document.querySelectorAll("main h2")];
   if (headings.length < 3 || document.body.classList.contains("teach")) return;
   const titles = headings.map((heading) => heading.innerText);
@@ -189,11 +360,14 @@ function addContents() {
   tell();
 }
 
-// Joints that a sentence names, as "(10, −20, 30, 0, 45, 0) deg" or "(10°, −20°, 30°, 0°, 45°, 0°)", lead to the arm in
-// the teach panel.
+// Joints that a sentence names, as "(10, −20, 30, 0, 45, 0) deg" or "(10°, −20°, 300 mm, 0°)", lead to the arm in the
+// teach panel; a variant has none.
 function linkJoints(page) {
-  const angle = "[−-]?\\d+(?:\\.\\d+)?";
-  const vector = new RegExp(`[(（]((?:${angle}°?[,，]\\s*){5}${angle})(?=°[)）]|[)）]\\s*(?:deg|°|度))`);
+  const value = "[−-]?\\d+(?:\\.\\d+)?";
+  const unit = "(?:°|\\s*mm)";
+  const more = Number(page.dataset.joints) - 1;
+  if (more < 3) return; // three numbers may as well be a place or a turn
+  const vector = new RegExp(`[(（]((?:${value}${unit}?[,，]\\s*){${more}}${value})(?=${unit}[)）]|[)）]\\s*(?:deg|°|度))`);
   const texts = document.createTreeWalker(page, NodeFilter.SHOW_TEXT);
   const found = [];
   while (texts.nextNode()) if (vector.test(texts.currentNode.data) && !texts.currentNode.parentElement.closest("a, code, h2, script")) found.push(texts.currentNode);
@@ -202,7 +376,7 @@ function linkJoints(page) {
       const named = text.splitText(hit.index + 1);
       text = named.splitText(hit[1].length);
       const link = document.createElement("a");
-      link.href = `${page.dataset.panel}#q=${hit[1].replace(/[\s°]/g, "").replaceAll("−", "-").replaceAll("，", ",")}`;
+      link.href = `${page.dataset.panel}#q=${hit[1].replace(/[\s°m]/g, "").replaceAll("−", "-").replaceAll("，", ",")}`;
       named.replaceWith(link);
       link.append(named);
     }
@@ -308,6 +482,9 @@ function explain(text, meaning) {
 }
 
 document.querySelectorAll("main[data-panel]").forEach(linkJoints);
+if (!document.querySelector("main[data-panel]")) {
+  for (const link of document.querySelectorAll('a[href^="teach.html#q="]')) link.replaceWith(...link.childNodes);
+}
 addContents();
 document.querySelectorAll("[data-one-of]").forEach(showOneOf);
 explainTerms(JSON.parse(document.getElementById("terms").textContent));
@@ -328,6 +505,7 @@ for (const table of document.querySelectorAll("table")) {
 for (const figure of document.querySelectorAll("figure")) {
   const image = figure.querySelector("img");
   if (!image) continue;
+  if (image.dataset.axes) answer(image);
   const tools = document.createElement("p");
   tools.className = "tools";
   const save = document.createElement("a");

@@ -20,16 +20,16 @@ from matplotlib.figure import Figure
 from er3a.files.kept_files import write_atomically
 from er3a.files.shipped import INSTALLED, ROOT, view_command
 from er3a.pipeline.messages import language
-from er3a.pipeline.messages.foundations import caveat
+from er3a.pipeline.messages.foundations import Caveat, caveat
 from er3a.pipeline.messages.glossary import glossary
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import Provenance, Stored
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.figure_readings import readings
 from er3a.pipeline.viewing.figures import svg_data_uri
 from er3a.pipeline.viewing.numbers import fixed, number
-from er3a.pipeline.viewing.panel_link import has_panel
 from er3a.version import __version__
 
 _HERE = Path(__file__).parent
@@ -85,6 +85,11 @@ class Picture:
         return [[*(round(float(value), 5) for value in own), name] for own, (_, name) in zip(edges, self.over_time)]
 
     @property
+    def readings(self) -> list[dict[str, Any]]:
+        """Of a figure that was drawn: what the pointer reads in it."""
+        return readings(self.figure)
+
+    @property
     def shades(self) -> bool:
         """Whether brightness means something in it, so that a dark page must not turn it round."""
         return any(drawn.get_array() is not None for ax in self.figure.axes for drawn in (*ax.collections, *ax.images))
@@ -111,7 +116,8 @@ class ShownFigure:
 class Head:
     """What frames a stage's page: its verdict as a sentence, key figures, and where the numbers come from.
 
-    ``caveats`` by the stage that it rests on: what to know first.
+    ``caveats`` by the stage that it rests on: what to know first. ``demonstrations``: how many targets, paths, programs
+    or objects fail as they are meant to.
     """
 
     robot: str
@@ -120,7 +126,8 @@ class Head:
     text: str
     figures: tuple[ShownFigure, ...]
     provenance: Provenance
-    caveats: Mapping[str, str]
+    caveats: Mapping[str, Caveat]
+    demonstrations: int
 
 
 def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
@@ -142,8 +149,9 @@ def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
         )
         for figure in stored.results.summary.figures
     )
-    caveats = {other: text for other, status in stored.rests_on.items() if (text := caveat(status))}
-    return Head(stored.robot, stage, verdict.status, say(verdict.finding), shown, stored.provenance, caveats)
+    caveats = {other: first for other, status in stored.rests_on.items() if (first := caveat(status))}
+    meant = len(getattr(verdict.finding, "demonstrations", ()))
+    return Head(stored.robot, stage, verdict.status, say(verdict.finding), shown, stored.provenance, caveats, meant)
 
 
 def render(
@@ -183,7 +191,6 @@ def render(
         "fixed": fixed,
         "tr": tr,
         "own": language.own_title,
-        "has_panel": has_panel,
         "sentence": whole_sentence,
     }
     html = environment.get_template(template.name).render(

@@ -6,19 +6,8 @@ from collections.abc import Iterable
 
 from markupsafe import Markup
 
-from er3a.robots.robot import Robot
 
-SIX = 6
-
-
-def has_panel(robot: Robot) -> bool:
-    """Whether the teach panel moves this arm: six joints that turn, each by itself."""
-    return robot.joints == robot.rows == SIX and not robot.sliding.any() and robot.coupling is None
-
-
-def panel_link(robot: Robot, q_deg: Iterable[float], text: str) -> str:
-    """A text that leads to the arm at joint angles (deg) in the teach panel, where it has one."""
-    if not has_panel(robot):
-        return text
+def panel_link(q_deg: Iterable[float], text: str) -> str:
+    """A text that leads to the arm at joint values (deg; mm of joints that slide) in the teach panel."""
     joints = ",".join(f"{round(float(angle), 9) + 0.0:.9g}" for angle in q_deg)
     return Markup('<a href="teach.html#q={}">{}</a>').format(joints, text)

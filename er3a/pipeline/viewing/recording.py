@@ -65,6 +65,14 @@ def note_view(stage: str) -> rrb.View:
     return rrb.TextDocumentView(origin=f"/{stage}/note", name="What to look at")
 
 
+def events_view(stage: str, name: str) -> rrb.View:
+    """The view of what is logged at ``/<stage>/events``; texts tell the time themselves, in words."""
+    columns = rrb.TextLogColumns(
+        timeline_columns=rrb.encodings.TimelineColumn(TIMELINE, visible=False), text_log_columns=["loglevel", "body"]
+    )
+    return rrb.TextLogView(origin=f"/{stage}/events", name=name, columns=columns)
+
+
 def escaped(text: str) -> str:
     """A text from an input file for a Markdown document: shown as it is, on one line, with nothing fetched for it."""
     return re.sub(r"([\\`*_{}\[\]<>#!|~])", r"\\\1", " ".join(text.split()))

@@ -12,7 +12,12 @@ async function unpackPlotly() {
 
 {
   const place = document.getElementById("turning");
-  const look = (entries) => entries.some((entry) => entry.isIntersecting) && draw();
+  // Drawing takes a second, so a motion that is played is not held up.
+  const look = (entries) => {
+    if (!entries.some((entry) => entry.isIntersecting)) return;
+    if (document.querySelector("[data-playing]")) addEventListener("player-rests", draw, { once: true });
+    else draw();
+  };
   const near = new IntersectionObserver(look, { rootMargin: "25%" });
   let plotly = null;
 

@@ -9,6 +9,7 @@ import numpy as np
 from er3a.collision.bodies import Bodies
 from er3a.files.target_file import load_targets
 from er3a.kinematics.inverse import inverse
+from er3a.kinematics.targets import MANY_TARGETS
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.collision.model import Closest, PathClearances, TargetClearances
 from er3a.pipeline.stages.trajectory.collisions import Surroundings, measured
@@ -22,12 +23,15 @@ from er3a.selection.select import refusals_of
 def target_clearances(robot: Robot, bodies: Bodies, file: str) -> tuple[TargetClearances, list[Closest]]:
     """Clearance of all solutions within the limits, and of the chosen ones where they are nearest to what."""
     tables, closest = [], []
-    for target in load_targets(file, robot):
+    targets = load_targets(file, robot)
+    for target in targets:
         solutions = inverse(robot, target.T, target.q_ref)
+        if len(targets) > MANY_TARGETS:
+            solutions = solutions.without_turns()
         rows = np.flatnonzero(solutions.within_limits)
         if not rows.size:
             continue
-        distance, pair = bodies.least(solutions.q[rows])
+        distance, pair = bodies.least_of_turns(solutions.q[rows])
         between = [bodies.pairs[k].label if k >= 0 else "" for k in pair]
         tables.append(
             TargetClearances(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from matplotlib.collections import QuadMesh
 from matplotlib.colors import ListedColormap
 
 from er3a.pipeline.messages.language import tr
@@ -52,9 +53,10 @@ def workspace(results: CollisionResults) -> Picture:
     cell = results.summary.places.cell_m * 1000
     labels = (tr("x (mm)"), tr("y (mm)"), tr("z (mm)"))
     for ax, (across, up), title in zip(axes, ((0, 2), (0, 1)), (tr("From the side"), tr("From above"))):
-        _columns(ax, rows.middle_mm[:, [across, up]], state, cell)
+        mesh = _columns(ax, rows.middle_mm[:, [across, up]], state, cell)
         equal_scale(ax, labels[across], labels[up])
         ax.set_title(title)
+    figure.colorbar(mesh, ax=axes.tolist(), label=tr("reached cells that are lost (%)"), shrink=0.8)
     found = results.summary.places
     caption = tr(
         "Each square is a column of cells of {cell:.0f} mm, as red as the share of its reached cells that are lost. "
@@ -71,7 +73,7 @@ def workspace(results: CollisionResults) -> Picture:
     return Picture(figure, tr("Two views of the reached places. {conclusion}", conclusion=caption), caption)
 
 
-def _columns(ax, at: np.ndarray, state: np.ndarray, cell: float) -> None:
+def _columns(ax, at: np.ndarray, state: np.ndarray, cell: float) -> QuadMesh:
     """One square for each column of cells: the share that is lost as its shade, a ring where some is not joined."""
     low = at.min(axis=0)
     index = np.round((at - low) / cell).astype(int)
@@ -83,9 +85,12 @@ def _columns(ax, at: np.ndarray, state: np.ndarray, cell: float) -> None:
     share = np.where(count > 0, lost / np.maximum(count, 1), np.nan)
     edges = [low[k] + cell * (np.arange(size[k] + 1) - 0.5) for k in (0, 1)]
     colours = ListedColormap([_mixed(k / 20) for k in range(21)])
-    ax.pcolormesh(*edges, share.T, cmap=colours, vmin=0, vmax=1, edgecolors="white", linewidth=0.3, rasterized=True)
+    mesh = ax.pcolormesh(
+        *edges, 100 * share.T, cmap=colours, vmin=0, vmax=100, edgecolors="white", linewidth=0.3, rasterized=True
+    )
     ringed = np.argwhere(apart > 0)
     ax.plot(*(low + cell * ringed).T, "o", markerfacecolor="none", markeredgecolor=HIGHLIGHT, markersize=5)
+    return mesh
 
 
 def _mixed(share: float) -> tuple[float, ...]:

@@ -31,6 +31,7 @@ from er3a.robots.robot import Robot
 from er3a.robots.shown import meant
 
 NO_BREAK_SPACE = "\u00a0"
+MOST_ROWS = 100  # of a table of targets and paths
 
 
 def report(study: Study, stored: Stored[CollisionResults], output: Path) -> None:
@@ -38,7 +39,8 @@ def report(study: Study, stored: Stored[CollisionResults], output: Path) -> None
     name, results, summary = stored.robot, stored.results, stored.results.summary
     robot = study.robot(name)
     scene = study.scene(name, stored.stage)
-    nearest = min(summary.closest, key=lambda found: found.clearance_mm, default=None)
+    closest = sorted(summary.closest, key=lambda found: found.clearance_mm)
+    nearest = closest[0] if closest else None
     render(
         Path(__file__).with_name("report.html.j2"),
         output,
@@ -55,7 +57,8 @@ def report(study: Study, stored: Stored[CollisionResults], output: Path) -> None
         clearance=clearance_over_time(results),
         player=player(robot, _motions(robot, results), load_scene(scene) if scene else None),
         player_style=player_style(),
-        closest=[_closest(found) for found in sorted(summary.closest, key=lambda found: found.clearance_mm)],
+        closest=[_closest(found) for found in closest[:MOST_ROWS]],
+        rows_left_out=max(len(closest), len(set(results.targets.target))) - MOST_ROWS,
         nearest=closest_pair(robot, nearest) if nearest else None,
         mounting=[_mounted(contact.solid, contact.depth_mm, contact.inside) for contact in summary.mounting],
     )
@@ -129,9 +132,16 @@ def _pairs(rows: PairShares) -> list[list[str]]:
 
 
 def _targets(rows: TargetClearances) -> list[list[str]]:
-    """One row for each target: solutions within limits, clear ones, the best clearance and its branch."""
+    """One row for each target: solutions within limits, clear ones, the best clearance and its branch.
+
+    Of many targets those whose best clearance is least.
+    """
+    names, first, group = np.unique(rows.target.astype(str), return_index=True, return_inverse=True)
+    most = np.full(len(names), -np.inf)
+    np.maximum.at(most, group, rows.clearance_mm)
+    kept = np.argsort(most, kind="stable")[:MOST_ROWS]
     found = []
-    for name in dict.fromkeys(rows.target):
+    for name in names[kept[np.argsort(first[kept])]]:
         own = rows.take(rows.target == name)
         best = int(own.clearance_mm.argmax())
         found.append(

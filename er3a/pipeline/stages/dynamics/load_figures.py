@@ -42,7 +42,7 @@ def torque_figure(path: PathLoad, rows: TorqueRows) -> Picture:
         low, high = rows.torque[:, j] - rows.tolerance[:, j], rows.torque[:, j] + rows.tolerance[:, j]
         torque.fill_between(rows.t_s, low, high, color=colour, alpha=0.15, linewidth=0)
         torque.plot(rows.t_s, rows.torque[:, j], color=colour, label=f"J{j + 1}")
-        power.plot(rows.t_s, rows.power_w[:, j], color=colour)
+        power.plot(rows.t_s, rows.power_w[:, j], color=colour, label=f"J{j + 1}")
     torque.legend(ncols=3, fontsize=8)
     torque.set_ylabel(tr("torque of the drive ({unit})", unit=unit))
     names = dict(zip(PARTS, (tr("gravity"), tr("inertia"), tr("velocity"), tr("friction"), tr("forces at the tool"))))
@@ -58,8 +58,8 @@ def torque_figure(path: PathLoad, rows: TorqueRows) -> Picture:
         ax.set_xlabel(tr("time (s)"))
     most = max(PARTS, key=lambda part: getattr(load, part))
     caption = tr(
-        "J{joint} feels most: {peak} ± {tolerance} {unit} at {t:.2f} s, mainly {part}. Shaded: by how much torques may "
-        "be off by the tolerances of masses and centres. Power below 0 goes back into the drive.",
+        "J{joint} carries the greatest torque, {peak} ± {tolerance} {unit} at {t:.2f} s, mainly {part}. Shaded: by how "
+        "much torques may be off by the tolerances of masses and centres. Power below 0 goes back into the drive.",
         joint=load.joint,
         peak=number(load.peak, 3),
         tolerance=number(load.tolerance, 2),

@@ -27,6 +27,7 @@ from er3a.pipeline.stages.dynamics.model import (
 )
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import fixed, head_of, number, render, run_command
+from er3a.pipeline.viewing.panel_link import panel_link
 from er3a.robots.robot import Robot
 from er3a.robots.shown import meant
 
@@ -154,7 +155,7 @@ def _path(path: PathLoad) -> list[str]:
     if path.no_law:
         timed = say(path.no_law)
     return [
-        path.name,
+        Markup('<a href="#{0}">{0}</a>').format(path.name),
         f"{number(worst.peak, 3)} ± {number(worst.tolerance, 2)} {worst.unit} (J{worst.joint})",
         number(energy, 3),
         number(back, 3),
@@ -195,7 +196,7 @@ def _both(given: float, taken: float) -> Markup:
 
 def _held(held: HoldingTorque) -> list[str]:
     found, bound, tolerance = (_no_noise(value) for value in (abs(held.torque), held.bound, held.tolerance))
-    pose = ", ".join(fixed(value, 0) for value in held.q)
+    pose = panel_link(held.q, ", ".join(fixed(value, 0) for value in held.q))
     return [_label(held.joint, held.unit), number(found, 4), bound_text(bound), number(tolerance, 2), pose]
 
 

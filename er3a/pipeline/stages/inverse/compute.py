@@ -11,7 +11,9 @@ from er3a.files.target_file import load_targets
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.classes.chain_solvers import Unsolved
 from er3a.kinematics.round_trips import MOST_BY_CLASS, SAME_JOINTS_RAD, BatchRoundTrips, batch_round_trips
+from er3a.kinematics.targets import MANY_TARGETS
 from er3a.kinematics.wrist_partitioned import has_branches
+from er3a.pipeline.progress import shown_progress
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
 from er3a.pipeline.stages.inverse.entry import InverseSettings
@@ -33,7 +35,7 @@ from er3a.pipeline.stages.inverse.model import (
 )
 from er3a.pipeline.stages.inverse.rankings import rankings, sequence
 from er3a.pipeline.stages.inverse.solution_map import solution_map
-from er3a.pipeline.stages.inverse.solve_target import solve_target
+from er3a.pipeline.stages.inverse.solve_target import SolvedTarget, solve_target
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.stages.trajectory.motion_demands import limits_of
 from er3a.pipeline.study import Study
@@ -41,6 +43,7 @@ from er3a.pipeline.study import Study
 STAGE = "inverse"
 REPRODUCED_M = 1e-9
 REPRODUCED_RAD = 1e-9
+MOST_ADVISED = 100  # of many targets those for which it is looked for what would help
 ADVICE_STREAM, ROUND_TRIP_STREAM = 0, 1
 
 
@@ -51,10 +54,13 @@ def compute(study: Study, name: str) -> InverseResults:
     settings, motion = study.section(InverseSettings), study.section(TrajectorySettings)
     scene_file = study.scene(name, STAGE)
     scene = load_scene(scene_file) if scene_file else None
-    solved = [
-        solve_target(robot, target, np.random.default_rng([study.seed, ADVICE_STREAM, number]), scene)
-        for number, target in enumerate(targets)
-    ]
+    many, advised, solved = len(targets) > MANY_TARGETS, 0, list[SolvedTarget]()
+    with shown_progress(len(targets), f"{name}: targets solved") as advance:
+        for number, target in enumerate(targets):
+            random = np.random.default_rng([study.seed, ADVICE_STREAM, number])
+            solved.append(solve_target(robot, target, random, scene, many, not many or advised < MOST_ADVISED))
+            advised += solved[-1].result.neighbours is not None
+            advance(1)
     ranked = [rankings(robot, target, one, scene, settings.mix) for target, one in zip(targets, solved)]
     solutions = SolutionRows.stacked(one.rows for one in solved).of_joints(robot.slides)
     results = tuple(one.result for one in solved)
@@ -68,8 +74,9 @@ def compute(study: Study, name: str) -> InverseResults:
         figures=_figures(results, worst, trips),
         mix=settings.mix,
         scene=scene.title if scene else None,
+        turns=not many,
         targets=results,
-        sequence=sequence(robot, targets, solved, scene, limits_of(robot, motion).acceleration),
+        sequence=sequence(robot, targets, solved, limits_of(robot, motion).acceleration),
         round_trips=_round_trips(trips) if trips else None,
     )
     number_of_solutions = solution_map(robot, settings.map_cells, scene) if has_branches(robot) else MapRows.empty()

@@ -131,7 +131,8 @@ class NotReproduced:
 class AllSolved:
     """Every target has an admissible solution, but for those that are meant to have none (``demonstrations``).
 
-    ``collisions``: a scene was given, so the solutions are free of collisions too. Demonstrations are not counted.
+    ``collisions``: a scene was given, so that the solutions touch nothing of it. The arm never touches itself.
+    Demonstrations are not counted.
     """
 
     targets: int

@@ -149,12 +149,14 @@ class InverseSummary(Summary):
     ----------
     mix : weights of rules that make one more rule
     scene : title of the scene whose solids are not to be touched
+    turns : whether the solutions stand in all turns; else (many targets) in the one nearest to the reference
     round_trips : None for arms without a closed form
     """
 
     verdict: Verdict[AllSolved | SomeUnsolved | NoneSolved | NotReproduced | ExpectationsUnmet]
     mix: dict[RuleName, float]
     scene: str | None
+    turns: bool
     targets: tuple[TargetResult, ...]
     sequence: Sequence | None
     round_trips: RoundTrips | None

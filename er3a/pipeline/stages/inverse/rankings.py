@@ -14,7 +14,7 @@ from er3a.pipeline.stages.inverse.solve_target import SolvedTarget, collides
 from er3a.robots.robot import Robot
 from er3a.robots.shown import shown
 from er3a.selection.rules import RULES, RuleName, available_rules, mixed_cost
-from er3a.selection.sequence import MoveRule, select_sequence
+from er3a.selection.sequence import MoveRule, best_of_sets
 
 MIX = "mix"
 SAME_COST = 1e-9
@@ -58,7 +58,6 @@ def sequence(
     robot: Robot,
     targets: tuple[Target, ...],
     solved: list[SolvedTarget],
-    scene: Scene | None,
     acceleration: Reals | None = None,
 ) -> Sequence | None:
     """Visiting all targets that are reached, in order: the best rows as a whole, against the greedy ones."""
@@ -66,17 +65,19 @@ def sequence(
     if len(reached) < 2:
         return None
     rule: MoveRule = "time" if "time" in available_rules(robot) else "nearest"
-    found = select_sequence(robot, [one.solutions for one in reached], targets[0].q_ref, rule, scene, acceleration)
+    usable = [np.flatnonzero(one.rows.rank) for one in reached]
+    sets = [one.solutions.q[rows] for one, rows in zip(reached, usable)]
+    found = best_of_sets(robot, sets, targets[0].q_ref, rule, acceleration)
     stops = tuple(
         Stop(
             target=one.result.name,
-            branch=int(one.solutions.branch[row]),
-            label=one.solutions.label[row],
+            branch=int(one.rows.branch[rows[row]]),
+            label=one.rows.label[rows[row]],
             q_deg=tuple(shown(robot, q).tolist()),
-            greedy_branch=int(one.solutions.branch[greedy]),
-            greedy_label=one.solutions.label[greedy],
+            greedy_branch=int(one.rows.branch[rows[greedy]]),
+            greedy_label=one.rows.label[rows[greedy]],
         )
-        for one, row, q, greedy in zip(reached, found.rows, found.q, found.greedy_rows)
+        for one, rows, row, q, greedy in zip(reached, usable, found.rows, found.q, found.greedy_rows)
     )
     differs = bool((found.rows != found.greedy_rows).any())
     return Sequence(rule, found.cost, found.greedy_cost, stops, differs)

@@ -15,6 +15,7 @@ from er3a.pipeline.messages.selection import say
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse.model import InverseResults, SolutionRows, TargetResult
 from er3a.pipeline.stages.inverse.shape_colours import colour_of, shape_of
+from er3a.pipeline.stages.inverse.shown_targets import shown_targets
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import arm_view, capsules, log_arm, send_motion
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, rgb
@@ -46,7 +47,7 @@ tree on the left. A flip and a no-flip branch lie on one another.
 def record(study: Study, stored: Stored[InverseResults], output: Path) -> None:
     """Write the recording from the stage's results."""
     name, solutions = stored.robot, stored.results.solutions
-    robot, targets = study.robot(name), stored.results.summary.targets
+    robot, targets = study.robot(name), shown_targets(stored.results.summary.targets)
     words = rrb.Vertical(
         note_view(STAGE), rrb.TextDocumentView(origin=f"/{STAGE}/now", name="This target"), name="Words"
     )
@@ -66,7 +67,7 @@ def record(study: Study, stored: Stored[InverseResults], output: Path) -> None:
             _log_target(stream, robot, target, branches)
 
 
-def _sight(robot: Robot, targets: tuple[TargetResult, ...]) -> float:
+def _sight(robot: Robot, targets: list[TargetResult]) -> float:
     """Radius (m) that shows the arm and the targets, unless they are so far that the arm would vanish."""
     points = np.array([target.xyz_mm for target in targets]) / 1000
     farthest = np.linalg.norm(points - robot.base[:3, 3], axis=1).max()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +11,7 @@ import numpy as np
 from markupsafe import Markup
 
 from er3a.kinematics.solutions import ClosedForm
+from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.inverse import FIGURES, FREE_AT, NEAREST_RULE, limits_in_short
 from er3a.pipeline.messages.kinematics import branch_word, singularity_word
 from er3a.pipeline.messages.language import tr
@@ -25,6 +27,7 @@ from er3a.pipeline.stages.inverse.model import (
     TargetResult,
 )
 from er3a.pipeline.stages.inverse.model import Sequence as Visits
+from er3a.pipeline.stages.inverse.shown_targets import shown_targets
 from er3a.pipeline.stages.inverse.solution_figures import histogram, overlay, solutions_per_position
 from er3a.pipeline.stages.inverse.symptoms import symptoms
 from er3a.pipeline.study import Study
@@ -64,7 +67,7 @@ class TargetSection:
 def report(study: Study, stored: Stored[InverseResults], output: Path) -> None:
     """Write the page from the stage's results."""
     name, results, summary = stored.robot, stored.results, stored.results.summary
-    robot, trips = study.robot(name), summary.round_trips
+    robot, trips, chosen = study.robot(name), summary.round_trips, shown_targets(summary.targets)
     rules = list(dict.fromkeys(results.rankings.rule))
     render(
         Path(__file__).with_name("report.html.j2"),
@@ -75,8 +78,10 @@ def report(study: Study, stored: Stored[InverseResults], output: Path) -> None:
         robot=robot,
         robot_pages=study.pages(name),
         nearest_rule=tr(NEAREST_RULE),
-        overview=[_overview_row(robot, target) for target in summary.targets],
-        sections=[_section(robot, target, results) for target in summary.targets],
+        overview=[_overview_row(target) for target in chosen],
+        sections=[_section(robot, target, results) for target in chosen],
+        outcomes=_outcomes(summary.targets),
+        not_advised=_not_advised(summary.targets),
         rule_columns=[tr("Branch"), *map(_rule_heading, rules)],
         trips=trips,
         histogram=histogram(trips) if trips else None,
@@ -84,7 +89,7 @@ def report(study: Study, stored: Stored[InverseResults], output: Path) -> None:
         symptoms=symptoms(summary),
         rules=[(_rule(rule), word("rule.title", RULE_TITLES, rule)) for rule in RULES],
         mix=tr(", ").join(f"{_rule(rule)} {weight:g}" for rule, weight in summary.mix.items()),
-        stops=_stops(robot, summary.sequence),
+        stops=_stops(summary.sequence, {target.name for target in chosen}),
         move=_move_rule(summary.sequence),
     )
 
@@ -97,14 +102,14 @@ def _section(robot: Robot, target: TargetResult, results: InverseResults) -> Tar
         picture=overlay(robot, target, branches),
         position=_listed(target.xyz_mm),
         orientation=_listed(target.rpy_deg),
-        reference=_joints(robot, target.q_ref_deg),
+        reference=_joints(target.q_ref_deg),
         reason=say(target.reason),
         advice=listed(target.advice),
         joints=[f"J{k + 1} ({'mm' if slides else '°'})>" for k, slides in enumerate(robot.slides)],
         method="" if isinstance(target.method, ClosedForm) else say(target.method),
         families=_self_motions(target.families),
         unsolved=joined(listed(target.unsolved)),
-        rows=_branch_rows(robot, rows, branches),
+        rows=_branch_rows(rows, branches),
         rules=_rule_rows(results.rankings.take(results.rankings.target == target.name)),
         residual_mm=rows.position_residual_mm.max() if len(rows) else None,
         residual_deg=rows.orientation_residual_deg.max() if len(rows) else None,
@@ -153,6 +158,18 @@ def _self_motions(families: tuple[SelfMotion, ...]) -> list[str]:
 
 
 def _self_motion(family: SelfMotion) -> str:
+    text = _curve(family)
+    if family.dimension > 1:
+        return tr(
+            "{text}; this is one curve of a surface of solutions, on which the arm can move in {count} ways at once "
+            "with the tool at rest",
+            text=text,
+            count=family.dimension,
+        )
+    return text
+
+
+def _curve(family: SelfMotion) -> str:
     moving = [
         f"J{j + 1} {'+' if rate > 0 else ''}{fixed(rate, 2)}"
         for j, rate in enumerate(family.direction)
@@ -184,30 +201,43 @@ def _move_rule(sequence: Visits | None) -> tuple[str, str]:
     return (RULES[sequence.rule].unit, word("rule.title", RULE_TITLES, sequence.rule)) if sequence else ("", "")
 
 
-def _stops(robot: Robot, sequence: Visits | None) -> list[list[str]]:
+def _outcomes(targets: Iterable[TargetResult]) -> str:
+    """How many targets came to what."""
+    counts = Counter(target.outcome for target in targets)
+    return tr(", ").join(f"{outcome_word(outcome)} {number(count)}" for outcome, count in counts.most_common())
+
+
+def _not_advised(targets: Iterable[TargetResult]) -> int:
+    """How many targets without solution were not looked at for what would help, where others were."""
+    without = [target.neighbours for target in targets if target.outcome in ("unreachable", "leaves limits")]
+    return without.count(None) if any(without) else 0
+
+
+def _stops(sequence: Visits | None, named: set[str]) -> list[list[str]]:
     return [
         [
             stop.target,
             _short(stop.label, stop.branch),
             _short(stop.greedy_label, stop.greedy_branch),
-            _joints(robot, stop.q_deg),
+            _joints(stop.q_deg),
         ]
         for stop in (sequence.stops if sequence else ())
+        if stop.target in named
     ]
 
 
-def _overview_row(robot: Robot, target: TargetResult) -> list[str]:
+def _overview_row(target: TargetResult) -> list[str]:
     unreached = target.obstacle if not target.solutions else None
     return [
         Markup('<a href="#{0}">{0}</a>').format(target.name),
         _listed(target.xyz_mm),
         tr("{within} of {all}", within=target.within_limits, all=target.solutions),
-        tr("none") if target.chosen_deg is None else _joints(robot, target.chosen_deg),
+        tr("none") if target.chosen_deg is None else _joints(target.chosen_deg),
         say(unreached or target.reason),
     ]
 
 
-def _branch_rows(robot: Robot, rows: SolutionRows, branches: SolutionRows) -> list[list[str]]:
+def _branch_rows(rows: SolutionRows, branches: SolutionRows) -> list[list[str]]:
     inside = rows.branch[rows.within_limits]
     ranks = branches.rank[branches.rank > 0]
     cells = []
@@ -215,7 +245,7 @@ def _branch_rows(robot: Robot, rows: SolutionRows, branches: SolutionRows) -> li
         place, turns = int((ranks <= branches.rank[k]).sum()), int((inside == branches.branch[k]).sum())
         cells.append(
             [
-                panel_link(robot, branches.q_deg[k], _on_one_line(branches.label[k], int(branches.branch[k]))),
+                panel_link(branches.q_deg[k], _on_one_line(branches.label[k], int(branches.branch[k]))),
                 *(fixed(angle, 1) for angle in branches.q_deg[k]),
                 fixed(branches.limit_margin_deg[k], 1),
                 fixed(branches.manipulability[k], 3),
@@ -250,9 +280,9 @@ def _on_one_line(label: str, branch: int) -> str:
     return _short(label, branch).replace(" ", NO_BREAK_SPACE)
 
 
-def _joints(robot: Robot, q_deg: Iterable[float]) -> str:
+def _joints(q_deg: Iterable[float]) -> str:
     """Joint angles that lead to the arm in the teach panel."""
-    return panel_link(robot, q_deg, _listed(q_deg))
+    return panel_link(q_deg, _listed(q_deg))
 
 
 def _listed(values: Iterable[float]) -> str:

@@ -58,9 +58,22 @@ class SolvedTarget:
     solutions: Solutions
 
 
-def solve_target(robot: Robot, target: Target, random: np.random.Generator, scene: Scene | None = None) -> SolvedTarget:
-    """Solve, choose, explain; solutions that collide with the scene or with themselves are not chosen."""
+def solve_target(
+    robot: Robot,
+    target: Target,
+    random: np.random.Generator,
+    scene: Scene | None = None,
+    many: bool = False,
+    advise: bool = True,
+) -> SolvedTarget:
+    """Solve, choose, explain; solutions that collide with the scene or with themselves are not chosen.
+
+    One of ``many``: only the turn nearest to the reference is kept of each arm. With ``advise`` what would help a pose
+    without solution is looked for.
+    """
     solutions = inverse(robot, target.T, target.q_ref)
+    if many:
+        solutions = solutions.without_turns()
     refused = refusals(robot, solutions, scene)
     choice = nearest(robot, solutions, target.q_ref, refused)
     rows = _rows(robot, target, solutions, choice, refused)
@@ -75,7 +88,7 @@ def solve_target(robot: Robot, target: Target, random: np.random.Generator, scen
         obstacle, advice = BranchesCollide(len(within)), (MoveObstacle(),)
     else:
         obstacle = _obstacle(robot, target, solutions, len(found))
-        if has_branches(robot):
+        if advise and has_branches(robot):
             near = _neighbours(robot, target, random)
             advice = _what_would_help(near)
     x, y, z = (target.T[:3, 3] * 1000).tolist()

@@ -5,7 +5,10 @@ from __future__ import annotations
 from er3a.kinematics.solutions import Iteration
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.stages.inverse.model import InverseSummary, Sequence
+from er3a.pipeline.viewing.numbers import number
 from er3a.selection.rules import RULES
+
+NAMED = 12  # targets that a cell names
 
 
 def symptoms(summary: InverseSummary) -> list[list[str]]:
@@ -61,6 +64,8 @@ def symptoms(summary: InverseSummary) -> list[list[str]]:
 
 
 def _names(names: list[str]) -> str:
+    if len(names) > NAMED:
+        return tr("{own_names} and {count} more", own_names=", ".join(names[:NAMED]), count=number(len(names) - NAMED))
     return ", ".join(names) if names else tr("no target")
 
 

@@ -28,6 +28,7 @@ from er3a.pipeline.stages.programs.model import (
     SomeProgramsFail,
 )
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
+from er3a.pipeline.stages.trajectory.motion_demands import assumed_speeds
 from er3a.pipeline.study import Study
 from er3a.program_check.check_program import CheckOptions, ProgramCheck, check_program
 from er3a.program_check.motion_laws import AssumedRates
@@ -37,6 +38,7 @@ from er3a.programs.instructions import Pause, Place
 from er3a.programs.program_findings import NameTwice, NotUnderstood
 from er3a.programs.program_outcomes import ProgramOutcome
 from er3a.programs.read_program import read_program
+from er3a.robots.robot import Robot
 
 OUTCOMES: dict[Level, ProgramOutcome] = {"pass": "pass", "note": "pass", "caution": "caution", "fail": "fail"}
 MOST_MOTIONS = 20_000
@@ -50,13 +52,13 @@ def compute(study: Study, name: str) -> ProgramsResults:
     listed = load_programs(file) if file else ProgramsFile(kind="programs")
     scene_file = study.scene(name, "trajectory")
     scene = load_scene(scene_file) if scene_file else None
-    options = replace(_options(study, listed), scene=scene)
+    options = replace(_options(study, listed, robot), scene=scene)
     summaries: list[ProgramSummary] = []
     lines: list[Lines] = []
     instructions: list[Instructions] = []
     motions: list[ProgramMotion] = []
     for entry in listed.programs:
-        check = check_program(read_program(entry.file), robot, replace(options, start=entry.start()))
+        check = check_program(read_program(entry.file), robot, replace(options, start=entry.start(robot)))
         summaries.append(_summary(entry, check))
         lines.append(_lines(entry.name, check))
         instructions.append(_instructions(entry.name, check, len(robot.lower)))
@@ -75,7 +77,7 @@ def compute(study: Study, name: str) -> ProgramsResults:
     )
 
 
-def _options(study: Study, listed: ProgramsFile) -> CheckOptions:
+def _options(study: Study, listed: ProgramsFile, robot: Robot) -> CheckOptions:
     paths, own = study.section(TrajectorySettings), study.section(ProgramsSettings)
     return CheckOptions(
         frames=listed.transforms(),
@@ -84,7 +86,7 @@ def _options(study: Study, listed: ProgramsFile) -> CheckOptions:
             float(np.radians(paths.near_elbow_deg)),
             paths.near_shoulder_mm / 1000,
         ),
-        assumed_speed=np.radians(paths.assumed_speed_deg_s),
+        assumed_speed=assumed_speeds(robot, paths),
         acceleration_time=paths.acceleration_time_s,
         penetration_tolerance=paths.penetration_tolerance_mm / 1000,
         assumed=AssumedRates(
@@ -152,7 +154,7 @@ def _instructions(name: str, check: ProgramCheck, joints: int) -> Instructions:
 
     return Instructions(
         program=np.full(len(verdicts), name, object),
-        line=np.array([each.place.line for each in verdicts], int),
+        line=np.array([each.line for each in verdicts], int),
         element=np.array([each.place.element for each in verdicts], object),
         kind=np.array([each.kind for each in verdicts], object),
         level=np.array([each.level for each in verdicts], object),
@@ -190,7 +192,7 @@ def _motion(name: str, check: ProgramCheck, joints: int) -> ProgramMotion:
         times.append(now + t)
         angles.append(q)
         points.append(forward(arm, q)[:, :3, 3])
-        lines += [step.place.line] * len(t)
+        lines += [check.execution.own_line(step)] * len(t)
         told += [levels[step.place]] * len(t)
         now += motion.way.law.duration if motion.way else 0.0
     return ProgramMotion(

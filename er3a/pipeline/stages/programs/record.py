@@ -20,7 +20,16 @@ from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, Progra
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import log_arm, send_motion
 from er3a.pipeline.viewing.palette import JOINT_NAMES, JOINTS, VERDICTS, rgb
-from er3a.pipeline.viewing.recording import ARM, TIMELINE, escaped, log_note, note_view, recording, send_series
+from er3a.pipeline.viewing.recording import (
+    ARM,
+    TIMELINE,
+    escaped,
+    events_view,
+    log_note,
+    note_view,
+    recording,
+    send_series,
+)
 from er3a.pipeline.viewing.scene_entities import log_scene
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.program_check.program_check_findings import Level
@@ -70,14 +79,7 @@ def _layout(robot: Robot, motion: ProgramMotion) -> rrb.Horizontal:
     words = rrb.Vertical(
         note_view(STAGE),
         rrb.TextDocumentView(origin=f"/{STAGE}/now", name="This line"),
-        rrb.TextLogView(
-            origin=f"/{STAGE}/events",
-            name="Findings",
-            columns=rrb.TextLogColumns(
-                timeline_columns=rrb.encodings.TimelineColumn(TIMELINE, visible=False),
-                text_log_columns=["loglevel", "body"],
-            ),
-        ),
+        events_view(STAGE, "Findings"),
         row_shares=[4, 5, 4],
         name="Words",
     )
@@ -177,10 +179,10 @@ def _note(robot: Robot, results: ProgramsResults, starts: list[tuple[ProgramSumm
             f"# {escaped(robot.title)}: programs",
             say(results.summary.verdict.finding),
             "",
-            "**Look first** at the red stretches of the tool's way. Press play: the arm carries out one program after "
+            "**Look first** at the red stretches of the tool's path. Press play: the arm carries out one program after "
             "another, and the text beside it shows the line that it is at.",
             "",
-            "- line: the tool's way, green where the motion passes, amber where it wants caution, red where it fails",
+            "- line: the tool's path, green where the motion passes, amber where it wants caution, red where it fails",
             "- grey solids: the scene",
             "",
             "| from | program | language | verdict |",

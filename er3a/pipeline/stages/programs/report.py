@@ -117,7 +117,7 @@ def _listing(
             skipped = True
             continue
         here = found.get(number, [])
-        levels: list[Level] = [each.level for each in here] + (["pass"] if number in moves else [])
+        levels: list[Level] = [*(each.level for each in here), *rows.level[moves[number]].tolist()]
         level = worst_of(levels) if levels else None
         remarks = [say(each.finding) + (f" ({each.times} ×)" if each.times > 1 else "") for each in here]
         leads = Markup(), Markup()
@@ -125,9 +125,7 @@ def _listing(
             t0, t1 = played[number]
             leads = stretch(name, t0, t1), moment(name, t1, str(number))
         word = "" if level is None else level_word(level)
-        lines.append(
-            ListingLine(number, words, level, word, remarks, _facts(rows, moves.get(number, [])), *leads, skipped)
-        )
+        lines.append(ListingLine(number, words, level, word, remarks, _facts(rows, moves[number]), *leads, skipped))
         skipped = False
     return lines
 

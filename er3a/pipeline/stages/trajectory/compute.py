@@ -68,7 +68,7 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     for each in listed_motions(file, planning, wanted, settings.checks_per_sample):
         motion = each.motion
         if motion is None:
-            skipped.append(PathNotFollowed(each.name, each.title, closed_form_missing(robot)))
+            skipped.append(PathNotFollowed(each.name, each.title, closed_form_missing(robot), each.stops))
             continue
         found = judge(robot, motion, near, limits)
         along = measured(surroundings, motion)
@@ -77,7 +77,9 @@ def compute(study: Study, name: str) -> TrajectoryResults:
         clearances.append(clearance_rows(each.name, along))
         strategies.append(avoided.rows)
         paths.append(path_summary(robot, motion, found, along, avoided, limits))
-        programs.append(program_files(robot, motion, paths[-1].verdict, settings.programs, settings.write_unsafe))
+        repair = avoided.rows.take(avoided.rows.strategy == (avoided.chosen or ""))
+        asked = settings.programs, settings.write_unsafe
+        programs.append(program_files(robot, motion, paths[-1].verdict, *asked, repair))
     checks = PathChecks.stacked(tables).of_joints(robot.slides)
     own = checks.take(checks.sample)
     length = characteristic_length(robot)
@@ -178,15 +180,19 @@ def _figures(paths: list[PathSummary], length: float, limits: LimitsUsed) -> tup
     events = [event for path in paths for event in path.singularities]
     bounded = [path for path in paths if path.max_joint_speed_deg_s]
     agreement = max((path.velocity_check_deg_s * 1e6 for path in bounded), default=None)
-    speeds = [speed for path in bounded for speed in zip(path.max_joint_speed_deg_s or (), limits.speed_deg_s)]
-    speed, limit = max(speeds, key=lambda pair: pair[0] / pair[1], default=(None, None))
+    speeds = [
+        (speed, limit, "mm/s" if joint in path.sliding else "deg/s")
+        for path in bounded
+        for joint, (speed, limit) in enumerate(zip(path.max_joint_speed_deg_s or (), limits.speed_deg_s), 1)
+    ]
+    speed, limit, unit = max(speeds, key=lambda each: each[0] / each[1], default=(None, None, "deg/s"))
     colliding = sum(bool(path.collisions) for path in paths)
     return (
         Figure("safe", sum(path.verdict == "safe" for path in paths), "", of=len(paths)),
         Figure("singular_poses", sum(event.crossing for event in events), ""),
         Figure("near_passes", sum(not event.crossing for event in events), ""),
         Figure("colliding", colliding, ""),
-        Figure("max_joint_speed", speed, "deg/s"),
+        Figure("max_joint_speed", speed, unit),
         Figure(
             "assumed_speed_ratio" if any(limits.speed_assumed) else "speed_ratio",
             speed / limit if speed is not None and limit is not None else None,

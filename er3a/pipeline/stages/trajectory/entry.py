@@ -67,7 +67,7 @@ def _tables_of(path_file: str) -> list[Path]:
 STAGE = Stage(
     name="trajectory",
     title=N_("trajectory"),
-    question=N_("Do the paths run into singularities?"),
+    question=N_("Are the paths safe, and if not, where and why?"),
     settings={"trajectory": TrajectorySettings},
     inputs=_inputs,
     rests_on=("validation",),

@@ -18,6 +18,7 @@ from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
 from er3a.pipeline.stages.trajectory.motion_demands import planning_of, wanted_of
 from er3a.pipeline.stages.trajectory.program_paths import planned_entries
 from er3a.pipeline.study import Study
+from er3a.planning.class_follow import PathEndsError
 from er3a.planning.commands import CommandSource
 from er3a.planning.tool_proof import Wanted
 from er3a.planning.way_around import PlanningTask
@@ -27,13 +28,15 @@ from er3a.planning.way_around import PlanningTask
 class ListedMotion:
     """A motion, the entry that it belongs to, and its name (a program's stretches have names of their own).
 
-    ``motion`` is None for a path of the tool that an arm of its class can't be made to follow.
+    ``motion`` is None for a path of the tool that an arm of its class can't be made to follow, or not to its end;
+    ``stops`` is then the time (s) beyond which it is not.
     """
 
     listed: str
     name: str
     title: str
     motion: Motion | None
+    stops: float | None = None
 
 
 def study_motions(study: Study, name: str, checks_per_sample: int) -> Iterator[ListedMotion]:
@@ -62,10 +65,13 @@ def listed_motions(file: Path, task: PlanningTask, wanted: Wanted, checks_per_sa
     for i, listed in enumerate(load_paths(file).paths):
         source = CommandSource(file, f"paths[{i}]")
         for entry in planned_entries(task.robot, listed, source):
+            stops = None
             try:
                 motion = motion_of(task.robot, entry, checks_per_sample, source, ends, wanted, task=task)
             except NotWristPartitionedError:
                 motion = None
+            except PathEndsError as error:
+                motion, stops = None, error.t
             end = np.full(task.robot.joints, np.nan) if motion is None else motion.q[-1]
             ends[entry.name] = ends[listed.name] = end
-            yield ListedMotion(listed.name, entry.name, entry.title, motion)
+            yield ListedMotion(listed.name, entry.name, entry.title, motion, stops)

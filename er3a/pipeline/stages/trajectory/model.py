@@ -223,7 +223,8 @@ class PathSummary:
     start_turn_deg : by which the arm turns at rest before it starts; None in joint space
     too_fast : where a joint exceeds a limit of speed, acceleration or jerk
     undecided : where the bounds between the poses that are solved leave something open
-    max_joint_speed_deg_s, max_joint_speed_ratio, max_joint_acceleration_ratio : None where speeds have no bound
+    max_joint_speed_deg_s, max_joint_speed_ratio, max_joint_acceleration_ratio : None where speeds have no bound; speeds
+        of joints that slide (``sliding``, from 1) in mm/s
     velocity_check_deg_s : greatest difference of joint velocities by the Jacobian and by differences of angles
     clearance : None where none could be measured
     no_way : why no motion was planned, of one that is to be
@@ -264,14 +265,14 @@ class PathSummary:
     fastest_s: float | None
     avoidance: tuple[TriedStrategy, ...]
     strategy: StrategyName | None
+    sliding: tuple[int, ...] = ()
 
     @property
     def fastest_joint(self) -> int | None:
         """The joint (from 0) that turns fastest, of equals the first; None where speeds have no bound."""
-        if not self.max_joint_speed_deg_s:
-            return None
-        nearly = max(self.max_joint_speed_deg_s) * (1 - SAME_SPEED)
-        return next(joint for joint, speed in enumerate(self.max_joint_speed_deg_s) if speed >= nearly)
+        speeds = {j: v for j, v in enumerate(self.max_joint_speed_deg_s or ()) if j + 1 not in self.sliding}
+        nearly = max(speeds.values(), default=0.0) * (1 - SAME_SPEED)
+        return next((joint for joint, speed in speeds.items() if speed >= nearly), None)
 
     @property
     def outcome(self) -> PathVerdict:
@@ -286,11 +287,13 @@ class PathSummary:
 
 @dataclass(frozen=True)
 class PathNotFollowed:
-    """A path of the tool that could not be followed, because the arm's class has no branches; and what it lacks."""
+    """A path of the tool that could not be followed: what the arm lacks for branches, and of arms whose class gives the
+    joints all the same the time (s) beyond which the path is out of reach or asks a joint to leap; else None."""
 
     name: str
     title: str
     lacking: ClosedFormMissing | None
+    stops_at_s: float | None = None
 
 
 @dataclass(frozen=True)
@@ -371,7 +374,8 @@ class AvoidanceRows(MotionRows):
 
 @dataclass(frozen=True, eq=False)
 class ProgramFiles(Table):
-    """Programs of the safe paths for controllers; of others only where the study asks for that."""
+    """Programs of the safe paths for controllers; of others only where the study asks for that, and the motion that
+    repairs them as a table in csv."""
 
     path: Texts = column("name of the path", dtype=object)
     language: Texts = column("krl, urscript, rpl, xpl or csv", dtype=object)

@@ -12,9 +12,11 @@ from er3a.collision.along import RateBounds
 from er3a.errors import PoseError
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.inverse import inverse
-from er3a.numerics.arrays import Reals
+from er3a.kinematics.wrist_partitioned import has_branches
+from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.stages.trajectory.program_paths import PlannedEntry
 from er3a.planning.build import Built, build
+from er3a.planning.class_follow import follow_by_class
 from er3a.planning.commands import CommandSource, PlanCommand
 from er3a.planning.followed import Followed
 from er3a.planning.moves import JointMove
@@ -25,6 +27,9 @@ from er3a.planning.tool_proof import ToolProof, Wanted, follow_and_prove
 from er3a.planning.way_around import NoWayAround, PlannedMove, PlanningTask, WayAround, way_between
 from er3a.robots.robot import Robot
 
+FOLLOWED_AT = 1030  # times at which a path of the tool is solved at least: its branches depend on no samples
+EQUAL_TIMES = 1e-12  # share of the duration
+
 
 @dataclass(frozen=True, eq=False)
 class Motion:
@@ -34,7 +39,7 @@ class Motion:
     ----------
     built : what the entry was made into
     samples, checks : times in s of the path's own points, and with the points checked between them
-    t, q : (N,) s and (N, 6) rad, the checks and whatever the branches of a line needed besides; q NaN where unreachable
+    t, q : (N,) s and (N, 6) rad, the checks and where a path of the tool was solved besides; q NaN where unreachable
     joints : angles (..., 6) at times (...,)
     rates : angles, velocities and accelerations, each (n, 6), at times (n,)
     tool : T_base_tool (n, 4, 4) that the path asks for at times (n,)
@@ -86,6 +91,8 @@ def motion_of(
     ------
     InputError
         for what :func:`er3a.planning.build.build` refuses, and a start branch that has no solution at the start
+    NotWristPartitionedError, PathEndsError
+        for a path of the tool that an arm without branches can't be made to follow
     """
     command = entry.command(source, robot)
     if isinstance(command, PlanCommand) and task is not None:
@@ -97,19 +104,27 @@ def motion_of(
     path = built.tool
     if path is None:
         raise ValueError(f"{entry.name}: neither a move of the joints nor a path of the tool")
+    if not has_branches(robot):
+        move = PlannedMove(follow_by_class(robot, path, built.q_start))
+        return _joint_motion(robot, entry, replace(built, joints=move), move, samples, checks)
     try:
-        followed, proof = follow_and_prove(robot, path, checks, wanted, built.q_start, built.start_slot)
+        even = np.linspace(0.0, built.duration, FOLLOWED_AT)
+        followed, proof = follow_and_prove(robot, path, even, wanted, built.q_start, built.start_slot)
     except PoseError:
         branch = getattr(entry, "start_branch", None)
         problem = f"'{branch}' has no solution at the start pose"
         raise source.error("start_branch", problem, "Choose another branch, or leave it out") from None
+    kept = _apart(followed.t, checks, EQUAL_TIMES * built.duration)
+    t = np.concatenate([checks, followed.t[kept]])
+    q = np.concatenate([followed.joints(checks), followed.q[kept]])
+    order = np.argsort(t)
     return Motion(
         entry=entry,
         built=built,
         samples=samples,
         checks=checks,
-        t=followed.t,
-        q=followed.q,
+        t=t[order],
+        q=q[order],
         joints=followed.joints,
         rates=followed.rates,
         tool=lambda t: path.poses(path.progress(t)[0]),
@@ -118,6 +133,13 @@ def motion_of(
         polynomials=None,
         proof=proof,
     )
+
+
+def _apart(times: Reals, others: Reals, tolerance: float) -> Flags:
+    """Which of times (n,) have none of the others (k,), rising, as near as this."""
+    right = np.clip(np.searchsorted(others, times), 1, len(others) - 1)
+    apart: Flags = np.minimum(np.abs(times - others[right - 1]), np.abs(others[right] - times)) > tolerance
+    return apart
 
 
 def _planned(task: PlanningTask, entry: PlannedEntry, command: PlanCommand, checks_per_sample: int) -> Motion:

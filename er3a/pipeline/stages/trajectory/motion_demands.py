@@ -28,8 +28,15 @@ def planning_of(robot: Robot, settings: TrajectorySettings, bodies: Bodies | Non
     return PlanningTask(robot, bodies, tolerance, limits_of(robot, settings), seed)
 
 
+def assumed_speeds(robot: Robot, settings: TrajectorySettings) -> Reals:
+    """Speeds (n,), rad/s or m/s, of joints whose own is unknown; those beyond the study's have the last of them."""
+    given = settings.assumed_speed_deg_s
+    turning = np.radians([given[min(k, len(given) - 1)] for k in range(robot.joints)])
+    return np.where(robot.slides, settings.assumed_speed_mm_s / 1000, turning)
+
+
 def limits_of(robot: Robot, settings: TrajectorySettings) -> JointLimits:
-    """Limits of a robot's joints; what the study assumes of further joints is what it assumes of the last.
+    """Limits of a robot's joints.
 
     Raises
     ------
@@ -37,10 +44,6 @@ def limits_of(robot: Robot, settings: TrajectorySettings) -> JointLimits:
         for accelerations or jerks of another number of joints
     """
     count = len(robot.lower)
-    turning = np.radians(
-        [settings.assumed_speed_deg_s[min(k, len(settings.assumed_speed_deg_s) - 1)] for k in range(count)]
-    )
-    assumed = np.where(robot.slides, settings.assumed_speed_mm_s / 1000, turning)
     given: list[Reals | None] = []
     for name in ("acceleration_deg_s2", "jerk_deg_s3"):
         values = getattr(settings, name)
@@ -48,4 +51,4 @@ def limits_of(robot: Robot, settings: TrajectorySettings) -> JointLimits:
             problem = f"{len(values)} values for the {count} joints of {robot.name}"
             raise InputError(None, f"trajectory.{name}", problem, "Give one for each joint")
         given.append(None if values is None else np.radians(values))
-    return joint_limits(robot, assumed, settings.acceleration_time_s, *given)
+    return joint_limits(robot, assumed_speeds(robot, settings), settings.acceleration_time_s, *given)

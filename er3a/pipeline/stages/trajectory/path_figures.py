@@ -120,7 +120,7 @@ def _joint_curves(axes: list[Axes], robot: Robot, path: PathSummary, rows: PathC
     )
     for ax, (values, label) in zip(axes, curves):
         for j in range(values.shape[1]):
-            ax.plot(rows.t_s, values[:, j], color=COLOURS[j], linewidth=WIDTHS[j])
+            ax.plot(rows.t_s, values[:, j], color=COLOURS[j], linewidth=WIDTHS[j], label=JOINT_NAMES[j])
         ax.set_ylabel(tr(label), fontsize=FONT)
         if values is rows.q_deg:
             _limits(ax, robot, values)

@@ -27,6 +27,7 @@ from er3a.planning.path_verdicts import PATH_VERDICTS, PathVerdict
 from er3a.planning.singular_events import SingularEvent
 from er3a.planning.timing import JointLimits
 from er3a.robots.robot import Robot
+from er3a.robots.shown import shown
 
 
 def path_summary(
@@ -58,6 +59,7 @@ def path_summary(
         corner_deviation_mm=_greatest(1000 * np.asarray(getattr(motion.built.tool, "deviation", []))),
         corner_deviation_deg=_greatest(np.degrees(getattr(motion.built.joints, "deviation", []))),
         repeated_rows=tuple(motion.built.repeated_rows),
+        sliding=tuple((np.flatnonzero(robot.slides) + 1).tolist()),
         start_turn_deg=None if followed is None else _degrees(followed.start_turn),
         singularities=tuple(_singularity(event) for event in found.events),
         unreachable=_stretches(motion, found.beyond),
@@ -67,7 +69,9 @@ def path_summary(
         jumps=tuple(
             Jump(jump.t, jump.joint, float(np.degrees(jump.angle))) for jump in (followed.jumps if followed else ())
         ),
-        max_joint_speed_deg_s=None if found.greatest_speed is None else _degrees(found.greatest_speed),
+        max_joint_speed_deg_s=None
+        if found.greatest_speed is None
+        else tuple(shown(robot, found.greatest_speed).tolist()),
         max_joint_speed_ratio=_ratio(found.greatest_speed, limits.speed),
         max_joint_acceleration_ratio=_ratio(found.greatest_acceleration, limits.acceleration),
         joint_speed_bounded=found.speed_bounded,

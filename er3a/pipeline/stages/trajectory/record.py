@@ -24,9 +24,18 @@ from er3a.pipeline.stages.trajectory.model import (
     TrajectorySummary,
 )
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.arm import log_arm, send_motion
+from er3a.pipeline.viewing.arm import LABEL, log_arm, send_motion
 from er3a.pipeline.viewing.palette import HIGHLIGHT, JOINT_NAMES, JOINTS, MODEL, MUTED, REFERENCE, rgb
-from er3a.pipeline.viewing.recording import ARM, TIMELINE, escaped, log_note, note_view, recording, send_series
+from er3a.pipeline.viewing.recording import (
+    ARM,
+    TIMELINE,
+    escaped,
+    events_view,
+    log_note,
+    note_view,
+    recording,
+    send_series,
+)
 from er3a.pipeline.viewing.scene_entities import log_scene
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.planning.path_verdicts import PathVerdict
@@ -102,14 +111,7 @@ def _layout(robot: Robot, checks: PathChecks) -> rrb.Horizontal:
     words = rrb.Vertical(
         note_view(STAGE),
         rrb.TextDocumentView(origin=f"/{STAGE}/now", name="This path"),
-        rrb.TextLogView(
-            origin=f"/{STAGE}/events",
-            name="Events",
-            columns=rrb.TextLogColumns(
-                timeline_columns=rrb.encodings.TimelineColumn(TIMELINE, visible=False),
-                text_log_columns=["loglevel", "body"],
-            ),
-        ),
+        events_view(STAGE, "Events"),
         row_shares=[5, 2, 4],
         name="Words",
     )
@@ -208,7 +210,7 @@ def _ghosts(stream: rr.RecordingStream, robot: Robot, path: PathSummary, rows: P
     above = points[list(labels)] + np.array(
         [0.0, 0.0, LABELS_APART * size_of(robot)]
     )  # clear of the joints' own labels
-    named = rr.Points3D(above, radii=0.001, colors=[rgb(HIGHLIGHT)] * len(labels), labels=list(labels.values()))
+    named = rr.Points3D(above, radii=0.001, colors=[LABEL] * len(labels), labels=list(labels.values()))
     stream.log(f"{STAGE}/marks/named", named)
     colours = [rgb(HIGHLIGHT)] * len(at)
     stream.log(f"{STAGE}/marks", rr.Points3D(points, radii=0.012, colors=colours))

@@ -12,10 +12,10 @@ from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.trajectory import (
     FIGURES,
     advice,
+    cause_text,
     event_distance,
     event_word,
     kind_word,
@@ -37,18 +37,21 @@ from er3a.pipeline.stages.trajectory.model import (
     StrategyMotion,
     Stretch,
     TrajectoryResults,
-    TrajectorySummary,
     TriedStrategy,
 )
 from er3a.pipeline.stages.trajectory.path_figure_3d import turning_figure
 from er3a.pipeline.stages.trajectory.path_figures import PathFigure
+from er3a.pipeline.stages.trajectory.written_programs import repair_file
 from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.figure_readings import readings
 from er3a.pipeline.viewing.page import fixed, head_of, number, render, run_command, text_address
 from er3a.planning.path_verdicts import PathVerdict
 from er3a.programs.arm_joints import WORDS, not_written
 from er3a.robots.robot import Robot
+from er3a.robots.shown import meant
 
 DRAWN = 250
+AT_ANY_PACE = ("leaves limits", "collides", "unreachable", "none found")  # verdicts of paths that fail however slow
 STATUS: dict[PathVerdict, str] = {
     "safe": "pass",
     "near-singular": "caution",
@@ -65,13 +68,15 @@ STATUS: dict[PathVerdict, str] = {
 
 @dataclass(frozen=True)
 class PathDrawing:
-    """A drawn image: address, what it shows, what to conclude, width in inches, and where its curves over time are."""
+    """A drawn image: address, what it shows, what to conclude, width in inches, where its curves over time are, and
+    what the pointer reads in it."""
 
     uri: str
     alt: str
     caption: str
     inches: float
     panels: list[list[float]]
+    readings: list[dict[str, Any]]
 
 
 @dataclass(frozen=True)
@@ -98,6 +103,8 @@ class PathSection:
     faults: list[list[str]]
     strategies: list[list[str]]
     programs: list[ProgramLink]
+    repaired: ProgramLink | None
+    shortest: str
     figure: PathDrawing
 
 
@@ -125,23 +132,28 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
         clearance=clearance_section(results),
         assumed=assumed,
         turning=turning_figure(robot, results),
-        player=player(robot, _motions(summary, checks), load_scene(scene) if scene else None),
+        player=player(robot, _motions(robot, results), load_scene(scene) if scene else None),
         player_style=player_style(),
     )
 
 
-def _motions(summary: TrajectorySummary, checks: PathChecks) -> list[PlayedMotion]:
-    """The paths as programmed, as far as the arm reaches them."""
-    motions = []
-    for path in summary.paths:
+def _motions(robot: Robot, results: TrajectoryResults) -> list[PlayedMotion]:
+    """The paths as programmed, as far as the arm reaches them, each followed by the motion that repairs it."""
+    checks, avoidance, motions = results.checks, results.avoidance, []
+    for path in results.summary.paths:
         rows = checks.take((checks.path == path.name) & checks.reachable)
-        motions.append(PlayedMotion(path.name, path_text(path), rows.t_s, np.radians(rows.q_deg), _events(path)))
+        motions.append(PlayedMotion(path.name, path_text(path), rows.t_s, meant(robot, rows.q_deg), _events(path)))
+        if path.chosen:
+            repair = avoidance.take((avoidance.path == path.name) & (avoidance.strategy == path.strategy))
+            name = tr("{path}, repaired", path=path.name)
+            motions.append(PlayedMotion(name, advice(path) or "", repair.t_s, meant(robot, repair.q_deg)))
     return motions
 
 
 def _events(path: PathSummary) -> list[PlayedEvent]:
     passes = [PlayedEvent(e.t_s, e.until_s, _singular(e), "caution") for e in path.singularities]
-    return passes + [PlayedEvent(s.t0_s, s.t1_s, word, "fail") for word, stretches in _kinds(path) for s in stretches]
+    faults = [(word, stretch) for word, stretches in _kinds(path) for stretch in stretches]
+    return passes + [PlayedEvent(s.t0_s, s.t1_s, f"{word}: {cause_text(path, s)}", "fail") for word, s in faults]
 
 
 def _programs(rows: ProgramFiles) -> list[ProgramLink]:
@@ -162,7 +174,9 @@ def _section(path: PathSummary, rows: PathChecks, figure: PathDrawing, programs:
         events=[_event_row(path.name, event) for event in path.singularities],
         faults=_faults(path),
         strategies=_strategies(path),
-        programs=programs,
+        programs=[each for each in programs if each.file != repair_file(path.name)],
+        repaired=next((each for each in programs if each.file == repair_file(path.name)), None),
+        shortest="–" if path.fastest_s is None or path.verdict in AT_ANY_PACE else fixed(path.fastest_s, 2),
         figure=figure,
     )
 
@@ -177,7 +191,8 @@ def _figure(
         finding=path_text(path),
     )
     uri = figure.draw(robot, path, _drawn(path, rows), motions, near)
-    return PathDrawing(uri, alt, _conclusion(path, rows), float(figure.figure.get_figwidth()), figure.panels())
+    width = float(figure.figure.get_figwidth())
+    return PathDrawing(uri, alt, _conclusion(path, rows), width, figure.panels(), readings(figure.figure))
 
 
 def _drawn(path: PathSummary, rows: PathChecks) -> PathChecks:
@@ -212,7 +227,7 @@ def _faults(path: PathSummary) -> list[list[str]]:
             moment(path.name, part.t1_s, fixed(part.t1_s, 3)),
             fixed(part.s0_m * 1000, 1),
             fixed(part.s1_m * 1000, 1),
-            say(part.cause),
+            cause_text(path, part),
         ]
         for word, stretches in _kinds(path)
         for part in stretches

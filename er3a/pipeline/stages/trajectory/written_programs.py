@@ -8,7 +8,7 @@ import numpy as np
 
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.stages.trajectory.model import ProgramFiles
+from er3a.pipeline.stages.trajectory.model import AvoidanceRows, ProgramFiles
 from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning.commands import CommandSource, JointTableCommand, PlanCommand, ToolMoveCommand
 from er3a.planning.path_verdicts import PathVerdict
@@ -21,7 +21,7 @@ from er3a.programs.syntax import Language
 from er3a.programs.write_program import write_program
 from er3a.programs.writing import HEAD, WriteOptions, ascii_text, head_line, program_name
 from er3a.robots.robot import Robot
-from er3a.robots.shown import joint_columns, shown
+from er3a.robots.shown import joint_columns, meant, shown
 
 LONGEST_NAME = 24
 
@@ -63,21 +63,40 @@ def written(
     return program.files, program.findings
 
 
+def repair_file(path: str) -> str:
+    """Name of the file with the motion that repairs a path."""
+    return f"{program_name(path, LONGEST_NAME)}_repaired.csv"
+
+
 def program_files(
-    robot: Robot, motion: Motion, verdict: PathVerdict, languages: Sequence[Language], write_unsafe: bool
+    robot: Robot,
+    motion: Motion,
+    verdict: PathVerdict,
+    languages: Sequence[Language],
+    write_unsafe: bool,
+    repaired: AvoidanceRows,
 ) -> ProgramFiles:
-    """The path's programs as rows; none where they are refused."""
+    """The path's programs as rows, none where they are refused; with the rows of the motion that repairs it, if any."""
     rows: list[tuple[str, str, str]] = []
+    name = program_name(motion.entry.name, LONGEST_NAME)
     allowed = verdict == "safe" or (write_unsafe and np.isfinite(motion.q[0]).all())
     for language in languages if allowed else ():
         if not_written(language, robot):
             continue
         files, _ = written(robot, motion, verdict, language)
-        name = program_name(motion.entry.name, LONGEST_NAME)
         rows += [(language, name + suffix, text) for suffix, text in files.items()]
+    if len(repaired) and "csv" in languages:
+        rows.append(("csv", repair_file(motion.entry.name), _table(robot, motion, repaired)))
     return ProgramFiles(
         path=np.full(len(rows), motion.entry.name, object),
         language=np.array([row[0] for row in rows], object),
         file=np.array([row[1] for row in rows], object),
         text=np.array([row[2] for row in rows], object),
     )
+
+
+def _table(robot: Robot, motion: Motion, rows: AvoidanceRows) -> str:
+    """A motion's rows as a table of times, joints and poses, with what they are in its head."""
+    told = f"path {motion.entry.name} for {ascii_text(robot.title)}, repaired: {rows.strategy[0]}"
+    poses = np.linalg.inv(robot.base) @ forward(robot, meant(robot, rows.q_deg))
+    return write_csv(rows.t_s, rows.q_deg, poses, (HEAD + told,), joint_columns(robot))

@@ -33,9 +33,16 @@ LEAST_DRAWN = 1e-3
 
 @dataclass(frozen=True)
 class DiagnosisStory:
-    """What the page says about a reference set's diagnosis; ``others``: rows of the next-best hypotheses."""
+    """What the page says about a reference set's diagnosis.
+
+    Attributes
+    ----------
+    own_claims : whether the set holds only what the table's author claims of it; others : rows of the next-best
+        hypotheses
+    """
 
     reference_set: str
+    own_claims: bool
     text: str
     against: str
     to_decide: str
@@ -62,7 +69,8 @@ class CalibrationStory:
 
 def diagnosis_stories(summary: ValidationSummary, residuals: Residuals) -> list[DiagnosisStory]:
     """Per reference set: what the diagnosis says, the next-best hypotheses, and the residuals as a figure."""
-    return [_diagnosis_story(diagnosis, residuals) for diagnosis in summary.diagnoses]
+    claims = {found.name for found in summary.sets if not found.is_authoritative}
+    return [_diagnosis_story(each, residuals, each.reference_set in claims) for each in summary.diagnoses]
 
 
 def correction_stories(summary: ValidationSummary, corrections: Corrections) -> list[CalibrationStory]:
@@ -70,11 +78,12 @@ def correction_stories(summary: ValidationSummary, corrections: Corrections) -> 
     return [_calibration_story(calibration, corrections) for calibration in summary.calibrations]
 
 
-def _diagnosis_story(diagnosis: SetDiagnosis, residuals: Residuals) -> DiagnosisStory:
+def _diagnosis_story(diagnosis: SetDiagnosis, residuals: Residuals, own_claims: bool) -> DiagnosisStory:
     named = isinstance(diagnosis.conclusion, MostLikelyFault | MainFault | TooSmallToTell)
     best = diagnosis.hypotheses[0] if named else None
     return DiagnosisStory(
         reference_set=diagnosis.reference_set,
+        own_claims=own_claims,
         text=typographic(say(diagnosis.conclusion)),
         against=_measured_against(diagnosis),
         to_decide=typographic(say(best.to_decide)) if best and best.to_decide else "",
@@ -149,7 +158,7 @@ def residual_figure(rows: Residuals) -> Figure:
     axes.set_ylim(-0.7, len(rows) - 0.3)
     axes.set_xlim(LEAST_DRAWN / 1.5, 2 * max(before.max(), after.max()))
     axes.grid(axis="y", visible=False)
-    axes.set_xlabel(tr("residual (mm or deg, as named; {least:g} stands for all that is less)", least=LEAST_DRAWN))
+    axes.set_xlabel(tr("residual (mm or deg, as named; smaller ones are drawn at {least:g})", least=LEAST_DRAWN))
     figure.legend(loc="outside upper left", ncols=3)
     return figure
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from math import pi
 
+from er3a.identifiability.entries import column_of
 from er3a.identifiability.entry_evidence import EntryEvidence, OtherReading, Status
 from er3a.pipeline.messages.evidence import STATUS_MEANINGS, STATUS_WORDS
 from er3a.pipeline.messages.language import N_, tr
@@ -53,7 +54,7 @@ DIFFERS = 2e-3
 IN_UNIT = {"a": MM, "d": MM, "direction": 1.0} | dict.fromkeys(("alpha", "beta", "offset"), 180 / pi)
 OTHER_TITLES = {
     "described": N_("The table that independent documents describe"),
-    "allowed": N_("A table that no document tells from it"),
+    "allowed": N_("Another table that fits every document"),
 }
 OTHER_TEXTS = {
     "described": N_(
@@ -204,7 +205,7 @@ def _interval(each: EntryEvidence) -> str:
     if each.interval is None:
         return "–"
     low, high = (fixed(value, 2).rstrip("0").rstrip(".") for value in each.interval)
-    if each.entry.startswith("direction"):
+    if column_of(each.entry) == "direction":
         return tr("{low} or {high}", low=low, high=high) if low != high else low
     if each.status in ("consistent", "open"):
         return tr("anything")

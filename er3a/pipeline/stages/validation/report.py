@@ -179,7 +179,7 @@ def _frames_picture(robot: Robot, summary: ValidationSummary) -> Picture:
 def _side_picture(robot: Robot, drawn: Axes, summary: ValidationSummary) -> Picture:
     corrected, label = corrected_robot(robot, summary.diagnoses)
     if not len(drawn):
-        caption = tr("No reference states any axis: there is nothing to hold the model's against.")
+        caption = tr("No reference states any axis: there is nothing to compare the model's with.")
     elif not drawn.is_off.any():
         caption = tr("Each axis of the model lies on the stated one: the links have the right lengths and offsets.")
     else:

@@ -33,7 +33,6 @@ from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import head_of, render, run_command, text_address
 from er3a.pipeline.viewing.panel_link import panel_link
 from er3a.programs.arm_joints import WORDS, not_written
-from er3a.robots.robot import Robot
 from er3a.vision.table_corrections import NoCorrections
 
 NEARLY_HALF_TURN = 170.0
@@ -77,14 +76,14 @@ def report(study: Study, stored: Stored[VisionResults], output: Path) -> None:
         images=image_picture(results.corners, _image_folder(study, name)) if len(results.corners) else None,
         map=map_picture(results.error_map, summary.objects) if len(results.error_map) else None,
         overview=[_overview(each) for each in summary.objects],
-        grasps=[_grasp(robot, each) for each in summary.objects if each.grasp],
+        grasps=[_grasp(each) for each in summary.objects if each.grasp],
         programs=_programs(results.programs),
         unwritten=[WORDS[each] for each in study.section(TrajectorySettings).programs if not_written(each, robot)],
         errors=[_errors(each) for each in summary.objects if each.error_mm],
         error_columns=[tr("Object"), *(f"{word('vision.part_of_error', PARTS, part)}>" for part in PARTS)],
         player=player(robot, _motions(results), load_scene(scene) if scene else None),
         player_style=player_style(),
-        next_pose=panel_link(robot, found.next_view.q_deg, _listed(found.next_view.q_deg))
+        next_pose=panel_link(found.next_view.q_deg, _listed(found.next_view.q_deg))
         if found and found.next_view
         else "",
     )
@@ -165,8 +164,8 @@ def _disagreement(found: CalibrationResult) -> str:
         )
     why = (
         tr(
-            "Some motions turn by nearly 180 deg, where quaternions and axes change their sign for a trifle: Tsai, "
-            "Horaud and Daniilidis suffer from that most."
+            "Some motions turn by nearly 180 deg, where quaternions and axes change their sign at the least error: "
+            "Tsai, Horaud and Daniilidis suffer from that most."
         )
         if found.greatest_turn_deg > NEARLY_HALF_TURN
         else ""
@@ -234,15 +233,15 @@ def _overview(each: ObjectResult) -> list[str]:
     return [each.name, _listed(each.xyz_mm), outcome, success, counts]
 
 
-def _grasp(robot: Robot, each: ObjectResult) -> list[str]:
+def _grasp(each: ObjectResult) -> list[str]:
     grasp = each.grasp
     assert grasp is not None
     near = tr("none") if grasp.clearance_mm is None else fixed(grasp.clearance_mm, 0)
     return [
         each.name,
         _listed(grasp.tool_xyz_mm),
-        panel_link(robot, grasp.q_before_deg, _listed(grasp.q_before_deg)),
-        panel_link(robot, grasp.q_deg, _listed(grasp.q_deg)),
+        panel_link(grasp.q_before_deg, _listed(grasp.q_before_deg)),
+        panel_link(grasp.q_deg, _listed(grasp.q_deg)),
         f"{near} ({say(grasp.nearest)})" if grasp.nearest else near,
         tr("straight") if not grasp.corners else tr("planned, {corners} corners", corners=grasp.corners),
         fixed(grasp.duration_s, 1),

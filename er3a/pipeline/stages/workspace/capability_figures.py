@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
+from er3a.collision.scene import Scene
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.stages.workspace.cell_lookup import CellLookup
@@ -18,7 +19,8 @@ from er3a.pipeline.stages.workspace.model import CapabilitySummary, PlacementSum
 from er3a.pipeline.stages.workspace.workspace_tables import BoxPlaces, CapabilityCells, Singles
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed
-from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK
+from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, MUTED
+from er3a.pipeline.viewing.scene_outlines import draw_scene
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot
 
@@ -81,21 +83,27 @@ def clear_percent(cells: CapabilityCells) -> Reals:
 
 
 def placement_views(
-    robot: Robot, capability: CapabilitySummary, placement: PlacementSummary, places: BoxPlaces
+    robot: Robot,
+    capability: CapabilitySummary,
+    placement: PlacementSummary,
+    places: BoxPlaces,
+    scene: Scene | None = None,
 ) -> Figure:
     """Where the middle of the box can stand, from above and from the side, with the best places as boxes."""
     percent = 100 * places.manipulability_m3 / capability.overall.best_manipulability_m3
     figure, axes = new_figure(1, 2, width=12.0, height=5.6)
+    provable = capability.core_m3 is not None
     top = float(percent.max())
     for panel, (across, up, title) in zip(axes, (("x", "y", tr("From above")), ("x", "z", tr("From the side")))):
         shown = ["xyz".index(across), "xyz".index(up)]
         steps = [placement.spacing_m[axis] for axis in shown]
-        edges, value, proven = _raster(places.centre_m[:, shown], steps, percent, places.proven)
+        edges, value, proven = _raster(places.centre_m[:, shown], steps, percent, places.proven | (not provable))
         extent = [1000 * edge for edge in edges]
         unproven = np.ma.masked_where((value < 0) | proven, value)
         panel.pcolormesh(*extent, unproven.T, cmap=ListedColormap([GRID]), rasterized=True)
         sure = np.ma.masked_where(~proven, value)
         mesh = panel.pcolormesh(*extent, sure.T, cmap=SHADES, vmin=0, vmax=top, rasterized=True)
+        draw_scene(panel, scene, shown)
         _draw_boxes(panel, placement.places, shown)
         panel.plot(
             *skeleton(robot, np.zeros(robot.joints)).T[shown] * 1000, color=INK, linewidth=2.2, marker="o", markersize=3
@@ -107,9 +115,11 @@ def placement_views(
     handles = [
         Line2D([], [], color=INK, marker="o", markersize=4, linewidth=2.2, label=tr("arm, all joints 0")),
         Patch(facecolor="none", edgecolor=HIGHLIGHT, label=tr("best places, as numbered in the table")),
-        Patch(facecolor=GRID, label=tr("by samples only")),
+        *([Patch(facecolor=GRID, label=tr("by samples only"))] if provable else []),
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    if scene:
+        handles.append(Patch(fill=False, edgecolor=MUTED, hatch="////", label=tr("scene")))
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     return figure
 
 

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
+from er3a.collision.scene import Scene
+from er3a.geometry.transforms import rpy_along
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import say, word
@@ -28,7 +32,7 @@ from er3a.pipeline.viewing.page import Picture
 from er3a.robots.robot import Robot
 
 
-def capability_context(robot: Robot, results: WorkspaceResults) -> dict[str, Any]:
+def capability_context(robot: Robot, results: WorkspaceResults, scene: Scene | None = None) -> dict[str, Any]:
     """What the template include ``capability.html.j2`` needs."""
     capability, placement = results.summary.capability, results.summary.placement
     if isinstance(capability, NeedsClosedForm) or placement is None:
@@ -40,12 +44,15 @@ def capability_context(robot: Robot, results: WorkspaceResults) -> dict[str, Any
         "core_text": _core_text(capability),
         "roll_text": _roll_text(capability),
         "task_text": _task_text(placement.task),
+        "try_text": _try_text(robot, placement.task),
         "points_serving": placement.points_serving,
-        "place_rows": [_place_row(n, place) for n, place in enumerate(placement.places, start=1)],
+        "place_rows": [
+            _place_row(n, place, capability.arm_angles) for n, place in enumerate(placement.places, start=1)
+        ],
         "place_picture": Picture(
-            placement_views(robot, capability, placement, results.places),
+            placement_views(robot, capability, placement, results.places, scene),
             tr("Where the middle of the box can stand, from above and from the side, with the best places"),
-            _places_caption(placement),
+            _places_caption(placement, capability.core_m3 is not None),
         )
         if len(results.places)
         else None,
@@ -123,6 +130,14 @@ def _slices_caption(capability: CapabilitySummary) -> str:
 
 
 def _roll_text(capability: CapabilitySummary) -> str:
+    if capability.arm_angles > 1:
+        return tr(
+            "Each pose was tried at {angles} arm angles, and a direction counts if it is reached at one of them: more "
+            "may be reached between them. Solutions are those of one arm angle. Rolls about the tool's own axis: "
+            "{rolls}.",
+            angles=capability.arm_angles,
+            rolls=tr("left free") if capability.roll.free else capability.roll.per_direction,
+        )
     if capability.roll.free:
         return tr(
             "The roll about the tool's own axis is left free: it turns joint 6 alone, so it takes no part in whether a "
@@ -137,6 +152,8 @@ def _roll_text(capability: CapabilitySummary) -> str:
 
 def _core_text(capability: CapabilitySummary) -> str:
     core = capability.core_m3
+    if core is None:
+        return tr("The dexterous core is bounded for arms with a spherical wrist only.")
     if core.upper == 0:
         return tr(
             "There is no dexterous core: in every part of the workspace some tool direction is proven unreachable at "
@@ -169,11 +186,34 @@ def _task_text(task: TaskSummary) -> str:
     )
 
 
+def _try_text(robot: Robot, task: TaskSummary) -> str:
+    """How to see the arm at a place: the roll, pitch and yaw (ZYX) that point the tool along the task's direction."""
+    roll, pitch, _ = np.degrees(rpy_along(np.array(task.tool_direction)))
+    parts = {"roll": fixed(roll, 1).removesuffix(".0"), "pitch": fixed(pitch, 1).removesuffix(".0")}
+    if np.allclose(robot.tool, np.eye(4)):
+        return tr(
+            "To see the arm at a place, type its middle, roll {roll}, pitch {pitch} and yaw 0 deg into the teach "
+            "panel. The robot has no tool here: the centre of its flange goes there.",
+            **parts,
+        )
+    return tr(
+        "To see the arm at a place, type its middle, roll {roll}, pitch {pitch} and yaw 0 deg into the teach panel: "
+        "the tool point goes there.",
+        **parts,
+    )
+
+
 def _whole(value: float) -> float | int:
     return int(value) if value == int(value) else value
 
 
-def _places_caption(placement: PlacementSummary) -> str:
+def _places_caption(placement: PlacementSummary, provable: bool) -> str:
+    if not provable:
+        return tr(
+            "{fitting} positions on the lattice pass by samples; proofs are for arms with a spherical wrist. Stand the "
+            "box's middle well inside a bright region.",
+            fitting=number(placement.fitting),
+        )
     return tr(
         "Of {fitting} positions on the lattice that pass by samples, {proven} are proven for every point and "
         "direction. Stand the box's middle on a bright spot; grey ones pass by samples only. The colour shows the best "
@@ -183,9 +223,9 @@ def _places_caption(placement: PlacementSummary) -> str:
     )
 
 
-def _place_row(row: int, place: PlaceSummary) -> list[str]:
+def _place_row(row: int, place: PlaceSummary, arm_angles: int) -> list[str]:
     if place.branch is None:
-        branch = tr("changes within the box")
+        branch = tr("changes within the box") if arm_angles == 1 else tr("at several arm angles")
     elif place.status == place.branch_status:
         branch = branch_word(place.branch)
     else:
@@ -198,4 +238,5 @@ def _place_row(row: int, place: PlaceSummary) -> list[str]:
         branch,
         fixed(100 * place.manipulability_ratio, 1),
         fixed(place.limit_margin_deg, 1),
+        fixed(place.clearance_mm, 0),
     ]

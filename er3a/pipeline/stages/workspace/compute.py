@@ -11,17 +11,19 @@ import numpy as np
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
-from er3a.pipeline.results import Figure
+from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.workspace import table_rows
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings, WorkspaceSettings
 from er3a.pipeline.stages.workspace.envelope_marks import drawing_table
 from er3a.pipeline.stages.workspace.model import (
     AxisSummary,
+    Bars,
     Bounds,
     CellCounts,
     GridSummary,
     HullSummary,
     ProofSummary,
+    SectionFrame,
     VoidSummary,
     Volume,
     VolumePoints,
@@ -33,6 +35,7 @@ from er3a.pipeline.stages.workspace.parts import gather
 from er3a.pipeline.stages.workspace.sample import draw_of, sampled
 from er3a.pipeline.stages.workspace.tool_capability import ToolCapability, tool_capability
 from er3a.pipeline.stages.workspace.void_verdict import judge
+from er3a.pipeline.stages.workspace.workspace_findings import OnSurface
 from er3a.pipeline.stages.workspace.workspace_tables import HullTriangles
 from er3a.pipeline.study import Study
 from er3a.robots.robot import Robot
@@ -45,6 +48,7 @@ from er3a.workspace.hull import Hull, cells_inside, convex_hull
 from er3a.workspace.proven import Proven, prove_robot
 from er3a.workspace.sampled_voids import find_voids, unseen_cells, void_numbers
 from er3a.workspace.side_view import border_lines, side_views
+from er3a.workspace.surface import Surface, surface_of
 from er3a.workspace.voids import Void, pocket_block, proven_voids, sampled_only
 
 
@@ -88,7 +92,7 @@ def compute(study: Study, name: str, parts: Sequence[Path] | None = None) -> Wor
     settings = study.section(WorkspaceSettings)
     proven = prove_robot(robot, settings.proof_cells, settings.volume_points, study.seed)
     voids = proven_voids(robot, proven, hull, shoulder)
-    if proven.arm is None:
+    if not proven.settles:
         voids += sampled_only(in_cloud, grid, shoulder, voids)
     scene_file = study.scene(name, "capability")
     scene = load_scene(scene_file) if scene_file else None
@@ -133,15 +137,19 @@ def _summary(
     touched, unseen = tally.counts > 0, unseen_cells(tally.counts)
     counts = CellCounts(int(touched.sum()), int(samples.inside.sum()), int((touched & samples.inside).sum()), unseen)
     lower, upper = proven.proof.bounds
+    surface = surface_of(robot, 2 * settings.proof_cells, study.seed) if lower == 0 else None
+    left = 100 * proven.proof.width if proven.arm is None and proven.settles else None
+    judged = judge(hull.volume, voids, counts.touched, unseen, proven.settles, left)
     guess = proven.estimate
     volume = Volume(lower, upper, guess.value, (guess.low, guess.high))
     reach = search_reach(robot, grid, samples.q_kept)
     return WorkspaceSummary(
-        verdict=judge(hull.volume, voids, counts.touched, unseen, proven.arm is not None),
-        figures=_figures(reach, voids, volume, hull, settings.samples),
+        verdict=Verdict("caution", OnSurface(surface)) if surface else judged,
+        figures=_figures(reach, voids, volume, hull, settings.samples, surface),
         samples=settings.samples,
         sampling=settings.sampling,
         volume_m3=volume,
+        surface=surface,
         volume_points=VolumePoints(guess.points, guess.reached, guess.undecided),
         touched_m3=counts.touched * grid.cell_volume,
         proof=ProofSummary(
@@ -150,6 +158,7 @@ def _summary(
             proven.proof.width,
             len(samples.q_kept),
             proven.count_in_empty(forward(robot, samples.q_kept)[:, :3, 3]),
+            _bars(proven),
         ),
         hull=HullSummary(hull.volume, hull.area, settings.hull_directions, len(hull.vertices)),
         reach_m=reach,
@@ -164,9 +173,24 @@ def _summary(
     )
 
 
+def _bars(proven: Proven) -> Bars | None:
+    if proven.proof.bar == 0:
+        return None
+    x, y, z = proven.R
+    return Bars(proven.proof.bar, SectionFrame((triple(x), triple(y), triple(z)), triple(proven.origin)))
+
+
 def _figures(
-    reach: ReachExtremes, voids: Sequence[Void], volume: Volume, hull: Hull, samples: int
+    reach: ReachExtremes, voids: Sequence[Void], volume: Volume, hull: Hull, samples: int, surface: Surface | None
 ) -> tuple[Figure, ...]:
+    if surface:
+        bounds = {"area_lower": surface.lower, "area_upper": surface.upper}
+        return (
+            Figure("greatest_reach", reach.furthest_from_axis * 1000, "mm"),
+            *(Figure(name, value, "m²") for name, value in bounds.items() if value is not None),
+            Figure("least_reach", reach.nearest_to_axis * 1000, "mm"),
+            Figure("samples", samples, ""),
+        )
     low, high = volume.ci95
     enclosed = [void.lower for void in voids if void.kind == "enclosed"]
     return (

@@ -104,7 +104,7 @@ def _inputs(study: Study, robot: str) -> list[Path]:
 STAGE = Stage(
     name="workspace",
     title=N_("workspace"),
-    question=N_("What can it reach, where are the voids?"),
+    question=N_("What can it reach, where are the voids, and where can a pallet stand?"),
     settings={"workspace": WorkspaceSettings, "capability": CapabilitySettings},
     inputs=_inputs,
     rests_on=("validation",),

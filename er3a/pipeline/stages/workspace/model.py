@@ -33,6 +33,7 @@ from er3a.workspace.causes import Relaxed, Unlimited, VoidCause
 from er3a.workspace.dexterous import Core
 from er3a.workspace.proven import ProofMethod
 from er3a.workspace.sampled_voids import VoidKind
+from er3a.workspace.surface import Surface
 
 Triple = tuple[float, float, float]
 
@@ -71,15 +72,32 @@ class VolumePoints:
 
 
 @dataclass(frozen=True)
+class SectionFrame:
+    """Frame about axis 1 in the base frame: x, y, z as rows, and origin."""
+
+    axes: tuple[Triple, Triple, Triple]
+    origin_m: Triple
+
+
+@dataclass(frozen=True)
+class Bars:
+    """Cells of the proof where joint 1 slides: bars along y of this frame, from 0 on, all so long."""
+
+    length_m: float
+    frame: SectionFrame
+
+
+@dataclass(frozen=True)
 class ProofSummary:
     """The proof: ``width`` of its bounds is (upper - lower) / upper; points of samples in empty cells would refute
-    it."""
+    it. ``bars`` is None where its cells are rings about axis 1."""
 
     method: ProofMethod
     cells: int
     width: float
     points_checked: int
     points_in_empty_cells: int
+    bars: Bars | None
 
 
 @dataclass(frozen=True)
@@ -135,14 +153,6 @@ class VoidSummary:
 
 
 @dataclass(frozen=True)
-class SectionFrame:
-    """Frame about axis 1 in the base frame: x, y, z as rows, and origin."""
-
-    axes: tuple[Triple, Triple, Triple]
-    origin_m: Triple
-
-
-@dataclass(frozen=True)
 class RollSummary:
     """The roll about the tool's direction: left to joint 6, or so many tried per direction."""
 
@@ -168,7 +178,11 @@ class ClearSummary:
 
 @dataclass(frozen=True)
 class CapabilitySummary:
-    """What the tool can do in the cells of the section, in so many directions and sectors of azimuth."""
+    """What the tool can do in the cells of the section, in so many directions and sectors of azimuth.
+
+    ``core_m3`` is None for arms without a spherical wrist; each pose of a redundant arm is tried at ``arm_angles``
+    values of its arm angle (else 1).
+    """
 
     directions: int
     cell_m: float
@@ -176,13 +190,14 @@ class CapabilitySummary:
     sectors: int
     roll: RollSummary
     overall: Overall
-    core_m3: Core
+    core_m3: Core | None
+    arm_angles: int
     clear: ClearSummary
 
 
 @dataclass(frozen=True)
 class NeedsClosedForm:
-    """Capability and placement were not computed: they need the closed-form inverse."""
+    """Capability and placement were not computed: they need a closed-form inverse of joints that turn."""
 
     lacks: ClosedFormMissing
     code: Literal["workspace.needs_closed_form"] = "workspace.needs_closed_form"
@@ -206,9 +221,11 @@ class PlaceSummary:
 
     Attributes
     ----------
-    branch : configuration that serves it all, None if it changes within the box
+    branch : configuration that serves it all, None if it changes within the box or has no name
     manipulability_m3 : least over the box and its directions; manipulability_ratio : of the arm's best
-    limit_margin_deg : least distance of joints from their limits, None without one branch
+    limit_margin_deg : least distance of joints from their limits, None without one branch, or without joints of less
+        than a full turn
+    clearance_mm : least distance of the arm from scene and itself over the samples, None if nothing can meet
     """
 
     centre_m: Triple
@@ -220,6 +237,7 @@ class PlaceSummary:
     manipulability_m3: float
     manipulability_ratio: float
     limit_margin_deg: float | None
+    clearance_mm: float | None = None
 
 
 @dataclass(frozen=True)
@@ -244,12 +262,16 @@ class PlacementSummary:
 
 @dataclass(frozen=True)
 class WorkspaceSummary(Summary):
-    """The stage's summary; ``pocket_block_m`` is the edge of the blocks that open pockets were looked for on."""
+    """The stage's summary; ``pocket_block_m`` is the edge of the blocks that open pockets were looked for on.
+
+    ``surface`` is what the tool point moves on where it reaches no volume.
+    """
 
     verdict: Verdict[WorkspaceFinding]
     samples: int
     sampling: Sampling
     volume_m3: Volume
+    surface: Surface | None
     volume_points: VolumePoints
     touched_m3: float
     proof: ProofSummary

@@ -7,17 +7,17 @@ from collections.abc import Iterator
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import PolyCollection, QuadMesh
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.language import N_, as_text, tr
 from er3a.pipeline.messages.say import word
 from er3a.pipeline.messages.workspace import POINTS
-from er3a.pipeline.stages.workspace.model import AxisSummary, WorkspaceResults
+from er3a.pipeline.stages.workspace.model import AxisSummary, Bars, WorkspaceResults
 from er3a.pipeline.stages.workspace.section_figures import DENSITY, log_norm, masked
 from er3a.pipeline.stages.workspace.workspace_tables import Border, Drawing, ProofCells, SectionCells
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
@@ -35,24 +35,34 @@ PROOF = {
 FILLED, WEDGE, UNDECIDED, EMPTY = range(4)
 BORDERS = {"tool_point": INK, "wrist_centre": REFERENCE, "flange": JOINTS[3]}
 DRAWN = JOINTS[2]
-SLICE_PIXELS = 321
+SLICE_PIXELS, _CLOUD_CELLS = 321, 80
 
 
 def sections(robot: Robot, results: WorkspaceResults) -> Figure:
-    """Side sections about axis 1: what the samples show, and what is proven."""
-    border, drawing = results.border, results.drawing
+    """Side sections about axis 1, or across it where it slides: what the samples show, and what is proven."""
+    border, drawing, bars = results.border, results.drawing, results.summary.proof.bars
     figure, (left, right) = new_figure(1, 2, width=11.5, height=9.0, sharey=True, sharex=True)
-    _draw_density(left, results.summary.section_cell_m, results.section)
-    _draw_proof(right, results.proof)
+    if bars:
+        counts = _draw_cloud(left, bars, results.cloud.point_m)
+        figure.colorbar(counts, ax=left, label=tr("samples per cm²"), location="top", shrink=0.8)
+        arm, across, up = _across(bars, skeleton(robot, np.zeros(robot.joints))), *_names_across(bars)
+        left.set_title(tr("Samples, all places along the slide folded in"))
+    else:
+        mesh = _draw_density(left, results.summary.section_cell_m, results.section)
+        figure.colorbar(mesh, ax=left, label=tr("samples per litre"), location="top", shrink=0.8)
+        arm = _about(results.summary.axis, skeleton(robot, np.zeros(robot.joints)))
+        across, up = tr("distance from axis 1 (mm)"), tr("height along axis 1 (mm)")
+        left.set_title(tr("Samples, all azimuths folded in"))
+    _draw_proof(right, results.proof, bars)
     for axes in (left, right):
         _draw_border(axes, border)
-        _draw_arm(axes, robot, results.summary.axis)
-        equal_scale(axes, tr("distance from axis 1 (mm)"), tr("height along axis 1 (mm)") if axes is left else "")
+        axes.plot(*arm.T * 1000, color=INK, linewidth=2.4, marker="o", markersize=4, solid_capstyle="round")
+        equal_scale(axes, across, up if axes is left else "")
         axes.set_aspect("equal", adjustable="box")
         axes.grid(False)
-        axes.set_xlim(0, None)
+        if not bars:
+            axes.set_xlim(0, None)
     draw_labels(right, drawing, drawing.rho_m)
-    left.set_title(tr("Samples, all azimuths folded in"))
     right.set_title(tr("Proof"))
     handles: list[Artist] = [
         Line2D([], [], color=INK, marker="o", markersize=4, linewidth=2.4, label=tr("arm, all joints 0"))
@@ -65,12 +75,13 @@ def sections(robot: Robot, results: WorkspaceResults) -> Figure:
     if len(drawing):
         label = tr("manufacturer's drawing, wrist centre")
         handles.append(Line2D([], [], color=DRAWN, marker="o", linestyle=":", label=label))
-    handles += [Patch(facecolor=colour, edgecolor=MUTED, label=tr(state)) for state, colour in PROOF.items()]
+    states = [state for kind, state in enumerate(PROOF) if not (bars and kind == WEDGE)]
+    handles += [Patch(facecolor=PROOF[state], edgecolor=MUTED, label=tr(state)) for state in states]
     figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return figure
 
 
-def _draw_density(axes: Axes, cell: float, section: SectionCells) -> None:
+def _draw_density(axes: Axes, cell: float, section: SectionCells) -> QuadMesh:
     middles = np.stack([section.rho_m, section.z_m], axis=1)
     low = middles.min(axis=0) - cell / 2
     index = np.rint((middles - low) / cell - 0.5).astype(int)
@@ -78,12 +89,41 @@ def _draw_density(axes: Axes, cell: float, section: SectionCells) -> None:
     rings = np.pi * cell**2 * 2 * section.rho_m * 1e3
     density[tuple(index.T)] = section.samples / rings
     rho, z = ((low[i] + np.arange(density.shape[i] + 1) * cell) * 1000 for i in (0, 1))
-    axes.pcolormesh(rho, z, masked(density).T, cmap=DENSITY, norm=log_norm(density), rasterized=True)
+    return axes.pcolormesh(rho, z, masked(density).T, cmap=DENSITY, norm=log_norm(density), rasterized=True)
 
 
-def _draw_proof(axes: Axes, proof: ProofCells) -> None:
-    corners = np.concatenate([proof.rho_m, proof.z_m], axis=1) * 1000
+def _across(bars: Bars, points: Reals) -> Reals:
+    """Points (n, 3), m, of the base frame in the plane across the slide (n, 2), counted from the base's origin."""
+    return points @ np.array(bars.frame.axes)[[0, 2]].T
+
+
+def _origin_across(bars: Bars | None) -> Reals:
+    """Where the section of the proof begins in the plane that is drawn, (2,), m."""
+    return _across(bars, np.array([bars.frame.origin_m]))[0] if bars else np.zeros(2)
+
+
+def _names_across(bars: Bars) -> tuple[str, str]:
+    """Labels of the axes across the slide."""
+    x, _, z = (", ".join(fixed(part, 2).removesuffix(".00") for part in axis) for axis in bars.frame.axes)
+    return (
+        tr("across the slide, along ({axis}) of the base (mm)", axis=x),
+        tr("across the slide, along ({axis}) of the base (mm)", axis=z),
+    )
+
+
+def _draw_cloud(axes: Axes, bars: Bars, points: Reals) -> QuadMesh:
+    x, z = _across(bars, points).T * 1000
+    counts, *edges = np.histogram2d(x, z, bins=_CLOUD_CELLS)
+    counts *= 100 / (np.diff(edges[0])[0] * np.diff(edges[1])[0])
+    return axes.pcolormesh(*edges, masked(counts).T, cmap=DENSITY, norm=log_norm(counts), rasterized=True)
+
+
+def _draw_proof(axes: Axes, proof: ProofCells, bars: Bars | None) -> None:
+    corners = (np.concatenate([proof.rho_m, proof.z_m], axis=1) + _origin_across(bars)[[0, 0, 1, 1]]) * 1000
     filled, empty = proof.filled_ratio, proof.empty_ratio
+    if bars:  # their ends are empty
+        filled, empty = filled / np.maximum(1 - empty, 1e-12), (empty >= 1).astype(float)
+        filled = np.where((filled > 0.5) | (empty == 1), 1 - empty, 0.0)
     kinds = np.select([1 - filled - empty > 0.5, empty >= 0.5, filled < 1], [UNDECIDED, EMPTY, WEDGE], FILLED)
     for kind, colour in enumerate(PROOF.values()):
         a, b, c, d = corners[kinds == kind].T
@@ -116,30 +156,48 @@ def draw_labels(axes: Axes, drawing: Drawing, across_m: Reals) -> None:
         else:
             axes.plot(x, z, "o", color=DRAWN, markersize=5)
             axes.annotate(
-                f"J2 {q2:g}, J3 {q3:g} deg", (x, z), (6, -11), textcoords="offset points", fontsize=8, color=DRAWN
+                f"J2 {as_text(q2, 'g')}, J3 {as_text(q3, 'g')} deg",
+                (x, z),
+                (6, -11),
+                textcoords="offset points",
+                fontsize=8,
+                color=DRAWN,
             )
 
 
-def _draw_arm(axes: Axes, robot: Robot, axis: AxisSummary) -> None:
-    offset = skeleton(robot, np.zeros(robot.joints)) - axis.point_m
+def _about(axis: AxisSummary, points: Reals) -> Reals:
+    """Distance from axis 1 and height along it (n, 2) of points (n, 3), m."""
+    offset = points - axis.point_m
     height = offset @ axis.direction
     away = np.sqrt(np.maximum(0, (offset**2).sum(axis=1) - height**2))
-    axes.plot(away * 1000, height * 1000, color=INK, linewidth=2.4, marker="o", markersize=4, solid_capstyle="round")
+    return np.stack([away, height], axis=1)
 
 
 def slices(results: WorkspaceResults) -> Figure:
-    """Slices of the proof across axis 1."""
+    """Slices of the proof across axis 1, or along the slide."""
+    bars = results.summary.proof.bars
     figure, axes = new_figure(1, 3, width=12.0, height=5.0)
-    size = results.proof.rho_m[:, 1].max()
-    line = np.linspace(-size, size, SLICE_PIXELS)
-    x, y = np.meshgrid(line, line, indexing="ij")
+    size, origin = results.proof.rho_m[:, 1].max(), _origin_across(bars)
+    low, high = ([0.0, 0.0], [size, bars.length_m]) if bars else ([-size, -size], [size, size])
+    across, along = np.linspace(low, high, SLICE_PIXELS).T
+    x, y = np.meshgrid(across, along, indexing="ij")
     for panel, height in zip(axes, slice_heights(results)):
         shades = ListedColormap(list(PROOF.values()))
-        shown = _slice(results.proof, x, y, height)
-        panel.pcolormesh(line * 1000, line * 1000, shown.T, cmap=shades, vmin=-0.5, vmax=3.5, rasterized=True)
-        panel.set_title(tr("{height} mm up axis 1", height=fixed(1000 * height, 0)))
-        across = tr("across it (mm)") if panel is axes[0] else ""
-        equal_scale(panel, tr("from axis 1, in the arm's zero plane (mm)"), across)
+        rho, azimuth = (x, 360 * y / bars.length_m) if bars else (np.hypot(x, y), np.degrees(np.arctan2(y, x)) % 360)
+        shown = _slice(results.proof, rho, azimuth, height)
+        title, first, second = (
+            tr("{height} mm up axis 1", height=fixed(1000 * height, 0)),
+            tr("from axis 1, in the arm's zero plane (mm)"),
+            tr("across it (mm)"),
+        )
+        if bars:
+            first, second = _names_across(bars)[0], tr("along the slide (mm)")
+            title = tr("at {height} mm across it", height=fixed(1000 * (height + origin[1]), 0))
+        panel.pcolormesh(
+            (across + origin[0]) * 1000, along * 1000, shown.T, cmap=shades, vmin=-0.5, vmax=3.5, rasterized=True
+        )
+        panel.set_title(title)
+        equal_scale(panel, first, second if panel is axes[0] else "")
         panel.set_aspect("equal", adjustable="box")
         panel.grid(False)
     states = [state for kind, state in enumerate(PROOF) if kind != WEDGE]
@@ -151,16 +209,18 @@ def slices(results: WorkspaceResults) -> Figure:
 def slice_heights(results: WorkspaceResults) -> list[float]:
     """Three heights (m) along axis 1: of the largest enclosed void, or else the shoulder, and midway to both ends."""
     axis, enclosed = results.summary.axis, results.summary.enclosed_voids
+    if results.summary.proof.bars:
+        ends = results.proof.z_m[results.proof.empty_ratio < 1]
+        return np.quantile([ends[:, 0].min(), ends[:, 1].max()], [0.25, 0.5, 0.75]).tolist()
     point = np.array(enclosed[0].centroid_m if enclosed else axis.shoulder_m)
     middle = float((point - axis.point_m) @ axis.direction)
     reached = results.proof.z_m[results.proof.empty_ratio < 1]
     return [(reached[:, 0].min() + middle) / 2, middle, (middle + reached[:, 1].max()) / 2]
 
 
-def _slice(proof: ProofCells, x: Reals, y: Reals, z: float) -> Integers:
-    """State of each pixel (x, y) in the frame about axis 1, as a row of PROOF."""
-    rho, azimuth = np.hypot(x, y), np.degrees(np.arctan2(y, x)) % 360
-    state = np.full(x.shape, EMPTY)
+def _slice(proof: ProofCells, rho: Reals, azimuth: Reals, z: float) -> Integers:
+    """State of each pixel (m, deg) about axis 1, as a row of PROOF."""
+    state = np.full(rho.shape, EMPTY)
     for row in np.flatnonzero((proof.z_m[:, 0] <= z) & (z < proof.z_m[:, 1])):
         ring = (rho >= proof.rho_m[row, 0]) & (rho < proof.rho_m[row, 1])
         empty, unfilled = (

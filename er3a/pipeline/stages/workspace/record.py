@@ -25,8 +25,8 @@ from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot
 
 STAGE = "workspace"
-POINT_SHARE = 0.1  # radius of a point of the cloud, of the mean distance between points
-DIMMEST = 0.3  # of the colour scale: darker points can't be seen on the viewer's ground
+POINT_SHARE = 0.16  # radius of a point of the cloud, of the mean distance between points
+DIMMEST = 0.4  # of the colour scale: darker points can't be seen on the viewer's ground
 _COLOURS = {"enclosed": HIGHLIGHT, "open": REFERENCE}
 
 

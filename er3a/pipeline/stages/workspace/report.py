@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import counted, joined, say, word
 from er3a.pipeline.messages.workspace import FIGURES, VOID_KINDS, VOID_STATUS
@@ -51,16 +52,18 @@ def report(study: Study, stored: Stored[WorkspaceResults], output: Path) -> None
         unexpected=isinstance(summary.verdict.finding, VoidUnexpected),
         wide=100 * summary.proof.width,
         has_drawing=len(results.drawing) > 0,
-        **_context(robot, results),
+        **_context(robot, results, study.scene(stored.robot, "capability")),
     )
 
 
-def _context(robot: Robot, results: WorkspaceResults) -> dict[str, Any]:
+def _context(robot: Robot, results: WorkspaceResults, scene: Path | None) -> dict[str, Any]:
     summary = results.summary
-    return capability_context(robot, results) | {
+    return capability_context(robot, results, load_scene(scene) if scene else None) | {
         "section": Picture(
             sections(robot, results),
-            tr("Side sections about axis 1: density of the samples, and proven cells with the exact border"),
+            tr("Sections across the slide of joint 1: density of the samples, and proven cells")
+            if summary.proof.bars
+            else tr("Side sections about axis 1: density of the samples, and proven cells with the exact border"),
             _section_caption(summary, len(results.drawing) > 0),
         ),
         "top": Picture(
@@ -136,6 +139,11 @@ def _void_row(row: int, void: VoidSummary) -> list[str]:
 def _section_caption(summary: WorkspaceSummary, drawn: bool) -> str:
     told = [
         tr(
+            "Cells are bars along the slide. What is white on the right is proven unreachable all along it; blank "
+            "cells on the left were merely not sampled."
+        )
+        if summary.proof.bars
+        else tr(
             "What is white on the right is proven unreachable from every side; blank cells on the left were merely not "
             "sampled."
         )
@@ -161,6 +169,8 @@ def _section_caption(summary: WorkspaceSummary, drawn: bool) -> str:
 
 
 def _top_caption(robot: Robot) -> str:
+    if robot.slides[0]:
+        return tr("Joint 1 slides: the view from above shows how far the samples reach along it and beside it.")
     if robot.upper[0] - robot.lower[0] >= 2 * np.pi - 1e-9:
         return tr("Density depends on the distance from axis 1 alone, as a full turn of joint 1 demands.")
     return tr(

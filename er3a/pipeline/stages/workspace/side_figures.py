@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -33,7 +34,8 @@ def side_view(results: WorkspaceResults, has_tool: bool) -> Figure:
     """
     figure, (left, right) = new_figure(1, 2, width=12.0, height=6.6, sharex=True, sharey=True)
     for axes, point, colour in ((left, "wrist_centre", WRIST), (right, "flange" if has_tool else "tool_point", FLANGE)):
-        _draw_samples(axes, results.side_view, "wrist_centre" if axes is left else "tool_point")
+        mesh = _draw_samples(axes, results.side_view, "wrist_centre" if axes is left else "tool_point")
+        figure.colorbar(mesh, ax=axes, label=tr("samples per litre"), location="top", shrink=0.8)
         for number, arc in arcs_of(results.border, "side", point):
             x, z = arc.rho_m * 1000, arc.z_m * 1000
             axes.plot(x, z, color=colour, linewidth=1.5)
@@ -74,13 +76,14 @@ def _numbered(colour: str) -> dict[str, Any]:
     return {"ha": "center", "va": "center", "fontsize": 8, "color": colour, "bbox": box}
 
 
-def _draw_samples(axes: Axes, views: SideViewCells, point: str) -> None:
+def _draw_samples(axes: Axes, views: SideViewCells, point: str) -> QuadMesh:
     rows = views.take(views.point == point)
     cell, middles = rows.cell_m[0], np.stack([rows.x_m, rows.z_m], axis=1)
     low = middles.min(axis=0) - cell / 2
     index = np.rint((middles - low) / cell - 0.5).astype(int)
     shown = np.zeros(tuple(index.max(axis=0) + 1))
     # Per volume of the half ring: else the samples near the axis would drown.
-    shown[tuple(index.T)] = rows.samples / np.maximum(np.abs(rows.x_m), cell / 2)
+    half_rings = np.pi * cell**2 * np.maximum(np.abs(rows.x_m), cell / 2) * 1e3
+    shown[tuple(index.T)] = rows.samples / half_rings
     x, z = ((low[i] + np.arange(shown.shape[i] + 1) * cell) * 1000 for i in (0, 1))
-    axes.pcolormesh(x, z, masked(shown).T, cmap=DENSITY, norm=log_norm(shown), alpha=0.8, rasterized=True)
+    return axes.pcolormesh(x, z, masked(shown).T, cmap=DENSITY, norm=log_norm(shown), alpha=0.8, rasterized=True)

@@ -150,7 +150,9 @@ def places(found: Places) -> BoxPlaces:
         turned=found.turned,
         slot=found.slot.astype(np.int8),
         manipulability_m3=found.least.astype(np.float32),
-        limit_margin_deg=np.degrees(found.limit_margin).astype(np.float32),
+        limit_margin_deg=np.degrees(np.where(np.isinf(found.limit_margin), np.nan, found.limit_margin)).astype(
+            np.float32
+        ),
         proven=found.proven,
     )
 

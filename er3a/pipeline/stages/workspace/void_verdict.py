@@ -19,7 +19,12 @@ from er3a.workspace.voids import Void
 
 
 def judge(
-    hull_volume: float, voids: Sequence[Void], touched: int, unseen: float, proof: bool
+    hull_volume: float,
+    voids: Sequence[Void],
+    touched: int,
+    unseen: float,
+    proof: bool,
+    undecided_percent: float | None = None,
 ) -> Verdict[WorkspaceFinding]:
     """The stage's verdict.
 
@@ -30,7 +35,7 @@ def judge(
     ----------
     hull_volume : m^3
     touched : number of touched cells; unseen : cells that more samples would touch
-    proof : whether the arm's build allowed a proof
+    proof : whether there is a proof that settles most; undecided_percent : what it leaves undecided, where that is told
     """
     if hull_volume == 0:
         return Verdict("caution", Flat())
@@ -45,7 +50,7 @@ def judge(
         return Verdict("caution", VoidUncertain(*_size_and_place(elsewhere[0])))
     if enclosed:
         return Verdict("pass", VoidAtShoulder(*_size_and_place(enclosed[0])))
-    return Verdict("pass", NoVoid(proof))
+    return Verdict("pass", NoVoid(proof, undecided_percent))
 
 
 def _size_and_place(void: Void) -> tuple[float, float, float, float]:

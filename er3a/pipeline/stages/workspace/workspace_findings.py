@@ -6,13 +6,22 @@ from dataclasses import dataclass
 from typing import Literal
 
 from er3a.workspace.causes import VoidCause
+from er3a.workspace.surface import Surface
 
 
 @dataclass(frozen=True)
 class Flat:
-    """The tool point moves on a plane, a line or not at all."""
+    """The tool point moves on a line or not at all."""
 
     code: Literal["workspace.flat"] = "workspace.flat"
+
+
+@dataclass(frozen=True)
+class OnSurface:
+    """The tool point moves on a surface; its area as :class:`er3a.workspace.surface.Surface` has it."""
+
+    surface: Surface
+    code: Literal["workspace.on_surface"] = "workspace.on_surface"
 
 
 @dataclass(frozen=True)
@@ -59,10 +68,12 @@ class VoidAtShoulder:
 
 @dataclass(frozen=True)
 class NoVoid:
-    """No enclosed void, by the proof or by samples alone."""
+    """No enclosed void, by the proof or by samples alone; ``undecided_percent`` is what the general proof leaves
+    undecided of the volume."""
 
     proven: bool
+    undecided_percent: float | None = None
     code: Literal["workspace.no_void"] = "workspace.no_void"
 
 
-WorkspaceFinding = Flat | Undersampled | VoidUnexpected | VoidUncertain | VoidAtShoulder | NoVoid
+WorkspaceFinding = Flat | OnSurface | Undersampled | VoidUnexpected | VoidUncertain | VoidAtShoulder | NoVoid

@@ -80,15 +80,16 @@ class HullTriangles(Table):
 
 @dataclass(frozen=True, eq=False)
 class ProofCells(Table):
-    """Cells of the proof: rings about axis 1."""
+    """Cells of the proof: rings about axis 1, or bars along a first joint that slides (``proof.bars`` of the summary,
+    with the frame); of these rho is x, and 360 deg are their length."""
 
     rho_m: Reals = vector("rho_{}_m", "inner and outer distance from axis 1", "m", parts="01")
     z_m: Reals = vector("z_{}_m", "lowest and highest height along axis 1", "m", parts="01")
-    volume_m3: Reals = column("volume of the ring", "m^3")
+    volume_m3: Reals = column("volume of the cell", "m^3")
     level: NDArray[np.int16] = column("how often the cell was split off", dtype=np.int16)
     status: Texts = column("filled, touched, empty, partly_filled or undecided", dtype=object)
-    filled_ratio: Reals = column("ratio of the ring that is proven filled")
-    empty_ratio: Reals = column("ratio of the ring that is proven empty")
+    filled_ratio: Reals = column("ratio of the cell that is proven filled")
+    empty_ratio: Reals = column("ratio of the cell that is proven empty")
     empty_arcs_deg: Texts = lists("ends of the azimuths that are proven empty", "deg")
     unfilled_arcs_deg: Texts = lists("ends of the azimuths that are not proven filled", "deg")
     q_deg: Reals = per_joint("q{}_deg", "joint angle that reaches into the cell, NaN if none is known", "deg")

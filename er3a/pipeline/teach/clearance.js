@@ -1,0 +1,71 @@
+/** How far the arm is from its surroundings and from itself, pair by pair of the bodies that the collision stage watches. */
+
+import { add, moved, norm, scaled, subtract } from "er3a/algebra";
+import { ballAround, bodyDistance } from "er3a/distance";
+import { write } from "er3a/readouts";
+import { fill, inMillimetres } from "er3a/text";
+
+const WORLD = -1; // link of what stands around the arm
+const balls = new WeakMap(); // around bodies, in their links' frames
+
+const byId = (id) => document.getElementById(id);
+
+/**
+ * The nearest pair at frames `T` (of `frames`), or null where nothing can meet: `{pair, distance, from, to, deep}`, m,
+ * with points on the bodies' surfaces. A pair that a joint joins counts only where it overlaps. `bodies` are those of
+ * `bodyDistance`, each with its `link` (0 the base, k what row k moves, -1 the world), points in the link's frame;
+ * `pairs` are `{bodies: [first, second], joined, text}`.
+ */
+export function nearestPair({ bodies, pairs }, base, T) {
+  const frame = (link) => (link ? T[link - 1] : base);
+  const local = balls.get(bodies) ?? balls.set(bodies, bodies.map(ballAround)).get(bodies);
+  const around = local.map((ball, i) => ball && (bodies[i].link === WORLD ? ball : { ...ball, centre: moved(frame(bodies[i].link), ball.centre) }));
+  const places = new Map();
+  const placed = (i) => {
+    const { link, points } = bodies[i];
+    if (!places.has(i)) places.set(i, link === WORLD ? points : points.map((point) => moved(frame(link), point)));
+    return places.get(i);
+  };
+  let best = null;
+  for (const pair of pairs) {
+    const [i, j] = pair.bodies;
+    const [ball, other] = [around[i], around[j]];
+    const apart = other ? norm(subtract(ball.centre, other.centre)) - ball.reach - other.reach : -Infinity;
+    if (best && apart >= best.distance) continue;
+    const found = bodyDistance(bodies[i], placed(i), bodies[j], placed(j));
+    if (pair.joined && found.distance >= 0) continue;
+    if (!best || found.distance < best.distance) best = { pair, ...found };
+  }
+  if (!best) return null;
+  const [i, j] = best.pair.bodies;
+  const [a, b] = best.near;
+  const length = norm(subtract(b, a));
+  const along = length > 0 ? scaled(subtract(b, a), 1 / length) : [0, 0, 0];
+  return { ...best, from: add(a, scaled(along, bodies[i].radius)), to: subtract(b, scaled(along, bodies[j].radius)) };
+}
+
+export class Clearance {
+  constructor({ table, clearance, words }) {
+    Object.assign(this, { table, clearance, words });
+  }
+
+  /** Writes the least distance at frames `T` into the page; returns what is to be drawn of it, null for nothing. */
+  show(T) {
+    const { words } = this;
+    const found = nearestPair(this.clearance, this.table.base, T);
+    const element = byId("clearance");
+    if (!found) {
+      element.dataset.state = "clear";
+      write(element, words.nothing_meets);
+      return null;
+    }
+    const { distance, deep, pair } = found;
+    const touching = distance <= 0;
+    element.dataset.state = touching ? "at" : distance < this.clearance.near ? "near" : "clear";
+    const length = inMillimetres(Math.abs(distance));
+    const told = touching ? (deep ? words.overlap_deep : words.overlap) : words.clearance_is;
+    write(element, fill(told, { distance: length, pair: pair.text }));
+    const links = touching ? pair.bodies.map((i) => this.clearance.bodies[i].link).filter((link) => link !== WORLD) : [];
+    return { from: found.from, to: found.to, text: deep ? "" : inMillimetres(distance), links };
+  }
+}

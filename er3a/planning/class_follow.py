@@ -1,0 +1,143 @@
+"""Paths of the tool for arms with fewer than six joints, under the task that their class can meet.
+
+Such an arm meets a part of the pose (:func:`er3a.kinematics.by_class.task_mask`): a SCARA leaves the tool's tilt, five
+joints the turn about the tool's axis, three the orientation. Its angles along the path are interpolated at Chebyshev
+points by polynomials, piece by piece; the pieces are halved until between these points, too, the angles are those that
+the closed form has there [1]_. What the arm then runs is that curve, and it is judged exactly, as moves of joints are.
+
+References
+----------
+.. [1] L. N. Trefethen, *Approximation Theory and Approximation Practice*, SIAM 2013, chapter 8.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from er3a.errors import Er3aError, NotWristPartitionedError
+from er3a.kinematics.by_class import arm_solver, class_rows
+from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.jit import kernel
+from er3a.planning.moves import ToolPath
+from er3a.planning.piecewise import PiecewiseMotion, chebyshev_times, motion_through
+from er3a.planning.polynomial_checks import limit_intervals
+from er3a.planning.profiles import times_at
+from er3a.robots.joint_limits import limit_margin, nearest_equivalent, within
+from er3a.robots.robot import Robot
+
+DEGREE = 9
+FIRST_PIECES, MOST_PIECES = 4, 1024  # between two corners of the path or of its law of time
+CLOSE = 1e-10  # rad, m
+SAME_TIME = 1e-9  # share of the duration
+WIDE = np.radians(20.0)  # rad, m; of a joint between two points
+ON_PATH = 1e-6  # rad, m; by which given joints may miss the closed form's at the start
+
+
+class PathEndsError(Er3aError):
+    """No arm follows the path beyond a time (s): it is out of reach, or a joint would have to leap."""
+
+    def __init__(self, robot: str, kind: Literal["out_of_reach", "singular"], t: float):
+        self.robot, self.kind, self.t = robot, kind, t
+        super().__init__(f"{robot}: the path can't be followed beyond {t:.6g} s ({kind.replace('_', ' ')})")
+
+
+def follow_by_class(robot: Robot, path: ToolPath, q_start: Reals | None = None) -> PiecewiseMotion:
+    """The joints' motion (n) along a path.
+
+    Parameters
+    ----------
+    q_start : (n,), rad or m, joints whose tool meets the path's first pose; None for those of the closed form that keep
+        the limits longest, then farthest from them
+
+    Raises
+    ------
+    NotWristPartitionedError
+        for an arm whose class has no such task
+    PathEndsError
+        where no arm follows to the end
+    """
+    missing, solver = closed_form_missing(robot), arm_solver(robot).chain
+    if (solver.code == "unsolved" or solver.parameters) and missing is not None:
+        raise NotWristPartitionedError(robot.name, missing)
+    rows = _rows(robot, path, np.zeros(1))[0]
+    starts = nearest_equivalent(robot, rows[np.isfinite(rows[:, 0])], np.zeros(robot.joints))
+    if q_start is not None:
+        starts = nearest_equivalent(robot, starts, q_start)
+        starts = starts[(np.abs(starts - q_start) <= ON_PATH).all(axis=1)]
+    if not len(starts):
+        raise PathEndsError(robot.name, "out_of_reach", 0.0)
+    found: list[PiecewiseMotion] = []
+    ends: list[PathEndsError] = []
+    for start in sorted(starts, key=lambda q: (not within(robot, q), -round(float(limit_margin(robot, q)), 9))):
+        try:
+            found.append(_followed(robot, path, start))
+        except PathEndsError as error:
+            ends.append(error)
+    if not found:
+        raise max(ends, key=lambda error: error.t)
+    return next((motion for motion in found if not limit_intervals(robot, motion)), found[0])
+
+
+def _rows(robot: Robot, path: ToolPath, t: Reals) -> Reals:
+    """All solutions (N, slots, n) at times (N,)."""
+    T = path.poses(path.progress(t)[0])
+    return class_rows(robot, T, np.zeros((len(t), 0))).q
+
+
+def _followed(robot: Robot, path: ToolPath, start: Reals) -> PiecewiseMotion:
+    corners = np.unique(np.concatenate([path.law.breaks, times_at(path.law, path.edges)]))
+    corners = corners[np.concatenate([[True], np.diff(corners) > SAME_TIME * corners[-1]])]
+    pieces = FIRST_PIECES
+    while True:
+        parts = [np.linspace(a, b, pieces + 1)[:-1] for a, b in pairwise(corners.tolist())]
+        times = np.append(np.concatenate(parts), corners[-1])
+        nodes, between = chebyshev_times(times, DEGREE)
+        t, back = np.unique(np.concatenate([nodes.ravel(), between.ravel()]), return_inverse=True)
+        q = np.empty((len(t), robot.joints))
+        ended, reached = _tracked(_rows(robot, path, t), robot.slides, start, q)
+        more = pieces < MOST_PIECES
+        if ended < len(t) and not (reached and more):
+            raise PathEndsError(robot.name, "singular" if reached else "out_of_reach", float(t[ended]))
+        if ended == len(t):
+            at_nodes, at_between = (q[part] for part in np.split(back, [nodes.size]))
+            motion = motion_through(at_nodes.reshape(*nodes.shape, -1), times)
+            if (np.abs(motion.joints(between.ravel()) - at_between) <= CLOSE).all():
+                return motion
+            if not more:
+                raise PathEndsError(robot.name, "singular", float(t[0]))
+        pieces *= 2
+
+
+@kernel
+def _tracked(rows: Reals, sliding: Flags, start: Reals, q: Reals) -> tuple[int, bool]:
+    """Fill ``q`` (N, n) with the rows (N, slots, n) nearest to those before, angles made continuous.
+
+    Returns
+    -------
+    the first point beyond which it does not go on, N if it does; and whether that point is reached by some row
+    """
+    n = rows.shape[2]
+    last, step = start.copy(), np.empty(n)
+    for i in range(rows.shape[0]):
+        least, reached = np.inf, False
+        for slot in range(rows.shape[1]):
+            if np.isnan(rows[i, slot, 0]):
+                continue
+            reached, farthest = True, 0.0
+            for j in range(n):
+                step[j] = rows[i, slot, j] - last[j]
+                if not sliding[j]:
+                    step[j] -= 2 * np.pi * np.round(step[j] / (2 * np.pi))
+                farthest = max(farthest, abs(step[j]))
+            if farthest < least:
+                least = farthest
+                for j in range(n):
+                    q[i, j] = last[j] + step[j]
+        if least > WIDE:
+            return i, reached
+        last[:] = q[i]
+    return rows.shape[0], True

@@ -1,0 +1,20 @@
+"""Results that are computed when a test first asks for them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+V = TypeVar("V")
+
+
+class OnDemand(dict[str, V]):
+    """By name, each made once."""
+
+    def __init__(self, make: Callable[[str], V]):
+        super().__init__()
+        self._make = make
+
+    def __missing__(self, name: str) -> V:
+        self[name] = self._make(name)
+        return self[name]

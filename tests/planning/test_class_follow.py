@@ -1,0 +1,102 @@
+"""Arms with fewer than six joints on paths of the tool, against plane trigonometry and their own tables."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from er3a.errors import NotWristPartitionedError
+from er3a.kinematics.forward import forward
+from er3a.planning.class_follow import PathEndsError, follow_by_class
+from er3a.planning.moves import line
+from er3a.robots.robot import Robot
+
+INNER, OUTER = 0.325, 0.275
+H = np.pi / 2
+
+
+def arm(rows, sliding=None, lower=None, upper=None) -> Robot:
+    a, alpha, d = (np.array(column, float) for column in rows)
+    n = len(a)
+    slides = np.zeros(n, bool) if sliding is None else np.array(sliding, bool)
+    most = np.full(n, 3.0)
+    lower, upper = (-most if lower is None else np.array(lower)), (most if upper is None else np.array(upper))
+    return Robot("arm", "arm", "standard", a, alpha, d, np.ones(n), np.zeros(n), lower, upper, sliding=slides)
+
+
+SCARA = arm(
+    ([INNER, OUTER, 0, 0], [0, np.pi, 0, 0], [0.4, 0, 0, 0.05]),
+    [False, False, True, False],
+    [-2.27, -2.44, 0.0, -6.0],
+    [2.27, 2.44, 0.2, 6.0],
+)
+FIVE = arm(([0, -0.425, -0.392, 0, 0], [H, 0, 0, H, -H], [0.089, 0, 0, 0.109, 0.095]))
+SIX = arm(([0, 0, 0, 0, 0, 0], [-H, H, 0, -H, H, 0], [0.4, 0.15, 0, 0, 0, 0.26]), [False, False, True, *[False] * 3])
+THREE = arm(([0, 0.3, 0.25], [H, 0, 0], [0.3, 0, 0]))
+
+
+def by_hand(x, y, z, yaw, side):
+    """Joints of the SCARA for x, y, z of its tool and the turn of it about the vertical."""
+    elbow = side * np.arccos((x**2 + y**2 - INNER**2 - OUTER**2) / (2 * INNER * OUTER))
+    first = np.arctan2(y, x) - np.arctan2(OUTER * np.sin(elbow), INNER + OUTER * np.cos(elbow))
+    return np.stack([first, elbow, 0.35 - z, first + elbow - yaw], axis=-1)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_scara_follows_a_line_as_plane_trigonometry_has_it(side):
+    start, end = np.array([0.45, -0.2, 0.3, 0.4]), np.array([0.1, 0.4, 0.2, -0.7])
+    T = forward(SCARA, by_hand(*np.stack([start, end]).T, side))
+    path = line(T[0], T[1], 1.3)
+    motion = follow_by_class(SCARA, path, by_hand(*start, side))
+    t = np.linspace(0, 1.3, 2001)
+    share = np.clip(t / 1.3, 0, 1)
+    share = share**3 * (10 - 15 * share + 6 * share**2)
+    turn = (end - start)[3]
+    asked = start + share[:, None] * np.array([*(end - start)[:3], turn])
+    q, velocity, acceleration = motion.rates(t)
+    expected = np.unwrap(by_hand(*asked.T, side), axis=0)
+    np.testing.assert_allclose(q, expected, atol=1e-9)
+    speed = np.gradient(expected, t, axis=0)
+    np.testing.assert_allclose(velocity[1:-1], speed[1:-1], atol=2e-5 * np.abs(speed).max() + 1e-4)
+    np.testing.assert_allclose(acceleration[2:-2], np.gradient(speed, t, axis=0)[2:-2], atol=0.02)
+
+
+@pytest.mark.parametrize("robot", [THREE, FIVE, SIX])
+def test_points_and_directions_of_the_tool_are_met_between_the_points_solved(robot, random):
+    q = random.uniform(0.3, 0.9, robot.joints)
+    T = forward(robot, np.stack([q, q + random.uniform(-0.1, 0.1, robot.joints)]))
+    path = line(T[0], T[1], 2.0)
+    motion = follow_by_class(robot, path, q)
+    t = random.uniform(0, 2, 200)
+    asked, found = path.poses(path.progress(t)[0]), forward(robot, motion.joints(t))
+    np.testing.assert_allclose(found[:, :3, 3], asked[:, :3, 3], atol=1e-8)
+    if robot is not THREE:
+        np.testing.assert_allclose(found[:, :3, 2], asked[:, :3, 2], atol=1e-8)
+    if robot is SIX:
+        np.testing.assert_allclose(found, asked, atol=1e-8)
+
+
+def test_without_start_joints_the_roomiest_arm_is_taken_and_limits_count():
+    T = forward(SCARA, by_hand(*np.array([[0.4, 0.2, 0.25, 0.1], [0.3, 0.35, 0.25, 0.1]]).T, 1))
+    motion = follow_by_class(SCARA, line(T[0], T[1], 1.0))
+    assert motion.joints(np.array([0.0]))[0, 1] > 0
+    narrow = SCARA.replace(lower=np.array([-2.27, -2.44, 0.0, -6.0]), upper=np.array([2.27, 0.5, 0.2, 6.0]))
+    assert follow_by_class(narrow, line(T[0], T[1], 1.0)).joints(np.array([0.0]))[0, 1] < 0
+
+
+def test_what_can_not_be_followed_is_told_with_the_time():
+    T = forward(SCARA, by_hand(*np.array([[0.5, 0.0, 0.25, 0.0]]).T, 1))[0]
+    beyond = T.copy()
+    beyond[0, 3] = 0.7
+    with pytest.raises(PathEndsError) as info:
+        follow_by_class(SCARA, line(T, beyond, 1.0))
+    assert info.value.kind == "out_of_reach"
+    share = info.value.t**3 * (10 - 15 * info.value.t + 6 * info.value.t**2)
+    assert abs(0.5 + 0.2 * share - INNER - OUTER) < 2e-3
+    through = T.copy()
+    through[0, 3] = -0.5  # through axis 1, where the inner arm would have to turn at once
+    with pytest.raises(PathEndsError):
+        follow_by_class(SCARA, line(T, through, 1.0))
+    seven = arm(([0] * 7, [-H, H, H, -H, -H, H, 0], [0.34, 0, 0.4, 0, 0.4, 0, 0.126]))
+    with pytest.raises(NotWristPartitionedError):
+        follow_by_class(seven, line(T, T, 1.0))

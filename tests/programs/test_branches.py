@@ -1,0 +1,225 @@
+"""Branches on what only the cell knows: which are followed on both sides, and which are passed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from er3a.files.robot_library import load_robot
+from er3a.program_check.check_program import CheckOptions, check_program
+from er3a.programs.execution import RunLimits
+from er3a.programs.instructions import Decision, JointTarget
+from er3a.programs.machine import Machine
+from er3a.programs.read_program import read_program
+from er3a.programs.run_program import execute
+from tests.programs.test_round_trips import ROBOT
+
+GRIPPER = """def work():
+  def grip(width):
+    timeout = 0
+    while get_digital_in(9) == False:
+      if timeout > 750000:
+        break
+      end
+      timeout = timeout + 1
+      sync()
+    end
+    i = 0
+    while i < 17:
+      set_digital_out(8, True)
+      if get_digital_in(8):
+        found = 1
+      end
+      i = i + 1
+    end
+    if get_digital_in(7):
+      popup("lost")
+      return False
+    end
+    return True
+  end
+  while True:
+    movej([0, -1.57, 1.57, 0, 1.57, 0])
+    grip(50)
+    movej([0.5, -1.57, 1.57, 0, 1.57, 0])
+    grip(10)
+  end
+end
+"""
+
+
+def program_of(folder, name, text):
+    """A program of a text."""
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return read_program(path)
+
+
+def test_a_grippers_own_waits_are_passed_and_the_motions_behind_are_checked(tmp_path):
+    execution = execute(program_of(tmp_path, "grip.script", GRIPPER))
+    assert execution.complete
+    assert [each.kind for each in execution.endings] == ["repeats"]
+    assert {execution.steps[i].place.line for i in execution.motions} == {26, 28}
+
+
+def test_a_side_that_changes_where_the_arm_goes_is_followed(tmp_path):
+    text = "DEF p( )\nDECL REAL z\nz=0\nIF $IN[1] THEN\nz=10\nENDIF\nPTP {A1 0,A2 z,A3 0,A4 0,A5 0,A6 0}\nEND\n"
+    steps = execute(program_of(tmp_path, "p.src", text)).steps
+    targets = [each.instruction.target for each in steps if hasattr(each.instruction, "target")]
+    assert sorted(round(float(np.degrees(each.joints[1]))) for each in targets) == [0, 10]
+
+
+@pytest.mark.parametrize(
+    "side", ["halt", "RETURN", "EXIT", "PTP {A1 5,A2 0,A3 0,A4 0,A5 0,A6 0}", "unknown()", "BAS(#TOOL,2)", "GOTO out"]
+)
+def test_a_side_that_ends_moves_or_leaves_is_not_passed(side, tmp_path):
+    inside = f"LOOP\nIF $IN[1] THEN\n{side}\nENDIF\nPTP {{A1 1,A2 0,A3 0,A4 0,A5 0,A6 0}}\nENDLOOP\nout:\n"
+    text = f"DEF p( )\n{inside}PTP {{A1 9,A2 0,A3 0,A4 0,A5 0,A6 0}}\nEND\n"
+    execution = execute(program_of(tmp_path, "p.src", text))
+    taken = {each.instruction.taken for each in execution.steps if isinstance(each.instruction, Decision)}
+    assert taken == ({True, False} if side != "halt" else taken)
+    assert execution.complete
+
+
+def random_program(rng, lines):
+    """Nested ifs and loops on inputs and counters, with motions, in KRL."""
+    text, blocks = ["DEF p( )", "INT a, b, c", "a=0", "b=0", "c=0"], []
+    for _ in range(lines):
+        kind = rng.integers(9)
+        name = "abc"[rng.integers(3)]
+        if kind <= 1 and len(blocks) < 4:
+            condition = [f"$IN[{rng.integers(4)}]", f"{name}>1", f"{name}==$IN[1]"][rng.integers(3)]
+            text.append(f"IF {condition} THEN")
+            blocks.append("ENDIF")
+        elif kind == 2 and len(blocks) < 4:
+            text.append(f"WHILE $IN[{rng.integers(4)}]")
+            blocks.append("ENDWHILE")
+        elif kind == 3 and blocks:
+            text.append(blocks.pop())
+        elif kind == 4 and blocks and blocks[-1] == "ENDIF":
+            text.append("ELSE")
+            blocks[-1] = "ENDIF "
+        elif kind <= 6:
+            text.append(f"{name}={['abc'[rng.integers(3)], str(rng.integers(3))][rng.integers(2)]}")
+        elif kind == 7:
+            text.append(f"PTP {{A1 {rng.integers(9)},A2 {name},A3 0,A4 0,A5 0,A6 0}}")
+        else:
+            text.append(["$OUT[1]=TRUE", "WAIT SEC 0", "sub()"][rng.integers(3)])
+    text += reversed(blocks)
+    sub = ["DEF sub( )", "IF $IN[7] THEN", "a=1", "RETURN", "ENDIF", "b=2", "END"]
+    return "\n".join([*text, "PTP {A1 1,A2 a,A3 b,A4 c,A5 0,A6 0}", "END", *sub, ""])
+
+
+def visited(execution):
+    """Where the arm goes, by line; what is not known by its text."""
+    found = set()
+    for step in execution.steps:
+        target = getattr(step.instruction, "target", None)
+        if target is not None:
+            known = isinstance(target, JointTarget)
+            found.add((step.place.line, tuple(np.degrees(target.joints).round(9)) if known else target))
+    return found
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_arm_goes_where_it_goes_when_both_sides_of_every_branch_are_followed(seed, tmp_path, monkeypatch):
+    program = program_of(tmp_path, "p.src", random_program(np.random.default_rng(seed), 40))
+    passed = execute(program, limits=RunLimits(ways=100_000))
+    start = Machine.__init__
+
+    def forgetful(self, *given):
+        start(self, *given)
+        self.quiet = {}
+
+    monkeypatch.setattr(Machine, "__init__", forgetful)
+    followed = execute(program, limits=RunLimits(ways=100_000))
+    assert passed.complete
+    assert followed.complete
+    assert visited(passed) == visited(followed)
+
+
+def test_motions_behind_the_last_step_that_is_followed_are_not_called_unreachable(tmp_path):
+    text = "DEF p( )\nINT i\nFOR i=1 TO 100\nIF $IN[i] THEN\nPTP {A1 i}\nENDIF\nENDFOR\nPTP {A1 3}\nEND\n"
+    options = CheckOptions(limits=RunLimits(operations=200, ways=3), start=np.zeros(6), measures=False)
+    check = check_program(program_of(tmp_path, "p.src", text), ROBOT, options)
+    codes = {each.finding.code: each.level for each in check.findings}
+    assert codes["not_come_to"] == "caution"
+    assert "never_reached" not in codes
+
+
+def test_behind_what_may_move_the_arm_no_way_is_known(tmp_path):
+    text = "DEF p( )\nPTP {A1 0,A2 0,A3 0,A4 0,A5 30,A6 0}\nother()\nPTP {A1 9,A2 0,A3 0,A4 0,A5 30,A6 0}\nEND\n"
+    check = check_program(program_of(tmp_path, "p.src", text), ROBOT, CheckOptions(start=np.zeros(6), measures=False))
+    assert [(each.place.line, each.finding.code) for each in check.findings if "known" in each.finding.code] == [
+        (4, "way_not_known")
+    ]
+
+
+def test_a_motion_to_where_the_arm_stands_needs_no_start(tmp_path):
+    text = "DEF p( )\nPTP $AXIS_ACT ; skip BCO quickly\nLIN $POS_ACT\nPTP {A1 9,A2 0,A3 0,A4 0,A5 30,A6 0}\nEND\n"
+    check = check_program(program_of(tmp_path, "p.src", text), ROBOT, CheckOptions(measures=False))
+    assert "target_not_given" not in {each.finding.code for each in check.findings}
+    assert [each.end is None for each in check.motions.values()] == [True, True, False]
+
+
+XPL = """<?xml version="1.0"?><Xpl-source><XplEnvironment><Pous><Pou><Name>Main</Name><Type>Program</Type><Body>
+{inside}
+<mjoint><target>POINTJ(0,-10,-10,0,-70,0)</target><speed>v5perc</speed><zone>fine</zone><tool>tool0</tool>
+<refsys></refsys></mjoint><end_pro/>{after}</Body>{pous}</Pou></Pous></XplEnvironment></Xpl-source>"""
+POU = """<Pou><Name>{n}</Name><Body><mjoint><target>POINTJ({n}0,-10,-10,0,-70,0)</target><speed>v5perc</speed>
+<zone>fine</zone><tool>tool0</tool></mjoint></Body></Pou>"""
+ONE = "<if><cond>io.DIn[1]</cond><pouref>1</pouref>{}</if>"
+ELSE, ELSIF = "<else><pouref>2</pouref></else>", "<elsif><cond>io.DIn[2]</cond><pouref>2</pouref></elsif>"
+
+
+@pytest.mark.parametrize(
+    ("inside", "ways"),
+    [
+        (ONE.format(""), {(1, 0), (0,)}),
+        (ONE.format("<pouref>2</pouref>"), {(1, 0), (2, 0)}),
+        (ONE.format(ELSE), {(1, 0), (2, 0)}),
+        (ONE.format("") + ELSE, {(1, 0), (2, 0)}),
+        (ONE.format(ELSIF), {(1, 0), (2, 0), (0,)}),
+        (ONE.format("").replace("io.DIn[1]", "1=1") + ELSE, {(1, 0)}),
+    ],
+)
+def test_an_if_of_the_controllers_xml_has_its_sides(inside, ways, tmp_path):
+    text = XPL.format(inside=inside, after="", pous=POU.format(n=1) + POU.format(n=2))
+    program = program_of(tmp_path, "IF.XPL", text)
+    assert [each.code for each in program.findings] == ["program_form_inferred"]
+    execution = execute(program)
+    found = set()
+    for ending in execution.endings:
+        moves = [execution.steps[i].instruction for i in execution.way(ending)]
+        if ending.kind == "joins":
+            moves += [execution.steps[ending.repeats_from].instruction]
+        found.add(tuple(round(float(np.degrees(m.target.joints[0])) / 10) for m in moves if hasattr(m, "target")))
+    assert found == ways
+
+
+def test_an_if_of_another_form_may_move_and_so_may_what_stands_behind_it(tmp_path):
+    inside = "<if><cond>x</cond><then><mjoint /></then></if>" + ELSE
+    check = check_program(
+        program_of(tmp_path, "IF.XPL", XPL.format(inside=inside, after="", pous=POU.format(n=2))), ROBOT
+    )
+    assert sorted({each.finding.code for each in check.findings if each.level == "caution"})[0] == "may_move"
+
+
+def test_nothing_stands_behind_the_end_of_a_program(tmp_path):
+    execution = execute(program_of(tmp_path, "END.XPL", XPL.format(inside="", after="<odd />", pous="")))
+    assert [type(each.instruction).__name__ for each in execution.steps] == ["ArmMotion"]
+
+
+@pytest.mark.long
+def test_lines_of_an_arm_with_three_parallel_axes_are_followed(tmp_path):
+    text = """def line():
+  movej([1.57, -1.57, 1.57, -1.57, -1.57, 0.0])
+  here = get_forward_kin([1.57, -1.57, 1.57, -1.57, -1.57, 0.0])
+  movel(pose_add(here, p[0,0,-0.1,0,0,0]), v=0.1)
+  movel(pose_add(here, p[0,2,0,0,0,0]), v=0.1)
+end
+"""
+    arm = load_robot("ur5e")
+    check = check_program(program_of(tmp_path, "line.script", text), arm, CheckOptions(measures=False))
+    assert {each.place.line: each.level for each in check.verdicts} == {2: "note", 4: "pass", 5: "fail"}
+    assert "way_out_of_reach" in {each.finding.code for each in check.findings}

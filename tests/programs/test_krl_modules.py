@@ -1,0 +1,73 @@
+"""A KRL program whose modules stand beside it: each has points and routines of its own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from er3a.errors import InputError
+from er3a.files.robot_library import load_robot
+from er3a.program_check.check_program import CheckOptions, check_program
+from er3a.programs.instructions import ArmMotion
+from er3a.programs.read_program import files_of, read_program
+from er3a.programs.run_program import execute
+
+FILES = {
+    "cell.src": "DEF CELL( )\nDECL INT I\nPTP XP1\nFOR I=1 TO 2\nPICK(5.0)\nENDFOR\nHELP( )\nSUB( )\nEND\n"
+    "DEF SUB( )\nPTP {A1 40}\nEND\n",
+    "cell.dat": "DEFDAT CELL\nDECL AXIS XP1={A1 10,A2 0,A3 0,A4 0,A5 30,A6 0}\nENDDAT\n",
+    "Pick.src": "DEF PICK(H:IN)\nDECL REAL H\nPTP XP1\nSUB(H)\nXP1.A1=XP1.A1+1\nEND\n"
+    "DEF SUB(A:IN)\nDECL REAL A\nPTP {A1 A}\nDEEPER( )\nEND\n"
+    "GLOBAL DEF HELP( )\nPTP SHARED\nEND\nDEF UNUSED( )\nPTP {A1 -70}\nEND\n",
+    "Pick.dat": "DEFDAT PICK PUBLIC\nDECL AXIS XP1={A1 -30,A2 0,A3 0,A4 0,A5 30,A6 0}\n"
+    "DECL GLOBAL AXIS SHARED={A1 0,A2 0,A3 0,A4 0,A5 20,A6 0}\nENDDAT\n",
+    "deeper.src": "DEF DEEPER( )\nSHARED.A2=-5\nPTP {A1 6}\nEND\n",
+    "other.src": "DEF OTHER( )\nno KRL at all \"\nEND\n",
+}  # fmt: skip
+
+
+@pytest.fixture
+def cell(tmp_path) -> Path:
+    for name, text in FILES.items():
+        (tmp_path / name).write_text(text)
+    return tmp_path / "cell.src"
+
+
+def test_each_module_has_its_own_points_and_routines(cell):
+    run = execute(read_program(cell), load_robot("er3a_c60"), np.zeros(6))
+    steps = [run.steps[i] for i in run.way(run.main()) if isinstance(run.steps[i].instruction, ArmMotion)]
+    visited = np.degrees([step.instruction.target.joints[[0, 1, 4]] for step in steps])
+    wanted = [(10, 0, 30)]
+    wanted += [(-30, 0, 30), (5, 0, 30), (6, 0, 30), (-29, 0, 30), (5, 0, 30), (6, 0, 30), (0, -5, 20), (40, -5, 20)]
+    np.testing.assert_allclose(visited, wanted, rtol=0, atol=1e-9)
+    assert [run.own_line(step) for step in steps] == [3, 5, 5, 5, 5, 5, 5, 7, 11]
+
+
+def test_files_are_those_that_it_calls(cell):
+    assert {file.name for file in files_of(cell)} == FILES.keys() - {"other.src"}
+
+
+def test_what_is_wrong_in_a_module_stands_at_its_own_line(cell):
+    deeper = cell.with_name("deeper.src")
+    deeper.write_text(deeper.read_text().replace("{A1 6}", "{A1 6,A2 200}"))
+    options = CheckOptions(start=np.zeros(6), measures=False)
+    check = check_program(read_program(cell), load_robot("er3a_c60"), options)
+    places = {each.place for each in check.findings if each.finding.code == "above_limit"}
+    assert [(place.file, place.line) for place in places] == [(deeper, 3)]
+    assert [(each.line, each.place.line) for each in check.verdicts if each.level == "fail"] == [(5, 3)]
+    assert "never_reached" not in {each.finding.code for each in check.findings}
+
+
+def test_a_module_that_can_not_be_read_is_named(cell):
+    cell.with_name("deeper.src").write_text('DEF DEEPER( )\nMsg("a\nEND\n')
+    with pytest.raises(InputError, match=r"deeper\.src: line 2: a text has no end"):
+        read_program(cell)
+
+
+def test_its_own_routines_come_first(cell):
+    cell.write_text(FILES["cell.src"] + "DEF PICK(H:IN)\nDECL REAL H\nPTP {A1 H}\nEND\n")
+    program = read_program(cell)
+    assert {routine.place.file for name, routine in program.routines.items() if name == "PICK"} == {cell}
+    assert "program_name_twice" not in {finding.code for finding in program.findings}

@@ -1,0 +1,187 @@
+"""Volumes and areas of arms whose first joint slides or goes with others, and of surfaces, against computations that
+share no code with the proof: formulas, forward kinematics by hand, and SciPy's bounded least squares."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from er3a.robots.robot import CombinedLimit, Robot
+from er3a.workspace.lookup import EMPTY, FILLED
+from er3a.workspace.proven import Proven, prove_robot
+from er3a.workspace.surface import surface_of
+from testing.arms import DEG, dh_matrix, gantry, made_of, palletiser, placement
+
+TILTED = placement([0.3, -0.2, 0.5], [0.4, -0.7, 1.1])
+ARM = [
+    *(("R", 90, -90, 300, -100, 150), ("R", 350, 0, 40, -120, 40), ("R", 60, -90, 0, -70, 130)),
+    *(("R", 0, 90, 310, -160, 120), ("R", 30, -90, 0, -100, 110), ("R", 0, 0, 70, -180, 180)),
+]
+
+
+def on_a_track() -> Robot:
+    """An arm without a spherical wrist on a tilted track."""
+    return made_of([("P", 0, 90, 0, -300, 900), *ARM], base=TILTED, tool=placement([0.05, 0.02, 0.1], [0.3, 0.2, 0.1]))
+
+
+def skew_gantry() -> Robot:
+    """Slides that are not at right angles, and a wrist."""
+    rows = [("P", 0, -80, 0, 100, 1300), ("P", 30, 75, 0, -200, 500), ("P", 20, 15, 0, 0, 400)]
+    rows += [("R", 80, 60, 0, -120, 120), ("R", 60, 0, 90, -100, 60)]
+    return made_of(rows, base=TILTED, direction=np.array([1.0, -1, 1, -1, 1]))
+
+
+def lift() -> Robot:
+    """A column that lifts two links and a slide askew."""
+    return made_of(
+        [("P", 0, 0, 100, 0, 500), ("R", 300, 20, 0, -140, 100), ("R", 200, 90, 0, -150, 30), ("P", 0, 0, 50, 0, 150)]
+    )
+
+
+def sum_with_joint_1() -> Robot:
+    """Joint 1 and joint 2 share a limit."""
+    return made_of(ARM, combined=(CombinedLimit((1.0, 0.6, 0.0, 0.0, 0.0, 0.0), -80 * DEG, 100 * DEG),))
+
+
+def follows_joint_1() -> Robot:
+    """Axes 1 and 2 are driven by sums of both joints."""
+    coupling = np.eye(6)
+    coupling[0, 1], coupling[1, 0] = 0.4, -0.5
+    return made_of(ARM, coupling=coupling, base=TILTED)
+
+
+def slide_in_a_sum() -> Robot:
+    """A track that the second joint's value shortens."""
+    limit = CombinedLimit((1.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0), -0.2, 0.9)
+    return made_of([("P", 0, 90, 0, -300, 900), *ARM], combined=(limit,), base=TILTED)
+
+
+MADE = [on_a_track, skew_gantry, lift, sum_with_joint_1, follows_joint_1, slide_in_a_sum]
+
+
+def point_by_hand(robot: Robot, q: np.ndarray) -> np.ndarray:
+    """Tool point (3,) from the table's rows."""
+    u = q if robot.coupling is None else robot.coupling @ q
+    T = robot.base.copy()
+    for k in range(robot.rows):
+        moved = robot.direction[k] * u[k]
+        turned, along = (0.0, moved) if robot.sliding[k] else (moved, 0.0)
+        T = T @ dh_matrix("standard", robot.a[k], robot.alpha[k], robot.d[k] + along, turned + robot.offset[k])
+    return (T @ robot.tool)[:3, 3]
+
+
+def beyond_sums(robot: Robot, q: np.ndarray) -> np.ndarray:
+    """By how much joint values miss the limits of sums."""
+    totals = [(q @ np.array(limit.factors), limit) for limit in robot.combined]
+    return np.array([max(0.0, limit.lower - total, total - limit.upper) for total, limit in totals])
+
+
+def is_reached(robot: Robot, point: np.ndarray, random: np.random.Generator) -> bool:
+    """Whether bounded least squares find joint values for a point."""
+
+    def miss(q: np.ndarray) -> np.ndarray:
+        return np.concatenate([point_by_hand(robot, q) - point, beyond_sums(robot, q)])
+
+    for _ in range(40):
+        found = least_squares(miss, random.uniform(robot.lower, robot.upper), bounds=(robot.lower, robot.upper))
+        if np.abs(found.fun).max() < 1e-6:
+            return True
+    return False
+
+
+def states(proven: Proven, points: np.ndarray) -> np.ndarray:
+    """What the proof says of points (n, 3)."""
+    return proven.section.status(*proven.in_section(points))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("make", MADE, ids=lambda make: make.__name__)
+def test_empty_cells_hold_no_point_and_filled_ones_are_reached(make, random):
+    robot = make()
+    proven = prove_robot(robot, 1500, 500, 1)
+    span = robot.upper - robot.lower
+    q = robot.lower + span * np.clip(random.uniform(-0.2, 1.2, (20_000, robot.joints)), 0, 1)  # many at limits
+    q = np.array([row for row in q if not beyond_sums(robot, row).any()])
+    points = np.array([point_by_hand(robot, row) for row in q])
+    assert len(points) > 1000
+    assert not (states(proven, points) == EMPTY).any()
+
+    box = random.uniform(points.min(axis=0), points.max(axis=0), (4000, 3))
+    filled = box[states(proven, box) == FILLED][:25]
+    assert len(filled) == 25
+    assert all(is_reached(robot, point, random) for point in filled)
+
+
+@pytest.mark.long
+def test_the_volume_of_a_gantry_lies_in_its_bracket():
+    proven = prove_robot(gantry(), 500, 500, 1)
+    lower, upper = proven.proof.bounds
+    assert lower < 1.2 * 0.8 * 0.5 < upper
+    assert lower > 0.8 * upper
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["puma_560", "ur5"])
+def test_arms_on_a_track_are_bounded_to_a_tenth(name):
+    rows = {
+        "puma_560": [
+            *(("R", 0, 90, 0, -160, 160), ("R", 431.8, 0, 0, -225, 45), ("R", 20.3, -90, 150.05, -45, 225)),
+            *(("R", 0, 90, 431.8, -110, 170), ("R", 0, -90, 0, -100, 100), ("R", 0, 0, 56.25, -266, 266)),
+        ],
+        "ur5": [
+            *(("R", 0, 90, 89.2, -360, 360), ("R", -425, 0, 0, -360, 360), ("R", -392.25, 0, 0, -360, 360)),
+            *(("R", 0, 90, 109.15, -360, 360), ("R", 0, -90, 94.65, -360, 360), ("R", 0, 0, 82.3, -360, 360)),
+        ],
+    }[name]
+    assert prove_robot(made_of([("P", 0, 90, 0, 0, 2000), *rows]), 8000, 500, 1).proof.width < 0.1
+
+
+@pytest.mark.long
+def test_a_sphere_that_slides_has_the_volume_of_a_formula():
+    """A ball's shell is swept along the track: no void is left in a shell that is moved by more than its hole."""
+    rows = [("P", 0, 0, 0, 0, 800), ("R", 0, 90, 0, -180, 180), ("R", 0, -90, 0, -180, 180), ("P", 0, 0, 0, 100, 400)]
+    lower, upper = prove_robot(made_of(rows), 2000, 500, 1).proof.bounds
+    assert lower < 4 / 3 * np.pi * 0.4**3 + np.pi * 0.4**2 * 0.8 < upper
+    assert lower > 0.8 * upper
+
+
+def planar(*rows: tuple) -> Robot:
+    return made_of(list(rows), base=TILTED)
+
+
+def ring(lower: float, upper: float, turn: float) -> float:
+    return turn / 2 * (upper**2 - lower**2)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("robot", "kind", "area"),
+    [
+        (planar(("R", 50, 90, 0, 20, 20), ("R", 300, 0, 0, -180, 180), ("R", 100, 0, 0, -150, 150)), "plane",
+         ring(np.sqrt(0.1 + 0.06 * np.cos(150 * DEG)), 0.4, 2 * np.pi)),
+        (planar(("R", 0, 90, 0, -150, 150), ("P", 0, 0, 0, 200, 400)), "plane", ring(0.2, 0.4, 300 * DEG)),
+        (planar(("R", 400, 0, 100, -180, 180), ("R", 300, 0, 50, -150, 150)), "plane",
+         ring(np.sqrt(0.25 + 0.24 * np.cos(150 * DEG)), 0.7, 2 * np.pi)),
+        (planar(("P", 0, -90, 0, 0, 900), ("P", 0, 0, 0, 0, 600)), "plane", 0.54),
+        (planar(("R", 0, -90, 300, -180, 180), ("R", 0, 90, 0, -60, 60), ("R", 0, 0, 500, -180, 180)), "sphere",
+         2 * np.pi * 0.25 * (1 - np.cos(60 * DEG))),
+    ],
+    ids=["locked_joint_1", "arm_that_lengthens", "two_links", "two_slides", "spherical"],
+)  # fmt: skip
+def test_areas_lie_in_their_brackets(robot, kind, area):
+    found = surface_of(robot, 3000, 1)
+    assert found.kind == kind
+    assert found.lower < area < found.upper
+    assert found.lower > 0.85 * found.upper
+
+
+def test_what_two_joints_sweep_of_a_torus_is_its_area():
+    found = surface_of(planar(("R", 300, 90, 200, -170, 170), ("R", 100, 0, 0, -180, 180)), 1000, 1)
+    assert (found.kind, found.lower) == ("other", None)
+    assert found.upper == pytest.approx(340 * DEG * 2 * np.pi * 0.3 * 0.1, rel=1e-6)
+
+
+@pytest.mark.parametrize("robot", [palletiser(), planar(("R", 400, 0, 0, -90, 90))], ids=["space", "line"])
+def test_arms_that_move_on_no_surface_have_none(robot):
+    assert surface_of(robot, 1000, 1) is None
