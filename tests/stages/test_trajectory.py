@@ -196,7 +196,7 @@ def test_strategies_are_listed_with_their_costs(results, name):
     assert paths["line_out"].strategy is None
     assert "out of reach from t =" in advice(paths["line_out"])
     met = paths["line_collides"].collisions[0]
-    assert f"Nothing overlaps up to t = {met.t0_s:.4g} s ({met.s0_m * 1000:.1f} mm)" in advice(paths["line_collides"])
+    assert f"Nothing overlaps before t = {met.t0_s:.4g} s ({met.s0_m * 1000:.1f} mm)" in advice(paths["line_collides"])
     assert paths["line_limits"].strategy == "planned" or "limit" in advice(paths["line_limits"])
     mended = paths["line_wrist"]
     assert mended.chosen.motion.max_joint_speed_ratio <= mended.max_joint_speed_ratio * (1 + 1e-6)
@@ -280,7 +280,7 @@ def test_tiles_beside_each_other_tell_of_one_path_and_of_different_counts(result
     assert tiles["max_joint_speed"] == speed
     assert ratio == pytest.approx(speed / limit)
     assert tiles["colliding"] == sum(bool(path.collisions) for path in summary.paths)
-    assert FIGURES["colliding"] == "Paths with a collision, whatever else is wrong"
+    assert FIGURES["colliding"] == "Paths with a collision"
 
 
 @pytest.mark.long
@@ -509,7 +509,7 @@ def test_the_shortest_time_of_a_path_that_is_too_fast_is_told_with_what_it_means
     path = by_name(results["er3a_c60"])["line_shoulder"]
     assert path.fastest_s < path.duration_s
     assert (
-        f"only its pace is too fast: slower there and faster elsewhere, it can be done in {path.fastest_s:.2f} s"
+        f"only the speed profile is at fault, not the path: slower there and faster elsewhere, the path takes {path.fastest_s:.2f} s"
         in (path_text(path))
     )
     assert "it takes 9.00 s at least" in path_text(replace(path, fastest_s=9.0))
@@ -519,7 +519,7 @@ def test_what_is_undecided_beside_another_fault_is_no_open_question(results):
     path = by_name(results["er3a_c60"])["line_wrist_near"]
     part = path.undecided[0]
     assert path.verdict != "undecided"
-    assert cause_text(path, part).endswith("singular pose is met; the path is not safe either way")
+    assert cause_text(path, part).endswith("singular pose is met; the path is not safe in either case")
     assert "either way" not in cause_text(replace(path, verdict="undecided"), part)
     assert "either way" not in cause_text(path, path.too_fast[0])
 

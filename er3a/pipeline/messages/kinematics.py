@@ -66,8 +66,8 @@ ARM_CLASSES = {
     "arm_angle": N_("spherical shoulder and wrist: up to 8 solutions in closed form at each arm angle"),
     "redundant": N_("more than six joints: solutions at given values of the redundant ones, and self-motions"),
     "scara": N_("SCARA: two solutions for x, y, z and yaw in closed form"),
-    "free_roll": N_("five joints: solutions for the tool point and the tool's axis; the turn about it is left over"),
-    "planar_wrist": N_("fewer than six joints: solutions of those poses that they can take exactly"),
+    "free_roll": N_("five joints: solutions for the tool point and the tool's axis; the roll about it is free"),
+    "planar_wrist": N_("fewer than six joints: solutions of poses that they can reach exactly"),
     "position": N_("three joints: solutions for the tool point"),
     "unsolved": N_("no class"),
 }
@@ -92,14 +92,14 @@ SUM_SIDES = {
 }
 GUESSES = {
     "other_starts": N_("bad guess: from the start given {miss}; other starts solve it, so allow restarts"),
-    "without_limits": N_("bad guess: {miss}; without limits an arm within them was found, start there"),
+    "without_limits": N_("bad guess: {miss}; ignoring the limits, a solution within them was found: start there"),
 }
 
 
 def branch_word(label: Label | str, branch: int = 0) -> str:
     """A branch by its code, or the number of an arm that iteration found."""
     if label == "found_arm":
-        return sentence("found_arm", "arm {number}", number=branch + 1)
+        return sentence("found_arm", "solution {number}", number=branch + 1)
     return word("branch", BRANCHES, label)
 
 
@@ -183,7 +183,7 @@ def _(found: NoArmLength) -> str:
 def _(found: ByClass) -> str:
     parts = {"arm_class": word("arm_class", ARM_CLASSES, found.arm_class)}
     if not found.certain:
-        return sentence("by_class_in_doubt", "{arm_class}; rounding leaves a doubt whether these are all", **parts)
+        return sentence("by_class_in_doubt", "{arm_class}; because of rounding, solutions may be missing", **parts)
     if found.cuspidal:
         return sentence(
             "by_class_cuspidal",
@@ -260,7 +260,7 @@ def _(found: PoseUnsolved) -> str:
 def _(found: NearestMiss) -> str:
     return sentence(
         found.code,
-        "the nearest arm found misses by {position:.3g} mm and {rotation:.3g} deg",
+        "the nearest configuration found misses by {position:.3g} mm and {rotation:.3g} deg",
         position=found.position_mm,
         rotation=found.rotation_deg,
     )
@@ -275,7 +275,7 @@ def _(found: BadGuess) -> str:
 def _(found: LimitBound) -> str:
     return sentence(
         found.code,
-        "limit-bound: {miss}; an arm that leaves the limits solves it: {beyond}",
+        "limit-bound: {miss}; a configuration outside the limits solves it: {beyond}",
         miss=say(found.miss),
         beyond=say(found.exceeded),
     )
@@ -284,7 +284,9 @@ def _(found: LimitBound) -> str:
 @say.register
 def _(found: SingularEnd) -> str:
     return sentence(
-        found.code, "singular: the iteration creeps towards a singular arm, where it ends: {miss}", miss=say(found.miss)
+        found.code,
+        ("singular: the iteration converges slowly to a singular configuration and ends there: {miss}"),
+        miss=say(found.miss),
     )
 
 

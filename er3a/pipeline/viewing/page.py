@@ -52,7 +52,7 @@ SCRIPT_WORDS = {
     "enlarge": N_("enlarge"),
     "close": N_("close"),
     "contents": N_("Contents"),
-    "filter": N_("Show rows with"),
+    "filter": N_("Filter rows by"),
     "link": N_("link to this section"),
     "previous": N_("Previous"),
     "next": N_("Next"),

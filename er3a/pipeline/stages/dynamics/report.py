@@ -87,7 +87,7 @@ def _motions(robot: Robot, results: DynamicsResults) -> list[PlayedMotion]:
 
 
 def _peak(load: JointLoad) -> str:
-    return tr("J{joint} at its greatest: {peak} {unit}", joint=load.joint, peak=number(load.peak, 3), unit=load.unit)
+    return tr("J{joint} at its peak: {peak} {unit}", joint=load.joint, peak=number(load.peak, 3), unit=load.unit)
 
 
 def _links(summary: DynamicsSummary) -> list[list[str]]:
@@ -148,7 +148,7 @@ def _motor(motor: MotorNeed) -> list[str]:
 
 def _path(path: PathLoad) -> list[str]:
     if not path.complete:
-        return [path.name, tr("not followed all along"), *[NONE] * 6]
+        return [path.name, tr("not followed to its end"), *[NONE] * 6]
     worst = path.hardest
     energy, back = sum(load.work_j for load in path.joints), sum(load.recovered_j for load in path.joints)
     timed = NONE if path.torque_timed_s is None else fixed(path.torque_timed_s, 2)

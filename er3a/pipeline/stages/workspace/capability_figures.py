@@ -114,7 +114,7 @@ def placement_views(
     figure.colorbar(mesh, ax=axes, label=tr("least manipulability in the box (% of the arm's best)"), shrink=0.85)
     handles = [
         Line2D([], [], color=INK, marker="o", markersize=4, linewidth=2.2, label=tr("arm, all joints 0")),
-        Patch(facecolor="none", edgecolor=HIGHLIGHT, label=tr("best places, as numbered in the table")),
+        Patch(facecolor="none", edgecolor=HIGHLIGHT, label=tr("best positions, numbered as in the table")),
         *([Patch(facecolor=GRID, label=tr("by samples only"))] if provable else []),
     ]
     if scene:

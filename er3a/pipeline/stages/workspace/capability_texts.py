@@ -51,7 +51,7 @@ def capability_context(robot: Robot, results: WorkspaceResults, scene: Scene | N
         ],
         "place_picture": Picture(
             placement_views(robot, capability, placement, results.places, scene),
-            tr("Where the middle of the box can stand, from above and from the side, with the best places"),
+            tr("Possible positions of the box centre, from above and from the side, with the best ones"),
             _places_caption(placement, capability.core_m3 is not None),
         )
         if len(results.places)
@@ -86,9 +86,9 @@ def _pictures(robot: Robot, results: WorkspaceResults, capability: CapabilitySum
                 capability,
                 results.capability,
                 clear_percent(results.capability),
-                tr("reached poses held clear (%)"),
+                tr("reached poses held without collision (%)"),
             ),
-            tr("Slices across axis 1: reached poses that an arm holds with nothing touched"),
+            tr("Slices across axis 1: reached poses that can be held without collision"),
             _clear_caption(capability.clear),
         ),
     ]
@@ -105,9 +105,9 @@ def _clear_caption(clear: ClearSummary) -> str:
             scene=clear.scene,
         )
     tried = tr(
-        "{tries} random poses were tried in each cell and sector, {reached} of all are reached, {clear} proven clear "
-        "by an arm; in {without} cells and sectors none was found. Shares of so few tries tell good regions from bad "
-        "ones, not single cells.",
+        "{tries} random poses were tried in each cell and sector: {reached} are reached, {clear} of them proven"
+        " collision-free; in {without} cells and sectors none was found. Shares of so few tries distinguish "
+        "good regions from bad ones, not single cells.",
         tries=clear.tries,
         reached=number(clear.reached),
         clear=number(clear.clear),
@@ -144,7 +144,7 @@ def _roll_text(capability: CapabilitySummary) -> str:
             "direction is reached, nor in the number of solutions."
         )
     return tr(
-        "The tool stands beside the axis of joint 6, so the roll about the tool's own axis moves the wrist: {rolls} "
+        "The tool is off the axis of joint 6, so the roll about the tool's own axis moves the wrist: {rolls} "
         "rolls are tried, and a direction counts if one of them is reached.",
         rolls=capability.roll.per_direction,
     )
@@ -153,16 +153,16 @@ def _roll_text(capability: CapabilitySummary) -> str:
 def _core_text(capability: CapabilitySummary) -> str:
     core = capability.core_m3
     if core is None:
-        return tr("The dexterous core is bounded for arms with a spherical wrist only.")
+        return tr("The dexterous workspace is bounded for arms with a spherical wrist only.")
     if core.upper == 0:
         return tr(
-            "There is no dexterous core: in every part of the workspace some tool direction is proven unreachable at "
-            "all its points. Work that needs the tool from every side needs a turntable."
+            "There is no dexterous workspace: in every part of the workspace some tool direction is proven "
+            "unreachable at all points. Work that needs the tool from every side needs a turntable."
         )
     return tr(
-        "The dexterous core, where the tool can take every direction of the sphere, holds at least {lower} L and at "
-        "most {upper} L: both are proven, for all points and directions in between too. By the {directions} sampled "
-        "directions alone it would be {estimate} L.",
+        "The dexterous workspace, where the tool can take every direction of the sphere, is at least {lower} L "
+        "and at most {upper} L; both bounds are proven for all points and directions. By the {directions} "
+        "sampled directions alone it would be {estimate} L.",
         directions=capability.directions,
         lower=number(1000 * core.lower, 2),
         upper=number(1000 * core.upper, 2),
@@ -174,9 +174,10 @@ def _task_text(task: TaskSummary) -> str:
     box = " × ".join(number(value, 4).rstrip(".") for value in map(_whole, task.box_mm))
     direction = ", ".join(fixed(value, 2).removesuffix(".00") for value in task.tool_direction)
     return tr(
-        "A box of {box} mm must be served at every point with the tool's axis anywhere within {cone} deg of "
-        "({direction}), joints {margin} deg within their limits. It stands level, as given or turned by 90 deg, its "
-        "underside at {lowest} mm or higher, and {clear} mm or more from axis 1.",
+        "Task: a box of {box} mm in which the tool reaches every point, with its axis anywhere within {cone} "
+        "deg of ({direction}) and the joints at least {margin} deg from their limits. The box is level, as "
+        "given or rotated by 90 deg, with its underside at {lowest} mm or higher, at least {clear} mm from axis"
+        " 1.",
         box=box,
         direction=direction,
         cone=fixed(task.cone_deg, 1).removesuffix(".0"),
@@ -192,13 +193,13 @@ def _try_text(robot: Robot, task: TaskSummary) -> str:
     parts = {"roll": fixed(roll, 1).removesuffix(".0"), "pitch": fixed(pitch, 1).removesuffix(".0")}
     if np.allclose(robot.tool, np.eye(4)):
         return tr(
-            "To see the arm at a place, type its middle, roll {roll}, pitch {pitch} and yaw 0 deg into the teach "
-            "panel. The robot has no tool here: the centre of its flange goes there.",
+            "To see the arm at a position, type its centre, roll {roll}, pitch {pitch} and yaw 0 deg into the "
+            "teach panel. The robot has no tool here: the centre of its flange goes there.",
             **parts,
         )
     return tr(
-        "To see the arm at a place, type its middle, roll {roll}, pitch {pitch} and yaw 0 deg into the teach panel: "
-        "the tool point goes there.",
+        "To see the arm at a position, type its centre, roll {roll}, pitch {pitch} and yaw 0 deg into the teach"
+        " panel: the tool point goes there.",
         **parts,
     )
 
@@ -210,14 +211,14 @@ def _whole(value: float) -> float | int:
 def _places_caption(placement: PlacementSummary, provable: bool) -> str:
     if not provable:
         return tr(
-            "{fitting} positions on the lattice pass by samples; proofs are for arms with a spherical wrist. Stand the "
-            "box's middle well inside a bright region.",
+            "{fitting} grid positions pass by samples; proofs exist for arms with a spherical wrist only. Put "
+            "the box centre well inside a bright region.",
             fitting=number(placement.fitting),
         )
     return tr(
-        "Of {fitting} positions on the lattice that pass by samples, {proven} are proven for every point and "
-        "direction. Stand the box's middle on a bright spot; grey ones pass by samples only. The colour shows the best "
-        "over what lies in the line of sight.",
+        "Of {fitting} grid positions that pass by samples, {proven} are proven for every point and direction. "
+        "Put the box centre on a bright spot; grey spots pass by samples only. The colour shows the best value "
+        "along the line of sight.",
         fitting=number(placement.fitting),
         proven=number(placement.fitting_proven),
     )
