@@ -102,7 +102,7 @@ def test_a_folder_without_results_is_one_error(folders, tmp_path):
     for name in ("a study", "results"):
         assert f"cd '{study}' && er3a run" in told[name]
     shutil.copytree(folders[0], study / "results")
-    with pytest.raises(ResultError, match="Give the results folder in it: '.*/a study/results'"):
+    with pytest.raises(ResultError, match=r"Give the results folder in it: '.*/a study/results'"):
         changes(folders[0], study)
 
 
