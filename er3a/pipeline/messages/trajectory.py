@@ -164,11 +164,14 @@ def _speeds(bounded: bool) -> str:
 @say.register
 def _(event: Singularity) -> str:
     when = f"{event.t_s:.4g}" if event.t_s == event.until_s else f"{event.t_s:.4g} – {event.until_s:.4g}"
-    kind = event_word(event)
+    parts = {"type": event_word(event), "when": when, "distance": event_distance(event)}
+    if event.type == "dependent_axes":
+        if event.crossing:
+            return sentence("dependent.met", "{type} at t = {when} s", **parts)
+        return sentence("dependent.passed", "close to {type} at t = {when} s ({distance})", **parts)
     if event.crossing:
-        return sentence("singularity.met", "{type} at t = {when} s", type=kind, when=when)
-    passed = {"type": kind, "when": when, "distance": event_distance(event)}
-    return sentence("singularity.passed", "{type} at t = {when} s, at {distance}", **passed)
+        return sentence("singularity.met", "{type} singularity at t = {when} s", **parts)
+    return sentence("singularity.passed", "{type} singularity within {distance} at t = {when} s", **parts)
 
 
 @say.register

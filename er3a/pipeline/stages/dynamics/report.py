@@ -61,6 +61,7 @@ def report(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
         more_uses=max(0, len(summary.uses) - MOST_USES),
         motors=[_motor(motor) for motor in summary.motors],
         paths=[_path(path) for path in summary.paths],
+        margins=any(path.payload or path.speed_scale or path.torque_timed_s for path in summary.paths),
         figures=figures,
         player=player(robot, _motions(robot, results)),
         player_style=player_style(),
