@@ -45,6 +45,7 @@ def capability_context(robot: Robot, results: WorkspaceResults, scene: Scene | N
         "roll_text": _roll_text(capability),
         "task_text": _task_text(placement.task),
         "try_text": _try_text(robot, placement.task),
+        "best_text": _best_text(placement),
         "points_serving": placement.points_serving,
         "place_rows": [
             _place_row(n, place, capability.arm_angles) for n, place in enumerate(placement.places, start=1)
@@ -201,6 +202,22 @@ def _try_text(robot: Robot, task: TaskSummary) -> str:
         "To see the arm at a position, type its centre, roll {roll}, pitch {pitch} and yaw 0 deg into the teach"
         " panel: the tool point goes there.",
         **parts,
+    )
+
+
+def _best_text(placement: PlacementSummary) -> str:
+    """Where to put the box: the first place that is proven, else the first; what there is none of."""
+    box = " × ".join(fixed(value, 0) for value in placement.task.box_mm)
+    if not placement.places:
+        return tr("No position for a box of {box} mm was found.", box=box)
+    ranked = list(enumerate(placement.places, start=1))
+    row, place = next((each for each in ranked if each[1].status == "proven"), ranked[0])
+    return tr(
+        "A box of {box} mm: put its centre at ({centre}) mm ({status}; number {row} of the best positions).",
+        box=box,
+        centre=", ".join(fixed(1000 * value, 0) for value in place.centre_m),
+        status=word("workspace.status", STATUS, place.status),
+        row=row,
     )
 
 
