@@ -58,7 +58,9 @@ STYLE: dict[RcKeyType, Any] = {
 }
 _COORDINATES = re.compile(r'(?<= )(?:d|x|y)="[^"]*"')
 _DECIMALS = re.compile(r"-?\d+\.\d{3,}")
-_IN_ADDRESSES = str.maketrans({letter: f"%{ord(letter):02X}" for letter in "%#<>&'\n"} | {'"': "'"})
+_TAG = re.compile(r"<[^>]*>")
+_QUOTED = re.compile(r"=\"([^\"']*)\"")
+_IN_ADDRESSES = str.maketrans({letter: f"%{ord(letter):02X}" for letter in '%#<>&"\n'})
 _BLANKS = re.compile(r"\s*(?<![=\"])([A-Za-z])\s+(?=[-\d])|\s+(?=[z\"])")
 
 
@@ -113,8 +115,9 @@ def svg_data_uri(figure: Figure) -> Markup:
     FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})
     svg = _compact(buffer.getvalue().decode())
     # As text, which is a third shorter than base64. The letters that an address or an attribute reads otherwise are
-    # written by their numbers.
-    return Markup("data:image/svg+xml," + svg.translate(_IN_ADDRESSES))
+    # written by their numbers; values stand in single quotes, which need none.
+    quoted = _TAG.sub(lambda tag: _QUOTED.sub(r"='\1'", tag[0]), svg)
+    return Markup("data:image/svg+xml," + quoted.translate(_IN_ADDRESSES))
 
 
 def _compact(svg: str) -> str:
