@@ -60,7 +60,7 @@ class CellFrame:
 
     def place_of(self, sector: Integers) -> Reals:
         """Middles of sectors: rad, or m along the bar."""
-        return self.width * (sector + (0.5 if self.bar else 0.0))
+        return np.asarray(self.width * (sector + (0.5 if self.bar else 0.0)), dtype=float)
 
     def points(self, rho: Reals, place: Reals, z: Reals) -> Reals:
         """Points (..., 3), m, in the base frame, at radii (m), places (see :meth:`place_of`) and heights (m)."""
@@ -73,8 +73,8 @@ class CellFrame:
         x, y, z = ((points - self.origin) @ self.R.T).T
         inside: Flags = (z >= self.heights[0]) & (z <= self.heights[1])
         if self.bar:
-            return inside & (x >= 0) & (x <= self.reach) & (y >= 0) & (y <= self.bar)
-        return inside & (np.hypot(x, y) <= self.reach)
+            return np.asarray(inside & (x >= 0) & (x <= self.reach) & (y >= 0) & (y <= self.bar))
+        return np.asarray(inside & (np.hypot(x, y) <= self.reach))
 
     def distance(self, points: Reals) -> Reals:
         """Distance (n,), m, of points (n, 3) of the base frame from axis 1; endless where it slides."""
@@ -95,7 +95,7 @@ def cell_frame(robot: Robot) -> CellFrame:
     reach, (low, high) = float(arm_in_cells.radii[0]), arm_in_cells.heights[0].tolist()
     if bar := arm_in_cells.bar:
         half = np.array([reach, bar, high - low]) / 2
-        middle = origin + (half + [0, 0, low]) @ R
+        middle = origin + (half + np.array([0.0, 0.0, low])) @ R
         return CellFrame(R, origin, reach, (low, high), bar, sectors, middle, float(np.linalg.norm(half)))
     bound = tool_bound(robot)
     middle = bound.axis_point + bound.height * bound.axis

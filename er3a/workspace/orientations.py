@@ -25,6 +25,7 @@ from er3a.workspace.directions import Roll, cone_directions, roll_of, tool_rotat
 AskedKind = Literal["directions", "tilts", "turns", "points"]
 _PARALLEL = 1e-9
 _LEAST_PLANAR = 3
+_TASK_TURNS = 36
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +109,7 @@ class AskedOrientations:
         if self.kind == "points":
             return np.eye(3)[None, None, None]
         if self.kind == "turns":
-            return self._turned(np.arange(count) * (2 * np.pi / count))[None, :, None]
+            return self._turned(2 * np.pi * np.linspace(0, 1, count, endpoint=False))[None, :, None]
         if self.plane is not None:
             tilts = np.arange(count) * (2 * np.pi / count)
             return self.plane.tilted(points, np.stack([tilts, -tilts], axis=1)[None])
@@ -123,7 +124,7 @@ class AskedOrientations:
         if self.kind == "points":
             return np.eye(3)[None, None, None]
         if self.kind == "turns":
-            turned = self._turned(np.arange(36) * (2 * np.pi / 36))
+            turned = self._turned(2 * np.pi * np.linspace(0, 1, _TASK_TURNS, endpoint=False))
             fits = turned[:, :, 2] @ axis >= np.cos(half_angle) - 1e-9
             return turned[fits][None, None] if fits.any() else np.empty((1, 0, 1, 3, 3))
         if self.plane is not None:

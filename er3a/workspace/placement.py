@@ -91,7 +91,8 @@ class Field:
     least : (nx, ny, nz, slots), m^3, least manipulability over the directions by branch, NO where it misses one, and
         where slots are no branches
     least_any : (nx, ny, nz), the same by the best branch for each direction
-    limit_margin : (nx, ny, nz, slots), rad, least distance from the limits of joints with less than a full turn, by branch
+    limit_margin : (nx, ny, nz, slots), rad, least distance from the limits of joints with less than a full turn, by
+        branch
     """
 
     origin: Reals
@@ -240,8 +241,9 @@ def _best_roll(value: Reals, q: Reals, free: Free | None, before: tuple[Flags, R
     """Which roll serves best among those whose arm counts, (n, slots); ``value`` (n, rolls, slots) of others becomes
     NO.
 
-    ``before`` (n, slots), (n,): branches that fail in a direction looked at before, and what some branch has served with in
-    all of these. A branch that failed is asked only where it can raise what some branch serves with, else it is NO.
+    ``before`` (n, slots), (n,): branches that fail in a direction looked at before, and what some branch has served
+    with in all of these. A branch that failed is asked only where it can raise what some branch serves with, else it is
+    NO.
     """
     best: Integers = value.argmax(axis=1)
     if free is None:

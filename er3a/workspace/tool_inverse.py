@@ -13,7 +13,14 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from er3a.kinematics.batch import inverse_batch
-from er3a.kinematics.by_class import arm_solver, checked_parameters, class_rows, parameters_of, slots_of_class, task_mask
+from er3a.kinematics.by_class import (
+    arm_solver,
+    checked_parameters,
+    class_rows,
+    parameters_of,
+    slots_of_class,
+    task_mask,
+)
 from er3a.kinematics.classes.chain_solvers import ChainSolver, Completed, LockedJoint, Unsolved
 from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.forward import forward, jacobian

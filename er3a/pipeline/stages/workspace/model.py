@@ -29,7 +29,7 @@ from er3a.pipeline.stages.workspace.workspace_tables import (
 from er3a.sampling.random_joints import Sampling
 from er3a.sampling.reach_search import ReachExtremes
 from er3a.workspace.capability import Overall
-from er3a.workspace.causes import Relaxed, Unlimited, VoidCause
+from er3a.workspace.causes import OneRelaxed, Unlimited, VoidCause
 from er3a.workspace.dexterous import Core
 from er3a.workspace.orientations import AskedKind
 from er3a.workspace.proven import ProofMethod
@@ -150,16 +150,18 @@ class VoidSummary:
     centroid_m: Triple
     extent_m: Triple
     cause: VoidCause
-    relaxed: tuple[Relaxed | Unlimited, ...]
+    relaxed: tuple[OneRelaxed | Unlimited, ...]
     holds_shoulder: bool
 
 
 @dataclass(frozen=True)
 class RollSummary:
-    """The roll about the tool's direction: left to joint 6, or so many tried per direction."""
+    """The roll about the tool's direction: left to the last joint, or so many tried per direction. Without
+    ``last_joint`` a free roll is what the arm can't choose."""
 
     free: bool
     per_direction: int
+    last_joint: bool = True
 
 
 @dataclass(frozen=True)
@@ -190,6 +192,7 @@ class CapabilitySummary:
     core_m3 : None for arms without a spherical wrist
     arm_angles : at how many values of what a pose leaves open to a redundant arm each is tried (else 1);
         ``held_joints`` are the joints (from 1) held at these, none where it is an arm angle
+    named_branches : whether its branches have names
     sliding : whether some joint slides; manipulability then has less than three lengths as factors
     coarse : whether cells are coarser and directions fewer than the study says, since a pose takes this arm long
     """
@@ -205,6 +208,7 @@ class CapabilitySummary:
     core_m3: Core | None
     arm_angles: int
     held_joints: tuple[int, ...]
+    named_branches: bool
     sliding: bool
     coarse: bool
     clear: ClearSummary

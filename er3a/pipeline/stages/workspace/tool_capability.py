@@ -98,17 +98,18 @@ def tool_capability(
         bar_m=frame.bar,
         frame=SectionFrame(_rows(frame.R), triple(frame.origin)),
         sectors=frame.sectors,
-        roll=RollSummary(asked.roll.free, len(asked.roll.angles)),
+        roll=RollSummary(asked.roll.free, len(asked.roll.angles), asked.roll.last_joint),
         overall=overall(found, cells, frame.bar),
         core_m3=core,
         arm_angles=tried_values(robot),
         held_joints=tuple(parameter.joint + 1 for parameter in parameters_of(robot) if parameter.joint >= 0),
+        named_branches=bool(slot_labels(robot)),
         sliding=bool(robot.sliding.any()),
         coarse=plan.coarse,
         clear=_clear_summary(cells, frame.bar, found.reachability, tried, scene),
     )
     placement, places = _placed(robot, settings, asked, task, plan, scene, float(found.manipulability.max()))
-    return ToolCapability(summary, placement, table_rows.capability(middles, found, tried), places)
+    return ToolCapability(summary, placement, table_rows.capability(middles, found, tried, frame.bar > 0), places)
 
 
 def _rows(R: Reals) -> tuple[Triple, Triple, Triple]:
@@ -215,8 +216,8 @@ def _placement_summary(
 
 def _listed(robot: Robot, task: Task, placement: BoxPlacement, best: float) -> list[PlaceSummary]:
     places, chosen = placement.places, placement.chosen
-    labels = slot_labels(robot) if tried_values(robot) == 1 else ()
-    labels = labels or (None,) * slot_count(robot)
+    named = slot_labels(robot) if tried_values(robot) == 1 else ()
+    labels = named or (None,) * slot_count(robot)
     return [
         PlaceSummary(
             centre_m=triple(places.centre[row]),
