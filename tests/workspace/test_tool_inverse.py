@@ -36,7 +36,7 @@ from testing.arms import (
     scara,
 )
 
-DIRECTIONS = 24
+DIRECTIONS, TILTS = 24, 10
 
 
 def crx_like() -> Robot:
@@ -115,8 +115,8 @@ def pointing(point: np.ndarray, direction: np.ndarray):
         (lambda: load_robot("lbr_iiwa_14"), (0.62, 0.55), 0),
         (crx_like, (1.21, 0.45), 0),
         (free_roll, (0.62, 0.25), 0),
-        (coupled, (0.63, 0.55), 0),
-        (gantry_with_wrist, (0.05, 0.4), 20),
+        (coupled, (0.5, 0.0), 0),
+        (gantry_with_wrist, (0.12, -0.3), 30),
     ],
 )
 def test_reachability_is_what_least_squares_find(make, middle, sector, random):
@@ -124,7 +124,9 @@ def test_reachability_is_what_least_squares_find(make, middle, sector, random):
     found = map_capability(robot, np.array([middle]), DIRECTIONS, asked)
     frame = cell_frame(robot)
     point = frame.points(np.array(middle[0]), frame.place_of(np.array(sector)), np.array(middle[1]))
-    share = np.mean([reached(robot, pointing(point, row), random) for row in fibonacci_sphere(DIRECTIONS) @ frame.R])
+    tries = 40 if make in (free_roll, coupled) else 12
+    directions = fibonacci_sphere(DIRECTIONS) @ frame.R
+    share = np.mean([reached(robot, pointing(point, row), random, tries) for row in directions])
     ratio = found.reachability[0, sector]
     assert 0.1 < share < 1.0
     if robot.joints < 7:
@@ -133,15 +135,16 @@ def test_reachability_is_what_least_squares_find(make, middle, sector, random):
         assert share - 2 / DIRECTIONS <= ratio <= share
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("rho", "z"), [(0.47, 0.35), (0.55, 0.62)])
 def test_tilts_are_those_that_least_squares_find(rho, z, random):
     robot = five_axis()
-    found = map_capability(robot, np.array([[rho, z]]), DIRECTIONS, asked_of(robot, 1))
+    found = map_capability(robot, np.array([[rho, z]]), TILTS, asked_of(robot, 1))
     frame = cell_frame(robot)
     x, _, up = frame.R
     point = frame.points(np.array(rho), np.array(0.0), np.array(z))
-    tilts = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-    share = np.mean([reached(robot, pointing(point, np.cos(t) * up + np.sin(t) * x), random, 6) for t in tilts])
+    tilts = 2 * np.pi * np.arange(TILTS) / TILTS
+    share = np.mean([reached(robot, pointing(point, np.cos(t) * up + np.sin(t) * x), random, 30) for t in tilts])
     assert 0.1 < share < 1.0
     assert found.reachability[0, 0] == pytest.approx(share)
 
