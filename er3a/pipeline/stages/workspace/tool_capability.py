@@ -87,7 +87,7 @@ def tool_capability(
     middles = np.stack([cells[:, :2].mean(axis=1), cells[:, 2:].mean(axis=1)], axis=1)
     found = map_capability(robot, middles, plan.count, asked)
     bodies, random = Bodies(robot, scene), np.random.default_rng([seed, CLEAR_STREAM])
-    tried = _tried(robot, asked, middles, found.reachability, plan, bodies, random)
+    tried = _tried(robot, plan, middles, found.reachability, bodies, random)
     core = None
     if proofs_hold(robot):
         core = dexterous_core(robot, cells, plan.count, asked.roll, settings.proof_poses)
@@ -108,7 +108,7 @@ def tool_capability(
         coarse=plan.coarse,
         clear=_clear_summary(cells, frame.bar, found.reachability, tried, scene),
     )
-    placement, places = _placed(robot, settings, asked, task, plan, scene, float(found.manipulability.max()))
+    placement, places = _placed(robot, settings, task, plan, scene, float(found.manipulability.max()))
     return ToolCapability(summary, placement, table_rows.capability(middles, found, tried, frame.bar > 0), places)
 
 
@@ -118,15 +118,10 @@ def _rows(R: Reals) -> tuple[Triple, Triple, Triple]:
 
 
 def _placed(
-    robot: Robot,
-    settings: CapabilitySettings,
-    asked: AskedOrientations,
-    task: Task,
-    plan: CapabilityPlan,
-    scene: Scene | None,
-    best: float,
+    robot: Robot, settings: CapabilitySettings, task: Task, plan: CapabilityPlan, scene: Scene | None, best: float
 ) -> tuple[Placement, BoxPlaces]:
     """Where the box can stand; ``best`` is the arm's greatest manipulability, m^3."""
+    asked = plan.asked
     if not asked.in_cone(np.zeros((1, 3)), task.axis, task.half_angle, task.step).shape[1]:
         return ToolPointsElsewhere(_task_summary(settings.placement), triple(asked.tool[:, 2])), BoxPlaces.empty()
     if plan.lattice is None:
@@ -142,17 +137,11 @@ def _placed(
 
 
 def _tried(
-    robot: Robot,
-    asked: AskedOrientations,
-    middles: Reals,
-    reachability: Reals,
-    plan: CapabilityPlan,
-    bodies: Bodies,
-    random: np.random.Generator,
+    robot: Robot, plan: CapabilityPlan, middles: Reals, reachability: Reals, bodies: Bodies, random: np.random.Generator
 ) -> ClearPoses:
     (cell, sector), frame = np.nonzero(reachability), cell_frame(robot)
     places, tries = (frame.place_of(sector), frame.width), plan.tries_of(len(cell), frame.sectors)
-    return try_poses(robot, middles[cell], places, tries, bodies.free, random, asked=asked)
+    return try_poses(robot, middles[cell], places, tries, bodies.free, random, asked=plan.asked)
 
 
 def _clear_summary(
