@@ -237,11 +237,13 @@ class ClassSlots:
     settled: dict[int, Settled]
 
 
-def slots_of_class(robot: Robot, T: Reals, q_ref: Reals, values: Reals, threads: int = 1) -> ClassSlots:
+def slots_of_class(
+    robot: Robot, T: Reals, q_ref: Reals, values: Reals, threads: int = 1, *, settling: bool = True
+) -> ClassSlots:
     """All slots for poses (N, 4, 4), with references (1 or N, n) and values (N, k) of the redundancy parameters.
 
     Poses at which a joint may be free, or that left a doubt, are settled one by one, if the arm has no more than six
-    joints.
+    joints. Without ``settling`` they keep what the class found: solutions all, but of a self-motion any members.
     """
     solver = arm_solver(robot)
     count, slots = len(T), solver.chain.slots
@@ -260,7 +262,9 @@ def slots_of_class(robot: Robot, T: Reals, q_ref: Reals, values: Reals, threads:
             inside[rows] = within(robot, q[rows])
 
     parallel_for(count, threads, SMALLEST_PART, part)
-    settled = {}
+    settled: dict[int, Settled] = {}
+    if not settling:
+        return ClassSlots(q, inside, certainty, settled)
     alone = not solver.chain.parameters  # self-motions of redundant arms are told by `all_motions`
     for n in np.flatnonzero(certainty != CERTAIN).tolist() if alone else ():
         own = q_ref[0 if len(q_ref) == 1 else n]

@@ -2,11 +2,11 @@
 
 Reachability is the index of Zacharias, Borst and Hirzinger [1]_: directions spread evenly over the sphere, a
 direction counts if some roll about it has an inverse solution within limits. Here all directions are asked of the
-cell's middle.
+cell's middle. Arms with fewer joints are asked for what they can do (:mod:`.orientations`).
 
-Joint 1 only turns everything about its axis. So each cell of the section is solved once, at azimuth 0 and with joint 1
-free; what another azimuth has follows by turning joint 1 on, exactly. With a limited joint 1 azimuths are told apart
-in sectors, by their middles.
+Joint 1 only turns everything about its axis, or shifts it. So each cell of the section is solved once, at azimuth 0 and
+with joint 1 free; what another azimuth has follows by turning joint 1 on, exactly. With a limited joint 1 azimuths are
+told apart in sectors, by their middles, and so are places along a slide.
 
 References
 ----------
@@ -21,32 +21,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.geometry.sphere import fibonacci_sphere
 from er3a.kinematics.block_constants import BlockConstants
-from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.wrist_partitioned import closed_form_missing, constants_for_blocks
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import kernel
-from er3a.robots.joint_limits import LIMIT_TOLERANCE, theta_limits
 from er3a.robots.robot import Robot
-from er3a.workspace.directions import Roll, left_to_roll, poses, tool_rotations, with_full_turn
+from er3a.workspace.cell_frame import CellFrame, cell_frame, places_served, without_first_limits
+from er3a.workspace.directions import left_to_roll, poses
+from er3a.workspace.orientations import AskedOrientations
 from er3a.workspace.proof import ring_volumes
-from er3a.workspace.section_arm import FULL_TURN
-from er3a.workspace.tool_inverse import all_solutions, frame_about_axis_1, generic_manipulability
+from er3a.workspace.tool_inverse import all_solutions, generic_manipulability, slot_count
 
-SECTORS = 64
-"""Sectors of azimuth with a limited joint 1, the first about azimuth 0; one bit each in a proof's masks."""
 _POSES = 50_000
-_TURN = 2 * np.pi
 
 
 @dataclass(frozen=True, eq=False)
 class Capability:
-    """Numbers per cell and sector of azimuth, both (n, sectors); a full turn of joint 1 makes one sector.
+    """Numbers per cell and sector of azimuth (part of a bar), both (n, sectors); a full turn of joint 1 makes one.
 
     Attributes
     ----------
-    reachability : ratio of the directions that are reached [1]_
+    reachability : ratio of the directions [1]_, or of what else is asked, that are reached
     solutions : branches within limits, the mean over reached directions (0 where none is), of the roll that has most
     most_solutions : the most branches that any direction has
     manipulability : m^3, the greatest ``|det J|`` [2]_ of any reached pose
@@ -77,9 +72,9 @@ def rings(reach: float, heights: tuple[float, float], cell: float) -> Reals:
     return np.stack([rho, rho + cell, z, z + cell], axis=1)
 
 
-def overall(capability: Capability, cells: Reals) -> Overall:
-    """Figures over all reached cells (n, 4), see :func:`rings`."""
-    volume = np.broadcast_to(ring_volumes(cells)[:, None], capability.reachability.shape)
+def overall(capability: Capability, cells: Reals, bar: float = 0.0) -> Overall:
+    """Figures over all reached cells (n, 4), see :func:`rings`, of rings or of bars that are so long (m)."""
+    volume = np.broadcast_to(ring_volumes(cells, bar)[:, None], capability.reachability.shape)
     weight = np.where(capability.reachability > 0, volume, 0.0)
     total = float(weight.sum())
     if total == 0:
@@ -93,42 +88,40 @@ def overall(capability: Capability, cells: Reals) -> Overall:
     )
 
 
-def sector_count(robot: Robot) -> int:
-    """How many sectors of azimuth differ."""
-    return 1 if robot.upper[0] - robot.lower[0] >= FULL_TURN else SECTORS
-
-
-def map_capability(robot: Robot, middles: Reals, directions: int, roll: Roll) -> Capability:
-    """Ask cells for their directions.
+def map_capability(robot: Robot, middles: Reals, count: int, asked: AskedOrientations) -> Capability:
+    """Ask cells for their orientations.
 
     Parameters
     ----------
-    middles : (n, 2), m, radius and height of the cells' middles about axis 1 (see ``section_arm.section_frame``)
-    directions : how many, over the sphere; roll : how the roll is treated
+    middles : (n, 2), m, radius and height of the cells' middles (see :class:`.cell_frame.CellFrame`)
+    count : of directions over the sphere, of turns or of tilts; asked : what is asked of the tool
     """
-    R, origin = frame_about_axis_1(robot)
-    asked = with_full_turn(left_to_roll(robot, roll), 0)
-    rotations = R.T @ tool_rotations(fibonacci_sphere(directions), roll)
-    sectors = sector_count(robot)
-    reachability, solutions, most, best = np.zeros((4, len(middles), sectors))
-    per_cell = directions * len(roll.angles)
-    points = np.stack([middles[:, 0], np.zeros(len(middles)), middles[:, 1]], axis=1) @ R + origin
+    frame, free = cell_frame(robot), left_to_roll(without_first_limits(robot), asked.roll)
+    reachability, solutions, most, best = np.zeros((4, len(middles), frame.sectors))
+    points = frame.points(middles[:, 0], np.zeros(len(middles)), middles[:, 1])
+    turned = _from_place_0(frame, asked)
+    per_cell = int(np.prod(asked.everywhere(points[:1], count).shape[1:3]))
     for start in range(0, len(middles), step := max(1, _POSES // per_cell)):
         part = slice(start, start + step)
-        T = poses(points[part][:, None, None], rotations)
-        q, within = all_solutions(asked, T.reshape(-1, 4, 4))
-        theta = robot.direction * q + robot.offset
-        shape = (len(T), directions, -1, SLOTS)
+        T = poses(points[part][:, None, None], turned @ asked.everywhere(points[part], count))
+        q, within = all_solutions(free, T.reshape(-1, 4, 4))
+        shape = (*T.shape[:2], -1, slot_count(robot))
         values = manipulability_of(robot, q, within).reshape(shape)
-        within = within.reshape(shape)
+        low, high = places_served(robot, q[..., 0])
         out = reachability[part], solutions[part], most[part], best[part]
-        _tally(theta[..., 0].reshape(shape), within, values, theta_limits(robot)[0], out)
+        told = low.reshape(shape), high.reshape(shape), frame.width, frame.bar > 0
+        _tally(told, within.reshape(shape), values, out)
     return Capability(reachability, solutions, most, best)
+
+
+def _from_place_0(frame: CellFrame, asked: AskedOrientations) -> Reals:
+    """What turns even directions (3, 3): they are even about axis 1 in the cells' frame, whatever the base's is."""
+    return frame.R.T if asked.kind == "directions" else np.eye(3)
 
 
 def manipulability_of(robot: Robot, q: Reals, within: Flags) -> Reals:
     """Manipulability (m^3) of joint values (..., n), rad; where these are not ``within`` the limits it may be 0."""
-    if closed_form_missing(robot):
+    if closed_form_missing(robot) or robot.coupling is not None:
         return generic_manipulability(robot, q, within)
     return manipulability(constants_for_blocks(robot), robot.direction * q + robot.offset)
 
@@ -147,31 +140,32 @@ def manipulability(arm: BlockConstants, theta: Reals) -> Reals:
     return np.abs(size * ahead * np.sin(bend) * np.sin(theta[..., 4] + arm.turn_5))
 
 
+_Places = tuple[Reals, Reals, float, bool]
+
+
 @kernel
-def _tally(
-    theta_1: Reals, within: Flags, values: Reals, range_1: Reals, out: tuple[Reals, Reals, Reals, Reals]
-) -> None:
-    """Sum up cells: ``theta_1``, ``within``, ``values`` are (cells, directions, rolls, slots), ``out`` is filled."""
+def _tally(places: _Places, within: Flags, values: Reals, out: tuple[Reals, Reals, Reals, Reals]) -> None:
+    """Sum up cells: ``within``, ``values`` and the first and last place that each serves are (cells, asked, tries,
+    slots); places go round, but along bars, whose parts have their middles half a part on. ``out`` is filled."""
     reachability, solutions, most, best = out
+    from_place, to_place, width, bars = places
     sectors = reachability.shape[1]
-    width = _TURN / sectors
+    shift = 0.5 if bars else 0.0
     count, reached = np.zeros(sectors, dtype=np.int64), np.zeros(sectors, dtype=np.int64)
-    for cell in range(theta_1.shape[0]):
-        for d in range(theta_1.shape[1]):
+    for cell in range(within.shape[0]):
+        for d in range(within.shape[1]):
             reached[:] = 0
-            for roll in range(theta_1.shape[2]):
+            for roll in range(within.shape[2]):
                 count[:] = 0
-                for slot in range(theta_1.shape[3]):
+                for slot in range(within.shape[3]):
                     if not within[cell, d, roll, slot]:
                         continue
-                    first, many = 0, sectors
-                    if range_1[1] - range_1[0] < FULL_TURN:
-                        at = theta_1[cell, d, roll, slot]
-                        first = int(np.ceil((range_1[0] - LIMIT_TOLERANCE - at) / width))
-                        last = int(np.floor((range_1[1] + LIMIT_TOLERANCE - at) / width))
-                        many = min(sectors, last - first + 1)
+                    first = int(np.ceil(from_place[cell, d, roll, slot] / width - shift))
+                    last = int(np.floor(to_place[cell, d, roll, slot] / width - shift))
+                    if bars or sectors == 1:
+                        first, last = max(first, 0), min(last, sectors - 1)
                     value = values[cell, d, roll, slot]
-                    for i in range(many):
+                    for i in range(min(sectors, last - first + 1)):
                         sector = (first + i) % sectors
                         count[sector] += 1
                         best[cell, sector] = max(best[cell, sector], value)
@@ -184,4 +178,4 @@ def _tally(
                     most[cell, sector] = max(most[cell, sector], reached[sector])
         for sector in range(sectors):
             solutions[cell, sector] /= max(reachability[cell, sector], 1.0)
-            reachability[cell, sector] /= theta_1.shape[1]
+            reachability[cell, sector] /= within.shape[1]

@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from er3a.kinematics.forward import forward
-from er3a.numerics.arrays import Reals
-from er3a.robots.robot import Robot
+from er3a.numerics.arrays import Flags, Reals
+from er3a.robots.joint_limits import within
+from er3a.robots.robot import CombinedLimit, Robot
 from er3a.workspace.cavities import Cavity
-from er3a.workspace.proof import ring_volumes, unfilled_arcs
+from er3a.workspace.proof import in_space, ring_volumes, unfilled_arcs
 from er3a.workspace.section_arm import FULL_TURN, section_arm
+from er3a.workspace.witness import reach_points
 
 InSection = Callable[[Reals], tuple[Reals, Reals, Reals]]
+InBase = Callable[[Reals], Reals]
 
-PROBES, SAMPLES = 300, 400_000
+PROBES, SAMPLES, _RESTARTS = 300, 50_000, 3
 STEPS = (15.0, 30.0, 60.0, 90.0, 180.0)
 """By how much a limit is widened, deg, until the void vanishes."""
+SLIDE_STEPS = (25.0, 50.0, 100.0, 200.0, 400.0)
+"""The same of joints that slide, mm."""
 _GONE, _SHRUNK = 0.98, 0.10
 
 Side = Literal["lower", "upper"]
@@ -33,7 +40,7 @@ class Relaxed:
 
     Attributes
     ----------
-    joint : from 1; joints that slide are left as they are
+    joint : from 1, one that turns
     limit_deg : the limit as it is
     by_deg : by how much it is widened: the least of ``STEPS`` that makes the void vanish, or the most there is
     filled : ratio of the void that is then reached
@@ -52,6 +59,43 @@ class Relaxed:
 
 
 @dataclass(frozen=True)
+class SlideRelaxed:
+    """One limit of a joint that slides widened, see :class:`Relaxed`: ``limit_mm`` as it is, by one of
+    ``SLIDE_STEPS``."""
+
+    joint: int
+    side: Side
+    limit_mm: float
+    by_mm: float
+    filled: float
+
+    @property
+    def extended_mm(self) -> float:
+        """The limit as it would be."""
+        return self.limit_mm + (self.by_mm if self.side == "upper" else -self.by_mm)
+
+
+@dataclass(frozen=True)
+class SumRelaxed:
+    """The limit of a sum of joints that turn widened, see :class:`Relaxed`; ``joints`` (from 1) and their factors."""
+
+    joints: tuple[int, ...]
+    factors: tuple[float, ...]
+    side: Side
+    limit_deg: float
+    by_deg: float
+    filled: float
+
+    @property
+    def extended_deg(self) -> float:
+        """The limit as it would be."""
+        return self.limit_deg + (self.by_deg if self.side == "upper" else -self.by_deg)
+
+
+OneRelaxed = Relaxed | SlideRelaxed | SumRelaxed
+
+
+@dataclass(frozen=True)
 class Unlimited:
     """All limits taken away; ``filled`` is the ratio of the void that is then reached."""
 
@@ -64,7 +108,7 @@ class Unlimited:
 class Disappears:
     """One limit alone makes the void, or each of two."""
 
-    limits: tuple[Relaxed, ...]
+    limits: tuple[OneRelaxed, ...]
     code: Literal["void_disappears"] = "void_disappears"
 
 
@@ -72,7 +116,7 @@ class Disappears:
 class SeveralLimits:
     """Only several limits together make the void; ``most`` is the one that shrinks it most, if one does."""
 
-    most: Relaxed | None
+    most: OneRelaxed | None
     code: Literal["void_of_several_limits"] = "void_of_several_limits"
 
 
@@ -81,7 +125,7 @@ class Geometry:
     """Part of the void stays without any limit; ``most`` is the limit that shrinks it most, if one does."""
 
     remaining_ratio: float
-    most: Relaxed | None
+    most: OneRelaxed | None
     code: Literal["void_of_geometry"] = "void_of_geometry"
 
 
@@ -95,59 +139,106 @@ class OnlySampled:
 VoidCause = Disappears | SeveralLimits | Geometry | OnlySampled
 
 
-def relaxations(robot: Robot, cavity: Cavity, in_section: InSection | None = None) -> tuple[list[Relaxed], Unlimited]:
+def relaxations(
+    robot: Robot, cavity: Cavity, section: tuple[InSection, InBase] | None = None
+) -> tuple[list[OneRelaxed], Unlimited]:
     """Judge a void's cells with each limit widened, the strongest first; then without any.
 
     Parameters
     ----------
-    in_section : for an arm without a section form: from points (n, 3), m, in the base frame to their radius, azimuth
-        and height about axis 1. Cells then count as reached if a random sample of the widened arm lies in them.
+    section : for an arm without a section form: what takes points (n, 3), m, of the base frame to their radius, azimuth
+        and height about axis 1, or places across and along bars, and what takes points of that frame to the base. Cells
+        then count as reached if a random sample of the widened arm lies in them, or a search brings it to their middle.
     """
     chosen = _probes(cavity)
-    turning = [joint for joint in range(1, robot.joints + 1) if not robot.slides[joint - 1]]
-    if in_section is None:
+    if section is None:
         before = _open_angle(robot, cavity, chosen)
         joints = list(range(1, 6))
 
         def ratio_filled(widened: Robot) -> float:
             return _ratio_filled(widened, cavity, chosen, before)
     else:
-        joints = turning
+        joints, probes = list(range(1, robot.joints + 1)), _spread_probes(cavity)
 
         def ratio_filled(widened: Robot) -> float:
-            return _ratio_sampled(robot, widened, cavity, chosen, in_section)
+            return _ratio_searched(robot, widened, probes, section)
 
-    found = [
-        _relaxed(robot, joint, side, ratio_filled, in_section is None)
-        for joint in joints
-        if robot.upper[joint - 1] - robot.lower[joint - 1] < FULL_TURN
-        for side in _SIDES
-    ]
-    found.sort(key=lambda relaxed: (relaxed.filled < _GONE, relaxed.by_deg, -relaxed.filled, relaxed.joint))
-    return found, Unlimited(ratio_filled(_widened(robot, turning, _SIDES, 2 * np.pi)))
+    slides, limited = robot.slides, robot.upper - robot.lower < FULL_TURN
+    found: list[tuple[int, OneRelaxed]] = []
+    for side in _SIDES:
+        for joint in joints:
+            if slides[joint - 1]:
+                each = _relaxed(SLIDE_STEPS, partial(_slide_by, robot, joint, side, ratio_filled))
+                found.append((SLIDE_STEPS.index(each.by_mm), each))  # type: ignore[union-attr]
+            elif limited[joint - 1] and not robot.continuous[joint - 1]:
+                each = _relaxed(STEPS, partial(_turn_by, robot, joint, side, ratio_filled))
+                found.append((STEPS.index(each.by_deg), each))  # type: ignore[union-attr]
+        for number, limit in enumerate(robot.combined):
+            if not slides[np.flatnonzero(limit.factors)].any():
+                each = _relaxed(STEPS, partial(_sum_by, robot, number, side, ratio_filled))
+                found.append((STEPS.index(each.by_deg), each))  # type: ignore[union-attr]
+    found.sort(key=lambda one: (one[1].filled < _GONE, one[0], -one[1].filled, _joints_of(one[1])))
+    return [relaxed for _, relaxed in found], Unlimited(ratio_filled(_without_limits(robot)))
 
 
-def _relaxed(robot: Robot, joint: int, side: Side, ratio_filled: Callable[[Robot], float], proven: bool) -> Relaxed:
-    limit = float((robot.lower if side == "lower" else robot.upper)[joint - 1])
-
-    def widened_by(step: float) -> Relaxed:
-        filled = ratio_filled(_widened(robot, [joint], [side], float(np.radians(step))))
-        return Relaxed(joint, side, float(np.degrees(limit)), step, filled)
-
-    if proven and (most := widened_by(STEPS[-1])).filled < _GONE:
-        return most  # no lesser step fills more; samples, spread thinner over a wider range, may tell otherwise
-    for step in STEPS:
+def _relaxed(steps: tuple[float, ...], widened_by: Callable[[float], OneRelaxed]) -> OneRelaxed:
+    """The least step that makes the void vanish, or else the widest, since no lesser step fills more."""
+    most = widened_by(steps[-1])
+    if most.filled < _GONE:
+        return most
+    for step in steps[:-1]:
         found = widened_by(step)
         if found.filled >= _GONE:
-            break
-    return found
+            return found
+    return most
 
 
-def cause_of(single: list[Relaxed], unlimited: Unlimited) -> VoidCause:
+def _turn_by(robot: Robot, joint: int, side: Side, filled: Callable[[Robot], float], step: float) -> Relaxed:
+    limit = float((robot.lower if side == "lower" else robot.upper)[joint - 1])
+    widened = _widened(robot, joint, side, float(np.radians(step)))
+    return Relaxed(joint, side, float(np.degrees(limit)), step, filled(widened))
+
+
+def _slide_by(robot: Robot, joint: int, side: Side, filled: Callable[[Robot], float], step: float) -> SlideRelaxed:
+    limit = float((robot.lower if side == "lower" else robot.upper)[joint - 1])
+    return SlideRelaxed(joint, side, 1000 * limit, step, filled(_widened(robot, joint, side, step / 1000)))
+
+
+def _sum_by(robot: Robot, number: int, side: Side, filled: Callable[[Robot], float], step: float) -> SumRelaxed:
+    limit, by = robot.combined[number], float(np.radians(step))
+    lower, upper = limit.lower - by * (side == "lower"), limit.upper + by * (side == "upper")
+    others = list(robot.combined)
+    others[number] = CombinedLimit(limit.factors, lower, upper)
+    joints = np.flatnonzero(limit.factors)
+    numbers, factors = tuple((joints + 1).tolist()), tuple(np.array(limit.factors)[joints].tolist())
+    ratio = filled(robot.replace(combined=tuple(others)))
+    return SumRelaxed(
+        numbers, factors, side, float(np.degrees(limit.lower if side == "lower" else limit.upper)), step, ratio
+    )
+
+
+def _without_limits(robot: Robot) -> Robot:
+    """The robot with its turning joints free, sums of joints without limits, and slides by the most that is tried."""
+    by = np.where(robot.slides, SLIDE_STEPS[-1] / 1000, 2 * np.pi)
+    return robot.replace(lower=robot.lower - by, upper=robot.upper + by, combined=())
+
+
+def _joints_of(limit: OneRelaxed) -> tuple[int, ...]:
+    return limit.joints if isinstance(limit, SumRelaxed) else (limit.joint,)
+
+
+def _as_far(first: OneRelaxed, other: OneRelaxed) -> bool:
+    """Whether two limits are of one kind and widened by as much."""
+    if isinstance(first, SlideRelaxed) or isinstance(other, SlideRelaxed):
+        return isinstance(first, SlideRelaxed) and isinstance(other, SlideRelaxed) and first.by_mm == other.by_mm
+    return first.by_deg == other.by_deg
+
+
+def cause_of(single: list[OneRelaxed], unlimited: Unlimited) -> VoidCause:
     """The cause that the relaxations show."""
     gone = [limit for limit in single if limit.filled >= _GONE]
     if gone:
-        return Disappears(tuple(limit for limit in gone if limit.by_deg == gone[0].by_deg)[:2])
+        return Disappears(tuple(limit for limit in gone if _as_far(limit, gone[0]))[:2])
     strongest = max(single, key=lambda limit: limit.filled, default=None)
     most = strongest if strongest is not None and strongest.filled >= _SHRUNK else None
     if unlimited.filled >= _GONE:
@@ -158,17 +249,16 @@ def cause_of(single: list[Relaxed], unlimited: Unlimited) -> VoidCause:
 def joints_behind(cause: VoidCause) -> set[int]:
     """The joints whose limits a cause names."""
     if isinstance(cause, Disappears):
-        return {limit.joint for limit in cause.limits}
-    return set() if isinstance(cause, OnlySampled) or cause.most is None else {cause.most.joint}
+        return {joint for limit in cause.limits for joint in _joints_of(limit)}
+    return set() if isinstance(cause, OnlySampled) or cause.most is None else set(_joints_of(cause.most))
 
 
-def _widened(robot: Robot, joints: Iterable[int], sides: Iterable[Side], by: float) -> Robot:
+def _widened(robot: Robot, joint: int, side: Side, by: float) -> Robot:
     lower, upper = robot.lower.copy(), robot.upper.copy()
-    for joint in joints:
-        if "upper" in sides:
-            upper[joint - 1] += by
-        if "lower" in sides:
-            lower[joint - 1] -= by
+    if side == "upper":
+        upper[joint - 1] += by
+    else:
+        lower[joint - 1] -= by
     return robot.replace(lower=lower, upper=upper)
 
 
@@ -177,6 +267,20 @@ def _probes(cavity: Cavity) -> NDArray[np.intp]:
     weight = cavity.volumes * cavity.empty
     chosen = np.argsort(-weight, kind="stable")[:PROBES]
     return chosen[weight[chosen] > 0]
+
+
+def _spread_probes(cavity: Cavity) -> tuple[Cavity, Reals]:
+    """Arcs all over a void, and how much each stands for: all if they are few, else drawn by how much of what is proven
+    empty they hold."""
+    weight = cavity.volumes * cavity.empty
+    if len(weight) <= PROBES:
+        chosen = np.flatnonzero(weight > 0)
+        return cavity.part(chosen, cavity.enclosed), weight[chosen]
+    order = np.random.Generator(np.random.Philox(key=len(weight))).permutation(len(weight))
+    total = np.cumsum(weight[order])
+    drawn = order[np.searchsorted(total, (np.arange(PROBES) + 0.5) * (total[-1] / PROBES))]
+    chosen, times = np.unique(drawn, return_counts=True)
+    return cavity.part(chosen, cavity.enclosed), times.astype(float)
 
 
 def _open_angle(robot: Robot, cavity: Cavity, chosen: NDArray[np.intp]) -> Reals:
@@ -197,22 +301,35 @@ def _ratio_filled(robot: Robot, cavity: Cavity, chosen: NDArray[np.intp], before
     return float(1 - (section @ _open_angle(robot, cavity, chosen)) / (section @ before))
 
 
-def _ratio_sampled(
-    robot: Robot, widened: Robot, cavity: Cavity, chosen: NDArray[np.intp], in_section: InSection
+def _ratio_searched(
+    robot: Robot, widened: Robot, spread: tuple[Cavity, Reals], section: tuple[InSection, InBase]
 ) -> float:
-    """Ratio by volume of the chosen arcs that samples of a widened arm lie in; fewer samples can only lower it."""
-    random = np.random.Generator(np.random.Philox(key=len(chosen)))
+    """Ratio by weight of the arcs that a widened arm reaches, by samples, then by search from the nearest of these."""
+    (in_section, in_base), (probes, weight) = section, spread
+    random = np.random.Generator(np.random.Philox(key=len(probes.cells)))
     q = random.uniform(widened.lower, widened.upper, (SAMPLES, robot.joints))
-    # The arm as it is does not come here: at least one joint must be beyond its limit.
-    q = q[((q < robot.lower) | (q > robot.upper)).any(axis=1)]
-    rho, azimuth, z = in_section(forward(widened, q)[:, :3, 3])
-    a, b, c, d = cavity.cells[chosen].T
-    low, high = cavity.arcs[chosen].T
-    inside = (rho > a.min()) & (rho < b.max()) & (z > c.min()) & (z < d.max())
-    rho, azimuth, z = rho[inside], azimuth[inside] % (2 * np.pi), z[inside]
-    hit = np.zeros(len(chosen), dtype=bool)
-    for n in range(len(chosen)):
-        in_cell = (rho > a[n]) & (rho < b[n]) & (z > c[n]) & (z < d[n])
-        hit[n] = (in_cell & (azimuth >= low[n]) & (azimuth <= high[n])).any()
-    volumes = cavity.volumes[chosen]
-    return float(volumes[hit].sum() / volumes.sum()) if len(chosen) else 0.0
+    # The arm as it is does not come here: at least one limit must be exceeded.
+    q = q[within(widened, q) & ~within(robot, q)]
+    if not len(q) or not len(probes.cells):
+        return 0.0
+    points = forward(widened, q)[:, :3, 3]
+    hit = np.zeros(len(probes.cells), dtype=bool)
+    rho, azimuth, z = in_section(points)
+    for n in range(len(hit)):
+        hit[n] = _in_arc(probes, n, (rho, azimuth, z)).any()
+    left = np.flatnonzero(~hit)
+    if left.size:
+        cells = probes.cells[left].reshape(-1, 2, 2).mean(axis=2)
+        wanted = in_base(in_space(cells[:, 0], probes.arcs[left].mean(axis=1), cells[:, 1], probes.bar))
+        starts = q[cKDTree(points).query(wanted)[1]]
+        found = reach_points(widened, wanted, starts, _RESTARTS)
+        found[~within(widened, np.nan_to_num(found))] = np.nan
+        hit[left] = np.isfinite(found[:, 0])
+    return float(weight[hit].sum() / weight.sum())
+
+
+def _in_arc(probes: Cavity, n: int, places: tuple[Reals, Reals, Reals]) -> Flags:
+    """Which places (radius, azimuth and height, or x, place along and z of bars) lie in an arc."""
+    (rho, azimuth, z), (a, b, c, d), (low, high) = places, probes.cells[n], probes.arcs[n]
+    azimuth = azimuth if probes.bar > 0 else azimuth % (2 * np.pi)
+    return np.asarray((rho > a) & (rho < b) & (z > c) & (z < d) & (azimuth >= low) & (azimuth <= high))

@@ -54,7 +54,7 @@ class Cavity:
         """Volume not proven filled, m^3."""
         return float(self.volumes.sum())
 
-    def part(self, chosen: Flags, enclosed: bool) -> Cavity:
+    def part(self, chosen: Flags | Integers, enclosed: bool) -> Cavity:
         """Some of its arcs."""
         return Cavity(enclosed, self.cells[chosen], self.arcs[chosen], self.empty[chosen], self.bar)
 

@@ -13,8 +13,10 @@ import numpy as np
 
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot
+from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.directions import across, poses
-from er3a.workspace.tool_inverse import all_solutions, frame_about_axis_1
+from er3a.workspace.orientations import AskedOrientations
+from er3a.workspace.tool_inverse import all_solutions
 
 Free = Callable[[Reals], Flags]
 """Which arms (N, n), rad, are free of collisions, (N,)."""
@@ -31,23 +33,35 @@ class ClearPoses:
 
 
 def try_poses(
-    robot: Robot, middles: Reals, azimuths: tuple[Reals, float], tries: int, free: Free, random: np.random.Generator
+    robot: Robot,
+    middles: Reals,
+    places: tuple[Reals, float],
+    tries: int,
+    free: Free,
+    random: np.random.Generator,
+    *,
+    asked: AskedOrientations,
 ) -> ClearPoses:
-    """Try poses with the tool point on the circles of cells' middles, orientations uniform over all.
+    """Try poses with the tool point on the circles (or bars) of cells' middles, orientations uniform over all.
 
     Parameters
     ----------
-    middles : (n, 2), m, radius and height about axis 1; azimuths : their sectors' middles (n,) and width, rad
+    middles : (n, 2), m, radius and height about axis 1; places : their sectors' middles (n,) and width, rad or m
     tries : poses in each; free : which arms count as clear
+    asked : what is asked of the tool; where that is no direction, the orientations are even among these
     """
-    R, origin = frame_about_axis_1(robot)
+    frame = cell_frame(robot)
     reached, clear = (np.zeros(len(middles), np.int64) for _ in range(2))
     for start in range(0, len(middles), step := max(1, _POSES // tries)):
         part = slice(start, start + step)
         rho, z = middles[part, 0, None], middles[part, 1, None]
-        at = azimuths[0][part, None] + azimuths[1] * (random.random((len(rho), tries)) - 0.5)
-        points = np.stack([rho * np.cos(at), rho * np.sin(at), np.broadcast_to(z, at.shape)], axis=-1) @ R + origin
-        q, inside = all_solutions(robot, poses(points, _orientations(random, at.shape)).reshape(-1, 4, 4))
+        at = places[0][part, None] + places[1] * (random.random((len(rho), tries)) - 0.5)
+        points = frame.points(rho, at, z)
+        if asked.kind == "directions":
+            rotations = _orientations(random, at.shape)
+        else:
+            rotations = asked.at_random(points.reshape(-1, 3), random).reshape(*at.shape, 3, 3)
+        q, inside = all_solutions(robot, poses(points, rotations).reshape(-1, 4, 4))
         held = np.zeros(at.size, bool)
         for slot, within in enumerate(inside.T):  # arms of one branch after another are alike
             pose = np.flatnonzero(within & ~held)

@@ -18,7 +18,7 @@ from er3a.kinematics.wrist_partitioned import constants_for_blocks
 from er3a.numerics.arrays import Reals, Words
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
-from er3a.workspace.capability import SECTORS, sector_count
+from er3a.workspace.cell_frame import SECTORS, cell_frame
 from er3a.workspace.directions import Roll, left_to_roll, point_tool, tool_rotations
 from er3a.workspace.interval_inverse import GOOD, NEVER, States, branches, theta_ranges
 from er3a.workspace.proof import ring_volumes
@@ -73,7 +73,7 @@ def dexterous_core(robot: Robot, cells: Reals, directions: int, roll: Roll, most
     """
     asked = left_to_roll(robot, roll)
     arm, frame = constants_for_blocks(asked), section_frame(robot)
-    sectors = sector_count(robot)
+    sectors = cell_frame(robot).sectors
     order = np.argsort(np.arange(directions) * _STRIDE % 1)
     against = frame[0].T @ tool_rotations(fibonacci_sphere(directions)[order], roll)
     angles = np.array(roll.angles)

@@ -18,7 +18,7 @@ from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 
 _ON_AXIS = 1e-12
-_RING = np.radians(10)
+RING = np.radians(10)
 
 
 @dataclass(frozen=True)
@@ -30,12 +30,14 @@ class Roll:
     free : whether it is left to joint 6
     angles : rad, the rolls to try; one if it is free
     reach : m, distance of the wrist centre (without one: of axis n) from the tool point; beside : m, from its axis
+    last_joint : whether a free roll is left to the last joint, or to nothing, since the arm can't make it
     """
 
     free: bool
     angles: tuple[float, ...]
     reach: float
     beside: float
+    last_joint: bool = True
 
     @property
     def half_step(self) -> float:
@@ -52,14 +54,24 @@ def roll_of(robot: Robot, rolls: int) -> Roll:
         arm = wrist_partitioned_arm(robot)
         axis_6, wrist = arm.tool_rotation.T @ arm.axes[5], arm.wrist_in_tool
     reach, beside = float(np.linalg.norm(wrist)), float(np.hypot(*wrist[:2]))
-    free = max(beside, float(np.hypot(*axis_6[:2]))) < _ON_AXIS
+    free = max(beside, float(np.hypot(*axis_6[:2]))) < _ON_AXIS and _last_turns_alone(robot)
     angles = (0.0,) if free else tuple((2 * np.pi * np.arange(rolls) / rolls).tolist())
     return Roll(free, angles, reach, beside)
 
 
+def _last_turns_alone(robot: Robot) -> bool:
+    """Whether the last joint turns, and neither moves with others nor has limits together with them."""
+    last = robot.joints - 1
+    if robot.sliding[-1] or any(limit.factors[last] for limit in robot.combined):
+        return False
+    alone = np.eye(robot.rows, robot.joints)
+    coupling = alone if robot.coupling is None else robot.coupling
+    return np.array_equal(coupling[-1], alone[-1]) and np.array_equal(coupling[:, last], alone[:, last])
+
+
 def left_to_roll(robot: Robot, roll: Roll) -> Robot:
     """The robot with a full turn of its last joint if it is what a free roll is made of."""
-    return with_full_turn(robot, robot.joints - 1) if roll.free else robot
+    return with_full_turn(robot, robot.joints - 1) if roll.free and roll.last_joint else robot
 
 
 def with_full_turn(robot: Robot, joint: int) -> Robot:
@@ -69,8 +81,8 @@ def with_full_turn(robot: Robot, joint: int) -> Robot:
     return robot.replace(lower=lower, upper=upper)
 
 
-def cone_directions(axis: Reals, half_angle: float) -> Reals:
-    """Unit vectors (n, 3) of a cone: rings at most 10 deg apart, the outermost (on the cone's edge) first.
+def cone_directions(axis: Reals, half_angle: float, step: float = RING) -> Reals:
+    """Unit vectors (n, 3) of a cone: rings at most ``step`` (rad) apart, the outermost (on the cone's edge) first.
 
     Each ring is its own image under quarter turns.
 
@@ -78,9 +90,9 @@ def cone_directions(axis: Reals, half_angle: float) -> Reals:
     ----------
     axis : (3,), unit vector; half_angle : rad, up to pi
     """
-    rings = int(np.ceil(half_angle / _RING - 1e-9))
+    rings = int(np.ceil(half_angle / step - 1e-9))
     angles = [half_angle * ring / rings for ring in range(rings, 0, -1)]
-    counts = [4 * max(2, int(np.ceil(np.pi / 2 * np.sin(min(angle, np.pi / 2)) / _RING))) for angle in angles]
+    counts = [4 * max(2, int(np.ceil(np.pi / 2 * np.sin(min(angle, np.pi / 2)) / step))) for angle in angles]
     polar = np.repeat([*angles, 0.0], [*counts, 1])
     around = np.concatenate([*(2 * np.pi * np.arange(count) / count for count in counts), [0.0]])
     return from_polar(axis, polar, around)

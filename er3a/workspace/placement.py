@@ -18,13 +18,14 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from er3a.kinematics.closed_form import SLOTS
+from er3a.kinematics.configuration import slot_labels
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.robots.robot import Robot
+from er3a.robots.robot import CombinedLimit, Robot
 from er3a.workspace.capability import manipulability_of
-from er3a.workspace.directions import Roll, cone_directions, left_to_roll, poses, tool_rotations
+from er3a.workspace.cell_frame import cell_frame
+from er3a.workspace.directions import RING, Roll, cone_directions, left_to_roll, poses, tool_rotations
 from er3a.workspace.section_arm import FULL_TURN
-from er3a.workspace.tool_inverse import all_solutions, frame_about_axis_1, section_bounds
+from er3a.workspace.tool_inverse import all_solutions, slot_count
 
 NO = -1.0
 MIXED = -1
@@ -33,6 +34,8 @@ _POSES = 50_000
 
 Free = Callable[[Reals], Flags]
 """Which arms (N, n), rad, are free of collisions, (N,)."""
+InCone = Callable[[Reals, Reals, float, float], Reals]
+"""What is asked at points; see :meth:`er3a.workspace.orientations.AskedOrientations.in_cone`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +47,8 @@ class Task:
     box : (3,), m, edges along x, y, z
     axis : (3,), unit vector, middle of the tool's directions; half_angle : rad, how far around it they reach
     lowest : m, least height of the box's underside; clear : m, least distance of its points from axis 1
-    margin : rad, how far joints with less than a full turn keep within their limits
+    margin : rad, how far joints with less than a full turn keep within their limits; not those that slide
+    step : rad, how far directions in the cone are apart
     """
 
     box: Reals
@@ -53,13 +57,28 @@ class Task:
     lowest: float
     clear: float
     margin: float = 0.0
+    step: float = RING
+
+
+def limited_joints(robot: Robot) -> Flags:
+    """Which joints (n,) turn, but less than a full turn."""
+    return (robot.upper - robot.lower < FULL_TURN) & ~robot.slides & ~robot.continuous
 
 
 def narrowed(robot: Robot, margin: float) -> Robot:
-    """The robot with the limits of joints that have less than a full turn drawn in by ``margin`` (rad)."""
-    span = robot.upper - robot.lower
-    inward = np.where(span < FULL_TURN, np.minimum(margin, span / 2), 0.0)
-    return robot.replace(lower=robot.lower + inward, upper=robot.upper - inward)
+    """The robot with the limits of joints that have less than a full turn, and of sums of joints that turn, drawn in by
+    ``margin`` (rad)."""
+    inward = np.where(limited_joints(robot), np.minimum(margin, (robot.upper - robot.lower) / 2), 0.0)
+    combined = tuple(
+        limit if robot.slides[np.flatnonzero(limit.factors)].any() else _drawn_in(limit, margin)
+        for limit in robot.combined
+    )
+    return robot.replace(lower=robot.lower + inward, upper=robot.upper - inward, combined=combined)
+
+
+def _drawn_in(limit: CombinedLimit, margin: float) -> CombinedLimit:
+    inward = min(margin, (limit.upper - limit.lower) / 2)
+    return CombinedLimit(limit.factors, limit.lower + inward, limit.upper - inward)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,9 +88,11 @@ class Field:
     Attributes
     ----------
     origin : (3,), m; spacing : (3,), m; shape of the arrays : (nx, ny, nz)
-    least : (nx, ny, nz, 8), m^3, least manipulability over the directions by branch, NO where it misses one
+    least : (nx, ny, nz, slots), m^3, least manipulability over the directions by branch, NO where it misses one, and
+        where slots are no branches
     least_any : (nx, ny, nz), the same by the best branch for each direction
-    limit_margin : (nx, ny, nz, 8), rad, least distance from the limits of joints with less than a full turn, by branch
+    limit_margin : (nx, ny, nz, slots), rad, least distance from the limits of joints with less than a full turn, by
+        branch
     """
 
     origin: Reals
@@ -111,7 +132,15 @@ def lattice_spacing(box: Reals, coarsest: float) -> Reals:
     return np.maximum(sides / np.maximum(1, np.round(sides / coarsest)), coarsest / 2)
 
 
-def survey(robot: Robot, task: Task, roll: Roll, coarsest: float, free: Free | None = None) -> Field:
+def survey(
+    robot: Robot,
+    task: Task,
+    roll: Roll,
+    coarsest: float,
+    free: Free | None = None,
+    *,
+    in_cone: InCone | None = None,
+) -> Field:
     """Ask a lattice over the arm's reach.
 
     Parameters
@@ -119,31 +148,48 @@ def survey(robot: Robot, task: Task, roll: Roll, coarsest: float, free: Free | N
     robot : with the limits that hold, see :func:`narrowed`
     coarsest : m, about the spacing
     free : which arms count; all, unless told otherwise
+    in_cone : what is asked at points; directions with this roll, unless told otherwise
     """
-    (_, _, height, reach), (R, origin) = section_bounds(robot), frame_about_axis_1(robot)
-    middle = origin + height * R[2]
+    slots = slot_count(robot)
+    start, spacing, shape, points, asked = _lattice(robot, task, coarsest)
+    least, least_any = np.full((len(points), slots), NO), np.full(len(points), NO)
+    limit_margin = np.zeros((len(points), slots))
+    if in_cone is None:
+        rotations = tool_rotations(cone_directions(task.axis, task.half_angle, task.step), roll)
+    else:
+        rotations = in_cone(points[asked], task.axis, task.half_angle, task.step)
+    if rotations.shape[-4]:
+        least[asked], least_any[asked], limit_margin[asked] = serve(robot, points[asked], rotations, roll, free)
+    if not slot_labels(robot):  # slots of a point's neighbours are other arms
+        least[:], limit_margin[:] = NO, 0.0
+    return Field(
+        start, spacing, least.reshape(*shape, slots), least_any.reshape(shape), limit_margin.reshape(*shape, slots)
+    )
+
+
+def lattice_size(robot: Robot, task: Task, coarsest: float) -> int:
+    """How many points of the lattice :func:`survey` would ask."""
+    return len(_lattice(robot, task, coarsest)[-1])
+
+
+def _lattice(robot: Robot, task: Task, coarsest: float) -> tuple[Reals, Reals, tuple[int, ...], Reals, Integers]:
+    """Lowest corner and spacing (3,), m, shape, points (n, 3) and the numbers of those to ask."""
+    frame = cell_frame(robot)
     spacing = lattice_spacing(task.box, coarsest)
-    count = np.ceil(reach / spacing).astype(int)
+    count = np.ceil(frame.ball / spacing).astype(int)
     count[2] += 1
-    start = middle - count * spacing
+    start = frame.middle - count * spacing
     # Heights count from the lowest place, so that the lowest box lies on lattice points.
     start[2] += (task.lowest - start[2]) % spacing[2]
-    shape = tuple(2 * count + 1)
+    shape = tuple((2 * count + 1).tolist())
     points = start + np.moveaxis(np.indices(shape), 0, -1).reshape(-1, 3) * spacing
-    local = (points - origin) @ R.T
-    near = np.hypot(local[:, 0], local[:, 1])
     asked = np.flatnonzero(
-        (near >= task.clear - 1e-9)
+        (frame.distance(points) >= task.clear - 1e-9)
         & (points[:, 2] >= task.lowest - 1e-9)
-        & (np.linalg.norm(points - middle, axis=1) <= reach)
+        & (np.linalg.norm(points - frame.middle, axis=1) <= frame.ball)
+        & frame.holds(points)
     )
-    least, least_any = np.full((len(points), SLOTS), NO), np.full(len(points), NO)
-    limit_margin = np.zeros((len(points), SLOTS))
-    rotations = tool_rotations(cone_directions(task.axis, task.half_angle), roll)
-    least[asked], least_any[asked], limit_margin[asked] = serve(robot, points[asked], rotations, roll, free)
-    return Field(
-        start, spacing, least.reshape(*shape, SLOTS), least_any.reshape(shape), limit_margin.reshape(*shape, SLOTS)
-    )
+    return start, spacing, shape, points, asked
 
 
 def serve(
@@ -153,31 +199,32 @@ def serve(
 
     Parameters
     ----------
-    points : (n, 3), m; rotations : (k, rolls, 3, 3), see ``directions.tool_rotations``
+    points : (n, 3), m; rotations : (k, rolls, 3, 3), or (1 or n, k, rolls, 3, 3) if they differ between points
     free : which arms count; all, unless told otherwise
 
     Returns
     -------
-    least, least_any, limit_margin : (n, 8), (n,), (n, 8), as in :class:`Field`
+    least, least_any, limit_margin : (n, slots), (n,), (n, slots), as in :class:`Field`
     """
-    asked = left_to_roll(robot, roll)
-    limited = np.flatnonzero(asked.upper - asked.lower < FULL_TURN)
-    least, least_any = np.full((len(points), SLOTS), np.inf), np.full(len(points), np.inf)
-    limit_margin = np.full((len(points), SLOTS), np.inf)
+    asked, slots = left_to_roll(robot, roll), slot_count(robot)
+    limited = np.flatnonzero(limited_joints(asked))
+    least, least_any = np.full((len(points), slots), np.inf), np.full(len(points), np.inf)
+    limit_margin = np.full((len(points), slots), np.inf)
     alive = np.arange(len(points))
-    for direction in rotations:
+    for direction in _by_direction(rotations):
         if not alive.size:
             break
-        for part in np.array_split(alive, max(1, len(alive) * len(direction) // _POSES)):
-            q_all, within = all_solutions(asked, poses(points[part][:, None], direction).reshape(-1, 4, 4))
-            value = np.where(within, manipulability_of(robot, q_all, within), NO).reshape(len(part), -1, SLOTS)
+        for part in np.array_split(alive, max(1, len(alive) * direction.shape[1] // _POSES)):
+            tried = direction if len(direction) == 1 else direction[part]
+            q_all, within = all_solutions(asked, poses(points[part][:, None], tried).reshape(-1, 4, 4))
+            value = np.where(within, manipulability_of(robot, q_all, within), NO).reshape(len(part), -1, slots)
             q = q_all[..., limited]
             inside = np.minimum(q - asked.lower[limited], asked.upper[limited] - q).min(axis=-1, initial=np.inf)
             rolled = _best_roll(value, q_all.reshape(*value.shape, -1), free, (least[part] <= NO, least_any[part]))[
                 :, None
             ]
             value = np.take_along_axis(value, rolled, axis=1)[:, 0]
-            inside = np.take_along_axis(inside.reshape(len(part), -1, SLOTS), rolled, axis=1)[:, 0]
+            inside = np.take_along_axis(inside.reshape(len(part), -1, slots), rolled, axis=1)[:, 0]
             least[part] = np.minimum(least[part], value)
             least_any[part] = np.minimum(least_any[part], value.max(axis=1))
             limit_margin[part] = np.fmin(limit_margin[part], inside)
@@ -185,11 +232,18 @@ def serve(
     return least, least_any, np.where(least > NO, limit_margin, 0.0)
 
 
-def _best_roll(value: Reals, q: Reals, free: Free | None, before: tuple[Flags, Reals]) -> Integers:
-    """Which roll serves best among those whose arm counts, (n, 8); ``value`` (n, rolls, 8) of others becomes NO.
+def _by_direction(rotations: Reals) -> Reals:
+    """Rotations (k, 1 or n, rolls, 3, 3) of :func:`serve`, one direction after another."""
+    return rotations[:, None] if rotations.ndim == 4 else np.moveaxis(rotations, 1, 0)
 
-    ``before`` (n, 8), (n,): branches that fail in a direction looked at before, and what some branch has served with in
-    all of these. A branch that failed is asked only where it can raise what some branch serves with, else it is NO.
+
+def _best_roll(value: Reals, q: Reals, free: Free | None, before: tuple[Flags, Reals]) -> Integers:
+    """Which roll serves best among those whose arm counts, (n, slots); ``value`` (n, rolls, slots) of others becomes
+    NO.
+
+    ``before`` (n, slots), (n,): branches that fail in a direction looked at before, and what some branch has served
+    with in all of these. A branch that failed is asked only where it can raise what some branch serves with, else it is
+    NO.
     """
     best: Integers = value.argmax(axis=1)
     if free is None:
@@ -229,15 +283,15 @@ def serving_arms(robot: Robot, points: Reals, rotations: Reals, roll: Roll, slot
 
     Parameters
     ----------
-    points : (n, 3), m; rotations : (k, rolls, 3, 3), see ``directions.tool_rotations``
+    points : (n, 3), m; rotations : as :func:`serve` takes them
     free : which arms count; where none does, there is no arm
     """
-    asked, rows = left_to_roll(robot, roll), np.arange(len(points))
-    first = np.zeros((len(points), SLOTS), bool), np.full(len(points), np.inf)
+    asked, rows, slots = left_to_roll(robot, roll), np.arange(len(points)), slot_count(robot)
+    first = np.zeros((len(points), slots), bool), np.full(len(points), np.inf)
     arms = []
-    for direction in rotations:
+    for direction in _by_direction(rotations):
         q, within = all_solutions(asked, poses(points[:, None], direction).reshape(-1, 4, 4))
-        value = np.where(within, manipulability_of(robot, q, within), NO).reshape(len(points), -1, SLOTS)
+        value = np.where(within, manipulability_of(robot, q, within), NO).reshape(len(points), -1, slots)
         q = q.reshape(*value.shape, -1)
         best = _best_roll(value, q, free, first)
         offered = np.take_along_axis(value, best[:, None], axis=1)[:, 0]
@@ -271,8 +325,9 @@ def _places(field: Field, bricks: Flags, box: Reals, turned: bool) -> Places:
     any_branch = _sliding_least(field.least_any, points)
     where = np.nonzero(any_branch > NO)
     used = np.flatnonzero((field.least > NO).any(axis=(0, 1, 2)))
-    by_slot = np.full((len(where[0]), SLOTS), NO)
-    limit_margin = np.zeros((len(where[0]), SLOTS))
+    slots = field.least.shape[-1]
+    by_slot = np.full((len(where[0]), slots), NO)
+    limit_margin = np.zeros((len(where[0]), slots))
     for slot in used:
         by_slot[:, slot] = _sliding_least(field.least[..., slot], points)[where]
         limit_margin[:, slot] = _sliding_least(field.limit_margin[..., slot], points)[where]

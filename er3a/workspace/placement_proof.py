@@ -13,14 +13,15 @@ import numpy as np
 
 from er3a.kinematics.block_constants import BlockConstants
 from er3a.kinematics.closed_form import SLOTS
-from er3a.kinematics.wrist_partitioned import closed_form_missing, constants_for_blocks
+from er3a.kinematics.wrist_partitioned import constants_for_blocks
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
+from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.directions import Roll, across, left_to_roll, point_tool
 from er3a.workspace.interval_inverse import GOOD, NEVER, States, branches, holds, misses, theta_ranges
-from er3a.workspace.placement import MIXED, NO, Field, Free, Places, Task, fitting_places, narrowed, survey
-from er3a.workspace.tool_inverse import frame_about_axis_1
+from er3a.workspace.placement import MIXED, NO, Field, Free, InCone, Places, Task, fitting_places, narrowed, survey
+from er3a.workspace.tool_inverse import proofs_hold
 
 Answer = Literal["proven", "refuted", "undecided"]
 PROVEN: Answer = "proven"
@@ -71,7 +72,15 @@ class BoxPlacement:
 
 
 def find_places(
-    robot: Robot, task: Task, roll: Roll, grid: float, count: int, most_poses: int, *, free: Free | None = None
+    robot: Robot,
+    task: Task,
+    roll: Roll,
+    grid: float,
+    count: int,
+    most_poses: int,
+    *,
+    free: Free | None = None,
+    in_cone: InCone | None = None,
 ) -> BoxPlacement:
     """Survey where the box can stand and put the best places to the proof.
 
@@ -80,11 +89,12 @@ def find_places(
     robot : with its own limits; grid : m, about the lattice's spacing
     count : how many places to choose; most_poses : how many neighbourhoods of poses their proofs may look at
     free : which arms count at the lattice's points; the proofs, of reach alone, look at none
+    in_cone : what is asked at points; directions with this roll, unless told otherwise
 
     Nothing is proven of arms without a spherical wrist.
     """
     robot = narrowed(robot, task.margin)
-    field = survey(robot, task, roll, grid, free)
+    field = survey(robot, task, roll, grid, free, in_cone=in_cone)
     places = fitting_places(field, proven_bricks(robot, task, field, roll), task.box)
     chosen = choose_places(robot, task, places, roll, count, most_poses)
     proven = places.proven.copy()
@@ -112,7 +122,7 @@ def choose_places(robot: Robot, task: Task, places: Places, roll: Roll, count: i
     free = np.ones(len(places.slot), dtype=bool)
 
     def proved(row: int, slot: int, most: int) -> tuple[Answer, int]:
-        if closed_form_missing(robot):
+        if not proofs_hold(robot):
             return "undecided", 0
         return prove_place(robot, task, places.centre[row], bool(places.turned[row]), slot, roll, most_poses=most)
 
@@ -140,10 +150,10 @@ def choose_places(robot: Robot, task: Task, places: Places, roll: Roll, count: i
 
 def _turned_about_axis_1(robot: Robot, task: Task, centre: Reals, row: int) -> Flags:
     """Which places (n, 3) are that of ``row`` but for a turn about axis 1, where the task looks the same after one."""
-    R, origin = frame_about_axis_1(robot)
-    if abs(task.axis @ R[2]) < 1 - SAME_DIRECTION:
+    frame = cell_frame(robot)
+    if frame.bar or abs(task.axis @ frame.R[2]) < 1 - SAME_DIRECTION:
         return np.zeros(len(centre), dtype=bool)
-    local = (centre - origin) @ R.T
+    local = (centre - frame.origin) @ frame.R.T
     rho = np.hypot(local[:, 0], local[:, 1])
     near = np.abs(rho - rho[row]) < task.box[:2].min() - 1e-9
     same: Flags = near & (np.abs(local[:, 2] - local[row, 2]) < task.box[2] - 1e-9)
@@ -193,7 +203,7 @@ def proven_bricks(robot: Robot, task: Task, field: Field, roll: Roll) -> Flags:
     bricks = np.argwhere(serving)
     good = np.zeros(len(bricks), dtype=bool)
     centres = field.origin + (bricks + 0.5) * field.spacing
-    if not closed_form_missing(robot):
+    if proofs_hold(robot):
         _prove_all(_constants(robot, task, roll), centres, field.spacing / 2, MIXED, _POSES_PER_BRICK, good)
     proven = np.zeros(serving.shape, dtype=bool)
     proven[tuple(bricks.T)] = good

@@ -16,7 +16,7 @@ from er3a.workspace.azimuths import MOST_ARCS, TURN
 from er3a.workspace.cavities import cavities, rim
 from er3a.workspace.general import prove_general
 from er3a.workspace.general_arm import coupled, general_arm
-from er3a.workspace.lookup import EMPTY, SectionMap
+from er3a.workspace.lookup import EMPTY, OUTSIDE, SectionMap
 from er3a.workspace.proof import Proof, in_section, prove, sharpen
 from er3a.workspace.section_arm import SectionArm, section_arm, section_frame
 from er3a.workspace.volume import VolumeEstimate, estimate_volume
@@ -100,6 +100,12 @@ class Proven:
         """How many points (n, 3), m, base frame, lie where nothing is reached; more than none would refute the
         proof."""
         return int((self.section.status(*self.in_section(points)) == EMPTY).sum())
+
+    def nowhere(self, rho: Reals, z: Reals) -> Flags:
+        """Whether nothing is reached at any azimuth (or place along bars) at radii and heights (n,), m, of the
+        section."""
+        cell = self.section.cell_of(rho, z)
+        return np.asarray((cell == OUTSIDE) | (self.proof.empty_ratio[cell] >= 1 - 1e-12))
 
     def cell_states(self) -> list[CellState]:
         """What each cell is; touched: not proven filled, but a joint vector reaches into it."""

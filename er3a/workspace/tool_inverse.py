@@ -1,85 +1,177 @@
-"""All solutions of tool poses for maps of what a tool can do: closed form, three parallel axes, or seven joints with an
-arm angle, which is taken at even values."""
+"""All solutions of tool poses for maps of what a tool can do, of any arm whose inverse is known by its class.
+
+Arms with more than six joints are tried at even values of what a pose leaves open.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from itertools import product
+from typing import Literal
+
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from er3a.kinematics.batch import inverse_batch
-from er3a.kinematics.by_class import arm_solver
-from er3a.kinematics.chain import constant_links
-from er3a.kinematics.closed_form import SLOTS
-from er3a.kinematics.forward import jacobian
-from er3a.kinematics.wrist_partitioned import ClosedFormMissing, CoupledJoints, closed_form_missing
+from er3a.kinematics.by_class import (
+    arm_solver,
+    checked_parameters,
+    class_rows,
+    parameters_of,
+    slots_of_class,
+    task_mask,
+)
+from er3a.kinematics.classes.chain_solvers import ChainSolver, Completed, LockedJoint, Unsolved
+from er3a.kinematics.classes.six_revolute import CERTAIN
+from er3a.kinematics.forward import forward, jacobian
+from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Flags, Reals
+from er3a.robots.derived import derived
 from er3a.robots.robot import Robot
-from er3a.sampling.grid import tool_bound
+from er3a.workspace.cell_frame import CLOSED_FORMS, is_quick, joint_1_alone
 from er3a.workspace.general_arm import coupled
-from er3a.workspace.section_arm import section_arm, section_frame
+from er3a.workspace.orientations import asked_of
 
 ARM_ANGLES = 8
-_QUICK = ("three_parallel", "arm_angle")
+QUICK_S, COMPLETED_S, CERTAIN_S, DOUBT_S, INNER_S = 4e-6, 16e-6, 3e-4, 8e-3, 1e-3
+"""About what a pose takes: of classes in closed form, of fewer joints completed, by elimination where its readings are
+clear and where they leave doubt, and besides where a joint within the arm is held."""
+BESIDE = np.array([1.1e-4, -0.7e-4, 0.9e-4])  # rad, about the tool's axes
+_PROBED = 24
+_TURN = 2 * np.pi
 
 
-def lacking_for_maps(robot: Robot) -> ClosedFormMissing | None:
+@dataclass(frozen=True)
+class InverseUnknown:
+    """No class of arms whose inverse is known fits this one."""
+
+    code: Literal["inverse_unknown"] = "inverse_unknown"
+
+
+@dataclass(frozen=True)
+class JointOneShared:
+    """Joint 1 is coupled with others or limited together with them, so what it carries around is not the same all
+    about."""
+
+    code: Literal["joint_one_shared"] = "joint_one_shared"
+
+
+@dataclass(frozen=True)
+class OrientationsUnknown:
+    """Which orientations the arm's few joints can give its tool at a point is not known."""
+
+    joints: int
+    code: Literal["orientations_unknown"] = "orientations_unknown"
+
+
+MapsMissing = InverseUnknown | JointOneShared | OrientationsUnknown
+
+
+def lacking_for_maps(robot: Robot) -> MapsMissing | None:
     """Why there are no maps of what a robot's tool can do; None if there are."""
-    if coupled(robot):
-        return CoupledJoints()
-    lacks = closed_form_missing(robot)
-    return None if lacks is None or arm_solver(robot).chain.code in _QUICK else lacks
+    if isinstance(arm_solver(robot).chain, Unsolved):
+        return InverseUnknown()
+    if not joint_1_alone(robot):
+        return JointOneShared()
+    return OrientationsUnknown(robot.joints) if asked_of(robot, 1) is None else None
 
 
-def arm_angles(robot: Robot) -> Reals:
-    """The arm angles (k,), rad, that each pose is tried with; one of no meaning for arms without."""
-    redundant = closed_form_missing(robot) and arm_solver(robot).chain.parameters
-    return 2 * np.pi * np.arange(ARM_ANGLES) / ARM_ANGLES if redundant else np.zeros(1)
+def proofs_hold(robot: Robot) -> bool:
+    """Whether the proofs for spherical wrists, which take each joint's range by itself, are of this robot."""
+    return not closed_form_missing(robot) and not coupled(robot)
+
+
+@derived
+def pose_cost(robot: Robot) -> float:
+    """About how long (s, the same on every machine) the solutions of a pose take, at one value of what it leaves
+    open: by the arm's class, and how many random poses of its own leave doubt."""
+    chain: ChainSolver | None = arm_solver(robot).chain
+    cost = COMPLETED_S if isinstance(chain, Completed) else 0.0
+    while isinstance(chain, LockedJoint | Completed):
+        chain = chain.rest
+    if chain is None:
+        return cost + CERTAIN_S + INNER_S
+    if chain.code in CLOSED_FORMS:
+        return cost + QUICK_S
+    random = np.random.default_rng(_PROBED)
+    q = robot.lower + random.random((_PROBED, robot.joints)) * (robot.upper - robot.lower)
+    values = checked_parameters(robot, None, q, _PROBED)
+    doubts = class_rows(robot, forward(robot, q), values).certainty != CERTAIN
+    return float(cost + CERTAIN_S + DOUBT_S * doubts.mean())
+
+
+def slot_count(robot: Robot) -> int:
+    """How many slots each pose has at one value of what it leaves open."""
+    return arm_solver(robot).chain.slots
+
+
+@derived
+def redundancy_values(robot: Robot) -> Reals | None:
+    """What each pose is tried with, (k, p), rad or m: arm angles or values of joints; None for arms of six joints."""
+    parameters = parameters_of(robot)
+    if not parameters:
+        return None
+    count = max(2, round(ARM_ANGLES ** (1 / len(parameters))))
+    each = []
+    for parameter in parameters:
+        j = parameter.joint
+        if j < 0:
+            each.append(_TURN * np.arange(count) / count)
+            continue
+        low, high = robot.lower[j], robot.upper[j]
+        if not robot.slides[j] and (robot.continuous[j] or high - low > _TURN):
+            low, high = (low + high) / 2 - np.pi, (low + high) / 2 + np.pi
+        each.append(low + (high - low) * (np.arange(count) + 0.5) / count)
+    return np.array(list(product(*each)))
+
+
+def tried_values(robot: Robot) -> int:
+    """At how many values of what it leaves open each pose is tried."""
+    values = redundancy_values(robot)
+    return 1 if values is None else len(values)
 
 
 def all_solutions(robot: Robot, T: Reals) -> tuple[Reals, Flags]:
-    """Solutions of poses (N, 4, 4): q (N, k * SLOTS, n), rad, all slots of one arm angle after those of another, and
-    whether each is within the limits."""
-    angles = arm_angles(robot)
-    if len(angles) == 1:
-        found = inverse_batch(robot, T)
+    """Solutions of poses (N, 4, 4): q (N, k * slots, n), rad or m, all slots of one value of what a pose leaves open
+    after those of another, and whether each is within the limits.
+
+    Of arms solved by elimination, a pose that leaves a doubt (where a joint may be free) is asked ``BESIDE`` beside it,
+    once: to look at it alone takes some 20 ms.
+    """
+    values = redundancy_values(robot)
+    each = [_solutions(robot, T, value) for value in ((None,) if values is None else values)]
+    return np.concatenate([q for q, _ in each], axis=1), np.concatenate([inside for _, inside in each], axis=1)
+
+
+def _solutions(robot: Robot, T: Reals, redundancy: Reals | None) -> tuple[Reals, Flags]:
+    if is_quick(robot):
+        found = inverse_batch(robot, T, redundancy=redundancy)
         return found.q, found.within_limits
-    each = [inverse_batch(robot, T, redundancy=angle[None]) for angle in angles]
-    return np.concatenate([part.q for part in each], axis=1), np.concatenate([p.within_limits for p in each], axis=1)
+    reference = np.zeros((1, robot.joints))
+    values = checked_parameters(robot, redundancy, reference, len(T))
+    slots = slots_of_class(robot, T, reference, values, settling=False)
+    left = np.flatnonzero(slots.certainty != CERTAIN)
+    if left.size:
+        beside = T[left].copy()
+        beside[:, :3, :3] = beside[:, :3, :3] @ Rotation.from_rotvec(BESIDE).as_matrix()
+        again = slots_of_class(robot, beside, reference, values[left], settling=False)
+        more = again.inside.sum(axis=1) > slots.inside[left].sum(axis=1)
+        slots.q[left[more]], slots.inside[left[more]] = again.q[more], again.inside[more]
+    return slots.q, slots.inside
 
 
 def generic_manipulability(robot: Robot, q: Reals, wanted: Flags) -> Reals:
-    """Product of the Jacobian's singular values (m^3) at the wanted joint values (..., n), 0 at others."""
-    J = jacobian(robot, q[wanted])
-    found = np.zeros(wanted.shape)
-    if robot.joints == J.shape[-2]:
-        found[wanted] = np.abs(np.linalg.det(J))
-    else:
-        found[wanted] = np.sqrt(np.maximum(0.0, np.linalg.det(J @ J.swapaxes(-1, -2))))
-    return found
+    """Product of the singular values of the Jacobian of what is asked of the tool, at the wanted joint values (..., n),
+    0 at others.
 
-
-def frame_about_axis_1(robot: Robot) -> tuple[Reals, Reals]:
-    """x, y, z about axis 1 in the base frame as rows (3, 3), and origin (3,), m."""
-    if not closed_form_missing(robot):
-        return section_frame(robot)
-    first = constant_links(robot)[0]
-    return first[:3, :3].T, first[:3, 3]
-
-
-def section_bounds(robot: Robot) -> tuple[float, tuple[float, float], float, float]:
-    """What the tool point never leaves: distance from axis 1 and heights along it, and a ball about a point of it.
-
-    Returns
-    -------
-    reach, (low, high) : m; middle, radius : m, height of the ball's centre, and its radius
+    In m^3, less one m for each joint that slides among those that place the tool point.
     """
-    if not closed_form_missing(robot):
-        arm = section_arm(robot)
-        return arm.reach, arm.heights, float(arm.centre[2]), arm.reach
-    bound = tool_bound(robot)
-    low, high = bound.height - bound.radius, bound.height + bound.radius
-    return bound.reach, (low, high), bound.height, bound.reach
-
-
-def slots_apart(values: Reals) -> Reals:
-    """Values (N, rolls * k * SLOTS, ...) as (N, rolls * k, SLOTS, ...)."""
-    return values.reshape(len(values), -1, SLOTS, *values.shape[2:])
+    J, found = jacobian(robot, q[wanted]), np.zeros(wanted.shape)
+    mask = task_mask(robot) > 0
+    if not mask.all() and arm_solver(robot).chain.code != "scara":  # of a SCARA the other rows are 0
+        R = forward(robot, q[wanted])[:, :3, :3]
+        J = np.concatenate([J[:, :3], R.swapaxes(-1, -2) @ J[:, 3:]], axis=1)[:, mask]
+    gram = J @ J.swapaxes(-1, -2) if J.shape[-2] <= J.shape[-1] else J.swapaxes(-1, -2) @ J
+    size = np.abs(np.linalg.det(J)) if J.shape[-2] == J.shape[-1] else np.sqrt(np.maximum(0.0, np.linalg.det(gram)))
+    found[wanted] = size
+    return found

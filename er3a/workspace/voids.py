@@ -11,7 +11,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import Grid
 from er3a.workspace.blocks import Blocks, blocks_of, mesh, pockets
-from er3a.workspace.causes import OnlySampled, Relaxed, Unlimited, VoidCause, cause_of, relaxations
+from er3a.workspace.causes import OneRelaxed, OnlySampled, Unlimited, VoidCause, cause_of, relaxations
 from er3a.workspace.cavities import Cavity, cavities
 from er3a.workspace.hull import Hull, inside_hull
 from er3a.workspace.proven import Proven
@@ -43,7 +43,7 @@ class Void:
     centroid: Reals
     extent: Reals
     cause: VoidCause
-    relaxed: tuple[Relaxed | Unlimited, ...]
+    relaxed: tuple[OneRelaxed | Unlimited, ...]
     holds_shoulder: bool
     vertices: Reals
     triangles: Integers
@@ -95,7 +95,9 @@ def sampled_only(voids: list[SampledVoid], grid: Grid, shoulder: Reals, proven: 
 def _void(
     kind: VoidKind, robot: Robot, proven: Proven, cavity: Cavity, shoulder: Reals, surface: tuple[Blocks, Flags]
 ) -> Void:
-    single, unlimited = relaxations(robot, cavity, None if proven.arm is not None else proven.in_section)
+    single, unlimited = relaxations(
+        robot, cavity, None if proven.arm is not None else (proven.in_section, proven.in_base)
+    )
     low, high = cavity.box()
     corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
     extent = np.ptp(proven.in_base(corners), axis=0)

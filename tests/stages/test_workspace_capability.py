@@ -17,7 +17,6 @@ from er3a.files.yaml_file import load
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
-from er3a.kinematics.wrist_partitioned import NoWristCentre
 from er3a.pipeline.stages.workspace.capability_texts import capability_context
 from er3a.pipeline.stages.workspace.cell_lookup import CellLookup
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings
@@ -27,21 +26,17 @@ from er3a.pipeline.viewing.page import Picture
 from er3a.robots.robot import Robot
 from er3a.workspace.clear_poses import try_poses
 from er3a.workspace.directions import cone_directions, poses, roll_of, tool_rotations
+from er3a.workspace.orientations import asked_of
 from er3a.workspace.placement import narrowed
 from er3a.workspace.section_arm import section_frame
+from er3a.workspace.tool_inverse import InverseUnknown
+from testing.arms import palletiser
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def settings(**changes) -> CapabilitySettings:
     return CapabilitySettings.model_validate({"directions": 40, "proof_poses": 20_000, **changes})
-
-
-def skew_wrist() -> Robot:
-    robot = load_robot("er3_600")
-    a = robot.a.copy()
-    a[4] = 0.04
-    return robot.replace(a=a)
 
 
 @pytest.fixture(scope="module")
@@ -127,7 +122,7 @@ def test_poses_are_tried_where_the_cells_are():
 
     middles, width = np.array([[0.45, 0.3], [0.5, 0.35]]), 2 * np.pi / 64
     azimuth = np.array([0.3, -0.5])
-    found = try_poses(robot, middles, (azimuth, width), 40, free, random)
+    found = try_poses(robot, middles, (azimuth, width), 40, free, random, asked=asked_of(robot, 1))
     R, origin = section_frame(robot)
     local = (forward(robot, np.concatenate(seen))[:, :3, 3] - origin) @ R.T
     rho, turned = np.hypot(local[:, 0], local[:, 1]), np.arctan2(local[:, 1], local[:, 0])
@@ -154,13 +149,13 @@ def test_slices_show_the_cells_they_cut(done):
     assert outside.tolist() == [-1, -1, -1]
 
 
-def test_an_arm_without_closed_form_is_told_so():
-    done = tool_capability(skew_wrist(), settings(), 0.08)
-    assert isinstance(done.capability.lacks, NoWristCentre)
+def test_an_arm_without_a_known_inverse_is_told_so():
+    done = tool_capability(palletiser(), settings(), 0.08)
+    assert isinstance(done.capability.lacks, InverseUnknown)
     assert done.placement is None
     assert len(done.cells) == len(done.places) == 0
-    context = context_of(skew_wrist(), done)
-    assert "axes 4, 5 and 6 miss a common point" in context["missing"]
+    context = context_of(palletiser(), done)
+    assert "no method here finds all inverse solutions" in context["missing"]
     assert not any(isinstance(value, Picture) for value in context.values())
 
 

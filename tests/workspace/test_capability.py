@@ -19,6 +19,7 @@ from er3a.workspace.capability import manipulability, map_capability
 from er3a.workspace.dexterous import dexterous_core
 from er3a.workspace.directions import cone_directions, poses, roll_of, tool_rotations
 from er3a.workspace.interval_inverse import GOOD, NEVER, branches, theta_ranges
+from er3a.workspace.orientations import asked_of
 from er3a.workspace.section_arm import section_arm, section_frame
 from testing.arms import arms, joints_within, placement
 from tests.workspace.shell_arm import NARROW, TOOL_ASIDE, shell_arm
@@ -114,7 +115,7 @@ def test_cells_agree_with_the_inverse_one_pose_at_a_time(robot, rolls, random):
     middles = np.stack([random.uniform(0, arm.reach, 8), random.uniform(*arm.heights, 8)], axis=1)
     middles[0] = [0.35 * arm.reach, arm.centre[2]]
     directions = 12
-    told = map_capability(robot, middles, directions, roll)
+    told = map_capability(robot, middles, directions, asked_of(robot, rolls))
     sectors = told.reachability.shape[1]
     assert sectors == (1 if robot.name == "er3a_c60_article" else 64)
     reached_somewhere = 0
@@ -145,7 +146,7 @@ def test_a_free_roll_reaches_what_some_roll_reaches(random):
     roll = roll_of(robot, 8)
     assert roll.free
     middles = np.array([[0.5, 0.4], [0.85, 0.3]])
-    told = map_capability(robot, middles, 30, roll)
+    told = map_capability(robot, middles, 30, asked_of(robot, 8))
     R, origin = section_frame(robot)
     rolls = roll_of(robot.replace(tool=placement([1e-9, 0, 0], [0, 0, 0])), 72)
     assert not rolls.free
@@ -161,7 +162,7 @@ def test_a_moved_base_changes_no_number():
     moved = robot.replace(base=placement([0.4, -0.2, 0.7], [0.3, 2.3, -1.2]))
     middles = np.array([[0.1, 0.5], [0.3, 0.4], [0.5, 0.6]])
     cells = np.column_stack([middles[:, 0] - 0.02, middles[:, 0] + 0.02, middles[:, 1] - 0.02, middles[:, 1] + 0.02])
-    one, other = (map_capability(arm, middles, 100, roll_of(arm, 1)) for arm in (robot, moved))
+    one, other = (map_capability(arm, middles, 100, asked_of(arm, 1)) for arm in (robot, moved))
     assert one.reachability == pytest.approx(other.reachability)
     assert one.manipulability == pytest.approx(other.manipulability, rel=1e-9)
     one, other = (dexterous_core(arm, cells, 50, roll_of(arm, 1), 5000) for arm in (robot, moved))
@@ -207,4 +208,4 @@ def test_no_random_direction_is_missed_in_the_core_and_the_real_arm_has_none(ran
     core = dexterous_core(robot, cells, 100, roll, 100_000)
     assert core.upper == 0
     middles = np.stack([cells[:, :2].mean(axis=1), cells[:, 2:].mean(axis=1)], axis=1)
-    assert map_capability(robot, middles, 150, roll).reachability.max() < 1
+    assert map_capability(robot, middles, 150, asked_of(robot, 1)).reachability.max() < 1

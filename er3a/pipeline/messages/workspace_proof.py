@@ -5,7 +5,16 @@ from __future__ import annotations
 from er3a.pipeline.messages import kinematics as _kinematics  # noqa: F401 (says what an arm lacks)
 from er3a.pipeline.messages.language import as_text
 from er3a.pipeline.messages.say import joined, say, sentence
-from er3a.workspace.causes import Disappears, Geometry, OnlySampled, Relaxed, SeveralLimits, VoidCause
+from er3a.workspace.causes import (
+    Disappears,
+    Geometry,
+    OneRelaxed,
+    OnlySampled,
+    SeveralLimits,
+    SlideRelaxed,
+    SumRelaxed,
+    VoidCause,
+)
 from er3a.workspace.proven import GeneralMethod, SphericalWrist, ToolNearWrist
 
 
@@ -44,7 +53,7 @@ def is_predicate(cause: VoidCause) -> bool:
     return isinstance(cause, Disappears) or (isinstance(cause, SeveralLimits) and cause.most is not None)
 
 
-def _shrinks(limit: Relaxed) -> str:
+def _shrinks(limit: OneRelaxed) -> str:
     return sentence(
         "void_shrinks",
         "shrinks by {percent:.0f} % if {extended}",
@@ -53,7 +62,18 @@ def _shrinks(limit: Relaxed) -> str:
     )
 
 
-def _extended(limit: Relaxed) -> str:
+def _extended(limit: OneRelaxed) -> str:
+    if isinstance(limit, SlideRelaxed):
+        shown = {"joint": limit.joint, "limit": as_text(limit.extended_mm, "+.4g")}
+        if limit.side == "upper":
+            return sentence("limit_extended", "joint {joint}'s upper limit is extended to {limit} mm", **shown)
+        return sentence("limit_extended", "joint {joint}'s lower limit is extended to {limit} mm", **shown)
+    if isinstance(limit, SumRelaxed):
+        terms = ((f"{factor:+.4g} × J{joint}") for joint, factor in zip(limit.joints, limit.factors))
+        shown = {"sum": " ".join(terms), "limit": as_text(limit.extended_deg, "+.4g")}
+        if limit.side == "upper":
+            return sentence("limit_extended", "the upper limit of {sum} is extended to {limit} deg", **shown)
+        return sentence("limit_extended", "the lower limit of {sum} is extended to {limit} deg", **shown)
     shown = {"joint": limit.joint, "limit": as_text(limit.extended_deg, "+.4g")}
     if limit.side == "upper":
         return sentence("limit_extended", "joint {joint}'s upper limit is extended to {limit} deg", **shown)

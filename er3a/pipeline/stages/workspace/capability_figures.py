@@ -16,6 +16,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.stages.workspace.cell_lookup import CellLookup
 from er3a.pipeline.stages.workspace.model import CapabilitySummary, PlacementSummary, PlaceSummary, SectionFrame
+from er3a.pipeline.stages.workspace.proof_figures import slide_names
 from er3a.pipeline.stages.workspace.workspace_tables import BoxPlaces, CapabilityCells, Singles
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed
@@ -32,48 +33,97 @@ _PLANE = N_("from axis 1, in the arm's zero plane (mm)")
 
 
 def upright_slices(robot: Robot, capability: CapabilitySummary, cells: CapabilityCells) -> Figure:
-    """Three slices through axis 1: reachability, IK solutions, manipulability."""
-    lookup = CellLookup(capability, cells)
-    x, z = lookup.reach * np.linspace(-1, 1, PIXELS), np.linspace(*lookup.heights, PIXELS)
+    """Three slices through axis 1, or across the slide at the middle of its way: reachability, IK solutions,
+    manipulability."""
+    lookup, origin = CellLookup(capability, cells), across_slide(capability)
+    x, z = lookup.reach * np.linspace(0 if lookup.bars else -1, 1, PIXELS), np.linspace(*lookup.heights, PIXELS)
     grid_x, grid_z = np.meshgrid(x, z, indexing="ij")
-    row = lookup.row(np.abs(grid_x), np.where(grid_x < 0, np.pi, 0.0), grid_z)
+    if lookup.bars:
+        row = lookup.row(grid_x, np.full(grid_x.shape, capability.bar_m / 2), grid_z)
+    else:
+        row = lookup.row(np.abs(grid_x), np.where(grid_x < 0, np.pi, 0.0), grid_z)
+    best = capability.overall.best_manipulability_m3
     panels = (
-        (cells.reachability, 100.0, tr("tool directions reached (%)"), (0, 100)),
-        (cells.solutions, 1.0, tr("IK solutions per reached direction"), (0, 8)),
-        (cells.manipulability_m3, 1e3, tr("best manipulability (10⁻³ m³)"), (0, None)),
+        (cells.reachability, 100.0, asked_ratio(capability), (0, 100)),
+        (cells.solutions, 1.0, solutions_label(capability), (0, max(1, capability.overall.most_solutions))),
+        (cells.manipulability_m3, 100 / best, tr("best manipulability (% of the arm's best)"), (0, 100))
+        if capability.sliding
+        else (cells.manipulability_m3, 1e3, tr("best manipulability (10⁻³ m³)"), (0, None)),
     )
-    figure, axes = new_figure(1, 3, width=12.0, height=4.7, sharey=True)
+    flat = float(np.ptp(z) / np.ptp(x))
+    figure, axes = new_figure(1, 3, width=12.0, height=min(5.2, 2.0 + 3.6 * flat), sharey=True)
     for panel, (values, factor, label, limits) in zip(axes, panels):
         shown = _looked_up(values, row) * factor
         mesh = panel.pcolormesh(
-            x * 1000, z * 1000, shown.T, cmap=SHADES, vmin=limits[0], vmax=limits[1], rasterized=True
+            (x + origin[0]) * 1000,
+            (z + origin[1]) * 1000,
+            shown.T,
+            cmap=SHADES,
+            vmin=limits[0],
+            vmax=limits[1],
+            rasterized=True,
         )
         figure.colorbar(mesh, ax=panel, label=label, location="top", shrink=0.9)
-        _draw_arm(panel, robot, capability.frame)
-        up = tr("height along axis 1 (mm)") if panel is axes[0] else ""
-        equal_scale(panel, tr(_PLANE) if panel is axes[1] else "", up)
+        _draw_arm(panel, robot, capability.frame, origin)
+        names = slide_names(capability.frame) if lookup.bars else (tr(_PLANE), tr("height along axis 1 (mm)"))
+        equal_scale(panel, names[0] if panel is axes[1] else "", names[1] if panel is axes[0] else "")
         panel.set_aspect("equal", adjustable="box")
         panel.grid(False)
     return figure
 
 
 def level_slices(capability: CapabilitySummary, cells: CapabilityCells, percent: Reals, label: str) -> Figure:
-    """A percentage of each cell, NaN where unknown, in three slices across axis 1."""
-    lookup = CellLookup(capability, cells)
-    line = lookup.reach * np.linspace(-1, 1, PIXELS)
-    x, y = np.meshgrid(line, line, indexing="ij")
+    """A percentage of each cell, NaN where unknown, in three slices across axis 1, or along the slide."""
+    lookup, origin = CellLookup(capability, cells), across_slide(capability)
+    line = lookup.reach * np.linspace(0 if lookup.bars else -1, 1, PIXELS)
+    along = np.linspace(0, capability.bar_m, PIXELS) if lookup.bars else line
+    x, y = np.meshgrid(line, along, indexing="ij")
     figure, axes = new_figure(1, 3, width=12.0, height=4.1, sharey=True)
-    for panel, height in zip(axes, _quantiles(cells)):
-        row = lookup.row(np.hypot(x, y), np.arctan2(y, x), np.full(x.shape, height))
+    for panel, height in zip(axes, _quantiles(cells, lookup.bars)):
+        rho, place = (x, y) if lookup.bars else (np.hypot(x, y), np.arctan2(y, x))
+        row = lookup.row(rho, place, np.full(x.shape, height))
         values = np.ma.masked_invalid(_looked_up(percent, row))
-        mesh = panel.pcolormesh(line * 1000, line * 1000, values.T, cmap=SHADES, vmin=0, vmax=100, rasterized=True)
-        panel.set_title(tr("{height} mm up axis 1", height=fixed(1000 * height, 0)))
-        across = tr("across it (mm)") if panel is axes[0] else ""
-        equal_scale(panel, tr(_PLANE) if panel is axes[1] else "", across)
+        mesh = panel.pcolormesh(
+            (line + origin[0]) * 1000, along * 1000, values.T, cmap=SHADES, vmin=0, vmax=100, rasterized=True
+        )
+        if lookup.bars:
+            title = tr("at {height} mm across it", height=fixed(1000 * (height + origin[1]), 0))
+            names = slide_names(capability.frame)[0], tr("along the slide (mm)")
+        else:
+            title = tr("{height} mm up axis 1", height=fixed(1000 * height, 0))
+            names = tr(_PLANE), tr("across it (mm)")
+        panel.set_title(title)
+        equal_scale(panel, names[0] if panel is axes[1] else "", names[1] if panel is axes[0] else "")
         panel.set_aspect("equal", adjustable="box")
         panel.grid(False)
     figure.colorbar(mesh, ax=axes, label=label, shrink=0.8)
     return figure
+
+
+def asked_ratio(capability: CapabilitySummary) -> str:
+    """Label of what of the orientations asked is reached."""
+    return {
+        "directions": tr("tool directions reached (%)"),
+        "tilts": tr("tilts of the tool reached (%)"),
+        "turns": tr("turns of the tool reached (%)"),
+        "points": tr("reached (%)"),
+    }[capability.asked]
+
+
+def solutions_label(capability: CapabilitySummary) -> str:
+    """Label of the solutions of what is asked."""
+    return {
+        "directions": tr("IK solutions per reached direction"),
+        "tilts": tr("IK solutions per reached tilt"),
+        "turns": tr("IK solutions per reached turn"),
+        "points": tr("IK solutions per reached point"),
+    }[capability.asked]
+
+
+def across_slide(capability: CapabilitySummary) -> Reals:
+    """Where bars begin in the plane across the slide, counted from the base's origin, (2,), m; 0 for rings."""
+    frame = capability.frame
+    return np.array(frame.axes)[[0, 2]] @ frame.origin_m if capability.bar_m else np.zeros(2)
 
 
 def clear_percent(cells: CapabilityCells) -> Reals:
@@ -94,7 +144,7 @@ def placement_views(
     percent = 100 * places.manipulability_m3 / capability.overall.best_manipulability_m3
     figure, axes = new_figure(1, 2, width=12.0, height=5.6)
     provable = capability.core_m3 is not None
-    top = float(percent.max())
+    top = max(1.0, float(percent.max()))
     for panel, (across, up, title) in zip(axes, (("x", "y", tr("From above")), ("x", "z", tr("From the side")))):
         shown = ["xyz".index(across), "xyz".index(up)]
         steps = [placement.spacing_m[axis] for axis in shown]
@@ -128,15 +178,16 @@ def _looked_up(values: Reals | Singles, row: Integers) -> np.ma.MaskedArray:
     return np.ma.masked_array(values[np.maximum(row, 0)], row < 0)
 
 
-def _quantiles(cells: CapabilityCells) -> Reals:
+def _quantiles(cells: CapabilityCells, bars: bool) -> Reals:
     """Heights below which 25, 50 and 75 % of the reached volume lie."""
     heights, row = np.unique(cells.z_m, return_inverse=True)
-    volume = np.bincount(row, weights=cells.rho_m)
+    volume = np.bincount(row, weights=None if bars else cells.rho_m)
     return np.interp(_HEIGHTS, volume.cumsum() / volume.sum(), heights)
 
 
-def _draw_arm(axes: Axes, robot: Robot, frame: SectionFrame) -> None:
+def _draw_arm(axes: Axes, robot: Robot, frame: SectionFrame, origin: Reals) -> None:
     local = (skeleton(robot, np.zeros(robot.joints)) - frame.origin_m) @ np.array(frame.axes).T * 1000
+    local[:, [0, 2]] += 1000 * origin
     axes.plot(local[:, 0], local[:, 2], color="white", linewidth=3.6, solid_capstyle="round")
     axes.plot(local[:, 0], local[:, 2], color=INK, linewidth=2.0, marker="o", markersize=3, solid_capstyle="round")
 

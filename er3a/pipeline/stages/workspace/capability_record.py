@@ -7,7 +7,12 @@ import rerun as rr
 from matplotlib import colormaps
 
 from er3a.pipeline.stages.workspace.cell_lookup import CellLookup
-from er3a.pipeline.stages.workspace.model import CapabilitySummary, NeedsClosedForm, WorkspaceResults
+from er3a.pipeline.stages.workspace.model import (
+    CapabilityMissing,
+    CapabilitySummary,
+    PlacementSummary,
+    WorkspaceResults,
+)
 from er3a.pipeline.stages.workspace.workspace_tables import CapabilityCells
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, rgb
 
@@ -18,11 +23,12 @@ _NAMES = ("below_25_percent", "25_to_50_percent", "50_to_75_percent", "75_percen
 def log_capability(stream: rr.RecordingStream, results: WorkspaceResults) -> None:
     """Log voxels coloured by reachability, by halves and classes of it, and the best places."""
     capability, placement = results.summary.capability, results.summary.placement
-    if isinstance(capability, NeedsClosedForm) or placement is None:
+    if isinstance(capability, CapabilityMissing):
         return
     if len(results.capability):
         _log_voxels(stream, capability, results.capability)
-    for number, place in enumerate(placement.places, start=1):
+    places = placement.places if isinstance(placement, PlacementSummary) else ()
+    for number, place in enumerate(places, start=1):
         box = rr.Boxes3D(
             centers=[place.centre_m],
             sizes=[place.size_m],
@@ -39,12 +45,13 @@ def _log_voxels(stream: rr.RecordingStream, capability: CapabilitySummary, cells
     count = int(np.ceil(lookup.reach / cell))
     line = (np.arange(-count, count) + 0.5) * cell
     height = np.arange(lookup.heights[0] + cell / 2, lookup.heights[1], cell)
-    x, y, z = (part.ravel() for part in np.meshgrid(line, line, height, indexing="ij"))
-    row = lookup.row(np.hypot(x, y), np.arctan2(y, x), z)
+    along = np.arange(cell / 2, capability.bar_m, cell) if lookup.bars else line
+    x, y, z = (part.ravel() for part in np.meshgrid(line, along, height, indexing="ij"))
+    row = lookup.row(x, y, z) if lookup.bars else lookup.row(np.hypot(x, y), np.arctan2(y, x), z)
     reached = row >= 0
     value, local = cells.reachability[row[reached]], np.stack([x, y, z], axis=1)[reached]
     colours = (colormaps["viridis"](value)[:, :3] * 255).astype(np.uint8)
-    far = (local @ axes)[:, 1] >= 0
+    far = (local @ axes)[:, 1] >= (float(local[:, 1].mean()) if lookup.bars else 0.0)
     level = np.digitize(value, _CLASSES[1:])
     placed = rr.Transform3D(translation=capability.frame.origin_m, mat3x3=axes.T)
     stream.log("workspace/capability", placed, static=True)

@@ -10,18 +10,20 @@ from er3a.collision.scene import Scene
 from er3a.geometry.transforms import rpy_along
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.messages.say import say, word
+from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.messages.workspace import STATUS
 from er3a.pipeline.stages.workspace.capability_figures import (
+    asked_ratio,
     clear_percent,
     level_slices,
     placement_views,
     upright_slices,
 )
 from er3a.pipeline.stages.workspace.model import (
+    CapabilityMissing,
     CapabilitySummary,
     ClearSummary,
-    NeedsClosedForm,
+    Placement,
     PlacementSummary,
     PlaceSummary,
     TaskSummary,
@@ -35,21 +37,33 @@ from er3a.robots.robot import Robot
 def capability_context(robot: Robot, results: WorkspaceResults, scene: Scene | None = None) -> dict[str, Any]:
     """What the template include ``capability.html.j2`` needs."""
     capability, placement = results.summary.capability, results.summary.placement
-    if isinstance(capability, NeedsClosedForm) or placement is None:
+    if isinstance(capability, CapabilityMissing) or placement is None:
         return {"missing": say(capability)}
     return {
         "missing": "",
-        "directions": capability.directions,
+        "asked_text": _asked_text(capability),
         "capability_pictures": _pictures(robot, results, capability) if len(results.capability) else [],
         "core_text": _core_text(capability),
-        "roll_text": _roll_text(capability),
-        "task_text": _task_text(placement.task),
-        "try_text": _try_text(robot, placement.task),
+        "collisions_text": tr("Reachability and dexterous workspace ignore collisions.")
+        if capability.core_m3
+        else tr("Reachability ignores collisions."),
+        "task_text": _task_text(placement.task, capability),
+    } | _placement_context(robot, results, capability, placement, scene)
+
+
+def _placement_context(
+    robot: Robot, results: WorkspaceResults, capability: CapabilitySummary, placement: Placement, scene: Scene | None
+) -> dict[str, Any]:
+    if not isinstance(placement, PlacementSummary):
+        return {"nowhere": say(placement)}
+    rows = [_place_row(n, place, capability) for n, place in enumerate(placement.places, start=1)]
+    return {
+        "nowhere": "",
+        "placing_scene": placement.scene,
+        "try_text": _try_text(robot, placement.task) if capability.asked == "directions" else "",
         "best_text": _best_text(placement),
         "points_serving": placement.points_serving,
-        "place_rows": [
-            _place_row(n, place, capability.arm_angles) for n, place in enumerate(placement.places, start=1)
-        ],
+        "place_rows": rows,
         "place_picture": Picture(
             placement_views(robot, capability, placement, results.places, scene),
             tr("Possible positions of the box centre, from above and from the side, with the best ones"),
@@ -64,7 +78,9 @@ def _pictures(robot: Robot, results: WorkspaceResults, capability: CapabilitySum
     return [
         Picture(
             upright_slices(robot, capability, results.capability),
-            tr("Slices through axis 1: reachability, IK solutions, manipulability"),
+            tr("Slices across the slide of joint 1: reachability, IK solutions, manipulability")
+            if capability.bar_m
+            else tr("Slices through axis 1: reachability, IK solutions, manipulability"),
             _slices_caption(capability),
         ),
         Picture(
@@ -72,15 +88,12 @@ def _pictures(robot: Robot, results: WorkspaceResults, capability: CapabilitySum
                 capability,
                 results.capability,
                 100.0 * results.capability.reachability.astype(float),
-                tr("tool directions reached (%)"),
+                asked_ratio(capability),
             ),
-            tr("Slices across axis 1: reachability"),
-            tr(
-                "Where joint 1 is limited, the sector behind the arm loses directions first: "
-                "put work that needs many tool angles in front."
-            )
-            if capability.sectors > 1
-            else tr("Joint 1 makes a full turn, so what counts is the distance from axis 1 and the height alone."),
+            tr("Slices along the slide of joint 1: reachability")
+            if capability.bar_m
+            else tr("Slices across axis 1: reachability"),
+            _level_caption(capability),
         ),
         Picture(
             level_slices(
@@ -89,7 +102,9 @@ def _pictures(robot: Robot, results: WorkspaceResults, capability: CapabilitySum
                 clear_percent(results.capability),
                 tr("reached poses held without collision (%)"),
             ),
-            tr("Slices across axis 1: reached poses that can be held without collision"),
+            tr("Slices along the slide of joint 1: reached poses that can be held without collision")
+            if capability.bar_m
+            else tr("Slices across axis 1: reached poses that can be held without collision"),
             _clear_caption(capability.clear),
         ),
     ]
@@ -117,28 +132,120 @@ def _clear_caption(clear: ClearSummary) -> str:
     return tr("{first} {rest}", first=what, rest=tried)
 
 
+def _level_caption(capability: CapabilitySummary) -> str:
+    if capability.bar_m:
+        return tr("All along the slide the arm can do the same, as far as its ends let it stand there.")
+    if capability.sectors == 1:
+        return tr("Joint 1 makes a full turn, so what counts is the distance from axis 1 and the height alone.")
+    if capability.asked == "directions":
+        return tr(
+            "Where joint 1 is limited, the sector behind the arm loses directions first: "
+            "put work that needs many tool angles in front."
+        )
+    return tr("Joint 1 is limited: blank sectors are out of its reach.")
+
+
 def _slices_caption(capability: CapabilitySummary) -> str:
     overall = capability.overall
+    numbers = {
+        "mean": number(100 * overall.mean_reachability, 2),
+        "best": number(100 * overall.best_reachability, 3),
+        "solutions": number(overall.mean_solutions, 2),
+        "most": overall.most_solutions,
+    }
+    first = {
+        "directions": tr(
+            "A reached cell offers {mean} % of all tool directions on average, the best one {best} %, each with "
+            "{solutions} IK solutions on average (of {most} at most).",
+            **numbers,
+        ),
+        "tilts": tr(
+            "A reached cell offers {mean} % of all tilts on average, the best one {best} %, each with {solutions} IK "
+            "solutions on average (of {most} at most).",
+            **numbers,
+        ),
+        "turns": tr(
+            "A reached cell offers {mean} % of all turns on average, the best one {best} %, each with {solutions} IK "
+            "solutions on average (of {most} at most).",
+            **numbers,
+        ),
+        "points": tr(
+            "A reached cell has {solutions} IK solutions on average (of {most} at most).",
+            **numbers,
+        ),
+    }[capability.asked]
+    if capability.asked == "points":
+        return first
+    return joined(
+        [
+            first,
+            tr("Plan work where all three are bright; dark rims are reached only with the arm stretched, folded or "
+               "twisted."),
+        ],
+        " ",
+    )  # fmt: skip
+
+
+def _asked_text(capability: CapabilitySummary) -> str:
+    """What was asked of the cells, and how."""
+    count = capability.directions
+    asked = {
+        "directions": tr(
+            "At each cell's middle {directions} tool directions, spread evenly over the sphere, were tried; the ratio "
+            "that is reached is its reachability index (Zacharias, Borst and Hirzinger 2007).",
+            directions=count,
+        ),
+        "tilts": tr(
+            "This arm can't point its tool anywhere: all its tilting joints turn about one direction, so the tool "
+            "stays within a plane that joint 1 turns. At each cell's middle {directions} tilts, spread evenly over the "
+            "full turn in that plane, were tried; reachability is the ratio that is reached.",
+            directions=count,
+        ),
+        "turns": tr(
+            "This arm can't tilt its tool, but turn it about the direction of its axes. At each cell's middle "
+            "{directions} turns, spread evenly, were tried; reachability is the ratio that is reached.",
+            directions=count,
+        ),
+        "points": tr(
+            "This arm has no joints to spare for the tool's orientation, which follows from the position. Each cell's "
+            "middle is asked as a point alone: it is reached or not."
+        ),
+    }[capability.asked]
+    return joined([asked, _roll_text(capability), _effort_text(capability)], " ")
+
+
+def _effort_text(capability: CapabilitySummary) -> str:
+    if not capability.coarse:
+        return ""
     return tr(
-        "A reached cell offers {mean} % of all tool directions on average, the best one {best} %, each with "
-        "{solutions} IK solutions on average (of {most} at most). Plan work where all three are bright; dark rims are "
-        "reached only with the arm stretched, folded or twisted.",
-        mean=number(100 * overall.mean_reachability, 2),
-        best=number(100 * overall.best_reachability, 3),
-        solutions=number(overall.mean_solutions, 2),
-        most=overall.most_solutions,
+        "A pose takes this arm's inverse long, so cells are {cell} mm wide and directions fewer than the study says.",
+        cell=fixed(1000 * capability.cell_m, 0),
     )
 
 
 def _roll_text(capability: CapabilitySummary) -> str:
+    if capability.asked != "directions":
+        return ""
+    rolls = tr("left free") if capability.roll.free else capability.roll.per_direction
+    if capability.held_joints:
+        return tr(
+            "Joints that the pose leaves open ({joints}) were tried at {values} values, and a direction counts if it "
+            "is reached at one of them: more may be reached between them. Solutions are those of one value. Rolls "
+            "about the tool's own axis: {rolls}.",
+            joints=_numbers(capability.held_joints),
+            values=capability.arm_angles,
+            rolls=rolls,
+        )
     if capability.arm_angles > 1:
         return tr(
             "Each pose was tried at {angles} arm angles, and a direction counts if it is reached at one of them: more "
             "may be reached between them. Solutions are those of one arm angle. Rolls about the tool's own axis: "
             "{rolls}.",
             angles=capability.arm_angles,
-            rolls=tr("left free") if capability.roll.free else capability.roll.per_direction,
+            rolls=rolls,
         )
+    if capability.roll.free and not capability.roll.last_joint:
+        return tr("The roll about the tool's own axis is not asked: with five joints the arm can't choose it.")
     if capability.roll.free:
         return tr(
             "The roll about the tool's own axis is left free: it turns joint 6 alone, so it takes no part in whether a "
@@ -154,7 +261,12 @@ def _roll_text(capability: CapabilitySummary) -> str:
 def _core_text(capability: CapabilitySummary) -> str:
     core = capability.core_m3
     if core is None:
-        return tr("The dexterous workspace is bounded for arms with a spherical wrist only.")
+        if capability.asked != "directions":
+            return ""
+        return tr(
+            "The dexterous workspace is bounded only for arms of six revolute joints with a spherical wrist, none of "
+            "them coupled."
+        )
     if core.upper == 0:
         return tr(
             "There is no dexterous workspace: in every part of the workspace some tool direction is proven "
@@ -171,21 +283,52 @@ def _core_text(capability: CapabilitySummary) -> str:
     )
 
 
-def _task_text(task: TaskSummary) -> str:
+def _task_text(task: TaskSummary, capability: CapabilitySummary) -> str:
     box = " × ".join(number(value, 4).rstrip(".") for value in map(_whole, task.box_mm))
     direction = ", ".join(fixed(value, 2).removesuffix(".00") for value in task.tool_direction)
-    return tr(
-        "Task: a box of {box} mm in which the tool reaches every point, with its axis anywhere within {cone} "
-        "deg of ({direction}) and the joints at least {margin} deg from their limits. The box is level, as "
-        "given or rotated by 90 deg, with its underside at {lowest} mm or higher, at least {clear} mm from axis"
-        " 1.",
-        box=box,
-        direction=direction,
-        cone=fixed(task.cone_deg, 1).removesuffix(".0"),
-        margin=fixed(task.limit_margin_deg, 1).removesuffix(".0"),
-        lowest=fixed(task.lowest_mm, 0),
-        clear=fixed(task.clear_of_axis_mm, 0),
-    )
+    shown = {
+        "box": box,
+        "direction": direction,
+        "cone": fixed(task.cone_deg, 1).removesuffix(".0"),
+        "margin": fixed(task.limit_margin_deg, 1).removesuffix(".0"),
+    }
+    served = {
+        "directions": tr(
+            "Task: a box of {box} mm in which the tool reaches every point, with its axis anywhere within {cone} deg "
+            "of ({direction}) and the joints at least {margin} deg from their limits.",
+            **shown,
+        ),
+        "tilts": tr(
+            "Task: a box of {box} mm in which the tool reaches every point at every tilt within {cone} deg of "
+            "({direction}) that the arm's plane allows, with the joints at least {margin} deg from their limits.",
+            **shown,
+        ),
+        "turns": tr(
+            "Task: a box of {box} mm in which the tool reaches every point at some rotation about its axis; the axis "
+            "must lie within {cone} deg of ({direction}), where it always points. Revolute joints stay at least "
+            "{margin} deg from their limits.",
+            **shown,
+        ),
+        "points": tr(
+            "Task: a box of {box} mm in which the tool reaches every point in any orientation. Revolute joints stay at "
+            "least {margin} deg from their limits.",
+            **shown,
+        ),
+    }[capability.asked]
+    lowest, clear = fixed(task.lowest_mm, 0), fixed(task.clear_of_axis_mm, 0)
+    if capability.bar_m:
+        stands = tr(
+            "The box is level, as given or rotated by 90 deg, with its underside at {lowest} mm or higher.",
+            lowest=lowest,
+        )
+    else:
+        stands = tr(
+            "The box is level, as given or rotated by 90 deg, with its underside at {lowest} mm or higher, at least "
+            "{clear} mm from axis 1.",
+            lowest=lowest,
+            clear=clear,
+        )
+    return joined([served, stands], " ")
 
 
 def _try_text(robot: Robot, task: TaskSummary) -> str:
@@ -221,6 +364,10 @@ def _best_text(placement: PlacementSummary) -> str:
     )
 
 
+def _numbers(joints: tuple[int, ...]) -> str:
+    return ", ".join(str(joint) for joint in joints)
+
+
 def _whole(value: float) -> float | int:
     return int(value) if value == int(value) else value
 
@@ -228,8 +375,8 @@ def _whole(value: float) -> float | int:
 def _places_caption(placement: PlacementSummary, provable: bool) -> str:
     if not provable:
         return tr(
-            "{fitting} grid positions pass by samples; proofs exist for arms with a spherical wrist only. Put "
-            "the box centre well inside a bright region.",
+            "{fitting} grid positions pass by samples; proofs exist only for arms of six revolute joints with a "
+            "spherical wrist. Put the box centre well inside a bright region.",
             fitting=number(placement.fitting),
         )
     return tr(
@@ -241,9 +388,12 @@ def _places_caption(placement: PlacementSummary, provable: bool) -> str:
     )
 
 
-def _place_row(row: int, place: PlaceSummary, arm_angles: int) -> list[str]:
-    if place.branch is None:
-        branch = tr("changes within the box") if arm_angles == 1 else tr("at several arm angles")
+def _place_row(row: int, place: PlaceSummary, capability: CapabilitySummary) -> list[str]:
+    if place.branch is None and capability.arm_angles > 1:
+        branch = tr("with joints {joints} at several values", joints=_numbers(capability.held_joints))
+        branch = branch if capability.held_joints else tr("at several arm angles")
+    elif place.branch is None:
+        branch = tr("changes within the box") if capability.named_branches else tr("not told: branches have no names")
     elif place.status == place.branch_status:
         branch = branch_word(place.branch)
     else:

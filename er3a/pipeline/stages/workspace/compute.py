@@ -96,7 +96,7 @@ def compute(study: Study, name: str, parts: Sequence[Path] | None = None) -> Wor
         voids += sampled_only(in_cloud, grid, shoulder, voids)
     scene_file = study.scene(name, "capability")
     scene = load_scene(scene_file) if scene_file else None
-    tool = tool_capability(robot, study.section(CapabilitySettings), grid.cell, scene, study.seed)
+    tool = tool_capability(robot, study.section(CapabilitySettings), grid.cell, scene, study.seed, proven=proven)
     vertices, triangles = table_rows.void_surfaces(voids)
     return WorkspaceResults(
         summary=_summary(study, robot, samples, proven, voids, tool),

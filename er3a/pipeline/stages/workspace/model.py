@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
+from er3a.kinematics.classes.chain_solvers import SlotName
 from er3a.kinematics.configuration import BranchLabel
-from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.workspace.workspace_findings import WorkspaceFinding
 from er3a.pipeline.stages.workspace.workspace_tables import (
@@ -29,11 +29,13 @@ from er3a.pipeline.stages.workspace.workspace_tables import (
 from er3a.sampling.random_joints import Sampling
 from er3a.sampling.reach_search import ReachExtremes
 from er3a.workspace.capability import Overall
-from er3a.workspace.causes import Relaxed, Unlimited, VoidCause
+from er3a.workspace.causes import OneRelaxed, Unlimited, VoidCause
 from er3a.workspace.dexterous import Core
+from er3a.workspace.orientations import AskedKind
 from er3a.workspace.proven import ProofMethod
 from er3a.workspace.sampled_voids import VoidKind
 from er3a.workspace.surface import Surface
+from er3a.workspace.tool_inverse import MapsMissing
 
 Triple = tuple[float, float, float]
 
@@ -148,16 +150,18 @@ class VoidSummary:
     centroid_m: Triple
     extent_m: Triple
     cause: VoidCause
-    relaxed: tuple[Relaxed | Unlimited, ...]
+    relaxed: tuple[OneRelaxed | Unlimited, ...]
     holds_shoulder: bool
 
 
 @dataclass(frozen=True)
 class RollSummary:
-    """The roll about the tool's direction: left to joint 6, or so many tried per direction."""
+    """The roll about the tool's direction: left to the last joint, or so many tried per direction. Without
+    ``last_joint`` a free roll is what the arm can't choose."""
 
     free: bool
     per_direction: int
+    last_joint: bool = True
 
 
 @dataclass(frozen=True)
@@ -180,27 +184,42 @@ class ClearSummary:
 class CapabilitySummary:
     """What the tool can do in the cells of the section, in so many directions and sectors of azimuth.
 
-    ``core_m3`` is None for arms without a spherical wrist; each pose of a redundant arm is tried at ``arm_angles``
-    values of its arm angle (else 1).
+    Attributes
+    ----------
+    asked : what cells are asked for: directions over the sphere, tilts in the plane that the arm's joints keep the tool
+        in, turns about the axes of a SCARA, or points alone; ``directions`` is how many of these
+    bar_m : length of cells along y of ``frame``, where joint 1 slides (``sectors`` are parts of it); 0 for rings
+    core_m3 : None for arms without a spherical wrist
+    arm_angles : at how many values of what a pose leaves open to a redundant arm each is tried (else 1);
+        ``held_joints`` are the joints (from 1) held at these, none where it is an arm angle
+    named_branches : whether its branches have names
+    sliding : whether some joint slides; manipulability then has less than three lengths as factors
+    coarse : whether cells are coarser and directions fewer than the study says, since a pose takes this arm long
     """
 
+    asked: AskedKind
     directions: int
     cell_m: float
+    bar_m: float
     frame: SectionFrame
     sectors: int
     roll: RollSummary
     overall: Overall
     core_m3: Core | None
     arm_angles: int
+    held_joints: tuple[int, ...]
+    named_branches: bool
+    sliding: bool
+    coarse: bool
     clear: ClearSummary
 
 
 @dataclass(frozen=True)
-class NeedsClosedForm:
-    """Capability and placement were not computed: they need a closed-form inverse of joints that turn."""
+class CapabilityMissing:
+    """Capability and placement were not computed, and why."""
 
-    lacks: ClosedFormMissing
-    code: Literal["workspace.needs_closed_form"] = "workspace.needs_closed_form"
+    lacks: MapsMissing
+    code: Literal["workspace.capability_missing"] = "workspace.capability_missing"
 
 
 @dataclass(frozen=True)
@@ -213,6 +232,23 @@ class TaskSummary:
     limit_margin_deg: float
     lowest_mm: float
     clear_of_axis_mm: float
+
+
+@dataclass(frozen=True)
+class ToolPointsElsewhere:
+    """The box is nowhere served: the tool points along ``direction`` and can't tilt, which is not what is asked."""
+
+    task: TaskSummary
+    direction: Triple
+    code: Literal["workspace.tool_points_elsewhere"] = "workspace.tool_points_elsewhere"
+
+
+@dataclass(frozen=True)
+class PlacementTooLong:
+    """Places were not looked for: with what a pose takes this arm, the lattice would have to be wider than the box."""
+
+    task: TaskSummary
+    code: Literal["workspace.placement_too_long"] = "workspace.placement_too_long"
 
 
 @dataclass(frozen=True)
@@ -232,7 +268,7 @@ class PlaceSummary:
     size_m: Triple
     turned: bool
     status: Literal["proven", "sampled"]
-    branch: BranchLabel | None
+    branch: BranchLabel | SlotName | None
     branch_status: Literal["proven", "sampled"]
     manipulability_m3: float
     manipulability_ratio: float
@@ -260,6 +296,9 @@ class PlacementSummary:
     places: tuple[PlaceSummary, ...]
 
 
+Placement = PlacementSummary | ToolPointsElsewhere | PlacementTooLong
+
+
 @dataclass(frozen=True)
 class WorkspaceSummary(Summary):
     """The stage's summary; ``pocket_block_m`` is the edge of the blocks that open pockets were looked for on.
@@ -283,8 +322,8 @@ class WorkspaceSummary(Summary):
     cells: CellCounts
     voids: tuple[VoidSummary, ...]
     pocket_block_m: float
-    capability: CapabilitySummary | NeedsClosedForm
-    placement: PlacementSummary | None
+    capability: CapabilitySummary | CapabilityMissing
+    placement: Placement | None
 
     @property
     def enclosed_voids(self) -> list[VoidSummary]:

@@ -17,7 +17,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.messages.language import N_, as_text, tr
 from er3a.pipeline.messages.say import word
 from er3a.pipeline.messages.workspace import POINTS
-from er3a.pipeline.stages.workspace.model import AxisSummary, Bars, WorkspaceResults
+from er3a.pipeline.stages.workspace.model import AxisSummary, Bars, SectionFrame, WorkspaceResults
 from er3a.pipeline.stages.workspace.section_figures import DENSITY, log_norm, masked
 from er3a.pipeline.stages.workspace.workspace_tables import Border, Drawing, ProofCells, SectionCells
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
@@ -45,7 +45,7 @@ def sections(robot: Robot, results: WorkspaceResults) -> Figure:
     if bars:
         counts = _draw_cloud(left, bars, results.cloud.point_m)
         figure.colorbar(counts, ax=left, label=tr("samples per cm²"), location="top", shrink=0.8)
-        arm, across, up = _across(bars, skeleton(robot, np.zeros(robot.joints))), *_names_across(bars)
+        arm, across, up = _across(bars, skeleton(robot, np.zeros(robot.joints))), *slide_names(bars.frame)
         left.set_title(tr("Samples, all positions along the slide overlaid"))
     else:
         mesh = _draw_density(left, results.summary.section_cell_m, results.section)
@@ -102,9 +102,9 @@ def _origin_across(bars: Bars | None) -> Reals:
     return _across(bars, np.array([bars.frame.origin_m]))[0] if bars else np.zeros(2)
 
 
-def _names_across(bars: Bars) -> tuple[str, str]:
+def slide_names(frame: SectionFrame) -> tuple[str, str]:
     """Labels of the axes across the slide."""
-    x, _, z = (", ".join(fixed(part, 2).removesuffix(".00") for part in axis) for axis in bars.frame.axes)
+    x, _, z = (", ".join(fixed(part, 2).removesuffix(".00") for part in axis) for axis in frame.axes)
     return (
         tr("across the slide, along ({axis}) of the base (mm)", axis=x),
         tr("across the slide, along ({axis}) of the base (mm)", axis=z),
@@ -191,7 +191,7 @@ def slices(results: WorkspaceResults) -> Figure:
             tr("across it (mm)"),
         )
         if bars:
-            first, second = _names_across(bars)[0], tr("along the slide (mm)")
+            first, second = slide_names(bars.frame)[0], tr("along the slide (mm)")
             title = tr("at {height} mm across it", height=fixed(1000 * (height + origin[1]), 0))
         panel.pcolormesh(
             (across + origin[0]) * 1000, along * 1000, shown.T, cmap=shades, vmin=-0.5, vmax=3.5, rasterized=True

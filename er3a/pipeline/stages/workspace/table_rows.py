@@ -127,15 +127,16 @@ def void_surfaces(voids: Sequence[Void]) -> tuple[VoidVertices, VoidTriangles]:
     )
 
 
-def capability(middles: Reals, found: Capability, tried: ClearPoses) -> CapabilityCells:
-    """Reached cells and sectors, in which poses were tried; ``middles`` (n, 2), m, are those of all cells."""
+def capability(middles: Reals, found: Capability, tried: ClearPoses, bars: bool) -> CapabilityCells:
+    """Reached cells and sectors, in which poses were tried; ``middles`` (n, 2), m, are those of all cells, which are
+    bars or rings."""
     cell, sector = np.nonzero(found.reachability)
     return CapabilityCells(
         reached_tries=tried.reached.astype(np.int16),
         clear_tries=tried.clear.astype(np.int16),
         rho_m=middles[cell, 0],
         z_m=middles[cell, 1],
-        azimuth_deg=360.0 * sector / found.reachability.shape[1],
+        azimuth_deg=360.0 * (sector + (0.5 if bars else 0.0)) / found.reachability.shape[1],
         reachability=found.reachability[cell, sector].astype(np.float32),
         solutions=found.solutions[cell, sector].astype(np.float32),
         most_solutions=found.most_solutions[cell, sector].astype(np.int8),

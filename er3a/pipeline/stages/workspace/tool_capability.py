@@ -9,38 +9,42 @@ import numpy as np
 
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
-from er3a.kinematics.closed_form import SLOTS
-from er3a.kinematics.configuration import branch_labels
-from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.kinematics.by_class import parameters_of
+from er3a.kinematics.configuration import slot_labels
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.workspace import table_rows
+from er3a.pipeline.stages.workspace.capability_plan import CapabilityPlan, plan_of
 from er3a.pipeline.stages.workspace.entry import BoxTask, CapabilitySettings
 from er3a.pipeline.stages.workspace.model import (
+    CapabilityMissing,
     CapabilitySummary,
     ClearSummary,
-    NeedsClosedForm,
+    Placement,
     PlacementSummary,
+    PlacementTooLong,
     PlaceSummary,
     RollSummary,
     SectionFrame,
     TaskSummary,
+    ToolPointsElsewhere,
+    Triple,
     triple,
 )
 from er3a.pipeline.stages.workspace.workspace_tables import BoxPlaces, CapabilityCells
 from er3a.robots.robot import Robot
-from er3a.workspace.capability import map_capability, overall, rings
+from er3a.workspace.capability import map_capability, overall
+from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.clear_poses import ClearPoses, try_poses
 from er3a.workspace.dexterous import dexterous_core
-from er3a.workspace.directions import Roll, cone_directions, roll_of, tool_rotations
+from er3a.workspace.directions import cone_directions
+from er3a.workspace.orientations import AskedOrientations, asked_of
 from er3a.workspace.placement import MIXED, NO, Task, box_points, narrowed, serving_arms
 from er3a.workspace.placement_proof import BoxPlacement, find_places
 from er3a.workspace.proof import ring_volumes
-from er3a.workspace.section_arm import section_arm
-from er3a.workspace.tool_inverse import arm_angles, frame_about_axis_1, lacking_for_maps, section_bounds
+from er3a.workspace.proven import Proven
+from er3a.workspace.tool_inverse import OrientationsUnknown, lacking_for_maps, proofs_hold, slot_count, tried_values
 
-MOST_ACROSS, MOST_ACROSS_REDUNDANT = 64, 28
 LISTED = 5
-CELL_TRIES, LEAST_TRIES = 192, 3  # poses tried in a cell, and in each sector of it
 CLEAR_STREAM = 11
 
 
@@ -48,76 +52,104 @@ CLEAR_STREAM = 11
 class ToolCapability:
     """This part's entries of the summary, and its tables."""
 
-    capability: CapabilitySummary | NeedsClosedForm
-    placement: PlacementSummary | None
+    capability: CapabilitySummary | CapabilityMissing
+    placement: Placement | None
     cells: CapabilityCells
     places: BoxPlaces
 
 
 def tool_capability(
-    robot: Robot, settings: CapabilitySettings, cell: float, scene: Scene | None = None, seed: int = 0
+    robot: Robot,
+    settings: CapabilitySettings,
+    cell: float,
+    scene: Scene | None = None,
+    seed: int = 0,
+    *,
+    proven: Proven | None = None,
 ) -> ToolCapability:
     """Work out what the tool can do.
 
     Parameters
     ----------
-    cell : m, edge of the workspace's cells; taken coarser where more than ``MOST_ACROSS`` would span the reach
+    cell : m, edge of the workspace's cells; taken coarser where more would span the reach, or take too long, than
+        :mod:`.capability_plan` allows
     scene : what the arm may not touch where it serves the box, and in clear poses; nor may it touch itself
     seed : of the poses tried
+    proven : what is known of the reach; cells that are proven empty need not be asked
     """
-    if lacks := lacking_for_maps(robot):
-        return ToolCapability(NeedsClosedForm(lacks), None, CapabilityCells.empty(), BoxPlaces.empty())
-    roll, (reach, heights, _, _) = roll_of(robot, settings.rolls), section_bounds(robot)
-    angles, spherical = len(arm_angles(robot)), not closed_form_missing(robot)
-    size = heights[1] - heights[0]
-    if spherical:
-        arm = section_arm(robot)
-        size = 2 * (arm.upper_length + arm.forearm_length + arm.d)
-    cell = max(cell, size / (MOST_ACROSS if angles == 1 else MOST_ACROSS_REDUNDANT))
-    cells = rings(reach, heights, cell)
-    middles = np.stack([cells[:, :2].mean(axis=1), cells[:, 2:].mean(axis=1)], axis=1)
-    found = map_capability(robot, middles, settings.directions, roll)
-    (x, y, z), origin = frame_about_axis_1(robot)
-    random = np.random.default_rng([seed, CLEAR_STREAM])
-    bodies = Bodies(robot, scene)
-    tried = _tried(robot, middles, found.reachability, bodies, random)
-    summary = CapabilitySummary(
-        directions=settings.directions,
-        cell_m=cell,
-        frame=SectionFrame((triple(x), triple(y), triple(z)), triple(origin)),
-        sectors=found.reachability.shape[1],
-        roll=RollSummary(roll.free, len(roll.angles)),
-        overall=overall(found, cells),
-        core_m3=dexterous_core(robot, cells, settings.directions, roll, settings.proof_poses) if spherical else None,
-        arm_angles=angles,
-        clear=_clear_summary(cells, found.reachability, tried, scene),
-    )
+    asked, lacks = asked_of(robot, settings.rolls), lacking_for_maps(robot)
+    if lacks or asked is None:
+        missing = CapabilityMissing(lacks) if lacks else CapabilityMissing(OrientationsUnknown(robot.joints))
+        return ToolCapability(missing, None, CapabilityCells.empty(), BoxPlaces.empty())
     task = _task(settings.placement)
-    within = Bodies(narrowed(robot, task.margin), scene)
-    placement = find_places(robot, task, roll, cell, LISTED, settings.proof_poses, free=within.free)
-    placed = _placement_summary(robot, settings.placement, task, placement, float(found.manipulability.max()), scene)
-    clearances = _clearances(bodies, within, task, roll, placement)
-    return ToolCapability(
-        summary,
-        replace(placed, places=tuple(replace(p, clearance_mm=mm) for p, mm in zip(placed.places, clearances))),
-        table_rows.capability(middles, found, tried),
-        table_rows.places(placement.best_turns),
+    plan = plan_of(robot, settings, asked, cell, task, proven)
+    asked, task, frame, cells = plan.asked, replace(task, step=plan.step), cell_frame(robot), plan.cells
+    middles = np.stack([cells[:, :2].mean(axis=1), cells[:, 2:].mean(axis=1)], axis=1)
+    found = map_capability(robot, middles, plan.count, asked)
+    bodies, random = Bodies(robot, scene), np.random.default_rng([seed, CLEAR_STREAM])
+    tried = _tried(robot, plan, middles, found.reachability, bodies, random)
+    core = None
+    if proofs_hold(robot):
+        core = dexterous_core(robot, cells, plan.count, asked.roll, settings.proof_poses)
+    summary = CapabilitySummary(
+        asked=asked.kind,
+        directions=plan.count,
+        cell_m=plan.cell,
+        bar_m=frame.bar,
+        frame=SectionFrame(_rows(frame.R), triple(frame.origin)),
+        sectors=frame.sectors,
+        roll=RollSummary(asked.roll.free, len(asked.roll.angles), asked.roll.last_joint),
+        overall=overall(found, cells, frame.bar),
+        core_m3=core,
+        arm_angles=tried_values(robot),
+        held_joints=tuple(parameter.joint + 1 for parameter in parameters_of(robot) if parameter.joint >= 0),
+        named_branches=bool(slot_labels(robot)),
+        sliding=bool(robot.sliding.any()),
+        coarse=plan.coarse,
+        clear=_clear_summary(cells, frame.bar, found.reachability, tried, scene),
     )
+    placement, places = _placed(robot, settings, task, plan, scene, float(found.manipulability.max()))
+    return ToolCapability(summary, placement, table_rows.capability(middles, found, tried, frame.bar > 0), places)
+
+
+def _rows(R: Reals) -> tuple[Triple, Triple, Triple]:
+    x, y, z = (triple(row) for row in R)
+    return x, y, z
+
+
+def _placed(
+    robot: Robot, settings: CapabilitySettings, task: Task, plan: CapabilityPlan, scene: Scene | None, best: float
+) -> tuple[Placement, BoxPlaces]:
+    """Where the box can stand; ``best`` is the arm's greatest manipulability, m^3."""
+    asked = plan.asked
+    if not asked.in_cone(np.zeros((1, 3)), task.axis, task.half_angle, task.step).shape[1]:
+        return ToolPointsElsewhere(_task_summary(settings.placement), triple(asked.tool[:, 2])), BoxPlaces.empty()
+    if plan.lattice is None:
+        return PlacementTooLong(_task_summary(settings.placement)), BoxPlaces.empty()
+    bodies, within = Bodies(robot, scene), Bodies(narrowed(robot, task.margin), scene)
+    placement = find_places(
+        robot, task, asked.roll, plan.lattice, LISTED, settings.proof_poses, free=within.free, in_cone=asked.in_cone
+    )
+    placed = _placement_summary(robot, settings.placement, task, placement, best, scene)
+    clearances = _clearances(bodies, within, task, asked, placement)
+    with_clearance = tuple(replace(p, clearance_mm=mm) for p, mm in zip(placed.places, clearances))
+    return replace(placed, places=with_clearance), table_rows.places(placement.best_turns)
 
 
 def _tried(
-    robot: Robot, middles: Reals, reachability: Reals, bodies: Bodies, random: np.random.Generator
+    robot: Robot, plan: CapabilityPlan, middles: Reals, reachability: Reals, bodies: Bodies, random: np.random.Generator
 ) -> ClearPoses:
-    cell, sector = np.nonzero(reachability)
-    width = 2 * np.pi / reachability.shape[1]
-    tries = max(LEAST_TRIES, CELL_TRIES // reachability.shape[1])
-    return try_poses(robot, middles[cell], (width * sector, width), tries, bodies.free, random)
+    (cell, sector), frame = np.nonzero(reachability), cell_frame(robot)
+    places, tries = (frame.place_of(sector), frame.width), plan.tries_of(len(cell), frame.sectors)
+    return try_poses(robot, middles[cell], places, tries, bodies.free, random, asked=plan.asked)
 
 
-def _clear_summary(cells: Reals, reachability: Reals, tried: ClearPoses, scene: Scene | None) -> ClearSummary:
+def _clear_summary(
+    cells: Reals, bar: float, reachability: Reals, tried: ClearPoses, scene: Scene | None
+) -> ClearSummary:
     """Cells weigh by their volume and reachability, since each was tried equally often."""
     cell, _ = np.nonzero(reachability)
-    volume = ring_volumes(cells)[cell]
+    volume = ring_volumes(cells, bar)[cell]
     reached = float(volume @ tried.reached)
     return ClearSummary(
         scene=scene.title if scene else None,
@@ -140,6 +172,17 @@ def _task(asked: BoxTask) -> Task:
     )
 
 
+def _task_summary(asked: BoxTask) -> TaskSummary:
+    return TaskSummary(
+        triple(asked.box_mm),
+        triple(asked.tool_direction),
+        asked.cone_deg,
+        asked.limit_margin_deg,
+        asked.lowest_mm,
+        asked.clear_of_axis_mm,
+    )
+
+
 def _placement_summary(
     robot: Robot, asked: BoxTask, task: Task, placement: BoxPlacement, best: float, scene: Scene | None
 ) -> PlacementSummary:
@@ -147,16 +190,9 @@ def _placement_summary(
     places = placement.places
     return PlacementSummary(
         scene=scene.title if scene else None,
-        task=TaskSummary(
-            triple(asked.box_mm),
-            triple(asked.tool_direction),
-            asked.cone_deg,
-            asked.limit_margin_deg,
-            asked.lowest_mm,
-            asked.clear_of_axis_mm,
-        ),
+        task=_task_summary(asked),
         spacing_m=triple(placement.field.spacing),
-        directions=len(cone_directions(task.axis, task.half_angle)),
+        directions=len(cone_directions(task.axis, task.half_angle, task.step)),
         points_serving=int((placement.field.least_any > NO).sum()),
         fitting=len(places.slot),
         fitting_with_one_branch=int((places.slot != MIXED).sum()),
@@ -169,7 +205,8 @@ def _placement_summary(
 
 def _listed(robot: Robot, task: Task, placement: BoxPlacement, best: float) -> list[PlaceSummary]:
     places, chosen = placement.places, placement.chosen
-    labels = branch_labels(robot) if len(arm_angles(robot)) == 1 else (None,) * SLOTS
+    named = slot_labels(robot) if tried_values(robot) == 1 else ()
+    labels = named or (None,) * slot_count(robot)
     return [
         PlaceSummary(
             centre_m=triple(places.centre[row]),
@@ -188,19 +225,21 @@ def _listed(robot: Robot, task: Task, placement: BoxPlacement, best: float) -> l
     ]
 
 
-def _clearances(bodies: Bodies, within: Bodies, task: Task, roll: Roll, placement: BoxPlacement) -> list[float | None]:
+def _clearances(
+    bodies: Bodies, within: Bodies, task: Task, asked: AskedOrientations, placement: BoxPlacement
+) -> list[float | None]:
     """The least clearance (mm) at each chosen place, over its lattice points and directions.
 
     Parameters
     ----------
     within : of the robot with the limits that the places were found with
     """
-    rotations = tool_rotations(cone_directions(task.axis, task.half_angle), roll)
     found: list[float | None] = []
     for row, slot in zip(placement.chosen.row, placement.chosen.slot):
         box = task.box[[1, 0, 2]] if placement.places.turned[row] else task.box
         points = box_points(placement.field, box, placement.places.centre[row])
-        least, _ = bodies.least(serving_arms(within.robot, points, rotations, roll, slot, within.free))
+        rotations = asked.in_cone(points, task.axis, task.half_angle, task.step)
+        least, _ = bodies.least(serving_arms(within.robot, points, rotations, asked.roll, slot, within.free))
         nearest = float(least.min(initial=np.inf))
         found.append(1000 * nearest if np.isfinite(nearest) else None)
     return found

@@ -139,15 +139,22 @@ class VoidTriangles(Table):
 
 @dataclass(frozen=True, eq=False)
 class CapabilityCells(Table):
-    """Reached cells of the section, by sector of azimuth."""
+    """Reached cells of the section, by sector of azimuth; or bars along a first joint that slides (``bar_m`` of the
+    summary), of which rho is x, and 360 deg are their length."""
 
     rho_m: Reals = column("distance of the cell's middle from axis 1", "m")
     z_m: Reals = column("height of the cell's middle along axis 1", "m")
     azimuth_deg: Reals = column("the sector's middle; 0 for all azimuths if there is one sector", "deg")
-    reachability: Singles = column("ratio of the tool directions that are reached", dtype=np.float32)
+    reachability: Singles = column(
+        "ratio of the tool directions (tilts, turns; ``asked`` of the summary) that are reached", dtype=np.float32
+    )
     solutions: Singles = column("mean number of solutions per reached direction", dtype=np.float32)
     most_solutions: NDArray[np.int8] = column("most solutions that any direction has", dtype=np.int8)
-    manipulability_m3: Singles = column("greatest |det J| of any reached pose", "m^3", dtype=np.float32)
+    manipulability_m3: Singles = column(
+        "greatest |det J| of any reached pose; of arms with joints that slide less one m for each that places the tool",
+        "m^3",
+        dtype=np.float32,
+    )
     reached_tries: NDArray[np.int16] = column("of the random poses tried there, those that are reached", dtype=np.int16)
     clear_tries: NDArray[np.int16] = column(
         "of these, those that an arm holds that touches neither the scene nor itself", dtype=np.int16

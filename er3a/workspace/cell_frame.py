@@ -1,0 +1,145 @@
+"""The frame that cells are told in: rings about axis 1, or bars along a first joint that slides, in parts along it.
+
+Joint 1 alone carries the tool around (or along), so what a tool can do at one place of a ring or bar it can do at the
+others with joint 1 moved on, as far as its limits go.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from er3a.kinematics.by_class import arm_solver
+from er3a.kinematics.classes.chain_solvers import ArmClassCode, ChainSolver, Completed, LockedJoint
+from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.robots.derived import derived
+from er3a.robots.joint_limits import LIMIT_TOLERANCE
+from er3a.robots.robot import Robot
+from er3a.sampling.grid import tool_bound
+from er3a.workspace.general_arm import general_arm
+from er3a.workspace.section_arm import FULL_TURN, section_arm, section_frame
+
+SECTORS = 64
+"""Sectors of azimuth with a limited joint 1, the first about azimuth 0, or parts of bars; one bit each in a proof's
+masks."""
+_FEW_SECTORS = 16
+"""The same of arms whose inverse takes long."""
+_TURN = 2 * np.pi
+CLOSED_FORMS: tuple[ArmClassCode, ...] = ("spherical_wrist", "three_parallel", "arm_angle", "gantry", "scara")
+
+
+@dataclass(frozen=True, eq=False)
+class CellFrame:
+    """Where cells lie.
+
+    Attributes
+    ----------
+    R, origin : x, y, z of the frame in the base frame as rows (3, 3), and its origin (3,), m; z along axis 1, or y
+        along the slide of joint 1
+    reach, heights : m, the tool point is never further from axis 1 (or x of bars, from 0 on), nor outside these heights
+    bar : m, length of bars along y from 0 on; 0 for rings
+    sectors : sectors of azimuth of rings (1 if joint 1 makes a full turn), or parts of bars
+    middle, ball : (3,) in the base frame and m, a ball that the tool point never leaves
+    """
+
+    R: Reals
+    origin: Reals
+    reach: float
+    heights: tuple[float, float]
+    bar: float
+    sectors: int
+    middle: Reals
+    ball: float
+
+    @property
+    def width(self) -> float:
+        """Of a sector, rad, or of a part of a bar, m."""
+        return (self.bar or _TURN) / self.sectors
+
+    def place_of(self, sector: Integers) -> Reals:
+        """Middles of sectors: rad, or m along the bar."""
+        return np.asarray(self.width * (sector + (0.5 if self.bar else 0.0)), dtype=float)
+
+    def points(self, rho: Reals, place: Reals, z: Reals) -> Reals:
+        """Points (..., 3), m, in the base frame, at radii (m), places (see :meth:`place_of`) and heights (m)."""
+        x, y = (rho, place) if self.bar else (rho * np.cos(place), rho * np.sin(place))
+        local: Reals = np.stack(np.broadcast_arrays(x, y, z), axis=-1)
+        return local @ self.R + self.origin
+
+    def holds(self, points: Reals) -> Flags:
+        """Whether points (n, 3), m, base frame, lie where cells can be."""
+        x, y, z = ((points - self.origin) @ self.R.T).T
+        inside: Flags = (z >= self.heights[0]) & (z <= self.heights[1])
+        if self.bar:
+            return np.asarray(inside & (x >= 0) & (x <= self.reach) & (y >= 0) & (y <= self.bar))
+        return np.asarray(inside & (np.hypot(x, y) <= self.reach))
+
+    def distance(self, points: Reals) -> Reals:
+        """Distance (n,), m, of points (n, 3) of the base frame from axis 1; endless where it slides."""
+        x, y, _ = ((points - self.origin) @ self.R.T).T
+        return np.full(len(points), np.inf) if self.bar else np.hypot(x, y)
+
+
+@derived
+def cell_frame(robot: Robot) -> CellFrame:
+    """The frame of a robot's cells."""
+    turns = not robot.slides[0] and (robot.continuous[0] or robot.upper[0] - robot.lower[0] >= FULL_TURN)
+    sectors = 1 if turns else SECTORS if is_quick(robot) else _FEW_SECTORS
+    if not closed_form_missing(robot):
+        arm, (R, origin) = section_arm(robot), section_frame(robot)
+        middle = origin + float(arm.centre[2]) * R[2]
+        return CellFrame(R, origin, arm.reach, arm.heights, 0.0, sectors, middle, arm.reach)
+    arm_in_cells, R, origin = general_arm(robot)
+    reach, (low, high) = float(arm_in_cells.radii[0]), arm_in_cells.heights[0].tolist()
+    if bar := arm_in_cells.bar:
+        half = np.array([reach, bar, high - low]) / 2
+        middle = origin + (half + np.array([0.0, 0.0, low])) @ R
+        return CellFrame(R, origin, reach, (low, high), bar, sectors, middle, float(np.linalg.norm(half)))
+    bound = tool_bound(robot)
+    middle = bound.axis_point + bound.height * bound.axis
+    return CellFrame(R, origin, reach, (low, high), 0.0, sectors, middle, bound.reach)
+
+
+def is_quick(robot: Robot) -> bool:
+    """Whether a pose is solved within some microseconds, or else within some tenths of a millisecond."""
+    chain: ChainSolver | None = arm_solver(robot).chain
+    while isinstance(chain, LockedJoint | Completed):
+        chain = chain.rest
+    return chain is not None and chain.code in CLOSED_FORMS
+
+
+def joint_1_alone(robot: Robot) -> bool:
+    """Whether joint 1 moves the first row alone, is the only one that does, and has limits of its own."""
+    uncouple = arm_solver(robot).uncouple
+    shared = any(limit.factors[0] for limit in robot.combined)
+    return not shared and (uncouple is None or not (uncouple[1:, 0].any() or uncouple[0, 1:].any()))
+
+
+@derived
+def without_first_limits(robot: Robot) -> Robot:
+    """The robot with joint 1 free to bring the tool to place 0 from wherever the others leave it."""
+    lower, upper = robot.lower.copy(), robot.upper.copy()
+    if robot.slides[0]:
+        spare = cell_frame(robot).bar - float(upper[0] - lower[0])
+        if _sense(robot) > 0:
+            lower[0], upper[0] = lower[0] - spare, lower[0]
+        else:
+            lower[0], upper[0] = upper[0], upper[0] + spare
+    else:
+        lower[0], upper[0] = -np.pi, np.pi
+    return robot.replace(lower=lower, upper=upper)
+
+
+def places_served(robot: Robot, q_1: Reals) -> tuple[Reals, Reals]:
+    """From which place up to which (rad or m) arms that bring the tool to place 0 with joint 1 at q_1 (...,) serve."""
+    if cell_frame(robot).sectors == 1:
+        return np.zeros(q_1.shape), np.zeros(q_1.shape)
+    low, high = robot.lower[0] - LIMIT_TOLERANCE - q_1, robot.upper[0] + LIMIT_TOLERANCE - q_1
+    return (low, high) if _sense(robot) > 0 else (-high, -low)
+
+
+def _sense(robot: Robot) -> float:
+    sense = robot.direction[0] * (1.0 if robot.coupling is None else robot.coupling[0, 0])
+    return float(np.sign(sense))

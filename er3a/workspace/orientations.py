@@ -1,0 +1,183 @@
+"""Which orientations of its tool are asked of an arm, by what its joints can do.
+
+Arms with six joints and more are asked for *directions* of the tool's z axis all over the sphere, and so are those with
+five that leave the turn about it. Where joints 2 to 4 turn about one direction and no other joint tilts the tool, it
+points within a plane that joint 1 carries around: such an arm is asked for *tilts* in that plane. A SCARA is asked for
+*turns* about its axes, an arm of three joints for *points* alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from er3a.geometry.sphere import fibonacci_sphere
+from er3a.kinematics.by_class import arm_solver
+from er3a.kinematics.chain import axes_at_zero_theta
+from er3a.numerics.arrays import Reals
+from er3a.robots.robot import Robot
+from er3a.workspace.cell_frame import cell_frame
+from er3a.workspace.directions import Roll, cone_directions, roll_of, tool_rotations
+
+AskedKind = Literal["directions", "tilts", "turns", "points"]
+_PARALLEL = 1e-9
+_LEAST_PLANAR = 3
+_TASK_TURNS = 36
+
+
+@dataclass(frozen=True, eq=False)
+class TiltPlane:
+    """The plane that the tool points within, with joint 1 at theta 0, in the base frame.
+
+    Attributes
+    ----------
+    axis, normal, up : (3,), unit vectors: axis 1, what joints 2 to 4 turn about, and axis 1 across it
+    origin : (3,), m, on axis 1; beside : m, how far the tool point is from there along the normal, always
+    tool : (3, 3), orientation of the tool with all joints at 0; tilt : rad, its tilt from ``up`` about the normal
+    """
+
+    axis: Reals
+    normal: Reals
+    up: Reals
+    origin: Reals
+    beside: float
+    tool: Reals
+    tilt: float
+
+    def turns(self, points: Reals) -> Reals:
+        """By how much joint 1 turns the plane to reach points (n, 3), m: (n, 2), rad, NaN where it can't."""
+        away = points - self.origin
+        flat = self.normal - (self.normal @ self.axis) * self.axis
+        a, b = away @ flat, away @ np.cross(self.axis, flat)
+        c = self.beside - (self.normal @ self.axis) * (away @ self.axis)
+        size = np.hypot(a, b)
+        ratio = np.divide(c, size, out=np.full(len(points), 2.0), where=size > 0)
+        aside = np.arccos(np.where(np.abs(ratio) <= 1, ratio, np.nan))
+        return np.asarray(np.arctan2(b, a)[:, None] + np.stack([aside, -aside], axis=1))
+
+    def tilted(self, points: Reals, tilts: Reals) -> Reals:
+        """Orientations (n, asked, 2, 3, 3) at points (n, 3), m, and tilts (1 or n, asked, 2), rad, of the plane's two
+        turns."""
+        return self._rotations(*np.broadcast_arrays(self.turns(points)[:, None], tilts))
+
+    def tilted_within(self, points: Reals, axis: Reals, half_angle: float, step: float) -> Reals:
+        """The same of tilts along which the tool is within ``half_angle`` of an axis, ``step`` (rad) apart."""
+        turns = self.turns(points)
+        frames = Rotation.from_rotvec(np.nan_to_num(turns).reshape(-1, 1) * self.axis).as_matrix()
+        normal, up = frames @ self.normal, frames @ self.up
+        aside = float(self.tool[:, 2] @ self.normal)
+        x, y = up @ axis, np.cross(normal, up) @ axis
+        size = np.hypot(x, y) * np.sqrt(max(0.0, 1 - aside**2))
+        least = np.cos(half_angle) - aside * (normal @ axis)
+        ratio = np.divide(least, size, out=np.where(least > 0, 2.0, -1.0), where=size > 1e-12)
+        width = np.arccos(np.where(ratio <= 1 + 1e-9, np.clip(ratio, -1, 1), np.nan)).reshape(turns.shape)
+        middle = np.arctan2(y, x).reshape(turns.shape)
+        share = np.linspace(-1, 1, 2 * int(np.ceil(half_angle / step - 1e-9)) + 1)[:, None] * [1.0, -1.0]
+        return self.tilted(points, middle[:, None] + width[:, None] * share)
+
+    def _rotations(self, turns: Reals, tilts: Reals) -> Reals:
+        """Orientations (..., 3, 3) of the tool at turns and tilts (rad, of one shape); out of the plane where NaN."""
+        none = np.isnan(turns) | np.isnan(tilts)
+        about_1 = Rotation.from_rotvec(np.where(none, 0.0, turns).reshape(-1, 1) * self.axis).as_matrix()
+        about_2 = Rotation.from_rotvec(np.where(none, 0.0, tilts - self.tilt).reshape(-1, 1) * self.normal).as_matrix()
+        found = (about_1 @ about_2 @ self.tool).reshape(*turns.shape, 3, 3)
+        found[none] = tool_rotations((0.8 * self.normal + 0.6 * self.up)[None], Roll(True, (0.0,), 0.0, 0.0))[0, 0]
+        return np.asarray(found)
+
+
+@dataclass(frozen=True, eq=False)
+class AskedOrientations:
+    """What is asked of a tool: its kind, how the roll is treated, and what turns and tilts are counted from.
+
+    Attributes
+    ----------
+    tool : (3, 3), orientation of the tool with all joints at theta 0; axis : (3,), axis 1, both in the base frame
+    plane : of tilts
+    """
+
+    kind: AskedKind
+    roll: Roll
+    tool: Reals
+    axis: Reals
+    plane: TiltPlane | None = None
+
+    def everywhere(self, points: Reals, count: int) -> Reals:
+        """All that is asked at points (n, 3), m, of place 0: (1 or n, asked, tries, 3, 3)."""
+        if self.kind == "points":
+            return np.eye(3)[None, None, None]
+        if self.kind == "turns":
+            return self._turned(2 * np.pi * np.linspace(0, 1, count, endpoint=False))[None, :, None]
+        if self.plane is not None:
+            tilts = np.arange(count) * (2 * np.pi / count)
+            return self.plane.tilted(points, np.stack([tilts, -tilts], axis=1)[None])
+        return tool_rotations(fibonacci_sphere(count), self.roll)[None]
+
+    def in_cone(self, points: Reals, axis: Reals, half_angle: float, step: float) -> Reals:
+        """What a task asks at points (n, 3), m: (1 or n, asked, tries, 3, 3), none asked if no orientation fits.
+
+        Directions within ``half_angle`` (rad) of ``axis`` (3,) are asked ``step`` (rad) apart; of a SCARA, one of the
+        turns along which its tool points so.
+        """
+        if self.kind == "points":
+            return np.eye(3)[None, None, None]
+        if self.kind == "turns":
+            turned = self._turned(2 * np.pi * np.linspace(0, 1, _TASK_TURNS, endpoint=False))
+            fits = turned[:, :, 2] @ axis >= np.cos(half_angle) - 1e-9
+            return turned[fits][None, None] if fits.any() else np.empty((1, 0, 1, 3, 3))
+        if self.plane is not None:
+            return self.plane.tilted_within(points, axis, half_angle, step)
+        return tool_rotations(cone_directions(axis, half_angle, step), self.roll)[None]
+
+    def at_random(self, points: Reals, random: np.random.Generator) -> Reals:
+        """One of the turns or tilts, or of the plane's two, at each of the points (n, 3), m: (n, 3, 3)."""
+        turns = 2 * np.pi * random.random(len(points))
+        if self.kind == "turns":
+            return self._turned(turns)
+        if self.plane is not None:
+            found = self.plane.tilted(points, np.stack([turns, turns], axis=1)[:, None])[:, 0]
+            return np.asarray(found[np.arange(len(points)), random.integers(2, size=len(points))])
+        return np.broadcast_to(np.eye(3), (len(points), 3, 3))
+
+    def _turned(self, turns: Reals) -> Reals:
+        return np.asarray(Rotation.from_rotvec(turns[:, None] * self.axis).as_matrix() @ self.tool)
+
+
+def asked_of(robot: Robot, rolls: int) -> AskedOrientations | None:
+    """What is asked of a robot's tool, with so many rolls where these matter; None where it is not known what its few
+    joints can do at a point."""
+    axes, _, T = axes_at_zero_theta(robot)
+    code, tool, axis = arm_solver(robot).chain.code, T[:3, :3], axes[0]
+    none = Roll(True, (0.0,), 0.0, 0.0, last_joint=False)
+    if code == "position":
+        return AskedOrientations("points", none, tool, axis)
+    if code == "scara":
+        return AskedOrientations("turns", none, tool, axes[int(np.flatnonzero(~robot.sliding)[0])])
+    if code == "free_roll":
+        return AskedOrientations("directions", none, tool, axis)
+    if code == "planar_wrist":
+        roll = roll_of(robot, rolls)
+        plane = _tilt_plane(robot, robot.joints - int(roll.free))
+        roll = roll if roll.free else none
+        return None if plane is None else AskedOrientations("tilts", roll, tool, axis, plane)
+    return AskedOrientations("directions", roll_of(robot, rolls), tool, axis)
+
+
+def _tilt_plane(robot: Robot, joints: int) -> TiltPlane | None:
+    """The plane of an arm whose first so many joints tilt its tool; None if they do so another way."""
+    axes, _, T = axes_at_zero_theta(robot)
+    behind, sliding = axes[1:joints], robot.sliding[1:joints]
+    if robot.sliding[0] or len(behind) < _LEAST_PLANAR or sliding.all():
+        return None
+    normal = behind[~sliding][0]
+    apart = np.linalg.norm(np.cross(behind[~sliding], normal), axis=1).max()
+    along = np.abs(behind[sliding] @ normal).max(initial=0.0)
+    up = axes[0] - (axes[0] @ normal) * normal
+    if max(apart, along) > _PARALLEL or np.linalg.norm(up) < _PARALLEL:
+        return None
+    up /= np.linalg.norm(up)
+    origin, pointing = cell_frame(robot).origin, T[:3, 2]
+    tilt = float(np.arctan2(np.cross(up, pointing) @ normal, up @ pointing))
+    return TiltPlane(axes[0], normal, up, origin, float((T[:3, 3] - origin) @ normal), T[:3, :3], tilt)
