@@ -148,7 +148,7 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
     found = [to_rows(robot, rows), solver.chain.seeds(T, values)]
     if chain.error(to_rows(robot, q_ref)) < 1e-11:
         found.insert(0, to_rows(robot, q_ref)[None])
-    if certainty == CONTINUUM and solver.chain.code in ("general_six", "six_one_prismatic"):
+    if certainty == CONTINUUM and solver.chain.code in ("general_six", "six_one_prismatic", "six_two_prismatic"):
         found.append(chain.roots(_starts(robot, STARTS)))
     candidates = np.concatenate(found)
     curves: list[TracedCurve] = []

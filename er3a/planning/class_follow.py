@@ -19,6 +19,7 @@ import numpy as np
 
 from er3a.errors import Er3aError, NotWristPartitionedError
 from er3a.kinematics.by_class import arm_solver, class_rows
+from er3a.kinematics.classes.chain_solvers import Unsolved
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import kernel
@@ -61,7 +62,7 @@ def follow_by_class(robot: Robot, path: ToolPath, q_start: Reals | None = None) 
         where no arm follows to the end
     """
     missing, solver = closed_form_missing(robot), arm_solver(robot).chain
-    if (solver.code == "unsolved" or solver.parameters) and missing is not None:
+    if (isinstance(solver, Unsolved) or solver.parameters) and missing is not None:
         raise NotWristPartitionedError(robot.name, missing)
     rows = _rows(robot, path, np.zeros(1))[0]
     starts = nearest_equivalent(robot, rows[np.isfinite(rows[:, 0])], np.zeros(robot.joints))

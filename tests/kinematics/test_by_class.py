@@ -40,6 +40,7 @@ ARMS = {
     "three_parallel": (arm(UR5), 8),
     "general_six": (arm(CRX), 16),
     "six_one_prismatic": (arm(STANFORD, [0, 0, 1, 0, 0, 0]), 16),
+    "six_two_prismatic": (arm(CRX, [0, 1, 0, 1, 0, 0]), 16),
     "spherical_wrist": (arm(PUMA, coupling=COUPLED), 8),
     "arm_angle": (arm(IIWA), 8),
     "redundant": (arm(PANDA), 16),
