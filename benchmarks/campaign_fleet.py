@@ -158,7 +158,7 @@ def _pinocchio(path: Path, found: UrdfImport, q: np.ndarray) -> tuple[np.ndarray
         pin.framesForwardKinematics(model, data, full)
         start, end = data.oMf[base], data.oMf[tip]
         T[n] = (start.inverse() * end).homogeneous
-        whole = pin.computeFrameJacobian(model, data, full, tip, pin.LOCAL_WORLD_ALIGNED)
+        whole = pin.computeFrameJacobian(model, data, full, tip, pin.LOCAL_WORLD_ALIGNED).reshape(6, -1)
         R = start.rotation.T
         J[n] = np.vstack([R @ whole[:3, columns], R @ whole[3:, columns]])
     return T, J

@@ -60,6 +60,7 @@ def random() -> np.random.Generator:
 
 
 ROOT = Path(__file__).resolve().parents[1]
+RUN_PARTS = ("results", "reports", "logs", ".snakemake")  # what a run leaves
 ALL_THERE = "all results, recordings and reports are there"  # the message of rule all, which does nothing
 
 
@@ -132,11 +133,17 @@ def fresh_project(shared_folder: Path, tmp_path_factory: pytest.TempPathFactory)
 
 @pytest.fixture(scope="session")
 def small_study(shared_folder: Path) -> StudyRun:
-    """The small study, run once from nothing with two cores; tests must leave it as they found it."""
-    folder = shared_folder / "small_study"
+    """The small study, run once from nothing with two cores; tests must leave it as they found it.
+
+    A checkout in which it stands finished already can be named by the environment variable SMALL_STUDY.
+    """
+    folder, finished = shared_folder / "small_study", os.environ.get("SMALL_STUDY")
     with once(folder) as wanted:
         if wanted:
-            copy_of_project(shared_folder / "snapshot", folder).make_run("--cores", "2")
+            study = copy_of_project(shared_folder / "snapshot", folder)
+            for part in RUN_PARTS if finished else ():
+                shutil.copytree(Path(finished) / part, folder / part)
+            study.make_run("--cores", "2")
     return StudyRun(folder)
 
 

@@ -1,8 +1,8 @@
-"""Transforms of a table's links and of the whole arm as polynomials in sines and cosines of the table's angles.
+"""Transforms of a table's links and of the whole arm as polynomials: sines, cosines, and the d of joints that slide.
 
 Each entry is a sum of products, so no algebra system is needed. Joints whose axes are parallel turn as one: of
 ``Rz(a) L Rz(b)`` with a link L that does not turn, the rotation is ``Rz(a + b)``, so sums of angles appear where a
-person writes them (c23 for the upper arm and forearm).
+person writes them (c23 for the upper arm and forearm). A joint that slides along their direction leaves them one.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.errors import Er3aError
+from er3a.geometry.transforms import translation
 from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, constant_links, link_parts
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 
 ROUNDING = 1e-12
-Factor = tuple[str, tuple[int, ...]]  # "c" or "s" of the sum of these joints' angles, joints from 1
+Factor = tuple[str, tuple[int, ...]]  # "c" or "s" of the sum of these rows' angles, or "d" of a row; rows from 1
 Product = tuple[Factor, ...]
 Polynomial = dict[Product, float]
 Entries = list[list[Polynomial]]
@@ -26,65 +26,66 @@ Entries = list[list[Polynomial]]
 
 @dataclass(frozen=True)
 class SymbolicTransform:
-    """A transform (4, 4) whose entries are polynomials: coefficient by product of sines and cosines; lengths in m."""
+    """A transform (4, 4) whose entries are polynomials: coefficient by product of factors; lengths in m."""
 
     entries: tuple[tuple[Mapping[Product, float], ...], ...]
 
-    def at(self, theta: Reals) -> Reals:
-        """The transform (4, 4), in m, at angles of the table (n,), in rad."""
-        return np.array([[_value(entry, theta) for entry in row] for row in self.entries])
+    def at(self, moved: Reals) -> Reals:
+        """The transform (4, 4), in m, at what moves of each row (m,): its theta, in rad, or its d, in m."""
+        return np.array([[_value(entry, moved) for entry in row] for row in self.entries])
 
 
 def link_transforms(robot: Robot) -> tuple[SymbolicTransform, ...]:
-    """Each row of the table as a transform: ``Rz Tz Tx Rx`` (standard) or ``Rx Tx Rz Tz`` (modified).
-
-    Raises
-    ------
-    Er3aError
-        for an arm with a joint that slides
-    """
-    _needs_turning(robot)
+    """Each row of the table as a transform: ``Rz Tz Tx Rx`` (standard) or ``Rx Tx Rz Tz`` (modified)."""
     parts, found = link_parts(robot), []
     for k in range(robot.rows):
-        turn, along = _rotation((k + 1,)), _constant(parts[k + 1, ALONG_Z])
+        moved = _product(_motion(robot, k), _constant(_without_d(robot, k) @ parts[k + 1, ALONG_Z]))
         if robot.convention == "standard":
-            row = _product(_product(turn, along), _constant(parts[k + 1, TO_NEXT_AXIS]))
+            row = _product(moved, _constant(parts[k + 1, TO_NEXT_AXIS]))
         else:
-            row = _product(_constant(parts[k, TO_NEXT_AXIS]), _product(turn, along))
+            row = _product(_constant(parts[k, TO_NEXT_AXIS]), moved)
         found.append(_frozen(row))
     return tuple(found)
 
 
 def arm_transform(robot: Robot) -> SymbolicTransform:
-    """From the tool to the base frame, base and tool included.
-
-    Raises
-    ------
-    Er3aError
-        for an arm with a joint that slides
-    """
-    _needs_turning(robot)
+    """From the tool to the base frame, base and tool included."""
     links = constant_links(robot)
-    whole, group = _constant(links[0]), [1]
-    for k in range(1, len(links)):
-        last = k == len(links) - 1
-        if not last and np.abs(links[k][:3, :3] - np.eye(3)).max() < ROUNDING:
-            whole = _product(whole, _shifted(_product(_rotation(tuple(group)), _constant(links[k]))))
-            group.append(k + 1)
+    whole = _constant(links[0])
+    group: tuple[int, ...] = ()  # rows that turn about parallel axes, whose rotation still stands to the right of whole
+    for k in range(robot.rows):
+        if robot.sliding[k]:  # along the group's axes: the order of the two does not matter
+            whole = _product(whole, _motion(robot, k))
         else:
-            whole = _product(_product(whole, _rotation(tuple(group))), _constant(links[k]))
-            group = [k + 1]
+            group += (k + 1,)
+        link = _constant(_without_d(robot, k) @ links[k + 1])
+        last = k == robot.rows - 1
+        if not last and np.abs(links[k + 1][:3, :3] - np.eye(3)).max() < ROUNDING:
+            whole = _product(whole, _shifted(_product(_rotation(group), link)))
+        else:
+            whole = _product(_product(whole, _rotation(group)), link)
+            group = ()
     return _frozen(whole)
 
 
-def _needs_turning(robot: Robot) -> None:
-    if robot.sliding.any():
-        raise Er3aError("symbolic transforms are made of arms whose joints all turn; this one has a joint that slides")
+def _motion(robot: Robot, k: int) -> Entries:
+    if not robot.sliding[k]:
+        return _rotation((k + 1,))
+    entries = _constant(np.eye(4))
+    entries[2][3] = {(("d", (k + 1,)),): 1.0}
+    return entries
+
+
+def _without_d(robot: Robot, k: int) -> Reals:
+    """Takes back the table's d where it is what moves."""
+    return translation(0, 0, -robot.d[k] if robot.sliding[k] else 0.0)
 
 
 def _rotation(joints: tuple[int, ...]) -> Entries:
-    c, s = ("c", joints), ("s", joints)
     entries = _constant(np.eye(4))
+    if not joints:
+        return entries
+    c, s = ("c", joints), ("s", joints)
     entries[0][0], entries[0][1] = {(c,): 1.0}, {(s,): -1.0}
     entries[1][0], entries[1][1] = {(s,): 1.0}, {(c,): 1.0}
     return entries
@@ -117,11 +118,11 @@ def _frozen(entries: Entries) -> SymbolicTransform:
     return SymbolicTransform(tuple(tuple(row) for row in entries))
 
 
-def _value(entry: Mapping[Product, float], theta: Reals) -> float:
+def _value(entry: Mapping[Product, float], moved: Reals) -> float:
     total = 0.0
     for product, coefficient in entry.items():
-        for function, joints in product:
-            angle = sum(theta[k - 1] for k in joints)
-            coefficient *= np.cos(angle) if function == "c" else np.sin(angle)
+        for function, rows in product:
+            value = sum(moved[k - 1] for k in rows)
+            coefficient *= value if function == "d" else np.cos(value) if function == "c" else np.sin(value)
         total += coefficient
     return float(total)

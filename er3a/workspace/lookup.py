@@ -22,23 +22,25 @@ class SectionMap:
     ----------
     proof : the cells
     size : m, edge of the raster; low : (2,), m, its lowest (rho, z)
+    steps : (2,), m, the raster's steps along rho and z: the edge, unless the proof is one ring that is no square
     owner : (n_rho, n_z), number of the cell
     """
 
     def __init__(self, proof: Proof):
         self.proof = proof
         cells = proof.cells
-        self.size = float((cells[:, 1] - cells[:, 0]).min())
+        self.size, height = float((cells[:, 1] - cells[:, 0]).min()), float((cells[:, 3] - cells[:, 2]).min())
+        self.steps = np.array([self.size, self.size if np.isclose(self.size, height) else height])
         self.low = np.array([cells[:, 0].min(), cells[:, 2].min()])
-        low = np.rint((cells[:, [0, 2]] - self.low) / self.size).astype(np.int64)
-        high = np.rint((cells[:, [1, 3]] - self.low) / self.size).astype(np.int64)
+        low = np.rint((cells[:, [0, 2]] - self.low) / self.steps).astype(np.int64)
+        high = np.rint((cells[:, [1, 3]] - self.low) / self.steps).astype(np.int64)
         self.owner = np.full(high.max(axis=0), OUTSIDE, dtype=np.int32)
         for n, ((a, c), (b, d)) in enumerate(zip(low.tolist(), high.tolist())):
             self.owner[a:b, c:d] = n
 
     def cell_of(self, rho: Reals, z: Reals) -> NDArray[np.int32]:
         """Numbers (n,) of the cells that hold points of the section, ``OUTSIDE`` where none does."""
-        index = np.stack([(rho - self.low[0]) // self.size, (z - self.low[1]) // self.size]).astype(np.int64)
+        index = (np.stack([rho - self.low[0], z - self.low[1]]) // self.steps[:, None]).astype(np.int64)
         inside = ((index >= 0) & (index < np.array(self.owner.shape)[:, None])).all(axis=0)
         index = np.where(inside, index, 0)
         return np.where(inside, self.owner[index[0], index[1]], OUTSIDE)

@@ -25,6 +25,7 @@ from er3a.workspace.witness import lies_in_cell, reach_points, witness_joints
 CellState = Literal["filled", "touched", "empty", "undecided", "partly_filled"]
 
 TARGET = 0.002
+BEYOND_ROUNDING = 1 + 1e-9
 LEAST_BOUND_M = 1e-4  # for a tool point that no joint moves
 VOID_RATIO = 0.25
 NEAR_WRIST = 0.07
@@ -131,7 +132,7 @@ def lacking_for_proof(robot: Robot) -> ClosedFormMissing | None:
 def _bounded_by_lengths(robot: Robot, points: int, seed: int, method: GeneralMethod) -> Proven:
     """One ring that the tool point can't leave, of arms whose joint 1 slides or goes with others."""
     bound = tool_bound(robot)
-    reach, radius = max(bound.reach, LEAST_BOUND_M), max(bound.radius, LEAST_BOUND_M)
+    reach, radius = (BEYOND_ROUNDING * max(length, LEAST_BOUND_M) for length in (bound.reach, bound.radius))
     low, high = bound.height - radius, bound.height + radius
     unfilled, empty = np.full((2, 1, MOST_ARCS, 2), np.nan)
     unfilled[0, 0] = 0.0, TURN

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from er3a.errors import Er3aError
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.kinematics.symbolic import arm_transform, link_transforms
@@ -47,8 +46,20 @@ def test_joints_about_parallel_axes_turn_as_one():
     assert {joints for _, joints in factors} == {(1,), (2,), (2, 3), (4,), (5,), (6,)}
 
 
-def test_an_arm_with_a_joint_that_slides_is_refused():
-    robot = load_robot("er3a_c60").replace(sliding=[True, False, False, False, False, False])
-    for transform in (link_transforms, arm_transform):
-        with pytest.raises(Er3aError, match="slides"):
-            transform(robot)
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+def test_joints_that_slide_and_coupled_ones_have_them(convention):
+    rng = np.random.default_rng(11)
+    for _ in range(10):
+        sliding = rng.random(6) < 0.4
+        alpha = rng.choice([0, np.pi / 2, 0.7], 6)  # parallel axes in a row among them
+        coupling = np.eye(6) + np.diag(rng.choice([0, 0.5], 5), -1)
+        robot = make_arm(alpha=alpha, a=rng.uniform(-1, 1, 6), d=rng.uniform(-1, 1, 6), convention=convention).replace(
+            sliding=sliding, direction=rng.choice([-1, 1], 6), coupling=coupling
+        )
+        q = rng.uniform(-1, 1, 6)
+        moved = np.where(sliding, robot.d, robot.offset) + robot.direction * (coupling @ q)
+        np.testing.assert_allclose(arm_transform(robot).at(moved), forward(robot, q), atol=1e-12)
+        product = robot.base
+        for link in link_transforms(robot):
+            product = product @ link.at(moved)
+        np.testing.assert_allclose(product @ robot.tool, forward(robot, q), atol=1e-12)

@@ -10,6 +10,8 @@ import pytest
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.pipeline.stages.validation.symbolic_section import formulas
+from er3a.robots.robot import Robot
+from testing.arms import make_arm
 
 
 @pytest.mark.parametrize("name", ["er3a_c60", "er3a_c60_article", "ur5e"])
@@ -30,6 +32,23 @@ def test_formulas_are_typeset_whole_and_their_numbers_are_those_of_the_zero_pose
     np.testing.assert_allclose(shown, expected.ravel(), atol=6e-3)
 
 
-def test_an_arm_with_a_joint_that_slides_has_none():
-    robot = load_robot("er3a_c60").replace(sliding=[True, False, False, False, False, False])
-    assert formulas(robot) is None
+def text_of(formula):
+    return "".join(ElementTree.fromstring(str(formula)).itertext())
+
+
+def test_what_moves_is_told_by_the_joints_of_the_pendant():
+    coupling = np.eye(6)
+    coupling[2, 1], coupling[4, 3] = 1, -0.5
+    robot = make_arm().replace(coupling=coupling, sliding=[True] + 5 * [False], direction=[1, 1, -1, 1, 1, 1])
+    told = [text_of(each) for each in formulas(robot).moved]
+    assert told == ["d1=q1+300", "θ2=q2", "θ3=−q2−q3", "θ4=q4", "θ5=−0.5q4+q5", "θ6=q6"]
+    assert text_of(formulas(robot).arm[-1][1]).endswith("+d1")  # the tool's height in mm, without a factor
+
+
+def test_formulas_that_nobody_reads_are_not_written():
+    rng = np.random.default_rng(5)
+    values = {key: rng.uniform(-1, 1, 8) for key in ("alpha", "a", "d", "offset")}
+    limits = {"lower": -np.ones(8), "upper": np.ones(8), "direction": np.ones(8)}
+    found = formulas(Robot(name="skew", title="skew", convention="standard", **values, **limits))
+    assert (found.arm, len(found.links)) == ([], 8)
+    assert found.longest > 1000

@@ -182,3 +182,13 @@ def test_no_sample_of_a_random_table_lies_in_an_empty_cell(a, d, alpha, spans, s
     q = np.random.default_rng(2).uniform(robot.lower, robot.upper, (20_000, 6))
     assert not (states(robot, proof, R, origin, forward(robot, q)[:, :3, 3]) == EMPTY).any()
     assert 0 <= proof.bounds[0] <= proof.bounds[1]
+
+
+@pytest.mark.parametrize("height", [0.0, 0.7])
+def test_an_arm_of_one_joint_has_a_ring_that_holds_it(height, random):
+    columns = {"a": [0.4], "alpha": [0.3], "d": [height], "offset": [0.1], "direction": [1]}
+    robot = Robot(name="one", title="one", convention="standard", lower=[-2], upper=[2.5], **columns)
+    proven = prove_robot(robot, 500, 200, 1)
+    q = random.uniform(robot.lower, robot.upper, (1000, 1))
+    assert proven.count_in_empty(forward(robot, q)[:, :3, 3]) == 0
+    assert proven.count_in_empty(np.array([[0, 0, height + 0.5], [1.0, 0, height]])) == 2

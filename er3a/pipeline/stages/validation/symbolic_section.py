@@ -15,6 +15,7 @@ from er3a.robots.robot import Robot
 COLUMNS = "noap"  # of a transform: the frame's x, y and z axis, and its origin
 MM = 1000.0
 DIGITS = 6
+MOST_PRODUCTS = 200  # of one entry: behind that nobody reads it
 
 
 @dataclass(frozen=True)
@@ -23,25 +24,26 @@ class Formulas:
 
     Attributes
     ----------
-    angles : the table's angles by the joints
+    moved : what moves of each row, its theta or its d, by the joints
     links : a matrix in symbols and one in numbers for each link, lengths in mm
-    arm : name, formula and value in the zero pose of each entry of the upper three rows
+    arm : name, formula and value in the zero pose of each entry of the upper three rows; none if one is too long
+    longest : products of the arm's longest entry
     """
 
-    angles: list[Markup]
+    moved: list[Markup]
     links: list[Markup]
     arm: list[tuple[Markup, Markup, str]]
+    longest: int
 
 
-def formulas(robot: Robot) -> Formulas | None:
-    """A robot's transforms, None for an arm with a joint that slides."""
-    if robot.sliding.any() or robot.coupling is not None:
-        return None
-    zero, arm = robot.offset, arm_transform(robot)
+def formulas(robot: Robot) -> Formulas:
+    """A robot's transforms."""
+    zero, arm = np.where(robot.sliding, robot.d, robot.offset), arm_transform(robot)
     values = arm.at(zero)
-    entries = [(r, c) for c in range(4) for r in range(3)]
+    longest = max(len(entry) for row in arm.entries for entry in row)
+    entries = [(r, c) for c in range(4) for r in range(3)] if longest <= MOST_PRODUCTS else []
     return Formulas(
-        angles=[_angle(k, int(robot.direction[k]), float(np.degrees(robot.offset[k]))) for k in range(robot.rows)],
+        moved=[_moved(robot, k) for k in range(robot.rows)],
         links=[_link(k, link, zero) for k, link in enumerate(link_transforms(robot))],
         arm=[
             (
@@ -51,13 +53,29 @@ def formulas(robot: Robot) -> Formulas | None:
             )
             for r, c in entries
         ],
+        longest=longest,
     )
 
 
-def _angle(k: int, direction: int, offset: float) -> Markup:
-    sign = Markup("<mo>−</mo>") if direction < 0 else Markup("")
-    shift = Markup("<mo>{}</mo><mn>{}°</mn>").format("+" if offset > 0 else "−", _plain(abs(offset))) if offset else ""
-    return _math(Markup("{}<mo>=</mo>{}{}{}").format(_sub("θ", k + 1), sign, _sub("q", k + 1), shift))
+def _moved(robot: Robot, k: int) -> Markup:
+    """``θ3 = q2 + q3 + 90°`` or ``d3 = −q3 + 200``: what moves of a row, by the joints."""
+    by_joint = robot.direction[k] * (np.eye(robot.rows) if robot.coupling is None else robot.coupling)[k]
+    terms = Markup("")
+    for n in np.flatnonzero(by_joint):
+        terms += _signed(by_joint[n], _sub("q", int(n) + 1), first=not terms)
+    if robot.sliding[k]:
+        name, shift, unit = "d", float(robot.d[k]) * MM, ""
+    else:
+        name, shift, unit = "θ", float(np.degrees(robot.offset[k])), "°"
+    if shift:
+        terms += Markup("<mo>{}</mo><mn>{}{}</mn>").format("+" if shift > 0 else "−", _plain(abs(shift)), unit)
+    return _math(Markup("{}<mo>=</mo>{}").format(_sub(name, k + 1), terms))
+
+
+def _signed(factor: float, symbol: Markup, first: bool) -> Markup:
+    sign = "−" if factor < 0 else "" if first else "+"
+    shown = Markup("") if abs(factor) == 1 else _number(abs(factor))
+    return Markup("{}{}{}").format(Markup("<mo>{}</mo>").format(sign) if sign else "", shown, symbol)
 
 
 def _link(k: int, link: SymbolicTransform, zero: np.ndarray) -> Markup:
@@ -70,9 +88,10 @@ def _link(k: int, link: SymbolicTransform, zero: np.ndarray) -> Markup:
 def _sum(entry: Mapping[Product, float], is_length: bool) -> Markup:
     terms = Markup("")
     for product, coefficient in entry.items():
-        size = abs(coefficient) * (MM if is_length else 1.0)
+        in_mm = is_length and not any(function == "d" for function, _ in product)
+        size = abs(coefficient) * (MM if in_mm else 1.0)
         sign = "−" if coefficient < 0 else "+" if terms else ""
-        shown = Markup("") if product and abs(size - 1) < 1e-9 and not is_length else _number(size)
+        shown = Markup("") if product and abs(size - 1) < 1e-9 and not in_mm else _number(size)
         factors = Markup("<mo>&#8290;</mo>").join(map(_factor, product))
         terms += Markup("{}{}{}").format(Markup("<mo>{}</mo>").format(sign) if sign else "", shown, factors)
     return terms or _number(0.0)
