@@ -39,7 +39,7 @@ FIRST_PIECES, MOST_PIECES = 4, 1024  # between two corners of the path or of its
 CLOSE = 1e-10  # rad, m
 SAME_TIME = 1e-9  # share of the duration
 WIDE = np.radians(20.0)  # rad, m; of a joint between two points
-LOOKED_AT = 49  # poses at which arm angles are compared
+LOOKED_AT, HALVINGS = 49, 30  # poses at which arm angles are compared; steps to where a path leaves the reach
 ON_PATH = 1e-6  # rad, m; by which given joints may miss the closed form's at the start
 
 
@@ -101,7 +101,7 @@ def _at_arm_angles(robot: Robot, path: ToolPath, q_start: Reals | None) -> Piece
         raise PathEndsError(robot.name, "out_of_reach", 0.0)
     laws = roomiest_laws(robot, poses, share, begin, slots)
     if not laws:
-        raise PathEndsError(robot.name, "out_of_reach", _first_unreached(robot, poses, times))
+        raise PathEndsError(robot.name, "out_of_reach", _first_unreached(robot, path, times))
     near = np.zeros(robot.joints) if q_start is None else q_start
 
     def way(law: ArmAngleLaw) -> tuple[Reals, Callable[[Reals], Reals]]:
@@ -113,14 +113,21 @@ def _at_arm_angles(robot: Robot, path: ToolPath, q_start: Reals | None) -> Piece
     return _first_within_limits(robot, path, [way(law) for law in laws])
 
 
-def _first_unreached(robot: Robot, poses: Reals, times: Reals) -> float:
+def _first_unreached(robot: Robot, path: ToolPath, times: Reals) -> float:
     """The first time at which no arm angle of a grid reaches the pose; 0 if all are reached, but by no law."""
     angles = np.linspace(-np.pi, np.pi, 73)
-    for T, t in zip(poses, times.tolist()):
-        rows = class_rows(robot, np.broadcast_to(T, (len(angles), 4, 4)), angles[:, None]).q
-        if np.isnan(rows).all():
-            return float(t)
-    return 0.0
+
+    def reached(t: float) -> bool:
+        return bool(np.isfinite(_rows(robot, path, np.full(len(angles), t), angles[:, None])).any())
+
+    late = next((k for k, t in enumerate(times.tolist()) if not reached(t)), 0)
+    if late == 0:
+        return 0.0
+    low, high = float(times[late - 1]), float(times[late])
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if reached(middle) else (low, middle)
+    return high
 
 
 def _first_within_limits(

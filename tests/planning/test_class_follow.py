@@ -162,7 +162,7 @@ def test_seven_joints_say_where_a_path_leaves_their_reach():
         follow_by_class(IIWA, line(T, beyond, 1.0), q)
     assert info.value.kind == "out_of_reach"
     wrist = path_wrist(T, beyond, info.value.t)
-    assert abs(wrist - 0.82) < 0.1  # upper arm and forearm stretched out
+    assert abs(wrist - 0.82) < 1e-6  # upper arm and forearm stretched out
 
 
 def path_wrist(T: np.ndarray, beyond: np.ndarray, t: float) -> float:
