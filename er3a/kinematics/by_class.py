@@ -285,19 +285,39 @@ def _with_own(robot: Robot, T: Reals, q_ref: Reals, numbers: Integers, found: tu
     are within the limits (N, S), and certainty (N,).
     """
     q, inside, certainty = found
+    numbers = numbers[_missing(q, inside, q_ref, numbers)]
     own = q_ref[numbers] if len(q_ref) == len(T) else np.broadcast_to(q_ref[0], (len(numbers), robot.joints))
-    fits = within(robot, own)
-    far = np.abs(q[numbers] - own[:, None]).max(axis=2)
-    far = np.where(np.isnan(far), np.inf, far)
-    lost = np.flatnonzero(~((far < SAME_ROW) & (inside[numbers] | ~fits[:, None])).any(axis=1))
-    solves = np.abs(forward(robot, own[lost]) - T[numbers[lost]]).max(axis=(1, 2), initial=0.0) < OWN_SOLVES
-    for k in lost[solves].tolist():
-        n, slot = numbers[k], int(far[k].argmin())
-        if far[k, slot] > MAYBE_SAME and np.isinf(far[k]).any():
-            slot = int(np.isinf(far[k]).argmax())
-        if far[k].min() > MISSED and certainty[n] == CERTAIN:
+    solves = np.abs(forward(robot, own) - T[numbers]).max(axis=(1, 2), initial=0.0) < OWN_SOLVES
+    for n, row in zip(numbers[solves].tolist(), own[solves]):
+        away, fits = np.abs(q[n] - row).max(axis=1), bool(within(robot, row))
+        away = np.where(np.isnan(away), np.inf, away)
+        if away.min() < SAME_ROW and not fits:
+            continue
+        slot = int(away.argmin())
+        if away[slot] > MAYBE_SAME and np.isinf(away).any():
+            slot = int(np.isinf(away).argmax())
+        if away.min() > MISSED and certainty[n] == CERTAIN:
             certainty[n] = UNCERTAIN
-        q[n, slot], inside[n, slot] = own[k], fits[k]
+        q[n, slot], inside[n, slot] = row, fits
+
+
+@kernel
+def _missing(q: Reals, inside: Flags, q_ref: Reals, numbers: Integers) -> Flags:
+    """Whether no row within the limits is the reference (k,), of the poses with these numbers (k,)."""
+    missing = np.ones(numbers.shape[0], np.bool_)
+    for i in range(numbers.shape[0]):
+        n = numbers[i]
+        ref = q_ref[n if q_ref.shape[0] > 1 else 0]
+        for slot in range(q.shape[1]):
+            if not inside[n, slot]:
+                continue
+            far = 0.0
+            for j in range(q.shape[2]):
+                far = max(far, abs(q[n, slot, j] - ref[j]))
+            if far < SAME_ROW:
+                missing[i] = False
+                break
+    return missing
 
 
 Pendant = tuple[Reals, Reals, Flags, Reals, Reals]
