@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from er3a.kinematics.solutions import (
     BadGuess,
     ByClass,
+    DependentJoints,
     Iteration,
     Label,
     LimitBound,
@@ -62,6 +63,7 @@ ARM_CLASSES = {
     "general_six": N_("six revolute joints without special geometry: up to 16 solutions by elimination"),
     "six_one_prismatic": N_("six joints, one of them sliding: up to 16 solutions by elimination"),
     "spherical_wrist_any": N_("spherical wrist on three joints of any kind: up to 8 solutions"),
+    "six_two_prismatic": N_("six joints, two of them sliding: up to 8 solutions by elimination"),
     "gantry": N_("three sliding joints and three that turn: two solutions in closed form"),
     "arm_angle": N_("spherical shoulder and wrist: up to 8 solutions in closed form at each arm angle"),
     "redundant": N_("more than six joints: solutions at given values of the redundant ones, and self-motions"),
@@ -69,6 +71,7 @@ ARM_CLASSES = {
     "free_roll": N_("five joints: solutions for the tool point and the tool's axis; the roll about it is free"),
     "planar_wrist": N_("fewer than six joints: solutions of poses that they can reach exactly"),
     "position": N_("three joints: solutions for the tool point"),
+    "dependent": N_("joints that move the tool in fewer ways than there are joints: by iteration"),
     "unsolved": N_("no class"),
 }
 SIDES = {"front": N_("front"), "back": N_("back")}
@@ -200,6 +203,15 @@ def _(found: ByClass) -> str:
 @say.register
 def _(found: NoSolutionOfClass) -> str:
     return sentence(found.code, "no joint values reach the pose; {miss}", miss=say(found.miss))
+
+
+@say.register
+def _(found: DependentJoints) -> str:
+    return sentence(
+        found.code,
+        "its joints move the tool in fewer ways than there are joints (parallel slides, for instance), so that each"
+        " pose has infinitely many solutions or none",
+    )
 
 
 @say.register
