@@ -197,8 +197,8 @@ def _asked_text(capability: CapabilitySummary) -> str:
         ),
         "tilts": tr(
             "This arm can't point its tool in every direction: all its tilting joints turn about one direction, so the "
-            "tool stays within a plane that joint 1 turns. At each cell's centre {directions} tilts, spread evenly over "
-            "the full turn in that plane, were tried; reachability is the share that is reached.",
+            "tool stays within a plane that joint 1 turns. At each cell's centre {directions} tilts, spread evenly "
+            "over the full turn in that plane, were tried; reachability is the share that is reached.",
             directions=count,
         ),
         "turns": tr(
