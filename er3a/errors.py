@@ -91,10 +91,16 @@ class NotWristPartitionedError(Er3aError):
 class ResultError(Er3aError):
     """A results file is missing, damaged or of another format version; a rerun of its stage corrects it."""
 
-    def __init__(self, file: str | Path, problem: str):
-        self.file = str(file)
+    def __init__(
+        self,
+        file: str | Path,
+        problem: str,
+        remedy: str = "Delete the file and run the study again, which writes a new one",
+    ):
+        self.file = _line(str(file))
         self.problem = _line(problem, 300)
-        super().__init__(f"{file}: {self.problem}. Delete the file and run the study again, which makes it again")
+        self.remedy = remedy
+        super().__init__(f"{self.file}: {self.problem}. {remedy}")
 
 
 class WriteError(Er3aError):

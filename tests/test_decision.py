@@ -12,8 +12,8 @@ from er3a.pipeline.viewing.index import LED, led
     ("table", "failed", "start"),
     [
         ("fail", ["trajectory"], "Never use this table"),
-        ("pass", ["trajectory"], "Not as it stands: see trajectory"),
-        ("caution", ["trajectory", "vision"], "Not as it stands: see trajectory, vision"),
+        ("pass", ["trajectory"], "Do not use it as it is: see trajectory"),
+        ("caution", ["trajectory", "vision"], "Do not use it as it is: see trajectory, vision"),
         ("caution", [], "Use it with care"),
         ("pass", [], "Use it: "),
         ("no_reference", [], "There is no evidence on its table"),

@@ -201,7 +201,7 @@ def test_a_file_cut_short_is_told(tmp_path, study, name, keep):
 def test_missing_files_are_told(tmp_path, study, name):
     write(tmp_path, study)
     (tmp_path / name).unlink()
-    with pytest.raises(ResultError, match=rf"{name}: missing\. Delete the file and run the study again"):
+    with pytest.raises(ResultError, match=rf"{name}: missing\. Run the study, which writes it"):
         read_results(tmp_path, MadeResults)
 
 

@@ -66,7 +66,7 @@ def read_bytes(path: Path) -> bytes:
     try:
         return Path(path).read_bytes()
     except FileNotFoundError:
-        raise ResultError(path, "missing") from None
+        raise ResultError(path, "missing", "Run the study, which writes it") from None
     except OSError as error:
         raise ResultError(path, f"can't be read ({error.strerror})") from None
 

@@ -29,7 +29,7 @@ class LinkPlaces(Protocol):
 
 ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 WHY = {
-    "not_finite": "holds something that is no number",
+    "not_finite": "contains something that is not a number",
     "negative_mass": "has a mass below 0",
     "negative_moment": "has a principal moment of inertia below 0",
     "triangle": "has a principal moment of inertia above the sum of the other two",

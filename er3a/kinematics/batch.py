@@ -14,7 +14,7 @@ from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.closed_form import REACHED, SLOTS
 from er3a.kinematics.configuration import slot_labels
 from er3a.kinematics.forward import checked_joints, forward
-from er3a.kinematics.inverse import BY_ELIMINATION, SAME_MEMBER, SOLVES, STARTS
+from er3a.kinematics.inverse import BY_ELIMINATION, SAME_MEMBER, SOLVES, lacking_class, starts_of
 from er3a.kinematics.numerical import all_found
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.solutions import ByClass, Iteration, Method, Solutions
@@ -120,7 +120,7 @@ def _by_class(
         own = np.broadcast_to(reference, (count, robot.joints))
         q = _found_by_starts(robot, T, own)
         inside = within(robot, q)
-        method = Iteration(STARTS, closed_form_missing(robot))
+        method = Iteration(starts_of(robot), lacking_class(robot))
     else:
         values = checked_parameters(robot, redundancy, reference, count)
         found = slots_of_class(robot, T, reference, values, threads)
@@ -137,7 +137,7 @@ def _found_by_starts(robot: Robot, T: Reals, q_ref: Reals) -> Reals:
     """Slots (N, S, n) with what random starts find, for chains of no class."""
     q = np.full((len(T), SLOTS_BY_STARTS, robot.joints), np.nan)
     for n, pose in enumerate(T):
-        rows = all_found(robot, pose, STARTS)[:SLOTS_BY_STARTS]
+        rows = all_found(robot, pose, starts_of(robot))[:SLOTS_BY_STARTS]
         q[n, : len(rows)] = nearest_equivalent(robot, rows, q_ref[n])
     return q
 

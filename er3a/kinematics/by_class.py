@@ -19,7 +19,8 @@ from er3a.kinematics.chain import constant_links, joint_starts, row_values
 from er3a.kinematics.classes.chain_solvers import ArmClassCode, ChainSolver, Redundancy, Unsolved, chain_solver
 from er3a.kinematics.classes.links import size_of
 from er3a.kinematics.classes.self_motion import PoseChain, TracedCurve
-from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM
+from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, UNCERTAIN
+from er3a.kinematics.forward import forward
 from er3a.kinematics.self_motions import SelfMotionCurve, self_motion_of
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
@@ -30,6 +31,7 @@ from er3a.robots.robot import Robot
 
 SAME_ROW = 1e-6  # rad or parts of the arm's size
 SOLVES = 1e-9
+OWN_SOLVES, MISSED = 1e-12, 1e-4  # m and parts of 1; rad or m from all rows
 MAYBE_SAME = 1e-2  # rad
 SPREAD = 1e-11
 MOST_CURVES, MOST_ON_SURFACE = 24, 2
@@ -148,7 +150,7 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
     found = [to_rows(robot, rows), solver.chain.seeds(T, values)]
     if chain.error(to_rows(robot, q_ref)) < 1e-11:
         found.insert(0, to_rows(robot, q_ref)[None])
-    if certainty == CONTINUUM and solver.chain.code in ("general_six", "six_one_prismatic"):
+    if certainty == CONTINUUM and solver.chain.code in ("general_six", "six_one_prismatic", "six_two_prismatic"):
         found.append(chain.roots(_starts(robot, STARTS)))
     candidates = np.concatenate(found)
     curves: list[TracedCurve] = []
@@ -272,14 +274,54 @@ def slots_of_class(
         settled[n] = settle(robot, T[n], rows[np.isfinite(rows[:, 0])], own, values[n : n + 1], int(certainty[n]))
         q[n] = nearest_equivalent(robot, _in_slots(robot, rows, settled[n]), own)
         inside[n] = within(robot, q[n])
-    for n in np.flatnonzero(certainty != CERTAIN).tolist() if not alone else ():
-        own = q_ref[0 if len(q_ref) == 1 else n]
-        if solver.poses_at(T[n]).error(to_rows(robot, own)) < 1e-11:
-            far = np.abs(q[n] - own).max(axis=1)
-            slot = int(np.argmin(np.where(np.isnan(far), 1e3, far)))
-            if not far[slot] < SAME_ROW:
-                q[n, slot], inside[n, slot] = own, within(robot, own)
+    each_its_own = alone and len(q_ref) == count
+    own_looked_for = np.arange(count) if each_its_own else np.flatnonzero(certainty != CERTAIN)
+    _with_own(robot, T, q_ref, own_looked_for, (q, inside, certainty))
     return ClassSlots(q, inside, certainty, settled)
+
+
+def _with_own(robot: Robot, T: Reals, q_ref: Reals, numbers: Integers, found: tuple[Reals, Flags, Integers]) -> None:
+    """Put references that solve their poses to rounding in a slot where no row is them.
+
+    Next to two singularities a pose does not tell all joints to rounding, and a row that it gives instead of the
+    arm's own can lie beyond a limit. The slot is that of the row nearest to the reference if that is near, else one
+    that is empty, else the nearest. ``numbers`` (k,) are the poses looked at; ``found`` rows (N, S, n), which of them
+    are within the limits (N, S), and certainty (N,).
+    """
+    q, inside, certainty = found
+    numbers = numbers[_missing(q, inside, q_ref, numbers)]
+    own = q_ref[numbers] if len(q_ref) == len(T) else np.broadcast_to(q_ref[0], (len(numbers), robot.joints))
+    solves = np.abs(forward(robot, own) - T[numbers]).max(axis=(1, 2), initial=0.0) < OWN_SOLVES
+    for n, row in zip(numbers[solves].tolist(), own[solves]):
+        away, fits = np.abs(q[n] - row).max(axis=1), bool(within(robot, row))
+        away = np.where(np.isnan(away), np.inf, away)
+        if away.min() < SAME_ROW and not fits:
+            continue
+        slot = int(away.argmin())
+        if away[slot] > MAYBE_SAME and np.isinf(away).any():
+            slot = int(np.isinf(away).argmax())
+        if away.min() > MISSED and certainty[n] == CERTAIN:
+            certainty[n] = UNCERTAIN
+        q[n, slot], inside[n, slot] = row, fits
+
+
+@kernel
+def _missing(q: Reals, inside: Flags, q_ref: Reals, numbers: Integers) -> Flags:
+    """Whether no row within the limits is the reference (k,), of the poses with these numbers (k,)."""
+    missing = np.ones(numbers.shape[0], np.bool_)
+    for i in range(numbers.shape[0]):
+        n = numbers[i]
+        ref = q_ref[n if q_ref.shape[0] > 1 else 0]
+        for slot in range(q.shape[1]):
+            if not inside[n, slot]:
+                continue
+            far = 0.0
+            for j in range(q.shape[2]):
+                far = max(far, abs(q[n, slot, j] - ref[j]))
+            if far < SAME_ROW:
+                missing[i] = False
+                break
+    return missing
 
 
 Pendant = tuple[Reals, Reals, Flags, Reals, Reals]

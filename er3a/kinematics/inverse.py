@@ -28,6 +28,7 @@ from er3a.kinematics.numerical import all_found, solve
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.solutions import (
     ByClass,
+    DependentJoints,
     Iteration,
     NearestMiss,
     NoSolutionOfClass,
@@ -41,7 +42,7 @@ from er3a.kinematics.solutions import (
     WristTooNear,
     WristTooNearAxis1,
 )
-from er3a.kinematics.wrist_partitioned import closed_form_missing, solve_slots, wrist_partitioned_arm
+from er3a.kinematics.wrist_partitioned import ClosedFormMissing, closed_form_missing, solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.joint_limits import nearest_equivalent, turn_bounds, within
 from er3a.robots.robot import Robot
@@ -51,9 +52,16 @@ SAME_MEMBER = 1e-6
 MISSED = 1e-4  # rad or m from all rows
 SOLVES = 1e-12  # m and parts of 1
 MOST_ROWS = 10_000
-STARTS = 400
+STARTS, STARTS_OF_DEPENDENT = 400, 24  # where joints depend on each other a start that leads anywhere leads elsewhere
 MISS_RESTARTS = 20
-BY_ELIMINATION: tuple[ArmClassCode, ...] = ("general_six", "six_one_prismatic", "redundant", "free_roll", "position")
+BY_ELIMINATION: tuple[ArmClassCode, ...] = (
+    "general_six",
+    "six_one_prismatic",
+    "six_two_prismatic",
+    "redundant",
+    "free_roll",
+    "position",
+)
 
 
 def inverse(robot: Robot, T: Reals, q_ref: Reals | None = None, redundancy: Reals | None = None) -> Solutions:
@@ -179,15 +187,25 @@ def _near_solved(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[list[i
 
 
 def _by_iteration(robot: Robot, T: Reals, q_ref: Reals) -> Solutions:
-    arms = all_found(robot, T, STARTS)
+    arms = all_found(robot, T, starts_of(robot))
     solves = np.abs(forward(robot, q_ref) - T).max() <= SOLVES
     if solves and not (len(arms) and greatest_move(np.asarray(arms), q_ref).min() < SAME_MEMBER):
         arms = np.concatenate([np.reshape(arms, (-1, robot.joints)), q_ref[None]])  # random starts miss singular arms
     q, branch = _stacked(list(range(len(arms))), [_rows_of_branch(robot, q, q_ref) for q in arms], robot.joints)
     inside = within(robot, q)
     unsolved = () if len(arms) else solve(robot, T, respect_limits=False).unsolved
-    method = Iteration(STARTS, closed_form_missing(robot))
+    method = Iteration(starts_of(robot), lacking_class(robot))
     return Solutions(robot, q, np.ones_like(inside), inside, branch, method, unsolved)
+
+
+def starts_of(robot: Robot) -> int:
+    """How many random starts look for the solutions of an arm that no class solves."""
+    return STARTS_OF_DEPENDENT if arm_solver(robot).chain.code == "dependent" else STARTS
+
+
+def lacking_class(robot: Robot) -> ClosedFormMissing | DependentJoints | None:
+    """Why the arm is solved by iteration."""
+    return DependentJoints() if arm_solver(robot).chain.code == "dependent" else closed_form_missing(robot)
 
 
 def checked_reference(robot: Robot, q_ref: Reals | None) -> Reals:

@@ -118,7 +118,8 @@ def all_found(robot: Robot, T: Reals, starts: int, seed: int = 0) -> Reals:
     q, _, used = search.run(np.tile(T, (starts, 1, 1)), begin, False, 0, 1)
     distinct: list[Reals] = []
     for row in q[used > 0]:
-        if all(np.abs(wrap_to_pi(row - other)).max() > SAME_ARM for other in distinct):
+        away = row - np.reshape(distinct, (-1, robot.joints))
+        if not (np.abs(np.where(robot.slides, away, wrap_to_pi(away))).max(axis=1) <= SAME_ARM).any():
             distinct.append(row)
     return np.array(distinct).reshape(-1, robot.joints)
 

@@ -102,7 +102,7 @@ def batch_round_trips(robot: Robot, random: np.random.Generator, poses: int) -> 
 
 def has_class(robot: Robot) -> bool:
     """Whether a class's solver, not random starts, solves the arm."""
-    return arm_solver(robot).chain.code != "unsolved"
+    return arm_solver(robot).chain.code not in ("dependent", "unsolved")
 
 
 def slot_round_trips(robot: Robot, poses: int, seed: int) -> SlotRoundTrips:

@@ -32,11 +32,21 @@ class ClosedForm:
 
 
 @dataclass(frozen=True)
+class DependentJoints:
+    """The joints move the tool in fewer ways than there are joints (six at most), such as two parallel slides.
+
+    Each pose that they reach, they reach in infinitely many ways.
+    """
+
+    code: Literal["dependent_joints"] = "dependent_joints"
+
+
+@dataclass(frozen=True)
 class Iteration:
     """Solutions by iteration from random starts, which may miss some; ``lacking`` where the arm has no closed form."""
 
     starts: int
-    lacking: ClosedFormMissing | None = None
+    lacking: ClosedFormMissing | DependentJoints | None = None
     code: Literal["iteration"] = "iteration"
 
 

@@ -101,5 +101,5 @@ def _place(file: Path) -> Path:
 
 def _there(path: Path) -> Path:
     if not path.is_file():
-        raise ResultError(path, "missing")
+        raise ResultError(path, "missing", "Run the study, which writes it")
     return path

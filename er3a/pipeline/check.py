@@ -75,7 +75,7 @@ def stage_forms(robot: Robot) -> dict[str, str]:
     solver = arm_solver(robot).chain.code.replace("_", " ")
     six = robot.rows == robot.joints == SIX and not robot.sliding.any() and robot.coupling is None
     proven = "proof and capability" if spherical and plain else "proof by the general method" if six and plain else ""
-    iterated = solver == "unsolved"
+    iterated = solver in ("dependent", "unsolved")
     return {
         "validation": "references, diagnosis and evidence" if six else "references and self-checks, no diagnosis",
         "workspace": f"samples, {proven or 'volume bounded by lengths alone'}",

@@ -17,6 +17,7 @@ from typing import Any
 from urllib.parse import quote
 
 from er3a.errors import InputError
+from er3a.pipeline.messages.language import as_text
 from er3a.pipeline.messages.program_check import say
 from er3a.pipeline.results import plain
 from er3a.program_check.check_program import LocatedFinding, MotionVerdict, ProgramCheck
@@ -79,7 +80,7 @@ def _verdict_line(verdict: MotionVerdict) -> str:
     if verdict.duration_s is not None:
         parts.append(f"{verdict.duration_s:.2f} s")
     if verdict.least_clearance_mm is not None:
-        parts.append(f"clearance {verdict.least_clearance_mm:.1f} mm")
+        parts.append(f"clearance {as_text(verdict.least_clearance_mm, '.1f')} mm")
     return f"{_where(verdict.place)}: {WORDS[verdict.level]}: {'; '.join(parts)} [motion]"
 
 

@@ -1,9 +1,11 @@
-"""Paths of the tool for arms with fewer than six joints, under the task that their class can meet.
+"""Paths of the tool for arms without the eight branches of six joints, under the task that their class can meet.
 
-Such an arm meets a part of the pose (:func:`er3a.kinematics.by_class.task_mask`): a SCARA leaves the tool's tilt, five
-joints the turn about the tool's axis, three the orientation. Its angles along the path are interpolated at Chebyshev
-points by polynomials, piece by piece; the pieces are halved until between these points, too, the angles are those that
-the closed form has there [1]_. What the arm then runs is that curve, and it is judged exactly, as moves of joints are.
+An arm with fewer than six joints meets a part of the pose (:func:`er3a.kinematics.by_class.task_mask`): a SCARA leaves
+the tool's tilt, five joints the turn about the tool's axis, three the orientation. Seven joints with spherical shoulder
+and wrist meet it at the arm angle that :mod:`er3a.planning.arm_angle_choice` takes along the path. The joints' values
+are interpolated at Chebyshev points by polynomials, piece by piece; the pieces are halved until between these points,
+too, they are those that the closed form has there [1]_. What the arm then runs is that curve, and it is judged exactly,
+as moves of joints are.
 
 References
 ----------
@@ -12,16 +14,19 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 
 from er3a.errors import Er3aError, NotWristPartitionedError
-from er3a.kinematics.by_class import arm_solver, class_rows
+from er3a.kinematics.by_class import arm_solver, checked_parameters, class_rows
+from er3a.kinematics.classes.chain_solvers import Unsolved
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import kernel
+from er3a.planning.arm_angle_choice import ArmAngleLaw, roomiest_laws
 from er3a.planning.moves import ToolPath
 from er3a.planning.piecewise import PiecewiseMotion, chebyshev_times, motion_through
 from er3a.planning.polynomial_checks import limit_intervals
@@ -34,6 +39,7 @@ FIRST_PIECES, MOST_PIECES = 4, 1024  # between two corners of the path or of its
 CLOSE = 1e-10  # rad, m
 SAME_TIME = 1e-9  # share of the duration
 WIDE = np.radians(20.0)  # rad, m; of a joint between two points
+LOOKED_AT, HALVINGS = 49, 30  # poses at which arm angles are compared; steps to where a path leaves the reach
 ON_PATH = 1e-6  # rad, m; by which given joints may miss the closed form's at the start
 
 
@@ -61,34 +67,96 @@ def follow_by_class(robot: Robot, path: ToolPath, q_start: Reals | None = None) 
         where no arm follows to the end
     """
     missing, solver = closed_form_missing(robot), arm_solver(robot).chain
-    if (solver.code == "unsolved" or solver.parameters) and missing is not None:
+    if solver.code == "arm_angle":
+        return _at_arm_angles(robot, path, q_start)
+    if (isinstance(solver, Unsolved) or solver.parameters) and missing is not None:
         raise NotWristPartitionedError(robot.name, missing)
-    rows = _rows(robot, path, np.zeros(1))[0]
+
+    def rows_at(t: Reals) -> Reals:
+        return _rows(robot, path, t, np.zeros((len(t), 0)))
+
+    rows = rows_at(np.zeros(1))[0]
     starts = nearest_equivalent(robot, rows[np.isfinite(rows[:, 0])], np.zeros(robot.joints))
     if q_start is not None:
         starts = nearest_equivalent(robot, starts, q_start)
         starts = starts[(np.abs(starts - q_start) <= ON_PATH).all(axis=1)]
     if not len(starts):
         raise PathEndsError(robot.name, "out_of_reach", 0.0)
+    ordered = sorted(starts, key=lambda q: (not within(robot, q), -round(float(limit_margin(robot, q)), 9)))
+    return _first_within_limits(robot, path, [(start, rows_at) for start in ordered])
+
+
+def _at_arm_angles(robot: Robot, path: ToolPath, q_start: Reals | None) -> PiecewiseMotion:
+    """The joints' motion of a seven-joint arm at the arm angles that keep most distance from its limits."""
+    times = np.linspace(0.0, path.duration, LOOKED_AT)
+    share = path.progress(times)[0]
+    poses = path.poses(share)
+    begin, slots = None, np.arange(arm_solver(robot).chain.slots)
+    if q_start is not None:
+        begin = float(checked_parameters(robot, None, q_start[None], 1)[0, 0])
+        own = class_rows(robot, poses[:1], np.array([[begin]])).q[0]
+        away = np.abs(nearest_equivalent(robot, np.nan_to_num(own, nan=np.inf), q_start) - q_start)
+        slots = np.flatnonzero((away <= ON_PATH).all(axis=1))
+    if not slots.size:
+        raise PathEndsError(robot.name, "out_of_reach", 0.0)
+    laws = roomiest_laws(robot, poses, share, begin, slots)
+    if not laws:
+        raise PathEndsError(robot.name, "out_of_reach", _first_unreached(robot, path, times))
+    near = np.zeros(robot.joints) if q_start is None else q_start
+
+    def way(law: ArmAngleLaw) -> tuple[Reals, Callable[[Reals], Reals]]:
+        def rows_at(t: Reals) -> Reals:
+            return _rows(robot, path, t, law.at(path.progress(t)[0]))
+
+        return nearest_equivalent(robot, rows_at(np.zeros(1))[0, law.slot], near), rows_at
+
+    return _first_within_limits(robot, path, [way(law) for law in laws])
+
+
+def _first_unreached(robot: Robot, path: ToolPath, times: Reals) -> float:
+    """The first time at which no arm angle of a grid reaches the pose; 0 if all are reached, but by no law."""
+    angles = np.linspace(-np.pi, np.pi, 73)
+
+    def reached(t: float) -> bool:
+        return bool(np.isfinite(_rows(robot, path, np.full(len(angles), t), angles[:, None])).any())
+
+    late = next((k for k, t in enumerate(times.tolist()) if not reached(t)), 0)
+    if late == 0:
+        return 0.0
+    low, high = float(times[late - 1]), float(times[late])
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if reached(middle) else (low, middle)
+    return high
+
+
+def _first_within_limits(
+    robot: Robot, path: ToolPath, ways: list[tuple[Reals, Callable[[Reals], Reals]]]
+) -> PiecewiseMotion:
+    """The first of the motions from starts (n,), with what tells all rows (N, slots, n) at times, that keeps all
+    limits; else the first that there is."""
     found: list[PiecewiseMotion] = []
     ends: list[PathEndsError] = []
-    for start in sorted(starts, key=lambda q: (not within(robot, q), -round(float(limit_margin(robot, q)), 9))):
+    for start, rows_at in ways:
         try:
-            found.append(_followed(robot, path, start))
+            motion = _followed(robot, path, start, rows_at)
         except PathEndsError as error:
             ends.append(error)
+            continue
+        if not limit_intervals(robot, motion):
+            return motion
+        found.append(motion)
     if not found:
         raise max(ends, key=lambda error: error.t)
-    return next((motion for motion in found if not limit_intervals(robot, motion)), found[0])
+    return found[0]
 
 
-def _rows(robot: Robot, path: ToolPath, t: Reals) -> Reals:
-    """All solutions (N, slots, n) at times (N,)."""
-    T = path.poses(path.progress(t)[0])
-    return class_rows(robot, T, np.zeros((len(t), 0))).q
+def _rows(robot: Robot, path: ToolPath, t: Reals, values: Reals) -> Reals:
+    """All solutions (N, slots, n) at times (N,) and values (N, k) of the redundancy parameters."""
+    return class_rows(robot, path.poses(path.progress(t)[0]), values).q
 
 
-def _followed(robot: Robot, path: ToolPath, start: Reals) -> PiecewiseMotion:
+def _followed(robot: Robot, path: ToolPath, start: Reals, rows_at: Callable[[Reals], Reals]) -> PiecewiseMotion:
     corners = np.unique(np.concatenate([path.law.breaks, times_at(path.law, path.edges)]))
     corners = corners[np.concatenate([[True], np.diff(corners) > SAME_TIME * corners[-1]])]
     pieces = FIRST_PIECES
@@ -98,7 +166,7 @@ def _followed(robot: Robot, path: ToolPath, start: Reals) -> PiecewiseMotion:
         nodes, between = chebyshev_times(times, DEGREE)
         t, back = np.unique(np.concatenate([nodes.ravel(), between.ravel()]), return_inverse=True)
         q = np.empty((len(t), robot.joints))
-        ended, reached = _tracked(_rows(robot, path, t), robot.slides, start, q)
+        ended, reached = _tracked(rows_at(t), robot.slides, start, q)
         more = pieces < MOST_PIECES
         if ended < len(t) and not (reached and more):
             raise PathEndsError(robot.name, "singular" if reached else "out_of_reach", float(t[ended]))

@@ -228,7 +228,7 @@ def test_every_solution_keeps_the_tool_in_place(panel):
     assert re.search(r"J3 at 138\.\d° is \d+\.\d° above its limit of 105°", outside.text)
     panel.browser.execute_script("arguments[0].click()", outside)
     assert panel.joints() == pytest.approx(start)
-    assert re.search(r"The arm stays where it is: .*J3 at 138\.\d° is \d+\.\d° above", panel.text("#refused"))
+    assert re.search(r"The arm does not move: .*J3 at 138\.\d° is \d+\.\d° above", panel.text("#refused"))
 
 
 def type_pose(panel, *values: float) -> None:
@@ -253,7 +253,9 @@ def test_a_typed_pose_is_reached_or_refused_in_words(panel):
     reached = panel.joints()
     type_pose(panel, 1800, 0, 300, 180, 0, 0)
     assert panel.joints() == pytest.approx(reached)
-    assert re.search(r"The arm stays: the wrist centre would be .* too far from axis 2", panel.text("#pose-message"))
+    assert re.search(
+        r"The arm does not move: the wrist centre would be .* too far from axis 2", panel.text("#pose-message")
+    )
     panel.one("#pose-form input").send_keys(SELECT_ALL, Keys.DELETE)
     panel.one("#pose-form button[type=submit]").click()
     assert "needs a number" in panel.text("#pose-message")
@@ -313,7 +315,7 @@ def test_way_points_become_a_path_file_and_a_program_that_er3a_reads(panel, tmp_
 @pytest.mark.parametrize(
     ("degrees", "state", "told"),
     [
-        ((10, 20, 30, 40, 3, 0), "near", "Near the wrist singularity: axes 4 and 6 are 3.0° short of one line."),
+        ((10, 20, 30, 40, 3, 0), "near", "Near the wrist singularity: axes 4 and 6 are 3.0° from collinear."),
         ((10, 20, 30, 40, 0, 0), "at", "At the wrist singularity"),
         ((0, 0, 76.824, 0, 50, 0), "near", "Near the elbow singularity"),
         ((0, 0, 0, 0, 50, 0), "clear", "No singularity is near."),

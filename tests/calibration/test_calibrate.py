@@ -161,7 +161,7 @@ def test_the_command_writes_a_robot_file_that_has_the_corrected_kinematics(rando
     path = written(tmp_path, truth, random)
     done = CliRunner().invoke(app, ["calibrate", "er3a_c60", str(path), "--output", str(tmp_path / "mine.yaml")])
     assert done.exit_code == 0, done.output
-    assert "d2 and d3 can't be separated: joints 2 and 3 are parallel" in done.output
+    assert "d2 and d3 can't be identified separately: axes 2 and 3 are parallel" in done.output
     mine = load_robot(tmp_path / "mine.yaml")
     assert mine.beta[1] != 0
     q = poses_in(robot, random, 200)

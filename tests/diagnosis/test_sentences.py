@@ -56,11 +56,11 @@ from er3a.pipeline.messages.say import say
         (WrongLength(1, "d", 367.5, 367.4371), "joint 1: d is 367.5 mm, 367.4 mm fits"),
         (WrongLength(2, "d", 10.0, 1e-12), "joint 2: d is 10 mm, 0 mm fits"),
         (WrongOffset(4, 45.0, -2.9e-5), "joint 4: offset is 45 deg, 0 deg fits"),
-        (WrongLimits(None, "crossed"), "every joint: limits crossed"),
+        (WrongLimits(None, "crossed"), "every joint: lower limit above the upper one"),
         (WrongLimits(3, "lower_sign"), "joint 3: lower limit has the wrong sign"),
         (WrongUnit("a", "metres_as_millimetres"), "column a: metres read as millimetres (1000 times too small)"),
         (SwappedEntries(None), "columns a and d are swapped"),
-        (WrongScale(1 / 1.05), "all lengths: scale wrong, times 0.952381 fits"),
+        (WrongScale(1 / 1.05), "all lengths: wrong scale: a factor of 0.952381 fits"),
         (WrongConvention("standard"), "the table is a modified one, read as standard"),
         (LimitDecides(3, "upper"), "the upper limit of joint 3 would distinguish them"),
         (
@@ -74,9 +74,9 @@ from er3a.pipeline.messages.say import say
         ),
         (
             NoFewFaultsExplain(7260, 1432.8, 444.2, "mm", 321.04),
-            "No one or two faults explain the data, of 7260 that were tried: the first in rank still leaves 444 mm of "
-            "1433 mm, and none leaves less than 321 mm. This is another arm, or more than two numbers are wrong, or "
-            "one is wrong in a manner that was not tried, or a reference is.",
+            "None of the 7260 hypotheses tried, of one fault or two, explains the data: the best still leaves 444 mm "
+            "of 1433 mm, and none leaves less than 321 mm. This is another arm, or more than two numbers are wrong, or "
+            "one is wrong in a way that was not tried, or a reference is wrong.",
         ),
         (
             MostLikelyFault((WrongOffset(4, 0.0, 180.0),), 136.0, 0.0, "mm", ((ReversedDirection(5),),)),
@@ -85,22 +85,21 @@ from er3a.pipeline.messages.say import say
         ),
         (
             TooSmallToTell(((WrongLength(3, "a", 70.06, 70.0),), (WrongScale(0.99994),)), 0.06, 0.3, "mm"),
-            "The disagreement (0.06 mm) is too small for these references to tell which of 2 faults it is: joint 3: a "
-            "is 70.06 mm, 70 mm fits; all lengths: scale wrong, times 0.99994 fits. From about 0.30 mm on they would "
-            "distinguish them, as far as they ever do.",
+            "The disagreement (0.06 mm) is too small to tell which of 2 faults causes it: joint 3: a is 70.06 mm, "
+            "70 mm fits; all lengths: wrong scale: a factor of 0.99994 fits. From about 0.30 mm on these references "
+            "distinguish them, where they can at all.",
         ),
         (
             NoFaultStandsOut(1, 45, 2.5, 9000),
-            "1 of 45 references is missed, by up to 2.5 times what it leaves open, but none of the 9000 faults and "
-            "pairs of faults that were tried does better than the table as it is.",
+            "1 of 45 references is missed, by up to 2.5 times its uncertainty, but none of the 9000 faults and "
+            "pairs of faults that were tried fits better than the table as it is.",
         ),
         (WrongAlpha(3, -70.0, -89.99997), "joint 3: alpha is −70 deg, −90 deg fits"),
         (WrongLimit(3, "lower", -75.0, -65.0), "joint 3: lower limit is −75 deg, −65 deg fits"),
         (
             Resolution(0.0512, 0.051, ("offset4",), ("offset6", "direction5")),
-            "A length that is wrong alone would be noticed from 0.051 mm on. An angle that is wrong alone would be "
-            "noticed from 0.051 deg on. Half a turn too much would not be noticed in offset4. Nothing at all would be "
-            "noticed of errors in offset6, direction5.",
+            "A single wrong length is detected from 0.051 mm on. A single wrong angle is detected from 0.051 deg on. "
+            "An error of 180 deg in offset4 would not be detected. No error in offset6, direction5 would be detected.",
         ),
     ],
 )
@@ -123,11 +122,11 @@ def test_all_that_a_diagnosis_can_find_has_a_sentence():
 
 def test_two_faults_are_joined_and_numbers_agree():
     assert both((SwappedEntries(None), WrongScale(2.0))) == (
-        "columns a and d are swapped and all lengths: scale wrong, times 2 fits"
+        "columns a and d are swapped and all lengths: wrong scale: a factor of 2 fits"
     )
     assert "the one reference" in say(NothingToExplain(1))
     assert "all 12 references" in say(NothingToExplain(12))
-    assert "leave open" in say(MainFault((SwappedEntries(None),), 10.0, 0.4, "mm"))
+    assert "exceeds the references' uncertainty" in say(MainFault((SwappedEntries(None),), 10.0, 0.4, "mm"))
 
 
 def test_fitted_numbers_to_four_digits_are_the_same_fault():

@@ -265,7 +265,7 @@ BAD_URDF = """<inertial><origin xyz="0 0 0.1" rpy="0.3 0.2 0.1"/><mass value="{m
     [
         ("-1", "0.1", "has a mass below 0"),
         ("1", "0.5", "above the sum"),
-        ("x", "0.1", "holds something"),
+        ("x", "0.1", "contains something"),
         ("1", "0.1", ""),
     ],
 )

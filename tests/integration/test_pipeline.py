@@ -81,7 +81,7 @@ def test_snakemake_s_report_holds_every_page_with_its_caption(small_study, tmp_p
         title = load_robot(robot).title
         for stage in stages_of(robot):
             assert f"{title}: {REGISTRY[stage].question}" in text
-        assert f"{title} to move by hand" in text
+        assert f"Move {title} by hand" in text
     assert "Start with the index" in text
 
 

@@ -40,6 +40,7 @@ ARMS = {
     "three_parallel": (arm(UR5), 8),
     "general_six": (arm(CRX), 16),
     "six_one_prismatic": (arm(STANFORD, [0, 0, 1, 0, 0, 0]), 16),
+    "six_two_prismatic": (arm(CRX, [0, 1, 0, 1, 0, 0]), 16),
     "spherical_wrist": (arm(PUMA, coupling=COUPLED), 8),
     "arm_angle": (arm(IIWA), 8),
     "redundant": (arm(PANDA), 16),
@@ -209,3 +210,41 @@ def test_a_reference_whose_redundancy_parameters_lead_nowhere_does_not_hide_the_
     assert solutions.within_limits.any()
     np.testing.assert_allclose(forward(robot, solutions.q), np.broadcast_to(T, (len(solutions.q), 4, 4)), atol=1e-9)
     assert not len(inverse(robot, T, redundancy=np.zeros(2)).q)  # what is asked for is not changed
+
+
+def test_near_two_singularities_and_limits_the_own_joints_stand_in_a_slot(random):
+    """A UR with its wrist and elbow within 1e-8 of singular, and limits through its self-motions."""
+    robot = arm(UR5, most=np.radians(170))
+    q = random.uniform(robot.lower, robot.upper, (3, 6))
+    q[:, [2, 4]] = 1e-8 * random.uniform(-1, 1, (3, 2))
+    found = inverse_batch(robot, forward(robot, q), q)
+    away = np.abs(found.q - q[:, None]).max(axis=2)
+    assert np.where(found.within_limits, away, 9.0).min(axis=1).max() < 1e-6
+
+
+@pytest.mark.parametrize("joints", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("sliding", [(), (0,), (-1,)])
+def test_a_few_joints_of_any_geometry_have_a_class(joints, sliding, random):
+    slides = np.zeros(joints, bool)
+    slides[list(sliding)] = True
+    lengths = random.uniform(-0.4, 0.4, (2, joints))
+    robot = arm((lengths[0], random.uniform(-3, 3, joints), lengths[1]), slides)
+    q = random.uniform(robot.lower, robot.upper, (10, joints))
+    T = forward(robot, q)
+    found = inverse_batch(robot, T)
+    assert found.method.code == "by_class"
+    for n in range(len(q)):
+        away = wrap_to_pi(found.q[n][found.solved[n]] - q[n])
+        assert np.abs(away).max(axis=1).min() < 1e-6
+    miss = np.abs(forward(robot, np.nan_to_num(found.q)) - T[:, None])[found.solved]
+    assert miss[:, :3, 3].max() < 1e-9
+    if task_mask(robot).all():
+        assert miss.max() < 1e-9
+
+
+def test_joints_that_depend_on_each_other_are_named_and_soon_done():
+    planar = arm(([0.3, 0.3, 0.2, 0.1], [0] * 4, [0] * 4))
+    found = inverse(planar, forward(planar, np.full(4, 0.4)), np.full(4, 0.4))
+    assert found.method.lacking.code == "dependent_joints"
+    assert len(found.q) <= found.method.starts + 1
+    assert np.abs(found.q - 0.4).max(axis=1).min() < 1e-6

@@ -97,6 +97,75 @@ def test_what_can_not_be_followed_is_told_with_the_time():
     through[0, 3] = -0.5  # through axis 1, where the inner arm would have to turn at once
     with pytest.raises(PathEndsError):
         follow_by_class(SCARA, line(T, through, 1.0))
-    seven = arm(([0] * 7, [-H, H, H, -H, -H, H, 0], [0.34, 0, 0.4, 0, 0.4, 0, 0.126]))
+    panda = ([0, 0, 0.0825, -0.0825, 0, 0.088, 0], [-H, H, H, -H, H, H, 0], [0.333, 0, 0.316, 0, 0.384, 0, 0.107])
     with pytest.raises(NotWristPartitionedError):
-        follow_by_class(seven, line(T, T, 1.0))
+        follow_by_class(arm(panda), line(T, T, 1.0))
+
+
+IIWA = arm(
+    ([0] * 7, [-H, H, H, -H, -H, H, 0], [0.36, 0, 0.42, 0, 0.4, 0, 0.126]),
+    lower=-np.radians([170, 120, 170, 120, 170, 120, 175]),
+    upper=np.radians([170, 120, 170, 120, 170, 120, 175]),
+)
+
+
+def margin(q: np.ndarray) -> float:
+    return float(np.minimum(q - IIWA.lower, IIWA.upper - q).min())
+
+
+def margins_at(T: np.ndarray, slot_angles: np.ndarray, near: np.ndarray) -> np.ndarray:
+    """Margins of the joints that Newton's method finds from joints (7,) with joint 3 held at several values."""
+    found = []
+    for angle in slot_angles:
+        q = near.copy()
+        q[2] = angle
+        for _ in range(30):
+            now = forward(IIWA, q)
+            J = np.stack([(forward(IIWA, q + 1e-6 * x) - now) / 1e-6 for x in np.eye(7)[[0, 1, 3, 4, 5, 6]]])
+            step = np.linalg.lstsq(J[:, :3].reshape(6, -1).T, (T - now)[:3].ravel(), rcond=None)[0]
+            q[[0, 1, 3, 4, 5, 6]] += np.clip(step, -0.2, 0.2)
+        if np.abs(forward(IIWA, q) - T).max() < 1e-9:
+            found.append(margin(q))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("with_start", [True, False])
+def test_seven_joints_follow_a_line_and_keep_margin(with_start):
+    q = np.radians([20, 40, -30, -80, 25, 60, 10])
+    T = forward(IIWA, np.stack([q, q + np.radians([25, -20, 10, 15, -20, 10, 30])]))
+    path = line(T[0], T[1], 2.0)
+    motion = follow_by_class(IIWA, path, q if with_start else None)
+    t = np.linspace(0, 2, 401)
+    joints, velocity, _ = motion.rates(t)
+    assert np.abs(forward(IIWA, joints) - path.poses(path.progress(t)[0])).max() < 1e-8
+    assert np.abs(velocity[[0, -1]]).max() < 1e-8
+    np.testing.assert_allclose(velocity[1:-1], np.gradient(joints, t, axis=0)[1:-1], atol=1e-3 * np.abs(velocity).max())
+    assert margin(joints) > 0
+    if with_start:
+        np.testing.assert_allclose(joints[0], q, atol=1e-9)
+    # where the motion has least margin, other arms of that self-motion have hardly more, unless the start is given
+    least = int(np.minimum(joints - IIWA.lower, IIWA.upper - joints).min(axis=1).argmin())
+    others = margins_at(
+        forward(IIWA, joints[least]), joints[least, 2] + np.radians(np.arange(-20, 21, 4)), joints[least]
+    )
+    assert len(others) > 5
+    if not with_start:
+        assert others.max() < margin(joints) + np.radians(2)
+
+
+def test_seven_joints_say_where_a_path_leaves_their_reach():
+    q = np.radians([20, 40, -30, -80, 25, 60, 10])
+    T = forward(IIWA, q)
+    beyond = T.copy()
+    beyond[:3, 3] *= 3.0
+    with pytest.raises(PathEndsError) as info:
+        follow_by_class(IIWA, line(T, beyond, 1.0), q)
+    assert info.value.kind == "out_of_reach"
+    wrist = path_wrist(T, beyond, info.value.t)
+    assert abs(wrist - 0.82) < 1e-6  # upper arm and forearm stretched out
+
+
+def path_wrist(T: np.ndarray, beyond: np.ndarray, t: float) -> float:
+    """Distance of the wrist centre from the shoulder at a time."""
+    pose = line(T, beyond, 1.0).poses(line(T, beyond, 1.0).progress(np.array([t]))[0])[0]
+    return float(np.linalg.norm(pose[:3, 3] - 0.126 * pose[:3, 2] - [0, 0, 0.36]))

@@ -82,7 +82,7 @@ def test_page_and_recording_say_what_was_found(folder, tmp_path):
     for view, file in (("report", "page.html"), ("record", "collision.rrd")):
         run.show(view, "collision", study_with(), NAME, folder, tmp_path / file)
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
-    for words in ("Which pairs are watched", "taken as its mounting", "link\u00a02", "They meet at joints"):
+    for words in ("Which pairs are checked", "taken to be its mounting", "link\u00a02", "They collide at joint values"):
         assert words in page
 
 

@@ -422,7 +422,7 @@ def test_of_many_targets_one_turn_of_each_branch_is_kept_and_the_page_says_so(tm
     assert "Of 15 targets" in page
     assert "this page and the recording show 5" in page
     assert "the turn nearest to the reference" in page
-    assert f"{len(asked) - 2} more were not looked at" in page
+    assert f"{len(asked) - 2} more were not searched" in page
 
 
 def test_a_page_shows_targets_of_each_outcome():

@@ -196,7 +196,7 @@ def test_strategies_are_listed_with_their_costs(results, name):
     assert paths["line_out"].strategy is None
     assert "out of reach from t =" in advice(paths["line_out"])
     met = paths["line_collides"].collisions[0]
-    assert f"Nothing overlaps up to t = {met.t0_s:.4g} s ({met.s0_m * 1000:.1f} mm)" in advice(paths["line_collides"])
+    assert f"Nothing overlaps before t = {met.t0_s:.4g} s ({met.s0_m * 1000:.1f} mm)" in advice(paths["line_collides"])
     assert paths["line_limits"].strategy == "planned" or "limit" in advice(paths["line_limits"])
     mended = paths["line_wrist"]
     assert mended.chosen.motion.max_joint_speed_ratio <= mended.max_joint_speed_ratio * (1 + 1e-6)
@@ -280,7 +280,7 @@ def test_tiles_beside_each_other_tell_of_one_path_and_of_different_counts(result
     assert tiles["max_joint_speed"] == speed
     assert ratio == pytest.approx(speed / limit)
     assert tiles["colliding"] == sum(bool(path.collisions) for path in summary.paths)
-    assert FIGURES["colliding"] == "Paths with a collision, whatever else is wrong"
+    assert FIGURES["colliding"] == "Paths with a collision"
 
 
 @pytest.mark.long
@@ -489,6 +489,44 @@ def test_what_repairs_a_path_is_written_as_a_table(study, results):
     np.testing.assert_array_equal(robot.base, np.eye(4))
 
 
+POINTS = {  # how a language writes a point of joints, and of how many degrees one of its units is
+    "krl": (r"PTP \{A1 (\S+), ?A2 (\S+), ?A3 (\S+), ?A4 (\S+), ?A5 (\S+), ?A6 (\S+)\}", 1.0),
+    "urscript": (r"movej\(\[(\S+), (\S+), (\S+), (\S+), (\S+), (\S+)\]", 180 / np.pi),
+    "rpl": (r"POINTJ\((\S+),(\S+),(\S+),(\S+),(\S+),(\S+)\)", 1.0),
+    "xpl": (r"POINTJ\((\S+),(\S+),(\S+),(\S+),(\S+),(\S+)\)", 1.0),
+}
+
+
+@pytest.mark.parametrize("language", POINTS)
+def test_what_repairs_a_path_is_written_in_each_language(results, language):
+    """Joints that move straight between the points read in the file come by every point that was checked."""
+    results, (pattern, unit) = results["er3a_c60"], POINTS[language]
+    rows, counts = results.programs, []
+    for path in (path for path in results.summary.paths if path.chosen):
+        own = (rows.path == path.name) & (rows.language == language)
+        (text,) = (
+            text
+            for file, text in zip(rows.file[own], rows.text[own])
+            if "_repaired." in file and re.search(pattern, text)
+        )
+        points = unit * np.array(re.findall(pattern, text), float)
+        motion = results.avoidance.take(
+            (results.avoidance.path == path.name) & (results.avoidance.strategy == path.strategy)
+        )
+        np.testing.assert_allclose(points[[0, -1]], motion.q_deg[[0, -1]], atol=1e-3)
+        counts.append(len(points))
+        starts, chords = points[:-1], np.diff(points, axis=0)
+        squares = np.maximum((chords**2).sum(axis=1), 1e-12)
+        for q in motion.q_deg:
+            along = np.clip(((q - starts) * chords).sum(axis=1) / squares, 0, 1)
+            off = np.abs(starts + along[:, None] * chords - q).max(axis=1)
+            assert off.min() < np.degrees(1e-4) + 1e-3
+        assert f"path {path.name} for " in text
+        assert f"repaired: {path.strategy}" in text
+    assert len(counts) > 1
+    assert 2 < max(counts) < len(motion.q_deg)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["line_wrist_near", "line_shoulder"])
 def test_the_slower_pace_that_is_advised_keeps_the_limits(study, results, tmp_path, name):
@@ -509,17 +547,17 @@ def test_the_shortest_time_of_a_path_that_is_too_fast_is_told_with_what_it_means
     path = by_name(results["er3a_c60"])["line_shoulder"]
     assert path.fastest_s < path.duration_s
     assert (
-        f"only its pace is too fast: slower there and faster elsewhere, it can be done in {path.fastest_s:.2f} s"
-        in (path_text(path))
+        "only the speed profile is at fault, not the path: slower there and faster elsewhere, the path takes "
+        f"{path.fastest_s:.2f} s" in (path_text(path))
     )
-    assert "it takes 9.00 s at least" in path_text(replace(path, fastest_s=9.0))
+    assert "it takes at least 9.00 s" in path_text(replace(path, fastest_s=9.0))
 
 
 def test_what_is_undecided_beside_another_fault_is_no_open_question(results):
     path = by_name(results["er3a_c60"])["line_wrist_near"]
     part = path.undecided[0]
     assert path.verdict != "undecided"
-    assert cause_text(path, part).endswith("singular pose is met; the path is not safe either way")
+    assert cause_text(path, part).endswith("singular pose is met; the path is not safe in either case")
     assert "either way" not in cause_text(replace(path, verdict="undecided"), part)
     assert "either way" not in cause_text(path, path.too_fast[0])
 

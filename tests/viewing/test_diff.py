@@ -82,14 +82,28 @@ def test_other_bytes_and_a_stage_on_one_side_are_named(folders, tmp_path):
     write_checksums(new / "er3_600/workspace")
     assert [entry.what for entry in changes(old, new)] == ["rows.parquet"]
     (new / "er3_600/workspace").rename(new / "er3_600/inverse")
-    assert [(entry.stage, entry.new) for entry in changes(old, new)] == [("inverse", "there"), ("workspace", "–")]
+    assert [(entry.stage, entry.new) for entry in changes(old, new)] == [("inverse", "present"), ("workspace", "–")]
     write_diff(old, new, changes(old, new), tmp_path / "diff.html")
     assert "workspace" in (tmp_path / "diff.html").read_text()
 
 
 def test_a_folder_without_results_is_one_error(folders, tmp_path):
-    with pytest.raises(ResultError, match="holds no results"):
-        changes(folders[0], tmp_path / "nothing")
+    study = tmp_path / "a study"
+    (study / "logs").mkdir(parents=True)
+    told = {}
+    for folder in (study, study / "results", study / "logs"):
+        with pytest.raises(ResultError) as error:
+            changes(folders[0], folder)
+        told[folder.name] = str(error.value)
+        assert told[folder.name].startswith(f"{folder}: ")
+        assert "Delete" not in told[folder.name]
+    assert "holds no results" in told["a study"]
+    assert "there is no such folder" in told["results"]
+    for name in ("a study", "results"):
+        assert f"cd '{study}' && er3a run" in told[name]
+    shutil.copytree(folders[0], study / "results")
+    with pytest.raises(ResultError, match=r"Give the results folder in it: '.*/a study/results'"):
+        changes(folders[0], study)
 
 
 @pytest.mark.long

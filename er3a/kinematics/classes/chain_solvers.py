@@ -23,6 +23,7 @@ from er3a.kinematics.classes.scara import Scara, scara, solve_scara
 from er3a.kinematics.classes.self_motion import PoseChain
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, SixRevolute, prepared, solve_six_revolute
 from er3a.kinematics.classes.spherical_joints import about_x, about_z, frame_along
+from er3a.kinematics.classes.two_slides import TwoSlides, solve_two_slides, two_slides
 from er3a.kinematics.closed_form import BOUNDARY_M, REACHED, ArmConstants, solve
 from er3a.kinematics.wrist_partitioned import WristPartitionedArm, constants_of, recognised
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -32,6 +33,7 @@ ArmClassCode = Literal[
     "three_parallel",
     "general_six",
     "six_one_prismatic",
+    "six_two_prismatic",
     "gantry",
     "arm_angle",
     "redundant",
@@ -39,6 +41,7 @@ ArmClassCode = Literal[
     "free_roll",
     "planar_wrist",
     "position",
+    "dependent",
     "unsolved",
 ]
 FULL_RANK = 1e-7
@@ -74,6 +77,7 @@ PREFERENCE: tuple[ArmClassCode, ...] = (
     "arm_angle",
     "gantry",
     "general_six",
+    "six_two_prismatic",
     "six_one_prismatic",
 )
 
@@ -199,6 +203,19 @@ class General(_Fixed):
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
         found = solve_six_revolute(self.arm, T)
+        return found.q, found.certainty
+
+
+@dataclass(frozen=True, eq=False)
+class TwoSliding(_Fixed):
+    """Six joints, two of which slide."""
+
+    arm: TwoSlides
+    code: ArmClassCode = "six_two_prismatic"
+    slots: int = 16
+
+    def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
+        found = solve_two_slides(self.arm, T)
         return found.q, found.certainty
 
 
@@ -431,10 +448,14 @@ def _of_six(links: Reals, sliding: Flags) -> ChainSolver:
     if three is not None:
         return ThreeSliding(three)
     if full_rank(links, sliding):
+        if sliding.sum() == 2:
+            two = two_slides(links, sliding)
+            return Unsolved(6) if two is None else TwoSliding(two)
         arm = prepared(links, sliding)
         if arm.readings:
             return General(arm, "six_one_prismatic" if sliding.any() else "general_six")
-    return Unsolved(6)
+        return Unsolved(6)
+    return Unsolved(6, "dependent")
 
 
 def full_rank(links: Reals, sliding: Flags) -> bool:
@@ -488,7 +509,7 @@ def _locked(links: Reals, sliding: Flags) -> ChainSolver:
         if best is None or rating < best[0]:
             best = (rating, joint, rest)  # type: ignore[assignment]
     if best is None or isinstance(best[2], Unsolved):
-        return Unsolved(n)
+        return Unsolved(n, "unsolved" if full_rank(links, sliding) else "dependent")
     _, joint, rest = best
     inner = tuple(Redundancy(p.joint + (p.joint >= joint), p.code) if p.joint >= 0 else p for p in rest.parameters)
     parameters = (Redundancy(joint, "locked_joint"), *inner)
@@ -499,9 +520,8 @@ def _locked(links: Reals, sliding: Flags) -> ChainSolver:
 def _completed(links: Reals, sliding: Flags) -> ChainSolver:
     """The chain with joints at the tool, or before its last joint, that make it a chain of six."""
     n = len(sliding)
-    lacking = 6 - n
-    if lacking > 3:
-        return Unsolved(n)
+    if not full_rank(links, sliding):
+        return Unsolved(n, "dependent")
     best: tuple[int, ChainSolver] | None = None
     for code, places, candidate in _completions(links, n):
         more = np.zeros(6, dtype=bool)
@@ -512,36 +532,53 @@ def _completed(links: Reals, sliding: Flags) -> ChainSolver:
         if isinstance(rest, Unsolved):
             continue
         place = PREFERENCE.index(rest.code)
+        if best is not None and code == "planar_wrist" and places == tuple(range(n, 6)):
+            break  # made for any chain, and needed by those alone that nothing else completes
         if best is None or (code == best[1].code and place < best[0]):
             best = (place, Completed(rest, places, code))
     return Unsolved(n) if best is None else best[1]
 
 
 def _completions(links: Reals, n: int) -> list[tuple[ArmClassCode, tuple[int, ...], Reals]]:
-    """Code, places of the added joints, and links (7, 4, 4) with them."""
+    """Code, places of the added joints, and links (7, 4, 4) with them; the last is made for any chain."""
     eye = np.eye(4)
     axes, _ = axes_of(links)
+    found: list[tuple[ArmClassCode, tuple[int, ...], Reals]] = []
     if n == 5:
-        found: list[tuple[ArmClassCode, tuple[int, ...], Reals]] = [
-            ("free_roll", (5,), np.concatenate([links, eye[None]]))
-        ]
+        found.append(("free_roll", (5,), np.concatenate([links, eye[None]])))
         across = np.cross(axes[3], axes[4])
         if np.linalg.norm(across) > 1e-6:
             found.append(("planar_wrist", (4,), _with_joint_between(links, 4, across)))
-        return found
     if n == 4:
         w = poses_of(links, np.zeros(4))[:3, :3].T @ axes[3]
         first, second = eye.copy(), eye.copy()
         second[:3, :3] = frame_along(w)[[1, 2, 0]].T  # z across the last axis
         first[:3, :3] = frame_along(w)[[2, 0, 1]].T  # z across both
         more = [links[-1] @ first, inverse_rigid(first) @ second, inverse_rigid(second)]
-        return [("planar_wrist", (4, 5), np.concatenate([links[:-1], more]))]
-    # a wrist about the tool point, askew, so that the tool's own orientation is none of its singular ones
-    askew = eye.copy()
-    askew[:3, :3] = about_x(0.9)
-    last = eye.copy()
-    last[:3, :3] = about_z(0.7) @ about_x(1.1)
-    return [("position", (3, 4, 5), np.concatenate([links, [askew], [inverse_rigid(askew)], [last]]))]
+        found.append(("planar_wrist", (4, 5), np.concatenate([links[:-1], more])))
+    if n == 3:
+        # a wrist about the tool point, askew, so that the tool's own orientation is none of its singular ones
+        askew = eye.copy()
+        askew[:3, :3] = about_x(0.9)
+        last = eye.copy()
+        last[:3, :3] = about_z(0.7) @ about_x(1.1)
+        found.append(("position", (3, 4, 5), np.concatenate([links, [askew], [inverse_rigid(askew)], [last]])))
+    found.append(("planar_wrist", tuple(range(n, 6)), _with_any_joints(links, n)))
+    return found
+
+
+def _with_any_joints(links: Reals, n: int) -> Reals:
+    """Links (7, 4, 4) with joints behind the tool about axes without special places."""
+    size, more = size_of(links), []
+    for k in range(6 - n):
+        step = np.eye(4)
+        step[:3, :3] = about_z(0.7 + 0.9 * k) @ about_x(1.1 - 0.3 * k)
+        step[:3, 3] = size * np.array([0.31, -0.17 + 0.13 * k, 0.23 - 0.19 * k])
+        more.append(step)
+    back = np.eye(4)
+    for step in more:
+        back = back @ step
+    return np.array([*links[:-1], links[-1] @ more[0], *more[1:], inverse_rigid(back)])
 
 
 def _with_joint_between(links: Reals, joint: int, axis: Reals) -> Reals:

@@ -12,6 +12,7 @@ poses beside it, too, and the solutions there are followed back.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -114,9 +115,13 @@ def solve_six_revolute(arm: SixRevolute, T: Reals) -> RowsFound:
     q, count = np.full((len(T), SLOTS, 6), np.nan), np.zeros(len(T), dtype=np.int64)
     certainty = np.full(len(T), CONTINUUM)
     memory = new_memory(arm.sliding)
-    _by_readings(arm, T, memory, q, count, certainty)
-    _from_beside(arm, T, memory, q, count, certainty)
-    _in_order(q, count)
+
+    def by_readings(poses: Reals, rows: Reals, number: Integers, doubt: Integers) -> None:
+        _by_readings(arm, poses, memory, rows, number, doubt)
+
+    by_readings(T, q, count, certainty)
+    from_beside(by_readings, (arm.links, arm.size), T, memory, (q, count, certainty))
+    in_order(q, count)
     q[:, :, arm.sliding] *= arm.size
     return RowsFound(q, count, certainty)
 
@@ -134,10 +139,19 @@ def _by_readings(
         left = left[(verdicts != CERTAIN) & (told[left] < MOST_READINGS)]
 
 
-def _from_beside(
-    arm: SixRevolute, T: Reals, memory: LoopMemory, q: Reals, count: Integers, certainty: Integers
+def from_beside(
+    by_readings: Callable[[Reals, Reals, Integers, Integers], None],
+    chain: tuple[Reals, float],
+    T: Reals,
+    memory: LoopMemory,
+    out: tuple[Reals, Integers, Integers],
 ) -> None:
-    """Add to poses in doubt what the solutions of poses beside them lead to."""
+    """Add to poses in doubt what the solutions of poses beside them lead to.
+
+    ``by_readings`` takes poses and fills rows, their number and certainty; ``chain`` are links and size, ``out`` rows
+    (N, 16, 6), their number (N,) and certainty (N,) at the poses T (N, 4, 4).
+    """
+    (links, size), (q, count, certainty) = chain, out
     random, in_doubt = np.random.default_rng(3), np.flatnonzero(certainty == UNCERTAIN)
     idle = np.zeros(len(in_doubt), dtype=np.int64)
     for k in range(BESIDE):
@@ -147,11 +161,11 @@ def _from_beside(
         way = random.normal(size=6) * ASIDE[k % len(ASIDE)]
         beside = np.eye(4)
         beside[:3, :3] = scipy.spatial.transform.Rotation.from_rotvec(way[:3]).as_matrix()
-        beside[:3, 3] = way[3:] * arm.size
+        beside[:3, 3] = way[3:] * size
         near = np.full((len(in_doubt), SLOTS, 6), np.nan), np.zeros(len(in_doubt), dtype=np.int64)
-        _by_readings(arm, T[in_doubt] @ beside, memory, *near, np.full(len(in_doubt), CONTINUUM))
+        by_readings(T[in_doubt] @ beside, *near, np.full(len(in_doubt), CONTINUUM))
         before = count[in_doubt]
-        followed_back(arm.links, arm.size, T, in_doubt, memory, *near, q, count)
+        followed_back(links, size, T, in_doubt, memory, *near, q, count)
         idle = np.where(count[in_doubt] > before, 0, idle + 1)
 
 
@@ -205,11 +219,11 @@ def followed_back(
             m.candidate[:] = near[i, r]
             residual, pivot = newton(links, m.sliding, pose, m.candidate, 20, m.frames, m.J, m.dq, m.columns)
             if residual < SOLVES:
-                count[n] = _add(links, pose, m, m.candidate, pivot, q[n], count[n])
+                count[n] = add_row(links, pose, m, m.candidate, pivot, q[n], count[n])
 
 
 @kernel
-def _in_order(q: Reals, count: Integers) -> None:
+def in_order(q: Reals, count: Integers) -> None:
     for n in range(q.shape[0]):
         for r in range(count[n]):
             least = r
@@ -255,13 +269,13 @@ def _by_reading(
                     away = m.candidate[reading.joint[2]] * reading.sense - m.zeros[z, 0]
                     away -= 2 * np.pi * np.round(away / (2 * np.pi))
                     solved = solved or abs(away) < 1e-2
-                    rows = _add(links, pose, m, m.candidate, pivot, q, rows)
+                    rows = add_row(links, pose, m, m.candidate, pivot, q, rows)
                     if pivot < 1e-3 and twin_start(
                         links, m.sliding, pose, m.candidate, m.start, m.frames, m.J, m.columns
                     ):
                         residual, pivot = newton(links, m.sliding, pose, m.start, 12, m.frames, m.J, m.dq, m.columns)
                         if residual < SOLVES:
-                            rows = _add(links, pose, m, m.start, pivot, q, rows)
+                            rows = add_row(links, pose, m, m.start, pivot, q, rows)
         if m.zeros[z, 2] == 0.0 or not solved:
             verdict = UNCERTAIN
     # Complex zeros come in pairs, and each zero tells a solution of its own.
@@ -271,7 +285,7 @@ def _by_reading(
 
 
 @kernel
-def _add(links: Reals, pose: Reals, m: LoopMemory, found: Reals, pivot: float, q: Reals, rows: int) -> int:
+def add_row(links: Reals, pose: Reals, m: LoopMemory, found: Reals, pivot: float, q: Reals, rows: int) -> int:
     """Add a row unless it stands there.
 
     Where the Jacobian's last pivot is small, rows are known to ``SPREAD / pivot`` only: a root of higher order comes

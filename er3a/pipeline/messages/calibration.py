@@ -33,18 +33,18 @@ def level(name: str) -> str:
 
 @say.register
 def _(found: MovesNothing) -> str:
-    return sentence(found.code, "{entry} moves none of the measured points", entry=found.entry)
+    return sentence(found.code, "{entry} has no effect on the measured points", entry=found.entry)
 
 
 @say.register
 def _(found: NotToldApart) -> str:
     entries = _listed(found.entries)
     if found.parallel_joints is None:
-        return sentence(found.code, "{entries} can't be separated", entries=entries)
+        return sentence(found.code, "{entries} can't be identified separately", entries=entries)
     first, second = found.parallel_joints
     return sentence(
         found.code,
-        "{entries} can't be separated: joints {first} and {second} are parallel",
+        "{entries} can't be identified separately: axes {first} and {second} are parallel",
         entries=entries,
         first=first,
         second=second,
@@ -71,7 +71,10 @@ def _(found: MorePositions) -> str:
         level=level(found.level),
     )
     needed = counted(
-        found.code, "it takes at least {count} more position", "it takes at least {count} more positions", found.least
+        found.code,
+        "at least {count} more position is needed",
+        "at least {count} more positions are needed",
+        found.least,
     )
     if found.entries:
         needed = sentence(found.code, "{needed} for {entries}", needed=needed, entries=joined(found.entries, ", "))
@@ -89,8 +92,8 @@ def _(found: MorePositions) -> str:
 def _(found: NoCorrectionFits) -> str:
     return sentence(
         found.code,
-        "no corrections make the table fit: after {steps} steps the positions are still {rest:.3g} mm off. The table "
-        "has a gross fault or is another arm's; er3a.diagnose names single faults",
+        "no corrections make the table fit: after {steps} steps the positions are still {rest:.3g} mm off. The "
+        "table has a gross fault or belongs to another arm; er3a.diagnose finds single faults",
         steps=found.steps,
         rest=found.rest_mm,
     )
@@ -100,8 +103,8 @@ def _(found: NoCorrectionFits) -> str:
 def _(found: Misfit) -> str:
     return sentence(
         found.code,
-        "No corrections of its {level} make this table meet the positions: {after:.3g} mm of {before:.3g} mm (root "
-        "mean square) remain. It is not a matter of calibration.",
+        "Correcting {level} does not make this table fit the positions: {after:.3g} mm of {before:.3g} mm (root"
+        " mean square) remain. Calibration can't repair it.",
         level=level(found.level),
         after=found.rms_after_mm,
         before=found.rms_before_mm,
@@ -112,7 +115,7 @@ def _(found: Misfit) -> str:
 def _(found: CorrectionsFound) -> str:
     return sentence(
         found.code,
-        "The positions indicate corrections of {entries}, beyond their 95 % intervals.",
+        "The positions indicate corrections of {entries}: their 95 % intervals exclude 0.",
         entries=joined(found.entries, ", "),
     )
 
@@ -121,8 +124,8 @@ def _(found: CorrectionsFound) -> str:
 def _(found: NoCorrectionFound) -> str:
     return counted(
         found.code,
-        "The positions indicate no correction: the interval (95 %) holds 0.",
-        "The positions indicate no correction: all {count} intervals (95 %) hold 0.",
+        "The positions indicate no correction: the 95 % interval contains 0.",
+        "The positions indicate no correction: all {count} 95 % intervals contain 0.",
         found.intervals,
     )
 
@@ -136,14 +139,17 @@ def lines_of(found: Calibration) -> str:
         f"{'entry':<9}{'table':>12}{'correction':>14}{'95 % interval':>16}",
     ]
     for each in found.estimates:
-        values = f"{each.nominal:>12.4f}{each.correction:>+14.4f}{each.half_width:>12.4f}"
+        values = as_text(each.nominal, ">12.4f") + as_text(each.correction, ">+14.4f") + f"{each.half_width:>12.4f}"
         lines.append(f"{each.name:<9}{values} {each.unit}")
-    lines += [f"held: {say(reason)}" for reason in found.held]
-    lines += [f"close: {pair.first} and {pair.second} are correlated by {pair.correlation:.2f}" for pair in found.close]
+    lines += [f"not estimated: {say(reason)}" for reason in found.held]
+    lines += [
+        f"strongly correlated: {pair.first} and {pair.second} ({as_text(pair.correlation, '.2f')})"
+        for pair in found.close
+    ]
     if found.scatter > MUCH_SCATTER:
-        lines.append("warning: what remains is larger than the stated deviations allow; so are the errors")
+        lines.append("warning: the residuals exceed the stated standard deviations, so errors may exceed the intervals")
     if found.more:
-        lines.append(f"for more: {say(found.more)}")
+        lines.append(f"to estimate more: {say(found.more)}")
     return "\n".join(lines)
 
 

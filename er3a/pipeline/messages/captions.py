@@ -14,13 +14,13 @@ def of_study() -> str:
     told = (
         tr("Evidence on kinematic models of robots: can each table be trusted, and what can the arm do?"),
         tr(
-            "Start with the index: verdicts and key figures of every robot and stage. Each robot has a page for each "
-            "stage and a teach panel. Pages are complete and work offline; links between them lead nowhere from "
-            "within this report, so choose pages from the lists here."
+            "Start with the index: verdicts and key figures of every robot and stage. Each robot has a page for"
+            " each stage and a teach panel. Pages are complete and work offline; links between pages do not "
+            "work inside this report, so choose pages from the lists here."
         ),
         tr(
-            "A fail is a result, not a broken run: evidence contradicts the table. The foot of each page names its "
-            "inputs and the command that makes it again."
+            "A fail is a result, not a broken run: evidence contradicts the table. The foot of each page lists "
+            "its inputs and the command that reproduces it."
         ),
     )
     return "\n\n".join(told)
@@ -39,8 +39,8 @@ def of_stage(robot: str, question: str) -> str:
 def of_teach_panel(robot: str) -> str:
     """The teach panel."""
     return tr(
-        "{robot} to move by hand: joints, typed poses, jogging, way points, how near a singularity is, and all IK "
-        "solutions of the pose.",
+        "Move {robot} by hand: joints, typed poses, jogging, way points, distance from singularities, and all "
+        "IK solutions of the pose.",
         robot=robot,
     )
 

@@ -8,22 +8,22 @@ from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import sentence, word
 
 FIGURES = {
-    "free_of_collisions": N_("Joint space free of collisions"),
+    "free_of_collisions": N_("Collision-free joint space"),
     "free_of_itself": N_("Free of self-collision"),
-    "free_of_scene": N_("Free of the scene"),
-    "clear_places": N_("Places reached clear of everything"),
-    "joined_places": N_("Of these, joined to home"),
+    "free_of_scene": N_("Free of collisions with the scene"),
+    "clear_places": N_("Cells reached without collision"),
+    "joined_places": N_("Of these, connected to home"),
     "lost_volume": N_("Volume lost to collisions, estimate"),
-    "watched_pairs": N_("Pairs of the arm that are watched"),
+    "watched_pairs": N_("Pairs of links that are checked"),
     "undecided_pairs": N_("Pairs undecided"),
 }
 STATES: dict[PairState, str] = {
-    "never": N_("never meet"),
-    "joined": N_("joined"),
-    "meets": N_("can meet"),
+    "never": N_("never collide"),
+    "joined": N_("adjacent"),
+    "meets": N_("can collide"),
     "undecided": N_("undecided"),
     "allowed": N_("allowed"),
-    "watched": N_("watched on request"),
+    "watched": N_("checked on request"),
 }
 
 
@@ -55,10 +55,14 @@ def why(state: PairState, least_mm: float, left_out_mm: float, boxes: int, witne
         case "allowed" | "watched":
             return tr("Decided in the robot or scene file: {reason}", reason=reason)
         case "undecided":
-            return tr("Neither proven apart nor found to meet, in {boxes} boxes; watched.", boxes=boxes)
+            return tr("Neither proven apart nor found to collide, in {boxes} boxes; checked.", boxes=boxes)
     if not left_out_mm:
-        return tr("They meet at joints ({witness}).", witness=witness)
-    joined = tr("They touch by construction: within {radius:.0f} mm of their joint is left out.", radius=left_out_mm)
+        return tr("They collide at joint values ({witness}).", witness=witness)
+    joined = tr(
+        "They touch by design: the region within {radius:.0f} mm of their joint is left out.", radius=left_out_mm
+    )
     if witness:
-        return tr("{first} {rest}", first=joined, rest=tr("Beyond it they meet at ({witness}).", witness=witness))
-    return tr("{first} {rest}", first=joined, rest=tr("Nothing beyond it was found to meet."))
+        return tr(
+            "{first} {rest}", first=joined, rest=tr("Outside that region they collide at ({witness}).", witness=witness)
+        )
+    return tr("{first} {rest}", first=joined, rest=tr("Outside that region no collision was found."))

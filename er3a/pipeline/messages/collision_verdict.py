@@ -13,7 +13,7 @@ NAMED = 3
 def _(found: NeverFree) -> str:
     return sentence(
         found.code,
-        "No joint vector within the limits is free of collisions, proven: {pairs} always overlap.",
+        "No joint vector within the limits is collision-free (proven): {pairs} always overlap.",
         pairs=joined(listed(found.pairs[:NAMED]), ", "),
     )
 
@@ -22,7 +22,7 @@ def _(found: NeverFree) -> str:
 def _(found: BaseInSolid) -> str:
     return sentence(
         found.code,
-        "The base stands inside {own_name}, whatever the joints do: correct the scene or the base's place.",
+        "The base is inside {own_name} at every joint vector: correct the scene or the position of the base.",
         own_name=", ".join(found.solids[:NAMED]),
     )
 
@@ -31,8 +31,8 @@ def _(found: BaseInSolid) -> str:
 def _(found: HomeCollides) -> str:
     return sentence(
         found.code,
-        "At home {pair} overlap by {depth:.1f} mm, so it is not known what can be reached from there; {percent:.1f} % "
-        "of the joint space is free of collisions.",
+        "In the home pose {pair} overlap by {depth:.1f} mm, so what can be reached from there is unknown; "
+        "{percent:.1f} % of the joint space is collision-free.",
         pair=say(found.pair),
         depth=found.depth_mm,
         percent=100 * found.free_ratio,
@@ -42,11 +42,11 @@ def _(found: HomeCollides) -> str:
 @say.register
 def _(found: FreeSpace) -> str:
     if not found.clear:
-        return sentence(found.code, "No arm free of collisions was found.")
+        return sentence(found.code, "No collision-free configuration was found.")
     free = sentence(
         found.code,
-        "{percent:.1f} % of the joint space is free of collisions. Of {places} places reached, {clear} are proven to "
-        "be reached clear of everything, {joined} of these by a proven motion from home.",
+        "{percent:.1f} % of the joint space is collision-free. Of {places} cells reached, {clear} are proven "
+        "reachable without collision, {joined} of these by a proven motion from home.",
         percent=100 * found.free_ratio,
         places=found.places,
         clear=found.clear,
@@ -56,7 +56,7 @@ def _(found: FreeSpace) -> str:
         return free
     doubt = sentence(
         found.code,
-        "Pairs of links of which it is not known whether they can meet, and which are watched: {count}.",
+        "Pairs of links that may or may not collide, and are therefore checked: {count}.",
         count=found.undecided,
     )
     return joined([free, doubt], " ")

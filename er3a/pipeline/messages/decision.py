@@ -15,11 +15,13 @@ def decision(table: str, failed: Sequence[str], instead: str | None = None) -> s
     if table == "fail" and instead:
         return tr("Never use this table: evidence contradicts it. Use {robot} instead.", robot=instead)
     if table == "fail":
-        return tr("Never use this table: evidence contradicts it, and so what follows from it.")
+        return tr("Never use this table: evidence contradicts it, so nothing computed from it holds for the robot.")
     if failed:
-        return tr("Not as it stands: see {stages}.", stages=", ".join(failed))
+        return tr("Do not use it as it is: see {stages}.", stages=", ".join(failed))
     if table == "pass":
-        return tr("Use it: what moves the tool is settled, and nothing here fails.")
+        return tr(
+            "Use it: every entry that moves the tool is settled by independent documents, and nothing here fails."
+        )
     if table == "caution":
         return tr("Use it with care: nothing contradicts its table, but part of it is not settled.")
     return tr("There is no evidence on its table: check it before you use it.")

@@ -68,8 +68,8 @@ CONVENTIONS = {
     "standard": N_("the table is a modified one, read as standard"),
 }
 LIMIT_FAULTS = {
-    "crossed": N_("limits crossed"),
-    "signs_swapped": N_("limits signed the wrong way round"),
+    "crossed": N_("lower limit above the upper one"),
+    "signs_swapped": N_("both limits have the wrong sign"),
     "lower_sign": N_("lower limit has the wrong sign"),
     "upper_sign": N_("upper limit has the wrong sign"),
 }
@@ -212,7 +212,7 @@ def _(found: WrongLength) -> str:
 
 @say.register
 def _(found: WrongScale) -> str:
-    fault = sentence(found.code, "scale wrong, times {factor:.6g} fits", factor=found.factor)
+    fault = sentence(found.code, "wrong scale: a factor of {factor:.6g} fits", factor=found.factor)
     return _at(word("wrong_unit", ENTRIES, "lengths"), fault)
 
 
@@ -243,17 +243,17 @@ def _(found: LimitDecides) -> str:
 
 @say.register
 def _(found: NothingDecides) -> str:
-    return sentence(found.code, "nothing can, they are the same arm written in different ways")
+    return sentence(found.code, "nothing can: they describe the same arm")
 
 
 @say.register
 def _(found: OrientationDecides) -> str:
-    return sentence(found.code, "no position of the flange does, but its orientation, or a point beside axis 6")
+    return sentence(found.code, "the flange's position does not, but its orientation does, or a point off axis 6")
 
 
 @say.register
 def _(found: NothingToRestOn) -> str:
-    return sentence(found.code, "There is nothing to base a diagnosis on.")
+    return sentence(found.code, "There are no data for a diagnosis.")
 
 
 @say.register
@@ -271,23 +271,17 @@ def _(found: NothingToExplain) -> str:
 def _(found: Resolution) -> str:
     texts = []
     if found.length_mm is not None:
-        texts.append(
-            sentence(
-                found.code, "A length that is wrong alone would be noticed from {mm:.2g} mm on.", mm=found.length_mm
-            )
-        )
+        texts.append(sentence(found.code, "A single wrong length is detected from {mm:.2g} mm on.", mm=found.length_mm))
     if found.angle_deg is not None:
         texts.append(
-            sentence(
-                found.code, "An angle that is wrong alone would be noticed from {deg:.2g} deg on.", deg=found.angle_deg
-            )
+            sentence(found.code, "A single wrong angle is detected from {deg:.2g} deg on.", deg=found.angle_deg)
         )
     if found.half_turns:
         entries = joined(found.half_turns, ", ")
-        texts.append(sentence(found.code, "Half a turn too much would not be noticed in {entries}.", entries=entries))
+        texts.append(sentence(found.code, "An error of 180 deg in {entries} would not be detected.", entries=entries))
     if found.unseen:
         entries = joined(found.unseen, ", ")
-        texts.append(sentence(found.code, "Nothing at all would be noticed of errors in {entries}.", entries=entries))
+        texts.append(sentence(found.code, "No error in {entries} would be detected.", entries=entries))
     return joined(texts, " ")
 
 
@@ -300,8 +294,8 @@ def _(found: MostLikelyFault) -> str:
 def _(found: TooSmallToTell) -> str:
     return sentence(
         found.code,
-        "The disagreement ({residual} {unit}) is too small for these references to tell which of {count} faults it is: "
-        "{candidates}. From about {told} {unit} on they would distinguish them, as far as they ever do.",
+        "The disagreement ({residual} {unit}) is too small to tell which of {count} faults causes it: "
+        "{candidates}. From about {told} {unit} on these references distinguish them, where they can at all.",
         residual=shown(found.residual),
         count=len(found.candidates),
         candidates=_candidates(found.candidates),
@@ -314,7 +308,7 @@ def _(found: TooSmallToTell) -> str:
 def _(found: MainFault) -> str:
     return sentence(
         found.code,
-        "The best that was tried: {hypothesis}, which is still more than the references leave open.",
+        "The best hypothesis tried: {hypothesis}, which still exceeds the references' uncertainty.",
         hypothesis=_residual_falls(found),
     )
 
@@ -323,10 +317,10 @@ def _(found: MainFault) -> str:
 def _(found: NoFaultStandsOut) -> str:
     return counted(
         found.code,
-        "{count} of {references} references is missed, by up to {times:.3g} times what it leaves open, but none of the "
-        "{tried} faults and pairs of faults that were tried does better than the table as it is.",
-        "{count} of {references} references are missed, by up to {times:.3g} times what they leave open, but none of "
-        "the {tried} faults and pairs of faults that were tried does better than the table as it is.",
+        "{count} of {references} references is missed, by up to {times:.3g} times its uncertainty, but none of "
+        "the {tried} faults and pairs of faults that were tried fits better than the table as it is.",
+        "{count} of {references} references are missed, by up to {times:.3g} times their uncertainty, but none "
+        "of the {tried} faults and pairs of faults that were tried fits better than the table as it is.",
         found.missed,
         references=found.references,
         times=found.half_widths,
@@ -338,9 +332,9 @@ def _(found: NoFaultStandsOut) -> str:
 def _(found: NoFewFaultsExplain) -> str:
     return sentence(
         found.code,
-        "No one or two faults explain the data, of {tried} that were tried: the first in rank still leaves {after} "
-        "{unit} of {before} {unit}, and none leaves less than {least} {unit}. This is another arm, or more than two "
-        "numbers are wrong, or one is wrong in a manner that was not tried, or a reference is.",
+        "None of the {tried} hypotheses tried, of one fault or two, explains the data: the best still leaves "
+        "{after} {unit} of {before} {unit}, and none leaves less than {least} {unit}. This is another arm, or "
+        "more than two numbers are wrong, or one is wrong in a way that was not tried, or a reference is wrong.",
         tried=found.tried,
         after=shown(found.residual_after),
         before=shown(found.residual_before),

@@ -24,13 +24,13 @@ FIGURES = {
     "mass": N_("Mass of the links"),
     "peak_torque": N_("Greatest torque on a path"),
     "holding_torque": N_("Greatest holding torque found"),
-    "energy": N_("Energy of the path that takes most"),
-    "utilisation": N_("Tightest comparison with a limit"),
+    "energy": N_("Greatest energy of a path"),
+    "utilisation": N_("Highest utilisation of a limit"),
     "power_balance": N_("Power balance, greatest error"),
 }
-BINDING: dict[Binding, str] = {"peak": N_("peak"), "rms": N_("effective"), "speed": N_("speed")}
+BINDING: dict[Binding, str] = {"peak": N_("peak"), "rms": N_("RMS"), "speed": N_("speed")}
 WHY: dict[NoBody, str] = {
-    "not_finite": N_("holds something that is no number"),
+    "not_finite": N_("contains something that is not a number"),
     "negative_mass": N_("its mass is below 0"),
     "negative_moment": N_("a principal moment is below 0"),
     "triangle": N_("a principal moment exceeds the sum of the other two"),
@@ -40,7 +40,7 @@ WHY: dict[NoBody, str] = {
 @say.register
 def _(found: ImpossibleInertia) -> str:
     why = word("dynamics.why", WHY, found.why)
-    return sentence(found.code, "link {link}: no body has this inertia ({why})", link=found.link, why=why)
+    return sentence(found.code, "link {link}: no body can have this inertia ({why})", link=found.link, why=why)
 
 
 @say.register
@@ -57,12 +57,12 @@ def _(found: MissingLink) -> str:
 
 @say.register
 def _(found: PointMass) -> str:
-    return sentence(found.code, "link {link}: a mass without inertia", link=found.link)
+    return sentence(found.code, "link {link}: mass without inertia", link=found.link)
 
 
 @say.register
 def _(found: InertiaWithoutMass) -> str:
-    return sentence(found.code, "link {link}: an inertia without a mass; it counts as given", link=found.link)
+    return sentence(found.code, "link {link}: inertia without mass; it is used as given", link=found.link)
 
 
 @say.register

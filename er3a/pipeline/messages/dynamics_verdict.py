@@ -18,7 +18,7 @@ from er3a.pipeline.stages.dynamics.model import (
 
 QUANTITIES: dict[Quantity, str] = {
     "peak": N_("peak torque"),
-    "rms": N_("effective torque"),
+    "rms": N_("RMS torque"),
     "holding": N_("holding torque"),
     "payload": N_("payload"),
     "moment": N_("wrist moment"),
@@ -106,11 +106,16 @@ def _(found: NoLimits) -> str:
 def _(found: Compared) -> str:
     tightest = use_text(found.tightest)
     if isinstance(found, AllWithin):
-        told = sentence("dynamics.fits", "Fits: all that has a limit is within it; tightest: {use}.", use=tightest)
+        told = sentence(
+            "dynamics.fits",
+            ("Fits: every quantity with a known limit is within it; highest utilisation: {use}."),
+            use=tightest,
+        )
     elif isinstance(found, Marginal):
         told = sentence(
             "dynamics.marginal",
-            "Marginal: within the limits, but masses are too uncertain or doubtful to rely on it; tightest: {use}.",
+            "Marginal: within the limits, but masses are too uncertain or doubtful to rely on it; highest "
+            "utilisation: {use}.",
             use=tightest,
         )
     else:
@@ -125,7 +130,7 @@ def _(found: Compared) -> str:
     open_ = ""
     if found.unlimited:
         what = joined(map(need_word, found.unlimited), ", ")
-        open_ = sentence("dynamics.unlimited", "Not known, in whole or in part: {what}.", what=what)
+        open_ = sentence("dynamics.unlimited", "Unknown, wholly or in part: {what}.", what=what)
     return joined([told, open_, *_reservations(found)], " ")
 
 
@@ -149,7 +154,9 @@ def _reservations(found: Compared | NoLimits) -> list[str]:
         )
         if found.doubts
         else "",
-        sentence("dynamics.inferred", "Masses are inferred: these are orders of magnitude.") if found.inferred else "",
+        sentence("dynamics.inferred", "Masses are inferred: the results are orders of magnitude only.")
+        if found.inferred
+        else "",
     ]
 
 

@@ -21,13 +21,15 @@ STATUS_WORDS = {
     "absent": N_("not given"),
 }
 STATUS_MEANINGS = {
-    "settled": N_("independent documents leave open less than moves the tool by the tolerance"),
-    "weak": N_("independent documents react to it, but leave more than the tolerance open"),
+    "settled": N_("what independent documents leave open moves the tool by less than the tolerance"),
+    "weak": N_(
+        "independent documents depend on it, but what they leave open moves the tool by more than the tolerance"
+    ),
     "contradicted": N_("the evidence excludes the value"),
     "consistent": N_("no document but its own source covers it"),
     "open": N_("no document distinguishes it from another value that moves the tool"),
-    "gauge": N_("alone it means nothing: changed together with others it describes the same robot"),
-    "given": N_("chosen by who writes the file"),
+    "gauge": N_("not determined alone: changed together with other entries it describes the same robot"),
+    "given": N_("chosen by the author of the file"),
 }
 CHECK_KINDS = {
     "independent": N_("independent"),

@@ -9,10 +9,10 @@ from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.say import word
 
 FOUNDATIONS: Mapping[str, str] = {
-    "fail": N_("Never use this table: evidence contradicts it. These results are true of the table, not of the robot."),
-    "caution": N_("Validation leaves part of this D-H table open: these results hold only as far as it does."),
-    "no_reference": N_("Nothing was compared with this D-H table: these results hold only as far as it does."),
-    "not_computed": N_("This D-H table was not validated: these results hold only as far as it does."),
+    "fail": N_("Never use this table: evidence contradicts it. These results hold for the table, not for the robot."),
+    "caution": N_("Validation leaves part of this D-H table open: these results are only as good as the table."),
+    "no_reference": N_("This D-H table was compared with no data: these results are only as good as the table."),
+    "not_computed": N_("This D-H table was not validated: these results are only as good as the table."),
 }
 
 

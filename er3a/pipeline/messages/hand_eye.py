@@ -6,7 +6,7 @@ import numpy as np
 
 import er3a.pipeline.messages.calibration  # noqa: F401
 from er3a.geometry.transforms import rpy_of
-from er3a.pipeline.messages.language import N_
+from er3a.pipeline.messages.language import N_, as_text
 from er3a.pipeline.messages.say import say, sentence, word
 from er3a.vision.boards import AmbiguousTilt
 from er3a.vision.hand_eye import HandEye, spread_of
@@ -39,7 +39,7 @@ MENDING = {
     "half_turn_z": N_("the board is detected turned by 180 deg in its plane"),
     "quarter_turn_z": N_("the board is detected turned by 90 deg in its plane"),
     "mirrored_tilt": N_("the board's tilt is mirrored, as of a flat board seen from far or head-on"),
-    "rotation": N_("no turn that detectors mistake explains it"),
+    "rotation": N_("no typical detector error explains it"),
 }
 STREAMS = {"flange": N_("flange"), "target": N_("board"), "both": N_("flange and board")}
 POSES = {
@@ -73,7 +73,8 @@ METHODS = {
 def _(found: RotationMismatch) -> str:
     return sentence(
         found.code,
-        "{own_name}: hand and board turn by different angles to the other samples, {off:.1f} deg in the median; {kind}",
+        "{own_name}: flange and board rotate by different angles relative to the other samples, {off:.1f} deg "
+        "in the median; {kind}",
         own_name=found.sample,
         off=found.off_deg,
         kind=word("vision.mending", MENDING, found.kind),
@@ -96,8 +97,8 @@ def _(found: FarFromFit) -> str:
 def _(found: RepeatedPose) -> str:
     return sentence(
         found.code,
-        "{own_name}: the arm stands as in {first}, and the board is seen {mm:.2g} mm and {deg:.2g} deg apart; a sample "
-        "elsewhere would say more",
+        "{own_name}: the arm has the same pose as in {first}, and the two board poses differ by {mm:.2g} mm and"
+        " {deg:.2g} deg; a sample at another pose would add more",
         own_name=found.sample,
         first=found.first,
         mm=found.apart_mm,
@@ -109,8 +110,8 @@ def _(found: RepeatedPose) -> str:
 def _(found: AmbiguousTilt) -> str:
     return sentence(
         found.code,
-        "{own_name}: the flat board is seen so nearly head-on, or so small, that its other tilt fits with only "
-        "{ratio:.2g} times the error: take the image nearer, or with the board tilted by 30 deg",
+        "{own_name}: the flat board is seen almost head-on, or too small: the mirrored tilt fits with only "
+        "{ratio:.2g} times the error. Take the image from nearer, or tilt the board by 30 deg",
         own_name=found.sample,
         ratio=found.ratio,
     )
@@ -120,8 +121,8 @@ def _(found: AmbiguousTilt) -> str:
 def _(found: NoMajority) -> str:
     return sentence(
         found.code,
-        "hand and board turn by different angles in {pairs} of {of} pairs of samples ({median:.3g} deg in the median): "
-        "the robot's table, the order of the samples, or the orientations of one stream are wrong",
+        "flange and board rotate by different angles in {pairs} of {of} pairs of samples ({median:.3g} deg in "
+        "the median): the robot's table, the order of the samples, or the orientations of one stream are wrong",
         pairs=found.pairs,
         of=found.of,
         median=found.median_deg,
@@ -132,8 +133,8 @@ def _(found: NoMajority) -> str:
 def _(found: QuaternionOrder) -> str:
     return sentence(
         found.code,
-        "the quaternions of the {stream} have their real part at the other end: read so, the residuals are {after:.2g} "
-        "deg, as given {before:.3g} deg",
+        "the quaternions of the {stream} have their real part at the other end: read that way the residuals are"
+        " {after:.2g} deg, as given {before:.3g} deg",
         stream=word("vision.stream", STREAMS, found.stream),
         after=found.rms_other_deg,
         before=found.rms_given_deg,
@@ -144,7 +145,7 @@ def _(found: QuaternionOrder) -> str:
 def _(found: AngleOrder) -> str:
     return sentence(
         found.code,
-        "the angles of the {stream} fit if they are read as R = {product}: the residuals are {after:.2g} deg then, as "
+        "the angles of the {stream} fit if read as R = {product}: the residuals are then {after:.2g} deg, as "
         "given {before:.3g} deg; convert them to R = Rz(yaw) Ry(pitch) Rx(roll)",
         stream=word("vision.stream", STREAMS, found.stream),
         product=found.product,
@@ -157,8 +158,8 @@ def _(found: AngleOrder) -> str:
 def _(found: TransposedRotations) -> str:
     return sentence(
         found.code,
-        "the rotations of the {stream} are transposed, with positions as they should be: read so, the residuals are "
-        "{after:.2g} deg, as given {before:.3g} deg; write matrices by rows",
+        "the rotations of the {stream} are transposed, its positions are right: read that way the residuals are"
+        " {after:.2g} deg, as given {before:.3g} deg; write matrices row by row",
         stream=word("vision.stream", STREAMS, found.stream),
         after=found.rms_other_deg,
         before=found.rms_given_deg,
@@ -171,8 +172,9 @@ def _(found: OtherDirection) -> str:
         return sentence(found.code, "the samples exclude this direction; invert both streams")
     return sentence(
         found.code,
-        "the samples exclude this direction: they fit with one stream inverted. Either the setup is the other one, or "
-        "the poses of the flange are those of the base in it (T_flange_base), or the board's those of the camera in it",
+        "the samples exclude this direction: they fit with one stream inverted. Either the setup is the other "
+        "one, or the flange poses are those of the base in the flange's frame (T_flange_base), or the board "
+        "poses are those of the camera in the board's frame",
     )
 
 
@@ -191,8 +193,8 @@ def _(found: BoardScale) -> str:
 def _(found: LittleMotion) -> str:
     return sentence(
         found.code,
-        "the samples turn by {turn:.3g} deg at most, about axes {apart:.2g} deg off one direction: add poses turned by "
-        "30 deg and more about a second axis",
+        "the samples rotate by at most {turn:.3g} deg, about axes within {apart:.2g} deg of one direction: add "
+        "poses rotated by 30 deg or more about a second axis",
         turn=found.greatest_turn_deg,
         apart=found.axes_apart_deg,
     )
@@ -202,8 +204,8 @@ def _(found: LittleMotion) -> str:
 def _(found: MoreScatter) -> str:
     return sentence(
         found.code,
-        "the residuals are {scatter:.3g} times the stated standard deviations, where chance leaves {largest:.2f} at "
-        "most: the arm's table, its repeatability or the camera is worse than stated",
+        "the residuals are {scatter:.3g} times the stated standard deviations, where chance explains at most "
+        "{largest:.2f}: the arm's table, its repeatability or the camera is worse than stated",
         scatter=found.scatter,
         largest=found.largest,
     )
@@ -222,7 +224,7 @@ def _(found: TooFewSamples) -> str:
 @say.register
 def _(found: AllSamplesEqual) -> str:
     if found.stream == "flange":
-        return sentence(found.code, "the flange stands in the same pose in all samples: move the arm between them")
+        return sentence(found.code, "the flange has the same pose in all samples: move the arm between them")
     return sentence(found.code, "the board is seen in the same pose in all samples: check what was recorded")
 
 
@@ -230,8 +232,8 @@ def _(found: AllSamplesEqual) -> str:
 def _(found: ParallelTurns) -> str:
     return sentence(
         found.code,
-        "all motions turn about one direction ({x:.2f}, {y:.2f}, {z:.2f}) within {spread:.2g} deg, so that the shift "
-        "along it is open: add poses turned about another axis by 30 deg and more",
+        "all motions rotate about one direction ({x:.2f}, {y:.2f}, {z:.2f}) within {spread:.2g} deg, so the "
+        "translation along it is undetermined: add poses rotated about another axis by 30 deg or more",
         x=found.axis[0],
         y=found.axis[1],
         z=found.axis[2],
@@ -243,7 +245,8 @@ def _(found: ParallelTurns) -> str:
 def _(found: NoRotation) -> str:
     return sentence(
         found.code,
-        "the flange turns by {turn:.2g} deg at most, so that the camera's position is open: turn it by 30 deg and more",
+        "the flange rotates by at most {turn:.2g} deg, so the camera's position is undetermined: rotate it by "
+        "30 deg or more",
         turn=found.greatest_turn_deg,
     )
 
@@ -264,9 +267,9 @@ def _(found: DirectionTried) -> str:
 
 
 NO_CORRECTIONS = {
-    "joints": N_("corrections to the table need recorded joint angles, of an arm with six joints that turn"),
+    "joints": N_("corrections to the table need recorded joint angles and an arm with six revolute joints"),
     "few": N_("too few samples for corrections to the table"),
-    "steps": N_("no corrections to the table fit: it has a gross fault or is another arm's"),
+    "steps": N_("no corrections to the table fit: it has a gross fault or belongs to another arm"),
 }
 
 
@@ -280,16 +283,16 @@ def correction_verdict(probability: float, before: float, after: float, limit: f
     if probability < limit:
         return sentence(
             "vision.corrections",
-            "The samples contradict the table: with corrections the residuals fall from {before:.3g} to {after:.3g} "
-            "standard deviations, by chance with a probability of {p:.1g}",
+            "The samples contradict the table: corrections lower the residuals from {before:.3g} to {after:.3g}"
+            " standard deviations, by chance with a probability of {p:.1g}",
             before=before,
             after=after,
             p=probability,
         )
     return sentence(
         "vision.corrections",
-        "The samples do not contradict the table: corrections lower the residuals from {before:.3g} to {after:.3g} "
-        "standard deviations, as chance does with a probability of {p:.2g}",
+        "The samples do not contradict the table: corrections lower the residuals from {before:.3g} to "
+        "{after:.3g} standard deviations, by chance with a probability of {p:.2g}",
         before=before,
         after=after,
         p=probability,
@@ -302,11 +305,12 @@ def correction_lines(found: TableCorrections | NoCorrections) -> list[str]:
         return [say(found)]
     lines = ["corrections to the arm's table, with 95 % intervals:"]
     for each, half in zip(found.estimates, found.entry_half_width):
-        lines.append(f"  {each.name:<9}{each.nominal:>10.3f} {each.correction:>+9.4f} ± {half:.4f} {each.unit}")
+        values = f"{as_text(each.nominal, '>10.3f')} {as_text(each.correction, '>+9.4f')} ± {half:.4f} {each.unit}"
+        lines.append(f"  {each.name:<9}{values}")
     lines += [f"  {say(each)}" for each in found.held]
     verdict = correction_verdict(found.probability, found.scatter_before, found.scatter)
     mm, deg = 1000 * found.moved[0], np.degrees(found.moved[1])
-    return [*lines, verdict, f"with them the camera is {mm:.3g} mm and {deg:.2g} deg elsewhere"]
+    return [*lines, verdict, f"with them the camera's pose changes by {mm:.3g} mm and {deg:.2g} deg"]
 
 
 def direction_word(found: DirectionTried) -> str:
@@ -324,28 +328,28 @@ def pose_words(setup: str) -> tuple[str, str]:
 def hand_eye_lines(found: HandEye, offset: TimeOffset | None) -> str:
     """A calibration as lines of text for a terminal."""
     spread, turned = spread_of(found)
+    about = {"roll": "x", "pitch": "y", "yaw": "z"}
     lines = [
-        f"{int(found.used.sum())} of {len(found.samples)} samples used; turned by up to "
-        f"{np.degrees(found.greatest_turn):.0f} deg, axes {np.degrees(found.axes_apart):.0f} deg off one direction",
-        f"camera's standard deviation by axis {1000 * found.deviations[0]:.3g} mm, "
+        f"{int(found.used.sum())} of {len(found.samples)} samples used; rotated by up to "
+        f"{np.degrees(found.greatest_turn):.0f} deg, about axes up to {np.degrees(found.axes_apart):.0f} deg away from "
+        "one direction",
+        f"camera's standard deviation per axis {1000 * found.deviations[0]:.3g} mm, "
         f"{np.degrees(found.deviations[1]):.3g} deg "
         + (
             "(estimated)" if found.samples.camera_covariance is None else f"(stated; scatter {found.scatter:.2f} of it)"
         ),
-        f"spread of the board's place {1000 * spread:.3g} mm, {np.degrees(turned):.2g} deg (root mean square)",
+        f"spread of the board's position {1000 * spread:.3g} mm, {np.degrees(turned):.2g} deg (root mean square)",
     ]
     if offset:
-        lines.append(f"the camera's clock plus {offset.offset:.4f} ± {offset.half_width:.2g} s is the arm's")
+        shift = as_text(offset.offset, ".4f")
+        lines.append(f"the camera's clock plus {shift} ± {offset.half_width:.2g} s is the arm's")
     for name, T, half in zip(pose_words(found.samples.setup), (found.X, found.Y), found.half_width.reshape(2, 6)):
-        qw, qx, qy, qz = quaternion_of(T)
-        lines.append(f"{name}, with 95 % intervals; turns are about the parent frame's axes:")
+        lines.append(f"{name}, with 95 % intervals; rotations are about the parent frame's axes:")
         for axis, value, h in zip("xyz", 1000 * T[:3, 3], 1000 * half[:3]):
-            lines.append(f"  {axis:<6}{value:>12.3f} ± {h:.3f} mm")
+            lines.append(f"  {axis:<6}{as_text(value, '>12.3f')} ± {h:.3f} mm")
         for axis, value, h in zip(("roll", "pitch", "yaw"), np.degrees(rpy_of(T)), np.degrees(half[3:])):
-            lines.append(
-                f"  {axis:<6}{value:>12.4f} deg; about {'xyz'[('roll', 'pitch', 'yaw').index(axis)]} ± {h:.4f} deg"
-            )
-        lines.append(f"  quaternion (w, x, y, z) {qw:.6f} {qx:.6f} {qy:.6f} {qz:.6f}")
+            lines.append(f"  {axis:<6}{as_text(value, '>12.4f')} deg; about {about[axis]} ± {h:.4f} deg")
+        lines.append("  quaternion (w, x, y, z) " + " ".join(as_text(part, ".6f") for part in quaternion_of(T)))
     lines.append(f"{'method':<12}{'apart mm':>10}{'deg':>9}{'/ interval':>12}{'rms mm':>9}")
     for each in found.methods:
         values = f"{each.apart_mm:>10.3f}{each.apart_deg:>9.4f}{each.beyond:>12.2f}{each.rms_mm:>9.3f}"
@@ -357,7 +361,7 @@ def hand_eye_lines(found: HandEye, offset: TimeOffset | None) -> str:
     lines += [f"sample {say(each)}" for each in found.suspects]
     if found.without_suspects is not None:
         mm, deg = 1000 * found.without_suspects[0], np.degrees(found.without_suspects[1])
-        lines.append(f"left in, they would move the camera by {mm:.3g} mm and {deg:.2g} deg")
+        lines.append(f"if included, they would move the camera by {mm:.3g} mm and {deg:.2g} deg")
     lines += [f"warning: {say(each)}" for each in found.warnings]
     return "\n".join(lines)
 

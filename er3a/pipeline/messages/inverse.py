@@ -30,17 +30,17 @@ NEAREST_RULE = N_(
     "smaller root of the summed squares of all joint motions decides, then the lower branch number."
 )
 FREE_AT = {
-    "wrist": N_("axes 4 and 6 in line"),
+    "wrist": N_("axes 4 and 6 collinear"),
     "shoulder": N_("wrist centre on axis 1"),
     "elbow": N_("arm folded onto itself"),
     "curve": N_("self-motion"),
 }
 AT = {
     "wrist": N_(
-        "Wrist singularity: axes 4 and 6 lie in one line, so J4 and J6 can be traded against one another; the "
+        "Wrist singularity: axes 4 and 6 are collinear, so J4 and J6 turn the tool about the same line; the "
         "pair nearest to the reference is taken. Leave this pose by a joint move, not along a straight line."
     ),
-    "elbow": N_("Elbow singularity: the arm is stretched or folded; it can't move further along itself."),
+    "elbow": N_("Elbow singularity: the arm is stretched or folded, so the wrist centre can't move along the arm."),
     "shoulder": N_("Shoulder singularity: the wrist centre is on axis 1, so J1 is free while the wrist follows."),
 }
 SHAPES = {
@@ -114,7 +114,7 @@ def _(found: ShiftingDoesNotHelp) -> str:
 
 @say.register
 def _(found: MoveObstacle) -> str:
-    return sentence(found.code, "Move the part, the obstacle or the base: limits leave this pose reachable.")
+    return sentence(found.code, "Move the part, the obstacle or the base: the joint limits allow this pose.")
 
 
 @say.register

@@ -84,7 +84,7 @@ def _and_demonstrations(text: str, shown: tuple[Demonstration, ...]) -> str:
 def _where(collisions: bool) -> str:
     if collisions:
         return sentence("where", "within the limits and free of collisions")
-    return sentence("where", "within the limits in which the arm does not touch itself")
+    return sentence("where", "within the limits and free of self-collision")
 
 
 def _none_for(unsolved: tuple[UnsolvedTarget, ...]) -> str:
@@ -106,7 +106,7 @@ def _(found: NothingFound) -> str:
 
 @say.register
 def _(found: TiltMissing) -> str:
-    return sentence(found.code, "{angle:.3g} deg of wrist missing", angle=found.angle_deg)
+    return sentence(found.code, "{angle:.3g} deg beyond the wrist's range", angle=found.angle_deg)
 
 
 @say.register
@@ -119,7 +119,10 @@ def _(found: ReachMissing) -> str:
 @say.register
 def _(found: BranchesLeaveLimits) -> str:
     return counted(
-        found.code, "the only solution leaves the limits", "all {count} solutions leave the limits", found.count
+        found.code,
+        "the only solution is outside the limits",
+        "all {count} solutions are outside the limits",
+        found.count,
     )
 
 

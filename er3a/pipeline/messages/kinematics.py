@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from er3a.kinematics.solutions import (
     BadGuess,
     ByClass,
+    DependentJoints,
     Iteration,
     Label,
     LimitBound,
@@ -62,13 +63,15 @@ ARM_CLASSES = {
     "general_six": N_("six revolute joints without special geometry: up to 16 solutions by elimination"),
     "six_one_prismatic": N_("six joints, one of them sliding: up to 16 solutions by elimination"),
     "spherical_wrist_any": N_("spherical wrist on three joints of any kind: up to 8 solutions"),
+    "six_two_prismatic": N_("six joints, two of them sliding: up to 8 solutions by elimination"),
     "gantry": N_("three sliding joints and three that turn: two solutions in closed form"),
     "arm_angle": N_("spherical shoulder and wrist: up to 8 solutions in closed form at each arm angle"),
     "redundant": N_("more than six joints: solutions at given values of the redundant ones, and self-motions"),
     "scara": N_("SCARA: two solutions for x, y, z and yaw in closed form"),
-    "free_roll": N_("five joints: solutions for the tool point and the tool's axis; the turn about it is left over"),
-    "planar_wrist": N_("fewer than six joints: solutions of those poses that they can take exactly"),
+    "free_roll": N_("five joints: solutions for the tool point and the tool's axis; the roll about it is free"),
+    "planar_wrist": N_("fewer than six joints: solutions of poses that they can reach exactly"),
     "position": N_("three joints: solutions for the tool point"),
+    "dependent": N_("joints that move the tool in fewer ways than there are joints: by iteration"),
     "unsolved": N_("no class"),
 }
 SIDES = {"front": N_("front"), "back": N_("back")}
@@ -92,14 +95,14 @@ SUM_SIDES = {
 }
 GUESSES = {
     "other_starts": N_("bad guess: from the start given {miss}; other starts solve it, so allow restarts"),
-    "without_limits": N_("bad guess: {miss}; without limits an arm within them was found, start there"),
+    "without_limits": N_("bad guess: {miss}; ignoring the limits, a solution within them was found: start there"),
 }
 
 
 def branch_word(label: Label | str, branch: int = 0) -> str:
     """A branch by its code, or the number of an arm that iteration found."""
     if label == "found_arm":
-        return sentence("found_arm", "arm {number}", number=branch + 1)
+        return sentence("found_arm", "solution {number}", number=branch + 1)
     return word("branch", BRANCHES, label)
 
 
@@ -183,7 +186,7 @@ def _(found: NoArmLength) -> str:
 def _(found: ByClass) -> str:
     parts = {"arm_class": word("arm_class", ARM_CLASSES, found.arm_class)}
     if not found.certain:
-        return sentence("by_class_in_doubt", "{arm_class}; rounding leaves a doubt whether these are all", **parts)
+        return sentence("by_class_in_doubt", "{arm_class}; because of rounding, solutions may be missing", **parts)
     if found.cuspidal:
         return sentence(
             "by_class_cuspidal",
@@ -200,6 +203,15 @@ def _(found: ByClass) -> str:
 @say.register
 def _(found: NoSolutionOfClass) -> str:
     return sentence(found.code, "no joint values reach the pose; {miss}", miss=say(found.miss))
+
+
+@say.register
+def _(found: DependentJoints) -> str:
+    return sentence(
+        found.code,
+        "its joints move the tool in fewer ways than there are joints (parallel slides, for instance), so that each"
+        " pose has infinitely many solutions or none",
+    )
 
 
 @say.register
@@ -260,7 +272,7 @@ def _(found: PoseUnsolved) -> str:
 def _(found: NearestMiss) -> str:
     return sentence(
         found.code,
-        "the nearest arm found misses by {position:.3g} mm and {rotation:.3g} deg",
+        "the nearest configuration found misses by {position:.3g} mm and {rotation:.3g} deg",
         position=found.position_mm,
         rotation=found.rotation_deg,
     )
@@ -275,7 +287,7 @@ def _(found: BadGuess) -> str:
 def _(found: LimitBound) -> str:
     return sentence(
         found.code,
-        "limit-bound: {miss}; an arm that leaves the limits solves it: {beyond}",
+        "limit-bound: {miss}; a configuration outside the limits solves it: {beyond}",
         miss=say(found.miss),
         beyond=say(found.exceeded),
     )
@@ -284,7 +296,9 @@ def _(found: LimitBound) -> str:
 @say.register
 def _(found: SingularEnd) -> str:
     return sentence(
-        found.code, "singular: the iteration creeps towards a singular arm, where it ends: {miss}", miss=say(found.miss)
+        found.code,
+        ("singular: the iteration converges slowly to a singular configuration and ends there: {miss}"),
+        miss=say(found.miss),
     )
 
 

@@ -30,13 +30,13 @@ from er3a.planning.way_around import (
 
 STRATEGIES: dict[StrategyName, str] = {
     "slow": N_("Keep the path and slow down"),
-    "branch": N_("Change to another solution of the arm first"),
-    "via_shift": N_("Bend the path through a shifted via point"),
-    "via_tilt": N_("Bend the path through a tilted via point"),
-    "damped": N_("Let damped least squares leave the path"),
+    "branch": N_("Switch to another IK solution first"),
+    "via_shift": N_("Route the path through a shifted via point"),
+    "via_tilt": N_("Route the path through a tilted via point"),
+    "damped": N_("Use damped least squares, which leaves the path"),
     "detour": N_("Cross the region by a joint move"),
     "stop": N_("Stop before the region with an alarm"),
-    "planned": N_("Take a planned motion of the joints instead"),
+    "planned": N_("Use a planned joint motion instead"),
 }
 
 
@@ -119,11 +119,13 @@ def _(found: AccelerationTooGreatIfAssumed) -> str:
 def _(found: JerkTooGreat) -> str:
     values = {"joint": found.joint, "unit": unit_of(found.slides), "able": found.limit_deg_s3}
     if found.needed_deg_s3 is None:
-        return sentence(found.code, "J{joint}'s acceleration steps; its jerk may be {able:g} {unit}/s³", **values)
+        return sentence(
+            found.code, "J{joint}'s acceleration has a step; its jerk limit is {able:g} {unit}/s³", **values
+        )
     needed = found.needed_deg_s3
     return sentence(
         found.code,
-        "J{joint} would need {needed:.0f} {unit}/s³; its jerk may be {able:g} {unit}/s³",
+        "J{joint} would need {needed:.0f} {unit}/s³; its jerk limit is {able:g} {unit}/s³",
         needed=needed,
         **values,
     )
@@ -141,7 +143,7 @@ OPEN: dict[Quantity, str] = {
 
 @say.register
 def _(found: Undecided) -> str:
-    return sentence(found.code, "the bounds do not settle {what}", what=word("undecided", OPEN, found.quantity))
+    return sentence(found.code, "the bounds can't decide {what}", what=word("undecided", OPEN, found.quantity))
 
 
 @say.register
@@ -271,12 +273,12 @@ def _(found: avoidance_findings.BentPathSingular) -> str:
 
 @say.register
 def _(found: avoidance_findings.NoDampingSuffices) -> str:
-    return sentence(found.code, "no damping keeps the joint speeds within their limits at this pace")
+    return sentence(found.code, "no damping keeps the joint speeds within their limits at this speed")
 
 
 @say.register
 def _(found: avoidance_findings.PathNotFinished) -> str:
-    return sentence(found.code, "only {share:.0%} of the path is done", share=found.done)
+    return sentence(found.code, "only {share:.0%} of the path is completed", share=found.done)
 
 
 @say.register

@@ -27,7 +27,7 @@ REASONS: dict[Unresolved, str] = {
     "position_unknown": N_("it depends on where the arm stands, which is not known"),
     "external_tool": N_("the workpiece is moved along a fixed tool, which is not supported"),
     "not_understood": N_("it is not understood"),
-    "too_many_joints": N_("it turns axes that the arm does not have"),
+    "too_many_joints": N_("it refers to axes that the arm does not have"),
 }
 ENDS: dict[EndKind, str] = {
     "drifts": N_("the loop never comes back to a state that it was in; it was followed for a limited number of rounds"),
@@ -95,8 +95,8 @@ def _(found: text.ArcsSplit) -> str:
 def _(found: text.ZonesDropped) -> str:
     return counted(
         found.code,
-        "{count} zone has no equal in this language: the arm stops there",
-        "{count} zones have no equal in this language: the arm stops there",
+        "{count} zone has no equivalent in this language: the arm stops there",
+        "{count} zones have no equivalent in this language: the arm stops there",
         found.zones,
     )
 
@@ -125,8 +125,8 @@ def _(found: text.SpeedsEstimated) -> str:
 def _(found: text.SpeedsCut) -> str:
     return counted(
         found.code,
-        "{count} speed above what the joints can do written as their greatest",
-        "{count} speeds above what the joints can do written as their greatest",
+        "{count} speed above the joints' limit written as that limit",
+        "{count} speeds above the joints' limit written as that limit",
         found.motions,
     )
 
@@ -207,7 +207,7 @@ def _(found: found_in.FrameTakenAsFlange) -> str:
 
 @say.register
 def _(found: found_in.WayNotKnown) -> str:
-    return sentence(found.code, "where the arm comes from is not known; only the target was checked")
+    return sentence(found.code, "the start of the motion is not known; only the target was checked")
 
 
 @say.register
@@ -401,7 +401,7 @@ def _(found: found_in.ZoneWithoutSize) -> str:
 
 @say.register
 def _(found: found_in.ArcHasNoCircle) -> str:
-    return sentence(found.code, "the arc's points fix no circle")
+    return sentence(found.code, "the arc's points do not define a circle")
 
 
 @say.register
@@ -425,7 +425,7 @@ def _(found: found_in.SplineAsLine) -> str:
 
 @say.register
 def _(found: found_in.ExternalAxesLeftOut) -> str:
-    return sentence(found.code, "external axes were taken to stand still: {axes}", axes=", ".join(found.axes))
+    return sentence(found.code, "external axes are assumed at rest: {axes}", axes=", ".join(found.axes))
 
 
 @say.register

@@ -28,4 +28,4 @@ def _(found: ProgramCounts) -> str:
 
 @say.register
 def _(found: NoPrograms) -> str:
-    return sentence(found.code, "The robot's file of programs names none.")
+    return sentence(found.code, "The robot's list of programs is empty.")

@@ -21,10 +21,10 @@ from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.intervals import JerkTooGreat, RateCause
 
 FIGURES = {
-    "safe": N_("Paths safe as they are"),
+    "safe": N_("Safe paths"),
     "singular_poses": N_("Singular poses met"),
-    "near_passes": N_("Near passes"),
-    "colliding": N_("Paths with a collision, whatever else is wrong"),
+    "near_passes": N_("Near-singular passes"),
+    "colliding": N_("Paths with a collision"),
     "max_joint_speed": N_("Speed of the joint nearest to its limit"),
     "assumed_speed_ratio": N_("Ratio to that joint's assumed limit"),
     "speed_ratio": N_("Ratio to that joint's limit"),
@@ -42,7 +42,7 @@ KINDS: dict[PathKind, str] = {
 }
 STRATEGIES: dict[StrategyName, str] = {
     "slow": N_("slow down on the path"),
-    "branch": N_("another solution of the arm first"),
+    "branch": N_("another IK solution first"),
     "via_shift": N_("via point, tool point shifted"),
     "via_tilt": N_("via point, tool tilted"),
     "damped": N_("damped least squares"),
@@ -103,7 +103,7 @@ def path_text(path: PathSummary) -> str:
 
 def _apart_from_collisions(path: PathSummary) -> str:
     if path.no_way:
-        shown = sentence("path.shown", "shown is the straight joint move")
+        shown = sentence("path.shown", "the figure shows the straight joint move")
         return joined([say(path.no_way), shown])
     if path.unreachable:
         return joined(map(_when, path.unreachable))
@@ -124,7 +124,7 @@ def _apart_from_collisions(path: PathSummary) -> str:
         return joined([*met, *map(say, path.jumps), _speeds(path.joint_speed_bounded)])
     if path.singularities:
         return joined(map(say, path.singularities))
-    return sentence("path.safe", "no singular pose near, within limits and reach")
+    return sentence("path.safe", "far from singular poses, within limits and reach")
 
 
 def _worst(stretches: tuple[Stretch[RateCause], ...]) -> list[Stretch[RateCause]]:
@@ -140,10 +140,11 @@ def _at_another_pace(path: PathSummary) -> str:
     if path.fastest_s is None or not _only_too_fast(path):
         return ""
     if path.fastest_s > path.duration_s:
-        return sentence("path.pace", "it takes {fastest:.2f} s at least", fastest=path.fastest_s)
+        return sentence("path.pace", "it takes at least {fastest:.2f} s", fastest=path.fastest_s)
     return sentence(
         "path.pace",
-        "not the path, only its pace is too fast: slower there and faster elsewhere, it can be done in {fastest:.2f} s",
+        "only the speed profile is at fault, not the path: slower there and faster elsewhere, the path takes "
+        "{fastest:.2f} s",
         fastest=path.fastest_s,
     )
 
@@ -163,11 +164,14 @@ def _speeds(bounded: bool) -> str:
 @say.register
 def _(event: Singularity) -> str:
     when = f"{event.t_s:.4g}" if event.t_s == event.until_s else f"{event.t_s:.4g} – {event.until_s:.4g}"
-    kind = event_word(event)
+    parts = {"type": event_word(event), "when": when, "distance": event_distance(event)}
+    if event.type == "dependent_axes":
+        if event.crossing:
+            return sentence("dependent.met", "{type} at t = {when} s", **parts)
+        return sentence("dependent.passed", "close to {type} at t = {when} s ({distance})", **parts)
     if event.crossing:
-        return sentence("singularity.met", "{type} at t = {when} s", type=kind, when=when)
-    passed = {"type": kind, "when": when, "distance": event_distance(event)}
-    return sentence("singularity.passed", "{type} at t = {when} s, at {distance}", **passed)
+        return sentence("singularity.met", "{type} singularity at t = {when} s", **parts)
+    return sentence("singularity.passed", "{type} singularity within {distance} at t = {when} s", **parts)
 
 
 @say.register
@@ -198,7 +202,7 @@ def cause_text(path: PathSummary, part: Stretch) -> str:  # type: ignore[type-ar
     """Why a stretch of a path is listed; what is undecided is no open question where something else decides."""
     told = say(part.cause)
     if part in path.undecided and path.verdict != "undecided":
-        return sentence("path.either_way", "{open}; the path is not safe either way", open=told)
+        return sentence("path.either_way", "{open}; the path is not safe in either case", open=told)
     return told
 
 
@@ -246,7 +250,8 @@ def _clear(path: PathSummary) -> str:
     first = path.collisions[0]
     return ". " + sentence(
         "advice.clear_until",
-        "Nothing overlaps up to t = {t:.4g} s ({far:.1f} mm): end the path before, or move its end or what it meets",
+        "Nothing overlaps before t = {t:.4g} s ({far:.1f} mm): end the path there, or move its end or the body "
+        "that it hits",
         t=first.t0_s,
         far=first.s0_m * 1000,
     )

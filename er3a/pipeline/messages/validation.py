@@ -23,11 +23,11 @@ FIGURES = {
     "independent_checks": N_("Independent checks passed"),
     "consistency_checks": N_("Consistency checks passed"),
     "zero_pose_flange_error": N_("Zero pose: flange off by"),
-    "farthest_axis": N_("Joint axes: farthest off"),
-    "most_tilted_axis": N_("Joint axes: most tilted"),
+    "farthest_axis": N_("Joint axes: largest distance"),
+    "most_tilted_axis": N_("Joint axes: largest angle"),
     "worst_drawing_label": N_("Workspace drawing: worst label off by"),
-    "wrist_centre_reach": N_("Wrist centre reaches from axis 1"),
-    "flange_reach": N_("Flange reaches from axis 1"),
+    "wrist_centre_reach": N_("Wrist centre: reach from axis 1"),
+    "flange_reach": N_("Flange: reach from axis 1"),
     "round_trip_joint_error": N_("Round trips: worst joint error"),
 }
 GRADES = {
@@ -36,7 +36,7 @@ GRADES = {
     "cad": N_("measured on a CAD model that carries the model's name"),
     "export": N_("a URDF exported from CAD"),
     "claim": N_("an article's text"),
-    "inferred": N_("reasoned, not stated"),
+    "inferred": N_("inferred, not stated"),
 }
 GRADE_NAMES = {
     "official": N_("official"),

@@ -27,7 +27,7 @@ from er3a.robots.robot import Grade
 
 SELF_CHECKS = {
     "numbers_not_finite": N_("numbers that are not finite"),
-    "crossed_limits": N_("joints whose limits are crossed"),
+    "crossed_limits": N_("joints whose lower limit is above the upper one"),
     "odd_directions": N_("joint directions other than +1 and -1"),
     "length_unit": N_("lengths in another unit (longest below 10 mm or above 20 m)"),
     "limit_unit": N_("limits in another unit (widest below 6.3 deg)"),
@@ -50,7 +50,7 @@ def _(found: SelfCheck) -> str:
 def _(found: Confirmed) -> str:
     text = sentence(
         found.code,
-        "Independent documents settle all that moves the tool: {checks} ({grades} data).",
+        "Independent documents settle every entry that moves the tool: {checks} ({grades} data).",
         checks=counted_checks(found.counts),
         grades=_grades(found.grades),
     )
@@ -86,7 +86,9 @@ def _(found: LeftOpen) -> str:
     told = [_what_speaks(found.counts), sentence(found.code, "{parts}.", parts=joined(parts)) if parts else ""]
     told += _how_far_off(found)
     if found.next_measurement:
-        told.append(sentence(found.code, "To settle most: {measurement}.", measurement=say(found.next_measurement)))
+        told.append(
+            sentence(found.code, "Most useful measurement: {measurement}.", measurement=say(found.next_measurement))
+        )
     return joined([*told, *_contradiction(found.contradiction), *_of_claims(found)], " ")
 
 
@@ -101,7 +103,8 @@ def _how_far_off(found: LeftOpen) -> list[str]:
         told.append(
             sentence(
                 found.code,
-                "{count} entries that move the tool rest on their own source alone: if it is wrong, there is no bound.",
+                "{count} entries that move the tool rest on their own source alone: if it is wrong, the error "
+                "has no bound.",
                 count=found.unbounded,
             )
         )

@@ -89,7 +89,9 @@ def _(found: GraspCounts) -> str:
         if found.point_mm is not None
         else ""
     )
-    unsure = sentence(found.code, "unsure: {named}", named=joined(listed(found.unsure), ", ")) if found.unsure else ""
+    unsure = (
+        sentence(found.code, "uncertain: {named}", named=joined(listed(found.unsure), ", ")) if found.unsure else ""
+    )
     left = sentence(found.code, "calibrated without {named}", named=", ".join(found.left_out)) if found.left_out else ""
     told = [
         grasped if found.objects else "",
@@ -147,13 +149,13 @@ def _(found: GraspCollides) -> str:
     if found.clearance_mm < 0:
         return sentence(
             found.code,
-            "at the grasp {pair} overlap by {depth:.1f} mm at best",
+            "at the grasp {pair} overlap by at least {depth:.1f} mm",
             pair=say(found.pair),
             depth=-found.clearance_mm,
         )
     return sentence(
         found.code,
-        "at the grasp {pair} are {clear:.1f} mm apart at best; {needed:g} mm are required",
+        "at the grasp {pair} are at most {clear:.1f} mm apart; {needed:g} mm are required",
         pair=say(found.pair),
         clear=found.clearance_mm,
         needed=found.needed_mm,
@@ -164,7 +166,7 @@ def _(found: GraspCollides) -> str:
 def _(found: LineLeaves) -> str:
     return sentence(
         found.code,
-        "the straight {part} leaves limits or regular poses {mm:.0f} mm from the grasp",
+        "the straight {part} exceeds limits or becomes singular {mm:.0f} mm from the grasp",
         part=word("vision.part", PARTS, found.part),
         mm=found.after_mm,
     )
@@ -174,7 +176,8 @@ def _(found: LineLeaves) -> str:
 def _(found: LineUnproven) -> str:
     return sentence(
         found.code,
-        "along the straight {part} the bounds do not settle that limits, rates and regular poses are kept",
+        "along the straight {part} the bounds can't decide whether limits, joint speeds and distances from "
+        "singularities are kept",
         part=word("vision.part", PARTS, found.part),
     )
 

@@ -30,8 +30,8 @@ def _(found: OnSurface) -> str:
     if lower is None:
         return sentence(
             found.code,
-            "The tool point moves on a curved surface of at most {upper:.4g} m²: what two joints sweep, which counts "
-            "twice what they sweep twice.",
+            "The tool point moves on a curved surface of at most {upper:.4g} m²: the area that two joints "
+            "sweep; parts swept twice count twice.",
             upper=upper,
         )
     if surface.kind == "plane":
@@ -53,8 +53,8 @@ def _(found: OnSurface) -> str:
 def _(found: Undersampled) -> str:
     return sentence(
         found.code,
-        "Too few samples for cells this small: about {percent:.0f} % of the reachable cells were not touched yet, so "
-        "nothing can be said about voids.",
+        "Too few samples for cells this small: about {percent:.0f} % of the reachable cells hold no sample yet,"
+        " so voids can't be judged.",
         percent=found.unseen_percent,
     )
 
@@ -83,8 +83,8 @@ def _(found: VoidUncertain) -> str:
 def _(found: VoidAtShoulder) -> str:
     return sentence(
         found.code,
-        "An enclosed void of {litres:.3g} L surrounds the arm's own shoulder, where it can't fold to; none elsewhere "
-        "points to a wrong joint range.",
+        "An enclosed void of {litres:.3g} L surrounds the shoulder, where the arm can't fold to; no other void "
+        "indicates a wrong joint range.",
         **_place(found),
     )
 

@@ -39,7 +39,7 @@ TABLE = (
 DRAWING = ("algebra", "kinematics", "orbit", "scene", "solids")
 LEVEL = 1e-6  # by which a plane's normal may differ from the vertical to be drawn as the floor
 WORDS = {
-    "player": N_("The motions, played"),
+    "player": N_("Motion playback"),
     "motion": N_("motion"),
     "play": N_("Play"),
     "pause": N_("Pause"),
@@ -50,13 +50,13 @@ WORDS = {
     "time": N_("time of the motion"),
     "clock": N_("t = {t} s of {end} s"),
     "points": N_("point {t} of {end}"),
-    "undock": N_("put the player back in its place"),
+    "undock": N_("return the player to its place"),
     "picture": N_("The arm on its path. Drag or use the arrow keys to turn the picture, + and − to zoom."),
     "help": N_(
         "Drag to turn, wheel or + and − to zoom. A click into a plot or on a time leads to that moment; coloured marks "
         "on the time bar are events."
     ),
-    "no_script": N_("The player needs scripts; the recording of this stage shows the same in the Rerun viewer."),
+    "no_script": N_("The player needs JavaScript; the recording of this stage shows the same in the Rerun viewer."),
 }
 
 

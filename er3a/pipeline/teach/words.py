@@ -34,8 +34,8 @@ WORDS: dict[str, Any] = {
             "mm along it."
         ),
     },
-    "zoom_in": N_("Closer"),
-    "zoom_out": N_("Farther"),
+    "zoom_in": N_("Zoom in"),
+    "zoom_out": N_("Zoom out"),
     "joints": N_("Joints"),
     "joints_help": N_(
         "Arrow keys move by 1° (1 mm where a joint slides), with Shift by a tenth; Page Up and Page Down by ten; Home "
@@ -57,12 +57,12 @@ WORDS: dict[str, Any] = {
     "copy_link": N_("Copy link"),
     "copied": N_("The joints are copied: {text}"),
     "link_copied": N_("The link to this pose is copied."),
-    "not_copied": N_("This browser lets no page copy; take it from here: {text}"),
-    "bad_link": N_("The link's joints were not taken: {reason}"),
+    "not_copied": N_("This browser does not let pages copy; copy it from here: {text}"),
+    "bad_link": N_("The joints in the link were not used: {reason}"),
     "bad_count": N_("it names {count} numbers where {joints} are needed."),
     "jog": N_("Jog"),
     "jog_help": N_(
-        "Along and about the axes of the base or of the tool, the tool point at rest while it turns, or joint by joint."
+        "Along and about the axes of the base or the tool (rotations keep the tool point fixed), or joint by joint."
     ),
     "jog_frame": N_("Frame"),
     "jog_frames": {"base": N_("base"), "tool": N_("tool"), "joints": N_("joints")},
@@ -80,26 +80,26 @@ WORDS: dict[str, Any] = {
         N_("yaw in degrees"),
     ],
     "pose_go": N_("Go there"),
-    "pose_take": N_("Take the present pose"),
+    "pose_take": N_("Use the current pose"),
     "pose_number": N_("“{field}” needs a number."),
-    "not_reached": N_("The arm stays: {reason}."),
+    "not_reached": N_("The arm does not move: {reason}."),
     "not_found": N_(
-        "iteration found no joint values within the limits; the nearest stays {length} and {angle} away, which does "
-        "not prove that there are none"
+        "iteration found no joint values within the limits; the nearest are {length} and {angle} away. This "
+        "does not prove that none exist"
     ),
     "left_over": N_(
         "The tool is {length} and {angle} away from what was asked, in what the {joints} joints of this arm cannot set."
     ),
-    "no_such_motion": N_("The arm stays: its joints cannot move the tool that way."),
+    "no_such_motion": N_("The arm does not move: its joints cannot move the tool that way."),
     "points": N_("Way points"),
     "points_help": N_(
-        "Two or more saved points become a path file (joint moves that stop at each point) or a program in RPL at a "
-        "tenth of full speed. Nothing here checks the way between them: er3a check and the trajectory stage do, and "
-        "er3a check-program."
+        "Export two or more saved points as a path file (joint moves that stop at each point) or as an RPL "
+        "program at a tenth of full speed. The motions between them are not checked here: use er3a check, the "
+        "trajectory stage and er3a check-program."
     ),
     "points_help_path": N_(
-        "Two or more saved points become a path file: joint moves that stop at each point. Nothing here checks the "
-        "way between them: er3a check and the trajectory stage do."
+        "Export two or more saved points as a path file: joint moves that stop at each point. The motions "
+        "between them are not checked here: use er3a check and the trajectory stage."
     ),
     "save_point": N_("Save this point"),
     "export_path": N_("Export path file"),
@@ -135,19 +135,23 @@ WORDS: dict[str, Any] = {
     "kinds": {"wrist": N_("Wrist"), "elbow": N_("Elbow"), "shoulder": N_("Shoulder")},
     "kinds_are": {
         "wrist": N_("between axes 4 and 6"),
-        "elbow": N_("short of straight or folded"),
+        "elbow": N_("from straight or folded"),
         "shoulder": N_("wrist centre from the plane of axes 1 and 2"),
     },
     "states": {"clear": N_("clear"), "near": N_("near"), "at": N_("singular")},
     "clear": N_("No singularity is near."),
     "near": {
-        "wrist": N_("Near the wrist singularity: axes 4 and 6 are {distance} short of one line."),
-        "elbow": N_("Near the elbow singularity: the arm is {distance} short of straight or folded."),
+        "wrist": N_("Near the wrist singularity: axes 4 and 6 are {distance} from collinear."),
+        "elbow": N_("Near the elbow singularity: the arm is {distance} from straight or folded."),
         "shoulder": N_("Near the shoulder singularity: the wrist centre is {distance} from the plane of axes 1 and 2."),
     },
     "at": {
-        "wrist": N_("At the wrist singularity: axes 4 and 6 lie in one line, so J4 and J6 turn the tool the same way."),
-        "elbow": N_("At the elbow singularity: the arm is straight or folded and can't move further along itself."),
+        "wrist": N_(
+            "At the wrist singularity: axes 4 and 6 are collinear, so J4 and J6 turn the tool about the same line."
+        ),
+        "elbow": N_(
+            "At the elbow singularity: the arm is straight or folded, so the wrist centre can't move along the arm."
+        ),
         "shoulder": N_(
             "At the shoulder singularity: the wrist centre is in the plane of axes 1 and 2, where no joint moves it "
             "along axis 2."
@@ -158,8 +162,8 @@ WORDS: dict[str, Any] = {
     "solutions": N_("All IK solutions of this pose"),
     "solutions_some": N_("IK solutions of this pose"),
     "solutions_help": N_(
-        "Choose one and the arm goes there; the tool stays. Point at one to see it as a pale arm. Branches: "
-        "wrist before axis 1 or over the head (back), elbow up or down, wrist flipped or not. "
+        "Choose one and the arm goes there; the tool stays in place. Point at one to see it as a pale arm. "
+        "Branches: wrist in front of axis 1 or behind it (back), elbow up or down, wrist flipped or not. "
         "Numbers are J1 to J6 in degrees."
     ),
     "previous": N_("Previous"),
@@ -173,7 +177,7 @@ WORDS: dict[str, Any] = {
     "below": N_("{joint} at {angle} is {excess} below its limit of {limit}"),
     "turn": N_("{joint} {turn}"),
     "other_turns": N_("Further turns:"),
-    "not_moved": N_("The arm stays where it is: {reasons}."),
+    "not_moved": N_("The arm does not move: {reasons}."),
     "missing": N_("not there: {reason}"),
     "faults": {
         "too_far": N_("the wrist centre would be {gap} too far from axis 2"),
@@ -183,8 +187,8 @@ WORDS: dict[str, Any] = {
     },
     "free": {
         "wrist": N_(
-            "Axes 4 and 6 are in one line: J4 and J6 can be traded, so there are infinitely many solutions; J4 is "
-            "kept here."
+            "Axes 4 and 6 are collinear: J4 and J6 compensate each other, so there are infinitely many "
+            "solutions; J4 is kept here."
         ),
         "elbow": N_(
             "The wrist centre is on axis 2: J2 is free, so there are infinitely many solutions; J2 is kept here."
@@ -201,19 +205,19 @@ WORDS: dict[str, Any] = {
         "solutions of its targets where the arm's class has a solver."
     ),
     "endless": N_(
-        "The arm has more joints than a pose asks for, so there are infinitely many solutions; some that are far "
+        "The arm has more joints than a pose needs, so there are infinitely many solutions; some that are far "
         "apart are shown."
     ),
     "clearance_help": N_(
-        "Clearance: the least distance between the arm's shapes and the scene's, and between links of the arm that can "
-        "meet, as the collision stage watches them. A line shows where."
+        "Clearance: the least distance between the arm's shapes and the scene's, and between links of the arm "
+        "that can collide, as checked by the collision stage. A line shows where."
     ),
     "clearance_estimated": N_(
         "The robot's file gives no shapes of its links, so they are capsules along the table, as thick as arms of this "
         "size usually are: an estimate."
     ),
-    "clearance_is": N_("{distance} clear: {pair}."),
-    "overlap": N_("Touches: {pair} overlap by {distance}."),
-    "overlap_deep": N_("Touches: {pair} overlap by {distance} or more."),
-    "nothing_meets": N_("Nothing here can meet."),
+    "clearance_is": N_("Clearance {distance}: {pair}."),
+    "overlap": N_("Collision: {pair} overlap by {distance}."),
+    "overlap_deep": N_("Collision: {pair} overlap by {distance} or more."),
+    "nothing_meets": N_("No bodies here can collide."),
 }

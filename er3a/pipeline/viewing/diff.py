@@ -25,6 +25,7 @@ from er3a.pipeline.viewing.page import Head, ShownFigure
 POINTS = {"tool_point": N_("tool point"), "wrist_centre": N_("wrist centre"), "flange": N_("flange")}
 VIEWS = {"section": N_("section"), "side": N_("side view")}
 SAME_BORDER_MM = 1e-6
+DEFAULT_RESULTS = "results"
 COLUMNS = (N_("robot"), N_("stage"), N_("what"), N_("old"), N_("new"), N_("difference"), N_("note"))
 
 
@@ -65,7 +66,11 @@ def changes(old: Path, new: Path) -> list[Change]:
             there = key in stages[new]
             found.append(
                 Change(
-                    robot, stage, tr("stage"), *(("–", tr("there")) if there else (tr("there"), "–")), tr("only here")
+                    robot,
+                    stage,
+                    tr("stage"),
+                    *(("–", tr("present")) if there else (tr("present"), "–")),
+                    tr("only here"),
                 )
             )
             continue
@@ -103,15 +108,27 @@ def _records(folder: Path) -> tuple[Input, ...]:
 def _stages(folder: Path) -> set[tuple[str, str]]:
     found = {(path.parent.parent.name, path.parent.name) for path in folder.glob("*/*/summary.json")}
     if not found:
-        raise ResultError(folder, "holds no results (no ROBOT/STAGE/summary.json in it)")
+        problem = (
+            "holds no results (no ROBOT/STAGE/summary.json in it)" if folder.is_dir() else "there is no such folder"
+        )
+        raise ResultError(folder, problem, _remedy(folder))
     return found
+
+
+def _remedy(folder: Path) -> str:
+    """What to do about a folder without results."""
+    inside = folder / DEFAULT_RESULTS
+    if any(inside.glob("*/*/summary.json")):
+        return f"Give the results folder in it: {shlex.quote(str(inside))}"
+    home = folder if folder.is_dir() and folder.name != DEFAULT_RESULTS else folder.parent
+    return f"Run the study there first (cd {shlex.quote(str(home))} && er3a run), or give a folder that holds results"
 
 
 def _in_heads(robot: str, stage: str, old: Head, new: Head) -> list[Change]:
     found = []
     status, turned = page.status_word(old.status), page.status_word(new.status)
     if status != turned:
-        found.append(Change(robot, stage, tr("verdict"), status, turned, tr("turned"), new.text))
+        found.append(Change(robot, stage, tr("verdict"), status, turned, tr("changed"), new.text))
     elif old.text != new.text:
         found.append(Change(robot, stage, tr("verdict's text"), old.text, new.text, tr("reworded")))
     before, after = ({figure.name: figure for figure in head.figures} for head in (old, new))
@@ -179,7 +196,7 @@ def _in_borders(robot: str, old: Path, new: Path) -> list[Change]:
         what = tr("border of the {point}, {view}", point=tr(POINTS[point]), view=tr(VIEWS[view]))
         before, after = (own.get(key) for own in borders)
         if before is None or after is None:
-            there = (tr("there"), "–") if after is None else ("–", tr("there"))
+            there = (tr("present"), "–") if after is None else ("–", tr("present"))
             found.append(Change(robot, "workspace", what, *there, tr("only here")))
         elif (farthest := max(_farthest(before, after), _farthest(after, before)))[0] > SAME_BORDER_MM:
             moved, radius, height = (number(value, 3) for value in farthest)
@@ -220,5 +237,5 @@ def _in_tables(robot: str, stage: str, old: Path, new: Path) -> list[Change]:
     for name in sorted(names):
         before, after = (sha256(folder / name)[:12] if (folder / name).is_file() else "–" for folder in (old, new))
         if before != after:
-            found.append(Change(robot, stage, name, before, after, tr("other bytes")))
+            found.append(Change(robot, stage, name, before, after, tr("different content")))
     return found

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import base64
 import io
+import re
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
 import matplotlib
+from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
@@ -55,6 +56,12 @@ STYLE: dict[RcKeyType, Any] = {
     "xtick.color": INK,
     "ytick.color": INK,
 }
+_COORDINATES = re.compile(r'(?<= )(?:d|x|y)="[^"]*"')
+_DECIMALS = re.compile(r"-?\d+\.\d{3,}")
+_TAG = re.compile(r"<[^>]*>")
+_QUOTED = re.compile(r"=\"([^\"']*)\"")
+_IN_ADDRESSES = str.maketrans({letter: f"%{ord(letter):02X}" for letter in '%#<>&"\n'})
+_BLANKS = re.compile(r"\s*(?<![=\"])([A-Za-z])\s+(?=[-\d])|\s+(?=[z\"])")
 
 
 def house_style() -> AbstractContextManager[None]:
@@ -98,11 +105,27 @@ def equal_scale(axes: Axes, x_label: str, y_label: str) -> None:
     axes.set_ylabel(y_label)
 
 
-def svg_data_uri(figure: Figure) -> str:
-    """A figure in the house style as a ``data:`` address of an SVG image (dense clouds rasterised at 160 dpi)."""
+def svg_data_uri(figure: Figure) -> Markup:
+    """A figure in the house style as a ``data:`` address of an SVG image (dense clouds rasterised at 160 dpi), fit for
+    an attribute in double quotes."""
     buffer = io.BytesIO()
     figure.dpi = 160
     name_parts(figure)
     # Not savefig: it would draw a figure with a layout twice.
     FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})
-    return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
+    svg = _compact(buffer.getvalue().decode())
+    # As text, which is a third shorter than base64. The letters that an address or an attribute reads otherwise are
+    # written by their numbers; values stand in single quotes, which need none.
+    quoted = _TAG.sub(lambda tag: _QUOTED.sub(r"='\1'", tag[0]), svg)
+    return Markup("data:image/svg+xml," + quoted.translate(_IN_ADDRESSES))
+
+
+def _compact(svg: str) -> str:
+    """The same picture in fewer letters: coordinates to a hundredth of a point, path data without blanks that say
+    nothing, no indentation and no comments."""
+    shorter = _COORDINATES.sub(lambda found: _BLANKS.sub(r"\1", _DECIMALS.sub(_shorter, found[0])), svg)
+    return re.sub(r">\s+<", "><", re.sub(r"<!--.*?-->", "", shorter, flags=re.DOTALL)).strip()
+
+
+def _shorter(number: re.Match[str]) -> str:
+    return f"{float(number[0]):.2f}".rstrip("0").rstrip(".")

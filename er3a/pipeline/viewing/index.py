@@ -5,7 +5,6 @@ Variants of a sweep stand in the section of their sweep only.
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +23,6 @@ from er3a.pipeline.viewing.sweep_section import sweep_sections
 from er3a.pipeline.viewing.thumbnail import thumbnail
 
 SHOWN_FIGURES = 3
-WHOLE, LED = 300, 260  # characters of a verdict that a cell shows whole, and those before which it breaks a longer one
 FIRST = ("fail", "conflict", "caution", "no_reference", "not_computed", "pass")  # what is open stands first
 
 
@@ -70,19 +68,11 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     return {
         "robot": study.robot(name),
         "table": table,
-        "heads": [(head, *led(head.text)) for head in shown],
+        "heads": [(head, *page.led(head.text)) for head in shown],
         "counts": [(status, sum(head.status == status for head in shown)) for status in FIRST],
         "expected": expected,
         "decision": decision(table, failed, _instead(study, name, results.parent)),
     }
-
-
-def led(text: str) -> tuple[str, str]:
-    """A verdict's text up to the end of a sentence or clause, and the rest, which unfolds; empty for a short text."""
-    ends = [found.end() for found in re.finditer(r"[.;](?= )|[。；]", text[:LED])]
-    if len(text) <= WHOLE or not ends:
-        return text, ""
-    return text[: ends[-1]], text[ends[-1] :].strip()
 
 
 def _instead(study: Study, name: str, results: Path) -> str | None:

@@ -148,7 +148,7 @@ class Answers {
   constructor(image) {
     this.image = image;
     this.axes = JSON.parse(image.dataset.axes);
-    const source = new TextDecoder().decode(Uint8Array.from(atob(image.src.split(",")[1]), (letter) => letter.charCodeAt(0)));
+    const source = decodeURIComponent(image.src.slice(image.src.indexOf(",") + 1));
     this.drawing = new DOMParser().parseFromString(source, "image/svg+xml").documentElement;
     for (const axes of this.axes) {
       axes.drawn = axes.curves.map(([name, title]) => ({ title, ...runsOf(this.drawing, name) }));

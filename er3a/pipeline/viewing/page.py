@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import os
 import platform
+import re
 import shlex
 import subprocess
 from collections.abc import Mapping, Sequence
@@ -45,6 +46,7 @@ VERDICT_WORDS = {
 
 PAGES = {stage.name: stage.title for stage in STAGES.values()} | {"teach": N_("teach panel")}
 
+WHOLE, LED = 300, 260  # characters of a verdict that is shown in one, and those before which a longer one breaks
 SCRIPT_WORDS = {
     "sort": N_("sort by this column"),
     "csv": N_("download as CSV"),
@@ -52,7 +54,7 @@ SCRIPT_WORDS = {
     "enlarge": N_("enlarge"),
     "close": N_("close"),
     "contents": N_("Contents"),
-    "filter": N_("Show rows with"),
+    "filter": N_("Filter rows by"),
     "link": N_("link to this section"),
     "previous": N_("Previous"),
     "next": N_("Next"),
@@ -192,6 +194,7 @@ def render(
         "tr": tr,
         "own": language.own_title,
         "sentence": whole_sentence,
+        "led": led,
     }
     html = environment.get_template(template.name).render(
         style=(_HERE / "style.css").read_text(encoding="utf-8"),
@@ -211,6 +214,14 @@ def render(
         **context,
     )
     write_atomically(output, lambda file: file.write_text(html, encoding="utf-8"))
+
+
+def led(text: str) -> tuple[str, str]:
+    """A verdict's text up to the end of a sentence or clause, and the rest; empty for a short text."""
+    ends = [found.end() for found in re.finditer(r"[.;](?= )|[。；]", text[:LED])]
+    if len(text) <= WHOLE or not ends:
+        return text, ""
+    return text[: ends[-1]], text[ends[-1] :].strip()
 
 
 def whole_sentence(finding: str) -> str:

@@ -34,11 +34,11 @@ def by_pair(pairs: PairShares) -> Picture | None:
     colours = [MODEL if own else REFERENCE for own in shown.of_itself]
     ax.barh(y, 100 * shown.ratio, color=colours, xerr=spread, ecolor=INK, height=0.7)
     ax.set_yticks(y, [say(pair) for pair in shown.between])
-    ax.set_xlabel(tr("share of the joint space in which they overlap (%)"))
+    ax.set_xlabel(tr("share of the joint space in which the pair overlaps (%)"))
     worst = say(shown.between[0])
     caption = tr(
-        "{pair} take most: {percent} % of the joint space. Blue: the arm with itself; orange: with the scene. Lines: "
-        "95 % intervals.",
+        "{pair} collide most often: in {percent} % of the joint space. Blue: self-collision; orange: with the "
+        "scene. Lines: 95 % intervals.",
         pair=worst[:1].upper() + worst[1:],
         percent=fixed(100 * shown.ratio[0], 1),
     )
@@ -56,13 +56,14 @@ def workspace(results: CollisionResults) -> Picture:
         mesh = _columns(ax, rows.middle_mm[:, [across, up]], state, cell)
         equal_scale(ax, labels[across], labels[up])
         ax.set_title(title)
-    figure.colorbar(mesh, ax=axes.tolist(), label=tr("reached cells that are lost (%)"), shrink=0.8)
+    figure.colorbar(mesh, ax=axes.tolist(), label=tr("reached cells lost to collisions (%)"), shrink=0.8)
     found = results.summary.places
     caption = tr(
-        "Each square is a column of cells of {cell:.0f} mm, as red as the share of its reached cells that are lost. "
-        "Of {reached} cells reached, {clear} have an arm free of collisions (proven), {joined} of these by a proven "
-        "motion from home; the rest was lost after {tries} arms tried in it in all, so its volume of {lost} L is an "
-        "estimate from above. Ringed: columns with clear cells that were not joined to home.",
+        "Each square is a column of {cell:.0f} mm cells: the redder, the more of its reached cells are lost. Of"
+        " {reached} cells reached, {clear} have a collision-free configuration (proven), {joined} of these "
+        "connected to home by a proven motion. In the others none was found in {tries} tries in all, so their "
+        "volume of {lost} L overestimates the loss. Ringed: columns with collision-free cells that are not "
+        "connected to home.",
         cell=cell,
         reached=found.reached,
         clear=found.clear,
@@ -70,7 +71,7 @@ def workspace(results: CollisionResults) -> Picture:
         tries=found.tries_in_lost,
         lost=fixed(found.lost_m3 * 1000, 0),
     )
-    return Picture(figure, tr("Two views of the reached places. {conclusion}", conclusion=caption), caption)
+    return Picture(figure, tr("Two views of the cells reached. {conclusion}", conclusion=caption), caption)
 
 
 def _columns(ax, at: np.ndarray, state: np.ndarray, cell: float) -> QuadMesh:
@@ -124,7 +125,7 @@ def clearance_over_time(results: CollisionResults) -> Picture | None:
     caption = (
         tr("Below zero bodies overlap: {paths}.", paths=", ".join(met))
         if met
-        else tr("No path comes to zero: none meets its surroundings or the arm itself.")
+        else tr("No path reaches zero: the arm collides neither with its surroundings nor with itself.")
     )
     alt = tr("Clearance over time, one panel per path. {conclusion}", conclusion=caption)
     return Picture(figure, alt, caption, panels)
@@ -150,7 +151,7 @@ def closest_pair(robot: Robot, found: Closest) -> Picture:
     )
     if found.clearance_mm < 0:
         caption = tr(
-            "{name}: {pair} overlap by {depth} mm; the line joins the points by which they are in each other.",
+            "{name}: {pair} overlap by {depth} mm; the line joins the points of deepest penetration.",
             name=found.name,
             pair=say(found.between),
             depth=fixed(-found.clearance_mm, 1),

@@ -41,7 +41,7 @@ def _inputs(study: Study, robot: str) -> list[Path]:
 STAGE = Stage(
     name="dynamics",
     title=N_("dynamics"),
-    question=N_("What do the motors feel, and do they bear it?"),
+    question=N_("How much torque do the motors need, and can they supply it?"),
     settings={"dynamics": DynamicsSettings, "trajectory": TrajectorySettings},
     inputs=_inputs,
     rests_on=("validation",),

@@ -44,22 +44,27 @@ def torque_figure(path: PathLoad, rows: TorqueRows) -> Picture:
         torque.plot(rows.t_s, rows.torque[:, j], color=colour, label=f"J{j + 1}")
         power.plot(rows.t_s, rows.power_w[:, j], color=colour, label=f"J{j + 1}")
     torque.legend(ncols=3, fontsize=8)
-    torque.set_ylabel(tr("torque of the drive ({unit})", unit=unit))
-    names = dict(zip(PARTS, (tr("gravity"), tr("inertia"), tr("velocity"), tr("friction"), tr("forces at the tool"))))
+    torque.set_ylabel(tr("drive torque ({unit})", unit=unit))
+    names = dict(
+        zip(
+            PARTS, (tr("gravity"), tr("inertia"), tr("Coriolis, centrifugal"), tr("friction"), tr("forces at the tool"))
+        )
+    )
     for part, style in zip(PARTS, STYLES):
         if part == "tool" and not rows.tool.any():
             continue
         parts.plot(rows.t_s, getattr(rows, part)[:, worst], color=INK, linestyle=style, label=names[part])
     parts.legend(fontsize=8)
-    parts.set_ylabel(tr("parts at J{joint} ({unit})", joint=worst + 1, unit=load.unit))
+    parts.set_ylabel(tr("contributions at J{joint} ({unit})", joint=worst + 1, unit=load.unit))
     power.axhline(0.0, color=MUTED, linewidth=0.8)
-    power.set_ylabel(tr("power of the drive (W)"))
+    power.set_ylabel(tr("drive power (W)"))
     for ax in (torque, parts, power):
         ax.set_xlabel(tr("time (s)"))
     most = max(PARTS, key=lambda part: getattr(load, part))
     caption = tr(
-        "J{joint} carries the greatest torque, {peak} ± {tolerance} {unit} at {t:.2f} s, mainly {part}. Shaded: by how "
-        "much torques may be off by the tolerances of masses and centres. Power below 0 goes back into the drive.",
+        "J{joint} needs the greatest torque, {peak} ± {tolerance} {unit} at {t:.2f} s; largest contribution: "
+        "{part}. Shaded: uncertainty of the torques from the tolerances of masses and centres. Power below 0 is"
+        " fed back to the drive.",
         joint=load.joint,
         peak=number(load.peak, 3),
         tolerance=number(load.tolerance, 2),
@@ -67,7 +72,7 @@ def torque_figure(path: PathLoad, rows: TorqueRows) -> Picture:
         t=load.peak_at_s,
         part=names[most],
     )
-    alt = tr("Three panels over time for {path}: torques, their parts, powers.", path=path.name)
+    alt = tr("Three panels over time for {path}: torques, their contributions, powers.", path=path.name)
     return Picture(figure, alt, caption, [(ax, path.name) for ax in (torque, parts, power)])
 
 
@@ -84,8 +89,8 @@ def holding_figure(summary: DynamicsSummary) -> Picture:
     ax.grid(visible=False, axis="x")
     worst = hardest_held(summary.holding)
     caption = tr(
-        "At rest J{joint} has to hold most: {torque} ± {tolerance} {unit}. No pose within the joint limits needs more "
-        "than {bound} {unit} there, for the masses as given.",
+        "At rest J{joint} needs the greatest holding torque: {torque} ± {tolerance} {unit}. No pose within the "
+        "joint limits needs more than {bound} {unit} there, for the masses as given.",
         joint=worst.joint,
         torque=number(abs(worst.torque), 3),
         tolerance=number(worst.tolerance, 2),

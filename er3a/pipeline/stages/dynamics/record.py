@@ -25,7 +25,7 @@ PAUSE = 1.0  # s between two paths
 LONGEST = 0.35  # of the arm's size, the arrow of the greatest torque
 WIDTH = 0.012  # of the arm's size
 CLEAR = 0.037  # of the arm's size, from the middle of a joint's drum to outside it
-CURVES = {"torque": "Torque of the drive ({unit})", "gravity": "Part against gravity ({unit})", "power": "Power (W)"}
+CURVES = {"torque": "Drive torque ({unit})", "gravity": "Part against gravity ({unit})", "power": "Power (W)"}
 SHOWN_S = rr.TimeRange(
     start=rr.TimeRangeBoundary.cursor_relative(seconds=-4), end=rr.TimeRangeBoundary.cursor_relative(seconds=12)
 )
@@ -117,7 +117,7 @@ def _note(robot: Robot, summary: DynamicsSummary) -> str:
             f"# {escaped(robot.title)}: torques",
             say(summary.verdict.finding),
             "",
-            "**Look first** at the arrow that is longest while the arm runs: that joint's drive feels most.",
+            "**Look first** at the arrow that is longest while the arm runs: that joint's drive needs the most torque.",
             "",
             "- arrow on an axis: the drive's torque, along the axis by the right-hand rule; all to one scale "
             "(forces of joints that slide to one of their own)",

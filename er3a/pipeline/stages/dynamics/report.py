@@ -61,6 +61,7 @@ def report(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
         more_uses=max(0, len(summary.uses) - MOST_USES),
         motors=[_motor(motor) for motor in summary.motors],
         paths=[_path(path) for path in summary.paths],
+        margins=any(path.payload or path.speed_scale or path.torque_timed_s for path in summary.paths),
         figures=figures,
         player=player(robot, _motions(robot, results)),
         player_style=player_style(),
@@ -87,7 +88,7 @@ def _motions(robot: Robot, results: DynamicsResults) -> list[PlayedMotion]:
 
 
 def _peak(load: JointLoad) -> str:
-    return tr("J{joint} at its greatest: {peak} {unit}", joint=load.joint, peak=number(load.peak, 3), unit=load.unit)
+    return tr("J{joint} at its peak: {peak} {unit}", joint=load.joint, peak=number(load.peak, 3), unit=load.unit)
 
 
 def _links(summary: DynamicsSummary) -> list[list[str]]:
@@ -148,7 +149,7 @@ def _motor(motor: MotorNeed) -> list[str]:
 
 def _path(path: PathLoad) -> list[str]:
     if not path.complete:
-        return [path.name, tr("not followed all along"), *[NONE] * 6]
+        return [path.name, tr("not followed to its end"), *[NONE] * 6]
     worst = path.hardest
     energy, back = sum(load.work_j for load in path.joints), sum(load.recovered_j for load in path.joints)
     timed = NONE if path.torque_timed_s is None else fixed(path.torque_timed_s, 2)

@@ -107,14 +107,15 @@ def solutions_per_position(table: MapRows) -> Picture:
         )
     listed = tr("; ").join(shares)
     bar = figure.colorbar(image, ax=axes[0].tolist(), ticks=range(9), shrink=0.85)
-    bar.set_label(tr("branches within the limits and clear"))
+    bar.set_label(tr("branches within the limits, collision-free"))
     return Picture(
         figure,
         tr("Maps of the number of solutions in the vertical plane through axis 1"),
         tr(
-            "Of the {count} tool positions inside the line, which the arm reaches when limits are left aside, the "
-            "limits leave at least one branch (dashed line), and one in which nothing is touched, for {shares}. All "
-            "branches of each position were tried; between positions nothing is known. Pink cross: base.",
+            "The line encloses the {count} tool positions that the arm reaches if limits are ignored. Share of "
+            "them with at least one branch within the limits (dashed line), and with one that is also "
+            "collision-free (clear): {shares}. All branches of each position were tried; between positions "
+            "nothing is known. Pink cross: base.",
             count=number(int((table.solutions > 0).sum())),
             shares=listed,
         ),
@@ -126,20 +127,20 @@ def _conclude(target: TargetResult) -> str:
         counts = {"within": target.within_limits, "all": target.solutions, "collide": target.collide}
         if not target.collide:
             return tr(
-                "The bold arm is the one taken; {within} of {all} branches stay within the limits. A no-flip and a "
-                "flip branch look the same from here: they differ in J4, J5 and J6.",
+                "The bold arm is the chosen solution; {within} of {all} branches are within the limits. A flip "
+                "and a no-flip branch look the same here: they differ in J4, J5 and J6.",
                 **counts,
             )
         return tr(
-            "The bold arm is the one taken; {within} of {all} branches stay within the limits, of which {collide} "
-            "collide. A no-flip and a flip branch look the same from here: they differ in J4, J5 and J6.",
+            "The bold arm is the chosen solution; {within} of {all} branches are within the limits, of which "
+            "{collide} collide. A flip and a no-flip branch look the same here: they differ in J4, J5 and J6.",
             **counts,
         )
     if target.collide:
-        return tr("Every arm that reaches the target (dashed) has a joint beyond its limit or runs into something.")
+        return tr("Every solution that reaches the target (dashed) has a joint beyond its limit or collides.")
     if target.solutions:
-        return tr("Every arm that reaches the target (dashed) has a joint beyond its limit: a cross on the right.")
-    return tr("The arm, drawn where it comes from, can't stretch to the target.")
+        return tr("Every solution that reaches the target (dashed) has a joint beyond its limit: a cross on the right.")
+    return tr("The arm, drawn at the reference, can't reach the target.")
 
 
 def _draw_arms(side: Axes, top: Axes, robot: Robot, target: TargetResult, branches: SolutionRows) -> list[Line2D]:
@@ -228,7 +229,7 @@ def _draw_joints(axes: Axes, robot: Robot, target: TargetResult, branches: Solut
     if robot.sliding.any():
         what = tr("joint angle (deg), or mm where a joint slides; grey: allowed range, line: reference")
     axes.set_xlabel(what)
-    axes.set_title(tr("Joint angles, one mark a branch"), **TITLE)
+    axes.set_title(tr("Joint angles, one mark per branch"), **TITLE)
     handles = []
     if not branches.within_limits.all():
         mark: dict[str, Any] = {"marker": "x", "color": HIGHLIGHT, "markeredgewidth": 1.6, "linestyle": "none"}

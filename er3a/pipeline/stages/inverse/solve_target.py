@@ -10,6 +10,7 @@ import scipy
 from er3a.collision.pairs import PairOverlaps
 from er3a.collision.scene import Scene
 from er3a.geometry.transforms import rotation_angle, rpy_of
+from er3a.kinematics.by_class import task_mask
 from er3a.kinematics.closed_form import ORIENTATION
 from er3a.kinematics.cuspidal import cuspidal_move
 from er3a.kinematics.families import Family
@@ -146,13 +147,24 @@ def _rows(
         rank=rank,
         first_of_branch=_first_of_branch(solutions.branch, rank),
         position_residual_mm=np.linalg.norm(back[:, :3, 3] - T[:3, 3], axis=1) * 1000,
-        orientation_residual_deg=np.degrees(rotation_angle(back[:, :3, :3], np.tile(T[:3, :3], (count, 1, 1)))),
+        orientation_residual_deg=np.degrees(_missed_orientation(robot, back[:, :3, :3], T[:3, :3])),
         manipulability=conditioning(robot, q, characteristic_length(robot)).manipulability,
         singular=_singular(robot, solutions),
         limit_margin_deg=np.degrees(limit_margin(robot, q)),
         greatest_move_deg=np.degrees(choice.greatest_move),
         distance_deg=np.degrees(choice.distance),
     )
+
+
+def _missed_orientation(robot: Robot, R: Reals, asked: Reals) -> Reals:
+    """By how much (n,), rad, rotations R (n, 3, 3) miss the one asked for, in what the arm's task asks of it."""
+    mask = task_mask(robot)[3:]
+    if mask.all():
+        return rotation_angle(R, np.tile(asked, (len(R), 1, 1)))
+    if not len(R):
+        return np.zeros(0)
+    missed = scipy.spatial.transform.Rotation.from_matrix(asked.T @ R).as_rotvec()
+    return np.asarray(np.linalg.norm(mask * missed, axis=1), dtype=float)
 
 
 def _singular(robot: Robot, solutions: Solutions) -> Flags:

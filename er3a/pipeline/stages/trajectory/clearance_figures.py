@@ -39,7 +39,7 @@ def clearance_section(results: TrajectoryResults) -> ClearanceSection:
         names = ", ".join(colliding)
         caption = tr("Below zero bodies overlap: {paths} can't be driven as planned.", paths=names)
     else:
-        caption = tr("No path comes to zero: none meets its surroundings or the arm itself.")
+        caption = tr("No path reaches zero: the arm collides neither with its surroundings nor with itself.")
     if any(path.unreachable for path, _ in paths):
         caption += " " + tr("Grey: not reachable.")
     alt = tr("Least clearance over time, one panel per path. {conclusion}", conclusion=caption)

@@ -41,7 +41,7 @@ from er3a.pipeline.stages.trajectory.model import (
 )
 from er3a.pipeline.stages.trajectory.path_figure_3d import turning_figure
 from er3a.pipeline.stages.trajectory.path_figures import PathFigure
-from er3a.pipeline.stages.trajectory.written_programs import repair_file
+from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figure_readings import readings
 from er3a.pipeline.viewing.page import fixed, head_of, number, render, run_command, text_address
@@ -103,7 +103,7 @@ class PathSection:
     faults: list[list[str]]
     strategies: list[list[str]]
     programs: list[ProgramLink]
-    repaired: ProgramLink | None
+    repaired: list[ProgramLink]
     shortest: str
     figure: PathDrawing
 
@@ -174,11 +174,15 @@ def _section(path: PathSummary, rows: PathChecks, figure: PathDrawing, programs:
         events=[_event_row(path.name, event) for event in path.singularities],
         faults=_faults(path),
         strategies=_strategies(path),
-        programs=[each for each in programs if each.file != repair_file(path.name)],
-        repaired=next((each for each in programs if each.file == repair_file(path.name)), None),
+        programs=[each for each in programs if not _repairs(path, each)],
+        repaired=[each for each in programs if _repairs(path, each)],
         shortest="–" if path.fastest_s is None or path.verdict in AT_ANY_PACE else fixed(path.fastest_s, 2),
         figure=figure,
     )
+
+
+def _repairs(path: PathSummary, program: ProgramLink) -> bool:
+    return program.file.rpartition(".")[0] == repair_name(path.name)
 
 
 def _figure(

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from er3a.kinematics.forward import forward
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.stages.trajectory.model import AvoidanceRows, ProgramFiles
 from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning.commands import CommandSource, JointTableCommand, PlanCommand, ToolMoveCommand
@@ -24,6 +24,8 @@ from er3a.robots.robot import Robot
 from er3a.robots.shown import joint_columns, meant, shown
 
 LONGEST_NAME = 24
+REPAIRED = "_repaired"
+STRAIGHT = 1e-4  # rad or m: by how much joints that move straight between written points may be off a repaired motion
 
 
 def written(
@@ -63,9 +65,9 @@ def written(
     return program.files, program.findings
 
 
-def repair_file(path: str) -> str:
-    """Name of the file with the motion that repairs a path."""
-    return f"{program_name(path, LONGEST_NAME)}_repaired.csv"
+def repair_name(path: str) -> str:
+    """Name of the program that holds the motion which repairs a path."""
+    return program_name(path, LONGEST_NAME - len(REPAIRED)) + REPAIRED
 
 
 def program_files(
@@ -85,8 +87,10 @@ def program_files(
             continue
         files, _ = written(robot, motion, verdict, language)
         rows += [(language, name + suffix, text) for suffix, text in files.items()]
-    if len(repaired) and "csv" in languages:
-        rows.append(("csv", repair_file(motion.entry.name), _table(robot, motion, repaired)))
+    for language in languages if len(repaired) else ():
+        if language == "csv" or not not_written(language, robot):
+            files = _repair(robot, motion, repaired, language)
+            rows += [(language, repair_name(motion.entry.name) + suffix, text) for suffix, text in files.items()]
     return ProgramFiles(
         path=np.full(len(rows), motion.entry.name, object),
         language=np.array([row[0] for row in rows], object),
@@ -95,8 +99,39 @@ def program_files(
     )
 
 
-def _table(robot: Robot, motion: Motion, rows: AvoidanceRows) -> str:
-    """A motion's rows as a table of times, joints and poses, with what they are in its head."""
+def _repair(robot: Robot, motion: Motion, rows: AvoidanceRows, language: Language) -> Mapping[str, str]:
+    """The motion that repairs a path by suffix: all rows with their times as a table, else as joint moves."""
     told = f"path {motion.entry.name} for {ascii_text(robot.title)}, repaired: {rows.strategy[0]}"
-    poses = np.linalg.inv(robot.base) @ forward(robot, meant(robot, rows.q_deg))
-    return write_csv(rows.t_s, rows.q_deg, poses, (HEAD + told,), joint_columns(robot))
+    q = meant(robot, rows.q_deg)
+    if language == "csv":
+        poses = np.linalg.inv(robot.base) @ forward(robot, q)
+        return {".csv": write_csv(rows.t_s, rows.q_deg, poses, (HEAD + told,), joint_columns(robot))}
+    kept = needed_points(q, STRAIGHT)
+    command = JointTableCommand(q[kept], Times(rows.t_s[kept], np.arange(len(kept))))
+    made = listing_of(command, robot, q[0], repair_name(motion.entry.name), motion.entry.title)
+    head = (told, f"joint moves between points of the checked motion, within {np.degrees(STRAIGHT):.3f} deg of it")
+    return write_program(made.listing, language, WriteOptions(robot, q[0], notes=made.findings, head=head)).files
+
+
+def needed_points(q: Reals, tolerance: float) -> Integers:
+    """Rows of a motion between which straight joint moves stay near all others; the first and the last among them.
+
+    Parameters
+    ----------
+    q : (N, n), rad or m, N at least 2; tolerance : of each joint, rad or m
+    """
+    kept, spans = {0, len(q) - 1}, [(0, len(q) - 1)]
+    while spans:
+        first, last = spans.pop()
+        if last - first < 2:
+            continue
+        chord = q[last] - q[first]
+        between = q[first + 1 : last] - q[first]
+        square = float(chord @ chord)
+        along = np.clip(between @ chord / square, 0.0, 1.0) if square else np.zeros(len(between))
+        off = np.abs(between - along[:, None] * chord).max(axis=1)
+        if off.max() > tolerance:
+            worst = first + 1 + int(off.argmax())
+            kept.add(worst)
+            spans += [(first, worst), (worst, last)]
+    return np.array(sorted(kept))

@@ -87,7 +87,9 @@ def _diagnosis_story(diagnosis: SetDiagnosis, residuals: Residuals, own_claims: 
         text=typographic(say(diagnosis.conclusion)),
         against=_measured_against(diagnosis),
         to_decide=typographic(say(best.to_decide)) if best and best.to_decide else "",
-        others_title=tr("Next-best hypotheses") if named else tr("The best hypotheses, none of which will do"),
+        others_title=tr("Next best hypotheses")
+        if named
+        else tr("The best hypotheses, none of which explains the data"),
         others=[_hypothesis_row(each) for each in diagnosis.hypotheses[1 if named else 0 : SHOWN_HYPOTHESES]],
         hypotheses_tried=diagnosis.hypotheses_tried,
         picture=_residual_picture(residuals.take(residuals.reference_set == diagnosis.reference_set), diagnosis),
@@ -101,7 +103,7 @@ def _measured_against(diagnosis: SetDiagnosis) -> str:
     told = tr("Residuals are measured against: {documents}.", documents=joined(others)) if others else ""
     if own:
         template = (
-            N_("Besides against {documents}: taken from the table or the other way round, so no evidence for it.")
+            N_("Also compared with {documents}: taken from the table, or the table from them, so no evidence for it.")
             if others
             else N_(
                 "Residuals are measured against {documents}: the table was taken from it or it from the table, so "
@@ -186,13 +188,13 @@ def _residual_picture(rows: Residuals, diagnosis: SetDiagnosis) -> Picture | Non
     shown = missed.take(np.arange(len(missed)) < SHOWN_RESIDUALS)
     still = int((missed.after > missed.uncertainty).sum())
     if isinstance(diagnosis.conclusion, MostLikelyFault | TooSmallToTell):
-        caption = tr("With the best hypothesis corrected, every number is within what its reference leaves open.")
+        caption = tr("With the best hypothesis corrected, every number is within its reference's uncertainty.")
     elif diagnosis.hypotheses:
         caption = tr("Even the best hypothesis leaves {still} of {all} references missed.", still=still, all=len(rows))
     else:
-        caption = tr("No hypothesis does better than the table as it is.")
+        caption = tr("No hypothesis fits better than the table as it is.")
     if len(missed) > len(shown):
-        more = tr("The {drawn} farthest off of {missed} are drawn.", drawn=len(shown), missed=len(missed))
+        more = tr("The figure shows the {drawn} largest of {missed}.", drawn=len(shown), missed=len(missed))
         caption = joined([caption, more], " ")
     alt = tr("Residual of each missed reference before and after the best hypothesis, on a logarithmic axis.")
     return Picture(residual_figure(shown), alt, caption)

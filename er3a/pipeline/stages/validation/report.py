@@ -198,7 +198,7 @@ def _side_picture(robot: Robot, drawn: Axes, summary: ValidationSummary) -> Pict
             correction = (
                 tr("The dashed arm has the named fault corrected: it meets the stated axes.")
                 if drawn.reference_set[0] == corrected_set
-                else tr("The dashed arm has the model's own zero pose put right; it still misses the stated axes.")
+                else tr("The dashed arm has the model's own zero pose corrected; it still misses the stated axes.")
             )
             caption = joined([caption, correction], " ")
     alt = tr("Side view of the zero pose: links and joint axes of the model, and the axes that references state.")

@@ -144,7 +144,7 @@ def _pose_rows(pose: PoseEstimate) -> list[list[str]]:
 
 
 def _methods(found: CalibrationResult) -> list[list[str]]:
-    rows = [[tr("likeliest"), "", "", "", fixed(_rms(found), 3)]]
+    rows = [[tr("maximum likelihood"), "", "", "", fixed(_rms(found), 3)]]
     for each in found.methods:
         numbers = (each.apart_mm, each.apart_deg, each.beyond, each.rms_mm)
         cells = [tr("fails") if value is None else fixed(value, 3) for value in numbers]
@@ -160,20 +160,21 @@ def _disagreement(found: CalibrationResult) -> str:
     off = [METHODS[each.method] for each in found.methods if each.beyond is not None and each.beyond > 1]
     if not off:
         return tr(
-            "All closed forms lie within the 95 % intervals of the likeliest pose: which one is taken hardly matters."
+            "All closed-form methods are within the 95 % intervals of the maximum-likelihood pose: the choice "
+            "hardly matters."
         )
     why = (
         tr(
-            "Some motions turn by nearly 180 deg, where quaternions and axes change their sign at the least error: "
-            "Tsai, Horaud and Daniilidis suffer from that most."
+            "Some motions rotate by nearly 180 deg, where the smallest error flips the sign of quaternions and "
+            "axes: this affects Tsai, Horaud and Daniilidis most."
         )
         if found.greatest_turn_deg > NEARLY_HALF_TURN
         else ""
     )
     weights = tr(
-        "Outside the 95 % intervals lie: {names}. Closed forms weigh all samples and all coordinates alike, and most "
-        "solve for the rotation first, so that its error goes into the position; the likeliest pose weighs each "
-        "coordinate by its deviation.",
+        "Outside the 95 % intervals: {names}. Closed-form methods weight all samples and coordinates equally, "
+        "and most solve for the rotation first, so its error enters the position; the maximum-likelihood pose "
+        "weights each coordinate by its standard deviation.",
         names=", ".join(off),
     )
     return joined([weights, why], " ")

@@ -32,7 +32,7 @@ def residual_picture(rows: SampleRows, found: CalibrationResult) -> Picture:
         number = np.arange(1, len(rows) + 1)
         ax.bar(number[rows.used], size[rows.used], color=MODEL, label=tr("used"))
         ax.bar(number[~rows.used], size[~rows.used], color=HIGHLIGHT, label=tr("left out"))
-        ax.axhline(mean, color=INK, linewidth=1, linestyle="--", label=tr("mean to expect"))
+        ax.axhline(mean, color=INK, linewidth=1, linestyle="--", label=tr("expected mean"))
         ax.set_yscale("log")
         ax.set_ylabel(label)
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -40,9 +40,8 @@ def residual_picture(rows: SampleRows, found: CalibrationResult) -> Picture:
     axes[0].legend(ncols=3, loc="upper right")
     worst = int(np.argmax(np.where(rows.used, sizes[0], 0.0)))
     caption = tr(
-        "How far each sample is from the calibration, with a logarithmic scale. Bars that tower over the dashed line "
-        "are samples that don't belong; those left out are coloured. Of the samples used, {name} is farthest off: "
-        "{mm} mm.",
+        "Residual of each sample, on a logarithmic scale. Bars far above the dashed line are outliers; samples "
+        "left out are coloured. Of the samples used, {name} is farthest off: {mm} mm.",
         name=rows.sample[worst],
         mm=fixed(sizes[0][worst], 2),
     )
@@ -84,11 +83,11 @@ def image_picture(rows: CornerRows, folder: Path) -> Picture:
     by_board = float(np.sqrt(((rows.by_board_px - rows.seen_px)[rows.used] ** 2).sum(axis=1).mean()))
     by_arm = float(np.sqrt((off[rows.used] ** 2).sum(axis=1).mean()))
     caption = tr(
-        "Corners as detected, and lines from there towards where arm and calibration put them, {scale:g} times as long "
-        "as they are; the {shown} of {count} images with the greatest residuals. In the images used, detected corners "
-        "are {board} px (root mean square) from the board's pose in that image, which is the camera's noise, and {arm} "
-        "px from the arm's. Lines all in one direction are a wrong pose of the arm or the board; lines that turn about "
-        "a point a wrong end of the board; short ones in all directions noise.",
+        "Detected corners with lines towards their position by arm and calibration, magnified {scale:g} times; "
+        "the {shown} of {count} images with the greatest residuals. In the images used, detected corners are "
+        "{board} px (root mean square) from the board's own pose in the image (the camera's noise) and {arm} px"
+        " from the pose by the arm. Lines all in one direction: wrong pose of arm or board. Lines circling a "
+        "point: board detected the wrong way round. Short lines in all directions: noise.",
         scale=scale,
         shown=len(shown),
         count=len(size),
@@ -133,11 +132,10 @@ def map_picture(rows: ErrorMapRows, objects: tuple[ObjectResult, ...]) -> Pictur
         equal_scale(ax, "x (mm)", "y (mm)")
     blank = "" if both.all() else tr("Blank cells are out of the camera's view or of the arm's reach.")
     caption = tr(
-        "Errors of a grasp (the first object's, held at each place) at the objects' mean height, seen from above. The "
-        "calibration's own part goes from {least} to {most} mm where the camera sees, that of repeatability and table "
-        "from {arm_least} to {arm_most} mm; with the camera's noise in one reading all of them make {low} to {high} mm "
-        "and {turn_low} to {turn_high}°. Where the first map is far below the third, more samples for the calibration "
-        "help little.",
+        "Grasp errors (first object, at each position) at the objects' mean height, from above. Within the "
+        "camera's view: calibration alone {least} to {most} mm; repeatability and table {arm_least} to "
+        "{arm_most} mm; all together, with the camera's noise in one reading, {low} to {high} mm and {turn_low}"
+        " to {turn_high}°. Where the first map is far below the third, more calibration samples help little.",
         **_range(rows.calibration_mm[seen], "least", "most"),
         **_range(rows.arm_mm[both], "arm_least", "arm_most"),
         **_range(rows.together_mm[both], "low", "high"),

@@ -28,6 +28,7 @@ from er3a.robots.robot import Robot
 SHADES = "viridis"
 PIXELS = 301
 _HEIGHTS = (0.25, 0.5, 0.75)
+_LABEL = 0.035  # height of a label, of the longer side of a drawing
 _PLANE = N_("from axis 1, in the arm's zero plane (mm)")
 
 
@@ -164,7 +165,7 @@ def placement_views(
     figure.colorbar(mesh, ax=axes, label=tr("least manipulability in the box (% of the arm's best)"), shrink=0.85)
     handles = [
         Line2D([], [], color=INK, marker="o", markersize=4, linewidth=2.2, label=tr("arm, all joints 0")),
-        Patch(facecolor="none", edgecolor=HIGHLIGHT, label=tr("best places, as numbered in the table")),
+        Patch(facecolor="none", edgecolor=HIGHLIGHT, label=tr("best positions, numbered as in the table")),
         *([Patch(facecolor=GRID, label=tr("by samples only"))] if provable else []),
     ]
     if scene:
@@ -212,6 +213,12 @@ def _draw_boxes(axes: Axes, listed: Sequence[PlaceSummary], shown: list[int]) ->
         axes.add_patch(Rectangle((low[0], low[1]), *size, fill=False, edgecolor=HIGHLIGHT, linewidth=1.6))
         labels.setdefault((low[0].round(3), (low[1] + size[1]).round(3)), []).append(str(number))
     shade = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1}
-    for corner, numbers in labels.items():
+    near = _LABEL * max(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim()))
+    taken: list[tuple[float, float]] = []
+    for corner, numbers in sorted(labels.items()):
+        x, y = corner
+        while any(abs(x - other[0]) < 2 * near and abs(y - other[1]) < near for other in taken):
+            y -= near  # below the label that is there already
+        taken.append((x, y))
         text = ", ".join(numbers)
-        axes.annotate(text, corner, (3, -10), textcoords="offset points", color=HIGHLIGHT, fontsize=8, bbox=shade)
+        axes.annotate(text, (x, y), (3, -10), textcoords="offset points", color=HIGHLIGHT, fontsize=8, bbox=shade)

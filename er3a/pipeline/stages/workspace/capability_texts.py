@@ -44,9 +44,9 @@ def capability_context(robot: Robot, results: WorkspaceResults, scene: Scene | N
         "asked_text": _asked_text(capability),
         "capability_pictures": _pictures(robot, results, capability) if len(results.capability) else [],
         "core_text": _core_text(capability),
-        "collisions_text": tr("Collisions are not looked at in reachability and core.")
+        "collisions_text": tr("Reachability and dexterous workspace ignore collisions.")
         if capability.core_m3
-        else tr("Collisions are not looked at in reachability."),
+        else tr("Reachability ignores collisions."),
         "task_text": _task_text(placement.task, capability),
     } | _placement_context(robot, results, capability, placement, scene)
 
@@ -61,11 +61,12 @@ def _placement_context(
         "nowhere": "",
         "placing_scene": placement.scene,
         "try_text": _try_text(robot, placement.task) if capability.asked == "directions" else "",
+        "best_text": _best_text(placement),
         "points_serving": placement.points_serving,
         "place_rows": rows,
         "place_picture": Picture(
             placement_views(robot, capability, placement, results.places, scene),
-            tr("Where the middle of the box can stand, from above and from the side, with the best places"),
+            tr("Possible positions of the box centre, from above and from the side, with the best ones"),
             _places_caption(placement, capability.core_m3 is not None),
         )
         if len(results.places)
@@ -99,11 +100,11 @@ def _pictures(robot: Robot, results: WorkspaceResults, capability: CapabilitySum
                 capability,
                 results.capability,
                 clear_percent(results.capability),
-                tr("reached poses held clear (%)"),
+                tr("reached poses held without collision (%)"),
             ),
-            tr("Slices along the slide of joint 1: reached poses that an arm holds with nothing touched")
+            tr("Slices along the slide of joint 1: reached poses that can be held without collision")
             if capability.bar_m
-            else tr("Slices across axis 1: reached poses that an arm holds with nothing touched"),
+            else tr("Slices across axis 1: reached poses that can be held without collision"),
             _clear_caption(capability.clear),
         ),
     ]
@@ -120,9 +121,9 @@ def _clear_caption(clear: ClearSummary) -> str:
             scene=clear.scene,
         )
     tried = tr(
-        "{tries} random poses were tried in each cell and sector, {reached} of all are reached, {clear} proven clear "
-        "by an arm; in {without} cells and sectors none was found. Shares of so few tries tell good regions from bad "
-        "ones, not single cells.",
+        "{tries} random poses were tried in each cell and sector: {reached} are reached, {clear} of them proven"
+        " collision-free; in {without} cells and sectors none was found. Shares of so few tries distinguish "
+        "good regions from bad ones, not single cells.",
         tries=clear.tries,
         reached=number(clear.reached),
         clear=number(clear.clear),
@@ -251,7 +252,7 @@ def _roll_text(capability: CapabilitySummary) -> str:
             "direction is reached, nor in the number of solutions."
         )
     return tr(
-        "The tool stands beside the axis of joint 6, so the roll about the tool's own axis moves the wrist: {rolls} "
+        "The tool is off the axis of joint 6, so the roll about the tool's own axis moves the wrist: {rolls} "
         "rolls are tried, and a direction counts if one of them is reached.",
         rolls=capability.roll.per_direction,
     )
@@ -263,18 +264,18 @@ def _core_text(capability: CapabilitySummary) -> str:
         if capability.asked != "directions":
             return ""
         return tr(
-            "The dexterous core is bounded only for arms of six turning joints with a spherical wrist, none of them "
-            "coupled."
+            "The dexterous workspace is bounded only for arms of six revolute joints with a spherical wrist, none of "
+            "them coupled."
         )
     if core.upper == 0:
         return tr(
-            "There is no dexterous core: in every part of the workspace some tool direction is proven unreachable at "
-            "all its points. Work that needs the tool from every side needs a turntable."
+            "There is no dexterous workspace: in every part of the workspace some tool direction is proven "
+            "unreachable at all points. Work that needs the tool from every side needs a turntable."
         )
     return tr(
-        "The dexterous core, where the tool can take every direction of the sphere, holds at least {lower} L and at "
-        "most {upper} L: both are proven, for all points and directions in between too. By the {directions} sampled "
-        "directions alone it would be {estimate} L.",
+        "The dexterous workspace, where the tool can take every direction of the sphere, is at least {lower} L "
+        "and at most {upper} L; both bounds are proven for all points and directions. By the {directions} "
+        "sampled directions alone it would be {estimate} L.",
         directions=capability.directions,
         lower=number(1000 * core.lower, 2),
         upper=number(1000 * core.upper, 2),
@@ -293,36 +294,37 @@ def _task_text(task: TaskSummary, capability: CapabilitySummary) -> str:
     }
     served = {
         "directions": tr(
-            "A box of {box} mm must be served at every point with the tool's axis anywhere within {cone} deg of "
-            "({direction}), joints {margin} deg within their limits.",
+            "Task: a box of {box} mm in which the tool reaches every point, with its axis anywhere within {cone} deg "
+            "of ({direction}) and the joints at least {margin} deg from their limits.",
             **shown,
         ),
         "tilts": tr(
-            "A box of {box} mm must be served at every point with every tilt within {cone} deg of ({direction}) that "
-            "the arm's plane allows, joints {margin} deg within their limits.",
+            "Task: a box of {box} mm in which the tool reaches every point at every tilt within {cone} deg of "
+            "({direction}) that the arm's plane allows, with the joints at least {margin} deg from their limits.",
             **shown,
         ),
         "turns": tr(
-            "A box of {box} mm must be served at every point, at some turn of the tool; its axis must lie within "
-            "{cone} deg of ({direction}), where it always points. Joints that turn keep {margin} deg within their "
-            "limits.",
+            "Task: a box of {box} mm in which the tool reaches every point at some rotation about its axis; the axis "
+            "must lie within {cone} deg of ({direction}), where it always points. Revolute joints stay at least "
+            "{margin} deg from their limits.",
             **shown,
         ),
         "points": tr(
-            "A box of {box} mm must be served at every point, whatever way the tool points there. Joints that turn "
-            "keep {margin} deg within their limits.",
+            "Task: a box of {box} mm in which the tool reaches every point in any orientation. Revolute joints stay at "
+            "least {margin} deg from their limits.",
             **shown,
         ),
     }[capability.asked]
     lowest, clear = fixed(task.lowest_mm, 0), fixed(task.clear_of_axis_mm, 0)
     if capability.bar_m:
         stands = tr(
-            "It stands level, as given or turned by 90 deg, its underside at {lowest} mm or higher.", lowest=lowest
+            "The box is level, as given or rotated by 90 deg, with its underside at {lowest} mm or higher.",
+            lowest=lowest,
         )
     else:
         stands = tr(
-            "It stands level, as given or turned by 90 deg, its underside at {lowest} mm or higher, and {clear} mm or "
-            "more from axis 1.",
+            "The box is level, as given or rotated by 90 deg, with its underside at {lowest} mm or higher, at least "
+            "{clear} mm from axis 1.",
             lowest=lowest,
             clear=clear,
         )
@@ -335,14 +337,30 @@ def _try_text(robot: Robot, task: TaskSummary) -> str:
     parts = {"roll": fixed(roll, 1).removesuffix(".0"), "pitch": fixed(pitch, 1).removesuffix(".0")}
     if np.allclose(robot.tool, np.eye(4)):
         return tr(
-            "To see the arm at a place, type its middle, roll {roll}, pitch {pitch} and yaw 0 deg into the teach "
-            "panel. The robot has no tool here: the centre of its flange goes there.",
+            "To see the arm at a position, type its centre, roll {roll}, pitch {pitch} and yaw 0 deg into the "
+            "teach panel. The robot has no tool here: the centre of its flange goes there.",
             **parts,
         )
     return tr(
-        "To see the arm at a place, type its middle, roll {roll}, pitch {pitch} and yaw 0 deg into the teach panel: "
-        "the tool point goes there.",
+        "To see the arm at a position, type its centre, roll {roll}, pitch {pitch} and yaw 0 deg into the teach"
+        " panel: the tool point goes there.",
         **parts,
+    )
+
+
+def _best_text(placement: PlacementSummary) -> str:
+    """Where to put the box: the first place that is proven, else the first; what there is none of."""
+    box = " × ".join(fixed(value, 0) for value in placement.task.box_mm)
+    if not placement.places:
+        return tr("No position for a box of {box} mm was found.", box=box)
+    ranked = list(enumerate(placement.places, start=1))
+    row, place = next((each for each in ranked if each[1].status == "proven"), ranked[0])
+    return tr(
+        "A box of {box} mm: put its centre at ({centre}) mm ({status}; number {row} of the best positions).",
+        box=box,
+        centre=", ".join(fixed(1000 * value, 0) for value in place.centre_m),
+        status=word("workspace.status", STATUS, place.status),
+        row=row,
     )
 
 
@@ -357,14 +375,14 @@ def _whole(value: float) -> float | int:
 def _places_caption(placement: PlacementSummary, provable: bool) -> str:
     if not provable:
         return tr(
-            "{fitting} positions on the lattice pass by samples; proofs are for arms of six turning joints with a "
-            "spherical wrist. Stand the box's middle well inside a bright region.",
+            "{fitting} grid positions pass by samples; proofs exist only for arms of six revolute joints with a "
+            "spherical wrist. Put the box centre well inside a bright region.",
             fitting=number(placement.fitting),
         )
     return tr(
-        "Of {fitting} positions on the lattice that pass by samples, {proven} are proven for every point and "
-        "direction. Stand the box's middle on a bright spot; grey ones pass by samples only. The colour shows the best "
-        "over what lies in the line of sight.",
+        "Of {fitting} grid positions that pass by samples, {proven} are proven for every point and direction. "
+        "Put the box centre on a bright spot; grey spots pass by samples only. The colour shows the best value "
+        "along the line of sight.",
         fitting=number(placement.fitting),
         proven=number(placement.fitting_proven),
     )

@@ -27,10 +27,10 @@ from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot
 
 PROOF = {
-    N_("filled"): "#9ecae1",
-    N_("filled but for a wedge"): "#d6e6f2",
+    N_("reachable"): "#9ecae1",
+    N_("reachable except a wedge"): "#d6e6f2",
     N_("undecided"): HIGHLIGHT,
-    N_("empty"): "#ffffff",
+    N_("unreachable"): "#ffffff",
 }
 FILLED, WEDGE, UNDECIDED, EMPTY = range(4)
 BORDERS = {"tool_point": INK, "wrist_centre": REFERENCE, "flange": JOINTS[3]}
@@ -46,13 +46,13 @@ def sections(robot: Robot, results: WorkspaceResults) -> Figure:
         counts = _draw_cloud(left, bars, results.cloud.point_m)
         figure.colorbar(counts, ax=left, label=tr("samples per cm²"), location="top", shrink=0.8)
         arm, across, up = _across(bars, skeleton(robot, np.zeros(robot.joints))), *slide_names(bars.frame)
-        left.set_title(tr("Samples, all places along the slide folded in"))
+        left.set_title(tr("Samples, all positions along the slide overlaid"))
     else:
         mesh = _draw_density(left, results.summary.section_cell_m, results.section)
         figure.colorbar(mesh, ax=left, label=tr("samples per litre"), location="top", shrink=0.8)
         arm = _about(results.summary.axis, skeleton(robot, np.zeros(robot.joints)))
         across, up = tr("distance from axis 1 (mm)"), tr("height along axis 1 (mm)")
-        left.set_title(tr("Samples, all azimuths folded in"))
+        left.set_title(tr("Samples, all azimuths overlaid"))
     _draw_proof(right, results.proof, bars)
     for axes in (left, right):
         _draw_border(axes, border)

@@ -75,8 +75,8 @@ def _context(robot: Robot, results: WorkspaceResults, scene: Path | None) -> dic
         "convergence": Picture(
             convergence(results),
             tr(
-                "Touched volume over the number of samples for three cell sizes, with the proven bounds and the "
-                "estimate"
+                "Volume of the sampled cells over the number of samples for three cell sizes, with the proven "
+                "bounds and the estimate"
             ),
             _curve_caption(summary, results.curve),
         ),
@@ -93,7 +93,7 @@ def _side(robot: Robot, results: WorkspaceResults) -> Picture | None:
             "The manufacturer's labels (green) should meet the orange border: extents touch it, corners lie on it."
         )
     else:
-        labels = tr("No drawing of this arm's envelope is on file to compare with.")
+        labels = tr("There is no drawing of this arm's envelope to compare with.")
     return Picture(
         side_view(results, not np.array_equal(robot.tool, np.eye(4))),
         tr("Side views of wrist centre and flange in the arm's plane, with exact borders"),
@@ -150,9 +150,9 @@ def _section_caption(summary: WorkspaceSummary, drawn: bool) -> str:
     ]
     enclosed = summary.enclosed_voids
     if enclosed and enclosed[0].holds_shoulder:
-        told.append(tr("The largest closed hollow lies about the shoulder."))
+        told.append(tr("The largest enclosed void surrounds the shoulder."))
     elif enclosed:
-        told.append(tr("The largest closed hollow lies away from the shoulder."))
+        told.append(tr("The largest enclosed void is away from the shoulder."))
     if drawn:
         told.append(
             tr(
@@ -162,9 +162,15 @@ def _section_caption(summary: WorkspaceSummary, drawn: bool) -> str:
         )
     checked, inside = number(summary.proof.points_checked), summary.proof.points_in_empty_cells
     if inside:
-        told.append(tr("Of {checked} recorded samples, {inside} lie in an empty cell.", checked=checked, inside=inside))
+        told.append(
+            tr(
+                "Of {checked} recorded samples, {inside} lie in a cell proven unreachable.",
+                checked=checked,
+                inside=inside,
+            )
+        )
     else:
-        told.append(tr("Of {checked} recorded samples, none lie in an empty cell.", checked=checked))
+        told.append(tr("Of {checked} recorded samples, none lies in a cell proven unreachable.", checked=checked))
     return joined(told, " ")
 
 
@@ -172,10 +178,10 @@ def _top_caption(robot: Robot) -> str:
     if robot.slides[0]:
         return tr("Joint 1 slides: the view from above shows how far the samples reach along it and beside it.")
     if robot.upper[0] - robot.lower[0] >= 2 * np.pi - 1e-9:
-        return tr("Density depends on the distance from axis 1 alone, as a full turn of joint 1 demands.")
+        return tr("Density depends only on the distance from axis 1, because joint 1 makes a full turn.")
     return tr(
-        "In the dead zone behind the robot, between the limits of joint 1, the tool point is reached only by leaning "
-        "back or turning the wrist aside, and less far."
+        "In the dead zone behind the robot, between the limits of joint 1, the tool point gets only by leaning "
+        "the arm back or turning the wrist aside, and less far."
     )
 
 
@@ -183,8 +189,8 @@ def _slices_caption(summary: WorkspaceSummary) -> str:
     enclosed = len(summary.enclosed_voids)
     pockets = len(summary.voids) - enclosed
     return tr(
-        "The hull holds {voids} and {pockets}. Every point of the blue area can be reached by some joint vector within "
-        "the limits; place nothing in the white.",
+        "The hull contains {voids} and {pockets}. Every point of the blue area is reached by some joint vector "
+        "within the limits; place nothing in the white.",
         voids=counted("workspace.voids", "{count} enclosed void", "{count} enclosed voids", enclosed)
         if enclosed
         else tr("no enclosed void"),
@@ -197,11 +203,14 @@ def _curve_caption(summary: WorkspaceSummary, curve: GrowthCurve) -> str:
     finest = curve.touched_m3[curve.cell_mm == curve.cell_mm.min()][-1]
     if finest > volume.upper:
         touched = tr(
-            "The touched volume depends on cell size and number of samples and overstates the volume: cells on the "
-            "border count whole."
+            "The volume of the sampled cells depends on cell size and number of samples and overestimates the "
+            "volume: border cells count whole."
         )
     else:
-        touched = tr("The touched volume depends on cell size and number of samples and is no estimate of the volume.")
+        touched = tr(
+            "The volume of the sampled cells depends on cell size and number of samples and is no estimate of "
+            "the volume."
+        )
     band = tr(
         "Use the band: the reached volume lies between {low} and {high} m³.",
         low=number(volume.lower),
