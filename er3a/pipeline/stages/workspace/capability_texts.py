@@ -55,7 +55,7 @@ def _placement_context(
     robot: Robot, results: WorkspaceResults, capability: CapabilitySummary, placement: Placement, scene: Scene | None
 ) -> dict[str, Any]:
     if not isinstance(placement, PlacementSummary):
-        return {"nowhere": say(placement)}
+        return {"nowhere": say(placement), "best_text": ""}
     rows = [_place_row(n, place, capability) for n, place in enumerate(placement.places, start=1)]
     return {
         "nowhere": "",
