@@ -508,7 +508,8 @@ def test_the_panel_names_the_nearest_pair_and_turns_red_where_links_touch(panel)
         panel.until(lambda state=state: panel.one("#clearance").get_attribute("data-state") == state)
         found = clearance(robot, np.radians([degrees]), scene)
         (distance,), (pair,) = found.distance * 1000, found.pair
-        assert panel.text("#clearance").startswith("Touches" if distance <= 0 else f"{distance:.1f}\u202fmm clear")
+        told = "Collision" if distance <= 0 else f"Clearance {distance:.1f}\u202fmm"
+        assert panel.text("#clearance").startswith(told)
         assert say(pair) in panel.text("#clearance")
     red = "const c = document.getElementById('arm'); const d = c.getContext('2d').getImageData(0, 0, c.width, c.height)"
     each = "n += d[i] > 100 && d[i + 1] < 60 && d[i + 2] < 70"
