@@ -265,7 +265,7 @@ def test_two_of_three_joints_in_line_are_a_self_motion(q):
     """Joints 1 and 3 turn about one axis where joint 2 is at 0: only their difference is told by the pose."""
     robot, q = arm(([0, 0, 0], [H, H, np.pi / 3], [0.3, 0, 0.3]), most=3.2), np.array(q)
     T = forward(robot, q)
-    np.testing.assert_allclose(forward(robot, q + [0.4, 0.0, 0.4]), T, atol=1e-12)
+    np.testing.assert_allclose(forward(robot, q + np.array([0.4, 0.0, 0.4])), T, atol=1e-12)
     found = inverse(robot, T, np.array([1.5, 0.3, 0.2]))
     assert len(found.families) == 1
     assert not found.method.certain
