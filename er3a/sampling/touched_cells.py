@@ -22,7 +22,7 @@ class TouchedSection:
 
     Attributes
     ----------
-    rho, z : (n,), m, distance from axis 1 and height of each cell's middle
+    rho, z : (n,), m, distance from axis 1 and height of each cell's centre
     samples : (n,), how many fell into it; void : (n,), whether it is cut off
     """
 

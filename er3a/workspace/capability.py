@@ -2,7 +2,7 @@
 
 Reachability is the index of Zacharias, Borst and Hirzinger [1]_: directions spread evenly over the sphere, a
 direction counts if some roll about it has an inverse solution within limits. Here all directions are asked of the
-cell's middle. Arms with fewer joints are asked for what they can do (:mod:`.orientations`).
+cell's centre. Arms with fewer joints are asked for what they can do (:mod:`.orientations`).
 
 Joint 1 only turns everything about its axis, or shifts it. So each cell of the section is solved once, at azimuth 0 and
 with joint 1 free; what another azimuth has follows by turning joint 1 on, exactly. With a limited joint 1 azimuths are

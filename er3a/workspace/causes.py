@@ -23,12 +23,15 @@ from er3a.workspace.witness import reach_points
 InSection = Callable[[Reals], tuple[Reals, Reals, Reals]]
 InBase = Callable[[Reals], Reals]
 
-PROBES, SAMPLES, _RESTARTS = 300, 50_000, 3
+PROBES, SEARCHED, SAMPLES, _RESTARTS = 300, 80, 50_000, 1
 STEPS = (15.0, 30.0, 60.0, 90.0, 180.0)
 """By how much a limit is widened, deg, until the void vanishes."""
 SLIDE_STEPS = (25.0, 50.0, 100.0, 200.0, 400.0)
 """The same of joints that slide, mm."""
 _GONE, _SHRUNK = 0.98, 0.10
+
+NEAR = 0.05
+"""Part of the points' extent within which a sample must lie for a cell to be searched."""
 
 Side = Literal["lower", "upper"]
 _SIDES: tuple[Side, Side] = ("lower", "upper")
@@ -309,12 +312,12 @@ def _spread_probes(cavity: Cavity) -> tuple[Cavity, Reals]:
     """Arcs all over a void, and how much each stands for: all if they are few, else drawn by how much of what is proven
     empty they hold."""
     weight = cavity.volumes * cavity.empty
-    if len(weight) <= PROBES:
+    if len(weight) <= SEARCHED:
         chosen = np.flatnonzero(weight > 0)
         return cavity.part(chosen, cavity.enclosed), weight[chosen]
     order = np.random.Generator(np.random.Philox(key=len(weight))).permutation(len(weight))
     total = np.cumsum(weight[order])
-    drawn = order[np.searchsorted(total, (np.arange(PROBES) + 0.5) * (total[-1] / PROBES))]
+    drawn = order[np.searchsorted(total, (np.arange(SEARCHED) + 0.5) * (total[-1] / SEARCHED))]
     chosen, times = np.unique(drawn, return_counts=True)
     return cavity.part(chosen, cavity.enclosed), times.astype(float)
 
@@ -353,14 +356,13 @@ def _ratio_searched(
     rho, azimuth, z = in_section(points)
     for n in range(len(hit)):
         hit[n] = _in_arc(probes, n, (rho, azimuth, z)).any()
-    left = np.flatnonzero(~hit)
+    middles = probes.cells.reshape(-1, 2, 2).mean(axis=2)
+    wanted = in_base(in_space(middles[:, 0], probes.arcs.mean(axis=1), middles[:, 1], probes.bar))
+    away, nearest = cKDTree(points).query(wanted)
+    left = np.flatnonzero(~hit & (away < NEAR * np.linalg.norm(np.ptp(points, axis=0))))
     if left.size:
-        cells = probes.cells[left].reshape(-1, 2, 2).mean(axis=2)
-        wanted = in_base(in_space(cells[:, 0], probes.arcs[left].mean(axis=1), cells[:, 1], probes.bar))
-        starts = q[cKDTree(points).query(wanted)[1]]
-        found = reach_points(widened, wanted, starts, _RESTARTS)
-        found[~within(widened, np.nan_to_num(found))] = np.nan
-        hit[left] = np.isfinite(found[:, 0])
+        found = reach_points(widened, wanted[left], q[nearest[left]], _RESTARTS)
+        hit[left] = within(widened, np.nan_to_num(found)) & np.isfinite(found[:, 0])
     return float(weight[hit].sum() / weight.sum())
 
 

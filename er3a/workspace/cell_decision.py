@@ -40,7 +40,7 @@ def judge_cells(
     most_boxes : of one emptiness proof; 0: nothing is proven empty, only filled
     unfilled, empty : (n, MOST_ARCS, 2), azimuths (rad) that are not proven filled, and those of them that are proven
         empty, with their counts (n,): at first of the cell that this one was split off, on return of the cell itself
-    witness : (n, 4), set to theta_2, tau, phi of a configuration that reaches the cell's middle, and 1 (else 0)
+    witness : (n, 4), set to theta_2, tau, phi of a configuration that reaches the cell's centre, and 1 (else 0)
 
     Returns
     -------

@@ -35,7 +35,7 @@ class Proof:
     unfilled, empty : (n, MOST_ARCS, 2), rad in [0, 2 pi]: arcs of azimuth that are not proven filled, and those of them
         that are proven empty; unused rows are NaN
     level : (n,), how often the cell was split off
-    witness : (n, 4): theta_2, tau, phi of a configuration that reaches the cell's middle, and 1; or zeros
+    witness : (n, 4): theta_2, tau, phi of a configuration that reaches the cell's centre, and 1; or zeros
     boxes : how many boxes the emptiness proofs looked at
     bar : m, length of the cells where they are bars along a first joint that slides; 0 for rings. Then rho is the place
         across the bars beside z, and azimuths are places along them, their length being a turn

@@ -20,6 +20,7 @@ from er3a.kinematics.forward import forward
 from er3a.pipeline.stages.workspace.capability_texts import capability_context
 from er3a.pipeline.stages.workspace.cell_lookup import CellLookup
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings
+from er3a.pipeline.stages.workspace.model import ToolPointsElsewhere
 from er3a.pipeline.stages.workspace.tool_capability import ToolCapability, tool_capability
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import Picture
@@ -30,7 +31,7 @@ from er3a.workspace.orientations import asked_of
 from er3a.workspace.placement import narrowed
 from er3a.workspace.section_arm import section_frame
 from er3a.workspace.tool_inverse import InverseUnknown
-from testing.arms import palletiser
+from testing.arms import palletiser, scara
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -157,6 +158,15 @@ def test_an_arm_without_a_known_inverse_is_told_so():
     context = context_of(palletiser(), done)
     assert "no method here finds all inverse solutions" in context["missing"]
     assert not any(isinstance(value, Picture) for value in context.values())
+
+
+def test_a_tool_that_points_elsewhere_is_told_so():
+    robot = scara()
+    found = tool_capability(robot, settings(placement={"tool_direction": [1, 0, 0]}), 0.15)
+    assert isinstance(found.placement, ToolPointsElsewhere)
+    context = context_of(robot, found)
+    assert context["nowhere"].startswith("Nowhere: the arm can't tilt its tool")
+    assert context["best_text"] == ""
 
 
 def test_no_place_is_no_error():

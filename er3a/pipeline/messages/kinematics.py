@@ -148,7 +148,7 @@ def _(found: LimitsExceeded) -> str:
 @say.register
 def _(found: NotSixTurning) -> str:
     if found.sliding:
-        return sentence(found.code, "{count} of its joints slide", count=found.sliding)
+        return sentence(found.code, "it has sliding joints ({count})", count=found.sliding)
     return sentence(found.code, "it has {count} joints", count=found.joints)
 
 

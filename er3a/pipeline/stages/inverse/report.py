@@ -79,7 +79,7 @@ def report(study: Study, stored: Stored[InverseResults], output: Path) -> None:
         robot_pages=study.pages(name),
         nearest_rule=tr(NEAREST_RULE),
         overview=[_overview_row(target) for target in chosen],
-        sections=[_section(robot, target, results) for target in chosen],
+        sections=[_section(robot, target, results, rules) for target in chosen],
         outcomes=_outcomes(summary.targets),
         not_advised=_not_advised(summary.targets),
         rule_columns=[tr("Branch"), *map(_rule_heading, rules)],
@@ -94,7 +94,7 @@ def report(study: Study, stored: Stored[InverseResults], output: Path) -> None:
     )
 
 
-def _section(robot: Robot, target: TargetResult, results: InverseResults) -> TargetSection:
+def _section(robot: Robot, target: TargetResult, results: InverseResults, rules: list[str]) -> TargetSection:
     rows = results.solutions.take(results.solutions.target == target.name)
     branches = best_of_branches(rows)
     return TargetSection(
@@ -110,7 +110,7 @@ def _section(robot: Robot, target: TargetResult, results: InverseResults) -> Tar
         families=_self_motions(target.families),
         unsolved=joined(listed(target.unsolved)),
         rows=_branch_rows(rows, branches),
-        rules=_rule_rows(results.rankings.take(results.rankings.target == target.name)),
+        rules=_rule_rows(results.rankings.take(results.rankings.target == target.name), rules),
         residual_mm=rows.position_residual_mm.max() if len(rows) else None,
         residual_deg=rows.orientation_residual_deg.max() if len(rows) else None,
     )
@@ -131,16 +131,16 @@ def _rule_heading(rule: str) -> str:
     return f"{_rule(rule)}{'' if unit == '1' else f' ({unit})'}>"
 
 
-def _rule_rows(ranked: RankingRows) -> list[list[str]]:
-    """One row for each branch: the measure of each rule, with its place."""
+def _rule_rows(ranked: RankingRows, rules: list[str]) -> list[list[str]]:
+    """One row for each branch: the measure of each rule, with its place; a dash for a rule that this target lacks."""
     rows, collides = [], tr("collides")
     for branch in np.unique(ranked.branch):
         own = ranked.take(ranked.branch == branch)
-        cells = [
-            f"{number(_no_noise(measure), 3)}{NO_BREAK_SPACE}({place or collides})"
-            for measure, place in zip(own.measure, own.place)
-        ]
-        rows.append([_on_one_line(own.label[0], int(branch)), *cells])
+        cells = {
+            rule: f"{number(_no_noise(measure), 3)}{NO_BREAK_SPACE}({place or collides})"
+            for rule, measure, place in zip(own.rule, own.measure, own.place)
+        }
+        rows.append([_on_one_line(own.label[0], int(branch)), *(cells.get(rule, "–") for rule in rules)])
     return rows
 
 

@@ -55,7 +55,7 @@ def _placement_context(
     robot: Robot, results: WorkspaceResults, capability: CapabilitySummary, placement: Placement, scene: Scene | None
 ) -> dict[str, Any]:
     if not isinstance(placement, PlacementSummary):
-        return {"nowhere": say(placement)}
+        return {"nowhere": say(placement), "best_text": ""}
     rows = [_place_row(n, place, capability) for n, place in enumerate(placement.places, start=1)]
     return {
         "nowhere": "",
@@ -134,7 +134,7 @@ def _clear_caption(clear: ClearSummary) -> str:
 
 def _level_caption(capability: CapabilitySummary) -> str:
     if capability.bar_m:
-        return tr("All along the slide the arm can do the same, as far as its ends let it stand there.")
+        return tr("The arm can do the same everywhere along the slide, up to its ends.")
     if capability.sectors == 1:
         return tr("Joint 1 makes a full turn, so what counts is the distance from axis 1 and the height alone.")
     if capability.asked == "directions":
@@ -191,24 +191,24 @@ def _asked_text(capability: CapabilitySummary) -> str:
     count = capability.directions
     asked = {
         "directions": tr(
-            "At each cell's middle {directions} tool directions, spread evenly over the sphere, were tried; the ratio "
+            "At each cell's centre {directions} tool directions, spread evenly over the sphere, were tried; the share "
             "that is reached is its reachability index (Zacharias, Borst and Hirzinger 2007).",
             directions=count,
         ),
         "tilts": tr(
-            "This arm can't point its tool anywhere: all its tilting joints turn about one direction, so the tool "
-            "stays within a plane that joint 1 turns. At each cell's middle {directions} tilts, spread evenly over the "
-            "full turn in that plane, were tried; reachability is the ratio that is reached.",
+            "This arm can't point its tool in every direction: all its tilting joints turn about one direction, so the "
+            "tool stays within a plane that joint 1 turns. At each cell's centre {directions} tilts, spread evenly "
+            "over the full turn in that plane, were tried; reachability is the share that is reached.",
             directions=count,
         ),
         "turns": tr(
-            "This arm can't tilt its tool, but turn it about the direction of its axes. At each cell's middle "
-            "{directions} turns, spread evenly, were tried; reachability is the ratio that is reached.",
+            "This arm can't tilt its tool, but turn it about the direction of its axes. At each cell's centre "
+            "{directions} rotations, spread evenly, were tried; reachability is the share that is reached.",
             directions=count,
         ),
         "points": tr(
-            "This arm has no joints to spare for the tool's orientation, which follows from the position. Each cell's "
-            "middle is asked as a point alone: it is reached or not."
+            "This arm has no joints to spare for the tool's orientation, which follows from the position. The "
+            "centre of each cell was tried as a point alone: it is reached or not."
         ),
     }[capability.asked]
     return joined([asked, _roll_text(capability), _effort_text(capability)], " ")
@@ -218,7 +218,7 @@ def _effort_text(capability: CapabilitySummary) -> str:
     if not capability.coarse:
         return ""
     return tr(
-        "A pose takes this arm's inverse long, so cells are {cell} mm wide and directions fewer than the study says.",
+        "The inverse of this arm takes long, so cells are {cell} mm wide and directions fewer than the study says.",
         cell=fixed(1000 * capability.cell_m, 0),
     )
 
@@ -245,7 +245,7 @@ def _roll_text(capability: CapabilitySummary) -> str:
             rolls=rolls,
         )
     if capability.roll.free and not capability.roll.last_joint:
-        return tr("The roll about the tool's own axis is not asked: with five joints the arm can't choose it.")
+        return tr("The roll about the tool's own axis is left out: with five joints the arm can't choose it.")
     if capability.roll.free:
         return tr(
             "The roll about the tool's own axis is left free: it turns joint 6 alone, so it takes no part in whether a "

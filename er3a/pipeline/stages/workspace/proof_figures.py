@@ -12,6 +12,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator
 
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.messages.language import N_, as_text, tr
@@ -36,6 +37,8 @@ FILLED, WEDGE, UNDECIDED, EMPTY = range(4)
 BORDERS = {"tool_point": INK, "wrist_centre": REFERENCE, "flange": JOINTS[3]}
 DRAWN = JOINTS[2]
 SLICE_PIXELS, _CLOUD_CELLS = 321, 80
+PANEL_IN, AROUND_PANELS_IN = 4.9, 2.4  # a panel's width; what stands above and below, in
+WITHIN = 0.05  # of the reached heights: nearer to an end, a height is no slice's
 
 
 def sections(robot: Robot, results: WorkspaceResults) -> Figure:
@@ -44,12 +47,12 @@ def sections(robot: Robot, results: WorkspaceResults) -> Figure:
     figure, (left, right) = new_figure(1, 2, width=11.5, height=9.0, sharey=True, sharex=True)
     if bars:
         counts = _draw_cloud(left, bars, results.cloud.point_m)
-        figure.colorbar(counts, ax=left, label=tr("samples per cm²"), location="top", shrink=0.8)
+        _colour_bar(figure, counts, tr("samples per cm²"))
         arm, across, up = _across(bars, skeleton(robot, np.zeros(robot.joints))), *slide_names(bars.frame)
         left.set_title(tr("Samples, all positions along the slide overlaid"))
     else:
         mesh = _draw_density(left, results.summary.section_cell_m, results.section)
-        figure.colorbar(mesh, ax=left, label=tr("samples per litre"), location="top", shrink=0.8)
+        _colour_bar(figure, mesh, tr("samples per litre"))
         arm = _about(results.summary.axis, skeleton(robot, np.zeros(robot.joints)))
         across, up = tr("distance from axis 1 (mm)"), tr("height along axis 1 (mm)")
         left.set_title(tr("Samples, all azimuths overlaid"))
@@ -78,7 +81,24 @@ def sections(robot: Robot, results: WorkspaceResults) -> Figure:
     states = [state for kind, state in enumerate(PROOF) if not (bars and kind == WEDGE)]
     handles += [Patch(facecolor=PROOF[state], edgecolor=MUTED, label=tr(state)) for state in states]
     figure.legend(handles=handles, loc="outside lower center", ncols=4)
+    ratio = max(axes.dataLim.height / max(axes.dataLim.width, 1e-9) for axes in (left, right))
+    figure.set_figheight(float(np.clip(PANEL_IN * ratio + AROUND_PANELS_IN, 4.5, 9.0)))
     return figure
+
+
+def _colour_bar(figure: Figure, shown: QuadMesh, label: str) -> None:
+    """Above both panels, so that they stay level with each other; at 1, 2 and 5 of each decade."""
+    bar = figure.colorbar(
+        shown,
+        ax=figure.axes,
+        label=label,
+        location="top",
+        shrink=0.4,
+        anchor=(0.0, 0.0),
+        ticks=LogLocator(subs=(1, 2, 5)),
+        format="%g",
+    )
+    bar.ax.minorticks_off()
 
 
 def _draw_density(axes: Axes, cell: float, section: SectionCells) -> QuadMesh:
@@ -207,15 +227,18 @@ def slices(results: WorkspaceResults) -> Figure:
 
 
 def slice_heights(results: WorkspaceResults) -> list[float]:
-    """Three heights (m) along axis 1: of the largest enclosed void, or else the shoulder, and midway to both ends."""
+    """Three heights (m) along axis 1: of the largest enclosed void, or else the shoulder, and midway to both ends.
+
+    Quarters of the reached heights where the shoulder lies at an end of them or joint 1 slides.
+    """
     axis, enclosed = results.summary.axis, results.summary.enclosed_voids
-    if results.summary.proof.bars:
-        ends = results.proof.z_m[results.proof.empty_ratio < 1]
-        return np.quantile([ends[:, 0].min(), ends[:, 1].max()], [0.25, 0.5, 0.75]).tolist()
+    reached = results.proof.z_m[results.proof.empty_ratio < 1]
+    low, high = reached[:, 0].min(), reached[:, 1].max()
     point = np.array(enclosed[0].centroid_m if enclosed else axis.shoulder_m)
     middle = float((point - axis.point_m) @ axis.direction)
-    reached = results.proof.z_m[results.proof.empty_ratio < 1]
-    return [(reached[:, 0].min() + middle) / 2, middle, (middle + reached[:, 1].max()) / 2]
+    if results.summary.proof.bars or min(middle - low, high - middle) < WITHIN * (high - low):
+        return np.quantile([low, high], [0.25, 0.5, 0.75]).tolist()
+    return [(low + middle) / 2, middle, (middle + high) / 2]
 
 
 def _slice(proof: ProofCells, rho: Reals, azimuth: Reals, z: float) -> Integers:

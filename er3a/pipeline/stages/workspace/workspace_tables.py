@@ -29,8 +29,8 @@ class Cells(Table):
 class SectionCells(Table):
     """Cells of the side section about axis 1 that were touched or are cut off by touched ones."""
 
-    rho_m: Reals = column("distance of the cell's middle from axis 1", "m")
-    z_m: Reals = column("height of the cell's middle along axis 1", "m")
+    rho_m: Reals = column("distance of the cell's centre from axis 1", "m")
+    z_m: Reals = column("height of the cell's centre along axis 1", "m")
     samples: Integers = column("samples in the cell, all azimuths", dtype=np.int64)
     void: Flags = column("whether touched cells cut it off", dtype=np.bool_)
 
@@ -40,7 +40,7 @@ class SideViewCells(Table):
     """Touched cells of the side views in the arm's plane."""
 
     x_m: Reals = column("middle of the cell to the front", "m")
-    z_m: Reals = column("height of the cell's middle along axis 1", "m")
+    z_m: Reals = column("height of the cell's centre along axis 1", "m")
     cell_m: Reals = column("edge of the cell", "m")
     samples: Integers = column("samples in the cell", dtype=np.int64)
     point: Texts = column("tool_point or wrist_centre", dtype=object)
@@ -142,8 +142,8 @@ class CapabilityCells(Table):
     """Reached cells of the section, by sector of azimuth; or bars along a first joint that slides (``bar_m`` of the
     summary), of which rho is x, and 360 deg are their length."""
 
-    rho_m: Reals = column("distance of the cell's middle from axis 1", "m")
-    z_m: Reals = column("height of the cell's middle along axis 1", "m")
+    rho_m: Reals = column("distance of the cell's centre from axis 1", "m")
+    z_m: Reals = column("height of the cell's centre along axis 1", "m")
     azimuth_deg: Reals = column("the sector's middle; 0 for all azimuths if there is one sector", "deg")
     reachability: Singles = column(
         "ratio of the tool directions (tilts, turns; ``asked`` of the summary) that are reached", dtype=np.float32
