@@ -284,3 +284,12 @@ def test_a_stretched_scara_is_one_arm():
 def test_three_slides_in_one_plane_are_no_gantry():
     robot = arm(([0.1] * 6, [0.6, -1.1, 0.5, H, H, 0], [0.1] * 6), [1, 1, 1, 0, 0, 0])
     assert inverse(robot, forward(robot, np.full(6, 0.2))).method.lacking.code == "dependent_joints"
+
+
+def test_starts_at_which_the_equations_are_singular_to_rounding_are_no_error():
+    """Slides of 15 m at either end of four turns, two of which rest at 0."""
+    rows = ([0, 0.3, 0, 0, 0.3, 0], [H, 0, H, -H, -H, 0], [0, 0, 0, 0.25, 0.25, 0])
+    robot = arm(rows, [1, 0, 0, 0, 0, 1]).replace(lower=np.array([-30.0, *[-3] * 4, -30]), upper=np.full(6, 30.0))
+    q = np.array([-15.3, 1.3, 0.69, 0.0, 0.0, 14.1])
+    found = inverse(robot, forward(robot, q), q)
+    assert np.abs(found.q - q).max(axis=1).min() < 1e-6
