@@ -36,6 +36,7 @@ MAYBE_SAME = 1e-2  # rad
 SPREAD = 1e-11
 MOST_CURVES, MOST_ON_SURFACE = 24, 2
 STARTS = 240
+SEARCHED: tuple[ArmClassCode, ...] = ("general_six", "six_one_prismatic", "six_two_prismatic", "planar_wrist")
 SMALLEST_PART = 64
 SCANNED = 16  # values of a redundancy parameter from which self-motions are collected
 
@@ -150,7 +151,7 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
     found = [to_rows(robot, rows), solver.chain.seeds(T, values)]
     if chain.error(to_rows(robot, q_ref)) < 1e-11:
         found.insert(0, to_rows(robot, q_ref)[None])
-    if certainty == CONTINUUM and solver.chain.code in ("general_six", "six_one_prismatic", "six_two_prismatic"):
+    if certainty == CONTINUUM and solver.chain.code in SEARCHED:
         found.append(chain.roots(_starts(robot, STARTS)))
     candidates = np.concatenate(found)
     curves: list[TracedCurve] = []

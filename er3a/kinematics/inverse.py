@@ -60,6 +60,7 @@ BY_ELIMINATION: tuple[ArmClassCode, ...] = (
     "six_two_prismatic",
     "redundant",
     "free_roll",
+    "planar_wrist",
     "position",
 )
 

@@ -95,7 +95,24 @@ class SumRelaxed:
         return self.limit_deg + (self.by_deg if self.side == "upper" else -self.by_deg)
 
 
-OneRelaxed = Relaxed | SlideRelaxed | SumRelaxed
+@dataclass(frozen=True)
+class SlideSumRelaxed:
+    """The limit of a sum of joints that slide widened, see :class:`SumRelaxed` and :class:`SlideRelaxed`."""
+
+    joints: tuple[int, ...]
+    factors: tuple[float, ...]
+    side: Side
+    limit_mm: float
+    by_mm: float
+    filled: float
+
+    @property
+    def extended_mm(self) -> float:
+        """The limit as it would be."""
+        return self.limit_mm + (self.by_mm if self.side == "upper" else -self.by_mm)
+
+
+OneRelaxed = Relaxed | SlideRelaxed | SumRelaxed | SlideSumRelaxed
 
 
 @dataclass(frozen=True)
@@ -177,9 +194,13 @@ def relaxations(
                 each = _relaxed(STEPS, partial(_turn_by, robot, joint, side, ratio_filled))
                 found.append((STEPS.index(each.by_deg), each))  # type: ignore[union-attr]
         for number, limit in enumerate(robot.combined):
-            if not slides[np.flatnonzero(limit.factors)].any():
+            summed = slides[np.flatnonzero(limit.factors)]
+            if not summed.any():
                 each = _relaxed(STEPS, partial(_sum_by, robot, number, side, ratio_filled))
                 found.append((STEPS.index(each.by_deg), each))  # type: ignore[union-attr]
+            elif summed.all():
+                each = _relaxed(SLIDE_STEPS, partial(_slide_sum_by, robot, number, side, ratio_filled))
+                found.append((SLIDE_STEPS.index(each.by_mm), each))  # type: ignore[union-attr]
     found.sort(key=lambda one: (one[1].filled < _GONE, one[0], -one[1].filled, _joints_of(one[1])))
     return [relaxed for _, relaxed in found], Unlimited(ratio_filled(_without_limits(robot)))
 
@@ -208,16 +229,31 @@ def _slide_by(robot: Robot, joint: int, side: Side, filled: Callable[[Robot], fl
 
 
 def _sum_by(robot: Robot, number: int, side: Side, filled: Callable[[Robot], float], step: float) -> SumRelaxed:
-    limit, by = robot.combined[number], float(np.radians(step))
+    limit = robot.combined[number]
+    bound = float(np.degrees(limit.lower if side == "lower" else limit.upper))
+    ratio = filled(_with_wider_sum(robot, number, side, float(np.radians(step))))
+    return SumRelaxed(*_terms(limit), side, bound, step, ratio)
+
+
+def _slide_sum_by(
+    robot: Robot, number: int, side: Side, filled: Callable[[Robot], float], step: float
+) -> SlideSumRelaxed:
+    limit = robot.combined[number]
+    bound = 1000 * float(limit.lower if side == "lower" else limit.upper)
+    return SlideSumRelaxed(*_terms(limit), side, bound, step, filled(_with_wider_sum(robot, number, side, step / 1000)))
+
+
+def _with_wider_sum(robot: Robot, number: int, side: Side, by: float) -> Robot:
+    limit, others = robot.combined[number], list(robot.combined)
     lower, upper = limit.lower - by * (side == "lower"), limit.upper + by * (side == "upper")
-    others = list(robot.combined)
     others[number] = CombinedLimit(limit.factors, lower, upper)
+    return robot.replace(combined=tuple(others))
+
+
+def _terms(limit: CombinedLimit) -> tuple[tuple[int, ...], tuple[float, ...]]:
+    """Joints (from 1) of a sum and their factors."""
     joints = np.flatnonzero(limit.factors)
-    numbers, factors = tuple((joints + 1).tolist()), tuple(np.array(limit.factors)[joints].tolist())
-    ratio = filled(robot.replace(combined=tuple(others)))
-    return SumRelaxed(
-        numbers, factors, side, float(np.degrees(limit.lower if side == "lower" else limit.upper)), step, ratio
-    )
+    return tuple((joints + 1).tolist()), tuple(np.array(limit.factors)[joints].tolist())
 
 
 def _without_limits(robot: Robot) -> Robot:
@@ -227,13 +263,13 @@ def _without_limits(robot: Robot) -> Robot:
 
 
 def _joints_of(limit: OneRelaxed) -> tuple[int, ...]:
-    return limit.joints if isinstance(limit, SumRelaxed) else (limit.joint,)
+    return limit.joints if isinstance(limit, SumRelaxed | SlideSumRelaxed) else (limit.joint,)
 
 
 def _as_far(first: OneRelaxed, other: OneRelaxed) -> bool:
     """Whether two limits are of one kind and widened by as much."""
-    if isinstance(first, SlideRelaxed) or isinstance(other, SlideRelaxed):
-        return isinstance(first, SlideRelaxed) and isinstance(other, SlideRelaxed) and first.by_mm == other.by_mm
+    if isinstance(first, SlideRelaxed | SlideSumRelaxed) or isinstance(other, SlideRelaxed | SlideSumRelaxed):
+        return getattr(first, "by_mm", None) == getattr(other, "by_mm", None)
     return first.by_deg == other.by_deg
 
 

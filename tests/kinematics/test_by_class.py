@@ -248,3 +248,48 @@ def test_joints_that_depend_on_each_other_are_named_and_soon_done():
     assert found.method.lacking.code == "dependent_joints"
     assert len(found.q) <= found.method.starts + 1
     assert np.abs(found.q - 0.4).max(axis=1).min() < 1e-6
+
+
+def test_four_joints_behind_a_slide_are_completed_where_the_arm_can_be(random):
+    """Joints added about and across the last axis would be singular at every pose of this arm."""
+    rows = ([0.3, 0.411, -0.3425, -0.25], [-H, np.pi, H, H], [-0.4, -0.4, 0, -0.4])
+    robot = arm(rows, [1, 0, 0, 0])
+    for q in random.uniform(-0.9, 0.9, (6, 4)):
+        found = inverse(robot, forward(robot, q))
+        assert found.method.certain
+        assert np.abs(wrap_to_pi(found.q - q)).max(axis=1).min() < 1e-6
+
+
+@pytest.mark.parametrize("q", [(1.2, 0.0, 0.7), (0.3, 0.0, 0.3), (2.5, 0.0, -1.0)])
+def test_two_of_three_joints_in_line_are_a_self_motion(q):
+    """Joints 1 and 3 turn about one axis where joint 2 is at 0: only their difference is told by the pose."""
+    robot, q = arm(([0, 0, 0], [H, H, np.pi / 3], [0.3, 0, 0.3]), most=3.2), np.array(q)
+    T = forward(robot, q)
+    np.testing.assert_allclose(forward(robot, q + np.array([0.4, 0.0, 0.4])), T, atol=1e-12)
+    found = inverse(robot, T, np.array([1.5, 0.3, 0.2]))
+    assert len(found.families) == 1
+    assert not found.method.certain
+    np.testing.assert_allclose(wrap_to_pi(found.q[:, 0] - found.q[:, 2] - (q[0] - q[2])), 0, atol=1e-9)
+    batch = inverse_batch(robot, T[None], q[None])
+    assert np.nanmin(np.abs(batch.q[0] - q).max(axis=1)) < 1e-6
+
+
+def test_a_stretched_scara_is_one_arm():
+    robot, q = ARMS["scara"][0], np.array([0.4, 0.0, 0.1, -0.3])
+    found = inverse(robot, forward(robot, q))
+    assert len(found.q) == 1
+    np.testing.assert_allclose(found.q[0], q, atol=1e-6)
+
+
+def test_three_slides_in_one_plane_are_no_gantry():
+    robot = arm(([0.1] * 6, [0.6, -1.1, 0.5, H, H, 0], [0.1] * 6), [1, 1, 1, 0, 0, 0])
+    assert inverse(robot, forward(robot, np.full(6, 0.2))).method.lacking.code == "dependent_joints"
+
+
+def test_starts_at_which_the_equations_are_singular_to_rounding_are_no_error():
+    """Slides of 15 m at either end of four turns, two of which rest at 0."""
+    rows = ([0, 0.3, 0, 0, 0.3, 0], [H, 0, H, -H, -H, 0], [0, 0, 0, 0.25, 0.25, 0])
+    robot = arm(rows, [1, 0, 0, 0, 0, 1]).replace(lower=np.array([-30.0, *[-3] * 4, -30]), upper=np.full(6, 30.0))
+    q = np.array([-15.3, 1.3, 0.69, 0.0, 0.0, 14.1])
+    found = inverse(robot, forward(robot, q), q)
+    assert np.abs(found.q - q).max(axis=1).min() < 1e-6

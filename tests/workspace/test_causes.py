@@ -12,6 +12,7 @@ from er3a.workspace.causes import (
     Geometry,
     Relaxed,
     SlideRelaxed,
+    SlideSumRelaxed,
     SumRelaxed,
     cause_of,
     joints_behind,
@@ -128,3 +129,20 @@ def test_a_hole_by_a_sum_of_joints_is_told_so(coupling):
     assert share_by_hand(robot, cavity, robot.lower, robot.upper, 0.0) == 0
     by = cause.limits[0].by_deg * DEG
     assert share_by_hand(robot, cavity, robot.lower, robot.upper, by) == 1
+
+
+@pytest.mark.long
+def test_a_hole_by_a_sum_of_slides_is_told_so():
+    """Two slides outwards, each from 0: only their sum keeps the tool 300 mm from axis 1."""
+    rows = [("R", 0, 0, 0, -180, 180), ("P", 0, 90, 0, 0, 500), ("P", 0, 0, 0, 0, 500), ("P", 0, 0, 0, 0, 500)]
+    limit = CombinedLimit((0, 0, 1.0, 1.0), 0.3, 1.0)
+    robot = made_of(rows, offset=np.array([0, 90, 0, 0]) * DEG, combined=(limit,))
+    cavity, section = of_cells(robot, (0.06, 0.29), (0.05, 0.45), (0.0, TURN))
+    cause = cause_of(*relaxations(robot, cavity, section))
+    assert isinstance(cause, Disappears)
+    (found,) = cause.limits
+    assert isinstance(found, SlideSumRelaxed)
+    assert (found.joints, found.side, found.extended_mm) == ((3, 4), "lower", pytest.approx(-100))
+    assert share_by_hand(robot, cavity, robot.lower, robot.upper, 0.0) == 0
+    assert share_by_hand(robot, cavity, robot.lower, robot.upper, 0.4) == 1
+    assert share_by_hand(robot, cavity, robot.lower - 0.4 * robot.sliding, robot.upper, 0.0) == 0

@@ -276,7 +276,9 @@ class PlanarFour(_Fixed):
     slots: int = 2
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
-        return solve_scara(self.arm, T)[0], np.full(len(T), CERTAIN)
+        q, second = solve_scara(self.arm, T)[0], self.arm.turning[1]
+        meet = np.abs(_turned(q[:, 0, second] - q[:, 1, second])) < NEAR_SINGULAR
+        return q, np.where(meet, CONTINUUM, CERTAIN)
 
     def seeds(self, T: Reals, values: Reals) -> Reals:
         return np.empty((0, 4))
@@ -444,10 +446,10 @@ def _of_six(links: Reals, sliding: Flags) -> ChainSolver:
         parallel = three_parallel(links)
         if parallel is not None:
             return ParallelAxes(parallel)
-    three = gantry(links, sliding)
-    if three is not None:
-        return ThreeSliding(three)
     if full_rank(links, sliding):
+        three = gantry(links, sliding)
+        if three is not None:
+            return ThreeSliding(three)
         if sliding.sum() == 2:
             two = two_slides(links, sliding)
             return Unsolved(6) if two is None else TwoSliding(two)
@@ -458,13 +460,15 @@ def _of_six(links: Reals, sliding: Flags) -> ChainSolver:
     return Unsolved(6, "dependent")
 
 
-def full_rank(links: Reals, sliding: Flags) -> bool:
-    """Whether the chain moves its tool in as many ways as it has joints (six at most) at random joint values."""
+def full_rank(links: Reals, sliding: Flags, at_rest: tuple[int, ...] = ()) -> bool:
+    """Whether the chain moves its tool in as many ways as it has joints (six at most) at random joint values; those
+    ``at_rest`` (from 0) are 0."""
     random = np.random.default_rng(5)
     scaled = np.array(links, float)
     scaled[:, :3, 3] /= size_of(links)
     best = 0.0
     for x in random.uniform(-2.5, 2.5, (4, len(sliding))):
+        x[list(at_rest)] = 0.0
         values = np.linalg.svd(_jacobian(scaled, sliding, x), compute_uv=False)
         best = max(best, float(values[-1]))
     return best > FULL_RANK
@@ -526,7 +530,8 @@ def _completed(links: Reals, sliding: Flags) -> ChainSolver:
     for code, places, candidate in _completions(links, n):
         more = np.zeros(6, dtype=bool)
         more[[j for j in range(6) if j not in places]] = sliding
-        if not full_rank(candidate, more):
+        # where the added joints must be 0, not only where they would turn the tool elsewhere
+        if not full_rank(candidate, more, places if code == "planar_wrist" else ()):
             continue
         rest = chain_solver(candidate, more)
         if isinstance(rest, Unsolved):

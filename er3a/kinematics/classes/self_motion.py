@@ -28,6 +28,7 @@ TRUNCATED = 1e-5  # singular values below this part of the largest are no direct
 SOLVES = 1e-11
 ON_CURVE = 1e-9
 SOLVES_AS_ROOT = 1e-12
+ABOVE_ROUNDING = 1e-15  # of the trace
 FEW_HALVINGS = 6
 PROBE = 2e-3
 LOST, CLOSED, OPEN = 0, 1, 2
@@ -307,7 +308,8 @@ def roots_from_starts(links: Reals, sliding: Flags, T: Reals, starts: Reals, out
                 solved = True
                 break
             M = J.T @ J
-            damping = 1e-2 * (e @ e) + 1e-15
+            # not below the rounding of M, with which a singular M stays so
+            damping = 1e-2 * (e @ e) + 1e-15 + ABOVE_ROUNDING * np.trace(M)
             for i in range(n):
                 M[i, i] += damping
             step = np.linalg.solve(M, J.T @ e)

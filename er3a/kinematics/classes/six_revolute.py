@@ -39,6 +39,7 @@ BESIDE, NOTHING_NEW = 24, 6  # poses beside one in doubt, and after how many tha
 ASIDE = (1e-3, 1e-2, 3e-2)  # how far beside, in turn: rad and parts of the size
 
 CERTAIN, UNCERTAIN, CONTINUUM = 0, 1, 2
+STUCK = 1e-9  # last pivot below which a row may move with the tool at rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,14 +130,19 @@ def solve_six_revolute(arm: SixRevolute, T: Reals) -> RowsFound:
 def _by_readings(
     arm: SixRevolute, T: Reals, memory: LoopMemory, q: Reals, count: Integers, certainty: Integers
 ) -> None:
-    """Fill rows (N, 16, 6), their number (N,) and certainty (N,), which starts as CONTINUUM."""
+    """Fill rows (N, 16, 6), their number (N,) and certainty (N,), which starts as CONTINUUM.
+
+    The joint that a reading hides may rest along a self-motion, whose row then stands like any other but for its pivot.
+    """
     told, left = np.zeros(len(T), dtype=np.int64), np.arange(len(T))
+    moving = np.zeros(len(T), dtype=bool)
     for reading in arm.readings:
         verdicts = np.empty(len(left), dtype=np.int64)
-        rows_by_reading(reading, arm.links, arm.size, T, left, memory, q, count, verdicts)
+        rows_by_reading(reading, arm.links, arm.size, T, left, memory, q, count, verdicts, moving)
         certainty[left] = np.minimum(certainty[left], verdicts)
         told[left] += verdicts != CONTINUUM
         left = left[(verdicts != CERTAIN) & (told[left] < MOST_READINGS)]
+    certainty[moving] = CONTINUUM
 
 
 def from_beside(
@@ -180,8 +186,12 @@ def rows_by_reading(
     q: Reals,
     count: Integers,
     verdicts: Integers,
+    moving: Flags,
 ) -> None:
-    """Add to ``q`` (N, 16, 6) and ``count`` (N,) what one reading of the loop finds at the poses with these numbers."""
+    """Add to ``q`` (N, 16, 6) and ``count`` (N,) what one reading of the loop finds at the poses with these numbers.
+
+    ``moving`` (N,) tells where some row may move with the tool at rest.
+    """
     pose, rest, pose_link = np.empty((4, 4)), np.empty((4, 4)), np.empty((4, 4))
     for i in range(numbers.shape[0]):
         n = numbers[i]
@@ -192,7 +202,8 @@ def rows_by_reading(
         invert_rigid(pose, rest)
         multiply_rigid(rest, links[0], pose_link)
         multiply_rigid(links[6], pose_link, rest)
-        verdicts[i], count[n] = _by_reading(reading, links, pose, rest, m, q[n], count[n])
+        verdicts[i], count[n], least = _by_reading(reading, links, pose, rest, m, q[n], count[n])
+        moving[n] |= least < STUCK
 
 
 @kernel
@@ -238,19 +249,20 @@ def in_order(q: Reals, count: Integers) -> None:
 @kernel
 def _by_reading(
     reading: Reading, links: Reals, pose: Reals, pose_link: Reals, m: LoopMemory, q: Reals, rows: int
-) -> tuple[int, int]:
-    """Add the solutions that one reading of the loop finds; returns its verdict and how many rows there are."""
+) -> tuple[int, int, float]:
+    """Add the solutions that one reading of the loop finds; returns its verdict, how many rows there are, and the
+    least of their last pivots."""
     e = m.elimination
     equations_of_pose(reading, pose_link, e)
     peak, noise = sampled_determinant(e)
     if peak < FAMILY_PEAK:
-        return CONTINUUM, rows
+        return CONTINUUM, rows, np.inf
     verdict = UNCERTAIN if noise > LOUD * peak else CERTAIN
     level = DARK * max(noise, 1e-16 * peak)
     zeros = hidden_angles(e, level, m)
     if zeros < 0:
-        return UNCERTAIN, rows
-    earlier, told = rows, 0
+        return UNCERTAIN, rows, np.inf
+    earlier, told, least = rows, 0, np.inf
     for z in range(zeros):
         solved, candidates = False, 0
         again = False
@@ -266,6 +278,7 @@ def _by_reading(
                     m.candidate[reading.joint[i]] = reading.sense * m.x[k, i]
                 residual, pivot = newton(links, m.sliding, pose, m.candidate, 8, m.frames, m.J, m.dq, m.columns)
                 if residual < SOLVES:
+                    least = min(least, pivot)
                     away = m.candidate[reading.joint[2]] * reading.sense - m.zeros[z, 0]
                     away -= 2 * np.pi * np.round(away / (2 * np.pi))
                     solved = solved or abs(away) < 1e-2
@@ -281,7 +294,7 @@ def _by_reading(
     # Complex zeros come in pairs, and each zero tells a solution of its own.
     if rows % 2 == 1 or (earlier == 0 and rows < told):
         verdict = UNCERTAIN
-    return verdict, rows
+    return verdict, rows, least
 
 
 @kernel

@@ -31,6 +31,7 @@ from er3a.kinematics.classes.six_revolute import (
     CERTAIN,
     CONTINUUM,
     SLOTS,
+    STUCK,
     UNCERTAIN,
     RowsFound,
     add_row,
@@ -48,7 +49,6 @@ MOST_DEGREE = 8
 FAINT = 1e-13  # of the largest coefficient: so small ones are rounding
 ACROSS = 1e-6  # sine between the axes of the two joints that follow
 ON_CIRCLE, NEAR_CIRCLE = 1e-6, 3e-2  # a zero's distance from the unit circle: real; perhaps one of several that meet
-STUCK = 1e-9  # last pivot below which a row may move with the tool at rest
 NOWHERE = 1e-12  # of a reading's usual largest sample: a polynomial as small as this vanishes
 CLUSTER = 1e-3  # distance from the unit circle at which a zero without a solution leaves a doubt
 

@@ -12,6 +12,7 @@ from er3a.workspace.causes import (
     OnlySampled,
     SeveralLimits,
     SlideRelaxed,
+    SlideSumRelaxed,
     SumRelaxed,
     VoidCause,
 )
@@ -68,16 +69,25 @@ def _extended(limit: OneRelaxed) -> str:
         if limit.side == "upper":
             return sentence("limit_extended", "joint {joint}'s upper limit is extended to {limit} mm", **shown)
         return sentence("limit_extended", "joint {joint}'s lower limit is extended to {limit} mm", **shown)
-    if isinstance(limit, SumRelaxed):
-        terms = ((f"{factor:+.4g} × J{joint}") for joint, factor in zip(limit.joints, limit.factors))
-        shown = {"sum": " ".join(terms), "limit": as_text(limit.extended_deg, "+.4g")}
-        if limit.side == "upper":
-            return sentence("limit_extended", "the upper limit of {sum} is extended to {limit} deg", **shown)
-        return sentence("limit_extended", "the lower limit of {sum} is extended to {limit} deg", **shown)
+    if isinstance(limit, SumRelaxed | SlideSumRelaxed):
+        return _sum_extended(limit)
     shown = {"joint": limit.joint, "limit": as_text(limit.extended_deg, "+.4g")}
     if limit.side == "upper":
         return sentence("limit_extended", "joint {joint}'s upper limit is extended to {limit} deg", **shown)
     return sentence("limit_extended", "joint {joint}'s lower limit is extended to {limit} deg", **shown)
+
+
+def _sum_extended(limit: SumRelaxed | SlideSumRelaxed) -> str:
+    terms = " ".join(f"{factor:+.4g} × J{joint}" for joint, factor in zip(limit.joints, limit.factors))
+    if isinstance(limit, SlideSumRelaxed):
+        shown = {"sum": terms, "limit": as_text(limit.extended_mm, "+.4g")}
+        if limit.side == "upper":
+            return sentence("limit_extended", "the upper limit of {sum} is extended to {limit} mm", **shown)
+        return sentence("limit_extended", "the lower limit of {sum} is extended to {limit} mm", **shown)
+    shown = {"sum": terms, "limit": as_text(limit.extended_deg, "+.4g")}
+    if limit.side == "upper":
+        return sentence("limit_extended", "the upper limit of {sum} is extended to {limit} deg", **shown)
+    return sentence("limit_extended", "the lower limit of {sum} is extended to {limit} deg", **shown)
 
 
 @say.register
