@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from er3a.pipeline.messages.decision import decision
-from er3a.pipeline.viewing.index import LED, led
+from er3a.pipeline.viewing.page import LED, led
 
 
 @pytest.mark.parametrize(
