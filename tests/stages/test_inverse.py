@@ -329,6 +329,7 @@ def test_families_are_in_the_summary(computed):
     assert np.array(families[0].q0_deg)[[3, 5]] == pytest.approx(7.5)
 
 
+@pytest.mark.long
 def test_arm_without_closed_form_is_solved_by_iteration_and_said_so(tmp_path):
     text = (ROBOTS / "er3_600.yaml").read_text(encoding="utf-8").replace("er3_600", "bent")
     file = tmp_path / "bent.yaml"

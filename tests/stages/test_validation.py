@@ -133,7 +133,7 @@ def page_of(study: Study, stored: Stored[ValidationResults], folder: Path) -> st
     [
         pytest.param("er3a_c60", "caution", LeftOpen, marks=pytest.mark.long),
         ("er3a_c60_article", "fail", AnotherArm),
-        ("er3_600", "caution", LeftOpen),
+        pytest.param("er3_600", "caution", LeftOpen, marks=pytest.mark.long),
     ],
 )
 def test_verdicts_on_the_three_robots(summaries, name, status, kind):

@@ -34,6 +34,7 @@ def folders(study, tmp_path_factory):
     return found
 
 
+@pytest.mark.long
 def test_objects_are_grasped_as_expected_and_the_turned_board_is_named(folders):
     summary = read_results(folders["er3a_c60"], VisionResults).results.summary
     assert summary.verdict.status == "pass"
@@ -47,6 +48,7 @@ def test_objects_are_grasped_as_expected_and_the_turned_board_is_named(folders):
     assert {each.refusal.code for each in summary.objects if each.refusal} == {"grasp_collides", "grasp_out_of_reach"}
 
 
+@pytest.mark.long
 def test_a_wrong_table_shows_in_the_calibration(folders):
     """The same recording, its joint angles turned into poses by the article's table."""
     summary = read_results(folders["er3a_c60_article"], VisionResults).results.summary
@@ -55,6 +57,7 @@ def test_a_wrong_table_shows_in_the_calibration(folders):
     assert summary.objects == ()
 
 
+@pytest.mark.long
 def test_tables_say_what_the_summary_says(folders):
     results = read_results(folders["er3_600"], VisionResults).results
     found = results.summary.calibration
@@ -71,6 +74,7 @@ def test_tables_say_what_the_summary_says(folders):
 
 
 @pytest.mark.long
+@pytest.mark.long
 def test_equal_inputs_give_equal_bytes(study, folders, tmp_path):
     run.compute("vision", study, "er3_600", tmp_path)
     for file in folders["er3_600"].iterdir():
@@ -85,6 +89,7 @@ def test_a_robot_without_a_camera_says_so(study, tmp_path):
     assert read_stage(tmp_path, STAGE).status == "not_computed"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["er3a_c60", "er3a_c60_article", "er3_600"])
 def test_page_and_recording_are_written(study, folders, tmp_path, name):
     for verb in ("record", "report"):

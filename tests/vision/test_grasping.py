@@ -36,7 +36,13 @@ BEHIND_THE_POST = np.radians([120, -30, -20, 0, -90, 0])  # from there the strai
 NEEDS = GraspNeeds(0.005, np.radians(2), 0.02, (0.003, 0.003, 0.004, *np.radians([5, 5, 5])))
 
 
-@pytest.fixture(scope="module", params=[(FIXED, "fixed_camera"), (CARRIED, "carried_camera")], ids=["fixed", "carried"])
+CELLS = [
+    pytest.param((FIXED, "fixed_camera"), id="fixed"),
+    pytest.param((CARRIED, "carried_camera"), id="carried", marks=pytest.mark.long),
+]
+
+
+@pytest.fixture(scope="module", params=CELLS)
 def cell(request):
     cell, name = request.param
     robot = load_robot(cell.robot)
