@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +24,10 @@ InSection = Callable[[Reals], tuple[Reals, Reals, Reals]]
 InBase = Callable[[Reals], Reals]
 
 PROBES, SEARCHED, SAMPLES, _RESTARTS = 300, 80, 50_000, 1
-STEPS = (15.0, 30.0, 60.0, 90.0, 180.0)
-"""By how much a limit is widened, deg, until the void vanishes."""
-SLIDE_STEPS = (25.0, 50.0, 100.0, 200.0, 400.0)
-"""The same of joints that slide, mm."""
+Unit = Literal["deg", "mm"]
+STEPS: dict[Unit, tuple[float, ...]] = {"deg": (15.0, 30.0, 60.0, 90.0, 180.0), "mm": (25.0, 50.0, 100.0, 200.0, 400.0)}
+"""By how much a limit is widened until the void vanishes."""
+_SI: dict[Unit, float] = {"deg": np.pi / 180, "mm": 1e-3}  # rad, m
 _GONE, _SHRUNK = 0.98, 0.10
 
 NEAR = 0.05
@@ -39,80 +39,29 @@ _SIDES: tuple[Side, Side] = ("lower", "upper")
 
 @dataclass(frozen=True)
 class Relaxed:
-    """One limit widened.
+    """One limit widened: of a joint, or of a sum of joints.
 
     Attributes
     ----------
-    joint : from 1, one that turns
-    limit_deg : the limit as it is
-    by_deg : by how much it is widened: the least of ``STEPS`` that makes the void vanish, or the most there is
+    joints, factors : from 1, and what they count in the sum; of a joint's own limit this joint, and 1
+    unit : "mm" where the joints slide
+    limit : as it is, in ``unit``
+    by : by how much it is widened: the least of ``STEPS[unit]`` that makes the void vanish, or the most there is
     filled : ratio of the void that is then reached
     """
 
-    joint: int
-    side: Side
-    limit_deg: float
-    by_deg: float
-    filled: float
-
-    @property
-    def extended_deg(self) -> float:
-        """The limit as it would be."""
-        return self.limit_deg + (self.by_deg if self.side == "upper" else -self.by_deg)
-
-
-@dataclass(frozen=True)
-class SlideRelaxed:
-    """One limit of a joint that slides widened, see :class:`Relaxed`: ``limit_mm`` as it is, by one of
-    ``SLIDE_STEPS``."""
-
-    joint: int
-    side: Side
-    limit_mm: float
-    by_mm: float
-    filled: float
-
-    @property
-    def extended_mm(self) -> float:
-        """The limit as it would be."""
-        return self.limit_mm + (self.by_mm if self.side == "upper" else -self.by_mm)
-
-
-@dataclass(frozen=True)
-class SumRelaxed:
-    """The limit of a sum of joints that turn widened, see :class:`Relaxed`; ``joints`` (from 1) and their factors."""
-
     joints: tuple[int, ...]
     factors: tuple[float, ...]
     side: Side
-    limit_deg: float
-    by_deg: float
+    unit: Unit
+    limit: float
+    by: float
     filled: float
 
     @property
-    def extended_deg(self) -> float:
+    def extended(self) -> float:
         """The limit as it would be."""
-        return self.limit_deg + (self.by_deg if self.side == "upper" else -self.by_deg)
-
-
-@dataclass(frozen=True)
-class SlideSumRelaxed:
-    """The limit of a sum of joints that slide widened, see :class:`SumRelaxed` and :class:`SlideRelaxed`."""
-
-    joints: tuple[int, ...]
-    factors: tuple[float, ...]
-    side: Side
-    limit_mm: float
-    by_mm: float
-    filled: float
-
-    @property
-    def extended_mm(self) -> float:
-        """The limit as it would be."""
-        return self.limit_mm + (self.by_mm if self.side == "upper" else -self.by_mm)
-
-
-OneRelaxed = Relaxed | SlideRelaxed | SumRelaxed | SlideSumRelaxed
+        return self.limit + (self.by if self.side == "upper" else -self.by)
 
 
 @dataclass(frozen=True)
@@ -128,7 +77,7 @@ class Unlimited:
 class Disappears:
     """One limit alone makes the void, or each of two."""
 
-    limits: tuple[OneRelaxed, ...]
+    limits: tuple[Relaxed, ...]
     code: Literal["void_disappears"] = "void_disappears"
 
 
@@ -136,7 +85,7 @@ class Disappears:
 class SeveralLimits:
     """Only several limits together make the void; ``most`` is the one that shrinks it most, if one does."""
 
-    most: OneRelaxed | None
+    most: Relaxed | None
     code: Literal["void_of_several_limits"] = "void_of_several_limits"
 
 
@@ -145,7 +94,7 @@ class Geometry:
     """Part of the void stays without any limit; ``most`` is the limit that shrinks it most, if one does."""
 
     remaining_ratio: float
-    most: OneRelaxed | None
+    most: Relaxed | None
     code: Literal["void_of_geometry"] = "void_of_geometry"
 
 
@@ -161,7 +110,7 @@ VoidCause = Disappears | SeveralLimits | Geometry | OnlySampled
 
 def relaxations(
     robot: Robot, cavity: Cavity, section: tuple[InSection, InBase] | None = None
-) -> tuple[list[OneRelaxed], Unlimited]:
+) -> tuple[list[Relaxed], Unlimited]:
     """Judge a void's cells with each limit widened, the strongest first; then without any.
 
     Parameters
@@ -183,30 +132,48 @@ def relaxations(
         def ratio_filled(widened: Robot) -> float:
             return _ratio_searched(robot, widened, probes, section)
 
-    slides, limited = robot.slides, robot.upper - robot.lower < FULL_TURN
-    found: list[tuple[int, OneRelaxed]] = []
+    found = [_relaxed(limit, ratio_filled) for limit in _limits(robot, joints)]
+    found.sort(key=lambda one: (one.filled < _GONE, STEPS[one.unit].index(one.by), -one.filled, one.joints))
+    return found, Unlimited(ratio_filled(_without_limits(robot)))
+
+
+class _Limit(NamedTuple):
+    """A limit, rad or m, and the robot with it widened by so much; the rest as in :class:`Relaxed`."""
+
+    joints: tuple[int, ...]
+    factors: tuple[float, ...]
+    side: Side
+    unit: Unit
+    value: float
+    widened: Callable[[float], Robot]
+
+
+def _limits(robot: Robot, joints: list[int]) -> Iterator[_Limit]:
+    """Limits of these joints (from 1), and of sums of joints that all turn or all slide."""
+    slides, limited = robot.slides, (robot.upper - robot.lower < FULL_TURN) & ~robot.continuous
     for side in _SIDES:
         for joint in joints:
-            if slides[joint - 1]:
-                each = _relaxed(SLIDE_STEPS, partial(_slide_by, robot, joint, side, ratio_filled))
-                found.append((SLIDE_STEPS.index(each.by_mm), each))  # type: ignore[union-attr]
-            elif limited[joint - 1] and not robot.continuous[joint - 1]:
-                each = _relaxed(STEPS, partial(_turn_by, robot, joint, side, ratio_filled))
-                found.append((STEPS.index(each.by_deg), each))  # type: ignore[union-attr]
+            if slides[joint - 1] or limited[joint - 1]:
+                value = float((robot.lower if side == "lower" else robot.upper)[joint - 1])
+                unit: Unit = "mm" if slides[joint - 1] else "deg"
+                yield _Limit((joint,), (1.0,), side, unit, value, partial(_widened, robot, joint, side))
         for number, limit in enumerate(robot.combined):
-            summed = slides[np.flatnonzero(limit.factors)]
-            if not summed.any():
-                each = _relaxed(STEPS, partial(_sum_by, robot, number, side, ratio_filled))
-                found.append((STEPS.index(each.by_deg), each))  # type: ignore[union-attr]
-            elif summed.all():
-                each = _relaxed(SLIDE_STEPS, partial(_slide_sum_by, robot, number, side, ratio_filled))
-                found.append((SLIDE_STEPS.index(each.by_mm), each))  # type: ignore[union-attr]
-    found.sort(key=lambda one: (one[1].filled < _GONE, one[0], -one[1].filled, _joints_of(one[1])))
-    return [relaxed for _, relaxed in found], Unlimited(ratio_filled(_without_limits(robot)))
+            summed = np.flatnonzero(limit.factors)
+            if slides[summed].all() or not slides[summed].any():
+                factors = tuple(np.array(limit.factors)[summed].tolist())
+                value = float(limit.lower if side == "lower" else limit.upper)
+                unit = "mm" if slides[summed].all() else "deg"
+                widened = partial(_with_wider_sum, robot, number, side)
+                yield _Limit(tuple((summed + 1).tolist()), factors, side, unit, value, widened)
 
 
-def _relaxed(steps: tuple[float, ...], widened_by: Callable[[float], OneRelaxed]) -> OneRelaxed:
+def _relaxed(limit: _Limit, filled: Callable[[Robot], float]) -> Relaxed:
     """The least step that makes the void vanish, or else the widest, since no lesser step fills more."""
+    scale, steps = _SI[limit.unit], STEPS[limit.unit]
+
+    def widened_by(step: float) -> Relaxed:
+        return Relaxed(*limit[:4], limit.value / scale, step, filled(limit.widened(step * scale)))
+
     most = widened_by(steps[-1])
     if most.filled < _GONE:
         return most
@@ -217,32 +184,6 @@ def _relaxed(steps: tuple[float, ...], widened_by: Callable[[float], OneRelaxed]
     return most
 
 
-def _turn_by(robot: Robot, joint: int, side: Side, filled: Callable[[Robot], float], step: float) -> Relaxed:
-    limit = float((robot.lower if side == "lower" else robot.upper)[joint - 1])
-    widened = _widened(robot, joint, side, float(np.radians(step)))
-    return Relaxed(joint, side, float(np.degrees(limit)), step, filled(widened))
-
-
-def _slide_by(robot: Robot, joint: int, side: Side, filled: Callable[[Robot], float], step: float) -> SlideRelaxed:
-    limit = float((robot.lower if side == "lower" else robot.upper)[joint - 1])
-    return SlideRelaxed(joint, side, 1000 * limit, step, filled(_widened(robot, joint, side, step / 1000)))
-
-
-def _sum_by(robot: Robot, number: int, side: Side, filled: Callable[[Robot], float], step: float) -> SumRelaxed:
-    limit = robot.combined[number]
-    bound = float(np.degrees(limit.lower if side == "lower" else limit.upper))
-    ratio = filled(_with_wider_sum(robot, number, side, float(np.radians(step))))
-    return SumRelaxed(*_terms(limit), side, bound, step, ratio)
-
-
-def _slide_sum_by(
-    robot: Robot, number: int, side: Side, filled: Callable[[Robot], float], step: float
-) -> SlideSumRelaxed:
-    limit = robot.combined[number]
-    bound = 1000 * float(limit.lower if side == "lower" else limit.upper)
-    return SlideSumRelaxed(*_terms(limit), side, bound, step, filled(_with_wider_sum(robot, number, side, step / 1000)))
-
-
 def _with_wider_sum(robot: Robot, number: int, side: Side, by: float) -> Robot:
     limit, others = robot.combined[number], list(robot.combined)
     lower, upper = limit.lower - by * (side == "lower"), limit.upper + by * (side == "upper")
@@ -250,34 +191,17 @@ def _with_wider_sum(robot: Robot, number: int, side: Side, by: float) -> Robot:
     return robot.replace(combined=tuple(others))
 
 
-def _terms(limit: CombinedLimit) -> tuple[tuple[int, ...], tuple[float, ...]]:
-    """Joints (from 1) of a sum and their factors."""
-    joints = np.flatnonzero(limit.factors)
-    return tuple((joints + 1).tolist()), tuple(np.array(limit.factors)[joints].tolist())
-
-
 def _without_limits(robot: Robot) -> Robot:
     """The robot with its turning joints free, sums of joints without limits, and slides by the most that is tried."""
-    by = np.where(robot.slides, SLIDE_STEPS[-1] / 1000, 2 * np.pi)
+    by = np.where(robot.slides, STEPS["mm"][-1] * _SI["mm"], 2 * np.pi)
     return robot.replace(lower=robot.lower - by, upper=robot.upper + by, combined=())
 
 
-def _joints_of(limit: OneRelaxed) -> tuple[int, ...]:
-    return limit.joints if isinstance(limit, SumRelaxed | SlideSumRelaxed) else (limit.joint,)
-
-
-def _as_far(first: OneRelaxed, other: OneRelaxed) -> bool:
-    """Whether two limits are of one kind and widened by as much."""
-    if isinstance(first, SlideRelaxed | SlideSumRelaxed) or isinstance(other, SlideRelaxed | SlideSumRelaxed):
-        return getattr(first, "by_mm", None) == getattr(other, "by_mm", None)
-    return first.by_deg == other.by_deg
-
-
-def cause_of(single: list[OneRelaxed], unlimited: Unlimited) -> VoidCause:
+def cause_of(single: list[Relaxed], unlimited: Unlimited) -> VoidCause:
     """The cause that the relaxations show."""
     gone = [limit for limit in single if limit.filled >= _GONE]
     if gone:
-        return Disappears(tuple(limit for limit in gone if _as_far(limit, gone[0]))[:2])
+        return Disappears(tuple(each for each in gone if (each.unit, each.by) == (gone[0].unit, gone[0].by))[:2])
     strongest = max(single, key=lambda limit: limit.filled, default=None)
     most = strongest if strongest is not None and strongest.filled >= _SHRUNK else None
     if unlimited.filled >= _GONE:
@@ -288,8 +212,8 @@ def cause_of(single: list[OneRelaxed], unlimited: Unlimited) -> VoidCause:
 def joints_behind(cause: VoidCause) -> set[int]:
     """The joints whose limits a cause names."""
     if isinstance(cause, Disappears):
-        return {joint for limit in cause.limits for joint in _joints_of(limit)}
-    return set() if isinstance(cause, OnlySampled) or cause.most is None else set(_joints_of(cause.most))
+        return {joint for limit in cause.limits for joint in limit.joints}
+    return set() if isinstance(cause, OnlySampled) or cause.most is None else set(cause.most.joints)
 
 
 def _widened(robot: Robot, joint: int, side: Side, by: float) -> Robot:

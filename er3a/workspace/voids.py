@@ -11,7 +11,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import Grid
 from er3a.workspace.blocks import Blocks, blocks_of, mesh, pockets
-from er3a.workspace.causes import OneRelaxed, OnlySampled, Unlimited, VoidCause, cause_of, relaxations
+from er3a.workspace.causes import OnlySampled, Relaxed, Unlimited, VoidCause, cause_of, relaxations
 from er3a.workspace.cavities import Cavity, cavities
 from er3a.workspace.hull import Hull, inside_hull
 from er3a.workspace.proven import Proven
@@ -43,7 +43,7 @@ class Void:
     centroid: Reals
     extent: Reals
     cause: VoidCause
-    relaxed: tuple[OneRelaxed | Unlimited, ...]
+    relaxed: tuple[Relaxed | Unlimited, ...]
     holds_shoulder: bool
     vertices: Reals
     triangles: Integers

@@ -142,7 +142,7 @@ def test_unseen_cells_are_predicted_or_understated(random):
 
 
 def void_record(status: str, at_shoulder: bool) -> Void:
-    limit = Relaxed(3, "upper", 75.0, 15.0, 1.0)
+    limit = Relaxed((3,), (1.0,), "upper", "deg", 75.0, 15.0, 1.0)
     proven = status == "proven_empty"
     return Void(
         kind="enclosed",
@@ -178,7 +178,7 @@ def test_an_enclosed_void_away_from_the_shoulder_is_never_passed_over(voids, sta
 
 def test_a_verdict_says_which_limit_makes_the_void():
     verdict = judge(1 / 6, [void_record("proven_empty", False)], 1000, 0.0, True)
-    assert verdict.finding.cause == Disappears((Relaxed(3, "upper", 75.0, 15.0, 1.0),))
+    assert verdict.finding.cause == Disappears((Relaxed((3,), (1.0,), "upper", "deg", 75.0, 15.0, 1.0),))
     assert "It disappears if joint 3's upper limit is extended to +90 deg: check the limits" in say(verdict.finding)
 
 

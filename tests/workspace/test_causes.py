@@ -10,10 +10,6 @@ from er3a.robots.robot import CombinedLimit, Robot
 from er3a.workspace.causes import (
     Disappears,
     Geometry,
-    Relaxed,
-    SlideRelaxed,
-    SlideSumRelaxed,
-    SumRelaxed,
     cause_of,
     joints_behind,
     relaxations,
@@ -91,8 +87,7 @@ def test_a_slide_that_ends_too_far_out_makes_a_hole():
     cause = cause_of(*relaxations(robot, cavity, section))
     assert isinstance(cause, Disappears)
     (limit,) = cause.limits
-    assert isinstance(limit, SlideRelaxed)
-    assert (limit.joint, limit.side, limit.extended_mm) == (3, "lower", pytest.approx(-100))
+    assert (limit.joints, limit.side, limit.unit, limit.extended) == ((3,), "lower", "mm", pytest.approx(-100))
     assert share_by_hand(robot, cavity, robot.lower, robot.upper, 0.0) == 0
     for by, filled in ((0.2, False), (0.4, True)):
         found = share_by_hand(robot, cavity, robot.lower - [0, 0, by], robot.upper, 0.0)
@@ -109,7 +104,7 @@ def test_a_tube_along_a_slide_is_of_the_elbow():
     cause = cause_of(*relaxations(robot, cavity, section))
     assert isinstance(cause, Disappears | Geometry)
     limits = cause.limits if isinstance(cause, Disappears) else (cause.most,)
-    assert {type(limit) for limit in limits} == {Relaxed}
+    assert {limit.unit for limit in limits} == {"deg"}
     assert joints_behind(cause) == {3}
     assert share_by_hand(robot, cavity, robot.lower, robot.upper, 0.0) == 0
     wide, aside = np.array([0, 0, 180 * DEG]), np.array([0.4, 0, 0])
@@ -124,10 +119,12 @@ def test_a_hole_by_a_sum_of_joints_is_told_so(coupling):
     cavity, section = of_cells(robot, (0.22, 0.4), (-0.3, 0.3), (0.0, TURN))
     cause = cause_of(*relaxations(robot, cavity, section))
     assert isinstance(cause, Disappears)
-    assert all(isinstance(limit, SumRelaxed) for limit in cause.limits)
+    (limited,) = robot.combined
+    factors = tuple(factor for factor in limited.factors if factor)
+    assert all((limit.factors, limit.unit) == (factors, "deg") for limit in cause.limits)
     assert joints_behind(cause) == ({3} if coupling is None else {2, 3})
     assert share_by_hand(robot, cavity, robot.lower, robot.upper, 0.0) == 0
-    by = cause.limits[0].by_deg * DEG
+    by = cause.limits[0].by * DEG
     assert share_by_hand(robot, cavity, robot.lower, robot.upper, by) == 1
 
 
@@ -141,8 +138,8 @@ def test_a_hole_by_a_sum_of_slides_is_told_so():
     cause = cause_of(*relaxations(robot, cavity, section))
     assert isinstance(cause, Disappears)
     (found,) = cause.limits
-    assert isinstance(found, SlideSumRelaxed)
-    assert (found.joints, found.side, found.extended_mm) == ((3, 4), "lower", pytest.approx(-100))
+    assert (found.joints, found.factors, found.unit) == ((3, 4), (1.0, 1.0), "mm")
+    assert (found.side, found.extended) == ("lower", pytest.approx(-100))
     assert share_by_hand(robot, cavity, robot.lower, robot.upper, 0.0) == 0
     assert share_by_hand(robot, cavity, robot.lower, robot.upper, 0.4) == 1
     assert share_by_hand(robot, cavity, robot.lower - 0.4 * robot.sliding, robot.upper, 0.0) == 0

@@ -139,12 +139,12 @@ def test_the_small_void_at_the_articles_shoulder_is_found():
     assert 0.21 < large.lower < large.upper < 0.26
     cause = cause_of(*relaxations(robot, small))
     assert isinstance(cause, Disappears)
-    assert [(limit.joint, limit.side, limit.limit_deg, limit.by_deg) for limit in cause.limits] == [
-        (3, "upper", pytest.approx(75), 15)
+    assert [(limit.joints, limit.side, limit.limit, limit.by) for limit in cause.limits] == [
+        ((3,), "upper", pytest.approx(75), 15)
     ]
     cause = cause_of(*relaxations(robot, large))
     limits = cause.limits if isinstance(cause, Disappears) else (cause.most,)
-    assert (3, "lower") in [(limit.joint, limit.side) for limit in limits]
+    assert ((3,), "lower") in [(limit.joints, limit.side) for limit in limits]
     assert joints_behind(cause) & {2, 3}
 
 

@@ -8,12 +8,9 @@ from er3a.pipeline.messages.say import joined, say, sentence
 from er3a.workspace.causes import (
     Disappears,
     Geometry,
-    OneRelaxed,
     OnlySampled,
+    Relaxed,
     SeveralLimits,
-    SlideRelaxed,
-    SlideSumRelaxed,
-    SumRelaxed,
     VoidCause,
 )
 from er3a.workspace.proven import GeneralMethod, SphericalWrist, ToolNearWrist
@@ -54,7 +51,7 @@ def is_predicate(cause: VoidCause) -> bool:
     return isinstance(cause, Disappears) or (isinstance(cause, SeveralLimits) and cause.most is not None)
 
 
-def _shrinks(limit: OneRelaxed) -> str:
+def _shrinks(limit: Relaxed) -> str:
     return sentence(
         "void_shrinks",
         "shrinks by {percent:.0f} % if {extended}",
@@ -63,28 +60,29 @@ def _shrinks(limit: OneRelaxed) -> str:
     )
 
 
-def _extended(limit: OneRelaxed) -> str:
-    if isinstance(limit, SlideRelaxed):
-        shown = {"joint": limit.joint, "limit": as_text(limit.extended_mm, "+.4g")}
+def _extended(limit: Relaxed) -> str:
+    value = as_text(limit.extended, "+.4g")
+    if limit.factors == (1.0,):
+        return _joint_extended(limit, {"joint": limit.joints[0], "limit": value})
+    terms = " ".join(f"{factor:+.4g} × J{joint}" for joint, factor in zip(limit.joints, limit.factors))
+    return _sum_extended(limit, {"sum": terms, "limit": value})
+
+
+def _joint_extended(limit: Relaxed, shown: dict[str, int | str]) -> str:
+    if limit.unit == "mm":
         if limit.side == "upper":
             return sentence("limit_extended", "joint {joint}'s upper limit is extended to {limit} mm", **shown)
         return sentence("limit_extended", "joint {joint}'s lower limit is extended to {limit} mm", **shown)
-    if isinstance(limit, SumRelaxed | SlideSumRelaxed):
-        return _sum_extended(limit)
-    shown = {"joint": limit.joint, "limit": as_text(limit.extended_deg, "+.4g")}
     if limit.side == "upper":
         return sentence("limit_extended", "joint {joint}'s upper limit is extended to {limit} deg", **shown)
     return sentence("limit_extended", "joint {joint}'s lower limit is extended to {limit} deg", **shown)
 
 
-def _sum_extended(limit: SumRelaxed | SlideSumRelaxed) -> str:
-    terms = " ".join(f"{factor:+.4g} × J{joint}" for joint, factor in zip(limit.joints, limit.factors))
-    if isinstance(limit, SlideSumRelaxed):
-        shown = {"sum": terms, "limit": as_text(limit.extended_mm, "+.4g")}
+def _sum_extended(limit: Relaxed, shown: dict[str, int | str]) -> str:
+    if limit.unit == "mm":
         if limit.side == "upper":
             return sentence("limit_extended", "the upper limit of {sum} is extended to {limit} mm", **shown)
         return sentence("limit_extended", "the lower limit of {sum} is extended to {limit} mm", **shown)
-    shown = {"sum": terms, "limit": as_text(limit.extended_deg, "+.4g")}
     if limit.side == "upper":
         return sentence("limit_extended", "the upper limit of {sum} is extended to {limit} deg", **shown)
     return sentence("limit_extended", "the lower limit of {sum} is extended to {limit} deg", **shown)

@@ -29,7 +29,7 @@ from er3a.pipeline.stages.workspace.workspace_tables import (
 from er3a.sampling.random_joints import Sampling
 from er3a.sampling.reach_search import ReachExtremes
 from er3a.workspace.capability import Overall
-from er3a.workspace.causes import OneRelaxed, Unlimited, VoidCause
+from er3a.workspace.causes import Relaxed, Unlimited, VoidCause
 from er3a.workspace.dexterous import Core
 from er3a.workspace.orientations import AskedKind
 from er3a.workspace.proven import ProofMethod
@@ -150,7 +150,7 @@ class VoidSummary:
     centroid_m: Triple
     extent_m: Triple
     cause: VoidCause
-    relaxed: tuple[OneRelaxed | Unlimited, ...]
+    relaxed: tuple[Relaxed | Unlimited, ...]
     holds_shoulder: bool
 
 
