@@ -8,7 +8,9 @@ they lack, and of what those turn it is told.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Literal, Protocol, get_args
 
 import numpy as np
@@ -21,9 +23,9 @@ from er3a.kinematics.classes.links import axes_of, inverse_rigid, poses_of, size
 from er3a.kinematics.classes.parallel_axes import ThreeParallel, three_parallel
 from er3a.kinematics.classes.scara import Scara, scara, solve_scara
 from er3a.kinematics.classes.self_motion import PoseChain
-from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, SixRevolute, prepared, solve_six_revolute
+from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, RowsFound, prepared, solve_six_revolute
 from er3a.kinematics.classes.spherical_joints import about_x, about_z, frame_along
-from er3a.kinematics.classes.two_slides import TwoSlides, solve_two_slides, two_slides
+from er3a.kinematics.classes.two_slides import solve_two_slides, two_slides
 from er3a.kinematics.closed_form import BOUNDARY_M, REACHED, ArmConstants, solve
 from er3a.kinematics.wrist_partitioned import WristPartitionedArm, constants_of, recognised
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -195,27 +197,14 @@ class ParallelAxes(_Fixed):
 
 @dataclass(frozen=True, eq=False)
 class General(_Fixed):
-    """Any six joints of which at most one slides."""
+    """Any six joints of which at most two slide."""
 
-    arm: SixRevolute
+    solve: Callable[[Reals], RowsFound]
     code: ArmClassCode
     slots: int = 16
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
-        found = solve_six_revolute(self.arm, T)
-        return found.q, found.certainty
-
-
-@dataclass(frozen=True, eq=False)
-class TwoSliding(_Fixed):
-    """Six joints, two of which slide."""
-
-    arm: TwoSlides
-    code: ArmClassCode = "six_two_prismatic"
-    slots: int = 16
-
-    def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
-        found = solve_two_slides(self.arm, T)
+        found = self.solve(T)
         return found.q, found.certainty
 
 
@@ -452,10 +441,10 @@ def _of_six(links: Reals, sliding: Flags) -> ChainSolver:
             return ThreeSliding(three)
         if sliding.sum() == 2:
             two = two_slides(links, sliding)
-            return Unsolved(6) if two is None else TwoSliding(two)
+            return Unsolved(6) if two is None else General(partial(solve_two_slides, two), "six_two_prismatic")
         arm = prepared(links, sliding)
         if arm.readings:
-            return General(arm, "six_one_prismatic" if sliding.any() else "general_six")
+            return General(partial(solve_six_revolute, arm), "six_one_prismatic" if sliding.any() else "general_six")
         return Unsolved(6)
     return Unsolved(6, "dependent")
 

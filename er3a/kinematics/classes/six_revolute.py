@@ -12,8 +12,9 @@ poses beside it, too, and the solutions there are followed back.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Protocol, TypeVar
 
 import numpy as np
 import scipy
@@ -40,6 +41,22 @@ ASIDE = (1e-3, 1e-2, 3e-2)  # how far beside, in turn: rad and parts of the size
 
 CERTAIN, UNCERTAIN, CONTINUUM = 0, 1, 2
 STUCK = 1e-9  # last pivot below which a row may move with the tool at rest
+
+
+class PreparedArm(Protocol):
+    """A chain in units of its size (m) and what tells its prismatic joints (6,)."""
+
+    @property
+    def links(self) -> Reals: ...
+
+    @property
+    def size(self) -> float: ...
+
+    @property
+    def sliding(self) -> Flags: ...
+
+
+_Arm = TypeVar("_Arm", bound=PreparedArm)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,19 +129,7 @@ def solve_six_revolute(arm: SixRevolute, T: Reals) -> RowsFound:
     After ``MOST_READINGS`` that told something a pose stays in doubt; those whose determinant vanishes don't count, as
     they may do so beside special geometry where others don't.
     """
-    T = np.ascontiguousarray(T, dtype=float)
-    q, count = np.full((len(T), SLOTS, 6), np.nan), np.zeros(len(T), dtype=np.int64)
-    certainty = np.full(len(T), CONTINUUM)
-    memory = new_memory(arm.sliding)
-
-    def by_readings(poses: Reals, rows: Reals, number: Integers, doubt: Integers) -> None:
-        _by_readings(arm, poses, memory, rows, number, doubt)
-
-    by_readings(T, q, count, certainty)
-    from_beside(by_readings, (arm.links, arm.size), T, memory, (q, count, certainty))
-    in_order(q, count)
-    q[:, :, arm.sliding] *= arm.size
-    return RowsFound(q, count, certainty)
+    return all_rows(arm, _by_readings, T)
 
 
 def _by_readings(
@@ -145,19 +150,30 @@ def _by_readings(
     certainty[moving] = CONTINUUM
 
 
-def from_beside(
-    by_readings: Callable[[Reals, Reals, Integers, Integers], None],
-    chain: tuple[Reals, float],
-    T: Reals,
-    memory: LoopMemory,
-    out: tuple[Reals, Integers, Integers],
-) -> None:
-    """Add to poses in doubt what the solutions of poses beside them lead to.
+def all_rows(
+    arm: _Arm, by_readings: Callable[[_Arm, Reals, LoopMemory, Reals, Integers, Integers], None], T: Reals
+) -> RowsFound:
+    """What readings find at poses T (N, 4, 4), m, and, where they leave doubt, at poses beside these.
 
-    ``by_readings`` takes poses and fills rows, their number and certainty; ``chain`` are links and size, ``out`` rows
-    (N, 16, 6), their number (N,) and certainty (N,) at the poses T (N, 4, 4).
+    ``by_readings`` takes arm, poses and memory, and fills rows (N, 16, 6), their number (N,) and certainty (N,), which
+    starts as CONTINUUM.
     """
-    (links, size), (q, count, certainty) = chain, out
+    T = np.ascontiguousarray(T, dtype=float)
+    q, count = np.full((len(T), SLOTS, 6), np.nan), np.zeros(len(T), dtype=np.int64)
+    certainty = np.full(len(T), CONTINUUM)
+    memory = new_memory(arm.sliding)
+    by_readings(arm, T, memory, q, count, certainty)
+    for numbers, beside in _beside(certainty, T, count, arm.size):
+        near = np.full((len(numbers), SLOTS, 6), np.nan), np.zeros(len(numbers), dtype=np.int64)
+        by_readings(arm, beside, memory, *near, np.full(len(numbers), CONTINUUM))
+        followed_back(arm.links, arm.size, T, numbers, memory, *near, q, count)
+    in_order(q, count)
+    q[:, :, arm.sliding] *= arm.size
+    return RowsFound(q, count, certainty)
+
+
+def _beside(certainty: Integers, T: Reals, count: Integers, size: float) -> Iterator[tuple[Integers, Reals]]:
+    """Numbers (k,) of poses in doubt, and poses (k, 4, 4) beside them, until nothing new is counted."""
     random, in_doubt = np.random.default_rng(3), np.flatnonzero(certainty == UNCERTAIN)
     idle = np.zeros(len(in_doubt), dtype=np.int64)
     for k in range(BESIDE):
@@ -168,10 +184,8 @@ def from_beside(
         beside = np.eye(4)
         beside[:3, :3] = scipy.spatial.transform.Rotation.from_rotvec(way[:3]).as_matrix()
         beside[:3, 3] = way[3:] * size
-        near = np.full((len(in_doubt), SLOTS, 6), np.nan), np.zeros(len(in_doubt), dtype=np.int64)
-        by_readings(T[in_doubt] @ beside, *near, np.full(len(in_doubt), CONTINUUM))
         before = count[in_doubt]
-        followed_back(links, size, T, in_doubt, memory, *near, q, count)
+        yield in_doubt, T[in_doubt] @ beside
         idle = np.where(count[in_doubt] > before, 0, idle + 1)
 
 

@@ -25,18 +25,16 @@ import numpy as np
 
 from er3a.kinematics.classes.circle_zeros import HARMONICS, SAMPLE_ANGLES, SAMPLES
 from er3a.kinematics.classes.links import inverse_rigid, poses_of, size_of
-from er3a.kinematics.classes.loop_rows import LoopMemory, new_memory
+from er3a.kinematics.classes.loop_rows import LoopMemory
 from er3a.kinematics.classes.polish import SOLVES, newton, twin_start
 from er3a.kinematics.classes.six_revolute import (
     CERTAIN,
     CONTINUUM,
-    SLOTS,
     STUCK,
     UNCERTAIN,
     RowsFound,
     add_row,
-    from_beside,
-    in_order,
+    all_rows,
 )
 from er3a.numerics.arrays import Complexes, Flags, Integers, Reals
 from er3a.numerics.jit import kernel
@@ -128,19 +126,7 @@ def _arrangements(links: Reals, sliding: Flags) -> list[tuple[Integers, float, R
 
 def solve_two_slides(arm: TwoSlides, T: Reals) -> RowsFound:
     """All solutions for poses T (N, 4, 4), m; q (N, 16, 6) in rad and m, NaN behind the last."""
-    T = np.ascontiguousarray(T, dtype=float)
-    q, count = np.full((len(T), SLOTS, 6), np.nan), np.zeros(len(T), dtype=np.int64)
-    certainty = np.full(len(T), CONTINUUM)
-    memory = new_memory(arm.sliding)
-
-    def by_readings(poses: Reals, rows: Reals, number: Integers, doubt: Integers) -> None:
-        _by_readings(arm, poses, memory, rows, number, doubt)
-
-    by_readings(T, q, count, certainty)
-    from_beside(by_readings, (arm.links, arm.size), T, memory, (q, count, certainty))
-    in_order(q, count)
-    q[:, :, arm.sliding] *= arm.size
-    return RowsFound(q, count, certainty)
+    return all_rows(arm, _by_readings, T)
 
 
 def _by_readings(arm: TwoSlides, T: Reals, memory: LoopMemory, q: Reals, count: Integers, certainty: Integers) -> None:
