@@ -12,7 +12,8 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -29,6 +30,7 @@ SAME_TIME = 1e-13  # share of the duration
 LOCATED = 1e-14  # share of the duration
 PIECES_AT_ONCE = 4096
 TIMES_AT_ONCE = 20_000
+Stretch = tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,9 +75,14 @@ class Pieces:
             scipy.optimize.brentq(value, start, end, xtol=max(LOCATED * (b - a), 1e-300), rtol=4 * np.finfo(float).eps)
         )
 
-    def above(self, level: float) -> list[tuple[float, float, float]]:
-        """Stretches on which the function is greater than a level: start, end, and its greatest value there."""
-        found: list[tuple[float, float, float]] = []
+    def above(self, level: float, found: list[Stretch] | None = None) -> list[Stretch]:
+        """Stretches on which the function is greater than a level: start, end, and its greatest value there.
+
+        Parameters
+        ----------
+        found : those of the pieces before, which are gone on with
+        """
+        found = [] if found is None else found
         for i in np.flatnonzero(self.range[1] > level).tolist():
             t, values = self.nodes(i)
             for k in range(len(t) - 1):
@@ -101,9 +108,16 @@ class Pieces:
                 most, at = float(values.max()), float(t[values.argmax()])
         return most, at
 
-    def greatest(self) -> float:
-        """The greatest value."""
-        return self.peak()[0]
+    def greatest(self, before: float = -np.inf) -> float:
+        """The greatest value, or ``before`` if that is greater."""
+        most = max(before, *(float(chebyshev.chebval(x, self.series.T).max()) for x in (-1.0, 1.0)))
+        bounds = self.range[1]
+        above = np.flatnonzero(bounds > most)
+        for i in above[np.argsort(-bounds[above])].tolist():
+            if bounds[i] <= most:
+                break
+            most = max(most, float(self.nodes(i)[1].max()))
+        return most
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,11 +153,16 @@ class PiecewiseMotion:
     @cached_property
     def steps(self) -> Reals:
         """(m + 1, n), rad/s^2, by which the acceleration steps between pieces, and from and to rest."""
-        signs = np.where(np.arange(self.acceleration.shape[1]) % 2, -1.0, 1.0)[:, None]
-        first, last = np.einsum("mdn,dz->mn", self.acceleration, signs), self.acceleration.sum(axis=1)
+        first, last = self.acceleration_at_ends
         rest = np.zeros((1, first.shape[1]))
         steps: Reals = np.abs(np.concatenate([first, rest]) - np.concatenate([rest, last]))
         return steps
+
+    @property
+    def acceleration_at_ends(self) -> tuple[Reals, Reals]:
+        """(m, n) and (m, n), rad/s^2, at the beginning and the end of each piece."""
+        signs = np.where(np.arange(self.acceleration.shape[1]) % 2, -1.0, 1.0)[:, None]
+        return np.einsum("mdn,dz->mn", self.acceleration, signs), self.acceleration.sum(axis=1)
 
     def rates(self, t: Reals) -> Rates:
         """Angles, velocities and accelerations at times (...,), each (..., n)."""
@@ -177,15 +196,16 @@ class PiecewiseMotion:
         joints = range(series.shape[2])
         return np.array([max(self.of_joint(series, j, sign).greatest() for sign in (1.0, -1.0)) for j in joints])
 
+    def parts(self) -> Iterator[PiecewiseMotion]:
+        """The motion in one part."""
+        yield self
+
     def rate_bounds(self, start: Reals, end: Reals) -> tuple[Reals, Reals]:
         """Bounds (k, n) of the sizes of velocity and acceleration between times (k,) and (k,)."""
-        first = np.clip(np.searchsorted(self.times, start, side="right") - 1, 0, len(self.times) - 2)
-        last = np.clip(np.searchsorted(self.times, end, side="left") - 1, first, len(self.times) - 2)
-        velocity, acceleration = (greatest_between(most, first, last) for most in self._bounds)
-        return velocity, acceleration
+        return _bounds_between(self.times, self.bounds, start, end)
 
     @cached_property
-    def _bounds(self) -> tuple[Reals, Reals]:
+    def bounds(self) -> tuple[Reals, Reals]:
         """Bounds (m, n) of the sizes of velocity and acceleration on each piece."""
         return _sizes(self.velocity), _sizes(self.acceleration)
 
@@ -194,25 +214,75 @@ class PiecewiseMotion:
         return PiecewiseMotion(self.times * factor, self.angle, self.velocity / factor, self.acceleration / factor**2)
 
 
+class MotionInParts:
+    """A motion of so many polynomials that they are made part by part, whenever they are wanted.
+
+    Attributes
+    ----------
+    times : (m + 1,), s, rising from 0
+    """
+
+    def __init__(self, rates: Callable[[Reals], Rates], breaks: Reals, degree: int):
+        """See :func:`polynomial_motion`."""
+        breaks = np.asarray(breaks, float)
+        kept = np.concatenate([[True], np.diff(breaks) > SAME_TIME * (breaks[-1] - breaks[0])])
+        self.times = breaks[kept]
+        self.times[-1] = breaks[-1]
+        self._rates, self._degree = rates, degree
+        self._bounds: tuple[Reals, Reals] | None = None
+
+    @property
+    def duration(self) -> float:
+        """s"""
+        return float(self.times[-1])
+
+    def parts(self) -> Iterator[PiecewiseMotion]:
+        """The motion in parts of so many pieces that they are no burden to the memory."""
+        x = np.cos(np.pi * (np.arange(self._degree + 1) + 0.5) / (self._degree + 1))
+        sizes = []
+        for k in range(0, len(self.times) - 1, PIECES_AT_ONCE):
+            times = self.times[k : k + PIECES_AT_ONCE + 1]
+            t = times[:-1, None] + np.diff(times)[:, None] * (x + 1) / 2
+            part = PiecewiseMotion(times, *(_trimmed(_interpolated(values)) for values in self._rates(t)))
+            sizes.append(part.bounds)
+            yield part
+        velocity, acceleration = (np.concatenate(each) for each in zip(*sizes))
+        self._bounds = velocity, acceleration
+
+    def joints(self, t: Reals) -> Reals:
+        """Angles (..., n) at times (...,)."""
+        t = np.asarray(t, float)
+        flat = t.reshape(-1)
+        parts = [self._rates(flat[k : k + TIMES_AT_ONCE])[0] for k in range(0, max(len(flat), 1), TIMES_AT_ONCE)]
+        return np.concatenate(parts).reshape(*t.shape, -1)
+
+    def rate_bounds(self, start: Reals, end: Reals) -> tuple[Reals, Reals]:
+        """See :meth:`PiecewiseMotion.rate_bounds`; the bounds of the pieces are kept when the parts are first made."""
+        if self._bounds is None:
+            deque(self.parts(), maxlen=0)
+        assert self._bounds is not None
+        return _bounds_between(self.times, self._bounds, start, end)
+
+
+Polynomials = PiecewiseMotion | MotionInParts
+
+
 def polynomial_motion(rates: Callable[[Reals], Rates], breaks: Reals, degree: int) -> PiecewiseMotion:
     """A motion whose angles are polynomials of at most so high a degree between break points (m + 1,) in s."""
-    breaks = np.asarray(breaks, float)
-    kept = np.concatenate([[True], np.diff(breaks) > SAME_TIME * (breaks[-1] - breaks[0])])
-    times = breaks[kept]
-    times[-1] = breaks[-1]
-    x = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
-    t = times[:-1, None] + np.diff(times)[:, None] * (x + 1) / 2
-    series = [np.empty((len(t), 0, 0))] * 3
-    for k in range(0, len(t), PIECES_AT_ONCE):  # the points of a long motion would fill the memory
-        for order, values in enumerate(rates(t[k : k + PIECES_AT_ONCE])):
-            part = _trimmed(_interpolated(values))
-            if part.shape[1] > series[order].shape[1]:
-                wider = np.zeros((len(t), *part.shape[1:]))
-                if k:
-                    wider[:k, : series[order].shape[1]] = series[order][:k]
-                series[order] = wider
-            series[order][k : k + len(part), : part.shape[1]] = part
-    return PiecewiseMotion(times, *series)
+    whole = MotionInParts(rates, breaks, degree)
+    parts = list(whole.parts())
+    angle, velocity, acceleration = (
+        _joined([getattr(part, name) for part in parts]) for name in ("angle", "velocity", "acceleration")
+    )
+    return PiecewiseMotion(whole.times, angle, velocity, acceleration)
+
+
+def _joined(series: list[Reals]) -> Reals:
+    """One array of series (m, d + 1, n) of different degrees."""
+    if len(series) == 1:
+        return series[0]
+    width = max(each.shape[1] for each in series)
+    return np.concatenate([np.pad(each, ((0, 0), (0, width - each.shape[1]), (0, 0))) for each in series])
 
 
 def chebyshev_times(times: Reals, degree: int) -> tuple[Reals, Reals]:
@@ -251,6 +321,13 @@ def greatest_between(values: Reals, first: Integers, last: Integers) -> Reals:
     for k in np.flatnonzero(last > first + 1):
         found[k] = values[first[k] : last[k] + 1].max(axis=0)
     return found
+
+
+def _bounds_between(times: Reals, bounds: tuple[Reals, Reals], start: Reals, end: Reals) -> tuple[Reals, Reals]:
+    first = np.clip(np.searchsorted(times, start, side="right") - 1, 0, len(times) - 2)
+    last = np.clip(np.searchsorted(times, end, side="left") - 1, first, len(times) - 2)
+    velocity, acceleration = (greatest_between(most, first, last) for most in bounds)
+    return velocity, acceleration
 
 
 def _interpolated(values: Reals) -> Reals:

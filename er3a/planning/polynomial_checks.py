@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -21,7 +22,7 @@ from er3a.planning.intervals import (
     limit_sides,
     rate_interval,
 )
-from er3a.planning.piecewise import Pieces, PiecewiseMotion
+from er3a.planning.piecewise import Pieces, PiecewiseMotion, Polynomials, Stretch
 from er3a.planning.singular_events import LONG_STAY, ON_SET, SAME_EVENT, SingularEvent, merged
 from er3a.robots.joint_limits import LIMIT_TOLERANCE
 from er3a.robots.robot import Robot
@@ -30,56 +31,190 @@ LONGEST_TURN = 1.0  # rad within one series of the shoulder's distance
 DEGREE = 24  # by which a sine of so short a turn is met to rounding
 
 
-def limit_intervals(robot: Robot, motion: PiecewiseMotion) -> list[Interval[LimitCause]]:
-    """Where joints, or sums of joints, leave their limits, one interval per limit, side and stretch."""
-    found: list[Interval[LimitCause]] = []
-    for side in limit_sides(robot):
-        pieces = Pieces(motion.times, side.of(motion.angle))
-        for start, end, most in pieces.above(side.sign * side.limit + LIMIT_TOLERANCE):
-            found.append(Interval(start, end, side.cause(most)))
-    return sorted(found, key=lambda interval: (interval.start, joints_of(interval.cause)))
+class LimitCheck:
+    """Where joints, or sums of joints, leave their limits, gathered from the parts of a motion."""
+
+    def __init__(self, robot: Robot):
+        self._sides = [(side, list[Stretch]()) for side in limit_sides(robot)]
+
+    def add(self, part: PiecewiseMotion) -> None:
+        """Go on with the next part."""
+        for side, found in self._sides:
+            Pieces(part.times, side.of(part.angle)).above(side.sign * side.limit + LIMIT_TOLERANCE, found)
+
+    def intervals(self) -> list[Interval[LimitCause]]:
+        """One for each limit, side and stretch."""
+        found = [Interval(start, end, side.cause(most)) for side, part in self._sides for start, end, most in part]
+        return sorted(found, key=lambda interval: (interval.start, joints_of(interval.cause)))
 
 
-def rate_intervals(motion: PiecewiseMotion, limit: RateLimit) -> list[Interval[RateCause]]:
-    """Where joints exceed a limit of speed, acceleration or jerk; a step of the acceleration exceeds any of jerk."""
-    series = {1: motion.velocity, 2: motion.acceleration}.get(limit.order)
-    found = []
-    for j in np.flatnonzero(np.isfinite(limit.most)).tolist():
-        stretches = [
-            part
-            for sign in (1.0, -1.0)
-            for part in motion.of_joint(motion.jerk if series is None else series, j, sign).above(limit.allowed[j])
+class RateCheck:
+    """Where joints exceed a limit of speed, acceleration or jerk, gathered from the parts of a motion; a step of the
+    acceleration exceeds any of jerk."""
+
+    def __init__(self, limit: RateLimit):
+        self._limit = limit
+        self._found = [
+            (j, (list[Stretch](), list[Stretch](), list[Stretch]()))  # above, below, and steps
+            for j in np.flatnonzero(np.isfinite(limit.most)).tolist()
         ]
+        self._last: tuple[float, Reals] | None = None  # time and acceleration (n,) at the end of the parts so far
+
+    def add(self, part: PiecewiseMotion) -> None:
+        """Go on with the next part."""
+        limit = self._limit
+        for j, found in self._found:
+            series = {1: part.velocity, 2: part.acceleration}.get(limit.order)
+            for sign, stretches in zip((1.0, -1.0), found):
+                part.of_joint(part.jerk if series is None else series, j, sign).above(limit.allowed[j], stretches)
         if limit.order == 3:
-            steps = np.flatnonzero(motion.steps[:, j] > limit.step_allowed[j])
-            stretches += [(float(motion.times[k]), float(motion.times[k]), np.inf) for k in steps]
-        found += [rate_interval(limit, j, *part) for part in stretches]
-    return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
+            first, last = part.acceleration_at_ends
+            before = np.zeros(last.shape[1]) if self._last is None else self._last[1]
+            self._stepped(part.times[:-1], np.abs(first - np.vstack([before, last[:-1]])))
+            self._last = float(part.times[-1]), last[-1]
+
+    def _stepped(self, times: Reals, steps: Reals) -> None:
+        for j, found in self._found:
+            found[2].extend((t, t, np.inf) for t in times[steps[:, j] > self._limit.step_allowed[j]].tolist())
+
+    def intervals(self) -> list[Interval[RateCause]]:
+        """One for each joint and stretch; to be asked for once, after the last part."""
+        if self._last is not None:
+            self._stepped(np.array([self._last[0]]), np.abs(self._last[1][None]))
+        found = [rate_interval(self._limit, j, *part) for j, parts in self._found for each in parts for part in each]
+        return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
 
 
-def polynomial_events(robot: Robot, motion: PiecewiseMotion, near: NearSingular) -> list[SingularEvent]:
-    """All crossings of singular sets, and the nearest pass of each stretch below its type's threshold.
+class GreatestRates:
+    """The greatest speeds and accelerations of the joints, gathered from the parts of a motion."""
+
+    def __init__(self, joints: int):
+        self._peaks = np.full((2, joints, 2), -np.inf)
+
+    def add(self, part: PiecewiseMotion) -> None:
+        """Go on with the next part."""
+        for order, series in enumerate((part.velocity, part.acceleration)):
+            for j, side in np.ndindex(self._peaks.shape[1:]):
+                pieces = part.of_joint(series, j, (1.0, -1.0)[side])
+                self._peaks[order, j, side] = pieces.greatest(float(self._peaks[order, j, side]))
+
+    @property
+    def rates(self) -> tuple[Reals, Reals]:
+        """Speeds and accelerations (n,), rad/s or m/s and rad/s^2 or m/s^2."""
+        speed, acceleration = self._peaks.max(axis=2)
+        return speed, acceleration
+
+
+class SingularCheck:
+    """All crossings of singular sets, and the nearest pass of each stretch below its type's threshold, gathered from
+    the parts of a motion.
 
     Raises
     ------
     NotWristPartitionedError
         if the sets of this arm are no functions of single joints
     """
-    events: list[SingularEvent] = []
-    if robot.coupling is not None:
-        moved = (series @ robot.coupling.T for series in (motion.angle, motion.velocity, motion.acceleration))
-        motion = PiecewiseMotion(motion.times, *moved)
-    for kind in TYPES:
-        for distance in _distances(robot, motion, kind, near.of(kind)):
-            events += _events(kind, distance, near.of(kind), motion.duration)
-    return sorted(events, key=lambda event: (event.t, TYPES.index(event.type)))
+
+    def __init__(self, robot: Robot, near: NearSingular):
+        self._robot, self._near = robot, near
+        self._stretches: dict[tuple[int, int], list[_Stretch]] = {}  # by the number of the type, and half turns
+        self._parts, self._end = 0, 0.0
+
+    def add(self, part: PiecewiseMotion) -> None:
+        """Go on with the next part."""
+        if self._robot.coupling is not None:
+            moved = (series @ self._robot.coupling.T for series in (part.angle, part.velocity, part.acceleration))
+            part = PiecewiseMotion(part.times, *moved)
+        self._parts, self._end = self._parts + 1, part.duration
+        for order, kind in enumerate(TYPES):
+            near = self._near.of(kind)
+            for turn, distance in _distances(self._robot, part, kind, near):
+                _near_stretches(distance, near, self._parts, self._stretches.setdefault((order, turn), []))
+
+    def events(self) -> list[SingularEvent]:
+        """In order of time."""
+        found: list[SingularEvent] = []
+        for (order, _), stretches in sorted(self._stretches.items(), key=lambda each: each[0]):
+            for stretch in stretches:
+                found += stretch.events(TYPES[order], self._near.of(TYPES[order]), self._end)
+        return sorted(found, key=lambda event: (event.t, TYPES.index(event.type)))
 
 
-def _distances(robot: Robot, motion: PiecewiseMotion, kind: SingularityType, near: float) -> Iterator[Pieces]:
-    """Signed distances from the sets of a type, one for each of the sets that the motion may come near."""
+def limit_intervals(robot: Robot, motion: Polynomials) -> list[Interval[LimitCause]]:
+    """Where joints, or sums of joints, leave their limits, one interval per limit, side and stretch."""
+    check = LimitCheck(robot)
+    for part in motion.parts():
+        check.add(part)
+    return check.intervals()
+
+
+def rate_intervals(motion: Polynomials, limit: RateLimit) -> list[Interval[RateCause]]:
+    """Where joints exceed a limit of speed, acceleration or jerk; a step of the acceleration exceeds any of jerk."""
+    check = RateCheck(limit)
+    for part in motion.parts():
+        check.add(part)
+    return check.intervals()
+
+
+@dataclass(eq=False)
+class _Stretch:
+    """Nodes of a signed distance, monotone between them, all along a stretch of pieces near its set.
+
+    Attributes
+    ----------
+    t, f : s, and distances, in lists of arrays that follow each other
+    roots : where it passes 0 between nodes, one less than these; NaN where it does not
+    part : number of the motion's part at whose end the stretch may go on, 0 if it has ended before
+    """
+
+    t: list[Reals]
+    f: list[Reals]
+    roots: list[Reals]
+    part: int = 0
+
+    def events(self, kind: SingularityType, near: float, duration: float) -> list[SingularEvent]:
+        """Crossings, and the nearest passes."""
+        t, f, roots = (np.concatenate(each) for each in (self.t, self.f, self.roots))
+        met = [_stay(t, f, a, b, duration) for a, b in runs(np.abs(f) <= ON_SET)]
+        crossed = np.isfinite(roots)
+        met += [(root, root) for root in roots[crossed].tolist()]
+        spans = merged(sorted(met), SAME_EVENT * duration)
+        events = [SingularEvent(float(a), float(b), kind, True, 0.0) for a, b in spans]
+        events += [
+            SingularEvent(float(t[k]), float(t[k]), kind, False, float(abs(f[k])))
+            for k in _passes(np.abs(f), crossed, near)
+        ]
+        return events
+
+
+def _near_stretches(distance: Pieces, near: float, part: int, found: list[_Stretch]) -> None:
+    """Add the stretches of a part's signed distance; the first may go on with that of the part before."""
+    low, high = distance.range
+    for first, last in runs((low < near) & (high > -near)):
+        nodes = [distance.nodes(i) for i in range(first, last)]
+        if not (first == 0 and found and found[-1].part == part - 1):
+            found.append(_Stretch([nodes[0][0][:1]], [nodes[0][1][:1]], []))
+        stretch = found[-1]
+        t = np.concatenate([stretch.t[-1][-1:], *(times[1:] for times, _ in nodes)])
+        f = np.concatenate([stretch.f[-1][-1:], *(values[1:] for _, values in nodes)])
+        piece = np.repeat(np.arange(first, last), [len(times) - 1 for times, _ in nodes])
+        roots = np.full(len(piece), np.nan)
+        crossed = (f[:-1] * f[1:] < 0) & (np.minimum(np.abs(f[:-1]), np.abs(f[1:])) > ON_SET)
+        for k in np.flatnonzero(crossed).tolist():
+            roots[k] = distance.root(int(piece[k]), t[k], t[k + 1], 0.0)
+        stretch.t.append(t[1:])
+        stretch.f.append(f[1:])
+        stretch.roots.append(roots)
+        stretch.part = part if last == len(low) else 0
+
+
+def _distances(
+    robot: Robot, motion: PiecewiseMotion, kind: SingularityType, near: float
+) -> Iterator[tuple[int, Pieces]]:
+    """Signed distances from the sets of a type, with the half turns to each that the motion may come near."""
     forms = factor_forms(robot)
     if kind == "shoulder":
-        yield _shoulder(robot, motion)
+        yield 0, _shoulder(robot, motion)
         return
     joint, phase = (WRIST_JOINT, forms.wrist_phase) if kind == "wrist" else (ELBOW_JOINT, forms.elbow_phase)
     pieces = motion.of_joint(motion.angle, joint)
@@ -87,7 +222,7 @@ def _distances(robot: Robot, motion: PiecewiseMotion, kind: SingularityType, nea
     for turn in range(int(np.ceil(low / np.pi)), int(np.floor(high / np.pi)) + 1):
         series = pieces.series.copy()
         series[:, 0] += phase - turn * np.pi
-        yield Pieces(pieces.times, series)
+        yield turn, Pieces(pieces.times, series)
 
 
 def _shoulder(robot: Robot, motion: PiecewiseMotion) -> Pieces:
@@ -101,34 +236,13 @@ def _shoulder(robot: Robot, motion: PiecewiseMotion) -> Pieces:
     times = np.append(starts, motion.times[-1])
     x = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
     inner = -1 + 2 * (within[:, None] + (x + 1) / 2) / parts[piece][:, None]
-    q2, q3 = (np.stack([chebyshev.chebval(row, motion.angle[i, :, j]) for i, row in zip(piece, inner)]) for j in (1, 2))
+    q2, q3 = (
+        np.ascontiguousarray(chebyshev.chebval(inner.T, motion.angle[piece, :, j].T, tensor=False).T) for j in (1, 2)
+    )
     values = forms.shoulder_at(q2, q2 + forms.sense * q3)
     basis = np.cos(np.outer(np.arange(DEGREE + 1), np.arccos(x))) * 2 / (DEGREE + 1)
     basis[0] /= 2
     return Pieces(times, values @ basis.T)
-
-
-def _events(kind: SingularityType, distance: Pieces, near: float, duration: float) -> list[SingularEvent]:
-    """Events of one signed distance."""
-    low, high = distance.range
-    events: list[SingularEvent] = []
-    for first, last in runs((low < near) & (high > -near)):
-        nodes = [(i, *distance.nodes(i)) for i in range(first, last)]
-        t = np.concatenate([nodes[0][1][:1], *(part[1][1:] for part in nodes)])
-        f = np.concatenate([nodes[0][2][:1], *(part[2][1:] for part in nodes)])
-        piece = np.concatenate([np.full(len(part[1]) - 1, part[0]) for part in nodes])
-        met = [_stay(t, f, a, b, duration) for a, b in runs(np.abs(f) <= ON_SET)]
-        crossed = (f[:-1] * f[1:] < 0) & (np.minimum(np.abs(f[:-1]), np.abs(f[1:])) > ON_SET)
-        for k in np.flatnonzero(crossed).tolist():
-            root = distance.root(int(piece[k]), t[k], t[k + 1], 0.0)
-            met.append((root, root))
-        spans = merged(sorted(met), SAME_EVENT * duration)
-        events += [SingularEvent(float(a), float(b), kind, True, 0.0) for a, b in spans]
-        events += [
-            SingularEvent(float(t[k]), float(t[k]), kind, False, float(abs(f[k])))
-            for k in _passes(np.abs(f), crossed, near)
-        ]
-    return events
 
 
 def _stay(t: Reals, f: Reals, a: int, b: int, duration: float) -> tuple[float, float]:

@@ -20,7 +20,7 @@ from er3a.numerics.arrays import Flags, Reals
 from er3a.planning.arcs import Arc
 from er3a.planning.curves import GAUSS_POINTS, GAUSS_WEIGHTS, POWERS, Curve, joining, straight
 from er3a.planning.moves import Segment
-from er3a.planning.piecewise import PiecewiseMotion, polynomial_motion
+from er3a.planning.piecewise import MotionInParts, PiecewiseMotion, polynomial_motion
 from er3a.planning.profiles import FromRestToRest, Rates, TimeLaw, Times, Timetable, times_at
 from er3a.planning.rotation_curves import spin
 
@@ -178,8 +178,16 @@ class JointSequence:
 
     def polynomials(self) -> PiecewiseMotion:
         """The sequence as polynomials in time: of each piece of the curve within each piece of the law."""
+        return polynomial_motion(self.joints, *self._pieces())
+
+    def in_parts(self) -> MotionInParts:
+        """:meth:`polynomials`, made part by part: those of a long sequence would fill the memory."""
+        return MotionInParts(self.joints, *self._pieces())
+
+    def _pieces(self) -> tuple[Reals, int]:
+        """When the polynomials begin and end, s, and their greatest degree."""
         breaks = np.unique(np.concatenate([self.law.breaks, times_at(self.law, self.curve.edges[1:-1])]))
-        return polynomial_motion(self.joints, breaks, self.law.degree * (POWERS - 1))
+        return breaks, self.law.degree * (POWERS - 1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,8 +24,8 @@ from er3a.planning.intervals import (
     unreachable,
 )
 from er3a.planning.path_verdicts import PathVerdict
-from er3a.planning.piecewise import PiecewiseMotion
-from er3a.planning.polynomial_checks import limit_intervals, polynomial_events, rate_intervals
+from er3a.planning.piecewise import Polynomials
+from er3a.planning.polynomial_checks import GreatestRates, LimitCheck, RateCheck, SingularCheck
 from er3a.planning.singular_events import SingularEvent, singular_events
 from er3a.planning.timing import JointLimits
 from er3a.planning.tool_proof import Undecided, jerk_intervals
@@ -127,20 +127,29 @@ def _verdict(found: _Found, beyond: bool, jumps: bool, of_tool: bool) -> PathVer
     return next((verdict for verdict, there in faults.items() if there), "safe")
 
 
-def _joint_faults(
-    robot: Robot, motion: PiecewiseMotion, checks: Reals, near: NearSingular, limits: JointLimits
-) -> _Found:
-    if closed_form_missing(robot) is None:
-        events = polynomial_events(robot, motion, near)
+def _joint_faults(robot: Robot, motion: Polynomials, checks: Reals, near: NearSingular, limits: JointLimits) -> _Found:
+    """Faults found in one run through the motion, whose parts are made while they are wanted."""
+    singular = SingularCheck(robot, near) if closed_form_missing(robot) is None else None
+    within, greatest = LimitCheck(robot), GreatestRates(robot.joints)
+    rates = [RateCheck(limit) for limit in limits.rates]
+    for part in motion.parts():
+        within.add(part)
+        greatest.add(part)
+        for rate in rates:
+            rate.add(part)
+        if singular is not None:
+            singular.add(part)
+    if singular is not None:
+        events = singular.events()
     else:  # sampled: a move of the joints takes no harm from singular poses
         t = np.union1d(checks, motion.times)
         events = singular_events(robot, t, motion.joints(t), motion.joints, near)
     return _Found(
         events=events,
-        limits=limit_intervals(robot, motion),
-        fast=[part for limit in limits.rates for part in rate_intervals(motion, limit)],
+        limits=within.intervals(),
+        fast=[part for check in rates for part in check.intervals()],
         undecided=[],
-        greatest=(motion.greatest(motion.velocity), motion.greatest(motion.acceleration)),
+        greatest=greatest.rates,
     )
 
 

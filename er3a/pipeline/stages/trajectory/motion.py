@@ -20,7 +20,7 @@ from er3a.planning.class_follow import follow_by_class
 from er3a.planning.commands import CommandSource, PlanCommand
 from er3a.planning.followed import Followed
 from er3a.planning.moves import JointMove
-from er3a.planning.piecewise import PiecewiseMotion
+from er3a.planning.piecewise import Polynomials
 from er3a.planning.sequences import JointSequence
 from er3a.planning.timing import standing, straight
 from er3a.planning.tool_proof import ToolProof, Wanted, follow_and_prove
@@ -61,7 +61,7 @@ class Motion:
     tool: Callable[[Reals], Reals]
     way: Callable[[Reals], Reals]
     followed: Followed | None
-    polynomials: PiecewiseMotion | None
+    polynomials: Polynomials | None
     proof: ToolProof | None
     no_way: NoWayAround | None = None
 
@@ -199,6 +199,6 @@ def _joint_motion(
         tool=lambda t: forward(robot, move.joints(t)[0]),
         way=way,
         followed=None,
-        polynomials=move.polynomials(),
+        polynomials=move.in_parts() if isinstance(move, JointSequence) else move.polynomials(),
         proof=None,
     )
