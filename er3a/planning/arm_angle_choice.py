@@ -2,15 +2,18 @@
 
 The arm angle is a polynomial of degree 2 in the share of the way, told by its values at the start, half way and at the
 end. Margins of all eight solutions on a grid of ways and arm angles tell which of many such polynomials keeps most;
-that one is improved by smaller and smaller changes. Nothing is proven by this choice: what the joints then do is judged
-exactly, as for every other motion, and a path could in principle be followed by a law of another form.
+that one is improved by smaller and smaller changes. Where none of these keeps the limits, polynomials of higher degree
+are fitted to a way through the grid: the evenest of those that keep half of the margin that any can keep. Nothing is
+proven by this choice: what the joints then do is judged exactly, as for every other motion, and a path could in
+principle be followed by a law of another form.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.polynomial import chebyshev
 
 from er3a.geometry.angles import TURN
 from er3a.kinematics.by_class import class_rows
@@ -24,11 +27,13 @@ CHANGES = 25  # from the start to half way and to the end, up to half a turn
 LEAP = 0.6  # rad, m, that a joint may move between two of the poses; a turn more, or a singularity, would be more
 SLOPE_PRICE = 1e-3  # rad of margin that a change by 1 rad has to gain
 ROUNDS, FIRST_STEP = 7, np.radians(7.5)
+DEGREES, STEPS = (4, 6, 8, 10, 12), np.arange(-3, 4)  # of bent laws; steps of the grid between two poses
 
 
 @dataclass(frozen=True, eq=False)
 class ArmAngleLaw:
-    """An arm angle along a path: values (3,), rad, at the start, half way and at the end.
+    """An arm angle along a path: values (3,), rad, at the start, half way and at the end, or Chebyshev series (k,) of a
+    ``bent`` one over the way.
 
     ``slot`` is the solution that keeps the least distance ``margin`` (rad, m) from the joint limits.
     """
@@ -36,9 +41,12 @@ class ArmAngleLaw:
     values: Reals
     slot: int
     margin: float
+    bent: bool = False
 
     def at(self, share: Reals) -> Reals:
         """Arm angles (N, 1) at shares (N,) of the way."""
+        if self.bent:
+            return np.asarray(chebyshev.chebval(2 * share - 1, self.values), dtype=float)[:, None]
         return _quadratic(self.values, share)[:, None]
 
 
@@ -74,6 +82,62 @@ def roomiest_laws(robot: Robot, T: Reals, share: Reals, start: float | None, slo
         if np.isfinite(law.margin):
             found.append(law)
     return sorted(found, key=lambda law: -law.margin)
+
+
+def bent_laws(robot: Robot, T: Reals, share: Reals, start: float | None, slots: Integers) -> list[ArmAngleLaw]:
+    """Laws of higher degree that keep the limits at the poses, most margin first; the rest as :func:`roomiest_laws`."""
+    first = -np.pi if start is None else start
+    grid = first + TURN * np.arange(ANGLES) / ANGLES
+    margins, q = _rows(robot, np.repeat(T, ANGLES, axis=0), np.tile(grid, len(T)))
+    margins = margins.reshape(len(T), ANGLES, -1)
+    q = q.reshape(len(T), ANGLES, -1, robot.joints)
+    if start is not None:
+        margins[0, 1:] = -np.inf
+    found = []
+    for slot in slots.tolist():
+        way = _even_way(margins[:, :, slot], q[:, :, slot])
+        if way is None:
+            continue
+        angles = first + TURN / ANGLES * way
+        weights = np.where(np.arange(len(share)) == 0, 1e3, 1.0)  # the start may be given
+        for degree in DEGREES:
+            values = np.asarray(chebyshev.chebfit(2 * share - 1, angles, degree, w=weights), dtype=float)
+            values[0] += angles[0] - chebyshev.chebval(-1.0, values)
+            law = ArmAngleLaw(values, slot, 0.0, bent=True)
+            rows, joints = _rows(robot, T, law.at(share)[:, 0])
+            least = min(rows[:, slot].min(), _leap(joints[1:, slot], joints[:-1, slot]).min())
+            if least > 0:
+                found.append(replace(law, margin=float(least)))
+    return sorted(found, key=lambda law: -law.margin)
+
+
+def _even_way(margins: Reals, q: Reals) -> Reals | None:
+    """Steps of the grid (K,) from its first angle, not taken modulo a turn, along the way with the least sum of squared
+    steps that keeps half of the margin that one can keep; None if none keeps the limits.
+
+    Parameters
+    ----------
+    margins : (K, angles); q : (K, angles, n), rad, m
+    """
+    at = np.arange(margins.shape[1])
+    before = (at[None] - STEPS[:, None]) % len(at)  # (steps, angles)
+    free = [np.abs(q[k][None] - q[k - 1][before]).max(axis=-1) <= LEAP for k in range(1, len(q))]
+    widest = margins[0]
+    for k, passable in enumerate(free, 1):
+        widest = np.minimum(margins[k], np.where(passable, widest[before], -np.inf).max(axis=0))
+    if not widest.max() > 0:
+        return None
+    allowed = margins >= widest.max() / 2
+    price, taken = np.where(allowed[0], 0.0, np.inf), []
+    for k, passable in enumerate(free, 1):
+        prices = np.where(passable, price[before] + STEPS[:, None] ** 2, np.inf)
+        taken.append(prices.argmin(axis=0))
+        price = np.where(allowed[k], prices.min(axis=0), np.inf)
+    place, steps = int(price.argmin()), []
+    for choice in reversed(taken):
+        steps.append(int(STEPS[choice[place]]))
+        place = (place - steps[-1]) % len(at)
+    return place + np.concatenate([[0.0], np.cumsum(steps[::-1])])
 
 
 def _quadratic(values: Reals, share: Reals) -> Reals:

@@ -14,7 +14,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from itertools import pairwise
 from typing import Literal
 
@@ -26,7 +26,7 @@ from er3a.kinematics.classes.chain_solvers import Unsolved
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import kernel
-from er3a.planning.arm_angle_choice import ArmAngleLaw, roomiest_laws
+from er3a.planning.arm_angle_choice import ArmAngleLaw, bent_laws, roomiest_laws
 from er3a.planning.moves import ToolPath
 from er3a.planning.piecewise import PiecewiseMotion, chebyshev_times, motion_through
 from er3a.planning.polynomial_checks import limit_intervals
@@ -99,7 +99,7 @@ def _at_arm_angles(robot: Robot, path: ToolPath, q_start: Reals | None) -> Piece
         slots = np.flatnonzero((away <= ON_PATH).all(axis=1))
     if not slots.size:
         raise PathEndsError(robot.name, "out_of_reach", 0.0)
-    laws = roomiest_laws(robot, poses, share, begin, slots)
+    laws = roomiest_laws(robot, poses, share, begin, slots) or bent_laws(robot, poses, share, begin, slots)
     if not laws:
         raise PathEndsError(robot.name, "out_of_reach", _first_unreached(robot, path, times))
     near = np.zeros(robot.joints) if q_start is None else q_start
@@ -110,7 +110,12 @@ def _at_arm_angles(robot: Robot, path: ToolPath, q_start: Reals | None) -> Piece
 
         return nearest_equivalent(robot, rows_at(np.zeros(1))[0, law.slot], near), rows_at
 
-    return _first_within_limits(robot, path, [way(law) for law in laws])
+    def tried() -> Iterator[ArmAngleLaw]:
+        yield from laws
+        if not laws[0].bent:
+            yield from bent_laws(robot, poses, share, begin, slots)
+
+    return _first_within_limits(robot, path, map(way, tried()))
 
 
 def _first_unreached(robot: Robot, path: ToolPath, times: Reals) -> float:
@@ -131,7 +136,7 @@ def _first_unreached(robot: Robot, path: ToolPath, times: Reals) -> float:
 
 
 def _first_within_limits(
-    robot: Robot, path: ToolPath, ways: list[tuple[Reals, Callable[[Reals], Reals]]]
+    robot: Robot, path: ToolPath, ways: Iterable[tuple[Reals, Callable[[Reals], Reals]]]
 ) -> PiecewiseMotion:
     """The first of the motions from starts (n,), with what tells all rows (N, slots, n) at times, that keeps all
     limits; else the first that there is."""
