@@ -85,6 +85,7 @@ def test_check_for_programs(tmp_path):
     assert done.stderr.startswith(f"error: {bad}: ")
 
 
+@pytest.mark.long
 def test_notes_go_to_standard_error_and_results_to_standard_output(tmp_path):
     urdf = tmp_path / "arm.urdf"
     assert called("export-urdf", "er3_600", "--output", urdf).returncode == 0

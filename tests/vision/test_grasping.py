@@ -214,6 +214,7 @@ def test_rates_of_the_motion_keep_the_limits(round_the_post):
             assert np.linalg.norm(np.diff(tool, axis=0), axis=1).max() / t[1] <= SPEED * (1 + 1e-6)
 
 
+@pytest.mark.long
 def test_without_the_planner_the_object_says_so(monkeypatch):
     monkeypatch.setitem(sys.modules, "ompl", None)
     _, _, plan = chosen_from(BEHIND_THE_POST)
