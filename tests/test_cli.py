@@ -35,6 +35,7 @@ def test_check_names_every_bad_file_and_goes_on(tmp_path):
     assert "a robot, in order" in done.stdout
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("words", "told"),
     [
