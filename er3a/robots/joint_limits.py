@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from typing import Literal
 
 import numpy as np
@@ -118,7 +119,29 @@ def nearest_equivalent(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
     below, above = near + TURN * (low - 1), near + TURN * low
     outside = np.where(robot.lower - below < above - robot.upper, below, above)
     found, whole = np.where(low <= high, inside, outside), turned_alike(robot)
-    return found if whole.all() else np.where(whole, found, q)
+    found = found if whole.all() else np.where(whole, found, q)
+    return _within_sums(robot, found, q_ref) if robot.combined else found
+
+
+def _within_sums(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
+    """The same arm poses (..., n), those that leave a limit of a sum in the turns nearest to q_ref that keep all of
+    them, where there are such."""
+    summed = np.any([limit.factors for limit in robot.combined], axis=0) & turned_alike(robot)
+    spare = np.where(robot.continuous, 2, np.floor((robot.upper - robot.lower + 2 * LIMIT_TOLERANCE) / TURN))
+    spare = np.where(summed, spare, 0).astype(int)
+    left = ~within(robot, q) & np.isfinite(q).all(axis=-1)
+    if not spare.any() or not left.any():
+        return q
+    rows, near = q[left], np.broadcast_to(q_ref, q.shape)[left]
+    best, least = rows.copy(), np.full(len(rows), np.inf)
+    for turns in product(*(range(-most, most + 1) for most in spare.tolist())):
+        tried = rows + TURN * np.array(turns)
+        away = np.where(within(robot, tried), np.abs(tried - near).max(axis=-1), np.inf)
+        nearer = away < least
+        best[nearer], least[nearer] = tried[nearer], away[nearer]
+    found = q.copy()
+    found[left] = best
+    return found
 
 
 def but_for_turns(robot: Robot, q: Reals) -> Reals:

@@ -14,7 +14,7 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.numerical import solve
 from er3a.kinematics.rank_loss import dependent_axes, rank_losses, scaled_jacobian
-from er3a.robots.robot import Robot
+from er3a.robots.robot import CombinedLimit, Robot
 
 H = np.pi / 2
 UR5 = ([0, -0.425, -0.39225, 0, 0, 0], [H, 0, 0, H, -H, 0], [0.089159, 0, 0, 0.10915, 0.09465, 0.0823])
@@ -322,3 +322,13 @@ def test_a_whole_turn_that_moves_another_row_by_less_is_no_other_solution(row, f
         assert np.abs(found.q - q).max(axis=1).min() < 1e-6
         assert np.abs(forward(robot, found.q) - T).max() < 1e-9
         assert np.abs(forward(robot, batch.q[0][batch.solved[0]]) - T).max() < 1e-9
+
+
+def test_a_slot_has_the_turn_that_keeps_a_limit_of_a_sum():
+    """Joints 1 and 2 at 200 and 100 deg: in the turns nearest to 0 their sum is -60 deg, and may not be below 0."""
+    limit = CombinedLimit((1.0, 1.0, 0, 0), 0.0, 6.0)
+    robot = arm(SCARA, [0, 0, 1, 0], most=6.0, combined=(limit,))
+    own = np.array([np.radians(200), np.radians(100), 0.1, 0.2])
+    found = inverse_batch(robot, forward(robot, own)[None])
+    assert found.within_limits[0].any()
+    assert np.abs(found.q[0][found.within_limits[0]] - own).max(axis=1).min() < 1e-9
