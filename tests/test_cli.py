@@ -18,12 +18,14 @@ def er3a(*words: str | Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.long
 def test_check_says_what_a_file_is(tmp_path):
     done = er3a("check", "data/robots/er3_600.yaml", "data/manual_refs/er3_600/axes.csv")
     assert done.returncode == 0
     assert "data/robots/er3_600.yaml: a robot, in order" in done.stdout
 
 
+@pytest.mark.long
 def test_check_names_every_bad_file_and_goes_on(tmp_path):
     bad = tmp_path / "bad.yaml"
     bad.write_text("kind: robot\nname: bad\n")
@@ -33,6 +35,7 @@ def test_check_names_every_bad_file_and_goes_on(tmp_path):
     assert "a robot, in order" in done.stdout
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("words", "told"),
     [
@@ -73,6 +76,7 @@ def test_a_machine_at_its_limits_is_one_line_and_exit_code_2(monkeypatch, capsys
     assert error.count("\n") == 1
 
 
+@pytest.mark.long
 def test_urdf_out_and_in(tmp_path):
     urdf, robot = tmp_path / "arm.urdf", tmp_path / "arm.yaml"
     assert er3a("export-urdf", "er3_600", "--output", urdf).returncode == 0

@@ -156,6 +156,7 @@ def test_unknown_module_is_refused():
         code_digest("er3a.pipeline.stages.typo.compute")
 
 
+@pytest.mark.long
 def test_imports_are_read_as_a_parser_reads_them():
     for path in PACKAGE.rglob("*.py"):
         parsed: set[str] = set()

@@ -54,6 +54,7 @@ def test_all_commands_have_help():
     assert "\x1b" not in shown
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("typed", "offered"),
     [("er3a ch", "check"), ("er3a compute val", "validation"), ("er3a report inverse er3_", "er3_600")],
@@ -71,6 +72,7 @@ def test_completion_knows_commands_stages_and_robots(typed, offered):
     assert offered in done.stdout.split()
 
 
+@pytest.mark.long
 def test_check_for_programs(tmp_path):
     bad = tmp_path / "bad.yaml"
     bad.write_text("kind: robot\nname: bad\n")
@@ -85,6 +87,7 @@ def test_check_for_programs(tmp_path):
     assert done.stderr.startswith(f"error: {bad}: ")
 
 
+@pytest.mark.long
 def test_notes_go_to_standard_error_and_results_to_standard_output(tmp_path):
     urdf = tmp_path / "arm.urdf"
     assert called("export-urdf", "er3_600", "--output", urdf).returncode == 0
@@ -98,6 +101,7 @@ def test_notes_go_to_standard_error_and_results_to_standard_output(tmp_path):
     assert len(told["notes"]) == 1
 
 
+@pytest.mark.long
 def test_calibration_for_programs(tmp_path):
     robot = load_robot("er3_600")
     random = np.random.default_rng(1)

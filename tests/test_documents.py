@@ -78,6 +78,7 @@ def test_python_in_documents_runs(block, monkeypatch):
     exec(compile(block, "a document", "exec"), {})
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda page: page.stem)
 def test_notebooks_run_to_their_end(notebook, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)

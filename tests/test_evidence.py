@@ -37,6 +37,7 @@ def test_every_campaign_is_known_and_its_page_names_its_code():
     assert [each.campaign for each in evidence() if each.named is None] == []
 
 
+@pytest.mark.long
 def test_a_page_goes_stale_with_the_code_it_rests_on_and_with_no_other(copy):
     page = copy / "docs/evidence/kinematics.md"
     page.write_text(page.read_text(encoding="utf-8") + code_line("kinematics", copy) + "\n", encoding="utf-8")

@@ -25,6 +25,7 @@ _WORD, _NUMBER, _OPTIONAL, _JOINT = (
 )
 STATED_AS = "stated_as"
 STANDARD_DEVIATION = "standard_deviation"
+UNCERTAINTIES = ("uncertainty_mm", "uncertainty_deg", "uncertainty_deg_s")
 _SOURCE = {
     "source": _WORD,
     "grade": CsvColumn(str, choices=tuple(GRADES)),
@@ -67,7 +68,7 @@ class Format:
     @property
     def uncertainty(self) -> str:
         """The column that ``digits`` fill in."""
-        return next(name for name in self.columns if name.startswith("uncertainty"))
+        return next(name for name in UNCERTAINTIES if name in self.columns)
 
 
 def _axis_fields(fields: Fields) -> Fields:

@@ -10,7 +10,7 @@ from er3a.errors import InputError
 from er3a.files.csv_file import Written, read_csv
 from er3a.files.reference_documents import FILE as DOCUMENTS
 from er3a.files.reference_documents import check_origins, load_documents
-from er3a.files.reference_rows import FORMATS, Fields, Format, row_of
+from er3a.files.reference_rows import FORMATS, UNCERTAINTIES, Fields, Format, row_of
 from er3a.files.shipped import names, own_or_shipped
 from er3a.files.units import LEAST_SPAN_MM, WIDEST_IN_RADIANS
 from er3a.references.documents import Documents
@@ -120,7 +120,7 @@ def _fill_uncertainty(format: Format, fields: Fields) -> None:
 def _check_row(path: Path, format: Format, fields: Fields) -> None:
     faults = []
     for column, value in fields.items():
-        if column.startswith("uncertainty") and value <= 0:
+        if column in UNCERTAINTIES and value <= 0:
             remedy = "Half the last digit that the source prints, if it gives none"
             faults.append((column, f"{value:g} is not positive", remedy))
     if fields.get("joint", 1) not in range(1, 7):

@@ -72,6 +72,7 @@ def coal_distance(robot: Robot, q: np.ndarray, first: str, second: str) -> float
     return least
 
 
+@pytest.mark.long
 @OTHERS_LONG
 def test_every_pair_of_links_stands_in_it_with_what_dense_sampling_finds(robot, random):
     """No pair that is said never to meet does, and witnesses overlap; by Coal on frames worked out apart."""

@@ -167,6 +167,7 @@ def test_the_first_set_is_all_single_entries_that_explain_and_no_more(arm, entry
     assert entry in named
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "wrong",
     [

@@ -170,6 +170,7 @@ KINDS = ("sliding", "coupled", "sum")
 WALL = np.array([[0.0, 0, 1, 0], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "kind", ["floor", *(pytest.param(each, marks=pytest.mark.long) for each in ("wall", "pushed", "seven")), *KINDS]
 )

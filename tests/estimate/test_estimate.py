@@ -102,7 +102,7 @@ def test_wall_time_has_the_start_and_its_range_the_wander_of_the_speed(study, ca
 
 
 def test_a_job_s_own_timing_goes_before_those_of_others(study, calibration):
-    key = ("compute", "inverse", "er3a_c60")
+    key = ("compute", "validation", "er3a_c60")
     timed = replace(calibration, timings={key: Timing(7.0, 10.0), (*key[:2], "er3_600"): Timing(9.0, 10.0)})
     found = {job.key: estimate for job, estimate in estimates_of(study, timed).items()}
     assert found[key].seconds[1] == 7.0

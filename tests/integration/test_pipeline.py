@@ -247,7 +247,7 @@ def test_what_is_missing_damaged_or_of_an_older_version_is_made_again(small_stud
     run = replace(small_study, folder=shutil.copytree(small_study.folder, tmp_path / "project"))
     results, reports = run.folder / "results", run.folder / "reports"
     before = {path: path.read_bytes() for path in results.rglob("*") if path.is_file()}
-    old = results / "er3a_c60_article/trajectory/summary.json"
+    old = results / "er3a_c60/trajectory/summary.json"
     old.write_text(old.read_text().replace(f'"format_version": {FORMAT_VERSION}', '"format_version": 1', 1))
     (old.parent / "samples.parquet").unlink()
     write_checksums(old.parent)
@@ -274,7 +274,7 @@ def test_what_is_missing_damaged_or_of_an_older_version_is_made_again(small_stud
         assert line.endswith("; it is made again")
     jobs = set(re.findall(r"^Job \d+: (.+)$", done.stdout + done.stderr, flags=re.MULTILINE)) - {ALL_THERE}
     expected = {*views("er3_600", "validation"), "er3_600: report workspace", "write the index"}
-    for robot in ("er3a_c60_article", "er3_600"):
+    for robot in ("er3a_c60", "er3_600"):
         expected |= {f"{robot}: compute trajectory", *views(robot, "trajectory")}
     assert jobs == expected
     assert {path: path.read_bytes() for path in results.rglob("*") if path.is_file()} == before

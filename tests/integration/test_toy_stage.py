@@ -122,7 +122,8 @@ def with_toy(fresh_project, small_study):
     text = text.replace("\nSTAGES:", "from er3a.pipeline.stages.toy.entry import STAGE as TOY\n\nSTAGES:", 1)
     registry.write_text(text.replace("DYNAMICS, VISION)", "DYNAMICS, VISION, TOY)"), encoding="utf-8")
     study = project.folder / STUDY
-    study.write_text(study.read_text(encoding="utf-8") + "\ntoy: {factor: 3}\n", encoding="utf-8")
+    text = study.read_text(encoding="utf-8").replace("stages: [validation,", "stages: [toy, validation,")
+    study.write_text(text + "\ntoy: {factor: 3}\n", encoding="utf-8")
     for robot in project.robots:
         for stage in (small_study.folder / "results" / robot).iterdir():
             shutil.copytree(stage, project.folder / "results" / robot / stage.name)

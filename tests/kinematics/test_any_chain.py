@@ -137,6 +137,7 @@ def test_the_sums_limit_is_named():
     assert limit_margin(arm, q) == pytest.approx(0.5 - np.radians(40))
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore::er3a.errors.InputWarning")
 @settings(max_examples=60, deadline=None)
 @given(robot=chains())

@@ -88,6 +88,7 @@ def test_every_file_is_in_order(written, monkeypatch):
     check_study(Path("config/config.yaml"))
 
 
+@pytest.mark.long
 def test_its_targets_are_reached_and_its_paths_are_safe(written, monkeypatch):
     name, folder = written
     monkeypatch.chdir(folder)
@@ -99,6 +100,7 @@ def test_its_targets_are_reached_and_its_paths_are_safe(written, monkeypatch):
     assert {path.name: path.verdict for path in paths} == {"joint_move": "safe", "line": "safe", "arc": "safe"}
 
 
+@pytest.mark.long
 def test_the_readme_tells_what_stands_there_and_which_references_count(written):
     name, folder = written
     text = (folder / "README.md").read_text(encoding="utf-8")

@@ -45,6 +45,7 @@ def blocked(bodies, random):
             return q
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "title",
     [*(pytest.param(title, marks=pytest.mark.long) for title in ("default", "slot", "shelf")), "post between tables"],

@@ -137,6 +137,7 @@ def test_no_overlap_of_a_way_between_two_lines_goes_unnoticed(seed, turn):
     assert told.count(type(None)) >= 1
 
 
+@pytest.mark.long
 def test_joints_bend_within_a_triangle_of_poses_by_no_more_than_is_said():
     rng = np.random.default_rng(9)
     proven, tightest = 0, 0.0

@@ -130,6 +130,7 @@ def test_many_branches_on_inputs_end_within_the_limits(tmp_path):
     assert not execution.complete
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["a.src", "a.script", "a.pgm"])
 def test_all_of_10_000_lines_are_read_and_run(name, tmp_path):
     count = 10_000

@@ -28,6 +28,7 @@ MOVING = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["WELD1.src", "poly.script", "job2.pgm", "JOB1.XPL"])
 def test_every_line_that_moves_has_a_verdict_or_a_finding(name):
     program = read_program(STYLES / name)

@@ -366,6 +366,7 @@ def test_damaged_results_are_one_clear_error(tmp_path):
         run.show("report", "inverse", make_study(), "er3_600", tmp_path, tmp_path / "page.html")
 
 
+@pytest.mark.long
 def test_page_and_recording_show_every_target(folders, tmp_path):
     name = "er3a_c60_article"
     run.show("report", "inverse", make_study(), name, folders[name], tmp_path / "page.html")

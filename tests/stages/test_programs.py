@@ -32,11 +32,8 @@ def study() -> Study:
 
 
 @pytest.fixture(scope="module")
-def folders(study, tmp_path_factory) -> dict[str, Path]:
-    found = {name: tmp_path_factory.mktemp(name) for name in ROBOTS}
-    for name, folder in found.items():
-        run.compute("programs", study, name, folder)
-    return found
+def folders(study, small_results) -> dict[str, Path]:
+    return {name: small_results("programs", name, study) for name in ROBOTS}
 
 
 @pytest.fixture(scope="module")
@@ -56,6 +53,7 @@ def test_only_robots_with_programs_go_through_the_stage(study):
     assert "programs" not in with_entry(study, programs=None).stages("er3a_c60")
 
 
+@pytest.mark.long
 def test_examples_pass_and_faults_are_as_expected(stored):
     for found in stored.values():
         assert found.results.summary.verdict.status == "pass"
@@ -66,6 +64,7 @@ def test_examples_pass_and_faults_are_as_expected(stored):
     assert names <= {program.name for program in stored["er3a_c60"].results.summary.programs}
 
 
+@pytest.mark.long
 def test_the_motion_follows_the_listing(stored):
     results = stored["er3_600"].results
     rows = results.motion.take(results.motion.program == "palletise_krl")
@@ -92,6 +91,7 @@ def test_an_unexpected_fault_fails_the_stage(study, tmp_path):
     assert results.summary.verdict.finding == SomeProgramsFail(1, 0, (), ("far",), ())
 
 
+@pytest.mark.long
 def test_page_and_recording_are_written(study, stored, tmp_path):
     report(study, stored["er3a_c60"], tmp_path / "programs.html")
     record(study, stored["er3a_c60"], tmp_path / "programs.rrd")

@@ -59,13 +59,8 @@ def study() -> Study:
 
 
 @pytest.fixture(scope="module")
-def folders(study, tmp_path_factory) -> dict[str, Path]:
-    def computed(name: str) -> Path:
-        folder = tmp_path_factory.mktemp(name)
-        run.compute("trajectory", study, name, folder)
-        return folder
-
-    return OnDemand(computed)
+def folders(study, small_results) -> dict[str, Path]:
+    return OnDemand(lambda name: small_results("trajectory", name, study))
 
 
 @pytest.fixture(scope="module")
@@ -220,6 +215,7 @@ def test_motions_in_the_table_lead_along_the_stated_deviation(study, results, na
         assert part.t_s.max() == pytest.approx(motion.duration_s)
 
 
+@pytest.mark.long
 def test_assumed_speeds_are_marked_and_change_the_times(study, results, tmp_path):
     known, assumed = (results[name].summary.joint_limits for name in ("er3_600", "er3a_c60"))
     assert known.speed_assumed == (False,) * 6
@@ -304,11 +300,12 @@ def test_articles_moves_are_those_of_robotics_toolbox(study, results):
 
 @pytest.mark.long
 def test_equal_inputs_give_equal_bytes(study, folders, tmp_path):
-    run.compute("trajectory", study, "er3a_c60_article", tmp_path)
-    for file in sorted(folders["er3a_c60_article"].iterdir()):
+    run.compute("trajectory", study, "er3_600", tmp_path)
+    for file in sorted(folders["er3_600"].iterdir()):
         assert (tmp_path / file.name).read_bytes() == file.read_bytes()
 
 
+@pytest.mark.long
 def test_page_and_recording_are_written(study, stored, tmp_path):
     found = stored["er3_600"]
     report(study, found, tmp_path / "trajectory.html")
@@ -324,7 +321,7 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
 @pytest.mark.parametrize(
     ("status", "told"),
     [
-        ("fail", "Never use this table"),
+        pytest.param("fail", "Never use this table", marks=pytest.mark.long),
         pytest.param("caution", "Validation leaves part", marks=pytest.mark.long),
         pytest.param("pass", None, marks=pytest.mark.long),
     ],

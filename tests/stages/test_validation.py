@@ -77,14 +77,8 @@ def study() -> Study:
 
 
 @pytest.fixture(scope="module")
-def folders(study, tmp_path_factory) -> dict[str, Path]:
-    folder = tmp_path_factory.mktemp("results")
-
-    def computed(name: str) -> Path:
-        run.compute("validation", study, name, folder / name)
-        return folder / name
-
-    return OnDemand(computed)
+def folders(study, small_results) -> dict[str, Path]:
+    return OnDemand(lambda name: small_results("validation", name, study))
 
 
 @pytest.fixture(scope="module")
@@ -142,6 +136,7 @@ def test_verdicts_on_the_three_robots(summaries, name, status, kind):
     assert isinstance(verdict.finding, kind)
 
 
+@pytest.mark.long
 def test_a_table_that_meets_all_but_that_nothing_settles_is_a_caution(summaries):
     found = summaries["er3_600"].verdict.finding
     assert isinstance(found, LeftOpen)
@@ -269,6 +264,7 @@ def test_speeds_that_the_robot_file_lacks_are_not_judged(study, tmp_path):
     assert JointSpeed(4) in with_status(results, "no_reference")
 
 
+@pytest.mark.long
 def test_an_arm_without_closed_form_is_still_checked(study, tmp_path):
     edited = edited_robot(study, tmp_path, lambda c: c["dh"]["rows"][4].update(a_mm=20))
     stored = computed(edited, tmp_path / "out")
@@ -471,6 +467,7 @@ def test_diagnosis_of_the_right_tables_has_nothing_to_explain(summaries, name):
     assert found.hypotheses == ()
 
 
+@pytest.mark.long
 def test_diagnosis_in_the_summary_is_that_of_the_public_function(summaries):
     robot = load_robot("er3a_c60_article")
     for found in summaries["er3a_c60_article"].diagnoses:
@@ -479,6 +476,7 @@ def test_diagnosis_in_the_summary_is_that_of_the_public_function(summaries):
         assert [each.residual_after for each in found.hypotheses] == [each.residual_after for each in ranked]
 
 
+@pytest.mark.long
 def test_a_named_fault_is_in_the_verdict_and_on_the_page(study, tmp_path):
     wrong = edited_robot(study, tmp_path, lambda c: c["zero"]["rows"][1].update(offset_deg=0))
     stored = computed(wrong, tmp_path / "out")
@@ -541,6 +539,7 @@ def test_a_circle_is_found_in_noisy_points(random):
     assert 0.005 < roundness < 0.1
 
 
+@pytest.mark.long
 def test_poses_outside_the_limits_and_missing_axes_are_said(study, tmp_path):
     def edit(content):
         content["references"] = ["er3a_c60"]
@@ -561,6 +560,7 @@ def test_axes_that_a_set_lacks_are_no_reference(stored):
     assert AxisPosition(1, None) not in silent
 
 
+@pytest.mark.long
 def test_the_readme_tells_which_table_can_be_trusted_as_validation_does(summaries):
     told = answer("Can the table be trusted")
     article, real = (

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from PIL import Image
@@ -15,23 +13,25 @@ from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.vision.model import VisionResults
 from er3a.pipeline.study import load_study
 from testing.hand_eye_sets import pose
+from testing.on_demand import OnDemand
 from tests.vision.test_boards import CHARUCO, board_places, rendered
 from tests.vision.test_hand_eye_file import HEAD, columns, write
 
 STAGE = STAGES["vision"]
+ARTICLE = "er3a_c60_article"
 
 
 @pytest.fixture(scope="module")
 def study():
-    return load_study(Path(__file__).resolve().parents[2] / "config" / "small.yaml")
+    """The small study, in which the article's table goes through this stage, too."""
+    small = load_study(ROOT / "config/small.yaml")
+    entry = small.entry(ARTICLE).model_copy(update={"vision": small.entry("er3a_c60").vision, "stages": None})
+    return small.model_copy(update={"robots": small.robots | {ARTICLE: entry}})
 
 
 @pytest.fixture(scope="module")
-def folders(study, tmp_path_factory):
-    found = {name: tmp_path_factory.mktemp(name) for name in ("er3a_c60", "er3a_c60_article", "er3_600")}
-    for name, folder in found.items():
-        run.compute("vision", study, name, folder)
-    return found
+def folders(study, small_results):
+    return OnDemand(lambda name: small_results("vision", name, study))
 
 
 @pytest.mark.long
@@ -51,7 +51,7 @@ def test_objects_are_grasped_as_expected_and_the_turned_board_is_named(folders):
 @pytest.mark.long
 def test_a_wrong_table_shows_in_the_calibration(folders):
     """The same recording, its joint angles turned into poses by the article's table."""
-    summary = read_results(folders["er3a_c60_article"], VisionResults).results.summary
+    summary = read_results(folders[ARTICLE], VisionResults).results.summary
     assert summary.verdict.status == "fail"
     assert "no_majority" in {each.code for each in summary.verdict.finding.warnings}
     assert summary.objects == ()
@@ -90,7 +90,7 @@ def test_a_robot_without_a_camera_says_so(study, tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["er3a_c60", "er3a_c60_article", "er3_600"])
+@pytest.mark.parametrize("name", ["er3a_c60", ARTICLE, "er3_600"])
 def test_page_and_recording_are_written(study, folders, tmp_path, name):
     for verb in ("record", "report"):
         run.show(verb, "vision", study, name, folders[name], tmp_path / verb)

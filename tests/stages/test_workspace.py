@@ -267,6 +267,7 @@ def test_blocks_twice_or_missing_are_named(parts):
         sample(study, "er3_600", 3, 2, second)
 
 
+@pytest.mark.long
 def test_summary_is_plain_finite_json(tmp_path):
     run.compute("workspace", make_study(samples=5000), "er3_600", tmp_path)
     text = (tmp_path / "summary.json").read_text(encoding="utf-8")

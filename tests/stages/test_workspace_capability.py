@@ -95,6 +95,7 @@ def test_the_clearance_of_a_place_is_that_of_the_nearest_arm_on_its_lattice(done
         assert 1000 * Bodies(robot, None).least(q)[0].min() == pytest.approx(place.clearance_mm, abs=1e-6)
 
 
+@pytest.mark.long
 def test_clear_poses_are_some_of_those_reached_and_fewer_among_obstacles(done):
     robot = load_robot("er3_600")
     among = tool_capability(robot, settings(), 0.08, load_scene(ROOT / "data/scenes/table_and_post.yaml"))
@@ -134,6 +135,7 @@ def test_poses_are_tried_where_the_cells_are():
     assert 0 < found.clear.sum() <= found.reached.sum() <= 80
 
 
+@pytest.mark.long
 def test_the_same_input_gives_the_same_numbers(done):
     again = tool_capability(load_robot("er3_600"), settings(), 0.08)
     assert (again.capability, again.placement) == (done.capability, done.placement)

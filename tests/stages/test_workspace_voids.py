@@ -85,6 +85,7 @@ def test_two_link_arm_leaves_the_ball_it_can_not_fold_into():
     assert wholly_inside < len(void.cells) * grid.cell_volume < 4 / 3 * np.pi * (0.2 + diagonal) ** 3
 
 
+@pytest.mark.long
 def test_a_void_of_40_mm_that_a_cloud_can_not_show_is_proven():
     """Links of 0.6 and 0.4 m, and a tool of 0.16 m that turns every way: the ball of radius 40 mm can't be reached."""
     robot = two_link_arm([-180.0] * 6, [180.0] * 6).replace(d=[0.3, 0, 0, 0.4, 0, 0.16])

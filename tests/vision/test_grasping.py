@@ -106,6 +106,7 @@ def test_repeatability_after_iso_9283_comes_back_from_its_deviation():
     assert distance.mean() + 3 * distance.std() == pytest.approx(1e-4, rel=2e-3)
 
 
+@pytest.mark.long
 def test_table_errors_are_those_of_tables_with_drawn_entries():
     robot, q = load_robot("er3a_c60"), np.radians([10, -30, -20, 5, -30, 10])
     accuracy = ArmAccuracy(length_deviation=1e-4, angle_deviation=2e-4)
@@ -138,6 +139,7 @@ def test_the_next_view_sees_the_board_is_free_and_keeps_its_promise(cell):
     assert view.error_after < view.error_before
 
 
+@pytest.mark.long
 def test_grasps_are_what_the_arm_can_carry_out(cell):
     made, robot, found = cell
     file, task, picture = task_of(made, robot)
@@ -214,6 +216,7 @@ def test_rates_of_the_motion_keep_the_limits(round_the_post):
             assert np.linalg.norm(np.diff(tool, axis=0), axis=1).max() / t[1] <= SPEED * (1 + 1e-6)
 
 
+@pytest.mark.long
 def test_without_the_planner_the_object_says_so(monkeypatch):
     monkeypatch.setitem(sys.modules, "ompl", None)
     _, _, plan = chosen_from(BEHIND_THE_POST)

@@ -189,6 +189,7 @@ def test_repeated_poses_are_named():
     assert (found.sample, found.first) == ("9", "4")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("setup", SETUPS)
 def test_directions_say_what_is_excluded_and_what_can_not_be_told(setup, seed):
@@ -221,6 +222,7 @@ def test_a_board_of_another_size_is_named_with_the_factor():
     assert scale[0].factor == pytest.approx(1.05, abs=scale[0].half_width)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stream", ["flange", "target", "both"])
 @pytest.mark.parametrize("how", ["quaternion", "kuka", "static_xyz", "transposed"])
 def test_orientations_read_by_another_convention_are_named(stream, how):

@@ -23,6 +23,7 @@ def corrected(samples) -> TableCorrections:
     return found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stated", [True, False])
 @pytest.mark.parametrize("setup", ["eye_in_hand", "eye_to_hand"])
 def test_wrong_entries_are_found_within_their_intervals(setup, stated):
@@ -57,6 +58,7 @@ def test_what_can_not_be_told_apart_is_named(setup, base, flange):
     assert held["d2"].parallel_joints == (2, 3)
 
 
+@pytest.mark.long
 def test_held_entries_change_no_prediction():
     """An error of a held entry is taken up in full by what it can't be told from: the residuals stay as they were."""
     alike = corrected(a_set("eye_to_hand", 3, {"d1": 2e-3, "offset6": np.radians(0.3)}))
@@ -66,6 +68,7 @@ def test_held_entries_change_no_prediction():
         assert a.correction == pytest.approx(b.correction, abs=1e-4)
 
 
+@pytest.mark.long
 def test_corrections_are_those_of_scipys_least_squares():
     """An oracle with forward kinematics of plain matrices, for the entries that were estimated."""
     samples = a_set("eye_in_hand", 4, WRONG)
