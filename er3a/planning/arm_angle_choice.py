@@ -53,7 +53,7 @@ def roomiest_laws(
     start : the arm angle at the start, rad, and the joints (n,), rad; None leaves them open, whole turns too
     slots : (s,), those that may be taken
     """
-    search = _Search(robot, T, share, slots, None if start is None else start[1])
+    search = _LawSearch(robot, T, share, slots, None if start is None else start[1])
     begun = -np.pi + TURN * np.arange(BEGUN_AT) / BEGUN_AT if start is None else np.array([start[0]])
     changes = np.linspace(-np.pi, np.pi, FEW_CHANGES if start is None else CHANGES)
     first, middle, last = (part.ravel() for part in np.meshgrid(begun, changes, changes, indexing="ij"))
@@ -69,7 +69,7 @@ def roomiest_laws(
 
 
 @dataclass(frozen=True, eq=False)
-class _Search:
+class _LawSearch:
     """Margins of laws at poses T (K, 4, 4) and shares (K,), by slots (s,); ``start`` (n,), rad, holds the joints' turns
     at the start, None leaves them open."""
 
@@ -153,7 +153,7 @@ def _ranges(q: Reals, place: Integers, near: Reals, slides: Flags, lines: Reals)
     return low, high, most
 
 
-def _improved(search: _Search, s: int, law: ArmAngleLaw) -> ArmAngleLaw:
+def _improved(search: _LawSearch, s: int, law: ArmAngleLaw) -> ArmAngleLaw:
     """The law of the slot of number ``s`` after changes of its values, one at a time, by steps that are halved."""
     step = FIRST_STEP
     for _ in range(ROUNDS):
