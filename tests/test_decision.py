@@ -24,6 +24,13 @@ def test_the_table_decides_first_then_what_fails(table, failed, start):
     assert decision(table, failed).startswith(start)
 
 
+def test_a_table_of_which_nothing_is_settled_is_told_from_one_that_is_nearly():
+    assert decision("caution", [], geometry=(0, 17)).startswith("Not proven")
+    assert decision("caution", [], geometry=(16, 17)).startswith("Use it with care")
+    assert "16 of 17" in decision("caution", [], geometry=(16, 17))
+    assert decision("pass", [], geometry=(0, 17)).startswith("Use it: ")
+
+
 @pytest.mark.parametrize(("end", "gap"), [(".", " "), (";", " "), ("。", ""), ("；", "")])
 def test_a_long_verdict_is_cut_at_the_end_of_a_clause_and_loses_nothing(end, gap):
     clauses = [f"clause {k}, 1.5 mm off, which has no end of its own" + end for k in range(20)]

@@ -14,7 +14,14 @@ from er3a.kinematics.inverse import inverse
 from er3a.robots.robot import Robot
 from er3a.workspace.directions import cone_directions, from_polar, poses, roll_of, tool_rotations
 from er3a.workspace.placement import MIXED, NO, Places, Task, fitting_places, lattice_spacing, narrowed, survey
-from er3a.workspace.placement_proof import PROVEN, REFUTED, choose_places, prove_place, proven_bricks
+from er3a.workspace.placement_proof import (
+    PROVEN,
+    REFUTED,
+    choose_places,
+    find_places,
+    prove_place,
+    proven_bricks,
+)
 from testing.arms import placement
 from tests.workspace.shell_arm import NARROW, TOOL_ASIDE, shell_arm
 
@@ -89,6 +96,30 @@ def test_proven_places_serve_random_points_and_directions(name, random):
         size = TRAY.box[[1, 0, 2]] if places.turned[row] else TRAY.box
         T = random_service(TRAY, places.centre[row], size, roll, random, 100)
         assert inverse_batch(tight, T[:, 0]).within_limits.any(axis=1).all()
+
+
+@pytest.mark.long
+def test_a_box_that_is_moved_as_far_as_is_said_is_served_on_the_way_and_no_step_farther(random):
+    robot, roll = load_robot("er3_600"), roll_of(load_robot("er3_600"), 2)
+    found = find_places(robot, TRAY, roll, 0.05, 4, 200_000)
+    held, moved = narrowed(robot, TRAY.margin), 0
+    for row in found.chosen.row:
+        place = found.places.rows(np.array([row]))
+        size = TRAY.box[[1, 0, 2]] if place.turned[0] else TRAY.box
+        alike = (found.places.turned == place.turned[0]) & (found.places.proven | ~place.proven[0])
+        centres = {tuple(np.round(each, 6)) for each in found.places.centre[alike]}
+        for (axis, way), room in np.ndenumerate(found.room(row)):
+            beyond = place.centre[0].copy()
+            beyond[axis] += (2 * way - 1) * (room + found.field.spacing[axis])
+            assert tuple(np.round(beyond, 6)) not in centres
+            if room and place.proven[0]:
+                centre = place.centre[0].copy()
+                centre[axis] += (2 * way - 1) * random.uniform(0, room)
+                tried = random_service(TRAY, centre, size, roll, random, 100)
+                served = inverse_batch(held, tried.reshape(-1, 4, 4)).within_limits.any(axis=1)
+                assert served.reshape(len(tried), -1).any(axis=1).all()
+                moved += 1
+    assert moved >= 4
 
 
 def test_the_criterion_is_the_least_over_box_and_cone(random):

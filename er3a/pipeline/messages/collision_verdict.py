@@ -46,8 +46,10 @@ def _(found: FreeSpace) -> str:
     free = sentence(
         found.code,
         "{percent:.1f} % of the joint space is collision-free. Of {places} cells reached, {clear} are proven "
-        "reachable without collision, {joined} of these by a proven motion from home.",
+        "reachable without collision, {joined} of these by a proven motion from home; at most {lost:.1f} % of the "
+        "cells are lost to collisions.",
         percent=100 * found.free_ratio,
+        lost=100 * (1 - found.clear / found.places),
         places=found.places,
         clear=found.clear,
         joined=found.joined,

@@ -13,7 +13,7 @@ FIGURES = {
     "instructions_passed": N_("Motion instructions that pass"),
     "instructions_caution": N_("Motion instructions with caution"),
     "instructions_failed": N_("Motion instructions that fail"),
-    "least_clearance": N_("Least clearance"),
+    "least_clearance": N_("Least clearance of programs meant to pass"),
 }
 LANGUAGES: dict[Language, str] = {
     "krl": "KRL",

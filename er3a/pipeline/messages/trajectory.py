@@ -25,7 +25,7 @@ FIGURES = {
     "singular_poses": N_("Singular poses met"),
     "near_passes": N_("Near-singular passes"),
     "colliding": N_("Paths with a collision"),
-    "max_joint_speed": N_("Speed of the joint nearest to its limit"),
+    "max_joint_speed": N_("Highest joint speed, against its limit"),
     "assumed_speed_ratio": N_("Ratio to that joint's assumed limit"),
     "speed_ratio": N_("Ratio to that joint's limit"),
     "velocity_check": N_("Velocity check, greatest error"),
@@ -157,7 +157,11 @@ def _only_too_fast(path: PathSummary) -> bool:
 
 def _speeds(bounded: bool) -> str:
     if bounded:
-        return sentence("path.speeds", "joint speeds stay finite")
+        return sentence(
+            "path.speeds",
+            "joint speeds stay finite on this configuration, but two configurations meet there: a controller may stop "
+            "or change to the other",
+        )
     return sentence("path.speeds", "no finite joint speed follows the path there")
 
 

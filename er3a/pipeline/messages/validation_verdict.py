@@ -84,6 +84,15 @@ def _of_claims(found: JudgedTable) -> list[str]:
 def _(found: LeftOpen) -> str:
     parts = [say(part) for part in found.parts if part.status != "settled"]
     told = [_what_speaks(found.counts), sentence(found.code, "{parts}.", parts=joined(parts)) if parts else ""]
+    if found.tolerance and any(part.settled for part in found.parts):
+        told.append(
+            sentence(
+                found.code,
+                "Settled: what is left open moves the tool by less than {mm} mm and {deg} deg.",
+                mm=as_text(found.tolerance.mm, "g"),
+                deg=as_text(found.tolerance.deg, "g"),
+            )
+        )
     told += _how_far_off(found)
     if found.next_measurement:
         told.append(
@@ -116,7 +125,15 @@ def _what_speaks(counts: CheckCounts) -> str:
         text = N_("No independent document covers this table ({checks}).")
     else:
         text = N_("Nothing independent contradicts the table ({checks}), but:")
-    return sentence("validation.left_open", text, checks=counted_checks(counts))
+    checks = counted_checks(counts)
+    if counts.independent.conflicting:
+        undecided = sentence(
+            "validation.left_open",
+            "{count} undecided, as documents contradict each other",
+            count=counts.independent.conflicting,
+        )
+        checks = joined([checks, undecided], ", ")
+    return sentence("validation.left_open", text, checks=checks)
 
 
 @say.register

@@ -13,6 +13,7 @@ from er3a.pipeline.messages.decision import decision
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.results import Provenance, read_stage, result_records
 from er3a.pipeline.stages.registry import STAGES, all_messages
+from er3a.pipeline.stages.validation.validation_findings import LeftOpen
 from er3a.pipeline.study import Study
 from er3a.pipeline.verdicts import read_verdicts
 from er3a.pipeline.viewing import page
@@ -71,8 +72,15 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "heads": [(head, *page.led(head.text)) for head in shown],
         "counts": [(status, sum(head.status == status for head in shown)) for status in FIRST],
         "expected": expected,
-        "decision": decision(table, failed, _instead(study, name, results.parent)),
+        "decision": decision(table, failed, _instead(study, name, results.parent), _geometry(heads.get("validation"))),
     }
+
+
+def _geometry(head: page.Head | None) -> tuple[int, int] | None:
+    """How many of how many entries of a table's geometry are settled, where only part of it is."""
+    if head is None or not isinstance(head.finding, LeftOpen):
+        return None
+    return next(((part.settled, part.entries) for part in head.finding.parts if part.part == "geometry"), None)
 
 
 def _instead(study: Study, name: str, results: Path) -> str | None:

@@ -118,8 +118,8 @@ class ShownFigure:
 class Head:
     """What frames a stage's page: its verdict as a sentence, key figures, and where the numbers come from.
 
-    ``caveats`` by the stage that it rests on: what to know first. ``demonstrations``: how many targets, paths, programs
-    or objects fail as they are meant to.
+    ``finding`` is what the sentence says; ``caveats`` by the stage that it rests on: what to know first;
+    ``demonstrations``: how many targets, paths, programs or objects fail as they are meant to.
     """
 
     robot: str
@@ -130,6 +130,7 @@ class Head:
     provenance: Provenance
     caveats: Mapping[str, Caveat]
     demonstrations: int
+    finding: Any
 
 
 def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
@@ -153,7 +154,8 @@ def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
     )
     caveats = {other: first for other, status in stored.rests_on.items() if (first := caveat(status))}
     meant = len(getattr(verdict.finding, "demonstrations", ()))
-    return Head(stored.robot, stage, verdict.status, say(verdict.finding), shown, stored.provenance, caveats, meant)
+    text = say(verdict.finding)
+    return Head(stored.robot, stage, verdict.status, text, shown, stored.provenance, caveats, meant, verdict.finding)
 
 
 def render(

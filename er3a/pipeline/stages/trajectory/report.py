@@ -81,10 +81,11 @@ class PathDrawing:
 
 @dataclass(frozen=True)
 class ProgramLink:
-    """A program of a path, to save: its file's name, and the data address of its text."""
+    """A program of a path, to save: its file's name, the data address of its text, and whether there is none."""
 
     file: str
     uri: str
+    empty: bool
 
 
 @dataclass(frozen=True)
@@ -158,7 +159,7 @@ def _events(path: PathSummary) -> list[PlayedEvent]:
 
 def _programs(rows: ProgramFiles) -> list[ProgramLink]:
     texts = zip(rows.file.tolist(), rows.text.tolist())
-    return [ProgramLink(file, text_address(text)) for file, text in texts]
+    return [ProgramLink(file, text_address(text), not text) for file, text in texts]
 
 
 def _section(path: PathSummary, rows: PathChecks, figure: PathDrawing, programs: list[ProgramLink]) -> PathSection:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from er3a.diagnosis.conclusions import MainFault, MostLikelyFault, TooSmallToTell
+from er3a.identifiability.entry_evidence import Tolerance
 from er3a.identifiability.proposals import Proposal
 from er3a.identifiability.reactions import CheckCounts
 from er3a.identifiability.statements import InconsistentWithOwnText, NotTheRobotDescribed
@@ -213,9 +214,11 @@ class LeftOpen(JudgedTable):
     at_least : whether that is what was found, and more may be left open
     unbounded : how many entries that move the tool only their own document speaks of: for these there is no bound
     next_measurement : the one that settles the entry for which it could be off farthest
+    tolerance : how far what counts as settled may leave the tool off
     """
 
     parts: tuple[PartFound, ...]
+    tolerance: Tolerance | None
     off: ToolOff
     at_least: bool
     unbounded: int

@@ -107,6 +107,7 @@ def verdict_of(
         left = LeftOpen(
             **common,
             parts=parts,
+            tolerance=evidence.tolerance if evidence else None,
             off=off,
             at_least=any(each.at_least for each in entries),
             unbounded=statuses.count("consistent"),

@@ -350,18 +350,50 @@ def _try_text(robot: Robot, task: TaskSummary) -> str:
 
 def _best_text(placement: PlacementSummary) -> str:
     """Where to put the box: the first place that is proven, else the first; what there is none of."""
-    box = " × ".join(fixed(value, 0) for value in placement.task.box_mm)
     if not placement.places:
-        return tr("No position for a box of {box} mm was found.", box=box)
+        return tr(
+            "No position for a box of {box} mm was found.",
+            box=" × ".join(fixed(value, 0) for value in placement.task.box_mm),
+        )
     ranked = list(enumerate(placement.places, start=1))
     row, place = next((each for each in ranked if each[1].status == "proven"), ranked[0])
-    return tr(
-        "A box of {box} mm: put its centre at ({centre}) mm ({status}; number {row} of the best positions).",
-        box=box,
-        centre=", ".join(fixed(1000 * value, 0) for value in place.centre_m),
-        status=word("workspace.status", STATUS, place.status),
-        row=row,
-    )
+    told = [
+        tr(
+            "Put the box, {along_x} mm along x and {along_y} mm along y, with its centre at ({centre}) mm: number "
+            "{row} of the best positions.",
+            along_x=fixed(1000 * place.size_m[0], 0),
+            along_y=fixed(1000 * place.size_m[1], 0),
+            centre=", ".join(fixed(1000 * value, 0) for value in place.centre_m),
+            row=row,
+        ),
+        tr("The whole task is proven to be reached there; collisions are judged at samples.")
+        if place.status == "proven"
+        else tr("The whole task is reached there, judged at samples."),
+        tr("It can be moved by {room} mm, one direction at a time.", room=_room(place)) if _movable(place) else "",
+        tr("Joints come within {margin} deg of their limits.", margin=fixed(place.limit_margin_deg, 1))
+        if place.limit_margin_deg is not None
+        else "",
+    ]
+    return joined(told, " ")
+
+
+def _movable(place: PlaceSummary) -> bool:
+    return any((*place.room_down_m, *place.room_up_m))
+
+
+def _room(place: PlaceSummary) -> str:
+    """How far the box can be moved, such as ``x ±25, y -50 to 0``, mm."""
+    if not _movable(place):
+        return fixed(0, 0)
+    parts = []
+    for axis, down, up in zip("xyz", place.room_down_m, place.room_up_m):
+        if down == up:
+            parts.append(f"{axis} {'±' if up else ''}{fixed(1000 * up, 0)}")
+        elif down or up:
+            parts.append(
+                tr("{axis} {least} to {most}", axis=axis, least=fixed(-1000 * down, 0), most=fixed(1000 * up, 0))
+            )
+    return ", ".join(parts)
 
 
 def _numbers(joints: tuple[int, ...]) -> str:
@@ -407,4 +439,5 @@ def _place_row(row: int, place: PlaceSummary, capability: CapabilitySummary) -> 
         fixed(100 * place.manipulability_ratio, 1),
         fixed(place.limit_margin_deg, 1),
         fixed(place.clearance_mm, 0),
+        _room(place),
     ]

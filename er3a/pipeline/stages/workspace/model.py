@@ -262,6 +262,7 @@ class PlaceSummary:
     limit_margin_deg : least distance of joints from their limits, None without one branch, or without joints of less
         than a full turn
     clearance_mm : least distance of the arm from scene and itself over the samples, None if nothing can meet
+    room_down_m, room_up_m : how far the box can be moved towards -x, -y, -z and +x, +y, +z, one at a time, as good
     """
 
     centre_m: Triple
@@ -273,6 +274,8 @@ class PlaceSummary:
     manipulability_m3: float
     manipulability_ratio: float
     limit_margin_deg: float | None
+    room_down_m: Triple
+    room_up_m: Triple
     clearance_mm: float | None = None
 
 

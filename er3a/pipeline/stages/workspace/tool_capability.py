@@ -207,6 +207,7 @@ def _listed(robot: Robot, task: Task, placement: BoxPlacement, best: float) -> l
     places, chosen = placement.places, placement.chosen
     named = slot_labels(robot) if tried_values(robot) == 1 else ()
     labels = named or (None,) * slot_count(robot)
+    rooms = [placement.room(row) for row in chosen.row]
     return [
         PlaceSummary(
             centre_m=triple(places.centre[row]),
@@ -220,8 +221,12 @@ def _listed(robot: Robot, task: Task, placement: BoxPlacement, best: float) -> l
             limit_margin_deg=float(np.degrees(places.limit_margin[row] + task.margin))
             if slot != MIXED and np.isfinite(places.limit_margin[row])
             else None,
+            room_down_m=triple(room[:, 0]),
+            room_up_m=triple(room[:, 1]),
         )
-        for row, slot, proven, branch_proven in zip(chosen.row, chosen.slot, chosen.proven, chosen.branch_proven)
+        for row, slot, proven, branch_proven, room in zip(
+            chosen.row, chosen.slot, chosen.proven, chosen.branch_proven, rooms
+        )
     ]
 
 
