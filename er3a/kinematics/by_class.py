@@ -26,7 +26,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
 from er3a.numerics.threads import parallel_for
 from er3a.robots.derived import derived
-from er3a.robots.joint_limits import LIMIT_TOLERANCE, nearest_equivalent, within
+from er3a.robots.joint_limits import LIMIT_TOLERANCE, WHOLE, nearest_equivalent, turn_of, turned_alike, within
 from er3a.robots.robot import Robot
 
 SAME_ROW = 1e-6  # rad or parts of the arm's size
@@ -85,10 +85,18 @@ def arm_solver(robot: Robot) -> ArmSolver:
     sliding = np.ascontiguousarray(robot.sliding)
     uncouple = None
     if robot.coupling is not None:
-        if robot.rows != robot.joints or abs(np.linalg.det(robot.coupling)) < 1e-9:
+        square = robot.rows == robot.joints and abs(np.linalg.det(robot.coupling)) >= 1e-9
+        uncouple = np.asarray(np.linalg.inv(robot.coupling), dtype=float) if square else None
+        if uncouple is None or not _whole_turns_all(robot, uncouple):
             return ArmSolver(Unsolved(robot.joints), links, sliding, size_of(links))
-        uncouple = np.asarray(np.linalg.inv(robot.coupling), dtype=float)
     return ArmSolver(chain_solver(links, sliding), links, sliding, size_of(links), uncouple)
+
+
+def _whole_turns_all(robot: Robot, uncouple: Reals) -> bool:
+    """Whether whole turns of rows are whole turns of joints, both ways, so that a row's angle tells all its joints'."""
+    turns = uncouple[:, ~robot.sliding]
+    parts = np.where(robot.slides[:, None], turns, turns - np.round(turns))
+    return bool((turned_alike(robot) | robot.slides).all() and np.abs(parts).max(initial=0.0) <= WHOLE)
 
 
 def to_rows(robot: Robot, q: Reals) -> Reals:
@@ -221,7 +229,7 @@ def _apart(robot: Robot, rows: Reals, chain: PoseChain | None = None) -> Reals:
 def _away(robot: Robot, rows: Reals, other: Reals) -> Reals:
     """Rows less others, angles by the shorter way."""
     away = rows - other
-    return np.where(robot.slides, away, away - TURN * np.round(away / TURN))
+    return away - turn_of(robot) * np.round(away / TURN)
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,7 +302,7 @@ def _with_own(robot: Robot, T: Reals, q_ref: Reals, numbers: Integers, found: tu
     own = q_ref[numbers] if len(q_ref) == len(T) else np.broadcast_to(q_ref[0], (len(numbers), robot.joints))
     solves = np.abs(forward(robot, own) - T[numbers]).max(axis=(1, 2), initial=0.0) < OWN_SOLVES
     for n, row in zip(numbers[solves].tolist(), own[solves]):
-        away, fits = np.abs(q[n] - row).max(axis=1), bool(within(robot, row))
+        away, fits = np.abs(_away(robot, q[n], row)).max(axis=1), bool(within(robot, row))
         away = np.where(np.isnan(away), np.inf, away)
         if away.min() < SAME_ROW and not fits:
             continue

@@ -27,7 +27,7 @@ from er3a.kinematics.solutions import (
 )
 from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.threads import parallel_for
-from er3a.robots.joint_limits import limits_exceeded, nearest_equivalent, within
+from er3a.robots.joint_limits import limits_exceeded, nearest_equivalent, turned_alike, within
 from er3a.robots.robot import Robot
 
 RESTARTS = 500
@@ -119,7 +119,7 @@ def all_found(robot: Robot, T: Reals, starts: int, seed: int = 0) -> Reals:
     distinct: list[Reals] = []
     for row in q[used > 0]:
         away = row - np.reshape(distinct, (-1, robot.joints))
-        if not (np.abs(np.where(robot.slides, away, wrap_to_pi(away))).max(axis=1) <= SAME_ARM).any():
+        if not (np.abs(np.where(turned_alike(robot), wrap_to_pi(away), away)).max(axis=1) <= SAME_ARM).any():
             distinct.append(row)
     return np.array(distinct).reshape(-1, robot.joints)
 
@@ -152,7 +152,7 @@ class _Search:
                 solve_any(each, limits, T[rows], q0[rows], goal, draws, out)
 
         parallel_for(count, threads, SMALLEST_PART, part)
-        return (q if respect else np.where(robot.slides, q, wrap_to_pi(q))), error, starts
+        return (q if respect else np.where(turned_alike(robot), wrap_to_pi(q), q)), error, starts
 
     def without_limits(self) -> tuple[Reals, Reals]:
         """From where to where joints (n,) start that need not keep to limits: a turn; slides twice as far as theirs."""

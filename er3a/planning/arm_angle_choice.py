@@ -17,7 +17,8 @@ from numpy.polynomial import chebyshev
 
 from er3a.geometry.angles import TURN
 from er3a.kinematics.by_class import class_rows
-from er3a.numerics.arrays import Integers, Reals
+from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.jit import kernel
 from er3a.robots.joint_limits import limit_margin, nearest_equivalent
 from er3a.robots.robot import Robot
 
@@ -50,68 +51,67 @@ class ArmAngleLaw:
         return _quadratic(self.values, share)[:, None]
 
 
-def roomiest_laws(robot: Robot, T: Reals, share: Reals, start: float | None, slots: Integers) -> list[ArmAngleLaw]:
+def roomiest_laws(
+    robot: Robot, T: Reals, share: Reals, start: tuple[float, Reals] | None, slots: Integers
+) -> list[ArmAngleLaw]:
     """The best law of each slot, most margin first; slots that don't reach all poses are left out.
 
     Parameters
     ----------
     T : (K, 4, 4), poses of the tool, m, at shares (K,) of the way
-    start : the arm angle at the start, rad; None leaves it open
+    start : the arm angle at the start, rad, and the joints (n,), rad; None leaves them open, whole turns too
     slots : (s,), those that may be taken
     """
-    grid = -np.pi + TURN * np.arange(ANGLES) / ANGLES
-    margins, q = _rows(robot, np.repeat(T, ANGLES, axis=0), np.tile(grid, len(T)))
-    margins = margins.reshape(len(T), ANGLES, -1)[..., slots]
-    q = q.reshape(len(T), ANGLES, -1, robot.joints)[:, :, slots]
-    begun = -np.pi + TURN * np.arange(BEGUN_AT) / BEGUN_AT if start is None else np.array([start])
+    search = _LawSearch(robot, T, share, slots, None if start is None else start[1])
+    begun = -np.pi + TURN * np.arange(BEGUN_AT) / BEGUN_AT if start is None else np.array([start[0]])
     changes = np.linspace(-np.pi, np.pi, FEW_CHANGES if start is None else CHANGES)
     first, middle, last = (part.ravel() for part in np.meshgrid(begun, changes, changes, indexing="ij"))
     laws = np.stack([first, first + middle, first + last], axis=1)
-    least, before = np.full((len(laws), len(slots)), np.inf), None
-    for k, at in enumerate(share):
-        place = np.round((_quadratic(laws.T, np.full(len(laws), at)) + np.pi) * ANGLES / TURN).astype(int) % ANGLES
-        least = np.minimum(least, margins[k, place])
-        if before is not None:
-            least = np.minimum(least, _leap(q[k, place], before))
-        before = q[k, place]
-    priced = least - SLOPE_PRICE * (np.abs(middle) + np.abs(last - middle))[:, None]
+    priced = search.on_grid(laws) - SLOPE_PRICE * (np.abs(middle) + np.abs(last - middle))[:, None]
     found = []
     for s, slot in enumerate(slots.tolist()):
         best = laws[int(priced[:, s].argmax())]
-        law = _improved(robot, T, share, ArmAngleLaw(best, slot, _least(robot, T, share, best, slot)), start is None)
+        law = _improved(search, s, ArmAngleLaw(best, slot, search.margin(_quadratic(best, share), s)))
         if np.isfinite(law.margin):
             found.append(law)
     return sorted(found, key=lambda law: -law.margin)
 
 
-def bent_laws(robot: Robot, T: Reals, share: Reals, start: float | None, slots: Integers) -> list[ArmAngleLaw]:
+def bent_laws(
+    robot: Robot, T: Reals, share: Reals, start: tuple[float, Reals] | None, slots: Integers
+) -> list[ArmAngleLaw]:
     """Laws of higher degree that keep the limits at the poses, most margin first; the rest as :func:`roomiest_laws`."""
-    first = -np.pi if start is None else start
-    grid = first + TURN * np.arange(ANGLES) / ANGLES
-    margins, q = _rows(robot, np.repeat(T, ANGLES, axis=0), np.tile(grid, len(T)))
-    margins = margins.reshape(len(T), ANGLES, -1)
-    q = q.reshape(len(T), ANGLES, -1, robot.joints)
+    search = _LawSearch(robot, T, share, slots, None if start is None else start[1])
+    first = -np.pi if start is None else start[0]
+    q = search.rows(first + TURN * np.arange(ANGLES) / ANGLES)
+    margins = _margins_alone(robot, q)
     if start is not None:
         margins[0, 1:] = -np.inf
+    weights = np.where(np.arange(len(share)) == 0, 1e3, 1.0)  # the start may be given
     found = []
-    for slot in slots.tolist():
-        way = _even_way(margins[:, :, slot], q[:, :, slot])
+    for s, slot in enumerate(slots.tolist()):
+        way = _even_way(margins[:, :, s], q[:, :, s], robot.slides)
         if way is None:
             continue
         angles = first + TURN / ANGLES * way
-        weights = np.where(np.arange(len(share)) == 0, 1e3, 1.0)  # the start may be given
         for degree in DEGREES:
             values = np.asarray(chebyshev.chebfit(2 * share - 1, angles, degree, w=weights), dtype=float)
             values[0] += angles[0] - chebyshev.chebval(-1.0, values)
             law = ArmAngleLaw(values, slot, 0.0, bent=True)
-            rows, joints = _rows(robot, T, law.at(share)[:, 0])
-            least = min(rows[:, slot].min(), _leap(joints[1:, slot], joints[:-1, slot]).min())
+            least = search.margin(law.at(share)[:, 0], s)
             if least > 0:
-                found.append(replace(law, margin=float(least)))
+                found.append(replace(law, margin=least))
     return sorted(found, key=lambda law: -law.margin)
 
 
-def _even_way(margins: Reals, q: Reals) -> Reals | None:
+def _margins_alone(robot: Robot, q: Reals) -> Reals:
+    """Distances of rows (..., n) from the joint limits, each in its best turn; -inf without a row."""
+    middle = np.where(robot.continuous, 0.0, 0.5 * (robot.lower + robot.upper))
+    turned = nearest_equivalent(robot, np.nan_to_num(q), middle)
+    return np.where(np.isnan(q[..., 0]), -np.inf, limit_margin(robot, turned))
+
+
+def _even_way(margins: Reals, q: Reals, slides: Flags) -> Reals | None:
     """Steps of the grid (K,) from its first angle, not taken modulo a turn, along the way with the least sum of squared
     steps that keeps half of the margin that one can keep; None if none keeps the limits.
 
@@ -121,7 +121,9 @@ def _even_way(margins: Reals, q: Reals) -> Reals | None:
     """
     at = np.arange(margins.shape[1])
     before = (at[None] - STEPS[:, None]) % len(at)  # (steps, angles)
-    free = [np.abs(q[k][None] - q[k - 1][before]).max(axis=-1) <= LEAP for k in range(1, len(q))]
+    moved = [q[k][None] - q[k - 1][before] for k in range(1, len(q))]
+    moved = [each - np.where(slides, 0.0, TURN * np.round(each / TURN)) for each in moved]
+    free = [np.abs(each).max(axis=-1) <= LEAP for each in moved]  # not where there is no row
     widest = margins[0]
     for k, passable in enumerate(free, 1):
         widest = np.minimum(margins[k], np.where(passable, widest[before], -np.inf).max(axis=0))
@@ -140,6 +142,54 @@ def _even_way(margins: Reals, q: Reals) -> Reals | None:
     return place + np.concatenate([[0.0], np.cumsum(steps[::-1])])
 
 
+@dataclass(frozen=True, eq=False)
+class _LawSearch:
+    """Margins of laws at poses T (K, 4, 4) and shares (K,), by slots (s,); ``start`` (n,), rad, holds the joints' turns
+    at the start, None leaves them open."""
+
+    robot: Robot
+    T: Reals
+    share: Reals
+    slots: Integers
+    start: Reals | None
+
+    def rows(self, angles: Reals) -> Reals:
+        """Joints (K, A, s, n) of all poses at all arm angles (A,); NaN where there are none."""
+        count = len(angles)
+        q = class_rows(self.robot, np.repeat(self.T, count, axis=0), np.tile(angles, len(self.T))[:, None]).q
+        return q.reshape(len(self.T), count, *q.shape[1:])[:, :, self.slots]
+
+    def on_grid(self, laws: Reals) -> Reals:
+        """About the margins (L, s) of laws (L, 3), by the nearest of ``ANGLES`` arm angles."""
+        angles = _quadratic(laws.T[:, None], self.share[:, None])
+        place = np.round((angles + np.pi) * ANGLES / TURN).astype(np.int64) % ANGLES
+        return self._margins(self.rows(-np.pi + TURN * np.arange(ANGLES) / ANGLES), place)
+
+    def margin(self, angles: Reals, s: int) -> float:
+        """The margin of arm angles (K,) by the slot of this number, as :class:`ArmAngleLaw` has it."""
+        q = class_rows(self.robot, self.T, angles[:, None]).q
+        return float(self._margins(q[:, None, self.slots[s : s + 1]], np.zeros((len(q), 1), np.int64))[0, 0])
+
+    def _margins(self, q: Reals, place: Integers) -> Reals:
+        """Least distances (L, s) from the limits, rad, of motions through rows (K, A, s, n) at places (K, L) in A: by
+        turns that hold on the whole way. Less than nothing where a joint leaps, -inf where a pose is not reached."""
+        robot, count = self.robot, self.robot.joints
+        lines = np.array([*np.eye(count), *(limit.factors for limit in robot.combined)])
+        lower = np.append(robot.lower, [limit.lower for limit in robot.combined])
+        upper = np.append(robot.upper, [limit.upper for limit in robot.combined])
+        near = np.zeros(count) if self.start is None else self.start
+        low, high, step = _ranges(np.ascontiguousarray(q), place, near, robot.slides, lines)
+        if self.start is None:
+            turns = np.round((lower + upper - low - high)[..., :count] / (2 * TURN))
+            turned = TURN * np.where(robot.slides | robot.continuous, 0.0, turns) @ lines.T
+            low, high = low + turned, high + turned
+        each = np.minimum(low - lower, upper - high)
+        each[..., :count] = np.where(robot.continuous, np.inf, each[..., :count])
+        return np.where(
+            np.isinf(step), -np.inf, np.minimum(each.min(axis=-1), np.where(step > LEAP, LEAP - step, np.inf))
+        )
+
+
 def _quadratic(values: Reals, share: Reals) -> Reals:
     """Lagrange's polynomial through values (3, ...) at shares 0, 1/2 and 1."""
     a, b, c = values
@@ -148,35 +198,48 @@ def _quadratic(values: Reals, share: Reals) -> Reals:
     )
 
 
-def _rows(robot: Robot, T: Reals, angles: Reals) -> tuple[Reals, Reals]:
-    """Distances (N, slots) of all solutions from the joint limits, -inf without one, and the joints (N, slots, n), each
-    in its best turn."""
-    q = class_rows(robot, T, angles[:, None]).q
-    middle = np.where(robot.continuous, 0.0, 0.5 * (robot.lower + robot.upper))
-    q, missing = nearest_equivalent(robot, np.nan_to_num(q), middle), np.isnan(q[..., 0])
-    return np.where(missing, -np.inf, limit_margin(robot, q)), q
+@kernel
+def _ranges(q: Reals, place: Integers, near: Reals, slides: Flags, lines: Reals) -> tuple[Reals, Reals, Reals]:
+    """Least and greatest values (L, s, m) of lines (m, n) of joints, through rows (K, A, s, n) at places (K, L), angles
+    made continuous from the turns nearest to ``near`` (n,) on; and the greatest step (L, s) of a joint, infinite where
+    there is no row."""
+    poses, _, slots, joints = q.shape
+    shape = (place.shape[1], slots, len(lines))
+    low, high, most = np.full(shape, np.inf), np.full(shape, -np.inf), np.zeros(shape[:2])
+    last = np.empty(joints)
+    for law in range(shape[0]):
+        for slot in range(slots):
+            last[:] = near
+            for k in range(poses):
+                row = q[k, place[k, law], slot]
+                if np.isnan(row[0]):
+                    most[law, slot] = np.inf
+                    break
+                for j in range(joints):
+                    step = row[j] - last[j]
+                    if not slides[j]:
+                        step -= 2 * np.pi * np.round(step / (2 * np.pi))
+                    last[j] += step
+                    if k > 0:
+                        most[law, slot] = max(most[law, slot], abs(step))
+                for line in range(shape[2]):
+                    value = 0.0
+                    for j in range(joints):
+                        value += lines[line, j] * last[j]
+                    low[law, slot, line] = min(low[law, slot, line], value)
+                    high[law, slot, line] = max(high[law, slot, line], value)
+    return low, high, most
 
 
-def _leap(q: Reals, before: Reals) -> Reals:
-    """Less than nothing where a joint leaps between rows (..., n); infinite elsewhere."""
-    step = np.abs(q - before).max(axis=-1)
-    return np.where(step > LEAP, LEAP - step, np.inf)
-
-
-def _least(robot: Robot, T: Reals, share: Reals, values: Reals, slot: int) -> float:
-    margins, q = _rows(robot, T, _quadratic(values, share))
-    return float(min(margins[:, slot].min(), _leap(q[1:, slot], q[:-1, slot]).min(initial=np.inf)))
-
-
-def _improved(robot: Robot, T: Reals, share: Reals, law: ArmAngleLaw, with_start: bool) -> ArmAngleLaw:
-    """The law after changes of its values, one at a time, by steps that are halved."""
+def _improved(search: _LawSearch, s: int, law: ArmAngleLaw) -> ArmAngleLaw:
+    """The law of the slot of number ``s`` after changes of its values, one at a time, by steps that are halved."""
     step = FIRST_STEP
     for _ in range(ROUNDS):
-        for k in range(0 if with_start else 1, 3):
+        for k in range(0 if search.start is None else 1, 3):
             for sign in (1.0, -1.0):
                 values = law.values.copy()
                 values[k] += sign * step
-                margin = _least(robot, T, share, values, law.slot)
+                margin = search.margin(_quadratic(values, search.share), s)
                 if margin > law.margin + SLOPE_PRICE * step:
                     law = ArmAngleLaw(values, law.slot, margin)
         step *= 0.5

@@ -15,12 +15,14 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 
 from er3a.errors import Er3aError, NotWristPartitionedError
+from er3a.geometry.angles import TURN
 from er3a.kinematics.by_class import arm_solver, checked_parameters, class_rows
 from er3a.kinematics.classes.chain_solvers import Unsolved
 from er3a.kinematics.wrist_partitioned import closed_form_missing
@@ -31,7 +33,7 @@ from er3a.planning.moves import ToolPath
 from er3a.planning.piecewise import PiecewiseMotion, chebyshev_times, motion_through
 from er3a.planning.polynomial_checks import limit_intervals
 from er3a.planning.profiles import times_at
-from er3a.robots.joint_limits import limit_margin, nearest_equivalent, within
+from er3a.robots.joint_limits import limit_margin, nearest_equivalent, turn_of, within
 from er3a.robots.robot import Robot
 
 DEGREE = 9
@@ -78,12 +80,12 @@ def follow_by_class(robot: Robot, path: ToolPath, q_start: Reals | None = None) 
     rows = rows_at(np.zeros(1))[0]
     starts = nearest_equivalent(robot, rows[np.isfinite(rows[:, 0])], np.zeros(robot.joints))
     if q_start is not None:
-        starts = nearest_equivalent(robot, starts, q_start)
+        starts = _turned_to(robot, starts, q_start)
         starts = starts[(np.abs(starts - q_start) <= ON_PATH).all(axis=1)]
     if not len(starts):
         raise PathEndsError(robot.name, "out_of_reach", 0.0)
     ordered = sorted(starts, key=lambda q: (not within(robot, q), -round(float(limit_margin(robot, q)), 9)))
-    return _first_within_limits(robot, path, [(start, rows_at) for start in ordered])
+    return _first_within_limits(robot, path, [(start, rows_at) for start in ordered], turns_open=q_start is None)
 
 
 def _at_arm_angles(robot: Robot, path: ToolPath, q_start: Reals | None) -> PiecewiseMotion:
@@ -93,10 +95,9 @@ def _at_arm_angles(robot: Robot, path: ToolPath, q_start: Reals | None) -> Piece
     poses = path.poses(share)
     begin, slots = None, np.arange(arm_solver(robot).chain.slots)
     if q_start is not None:
-        begin = float(checked_parameters(robot, None, q_start[None], 1)[0, 0])
-        own = class_rows(robot, poses[:1], np.array([[begin]])).q[0]
-        away = np.abs(nearest_equivalent(robot, np.nan_to_num(own, nan=np.inf), q_start) - q_start)
-        slots = np.flatnonzero((away <= ON_PATH).all(axis=1))
+        begin = float(checked_parameters(robot, None, q_start[None], 1)[0, 0]), q_start
+        own = class_rows(robot, poses[:1], np.array([[begin[0]]])).q[0]
+        slots = np.flatnonzero((np.abs(_turned_to(robot, own, q_start) - q_start) <= ON_PATH).all(axis=1))
     if not slots.size:
         raise PathEndsError(robot.name, "out_of_reach", 0.0)
     laws = roomiest_laws(robot, poses, share, begin, slots) or bent_laws(robot, poses, share, begin, slots)
@@ -108,14 +109,19 @@ def _at_arm_angles(robot: Robot, path: ToolPath, q_start: Reals | None) -> Piece
         def rows_at(t: Reals) -> Reals:
             return _rows(robot, path, t, law.at(path.progress(t)[0]))
 
-        return nearest_equivalent(robot, rows_at(np.zeros(1))[0, law.slot], near), rows_at
+        return _turned_to(robot, rows_at(np.zeros(1))[0, law.slot], near), rows_at
 
     def tried() -> Iterator[ArmAngleLaw]:
         yield from laws
         if not laws[0].bent:
             yield from bent_laws(robot, poses, share, begin, slots)
 
-    return _first_within_limits(robot, path, map(way, tried()))
+    return _first_within_limits(robot, path, map(way, tried()), turns_open=q_start is None)
+
+
+def _turned_to(robot: Robot, q: Reals, near: Reals) -> Reals:
+    """Joints (..., n) by the turns nearest to others (n,), within the limits or not."""
+    return q + turn_of(robot) * np.round((near - q) / TURN)
 
 
 def _first_unreached(robot: Robot, path: ToolPath, times: Reals) -> float:
@@ -136,15 +142,16 @@ def _first_unreached(robot: Robot, path: ToolPath, times: Reals) -> float:
 
 
 def _first_within_limits(
-    robot: Robot, path: ToolPath, ways: Iterable[tuple[Reals, Callable[[Reals], Reals]]]
+    robot: Robot, path: ToolPath, ways: Iterable[tuple[Reals, Callable[[Reals], Reals]]], *, turns_open: bool
 ) -> PiecewiseMotion:
     """The first of the motions from starts (n,), with what tells all rows (N, slots, n) at times, that keeps all
-    limits; else the first that there is."""
+    limits; else the first that there is. ``turns_open`` tells whether whole turns of the starts may be changed."""
     found: list[PiecewiseMotion] = []
     ends: list[PathEndsError] = []
     for start, rows_at in ways:
         try:
             motion = _followed(robot, path, start, rows_at)
+            motion = _turned_inwards(robot, motion) if turns_open else motion
         except PathEndsError as error:
             ends.append(error)
             continue
@@ -154,6 +161,18 @@ def _first_within_limits(
     if not found:
         raise max(ends, key=lambda error: error.t)
     return found[0]
+
+
+def _turned_inwards(robot: Robot, motion: PiecewiseMotion) -> PiecewiseMotion:
+    """The motion by the whole turns that keep it farthest from the limits of each joint."""
+    high, low = (
+        sign * np.array([motion.of_joint(motion.angle, j, sign).peak()[0] for j in range(robot.joints)])
+        for sign in (1.0, -1.0)
+    )
+    turns = np.round((robot.lower + robot.upper - low - high) / (2 * TURN))
+    angle = motion.angle.copy()
+    angle[:, 0] += np.where(robot.continuous, 0.0, turn_of(robot) * turns)
+    return replace(motion, angle=angle)
 
 
 def _rows(robot: Robot, path: ToolPath, t: Reals, values: Reals) -> Reals:

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from typing import Literal
 
 import numpy as np
 
 from er3a.geometry.angles import TURN, wrap_to_pi
 from er3a.numerics.arrays import Flags, Reals
+from er3a.robots.derived import derived
 from er3a.robots.robot import Robot
 
 SAME_DIGITS = 9  # of rad, m: joint values that are alike to these are one
 LIMIT_TOLERANCE = 1e-9
+WHOLE = 1e-12  # parts of a turn
 
 
 @dataclass(frozen=True)
@@ -108,40 +111,75 @@ def limit_margin(robot: Robot, q: Reals) -> Reals:
 def nearest_equivalent(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
     """The same arm poses (..., n) by the turns nearest to q_ref within the limits, else by those nearest to them.
 
-    Joints that slide stay where they are.
+    Joints that no whole turn brings back (:func:`turned_alike`), such as slides, stay where they are.
     """
     near = q + turn_of(robot) * np.round((q_ref - q) / TURN)
     low, high = turn_bounds(robot, near)
     inside = near + TURN * np.clip(0, low, np.maximum(low, high))
     below, above = near + TURN * (low - 1), near + TURN * low
     outside = np.where(robot.lower - below < above - robot.upper, below, above)
-    found = np.where(low <= high, inside, outside)
-    return np.where(robot.slides, q, found) if robot.sliding.any() else found
+    found, whole = np.where(low <= high, inside, outside), turned_alike(robot)
+    found = found if whole.all() else np.where(whole, found, q)
+    return _within_sums(robot, found, q_ref) if robot.combined else found
+
+
+def _within_sums(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
+    """The same arm poses (..., n), those that leave a limit of a sum in the turns nearest to q_ref that keep all of
+    them, where there are such."""
+    summed = np.any([limit.factors for limit in robot.combined], axis=0) & turned_alike(robot)
+    spare = np.where(robot.continuous, 2, np.floor((robot.upper - robot.lower + 2 * LIMIT_TOLERANCE) / TURN))
+    spare = np.where(summed, spare, 0).astype(int)
+    left = ~within(robot, q) & np.isfinite(q).all(axis=-1)
+    if not spare.any() or not left.any():
+        return q
+    rows, near = q[left], np.broadcast_to(q_ref, q.shape)[left]
+    best, least = rows.copy(), np.full(len(rows), np.inf)
+    for turns in product(*(range(-most, most + 1) for most in spare.tolist())):
+        tried = rows + TURN * np.array(turns)
+        away = np.where(within(robot, tried), np.abs(tried - near).max(axis=-1), np.inf)
+        nearer = away < least
+        best[nearer], least[nearer] = tried[nearer], away[nearer]
+    found = q.copy()
+    found[left] = best
+    return found
 
 
 def but_for_turns(robot: Robot, q: Reals) -> Reals:
     """Joint values (..., n) with their whole turns taken off, to ``SAME_DIGITS``."""
-    wrapped: Reals = np.where(robot.slides, q, wrap_to_pi(q))
+    wrapped: Reals = np.where(turned_alike(robot), wrap_to_pi(q), q)
     return np.round(wrapped, SAME_DIGITS)
 
 
+@derived
+def turned_alike(robot: Robot) -> Flags:
+    """Which joints (n,) leave the arm as it was by a whole turn: not those that slide, nor those that move a row that
+    slides, or a row that turns by a part of a turn."""
+    if robot.coupling is None:
+        return ~robot.sliding
+    parts = np.where(robot.sliding[:, None], robot.coupling, robot.coupling - np.round(robot.coupling))
+    return np.asarray(~robot.slides & (np.abs(parts) <= WHOLE).all(axis=0))
+
+
 def turn_of(robot: Robot) -> Reals | float:
-    """What may be added to each joint with the arm as it was: a turn, and 0 to those that slide; (n,) or a number."""
-    return np.where(robot.slides, 0.0, TURN) if robot.sliding.any() else TURN
+    """What may be added to each joint with the arm as it was: a turn or 0 (:func:`turned_alike`); (n,) or a number."""
+    whole = turned_alike(robot)
+    return TURN if whole.all() else np.where(whole, TURN, 0.0)
 
 
 def turn_bounds(robot: Robot, q: Reals) -> tuple[Reals, Reals]:
     """Least and greatest number of turns to add so that each value lies within its limits (least > greatest: none).
 
-    Of a continuous joint the turn it has is given; of one that slides 0, or none if it is outside.
+    Of a continuous joint the turn it has is given; of one that a turn would move elsewhere (:func:`turned_alike`) 0, or
+    none if it is outside.
     """
     low = np.ceil((robot.lower - LIMIT_TOLERANCE - q) / TURN)
     high = np.floor((robot.upper + LIMIT_TOLERANCE - q) / TURN)
     if robot.continuous.any():
         low, high = np.where(robot.continuous, 0.0, low), np.where(robot.continuous, 0.0, high)
-    if robot.sliding.any():
-        fits = (q >= robot.lower - LIMIT_TOLERANCE) & (q <= robot.upper + LIMIT_TOLERANCE)
-        low, high = np.where(robot.slides, 0.0, low), np.where(robot.slides, np.where(fits, 0.0, -1.0), high)
+    whole = turned_alike(robot)
+    if not whole.all():
+        fits = (q >= robot.lower - LIMIT_TOLERANCE) & (q <= robot.upper + LIMIT_TOLERANCE) | robot.continuous
+        low, high = np.where(whole, low, 0.0), np.where(whole, high, np.where(fits, 0.0, -1.0))
     return low, high
 
 

@@ -14,7 +14,7 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.numerical import solve
 from er3a.kinematics.rank_loss import dependent_axes, rank_losses, scaled_jacobian
-from er3a.robots.robot import Robot
+from er3a.robots.robot import CombinedLimit, Robot
 
 H = np.pi / 2
 UR5 = ([0, -0.425, -0.39225, 0, 0, 0], [H, 0, 0, H, -H, 0], [0.089159, 0, 0, 0.10915, 0.09465, 0.0823])
@@ -293,3 +293,42 @@ def test_starts_at_which_the_equations_are_singular_to_rounding_are_no_error():
     q = np.array([-15.3, 1.3, 0.69, 0.0, 0.0, 14.1])
     found = inverse(robot, forward(robot, q), q)
     assert np.abs(found.q - q).max(axis=1).min() < 1e-6
+
+
+def test_a_reference_beyond_a_limit_takes_no_other_arm_its_slot():
+    """Joint 1 at 200 deg is beyond 180, the same arm at -160 deg is not; the other elbow is half a turn away."""
+    robot = arm(([0.3, 0.3, 0, 0], [0, 0, 0, 0], [0] * 4), [0, 0, 1, 0], most=np.pi)
+    own = np.array([np.radians(200), np.radians(179), 0.1, 0.2])
+    T = forward(robot, own)
+    elbow_over = [own[0] + own[1] - np.pi * 2, -own[1], 0.1, own[3] + own[1]]  # equal links: a rhombus
+    for q in (inverse(robot, T, own).q, inverse_batch(robot, T[None], own[None]).q[0]):
+        assert len(q) == 2
+        for expected in (own, elbow_over):
+            away = q - expected
+            away[:, [0, 1, 3]] = wrap_to_pi(away[:, [0, 1, 3]])
+            assert np.abs(away).max(axis=1).min() < 1e-9
+        assert np.abs(q).max() <= np.pi
+
+
+@pytest.mark.parametrize(("row", "factor"), [(1, 0.5), (2, 0.02), (3, -0.25)])
+def test_a_whole_turn_that_moves_another_row_by_less_is_no_other_solution(row, factor, random):
+    """A gear of half a turn, and a ball screw: of joint 1 a turn more is another pose."""
+    coupling = np.eye(4)
+    coupling[row, 0] = factor
+    robot = arm(SCARA, [0, 0, 1, 0], most=6.0, coupling=coupling)
+    for q in random.uniform(robot.lower, robot.upper, (3, 4)):
+        T = forward(robot, q)
+        found, batch = inverse(robot, T, q), inverse_batch(robot, T[None], q[None])
+        assert np.abs(found.q - q).max(axis=1).min() < 1e-6
+        assert np.abs(forward(robot, found.q) - T).max() < 1e-9
+        assert np.abs(forward(robot, batch.q[0][batch.solved[0]]) - T).max() < 1e-9
+
+
+def test_a_slot_has_the_turn_that_keeps_a_limit_of_a_sum():
+    """Joints 1 and 2 at 200 and 100 deg: in the turns nearest to 0 their sum is -60 deg, and may not be below 0."""
+    limit = CombinedLimit((1.0, 1.0, 0, 0), 0.0, 6.0)
+    robot = arm(SCARA, [0, 0, 1, 0], most=6.0, combined=(limit,))
+    own = np.array([np.radians(200), np.radians(100), 0.1, 0.2])
+    found = inverse_batch(robot, forward(robot, own)[None])
+    assert found.within_limits[0].any()
+    assert np.abs(found.q[0][found.within_limits[0]] - own).max(axis=1).min() < 1e-9

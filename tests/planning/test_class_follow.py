@@ -182,6 +182,35 @@ def test_arm_angle_bends_more_often_where_a_parabola_leaves_the_limits(start, po
     assert margin(joints) > 0
 
 
+@pytest.mark.parametrize("with_start", [True, False])
+def test_a_last_joint_of_two_turns_goes_on_through_half_a_turn(with_start):
+    """At one arm angle the joints keep all limits; joint 7 passes 180 deg on the way, which is no leap."""
+    most = np.radians([170, 120, 170, 120, 170, 120, 340])
+    robot = IIWA.replace(lower=-most, upper=most)
+    q = np.radians([20, 40, -30, -80, 25, 60, 130])
+    T = forward(robot, np.stack([q, q + np.radians([10, -10, 5, 10, -5, 10, 150])]))
+    path = line(T[0], T[1], 2.0)
+    joints = follow_by_class(robot, path, q if with_start else None).joints(np.linspace(0, 2, 401))
+    assert np.abs(forward(robot, joints) - path.poses(path.progress(np.linspace(0, 2, 401))[0])).max() < 1e-8
+    assert np.minimum(joints - robot.lower, robot.upper - joints).min() > np.radians(30)
+
+
+def test_turns_at_the_start_are_those_that_keep_the_limits_on_the_whole_way():
+    most = np.array([2.27, 2.44, 0.2, np.radians(200)])
+    robot = SCARA.replace(lower=np.where([0, 0, 1, 0], 0.0, -most), upper=most)
+    x, y, z = 0.45, 0.1, 0.25
+    sides = by_hand(*np.array([[x, y, z, 0.0], [x, y + 0.05, z, 0.0]]).T, 1)
+    turned = np.radians([160, 280])
+    q = np.column_stack([sides[:, :3], turned])
+    T = forward(robot, q)
+    joints = follow_by_class(robot, line(T[0], T[1], 1.0)).joints(np.linspace(0, 1, 201))
+    assert np.minimum(joints - robot.lower, robot.upper - joints).min() > 0
+    motion = follow_by_class(robot, line(T[0], T[1], 1.0), q[0])  # given joints stay as they are
+    np.testing.assert_allclose(motion.joints(np.array([0.0, 1.0])), q, atol=1e-9)
+    motion = follow_by_class(robot, line(T[1], T[0], 1.0), q[1])  # beyond a limit, though a turn less would not be
+    np.testing.assert_allclose(motion.joints(np.array([0.0]))[0], q[1], atol=1e-9)
+
+
 def test_seven_joints_say_where_a_path_leaves_their_reach():
     q = np.radians([20, 40, -30, -80, 25, 60, 10])
     T = forward(IIWA, q)
