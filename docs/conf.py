@@ -63,6 +63,7 @@ ROOMS = {
     "Files and formats": ("formats", "files"),
     "Beneath": ("numerics",),
 }
+TABLE = ("| module | what it is about |", "|---|---|")
 ALONE = ("errors", "findings", "display", "public")
 
 
@@ -79,11 +80,11 @@ def module_name(path: Path) -> str:
 
 
 def write_module_page(path: Path) -> str:
-    """A page on a module; returns its name below docs/generated."""
+    """A page on a module, in no table of contents: hundreds of entries on each page take minutes; returns its row."""
     name = module_name(path)
-    text = f"{name}\n{'=' * len(name)}\n\n.. automodule:: {name}\n"
+    text = f":orphan:\n\n{name}\n{'=' * len(name)}\n\n.. automodule:: {name}\n"
     (GENERATED / f"{name}.rst").write_text(text, encoding="utf-8")
-    return name
+    return f"| {{py:mod}}`{name}` | {first_sentence(import_module(name).__doc__)} |"
 
 
 def write_reference() -> None:
@@ -94,10 +95,10 @@ def write_reference() -> None:
     parts = ["# Modules\n", "All modules of the library, by what they are about; `er3a` names the public functions.\n"]
     for title, rooms in ROOMS.items():
         paths = [path for room in rooms for path in sorted((ROOT / "er3a" / room).rglob("*.py"))]
-        names = [write_module_page(path) for path in paths if path.stem != "__init__"]
-        parts += [f"## {title}\n", "```{toctree}", ":maxdepth: 1", *names, "```\n"]
-    names = [write_module_page(ROOT / f"er3a/{stem}.py") for stem in ALONE]
-    parts += ["## For all of them\n", "```{toctree}", ":maxdepth: 1", *names, "```\n"]
+        rows = [write_module_page(path) for path in paths if path.stem != "__init__"]
+        parts += [f"## {title}\n", *TABLE, *rows, ""]
+    rows = [write_module_page(ROOT / f"er3a/{stem}.py") for stem in ALONE]
+    parts += ["## For all of them\n", *TABLE, *rows, ""]
     (GENERATED / "modules.md").write_text("\n".join(parts), encoding="utf-8")
 
 
