@@ -24,6 +24,7 @@ def imported(path: Path) -> set[str]:
     return {module.partition(".")[0] for module in modules}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("room", FOREIGN)
 def test_a_room_imports_nothing_from_those_above_it(room):
     files = list((ROOT / room).rglob("*.py"))

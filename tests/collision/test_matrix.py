@@ -187,6 +187,7 @@ class TestFaultsOfOthers:
         assert coal_distance(robot, row.witness, "base", "link_2") < 0
 
 
+@pytest.mark.long
 def test_what_the_tool_carries_is_looked_at_and_may_touch_what_is_allowed():
     robot = load_robot("er3_600")
     scene = {

@@ -20,7 +20,7 @@ ROUND_M = 3e-4  # depth of a cylinder's core, for which a prism of 96 sides stan
 
 
 @pytest.mark.parametrize(
-    "kind", [pytest.param(kind, marks=() if kind in ("capsule", "hull") else pytest.mark.long) for kind in SHAPES]
+    "kind", [pytest.param(kind, marks=() if kind == "capsule" else pytest.mark.long) for kind in SHAPES]
 )
 def test_distances_are_those_of_coal_and_fcl(kind, random):
     deep = 0

@@ -256,6 +256,7 @@ def test_a_fault_beside_references_that_are_off_is_named_as_what_leaves_least(ar
     assert {entry_of(fault) for faults in members for fault in faults} == {"d2", "d3", "d4"}  # parallel axes
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["er3a_c60", "er3_600"])
 def test_a_missed_reference_is_never_put_down_to_noise(name):
     """One reference moved beyond its half-width: the table can't meet it, so something is said about it."""
@@ -267,6 +268,7 @@ def test_a_missed_reference_is_never_put_down_to_noise(name):
     assert all(h.half_widths <= 1 + 1e-6 for h in found.hypotheses if h.explains)
 
 
+@pytest.mark.long
 def test_few_references_leave_a_set_without_end_that_is_still_said_whole(arm):
     """Two coordinates, both wrong: whatever moves the flange in two directions explains them."""
     stated = stated_of(arm)[:2]

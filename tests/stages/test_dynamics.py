@@ -187,6 +187,7 @@ def test_beyond_the_limits_it_is_an_overload(tmp_path, factor, status, kind):
     assert ("Overload" in say(verdict)) == (kind is Overload)
 
 
+@pytest.mark.long
 def test_what_only_the_tolerances_carry_beyond_a_limit_is_marginal(tmp_path, full):
     scaled = [use for use in full[1].results.summary.uses if use.quantity != "payload"]
     tightest, widest = (max(values) for values in zip(*((use.ratio, use.upper / use.allowed) for use in scaled)))

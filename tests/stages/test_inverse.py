@@ -245,6 +245,7 @@ def test_all_targets_solved_is_a_pass_and_none_a_fail(tmp_path):
         assert compute(study, "er3_600").summary.verdict.status == status
 
 
+@pytest.mark.long
 def test_colliding_solutions_are_named_and_not_chosen(tmp_path):
     """A low ceiling keeps the elbow down, a floor under which the target lies leaves nothing."""
     robot, q = load_robot("er3_600"), [20, -30, 10, 35, 40, -20]

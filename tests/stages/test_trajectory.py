@@ -50,7 +50,7 @@ from er3a.planning.intervals import AboveLimit
 from testing.on_demand import OnDemand
 from testing.readme import README, answer
 
-ROBOTS = ("er3a_c60", pytest.param("er3a_c60_article", marks=pytest.mark.long), "er3_600")
+ROBOTS = ("er3a_c60", *(pytest.param(name, marks=pytest.mark.long) for name in ("er3a_c60_article", "er3_600")))
 
 
 @pytest.fixture(scope="module")
@@ -247,6 +247,7 @@ def test_a_strategy_that_meets_something_is_not_taken(study, results, tmp_path):
     assert path.strategy != "via_shift"
 
 
+@pytest.mark.long
 def test_speeds_are_judged_where_they_are_known(results):
     paths = by_name(results["er3_600"])
     assert paths["line_shoulder"].max_joint_speed_ratio > 1
@@ -254,6 +255,7 @@ def test_speeds_are_judged_where_they_are_known(results):
     assert paths["line_clean"].max_joint_speed_ratio < 1
 
 
+@pytest.mark.long
 def test_equal_speeds_are_the_first_joint_s(results):
     """A rounding tie once made J6 the fastest on the ER3-600's line past the shoulder, where J1 is."""
     path = by_name(results["er3_600"])["line_shoulder"]
@@ -335,6 +337,7 @@ def test_the_page_says_first_what_validation_came_to(study, stored, tmp_path, st
         assert body.index(told) < body.index('class="verdict') < body.index("safe")
 
 
+@pytest.mark.long
 def test_cells_of_the_index_say_first_what_validation_came_to(study, folders, stored, tmp_path):
     one = study.model_copy(update={"robots": {"er3_600": study.robots["er3_600"]}})
     for stage in (each for each in one.stages("er3_600") if each != "trajectory"):
@@ -469,6 +472,7 @@ def test_path_that_goes_on_from_one_that_does_not_end_is_refused(study, tmp_path
     np.testing.assert_allclose(last[-1], first[0], atol=1e-9)
 
 
+@pytest.mark.long
 def test_what_repairs_a_path_is_written_as_a_table(study, results):
     results, robot = results["er3_600"], study.robot("er3_600")
     rows = results.programs

@@ -67,7 +67,7 @@ from testing.readme import answer
 from tests.robots.test_conventions import random_arm
 
 MISSING_OFFSET = WrongOffset(2, 0.0, -90.0)
-NAMES = (pytest.param("er3a_c60", marks=pytest.mark.long), "er3a_c60_article", "er3_600")
+NAMES = ("er3a_c60_article", *(pytest.param(name, marks=pytest.mark.long) for name in ("er3a_c60", "er3_600")))
 WRITTEN = {f"{name}.parquet" for name in table_types(RESULTS)} | {"summary.json", "SHA256SUMS"}
 
 
@@ -151,12 +151,14 @@ def test_a_table_that_meets_all_but_that_nothing_settles_is_a_caution(summaries)
     assert {kind for (subject, _), kind in kinds.items() if isinstance(subject, JointSpeed)} == {"consistency"}
 
 
+@pytest.mark.long
 def test_er3_600_meets_its_drawing_to_a_tenth_of_a_millimetre(summaries):
     labels = [check for check in summaries["er3_600"].checks if check.group == "envelope"]
     assert len(labels) == 9
     assert all(abs(check.difference) <= 0.1 for check in labels)
 
 
+@pytest.mark.long
 def test_the_manufacturers_600_mm_is_a_conflict_counted_against_no_model(summaries):
     summary = summaries["er3_600"]
     (conflict,) = [check for check in summary.checks if check.status == "conflict"]
@@ -277,6 +279,7 @@ def test_an_arm_without_closed_form_is_still_checked(study, tmp_path):
     assert "miss a common point" in page_of(edited, stored, tmp_path)
 
 
+@pytest.mark.long
 def test_a_table_with_crossed_limits_fails_its_internal_checks(summaries):
     summary = summaries["er3_600"]
     name = SelfCheck("crossed_limits")
@@ -423,6 +426,7 @@ def test_every_entry_of_the_table_leads_to_its_evidence(study, stored, tmp_path,
     assert page.index("entry by entry") < page.index("<h2>Diagnosis")
 
 
+@pytest.mark.long
 def test_the_table_stands_beside_the_one_that_documents_describe_or_do_not_tell_from_it(summaries):
     described = summaries["er3a_c60_article"].evidence.other
     real = load_robot("er3a_c60")
@@ -460,7 +464,8 @@ def test_diagnosis_names_the_articles_missing_offset_and_no_fault_of_another_arm
     assert (claims.claims, claims.failed) == (22, 4)
 
 
-@pytest.mark.parametrize("name", [pytest.param("er3a_c60", marks=pytest.mark.long), "er3_600"])
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["er3a_c60", "er3_600"])
 def test_diagnosis_of_the_right_tables_has_nothing_to_explain(summaries, name):
     (found,) = summaries[name].diagnoses
     assert isinstance(found.conclusion, NothingToExplain)
@@ -504,6 +509,7 @@ def test_positions_ask_for_no_correction_of_the_right_tables(stored, summaries):
     assert isinstance(real.result.conclusion, Misfit)
 
 
+@pytest.mark.long
 def test_a_tool_in_the_robots_file_does_not_matter(study, folders, tmp_path):
     def edit(content):
         content["tool"] = {"xyz_mm": [50, 0, 100], "source": "made up", "grade": "inferred"}

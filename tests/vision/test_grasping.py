@@ -262,6 +262,7 @@ def test_success_is_the_share_of_errors_that_the_gripper_forgives(cell):
     assert plan.chosen.probability == pytest.approx(0.6827, abs=0.025)
 
 
+@pytest.mark.long
 def test_a_can_forgives_turns_about_its_axis_and_a_box_does_not(cell):
     made, robot, found = cell
     file, task, picture = task_of(made, robot)

@@ -163,6 +163,7 @@ def test_the_border_is_where_filled_meets_empty(proven):
 # --- workspaces known exactly ---
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("tool", "inner"), [(0.1, 0.1), (0.25, 0.0), (0.05, 0.15)])
 def test_two_links_reach_a_shell(tool, inner):
     robot = two_links(tool)
@@ -196,6 +197,7 @@ angles = st.floats(-np.pi, np.pi)
 small = st.floats(-0.15, 0.15)
 
 
+@pytest.mark.long
 @settings(max_examples=12, deadline=None)
 @given(
     st.lists(st.tuples(angles, st.floats(0, 7)), min_size=6, max_size=6),
