@@ -16,7 +16,8 @@ from er3a.errors import ShapeError
 from er3a.geometry.angles import TURN, wrap_to_pi
 from er3a.geometry.transforms import as_floats
 from er3a.kinematics.chain import constant_links, joint_starts, row_values
-from er3a.kinematics.classes.chain_solvers import ArmClassCode, ChainSolver, Redundancy, Unsolved, chain_solver
+from er3a.kinematics.classes.chain_solvers import Unsolved, chain_solver
+from er3a.kinematics.classes.class_solvers import ArmClassCode, ChainSolver, Redundancy
 from er3a.kinematics.classes.links import size_of
 from er3a.kinematics.classes.self_motion import PoseChain, TracedCurve
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, UNCERTAIN

@@ -15,7 +15,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from er3a.kinematics.by_class import arm_solver, to_rows
-from er3a.kinematics.classes.chain_solvers import SlotName
+from er3a.kinematics.classes.class_solvers import SlotName
 from er3a.kinematics.closed_form import BOUNDARY_M, SLOTS
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import closed_form_missing, parallel_axes_arm, wrist_partitioned_arm

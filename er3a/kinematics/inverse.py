@@ -17,8 +17,8 @@ from er3a.kinematics.by_class import (
     slots_of_class,
     task_mask,
 )
-from er3a.kinematics.classes.chain_solvers import ArmClassCode
 from er3a.kinematics.classes.chain_solvers import Unsolved as UnsolvedChain
+from er3a.kinematics.classes.class_solvers import ArmClassCode
 from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.closed_form import FREE, OFF_AXIS, ORIENTATION, REACHED, TOO_FAR
 from er3a.kinematics.configuration import side_of, slot_labels

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.kinematics.by_class import arm_solver
-from er3a.kinematics.classes.chain_solvers import ArmClassCode, ChainSolver, Completed, LockedJoint
+from er3a.kinematics.classes.chain_solvers import LockedJoint
+from er3a.kinematics.classes.class_solvers import ArmClassCode, ChainSolver, Completed
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.derived import derived

@@ -21,7 +21,8 @@ from er3a.kinematics.by_class import (
     slots_of_class,
     task_mask,
 )
-from er3a.kinematics.classes.chain_solvers import ChainSolver, Completed, LockedJoint, Unsolved
+from er3a.kinematics.classes.chain_solvers import LockedJoint, Unsolved
+from er3a.kinematics.classes.class_solvers import ChainSolver, Completed
 from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.wrist_partitioned import closed_form_missing

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.kinematics.classes.chain_solvers import ArmClassCode, chain_solver
+from er3a.kinematics.classes.chain_solvers import chain_solver
+from er3a.kinematics.classes.class_solvers import ArmClassCode
 from er3a.kinematics.classes.links import axes_of, size_of
 from er3a.numerics.arrays import Flags, Reals
 

@@ -1,0 +1,329 @@
+"""The solvers of the classes of arms, with one interface.
+
+Chains are constant links and joints that turn about or slide along z (:mod:`links`); base, tool, offsets and coupling
+are the caller's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Literal, Protocol, get_args
+
+import numpy as np
+
+from er3a.geometry.angles import TURN
+from er3a.kinematics.classes.arm_angle import ArmAngleArm, arm_angles_of, solve_at_arm_angle
+from er3a.kinematics.classes.four_bar import four_bars, solve_three_parallel
+from er3a.kinematics.classes.gantry import Gantry, solve_gantry
+from er3a.kinematics.classes.links import axes_of, poses_of, size_of
+from er3a.kinematics.classes.parallel_axes import ThreeParallel
+from er3a.kinematics.classes.scara import Scara, solve_scara
+from er3a.kinematics.classes.self_motion import PoseChain
+from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, RowsFound
+from er3a.kinematics.closed_form import BOUNDARY_M, REACHED, ArmConstants, solve
+from er3a.numerics.arrays import Flags, Integers, Reals
+
+ArmClassCode = Literal[
+    "spherical_wrist",
+    "three_parallel",
+    "general_six",
+    "six_one_prismatic",
+    "six_two_prismatic",
+    "gantry",
+    "arm_angle",
+    "redundant",
+    "scara",
+    "free_roll",
+    "planar_wrist",
+    "position",
+    "dependent",
+    "unsolved",
+]
+SlotName = Literal[
+    "front_elbow_up_no_flip",
+    "front_elbow_up_flip",
+    "front_elbow_down_no_flip",
+    "front_elbow_down_flip",
+    "back_elbow_up_no_flip",
+    "back_elbow_up_flip",
+    "back_elbow_down_no_flip",
+    "back_elbow_down_flip",
+    "shoulder_plus_elbow_plus_wrist_plus",
+    "shoulder_plus_elbow_plus_wrist_minus",
+    "shoulder_plus_elbow_minus_wrist_plus",
+    "shoulder_plus_elbow_minus_wrist_minus",
+    "shoulder_minus_elbow_plus_wrist_plus",
+    "shoulder_minus_elbow_plus_wrist_minus",
+    "shoulder_minus_elbow_minus_wrist_plus",
+    "shoulder_minus_elbow_minus_wrist_minus",
+    "elbow_plus",
+    "elbow_minus",
+    "wrist_plus",
+    "wrist_minus",
+]
+SLOT_NAMES: tuple[SlotName, ...] = get_args(SlotName)
+LEFT_OVER = 1e-6  # rad by which a pose may miss those that fewer than six joints can take
+RANK_LOST = 1e-6  # smallest singular value below which a joint may be free
+NEAR_SINGULAR = 1e-7  # rad or parts of the reach: a closed form's row so near to its singular sets is looked at again
+
+
+@dataclass(frozen=True)
+class Redundancy:
+    """What a pose leaves open in chains of seven and more: a joint (from 0), or the arm angle (-1)."""
+
+    joint: int
+    code: Literal["locked_joint", "arm_angle"]
+
+
+class ChainSolver(Protocol):
+    """What every class offers.
+
+    ``rows`` takes poses (N, 4, 4) in m and values (N, k) of the k parameters; it gives joint values (N, slots, n), NaN
+    in empty slots, and how sure it is (N,): CERTAIN, UNCERTAIN, or CONTINUUM where branches meet or a joint is free.
+    ``names`` tells the slots' names, with joint values (n,) of the manufacturer's zero pose; none where no sign factors
+    separate the solutions.
+    """
+
+    @property
+    def code(self) -> ArmClassCode: ...
+
+    @property
+    def slots(self) -> int: ...
+
+    @property
+    def parameters(self) -> tuple[Redundancy, ...]: ...
+
+    def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]: ...
+
+    def values_of(self, x: Reals) -> Reals: ...
+
+    def seeds(self, T: Reals, values: Reals) -> Reals: ...
+
+    def names(self, x: Reals) -> tuple[SlotName, ...]: ...
+
+
+class WithoutParameters:
+    """A class without parameters."""
+
+    parameters: tuple[Redundancy, ...] = ()
+
+    def values_of(self, x: Reals) -> Reals:
+        return np.empty((*x.shape[:-1], 0))
+
+    def seeds(self, T: Reals, values: Reals) -> Reals:
+        """Members (k, n) of continua of one pose (4, 4) that the class knows without a search."""
+        return np.empty((0, 6))
+
+    def names(self, x: Reals) -> tuple[SlotName, ...]:
+        return ()
+
+
+@dataclass(frozen=True, eq=False)
+class SphericalWristSolver(WithoutParameters):
+    """Axes 2 and 3 parallel, and a spherical wrist."""
+
+    links: Reals
+    constants: ArmConstants
+    code: ArmClassCode = "spherical_wrist"
+    slots: int = 8
+
+    def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
+        shape = len(T), 8
+        q, fault, gap = np.full((*shape, 6), np.nan), np.zeros(shape, dtype=np.int8), np.zeros(shape)
+        plain = np.ones(6), np.zeros(6)
+        solve(self.constants, plain, np.ascontiguousarray(T), np.zeros((len(T), 6)), True, True, (q, fault, gap))
+        q[fault != REACHED] = np.nan
+        return q, np.where(_branches_meet(q, ((4, 0), (2, 2), (1, 4))), CONTINUUM, CERTAIN)
+
+    def names(self, x: Reals) -> tuple[SlotName, ...]:
+        k = self.constants
+        w1, w2 = np.array(k.axis_1), np.array(k.axis_2)
+        T = poses_of(self.links, x)
+        W = T[:3, 3] + T[:3, :3] @ np.array(k.wrist_in_tool) - np.array(k.point_1)
+        side = float(np.cross(w1, w2) @ _turned_back(W, w1, x[0]))
+        return _three_signs(w1, w2, side if abs(side) > BOUNDARY_M else 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class ParallelAxes(WithoutParameters):
+    """Axes 2, 3 and 4 parallel, 5 and 6 meet."""
+
+    arm: ThreeParallel
+    code: ArmClassCode = "three_parallel"
+    slots: int = 8
+
+    def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
+        q, marked = solve_three_parallel(self.arm, T)
+        certainty = np.full(len(T), CERTAIN)
+        for n in np.flatnonzero(marked):
+            chain = PoseChain.of(self.arm.links, np.zeros(6, dtype=bool), T[n], size_of(self.arm.links))
+            solved = q[n][np.isfinite(q[n, :, 0])]
+            certainty[n] = CONTINUUM if any(chain.smallest(x) < RANK_LOST for x in solved) else CERTAIN
+        return q, certainty
+
+    def seeds(self, T: Reals, values: Reals) -> Reals:
+        found = [
+            family.members(np.array([0.5 * (low + high), 0.25 * low + 0.75 * high]), elbow)
+            for family in four_bars(self.arm, T)
+            for low, high in family.intervals
+            for elbow in (0, 1)
+        ]
+        return np.concatenate([np.empty((0, 6)), *found])
+
+    def names(self, x: Reals) -> tuple[SlotName, ...]:
+        axes, points = axes_of(self.arm.links)
+        T = poses_of(self.arm.links, x)
+        W = T[:3, 3] + T[:3, :3] @ np.array(self.arm.constants.wrist_in_tool) - points[0]
+        side = float(np.cross(axes[0], axes[1]) @ _turned_back(W, axes[0], x[0]))
+        return _three_signs(axes[0], axes[1], side if abs(side) > BOUNDARY_M else 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class General(WithoutParameters):
+    """Any six joints of which at most two slide."""
+
+    solve: Callable[[Reals], RowsFound]
+    code: ArmClassCode
+    slots: int = 16
+
+    def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
+        found = self.solve(T)
+        return found.q, found.certainty
+
+
+@dataclass(frozen=True, eq=False)
+class ArmAngle:
+    """Seven joints with a spherical shoulder and wrist."""
+
+    arm: ArmAngleArm
+    spare: ArmAngleArm  # with another reference
+    code: ArmClassCode = "arm_angle"
+    slots: int = 8
+    parameters: tuple[Redundancy, ...] = (Redundancy(-1, "arm_angle"),)
+
+    def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
+        q, singular = solve_at_arm_angle(self.arm, T, values[:, 0])
+        lost = np.flatnonzero(singular & np.isnan(q).all(axis=(1, 2)))
+        if lost.size:  # shoulder and wrist may be in line with the reference
+            q[lost] = solve_at_arm_angle(self.spare, T[lost], np.nan_to_num(values[lost, 0]))[0]
+        return q, np.where(singular, CONTINUUM, CERTAIN)
+
+    def values_of(self, x: Reals) -> Reals:
+        angles = arm_angles_of(self.arm, x)
+        if np.isnan(angles).any():
+            angles = np.where(np.isnan(angles), arm_angles_of(self.spare, x), angles)
+        return angles[..., None]
+
+    def seeds(self, T: Reals, values: Reals) -> Reals:
+        return np.empty((0, 7))
+
+    def names(self, x: Reals) -> tuple[SlotName, ...]:
+        # slots are 4 elbow + 2 shoulder + wrist
+        first = SLOT_NAMES.index("shoulder_plus_elbow_plus_wrist_plus")
+        return tuple(SLOT_NAMES[first + 4 * (s // 2 % 2) + 2 * (s // 4) + s % 2] for s in range(8))
+
+
+@dataclass(frozen=True, eq=False)
+class ThreeSliding(WithoutParameters):
+    """Six joints, three of which slide."""
+
+    arm: Gantry
+    code: ArmClassCode = "gantry"
+    slots: int = 2
+
+    def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
+        q, singular = solve_gantry(self.arm, T)
+        return q, np.where(singular, CONTINUUM, CERTAIN)
+
+    def names(self, x: Reals) -> tuple[SlotName, ...]:
+        return "wrist_plus", "wrist_minus"
+
+
+@dataclass(frozen=True, eq=False)
+class PlanarFour(WithoutParameters):
+    """Four joints of one direction, one of them sliding."""
+
+    arm: Scara
+    code: ArmClassCode = "scara"
+    slots: int = 2
+
+    def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
+        q, second = solve_scara(self.arm, T)[0], self.arm.turning[1]
+        meet = np.abs(_turned(q[:, 0, second] - q[:, 1, second])) < NEAR_SINGULAR
+        return q, np.where(meet, CONTINUUM, CERTAIN)
+
+    def seeds(self, T: Reals, values: Reals) -> Reals:
+        return np.empty((0, 4))
+
+    def names(self, x: Reals) -> tuple[SlotName, ...]:
+        return "elbow_plus", "elbow_minus"
+
+
+@dataclass(frozen=True, eq=False)
+class Completed(WithoutParameters):
+    """Fewer than six joints, solved with joints that the chain lacks at these places (from 0, rising)."""
+
+    rest: ChainSolver
+    lacking: tuple[int, ...]
+    code: ArmClassCode
+    slots: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "slots", self.rest.slots)
+
+    def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
+        x, certainty = self.rest.rows(T, values)
+        if self.code == "planar_wrist":  # what these joints would have to turn, the tool can't
+            x[np.abs(_turned(x[:, :, list(self.lacking)])).max(axis=2) > LEFT_OVER] = np.nan
+        x = np.delete(x, self.lacking, axis=2)
+        for first in range(x.shape[1]):  # rows that differ in the joints that are not there
+            same = np.abs(_turned(x[:, first + 1 :] - x[:, first : first + 1])).max(axis=2, initial=0.0) < 1e-9
+            x[:, first + 1 :][same] = np.nan
+        return x, certainty
+
+    def seeds(self, T: Reals, values: Reals) -> Reals:
+        return np.empty((0, 6 - len(self.lacking)))
+
+    def names(self, x: Reals) -> tuple[SlotName, ...]:
+        if self.code == "position":  # rows that differ in the joints that are not there are one
+            return ()
+        full = np.zeros(6)
+        full[[j for j in range(6) if j not in self.lacking]] = x
+        return self.rest.names(full)
+
+
+def _turned_back(v: Reals, axis: Reals, angle: float) -> Reals:
+    """A vector as seen with joint 1 at 0."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.asarray(c * v - s * np.cross(axis, v) + (1 - c) * (axis @ v) * axis)
+
+
+def _three_signs(w1: Reals, w2: Reals, zero_side: float) -> tuple[SlotName, ...]:
+    """Names of the slots ``4 shoulder + 2 elbow + wrist``.
+
+    As :func:`er3a.kinematics.configuration.branch_labels`: *front* is where the wrist is in the zero pose; *up*: with
+    the arm stretched out level on that side the elbow is above the line from shoulder to wrist.
+    """
+    names = []
+    for slot in range(8):
+        shoulder, elbow, wrist = slot // 4, slot // 2 % 2, slot % 2
+        outward = (-1.0 if shoulder == 0 else 1.0) * np.cross(w1, w2)
+        back = (outward @ np.cross(w1, w2)) * zero_side < 0
+        down = (1.0 if elbow == 0 else -1.0) * (np.cross(w2, outward) @ w1) >= 0
+        names.append(SLOT_NAMES[4 * int(back) + 2 * int(down) + wrist])
+    return tuple(names)
+
+
+def _turned(x: Reals) -> Reals:
+    return np.asarray(x - TURN * np.round(x / TURN))
+
+
+def _branches_meet(q: Reals, pairs: tuple[tuple[int, int], ...]) -> Flags:
+    """Whether two rows that differ in one root (slots apart, joint that tells it) lie within a small angle, (N,)."""
+    meet = np.zeros(len(q), dtype=bool)
+    for step, joint in pairs:
+        for slot in range(8):
+            if slot // step % 2 == 0:
+                meet |= np.abs(_turned(q[:, slot, joint] - q[:, slot + step, joint])) < NEAR_SINGULAR
+    return meet
