@@ -9,7 +9,8 @@ from itertools import compress, product
 
 import numpy as np
 
-from er3a.collision.distance_kernels import CYLINDER, FREE, measure, search_boxes, some_distances, which_overlap
+from er3a.collision.core_distance import CYLINDER
+from er3a.collision.distance_kernels import FREE, measure, search_boxes, some_distances, which_overlap
 from er3a.collision.envelopes import link_frames
 from er3a.collision.matrix import BOXES, MatrixRow, collision_matrix, matrix_of
 from er3a.collision.overlap_depth import cylinder_points, overlap_depth

@@ -25,16 +25,8 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.collision.distance_kernels import (
-    FREE,
-    MEETS,
-    ROOM,
-    Layout,
-    measure,
-    pair_distance,
-    place,
-    search_boxes,
-)
+from er3a.collision.core_distance import ROOM, pair_distance
+from er3a.collision.distance_kernels import FREE, MEETS, Layout, measure, place, search_boxes
 from er3a.collision.shapes import Body, arm_bodies, layout_of
 from er3a.collision.trimming import beside_axis, girth, trimmed
 from er3a.kinematics.forward import frames

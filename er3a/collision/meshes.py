@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from er3a.collision.distance_kernels import distances_from_hull
+from er3a.collision.core_distance import distances_from_hull
 from er3a.errors import Er3aError
 from er3a.geometry.open3d_loader import load_open3d
 from er3a.geometry.sphere import fibonacci_sphere

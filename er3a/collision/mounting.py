@@ -7,7 +7,8 @@ from itertools import product
 
 import numpy as np
 
-from er3a.collision.distance_kernels import ROOM, pair_distance, place
+from er3a.collision.core_distance import ROOM, pair_distance
+from er3a.collision.distance_kernels import place
 from er3a.collision.pairs import BASE
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_bodies, layout_of, solid_bodies

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.collision.distance_kernels import CYLINDER, HALF_SPACE, HULL, WORLD, Layout
+from er3a.collision.core_distance import CYLINDER, HALF_SPACE, HULL
+from er3a.collision.distance_kernels import WORLD, Layout
 from er3a.collision.envelopes import envelopes_of
 from er3a.collision.overlap_depth import cylinder_points
 from er3a.collision.pairs import link_label
@@ -31,7 +32,7 @@ class Body:
     name : ``base``, ``link_3``, or that of the solid or of what is carried
     link : 0 for the base, k for the link that row k moves, ``WORLD`` for what stands around
     points : (k, 3), m, in the link's frame; a half-space has its normal and, in the second row, its offset first
-    kind, radius, disc : see ``distance_kernels``
+    kind, radius, disc : see :mod:`core_distance`
     """
 
     name: str

@@ -9,7 +9,7 @@ import numpy as np
 
 import er3a.pipeline.messages.pairs  # noqa: F401
 from er3a.collision.bodies import Bodies
-from er3a.collision.distance_kernels import CYLINDER, HALF_SPACE, HULL
+from er3a.collision.core_distance import CYLINDER, HALF_SPACE, HULL
 from er3a.collision.scene import Scene
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.configuration import branch_labels
