@@ -16,7 +16,7 @@ from er3a.files.robot_file import Name, Text
 from er3a.files.target_file import Orientation
 from er3a.files.units import JointsDeg, PositionMm, Triple, joint_values
 from er3a.files.yaml_file import StrictModel, load
-from er3a.kinematics.configuration import BranchLabel
+from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.numerics.arrays import Reals
 from er3a.planning.commands import (
     Command,

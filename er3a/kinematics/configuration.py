@@ -15,7 +15,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from er3a.kinematics.by_class import arm_solver, to_rows
-from er3a.kinematics.classes.class_solvers import SlotName
+from er3a.kinematics.classes.class_solvers import BranchLabel, SlotName
 from er3a.kinematics.closed_form import BOUNDARY_M, SLOTS
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import closed_form_missing, parallel_axes_arm, wrist_partitioned_arm
@@ -23,16 +23,6 @@ from er3a.robots.derived import derived
 from er3a.robots.robot import Robot
 
 Side = Literal["front", "back"]
-BranchLabel = Literal[
-    "front_elbow_up_no_flip",
-    "front_elbow_up_flip",
-    "front_elbow_down_no_flip",
-    "front_elbow_down_flip",
-    "back_elbow_up_no_flip",
-    "back_elbow_up_flip",
-    "back_elbow_down_no_flip",
-    "back_elbow_down_flip",
-]
 LABELS: tuple[BranchLabel, ...] = get_args(BranchLabel)
 
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from er3a.display import MOST_ROWS, Displayed, Sheet, first_rows, shortly
 from er3a.geometry.angles import TURN, wrap_to_pi
-from er3a.kinematics.classes.class_solvers import ArmClassCode, SlotName
-from er3a.kinematics.configuration import BranchLabel, slot_labels
+from er3a.kinematics.classes.class_solvers import ArmClassCode, BranchLabel, SlotName
+from er3a.kinematics.configuration import slot_labels
 from er3a.kinematics.families import Family
 from er3a.kinematics.self_motions import SelfMotionCurve
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing

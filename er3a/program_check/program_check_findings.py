@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from er3a.collision.pairs import Pair
-from er3a.kinematics.configuration import BranchLabel
+from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.kinematics.singularity import EventType
 from er3a.kinematics.solutions import Unsolved
 from er3a.planning.intervals import AboveLimit, BelowLimit, TooFast

@@ -40,7 +40,7 @@ ArmClassCode = Literal[
     "dependent",
     "unsolved",
 ]
-SlotName = Literal[
+BranchLabel = Literal[
     "front_elbow_up_no_flip",
     "front_elbow_up_flip",
     "front_elbow_down_no_flip",
@@ -49,6 +49,9 @@ SlotName = Literal[
     "back_elbow_up_flip",
     "back_elbow_down_no_flip",
     "back_elbow_down_flip",
+]
+SlotName = Literal[
+    BranchLabel,
     "shoulder_plus_elbow_plus_wrist_plus",
     "shoulder_plus_elbow_plus_wrist_minus",
     "shoulder_plus_elbow_minus_wrist_plus",

@@ -10,7 +10,7 @@ from typing import Generic, Literal, TypeVar
 
 from er3a.collision.pairs import Pair, PairOverlaps
 from er3a.findings import Finding
-from er3a.kinematics.configuration import BranchLabel
+from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.kinematics.singularity import EventType
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.numerics.arrays import Flags, Reals

@@ -6,8 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from er3a.kinematics.classes.class_solvers import SlotName
-from er3a.kinematics.configuration import BranchLabel
+from er3a.kinematics.classes.class_solvers import BranchLabel, SlotName
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.workspace.workspace_findings import WorkspaceFinding
 from er3a.pipeline.stages.workspace.workspace_tables import (
