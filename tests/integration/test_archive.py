@@ -15,6 +15,7 @@ from rocrate_validator.utils.http import HttpRequester
 
 from er3a.errors import ResultError
 from er3a.pipeline.archive import archive
+from testing.small_study import stages_of
 
 
 @pytest.fixture
@@ -40,7 +41,8 @@ def test_archive_holds_pages_recordings_results_and_inputs(pack, small_study):
         for page in small_study.folder.glob("reports/*/*.html"):
             assert zipped.read(page.relative_to(small_study.folder).as_posix()) == page.read_bytes()
     for robot in small_study.robots:
-        assert {f"data/robots/{robot}.yaml", f"data/targets/{robot}.yaml", f"data/paths/{robot}.yaml"} <= names
+        asked = (f"data/targets/{robot}.yaml", f"data/paths/{robot}.yaml") if "trajectory" in stages_of(robot) else ()
+        assert {f"data/robots/{robot}.yaml", *asked} <= names
         assert {f"reports/{robot}/workspace.rrd", f"results/{robot}/workspace/summary.json"} <= names
     assert {"reports/index.html", "config/small.yaml"} <= names
 
