@@ -70,18 +70,21 @@ class RateCheck:
         if limit.order == 3:
             first, last = part.acceleration_at_ends
             before = np.zeros(last.shape[1]) if self._last is None else self._last[1]
-            self._stepped(part.times[:-1], np.abs(first - np.vstack([before, last[:-1]])))
+            steps = np.abs(first - np.vstack([before, last[:-1]]))
+            for j, found in self._found:
+                found[2].extend(self._steps(j, part.times[:-1], steps))
             self._last = float(part.times[-1]), last[-1]
 
-    def _stepped(self, times: Reals, steps: Reals) -> None:
-        for j, found in self._found:
-            found[2].extend((t, t, np.inf) for t in times[steps[:, j] > self._limit.step_allowed[j]].tolist())
+    def _steps(self, j: int, times: Reals, steps: Reals) -> list[Stretch]:
+        """Steps (m, n) of the acceleration at times (m,) that exceed the limit of joint ``j``."""
+        return [(t, t, np.inf) for t in times[steps[:, j] > self._limit.step_allowed[j]].tolist()]
 
     def intervals(self) -> list[Interval[RateCause]]:
-        """One for each joint and stretch; to be asked for once, after the last part."""
-        if self._last is not None:
-            self._stepped(np.array([self._last[0]]), np.abs(self._last[1][None]))
+        """One for each joint and stretch."""
         found = [rate_interval(self._limit, j, *part) for j, parts in self._found for each in parts for part in each]
+        if self._last is not None:  # the motion ends at rest
+            t, steps = np.array([self._last[0]]), np.abs(self._last[1][None])
+            found += [rate_interval(self._limit, j, *part) for j, _ in self._found for part in self._steps(j, t, steps)]
         return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
 
 

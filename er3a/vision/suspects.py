@@ -12,7 +12,6 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import get_args
 
 import numpy as np
 import scipy
@@ -35,7 +34,13 @@ MOST_DEVIATION = np.radians(2.0)  # of a camera that is of any use
 ROUNDING = 1e-6  # rad
 SAME_POSITION_M, SAME_ROTATION_RAD = 5e-5, 2e-4
 FALSE_ALARMS = 0.01  # of sound sets in which a sample is called far from the fit
-MEND_KINDS: tuple[SuspectKind, ...] = get_args(SuspectKind)[:-1]
+BOARD_TURNS: dict[SuspectKind, tuple[str, tuple[float, ...]]] = {  # axis of the board, and deg
+    "half_turn_x": ("x", (180.0,)),
+    "half_turn_y": ("y", (180.0,)),
+    "half_turn_z": ("z", (180.0,)),
+    "quarter_turn_z": ("z", (90.0, -90.0)),
+}
+MEND_KINDS: tuple[SuspectKind, ...] = (*BOARD_TURNS, "mirrored_tilt")
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,8 +131,7 @@ def _mended(T: Reals, kind: SuspectKind) -> list[Reals]:
         sight = T[:3, 3] / max(float(np.linalg.norm(T[:3, 3])), 1e-12)
         away = np.eye(3) - 2 * np.outer(sight, sight)
         return [away @ R @ np.diag([1.0, 1.0, -1.0])]
-    axis = kind[-1]
-    turns = (90.0, -90.0) if kind.startswith("quarter") else (180.0,)
+    axis, turns = BOARD_TURNS[kind]
     return [R @ scipy.spatial.transform.Rotation.from_euler(axis, turn, degrees=True).as_matrix() for turn in turns]
 
 
