@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
+from yaml.composer import Composer
 
 from er3a.errors import InputError, InputWarning
 from er3a.formats.text_file import read_text
@@ -44,12 +45,16 @@ class StrictModel(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
 
-class _PlainLoader(yaml.SafeLoader):
+class _PlainLoader(Composer, yaml.CSafeLoader):
     """Safe YAML loader with numbers as in YAML 1.2, which refuses a key written twice, aliases and tags.
 
     YAML 1.1 would read ``0650`` as octal 424, ``1:30`` as 90, and ``1e3`` as a text; a tag (``!!int 0650``) would
-    bring that back.
+    bring that back. The text is parsed by libyaml; Python's composer shows each node's event before it is built.
     """
+
+    def __init__(self, stream):
+        yaml.CSafeLoader.__init__(self, stream)
+        Composer.__init__(self)
 
     def compose_node(self, parent, index):
         event = self.peek_event()

@@ -42,19 +42,24 @@ def digest_of(files: Iterable[Path], folder: Path) -> str:
 def sources(modules: Iterable[str], root: Path = _ROOT) -> set[Path]:
     """The files of modules below ``root``, of those there that they import (transitively), and templates of views."""
     found: set[Path] = set()
-    todo = list(modules)
+    todo = [path for module in modules if (path := _file(module, root))]
     while todo:
-        path = _file(todo.pop(), root)
-        if path is None or path in found:
+        path = todo.pop()
+        if path in found:
             continue
         found.add(path)
         if path.name in VIEWS:
             found |= {file for kind in ("j2", "css", "js") for file in path.parent.glob(f"*.{kind}")}
-        todo += _imports(path, root)
+        todo += _imported(path, root)
     return found
 
 
 @cache
+def _imported(path: Path, root: Path) -> tuple[Path, ...]:
+    """The files below ``root`` that a file imports."""
+    return tuple(file for name in _imports(path, root) if (file := _file(name, root)))
+
+
 def _imports(path: Path, root: Path) -> tuple[str, ...]:
     """All names that a file imports, public names of er3a by the modules that they come from."""
     names: list[str] = []

@@ -67,7 +67,7 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\nb: &b [*a, *a, *a, *a, *a, *a, *a, *a
         ("kind: whole\nkind: whole\n", "line 2, column 1", "the key 'kind' is given twice"),
         ("kind: whole\nparts:\n- {length_mm: 1, length_mm: 2}\n", "line 3, column 18", "the key 'length_mm' is given"),
         ("kind: [whole\n", "line 2, column 1", "expected ',' or ']'"),
-        ("kind: whole\n\tcount: 1\n", "line 2, column 1", "can't|cannot start any token"),
+        ("kind: whole\n\tcount: 1\n", "line 2, column 1", "a tab character"),
         (BOMB, "line 2, column 8", "aliases (*name) are not supported"),
         ("kind: whole\n<<: {count: 1}\n", "line 2, column 1", "merge"),
         ("kind: whole\n1: 2\n", "line 2, column 1", "the key 1 is not a word"),
@@ -99,7 +99,7 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\nb: &b [*a, *a, *a, *a, *a, *a, *a, *a
 def test_refusals_name_place_and_problem(write, content, field, problem):
     error = refusal(write(content))
     assert error.field == field
-    assert any(words in error.problem for words in problem.split("|"))
+    assert problem in error.problem
     assert error.remedy
 
 
