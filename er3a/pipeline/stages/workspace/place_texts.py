@@ -45,16 +45,14 @@ def _nearest_limit(place: PlaceSummary) -> str:
     margin = fixed(place.limit_margin_deg, 1)
     if place.limit_joint is None:
         return tr("Joints come within {margin} deg of their limits.", margin=margin)
-    return tr(
-        "J{joint} comes within {margin} deg of its limit, the others less near.", joint=place.limit_joint, margin=margin
-    )
+    return tr("The joint nearest to its limit is J{joint}: {margin} deg.", joint=place.limit_joint, margin=margin)
 
 
 def _nearest_bodies(place: PlaceSummary) -> str:
     if place.clearance_mm is None or place.clearance_pair is None:
         return ""
     pair, far = say(place.clearance_pair), fixed(place.clearance_mm, 0)
-    return tr("Nearest to each other come {pair}: {far} mm.", pair=pair, far=far)
+    return tr("The least clearance is {far} mm, between {pair}.", pair=pair, far=far)
 
 
 def _movable(place: PlaceSummary) -> bool:
