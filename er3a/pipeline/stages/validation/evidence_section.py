@@ -54,7 +54,7 @@ DETAIL_COLUMNS = (
 OFF_COLUMNS = (
     N_("Entry"),
     N_("Stated>"),
-    N_("Supported by evidence>"),
+    N_("Supported>"),
     N_("Difference>"),
     N_("Tool off by"),
     N_("Documents"),

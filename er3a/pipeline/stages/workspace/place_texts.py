@@ -35,6 +35,7 @@ def best_text(placement: PlacementSummary) -> str:
         tr("It can be moved by {room} mm, one direction at a time.", room=_room(place)) if _movable(place) else "",
         _nearest_limit(place),
         _nearest_bodies(place),
+        tr("The box itself does not count as an obstacle."),
     ]
     return joined(told, " ")
 
