@@ -30,8 +30,9 @@ from er3a.numerics.runs import runs
 from er3a.planning.branch_tracking import WIDE_STEP, Branches, branches_along, turned_difference, wrist_joints
 from er3a.planning.followed import BranchJump, Followed
 from er3a.planning.moves import ToolPath
-from er3a.robots.joint_limits import LIMIT_TOLERANCE, limit_margin, nearest_equivalent, within
+from er3a.robots.joint_limits import limit_margin, nearest_equivalent, within
 from er3a.robots.robot import Robot
+from er3a.robots.whole_turns import LIMIT_TOLERANCE
 
 JUMP_COST = 1e7
 OUTSIDE_COST = 1e4  # for the whole duration

@@ -28,6 +28,7 @@ from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.derived import derived
+from er3a.robots.joint_limits import row_limits
 from er3a.robots.robot import Robot
 from er3a.workspace.cell_frame import CLOSED_FORMS, is_quick, joint_1_alone
 from er3a.workspace.general_arm import coupled
@@ -108,19 +109,21 @@ def slot_count(robot: Robot) -> int:
 
 @derived
 def redundancy_values(robot: Robot) -> Reals | None:
-    """What each pose is tried with, (k, p), rad or m: arm angles or values of joints; None for arms of six joints."""
+    """What each pose is tried with, (k, p), rad or m: arm angles or values of joints (where they are
+    coupled, of rows); None for arms of six joints."""
     parameters = parameters_of(robot)
     if not parameters:
         return None
     count = max(2, round(ARM_ANGLES ** (1 / len(parameters))))
     each = []
+    endless = robot.continuous if robot.coupling is None else (robot.coupling[:, robot.continuous] != 0).any(axis=1)
     for parameter in parameters:
         j = parameter.joint
         if j < 0:
             each.append(_TURN * np.arange(count) / count)
             continue
-        low, high = robot.lower[j], robot.upper[j]
-        if not robot.slides[j] and (robot.continuous[j] or high - low > _TURN):
+        low, high = row_limits(robot)[j].tolist()
+        if not robot.sliding[j] and (endless[j] or high - low > _TURN):
             low, high = (low + high) / 2 - np.pi, (low + high) / 2 + np.pi
         each.append(low + (high - low) * (np.arange(count) + 0.5) / count)
     return np.array(list(product(*each)))
