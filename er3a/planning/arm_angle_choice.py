@@ -21,7 +21,7 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.joint_limits import limit_margin, nearest_equivalent
 from er3a.robots.robot import Robot
-from er3a.robots.whole_turns import shortest_way, turns_inward, whole_turns
+from er3a.robots.whole_turns import shortest_way, take_turns_off, turns_inward, whole_turns
 
 ANGLES = 72  # of the grid, over a turn
 BEGUN_AT, FEW_CHANGES = 24, 13  # arm angles at the start where none is given; then changes from it
@@ -205,7 +205,7 @@ def _ranges(
     poses, _, slots, joints = q.shape
     shape = (place.shape[1], slots, len(lines))
     low, high, most = np.full(shape, np.inf), np.full(shape, -np.inf), np.zeros(shape[:2])
-    last, (steps, counts) = np.empty(joints), turns
+    last, step = np.empty(joints), np.empty(joints)
     for law in range(shape[0]):
         for slot in range(slots):
             last[:] = near
@@ -214,11 +214,13 @@ def _ranges(
                 if np.isnan(row[0]):
                     most[law, slot] = np.inf
                     break
-                step = row - last
-                step -= steps @ np.round(counts @ step)
-                last += step
-                if k > 0:
-                    most[law, slot] = max(most[law, slot], np.abs(step).max())
+                for j in range(joints):
+                    step[j] = row[j] - last[j]
+                take_turns_off(step, turns)
+                for j in range(joints):
+                    last[j] += step[j]
+                    if k > 0:
+                        most[law, slot] = max(most[law, slot], abs(step[j]))
                 for line in range(shape[2]):
                     value = 0.0
                     for j in range(joints):

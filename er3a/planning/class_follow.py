@@ -34,7 +34,7 @@ from er3a.planning.polynomial_checks import limit_intervals
 from er3a.planning.profiles import times_at
 from er3a.robots.joint_limits import limit_margin, nearest_equivalent, within
 from er3a.robots.robot import Robot
-from er3a.robots.whole_turns import shortest_way, turns_inward, whole_turns
+from er3a.robots.whole_turns import shortest_way, take_turns_off, turns_inward, whole_turns
 
 DEGREE = 9
 FIRST_PIECES, MOST_PIECES = 4, 1024  # between two corners of the path or of its law of time
@@ -214,7 +214,7 @@ def _tracked(rows: Reals, turns: tuple[Reals, Reals], start: Reals, q: Reals) ->
     -------
     the first point beyond which it does not go on, N if it does; and whether that point is reached by some row
     """
-    n, (steps, counts) = rows.shape[2], turns
+    n = rows.shape[2]
     last, step = start.copy(), np.empty(n)
     for i in range(rows.shape[0]):
         least, reached = np.inf, False
@@ -222,8 +222,9 @@ def _tracked(rows: Reals, turns: tuple[Reals, Reals], start: Reals, q: Reals) ->
             if np.isnan(rows[i, slot, 0]):
                 continue
             reached, farthest = True, 0.0
-            step[:] = rows[i, slot] - last
-            step -= steps @ np.round(counts @ step)
+            for j in range(n):
+                step[j] = rows[i, slot, j] - last[j]
+            take_turns_off(step, turns)
             for j in range(n):
                 farthest = max(farthest, abs(step[j]))
             if farthest < least:

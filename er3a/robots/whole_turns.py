@@ -174,6 +174,20 @@ def _windows(robot: Robot, q_ref: Reals, widened: float) -> tuple[Reals, Reals]:
     return lower, upper
 
 
+@kernel
+def take_turns_off(step: Reals, turns: tuple[Reals, Reals]) -> None:
+    """Make a move of joints (n,) the one by the shortest way; ``turns`` are steps (n, r) and counts (r, n)."""
+    steps, counts = turns
+    for i in range(counts.shape[0]):
+        count = 0.0
+        for j in range(step.shape[0]):
+            count += counts[i, j] * step[j]
+        count = np.round(count)
+        if count != 0.0:
+            for j in range(step.shape[0]):
+                step[j] -= steps[j, i] * count
+
+
 Lattice = tuple[Reals, Reals, Reals]
 """What turns of rows change what limits are of by (m, r), turns of rows for joints (r, n), and what limits are of."""
 Limits = tuple[Reals, Reals, Reals]
