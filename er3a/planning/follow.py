@@ -129,11 +129,14 @@ def _turned(robot: Robot, q: Reals, slot: Integers, jumps: Flags, share: Reals, 
         low = int(np.floor((robot.lower[j] - unwound[:, j].max()) / TURN))
         high = int(np.ceil((robot.upper[j] - unwound[:, j].min()) / TURN))
         nearest = round((reference[j] - unwound[0, j]) / TURN)
-        fixed = before is not None and abs(unwound[0, j] + TURN * nearest - reference[j]) < SAME_JOINTS
+        fixed = robot.continuous[j] or (
+            before is not None and abs(unwound[0, j] + TURN * nearest - reference[j]) < SAME_JOINTS
+        )
         priced.append([])
         for turn in [nearest] if fixed else sorted({nearest, *range(low, high + 1)}):
             angle = unwound[:, j] + TURN * turn
             beyond = (angle > robot.upper[j] + LIMIT_TOLERANCE) | (angle < robot.lower[j] - LIMIT_TOLERANCE)
+            beyond &= ~robot.continuous[j]
             priced[j].append((round(float(share[beyond].sum()), 6), abs(angle[0] - reference[j]), turn))
     outside, turns = _cheapest(robot, unwound, share, priced)
     unwound += TURN * turns
