@@ -38,7 +38,7 @@ MAYBE_SAME = 1e-2  # rad
 SPREAD = 1e-11
 MOST_CURVES, MOST_ON_SURFACE = 24, 2
 STARTS = 240
-SEARCHED: tuple[ArmClassCode, ...] = ("general_six", "six_one_prismatic", "six_two_prismatic", "planar_wrist")
+SEARCHED: tuple[ArmClassCode, ...] = ("general_six", "six_one_prismatic", "six_two_prismatic", "planar_wrist", "gantry")
 SMALLEST_PART = 64
 SCANNED = 16  # values of a redundancy parameter from which self-motions are collected
 
