@@ -337,6 +337,7 @@ def test_a_slot_has_the_turn_that_keeps_a_limit_of_a_sum():
 GANTRY = ([0, 0, 0, 0.1, 0, 0], [H, H, 0, -H, H, 0], [0, 0, 0, 0.2, 0, 0.15])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("turns", "slides"),
     [((0.0, 0.4, 0.7), (1, 1, 0)), ((0.5, 0.4, 0.0), (0, 1, -1)), ((np.pi, 0.4, 0.7), (1, -1, 0))],
