@@ -23,6 +23,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.threads import parallel_for
 from er3a.robots.joint_limits import nearest_equivalent, turn_bounds, within
 from er3a.robots.robot import Robot
+from er3a.robots.whole_turns import whole_turns
 
 SMALLEST_PART = 8 * BLOCK
 SLOTS_BY_STARTS = 16
@@ -157,7 +158,7 @@ def _checked_reference(robot: Robot, q_ref: Reals | None, count: int) -> Reals:
 
 def _turn_range(robot: Robot, q: Reals) -> NDArray[np.int8]:
     turns = np.empty((*q.shape, 2), dtype=np.int8)
-    if robot.joints == 6 and not robot.sliding.any():
+    if robot.joints == 6 and whole_turns(robot).alone.all():
         count_turns(q.reshape(-1, 6), robot.lower, robot.upper, turns.reshape(-1, 6, 2))
         return turns
     low, high = turn_bounds(robot, q)

@@ -20,7 +20,7 @@ from er3a.kinematics.block_constants import EDGE, BlockConstants
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.fast_math import arctan2
 from er3a.numerics.jit import kernel
-from er3a.robots.joint_limits import LIMIT_TOLERANCE
+from er3a.robots.whole_turns import LIMIT_TOLERANCE
 
 BLOCK = 64
 NEAR = 1e-6  # m, rad or their product, from where joints become free

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from er3a.errors import ShapeError
-from er3a.geometry.angles import TURN, wrap_to_pi
+from er3a.geometry.angles import TURN
 from er3a.geometry.transforms import as_floats
 from er3a.kinematics.chain import constant_links, joint_starts, row_values
 from er3a.kinematics.classes.chain_solvers import Unsolved, chain_solver
@@ -27,8 +27,9 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
 from er3a.numerics.threads import parallel_for
 from er3a.robots.derived import derived
-from er3a.robots.joint_limits import LIMIT_TOLERANCE, WHOLE, nearest_equivalent, turn_of, turned_alike, within
+from er3a.robots.joint_limits import nearest_equivalent, row_limits, unwound, within
 from er3a.robots.robot import Robot
+from er3a.robots.whole_turns import LIMIT_TOLERANCE, shortest_way, uncoupling
 
 SAME_ROW = 1e-6  # rad or parts of the arm's size
 SOLVES = 1e-9
@@ -37,7 +38,7 @@ MAYBE_SAME = 1e-2  # rad
 SPREAD = 1e-11
 MOST_CURVES, MOST_ON_SURFACE = 24, 2
 STARTS = 240
-SEARCHED: tuple[ArmClassCode, ...] = ("general_six", "six_one_prismatic", "six_two_prismatic", "planar_wrist")
+SEARCHED: tuple[ArmClassCode, ...] = ("general_six", "six_one_prismatic", "six_two_prismatic", "planar_wrist", "gantry")
 SMALLEST_PART = 64
 SCANNED = 16  # values of a redundancy parameter from which self-motions are collected
 
@@ -84,20 +85,10 @@ def arm_solver(robot: Robot) -> ArmSolver:
     """The solver that the robot's geometry asks for."""
     links = constant_links(robot)
     sliding = np.ascontiguousarray(robot.sliding)
-    uncouple = None
-    if robot.coupling is not None:
-        square = robot.rows == robot.joints and abs(np.linalg.det(robot.coupling)) >= 1e-9
-        uncouple = np.asarray(np.linalg.inv(robot.coupling), dtype=float) if square else None
-        if uncouple is None or not _whole_turns_all(robot, uncouple):
-            return ArmSolver(Unsolved(robot.joints), links, sliding, size_of(links))
+    uncouple = uncoupling(robot)
+    if robot.coupling is not None and uncouple is None:  # more rows than joints
+        return ArmSolver(Unsolved(robot.joints), links, sliding, size_of(links))
     return ArmSolver(chain_solver(links, sliding), links, sliding, size_of(links), uncouple)
-
-
-def _whole_turns_all(robot: Robot, uncouple: Reals) -> bool:
-    """Whether whole turns of rows are whole turns of joints, both ways, so that a row's angle tells all its joints'."""
-    turns = uncouple[:, ~robot.sliding]
-    parts = np.where(robot.slides[:, None], turns, turns - np.round(turns))
-    return bool((turned_alike(robot) | robot.slides).all() and np.abs(parts).max(initial=0.0) <= WHOLE)
 
 
 def to_rows(robot: Robot, q: Reals) -> Reals:
@@ -106,11 +97,11 @@ def to_rows(robot: Robot, q: Reals) -> Reals:
 
 
 def to_joints(robot: Robot, x: Reals) -> Reals:
-    """The manufacturer's values (..., n) of what the rows turn or shift by; angles in (-pi, pi]."""
+    """The manufacturer's values (..., n) of what the rows turn or shift by; angles in (-pi, pi], behind a gear those of
+    rows."""
     uncouple = arm_solver(robot).uncouple
     u = robot.direction * (x - joint_starts(robot))
-    q = u if uncouple is None else u @ uncouple.T
-    return np.where(robot.slides, q, wrap_to_pi(q))
+    return unwound(robot, u if uncouple is None else u @ uncouple.T)
 
 
 def parameters_of(robot: Robot) -> tuple[Redundancy, ...]:
@@ -121,7 +112,7 @@ def parameters_of(robot: Robot) -> tuple[Redundancy, ...]:
 def checked_parameters(robot: Robot, redundancy: Reals | None, q_ref: Reals, count: int) -> Reals:
     """Values (N, k) of the redundancy parameters: as given, or those of the reference (1 or N, n).
 
-    A locked joint is given as the manufacturer's value, an arm angle in rad.
+    A locked joint is given as the manufacturer's value (of coupled joints what its row moves by), an arm angle in rad.
     """
     parameters = parameters_of(robot)
     if redundancy is None:
@@ -191,8 +182,9 @@ def all_motions(robot: Robot, T: Reals, q_ref: Reals, values: Reals) -> Settled:
     parameter = parameters_of(robot)[0]
     if parameter.joint >= 0:
         j = parameter.joint
-        if robot.slides[j]:
-            span = np.linspace(robot.lower[j], robot.upper[j], SCANNED)
+        if robot.sliding[j]:
+            low, high = row_limits(robot)[j].tolist()
+            span = np.linspace(low, high, SCANNED)
         span = robot.direction[j] * span + joint_starts(robot)[j]
     grid = np.concatenate([values, span[:, None]])
     q = class_rows(robot, np.broadcast_to(T, (len(grid), 4, 4)), grid).q.reshape(-1, robot.joints)
@@ -216,8 +208,7 @@ def _apart(robot: Robot, rows: Reals, chain: PoseChain | None = None) -> Reals:
     kept: list[Reals] = []
     for row in rows:
         for other in kept:
-            away = _away(robot, row, other)
-            apart = float(np.abs(away).max())
+            apart = float(np.abs(shortest_way(robot, row - other)).max())
             if apart < SAME_ROW:
                 break
             if chain is not None and apart < MAYBE_SAME and apart * chain.smallest(to_rows(robot, row)) < SPREAD:
@@ -225,12 +216,6 @@ def _apart(robot: Robot, rows: Reals, chain: PoseChain | None = None) -> Reals:
         else:
             kept.append(row)
     return np.array(kept).reshape(-1, robot.joints)
-
-
-def _away(robot: Robot, rows: Reals, other: Reals) -> Reals:
-    """Rows less others, angles by the shorter way."""
-    away = rows - other
-    return away - turn_of(robot) * np.round(away / TURN)
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,7 +265,7 @@ def slots_of_class(
     alone = not solver.chain.parameters  # self-motions of redundant arms are told by `all_motions`
     for n in np.flatnonzero(certainty != CERTAIN).tolist() if alone else ():
         own = q_ref[0 if len(q_ref) == 1 else n]
-        rows = np.where(robot.slides, q[n], wrap_to_pi(q[n]))
+        rows = unwound(robot, q[n])
         settled[n] = settle(robot, T[n], rows[np.isfinite(rows[:, 0])], own, values[n : n + 1], int(certainty[n]))
         q[n] = nearest_equivalent(robot, _in_slots(robot, rows, settled[n]), own)
         inside[n] = within(robot, q[n])
@@ -303,7 +288,7 @@ def _with_own(robot: Robot, T: Reals, q_ref: Reals, numbers: Integers, found: tu
     own = q_ref[numbers] if len(q_ref) == len(T) else np.broadcast_to(q_ref[0], (len(numbers), robot.joints))
     solves = np.abs(forward(robot, own) - T[numbers]).max(axis=(1, 2), initial=0.0) < OWN_SOLVES
     for n, row in zip(numbers[solves].tolist(), own[solves]):
-        away, fits = np.abs(_away(robot, q[n], row)).max(axis=1), bool(within(robot, row))
+        away, fits = np.abs(shortest_way(robot, q[n] - row)).max(axis=1), bool(within(robot, row))
         away = np.where(np.isnan(away), np.inf, away)
         if away.min() < SAME_ROW and not fits:
             continue
@@ -368,7 +353,7 @@ def _in_slots(robot: Robot, rows: Reals, settled: Settled) -> Reals:
     reference, and what was found besides takes free slots."""
     kept, left = np.full_like(rows, np.nan), []
     for row in settled.alone:
-        away = _away(robot, rows, row)
+        away = shortest_way(robot, rows - row)
         far = np.where(np.isnan(rows[:, 0]), np.inf, np.abs(away).max(axis=1))
         slot = int(far.argmin())
         if far[slot] < SAME_ROW and np.isnan(kept[slot, 0]):
@@ -388,7 +373,7 @@ def slot_of(robot: Robot, T: Reals, q: Reals) -> int:
     """The slot of joint values (n,) that solve a pose (4, 4); 0 if they are none of its class's rows."""
     values = checked_parameters(robot, None, q[None], 1)
     rows = class_rows(robot, T[None], values).q[0]
-    away = _away(robot, rows, q)
+    away = shortest_way(robot, rows - q)
     far = np.where(np.isnan(rows[:, 0]), np.inf, np.abs(away).max(axis=1))
     return int(far.argmin()) if far.min() < SAME_ROW else 0
 

@@ -31,8 +31,9 @@ from er3a.kinematics.forward import frames, jacobian
 from er3a.kinematics.singularity import SingularityType
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.numerics.arrays import Reals
-from er3a.robots.joint_limits import LIMIT_TOLERANCE, nearest_equivalent, within
+from er3a.robots.joint_limits import nearest_equivalent, within
 from er3a.robots.robot import Robot
+from er3a.robots.whole_turns import LIMIT_TOLERANCE
 
 GRID = np.radians(2.0)
 SPLIT, ROUNDS = 16, 10  # an interval is cut into so many parts, so often

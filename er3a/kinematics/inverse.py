@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.errors import Er3aError, PoseError, ShapeError
-from er3a.geometry.angles import TURN, greatest_move, wrap_to_pi
+from er3a.errors import PoseError, ShapeError
+from er3a.geometry.angles import greatest_move, wrap_to_pi
 from er3a.geometry.transforms import check_poses
 from er3a.kinematics.by_class import (
     all_motions,
@@ -44,14 +44,13 @@ from er3a.kinematics.solutions import (
 )
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing, closed_form_missing, solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Integers, Reals
-from er3a.robots.joint_limits import nearest_equivalent, turn_bounds, within
+from er3a.robots.joint_limits import equivalents_within, within
 from er3a.robots.robot import Robot
 
 SAME_JOINTS = 1e-9
 SAME_MEMBER = 1e-6
 MISSED = 1e-4  # rad or m from all rows
 SOLVES = 1e-12  # m and parts of 1
-MOST_ROWS = 10_000
 STARTS, STARTS_OF_DEPENDENT = 400, 24  # where joints depend on each other a start that leads anywhere leads elsewhere
 MISS_RESTARTS = 20
 BY_ELIMINATION: tuple[ArmClassCode, ...] = (
@@ -240,14 +239,7 @@ def _free_joints_near(robot: Robot, T: Reals, q: Reals, q_ref: Reals, continua: 
 
 
 def _rows_of_branch(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
-    q = np.where(robot.continuous, q + TURN * np.round((q_ref - q) / TURN), q)
-    low, high = turn_bounds(robot, q)
-    if (low > high).any():
-        return nearest_equivalent(robot, q, q_ref)[None]
-    if np.prod(high - low + 1) > MOST_ROWS:
-        raise Er3aError(f"{robot.name}: the limits allow more than {MOST_ROWS} turns of one pose; narrow them")
-    choices = [q[j] + TURN * np.arange(low[j], high[j] + 1) for j in range(len(q))]
-    rows = np.stack(np.meshgrid(*choices, indexing="ij"), axis=-1).reshape(-1, len(q))
+    rows = equivalents_within(robot, q, q_ref)
     return rows[np.argsort(greatest_move(rows, q_ref), kind="stable")]
 
 

@@ -8,7 +8,6 @@ from numbers import Integral, Real
 import numpy as np
 
 from er3a.errors import Er3aError, PoseError, ShapeError
-from er3a.geometry.angles import wrap_to_pi
 from er3a.geometry.transforms import as_floats, check_poses
 from er3a.kinematics.chain import arm_length, constant_links, joint_starts
 from er3a.kinematics.forward import checked_joints, jacobian
@@ -27,8 +26,9 @@ from er3a.kinematics.solutions import (
 )
 from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.threads import parallel_for
-from er3a.robots.joint_limits import limits_exceeded, nearest_equivalent, turned_alike, within
+from er3a.robots.joint_limits import limits_exceeded, nearest_equivalent, unwound, within
 from er3a.robots.robot import Robot
+from er3a.robots.whole_turns import shortest_way
 
 RESTARTS = 500
 DIAGNOSIS_RESTARTS = 100
@@ -119,7 +119,7 @@ def all_found(robot: Robot, T: Reals, starts: int, seed: int = 0) -> Reals:
     distinct: list[Reals] = []
     for row in q[used > 0]:
         away = row - np.reshape(distinct, (-1, robot.joints))
-        if not (np.abs(np.where(turned_alike(robot), wrap_to_pi(away), away)).max(axis=1) <= SAME_ARM).any():
+        if not (np.abs(shortest_way(robot, away)).max(axis=1) <= SAME_ARM).any():
             distinct.append(row)
     return np.array(distinct).reshape(-1, robot.joints)
 
@@ -152,7 +152,7 @@ class _Search:
                 solve_any(each, limits, T[rows], q0[rows], goal, draws, out)
 
         parallel_for(count, threads, SMALLEST_PART, part)
-        return (q if respect else np.where(turned_alike(robot), wrap_to_pi(q), q)), error, starts
+        return (q if respect else unwound(robot, q)), error, starts
 
     def without_limits(self) -> tuple[Reals, Reals]:
         """From where to where joints (n,) start that need not keep to limits: a turn; slides twice as far as theirs."""

@@ -8,11 +8,10 @@ from typing import Literal
 import numpy as np
 
 from er3a.display import Displayed, Sheet, shortly
-from er3a.geometry.angles import wrap_to_pi
 from er3a.kinematics.chain import joint_starts, row_values
 from er3a.kinematics.classes.self_motion import PoseChain, TracedCurve
 from er3a.numerics.arrays import Flags, Reals
-from er3a.robots.joint_limits import limit_margin, nearest_equivalent, within
+from er3a.robots.joint_limits import limit_margin, nearest_equivalent, unwound, within
 from er3a.robots.robot import Robot
 
 LAPS = 6  # a curve that turns a joint is followed over so many of its laps at most
@@ -89,7 +88,7 @@ def self_motion_of(robot: Robot, T: Reals, chain: PoseChain, curve: TracedCurve,
     q = _joints(robot, curve.points)
     steps = np.diff(np.where(robot.slides, q / chain.size, q), axis=0)
     lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))])
-    near = nearest_equivalent(robot, np.where(robot.slides, q, wrap_to_pi(q)), q_ref)
+    near = nearest_equivalent(robot, unwound(robot, q), q_ref)
     inside = within(robot, near)
     made = []
     parts = _parts(inside, curve.closed) if inside.any() else [np.arange(len(q))]
@@ -142,8 +141,7 @@ def _part(
         return _joints(robot, chain.members(curve, _place_of(lengths, np.atleast_1d(t), curve.closed)))
 
     def near(t: Reals) -> Reals:
-        q = at(t)
-        return nearest_equivalent(robot, np.where(robot.slides, q, wrap_to_pi(q)), q_ref)
+        return nearest_equivalent(robot, unwound(robot, at(t)), q_ref)
 
     def distance(t: Reals) -> Reals:
         q = near(t)

@@ -17,10 +17,11 @@ from numpy.polynomial import chebyshev
 
 from er3a.geometry.angles import TURN
 from er3a.kinematics.by_class import class_rows
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.joint_limits import limit_margin, nearest_equivalent
 from er3a.robots.robot import Robot
+from er3a.robots.whole_turns import shortest_way, take_turns_off, turns_inward, whole_turns
 
 ANGLES = 72  # of the grid, over a turn
 BEGUN_AT, FEW_CHANGES = 24, 13  # arm angles at the start where none is given; then changes from it
@@ -90,7 +91,7 @@ def bent_laws(
     weights = np.where(np.arange(len(share)) == 0, 1e3, 1.0)  # the start may be given
     found = []
     for s, slot in enumerate(slots.tolist()):
-        way = _even_way(margins[:, :, s], q[:, :, s], robot.slides)
+        way = _even_way(robot, margins[:, :, s], q[:, :, s])
         if way is None:
             continue
         angles = first + TURN / ANGLES * way
@@ -111,7 +112,7 @@ def _margins_alone(robot: Robot, q: Reals) -> Reals:
     return np.where(np.isnan(q[..., 0]), -np.inf, limit_margin(robot, turned))
 
 
-def _even_way(margins: Reals, q: Reals, slides: Flags) -> Reals | None:
+def _even_way(robot: Robot, margins: Reals, q: Reals) -> Reals | None:
     """Steps of the grid (K,) from its first angle, not taken modulo a turn, along the way with the least sum of squared
     steps that keeps half of the margin that one can keep; None if none keeps the limits.
 
@@ -121,8 +122,7 @@ def _even_way(margins: Reals, q: Reals, slides: Flags) -> Reals | None:
     """
     at = np.arange(margins.shape[1])
     before = (at[None] - STEPS[:, None]) % len(at)  # (steps, angles)
-    moved = [q[k][None] - q[k - 1][before] for k in range(1, len(q))]
-    moved = [each - np.where(slides, 0.0, TURN * np.round(each / TURN)) for each in moved]
+    moved = [shortest_way(robot, q[k][None] - q[k - 1][before]) for k in range(1, len(q))]
     free = [np.abs(each).max(axis=-1) <= LEAP for each in moved]  # not where there is no row
     widest = margins[0]
     for k, passable in enumerate(free, 1):
@@ -174,17 +174,14 @@ class _LawSearch:
         """Least distances (L, s) from the limits, rad, of motions through rows (K, A, s, n) at places (K, L) in A: by
         turns that hold on the whole way. Less than nothing where a joint leaps, -inf where a pose is not reached."""
         robot, count = self.robot, self.robot.joints
-        lines = np.array([*np.eye(count), *(limit.factors for limit in robot.combined)])
-        lower = np.append(robot.lower, [limit.lower for limit in robot.combined])
-        upper = np.append(robot.upper, [limit.upper for limit in robot.combined])
+        turns = whole_turns(robot)
         near = np.zeros(count) if self.start is None else self.start
-        low, high, step = _ranges(np.ascontiguousarray(q), place, near, robot.slides, lines)
+        low, high, step = _ranges(np.ascontiguousarray(q), place, near, (turns.steps, turns.counts), turns.lines)
         if self.start is None:
-            turns = np.round((lower + upper - low - high)[..., :count] / (2 * TURN))
-            turned = TURN * np.where(robot.slides | robot.continuous, 0.0, turns) @ lines.T
+            rows = (values.reshape(-1, len(turns.lines)) for values in (low, high))
+            turned = turns_inward(robot, *rows).reshape(*step.shape, count) @ turns.lines.T
             low, high = low + turned, high + turned
-        each = np.minimum(low - lower, upper - high)
-        each[..., :count] = np.where(robot.continuous, np.inf, each[..., :count])
+        each = np.minimum(low - turns.lower, turns.upper - high)
         return np.where(
             np.isinf(step), -np.inf, np.minimum(each.min(axis=-1), np.where(step > LEAP, LEAP - step, np.inf))
         )
@@ -199,14 +196,16 @@ def _quadratic(values: Reals, share: Reals) -> Reals:
 
 
 @kernel
-def _ranges(q: Reals, place: Integers, near: Reals, slides: Flags, lines: Reals) -> tuple[Reals, Reals, Reals]:
-    """Least and greatest values (L, s, m) of lines (m, n) of joints, through rows (K, A, s, n) at places (K, L), angles
-    made continuous from the turns nearest to ``near`` (n,) on; and the greatest step (L, s) of a joint, infinite where
-    there is no row."""
+def _ranges(
+    q: Reals, place: Integers, near: Reals, turns: tuple[Reals, Reals], lines: Reals
+) -> tuple[Reals, Reals, Reals]:
+    """Least and greatest values (L, s, m) of lines (m, n) of joints, through rows (K, A, s, n) at places (K, L), made
+    continuous by whole turns (steps (n, r), counts (r, n)) from those nearest to ``near`` (n,) on; and the greatest
+    step (L, s) of a joint, infinite where there is no row."""
     poses, _, slots, joints = q.shape
     shape = (place.shape[1], slots, len(lines))
     low, high, most = np.full(shape, np.inf), np.full(shape, -np.inf), np.zeros(shape[:2])
-    last = np.empty(joints)
+    last, step = np.empty(joints), np.empty(joints)
     for law in range(shape[0]):
         for slot in range(slots):
             last[:] = near
@@ -216,12 +215,12 @@ def _ranges(q: Reals, place: Integers, near: Reals, slides: Flags, lines: Reals)
                     most[law, slot] = np.inf
                     break
                 for j in range(joints):
-                    step = row[j] - last[j]
-                    if not slides[j]:
-                        step -= 2 * np.pi * np.round(step / (2 * np.pi))
-                    last[j] += step
+                    step[j] = row[j] - last[j]
+                take_turns_off(step, turns)
+                for j in range(joints):
+                    last[j] += step[j]
                     if k > 0:
-                        most[law, slot] = max(most[law, slot], abs(step))
+                        most[law, slot] = max(most[law, slot], abs(step[j]))
                 for line in range(shape[2]):
                     value = 0.0
                     for j in range(joints):

@@ -22,19 +22,19 @@ from typing import Literal
 import numpy as np
 
 from er3a.errors import Er3aError, NotWristPartitionedError
-from er3a.geometry.angles import TURN
 from er3a.kinematics.by_class import arm_solver, checked_parameters, class_rows
 from er3a.kinematics.classes.chain_solvers import Unsolved
 from er3a.kinematics.wrist_partitioned import closed_form_missing
-from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import kernel
 from er3a.planning.arm_angle_choice import ArmAngleLaw, bent_laws, roomiest_laws
 from er3a.planning.moves import ToolPath
 from er3a.planning.piecewise import PiecewiseMotion, chebyshev_times, motion_through
 from er3a.planning.polynomial_checks import limit_intervals
 from er3a.planning.profiles import times_at
-from er3a.robots.joint_limits import limit_margin, nearest_equivalent, turn_of, within
+from er3a.robots.joint_limits import limit_margin, nearest_equivalent, within
 from er3a.robots.robot import Robot
+from er3a.robots.whole_turns import shortest_way, take_turns_off, turns_inward, whole_turns
 
 DEGREE = 9
 FIRST_PIECES, MOST_PIECES = 4, 1024  # between two corners of the path or of its law of time
@@ -121,7 +121,7 @@ def _at_arm_angles(robot: Robot, path: ToolPath, q_start: Reals | None) -> Piece
 
 def _turned_to(robot: Robot, q: Reals, near: Reals) -> Reals:
     """Joints (..., n) by the turns nearest to others (n,), within the limits or not."""
-    return q + turn_of(robot) * np.round((near - q) / TURN)
+    return near + shortest_way(robot, q - near)
 
 
 def _first_unreached(robot: Robot, path: ToolPath, times: Reals) -> float:
@@ -164,14 +164,15 @@ def _first_within_limits(
 
 
 def _turned_inwards(robot: Robot, motion: PiecewiseMotion) -> PiecewiseMotion:
-    """The motion by the whole turns that keep it farthest from the limits of each joint."""
+    """The motion by the whole turns with which all of it keeps limits, of joints and of sums of joints, and is nearest
+    to the middle of each joint's; if none do, by those nearest to the middle."""
+    lines = motion.angle @ whole_turns(robot).lines.T
     high, low = (
-        sign * np.array([motion.of_joint(motion.angle, j, sign).peak()[0] for j in range(robot.joints)])
+        sign * np.array([motion.of_joint(lines, j, sign).peak()[0] for j in range(lines.shape[2])])
         for sign in (1.0, -1.0)
     )
-    turns = np.round((robot.lower + robot.upper - low - high) / (2 * TURN))
     angle = motion.angle.copy()
-    angle[:, 0] += np.where(robot.continuous, 0.0, turn_of(robot) * turns)
+    angle[:, 0] += turns_inward(robot, low[None], high[None])[0]
     return replace(motion, angle=angle)
 
 
@@ -183,14 +184,14 @@ def _rows(robot: Robot, path: ToolPath, t: Reals, values: Reals) -> Reals:
 def _followed(robot: Robot, path: ToolPath, start: Reals, rows_at: Callable[[Reals], Reals]) -> PiecewiseMotion:
     corners = np.unique(np.concatenate([path.law.breaks, times_at(path.law, path.edges)]))
     corners = corners[np.concatenate([[True], np.diff(corners) > SAME_TIME * corners[-1]])]
-    pieces = FIRST_PIECES
+    pieces, turns = FIRST_PIECES, whole_turns(robot)
     while True:
         parts = [np.linspace(a, b, pieces + 1)[:-1] for a, b in pairwise(corners.tolist())]
         times = np.append(np.concatenate(parts), corners[-1])
         nodes, between = chebyshev_times(times, DEGREE)
         t, back = np.unique(np.concatenate([nodes.ravel(), between.ravel()]), return_inverse=True)
         q = np.empty((len(t), robot.joints))
-        ended, reached = _tracked(rows_at(t), robot.slides, start, q)
+        ended, reached = _tracked(rows_at(t), (turns.steps, turns.counts), start, q)
         more = pieces < MOST_PIECES
         if ended < len(t) and not (reached and more):
             raise PathEndsError(robot.name, "singular" if reached else "out_of_reach", float(t[ended]))
@@ -205,8 +206,9 @@ def _followed(robot: Robot, path: ToolPath, start: Reals, rows_at: Callable[[Rea
 
 
 @kernel
-def _tracked(rows: Reals, sliding: Flags, start: Reals, q: Reals) -> tuple[int, bool]:
-    """Fill ``q`` (N, n) with the rows (N, slots, n) nearest to those before, angles made continuous.
+def _tracked(rows: Reals, turns: tuple[Reals, Reals], start: Reals, q: Reals) -> tuple[int, bool]:
+    """Fill ``q`` (N, n) with the rows (N, slots, n) nearest to those before, made continuous by whole turns: steps
+    (n, r) and counts (r, n) of :class:`er3a.robots.whole_turns.WholeTurns`.
 
     Returns
     -------
@@ -222,8 +224,8 @@ def _tracked(rows: Reals, sliding: Flags, start: Reals, q: Reals) -> tuple[int, 
             reached, farthest = True, 0.0
             for j in range(n):
                 step[j] = rows[i, slot, j] - last[j]
-                if not sliding[j]:
-                    step[j] -= 2 * np.pi * np.round(step[j] / (2 * np.pi))
+            take_turns_off(step, turns)
+            for j in range(n):
                 farthest = max(farthest, abs(step[j]))
             if farthest < least:
                 least = farthest

@@ -2,11 +2,11 @@
 
 On the grid of :mod:`er3a.planning.branch_tracking`, dynamic programming [1]_ finds for each branch at the start the
 best way to continue to the end. Best means, in this order: fewest jumps (a joint would have to move far in no time),
-least time outside the limits, least joint travel, and among equals the greatest distance from the limits. Whole turns
-cost no states of their own: along a continuous sequence they are fixed by the first angle, so each joint's turn is
-chosen once per stretch, by least time outside the limits, then nearest to the joints before. Among the branches at the
-start, the best whole sequence wins; given start joints admit only the branches that they lie on (several, if the start
-is singular).
+least time outside the limits, of joints and of sums of joints, least joint travel, and among equals the greatest
+distance from the limits. Whole turns cost no states of their own: along a continuous sequence they are fixed by the
+first angle, so each joint's turn is chosen once per stretch, by least time outside the limits, then nearest to the
+joints before. Among the branches at the start, the best whole sequence wins; given start joints admit only the branches
+that they lie on (several, if the start is singular).
 
 An unreachable pose interrupts the sequence; the stretch behind it is solved on its own.
 
@@ -18,6 +18,7 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -30,8 +31,9 @@ from er3a.numerics.runs import runs
 from er3a.planning.branch_tracking import WIDE_STEP, Branches, branches_along, turned_difference, wrist_joints
 from er3a.planning.followed import BranchJump, Followed
 from er3a.planning.moves import ToolPath
-from er3a.robots.joint_limits import LIMIT_TOLERANCE, limit_margin, nearest_equivalent, within
+from er3a.robots.joint_limits import limit_margin, nearest_equivalent, within
 from er3a.robots.robot import Robot
+from er3a.robots.whole_turns import LIMIT_TOLERANCE
 
 JUMP_COST = 1e7
 OUTSIDE_COST = 1e4  # for the whole duration
@@ -117,27 +119,65 @@ def _best(robot: Robot, grid: Branches, part: slice, starts: Integers, before: R
 
 
 def _turned(robot: Robot, q: Reals, slot: Integers, jumps: Flags, share: Reals, before: Reals | None) -> _Sequence:
-    """Make angles continuous and choose each joint's whole turns."""
+    """Make angles continuous and choose each joint's whole turns: those that leave its limits, and those of sums of
+    joints, for the least part of the time, then the nearest."""
     steps = turned_difference(q[:-1], q[1:])
     unwound = q[0] + np.concatenate([np.zeros((1, 6)), np.cumsum(steps, axis=0)])
     reference = np.zeros(6) if before is None else before
-    outside = 0.0
+    priced: list[list[tuple[float, float, int]]] = []
     for j in range(6):
         low = int(np.floor((robot.lower[j] - unwound[:, j].max()) / TURN))
         high = int(np.ceil((robot.upper[j] - unwound[:, j].min()) / TURN))
         nearest = round((reference[j] - unwound[0, j]) / TURN)
-        fixed = before is not None and abs(unwound[0, j] + TURN * nearest - reference[j]) < SAME_JOINTS
-        turns = [nearest] if fixed else sorted({nearest, *range(low, high + 1)})
-        priced = []
-        for turn in turns:
+        fixed = robot.continuous[j] or (
+            before is not None and abs(unwound[0, j] + TURN * nearest - reference[j]) < SAME_JOINTS
+        )
+        priced.append([])
+        for turn in [nearest] if fixed else sorted({nearest, *range(low, high + 1)}):
             angle = unwound[:, j] + TURN * turn
             beyond = (angle > robot.upper[j] + LIMIT_TOLERANCE) | (angle < robot.lower[j] - LIMIT_TOLERANCE)
-            priced.append((round(float(share[beyond].sum()), 6), abs(angle[0] - reference[j]), turn))
-        outside += min(priced)[0]
-        unwound[:, j] += TURN * min(priced)[2]
+            beyond &= ~robot.continuous[j]
+            priced[j].append((round(float(share[beyond].sum()), 6), abs(angle[0] - reference[j]), turn))
+    outside, turns = _cheapest(robot, unwound, share, priced)
+    unwound += TURN * turns
     travel = float(np.linalg.norm(steps, axis=1).sum() + np.linalg.norm(unwound[0] - reference))
     margin = float(limit_margin(robot, unwound).min())
     return _Sequence(unwound, slot, jumps, (float(jumps.sum()), outside, round(travel, EQUAL), -round(margin, EQUAL)))
+
+
+def _cheapest(
+    robot: Robot, q: Reals, share: Reals, priced: list[list[tuple[float, float, int]]]
+) -> tuple[float, Reals]:
+    """For what part of the time a motion q (N, 6) leaves limits, each counted, and the turns (6,) of its joints.
+
+    Joints that sums are limited of are chosen together, the others each by itself.
+
+    Parameters
+    ----------
+    share : (N,), part of the time that each point stands for
+    priced : for each joint, its turns, for what part of the time it leaves its limits, and how far it is at first
+    """
+    choice = [min(each) for each in priced]
+    summed = [j for j in range(6) if any(limit.factors[j] for limit in robot.combined)]
+
+    def price(turns: Reals) -> float:
+        total = (q + TURN * turns) @ np.array([limit.factors for limit in robot.combined]).T
+        ends = np.array([(limit.lower - LIMIT_TOLERANCE, limit.upper + LIMIT_TOLERANCE) for limit in robot.combined]).T
+        return round(float((share[:, None] * ((total < ends[0]) | (total > ends[1]))).sum()), 6)
+
+    best: tuple[float, float] | None = None
+    for tried in product(*(priced[j] for j in summed)) if summed else ():
+        each = choice.copy()
+        for j, turn in zip(summed, tried):
+            each[j] = turn
+        cost = sum(one[0] for one in tried), sum(one[1] for one in tried)
+        if best is not None and cost >= best:
+            continue  # sums can only add to it
+        cost = cost[0] + price(np.array([one[2] for one in each])), cost[1]
+        if best is None or cost < best:
+            best, choice = cost, each
+    turns = np.array([one[2] for one in choice], dtype=float)
+    return sum(one[0] for one in choice) + (price(turns) if summed else 0.0), turns
 
 
 def _jump(t: Reals, q: Reals, i: int) -> BranchJump:

@@ -18,8 +18,9 @@ from er3a.numerics.runs import runs
 from er3a.planning.branch_tracking import parabolas
 from er3a.planning.followed import Followed
 from er3a.planning.singular_events import Joints
-from er3a.robots.joint_limits import LIMIT_TOLERANCE, CombinationExceeded, SlideExceeded
+from er3a.robots.joint_limits import CombinationExceeded, SlideExceeded
 from er3a.robots.robot import Robot
+from er3a.robots.whole_turns import LIMIT_TOLERANCE
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,8 @@ from er3a.planning.intervals import (
 )
 from er3a.planning.piecewise import Pieces, PiecewiseMotion, Polynomials, Stretch
 from er3a.planning.singular_events import LONG_STAY, ON_SET, SAME_EVENT, SingularEvent, merged
-from er3a.robots.joint_limits import LIMIT_TOLERANCE
 from er3a.robots.robot import Robot
+from er3a.robots.whole_turns import LIMIT_TOLERANCE
 
 LONGEST_TURN = 1.0  # rad within one series of the shoulder's distance
 DEGREE = 24  # by which a sine of so short a turn is met to rounding

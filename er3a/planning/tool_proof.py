@@ -43,8 +43,8 @@ from er3a.planning.moves import ToolPath
 from er3a.planning.piecewise import PiecewiseMotion, greatest_between, polynomial_motion
 from er3a.planning.profiles import TimeLaw, times_at
 from er3a.planning.singular_events import singular_events
-from er3a.robots.joint_limits import LIMIT_TOLERANCE
 from er3a.robots.robot import Robot
+from er3a.robots.whole_turns import LIMIT_TOLERANCE
 
 SHORTEST = 1e-9  # share of the duration
 SHORTEST_JERK = 2e-7  # share of the duration; below, jerks are differences of equal numbers

@@ -58,9 +58,9 @@ from er3a.program_check.program_check_findings import (
     WholeTurn,
 )
 from er3a.programs.instructions import ArmMotion
-from er3a.robots.joint_limits import LIMIT_TOLERANCE
 from er3a.robots.robot import Robot
 from er3a.robots.shown import joint_shown
+from er3a.robots.whole_turns import LIMIT_TOLERANCE
 
 POINTS_APART_M, POINTS_APART_RAD = 0.01, np.radians(2.0)
 FEWEST_POINTS, MOST_POINTS = 21, 501

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
 from typing import Literal
 
 import numpy as np
 
+from er3a.errors import Er3aError
 from er3a.geometry.angles import TURN, wrap_to_pi
 from er3a.numerics.arrays import Flags, Reals
-from er3a.robots.derived import derived
 from er3a.robots.robot import Robot
+from er3a.robots.whole_turns import LIMIT_TOLERANCE, nearest_rows, rows_within, shortest_way, turns_in, whole_turns
 
 SAME_DIGITS = 9  # of rad, m: joint values that are alike to these are one
-LIMIT_TOLERANCE = 1e-9
-WHOLE = 1e-12  # parts of a turn
+MOST_ROWS = 10_000
 
 
 @dataclass(frozen=True)
@@ -79,16 +78,21 @@ def within(robot: Robot, q: Reals) -> Flags:
     return fits
 
 
+def row_limits(robot: Robot) -> Reals:
+    """Ends (m, 2), rad (m of rows that slide), of what each row moves by, each row by itself, the lower first."""
+    ends = np.stack([robot.lower, robot.upper], axis=1)
+    if robot.coupling is None:
+        return ends
+    parts = robot.coupling[:, :, None] * ends[None]
+    return np.stack([parts.min(axis=2).sum(axis=1), parts.max(axis=2).sum(axis=1)], axis=1)
+
+
 def theta_limits(robot: Robot) -> Reals:
     """Ends (m, 2), rad (m of rows that slide), of the range of each row's theta or shift, the lower first.
 
     With a coupling they are those of the sums of each row, each by itself.
     """
-    ends = np.stack([robot.lower, robot.upper], axis=1)
-    if robot.coupling is not None:
-        parts = robot.coupling[:, :, None] * ends[None]
-        ends = np.stack([parts.min(axis=2).sum(axis=1), parts.max(axis=2).sum(axis=1)], axis=1)
-    ends = robot.direction[:, None] * ends + np.where(robot.sliding, 0.0, robot.offset)[:, None]
+    ends = robot.direction[:, None] * row_limits(robot) + np.where(robot.sliding, 0.0, robot.offset)[:, None]
     ends.sort(axis=1)
     return ends
 
@@ -111,72 +115,70 @@ def limit_margin(robot: Robot, q: Reals) -> Reals:
 def nearest_equivalent(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
     """The same arm poses (..., n) by the turns nearest to q_ref within the limits, else by those nearest to them.
 
-    Joints that no whole turn brings back (:func:`turned_alike`), such as slides, stay where they are.
+    Joints that no turn brings back, such as slides, stay where they are. Behind a gear or a ball screw turns are those
+    of rows (:mod:`er3a.robots.whole_turns`), which can move several joints, slides among them.
     """
-    near = q + turn_of(robot) * np.round((q_ref - q) / TURN)
+    turns = whole_turns(robot)
+    if not turns.each:
+        return _nearest_rows(robot, q, q_ref)
+    whole, near = turns.alone, q + turns_in(robot, q_ref - q)
     low, high = turn_bounds(robot, near)
     inside = near + TURN * np.clip(0, low, np.maximum(low, high))
     below, above = near + TURN * (low - 1), near + TURN * low
     outside = np.where(robot.lower - below < above - robot.upper, below, above)
-    found, whole = np.where(low <= high, inside, outside), turned_alike(robot)
+    found = np.where(low <= high, inside, outside)
     found = found if whole.all() else np.where(whole, found, q)
-    return _within_sums(robot, found, q_ref) if robot.combined else found
+    if not robot.combined:
+        return found
+    left = ~within(robot, found)
+    again = found.copy()
+    again[left] = _nearest_rows(robot, found[left], np.broadcast_to(q_ref, found.shape)[left])
+    return again
 
 
-def _within_sums(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
-    """The same arm poses (..., n), those that leave a limit of a sum in the turns nearest to q_ref that keep all of
-    them, where there are such."""
-    summed = np.any([limit.factors for limit in robot.combined], axis=0) & turned_alike(robot)
-    spare = np.where(robot.continuous, 2, np.floor((robot.upper - robot.lower + 2 * LIMIT_TOLERANCE) / TURN))
-    spare = np.where(summed, spare, 0).astype(int)
-    left = ~within(robot, q) & np.isfinite(q).all(axis=-1)
-    if not spare.any() or not left.any():
-        return q
-    rows, near = q[left], np.broadcast_to(q_ref, q.shape)[left]
-    best, least = rows.copy(), np.full(len(rows), np.inf)
-    for turns in product(*(range(-most, most + 1) for most in spare.tolist())):
-        tried = rows + TURN * np.array(turns)
-        away = np.where(within(robot, tried), np.abs(tried - near).max(axis=-1), np.inf)
-        nearer = away < least
-        best[nearer], least[nearer] = tried[nearer], away[nearer]
-    found = q.copy()
-    found[left] = best
-    return found
+def _nearest_rows(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
+    shape = np.broadcast_shapes(q.shape, q_ref.shape)
+    rows, refs = (np.ascontiguousarray(np.broadcast_to(each, shape).reshape(-1, shape[-1])) for each in (q, q_ref))
+    return nearest_rows(robot, rows, refs)[0].reshape(shape)
+
+
+def equivalents_within(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
+    """The same arm pose as joints (n,), in all turns (k, n) that keep all limits; if there are none, the one of
+    :func:`nearest_equivalent`. Of continuous joints only turns near to q_ref (n,) count.
+
+    Raises
+    ------
+    Er3aError
+        if the limits allow more than ``MOST_ROWS``
+    """
+    rows = rows_within(robot, q, q_ref, MOST_ROWS)
+    if len(rows) > MOST_ROWS:
+        raise Er3aError(f"{robot.name}: the limits allow more than {MOST_ROWS} turns of one pose; narrow them")
+    return rows if len(rows) else nearest_equivalent(robot, q, q_ref)[None]
+
+
+def unwound(robot: Robot, q: Reals) -> Reals:
+    """Joint values (..., n) with their whole turns taken off: angles in (-pi, pi], behind a gear those of rows."""
+    turns = whole_turns(robot)
+    return np.where(turns.alone, wrap_to_pi(q), q) if turns.each else shortest_way(robot, q)
 
 
 def but_for_turns(robot: Robot, q: Reals) -> Reals:
     """Joint values (..., n) with their whole turns taken off, to ``SAME_DIGITS``."""
-    wrapped: Reals = np.where(turned_alike(robot), wrap_to_pi(q), q)
-    return np.round(wrapped, SAME_DIGITS)
-
-
-@derived
-def turned_alike(robot: Robot) -> Flags:
-    """Which joints (n,) leave the arm as it was by a whole turn: not those that slide, nor those that move a row that
-    slides, or a row that turns by a part of a turn."""
-    if robot.coupling is None:
-        return ~robot.sliding
-    parts = np.where(robot.sliding[:, None], robot.coupling, robot.coupling - np.round(robot.coupling))
-    return np.asarray(~robot.slides & (np.abs(parts) <= WHOLE).all(axis=0))
-
-
-def turn_of(robot: Robot) -> Reals | float:
-    """What may be added to each joint with the arm as it was: a turn or 0 (:func:`turned_alike`); (n,) or a number."""
-    whole = turned_alike(robot)
-    return TURN if whole.all() else np.where(whole, TURN, 0.0)
+    return np.asarray(np.round(unwound(robot, q), SAME_DIGITS))
 
 
 def turn_bounds(robot: Robot, q: Reals) -> tuple[Reals, Reals]:
     """Least and greatest number of turns to add so that each value lies within its limits (least > greatest: none).
 
-    Of a continuous joint the turn it has is given; of one that a turn would move elsewhere (:func:`turned_alike`) 0, or
-    none if it is outside.
+    Of a continuous joint the turn it has is given; of one that a turn of its own would move elsewhere 0, or none if it
+    is outside.
     """
     low = np.ceil((robot.lower - LIMIT_TOLERANCE - q) / TURN)
     high = np.floor((robot.upper + LIMIT_TOLERANCE - q) / TURN)
     if robot.continuous.any():
         low, high = np.where(robot.continuous, 0.0, low), np.where(robot.continuous, 0.0, high)
-    whole = turned_alike(robot)
+    whole = whole_turns(robot).alone
     if not whole.all():
         fits = (q >= robot.lower - LIMIT_TOLERANCE) & (q <= robot.upper + LIMIT_TOLERANCE) | robot.continuous
         low, high = np.where(whole, low, 0.0), np.where(whole, high, np.where(fits, 0.0, -1.0))

@@ -52,7 +52,8 @@ class Envelope:
 class CombinedLimit:
     """Limits of a sum of joints: ``lower <= factors @ q <= upper``, such as J2 + J3 of arms with a parallelogram.
 
-    ``factors`` has one number for each of the n joints; lower and upper are in rad (m if all its joints slide).
+    ``factors`` has one number for each of the n joints; lower and upper are in rad (m if all its joints slide; among
+    joints that turn, factors of slides are in rad/m).
     """
 
     factors: tuple[float, ...]

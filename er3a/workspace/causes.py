@@ -44,9 +44,10 @@ class Relaxed:
     Attributes
     ----------
     joints, factors : from 1, and what they count in the sum; of a joint's own limit this joint, and 1
-    unit : "mm" where the joints slide
+    unit : "mm" where the joints slide; of a sum of joints that turn and joints that slide "deg", as its limits are
     limit : as it is, in ``unit``
-    by : by how much it is widened: the least of ``STEPS[unit]`` that makes the void vanish, or the most there is
+    by : by how much it is widened: the least of ``STEPS[unit]`` that makes the void vanish, or the most there is; of a
+        sum that this leaves in force at some joints, by as much as takes it away, in whole ``unit``
     filled : ratio of the void that is then reached
     """
 
@@ -133,12 +134,13 @@ def relaxations(
             return _ratio_searched(robot, widened, probes, section)
 
     found = [_relaxed(limit, ratio_filled) for limit in _limits(robot, joints)]
-    found.sort(key=lambda one: (one.filled < _GONE, STEPS[one.unit].index(one.by), -one.filled, one.joints))
+    found.sort(key=lambda one: (one.filled < _GONE, np.searchsorted(STEPS[one.unit], one.by), -one.filled, one.joints))
     return found, Unlimited(ratio_filled(_without_limits(robot)))
 
 
 class _Limit(NamedTuple):
-    """A limit, rad or m, and the robot with it widened by so much; the rest as in :class:`Relaxed`."""
+    """A limit, rad or m, and the robot with it widened by so much; the rest as in :class:`Relaxed`. A limit of a sum
+    that is widened by ``idle`` limits nothing."""
 
     joints: tuple[int, ...]
     factors: tuple[float, ...]
@@ -146,10 +148,11 @@ class _Limit(NamedTuple):
     unit: Unit
     value: float
     widened: Callable[[float], Robot]
+    idle: float = 0.0
 
 
 def _limits(robot: Robot, joints: list[int]) -> Iterator[_Limit]:
-    """Limits of these joints (from 1), and of sums of joints that all turn or all slide."""
+    """Limits of these joints (from 1), and of sums of joints."""
     slides, limited = robot.slides, (robot.upper - robot.lower < FULL_TURN) & ~robot.continuous
     for side in _SIDES:
         for joint in joints:
@@ -159,17 +162,21 @@ def _limits(robot: Robot, joints: list[int]) -> Iterator[_Limit]:
                 yield _Limit((joint,), (1.0,), side, unit, value, partial(_widened, robot, joint, side))
         for number, limit in enumerate(robot.combined):
             summed = np.flatnonzero(limit.factors)
-            if slides[summed].all() or not slides[summed].any():
-                factors = tuple(np.array(limit.factors)[summed].tolist())
-                value = float(limit.lower if side == "lower" else limit.upper)
-                unit = "mm" if slides[summed].all() else "deg"
-                widened = partial(_with_wider_sum, robot, number, side)
-                yield _Limit(tuple((summed + 1).tolist()), factors, side, unit, value, widened)
+            factors = np.array(limit.factors)[summed]
+            ends = np.sort([factors * robot.lower[summed], factors * robot.upper[summed]], axis=0).sum(axis=1)
+            value, idle = (
+                (limit.lower, limit.lower - ends[0]) if side == "lower" else (limit.upper, ends[1] - limit.upper)
+            )
+            unit, widened = "mm" if slides[summed].all() else "deg", partial(_with_wider_sum, robot, number, side)
+            names = tuple((summed + 1).tolist()), tuple(factors.tolist())
+            yield _Limit(*names, side, unit, float(value), widened, float(idle))
 
 
 def _relaxed(limit: _Limit, filled: Callable[[Robot], float]) -> Relaxed:
     """The least step that makes the void vanish, or else the widest, since no lesser step fills more."""
     scale, steps = _SI[limit.unit], STEPS[limit.unit]
+    if limit.idle > steps[-1] * scale:
+        steps = (*steps, float(np.ceil(limit.idle / scale)))
 
     def widened_by(step: float) -> Relaxed:
         return Relaxed(*limit[:4], limit.value / scale, step, filled(limit.widened(step * scale)))

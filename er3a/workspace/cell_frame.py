@@ -16,8 +16,8 @@ from er3a.kinematics.classes.class_solvers import ArmClassCode, ChainSolver, Com
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.derived import derived
-from er3a.robots.joint_limits import LIMIT_TOLERANCE
 from er3a.robots.robot import Robot
+from er3a.robots.whole_turns import LIMIT_TOLERANCE
 from er3a.sampling.grid import tool_bound
 from er3a.workspace.general_arm import general_arm
 from er3a.workspace.section_arm import FULL_TURN, section_arm, section_frame
@@ -112,10 +112,12 @@ def is_quick(robot: Robot) -> bool:
 
 
 def joint_1_alone(robot: Robot) -> bool:
-    """Whether joint 1 moves the first row alone, is the only one that does, and has limits of its own."""
+    """Whether joint 1 moves the first row alone and as far as itself, is the only one that does, and has limits of its
+    own."""
     uncouple = arm_solver(robot).uncouple
-    shared = any(limit.factors[0] for limit in robot.combined)
-    return not shared and (uncouple is None or not (uncouple[1:, 0].any() or uncouple[0, 1:].any()))
+    if any(limit.factors[0] for limit in robot.combined):
+        return False
+    return uncouple is None or not (uncouple[1:, 0].any() or uncouple[0, 1:].any() or abs(uncouple[0, 0]) != 1)
 
 
 @derived

@@ -47,7 +47,8 @@ class Task:
     box : (3,), m, edges along x, y, z
     axis : (3,), unit vector, middle of the tool's directions; half_angle : rad, how far around it they reach
     lowest : m, least height of the box's underside; clear : m, least distance of its points from axis 1
-    margin : rad, how far joints with less than a full turn keep within their limits; not those that slide
+    margin : rad, how far joints with less than a full turn keep within their limits, and sums of joints that turn
+        within theirs; not those that slide
     step : rad, how far directions in the cone are apart
     """
 
@@ -65,14 +66,28 @@ def limited_joints(robot: Robot) -> Flags:
     return (robot.upper - robot.lower < FULL_TURN) & ~robot.slides & ~robot.continuous
 
 
+def _limit_margin(robot: Robot, q: Reals) -> Reals:
+    """Least distance (...,), rad, of joints (..., n) from the limits of those with less than a full turn, and of sums
+    of joints that turn."""
+    limited = np.flatnonzero(limited_joints(robot))
+    inside = np.minimum(q[..., limited] - robot.lower[limited], robot.upper[limited] - q[..., limited])
+    margin: Reals = inside.min(axis=-1, initial=np.inf)
+    for limit in _turning_sums(robot):
+        total = q @ np.array(limit.factors)
+        margin = np.minimum(margin, np.minimum(total - limit.lower, limit.upper - total))
+    return margin
+
+
+def _turning_sums(robot: Robot) -> tuple[CombinedLimit, ...]:
+    return tuple(limit for limit in robot.combined if not robot.slides[np.flatnonzero(limit.factors)].any())
+
+
 def narrowed(robot: Robot, margin: float) -> Robot:
     """The robot with the limits of joints that have less than a full turn, and of sums of joints that turn, drawn in by
     ``margin`` (rad)."""
     inward = np.where(limited_joints(robot), np.minimum(margin, (robot.upper - robot.lower) / 2), 0.0)
-    combined = tuple(
-        limit if robot.slides[np.flatnonzero(limit.factors)].any() else _drawn_in(limit, margin)
-        for limit in robot.combined
-    )
+    turning = _turning_sums(robot)
+    combined = tuple(_drawn_in(limit, margin) if limit in turning else limit for limit in robot.combined)
     return robot.replace(lower=robot.lower + inward, upper=robot.upper - inward, combined=combined)
 
 
@@ -91,8 +106,8 @@ class Field:
     least : (nx, ny, nz, slots), m^3, least manipulability over the directions by branch, NO where it misses one, and
         where slots are no branches
     least_any : (nx, ny, nz), the same by the best branch for each direction
-    limit_margin : (nx, ny, nz, slots), rad, least distance from the limits of joints with less than a full turn, by
-        branch
+    limit_margin : (nx, ny, nz, slots), rad, least distance from the limits of joints with less than a full turn and of
+        sums of joints that turn, by branch
     """
 
     origin: Reals
@@ -207,7 +222,6 @@ def serve(
     least, least_any, limit_margin : (n, slots), (n,), (n, slots), as in :class:`Field`
     """
     asked, slots = left_to_roll(robot, roll), slot_count(robot)
-    limited = np.flatnonzero(limited_joints(asked))
     least, least_any = np.full((len(points), slots), np.inf), np.full(len(points), np.inf)
     limit_margin = np.full((len(points), slots), np.inf)
     alive = np.arange(len(points))
@@ -218,8 +232,7 @@ def serve(
             tried = direction if len(direction) == 1 else direction[part]
             q_all, within = all_solutions(asked, poses(points[part][:, None], tried).reshape(-1, 4, 4))
             value = np.where(within, manipulability_of(robot, q_all, within), NO).reshape(len(part), -1, slots)
-            q = q_all[..., limited]
-            inside = np.minimum(q - asked.lower[limited], asked.upper[limited] - q).min(axis=-1, initial=np.inf)
+            inside = _limit_margin(asked, q_all)
             rolled = _best_roll(value, q_all.reshape(*value.shape, -1), free, (least[part] <= NO, least_any[part]))[
                 :, None
             ]

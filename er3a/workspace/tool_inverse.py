@@ -28,15 +28,18 @@ from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.derived import derived
+from er3a.robots.joint_limits import row_limits
 from er3a.robots.robot import Robot
+from er3a.robots.whole_turns import whole_turns
 from er3a.workspace.cell_frame import CLOSED_FORMS, is_quick, joint_1_alone
 from er3a.workspace.general_arm import coupled
 from er3a.workspace.orientations import asked_of
 
 ARM_ANGLES = 8
-QUICK_S, COMPLETED_S, CERTAIN_S, DOUBT_S, INNER_S = 4e-6, 16e-6, 3e-4, 8e-3, 1e-3
+QUICK_S, COMPLETED_S, CERTAIN_S, DOUBT_S, INNER_S, GEARED_S = 4e-6, 16e-6, 3e-4, 8e-3, 1e-3, 5e-6
 """About what a pose takes: of classes in closed form, of fewer joints completed, by elimination where its readings are
-clear and where they leave doubt, and besides where a joint within the arm is held."""
+clear and where they leave doubt, besides where a joint within the arm is held, and of each slot for its turns where
+gears or ball screws stand between motors and joints."""
 BESIDE = np.array([1.1e-4, -0.7e-4, 0.9e-4])  # rad, about the tool's axes
 _PROBED = 24
 _TURN = 2 * np.pi
@@ -88,6 +91,7 @@ def pose_cost(robot: Robot) -> float:
     open: by the arm's class, and how many random poses of its own leave doubt."""
     chain: ChainSolver | None = arm_solver(robot).chain
     cost = COMPLETED_S if isinstance(chain, Completed) else 0.0
+    cost += 0.0 if whole_turns(robot).each else GEARED_S * slot_count(robot)
     while isinstance(chain, LockedJoint | Completed):
         chain = chain.rest
     if chain is None:
@@ -108,19 +112,21 @@ def slot_count(robot: Robot) -> int:
 
 @derived
 def redundancy_values(robot: Robot) -> Reals | None:
-    """What each pose is tried with, (k, p), rad or m: arm angles or values of joints; None for arms of six joints."""
+    """What each pose is tried with, (k, p), rad or m: arm angles or values of joints (where they are
+    coupled, of rows); None for arms of six joints."""
     parameters = parameters_of(robot)
     if not parameters:
         return None
     count = max(2, round(ARM_ANGLES ** (1 / len(parameters))))
     each = []
+    endless = robot.continuous if robot.coupling is None else (robot.coupling[:, robot.continuous] != 0).any(axis=1)
     for parameter in parameters:
         j = parameter.joint
         if j < 0:
             each.append(_TURN * np.arange(count) / count)
             continue
-        low, high = robot.lower[j], robot.upper[j]
-        if not robot.slides[j] and (robot.continuous[j] or high - low > _TURN):
+        low, high = row_limits(robot)[j].tolist()
+        if not robot.sliding[j] and (endless[j] or high - low > _TURN):
             low, high = (low + high) / 2 - np.pi, (low + high) / 2 + np.pi
         each.append(low + (high - low) * (np.arange(count) + 0.5) / count)
     return np.array(list(product(*each)))

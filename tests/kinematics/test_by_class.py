@@ -332,3 +332,49 @@ def test_a_slot_has_the_turn_that_keeps_a_limit_of_a_sum():
     found = inverse_batch(robot, forward(robot, own)[None])
     assert found.within_limits[0].any()
     assert np.abs(found.q[0][found.within_limits[0]] - own).max(axis=1).min() < 1e-9
+
+
+GANTRY = ([0, 0, 0, 0.1, 0, 0], [H, H, 0, -H, H, 0], [0, 0, 0, 0.2, 0, 0.15])
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("turns", "slides"),
+    [((0.0, 0.4, 0.7), (1, 1, 0)), ((0.5, 0.4, 0.0), (0, 1, -1)), ((np.pi, 0.4, 0.7), (1, -1, 0))],
+    ids=["1 and 3", "3 and 6", "1 against 3"],
+)
+def test_slides_that_a_turn_makes_parallel_shift_against_each_other(turns, slides, random):
+    """A family with its direction, the whole way between the limits, whatever the reference."""
+    robot, direction = arm(GANTRY, [1, 0, 1, 0, 0, 1], most=3.2), np.zeros(6)
+    direction[[0, 2, 5]] = slides
+    for _ in range(2):
+        q = np.zeros(6)
+        q[[1, 3, 4]], q[[0, 2, 5]] = turns, random.uniform(-0.6, 0.6, 3)
+        T = forward(robot, q)
+        for ref in (np.zeros(6), q, random.uniform(-0.5, 0.5, 6)):
+            found = inverse(robot, T, ref)
+            own = [
+                family
+                for family in found.families
+                if np.abs(wrap_to_pi(family.q0 - q)[[1, 3, 4]]).max() < 1e-6
+                and np.abs(np.cross(family.direction[[0, 2, 5]], direction[[0, 2, 5]])).max() < 1e-6
+            ]
+            assert len(own) == 1
+            members = own[0].members(np.linspace(*own[0].range, 41))
+            assert np.abs(forward(robot, members) - T).max() < 1e-9
+            moved = np.flatnonzero(direction)
+            ends = np.abs(members[[0, -1]][:, moved]).max(axis=1)  # each end is where a slide meets its limit
+            np.testing.assert_allclose(ends, 1.0, atol=1e-6)
+            assert np.abs(found.q - own[0].q0).max(axis=1).min() < 1e-6
+        batch = inverse_batch(robot, T[None], q[None])
+        assert np.abs(batch.q[0][batch.solved[0]] - q).max(axis=1).min() < 1e-9
+
+
+def test_slides_made_parallel_reach_nothing_off_their_plane():
+    robot = arm(GANTRY, [1, 0, 1, 0, 0, 1], most=3.2)
+    T = forward(robot, np.array([0.1, 0.0, 0.2, 0.4, 0.7, 0.3]))
+    directions = np.array([np.eye(3)[2], T[:3, 2]])  # slides 1 and 3 along the base's z, slide 6 along the tool's
+    off = T.copy()
+    off[:3, 3] += 0.05 * np.cross(*directions)
+    assert not len(inverse(robot, off).q)
+    assert not inverse_batch(robot, off[None]).solved.any()

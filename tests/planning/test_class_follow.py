@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 import scipy
@@ -10,7 +12,7 @@ from er3a.errors import NotWristPartitionedError
 from er3a.kinematics.forward import forward
 from er3a.planning.class_follow import PathEndsError, follow_by_class
 from er3a.planning.moves import line
-from er3a.robots.robot import Robot
+from er3a.robots.robot import CombinedLimit, Robot
 
 INNER, OUTER = 0.325, 0.275
 H = np.pi / 2
@@ -227,3 +229,36 @@ def path_wrist(T: np.ndarray, beyond: np.ndarray, t: float) -> float:
     """Distance of the wrist centre from the shoulder at a time."""
     pose = line(T, beyond, 1.0).poses(line(T, beyond, 1.0).progress(np.array([t]))[0])[0]
     return float(np.linalg.norm(pose[:3, 3] - 0.126 * pose[:3, 2] - [0, 0, 0.36]))
+
+
+GEARED = np.array([[1, 0, 0, 0], [0.5, 1, 0, 0], [0.02, 0, 1, 0], [0, 0, 0, 0.5]])
+
+
+@pytest.mark.parametrize("coupling", [None, GEARED], ids=["each joint its row", "gears and a ball screw"])
+def test_turns_at_the_start_keep_the_limits_of_sums_on_the_whole_way(coupling, random):
+    """All turns of the rows are tried by hand on a grid: where some keep all limits, the motion's do, too."""
+    wide = SCARA.replace(lower=np.array([-7, -7, -0.3, -7]), upper=np.array([7, 7, 0.3, 7]), coupling=coupling)
+    rows = np.eye(4) if coupling is None else coupling
+    t, kept, moved = np.linspace(0, 1, 201), 0, 0
+    for _ in range(12):
+        middle = float(random.uniform(-9, 9))
+        limit = CombinedLimit((1.0, 1.0, 0.0, 0.7), middle - 2.0, middle + 2.0)
+        robot = wide.replace(combined=(limit,))
+        hand = by_hand(*random.uniform([0.25, 0.2, 0.25, -3], [0.35, 0.4, 0.35, 3]), 1)
+        end = hand + random.uniform(-0.1, 0.1, 4) * [1, 1, 0.1, 1]
+        T = forward(SCARA, np.stack([hand, end]))
+        path = line(T[0], T[1], 1.0)
+        q = follow_by_class(robot, path).joints(t)
+        np.testing.assert_allclose(forward(robot, q)[:, :3, 3], path.poses(path.progress(t)[0])[:, :3, 3], atol=1e-8)
+        steps = np.linalg.solve(rows, 2 * np.pi * np.eye(4)[:, [0, 1, 3]])
+        fits = [_keeps(robot, limit, q + steps @ turn) for turn in product(range(-4, 5), repeat=3)]
+        assert _keeps(robot, limit, q) or not any(fits)
+        kept, moved = kept + any(fits), moved + (any(fits) and bool(abs(middle) > 3))
+    assert kept >= 4
+    assert moved >= 2
+
+
+def _keeps(robot: Robot, limit: CombinedLimit, q: np.ndarray) -> bool:
+    total = q @ np.array(limit.factors)
+    alone = ((q >= robot.lower - 1e-9) & (q <= robot.upper + 1e-9)).all()
+    return bool(alone and total.min() >= limit.lower - 1e-9 and total.max() <= limit.upper + 1e-9)

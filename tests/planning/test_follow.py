@@ -21,6 +21,7 @@ from er3a.planning.sequences import segment_path
 from er3a.planning.singular_events import singular_events
 from er3a.planning.timing import joint_limits
 from er3a.robots.joint_limits import nearest_equivalent, within
+from er3a.robots.robot import CombinedLimit
 
 NEAR = NearSingular(float(np.radians(5)), float(np.radians(5)), 0.03)
 GRID = np.linspace(0, 1, 301)
@@ -203,6 +204,32 @@ def test_branch_is_chosen_for_the_whole_path_not_for_its_first_point():
     others = [follow(robot, way, GRID, start_slot=slot) for slot in range(4) if slot != followed.slot[0]]
     at_start = [within(robot, nearest_equivalent(robot, other.q[0], np.zeros(6))) for other in others]
     assert any(ok and not within(robot, other.q).all() for ok, other in zip(at_start, others))
+
+
+def test_turns_keep_the_limits_of_sums_where_some_turns_do(robot, random):
+    """Joints 4 and 6 of five turns each: of all turns, tried by hand, the least time outside a limit of a sum."""
+    wide = robot.replace(lower=np.full(6, -5 * np.pi), upper=np.full(6, 5 * np.pi))
+    q_start = np.radians([10, 10, -10, 30, 40, 20])
+    T = forward(robot, q_start)
+    way = line(T, shifted(T, [0.02, -0.04, 0.03], [0.2, 0.1, -0.3]), 1.0)
+    plain = follow(wide, way, GRID)
+    compared = 0
+    for middle in random.uniform(-20, 20, 8):
+        limit = CombinedLimit((0.0, 0.0, 0.0, 1.0, 0.0, -0.5), float(middle) - 1.5, float(middle) + 1.5)
+        q = follow(wide.replace(combined=(limit,)), way, GRID, start_slot=int(plain.slot[0])).q
+        whole = (q - plain.q) / (2 * np.pi)
+        if np.abs(whole - np.round(whole)).max() > 1e-9:
+            continue  # another branch
+        every = (plain.q + 2 * np.pi * np.array([0, 0, 0, a, 0, b]) for a in range(-3, 4) for b in range(-3, 4))
+        assert _outside(limit, q) <= min(_outside(limit, tried) for tried in every) + 1e-9
+        compared += 1
+    assert compared > 3
+
+
+def _outside(limit: CombinedLimit, q: np.ndarray) -> float:
+    total = q @ np.array(limit.factors)
+    beyond = (np.abs(q) > 5 * np.pi).any(axis=1) | (total > limit.upper + 1e-9) | (total < limit.lower - 1e-9)
+    return float(beyond.mean())
 
 
 def test_speed_limits_are_named():

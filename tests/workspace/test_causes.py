@@ -143,3 +143,24 @@ def test_a_hole_by_a_sum_of_slides_is_told_so():
     assert share_by_hand(robot, cavity, robot.lower, robot.upper, 0.0) == 0
     assert share_by_hand(robot, cavity, robot.lower, robot.upper, 0.4) == 1
     assert share_by_hand(robot, cavity, robot.lower - 0.4 * robot.sliding, robot.upper, 0.0) == 0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("factor", [1.0, 40.0])
+def test_a_hole_by_a_sum_of_a_turn_and_a_slide_is_told_so(factor):
+    """A slide outwards from 0, which a turning joint behind it only lets come in where that turns: rad, and rad/m."""
+    rows = [("R", 0, 0, 0, -180, 180), ("P", 0, 90, 0, 0, 500), ("P", 0, 0, 0, 0, 1000), ("R", 0, 0, 0, -20, 20)]
+    limit = CombinedLimit((0, 0, factor, 0.2), 0.3 * factor + 0.2 * 20 * DEG, 2 * factor)
+    robot = made_of(rows, offset=np.array([0, 90, 0, 0]) * DEG, combined=(limit,))
+    cavity, section = of_cells(robot, (0.06, 0.29), (0.05, 0.45), (0.0, TURN))
+    single, unlimited = relaxations(robot, cavity, section)
+    cause = cause_of(single, unlimited)
+    assert isinstance(cause, Disappears)
+    (found,) = cause.limits
+    assert (found.joints, found.factors, found.side, found.unit) == ((3, 4), (factor, 0.2), "lower", "deg")
+    assert share_by_hand(robot, cavity, robot.lower, robot.upper, 0.0) == 0
+    assert share_by_hand(robot, cavity, robot.lower, robot.upper, found.by * DEG) == 1
+    for narrower in (step for step in (15, 30, 60, 90, 180) if step < found.by):
+        assert share_by_hand(robot, cavity, robot.lower, robot.upper, narrower * DEG) < 1
+    joints = [(each.joints, each.side) for each in single]
+    assert len(joints) == len(set(joints))

@@ -11,9 +11,9 @@ from er3a.files.robot_library import load_robot
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import jacobian
 from er3a.kinematics.inverse import inverse
-from er3a.robots.robot import Robot
+from er3a.robots.robot import CombinedLimit, Robot
 from er3a.workspace.directions import cone_directions, from_polar, poses, roll_of, tool_rotations
-from er3a.workspace.placement import MIXED, NO, Places, Task, fitting_places, lattice_spacing, narrowed, survey
+from er3a.workspace.placement import MIXED, NO, Places, Task, fitting_places, lattice_spacing, narrowed, serve, survey
 from er3a.workspace.placement_proof import (
     PROVEN,
     REFUTED,
@@ -75,6 +75,27 @@ def test_places_agree_with_brute_force_one_pose_at_a_time():
     found = {(bool(t), *np.round(c, 6).tolist()) for t, c in zip(places.turned, places.centre)}
     assert len(expected) > 50
     assert found == expected
+
+
+def test_the_margin_of_a_point_counts_limits_of_sums(random):
+    """Joints 2 and 3, and 3, 4 and 5, of limited sums: the margin by hand from the joints that serve each point."""
+    robot = load_robot("er3_600")
+    sums = ([0, 1, 1, 0, 0, 0], -2.0, 0.4), ([0, 0, 1, 0.5, -1, 0], -2.2, 2.4)
+    limits = tuple(CombinedLimit(tuple(map(float, factors)), low, high) for factors, low, high in sums)
+    robot = robot.replace(combined=limits)
+    points = random.uniform([0.15, -0.3, 0.1], [0.45, 0.3, 0.5], (80, 3))
+    (rotation,) = rotations = tool_rotations(cone_directions(DOWN, 0.0), roll_of(robot, 1))
+    least, _, margin = serve(robot, points, rotations, roll_of(robot, 1))
+    rows = inverse_batch(robot, poses(points[:, None], rotation).reshape(-1, 4, 4))
+    own = np.flatnonzero(robot.upper - robot.lower < 2 * np.pi - 1e-6)
+    by_sums = 0
+    for n, slot in zip(*np.nonzero(least > NO)):
+        q = rows.q[n, slot]
+        alone = min(min(q[j] - robot.lower[j], robot.upper[j] - q[j]) for j in own)
+        summed = min(min(q @ factors - low, high - q @ factors) for factors, low, high in sums)
+        assert margin[n, slot] == pytest.approx(min(alone, summed), abs=1e-9)
+        by_sums += summed < alone
+    assert by_sums > 10
 
 
 @pytest.mark.parametrize("name", ["er3a_c60", "er3_600"])

@@ -1,7 +1,8 @@
 """Three sliding joints and three that turn, in any order: two solutions.
 
 Only the turning joints move the orientation, so three angles follow from it; then the sliding ones' directions are
-known, and the position is linear in them.
+known, and the position is linear in them. Where a turn has made two of them parallel (or all three lie in a plane),
+they shift against each other with the tool at rest: positions that they reach then, they reach in infinitely many ways.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ SLOTS = 2
 APART = 1e-9  # sine between neighbouring turning axes
 NEAR = 1e-9
 SPANS = 1e-9  # determinant of three sliding directions that span space
+FLAT = 1e-8  # least singular value of sliding directions, in parts of the largest, by which they do span a direction
+REACHED = 1e-9  # m, by which slides that don't span space may miss a position
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +50,10 @@ def gantry(links: Reals, sliding: Flags) -> Gantry | None:
 
 
 def solve_gantry(arm: Gantry, T: Reals) -> tuple[Reals, Flags]:
-    """Solutions q (N, 2, 6), rad and m, NaN where there is none; whether both roots meet or the slides don't span."""
+    """Solutions q (N, 2, 6), rad and m, NaN where there is none; whether both roots meet or the slides don't span.
+
+    Where slides don't span space, the solution with the least shifts stands for all.
+    """
     turn = np.ascontiguousarray(arm.frame @ T[:, :3, :3] @ arm.behind)
     angles, least = np.empty((len(T), SLOTS, 3)), np.empty(len(T))
     _angles(arm.angles, turn, angles, least)
@@ -56,10 +62,17 @@ def solve_gantry(arm: Gantry, T: Reals) -> tuple[Reals, Flags]:
     start = poses_of(arm.links, q, arm.sliding)[..., :3, 3]
     slides = np.flatnonzero(arm.sliding)
     step = np.stack([poses_of(arm.links, q + np.eye(6)[k], arm.sliding)[..., :3, 3] - start for k in slides], axis=-1)
+    wanted = T[:, None, :3, 3] - start
     spans = np.abs(np.linalg.det(np.nan_to_num(step))) > SPANS
-    step[~spans] = np.eye(3)
-    q[:, :, slides] = np.linalg.solve(step, (T[:, None, :3, 3] - start)[..., None])[..., 0]
-    q[~spans | np.isnan(q).any(axis=2)] = np.nan
+    shifts = np.empty_like(wanted)
+    shifts[spans] = np.linalg.solve(step[spans], wanted[spans][..., None])[..., 0]
+    for n, slot in np.argwhere(~spans):
+        G, to = step[n, slot], wanted[n, slot]
+        shifts[n, slot] = np.linalg.lstsq(G, to, rcond=FLAT)[0] if np.isfinite(G).all() else np.nan
+        if not np.abs(G @ shifts[n, slot] - to).max() < REACHED:
+            shifts[n, slot] = np.nan
+    q[:, :, slides] = shifts
+    q[np.isnan(q).any(axis=2)] = np.nan
     return q, (np.abs(least) < NEAR) | ~spans.all(axis=1)
 
 

@@ -57,7 +57,8 @@ class BoxTask(StrictModel):
 
     ``box_mm`` are its edges along x, y and z (it may stand turned by 90 deg about z), ``lowest_mm`` the least height of
     its underside, ``clear_of_axis_mm`` the least distance of its points from axis 1. At every point the tool must reach
-    all directions within ``cone_deg`` of ``tool_direction`` (z of the tool frame), ``limit_margin_deg`` within limits.
+    all directions within ``cone_deg`` of ``tool_direction`` (z of the tool frame), ``limit_margin_deg`` within
+    the limits of joints with less than a full turn and of sums of joints that turn.
     """
 
     box_mm: Annotated[list[Annotated[float, Field(gt=0)]], Field(min_length=3, max_length=3)] = [200, 150, 50]

@@ -259,8 +259,8 @@ class PlaceSummary:
     ----------
     branch : configuration that serves it all, None if it changes within the box or has no name
     manipulability_m3 : least over the box and its directions; manipulability_ratio : of the arm's best
-    limit_margin_deg : least distance of joints from their limits, None without one branch, or without joints of less
-        than a full turn
+    limit_margin_deg : least distance of joints, and of sums of joints, from their limits, None without one branch, or
+        without joints of less than a full turn
     clearance_mm : least distance of the arm from scene and itself over the samples, None if nothing can meet
     clearance_pair : the bodies that are so near each other
     limit_joint : the joint (from 1) that comes so near its limit

@@ -1,0 +1,309 @@
+"""The lattice of what leaves an arm as it was: sums of whole turns of the rows of its table.
+
+With u = C q what the rows move by, a row that turns is where it was after a turn, a row that slides is not. So with
+joints q all of q + C^-1 k are the same arm, k having whole turns for rows that turn and 0 for those that slide: a whole
+turn of each joint where nothing is coupled (or by whole numbers, both ways), less than a turn behind a gear, a turn of
+one joint and a shift of another at a ball screw. Which of these keep limits, of joints and of sums of joints, is found
+by trying turns row by row, where limits leave room for what the rows left can still add [1]_.
+
+References
+----------
+.. [1] U. Fincke, M. Pohst, "Improved methods for calculating vectors of short length in a lattice", Mathematics of
+   Computation 44, 1985.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from er3a.geometry.angles import TURN
+from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.jit import kernel
+from er3a.robots.derived import derived
+from er3a.robots.robot import Robot
+
+LIMIT_TOLERANCE = 1e-9  # rad, m
+WHOLE = 1e-12  # parts of a turn
+INVERTIBLE = 1e-9  # least determinant of a coupling that is undone
+WIDENED = (1.0, 2.0, 4.0, 8.0, 16.0)  # how far continuous joints are looked for, in halves of what turns move them by
+
+
+@dataclass(frozen=True, eq=False)
+class WholeTurns:
+    """Steps that leave the arm as it was, and all sums of them.
+
+    Attributes
+    ----------
+    steps : (n, r), rad or m, what a turn of each of r rows moves the joints by
+    counts : (r, n), turns of these rows for joints: ``counts @ steps`` is the identity
+    alone : (n,) bool, joints of which a whole turn leaves the arm as it was
+    each : whether the steps are whole turns of one joint each
+    lines : (n + s, n), what limits are of: the joints and the s sums; lower, upper : (n + s,), rad or m
+    """
+
+    steps: Reals
+    counts: Reals
+    alone: Flags
+    each: bool
+    lines: Reals
+    lower: Reals
+    upper: Reals
+
+
+@derived
+def whole_turns(robot: Robot) -> WholeTurns:
+    """The robot's lattice of turns. Where a coupling moves more rows than there are joints, it is made of those joints
+    alone that a whole turn brings back."""
+    coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
+    parts = np.where(robot.sliding[:, None], coupling, coupling - np.round(coupling))
+    alone = ~robot.slides & (np.abs(parts) <= WHOLE).all(axis=0)
+    steps, counts = TURN * np.eye(robot.joints)[:, alone], np.eye(robot.joints)[alone] / TURN
+    each, undone = True, uncoupling(robot)
+    if undone is not None:
+        turns = undone[:, ~robot.sliding]
+        parts = np.where(robot.slides[:, None], turns, turns - np.round(turns))
+        each = bool((alone | robot.slides).all() and np.abs(parts).max(initial=0.0) <= WHOLE)
+        if not each:
+            steps, counts = TURN * turns, coupling[~robot.sliding] / TURN
+    sums = np.array([limit.factors for limit in robot.combined]).reshape(-1, robot.joints)
+    lower = np.append(np.where(robot.continuous, -np.inf, robot.lower), [limit.lower for limit in robot.combined])
+    upper = np.append(np.where(robot.continuous, np.inf, robot.upper), [limit.upper for limit in robot.combined])
+    lines = np.concatenate([np.eye(robot.joints), sums])
+    return WholeTurns(np.ascontiguousarray(steps), np.ascontiguousarray(counts), alone, each, lines, lower, upper)
+
+
+@derived
+def uncoupling(robot: Robot) -> Reals | None:
+    """(n, n), what undoes the coupling; None where there is none, or none that undoes it."""
+    if robot.coupling is None or robot.rows != robot.joints or abs(np.linalg.det(robot.coupling)) < INVERTIBLE:
+        return None
+    return np.asarray(np.linalg.inv(robot.coupling), dtype=float)
+
+
+def turns_in(robot: Robot, move: Reals) -> Reals:
+    """The whole turns of rows, as moves (..., n) of joints, that are nearest to moves (..., n), row by row."""
+    turns = whole_turns(robot)
+    if turns.each:
+        return np.asarray(np.where(turns.alone, TURN, 0.0) * np.round(move / TURN))
+    return np.asarray(np.round(move @ turns.counts.T) @ turns.steps.T)
+
+
+def shortest_way(robot: Robot, move: Reals) -> Reals:
+    """Moves of joints (..., n), less the whole turns of rows in them, each row by its shorter way."""
+    return move - turns_in(robot, move)
+
+
+def rows_within(robot: Robot, q: Reals, q_ref: Reals, most: int) -> Reals:
+    """The same arm (k, n) as joints (n,) by all turns that keep all limits; at most ``most`` + 1 are looked for.
+
+    Of continuous joints those that lie as near to q_ref (n,) as half of what a turn of each row moves them by.
+    """
+    lower, upper = _windows(robot, q_ref[None], 1.0)
+    found = np.empty((most + 1, robot.joints))
+    count = _all_within(q, _lattice(robot), (lower[0], upper[0], np.zeros(lower.shape[1])), found)
+    return found[:count]
+
+
+def nearest_rows(
+    robot: Robot, q: Reals, q_ref: Reals, around: tuple[Reals, Reals] | None = None
+) -> tuple[Reals, Flags]:
+    """The same arms (N, n) as joints (N, n) by the turns that keep all limits and are nearest to q_ref (N, n): by the
+    least greatest move, then the least sum of moves; and whether there are such turns (N,).
+
+    Where there are none, joints are left as they are if steps are whole turns of one joint each; else, of those that
+    leave no joint's limit by more than half of what a turn of each row moves it, come the turns that leave limits
+    least, then the nearest.
+
+    Parameters
+    ----------
+    around : how far below (negative) and above q joints and sums (N, n + s) go, rad or m, all of which keeps limits;
+        None for 0
+    """
+    turns = whole_turns(robot)
+    found, fits = q.copy(), np.zeros(len(q), dtype=bool)
+    told = np.isfinite(q).all(axis=1)
+    beyond = np.full(len(turns.lines), np.inf)
+    beyond[: robot.joints] = 0.5 * np.abs(turns.steps).sum(axis=1)
+    tries = [(widened, np.zeros(len(beyond))) for widened in (WIDENED if robot.continuous.any() else WIDENED[:1])]
+    for widened, away in tries if turns.each else [*tries, (1.0, beyond)]:
+        left = np.flatnonzero(told & ~fits)
+        lower, upper = _windows(robot, q_ref[left], widened)
+        if around is not None:
+            lower, upper = lower - around[0][left], upper - around[1][left]
+        tried, excess = found[left], np.empty(len(left))
+        _nearest(q[left], q_ref[left], _lattice(robot), (lower, upper, away), (tried, excess))
+        found[left], fits[left] = tried, excess == 0.0
+    return found, fits
+
+
+def turns_inward(robot: Robot, low: Reals, high: Reals) -> Reals:
+    """The turns, as moves (N, n) of joints, by which motions keep all limits, of joints and of sums, and are nearest to
+    the middle of each joint's; if none do, those nearest to the middle. Continuous joints stay if they can.
+
+    Parameters
+    ----------
+    low, high : (N, n + s), rad or m, least and greatest values of joints and sums along each motion
+    """
+    turns = whole_turns(robot)
+    middle = (low + high)[:, : robot.joints] / 2
+    centre = np.where(robot.continuous, middle, (robot.lower + robot.upper) / 2)
+    shift = turns_in(robot, centre - middle)
+    if turns.each and not robot.combined:
+        return shift
+    around = middle @ turns.lines.T
+    turned, fits = nearest_rows(robot, middle, centre, (low - around, high - around))
+    return np.where(fits[:, None], turned - middle, shift)
+
+
+@derived
+def _lattice(robot: Robot) -> Lattice:
+    turns = whole_turns(robot)
+    return np.ascontiguousarray(turns.lines @ turns.steps), turns.counts, turns.lines
+
+
+def _windows(robot: Robot, q_ref: Reals, widened: float) -> tuple[Reals, Reals]:
+    """Limits (N, n + s) of joints and sums; of continuous joints a window about references (N, n), open below."""
+    turns = whole_turns(robot)
+    half = widened * 0.5 * np.abs(turns.steps).sum(axis=1)
+    lower, upper = np.tile(turns.lower, (len(q_ref), 1)), np.tile(turns.upper, (len(q_ref), 1))
+    endless = np.flatnonzero(robot.continuous)
+    lower[:, endless] = q_ref[:, endless] - half[endless] + 2 * LIMIT_TOLERANCE
+    upper[:, endless] = q_ref[:, endless] + half[endless]
+    return lower, upper
+
+
+@kernel
+def take_turns_off(step: Reals, turns: tuple[Reals, Reals]) -> None:
+    """Make a move of joints (n,) the one by the shortest way; ``turns`` are steps (n, r) and counts (r, n)."""
+    steps, counts = turns
+    for i in range(counts.shape[0]):
+        count = 0.0
+        for j in range(step.shape[0]):
+            count += counts[i, j] * step[j]
+        count = np.round(count)
+        if count != 0.0:
+            for j in range(step.shape[0]):
+                step[j] -= steps[j, i] * count
+
+
+Lattice = tuple[Reals, Reals, Reals]
+"""What turns of rows change what limits are of by (m, r), turns of rows for joints (r, n), and what limits are of."""
+Limits = tuple[Reals, Reals, Reals]
+"""Lower and upper limits, and how far they may be left, (m,) each; of many poses (N, m) but for the last."""
+
+
+@kernel
+def _room(q: Reals, lattice: Lattice, limits: Limits) -> tuple[Reals, Reals, Reals, Reals]:
+    """Turns of each row (r,) between which joints (n,) keep to limits, and what rows from each one on can add to what
+    limits are of, at least and at most (r + 1, m)."""
+    (G, counts, _), (lower, upper, away) = lattice, limits
+    m, rows = G.shape
+    least, most = np.empty(rows), np.empty(rows)
+    for i in range(rows):
+        low, high = 0.0, 0.0
+        for j in range(q.shape[0]):
+            a = counts[i, j]
+            if a != 0.0:
+                below, above = lower[j] - away[j] - q[j], upper[j] + away[j] - q[j]
+                low += a * (below if a > 0.0 else above)
+                high += a * (above if a > 0.0 else below)
+        least[i], most[i] = np.ceil(low - LIMIT_TOLERANCE), np.floor(high + LIMIT_TOLERANCE)
+    adds, addable = np.zeros((rows + 1, m)), np.zeros((rows + 1, m))
+    for i in range(rows - 1, -1, -1):
+        for c in range(m):
+            a, b = G[c, i] * least[i], G[c, i] * most[i]
+            adds[i, c], addable[i, c] = adds[i + 1, c] + min(a, b), addable[i + 1, c] + max(a, b)
+    return least, most, adds, addable
+
+
+@kernel
+def _all_within(q: Reals, lattice: Lattice, limits: Limits, found: Reals) -> int:
+    """Fill ``found`` (k, n) with joints (n,) by all turns that keep limits (m,), as many as there is room for; returns
+    how many."""
+    (G, _, lines), (lower, upper, _) = lattice, limits
+    m, rows = G.shape
+    least, most, low, high = _room(q, lattice, limits)
+    value, at, count, i = np.empty((rows + 1, m)), least - 1.0, 0, 0
+    value[0] = lines @ q
+    if (least > most).any():
+        return 0
+    while i >= 0:
+        if i < rows:
+            at[i] += 1.0
+            if at[i] > most[i]:
+                i -= 1
+                continue
+            for c in range(m):
+                value[i + 1, c] = value[i, c] + G[c, i] * at[i]
+            i += 1
+        fits = True
+        for c in range(m):
+            fits &= value[i, c] + low[i, c] <= upper[c] + LIMIT_TOLERANCE
+            fits &= value[i, c] + high[i, c] >= lower[c] - LIMIT_TOLERANCE
+        if fits and i < rows:
+            at[i] = least[i] - 1.0
+            continue
+        if fits:
+            if count == found.shape[0]:
+                return count
+            found[count] = value[rows, : q.shape[0]]
+            count += 1
+        i -= 1
+    return count
+
+
+@kernel
+def _nearest(Q: Reals, refs: Reals, lattice: Lattice, limits: Limits, out: tuple[Reals, Reals]) -> None:
+    """Fill ``found`` (N, n) with joints Q (N, n) by the turns that leave limits least, by no more than each may be
+    left, then are nearest to refs (N, n); and ``left`` (N,) with the sum by which they leave them, infinite where there
+    are none."""
+    (G, counts, lines), (lowers, uppers, away), (found, left) = lattice, limits, out
+    (m, rows), n = G.shape, Q.shape[1]
+    value, at = np.empty((rows + 1, m)), np.zeros(rows, np.int64)
+    for pose in range(Q.shape[0]):
+        q, ref, lower, upper = Q[pose], refs[pose], lowers[pose], uppers[pose]
+        left[pose], farthest, total = np.inf, np.inf, np.inf
+        least, most, low, high = _room(q, lattice, (lower, upper, away))
+        if (least > most).any():
+            continue
+        middle = np.minimum(np.maximum(np.rint(counts @ (ref - q)), least), most)
+        value[0], i = lines @ q, 0
+        at[:] = -1
+        while i >= 0:
+            if i < rows:
+                at[i] += 1  # from the nearest turn on to both sides
+                if at[i] > 2 * max(most[i] - middle[i], middle[i] - least[i]):
+                    i -= 1
+                    continue
+                turn = middle[i] + ((at[i] + 1) // 2) * (1.0 if at[i] % 2 == 1 else -1.0)
+                if turn < least[i] or turn > most[i]:
+                    continue
+                for c in range(m):
+                    value[i + 1, c] = value[i, c] + G[c, i] * turn
+                i += 1
+            beyond, fits, move, moves = 0.0, True, 0.0, 0.0
+            for c in range(m):
+                over, under = value[i, c] + low[i, c] - upper[c], lower[c] - value[i, c] - high[i, c]
+                excess = max(over, under) - LIMIT_TOLERANCE
+                if excess > 0.0:
+                    beyond += excess
+                    fits &= excess <= away[c]
+            for c in range(n):
+                step = max(value[i, c] + low[i, c] - ref[c], ref[c] - value[i, c] - high[i, c], 0.0)
+                move, moves = max(move, step), moves + step
+            if beyond > 0.0 or left[pose] > 0.0:
+                worse, alike = beyond > left[pose] + LIMIT_TOLERANCE, beyond >= left[pose] - LIMIT_TOLERANCE
+                fits &= not worse
+            else:
+                alike = True
+            if fits and alike:
+                fits = move < farthest - LIMIT_TOLERANCE or (move <= farthest + LIMIT_TOLERANCE and moves < total)
+            if fits and i < rows:
+                at[i] = -1
+                continue
+            if fits:
+                left[pose], farthest, total = beyond, move, moves
+                found[pose] = value[rows, :n]
+            i -= 1
