@@ -332,3 +332,28 @@ def test_a_slot_has_the_turn_that_keeps_a_limit_of_a_sum():
     found = inverse_batch(robot, forward(robot, own)[None])
     assert found.within_limits[0].any()
     assert np.abs(found.q[0][found.within_limits[0]] - own).max(axis=1).min() < 1e-9
+
+
+def test_a_stretched_arm_of_seven_has_solutions_in_every_batch_its_own_among_them(random):
+    robot = ARMS["arm_angle"][0]
+    q = random.uniform(robot.lower, robot.upper, (200, 7))
+    q[:, 3] = 0.0
+    T = plain_poses(IIWA, q)
+    for reference in (q, random.uniform(robot.lower, robot.upper, (200, 7))):
+        found = inverse_batch(robot, T, reference)
+        assert found.solved.any(axis=1).all()
+        off = np.abs(plain_poses(IIWA, found.q) - T[:, None])[found.solved]
+        assert off.max() < 2e-9
+        if reference is q:
+            away = np.abs(wrap_to_pi(found.q - q[:, None])).max(axis=2)
+            assert np.nanmin(away, axis=1).max() < 1e-6
+
+
+def plain_poses(rows, q):
+    """The product of the textbook's D-H matrices (..., 4, 4), written out."""
+    T = np.broadcast_to(np.eye(4), (*q.shape[:-1], 4, 4))
+    for (a, alpha, d), theta in zip(zip(*rows), np.moveaxis(q, -1, 0)):
+        c, s, ca, sa, o = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha), 0 * theta
+        link = [[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [o, o + sa, o + ca, o + d], [o, o, o, o + 1]]
+        T = T @ np.moveaxis(np.array([[np.broadcast_to(x, o.shape) for x in line] for line in link]), (0, 1), (-2, -1))
+    return T
