@@ -349,6 +349,22 @@ def test_a_stretched_arm_of_seven_has_solutions_in_every_batch_its_own_among_the
             assert np.nanmin(away, axis=1).max() < 1e-6
 
 
+@pytest.mark.parametrize("tilt", [0.0, 0.7])
+def test_a_pose_that_the_class_loses_at_a_singularity_is_searched_for_within_the_limits(tilt, random):
+    """A turn, a tilt and a slide: the point where all axes meet, and points on axis 1."""
+    rows = ([0, 0, 0], [H, H, 0], [0.4, 0, 0])
+    robot = arm(rows, [0, 0, 1]).replace(lower=np.array([-3, -3, -0.2]), upper=np.array([3, 3, 0.9]))
+    for own in ([0.3, 0.0, 0.4], [0.3, tilt, 0.0]):
+        T = forward(robot, np.array(own))
+        for reference in random.uniform(robot.lower, robot.upper, (3, 3)):
+            one = inverse(robot, T, reference)
+            batch = inverse_batch(robot, T[None], reference)
+            for found, inside in ((one.q, one.within_limits), (batch.q[0], batch.within_limits[0])):
+                assert inside.any()
+                for row in found[inside]:
+                    assert np.abs(forward(robot, row) - T)[:3, 3].max() < 1e-9
+
+
 def plain_poses(rows, q):
     """The product of the textbook's D-H matrices (..., 4, 4), written out."""
     T = np.broadcast_to(np.eye(4), (*q.shape[:-1], 4, 4))
