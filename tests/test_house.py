@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from collections import defaultdict
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -12,15 +13,18 @@ LONGEST_FUNCTION = 80
 MOST_POSITIONAL = 6
 IN_EVERY_STAGE = {"entry", "model", "compute", "record", "report"}
 MESSAGES = "er3a/pipeline/messages"  # its modules are named after those that they speak for
-TREES = {
-    path.relative_to(ROOT).as_posix(): ast.parse(path.read_text(encoding="utf-8"))
-    for path in sorted((ROOT / "er3a").rglob("*.py"))
-}
+
+
+@cache
+def trees() -> dict[str, ast.Module]:
+    """All modules of the package, parsed, by their paths."""
+    paths = sorted((ROOT / "er3a").rglob("*.py"))
+    return {path.relative_to(ROOT).as_posix(): ast.parse(path.read_text(encoding="utf-8")) for path in paths}
 
 
 def functions() -> Iterator[tuple[str, ast.FunctionDef]]:
     """All functions that are no kernels, with the place that each begins at."""
-    for path, tree in TREES.items():
+    for path, tree in trees().items():
         for node in ast.walk(tree):
             if isinstance(node, ast.FunctionDef) and "kernel" not in map(ast.unparse, node.decorator_list):
                 yield f"{path}:{node.lineno} {node.name}", node
@@ -32,7 +36,7 @@ def several(places: dict[str, set[str]]) -> dict[str, set[str]]:
 
 
 def test_the_rules_are_read_off_the_whole_package():
-    assert len(TREES) > 200
+    assert len(trees()) > 200
     assert len(list(functions())) > 1000
 
 
@@ -49,20 +53,20 @@ def test_no_function_takes_many_positional_arguments():
 
 def test_no_two_modules_of_different_rooms_share_a_name():
     places: dict[str, set[str]] = defaultdict(set)
-    for path in map(Path, TREES):
+    for path in map(Path, trees()):
         if path.parent.as_posix() != MESSAGES and path.stem not in {"__init__", *IN_EVERY_STAGE}:
             places[path.stem].add(path.as_posix())
     assert several(places) == {}
 
 
 def test_stages_alone_have_the_modules_of_a_stage():
-    contract = [Path(path) for path in TREES if Path(path).stem in IN_EVERY_STAGE]
+    contract = [Path(path) for path in trees() if Path(path).stem in IN_EVERY_STAGE]
     assert {path.parent.parent.as_posix() for path in contract} == {"er3a/pipeline/stages"}
 
 
 def test_no_two_classes_share_a_name():
     places: dict[str, set[str]] = defaultdict(set)
-    for path, tree in TREES.items():
+    for path, tree in trees().items():
         for node in ast.walk(tree):
             if isinstance(node, ast.ClassDef):
                 places[node.name].add(f"{path}:{node.lineno}")

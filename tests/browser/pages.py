@@ -6,3 +6,9 @@ from tests.conftest import ROBOTS
 OVER_ALL = ["index.html", "compare.html"]
 STAGE_PAGES = [f"{robot}/{stage}.html" for robot in ROBOTS for stage in stages_of(robot)]
 PAGES = OVER_ALL + STAGE_PAGES + [f"{robot}/teach.html" for robot in ROBOTS]
+
+STAGE_PAGES_OF_EACH_KIND = [
+    *(page for page in STAGE_PAGES if page.startswith("er3a_c60/")),
+    "er3a_c60_article/validation.html",  # of a table that evidence contradicts
+]
+PAGES_OF_EACH_KIND = [*OVER_ALL, *STAGE_PAGES_OF_EACH_KIND, "er3a_c60/teach.html"]

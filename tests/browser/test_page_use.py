@@ -10,10 +10,10 @@ from selenium.webdriver.support.wait import WebDriverWait
 
 from er3a.pipeline.viewing.figure_3d import WORDS
 from testing import chromium
-from tests.browser.pages import PAGES, STAGE_PAGES
+from tests.browser.pages import PAGES_OF_EACH_KIND, STAGE_PAGES, STAGE_PAGES_OF_EACH_KIND
 
 
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize("page", PAGES_OF_EACH_KIND)
 def test_tab_key_reaches_everything_in_the_page_s_order(browser, small_study, page):
     browser.get((small_study.folder / "reports" / page).as_uri())
     sortable = page in STAGE_PAGES and browser.execute_script(HAS_TABLES)
@@ -54,7 +54,7 @@ return [controls.indexOf(document.activeElement), outlineStyle !== "none" && par
 """
 
 
-@pytest.mark.parametrize("page", STAGE_PAGES)
+@pytest.mark.parametrize("page", STAGE_PAGES_OF_EACH_KIND)
 def test_figures_enlarge_and_give_the_focus_back(browser, small_study, page):
     browser.get((small_study.folder / "reports" / page).as_uri())
     found = browser.find_elements(By.CSS_SELECTOR, "figure button")
@@ -180,7 +180,7 @@ def test_joint_vectors_lead_to_the_teach_panel(browser, small_study):
     assert taken == pytest.approx(shown, abs=0.06)
 
 
-@pytest.mark.parametrize("page", ["compare.html", *STAGE_PAGES])
+@pytest.mark.parametrize("page", ["compare.html", *STAGE_PAGES_OF_EACH_KIND])
 def test_every_table_sorts_by_every_column(browser, small_study, page):
     browser.get((small_study.folder / "reports" / page).as_uri())
     sorted_columns = browser.execute_script(SORT_ALL)

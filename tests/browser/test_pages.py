@@ -13,7 +13,7 @@ from selenium.webdriver.support.ui import Select
 from er3a.files.robot_library import load_robot
 from er3a.pipeline.viewing.index import FIRST
 from testing import chromium
-from tests.browser.pages import OVER_ALL, PAGES
+from tests.browser.pages import OVER_ALL, PAGES, PAGES_OF_EACH_KIND
 from tests.conftest import ROBOTS
 
 
@@ -32,7 +32,7 @@ def test_page_opens_clean(browser, small_study, page):
     assert [address for address in loaded if not address.startswith(("data:", "blob:"))] == []
 
 
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize("page", PAGES_OF_EACH_KIND)
 def test_page_is_accessible(browser, small_study, page):
     browser.get((small_study.folder / "reports" / page).as_uri())
     assert serious_faults(browser) == []

@@ -186,13 +186,9 @@ class Search:
 CORRUPTED: list[tuple[str, list[str], dict[tuple[int, int], float]]] = [
     ("er3_600", ["rows 2 and 3"], {(D, 3): 0.03}),
     ("er3_600", ["a x 0.001"], {(OFFSET, 2): 0.17}),
-    ("er3_600", ["a for d of 4", "direction2"], {}),
     ("er3_600", ["alpha in deg", "d x 1000"], {}),
-    ("er3a_c60", ["alpha up"], {(A, 1): -0.02}),
     ("er3a_c60", ["convention", "direction3"], {}),
-    ("er3a_c60", ["rows 1 and 4", "alpha4"], {}),
     ("er3a_c60", ["lengths x 1000"], {(ALPHA, 2): 0.3}),
-    ("er3a_c60", ["d down", "a for d of 2"], {}),
 ]
 
 
