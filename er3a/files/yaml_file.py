@@ -53,11 +53,11 @@ class _PlainLoader(Composer, yaml.CSafeLoader):
     """
 
     def __init__(self, stream):
-        yaml.CSafeLoader.__init__(self, stream)
-        Composer.__init__(self)
+        yaml.CSafeLoader.__init__(self, stream)  # type: ignore[no-untyped-call]
+        Composer.__init__(self)  # type: ignore[no-untyped-call]
 
     def compose_node(self, parent, index):
-        event = self.peek_event()
+        event: Any = self.peek_event()
         unsupported = "aliases (*name)" if isinstance(event, yaml.AliasEvent) else "tags (!name)"
         if isinstance(event, yaml.AliasEvent) or getattr(event, "tag", None) is not None:
             raise yaml.constructor.ConstructorError(None, None, f"{unsupported} are not supported", event.start_mark)

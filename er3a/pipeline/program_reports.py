@@ -19,6 +19,7 @@ from urllib.parse import quote
 from er3a.errors import InputError
 from er3a.pipeline.messages.language import as_text
 from er3a.pipeline.messages.program_check import say
+from er3a.pipeline.messages.program_remedies import remedy
 from er3a.pipeline.results import plain
 from er3a.program_check.check_program import LocatedFinding, MotionVerdict, ProgramCheck
 from er3a.program_check.program_check_findings import Level
@@ -156,6 +157,8 @@ def _finding_record(each: LocatedFinding) -> dict[str, Any]:
         "level": each.level,
         "code": each.finding.code,
         "message": say(each.finding),
+        "remedy": remedy(each.finding),
+        "moment_s": each.moment,
         "times": each.times,
         "called_from": [_place_record(place) for place in each.calls],
         "params": params,

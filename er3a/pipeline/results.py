@@ -115,6 +115,7 @@ class Stored(Generic[ResultsT]):
     Attributes
     ----------
     rests_on : statuses of the stages without which they mean little, as far as those were computed
+    folder : that they were read from
     """
 
     robot: str
@@ -122,6 +123,7 @@ class Stored(Generic[ResultsT]):
     provenance: Provenance
     results: ResultsT
     rests_on: Mapping[str, Status] = field(default_factory=dict)
+    folder: Path | None = None
 
     @property
     def status(self) -> Status:
@@ -189,8 +191,8 @@ def read_stage(folder: Path, stage: Stage) -> Stored[Any]:
     if record["verdict"]["status"] == "not_computed":
         absent = AbsentResults(Summary(Verdict("not_computed", _reason_of_absence(record["verdict"], stage)), ()))
         origin = _adapter(Provenance).validate_python(record["provenance"])
-        return Stored(record["robot"], stage.name, origin, absent, rests_on)
-    return replace(read_results(folder, stage.module("model").RESULTS), rests_on=rests_on)
+        return Stored(record["robot"], stage.name, origin, absent, rests_on, folder)
+    return replace(read_results(folder, stage.module("model").RESULTS), rests_on=rests_on, folder=folder)
 
 
 def _reason_of_absence(verdict: dict[str, Any], stage: Stage) -> Finding:

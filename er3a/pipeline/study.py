@@ -185,6 +185,11 @@ class StudyBase(StrictModel):
         """The reference sets that a robot's file names."""
         return read_robot(self.robot_file(name)).references
 
+    def other_tables(self, name: str) -> list[str]:
+        """Other robots of the study, with validation, that one of this robot's reference sets is about."""
+        others = [other for other in self.references(name) if other != name and other in self.robots]
+        return [other for other in others if "validation" in self.stages(other)]
+
     def inputs(self, name: str, stage: str) -> list[Path]:
         """The files that a stage, or the teach panel, reads for a robot."""
         more = REGISTRY[stage].inputs(self, name) if stage in REGISTRY else self.scenes(name, "trajectory")

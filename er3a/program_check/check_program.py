@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -80,6 +80,8 @@ class LocatedFinding:
     ----------
     calls : where the routines were called, the outermost first, when it was found first
     times : how often the instruction was carried out with it
+    step : number of the step that it was found at first, None where it belongs to none
+    moment : s from the start of that step's motion, when it begins; None of what is about the motion as a whole
     """
 
     level: Level
@@ -87,6 +89,8 @@ class LocatedFinding:
     place: Place
     calls: tuple[Place, ...] = ()
     times: int = 1
+    step: int | None = None
+    moment: float | None = None
 
 
 @dataclass(frozen=True)
@@ -217,7 +221,10 @@ def _located(execution: Execution, checker: StepChecker, end: int) -> tuple[Loca
             found += [LocatedFinding(level_of(each), each, step.place, step.calls) for each in each_wrong]
     for number, motion in checker.motions.items():
         step = execution.steps[number]
-        found += [LocatedFinding(level_of(each), each, step.place, step.calls) for each in motion.findings]
+        found += [
+            LocatedFinding(level_of(each), each, step.place, step.calls, 1, number, motion.moments.get(each))
+            for each in motion.findings
+        ]
     for step in execution.steps:
         what = step.instruction
         if isinstance(what, Unknown):
@@ -236,10 +243,7 @@ def _located(execution: Execution, checker: StepChecker, end: int) -> tuple[Loca
     groups: dict[tuple[Place, str, str], list[LocatedFinding]] = defaultdict(list)
     for each in found:
         groups[each.place, each.finding.code, _which(each.finding)].append(each)
-    grouped = [
-        LocatedFinding(same[0].level, same[0].finding, same[0].place, same[0].calls, len(same))
-        for same in groups.values()
-    ]
+    grouped = [replace(same[0], times=len(same)) for same in groups.values()]
     order = {path: i for i, path in enumerate(dict.fromkeys(str(each.place.file) for each in grouped))}
     return tuple(sorted(grouped, key=lambda each: (order[str(each.place.file)], each.place.line, -RANKS[each.level])))
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
-from dataclasses import dataclass, replace
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -82,6 +82,7 @@ class CheckedMotion:
     end : (n,), rad, where the motions that follow go on from; None if not known
     clearance : m, least on the way, negative by an overlap; None where not measured
     blended_ends : of its two ends, how many have a zone that is not fine
+    moments : s from the motion's start, when what is found begins; not of findings about the motion as a whole
     """
 
     kind: str
@@ -93,6 +94,7 @@ class CheckedMotion:
     clearance: float | None = None
     stays: bool = False
     blended_ends: int = 0
+    moments: Mapping[CheckFinding, float] = field(default_factory=dict)
 
 
 class StepChecker:
@@ -189,8 +191,8 @@ class StepChecker:
         found = (*findings, *way.findings)
         beyond = np.maximum(goal.joints - placed.arm.upper, placed.arm.lower - goal.joints).max()
         if beyond > TURN:  # no arm gets there, and nothing goes on from there
-            return CheckedMotion("joint", placed, before, None, None, found)
-        return self._measured(CheckedMotion("joint", placed, before, way, way.end, found))
+            return CheckedMotion("joint", placed, before, None, None, found, moments=way.moments)
+        return self._measured(CheckedMotion("joint", placed, before, way, way.end, found, moments=way.moments))
 
     def _tool_move(
         self, placed: PlacedMotion, goal: Goal, before: Reals, findings: list[CheckFinding]
@@ -220,7 +222,8 @@ class StepChecker:
             return CheckedMotion(kind, placed, before, None, goal.joints, (*findings, way))
         if any(isinstance(each, WayOutOfReach) for each in way.findings):
             findings = [each for each in findings if not isinstance(each, TargetOutOfReach)]
-        return self._measured(CheckedMotion(kind, placed, before, way, way.end, (*findings, *way.findings)))
+        told = (*findings, *way.findings)
+        return self._measured(CheckedMotion(kind, placed, before, way, way.end, told, moments=way.moments))
 
     def _via(self, placed: PlacedMotion, before: Reals) -> Reals | None:
         """The arc's point (3,), m."""
@@ -241,15 +244,13 @@ class StepChecker:
         ends = way.t[[0, -1]]
         along = clearance_along(bodies, way.joints, way.rates, way.t, ends, self.obstacles.tolerance)
         least = float(along.distance[along.least]) if along.least >= 0 else None
-        hits = [
-            MotionCollides(
-                contact.pairs, contact.depth * 1000, None if motion.kind == "joint" else way.along_mm(contact.start)
-            )
-            for contact in along.contacts
-        ]
-        worst = max(hits, key=lambda hit: hit.depth_mm, default=None)
-        findings = motion.findings if worst is None else (*motion.findings, worst)
-        return replace(motion, findings=findings, clearance=least)
+        if not along.contacts:
+            return replace(motion, clearance=least)
+        worst = max(along.contacts, key=lambda contact: contact.depth)
+        at = None if motion.kind == "joint" else way.along_mm(worst.start)
+        hit = MotionCollides(worst.pairs, worst.depth * 1000, at)
+        moments = {**motion.moments, hit: worst.start}
+        return replace(motion, findings=(*motion.findings, hit), clearance=least, moments=moments)
 
     def _corner(self, first: int, second: int) -> None:
         """Check the corner between two motions, if a zone lets the arm round it."""

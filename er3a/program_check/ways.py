@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -21,7 +21,9 @@ from er3a.planning.followed import Followed
 from er3a.planning.intervals import (
     AccelerationTooGreat,
     AccelerationTooGreatIfAssumed,
+    Interval,
     LimitCause,
+    LimitSide,
     RateCause,
     TooFast,
     TooFastIfAssumed,
@@ -37,6 +39,7 @@ from er3a.planning.sequences import TURN_LENGTH
 from er3a.planning.singular_events import singular_events
 from er3a.planning.timing import JointLimits
 from er3a.planning.tool_proof import ToolProof, Wanted, follow_and_prove
+from er3a.program_check.joint_move_moments import change_moment, limit_moment, speed_moment
 from er3a.program_check.motion_laws import AssumedRates, MotionLaw, joint_law, progress, tool_law
 from er3a.program_check.program_check_findings import (
     AcceleratesMoreThanAssumed,
@@ -96,6 +99,7 @@ class MotionWay:
     turned : rad, by which the tool turns, or for a joint move the joint that turns most
     end : (n,), rad; None where the end is not reached
     tool_path : of the tool; None for a joint move
+    moments : s, when what is found begins; not of findings about the way as a whole
     """
 
     arm: Robot
@@ -110,6 +114,7 @@ class MotionWay:
     end: Reals | None
     findings: tuple[CheckFinding, ...]
     tool_path: Segment | None = None
+    moments: Mapping[CheckFinding, float] = field(default_factory=dict)
 
     def sagitta(self, share: float) -> float:
         """By how much (m) a share of the tool's way bulges over the straight line between its ends."""
@@ -143,14 +148,17 @@ def joint_way(arm: Robot, motion: ArmMotion, start: Reals, end: Reals, rules: Ch
     times = np.linspace(0.0, law.duration, _points(0.0, float(np.abs(step).max())))
     top = 1 / (1 - law.ramp) / law.duration
     peaks = np.abs(step) * top, np.abs(step) * top / (law.ramp * law.duration)
-    findings = (
-        *limit_findings(arm, end),
-        *_rate_findings(arm, *peaks, rules.limits),
-        *_joint_jumps(arm, start, end, moved, turned),
-    )
+    moments = {
+        **_limit_moments(arm, law, start, end),
+        **_rate_moments(arm, law, peaks, rules.limits),
+        **_configuration_moment(arm, law, joints_at),
+    }
+    findings = (*moments, *_joint_jumps(arm, start, end, moved, turned))
     lead = float(np.abs(step).max())
     rates = polynomial_motion(lambda t: _scaled(progress(law, t), start, step), law.breaks, 2).rate_bounds
-    return MotionWay(arm, law, times, joints(times), joints, joints_at, rates, moved, lead, end, findings)
+    return MotionWay(
+        *(arm, law, times, joints(times), joints, joints_at, rates, moved, lead, end, findings), moments=moments
+    )
 
 
 def _scaled(shares: tuple[Reals, Reals, Reals], start: Reals, step: Reals) -> tuple[Reals, Reals, Reals]:
@@ -160,8 +168,16 @@ def _scaled(shares: tuple[Reals, Reals, Reals], start: Reals, step: Reals) -> tu
 
 def limit_findings(arm: Robot, q: Reals) -> tuple[LimitCause, ...]:
     """Joints (n,) in rad or m, and sums of them, that are beyond a limit."""
-    sides = [(side, float(side.of(q))) for side in limit_sides(arm)]
-    return tuple(side.cause(value) for side, value in sides if value > side.sign * side.limit + LIMIT_TOLERANCE)
+    return tuple(side.cause(float(side.of(q))) for side in _sides_left(arm, q))
+
+
+def _sides_left(arm: Robot, q: Reals) -> list[LimitSide]:
+    return [side for side in limit_sides(arm) if float(side.of(q)) > side.sign * side.limit + LIMIT_TOLERANCE]
+
+
+def _limit_moments(arm: Robot, law: MotionLaw, start: Reals, end: Reals) -> dict[CheckFinding, float]:
+    """Limits that the end (n,) of a joint move is beyond, and when (s) the move passes them."""
+    return {side.cause(float(side.of(end))): limit_moment(law, side, start, end) for side in _sides_left(arm, end)}
 
 
 def tool_way(
@@ -199,9 +215,8 @@ def tool_way(
         *(arm, law, followed.t, followed.q, followed.joints, followed.joints_at, proof.rate_bounds),
         *(path.length, path.turned, end_joints, (), path),
     )
-    return replace(
-        way, findings=(*_followed_findings(followed, proof, way, rules), *_arrival_findings(followed, given, arm))
-    )
+    moments = _followed_moments(followed, proof, way, rules) | _arrival_moments(followed, given, way)
+    return replace(way, findings=tuple(moments), moments=moments)
 
 
 def _arc(T_start: Reals, via: Reals, end: Reals, time: tuple[float, float | None], angle: float | None) -> Arc:
@@ -212,22 +227,23 @@ def _arc(T_start: Reals, via: Reals, end: Reals, time: tuple[float, float | None
     return replace(made, normal=made.normal if angle > 0 else -made.normal, angle=abs(angle))
 
 
-def _followed_findings(followed: Followed, proof: ToolProof, way: MotionWay, rules: CheckRules) -> list[CheckFinding]:
-    """Reach, configuration, limits, singular poses, speeds."""
+def _followed_moments(
+    followed: Followed, proof: ToolProof, way: MotionWay, rules: CheckRules
+) -> dict[CheckFinding, float]:
+    """Reach, configuration, limits, singular poses and speeds, each with the time (s) from which on it is wrong."""
     arm = way.arm
-    found: list[CheckFinding] = [
-        WayOutOfReach(way.along_mm(stretch.start), stretch.cause.reasons) for stretch in unreachable(followed)
-    ]
+    found: dict[CheckFinding, float] = {
+        WayOutOfReach(way.along_mm(stretch.start), stretch.cause.reasons): stretch.start
+        for stretch in unreachable(followed)
+    }
     for jump in followed.jumps:
         amount, slides = joint_shown(arm, jump.joint - 1, jump.angle)
-        found.append(ConfigurationEnds(way.along_mm(jump.t), jump.joint, amount, slides))
+        found[ConfigurationEnds(way.along_mm(jump.t), jump.joint, amount, slides)] = jump.t
     ends = bool(found)
     t, kept = np.unique(np.concatenate([way.t, proof.t]), return_index=True)
     solved = np.concatenate([way.q, proof.q])[kept]
-    limits = {
-        (type(each.cause), joints_of(each.cause)): each.cause for each in out_of_limits(arm, t, solved, way.joints)
-    }
-    found += list(limits.values())
+    limits = {(type(each.cause), joints_of(each.cause)): each for each in out_of_limits(arm, t, solved, way.joints)}
+    found |= {each.cause: each.start for each in limits.values()}
     events = singular_events(arm, t, solved, way.joints, rules.near)
     at = np.unique(np.concatenate([t, [event.t for event in events]]))
     q, velocity, acceleration = followed.rates(at)
@@ -236,21 +252,20 @@ def _followed_findings(followed: Followed, proof: ToolProof, way: MotionWay, rul
         where = way.along_mm(event.t)
         if not event.crossing:
             scale = 1000.0 if event.type == "shoulder" else float(np.degrees(1.0))
-            found.append(PassesSingularity(event.type, where, event.distance * scale))
+            found[PassesSingularity(event.type, where, event.distance * scale)] = event.t
         elif not ends:
-            found.append(MeetsSingularity(event.type, where, bounded))
+            found[MeetsSingularity(event.type, where, bounded)] = event.t
     if ends:  # towards the end of reach joint speeds grow without bound
         return found
-    causes: list[RateCause] = []
+    stretches: list[Interval[RateCause]] = []
     for limit in rules.limits.rates[:2]:
         values = velocity if limit.order == 1 else acceleration
-        stretches = rates_exceeded(at, values, limit, lambda t, order=limit.order: followed.rates(t)[order])  # type: ignore[misc]
-        causes += [stretch.cause for stretch in stretches]
-    worst: dict[tuple[type, int], RateCause] = {}
-    for cause in sorted(causes, key=lambda cause: cause.ratio):
-        worst[type(cause), cause.joint] = cause
-    found += [_as_checked(cause) for _, cause in sorted(worst.items(), key=lambda item: item[0][1])]
-    return found + list(dict.fromkeys(part.cause for part in proof.undecided))
+        stretches += rates_exceeded(at, values, limit, lambda t, order=limit.order: followed.rates(t)[order])  # type: ignore[misc]
+    worst: dict[tuple[type, int], Interval[RateCause]] = {}
+    for stretch in sorted(stretches, key=lambda stretch: stretch.cause.ratio):
+        worst[type(stretch.cause), stretch.cause.joint] = stretch
+    found |= {_as_checked(each.cause): each.start for _, each in sorted(worst.items(), key=lambda item: item[0][1])}
+    return found | {part.cause: part.start for part in reversed(proof.undecided)}
 
 
 def _as_checked(cause: RateCause) -> CheckFinding:
@@ -262,16 +277,17 @@ def _as_checked(cause: RateCause) -> CheckFinding:
     return AcceleratesMoreThanAssumed(cause.joint, cause.needed_deg_s2, cause.limit_deg_s2, cause.slides)
 
 
-def _arrival_findings(followed: Followed, given: Reals | None, arm: Robot) -> list[CheckFinding]:
-    """Turns at rest at the start, and whether the end has the joints that the program gives."""
-    found: list[CheckFinding] = []
+def _arrival_moments(followed: Followed, given: Reals | None, way: MotionWay) -> dict[CheckFinding, float]:
+    """Turns at rest at the start, and whether the end has the joints that the program gives; with their times, s."""
+    found: dict[CheckFinding, float] = {}
     turn, last = followed.start_turn, followed.q[-1]
     joint = int(np.argmax(np.abs(turn)))
     if abs(turn[joint]) > SAME_ARRIVAL:
-        found.append(TurnsAtStart(joint + 1, float(np.degrees(turn[joint]))))
+        found[TurnsAtStart(joint + 1, float(np.degrees(turn[joint])))] = 0.0
     if given is not None and np.isfinite(last).all() and np.abs(last - given).max() > SAME_ARRIVAL:
         joint = int(np.argmax(np.abs(last - given)))
-        found.append(ArrivesOtherwise(joint + 1, *joint_shown(arm, joint, float(last[joint] - given[joint]))))
+        other = joint_shown(way.arm, joint, float(last[joint] - given[joint]))
+        found[ArrivesOtherwise(joint + 1, *other)] = way.law.duration
     return found
 
 
@@ -280,14 +296,17 @@ def _points(length: float, turned: float) -> int:
     return int(np.clip(np.ceil(wanted) + 1, FEWEST_POINTS, MOST_POINTS))
 
 
-def _rate_findings(arm: Robot, velocity: Reals, acceleration: Reals, limits: JointLimits) -> list[CheckFinding]:
-    """Of greatest speeds and accelerations (n,) of the joints."""
-    found: list[CheckFinding] = []
-    for j in np.flatnonzero(velocity > limits.speed * (1 + SPEED_TOLERANCE)).tolist():
-        (needed, slides), (able, _) = (joint_shown(arm, j, float(rates[j])) for rates in (velocity, limits.speed))
+def _rate_moments(
+    arm: Robot, law: MotionLaw, greatest: tuple[Reals, Reals], limits: JointLimits
+) -> dict[CheckFinding, float]:
+    """Of a joint move with greatest speeds and accelerations (n,), each with when (s) it gets too great."""
+    found: dict[CheckFinding, float] = {}
+    speed = greatest[0]
+    for j in np.flatnonzero(speed > limits.speed * (1 + SPEED_TOLERANCE)).tolist():
+        (needed, slides), (able, _) = (joint_shown(arm, j, float(rates[j])) for rates in (speed, limits.speed))
         made = TooFast if np.isfinite(arm.speed[j]) else FasterThanAssumed
-        found.append(made(j + 1, needed, able, slides))
-    return found + _acceleration_findings(arm, acceleration, limits)
+        found[made(j + 1, needed, able, slides)] = speed_moment(law, float(limits.speed[j] / speed[j]))
+    return found | dict.fromkeys(_acceleration_findings(arm, greatest[1], limits), 0.0)
 
 
 def _acceleration_findings(arm: Robot, acceleration: Reals, limits: JointLimits) -> list[CheckFinding]:
@@ -302,13 +321,23 @@ def _acceleration_findings(arm: Robot, acceleration: Reals, limits: JointLimits)
     return [AcceleratesMoreThanAssumed(worst + 1, needed, able, slides)]
 
 
+def _configuration_moment(arm: Robot, law: MotionLaw, joints_at: Callable[[Reals], Reals]) -> dict[CheckFinding, float]:
+    """Whether a joint move ends in another configuration, and when (s) it leaves that of its start."""
+    if closed_form_missing(arm) is not None:
+        return {}
+
+    def slot(share: float) -> int | None:
+        return _slot(arm, joints_at(np.array(share)))
+
+    labels, first, last = branch_labels(arm), slot(0.0), slot(1.0)
+    if first is None or last is None or first == last:
+        return {}
+    return {ConfigurationChanges(labels[first], labels[last]): change_moment(law, slot)}
+
+
 def _joint_jumps(arm: Robot, start: Reals, end: Reals, moved: float, turned: float) -> list[CheckFinding]:
     found: list[CheckFinding] = []
     step = end - start
-    if closed_form_missing(arm) is None:
-        labels, first, last = branch_labels(arm), _slot(arm, start), _slot(arm, end)
-        if first is not None and last is not None and first != last:
-            found.append(ConfigurationChanges(labels[first], labels[last]))
     turned_by = np.where(arm.slides, 0.0, np.abs(step))
     lead = int(np.argmax(turned_by))
     if turned_by[lead] > FAR_TURN and moved < NEAR_MOVE and turned < turned_by[lead] / 2:

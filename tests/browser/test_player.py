@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.wait import WebDriverWait
 
 from er3a.files.robot_library import load_robot
@@ -128,6 +129,64 @@ def test_one_processor_makes_thirty_frames_a_second_without_a_graphics_processor
     before = chromium.processor_time(page)
     frames = page.execute_async_script(PLAYED, 3)
     assert (chromium.processor_time(page) - before) / frames < 1 / 30
+
+
+JOINTS = """return [...document.querySelectorAll(".player .joints dl > div")].map((cell) => {
+  return [cell.querySelector(".value").innerText, cell.querySelector(".room").innerText, cell.className];
+})"""
+
+
+def test_it_tells_the_joint_values_and_how_far_each_is_from_its_nearer_limit(page):
+    robot = load_robot("er3a_c60")
+    lower, upper = np.degrees(robot.lower), np.degrees(robot.upper)
+    page.execute_script("document.querySelector('[data-t]').click()")
+    until(page, lambda: "1.250 s" in clock(page))
+    q = (0.2 + 0.6 * 1.25 / 2.0) * upper
+    room = np.minimum(q - lower, upper - q)
+    told = page.execute_script(JOINTS)
+    for i, (value, margin, mark) in enumerate(told):
+        assert value == f"{q[i]:.1f} deg" or abs(float(value.split()[0]) - q[i]) < 0.07
+        assert abs(float(margin.split()[0]) - room[i]) < 0.07
+        assert (mark == "least") == (i == room.argmin())
+    assert told[0][1].endswith("to limit")
+
+
+def test_joint_values_keep_their_place_while_it_plays_and_are_reached_by_keys(page):
+    frame = "const r = document.querySelector('.player .joints').getBoundingClientRect(); return [r.height, r.width]"
+    cells = (
+        "return [...document.querySelectorAll('.player .joints dl > div')].map((c) => [c.offsetLeft, c.offsetWidth])"
+    )
+    met = set()
+    for t in np.linspace(0.0, 2.0, 9):
+        page.execute_script(
+            "const bar = document.querySelector('.player .time'); bar.value = arguments[0];"
+            "bar.dispatchEvent(new Event('input'))",
+            float(t),
+        )
+        until(page, lambda t=t: clock(page).startswith(f"t = {t:.3f}"))
+        met.add(str((page.execute_script(frame), page.execute_script(cells))))
+    assert len(met) == 1
+    page.execute_script("document.querySelector('.player .time').focus()")
+    page.switch_to.active_element.send_keys(Keys.TAB)
+    assert page.switch_to.active_element.get_attribute("class") == "joints"
+    assert page.switch_to.active_element.get_attribute("aria-label").startswith("Joint values")
+
+
+def test_a_joint_beyond_its_limit_is_marked(browser, tmp_path):
+    robot = load_robot("er3a_c60")
+    q = np.zeros((2, 6))
+    q[1, 2] = robot.upper[2] + np.radians(35)
+    far = PlayedMotion("far", "It leaves a limit.", np.array([0.0, 1.0]), q)
+    (tmp_path / "page.html.j2").write_text(TEMPLATE, encoding="utf-8")
+    given = {"player": player(robot, [far]), "player_style": player_style(), "stretch": stretch("far", 0.0, 1.0)}
+    link, origin = moment("far", 1.0, "there"), Provenance(inputs=(), code="0" * 64)
+    output = tmp_path / "page.html"
+    render(tmp_path / "page.html.j2", output, command=None, provenance=origin, link=link, **given)
+    browser.get(output.as_uri())
+    WebDriverWait(browser, 10).until(lambda _: clock(browser))
+    browser.execute_script("document.querySelector('[data-t]').click()")
+    until(browser, lambda: clock(browser).startswith("t = 1.000"))
+    assert browser.execute_script(JOINTS)[2] == ["140.0 deg", "35.0 beyond", "least past"]
 
 
 def test_another_motion_starts_at_its_start(page):

@@ -113,6 +113,49 @@ def test_a_line_is_timed_by_speed_and_acceleration(tmp_path):
     assert check.cycle.complete
 
 
+def moment(check, code: str) -> float:
+    """When, within its motion, the one finding of a code begins, s."""
+    return next(each.moment for each in check.findings if each.finding.code == code)
+
+
+def test_a_joint_move_passes_a_limit_when_its_trapezoid_of_speed_says(tmp_path):
+    far = np.degrees(ROBOT.upper[2]) - np.degrees(HOME[2])
+    check = checked(f"PTP {{A3 {np.degrees(ROBOT.upper[2]) + 35:.6f}}}", tmp_path)
+    speed, acceleration = 0.3 * 180.0, 180.0 / 0.25  # deg/s and deg/s^2, assumed of a joint without a document
+    ramp = speed / acceleration
+    assert moment(check, "above_limit") == pytest.approx(ramp + (far - speed * ramp / 2) / speed, abs=1e-6)
+
+
+def test_a_joint_is_too_fast_from_when_its_ramp_comes_to_its_limit(tmp_path):
+    fast = ROBOT.replace(speed=np.full(6, np.radians(100.0)))
+    (tmp_path / "b.script").write_text("def b():\n  movej([1,-0.17,-0.17,0,-1.22,0], a=5, v=2.0)\nend\n")
+    check = check_program(read_program(tmp_path / "b.script"), fast, CheckOptions(start=HOME))
+    assert moment(check, "too_fast") == pytest.approx(np.radians(100.0) / 5, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("name", "code"), [("out_of_reach", "way_out_of_reach"), ("collision_with_table", "motion_collides")]
+)
+def test_what_a_line_meets_has_the_time_of_its_place(name, code):
+    scene = load_scene(ROOT / "data/scenes/table_and_post.yaml")
+    check = check_program(read_program(FAULTS / f"{name}.src"), ROBOT, CheckOptions(start=HOME, scene=scene))
+    found = next(each for each in check.findings if each.finding.code == code)
+    speed, acceleration = 0.2, 2.0  # m/s of the program's $VEL.CP; m/s^2 that are assumed
+    way = found.finding.at_mm / 1000
+    assert way > speed**2 / acceleration / 2  # behind the ramp up
+    assert found.moment == pytest.approx(way / speed + speed / acceleration / 2, abs=1e-4)
+    assert check.execution.steps[found.step].place.line == found.place.line
+
+
+def test_a_move_through_the_straight_wrist_changes_its_configuration_there():
+    check = check_program(read_program(FAULTS / "joint_jump.src"), ROBOT, CheckOptions(start=HOME))
+    found = next(each for each in check.findings if each.finding.code == "configuration_changes")
+    motion = check.motions[found.step]
+    j5 = np.interp(found.moment, motion.way.t, motion.way.q[:, 4])
+    assert abs(j5) < 1e-6 < abs(motion.start[4])
+    assert next(each for each in check.findings if each.finding.code == "joint_jumps").moment is None
+
+
 def test_a_line_keeps_the_tool_on_its_way(tmp_path):
     T = forward(ROBOT, HOME)
     end = T.copy()

@@ -70,6 +70,11 @@ def test_json_holds_verdicts_and_parameters():
     assert found["level"] == "caution"
     assert [each["params"]["zone_mm"] for each in found["findings"]] == pytest.approx([80, 80])
     assert [each["line"] for each in found["motions"]] == [8, 9, 11, 12, 13]
+    assert [each["remedy"] for each in found["findings"]] == ["Make the zone 10.0 mm at most."] * 2
+    assert [each["moment_s"] for each in found["findings"]] == [None, None]
+    beyond = json.loads(check(f"{FAULTS}/outside_limits.src", "--json").stdout)[0]["findings"]
+    moments = {each["code"]: each["moment_s"] for each in beyond}
+    assert 0 < moments["configuration_changes"] < moments["above_limit"]
 
 
 def test_sarif_has_rules_places_and_fingerprints_that_stay(tmp_path):

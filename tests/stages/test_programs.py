@@ -76,6 +76,17 @@ def test_the_motion_follows_the_listing(stored):
 
 
 @pytest.mark.long
+def test_a_finding_leads_to_its_moment_of_the_motion(stored):
+    results = stored["er3a_c60"].results
+    program = next(each for each in results.summary.programs if each.name == "outside_limits")
+    found = next(each for each in program.findings if each.finding.code == "above_limit")
+    rows = results.motion.take(results.motion.program == program.name)
+    own = rows.take(rows.line == found.line)
+    assert found.program_s == pytest.approx(own.t_s[0] + found.motion_s, abs=0.2)  # the row before the motion's first
+    assert np.interp(found.program_s, rows.t_s, rows.q_deg[:, 2]) == pytest.approx(105.0, abs=0.01)
+
+
+@pytest.mark.long
 def test_equal_inputs_give_equal_bytes(study, folders, tmp_path):
     run.compute("programs", study, "er3_600", tmp_path)
     for file in sorted(folders["er3_600"].iterdir()):
@@ -101,6 +112,10 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
     assert f'data-play="collision_with_table" data-from="{met.t_s[0]}" data-t="{met.t_s[-1]}"' in html
     assert html.count('<div class="listing"') == len(stored["er3a_c60"].results.summary.programs)
     assert "the tool TOOL_DATA[7] is not given" in html
+    program = next(each for each in stored["er3a_c60"].results.summary.programs if each.name == "outside_limits")
+    found = next(each for each in program.findings if each.finding.code == "above_limit")
+    assert f'data-play="outside_limits" data-t="{found.program_s}">at {found.motion_s:.2f} s</a>' in html
+    assert "Teach the target in another configuration" in html
     assert (tmp_path / "programs.rrd").stat().st_size > 100_000
 
 

@@ -26,7 +26,14 @@ from er3a.kinematics.forward import frames
 from er3a.kinematics.round_trips import slot_round_trips
 from er3a.kinematics.wrist_partitioned import NoWristCentre
 from er3a.pipeline.messages.say import say
-from er3a.pipeline.results import Stored, read_results, table_types, write_results
+from er3a.pipeline.results import (
+    FORMAT_VERSION,
+    Stored,
+    read_results,
+    table_types,
+    write_checksums,
+    write_results,
+)
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation import compute as compute_module
@@ -437,6 +444,51 @@ def test_the_table_stands_beside_the_one_that_documents_describe_or_do_not_tell_
     assert allowed.code == "allowed"
     assert allowed.table.direction == (-1.0, -1.0, -1.0, -1.0, -1.0, -1.0)
     assert allowed.table.a == tuple(load_robot("er3_600").a)
+
+
+def test_the_page_says_how_far_each_contradicted_entry_is_off(study, stored, summaries, tmp_path):
+    """Stated and supported values, against the tables that people wrote of the article and of the real arm."""
+    files = [yaml.safe_load((ROBOTS / f"{name}.yaml").read_text()) for name in ("er3a_c60_article", "er3a_c60")]
+    stated, real = (
+        {f"{key[:-3]}{row['joint']}": row[key] for row in each["dh"]["rows"] for key in ("a_mm", "d_mm")}
+        for each in files
+    )
+    page = page_of(study, stored["er3a_c60_article"], tmp_path)
+    found = re.search(r"How far the contradicted entries are off(.*?)</table>", page, re.DOTALL).group(1)
+    rows = {}
+    for row in re.findall(r"<tr><td><a href=\"#entry-(\w+)\">.*?</tr>", found, re.DOTALL):
+        line = re.search(rf'#entry-{row}">(.*?)</tr>', found, re.DOTALL).group(1)
+        cells = re.sub(r"<[^>]*>", "|", line).replace("−", "-").replace("\u202f", "")
+        rows[row] = [float(number) for number in re.findall(r"[-+]?\d+(?:\.\d+)?(?= (?:mm|±))", cells)][:4]
+    lengths = {name for name in stated if stated[name] != real[name]}
+    assert (
+        lengths
+        == {name for name in rows if name[0] in "ad" and name[:2] != "di"}
+        == {"a1", "a2", "a3", "d1", "d4", "d6"}
+    )
+    for name in lengths:
+        given, supported, half, difference = rows[name]
+        assert given == stated[name]
+        assert abs(supported - real[name]) <= half <= 0.16
+        assert difference == pytest.approx(given - supported, abs=0.011)
+    contradicted = {
+        each.entry for each in summaries["er3a_c60_article"].evidence.entries if each.status == "contradicted"
+    }
+    assert set(rows) == contradicted
+
+
+def test_the_verdict_names_the_table_to_use_instead_if_the_study_has_one_that_holds(study, stored, tmp_path):
+    found = stored["er3a_c60_article"]
+    assert "Use er3a_c60 instead" not in page_of(study, replace(found, folder=tmp_path / "x" / "validation"), tmp_path)
+    other = tmp_path / "er3a_c60" / "validation"
+    other.mkdir(parents=True)
+    for status in ("caution", "fail"):
+        verdict = {"status": status, "code": "", "text": ""}
+        made = {"robot": "er3a_c60", "stage": "validation", "verdict": verdict, "figures": [], "provenance": {}}
+        (other / "summary.json").write_text(json.dumps({"format_version": FORMAT_VERSION, **made}))
+        write_checksums(other)
+        page = page_of(study, replace(found, folder=tmp_path / "er3a_c60_article" / "validation"), tmp_path)
+        assert ("Never use this table: evidence contradicts it. Use er3a_c60 instead." in page) == (status == "caution")
 
 
 @pytest.mark.long

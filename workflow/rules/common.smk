@@ -122,9 +122,13 @@ def viewed(wildcards):
 
 
 def rests_on(wildcards):
-    """Input function: the verdicts that a stage's page says first."""
+    """Input function: the verdicts that a stage's page says first, and those on tables to use instead of the robot's."""
     others = [stage for stage in STAGES[wildcards.stage].rests_on if stage in STUDY.stages(wildcards.robot)]
-    return [f"results/{wildcards.robot}/{stage}/summary.json" for stage in others]
+    tables = STUDY.other_tables(wildcards.robot) if wildcards.stage == "validation" else []
+    return [
+        *(f"results/{wildcards.robot}/{stage}/summary.json" for stage in others),
+        *(f"results/{robot}/validation/summary.json" for robot in tables),
+    ]
 
 
 def picture(wildcards):

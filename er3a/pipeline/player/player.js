@@ -9,7 +9,7 @@
 
 import { add, column, scaled, translation } from "er3a/algebra";
 import { Orbit } from "er3a/orbit";
-import { decodePoses, poseBetween } from "er3a/poses";
+import { decodePoses, decodeValues, poseBetween, valuesBetween } from "er3a/poses";
 import { eyeOf, Picture } from "er3a/scene";
 import { armSolids, sceneSolids } from "er3a/solids";
 
@@ -33,15 +33,20 @@ let awaited = false;
 
 const orbit = new Orbit(canvas, data.target, 0.75 * data.size, refresh);
 const plots = [...document.querySelectorAll("figure[data-panels]")].map(withCursors);
+const cells = [...part("joints").querySelectorAll("dl > div")].map((place) => {
+  return { place, value: place.querySelector(".value"), room: place.querySelector(".room") };
+});
 const stretches = [...document.querySelectorAll("[data-from]")];
 
 function prepared(motion) {
-  return { ...motion, poses: decodePoses(motion.poses, motion.times.length, table.a.length + 1) };
+  const count = motion.times.length;
+  const poses = decodePoses(motion.poses, count, table.a.length + 1);
+  return { ...motion, poses, values: decodeValues(motion.values, count, motion.step) };
 }
 
 const start = () => motion.times[0];
 const end = () => motion.times.at(-1);
-const fixed = (value, digits = 3) => value.toFixed(digits).replace("-", "−");
+const fixed = (value, digits = 3) => value.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
 
 /** Shows a moment of a motion; `name` is that of the motion, null for the one that is shown. */
 export function goTo(name, time) {
@@ -112,12 +117,33 @@ function tell() {
   bar.setAttribute("aria-valuetext", clock.textContent);
   const near = motion.events.filter((event) => t >= event.t - 1e-9 && t <= event.until + 1e-9);
   const text = near.map((event) => event.text).join("; ") || motion.text;
-  if (told.textContent !== text) told.textContent = text;
+  show(told, text);
+  tellJoints();
   for (const plot of plots) plot(motion.name, t);
   for (const { dataset, classList } of stretches) {
     const [from, to] = [Number(dataset.from), Number(dataset.t)];
     classList.toggle("now", dataset.play === motion.name && t >= from - 1e-9 && t <= to + 1e-9);
   }
+}
+
+/** Joint values with their margins; the least of those in deg is marked, and of those in mm. */
+function tellJoints() {
+  const values = valuesBetween(motion.times, motion.values, t);
+  const rooms = data.joints.map(({ lower, upper }, i) => (lower === null ? Infinity : Math.min(values[i] - lower, upper - values[i])));
+  const least = new Map();
+  data.joints.forEach(({ unit }, i) => (rooms[i] < (rooms[least.get(unit)] ?? Infinity) ? least.set(unit, i) : null));
+  data.joints.forEach(({ unit }, i) => {
+    const past = rooms[i] <= -0.05; // what one decimal shows
+    const text = rooms[i] === Infinity ? words.unlimited : past ? words.beyond : words.room;
+    show(cells[i].value, `${fixed(values[i], 1)} ${unit}`);
+    show(cells[i].room, text.replace("{room}", fixed(Math.abs(rooms[i]), 1)));
+    cells[i].place.classList.toggle("least", least.get(unit) === i);
+    cells[i].place.classList.toggle("past", past);
+  });
+}
+
+function show(element, text) {
+  if (element.textContent !== text) element.textContent = text;
 }
 
 function newMotion() {
@@ -201,14 +227,15 @@ bar.addEventListener("input", () => goTo(null, Number(bar.value)));
 for (const link of document.querySelectorAll("[data-t]")) {
   link.addEventListener("click", (event) => {
     event.preventDefault();
+    event.stopPropagation(); // a link to a moment within a row that leads to its end
     goTo(link.dataset.play, Number(link.dataset.t));
     dock();
   });
 }
 addEventListener("resize", refresh);
-const show = (name) => motions.has(name) && goTo(name, motions.get(name).times[0]);
-addEventListener("chosen", ({ detail }) => show(detail));
-show(decodeURIComponent(location.hash.slice(1)));
-part("controls").hidden = false;
+const choose = (name) => motions.has(name) && goTo(name, motions.get(name).times[0]);
+addEventListener("chosen", ({ detail }) => choose(detail));
+choose(decodeURIComponent(location.hash.slice(1)));
+part("controls").hidden = part("joints").hidden = false;
 refresh();
 performance.mark("player");

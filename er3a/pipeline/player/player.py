@@ -22,12 +22,13 @@ from er3a.pipeline.teach.scripts import TEACH, import_map
 from er3a.pipeline.viewing.palette import BODY, INK, JOINTS, LINK, VERDICTS, rgb
 from er3a.robots.joint_limits import theta_limits
 from er3a.robots.robot import Robot
-from er3a.robots.shown import size_of
+from er3a.robots.shown import shown, size_of
 
 _HERE = Path(__file__).parent
 MOST_FRAMES = 240
 UNTIMED_S = 8.0  # how long a motion without times is shown
 TRAIL_POINTS = 200
+MOST_STEPS = 32_000  # that the greatest joint value (deg or mm) of a motion is divided into
 MOST_FACES, FEWEST_CORNERS = 2000, 12  # of an arm, and of a convex piece
 SCENE_COLOUR = "#b9a78f"
 COLOURS = {status: VERDICTS[status] for status in ("caution", "fail")}
@@ -50,6 +51,10 @@ WORDS = {
     "time": N_("time of the motion"),
     "clock": N_("t = {t} s of {end} s"),
     "points": N_("point {t} of {end}"),
+    "joints": N_("Joint values at this moment, and how far each is from the nearer of its limits; ▲ marks the least."),
+    "room": N_("{room} to limit"),
+    "beyond": N_("{room} beyond"),
+    "unlimited": N_("no limit"),
     "undock": N_("return the player to its place"),
     "picture": N_("The arm on its path. Drag or use the arrow keys to turn the picture, + and − to zoom."),
     "help": N_(
@@ -147,8 +152,18 @@ def _data(robot: Robot, motions: Sequence[PlayedMotion], scene: Scene | None, wo
         "scene": scene_data(scene.solids if scene else ()),
         "carried": scene_data(scene.carried if scene else ()),
         "motions": [_motion(robot, motion) for motion in motions],
+        "joints": _joints(robot),
         "words": words,
     }
+
+
+def _joints(robot: Robot) -> list[dict[str, Any]]:
+    """Unit and limits of each joint in it, None where it has none."""
+    ends = np.round(shown(robot, np.stack([robot.lower, robot.upper])), 6)
+    return [
+        {"unit": "mm" if slides else "deg", "lower": None if free else low, "upper": None if free else high}
+        for slides, free, low, high in zip(robot.slides.tolist(), robot.continuous.tolist(), *ends.tolist())
+    ]
 
 
 def table_data(robot: Robot) -> dict[str, Any]:
@@ -229,6 +244,8 @@ def _motion(robot: Robot, motion: PlayedMotion) -> dict[str, Any]:
         .reshape(*T.shape[:2], 4)
     )
     poses = np.concatenate([T[..., :3, 3], turns], axis=-1).astype("<f4")
+    values = shown(robot, motion.q[rows])
+    step = float(np.abs(values).max()) / MOST_STEPS or 1.0
     trail = T[:: max(1, len(rows) // TRAIL_POINTS), -1, :3, 3]
     return {
         "name": motion.name,
@@ -236,6 +253,8 @@ def _motion(robot: Robot, motion: PlayedMotion) -> dict[str, Any]:
         "text": motion.text,
         "times": np.round(motion.t[rows], 6).tolist(),
         "poses": base64.b64encode(poses.tobytes()).decode("ascii"),
+        "step": step,
+        "values": base64.b64encode(np.round(values / step).astype("<i2").tobytes()).decode("ascii"),
         "trail": np.round(trail, 5).tolist(),
         "events": [
             asdict(event) | {"way": _way(event, motion.t[rows], T[:, -1, :3, 3])}

@@ -19,6 +19,7 @@ from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.heads import stage_head
 from er3a.pipeline.viewing.numbers import number
 from er3a.robots.robot import Robot
+from er3a.robots.shown import shown
 
 BORDER_POINT = "tool_point"
 Workspaces = Mapping[str, WorkspaceResults | AbsentResults]
@@ -66,23 +67,33 @@ def _inputs(study: Study, results: Path) -> tuple[Input, ...]:
 
 def parameters(robot: Robot) -> dict[tuple[str, str, str], float | str | None]:
     """Values of a robot's table by (group, name, unit); None where unknown."""
+    of_joints = ["mm" if slides else "deg" for slides in robot.slides]
+    own = shown(robot, np.stack([robot.lower, robot.upper, robot.speed]))
     columns = (
-        (tr("D-H table"), "a", "mm", robot.a * 1000),
-        (tr("D-H table"), "α", "deg", np.degrees(robot.alpha)),
-        (tr("D-H table"), "d", "mm", robot.d * 1000),
-        (tr("zero"), tr("offset"), "deg", np.degrees(robot.offset)),
-        (tr("zero"), tr("direction"), "", robot.direction),
-        (tr("limits"), tr("lower limit"), "deg", np.degrees(robot.lower)),
-        (tr("limits"), tr("upper limit"), "deg", np.degrees(robot.upper)),
-        (tr("speeds"), tr("greatest speed"), "deg/s", np.degrees(robot.speed)),
+        (tr("D-H table"), "a", ["mm"] * robot.rows, robot.a * 1000),
+        (tr("D-H table"), "α", ["deg"] * robot.rows, np.degrees(robot.alpha)),
+        (tr("D-H table"), "d", ["mm"] * robot.rows, robot.d * 1000),
+        (tr("zero"), tr("offset"), ["deg"] * robot.rows, np.degrees(robot.offset)),
+        (tr("zero"), tr("direction"), [""] * robot.rows, [_sense(value) for value in robot.direction.tolist()]),
+        (tr("limits"), tr("lower limit"), of_joints, own[0]),
+        (tr("limits"), tr("upper limit"), of_joints, own[1]),
+        (tr("speeds"), tr("greatest speed"), [f"{unit}/s" for unit in of_joints], own[2]),
     )
     found: dict[tuple[str, str, str], float | str | None] = {
         (tr("D-H table"), tr("convention"), ""): tr(CONVENTIONS[robot.convention])
     }
-    for group, name, unit, values in columns:
-        for joint, value in enumerate(values, start=1):
-            found[group, f"J{joint} {name}", unit] = None if np.isnan(value) else round(float(value), 9)
+    for group, name, units, values in columns:
+        for joint, (unit, value) in enumerate(zip(units, values), start=1):
+            found[group, f"J{joint} {name}", unit] = value if isinstance(value, str) else _finite(value)
     return found
+
+
+def _sense(direction: float) -> str:
+    return tr("+1: positive as the D-H row") if direction > 0 else tr("−1: positive against the D-H row")
+
+
+def _finite(value: float) -> float | None:
+    return round(float(value), 9) if np.isfinite(value) else None
 
 
 def key_figures(folder: Path, stages: Sequence[str]) -> dict[tuple[str, str, str], float | str | None]:

@@ -19,6 +19,7 @@ from er3a.pipeline.verdicts import read_verdicts
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.comparison import write_compare
 from er3a.pipeline.viewing.heads import stage_head
+from er3a.pipeline.viewing.instead import table_instead
 from er3a.pipeline.viewing.junit import write_junit
 from er3a.pipeline.viewing.sweep_section import sweep_sections
 from er3a.pipeline.viewing.thumbnail import thumbnail
@@ -72,7 +73,9 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "heads": [(head, *page.led(head.text)) for head in shown],
         "counts": [(status, sum(head.status == status for head in shown)) for status in FIRST],
         "expected": expected,
-        "decision": decision(table, failed, _instead(study, name, results.parent), _geometry(heads.get("validation"))),
+        "decision": decision(
+            table, failed, table_instead(study, name, results.parent), _geometry(heads.get("validation"))
+        ),
     }
 
 
@@ -81,13 +84,3 @@ def _geometry(head: page.Head | None) -> tuple[int, int] | None:
     if head is None or not isinstance(head.finding, LeftOpen):
         return None
     return next(((part.settled, part.entries) for part in head.finding.parts if part.part == "geometry"), None)
-
-
-def _instead(study: Study, name: str, results: Path) -> str | None:
-    """A robot of the study that one of this robot's reference sets is about, and that its own evidence bears out."""
-    for other in study.references(name):
-        if other == name or other not in study.robots or "validation" not in study.stages(other):
-            continue
-        if stage_head(results / other / "validation", STAGES["validation"]).status in ("pass", "caution"):
-            return other
-    return None

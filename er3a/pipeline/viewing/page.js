@@ -493,7 +493,15 @@ document.querySelectorAll(".scroll").forEach(fade);
 // A sheet of paper can't be unfolded.
 addEventListener("beforeprint", () => document.querySelectorAll(".provenance").forEach((details) => (details.open = true)));
 
+// On a phone each row of such a table is a card: its cells stand below one another, each after its column's name.
+function nameCells(table) {
+  const names = [...table.tHead.rows[0].cells].map((header) => header.innerText.replace(/\s+/g, " ").trim());
+  for (const row of table.tBodies[0].rows) [...row.cells].forEach((cell, column) => (cell.dataset.column = names[column]));
+  table.classList.add("named");
+}
+
 for (const table of document.querySelectorAll("table")) {
+  if (table.classList.contains("cards")) nameCells(table);
   makeSortable(table);
   const tools = document.createElement("p");
   tools.className = "tools";

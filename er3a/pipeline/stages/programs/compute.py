@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -30,7 +31,7 @@ from er3a.pipeline.stages.programs.model import (
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.stages.trajectory.motion_demands import assumed_speeds
 from er3a.pipeline.study import Study
-from er3a.program_check.check_program import CheckOptions, ProgramCheck, check_program
+from er3a.program_check.check_program import CheckOptions, LocatedFinding, ProgramCheck, check_program
 from er3a.program_check.motion_laws import AssumedRates
 from er3a.program_check.program_check_findings import CheckFinding, Level
 from er3a.programs.execution import RunLimits
@@ -59,10 +60,11 @@ def compute(study: Study, name: str) -> ProgramsResults:
     motions: list[ProgramMotion] = []
     for entry in listed.programs:
         check = check_program(read_program(entry.file), robot, replace(options, start=entry.start(robot)))
-        summaries.append(_summary(entry, check))
+        motion, starts = _motion(entry.name, check, len(robot.lower))
+        summaries.append(_summary(entry, check, starts))
         lines.append(_lines(entry.name, check))
         instructions.append(_instructions(entry.name, check, len(robot.lower)))
-        motions.append(_motion(entry.name, check, len(robot.lower)))
+        motions.append(motion)
     return ProgramsResults(
         summary=ProgramsSummary(
             verdict=_verdict(summaries),
@@ -97,7 +99,7 @@ def _options(study: Study, listed: ProgramsFile, robot: Robot) -> CheckOptions:
     )
 
 
-def _summary(entry: ProgramEntry, check: ProgramCheck) -> ProgramSummary:
+def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, float]) -> ProgramSummary:
     levels = [OUTCOMES[verdict.level] for verdict in check.verdicts]
     clear = [verdict.least_clearance_mm for verdict in check.verdicts if verdict.least_clearance_mm is not None]
     return ProgramSummary(
@@ -115,17 +117,23 @@ def _summary(entry: ProgramEntry, check: ProgramCheck) -> ProgramSummary:
         failed=levels.count("fail"),
         cycle=check.cycle,
         least_clearance_mm=min(clear, default=None),
-        findings=tuple(
-            FindingAt(
-                each.place.file.name if each.place.file else "",
-                each.place.line,
-                each.place.element,
-                each.level,
-                each.times,
-                _without_path(each.finding),
-            )
-            for each in check.findings
-        ),
+        findings=tuple(_finding_at(each, starts) for each in check.findings),
+    )
+
+
+def _finding_at(each: LocatedFinding, starts: Mapping[int, float]) -> FindingAt:
+    """``starts``: when (s) steps of the way that is kept begin."""
+    own = None if each.moment is None else float(each.moment)
+    start = None if each.step is None else starts.get(each.step)
+    return FindingAt(
+        each.place.file.name if each.place.file else "",
+        each.place.line,
+        each.place.element,
+        each.level,
+        each.times,
+        _without_path(each.finding),
+        own,
+        None if own is None or start is None else start + own,
     )
 
 
@@ -165,8 +173,10 @@ def _instructions(name: str, check: ProgramCheck, joints: int) -> Instructions:
     )
 
 
-def _motion(name: str, check: ProgramCheck, joints: int) -> ProgramMotion:
-    """The main way over time, with a stop at each target; what is not known is left out."""
+def _motion(name: str, check: ProgramCheck, joints: int) -> tuple[ProgramMotion, dict[int, float]]:
+    """The main way over time, with a stop at each target, and when (s) each of its steps begins; what is not known is
+    left out."""
+    starts: dict[int, float] = {}
     levels = {each.place: each.level for each in check.verdicts}
     times: list[Reals] = [np.empty(0)]
     angles: list[Reals] = [np.empty((0, joints))]
@@ -189,13 +199,14 @@ def _motion(name: str, check: ProgramCheck, joints: int) -> ProgramMotion:
             t, q, arm = motion.way.t[known], motion.way.q[known], motion.way.arm
         if not len(t) or len(lines) + len(t) > MOST_POINTS:
             break
+        starts[number] = now
         times.append(now + t)
         angles.append(q)
         points.append(forward(arm, q)[:, :3, 3])
         lines += [check.execution.own_line(step)] * len(t)
         told += [levels[step.place]] * len(t)
         now += motion.way.law.duration if motion.way else 0.0
-    return ProgramMotion(
+    kept = ProgramMotion(
         program=np.full(len(lines), name, object),
         t_s=np.concatenate(times),
         line=np.array(lines, int),
@@ -203,6 +214,7 @@ def _motion(name: str, check: ProgramCheck, joints: int) -> ProgramMotion:
         q_deg=np.degrees(np.concatenate(angles)),
         xyz_mm=np.concatenate(points) * 1000,
     )
+    return kept, starts
 
 
 def _verdict(

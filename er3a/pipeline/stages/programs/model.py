@@ -59,7 +59,14 @@ class NoPrograms:
 
 @dataclass(frozen=True)
 class FindingAt:
-    """A finding in the text of a program; ``file`` is the name of the file that holds the line."""
+    """A finding in the text of a program.
+
+    Attributes
+    ----------
+    file : the name of the file that holds the line
+    motion_s : s from the start of the instruction's motion, when it begins; None of what is about a motion as a whole
+    program_s : the same on the clock of the table of motion; None off the way that is kept there
+    """
 
     file: str
     line: int
@@ -67,6 +74,8 @@ class FindingAt:
     level: Level
     times: int
     finding: CheckFinding
+    motion_s: float | None = None
+    program_s: float | None = None
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.program_check import level_word
+from er3a.pipeline.messages.program_remedies import remedies, remedy
 from er3a.pipeline.messages.programs import FIGURES, LANGUAGES, cycle_text
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, moment, player, player_style, stretch
@@ -26,7 +27,7 @@ from er3a.pipeline.stages.programs.model import (
 )
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import fixed, head_of, render, run_command
-from er3a.program_check.program_check_findings import Level, worst_of
+from er3a.program_check.program_check_findings import RANKS, Level, worst_of
 from er3a.robots.robot import Robot
 
 MOST_LINES = 400  # of a listing that the page shows
@@ -37,13 +38,17 @@ STATUSES: dict[Level, str] = {"pass": "pass", "note": "pass", "caution": "cautio
 
 @dataclass(frozen=True)
 class ListingLine:
-    """A line of a listing; ``stretch`` and ``moment`` lead the player to where its first motion ends, if it moves."""
+    """A line of a listing with what was found there and what to do about it.
+
+    ``stretch`` and ``moment`` lead the player to where its first motion ends, if it moves.
+    """
 
     number: int
     text: str
     level: Level | None
     word: str
-    remarks: list[str]
+    remarks: list[Markup]
+    remedies: list[str]
     facts: str
     stretch: Markup
     moment: Markup
@@ -52,12 +57,13 @@ class ListingLine:
 
 @dataclass(frozen=True)
 class ProgramSection:
-    """A program on the page, and what it says in the page's language."""
+    """A program on the page, and what it says in the page's language; ``worst``: the finding that weighs most."""
 
     program: ProgramSummary
     status: str
     language: str
     cycle: str
+    worst: Markup
     lines: list[ListingLine]
     elsewhere: list[list[str]]
 
@@ -90,13 +96,35 @@ def _section(results: ProgramsResults, program: ProgramSummary) -> ProgramSectio
             found[each.line].append(each)
         else:
             line = str(each.line) if each.line else "–"
-            elsewhere.append([each.file, line, level_word(each.level), say(each.finding)])
+            elsewhere.append(
+                [each.file, line, level_word(each.level), _remark(program.name, each), remedy(each.finding) or "–"]
+            )
     text = results.lines.take(results.lines.program == program.name)
     rows = results.instructions.take(results.instructions.program == program.name)
     motion = results.motion.take(results.motion.program == program.name)
     lines = _listing(program.name, text, rows, motion, found)
     status = STATUSES[program.outcome]
-    return ProgramSection(program, status, LANGUAGES[program.language], cycle_text(program), lines, elsewhere)
+    told = LANGUAGES[program.language], cycle_text(program), _worst(program)
+    return ProgramSection(program, status, *told, lines, elsewhere)
+
+
+def _worst(program: ProgramSummary) -> Markup:
+    """The first of the findings that weigh most, with its line; empty where a program passes."""
+    found = max(program.findings, key=lambda each: RANKS[each.level], default=None)
+    if found is None or program.outcome == "pass":
+        return Markup()
+    remark = _remark(program.name, found)
+    return Markup(tr("line {line}: {text}", line=found.line, text=remark)) if found.line else remark
+
+
+def _remark(name: str, each: FindingAt) -> Markup:
+    """What was found, after the moment at which it begins: a link to it where the player shows it."""
+    text = escape(say(each.finding) + (f" ({each.times} ×)" if each.times > 1 else ""))
+    if each.motion_s is None:
+        return text
+    at = tr("at {time} s", time=fixed(each.motion_s, 2))
+    shown = escape(at) if each.program_s is None else moment(name, each.program_s, at)
+    return Markup("<b>{}</b>: {}").format(shown, text)
 
 
 def _listing(
@@ -119,13 +147,15 @@ def _listing(
         here = found.get(number, [])
         levels: list[Level] = [*(each.level for each in here), *rows.level[moves[number]].tolist()]
         level = worst_of(levels) if levels else None
-        remarks = [say(each.finding) + (f" ({each.times} ×)" if each.times > 1 else "") for each in here]
+        remarks, to_do = [_remark(name, each) for each in here], remedies(each.finding for each in here)
         leads = Markup(), Markup()
         if number in played:
             t0, t1 = played[number]
             leads = stretch(name, t0, t1), moment(name, t1, str(number))
         word = "" if level is None else level_word(level)
-        lines.append(ListingLine(number, words, level, word, remarks, _facts(rows, moves[number]), *leads, skipped))
+        lines.append(
+            ListingLine(number, words, level, word, remarks, to_do, _facts(rows, moves[number]), *leads, skipped)
+        )
         skipped = False
     return lines
 

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from math import pi
 
+from markupsafe import Markup
+
 from er3a.identifiability.entries import column_of
 from er3a.identifiability.entry_evidence import EntryEvidence, OtherReading, Status
 from er3a.pipeline.messages.evidence import STATUS_MEANINGS, STATUS_WORDS
@@ -49,6 +51,14 @@ DETAIL_COLUMNS = (
 )
 
 
+OFF_COLUMNS = (
+    N_("Entry"),
+    N_("Stated>"),
+    N_("Supported>"),
+    N_("Difference>"),
+    N_("Tool off by"),
+    N_("Documents"),
+)
 OTHER_COLUMNS = ("a", "alpha", "d", "beta", "offset", "direction")
 DIFFERS = 2e-3
 IN_UNIT = {"a": MM, "d": MM, "direction": 1.0} | dict.fromkeys(("alpha", "beta", "offset"), 180 / pi)
@@ -90,12 +100,15 @@ class OtherSection:
 class EvidenceSection:
     """The table by rows (a cell is None where the table has no such entry), its legend, and the entries in words.
 
-    Rows of entries begin with the entry's name, which is its address on the page.
+    Rows of entries begin with the entry's name, which is its address on the page. ``off_rows`` are of entries that the
+    evidence contradicts: what is stated, what is supported, and the difference.
     """
 
     columns: list[str]
     rows: list[tuple[int, list[EntryCell | None]]]
     legend: list[tuple[str, str, str, str]]
+    off_columns: list[str]
+    off_rows: list[list[str]]
     open_columns: list[str]
     open_rows: list[list[str]]
     settled_columns: list[str]
@@ -125,6 +138,8 @@ def evidence_section(evidence: TableEvidence | None) -> EvidenceSection | None:
             for status, mark in MARKS.items()
             if status in present
         ],
+        off_columns=[tr(column) for column in OFF_COLUMNS],
+        off_rows=[_off_row(each) for each in numbers if each.status == "contradicted"],
         open_columns=[tr(column) for column in DETAIL_COLUMNS],
         settled_columns=[tr(column) for column in DETAIL_COLUMNS[:-1]],
         open_rows=[[*_row(each), proposals.get(each.entry, "–")] for each in left],
@@ -190,6 +205,28 @@ def _row(each: EntryEvidence) -> list[str]:
         joined(each.by, ", ") or "–",
         joined([_reading(reading) for reading in each.alternatives[:SHOWN_READINGS]]) or "–",
     ]
+
+
+def _off_row(each: EntryEvidence) -> list[str]:
+    """A contradicted entry: what is stated, the middle of what evidence leaves open with half its width, and how far
+    apart they are."""
+    link = Markup('<a href="#entry-{0}">{0}</a>').format(each.entry)
+    told = [_tool_off(each), joined(each.by, ", ") or "–"]
+    if each.value is None or each.interval is None:
+        return [link, _value(each), "–", "–", *told]
+    if column_of(each.entry) == "direction":
+        return [link, _signed(each.value, 0), _signed(each.interval[0], 0), tr("turns the other way"), *told]
+    stated = f"{_value(each)} {each.unit}"
+    if each.at_least:
+        return [link, stated, _interval(each), "–", *told]
+    low, high = each.interval
+    middle, half = (low + high) / 2, (high - low) / 2
+    supported = f"{fixed(middle, 2)} ± {fixed(half, 2)} {each.unit}"
+    return [link, stated, supported, f"{_signed(each.value - middle, 2)} {each.unit}", *told]
+
+
+def _signed(value: float, decimals: int) -> str:
+    return ("+" if value > 0 else "") + fixed(value, decimals)
 
 
 def _tool_off(each: EntryEvidence) -> str:

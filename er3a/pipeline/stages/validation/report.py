@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from er3a.pipeline.messages.decision import decision
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import counted, joined, say, word
 from er3a.pipeline.messages.validation import CONVENTIONS, FIGURES, GRADE_NAMES, GRADES, GROUPS
@@ -32,7 +33,8 @@ from er3a.pipeline.stages.validation.subject import model_of
 from er3a.pipeline.stages.validation.symbolic_section import formulas
 from er3a.pipeline.stages.validation.wording import typographic
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.page import Picture, fixed, head_of, render, run_command
+from er3a.pipeline.viewing.instead import table_instead
+from er3a.pipeline.viewing.page import Head, Picture, fixed, head_of, render, run_command
 from er3a.references.subjects import SegmentInclination
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Robot
 
@@ -76,7 +78,7 @@ def report(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
         Path(__file__).with_name("report.html.j2"),
         output,
         summary,
-        head=head_of(stored, FIGURES),
+        head=_head(study, stored),
         command=run_command(study, f"{name}/validation.html"),
         robot=robot,
         robot_pages=study.pages(name),
@@ -104,6 +106,15 @@ def report(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
         convention=word("convention", CONVENTIONS, robot.convention),
         grade_names={grade: word("grade", GRADE_NAMES, grade) for grade in GRADE_NAMES},
     )
+
+
+def _head(study: Study, stored: Stored[ValidationResults]) -> Head:
+    """The head; the verdict on a table that evidence contradicts begins with what to do."""
+    head = head_of(stored, FIGURES)
+    if head.status != "fail":
+        return head
+    instead = table_instead(study, stored.robot, stored.folder.parents[1]) if stored.folder else None
+    return replace(head, text=joined([decision(head.status, (), instead), head.text], " "))
 
 
 def _set_story(found: SetSummary, checks: Iterable[Judged], poses: KeyPoses) -> SetStory:

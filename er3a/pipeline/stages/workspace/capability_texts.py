@@ -8,10 +8,8 @@ import numpy as np
 
 from er3a.collision.scene import Scene
 from er3a.geometry.transforms import rpy_along
-from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.messages.say import joined, say, word
-from er3a.pipeline.messages.workspace import STATUS
+from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.stages.workspace.capability_figures import (
     asked_ratio,
     clear_percent,
@@ -25,10 +23,10 @@ from er3a.pipeline.stages.workspace.model import (
     ClearSummary,
     Placement,
     PlacementSummary,
-    PlaceSummary,
     TaskSummary,
     WorkspaceResults,
 )
+from er3a.pipeline.stages.workspace.place_texts import best_text, numbers, place_row
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import Picture
 from er3a.robots.robot import Robot
@@ -56,12 +54,12 @@ def _placement_context(
 ) -> dict[str, Any]:
     if not isinstance(placement, PlacementSummary):
         return {"nowhere": say(placement), "best_text": ""}
-    rows = [_place_row(n, place, capability) for n, place in enumerate(placement.places, start=1)]
+    rows = [place_row(n, place, capability) for n, place in enumerate(placement.places, start=1)]
     return {
         "nowhere": "",
         "placing_scene": placement.scene,
         "try_text": _try_text(robot, placement.task) if capability.asked == "directions" else "",
-        "best_text": _best_text(placement),
+        "best_text": best_text(placement),
         "points_serving": placement.points_serving,
         "place_rows": rows,
         "place_picture": Picture(
@@ -232,7 +230,7 @@ def _roll_text(capability: CapabilitySummary) -> str:
             "Joints that the pose leaves open ({joints}) were tried at {values} values, and a direction counts if it "
             "is reached at one of them: more may be reached between them. Solutions are those of one value. Rolls "
             "about the tool's own axis: {rolls}.",
-            joints=_numbers(capability.held_joints),
+            joints=numbers(capability.held_joints),
             values=capability.arm_angles,
             rolls=rolls,
         )
@@ -348,58 +346,6 @@ def _try_text(robot: Robot, task: TaskSummary) -> str:
     )
 
 
-def _best_text(placement: PlacementSummary) -> str:
-    """Where to put the box: the first place that is proven, else the first; what there is none of."""
-    if not placement.places:
-        return tr(
-            "No position for a box of {box} mm was found.",
-            box=" × ".join(fixed(value, 0) for value in placement.task.box_mm),
-        )
-    ranked = list(enumerate(placement.places, start=1))
-    row, place = next((each for each in ranked if each[1].status == "proven"), ranked[0])
-    told = [
-        tr(
-            "Put the box, {along_x} mm along x and {along_y} mm along y, with its centre at ({centre}) mm: number "
-            "{row} of the best positions.",
-            along_x=fixed(1000 * place.size_m[0], 0),
-            along_y=fixed(1000 * place.size_m[1], 0),
-            centre=", ".join(fixed(1000 * value, 0) for value in place.centre_m),
-            row=row,
-        ),
-        tr("The whole task is proven to be reached there; collisions are judged at samples.")
-        if place.status == "proven"
-        else tr("The whole task is reached there, judged at samples."),
-        tr("It can be moved by {room} mm, one direction at a time.", room=_room(place)) if _movable(place) else "",
-        tr("Joints come within {margin} deg of their limits.", margin=fixed(place.limit_margin_deg, 1))
-        if place.limit_margin_deg is not None
-        else "",
-    ]
-    return joined(told, " ")
-
-
-def _movable(place: PlaceSummary) -> bool:
-    return any((*place.room_down_m, *place.room_up_m))
-
-
-def _room(place: PlaceSummary) -> str:
-    """How far the box can be moved, such as ``x ±25, y -50 to 0``, mm."""
-    if not _movable(place):
-        return fixed(0, 0)
-    parts = []
-    for axis, down, up in zip("xyz", place.room_down_m, place.room_up_m):
-        if down == up:
-            parts.append(f"{axis} {'±' if up else ''}{fixed(1000 * up, 0)}")
-        elif down or up:
-            parts.append(
-                tr("{axis} {least} to {most}", axis=axis, least=fixed(-1000 * down, 0), most=fixed(1000 * up, 0))
-            )
-    return ", ".join(parts)
-
-
-def _numbers(joints: tuple[int, ...]) -> str:
-    return ", ".join(str(joint) for joint in joints)
-
-
 def _whole(value: float) -> float | int:
     return int(value) if value == int(value) else value
 
@@ -418,26 +364,3 @@ def _places_caption(placement: PlacementSummary, provable: bool) -> str:
         fitting=number(placement.fitting),
         proven=number(placement.fitting_proven),
     )
-
-
-def _place_row(row: int, place: PlaceSummary, capability: CapabilitySummary) -> list[str]:
-    if place.branch is None and capability.arm_angles > 1:
-        branch = tr("with joints {joints} at several values", joints=_numbers(capability.held_joints))
-        branch = branch if capability.held_joints else tr("at several arm angles")
-    elif place.branch is None:
-        branch = tr("changes within the box") if capability.named_branches else tr("not told: branches have no names")
-    elif place.status == place.branch_status:
-        branch = branch_word(place.branch)
-    else:
-        branch = tr("{branch} (by samples)", branch=branch_word(place.branch))
-    return [
-        str(row),
-        ", ".join(fixed(1000 * value, 0) for value in place.centre_m),
-        " × ".join(fixed(1000 * value, 0) for value in place.size_m),
-        word("workspace.status", STATUS, place.status),
-        branch,
-        fixed(100 * place.manipulability_ratio, 1),
-        fixed(place.limit_margin_deg, 1),
-        fixed(place.clearance_mm, 0),
-        _room(place),
-    ]

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
+from er3a.collision.pairs import Pair
 from er3a.kinematics.classes.class_solvers import BranchLabel, SlotName
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.workspace.workspace_findings import WorkspaceFinding
@@ -261,6 +262,8 @@ class PlaceSummary:
     limit_margin_deg : least distance of joints from their limits, None without one branch, or without joints of less
         than a full turn
     clearance_mm : least distance of the arm from scene and itself over the samples, None if nothing can meet
+    clearance_pair : the bodies that are so near each other
+    limit_joint : the joint (from 1) that comes so near its limit
     room_down_m, room_up_m : how far the box can be moved towards -x, -y, -z and +x, +y, +z, one at a time, as good
     """
 
@@ -276,6 +279,8 @@ class PlaceSummary:
     room_down_m: Triple
     room_up_m: Triple
     clearance_mm: float | None = None
+    clearance_pair: Pair | None = None
+    limit_joint: int | None = None
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ from er3a.workspace.clear_poses import ClearPoses, try_poses
 from er3a.workspace.dexterous import dexterous_core
 from er3a.workspace.directions import cone_directions
 from er3a.workspace.orientations import AskedOrientations, asked_of
-from er3a.workspace.placement import MIXED, NO, Task, box_points, narrowed, serving_arms
+from er3a.workspace.placement import MIXED, NO, Task, box_points, limited_joints, narrowed, serving_arms
 from er3a.workspace.placement_proof import BoxPlacement, find_places
 from er3a.workspace.proof import ring_volumes
 from er3a.workspace.proven import Proven
@@ -131,9 +131,9 @@ def _placed(
         robot, task, asked.roll, plan.lattice, LISTED, settings.proof_poses, free=within.free, in_cone=asked.in_cone
     )
     placed = _placement_summary(robot, settings.placement, task, placement, best, scene)
-    clearances = _clearances(bodies, within, task, asked, placement)
-    with_clearance = tuple(replace(p, clearance_mm=mm) for p, mm in zip(placed.places, clearances))
-    return replace(placed, places=with_clearance), table_rows.places(placement.best_turns)
+    arms = _arms_at(within, task, asked, placement)
+    listed = tuple(_with_nearest(place, bodies, q) for place, q in zip(placed.places, arms))
+    return replace(placed, places=listed), table_rows.places(placement.best_turns)
 
 
 def _tried(
@@ -230,24 +230,36 @@ def _listed(robot: Robot, task: Task, placement: BoxPlacement, best: float) -> l
     ]
 
 
-def _clearances(
-    bodies: Bodies, within: Bodies, task: Task, asked: AskedOrientations, placement: BoxPlacement
-) -> list[float | None]:
-    """The least clearance (mm) at each chosen place, over its lattice points and directions.
+def _arms_at(within: Bodies, task: Task, asked: AskedOrientations, placement: BoxPlacement) -> list[Reals]:
+    """The arms (m, joints), rad, at each chosen place, over its lattice points and directions.
 
     Parameters
     ----------
     within : of the robot with the limits that the places were found with
     """
-    found: list[float | None] = []
+    arms = []
     for row, slot in zip(placement.chosen.row, placement.chosen.slot):
         box = task.box[[1, 0, 2]] if placement.places.turned[row] else task.box
         points = box_points(placement.field, box, placement.places.centre[row])
         rotations = asked.in_cone(points, task.axis, task.half_angle, task.step)
-        least, _ = bodies.least(serving_arms(within.robot, points, rotations, asked.roll, slot, within.free))
-        nearest = float(least.min(initial=np.inf))
-        found.append(1000 * nearest if np.isfinite(nearest) else None)
-    return found
+        arms.append(serving_arms(within.robot, points, rotations, asked.roll, slot, within.free))
+    return arms
+
+
+def _with_nearest(place: PlaceSummary, bodies: Bodies, q: Reals) -> PlaceSummary:
+    """A place with the least clearance of its arms (m, joints), rad, the pair that has it, and the joint nearest to a
+    limit."""
+    least, pair = bodies.least(q)
+    nearest = int(least.argmin()) if len(least) else -1
+    if nearest >= 0 and np.isfinite(least[nearest]):
+        place = replace(
+            place, clearance_mm=1000 * float(least[nearest]), clearance_pair=bodies.pairs[int(pair[nearest])]
+        )
+    if place.limit_margin_deg is None or not len(q):
+        return place
+    robot = bodies.robot
+    room = np.where(limited_joints(robot), np.minimum(q - robot.lower, robot.upper - q), np.inf).min(axis=0)
+    return replace(place, limit_joint=int(room.argmin()) + 1)
 
 
 def _status(proven: bool) -> Literal["proven", "sampled"]:
