@@ -15,6 +15,7 @@ from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.files.target_file import TargetEntry, load_targets, read_targets
 from er3a.kinematics.forward import forward
+from testing.arms import made_of
 
 ROBOT = load_robot("er3_600")
 DATA = Path(__file__).parents[1] / "data" / "targets"
@@ -105,7 +106,7 @@ BAD = {
     "joints and a position": ([TURNED | {"q_deg": [0] * 6}], "targets[0]", "q_deg and xyz_mm"),
     "metres": ([TURNED | {"xyz_mm": [0.5, 0.2, 0.7]}], "targets[0].xyz_mm", "0.5, 0.2, 0.7 mm can only be metres"),
     "micrometres": ([TURNED | {"xyz_mm": [500_000, 0, 0]}], "targets[0].xyz_mm", "more than 100 m"),
-    "many turns": ([TURNED | {"q_ref_deg": [0, 0, 0, 0, 0, 99999]}], "targets[0].q_ref_deg", "ten turns"),
+    "many turns": ([TURNED | {"q_ref_deg": [0, 0, 0, 0, 0, 100001]}], "targets[0].q_ref_deg", "ten turns"),
     "long quaternion": ([PLACE | {"quaternion_wxyz": [1, 1, 0, 0]}], "targets[0].quaternion_wxyz", "length is 1.41"),
     "short quaternion": ([PLACE | {"quaternion_wxyz": [0.999998, 0, 0, 0]}], "targets[0].quaternion_wxyz", "length is"),
     "zero quaternion": ([PLACE | {"quaternion_wxyz": [0, 0, 0, 0]}], "targets[0].quaternion_wxyz", "length is 0"),
@@ -128,6 +129,24 @@ def test_wrong_file_is_refused_with_file_and_field(case, tmp_path):
     assert caught.value.file == str(path)
     assert caught.value.field == field
     assert words in str(caught.value)
+
+
+def test_joints_that_slide_far_are_mm_and_those_that_turn_stay_within_ten_turns(tmp_path):
+    rail = made_of([("P", 0, 90, 0, -20_000, 20_000), ("R", 400, 0, 0, -180, 180)])
+    path = tmp_path / "far.yaml"
+    for values, problem in (([-11_017, -139], None), ([500, 3601], "3601 deg of joint 2 is more than ten turns")):
+        path.write_text(yaml.dump({"kind": "targets", "targets": [{"name": "a", "q_deg": values}]}), encoding="utf-8")
+        if problem is None:
+            (target,) = load_targets(path, rail)
+            # the slide is along z, the link behind it lies in the plane that its turn by 90 deg sets
+            at = np.radians(-139)
+            np.testing.assert_allclose(target.T[:3, 3], [0.4 * np.cos(at), 0, -11.017 + 0.4 * np.sin(at)], atol=1e-12)
+            continue
+        with pytest.raises(InputError) as caught:
+            load_targets(path, rail)
+        assert caught.value.file == str(path)
+        assert "a: q_deg" in caught.value.field
+        assert problem in str(caught.value)
 
 
 @pytest.mark.parametrize("rpy", [[0, 0, 0], [0.5, 90, 0], [0, 5, 0], [0, 3, 6], [0, 0.1, 0], [-180, 6.2, 180]])

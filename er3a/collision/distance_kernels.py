@@ -170,7 +170,7 @@ def measure(layout: Layout, q: Reals, found: Reals, least: Reals, pair: Integers
             inside = inside or overlap
             if found.shape[1]:
                 found[n, k] = distance
-            if distance < best and not (joined[k] and distance >= 0):
+            if distance < best and not (joined[k] and distance >= 0 and not overlap):
                 best, at = distance, k
         least[n], pair[n], deep[n] = best, at, inside
 
@@ -210,7 +210,8 @@ def which_overlap(layout: Layout, q: Reals, found: Flags) -> None:
                     placed[body] = n
             if solid and apart_along(w, shape, a, b, room, axes[k]):
                 continue
-            overlap = pair_distance(w, shape, a, b, room, near)[0] < 0
+            distance, inside = pair_distance(w, shape, a, b, room, near)
+            overlap = inside or distance < 0  # hulls without margin that overlap are 0 apart
             found[n, 0 if one else k] |= overlap
             if one and overlap:
                 hit = k
@@ -281,8 +282,8 @@ def _box_state(
         moved = _pair_motion(layout, T, w, k, half)
         if _apart(middle, reach, first[k], second[k]) > moved:
             continue
-        distance = pair_distance(w, shape, first[k], second[k], room, near)[0]
-        if distance < 0:
+        distance, inside = pair_distance(w, shape, first[k], second[k], room, near)
+        if inside or distance < 0:
             return MEETS, moved
         if distance <= moved:
             state, widest = UNDECIDED, max(widest, moved)
@@ -393,8 +394,9 @@ def search_boxes(
         half[:] = (high - low) / 2
         place(layout, (low + high) / 2, T, w, middle)
         looked += 1
-        distance = sign * pair_distance(w, shape, a, b, room, near)[0]
-        if distance < 0:
+        distance, inside = pair_distance(w, shape, a, b, room, near)
+        distance *= sign
+        if distance < 0 or (inside and not overlapping):
             at[:] = (low + high) / 2
             return MEETS, looked, distance
         moved = _pair_motion(layout, T, w, k, half)

@@ -82,7 +82,7 @@ def hull_of(points: Reals) -> ConvexPieces:
 
     What the corners left out stand out by is the margin; the excess is not that of a mesh, but 0: corners are points.
     """
-    corners = points[scipy.spatial.ConvexHull(points).vertices]
+    corners = _corners(points)
     if len(corners) <= MOST_CORNERS:
         return ConvexPieces((corners,), 0.0, 0.0)
     kept = _corners(corners[np.unique((fibonacci_sphere(MOST_CORNERS) @ corners.T).argmax(axis=1))])

@@ -14,7 +14,7 @@ from er3a.errors import InputError
 from er3a.files.path_table import read_path_table
 from er3a.files.robot_file import Name, Text
 from er3a.files.target_file import Orientation
-from er3a.files.units import JointsDeg, PositionMm, Triple, joint_values
+from er3a.files.units import JointsDeg, PositionMm, Triple, joint_rates, joint_values
 from er3a.files.yaml_file import StrictModel, load
 from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.numerics.arrays import Reals
@@ -396,4 +396,4 @@ def _branch(words: str | None) -> str | None:
 
 
 def _rates(robot: Robot, values: list[float] | None, field: str) -> Reals | float:
-    return 0.0 if values is None else joint_values(robot, values, field)
+    return 0.0 if values is None else joint_rates(robot, values, field)

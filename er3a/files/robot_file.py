@@ -7,11 +7,13 @@ from collections.abc import Collection
 from pathlib import PurePosixPath
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from er3a.files.mass_fields import DriveFields, InertiaFields, WeightFields, WristLoadFields, check_masses
 from er3a.files.units import FARTHEST_MM, MOST_DEG, RADIANS_BELOW_DEG, Triple, look_like_radians, suspect
 from er3a.files.yaml_file import StrictModel
+from er3a.numerics.arrays import Reals
 from er3a.robots.robot import MOST_JOINTS, Grade, PairRule
 
 NAME_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
@@ -354,6 +356,12 @@ class RobotFile(StrictModel):
                 raise ValueError(f"coupling.rows[{i}].row: the table has no row {row.row} | Name one of dh.rows")
         if missing := [row for row in range(joints + 1, len(self.dh.rows) + 1) if row not in coupled]:
             raise ValueError(f"coupling.rows: nothing moves row {missing[0]} of the table | Add a line for it")
+        matrix = coupling_matrix(self.coupling, len(self.dh.rows), joints)
+        if np.linalg.matrix_rank(matrix) < joints:
+            problem = "coupling.rows: joints move nothing by themselves"
+            raise ValueError(
+                f"{problem} | Let each of the {joints} joints move the rows in a way that the others can't"
+            )
         return self
 
     @property
@@ -460,6 +468,15 @@ def _check_limit(field: str, row: JointLimitRow | CombinedLimitRow, sliding: boo
         raise ValueError(f"{field}: {named} slides more than 100 m | Write mm, not micrometres")
     if sliding and 0 < max(abs(lower), abs(upper)) < SHORTEST_PLAIN_LENGTH_MM:
         suspect(f"{field}: {lower:g} to {upper:g} mm may be metres")
+
+
+def coupling_matrix(group: Coupling, rows: int, joints: int) -> Reals:
+    """What each row of the table moves by, per joint (rows, joints)."""
+    matrix = np.eye(rows, joints)
+    for row in group.rows:
+        matrix[row.row - 1] = 0.0
+        matrix[row.row - 1, np.array(row.joints) - 1] = row.factors
+    return matrix
 
 
 def check_placement(field: str, placement: Placement | None) -> None:

@@ -11,12 +11,12 @@ from er3a.files.mass_fields import masses_of
 from er3a.files.pieces_file import load_pieces
 from er3a.files.robot_file import (
     CombinedLimitRow,
-    Coupling,
     Envelopes,
     JointLimitRow,
     LinkPieces,
     Placement,
     RobotFile,
+    coupling_matrix,
 )
 from er3a.files.shipped import ROOT, names, own_or_shipped
 from er3a.files.yaml_file import load
@@ -87,7 +87,7 @@ def robot_of(content: RobotFile) -> Robot:
         upper=limits[:, 1],
         speed=np.array([_si(row.speed_deg_s, row.speed_mm_s) for row in content.speeds.rows] if content.speeds else []),
         sliding=np.array(sliding),
-        coupling=_coupling(content.coupling, len(rows), joints),
+        coupling=coupling_matrix(content.coupling, len(rows), joints) if content.coupling else None,
         continuous=np.array([row.continuous for row in content.limits.rows]),
         combined=tuple(_combined(row, joints) for row in content.limits.combined),
         base=placement_transform(content.base),
@@ -120,16 +120,6 @@ def _combined(row: CombinedLimitRow, joints: int) -> CombinedLimit:
     factors = np.zeros(joints)
     factors[np.array(row.joints) - 1] = row.factors
     return CombinedLimit(tuple(factors.tolist()), *_limits(row))
-
-
-def _coupling(group: Coupling | None, rows: int, joints: int) -> np.ndarray | None:
-    if group is None:
-        return None
-    matrix = np.eye(rows, joints)
-    for row in group.rows:
-        matrix[row.row - 1] = 0.0
-        matrix[row.row - 1, np.array(row.joints) - 1] = row.factors
-    return matrix
 
 
 VALUES_OF_ROW = {

@@ -193,7 +193,10 @@ def load_targets(path: str | Path, robot: Robot) -> tuple[Target, ...]:
     InputError
         naming file, field (or row and column) and remedy
     """
-    return tuple(entry.target(robot) for entry in read_targets(path))
+    try:
+        return tuple(entry.target(robot) for entry in read_targets(path))
+    except InputError as error:
+        raise InputError(error.file or path, error.field, error.problem, error.remedy) from None
 
 
 def read_targets(path: str | Path) -> tuple[TargetEntry, ...]:

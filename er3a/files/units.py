@@ -40,7 +40,7 @@ def check_millimetres(values: Sequence[float]) -> None:
         raise ValueError(f"{shown} mm is more than 100 m | Write mm, not micrometres")
 
 
-def check_degrees(values: Sequence[float], otherwise: str) -> None:
+def check_degrees(values: Sequence[float], otherwise: str, slides: bool = False) -> None:
     """Refuse angles of more than ten turns; warn of those that look like radians.
 
     All within +-6.3, they look so if two are not whole numbers.
@@ -48,11 +48,13 @@ def check_degrees(values: Sequence[float], otherwise: str) -> None:
     Parameters
     ----------
     otherwise : how to write such small angles if degrees are meant
+    slides : whether some can be mm of joints that slide; :func:`joint_values` knows which
     """
     largest = max(abs(value) for value in values)
     shown = ", ".join(f"{value:g}" for value in values)
-    if largest > MOST_DEG:
-        raise ValueError(f"{shown} deg is more than ten turns | Write degrees within +-{MOST_DEG:g}")
+    if largest > (FARTHEST_MM if slides else MOST_DEG):
+        much = "more than ten turns, or than 100 m" if slides else "more than ten turns"
+        raise ValueError(f"{shown} deg is {much} | Write degrees within +-{MOST_DEG:g}")
     broken = sum(value != round(value) for value in values)
     if largest < RADIANS_BELOW_DEG and broken >= 2:
         converted = ", ".join(f"{math.degrees(value):.4g}" for value in values)
@@ -70,18 +72,30 @@ def look_like_radians(values: Sequence[float]) -> bool:
     return sum(round(each) != 0 and abs(each - round(each)) * math.pi / 2 < 2e-3 for each in quarters) >= 2
 
 
-def as_degrees(otherwise: str) -> AfterValidator:
+def as_degrees(otherwise: str, slides: bool = False) -> AfterValidator:
     """:func:`check_degrees` for a list of angles, as part of a type."""
 
     def checked(values: list[float]) -> list[float]:
-        check_degrees(values, otherwise)
+        check_degrees(values, otherwise, slides)
         return values
 
     return AfterValidator(checked)
 
 
 def joint_values(robot: Robot, values: Sequence[float], field: str) -> Reals:
-    """Written joint values as rad or m (..., n); :class:`InputError` if they are not as many as the robot's joints."""
+    """Written joint values as rad or m (..., n); :class:`InputError` if they are not as many as the robot's joints, or
+    a joint would turn more than ten times."""
+    given = joint_rates(robot, values, field)
+    turned = np.where(robot.slides, 0.0, np.abs(given))
+    if turned.max(initial=0.0) > np.radians(MOST_DEG):
+        joint = int(turned.argmax()) + 1
+        problem = f"{values[joint - 1]:g} deg of joint {joint} is more than ten turns"
+        raise InputError(None, field, problem, f"Write degrees within +-{MOST_DEG:g}")
+    return given
+
+
+def joint_rates(robot: Robot, values: Sequence[float], field: str) -> Reals:
+    """Written rates of joints in SI units (..., n); :class:`InputError` if they are not as many as the joints."""
     given = np.array(values, float)
     if given.shape[-1] != robot.joints:
         problem = f"{given.shape[-1]} joint values for {robot.name}, which has {robot.joints} joints"
@@ -99,4 +113,4 @@ Joints = Annotated[list[float], Field(min_length=1, max_length=MOST_JOINTS)]
 """One value for each joint: degrees, or mm of those that slide."""
 PositionMm = Annotated[Triple, AfterValidator(_as_millimetres)]
 RpyDeg = Annotated[Triple, as_degrees(WHOLE_DEGREES)]
-JointsDeg = Annotated[Joints, as_degrees(WHOLE_DEGREES)]
+JointsDeg = Annotated[Joints, as_degrees(WHOLE_DEGREES, slides=True)]

@@ -8,10 +8,11 @@ from pathlib import Path
 from er3a.errors import InputError
 
 MAX_BYTES = 1_000_000
+TOO_LARGE = "Write long lists of targets or points as CSV tables"
 
 
-def read_text(path: Path, most: int = MAX_BYTES) -> str:
-    """Read a UTF-8 text file of at most so many bytes, or raise :class:`InputError`."""
+def read_text(path: Path, most: int = MAX_BYTES, too_large: str = TOO_LARGE) -> str:
+    """Read a UTF-8 text file of at most so many bytes, or raise :class:`InputError` (``too_large`` is its remedy)."""
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
@@ -23,7 +24,7 @@ def read_text(path: Path, most: int = MAX_BYTES) -> str:
         reason = getattr(error, "strerror", None) or error
         raise InputError(path, None, f"can't be read ({reason})", "Check the path and its permissions") from None
     if raw is None:
-        raise InputError(path, None, f"larger than {most} bytes", "Write long lists of targets or points as CSV tables")
+        raise InputError(path, None, f"larger than {most} bytes", too_large)
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:

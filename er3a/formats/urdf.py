@@ -31,7 +31,8 @@ from er3a.robots.robot import MOST_JOINTS, ConvexPiece, Envelope, Robot, Source
 MISFIT_POSES = 1000
 NO_RANGE = math.pi
 NO_SLIDE_M, MOST_SLID_M = 1.0, 100.0
-MOST_TURNED = 20 * math.pi
+MANY_TURNS, MOST_TURNED = 4 * math.pi + 0.01, 20 * math.pi
+FOLLOWS = 1e-6  # rad or m
 FASTEST = 100.0  # rad/s or m/s; what URDFs give above stands for a speed that no one knows
 
 
@@ -125,7 +126,8 @@ def import_urdf(
     more = {group: Source(f"As {path.name} states it", "export") for group, there in stated.items() if there}
     robot = robot.replace(envelopes=envelopes, hulls=hulls, masses=masses, sources={**robot.sources, **more})
     first, last = found.joints[0].parent, found.joints[-1].child
-    return UrdfImport(robot, (*found.notes, *notes, *told, *weighed), float(misfit), names, first, last)
+    beyond = _followers_beyond(moving, coupling, shift, limits)
+    return UrdfImport(robot, (*found.notes, *notes, *beyond, *told, *weighed), float(misfit), names, first, last)
 
 
 def link_places(found: UrdfChain, shift: Reals) -> LinkPlaces:
@@ -242,13 +244,28 @@ def _limits(path: Path, sources: list[UrdfJoint]) -> tuple[Reals, list[str]]:
             notes.append(f"joint {joint.name} has {has}: +-{shown} were assumed")
             lower, upper = -half, half
         elif joint.type == "revolute" and max(abs(lower), abs(upper)) > MOST_TURNED:
-            notes.append(f"joint {joint.name} has limits beyond ten turns: +-180 deg were assumed")
+            notes.append(f"joint {joint.name} has limits beyond ten turns (in radians): +-180 deg were assumed")
             lower, upper = -NO_RANGE, NO_RANGE
+        elif joint.type == "revolute" and max(abs(lower), abs(upper)) > MANY_TURNS:
+            shown = f"{lower:g} to {upper:g} rad"
+            notes.append(f"joint {joint.name} has limits of more than two turns ({shown}); a URDF's are in radians")
         elif joint.type == "prismatic" and max(abs(lower), abs(upper)) > MOST_SLID_M:
             notes.append(f"joint {joint.name} has limits beyond {MOST_SLID_M:g} m: it was held to that")
             lower, upper = max(lower, -MOST_SLID_M), min(upper, MOST_SLID_M)
         rows.append((lower, upper))
     return np.array(rows), notes
+
+
+def _followers_beyond(moving: Sequence[UrdfJoint], coupling: Reals, shift: Reals, limits: Reals) -> list[str]:
+    """Which joints of the chain follow others out of limits of their own, which the robot's limits don't keep."""
+    ends = np.sort(coupling @ limits + shift[:, None], axis=1)
+    notes = []
+    for joint, (least, most) in zip(moving, ends.tolist()):
+        stated = joint.lower < joint.upper and joint.type != "continuous"
+        if joint.mimic is not None and stated and (least < joint.lower - FOLLOWS or most > joint.upper + FOLLOWS):
+            taken, own = f"from {least:g} to {most:g}", f"{joint.lower:g} to {joint.upper:g}"
+            notes.append(f"joint {joint.name} follows {joint.mimic.source} {taken}; its own limits {own} are not kept")
+    return notes
 
 
 def export_urdf(robot: Robot) -> str:

@@ -44,14 +44,16 @@ def collision_shapes(
     shape = geometry[0] if geometry is not None and len(geometry) else None
     match shape.tag if shape is not None else "":
         case "box":
-            pieces = ConvexPieces((CORNERS * numbers(path, where, shape, "size", (1.0, 1.0, 1.0)),), 0.0, 0.0)
+            size = _sizes(path, where, numbers(path, where, shape, "size", (1.0, 1.0, 1.0)))
+            pieces = ConvexPieces((CORNERS * size,), 0.0, 0.0)
         case "cylinder":
-            radius, half = (float(numbers(path, where, shape, key, None)[0]) for key in ("radius", "length"))
-            ends = np.array([[0, 0, -half / 2], [0, 0, half / 2]])
+            given = [numbers(path, where, shape, key, None) for key in ("radius", "length")]
+            radius, length = _sizes(path, where, np.concatenate(given)).tolist()
+            ends = np.array([[0, 0, -length / 2], [0, 0, length / 2]])
             pieces = ConvexPieces((cylinder_points(ends, radius, PRISM_SIDES),), 0.0, 0.0)
         case "sphere":
             x, y, z = T[:3, 3].tolist()
-            radius = float(numbers(path, where, shape, "radius", None)[0])
+            radius = float(_sizes(path, where, numbers(path, where, shape, "radius", None))[0])
             if radius < SMALLEST_SPHERE_M:
                 notes.append(
                     f"{where}: a sphere of {1000 * radius:g} mm is taken as one of {1000 * SMALLEST_SPHERE_M:g} mm"
@@ -67,6 +69,13 @@ def collision_shapes(
             return []
     placed = (piece @ T[:3, :3].T + T[:3, 3] for piece in pieces.pieces)
     return [ConvexPiece(link, tuple((x, y, z) for x, y, z in piece.tolist()), pieces.uncovered) for piece in placed]
+
+
+def _sizes(path: Path, where: str, sizes: Reals) -> Reals:
+    """Sizes of a shape, m, none of them below 0."""
+    if (sizes < 0).any():
+        raise InputError(path, where, f"a size of {sizes.min():g} m is below 0", "Write sizes above 0")
+    return sizes
 
 
 def _mesh(
@@ -103,7 +112,7 @@ def numbers(
     text = element.get(key) if element is not None else None
     if text is None:
         if default is None:
-            raise InputError(path, where, f"has no {key}", f"Add {key} to its <limit>")
+            raise InputError(path, where, f"has no {key}", f"Add {key} to it")
         return np.array(default)
     try:
         values = np.array([float(word) for word in text.split()])

@@ -9,7 +9,6 @@ import math
 import re
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,12 +20,15 @@ from er3a.geometry.transforms import transform
 from er3a.numerics.arrays import Reals
 
 MOVING = ("revolute", "continuous", "prismatic")
+FREE = ("floating", "planar")
 SNAP_RAD = 1e-4
 MOST_BYTES = 20_000_000
 ARM_JOINTS = 4  # so many joints before a branching make what follows a hand rather than an arm
 FINGER_JOINTS = 4
 GRIPPER = re.compile("gripper|finger|jaw", re.IGNORECASE)
 SHOWN = 12
+WHOLE_TURN = 2 * math.pi + SNAP_RAD
+FAR_APART_M, MOST_APART_M = 5.0, 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,58 +97,61 @@ class Tree:
             self.by_child[joint.child] = joint
             self.by_parent.setdefault(joint.parent, []).append(joint)
         self.links = {*self.by_parent, *self.by_child}
+        self.moves: dict[str, bool] = {}  # of a joint: whether it or one behind it moves
+        self.depth: dict[str, int] = {}  # most independent joints in a row from it on
+        for joint in reversed(self._outwards()):
+            behind = [each.name for each in self.by_parent.get(joint.child, [])]
+            self.moves[joint.name] = joint.moves or any(self.moves[name] for name in behind)
+            self.depth[joint.name] = joint.independent + max((self.depth[name] for name in behind), default=0)
 
-    def behind(self, joint: UrdfJoint) -> Iterator[UrdfJoint]:
-        """This joint and all behind it."""
-        todo, seen = [joint], {joint.child}
+    def _outwards(self) -> list[UrdfJoint]:
+        """All joints, each before those behind it; :class:`InputError` for joints that no root leads to."""
+        found: list[UrdfJoint] = []
+        todo = [joint for link in self.by_parent if link not in self.by_child for joint in self.by_parent[link]]
         while todo:
-            current = todo.pop()
-            yield current
-            new = [each for each in self.by_parent.get(current.child, []) if each.child not in seen]
-            seen.update(each.child for each in new)
-            todo += new
-
-    def depth(self, joint: UrdfJoint) -> int:
-        """Most independent joints in a row from this one on."""
-        most = 0
-        todo = [(joint, 0)]
-        while todo:
-            current, count = todo.pop()
-            count += current.independent
-            most = max(most, count)
-            todo += [(each, count) for each in self.by_parent.get(current.child, []) if count <= len(self.by_name)]
-        return most
+            found.append(todo.pop())
+            todo += self.by_parent.get(found[-1].child, [])
+        if len(found) < len(self.by_name):
+            reached = {joint.name for joint in found}
+            looped = _some([name for name in self.by_name if name not in reached])
+            raise InputError(self.path, "joint", f"the joints {looped} form a closed loop", "A URDF is a tree")
+        return found
 
     def up_from(self, link: str) -> list[UrdfJoint]:
         """The joints from the root to a link."""
         found: list[UrdfJoint] = []
         while link in self.by_child:
-            if len(found) > len(self.by_child):
-                raise InputError(self.path, "joint", "the joints form a closed loop", "A URDF is a tree")
             found.append(self.by_child[link])
             link = found[-1].parent
         return found[::-1]
 
     def onward(self, link: str) -> tuple[list[UrdfJoint], list[UrdfJoint]]:
         """The joints at a link behind which anything moves, and those behind which anything moves by itself."""
-        moving = [joint for joint in self.by_parent.get(link, []) if any(each.moves for each in self.behind(joint))]
-        return moving, [joint for joint in moving if self.depth(joint)]
+        moving = [joint for joint in self.by_parent.get(link, []) if self.moves[joint.name]]
+        return moving, [joint for joint in moving if self.depth[joint.name]]
 
     def hand_begins(self, moving: list[UrdfJoint], count: int) -> bool:
         """Whether what moves behind a link, after so many joints, is a gripper or a hand."""
-        if count < ARM_JOINTS or any(self.depth(joint) > FINGER_JOINTS for joint in moving):
+        if count < ARM_JOINTS or any(self.depth[joint.name] > FINGER_JOINTS for joint in moving):
             return False
-        alone = [joint for joint in moving if self.depth(joint) == 1 and GRIPPER.search(f"{joint.name} {joint.child}")]
+        alone = [
+            joint for joint in moving if self.depth[joint.name] == 1 and GRIPPER.search(f"{joint.name} {joint.child}")
+        ]
         return len(moving) > 1 or len(alone) == 1
 
     def ends(self, link: str, count: int = 0) -> list[str]:
         """Links behind a link, which has so many moving joints before it, at which an arm may end."""
-        moving, active = self.onward(link)
-        if self.hand_begins(moving, count):
-            return [link]
-        if not active:
-            return [self._tail(link)] if count else []
-        return [end for joint in active for end in self.ends(joint.child, count + joint.independent)]
+        found, todo = list[str](), [(link, count)]
+        while todo:
+            link, count = todo.pop()
+            moving, active = self.onward(link)
+            if self.hand_begins(moving, count):
+                found.append(link)
+            elif active:
+                todo += [(joint.child, count + joint.independent) for joint in reversed(active)]
+            elif count:
+                found.append(self._tail(link))
+        return found
 
     def _tail(self, link: str) -> str:
         """The end of the fixed joints behind a link, or the link itself where they branch."""
@@ -181,9 +186,15 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
         joints = _downwards(tree, base or _root(tree), notes)
     for joint in joints:
         if joint.moves and joint.type not in MOVING:
-            candidates = _some([each.child for each in joints])
+            remedy = f"Write {', '.join(MOVING)} or fixed"
+            if joint.type in FREE:
+                remedy = f"Name where the arm begins by --base: {_some([each.child for each in joints])}"
             problem = f"type '{joint.type}' is no joint of a serial arm"
-            raise InputError(path, f"joint {joint.name}", problem, f"Name where the arm begins by --base: {candidates}")
+            raise InputError(path, f"joint {joint.name}", problem, remedy)
+        if (apart := np.abs(joint.T_parent_joint[:3, 3]).max()) > MOST_APART_M:
+            problem = f"stands {apart:g} m from the one before it"
+            remedy = "A URDF's lengths are in metres: divide millimetres by 1000"
+            raise InputError(path, f"joint {joint.name}, xyz", problem, remedy)
     taken = [note for joint in joints for note in joint.notes]
     return UrdfChain(tuple(joints), tree.by_name, (*taken, *notes))
 
@@ -239,7 +250,7 @@ def _some(names: list[str]) -> str:
 
 
 def _joint_elements(path: Path) -> list[ElementTree.Element]:
-    text = read_text(path, MOST_BYTES)
+    text = read_text(path, MOST_BYTES, "Leave out of it what is no link or joint of the arm")
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise InputError(path, None, "holds a document type or entities", "Remove them; a URDF needs none")
     try:
@@ -251,6 +262,11 @@ def _joint_elements(path: Path) -> list[ElementTree.Element]:
     if any("xacro" in element.tag for element in root.iter()):
         raise InputError(path, None, "holds xacro macros", "Expand it first: xacro FILE > arm.urdf")
     elements = root.findall("joint")
+    for element in elements:
+        for name, value in ((name, value) for each in element.iter() for name, value in each.items()):
+            if "${" in value or "$(" in value:
+                where, problem = f"joint {element.get('name', '?')}, {name}", f"'{value[:60]}' is a xacro expression"
+                raise InputError(path, where, problem, "Expand it first: xacro FILE > arm.urdf")
     if not elements:
         raise InputError(path, "robot", "holds no joints", "Give a URDF of a serial arm")
     return elements
@@ -273,16 +289,26 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
     notes: list[str] = []
     if snap:
         rpy = _snapped(rpy, where, notes)
+    if (np.abs(xyz) > FAR_APART_M).any():
+        notes.append(f"{where} stands {np.abs(xyz).max():g} m from the one before it; a URDF's lengths are in metres")
+    if (np.abs(rpy) > WHOLE_TURN).any():
+        notes.append(f"{where} is turned by {np.abs(rpy).max():g} rad; a URDF's angles are in radians")
     direction = _numbers(path, where, axis, "xyz", (1.0, 0.0, 0.0))
-    length = np.linalg.norm(direction)
-    if kind in MOVING and length < 1e-9:
+    longest = np.abs(direction).max()
+    if kind in MOVING and longest < 1e-9:
         raise InputError(path, where, "the axis has no length", 'Write for example <axis xyz="0 0 1"/>')
+    direction = direction / (longest or 1.0)  # so that no square overflows
     lower, upper, speed = math.nan, math.nan, math.nan
     if kind in ("revolute", "prismatic") and limit is not None:
         lower, upper = (_numbers(path, where, limit, key, (math.nan,))[0] for key in ("lower", "upper"))
         if math.isnan(lower) != math.isnan(upper):  # the specification's default
-            notes.append(f"{where} has no {'lower' if math.isnan(lower) else 'upper'} limit: 0 was taken")
+            missing = "lower" if math.isnan(lower) else "upper"
+            notes.append(f"{where} has no {missing} limit: 0 was taken")
             lower, upper = np.nan_to_num([lower, upper]).tolist()
+            if lower > upper:
+                raise InputError(
+                    path, where, f"has no {missing} limit, and 0 does not fit the other", f"Add {missing}="
+                )
         if lower > upper:
             raise InputError(path, where, f"lower limit {lower:g} above upper {upper:g}", "Swap them")
     if kind in MOVING and limit is not None and (limit.get("velocity") or "inf") != "inf":
@@ -296,7 +322,7 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
         told = (_numbers(path, where, mimic, key, (value,))[0] for key, value in (("multiplier", 1.0), ("offset", 0.0)))
         follows = Mimic(mimic.get("joint", ""), *told)
     parent, child = _link(path, element, "parent"), _link(path, element, "child")
-    placed, axis_of = transform(xyz, rpy), direction / (length or 1.0)
+    placed, axis_of = transform(xyz, rpy), direction / (np.linalg.norm(direction) or 1.0)
     return UrdfJoint(name, kind, parent, child, placed, axis_of, lower, upper, speed, follows, tuple(notes))
 
 

@@ -161,7 +161,7 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None) ->
     unsolved: tuple[Unsolved, ...] = ()
     if not branches:
         open_pose = bool(solver.parameters)
-        near = solve(robot, T, q_ref, mask=task_mask(robot), respect_limits=open_pose, restarts=MISS_RESTARTS)
+        near = missed_row(robot, T, q_ref)
         if bool(near.solved) and not (open_pose and redundancy is not None):
             branches, rows = _near_solved(
                 robot, T, near.q, q_ref
@@ -175,6 +175,17 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None) ->
     inside = within(robot, q)
     method = ByClass(solver.code, bool(certain), bool(slot_labels(robot)))
     return Solutions(robot, q, np.ones_like(inside), inside, branch, method, unsolved, motions)
+
+
+def missed_row(robot: Robot, T: Reals, q_ref: Reals) -> Solutions:
+    """What a search from the reference (n,) finds at a pose that the arm's class has no row for, within the limits if
+    it can."""
+    open_pose = bool(parameters_of(robot))
+    near = solve(robot, T, q_ref, mask=task_mask(robot), respect_limits=open_pose, restarts=MISS_RESTARTS)
+    if open_pose or not near.solved or within(robot, near.q):
+        return near
+    inside = solve(robot, T, q_ref, mask=task_mask(robot), restarts=MISS_RESTARTS)
+    return inside if inside.solved else near
 
 
 def _near_solved(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[list[int], list[Reals]]:

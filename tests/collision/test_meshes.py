@@ -20,6 +20,8 @@ from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.files.scene_file import load_scene
 from er3a.formats.mesh_file import read_mesh
 from er3a.formats.urdf import import_urdf
+from er3a.robots.robot import ConvexPiece
+from testing.arms import made_of
 
 
 def angle_iron() -> trimesh.Trimesh:
@@ -198,3 +200,17 @@ def test_collision_geometry_of_a_urdf_is_taken_over(tmp_path):
     box = next(np.array(hull.points) for hull in found.robot.hulls if hull.link == 2)
     assert np.ptp(box, axis=0).max() < 0.26
     np.testing.assert_allclose(np.linalg.norm(box.mean(axis=0)), 0.1, atol=1e-9)  # 100 mm from axis 2's origin
+
+
+def test_hulls_without_margin_that_overlap_are_found_by_every_search():
+    """A pole that turns about the middle of a box on a slide: its first corner is always inside the box."""
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
+    box = ConvexPiece(1, tuple(map(tuple, (0.25 * corners).tolist())), 0.0)
+    pole = ConvexPiece(2, tuple(map(tuple, (corners * [0.02, 0.5, 0.02] + [0, 0.5, 0]).tolist())), 0.0)
+    robot = made_of([("P", 0, 90, 0, -1000, 1000), ("R", 0, 0, 0, -180, 180)]).replace(hulls=(box, pole))
+    bodies = Bodies(robot, None)
+    q = np.random.default_rng(4).uniform(robot.lower, robot.upper, (50, 2))
+    assert bodies.overlaps(q).all()
+    assert not bodies.free(q).any()
+    assert (bodies.least(q)[0] < 0).all()
+    assert [row.state for row in bodies.matrix] == ["meets"]

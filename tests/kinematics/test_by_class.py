@@ -378,3 +378,44 @@ def test_slides_made_parallel_reach_nothing_off_their_plane():
     off[:3, 3] += 0.05 * np.cross(*directions)
     assert not len(inverse(robot, off).q)
     assert not inverse_batch(robot, off[None]).solved.any()
+
+
+def test_a_stretched_arm_of_seven_has_solutions_in_every_batch_its_own_among_them(random):
+    robot = ARMS["arm_angle"][0]
+    q = random.uniform(robot.lower, robot.upper, (200, 7))
+    q[:, 3] = 0.0
+    T = plain_poses(IIWA, q)
+    for reference in (q, random.uniform(robot.lower, robot.upper, (200, 7))):
+        found = inverse_batch(robot, T, reference)
+        assert found.solved.any(axis=1).all()
+        off = np.abs(plain_poses(IIWA, found.q) - T[:, None])[found.solved]
+        assert off.max() < 2e-9
+        if reference is q:
+            away = np.abs(wrap_to_pi(found.q - q[:, None])).max(axis=2)
+            assert np.nanmin(away, axis=1).max() < 1e-6
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.7])
+def test_a_pose_that_the_class_loses_at_a_singularity_is_searched_for_within_the_limits(tilt, random):
+    """A turn, a tilt and a slide: the point where all axes meet, and points on axis 1."""
+    rows = ([0, 0, 0], [H, H, 0], [0.4, 0, 0])
+    robot = arm(rows, [0, 0, 1]).replace(lower=np.array([-3, -3, -0.2]), upper=np.array([3, 3, 0.9]))
+    for own in ([0.3, 0.0, 0.4], [0.3, tilt, 0.0]):
+        T = forward(robot, np.array(own))
+        for reference in random.uniform(robot.lower, robot.upper, (3, 3)):
+            one = inverse(robot, T, reference)
+            batch = inverse_batch(robot, T[None], reference)
+            for found, inside in ((one.q, one.within_limits), (batch.q[0], batch.within_limits[0])):
+                assert inside.any()
+                for row in found[inside]:
+                    assert np.abs(forward(robot, row) - T)[:3, 3].max() < 1e-9
+
+
+def plain_poses(rows, q):
+    """The product of the textbook's D-H matrices (..., 4, 4), written out."""
+    T = np.broadcast_to(np.eye(4), (*q.shape[:-1], 4, 4))
+    for (a, alpha, d), theta in zip(zip(*rows), np.moveaxis(q, -1, 0)):
+        c, s, ca, sa, o = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha), 0 * theta
+        link = [[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [o, o + sa, o + ca, o + d], [o, o, o, o + 1]]
+        T = T @ np.moveaxis(np.array([[np.broadcast_to(x, o.shape) for x in line] for line in link]), (0, 1), (-2, -1))
+    return T

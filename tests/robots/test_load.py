@@ -56,6 +56,9 @@ def refusal(path: Path) -> InputError:
     return error
 
 
+GROUP = {"source": "x", "grade": "claim"}
+
+
 def set_in(*keys: str | int, to: Any) -> Change:
     """Sets one entry."""
 
@@ -277,6 +280,11 @@ def test_calibrated_tables_may_hold_short_lengths(write):
         (set_in("zero", "rows", 0, "direction", to=True), "zero.rows[0].direction", "True is refused"),
         (set_in("speeds", "rows", 0, "speed_deg_s", to=0), "speeds.rows[0].speed_deg_s", "greater than 0"),
         (set_in("coupling", to=[2, 3]), "coupling", "is refused. Write `key: value` lines"),
+        (
+            set_in("coupling", to=GROUP | {"rows": [{"row": 3, "joints": [2], "factors": [1]}]}),
+            "coupling.rows",
+            "joints move nothing by themselves",
+        ),
         (set_in("dh", "parallelogram", to=True), "dh.parallelogram", "Write coupled joints as `coupling:`"),
         (set_in("name", to="other"), "name", "'other' is not the file's name. Write arm"),
         (set_in("name", to="Arm 1"), "name", "'Arm 1' is refused"),

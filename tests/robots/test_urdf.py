@@ -37,6 +37,10 @@ def urdf(joints=REAL_ARM, limit='<limit lower="-2" upper="2" velocity="3" effort
     return text + extra + "</robot>"
 
 
+def shaped(shape: str) -> str:
+    return f'<link name="l6"><collision><geometry>{shape}</geometry></collision></link>'
+
+
 def written(folder: Path, text: str) -> Path:
     path = folder / "arm.urdf"
     path.write_text(text)
@@ -154,6 +158,15 @@ def test_a_limit_that_is_not_given_is_0_as_the_specification_says(tmp_path):
         (urdf()[:-20], "not valid XML"),
         ('<!DOCTYPE x [<!ENTITY a "b">]>' + urdf(), "entities"),
         ("<robot/>", "no joints"),
+        (urdf([("revolute", "0 0 300", "0 0 0", "0 0 1"), *REAL_ARM[1:]]), "divide millimetres by 1000"),
+        (urdf([("revolute", "0 0 1e308", "0 0 0", "0 0 1"), *REAL_ARM[1:]]), "stands 1e+308 m"),
+        (urdf([("rotary", *REAL_ARM[0][1:]), *REAL_ARM[1:]]), "Write revolute, continuous, prismatic or fixed"),
+        (urdf([("revolute", "${x} 0 0", "0 0 0", "0 0 1"), *REAL_ARM[1:]]), "xacro FILE > arm.urdf"),
+        (urdf().replace('name="j2"', 'name="$(arg prefix)j2"'), "xacro FILE > arm.urdf"),
+        (urdf(limit='<limit lower="1" velocity="1"/>'), "no upper limit, and 0 does not fit the other"),
+        (urdf().replace('<parent link="l0"/>', '<parent link="l6"/>'), "form a closed loop"),
+        (urdf(extra=shaped('<cylinder radius="-1" length="1"/>')), "a size of -1 m is below 0"),
+        (urdf(extra=shaped('<cylinder length="1"/>')), "has no radius. Add radius to it"),
     ],
 )
 def test_what_is_no_six_axis_chain_is_one_clear_error(tmp_path, text, told):
@@ -162,3 +175,46 @@ def test_what_is_no_six_axis_chain_is_one_clear_error(tmp_path, text, told):
         import_urdf(path)
     assert told in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_base_within_a_loop_of_joints_is_refused(tmp_path):
+    loop = urdf().replace('<parent link="l0"/>', '<parent link="l6"/>')
+    for base, tip in (("l3", None), (None, "l3"), ("l2", "l5")):
+        with pytest.raises(InputError, match="closed loop"):
+            import_urdf(written(tmp_path, loop), base=base, tip=tip)
+
+
+def test_numbers_that_can_be_other_units_are_taken_with_a_note(tmp_path):
+    notes = import_urdf(written(tmp_path, urdf([("revolute", "0 0 60", "0 90 0", "0 0 1"), *REAL_ARM[1:]]))).notes
+    assert any("stands 60 m from" in note and "in metres" in note for note in notes)
+    assert any("turned by 90 rad" in note and "in radians" in note for note in notes)
+    many = import_urdf(written(tmp_path, urdf(limit='<limit lower="-45" upper="45" velocity="3"/>'))).notes
+    assert sum("more than two turns (-45 to 45 rad)" in note for note in many) == 5  # the sixth turns without end
+    plain = import_urdf(written(tmp_path, urdf(limit='<limit lower="-12.56" upper="12.56" velocity="3"/>'))).notes
+    assert not any("radians" in note or "metres" in note for note in plain)
+
+
+def test_an_axis_of_any_length_is_a_direction(tmp_path, random):
+    long = urdf([(kind, xyz, rpy, "0 0 1e300") for kind, xyz, rpy, _ in REAL_ARM])
+    q = random.uniform(-2, 2, (20, 6))
+    expected = forward(import_urdf(written(tmp_path, urdf())).robot, q)
+    np.testing.assert_allclose(forward(import_urdf(written(tmp_path, long)).robot, q), expected, atol=1e-12)
+
+
+def test_a_flat_mesh_is_a_shape(tmp_path):
+    (tmp_path / "flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 2 0\nf 1 2 3\n")
+    (piece,) = import_urdf(written(tmp_path, urdf(extra=shaped('<mesh filename="flat.obj"/>')))).robot.hulls
+    assert len(piece.points) == 3
+    sides = np.linalg.norm(np.diff(np.array(piece.points)[[0, 1, 2, 0]], axis=0), axis=1)
+    np.testing.assert_allclose(np.sort(sides), [1, 2, np.sqrt(5)])
+
+
+def test_a_follower_that_leaves_its_own_limits_is_told(tmp_path):
+    follower = '<mimic joint="j1" multiplier="3" offset="0.5"/>'
+    kept, left = (f'<limit lower="-{x}" upper="{x}" velocity="3"/>' for x in (6.5, 6.4))
+    for own, told in ((kept, []), (left, ["joint j2 follows j1 from -5.5 to 6.5; its own limits -6.4 to 6.4 are not"])):
+        text = urdf()
+        at = text.index("</joint>", text.index('"j2"'))
+        start = text.rindex("<limit", 0, at)
+        notes = import_urdf(written(tmp_path, text[:start] + own + follower + text[at:])).notes
+        assert [note.removesuffix(" kept") for note in notes if "follows" in note] == told

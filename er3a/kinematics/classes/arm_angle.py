@@ -134,8 +134,8 @@ def solve_at_arm_angle(arm: ArmAngleArm, T: Reals, psi: Reals | float) -> tuple[
     Returns
     -------
     q : (N, 8, 7), rad, in (-pi, pi]; NaN where a slot has none
-    singular : (N,), where S W lies along the reference (no arm angle is defined: another reference is needed), or a
-        wrist, shoulder or elbow is within 1e-9 of a singularity
+    singular : (N,), where S W lies along the reference (no arm angle is defined: another reference is needed), a wrist
+        or shoulder is within 1e-9 of a singularity, or the arm within 1e-9 m of stretched or folded
     """
     T = np.ascontiguousarray(T, dtype=float)
     angles = np.ascontiguousarray(np.broadcast_to(np.asarray(psi, float), (len(T),)))
@@ -249,9 +249,9 @@ def _elbow(k: ArmAngleConstants, w: Reals, sign: float) -> None:
         distance = w[37 * BLOCK + i]
         squared = distance * distance - k.height * k.height
         far, near = reach * reach - squared, squared - least * least
-        slack = NEAR * NEAR * reach * reach
+        slack = 2.0 * MEETS_M * reach  # what S and W are known to
         valid = (far > -slack) & (near > -slack)
-        straight = (abs(far) < NEAR * NEAR) | (abs(near) < NEAR * NEAR)
+        straight = (abs(far) < slack) | (abs(near) < slack)
         w[38 * BLOCK + i] = 1.0 if straight else w[38 * BLOCK + i]
         far, near = max(far, 0.0), max(near, 0.0)
         root_far, root_near = np.sqrt(far), np.sqrt(near)
