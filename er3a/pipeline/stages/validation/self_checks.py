@@ -45,7 +45,7 @@ def table_checks(robot: Robot) -> list[Check]:
     turning = limits[:, ~robot.slides & ~robot.continuous]
     faults: dict[SelfChecked, int] = {
         "numbers_not_finite": sum(int((~np.isfinite(part)).sum()) for part in parts),
-        "crossed_limits": int((robot.lower >= robot.upper).sum()),
+        "crossed_limits": int((robot.lower > robot.upper).sum()),
         "odd_directions": int((np.abs(robot.direction) != 1).sum()),
         "length_unit": int(not SHORTEST <= np.nanmax(lengths) <= LONGEST),
         "limit_unit": int(turning.shape[1] > 1 and 0 < np.degrees(np.nanmax(turning)) < WIDEST_IN_RADIANS),
