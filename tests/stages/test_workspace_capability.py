@@ -29,6 +29,7 @@ from er3a.workspace.clear_poses import try_poses
 from er3a.workspace.directions import cone_directions, poses, roll_of, tool_rotations
 from er3a.workspace.orientations import asked_of
 from er3a.workspace.placement import narrowed
+from er3a.workspace.proven import prove_robot
 from er3a.workspace.section_arm import section_frame
 from er3a.workspace.tool_inverse import InverseUnknown
 from testing.arms import palletiser, scara
@@ -175,6 +176,13 @@ def test_a_tool_that_points_elsewhere_is_told_so():
     context = context_of(robot, found)
     assert context["nowhere"].startswith("Nowhere: the arm can't tilt its tool")
     assert context["best_text"] == ""
+
+
+def test_cells_whose_middles_all_lie_out_of_reach_are_no_error():
+    robot = load_robot("er3_600")
+    done = tool_capability(robot, settings(), 3.0, proven=prove_robot(robot, 200, 500, 1))
+    assert done.capability.cell_m == 3.0
+    assert len(done.cells) == 0
 
 
 def test_no_place_is_no_error():

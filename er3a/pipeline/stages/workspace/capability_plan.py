@@ -112,9 +112,11 @@ def _for_places(
 
 
 def _cells(robot: Robot, cell: float, proven: Proven | None) -> Reals:
-    """Cells (n, 4), m, with this edge, but for those whose middles are proven out of reach."""
+    """Cells (n, 4), m, with this edge, but for those whose middles are proven out of reach; all, if those of cells this
+    coarse all are."""
     frame = cell_frame(robot)
     cells = rings(frame.reach, frame.heights, cell)
     if proven is None or proven.arm is not None or proven.proof.bar != frame.bar:
         return cells
-    return cells[~proven.nowhere(cells[:, :2].mean(axis=1), cells[:, 2:].mean(axis=1))]
+    kept = cells[~proven.nowhere(cells[:, :2].mean(axis=1), cells[:, 2:].mean(axis=1))]
+    return kept if len(kept) else cells
