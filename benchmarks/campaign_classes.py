@@ -61,7 +61,7 @@ def _started(a, alpha, d, T, seed, found):
                 B[1, 0], B[1, 1], B[1, 2], B[1, 3] = s, c * ca, -c * sa, a[k] * s
                 B[2, 1], B[2, 2], B[2, 3] = sa, ca, d[k]
                 A = A @ B
-            R = T[:3, :3] @ A[:3, :3].T
+            R = np.ascontiguousarray(T[:3, :3]) @ np.ascontiguousarray(A[:3, :3].T)
             e[:3] = T[:3, 3] - A[:3, 3]
             e[3], e[4], e[5] = 0.5 * (R[2, 1] - R[1, 2]), 0.5 * (R[0, 2] - R[2, 0]), 0.5 * (R[1, 0] - R[0, 1])
             size = np.abs(e).max()
@@ -92,6 +92,21 @@ def _started(a, alpha, d, T, seed, found):
     return count
 
 
+@numba.njit(error_model="numpy", parallel=True)
+def _all_started(a, alpha, d, T, found):
+    """Roots of poses T (N, 4, 4) from random starts, into ``found`` (N, 32, 6); how many (N,)."""
+    counts = np.zeros(len(T), np.int64)
+    for n in numba.prange(len(T)):
+        counts[n] = _started(a, alpha, d, T[n], n, found[n])
+    return counts
+
+
+def by_starts(a, alpha, d, T):
+    """For each pose what starts find (k, 6)."""
+    found = np.empty((len(T), 32, 6))
+    return [rows[:count] for rows, count in zip(found, _all_started(a, alpha, d, np.ascontiguousarray(T), found))]
+
+
 def turned(q: np.ndarray) -> np.ndarray:
     return q - 2 * np.pi * np.round(q / (2 * np.pi))
 
@@ -117,12 +132,10 @@ def general_row(name: str, rows, random: np.random.Generator) -> str:
         each = found.q[n, : found.count[n]]
         apart = np.abs(turned(each[:, None] - each[None])).max(axis=2) + 9 * np.eye(len(each))
         twice += int(len(each) > 1 and apart.min() < 1e-6)
-    missed, roots = np.empty((32, 6)), 0
-    more = 0
-    for n in range(POSES):
-        count = _started(a, alpha, d, T[n], n, missed)
-        roots += count
-        for row in missed[:count]:
+    more, roots = 0, 0
+    for n, started in enumerate(by_starts(a, alpha, d, T)):
+        roots += len(started)
+        for row in started:
             more += int(np.abs(turned(found.q[n, : found.count[n]] - row)).max(axis=1).min(initial=9) > 1e-3)
     histogram = ", ".join(f"{k}: {v}" for k, v in enumerate(np.bincount(found.count)) if v)
     unsure = int((found.certainty != 0).sum())
@@ -162,7 +175,7 @@ def _started_any(a, alpha, d, sliding, T, starts, found):
                 B[1, 0], B[1, 1], B[1, 2], B[1, 3] = s, c * ca, -c * sa, a[k] * s
                 B[2, 1], B[2, 2], B[2, 3] = sa, ca, shift
                 A = A @ B
-            R = T[:3, :3] @ A[:3, :3].T
+            R = np.ascontiguousarray(T[:3, :3]) @ np.ascontiguousarray(A[:3, :3].T)
             e[:3] = T[:3, 3] - A[:3, 3]
             e[3], e[4], e[5] = 0.5 * (R[2, 1] - R[1, 2]), 0.5 * (R[0, 2] - R[2, 0]), 0.5 * (R[1, 0] - R[0, 1])
             if np.abs(e).max() < 1e-12 and R[0, 0] + R[1, 1] + R[2, 2] > 2.0:
@@ -191,7 +204,6 @@ def arm_of(rows, sliding=None, most: float = 2 * np.pi) -> Robot:
 def special_rows(random: np.random.Generator) -> str:
     """Arms whose lengths and angles are often 0, 90 deg or equal, that have full rank: one line for all."""
     arms, poses, lost, more, roots, wrong, unsure, worst = 0, 100, 0, 0, 0, 0, 0, 0.0
-    missed = np.empty((32, 6))
     while arms < SPECIAL_ARMS:
         alpha = [
             random.choice([0, H, -H, np.pi, random.uniform(-3, 3)], p=[0.15, 0.25, 0.25, 0.05, 0.3]) for _ in "6 rows"
@@ -218,11 +230,10 @@ def special_rows(random: np.random.Generator) -> str:
         back = np.abs(forward(robot, np.nan_to_num(found.q)) - T[:, None]).max(axis=(2, 3))[found.solved]
         wrong, worst = wrong + int((back > 1e-9).sum()), max(worst, float(back.max()))
         unsure += 0 if found.certain is None else int((~found.certain).sum())
-        for n in range(poses):
-            count = _started(a, alpha, d, T[n], n, missed)
-            roots += count
+        for n, started in enumerate(by_starts(a, alpha, d, T)):
+            roots += len(started)
             each = found.q[n][found.solved[n]]
-            more += sum(int(np.abs(turned(each - row)).max(axis=1).min(initial=9) > 1e-3) for row in missed[:count])
+            more += sum(int(np.abs(turned(each - row)).max(axis=1).min(initial=9) > 1e-3) for row in started)
     return (
         f"| {arms} arms of special geometry, {poses} poses each | {lost} | {more} of {roots} | - "
         f"| {wrong} ({worst:.0e}) | {unsure} | - | - |"

@@ -19,7 +19,7 @@ from er3a.kinematics.chain import constant_links, joint_starts, row_values
 from er3a.kinematics.classes.chain_solvers import Unsolved, chain_solver
 from er3a.kinematics.classes.class_solvers import ArmClassCode, ChainSolver, Redundancy
 from er3a.kinematics.classes.links import size_of
-from er3a.kinematics.classes.self_motion import PoseChain, TracedCurve
+from er3a.kinematics.classes.self_motion import OPEN_ROLL, POSE, POSITION, PoseChain, TracedCurve
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, UNCERTAIN
 from er3a.kinematics.forward import forward
 from er3a.kinematics.self_motions import SelfMotionCurve, self_motion_of
@@ -38,7 +38,17 @@ MAYBE_SAME = 1e-2  # rad
 SPREAD = 1e-11
 MOST_CURVES, MOST_ON_SURFACE = 24, 2
 STARTS = 240
-SEARCHED: tuple[ArmClassCode, ...] = ("general_six", "six_one_prismatic", "six_two_prismatic", "planar_wrist", "gantry")
+SEARCHED: tuple[ArmClassCode, ...] = (
+    "general_six",
+    "six_one_prismatic",
+    "six_two_prismatic",
+    "planar_wrist",
+    "gantry",
+    "free_roll",
+    "position",
+    "scara",
+)
+TRACED: dict[ArmClassCode, int] = {"free_roll": OPEN_ROLL, "position": POSITION}
 SMALLEST_PART = 64
 SCANNED = 16  # values of a redundancy parameter from which self-motions are collected
 
@@ -54,8 +64,8 @@ class ArmSolver:
     uncouple: Reals | None = None
 
     def poses_at(self, T: Reals) -> PoseChain:
-        """The chain with one pose (4, 4)."""
-        return PoseChain.of(self.links, self.sliding, T, self.size)
+        """The chain with one pose (4, 4) and what its class meets of it."""
+        return PoseChain.of(self.links, self.sliding, T, self.size, TRACED.get(self.chain.code, POSE))
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,10 +154,11 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
     values : (1, k), of the redundancy parameters; certainty : of the class at this pose
     """
     solver = arm_solver(robot)
-    chain = solver.poses_at(T)
-    full_pose = solver.chain.code not in ("free_roll", "position", "scara")
-    if not full_pose or isinstance(solver.chain, Unsolved):
+    if isinstance(solver.chain, Unsolved) or (solver.chain.code == "scara" and not len(rows)):
         return Settled(_apart(robot, rows))
+    if solver.chain.code == "scara":  # without the tilt that no joint can take away
+        T = forward(robot, rows[0])
+    chain = solver.poses_at(T)
     found = [to_rows(robot, rows), solver.chain.seeds(T, values)]
     if chain.error(to_rows(robot, q_ref)) < 1e-11:
         found.insert(0, to_rows(robot, q_ref)[None])

@@ -13,6 +13,7 @@ from er3a.kinematics.classes.self_motion import PoseChain, TracedCurve
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.joint_limits import limit_margin, nearest_equivalent, unwound, within
 from er3a.robots.robot import Robot
+from er3a.robots.shown import joint_columns, shown
 
 LAPS = 6  # a curve that turns a joint is followed over so many of its laps at most
 SPLIT, SPLITS = 16, 11
@@ -65,9 +66,10 @@ class SelfMotionCurve(Displayed):
         """A line: range and the nearest member."""
         low, high = np.degrees(self.range).tolist()
         within = "within the limits" if self.within_limits else "outside the limits"
-        q0 = shortly(tuple(np.degrees(self.q0).tolist()))
+        values = zip(joint_columns(self.robot), shown(self.robot, self.q0).tolist())
+        q0 = ", ".join(f"{name} {shortly(value)}" for name, value in values)
         of_surface = f", one curve of a surface of dimension {self.dimension}" if self.dimension > 1 else ""
-        return Sheet(f"Self-motion, t from {shortly(low)} to {shortly(high)} deg, {within}, q0_deg {q0}{of_surface}")
+        return Sheet(f"Self-motion, t from {shortly(low)} to {shortly(high)} deg, {within}, q0: {q0}{of_surface}")
 
 
 def _joints(robot: Robot, x: Reals) -> Reals:

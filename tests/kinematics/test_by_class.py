@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.optimize
 
 from er3a.files.robot_library import load_robot
 from er3a.geometry.angles import wrap_to_pi
 from er3a.kinematics.batch import inverse_batch
-from er3a.kinematics.by_class import checked_parameters, parameters_of, task_mask
+from er3a.kinematics.by_class import checked_parameters, parameters_of, task_mask, to_rows
 from er3a.kinematics.cuspidal import cuspidal_move
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
@@ -409,6 +410,72 @@ def test_a_pose_that_the_class_loses_at_a_singularity_is_searched_for_within_the
                 assert inside.any()
                 for row in found[inside]:
                     assert np.abs(forward(robot, row) - T)[:3, 3].max() < 1e-9
+
+
+L = 0.3
+OPEN_TASKS = {  # rows, which joints slide, joint values at which joints can move on the target, what moves there
+    "slide through axis 1": (([0, 0, 0], [H, H, 0], [0.4, 0, 0]), [0, 0, 1], [1.0, 0.0, -0.2], [1, 0, 0]),
+    "point on axis 1": (([0, L, L], [H, 0, 0], [0.4, 0, 0]), None, [0.4, 0.7, 2 * (H - 0.7)], [1, 0, 0]),
+    "roll of a UR's flange": (tuple(column[:5] for column in UR5), None, [0.3, 0.5, -0.8, 0.4, 0.0], [0, 1, 1, 1, 0]),
+    "folded SCARA": (([L, L, 0, 0], [0] * 4, [0.4, 0, 0, 0]), [0, 0, 1, 0], [0.3, np.pi, 0.1, 0.4], [1, 0, 0, 1]),
+}
+
+
+def missed_task(code, T, asked):
+    """What tasks with open orientation ask: the point; the tool's z axis; the turn about the axis of all joints."""
+    off = [*np.moveaxis(T[..., :3, 3] - asked[:3, 3], -1, 0)]
+    if code == "free_roll":
+        off += [*np.moveaxis(T[..., :3, 2] - asked[:3, 2], -1, 0)]
+    if code == "scara":
+        off += [*np.moveaxis(T[..., :3, 0] - asked[:3, 0], -1, 0)]
+    return np.abs(off).max()
+
+
+@pytest.mark.parametrize("name", OPEN_TASKS)
+def test_where_orientation_is_open_joints_that_can_move_on_the_target_are_a_family(name, random):
+    rows, sliding, own, moving = OPEN_TASKS[name]
+    robot, own = arm(rows, sliding, most=3.2), np.array(own)
+    code, T = inverse(robot, forward(robot, own)).method.arm_class, forward(robot, own)
+    for reference in (own, np.zeros(len(own)), random.uniform(robot.lower, robot.upper)):
+        found = inverse(robot, T, reference)
+        assert any(motion.chain.holds(motion.curve, own) for motion in found.families)
+        for motion in found.families:
+            members = motion.members(np.linspace(*motion.range, 60))
+            assert missed_task(code, forward(robot, members), T) < 1e-9
+            np.testing.assert_array_equal(np.ptp(members, axis=0) > 0.1, np.array(moving, bool))
+            assert np.abs(found.q - motion.q0).max(axis=1).min() < 1e-6
+        assert missed_task(code, forward(robot, found.q), T) < 1e-9
+    assert np.abs(inverse(robot, T, own).q - own).max(axis=1).min() < 1e-6
+    batch = inverse_batch(robot, T[None], own[None])
+    assert np.nanmin(np.abs(batch.q[0] - own).max(axis=1)) < 1e-6
+
+
+def test_a_tilt_that_no_joint_takes_away_leaves_the_folded_scara_its_family():
+    rows, sliding, own, _ = OPEN_TASKS["folded SCARA"]
+    robot, T = arm(rows, sliding, most=3.2), forward(arm(rows, sliding), np.array(own))
+    T[:3, :3] = T[:3, :3] @ rotation_about_x(0.2)
+    assert inverse(robot, T).families
+
+
+def test_a_coupled_arm_with_its_wrist_centre_on_axis_1_can_turn_there():
+    robot = ARMS["spherical_wrist"][0].replace(d=np.array([0, 0, 0, 0.4318, 0, 0.1]))
+    q = np.array([0.4, 0.3, 0.0, 0.5, 0.7, -0.6])
+    q[2] = scipy.optimize.brentq(lambda third: wrist_beside_axis_1(robot, [*q[:2], third, *q[3:]]), 0.0, 1.0)
+    found = inverse(robot, forward(robot, q), np.zeros(6))
+    assert any(motion.chain.holds(motion.curve, to_rows(robot, q)) for motion in found.families)
+    for motion in found.families:
+        members = motion.members(np.linspace(*motion.range, 40))
+        assert np.abs(forward(robot, members) - forward(robot, q)).max() < 1e-9
+
+
+def wrist_beside_axis_1(robot, q):
+    T = forward(robot, np.array(q))
+    return float((T[:3, 3] - 0.1 * T[:3, 2])[:2] @ [np.cos(q[0]), np.sin(q[0])])
+
+
+def rotation_about_x(angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
 
 
 def plain_poses(rows, q):

@@ -137,7 +137,14 @@ class SphericalWristSolver(WithoutParameters):
         plain = np.ones(6), np.zeros(6)
         solve(self.constants, plain, np.ascontiguousarray(T), np.zeros((len(T), 6)), True, True, (q, fault, gap))
         q[fault != REACHED] = np.nan
-        return q, np.where(_branches_meet(q, ((4, 0), (2, 2), (1, 4))), CONTINUUM, CERTAIN)
+        singular = _branches_meet(q, ((4, 0), (2, 2), (1, 4))) | (self._beside_axis_1(T) < NEAR_SINGULAR)
+        return q, np.where(singular, CONTINUUM, CERTAIN)
+
+    def _beside_axis_1(self, T: Reals) -> Reals:
+        """How far the wrist centre lies beside axis 1 (N,), in parts of the reach; next to it that joint is free."""
+        k = self.constants
+        W = T[:, :3, 3] + T[:, :3, :3] @ np.array(k.wrist_in_tool) - np.array(k.point_1)
+        return np.asarray(np.linalg.norm(np.cross(W, np.array(k.axis_1)), axis=1) / k.reach)
 
     def names(self, x: Reals) -> tuple[SlotName, ...]:
         k = self.constants

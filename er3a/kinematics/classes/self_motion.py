@@ -2,7 +2,8 @@
 
 A step goes along the direction of the null space that is nearest to the last one, so the curve runs on through points
 where two curves cross; Newton's steps of least length, blind to directions without a clear singular value, bring it
-back [1]_. Lengths are in units of the chain's size.
+back [1]_. Lengths are in units of the chain's size. A task that leaves the tool's turn about its own z axis open, or
+all of its orientation, has an error of 0 in what is open, and so has the Jacobian's share in it.
 
 References
 ----------
@@ -32,11 +33,16 @@ ABOVE_ROUNDING = 1e-15  # of the trace
 FEW_HALVINGS = 6
 PROBE = 2e-3
 LOST, CLOSED, OPEN = 0, 1, 2
+POSE, OPEN_ROLL, POSITION = 0, 1, 2  # tasks
+
+Posed = tuple[Reals, Flags, Reals, int]
+"""Links (n + 1, 4, 4), which joints slide (n,), a pose (4, 4), and the task: POSE, OPEN_ROLL or POSITION."""
 
 
 @kernel
-def error_and_jacobian(links: Reals, sliding: Flags, T: Reals, x: Reals, e: Reals, J: Reals) -> float:
+def error_and_jacobian(posed: Posed, x: Reals, e: Reals, J: Reals) -> float:
     """Fill the pose error ``e`` (6,) and ``J`` (6, n); returns its largest component, at least 1 beyond 90 deg."""
+    links, sliding, T, task = posed
     n = x.shape[0]
     frame, other = links[0].copy(), np.empty((4, 4))
     for k in range(n):
@@ -67,8 +73,33 @@ def error_and_jacobian(links: Reals, sliding: Flags, T: Reals, x: Reals, e: Real
             trace += frame[i, j] * T[i, j]
         e[i] = T[i, 3] - frame[i, 3]
         e[3 + i] = 0.5 * turn
-        largest = max(largest, max(abs(e[i]), abs(e[3 + i])))
+    if task != POSE:
+        trace = _without_what_is_open(T, task, frame, e, J)
+    for i in range(6):
+        largest = max(largest, abs(e[i]))
     return max(largest, 1.0) if trace < 0.0 else largest
+
+
+@kernel
+def _without_what_is_open(T: Reals, task: int, frame: Reals, e: Reals, J: Reals) -> float:
+    """Take what the task leaves open out of the error and the Jacobian; returns the cosine between the z axes, 1 if
+    orientation is open."""
+    e[3:] = 0.0
+    if task == POSITION:
+        J[3:] = 0.0
+        return 1.0
+    cosine = 0.0
+    for i in range(3):
+        a, b = (i + 1) % 3, (i + 2) % 3
+        e[3 + i] = frame[a, 2] * T[b, 2] - frame[b, 2] * T[a, 2]
+        cosine += frame[i, 2] * T[i, 2]
+    for k in range(J.shape[1]):
+        along = 0.0
+        for i in range(3):
+            along += J[3 + i, k] * T[i, 2]
+        for i in range(3):
+            J[3 + i, k] -= along * T[i, 2]
+    return cosine
 
 
 @kernel
@@ -138,11 +169,11 @@ def null_share(J: Reals, v: Reals, out: Reals) -> int:
 
 
 @kernel
-def onto_curve(links: Reals, sliding: Flags, T: Reals, x: Reals, e: Reals, J: Reals) -> float:
+def onto_curve(posed: Posed, x: Reals, e: Reals, J: Reals) -> float:
     """Newton's steps of least length; returns the error that is left."""
     least, step = np.inf, np.empty(x.shape[0])
     for _ in range(25):
-        error = error_and_jacobian(links, sliding, T, x, e, J)
+        error = error_and_jacobian(posed, x, e, J)
         if error < 1e-15 or (error < SOLVES and error >= 0.5 * least):
             return error
         if error > 0.5:
@@ -161,18 +192,18 @@ def onto_curve(links: Reals, sliding: Flags, T: Reals, x: Reals, e: Reals, J: Re
                 along /= s[r]
                 for k in range(x.shape[0]):
                     x[k] += along * Vt[r, k]
-    return error_and_jacobian(links, sliding, T, x, e, J)
+    return error_and_jacobian(posed, x, e, J)
 
 
 @kernel
-def free_direction(links: Reals, sliding: Flags, T: Reals, x: Reals, v: Reals) -> int:
+def free_direction(posed: Posed, x: Reals, v: Reals) -> int:
     """Fill v (n,) with a direction, of greatest component 1, in which x can move with the tool at rest.
 
     Returns the null space's dimension there, 0 if no step in any of its directions stays on the pose.
     """
     n: int = x.shape[0]
     e, J, y = np.empty(6), np.empty((6, n)), np.empty(n)
-    error_and_jacobian(links, sliding, T, x, e, J)
+    error_and_jacobian(posed, x, e, J)
     _, s, Vt = np.linalg.svd(J, True)
     dimension = n
     for r in range(s.shape[0]):
@@ -183,7 +214,7 @@ def free_direction(links: Reals, sliding: Flags, T: Reals, x: Reals, v: Reals) -
         for sign in range(2):
             step = PROBE / largest * (1.0 - 2.0 * sign)
             y[:] = x + step * Vt[r]
-            if onto_curve(links, sliding, T, y, e, J) < ON_CURVE:
+            if onto_curve(posed, y, e, J) < ON_CURVE:
                 moved = 0.0
                 for k in range(n):
                     moved += (y[k] - x[k]) * Vt[r, k]
@@ -194,19 +225,19 @@ def free_direction(links: Reals, sliding: Flags, T: Reals, x: Reals, v: Reals) -
 
 
 @kernel
-def trace(links: Reals, sliding: Flags, T: Reals, x: Reals, v: Reals, points: Reals) -> tuple[int, int]:
+def trace(posed: Posed, x: Reals, v: Reals, points: Reals) -> tuple[int, int]:
     """Fill ``points`` (k, n) with joint values along the curve from x in the sense of v, not wrapped.
 
     Returns how many, and how it ended: CLOSED (back at the start but for whole turns, the last point), OPEN (``points``
     is full), LOST (no further step solves the pose).
     """
-    n = x.shape[0]
+    sliding, n = posed[1], x.shape[0]
     e, J, y, along, last = np.empty(6), np.empty((6, n)), np.empty(n), np.empty(n), v.copy()
     points[0] = x
     count = 1
     while count < points.shape[0]:
         here = points[count - 1]
-        error_and_jacobian(links, sliding, T, here, e, J)
+        error_and_jacobian(posed, here, e, J)
         null_share(J, last, along)
         largest = np.abs(along).max()
         if largest < 1e-9:
@@ -215,7 +246,7 @@ def trace(links: Reals, sliding: Flags, T: Reals, x: Reals, v: Reals, points: Re
         step, ahead = STEP, False
         for _ in range(FEW_HALVINGS):
             y[:] = here + step * along
-            if onto_curve(links, sliding, T, y, e, J) < ON_CURVE:
+            if onto_curve(posed, y, e, J) < ON_CURVE:
                 away, forward = np.abs(y - here).max(), ((y - here) * along).sum()
                 if away < 1.5 * step and forward > 0.2 * step:
                     ahead = True
@@ -253,7 +284,7 @@ def trace(links: Reals, sliding: Flags, T: Reals, x: Reals, v: Reals, points: Re
 
 
 @kernel
-def between(links: Reals, sliding: Flags, T: Reals, points: Reals, at: Reals, out: Reals) -> None:
+def between(posed: Posed, points: Reals, at: Reals, out: Reals) -> None:
     """Fill ``out`` (k, n) with the curve's points at ``at`` (k,), counted in points of the polyline; NaN if lost."""
     n = points.shape[1]
     e, J = np.empty(6), np.empty((6, n))
@@ -261,14 +292,14 @@ def between(links: Reals, sliding: Flags, T: Reals, points: Reals, at: Reals, ou
         low = min(max(int(np.floor(at[i])), 0), points.shape[0] - 2)
         share = at[i] - low
         out[i] = (1.0 - share) * points[low] + share * points[low + 1]
-        if not onto_curve(links, sliding, T, out[i], e, J) < ON_CURVE:
+        if not onto_curve(posed, out[i], e, J) < ON_CURVE:
             out[i] = np.nan
 
 
 @kernel
-def _to_rounding(links: Reals, sliding: Flags, T: Reals, x: Reals, e: Reals, J: Reals) -> float:
+def _to_rounding(posed: Posed, x: Reals, e: Reals, J: Reals) -> float:
     """Onto a curve, or to a root where the Jacobian is nearly singular: there each step halves what is missing."""
-    error = onto_curve(links, sliding, T, x, e, J)
+    error = onto_curve(posed, x, e, J)
     best, least = x.copy(), error
     for _ in range(40):
         if least < SOLVES_AS_ROOT * 1e-2:
@@ -282,7 +313,7 @@ def _to_rounding(links: Reals, sliding: Flags, T: Reals, x: Reals, e: Reals, J: 
                 along = max(min(along / s[r], 1e-2), -1e-2)
                 for k in range(x.shape[0]):
                     x[k] += along * Vt[r, k]
-        error = error_and_jacobian(links, sliding, T, x, e, J)
+        error = error_and_jacobian(posed, x, e, J)
         if error < least:
             best[:] = x
             least = error
@@ -291,19 +322,19 @@ def _to_rounding(links: Reals, sliding: Flags, T: Reals, x: Reals, e: Reals, J: 
 
 
 @kernel
-def roots_from_starts(links: Reals, sliding: Flags, T: Reals, starts: Reals, out: Reals) -> int:
+def roots_from_starts(posed: Posed, starts: Reals, out: Reals) -> int:
     """Fill ``out`` (k, n) with joint values that solve the pose, one for each start (k, n) that leads to one.
 
     Returns how many.
     """
-    n = starts.shape[1]
+    sliding, n = posed[1], starts.shape[1]
     e, J, y = np.empty(6), np.empty((6, n)), np.empty(n)
     count = 0
     for k in range(starts.shape[0]):
         y[:] = starts[k]
         solved = False
         for _ in range(40):
-            error = error_and_jacobian(links, sliding, T, y, e, J)
+            error = error_and_jacobian(posed, y, e, J)
             if error < 1e-9:
                 solved = True
                 break
@@ -314,7 +345,7 @@ def roots_from_starts(links: Reals, sliding: Flags, T: Reals, starts: Reals, out
                 M[i, i] += damping
             step = np.linalg.solve(M, J.T @ e)
             y += step
-        if solved and _to_rounding(links, sliding, T, y, e, J) < SOLVES_AS_ROOT:
+        if solved and _to_rounding(posed, y, e, J) < SOLVES_AS_ROOT:
             for i in range(n):
                 if not sliding[i]:
                     y[i] -= TURN * np.ceil((y[i] - np.pi) / TURN)
@@ -341,20 +372,23 @@ class TracedCurve:
 
 @dataclass(frozen=True, eq=False)
 class PoseChain:
-    """A chain with a pose, scaled to the chain's size, whose curves are traced."""
+    """A chain with a pose and a task, scaled to the chain's size, whose curves are traced."""
 
-    links: Reals
-    sliding: Flags
-    T: Reals
+    posed: Posed
     size: float
 
     @staticmethod
-    def of(links: Reals, sliding: Flags, T: Reals, size: float) -> PoseChain:
+    def of(links: Reals, sliding: Flags, T: Reals, size: float, task: int = POSE) -> PoseChain:
         """From links (n + 1, 4, 4) and a pose (4, 4) in m."""
         scaled, pose = np.array(links, float), np.array(T, float)
         scaled[:, :3, 3] /= size
         pose[:3, 3] /= size
-        return PoseChain(scaled, np.ascontiguousarray(sliding), pose, size)
+        return PoseChain((scaled, np.ascontiguousarray(sliding), pose, task), size)
+
+    @property
+    def sliding(self) -> Flags:
+        """Which joints slide (n,)."""
+        return self.posed[1]
 
     def _scaled(self, x: Reals) -> Reals:
         return np.ascontiguousarray(np.where(self.sliding, np.asarray(x, float) / self.size, x))
@@ -365,35 +399,35 @@ class PoseChain:
     def error(self, x: Reals) -> float:
         """Largest component of the pose error, rad and parts of the size, at joint values (n,)."""
         n = len(self.sliding)
-        return error_and_jacobian(self.links, self.sliding, self.T, self._scaled(x), np.empty(6), np.empty((6, n)))
+        return error_and_jacobian(self.posed, self._scaled(x), np.empty(6), np.empty((6, n)))
 
     def smallest(self, x: Reals) -> float:
         """Smallest singular value of the scaled Jacobian at joint values (n,)."""
         J = np.empty((6, len(self.sliding)))
-        error_and_jacobian(self.links, self.sliding, self.T, self._scaled(x), np.empty(6), J)
+        error_and_jacobian(self.posed, self._scaled(x), np.empty(6), J)
         return float(np.linalg.svd(J, compute_uv=False)[-1])
 
     def roots(self, starts: Reals) -> Reals:
         """Solutions (k, n) that starts (many, n), rad and parts of the size, lead to; members of curves among them."""
         out = np.empty_like(starts)
-        count = roots_from_starts(self.links, self.sliding, self.T, starts, out)
+        count = roots_from_starts(self.posed, starts, out)
         return self._in_m(out[:count])
 
     def moves(self, x: Reals) -> bool:
         """Whether joint values (n,) that solve the pose can move with the tool at rest."""
-        return free_direction(self.links, self.sliding, self.T, self._scaled(x), np.empty(len(x))) > 0
+        return free_direction(self.posed, self._scaled(x), np.empty(len(x))) > 0
 
     def curve(self, x: Reals) -> TracedCurve | None:
         """The curve through joint values (n,) that solve the pose; None if they can't move with the tool at rest."""
         start, v = self._scaled(x), np.empty(len(x))
-        dimension = free_direction(self.links, self.sliding, self.T, start, v)
+        dimension = free_direction(self.posed, start, v)
         if dimension == 0:
             return None
         points = np.empty((MOST_POINTS, len(x)))
-        count, end = trace(self.links, self.sliding, self.T, start, v, points)
+        count, end = trace(self.posed, start, v, points)
         path = points[:count].copy()
         if end != CLOSED:
-            count, _ = trace(self.links, self.sliding, self.T, start, -v, points)
+            count, _ = trace(self.posed, start, -v, points)
             path = np.concatenate([points[:count][::-1], path[1:]])
         if len(path) < 3:
             return None
@@ -404,7 +438,7 @@ class PoseChain:
         e, J, out = np.empty(6), np.empty((6, n)), np.empty(n)
         found = []
         for at in np.linspace(0, len(path) - 1, 7).astype(int):
-            error_and_jacobian(self.links, self.sliding, self.T, path[at], e, J)
+            error_and_jacobian(self.posed, path[at], e, J)
             found.append(null_share(J, np.zeros(n), out))
         return int(np.median(found))
 
@@ -414,7 +448,7 @@ class PoseChain:
         laps = np.floor(at / last) if curve.closed else np.zeros_like(at)
         inside = np.clip(at - laps * last, 0, last)
         out = np.empty((len(at), len(self.sliding)))
-        between(self.links, self.sliding, self.T, self._scaled(curve.points), np.ascontiguousarray(inside), out)
+        between(self.posed, self._scaled(curve.points), np.ascontiguousarray(inside), out)
         lap = np.where(self.sliding, 0.0, curve.points[-1] - curve.points[0])
         return self._in_m(out) + laps[:, None] * lap
 

@@ -43,7 +43,8 @@ class SelfMotion:
     """A continuum of solutions (``kinematics.families``, ``kinematics.self_motions``).
 
     Above a ``dimension`` of 1 it is one curve of many on a surface of solutions.
-    ``direction`` is in deg per deg of the joint that is free; of kind curve in deg per deg of its length.
+    ``direction`` is in deg (mm of joints that slide) per deg of the joint that is free; of kind curve per deg of its
+    length.
     """
 
     kind: Literal["wrist", "shoulder", "elbow", "curve"]

@@ -107,7 +107,7 @@ def _section(robot: Robot, target: TargetResult, results: InverseResults, rules:
         advice=listed(target.advice),
         joints=[f"J{k + 1} ({'mm' if slides else '°'})>" for k, slides in enumerate(robot.slides)],
         method="" if isinstance(target.method, ClosedForm) else say(target.method),
-        families=_self_motions(target.families),
+        families=_self_motions(robot, target.families),
         unsolved=joined(listed(target.unsolved)),
         rows=_branch_rows(rows, branches),
         rules=_rule_rows(results.rankings.take(results.rankings.target == target.name), rules),
@@ -149,51 +149,61 @@ def _no_noise(measure: float) -> float:
     return 0.0 if abs(measure) < 1e-9 else float(measure)
 
 
-def _self_motions(families: tuple[SelfMotion, ...]) -> list[str]:
+def _self_motions(robot: Robot, families: tuple[SelfMotion, ...]) -> list[str]:
     """The nearest self-motions, and how many more there are."""
-    told = [_self_motion(family) for family in families[:MOST_SELF_MOTIONS]]
+    told = [_self_motion(robot, family) for family in families[:MOST_SELF_MOTIONS]]
     if len(families) > MOST_SELF_MOTIONS:
         told.append(tr("{count} more in summary.json", count=len(families) - MOST_SELF_MOTIONS))
     return told
 
 
-def _self_motion(family: SelfMotion) -> str:
-    text = _curve(family)
+def _self_motion(robot: Robot, family: SelfMotion) -> str:
+    text = _curve(robot, family)
     if family.dimension > 1:
         return tr(
             "{text}; this is one curve of a surface of solutions, on which the arm can move in {count} ways at once "
-            "with the tool at rest",
+            "and stay on the target",
             text=text,
             count=family.dimension,
         )
     return text
 
 
-def _curve(family: SelfMotion) -> str:
+def _curve(robot: Robot, family: SelfMotion) -> str:
+    of_slide = f"{NO_BREAK_SPACE}mm/°"
     moving = [
-        f"J{j + 1} {'+' if rate > 0 else ''}{fixed(rate, 2)}"
+        f"J{j + 1} {'+' if rate > 0 else ''}{fixed(rate, 2)}{of_slide if robot.slides[j] else ''}"
         for j, rate in enumerate(family.direction)
         if abs(rate) > 1e-9
     ]
     low, high = family.range_deg
     parts = {
         "where": word("self_motion", FREE_AT, family.kind),
-        "joints": _listed(family.q0_deg),
+        "joints": _joint_values(robot, family.q0_deg),
         "rates": ", ".join(moving),
     }
     if not family.within_limits:
         return tr(
-            "{where}: from ({joints}) deg, nearest to the reference, joints turn with the tool at rest in the ratio "
-            "{rates}, but every member leaves the limits",
+            "{where}: from {joints}, nearest to the reference, joints move on the target in the ratio {rates}, but "
+            "every member leaves the limits",
             **parts,
         )
     return tr(
-        "{where}: from ({joints}) deg, nearest to the reference, joints turn with the tool at rest in the ratio "
-        "{rates}, for {low} to {high} deg",
+        "{where}: from {joints}, nearest to the reference, joints move on the target in the ratio {rates}, for {low} "
+        "to {high} deg",
         low=fixed(low, 1),
         high=fixed(high, 1),
         **parts,
     )
+
+
+def _joint_values(robot: Robot, values: tuple[float, ...]) -> str:
+    """Joint values with their units: one for all where no joint slides."""
+    if not robot.slides.any():
+        return f"({_listed(values)}){NO_BREAK_SPACE}deg"
+    units = ("mm" if slides else "deg" for slides in robot.slides)
+    each = (f"{_listed([value])}{NO_BREAK_SPACE}{unit}" for value, unit in zip(values, units))
+    return f"({', '.join(each)})"
 
 
 def _move_rule(sequence: Visits | None) -> tuple[str, str]:

@@ -196,7 +196,7 @@ def _self_motion(family: Family | SelfMotionCurve) -> SelfMotion:
     return SelfMotion(
         kind=family.kind,
         q0_deg=tuple(shown(family.robot, family.q0).tolist()),
-        direction=tuple(family.direction.tolist()),
+        direction=tuple((shown(family.robot, family.direction) / np.degrees(1.0)).tolist()),
         range_deg=(low, high),
         within_limits=family.within_limits,
         branches=family.branches,
